@@ -27,7 +27,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     pyo3_build_config::add_libpython_rpath_link_args();
     let mut messages = Vec::new();
     for package in entries(STANDARD)? {
-        read(&package, package.rsplit('/').next().unwrap_or_default(), &mut messages)?;
+        read(
+            &package,
+            package.rsplit('/').next().unwrap_or_default(),
+            &mut messages,
+        )?;
     }
     for kind in ["msg", "srv", "action"] {
         read(&format!("{OWN}/{kind}"), "touchup_msgs", &mut messages)?;
@@ -44,9 +48,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 }
 
 /// All messages that the files of a folder define.
-fn read(folder: &str, package: &str, messages: &mut Vec<Message>) -> Result<(), Box<dyn std::error::Error>> {
+fn read(
+    folder: &str,
+    package: &str,
+    messages: &mut Vec<Message>,
+) -> Result<(), Box<dyn std::error::Error>> {
     for path in entries(folder)? {
-        messages.extend(definition::parse(package, &path, &fs::read_to_string(&path)?)?);
+        messages.extend(definition::parse(
+            package,
+            &path,
+            &fs::read_to_string(&path)?,
+        )?);
     }
     Ok(())
 }
@@ -54,7 +66,8 @@ fn read(folder: &str, package: &str, messages: &mut Vec<Message>) -> Result<(), 
 /// What is in a folder, by name.
 fn entries(folder: &str) -> std::io::Result<Vec<String>> {
     println!("cargo::rerun-if-changed={folder}");
-    let paths = fs::read_dir(folder)?.map(|entry| Ok(format!("{folder}/{}", entry?.file_name().to_string_lossy())));
+    let paths = fs::read_dir(folder)?
+        .map(|entry| Ok(format!("{folder}/{}", entry?.file_name().to_string_lossy())));
     let mut paths = paths.collect::<std::io::Result<Vec<_>>>()?;
     paths.sort();
     Ok(paths)

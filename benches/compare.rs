@@ -58,7 +58,9 @@ fn distances(bencher: Bencher, faces: usize, workers: &dyn Workers) {
     let found = deviations(&points, &mesh, &tree, workers).expect("finite");
     let largest = found.into_iter().fold(0.0, |a: f64, b| a.max(b.abs()));
     assert!(largest > NOISE && largest < 10.0 * NOISE, "{largest}");
-    bencher.counter(ItemsCount::new(points.len())).bench(|| deviations(&points, &mesh, &tree, workers));
+    bencher
+        .counter(ItemsCount::new(points.len()))
+        .bench(|| deviations(&points, &mesh, &tree, workers));
 }
 
 /// A hundred thousand points, 1 mm and 0.6° off, onto a surface of so many faces.
@@ -74,12 +76,29 @@ fn points_to_mesh_alone(bencher: Bencher, faces: usize) {
 }
 
 fn register(bencher: Bencher, faces: usize, workers: &dyn Workers) {
-    let moved = Isometry3::new(Vector3::new(0.6e-3, -0.5e-3, 0.6e-3), Vector3::new(0.004, -0.005, 0.008));
+    let moved = Isometry3::new(
+        Vector3::new(0.6e-3, -0.5e-3, 0.6e-3),
+        Vector3::new(0.004, -0.005, 0.008),
+    );
     let (mut points, (mesh, tree)) = (points(100_000), truth(faces));
     points.iter_mut().for_each(|p| *p = moved.inverse() * *p);
-    let register = || icp(&points, &mesh, &tree, &Isometry3::identity(), &IcpParams::default(), workers);
+    let register = || {
+        icp(
+            &points,
+            &mesh,
+            &tree,
+            &Isometry3::identity(),
+            &IcpParams::default(),
+            workers,
+        )
+    };
     let found = register().expect("roughly in place");
     // the scatter over the root of the count, times five
-    assert!((found.source_to_target.translation.vector - moved.translation.vector).norm() < 5e-6, "{found:?}");
-    bencher.counter(ItemsCount::new(points.len())).bench(register);
+    assert!(
+        (found.source_to_target.translation.vector - moved.translation.vector).norm() < 5e-6,
+        "{found:?}"
+    );
+    bencher
+        .counter(ItemsCount::new(points.len()))
+        .bench(register);
 }

@@ -35,9 +35,13 @@ fn shuffled(mesh: &TriMesh) -> TriMesh {
     let mut place: Vec<u32> = (0..mesh.vertex_slots() as u32).collect();
     place.shuffle(&mut rng);
     let mut positions = vec![Point3::origin(); place.len()];
-    place.iter().zip(mesh.positions()).for_each(|(to, p)| positions[*to as usize] = *p);
-    let mut faces: Vec<_> =
-        (0..mesh.face_slots() as u32).map(|f| mesh.corners(FaceId(f)).map(|v| place[v.0 as usize])).collect();
+    place
+        .iter()
+        .zip(mesh.positions())
+        .for_each(|(to, p)| positions[*to as usize] = *p);
+    let mut faces: Vec<_> = (0..mesh.face_slots() as u32)
+        .map(|f| mesh.corners(FaceId(f)).map(|v| place[v.0 as usize]))
+        .collect();
     faces.shuffle(&mut rng);
     TriMesh::new(positions, faces).expect("the same mesh in another order")
 }

@@ -31,7 +31,8 @@ const SMALLEST_SIDE: f64 = 5.0 * RADIUS;
 /// Median, 99 % and 99.9 % of times in ns, as text in us; sorts them.
 fn shown(times: &mut [u64]) -> String {
     times.sort_unstable();
-    let [median, p99, p999, longest] = [0.5, 0.99, 0.999, 1.0].map(|share| percentile(times, share));
+    let [median, p99, p999, longest] =
+        [0.5, 0.99, 0.999, 1.0].map(|share| percentile(times, share));
     format!("median {median:6.2} us p99 {p99:7.2} p99.9 {p999:7.1} max {longest:8.0}")
 }
 
@@ -41,11 +42,19 @@ fn measure(faces: usize, edge: f64, seconds: usize, is_live: bool) {
         return;
     }
     let mesh = plate(faces, side).expect("it can be counted");
-    let tip = TipParams { radius: RADIUS, stiffness: Some(STIFFNESS) };
+    let tip = TipParams {
+        radius: RADIUS,
+        stiffness: Some(STIFFNESS),
+    };
     let params = PatcherParams::new(RADIUS, Some(STIFFNESS), SCAN_NOISE);
     let renewal = if is_live {
         let scan = Arc::new((mesh.clone(), FaceTree::new(&mesh)));
-        Renewal::Beside { scan, pace: Pace::default(), room: 1 << 18, gate: Gate::default() }
+        Renewal::Beside {
+            scan,
+            pace: Pace::default(),
+            room: 1 << 18,
+            gate: Gate::default(),
+        }
     } else {
         Renewal::AtEnd
     };
@@ -73,7 +82,11 @@ fn measure(faces: usize, edge: f64, seconds: usize, is_live: bool) {
             answers.push(answered.as_nanos() as u64);
             followed.push(done.as_nanos() as u64);
             moved += engine.refiner().moved_vertices().len();
-            ages.extend(engine.patched_until_ns().map(|until_ns| (sample.stamp_ns - until_ns) as u64 / 1000));
+            ages.extend(
+                engine
+                    .patched_until_ns()
+                    .map(|until_ns| (sample.stamp_ns - until_ns) as u64 / 1000),
+            );
         }
     }
     ages.sort_unstable();
@@ -86,17 +99,32 @@ fn measure(faces: usize, edge: f64, seconds: usize, is_live: bool) {
         resident(),
     );
     if is_live {
-        let ([median, p99], counts) = ([0.5, 0.99].map(|share| percentile(&ages, share)), engine.counts());
-        print!("; patch behind {median:5.1} ms, p99 {p99:6.1}; late {} of {}", counts.late, counts.renewals);
+        let ([median, p99], counts) = (
+            [0.5, 0.99].map(|share| percentile(&ages, share)),
+            engine.counts(),
+        );
+        print!(
+            "; patch behind {median:5.1} ms, p99 {p99:6.1}; late {} of {}",
+            counts.late, counts.renewals
+        );
     }
     println!();
 }
 
 fn main() {
-    let numbers: Vec<usize> = std::env::args().filter_map(|word| word.parse().ok()).collect();
+    let numbers: Vec<usize> = std::env::args()
+        .filter_map(|word| word.parse().ok())
+        .collect();
     let is_live = std::env::args().any(|word| word == "live");
-    let seconds = numbers.first().copied().unwrap_or(if is_live { 10 } else { 100 });
-    let sizes = if numbers.len() > 1 { numbers[1..].to_vec() } else { vec![10_000, 200_000, 1_000_000, 5_000_000] };
+    let seconds = numbers
+        .first()
+        .copied()
+        .unwrap_or(if is_live { 10 } else { 100 });
+    let sizes = if numbers.len() > 1 {
+        numbers[1..].to_vec()
+    } else {
+        vec![10_000, 200_000, 1_000_000, 5_000_000]
+    };
     for faces in sizes {
         for share in EDGES {
             measure(faces, share * RADIUS, seconds, is_live);

@@ -56,7 +56,10 @@ impl Times {
             (&mut self.replace, other.replace),
         ];
         for (times, others) in pairs {
-            times.iter_mut().zip(others).for_each(|(time, other)| *time = other.min(*time));
+            times
+                .iter_mut()
+                .zip(others)
+                .for_each(|(time, other)| *time = other.min(*time));
         }
     }
 }
@@ -75,14 +78,25 @@ fn remove(mesh: &mut TriMesh, tree: &mut FaceTree, faces: &[FaceId], times: &mut
     }
 }
 
-fn insert(mesh: &mut TriMesh, tree: &mut FaceTree, corners: [VertexId; 3], times: &mut Times) -> FaceId {
+fn insert(
+    mesh: &mut TriMesh,
+    tree: &mut FaceTree,
+    corners: [VertexId; 3],
+    times: &mut Times,
+) -> FaceId {
     let face = timed(&mut times.mesh, || mesh.add_face(corners)).expect("the corners are there");
     assert!(timed(&mut times.insert, || tree.insert(mesh, face)));
     face
 }
 
 /// The same as [`remove`] and [`insert`], timed as a whole: the delay of one push.
-fn replace(mesh: &mut TriMesh, tree: &mut FaceTree, old: &[FaceId], new: &[[VertexId; 3]], made: &mut Vec<FaceId>) {
+fn replace(
+    mesh: &mut TriMesh,
+    tree: &mut FaceTree,
+    old: &[FaceId],
+    new: &[[VertexId; 3]],
+    made: &mut Vec<FaceId>,
+) {
     made.clear();
     for &face in old {
         tree.remove(mesh, face);
@@ -97,7 +111,10 @@ fn replace(mesh: &mut TriMesh, tree: &mut FaceTree, old: &[FaceId], new: &[[Vert
 
 /// Middle of spot `i`, spread over the plate.
 fn spot(i: usize) -> Point3<f64> {
-    let (x, y) = (0.1 + 0.8 * (i as f64 * 0.618).fract(), 0.1 + 0.8 * (i as f64 * 0.414).fract());
+    let (x, y) = (
+        0.1 + 0.8 * (i as f64 * 0.618).fract(),
+        0.1 + 0.8 * (i as f64 * 0.414).fract(),
+    );
     Point3::new(x * SIDE, y * SIDE, height(x * SIDE, y * SIDE))
 }
 
@@ -105,7 +122,9 @@ fn nearest_faces(mesh: &TriMesh, tree: &FaceTree, middle: &Point3<f64>, query: &
     let half = nalgebra::Vector3::repeat(HALF_SPOT);
     tree.faces_in_box(&(middle - half), &(middle + half), query);
     let far = |face: &FaceId| (mesh.barycentre(*face) - middle).norm_squared();
-    query.faces.sort_unstable_by(|a, b| far(a).total_cmp(&far(b)).then(a.cmp(b)));
+    query
+        .faces
+        .sort_unstable_by(|a, b| far(a).total_cmp(&far(b)).then(a.cmp(b)));
     query.faces.truncate(REPLACED);
 }
 
@@ -115,11 +134,16 @@ fn halves(mesh: &mut TriMesh, old: &[FaceId], vertices: &mut Vec<VertexId>) -> V
     for &face in old {
         let (c, t) = (mesh.corners(face), mesh.triangle(face));
         let length = |i: usize| (t[(i + 1) % 3] - t[i]).norm_squared();
-        let i = (0..3).max_by(|&a, &b| length(a).total_cmp(&length(b))).unwrap_or(0);
+        let i = (0..3)
+            .max_by(|&a, &b| length(a).total_cmp(&length(b)))
+            .unwrap_or(0);
         let middle = nalgebra::center(&t[i], &t[(i + 1) % 3]);
         let vertex = mesh.add_vertex(middle).expect("there is room");
         vertices.push(vertex);
-        new.extend([[c[i], vertex, c[(i + 2) % 3]], [vertex, c[(i + 1) % 3], c[(i + 2) % 3]]]);
+        new.extend([
+            [c[i], vertex, c[(i + 2) % 3]],
+            [vertex, c[(i + 1) % 3], c[(i + 2) % 3]],
+        ]);
     }
     new
 }
@@ -133,14 +157,18 @@ fn queries(mesh: &TriMesh, tree: &FaceTree) -> Vec<u64> {
             let p = spot(i % SPOTS) + nalgebra::vector![offset(0.7548), offset(0.5698), 0.2e-3];
             timed(&mut times, || tree.closest(mesh, &p, 0.01));
         }
-        least.iter_mut().zip(times).for_each(|(least, time)| *least = time.min(*least));
+        least
+            .iter_mut()
+            .zip(times)
+            .for_each(|(least, time)| *least = time.min(*least));
     }
     least
 }
 
 /// Edits spot after spot.
 fn session(mesh: &mut TriMesh, tree: &mut FaceTree) -> Times {
-    let (mut times, mut query, mut made, mut vertices) = (Times::default(), BoxQuery::default(), vec![], vec![]);
+    let (mut times, mut query, mut made, mut vertices) =
+        (Times::default(), BoxQuery::default(), vec![], vec![]);
     for round in 0..SPOTS * ROUNDS_PER_SPOT {
         nearest_faces(mesh, tree, &spot(round / ROUNDS_PER_SPOT), &mut query);
         let old = query.faces.clone();
@@ -148,15 +176,22 @@ fn session(mesh: &mut TriMesh, tree: &mut FaceTree) -> Times {
         let new = halves(mesh, &old, &mut vertices);
         if round % 2 == 0 {
             remove(mesh, tree, &old, &mut times);
-            made = new.iter().map(|&corners| insert(mesh, tree, corners, &mut times)).collect();
+            made = new
+                .iter()
+                .map(|&corners| insert(mesh, tree, corners, &mut times))
+                .collect();
         } else {
-            timed(&mut times.replace, || replace(mesh, tree, &old, &new, &mut made));
+            timed(&mut times.replace, || {
+                replace(mesh, tree, &old, &new, &mut made)
+            });
         }
         // the last round of a spot leaves it as it is
         if round % ROUNDS_PER_SPOT + 1 < ROUNDS_PER_SPOT {
             let finer = made.clone();
             replace(mesh, tree, &finer, &old_corners, &mut made);
-            vertices.drain(..).for_each(|vertex| assert!(mesh.remove_vertex(vertex)));
+            vertices
+                .drain(..)
+                .for_each(|vertex| assert!(mesh.remove_vertex(vertex)));
         }
         vertices.clear();
     }
@@ -168,14 +203,23 @@ fn bench(faces: usize) {
     let built = FaceTree::new(&plate);
     // a copy takes no more than it needs
     let bytes = (plate.clone().bytes(), built.clone().bytes());
-    println!("{faces} faces: depth {}, mesh and tree {bytes:?} bytes", built.depth());
+    println!(
+        "{faces} faces: depth {}, mesh and tree {bytes:?} bytes",
+        built.depth()
+    );
     let (mut mesh, mut tree, mut times) = (plate.clone(), built.clone(), Times::default());
     for repeat in 0..REPEATS {
         (mesh, tree) = (plate.clone(), built.clone());
         let room = 2 * REPLACED * (SPOTS + 1);
-        mesh.reserve(room, room).and_then(|()| tree.reserve(room)).expect("there is memory");
+        mesh.reserve(room, room)
+            .and_then(|()| tree.reserve(room))
+            .expect("there is memory");
         let new = session(&mut mesh, &mut tree);
-        if repeat == 0 { times = new } else { times.take_lesser(new) }
+        if repeat == 0 {
+            times = new
+        } else {
+            times.take_lesser(new)
+        }
     }
     report("FaceTree::insert", times.insert);
     report("FaceTree::remove", times.remove);
@@ -184,14 +228,23 @@ fn bench(faces: usize) {
     let start = Instant::now();
     let rebuilt = FaceTree::new(&mesh);
     let took = start.elapsed().as_millis();
-    println!("  after: depth {}, mesh and tree {:?} bytes", tree.depth(), (mesh.bytes(), tree.bytes()));
+    println!(
+        "  after: depth {}, mesh and tree {:?} bytes",
+        tree.depth(),
+        (mesh.bytes(), tree.bytes())
+    );
     report("closest, edited tree", queries(&mesh, &tree));
     report("closest, rebuilt tree", queries(&mesh, &rebuilt));
-    println!("  rebuilding takes {took} ms and gives depth {}", rebuilt.depth());
+    println!(
+        "  rebuilding takes {took} ms and gives depth {}",
+        rebuilt.depth()
+    );
 }
 
 fn main() {
-    let mut sizes: Vec<usize> = std::env::args().filter_map(|word| word.parse().ok()).collect();
+    let mut sizes: Vec<usize> = std::env::args()
+        .filter_map(|word| word.parse().ok())
+        .collect();
     if sizes.is_empty() {
         sizes = vec![10_000, 1_000_000];
     }

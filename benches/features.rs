@@ -35,7 +35,9 @@ fn fine_scan(divisions: u32) -> TriMesh {
     };
     let plate = Plate::default();
     let coarse = scan(&plate, &params).expect("the plate can be scanned");
-    (0..divisions).fold(coarse, |mesh, _| subdivided(&mesh, |p| plate.closest(&p).point))
+    (0..divisions).fold(coarse, |mesh, _| {
+        subdivided(&mesh, |p| plate.closest(&p).point)
+    })
 }
 
 #[divan::bench(args = DIVISIONS, sample_count = 5)]
@@ -43,7 +45,11 @@ fn found(bencher: Bencher, divisions: u32) {
     let mesh = fine_scan(divisions);
     let tree = FaceTree::new(&mesh);
     let features = detect(&mesh, &tree, &[]).features;
-    println!("{} vertices, {} features", mesh.vertex_count(), features.len());
+    println!(
+        "{} vertices, {} features",
+        mesh.vertex_count(),
+        features.len()
+    );
     bencher.bench_local(|| detect(black_box(&mesh), &tree, &[]));
 }
 
@@ -57,7 +63,9 @@ fn touched_plate() -> (TriMesh, Vec<ProbedPoint>) {
     let contacts = contacts_of(stylus.radius, Some(stylus.stiffness), &stream.samples);
     contacts.iter().for_each(|contact| patcher.push(contact));
     patcher.flush();
-    let patched = patcher.patched(&stream.scan, &FaceTree::new(&stream.scan)).expect("the plate can be meshed");
+    let patched = patcher
+        .patched(&stream.scan, &FaceTree::new(&stream.scan))
+        .expect("the plate can be meshed");
     (patched.mesh, patcher.probed().to_vec())
 }
 
@@ -66,9 +74,17 @@ fn touched_plate() -> (TriMesh, Vec<ProbedPoint>) {
 fn followed(bencher: Bencher) {
     let (mesh, touches) = touched_plate();
     let mut known = Tracker::new();
-    known.renew(&mesh, &FaceTree::new(&mesh), &touches[..touches.len() - 2000]);
+    known.renew(
+        &mesh,
+        &FaceTree::new(&mesh),
+        &touches[..touches.len() - 2000],
+    );
     // the first news that change a feature
     let is_news = |count: &usize| !known.clone().update(&touches[..*count]).is_empty();
-    let until = (touches.len() - 2000..touches.len()).find(is_news).expect("the demo ends with runs along walls");
-    bencher.with_inputs(|| known.clone()).bench_local_refs(|tracker| tracker.update(black_box(&touches[..until + 5])));
+    let until = (touches.len() - 2000..touches.len())
+        .find(is_news)
+        .expect("the demo ends with runs along walls");
+    bencher
+        .with_inputs(|| known.clone())
+        .bench_local_refs(|tracker| tracker.update(black_box(&touches[..until + 5])));
 }

@@ -28,19 +28,42 @@ const WIDTH: f64 = 40e-3;
 const MINUTE: usize = 60_000;
 
 fn main() {
-    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
-    let number = |at: usize, default: usize| arguments.get(at).map_or(default, |x| x.parse().expect("a whole number"));
+    let arguments: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|argument| argument != "--bench")
+        .collect();
+    let number = |at: usize, default: usize| {
+        arguments
+            .get(at)
+            .map_or(default, |x| x.parse().expect("a whole number"))
+    };
     let (faces, seconds, is_fast) = (number(0, 1_000_000), number(1, 60), arguments.len() > 2);
     let mesh = wavy_plate(faces).expect("it can be counted");
-    let tip = TipParams { radius: RADIUS, stiffness: Some(STIFFNESS) };
+    let tip = TipParams {
+        radius: RADIUS,
+        stiffness: Some(STIFFNESS),
+    };
     // its uncertainty is asked for, too
     let params = PatcherParams::new(RADIUS, Some(STIFFNESS), SCAN_NOISE);
     let scan = Arc::new((mesh.clone(), FaceTree::new(&mesh)));
-    let pace = Pace { is_patient: is_fast, ..Pace::default() };
-    let renewal = Renewal::Beside { scan, pace, room: 1 << 18, gate: Gate::default() };
+    let pace = Pace {
+        is_patient: is_fast,
+        ..Pace::default()
+    };
+    let renewal = Renewal::Beside {
+        scan,
+        pace,
+        room: 1 << 18,
+        gate: Gate::default(),
+    };
     let refine = RefineParams::robust(tip);
-    let mut live = Engine::new(mesh.clone(), refine, Some(params), renewal).expect("the settings are in range");
-    println!("{} faces, {:.0} MB; {seconds} s at 1 kHz", mesh.face_count(), resident());
+    let mut live = Engine::new(mesh.clone(), refine, Some(params), renewal)
+        .expect("the settings are in range");
+    println!(
+        "{} faces, {:.0} MB; {seconds} s at 1 kHz",
+        mesh.face_count(),
+        resident()
+    );
     let (mut times, mut ages, mut late, begun) = (Vec::new(), Vec::new(), 0, Instant::now());
     for i in 0..seconds * 1000 {
         let sample = noisy_slide_on(SIDE, i, WIDTH);
@@ -48,13 +71,20 @@ fn main() {
         // a thread that waits busily would slow the other down where both share a core
         let now = begun.elapsed();
         std::thread::sleep(due.saturating_sub(now));
-        let waited = if is_fast { Duration::ZERO } else { now.saturating_sub(due) };
+        let waited = if is_fast {
+            Duration::ZERO
+        } else {
+            now.saturating_sub(due)
+        };
         let start = Instant::now();
         live.answer(&sample).expect("the sample is sound");
         times.push((waited + start.elapsed()).as_nanos() as u64);
         live.follow().expect("the thread of the patch goes on");
         if i > 1000 {
-            ages.extend(live.patched_until_ns().map(|until_ns| (sample.stamp_ns - until_ns) as u64 / 1000));
+            ages.extend(
+                live.patched_until_ns()
+                    .map(|until_ns| (sample.stamp_ns - until_ns) as u64 / 1000),
+            );
         }
         if (i + 1) % MINUTE == 0 || i + 1 == seconds * 1000 {
             times.sort_unstable();

@@ -26,12 +26,16 @@ fn sheet([columns, rows]: [u32; 2]) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
         let (x, y) = (f64::from(i) * 1e-3, f64::from(j) * 1e-3);
         Point3::new(x, y, 0.02 * (17.0 * x).sin() * (23.0 * y).cos())
     };
-    let positions = (0..=rows).flat_map(|j| (0..=columns).map(move |i| point(i, j))).collect();
+    let positions = (0..=rows)
+        .flat_map(|j| (0..=columns).map(move |i| point(i, j)))
+        .collect();
     let quad = |i: u32, j: u32| {
         let [a, b] = [j * (columns + 1) + i, (j + 1) * (columns + 1) + i];
         [[a, a + 1, b + 1], [a, b + 1, b]]
     };
-    let faces = (0..rows).flat_map(|j| (0..columns).flat_map(move |i| quad(i, j))).collect();
+    let faces = (0..rows)
+        .flat_map(|j| (0..columns).flat_map(move |i| quad(i, j)))
+        .collect();
     (positions, faces)
 }
 
@@ -49,7 +53,14 @@ fn file(name: &str, quads: [u32; 2]) -> (TempDir, PathBuf) {
     }
     let read = read_mesh(&path, MeshUnit::Metre).expect("the file just written");
     assert_eq!((read.mesh.vertex_count(), read.mesh.face_count()), counts);
-    assert_eq!((read.repair.components, read.repair.boundary_loops, read.repair.flipped_faces), (1, 1, 0));
+    assert_eq!(
+        (
+            read.repair.components,
+            read.repair.boundary_loops,
+            read.repair.flipped_faces
+        ),
+        (1, 1, 0)
+    );
     (folder, path)
 }
 
@@ -64,7 +75,11 @@ fn write_single(path: &PathBuf, positions: &[Point3<f64>], faces: &[[u32; 3]]) {
     );
     let mut put = |bytes: &[u8]| out.write_all(bytes).expect("room for the file");
     put(header.as_bytes());
-    positions.iter().for_each(|p| p.coords.iter().for_each(|x| put(&(*x as f32).to_le_bytes())));
+    positions.iter().for_each(|p| {
+        p.coords
+            .iter()
+            .for_each(|x| put(&(*x as f32).to_le_bytes()))
+    });
     for face in faces {
         put(&[3]);
         face.iter().for_each(|v| put(&v.to_le_bytes()));
@@ -101,6 +116,9 @@ fn repair_only(bencher: divan::Bencher) {
 #[divan::bench(sample_count = 5)]
 fn tobj_only(bencher: divan::Bencher) {
     let (_folder, path) = file("text.obj", MILLION);
-    let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
+    let options = tobj::LoadOptions {
+        triangulate: true,
+        ..Default::default()
+    };
     bencher.bench_local(|| tobj::load_obj(black_box(&path), &options).expect("read before"));
 }

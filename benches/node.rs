@@ -34,7 +34,8 @@ use touchup::ros::arguments::NodeConfig;
 use touchup::ros::in_process::OtherParticipants;
 use touchup::ros::inbox::inbox;
 use touchup::ros::messages::{
-    HapticMismatch, Header, Point, Pose, PoseStamped, Quaternion, Time, Vector3, Wrench, WrenchStamped,
+    HapticMismatch, Header, Point, Pose, PoseStamped, Quaternion, Time, Vector3, Wrench,
+    WrenchStamped,
 };
 use touchup::ros::node::{INBOX, Node, Prepared, SessionReport};
 use touchup::ros::parameters::{ParameterValue, Parameters};
@@ -52,24 +53,67 @@ const ECHO_SECONDS: usize = 10;
 
 fn header(stamp_ns: i64, frame: &str) -> Header {
     let (sec, nanosec) = (stamp_ns / 1_000_000_000, stamp_ns % 1_000_000_000);
-    Header { stamp: Time { sec: sec as i32, nanosec: nanosec as u32 }, frame_id: frame.to_owned() }
+    Header {
+        stamp: Time {
+            sec: sec as i32,
+            nanosec: nanosec as u32,
+        },
+        frame_id: frame.to_owned(),
+    }
 }
 
 fn messages(sample: &Sample) -> (WrenchStamped, PoseStamped) {
     let (p, q) = (sample.pose_ot.translation.vector, sample.pose_ot.rotation);
-    let pose =
-        Pose { position: Point { x: p.x, y: p.y, z: p.z }, orientation: Quaternion { x: q.i, y: q.j, z: q.k, w: q.w } };
+    let pose = Pose {
+        position: Point {
+            x: p.x,
+            y: p.y,
+            z: p.z,
+        },
+        orientation: Quaternion {
+            x: q.i,
+            y: q.j,
+            z: q.k,
+            w: q.w,
+        },
+    };
     let force = sample.wrench.force;
-    let wrench = Wrench { force: Vector3 { x: force.x, y: force.y, z: force.z }, torque: Vector3::default() };
+    let wrench = Wrench {
+        force: Vector3 {
+            x: force.x,
+            y: force.y,
+            z: force.z,
+        },
+        torque: Vector3::default(),
+    };
     (
-        WrenchStamped { header: header(sample.stamp_ns, "stylus"), wrench },
-        PoseStamped { header: header(sample.stamp_ns, "object"), pose },
+        WrenchStamped {
+            header: header(sample.stamp_ns, "stylus"),
+            wrench,
+        },
+        PoseStamped {
+            header: header(sample.stamp_ns, "object"),
+            pose,
+        },
     )
 }
 
-fn shown(Quantiles { median, p99, p999, max }: Quantiles) -> String {
+fn shown(
+    Quantiles {
+        median,
+        p99,
+        p999,
+        max,
+    }: Quantiles,
+) -> String {
     let us = |ns: u64| ns as f64 * 1e-3;
-    format!("p50 {:.1} us p99 {:.0} p99.9 {:.0} max {:.0}", us(median), us(p99), us(p999), us(max))
+    format!(
+        "p50 {:.1} us p99 {:.0} p99.9 {:.0} max {:.0}",
+        us(median),
+        us(p99),
+        us(p999),
+        us(max)
+    )
 }
 
 fn print_summary(report: &SessionReport) {
@@ -96,9 +140,15 @@ fn parameters(folder: &Path, faces: usize) -> Parameters {
     println!("{} faces", mesh.face_count());
     let text = |path: &Path| ParameterValue::String(path.display().to_string());
     let mut parameters = Parameters::default();
-    parameters.set("scan", &text(&scan)).expect("a path is text");
-    parameters.set("session_folder", &text(folder)).expect("a path is text");
-    parameters.set("tip_radius_mm", &ParameterValue::Double(RADIUS * 1e3)).expect("a radius is a number");
+    parameters
+        .set("scan", &text(&scan))
+        .expect("a path is text");
+    parameters
+        .set("session_folder", &text(folder))
+        .expect("a path is text");
+    parameters
+        .set("tip_radius_mm", &ParameterValue::Double(RADIUS * 1e3))
+        .expect("a radius is a number");
     parameters
 }
 
@@ -107,7 +157,9 @@ fn alone(faces: usize) {
     let (inbox, received) = inbox(INBOX, &Clock::system());
     let (port, world) = in_process::start(inbox, &Clock::system());
     let ready = Prepared::new(parameters(folder.path(), faces)).expect("the scan is sound");
-    let node = ready.start(port, received, None).expect("there are threads");
+    let node = ready
+        .start(port, received, None)
+        .expect("there are threads");
     print_summary(&slid_over(node, &world));
 }
 
@@ -125,7 +177,10 @@ fn slid_over(node: Node, world: &OtherParticipants) -> SessionReport {
             published += world.published().len();
         }
     }
-    println!("{:.1} s, {published} messages out", begun.elapsed().as_secs_f64());
+    println!(
+        "{:.1} s, {published} messages out",
+        begun.elapsed().as_secs_f64()
+    );
     world.arrive_patiently(Arrival::Shutdown);
     node.join().expect("the result can be written").report
 }
@@ -138,12 +193,18 @@ fn beside_pages(faces: usize, turns: usize) {
     let mut p99 = kinds.map(|_| Vec::new());
     for turn in 0..turns {
         for (kind, p99) in kinds.into_iter().zip(&mut p99) {
-            let folder = tempfile::tempdir().expect("there is room in the folder for temporary files");
+            let folder =
+                tempfile::tempdir().expect("there is room in the folder for temporary files");
             let (inbox, received) = inbox(INBOX, &Clock::system());
             let (port, world) = in_process::start(inbox.clone(), &Clock::system());
             let ready = Prepared::new(parameters(folder.path(), faces)).expect("the scan is sound");
             let address = ([127, 0, 0, 1], 0).into();
-            let params = WebParams { address, names: Vec::new(), by_link: false, certificate: None };
+            let params = WebParams {
+                address,
+                names: Vec::new(),
+                by_link: false,
+                certificate: None,
+            };
             let (scan, session_folder) = ("scan.ply".into(), folder.path().to_owned());
             let (scan_mesh, mesh_unit) = (ready.scan_mesh(), ready.mesh_unit());
             let facts = NodeFacts {
@@ -156,8 +217,14 @@ fn beside_pages(faces: usize, turns: usize) {
                 is_size_confirmed: true,
             };
             let page = WebServer::open(&params, |_| ()).expect("a port is free");
-            let port = page.serve_node(facts, inbox, ready.whole_mesh(), port).expect("the services have names");
-            let address = page.url().trim_start_matches("http://").parse().expect("it is an address");
+            let port = page
+                .serve_node(facts, inbox, ready.whole_mesh(), port)
+                .expect("the services have names");
+            let address = page
+                .url()
+                .trim_start_matches("http://")
+                .parse()
+                .expect("it is an address");
             let _stuck = match kind {
                 "no page" => None,
                 "a page that reads" => {
@@ -166,7 +233,9 @@ fn beside_pages(faces: usize, turns: usize) {
                 }
                 _ => Some(pages::stuck(address)),
             };
-            let node = ready.start(port, received, None).expect("there are threads");
+            let node = ready
+                .start(port, received, None)
+                .expect("there are threads");
             let report = slid_over(node, &world);
             println!(
                 "{turn} {kind}: work {}; answer {}; dropped {:?}",
@@ -195,7 +264,9 @@ fn beside_pages(faces: usize, turns: usize) {
 /// - `out`: where it writes what it sees.
 fn other(role: &str, domain: u16, seconds: usize, out: &Path) -> Command {
     let mut program = Command::new(std::env::current_exe().expect("a program knows where it is"));
-    program.args([role, &domain.to_string(), &seconds.to_string()]).arg(out);
+    program
+        .args([role, &domain.to_string(), &seconds.to_string()])
+        .arg(out);
     program
 }
 
@@ -204,7 +275,10 @@ fn started(command: &mut Command) -> Child {
 }
 
 fn check(mut child: Child) {
-    assert!(child.wait().is_ok_and(|status| status.success()), "another process failed");
+    assert!(
+        child.wait().is_ok_and(|status| status.success()),
+        "another process failed"
+    );
 }
 
 /// What another end wrote.
@@ -222,7 +296,11 @@ struct Viewer {
 impl Viewer {
     /// Returns when it has the mesh.
     fn start(domain: u16, out: &Path) -> Self {
-        let mut child = started(other("viewer", domain, 0, out).stdin(Stdio::piped()).stdout(Stdio::piped()));
+        let mut child = started(
+            other("viewer", domain, 0, out)
+                .stdin(Stdio::piped())
+                .stdout(Stdio::piped()),
+        );
         let mut said = BufReader::new(child.stdout.take().expect("it was asked for"));
         let mut line = String::new();
         said.read_line(&mut line).expect("it speaks in UTF-8");
@@ -243,14 +321,23 @@ fn config(domain: u16, parameters: Parameters) -> NodeConfig {
         "ROS_LOCALHOST_ONLY" => Some("1".to_owned()),
         _ => None,
     };
-    NodeConfig { parameters, ..NodeConfig::new(&[], variable).expect("the domain is in its range") }
+    NodeConfig {
+        parameters,
+        ..NodeConfig::new(&[], variable).expect("the domain is in its range")
+    }
 }
 
 /// Answers wrenches over DDS, and does nothing else.
 fn echo(domain: u16, folder: &Path) {
     let (inbox, arrivals) = inbox(INBOX, &Clock::system());
-    let port = dds::start(&config(domain, Parameters::default()), inbox.clone()).expect("the loopback interface is up");
-    let asking = started(&mut other("echo", domain, ECHO_SECONDS, &folder.join("echo.json")));
+    let port = dds::start(&config(domain, Parameters::default()), inbox.clone())
+        .expect("the loopback interface is up");
+    let asking = started(&mut other(
+        "echo",
+        domain,
+        ECHO_SECONDS,
+        &folder.join("echo.json"),
+    ));
     let waiting = std::thread::spawn(move || {
         check(asking);
         inbox.put(Arrival::Shutdown);
@@ -258,7 +345,10 @@ fn echo(domain: u16, folder: &Path) {
     while let Some(arrival) = arrivals.recv() {
         match arrival {
             Arrival::Wrench(WrenchStamped { header, .. }, _) => {
-                port.publish(Publication::Mismatch(HapticMismatch { header, ..HapticMismatch::default() }));
+                port.publish(Publication::Mismatch(HapticMismatch {
+                    header,
+                    ..HapticMismatch::default()
+                }));
             }
             Arrival::Shutdown => break,
             _ => {}
@@ -275,8 +365,11 @@ fn over_dds(faces: usize, seconds: usize, plots: Option<&Path>) {
     let parameters = parameters(folder.path(), faces);
     let (inbox, received) = inbox(INBOX, &Clock::system());
     let ready = Prepared::new(parameters.clone()).expect("the scan is sound");
-    let port = dds::start(&config(domain, parameters), inbox.clone()).expect("the loopback interface is up");
-    let node = ready.start(port.clone(), received, None).expect("there are threads");
+    let port = dds::start(&config(domain, parameters), inbox.clone())
+        .expect("the loopback interface is up");
+    let node = ready
+        .start(port.clone(), received, None)
+        .expect("there are threads");
     let [answers, drawn] = ["answers.json", "drawn.json"].map(|name| folder.path().join(name));
     let viewer = Viewer::start(domain, &drawn);
     let mut sensors = started(&mut other("sensors", domain, seconds, &answers));
@@ -296,7 +389,11 @@ fn over_dds(faces: usize, seconds: usize, plots: Option<&Path>) {
     viewer.end();
     println!("at the end {:.0} MB", resident());
     check(started(&mut other("late", domain, 0, &drawn)));
-    println!("lost in transport {:?}, unsent {:?}", port.lost(), port.unsent());
+    println!(
+        "lost in transport {:?}, unsent {:?}",
+        port.lost(),
+        port.unsent()
+    );
     inbox.put(Arrival::Shutdown);
     print_summary(&node.join().expect("the result can be written").report);
     drop(port);
@@ -308,18 +405,28 @@ fn over_dds(faces: usize, seconds: usize, plots: Option<&Path>) {
 
 fn write(seen: &impl Serialize, path: Option<&Path>) {
     let text = serde_json::to_vec(seen).expect("numbers have a JSON form");
-    std::fs::write(path.expect("the command line names the file"), text).expect("there is room in the folder");
+    std::fs::write(path.expect("the command line names the file"), text)
+        .expect("there is room in the folder");
 }
 
 fn main() {
-    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
-    let numbers: Vec<usize> = arguments.iter().filter_map(|argument| argument.parse().ok()).collect();
+    let arguments: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|argument| argument != "--bench")
+        .collect();
+    let numbers: Vec<usize> = arguments
+        .iter()
+        .filter_map(|argument| argument.parse().ok())
+        .collect();
     let number = |at: usize, default: usize| numbers.get(at).copied().unwrap_or(default);
     let path = arguments.get(3).map(Path::new);
     match arguments.first().map(String::as_str) {
         Some("dds") => over_dds(number(0, 1_000_000), number(1, 30), path),
         Some(role @ ("echo" | "sensors")) => {
-            write(&peer::touch(number(0, 0) as u16, number(1, 0), role == "sensors"), path);
+            write(
+                &peer::touch(number(0, 0) as u16, number(1, 0), role == "sensors"),
+                path,
+            );
         }
         Some("viewer") => write(&peer::view(number(0, 0) as u16), path),
         Some("late") => peer::join_late(number(0, 0) as u16),

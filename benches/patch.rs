@@ -4,7 +4,9 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use nalgebra::{Point3, Vector3};
 use touchup::mesh::{FaceTree, TriMesh, signed_distance};
-use touchup::reconstruct::{Crossing, Cut, Edge, Lattice, LatticeRegion, NodeValues, Patch, contour};
+use touchup::reconstruct::{
+    Crossing, Cut, Edge, Lattice, LatticeRegion, NodeValues, Patch, contour,
+};
 use touchup::sim::wavy;
 
 /// Pitch of the lattice, m.
@@ -32,13 +34,17 @@ impl Case {
     fn new(faces: usize) -> Self {
         let scan = wavy::wavy_plate(faces).expect("it can be counted");
         let tree = FaceTree::new(&scan);
-        let lattice = Lattice { origin: Point3::new(0.137, -0.0931, 0.2713) * PITCH, pitch: PITCH };
+        let lattice = Lattice {
+            origin: Point3::new(0.137, -0.0931, 0.2713) * PITCH,
+            pitch: PITCH,
+        };
         let middle = wavy::SIDE / 2.0;
         let lo = lattice.cell_of(&Point3::new(middle - REACH, middle - REACH, -4e-3));
         let hi = lattice.cell_of(&Point3::new(middle + REACH, middle + REACH, 4e-3));
-        let (mut region, mut values, mut surface_cells) = (LatticeRegion::default(), NodeValues::default(), 0);
-        let cells =
-            (lo[0]..hi[0]).flat_map(|x| (lo[1]..hi[1]).flat_map(move |y| (lo[2]..hi[2]).map(move |z| [x, y, z])));
+        let (mut region, mut values, mut surface_cells) =
+            (LatticeRegion::default(), NodeValues::default(), 0);
+        let cells = (lo[0]..hi[0])
+            .flat_map(|x| (lo[1]..hi[1]).flat_map(move |y| (lo[2]..hi[2]).map(move |z| [x, y, z])));
         for cell in cells {
             let centre = lattice.position(cell) + Vector3::repeat(PITCH / 2.0);
             // a shell of two cells, as the field is known near the surface only
@@ -49,12 +55,21 @@ impl Case {
             let mut outside = 0;
             for corner in 0..8 {
                 let node = std::array::from_fn(|i| cell[i] + (corner >> i & 1));
-                values.insert_with(node, || signed_distance(&scan, &tree, &lattice.position(node), 1.0).unwrap_or(1.0));
+                values.insert_with(node, || {
+                    signed_distance(&scan, &tree, &lattice.position(node), 1.0).unwrap_or(1.0)
+                });
                 outside += usize::from(values.get(&node).is_some_and(|f| *f >= 0.0));
             }
             surface_cells += usize::from(outside % 8 != 0);
         }
-        Self { scan, tree, lattice, region, values, surface_cells }
+        Self {
+            scan,
+            tree,
+            lattice,
+            region,
+            values,
+            surface_cells,
+        }
     }
 
     fn cut(&self) -> Cut {
@@ -63,10 +78,14 @@ impl Case {
 
     fn contour(&self, cut: &Cut) -> Patch {
         let crossing = |edge: &Edge| {
-            let [a, b] = [edge.node, edge.end()].map(|node| self.values.get(&node).copied().unwrap_or(1.0));
+            let [a, b] =
+                [edge.node, edge.end()].map(|node| self.values.get(&node).copied().unwrap_or(1.0));
             let mut point = self.lattice.position(edge.node);
             point[edge.axis as usize] += PITCH * a / (a - b);
-            Crossing { point, normal: Vector3::z() }
+            Crossing {
+                point,
+                normal: Vector3::z(),
+            }
         };
         contour(&self.lattice, &self.region, &self.values, cut, crossing)
     }
@@ -77,7 +96,9 @@ impl Case {
 fn cut(bencher: Bencher, faces: usize) {
     let case = Case::new(faces);
     assert!(!case.cut().patch.removed.is_empty());
-    bencher.counter(ItemsCount::new(case.surface_cells)).bench(|| case.cut());
+    bencher
+        .counter(ItemsCount::new(case.surface_cells))
+        .bench(|| case.cut());
 }
 
 /// Meshes the region.
@@ -87,5 +108,7 @@ fn mesh(bencher: Bencher, faces: usize) {
     let cut = case.cut();
     let patch = case.contour(&cut);
     assert!(patch.open.is_empty() && patch.faces.len() > case.surface_cells);
-    bencher.counter(ItemsCount::new(case.surface_cells)).bench(|| case.contour(&cut));
+    bencher
+        .counter(ItemsCount::new(case.surface_cells))
+        .bench(|| case.contour(&cut));
 }

@@ -36,8 +36,13 @@ fn report(name: &str, faces: usize, mut times: Vec<u64>, more: &str) {
 }
 
 fn push(name: &str, mesh: &TriMesh, roi: RoiSize, carve: bool) {
-    let mut params =
-        RefineParams { roi, ..RefineParams::robust(TipParams { radius: RADIUS, stiffness: Some(STIFFNESS) }) };
+    let mut params = RefineParams {
+        roi,
+        ..RefineParams::robust(TipParams {
+            radius: RADIUS,
+            stiffness: Some(STIFFNESS),
+        })
+    };
     if !carve {
         params.carve = None;
     }
@@ -56,7 +61,11 @@ fn push(name: &str, mesh: &TriMesh, roi: RoiSize, carve: bool) {
         }
     }
     check_index(&refiner);
-    let more = format!("{:.1} vertices moved, {} cut back", vertices as f64 / TIMED as f64, refiner.counts().cut_back);
+    let more = format!(
+        "{:.1} vertices moved, {} cut back",
+        vertices as f64 / TIMED as f64,
+        refiner.counts().cut_back
+    );
     report(name, mesh.face_count(), times, &more);
 }
 
@@ -64,15 +73,23 @@ fn push(name: &str, mesh: &TriMesh, roi: RoiSize, carve: bool) {
 fn check_index(refiner: &Refiner) {
     let mesh = refiner.mesh();
     for i in 0..1_000 {
-        let at = slide(WARM + i * TIMED / 1_000, WIDTH).pose_ot.translation.vector;
+        let at = slide(WARM + i * TIMED / 1_000, WIDTH)
+            .pose_ot
+            .translation
+            .vector;
         let p = Point3::from(at + Vector3::new(0.3e-3, -0.2e-3, 0.1e-3));
         let hit = refiner.closest_face(&p, 0.1).expect("there is a face");
         let nearest = mesh
             .faces()
             .filter(|(face, _)| (mesh.barycentre(*face) - p).norm() < 0.02)
-            .map(|(face, _)| (triangle::closest_point(&p, &mesh.triangle(face)).0 - p).norm_squared())
+            .map(|(face, _)| {
+                (triangle::closest_point(&p, &mesh.triangle(face)).0 - p).norm_squared()
+            })
             .fold(f64::INFINITY, f64::min);
-        assert!((hit.distance_squared - nearest).abs() <= 1e-12 * nearest, "query {i}");
+        assert!(
+            (hit.distance_squared - nearest).abs() <= 1e-12 * nearest,
+            "query {i}"
+        );
         if mesh.face_count() > 200_000 && i >= 50 {
             // brute force over millions of faces: fifty full scans, the rest by rebuilding the tree once
             return check_against_new_tree(refiner);
@@ -85,8 +102,17 @@ fn check_against_new_tree(refiner: &Refiner) {
     let mesh = refiner.mesh();
     let tree = FaceTree::new(mesh);
     for i in 0..1_000 {
-        let p = Point3::from(slide(WARM + i * TIMED / 1_000, WIDTH).pose_ot.translation.vector);
-        assert_eq!(refiner.closest_face(&p, 0.1), tree.closest(mesh, &p, 0.1), "query {i}");
+        let p = Point3::from(
+            slide(WARM + i * TIMED / 1_000, WIDTH)
+                .pose_ot
+                .translation
+                .vector,
+        );
+        assert_eq!(
+            refiner.closest_face(&p, 0.1),
+            tree.closest(mesh, &p, 0.1),
+            "query {i}"
+        );
     }
 }
 
@@ -106,7 +132,9 @@ fn minimal(mesh: &TriMesh) {
 }
 
 fn main() {
-    let mut sizes: Vec<usize> = std::env::args().filter_map(|word| word.parse().ok()).collect();
+    let mut sizes: Vec<usize> = std::env::args()
+        .filter_map(|word| word.parse().ok())
+        .collect();
     if sizes.is_empty() {
         sizes = vec![10_000, 100_000, 1_000_000, 5_000_000];
     }
@@ -114,13 +142,26 @@ fn main() {
         let mesh = wavy_plate(faces).expect("it can be counted");
         let start = Instant::now();
         black_box(FaceTree::new(&mesh));
-        println!("tree built in {:.0} ms", start.elapsed().as_secs_f64() * 1e3);
+        println!(
+            "tree built in {:.0} ms",
+            start.elapsed().as_secs_f64() * 1e3
+        );
         minimal(&mesh);
-        push("push, handle only, no carving", &mesh, RoiSize::Handle, false);
+        push(
+            "push, handle only, no carving",
+            &mesh,
+            RoiSize::Handle,
+            false,
+        );
         push("push, one ring, no carving", &mesh, RoiSize::OneRing, false);
         push("push, one ring", &mesh, RoiSize::OneRing, true);
         if (100_000..=1_000_000).contains(&faces) {
-            push("push, region of the tip's radius", &mesh, RoiSize::Radius(RADIUS), true);
+            push(
+                "push, region of the tip's radius",
+                &mesh,
+                RoiSize::Radius(RADIUS),
+                true,
+            );
         }
     }
 }

@@ -13,12 +13,17 @@ use touchup::stylus::{SyncParams, Synchroniser};
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<_> = std::env::args().skip(1).collect();
-    let [scan, bag, out] = &arguments[..] else { anyhow::bail!("give a scan, a recording and an output file") };
+    let [scan, bag, out] = &arguments[..] else {
+        anyhow::bail!("give a scan, a recording and an output file")
+    };
 
     let scan = read_mesh(Path::new(scan), MeshUnit::Millimetre)?;
     println!("{}", scan.repair);
     // a ball of 3 mm on a stylus that deflects by 1 mm at 20 N; wrenches in the axes of the stylus
-    let tip = TipParams { radius: 1.5e-3, stiffness: Some(20e3) };
+    let tip = TipParams {
+        radius: 1.5e-3,
+        stiffness: Some(20e3),
+    };
     let mut refiner = Refiner::new(scan.mesh, RefineParams::robust(tip))?;
 
     let mut recording = RecordingReader::open(Path::new(bag), &Topics::default())?;
@@ -31,7 +36,11 @@ fn main() -> anyhow::Result<()> {
     sync.finish();
     from_fn(|| sync.next_sample()).try_for_each(|sample| refiner.push(&sample).map(drop))?;
 
-    println!("{:?}\nwrenches without a pose: {}", refiner.counts(), sync.counts().total());
+    println!(
+        "{:?}\nwrenches without a pose: {}",
+        refiner.counts(),
+        sync.counts().total()
+    );
     write_mesh(Path::new(out), refiner.mesh(), MeshUnit::Millimetre)?;
     Ok(())
 }

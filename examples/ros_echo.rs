@@ -11,8 +11,9 @@ use touchup::ros::arguments::{NodeConfig, split};
 use touchup::ros::dds;
 use touchup::ros::inbox::inbox;
 use touchup::ros::messages::{
-    ColorRGBA, DetectFeaturesResponse, Feature, FeatureArray, HapticMismatch, Marker, Point, ProbeFeatureResponse,
-    ProbeFeedback, ProbeResponse, ProbeResult, ProbeTouch, UndoResponse, Vector3,
+    ColorRGBA, DetectFeaturesResponse, Feature, FeatureArray, HapticMismatch, Marker, Point,
+    ProbeFeatureResponse, ProbeFeedback, ProbeResponse, ProbeResult, ProbeTouch, UndoResponse,
+    Vector3,
 };
 use touchup::ros::port::{ArmOrder, Arrival, Call, GoalEnd, Publication};
 use tracing_subscriber::filter::{LevelFilter, Targets};
@@ -21,11 +22,35 @@ use tracing_subscriber::util::SubscriberInitExt;
 
 /// A tile of 500 triangles, each point different.
 fn tile(id: i32) -> Marker {
-    let point = |i: i32| Point { x: f64::from(i), y: f64::from(id), z: 0.001 * f64::from(i) };
-    let color = |i: i32| ColorRGBA { r: i as f32 / 1500.0, g: 0.5, b: 0.5, a: 1.0 };
-    let (points, colors) = ((0..1500).map(point).collect(), (0..1500).map(color).collect());
-    let scale = Vector3 { x: 1.0, y: 1.0, z: 1.0 };
-    Marker { ns: "mesh".into(), id, r#type: Marker::TRIANGLE_LIST, scale, points, colors, ..Marker::default() }
+    let point = |i: i32| Point {
+        x: f64::from(i),
+        y: f64::from(id),
+        z: 0.001 * f64::from(i),
+    };
+    let color = |i: i32| ColorRGBA {
+        r: i as f32 / 1500.0,
+        g: 0.5,
+        b: 0.5,
+        a: 1.0,
+    };
+    let (points, colors) = (
+        (0..1500).map(point).collect(),
+        (0..1500).map(color).collect(),
+    );
+    let scale = Vector3 {
+        x: 1.0,
+        y: 1.0,
+        z: 1.0,
+    };
+    Marker {
+        ns: "mesh".into(),
+        id,
+        r#type: Marker::TRIANGLE_LIST,
+        scale,
+        points,
+        colors,
+        ..Marker::default()
+    }
 }
 
 /// Features that are found, more than an answer can name.
@@ -36,18 +61,32 @@ const MOST_NAMED: u32 = 128;
 const TOUCHES: u32 = 20;
 
 fn outline() -> Feature {
-    Feature { kind: Feature::KIND_SLOT, points: vec![Point::default(); 2], ..Feature::default() }
+    Feature {
+        kind: Feature::KIND_SLOT,
+        points: vec![Point::default(); 2],
+        ..Feature::default()
+    }
 }
 
 /// One with as long a curve as the node publishes.
 fn touch(id: u32, index: u32) -> ProbeTouch {
     let row = || (0..2000).map(|i| i as f32).collect();
     let (curve_time, curve_travel, curve_force, curve_lateral_force) = (row(), row(), row(), row());
-    ProbeTouch { id, index, curve_time, curve_travel, curve_force, curve_lateral_force, ..ProbeTouch::default() }
+    ProbeTouch {
+        id,
+        index,
+        curve_time,
+        curve_travel,
+        curve_force,
+        curve_lateral_force,
+        ..ProbeTouch::default()
+    }
 }
 
 fn main() -> anyhow::Result<()> {
-    let filter = Targets::new().with_default(LevelFilter::WARN).with_target("touchup", LevelFilter::INFO);
+    let filter = Targets::new()
+        .with_default(LevelFilter::WARN)
+        .with_target("touchup", LevelFilter::INFO);
     tracing_subscriber::registry()
         .with(tracing_subscriber::fmt::layer().with_writer(std::io::stderr))
         .with(filter)
@@ -74,12 +113,26 @@ fn main() -> anyhow::Result<()> {
             Arrival::Call(Call::Undo(request, reply)) => {
                 // as long as it is asked for: in the enhanced mapping it is cut where it fits into no packet
                 let message = "echo".repeat(request.strokes as usize);
-                let answer = UndoResponse { success: true, message, mesh_version: 1 << 40, ..Default::default() };
-                reply.send(UndoResponse { strokes: request.strokes, ..answer });
+                let answer = UndoResponse {
+                    success: true,
+                    message,
+                    mesh_version: 1 << 40,
+                    ..Default::default()
+                };
+                reply.send(UndoResponse {
+                    strokes: request.strokes,
+                    ..answer
+                });
             }
             Arrival::Call(Call::Detect(_, reply)) => {
-                let features = (0..FEATURES).map(|id| Feature { id, ..outline() }).collect();
-                let array = FeatureArray { mesh_version: 7, features, ..FeatureArray::default() };
+                let features = (0..FEATURES)
+                    .map(|id| Feature { id, ..outline() })
+                    .collect();
+                let array = FeatureArray {
+                    mesh_version: 7,
+                    features,
+                    ..FeatureArray::default()
+                };
                 port.publish(Publication::Features(array));
                 reply.send(DetectFeaturesResponse {
                     success: true,
@@ -93,16 +146,35 @@ fn main() -> anyhow::Result<()> {
                 for index in 0..TOUCHES {
                     port.publish(Publication::ProbeTouch(touch(request.id, index)));
                 }
-                let result = ProbeResult { id: request.id, code: 1, feature: outline(), ..ProbeResult::default() };
-                let result = ProbeResult { message: "reached".to_owned(), touch_count: TOUCHES, ..result };
+                let result = ProbeResult {
+                    id: request.id,
+                    code: 1,
+                    feature: outline(),
+                    ..ProbeResult::default()
+                };
+                let result = ProbeResult {
+                    message: "reached".to_owned(),
+                    touch_count: TOUCHES,
+                    ..result
+                };
                 port.publish(Publication::ProbeResult(result.clone()));
                 reply.send(ProbeFeatureResponse { result });
             }
             Arrival::Call(Call::Arm(ArmOrder::Goal(request, goal))) => {
                 goal.accept.send(!request.ids.is_empty());
-                (0..3).for_each(|touch| (goal.feedback.0)(ProbeFeedback { touch, ..ProbeFeedback::default() }));
+                (0..3).for_each(|touch| {
+                    (goal.feedback.0)(ProbeFeedback {
+                        touch,
+                        ..ProbeFeedback::default()
+                    })
+                });
                 let (ids, codes) = ((0..MOST_NAMED).collect(), vec![4; MOST_NAMED as usize]);
-                let result = ProbeResponse { code: 4, ids, codes, ..ProbeResponse::default() };
+                let result = ProbeResponse {
+                    code: 4,
+                    ids,
+                    codes,
+                    ..ProbeResponse::default()
+                };
                 goal.result.send((GoalEnd::Succeeded, result));
             }
             Arrival::SetParameter(_, _, reply) => reply.send(Ok(())),
@@ -111,6 +183,11 @@ fn main() -> anyhow::Result<()> {
         }
         stdout().flush()?;
     }
-    println!("dropped {:?} lost {:?} unsent {:?}", port.dropped(), port.lost(), port.unsent());
+    println!(
+        "dropped {:?} lost {:?} unsent {:?}",
+        port.dropped(),
+        port.lost(),
+        port.unsent()
+    );
     Ok(())
 }

@@ -85,20 +85,38 @@ pub const BASIC: [(&str, &str); 14] = [
 
 /// The messages in a file: one in a `.msg`, two in a `.srv`, three in a `.action`.
 pub fn parse(package: &str, path: &str, text: &str) -> Result<Vec<Message>, String> {
-    let (file, kind) = path.rsplit('/').next().and_then(|name| name.split_once('.')).unwrap_or((path, ""));
+    let (file, kind) = path
+        .rsplit('/')
+        .next()
+        .and_then(|name| name.split_once('.'))
+        .unwrap_or((path, ""));
     let parts: &[&'static str] = match kind {
         "msg" => &[""],
         "srv" => &["Request", "Response"],
         "action" => &["Goal", "Result", "Feedback"],
-        _ => return Err(format!("{path}: it ends in .{kind}, definitions end in .msg, .srv or .action")),
+        _ => {
+            return Err(format!(
+                "{path}: it ends in .{kind}, definitions end in .msg, .srv or .action"
+            ));
+        }
     };
     let texts: Vec<&str> = text.split("\n---\n").collect();
     if texts.len() != parts.len() {
-        return Err(format!("{path}: {} parts, a .{kind} has {}", texts.len(), parts.len()));
+        return Err(format!(
+            "{path}: {} parts, a .{kind} has {}",
+            texts.len(),
+            parts.len()
+        ));
     }
-    let whole =
-        |part| Message { package: package.into(), kind: kind.into(), file: file.into(), part, ..Message::default() };
-    let read = |(part, text)| part_of(whole(part), text).map_err(|error| format!("{path}: {error}"));
+    let whole = |part| Message {
+        package: package.into(),
+        kind: kind.into(),
+        file: file.into(),
+        part,
+        ..Message::default()
+    };
+    let read =
+        |(part, text)| part_of(whole(part), text).map_err(|error| format!("{path}: {error}"));
     parts.iter().copied().zip(texts).map(read).collect()
 }
 
@@ -117,9 +135,17 @@ fn part_of(mut message: Message, text: &str) -> Result<Message, String> {
             }
             continue;
         }
-        let (code, behind) = line.split_once('#').map_or((line, ""), |(code, behind)| (code.trim(), behind.trim()));
-        let (item, rest) = code.split_once(' ').ok_or_else(|| format!("\"{line}\" has a type and no name"))?;
-        let own = if behind.is_empty() { comment.paragraphs.join(" ") } else { behind.to_owned() };
+        let (code, behind) = line
+            .split_once('#')
+            .map_or((line, ""), |(code, behind)| (code.trim(), behind.trim()));
+        let (item, rest) = code
+            .split_once(' ')
+            .ok_or_else(|| format!("\"{line}\" has a type and no name"))?;
+        let own = if behind.is_empty() {
+            comment.paragraphs.join(" ")
+        } else {
+            behind.to_owned()
+        };
         let is_silent = behind.is_empty() && replace(&mut comment.is_used, true);
         match rest.split_once('=') {
             Some((name, value)) => message.constants.push(Constant {
@@ -129,7 +155,9 @@ fn part_of(mut message: Message, text: &str) -> Result<Message, String> {
                 comment: if is_silent { String::new() } else { own },
                 of: message.fields.len(),
             }),
-            None => message.fields.push(field(&message.package, item, rest, own)?),
+            None => message
+                .fields
+                .push(field(&message.package, item, rest, own)?),
         }
     }
     Ok(message)
@@ -157,13 +185,18 @@ impl Comment {
 }
 
 fn field(package: &str, item: &str, rest: &str, mut comment: String) -> Result<Field, String> {
-    let (name, default) =
-        rest.split_once(' ').map_or((rest, None), |(name, default)| (name, Some(default.trim().into())));
+    let (name, default) = rest
+        .split_once(' ')
+        .map_or((rest, None), |(name, default)| {
+            (name, Some(default.trim().into()))
+        });
     let (item, count) = item
         .strip_suffix(']')
         .and_then(|item| item.split_once('['))
         .map_or((item, None), |(item, count)| (item, Some(count)));
-    let (item, letters) = item.split_once("<=").map_or((item, None), |(item, most)| (item, Some(most)));
+    let (item, letters) = item
+        .split_once("<=")
+        .map_or((item, None), |(item, most)| (item, Some(most)));
     let most = count.and_then(|count| count.strip_prefix("<="));
     for (most, of) in [(most, "items"), (letters, "letters")] {
         if let Some(most) = most {
@@ -173,11 +206,23 @@ fn field(package: &str, item: &str, rest: &str, mut comment: String) -> Result<F
     let length = match count {
         None => Length::One,
         Some(count) if count.is_empty() || most.is_some() => Length::Any,
-        Some(count) => {
-            Length::Fixed(count.parse().map_err(|_| format!("{name} has a length that is no number: {count}"))?)
-        }
+        Some(count) => Length::Fixed(
+            count
+                .parse()
+                .map_err(|_| format!("{name} has a length that is no number: {count}"))?,
+        ),
     };
     let is_whole = item.contains('/') || BASIC.iter().any(|(basic, _)| *basic == item);
-    let item = if is_whole { item.to_owned() } else { format!("{package}/{item}") };
-    Ok(Field { item, length, name: name.to_owned(), default, comment })
+    let item = if is_whole {
+        item.to_owned()
+    } else {
+        format!("{package}/{item}")
+    };
+    Ok(Field {
+        item,
+        length,
+        name: name.to_owned(),
+        default,
+        comment,
+    })
 }

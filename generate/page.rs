@@ -26,7 +26,16 @@ pub fn build(web: &Path, out: &Path) -> Result<String, Box<dyn Error>> {
     let lock = fs::read(place.join("package-lock.json"))?;
     let installed = place.join("installed.lock");
     if fs::read(&installed).ok().as_ref() != Some(&lock) {
-        npm(&place, &["ci", "--ignore-scripts", "--no-audit", "--no-fund", "--loglevel=error"])?;
+        npm(
+            &place,
+            &[
+                "ci",
+                "--ignore-scripts",
+                "--no-audit",
+                "--no-fund",
+                "--loglevel=error",
+            ],
+        )?;
         fs::write(&installed, &lock)?;
     }
     npm(&place, &["run", "build", "--silent"])?;
@@ -34,7 +43,10 @@ pub fn build(web: &Path, out: &Path) -> Result<String, Box<dyn Error>> {
 }
 
 fn npm(place: &Path, arguments: &[&str]) -> Result<(), Box<dyn Error>> {
-    let ended = Command::new("npm").args(arguments).current_dir(place).output();
+    let ended = Command::new("npm")
+        .args(arguments)
+        .current_dir(place)
+        .output();
     let ended = ended.map_err(|error| match error.kind() {
         io::ErrorKind::NotFound => NO_NPM.to_owned(),
         _ => format!("npm: {error}"),
@@ -42,7 +54,8 @@ fn npm(place: &Path, arguments: &[&str]) -> Result<(), Box<dyn Error>> {
     if ended.status.success() {
         return Ok(());
     }
-    let said = String::from_utf8_lossy(&ended.stdout).into_owned() + &String::from_utf8_lossy(&ended.stderr);
+    let said = String::from_utf8_lossy(&ended.stdout).into_owned()
+        + &String::from_utf8_lossy(&ended.stderr);
     Err(format!("npm {}: {}\n{said}", arguments.join(" "), ended.status).into())
 }
 
@@ -61,7 +74,10 @@ fn files(root: &Path, folder: &Path) -> io::Result<Vec<PathBuf>> {
         let path = folder.join(entry.file_name());
         if !entry.file_type()?.is_dir() {
             found.push(path);
-        } else if !["node_modules", "dist"].iter().any(|made| path.as_path() == Path::new(made)) {
+        } else if !["node_modules", "dist"]
+            .iter()
+            .any(|made| path.as_path() == Path::new(made))
+        {
             found.extend(files(root, &path)?);
         }
     }
@@ -70,11 +86,20 @@ fn files(root: &Path, folder: &Path) -> io::Result<Vec<PathBuf>> {
 }
 
 fn constants(dist: &Path) -> Result<String, Box<dyn Error>> {
-    let mut text = "/// All files of the page.\npub(super) const PAGE: &[PageFile] = &[\n".to_owned();
+    let mut text =
+        "/// All files of the page.\npub(super) const PAGE: &[PageFile] = &[\n".to_owned();
     for file in files(dist, Path::new(""))? {
         let path = dist.join(&file);
-        let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let content_type = match file.extension().and_then(|ending| ending.to_str()).unwrap_or_default() {
+        let name = file
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        let content_type = match file
+            .extension()
+            .and_then(|ending| ending.to_str())
+            .unwrap_or_default()
+        {
             "gz" => continue,
             "html" => "text/html; charset=utf-8",
             "js" => "text/javascript; charset=utf-8",
@@ -82,7 +107,11 @@ fn constants(dist: &Path) -> Result<String, Box<dyn Error>> {
             "svg" => "image/svg+xml",
             "png" => "image/png",
             "json" | "webmanifest" => "application/manifest+json",
-            other => return Err(format!("{}: what is a file .{other} of the page?", path.display()).into()),
+            other => {
+                return Err(
+                    format!("{}: what is a file .{other} of the page?", path.display()).into(),
+                );
+            }
         };
         let compressed = PathBuf::from(format!("{}.gz", path.display()));
         let gzip = match compressed.exists() {

@@ -9,40 +9,77 @@ const EMPTY: &str = "structure_needs_at_least_one_member";
 
 /// The structs, their constants and names.
 pub fn structs(messages: &[Message]) -> Result<String, String> {
-    messages.iter().map(|message| structure(message, messages)).collect()
+    messages
+        .iter()
+        .map(|message| structure(message, messages))
+        .collect()
 }
 
 fn structure(message: &Message, all: &[Message]) -> Result<String, String> {
     let name = name(message);
-    let fields: Result<String, String> = message.fields.iter().map(|field| declared(field, all)).collect();
+    let fields: Result<String, String> = message
+        .fields
+        .iter()
+        .map(|field| declared(field, all))
+        .collect();
     let mut fields = fields?;
     if message.fields.is_empty() {
         fields = format!("    /// 0, means nothing\n    pub {EMPTY}: u8,\n");
     }
-    let mut derived = vec!["Clone", "Debug", "PartialEq", "serde::Serialize", "serde::Deserialize"];
+    let mut derived = vec![
+        "Clone",
+        "Debug",
+        "PartialEq",
+        "serde::Serialize",
+        "serde::Deserialize",
+    ];
     let has_default = message.fields.iter().any(|field| field.default.is_some());
     for (name, is_so) in [
-        ("Copy", every(message, all, |field| field.length != Length::Any && field.item != "string")),
-        ("Eq", every(message, all, |field| !field.item.starts_with("float"))),
+        (
+            "Copy",
+            every(message, all, |field| {
+                field.length != Length::Any && field.item != "string"
+            }),
+        ),
+        (
+            "Eq",
+            every(message, all, |field| !field.item.starts_with("float")),
+        ),
         ("Default", !has_default),
     ] {
         derived.extend(is_so.then_some(name));
     }
     let mut text = documentation(message);
-    text += &format!("#[derive({})]\npub struct {name} {{\n{fields}}}\n", derived.join(", "));
+    text += &format!(
+        "#[derive({})]\npub struct {name} {{\n{fields}}}\n",
+        derived.join(", ")
+    );
     if !message.constants.is_empty() {
-        let constants: String = message.constants.iter().map(|one| constant(one, message)).collect();
+        let constants: String = message
+            .constants
+            .iter()
+            .map(|one| constant(one, message))
+            .collect();
         text += &format!("impl {name} {{\n{constants}}}\n");
     }
     if has_default {
         let values: String = message.fields.iter().map(default).collect();
-        let begin = format!("impl Default for {name} {{\n    fn default() -> Self {{\n        Self {{\n");
+        let begin =
+            format!("impl Default for {name} {{\n    fn default() -> Self {{\n        Self {{\n");
         text += &(begin + &values + "        }\n    }\n}\n");
     }
-    let Message { package, kind, file, part, .. } = message;
+    let Message {
+        package,
+        kind,
+        file,
+        part,
+        ..
+    } = message;
     let gap = if part.is_empty() { "" } else { "_" };
     let whole = format!("\"{package}/{kind}/{file}{gap}{part}\"");
-    text += &format!("impl RosMessage for {name} {{\n    const TYPE_NAME: &'static str = {whole};\n}}\n\n");
+    text += &format!(
+        "impl RosMessage for {name} {{\n    const TYPE_NAME: &'static str = {whole};\n}}\n\n"
+    );
     if message.part == "Request" {
         text += &service(message);
     }
@@ -51,8 +88,9 @@ fn structure(message: &Message, all: &[Message]) -> Result<String, String> {
 
 /// A service by itself, as a type without values.
 fn service(Message { package, file, .. }: &Message) -> String {
-    let declared =
-        format!("/// The service `{package}/srv/{file}`.\n#[derive(Clone, Copy, Debug)]\npub enum {file} {{}}\n");
+    let declared = format!(
+        "/// The service `{package}/srv/{file}`.\n#[derive(Clone, Copy, Debug)]\npub enum {file} {{}}\n"
+    );
     let parts = format!("    type Request = {file}Request;\n    type Response = {file}Response;\n");
     let name = format!("    const TYPE_NAME: [&'static str; 2] = [\"{package}\", \"{file}\"];\n");
     format!("{declared}impl RosService for {file} {{\n{parts}{name}}}\n\n")
@@ -60,21 +98,46 @@ fn service(Message { package, file, .. }: &Message) -> String {
 
 /// For `carried!`: requests, answers and feedback.
 pub fn carried(messages: &[Message]) -> String {
-    let parts: Vec<_> = messages.iter().filter(|message| !message.part.is_empty()).map(name).collect();
+    let parts: Vec<_> = messages
+        .iter()
+        .filter(|message| !message.part.is_empty())
+        .map(name)
+        .collect();
     format!("carried!({});\n", parts.join(", "))
 }
 
 /// In a package of Rust names stand alone: `FlagFeatureRequest`; the result of an action gives way to the message of that name.
 fn name(message: &Message) -> String {
-    format!("{}{}", message.file, if message.part == "Result" { "Response" } else { message.part })
+    format!(
+        "{}{}",
+        message.file,
+        if message.part == "Result" {
+            "Response"
+        } else {
+            message.part
+        }
+    )
 }
 
 fn documentation(message: &Message) -> String {
-    let whole = if message.kind == "srv" { "service" } else { "action" };
-    let head = (!message.part.is_empty()).then(|| format!("{} of the {whole} `{}`.", message.part, message.file));
+    let whole = if message.kind == "srv" {
+        "service"
+    } else {
+        "action"
+    };
+    let head = (!message.part.is_empty())
+        .then(|| format!("{} of the {whole} `{}`.", message.part, message.file));
     // of a service or action the comment of the file stands above its first part
-    let gap = if head.is_some() && !message.comment.is_empty() { "///\n" } else { "" };
-    let paragraphs: Vec<_> = message.comment.iter().map(|paragraph| escaped(paragraph, "")).collect();
+    let gap = if head.is_some() && !message.comment.is_empty() {
+        "///\n"
+    } else {
+        ""
+    };
+    let paragraphs: Vec<_> = message
+        .comment
+        .iter()
+        .map(|paragraph| escaped(paragraph, ""))
+        .collect();
     head.map(|head| format!("/// {head}\n")).unwrap_or_default() + gap + &paragraphs.join("///\n")
 }
 
@@ -89,11 +152,18 @@ fn declared(field: &Field, all: &[Message]) -> Result<String, String> {
         (Some(basic), _) => basic.to_owned(),
         (None, Some(message)) => name(message),
         (None, None) => {
-            return Err(format!("{} is no type: is it described below src/ros/messages/standard?", field.item));
+            return Err(format!(
+                "{} is no type: is it described below src/ros/messages/standard?",
+                field.item
+            ));
         }
     };
     let comment = escaped(&field.comment, "    ");
-    Ok(format!("{comment}    pub {}: {},\n", raw(&field.name), list(&item, field.length)))
+    Ok(format!(
+        "{comment}    pub {}: {},\n",
+        raw(&field.name),
+        list(&item, field.length)
+    ))
 }
 
 fn list(item: &str, length: Length) -> String {
@@ -105,17 +175,35 @@ fn list(item: &str, length: Length) -> String {
 }
 
 fn constant(constant: &Constant, message: &Message) -> String {
-    let Constant { item, name, value, comment, of } = constant;
+    let Constant {
+        item,
+        name,
+        value,
+        comment,
+        of,
+    } = constant;
     let comment = match message.fields.get(*of) {
-        Some(field) if comment.is_empty() => format!("    /// a value of [`Self::{}`]\n", field.name),
+        Some(field) if comment.is_empty() => {
+            format!("    /// a value of [`Self::{}`]\n", field.name)
+        }
         _ => escaped(comment, "    "),
     };
-    let kind = if item == "string" { "&str" } else { basic(item).unwrap_or(item) };
-    format!("{comment}    pub const {name}: {kind} = {};\n", literal(item, value))
+    let kind = if item == "string" {
+        "&str"
+    } else {
+        basic(item).unwrap_or(item)
+    };
+    format!(
+        "{comment}    pub const {name}: {kind} = {};\n",
+        literal(item, value)
+    )
 }
 
 fn default(field: &Field) -> String {
-    let value = field.default.as_ref().map(|value| literal(&field.item, value));
+    let value = field
+        .default
+        .as_ref()
+        .map(|value| literal(&field.item, value));
     let value = match value {
         Some(text) if field.item == "string" => format!("{text}.into()"),
         Some(value) => value,
@@ -129,35 +217,55 @@ fn literal(item: &str, value: &str) -> String {
     match item {
         "string" => format!("{:?}", value.trim_matches(['"', '\''])),
         "bool" => (value == "1" || value.eq_ignore_ascii_case("true")).to_string(),
-        "float32" | "float64" => format!("{value}_{}", if item == "float32" { "f32" } else { "f64" }),
+        "float32" | "float64" => {
+            format!("{value}_{}", if item == "float32" { "f32" } else { "f64" })
+        }
         _ => value.to_owned(),
     }
 }
 
 fn basic(item: &str) -> Option<&'static str> {
-    BASIC.iter().find(|(name, _)| *name == item).map(|(_, rust)| *rust)
+    BASIC
+        .iter()
+        .find(|(name, _)| *name == item)
+        .map(|(_, rust)| *rust)
 }
 
 fn defined<'a>(item: &str, all: &'a [Message]) -> Option<&'a Message> {
     let (package, name) = item.split_once('/')?;
-    all.iter().find(|message| message.kind == "msg" && message.package == package && message.file == name)
+    all.iter()
+        .find(|message| message.kind == "msg" && message.package == package && message.file == name)
 }
 
 /// Whether something is so of every field, and of every field of those.
 fn every(message: &Message, all: &[Message], is_so: fn(&Field) -> bool) -> bool {
-    message.fields.iter().all(|field| is_so(field) && defined(&field.item, all).is_none_or(|of| every(of, all, is_so)))
+    message.fields.iter().all(|field| {
+        is_so(field) && defined(&field.item, all).is_none_or(|of| every(of, all, is_so))
+    })
 }
 
 /// A name as Rust takes it.
 fn raw(name: &str) -> String {
-    if name == "type" { format!("r#{name}") } else { name.to_owned() }
+    if name == "type" {
+        format!("r#{name}")
+    } else {
+        name.to_owned()
+    }
 }
 
 /// For `message!` and `service!`: each message and service, what r2r calls it, and the fields on both sides.
 pub fn conversions(messages: &[Message]) -> String {
     let lines = messages.iter().map(|message| {
-        let fields = message.fields.iter().map(|field| format!("{}: {}, ", raw(&field.name), trailed(&field.name)));
-        let both = format!("message!({} = {} {{ {}}});\n", name(message), path(message), fields.collect::<String>());
+        let fields = message
+            .fields
+            .iter()
+            .map(|field| format!("{}: {}, ", raw(&field.name), trailed(&field.name)));
+        let both = format!(
+            "message!({} = {} {{ {}}});\n",
+            name(message),
+            path(message),
+            fields.collect::<String>()
+        );
         let service = path(message).replace("::Request", "::Service");
         both + &if message.part == "Request" {
             format!("service!({} = {service});\n", message.file)
@@ -170,14 +278,32 @@ pub fn conversions(messages: &[Message]) -> String {
 
 /// A name as r2r takes it.
 fn trailed(name: &str) -> String {
-    if name == "type" { format!("{name}_") } else { name.to_owned() }
+    if name == "type" {
+        format!("{name}_")
+    } else {
+        name.to_owned()
+    }
 }
 
 /// Where r2r has it.
 fn path(message: &Message) -> String {
-    let Message { package, kind, file, part, .. } = message;
-    let module = if STAND_INS.contains(&package.as_str()) { "super" } else { "r2r" };
-    let end = if part.is_empty() { String::new() } else { format!("::{part}") };
+    let Message {
+        package,
+        kind,
+        file,
+        part,
+        ..
+    } = message;
+    let module = if STAND_INS.contains(&package.as_str()) {
+        "super"
+    } else {
+        "r2r"
+    };
+    let end = if part.is_empty() {
+        String::new()
+    } else {
+        format!("::{part}")
+    };
     format!("{module}::{package}::{kind}::{file}{end}")
 }
 
@@ -185,8 +311,13 @@ fn path(message: &Message) -> String {
 pub fn stand_ins(messages: &[Message]) -> String {
     let modules = STAND_INS.map(|package| {
         let kinds = ["msg", "srv", "action"].map(|kind| {
-            let of_kind: Vec<_> = messages.iter().filter(|one| one.package == package && one.kind == kind).collect();
-            let files = of_kind.chunk_by(|one, next| one.file == next.file).map(stand_in);
+            let of_kind: Vec<_> = messages
+                .iter()
+                .filter(|one| one.package == package && one.kind == kind)
+                .collect();
+            let files = of_kind
+                .chunk_by(|one, next| one.file == next.file)
+                .map(stand_in);
             format!("pub mod {kind} {{\n{}}}\n", files.collect::<String>())
         });
         format!("pub mod {package} {{\n{}}}\n", kinds.concat())
@@ -200,10 +331,20 @@ fn stand_in(parts: &[&Message]) -> String {
         2 => "service",
         _ => "action",
     };
-    let parts: Vec<_> =
-        parts.iter().map(|part| (part.file.as_str(), part.fields.iter().map(theirs).collect::<String>())).collect();
+    let parts: Vec<_> = parts
+        .iter()
+        .map(|part| {
+            (
+                part.file.as_str(),
+                part.fields.iter().map(theirs).collect::<String>(),
+            )
+        })
+        .collect();
     let name = parts.first().map_or("", |(name, _)| name);
-    let fields: String = parts.iter().map(|(_, fields)| format!(" {{ {fields}}}")).collect();
+    let fields: String = parts
+        .iter()
+        .map(|(_, fields)| format!(" {{ {fields}}}"))
+        .collect();
     format!("{kind}!({name}{fields});\n")
 }
 

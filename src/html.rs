@@ -37,7 +37,11 @@ pub(crate) fn base64(bytes: &[u8]) -> String {
         let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
         for at in 0..4 {
             let sextet = bits >> (18 - 6 * at) & 63;
-            text.push(if at > chunk.len() { '=' } else { LETTERS[sextet as usize] as char });
+            text.push(if at > chunk.len() {
+                '='
+            } else {
+                LETTERS[sextet as usize] as char
+            });
         }
     }
     text
@@ -48,12 +52,26 @@ pub(crate) fn base64(bytes: &[u8]) -> String {
 /// - `rows`: cells that are HTML already.
 pub(crate) fn table(class: &str, head: &[&str], rows: &[Vec<String>]) -> String {
     let cells = |tag: &str, cells: &mut dyn Iterator<Item = &str>| {
-        cells.map(|cell| format!("<{tag}>{cell}</{tag}>")).collect::<String>()
+        cells
+            .map(|cell| format!("<{tag}>{cell}</{tag}>"))
+            .collect::<String>()
     };
-    let body: String =
-        rows.iter().map(|row| format!("<tr>{}</tr>\n", cells("td", &mut row.iter().map(String::as_str)))).collect();
-    let head: String = head.iter().map(|cell| format!("<th scope=\"col\">{cell}</th>")).collect();
-    format!("<table class=\"{class}\">\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody>\n</table>\n")
+    let body: String = rows
+        .iter()
+        .map(|row| {
+            format!(
+                "<tr>{}</tr>\n",
+                cells("td", &mut row.iter().map(String::as_str))
+            )
+        })
+        .collect();
+    let head: String = head
+        .iter()
+        .map(|cell| format!("<th scope=\"col\">{cell}</th>"))
+        .collect();
+    format!(
+        "<table class=\"{class}\">\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody>\n</table>\n"
+    )
 }
 
 #[cfg(test)]
@@ -63,13 +81,22 @@ mod tests {
     #[test]
     fn markup_in_a_name_stays_text() {
         assert_eq!(escaped("<b>&\"'\u{7}"), "&lt;b&gt;&amp;&quot;&#39;\u{fffd}");
-        assert_eq!(css_string("a\"</style>\n"), "\"a\\22 \\3c \\2f style\\3e  \"");
+        assert_eq!(
+            css_string("a\"</style>\n"),
+            "\"a\\22 \\3c \\2f style\\3e  \""
+        );
     }
 
     /// The examples of RFC 4648, 10.
     #[test]
     fn base64_has_the_examples_of_its_standard() {
-        for (text, expected) in [("", ""), ("f", "Zg=="), ("fo", "Zm8="), ("foo", "Zm9v"), ("foobar", "Zm9vYmFy")] {
+        for (text, expected) in [
+            ("", ""),
+            ("f", "Zg=="),
+            ("fo", "Zm8="),
+            ("foo", "Zm9v"),
+            ("foobar", "Zm9vYmFy"),
+        ] {
             assert_eq!(base64(text.as_bytes()), expected);
         }
     }

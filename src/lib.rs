@@ -22,7 +22,8 @@
 struct MethodPage;
 
 pub use touchup_core::{
-    align, calibrate, compare, conformity, diagnose, features, form, haptic, mesh, probing, reconstruct, stylus,
+    align, calibrate, compare, conformity, diagnose, features, form, haptic, mesh, probing,
+    reconstruct, stylus,
 };
 pub use touchup_session::{
     calibration, clock, input_check, live, refinement, replay, scan, scene, session, sweep, threads,

@@ -60,12 +60,17 @@ impl<S: Subscriber> Layer<S> for LogLines {
         if !about.target().starts_with("touchup") {
             return;
         }
-        let Some(listener) = locked(&LISTENER).clone() else { return };
+        let Some(listener) = locked(&LISTENER).clone() else {
+            return;
+        };
         let place = (about.file().unwrap_or_default(), about.line().unwrap_or(0));
         let now = Instant::now();
         {
             let mut said = locked(&self.said);
-            if said.get(&place).is_some_and(|last| now.saturating_duration_since(*last) < EVERY) {
+            if said
+                .get(&place)
+                .is_some_and(|last| now.saturating_duration_since(*last) < EVERY)
+            {
                 return;
             }
             said.insert(place, now);
@@ -74,11 +79,18 @@ impl<S: Subscriber> Layer<S> for LogLines {
         event.record(&mut text);
         let LineText { mut said, fields } = text;
         said.push_str(&fields);
-        let whole = (0..=LONGEST.min(said.len())).rev().find(|&at| said.is_char_boundary(at));
+        let whole = (0..=LONGEST.min(said.len()))
+            .rev()
+            .find(|&at| said.is_char_boundary(at));
         said.truncate(whole.unwrap_or(0));
         let (file, line) = place;
         // nobody waits for room
-        let _ = listener.try_send(LogLine { level: *about.level(), text: said, file, line });
+        let _ = listener.try_send(LogLine {
+            level: *about.level(),
+            text: said,
+            file,
+            line,
+        });
     }
 }
 
@@ -111,13 +123,24 @@ mod tests {
     fn lines_of_this_program_come_with_their_fields_and_what_repeats_itself_comes_once() {
         let lines = listen();
         tracing::subscriber::with_default(registry().with(LogLines::default()), || {
-            (0..100).for_each(|count| tracing::warn!(topic = "stylus/pose", count, "messages could not be read"));
+            (0..100).for_each(|count| {
+                tracing::warn!(topic = "stylus/pose", count, "messages could not be read")
+            });
             tracing::error!(target: "rustdds", "what a library says");
             tracing::info!("{}", "ä".repeat(LONGEST));
         });
-        let mine: Vec<_> = lines.try_iter().filter(|line| line.file.ends_with("log_lines.rs")).collect();
+        let mine: Vec<_> = lines
+            .try_iter()
+            .filter(|line| line.file.ends_with("log_lines.rs"))
+            .collect();
         assert_eq!(mine.len(), 2, "{mine:?}");
-        assert_eq!(mine[0].text, "messages could not be read topic=\"stylus/pose\" count=0");
-        assert_eq!((mine[0].level, mine[1].level, mine[1].text.len()), (Level::WARN, Level::INFO, LONGEST));
+        assert_eq!(
+            mine[0].text,
+            "messages could not be read topic=\"stylus/pose\" count=0"
+        );
+        assert_eq!(
+            (mine[0].level, mine[1].level, mine[1].text.len()),
+            (Level::WARN, Level::INFO, LONGEST)
+        );
     }
 }

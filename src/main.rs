@@ -13,9 +13,18 @@ use tracing_subscriber::util::SubscriberInitExt;
 fn main() -> ExitCode {
     let arguments: Vec<OsString> = std::env::args_os().collect();
     // RUST_LOG=touchup=debug shows more; results go to stdout, all else to stderr
-    let wanted: Option<Targets> = std::env::var("RUST_LOG").ok().and_then(|levels| levels.parse().ok());
+    let wanted: Option<Targets> = std::env::var("RUST_LOG")
+        .ok()
+        .and_then(|levels| levels.parse().ok());
     let filter = wanted.unwrap_or_else(|| log_filter(&arguments));
-    let lines = tracing_subscriber::fmt::layer().with_writer(stderr).with_ansi(stderr().is_terminal()).without_time();
-    tracing_subscriber::registry().with(lines).with(LogLines::default()).with(filter).init();
+    let lines = tracing_subscriber::fmt::layer()
+        .with_writer(stderr)
+        .with_ansi(stderr().is_terminal())
+        .without_time();
+    tracing_subscriber::registry()
+        .with(lines)
+        .with(LogLines::default())
+        .with(filter)
+        .init();
     run(arguments)
 }

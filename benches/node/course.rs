@@ -22,9 +22,15 @@ pub struct Times {
 
 impl Times {
     pub fn of(latencies: &Latencies) -> Option<Self> {
-        let Quantiles { median, p99, max, .. } = latencies.quantiles();
+        let Quantiles {
+            median, p99, max, ..
+        } = latencies.quantiles();
         let [median, p99, longest] = [median, p99, max].map(|ns| ns as f64 * 1e-6);
-        (max > 0).then_some(Self { median, p99, longest })
+        (max > 0).then_some(Self {
+            median,
+            p99,
+            longest,
+        })
     }
 }
 
@@ -76,8 +82,17 @@ fn seconds(answers: &Answers, drawn: &Drawn, memory: &[(i64, f64)]) -> Vec<Secon
         let seen = drawn.seconds.get(&at);
         let before = memory.partition_point(|(at_ns, _)| *at_ns <= (at + 1) * 1_000_000_000);
         let memory = before.checked_sub(1).map(|last| memory[last].1);
-        let (drawn, shown) = (seen.and_then(|seen| seen.drawn), seen.and_then(|seen| seen.shown));
-        Second { unanswered, answer, drawn, shown, memory }
+        let (drawn, shown) = (
+            seen.and_then(|seen| seen.drawn),
+            seen.and_then(|seen| seen.shown),
+        );
+        Second {
+            unanswered,
+            answer,
+            drawn,
+            shown,
+            memory,
+        }
     };
     answers.seconds.iter().zip(first..).map(second).collect()
 }
@@ -87,12 +102,20 @@ fn seconds(answers: &Answers, drawn: &Drawn, memory: &[(i64, f64)]) -> Vec<Secon
 /// - `memory`: of the node, MB, with the time at which it was that, ns since 1970.
 pub fn write(folder: &Path, faces: usize, answers: &Answers, drawn: &Drawn, memory: &[(i64, f64)]) {
     let seconds = seconds(answers, drawn, memory);
-    let (figures, tables) = (vec![lag(faces, &seconds), usage(&seconds)], vec![table(&seconds)]);
+    let (figures, tables) = (
+        vec![lag(faces, &seconds), usage(&seconds)],
+        vec![table(&seconds)],
+    );
     let report = Report {
         machine: describe_machine(),
         commit: COMMIT.to_owned(),
         command: format!("cargo bench --bench node -- dds {faces} {}", seconds.len()),
-        chapters: vec![Chapter::of("The node in real time", Vec::new(), figures, tables)],
+        chapters: vec![Chapter::of(
+            "The node in real time",
+            Vec::new(),
+            figures,
+            tables,
+        )],
         ..Report::default()
     };
     std::fs::create_dir_all(folder).expect("the folder can be made");
@@ -102,7 +125,10 @@ pub fn write(folder: &Path, faces: usize, answers: &Answers, drawn: &Drawn, memo
 }
 
 fn course(name: &str, seconds: &[Second], value: impl Fn(&Second) -> Option<f64>) -> Series {
-    let marks = seconds.iter().zip(1..).filter_map(|(second, at)| Some(Mark::at(f64::from(at), value(second)?)));
+    let marks = seconds
+        .iter()
+        .zip(1..)
+        .filter_map(|(second, at)| Some(Mark::at(f64::from(at), value(second)?)));
     Series::new(name, LineStroke::Course, marks)
 }
 
@@ -110,14 +136,26 @@ fn lag(faces: usize, seconds: &[Second]) -> Figure {
     let shown = |second: &Second| Some(second.shown?.0);
     let end = seconds.len() as f64;
     let series = vec![
-        course("answer, median", seconds, |second| Some(second.answer?.median)),
+        course("answer, median", seconds, |second| {
+            Some(second.answer?.median)
+        }),
         course("answer, 99 %", seconds, |second| Some(second.answer?.p99)),
-        course("answer, longest", seconds, |second| Some(second.answer?.longest)),
-        course("patch, median", seconds, |second| Some(shown(second)?.median)),
+        course("answer, longest", seconds, |second| {
+            Some(second.answer?.longest)
+        }),
+        course("patch, median", seconds, |second| {
+            Some(shown(second)?.median)
+        }),
         course("patch, 99 %", seconds, |second| Some(shown(second)?.p99)),
-        course("patch, longest", seconds, |second| Some(shown(second)?.longest)),
+        course("patch, longest", seconds, |second| {
+            Some(shown(second)?.longest)
+        }),
         course("viewer, 99 %", seconds, |second| Some(second.drawn?.p99)),
-        Series::new("50 ms", LineStroke::Dashed, [0.0, end].map(|at| Mark::at(at, WANTED_MS))),
+        Series::new(
+            "50 ms",
+            LineStroke::Dashed,
+            [0.0, end].map(|at| Mark::at(at, WANTED_MS)),
+        ),
     ];
     Figure::of("live_lag", Drawing::Curves(series))
         .title(format!("The node on a scan of {faces} faces at 1 kHz: from a touch to what comes of it"))
@@ -130,17 +168,28 @@ fn lag(faces: usize, seconds: &[Second]) -> Figure {
 
 fn usage(seconds: &[Second]) -> Figure {
     let unanswered: u64 = seconds.iter().map(|second| second.unanswered).sum();
-    let [renewals, late] = seconds.iter().rev().find_map(|second| Some(second.shown?.1)).unwrap_or_default();
+    let [renewals, late] = seconds
+        .iter()
+        .rev()
+        .find_map(|second| Some(second.shown?.1))
+        .unwrap_or_default();
     let title = format!(
         "Memory of the node; {unanswered} of {} samples not answered, {late} of {renewals} renewals late",
         1000 * seconds.len()
     );
     // from 0, so that what is flat looks flat
-    let floor = Series::new("0", LineStroke::Dashed, [0.0, seconds.len() as f64].map(|at| Mark::at(at, 0.0)));
+    let floor = Series::new(
+        "0",
+        LineStroke::Dashed,
+        [0.0, seconds.len() as f64].map(|at| Mark::at(at, 0.0)),
+    );
     let memory = course("memory", seconds, |second| second.memory);
     Figure::of("live_memory", Drawing::Curves(vec![memory, floor]))
         .title(title)
-        .axes(Axis::linear("time, s", "time_s"), Axis::linear("memory, MB", "memory_mb"))
+        .axes(
+            Axis::linear("time, s", "time_s"),
+            Axis::linear("memory, MB", "memory_mb"),
+        )
         .caption("Resident memory of the process, the scan in it.")
 }
 
@@ -156,14 +205,22 @@ fn table(seconds: &[Second]) -> Table {
     ];
     for (name, times) in parts {
         table = table
-            .column(format!("{name}, median, ms"), |at| Some(times(second(at))?.median))
-            .column(format!("{name}, 99 %, ms"), |at| Some(times(second(at))?.p99))
-            .column(format!("{name}, longest, ms"), |at| Some(times(second(at))?.longest));
+            .column(format!("{name}, median, ms"), |at| {
+                Some(times(second(at))?.median)
+            })
+            .column(format!("{name}, 99 %, ms"), |at| {
+                Some(times(second(at))?.p99)
+            })
+            .column(format!("{name}, longest, ms"), |at| {
+                Some(times(second(at))?.longest)
+            });
     }
     let counts = |at: usize| Some(second(at).shown?.1);
     table
         .column("renewals so far", |at| Some(counts(at)?[0] as usize))
         .column("… late", |at| Some(counts(at)?[1] as usize))
         .column("memory, MB", |at| second(at).memory)
-        .caption("What sensors and viewer saw in each second, and the memory of the node at its end.")
+        .caption(
+            "What sensors and viewer saw in each second, and the memory of the node at its end.",
+        )
 }

@@ -17,7 +17,9 @@ fn opened(address: SocketAddr) -> TcpStream {
         "Sec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==".to_owned(),
         "Sec-WebSocket-Protocol: touchup.v1".to_owned(),
     ];
-    stream.write_all((lines.join("\r\n") + "\r\n\r\n").as_bytes()).expect("the page listens");
+    stream
+        .write_all((lines.join("\r\n") + "\r\n\r\n").as_bytes())
+        .expect("the page listens");
     stream
 }
 

@@ -8,13 +8,18 @@ use std::thread::{sleep, spawn};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use ros2_client::dds::rustdds::mio1::{Events, Interest, Poll, Token};
-use ros2_client::dds::rustdds::{DomainParticipantBuilder, DomainParticipantStatusEvent, StatusEvented};
+use ros2_client::dds::rustdds::{
+    DomainParticipantBuilder, DomainParticipantStatusEvent, StatusEvented,
+};
 use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
-use ros2_client::{Context, MessageTypeName, Name, Node, NodeName, NodeOptions, Publisher, Subscription};
+use ros2_client::{
+    Context, MessageTypeName, Name, Node, NodeName, NodeOptions, Publisher, Subscription,
+};
 use touchup::live::Latencies;
 use touchup::ros::clock::stamp_ns;
 use touchup::ros::messages::{
-    DiagnosticArray, HapticMismatch, Marker, MeshPatch, Point, PoseStamped, RosMessage, WrenchStamped,
+    DiagnosticArray, HapticMismatch, Marker, MeshPatch, Point, PoseStamped, RosMessage,
+    WrenchStamped,
 };
 use touchup::sim::wavy::{STEP_NS, slide};
 
@@ -30,43 +35,60 @@ const PATIENCE: Duration = Duration::from_secs(60);
 /// Time limit for the answers after the last sample.
 const REST: Duration = Duration::from_secs(2);
 
-const SAMPLES: QosProfile = QosProfile::subscription_default().history(History::KeepLast { depth: 2048 });
+const SAMPLES: QosProfile =
+    QosProfile::subscription_default().history(History::KeepLast { depth: 2048 });
 const MESH: QosProfile = QosProfile::subscription_default()
     .history(History::KeepLast { depth: 4096 })
     .reliability_reliable(WhenFull::Wait(Duration::from_millis(100)))
     .durability(Durability::TransientLocal);
 
-const CHANGES: QosProfile = SAMPLES.reliability_reliable(WhenFull::Wait(Duration::from_millis(100)));
+const CHANGES: QosProfile =
+    SAMPLES.reliability_reliable(WhenFull::Wait(Duration::from_millis(100)));
 
 /// Time of all processes, ns since 1970.
 pub fn wall_ns() -> i64 {
-    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos() as i64)
+    SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .map_or(0, |since| since.as_nanos() as i64)
 }
 
 fn joined(domain: u16, name: &str) -> (Context, Node) {
-    let participant = DomainParticipantBuilder::new(domain).with_only_networks([std::net::Ipv4Addr::LOCALHOST]);
+    let participant =
+        DomainParticipantBuilder::new(domain).with_only_networks([std::net::Ipv4Addr::LOCALHOST]);
     let participant = participant.build().expect("the loopback interface is up");
     let context = Context::from_domain_participant(participant).expect("a participant has a graph");
     let name = NodeName::new("/", name).expect("it is a name");
-    let node = context.new_node(name, NodeOptions::new()).expect("a context makes nodes");
+    let node = context
+        .new_node(name, NodeOptions::new())
+        .expect("a context makes nodes");
     (context, node)
 }
 
-fn topic<M: RosMessage>(node: &Node, name: &str, qos: &QosProfile) -> ros2_client::dds::rustdds::Topic {
+fn topic<M: RosMessage>(
+    node: &Node,
+    name: &str,
+    qos: &QosProfile,
+) -> ros2_client::dds::rustdds::Topic {
     let mut parts = M::TYPE_NAME.split('/');
-    let (package, kind) = (parts.next().unwrap_or_default(), parts.next_back().unwrap_or_default());
+    let (package, kind) = (
+        parts.next().unwrap_or_default(),
+        parts.next_back().unwrap_or_default(),
+    );
     let name = Name::parse(name).expect("it is a name");
-    node.create_topic(&name, MessageTypeName::new(package, kind), qos).expect("a node makes topics")
+    node.create_topic(&name, MessageTypeName::new(package, kind), qos)
+        .expect("a node makes topics")
 }
 
 fn reader<M: RosMessage>(node: &mut Node, name: &str, qos: QosProfile) -> Subscription<M> {
     let topic = topic::<M>(node, name, &qos);
-    node.create_subscription(&topic, Some(qos)).expect("a node subscribes")
+    node.create_subscription(&topic, Some(qos))
+        .expect("a node subscribes")
 }
 
 fn writer<M: RosMessage>(node: &mut Node, name: &str) -> Publisher<M> {
     let topic = topic::<M>(node, name, &SAMPLES);
-    node.create_publisher(&topic, Some(SAMPLES)).expect("a node publishes")
+    node.create_publisher(&topic, Some(SAMPLES))
+        .expect("a node publishes")
 }
 
 /// Returns when all of `wanted` readers and writers have somebody at the other end.
@@ -82,7 +104,10 @@ fn wait_for_matches(context: &Context, wanted: usize) {
             Some(_) => {}
             None => sleep(Duration::from_millis(10)),
         }
-        assert!(begun.elapsed() < PATIENCE, "the other end was not discovered");
+        assert!(
+            begun.elapsed() < PATIENCE,
+            "the other end was not discovered"
+        );
     }
     // the other end learns of it a little later
     sleep(QUIET);
@@ -113,7 +138,8 @@ impl Tiles {
             if tile.action == Marker::DELETE {
                 self.seen.remove(&tile.id);
             } else {
-                self.seen.insert(tile.id, tile.points.iter().map(place).collect());
+                self.seen
+                    .insert(tile.id, tile.points.iter().map(place).collect());
                 came.push(tile.id);
             }
         }
@@ -121,7 +147,8 @@ impl Tiles {
     }
 
     fn is_quiet(&self) -> bool {
-        self.changed.is_some_and(|changed| changed.elapsed() >= QUIET)
+        self.changed
+            .is_some_and(|changed| changed.elapsed() >= QUIET)
     }
 }
 
@@ -135,8 +162,13 @@ pub fn join_late(domain: u16) {
         tiles.take(&mut mesh);
         sleep(Duration::from_millis(1));
     }
-    let took = tiles.changed.map_or(f64::NAN, |changed| (changed - begun).as_secs_f64());
-    println!("a late joiner has {} tiles after {took:.1} s", tiles.seen.len());
+    let took = tiles
+        .changed
+        .map_or(f64::NAN, |changed| (changed - begun).as_secs_f64());
+    println!(
+        "a late joiner has {} tiles after {took:.1} s",
+        tiles.seen.len()
+    );
 }
 
 /// What the viewer sees.
@@ -167,11 +199,17 @@ impl Viewer {
                 Some(&at_ns) => self.record(moved_ns, at_ns),
                 None => {
                     self.pending.insert(place, vertex);
-                    self.moves.entry(vertex).or_default().push((moved_ns, place));
+                    self.moves
+                        .entry(vertex)
+                        .or_default()
+                        .push((moved_ns, place));
                 }
             }
         }
-        patch.removed_vertices.iter().for_each(|&vertex| self.forget(vertex));
+        patch
+            .removed_vertices
+            .iter()
+            .for_each(|&vertex| self.forget(vertex));
     }
 
     fn forget(&mut self, vertex: u32) {
@@ -184,9 +222,14 @@ impl Viewer {
     fn look(&mut self, corners: &[VertexBits], at_ns: i64) {
         for &place in corners {
             self.drawn.entry(place).or_insert(at_ns);
-            let Some(vertex) = self.pending.remove(&place) else { continue };
+            let Some(vertex) = self.pending.remove(&place) else {
+                continue;
+            };
             let moves = self.moves.remove(&vertex).unwrap_or_default();
-            let until = moves.iter().rposition(|&(_, to)| to == place).map_or(0, |last| last + 1);
+            let until = moves
+                .iter()
+                .rposition(|&(_, to)| to == place)
+                .map_or(0, |last| last + 1);
             let (shown, open) = moves.split_at(until);
             for &(moved_ns, to) in shown {
                 self.pending.remove(&to);
@@ -201,19 +244,31 @@ impl Viewer {
     fn record(&mut self, moved_ns: i64, at_ns: i64) {
         let took = Duration::from_nanos((at_ns - moved_ns).max(0) as u64);
         self.visible.record(took);
-        self.seconds.entry(moved_ns / SECOND_NS).or_default().record(took);
+        self.seconds
+            .entry(moved_ns / SECOND_NS)
+            .or_default()
+            .record(took);
     }
 
     /// What the node says of the second that ends.
     fn note_diagnostics(&mut self, message: &DiagnosticArray) {
         let values = message.status.iter().flat_map(|status| &status.values);
-        let values: HashMap<&str, f64> =
-            values.filter_map(|pair| Some((pair.key.as_str(), pair.value.parse().ok()?))).collect();
+        let values: HashMap<&str, f64> = values
+            .filter_map(|pair| Some((pair.key.as_str(), pair.value.parse().ok()?)))
+            .collect();
         let number = |name: &str| values.get(name).copied();
         let shown = || {
-            let [median, p99, longest] = ["p50", "p99", "max"].map(|which| number(&format!("patch_behind_{which}_ms")));
-            let times = Times { median: median?, p99: p99?, longest: longest? };
-            Some((times, [number("renewals")? as u64, number("late_renewals")? as u64]))
+            let [median, p99, longest] =
+                ["p50", "p99", "max"].map(|which| number(&format!("patch_behind_{which}_ms")));
+            let times = Times {
+                median: median?,
+                p99: p99?,
+                longest: longest?,
+            };
+            Some((
+                times,
+                [number("renewals")? as u64, number("late_renewals")? as u64],
+            ))
         };
         // before anything was touched nothing is shown
         if let Some(shown) = shown().filter(|(times, _)| times.longest > 0.0) {
@@ -228,7 +283,9 @@ impl Viewer {
             shown: self.shown.get(second).copied(),
         };
         let seconds = self.seconds.keys().chain(self.shown.keys());
-        Drawn { seconds: seconds.map(|second| (*second, at(second))).collect() }
+        Drawn {
+            seconds: seconds.map(|second| (*second, at(second))).collect(),
+        }
     }
 }
 
@@ -244,10 +301,23 @@ pub fn view(domain: u16) -> Drawn {
         tiles.take(&mut mesh);
         sleep(Duration::from_millis(1));
     }
-    let took = tiles.changed.map_or(f64::NAN, |changed| (changed - begun).as_secs_f64());
-    let drawn = tiles.seen.values().flatten().map(|&place| (place, 0)).collect();
-    let mut seen = Viewer { drawn, ..Viewer::default() };
-    println!("the viewer has {} tiles after {took:.1} s", tiles.seen.len());
+    let took = tiles
+        .changed
+        .map_or(f64::NAN, |changed| (changed - begun).as_secs_f64());
+    let drawn = tiles
+        .seen
+        .values()
+        .flatten()
+        .map(|&place| (place, 0))
+        .collect();
+    let mut seen = Viewer {
+        drawn,
+        ..Viewer::default()
+    };
+    println!(
+        "the viewer has {} tiles after {took:.1} s",
+        tiles.seen.len()
+    );
     let has_ended = Arc::new(AtomicBool::new(false));
     spawn({
         let has_ended = Arc::clone(&has_ended);
@@ -258,7 +328,9 @@ pub fn view(domain: u16) -> Drawn {
         }
     });
     let mut poll = Poll::new().expect("the system polls");
-    poll.registry().register(&mut mesh, Token(0), Interest::READABLE).expect("it can be polled");
+    poll.registry()
+        .register(&mut mesh, Token(0), Interest::READABLE)
+        .expect("it can be polled");
     let mut events = Events::with_capacity(8);
     while !has_ended.load(Ordering::Relaxed) {
         // an interrupted wait is one that is over
@@ -270,7 +342,8 @@ pub fn view(domain: u16) -> Drawn {
             seen.note_diagnostics(&message);
         }
         let (came, now) = (tiles.take(&mut mesh), wall_ns());
-        came.iter().for_each(|tile| seen.look(&tiles.seen[tile], now));
+        came.iter()
+            .for_each(|tile| seen.look(&tiles.seen[tile], now));
     }
     let unseen: usize = seen.moves.values().map(Vec::len).sum();
     println!(
@@ -297,7 +370,10 @@ pub fn touch(domain: u16, seconds: usize, is_node: bool) -> Answers {
         let sent_ns = Arc::clone(&sent_ns);
         move || {
             for (number, sent) in sent_ns.iter().enumerate() {
-                sleep((begin + Duration::from_millis(number as u64)).saturating_duration_since(Instant::now()));
+                sleep(
+                    (begin + Duration::from_millis(number as u64))
+                        .saturating_duration_since(Instant::now()),
+                );
                 let mut sample = slide(number, WIDTH);
                 sample.stamp_ns += begin_ns;
                 let (wrench, pose) = messages(&sample);
@@ -313,18 +389,27 @@ pub fn touch(domain: u16, seconds: usize, is_node: bool) -> Answers {
         }
     });
     let mut round_trips = Latencies::new();
-    let mut by_second: Vec<(u64, Latencies)> = (0..seconds).map(|_| (0, Latencies::new())).collect();
+    let mut by_second: Vec<(u64, Latencies)> =
+        (0..seconds).map(|_| (0, Latencies::new())).collect();
     let mut poll = Poll::new().expect("the system polls");
-    poll.registry().register(&mut mismatches, Token(0), Interest::READABLE).expect("it can be polled");
+    poll.registry()
+        .register(&mut mismatches, Token(0), Interest::READABLE)
+        .expect("it can be polled");
     let mut events = Events::with_capacity(8);
     let end = begin + Duration::from_secs(seconds as u64) + REST;
     while Instant::now() < end {
         // an interrupted wait is one that is over
         let _ = poll.poll(&mut events, Some(Duration::from_millis(100)));
         while let Ok(Some((mismatch, _))) = mismatches.take() {
-            let number = usize::try_from((stamp_ns(mismatch.header.stamp) - begin_ns) / STEP_NS).ok();
-            let Some((number, sent)) = number.and_then(|number| Some((number, sent_ns.get(number)?))) else { continue };
-            let took = Duration::from_nanos((wall_ns() - sent.load(Ordering::Relaxed)).max(0) as u64);
+            let number =
+                usize::try_from((stamp_ns(mismatch.header.stamp) - begin_ns) / STEP_NS).ok();
+            let Some((number, sent)) =
+                number.and_then(|number| Some((number, sent_ns.get(number)?)))
+            else {
+                continue;
+            };
+            let took =
+                Duration::from_nanos((wall_ns() - sent.load(Ordering::Relaxed)).max(0) as u64);
             let (answered, times) = &mut by_second[number / 1000];
             *answered += 1;
             times.record(took);
@@ -333,7 +418,15 @@ pub fn touch(domain: u16, seconds: usize, is_node: bool) -> Answers {
     }
     sending.join().expect("it sends to the end");
     let answered: u64 = by_second.iter().map(|(answered, _)| answered).sum();
-    println!("{answered} of {count} answered; from the sensors and back {}", shown(round_trips.quantiles()));
-    let seconds = by_second.iter().map(|(answered, times)| (1000_u64.saturating_sub(*answered), Times::of(times)));
-    Answers { begin_ns, seconds: seconds.collect() }
+    println!(
+        "{answered} of {count} answered; from the sensors and back {}",
+        shown(round_trips.quantiles())
+    );
+    let seconds = by_second
+        .iter()
+        .map(|(answered, times)| (1000_u64.saturating_sub(*answered), Times::of(times)));
+    Answers {
+        begin_ns,
+        seconds: seconds.collect(),
+    }
 }

@@ -8,7 +8,10 @@ const SOURCES: [&str; 4] = ["src", "crates", "Cargo.toml", "Cargo.lock"];
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
-    println!("cargo::rustc-env=TOUCHUP_COMMIT={}", commit().unwrap_or_else(|| "unknown".to_owned()));
+    println!(
+        "cargo::rustc-env=TOUCHUP_COMMIT={}",
+        commit().unwrap_or_else(|| "unknown".to_owned())
+    );
 }
 
 /// `None` without git, and where this is no checkout of its own: a tarball, or inside another repository.
@@ -18,15 +21,24 @@ fn commit() -> Option<String> {
     let branch = git(&["symbolic-ref", "--quiet", "HEAD"]);
     for name in ["HEAD", "logs/HEAD", branch.as_deref().unwrap_or("HEAD")] {
         // a path that is not there would be asked for at every build
-        git(&["rev-parse", "--git-path", name]).filter(|path| Path::new(path).exists()).into_iter().for_each(watch);
+        git(&["rev-parse", "--git-path", name])
+            .filter(|path| Path::new(path).exists())
+            .into_iter()
+            .for_each(watch);
     }
-    SOURCES.iter().for_each(|path| watch(format!("../../{path}")));
+    SOURCES
+        .iter()
+        .for_each(|path| watch(format!("../../{path}")));
     let hash = git(&["rev-parse", "--short=12", "HEAD"])?;
     let sources = SOURCES.map(|path| format!(":/{path}"));
     let mut status = vec!["status", "--porcelain", "--untracked-files=no", "--"];
     status.extend(sources.iter().map(String::as_str));
     let changed = git(&status)?;
-    Some(if changed.is_empty() { hash } else { format!("{hash}, with changes") })
+    Some(if changed.is_empty() {
+        hash
+    } else {
+        format!("{hash}, with changes")
+    })
 }
 
 fn watch(path: String) {

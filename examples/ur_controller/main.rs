@@ -44,7 +44,11 @@ const LOOK: Duration = Duration::from_micros(500);
 const CHORD: f64 = 2e-6;
 
 /// What hangs on the flange: the payload that the client states for a probe by default.
-const PROBE: Payload = Payload { mass: 0.25, p_sc: Vector3::new(0.0, 0.0, 0.05), ..WEIGHTLESS };
+const PROBE: Payload = Payload {
+    mass: 0.25,
+    p_sc: Vector3::new(0.0, 0.0, 0.05),
+    ..WEIGHTLESS
+};
 
 struct Arguments {
     address: String,
@@ -60,26 +64,42 @@ fn arguments() -> anyhow::Result<Arguments> {
         "usage: ur_controller ADDRESS [--record FILE] [--version V] [--start-mm X,Y,Z] [--payload KG,X,Y,Z]",
     )?;
     let start = Point3::new(45e-3, 8e-3, 25e-3);
-    let mut found = Arguments { address, record: None, version: [5, 15, 0], start, payload: PROBE };
+    let mut found = Arguments {
+        address,
+        record: None,
+        version: [5, 15, 0],
+        start,
+        payload: PROBE,
+    };
     while let Some(flag) = words.next() {
-        let value = words.next().with_context(|| format!("{flag} needs a value"))?;
+        let value = words
+            .next()
+            .with_context(|| format!("{flag} needs a value"))?;
         match flag.as_str() {
             "--record" => found.record = Some(value.into()),
             "--version" => {
                 let parts: Result<Vec<u32>, _> = value.split('.').map(str::parse).collect();
-                found.version = parts?.try_into().map_err(|_| anyhow::anyhow!("--version takes three numbers"))?;
+                found.version = parts?
+                    .try_into()
+                    .map_err(|_| anyhow::anyhow!("--version takes three numbers"))?;
             }
             "--start-mm" => {
                 let parts: Result<Vec<f64>, _> = value.split(',').map(str::parse).collect();
-                let parts: [f64; 3] =
-                    parts?.try_into().map_err(|_| anyhow::anyhow!("--start-mm takes three numbers"))?;
+                let parts: [f64; 3] = parts?
+                    .try_into()
+                    .map_err(|_| anyhow::anyhow!("--start-mm takes three numbers"))?;
                 found.start = Point3::from(parts.map(|mm| mm * 1e-3));
             }
             "--payload" => {
                 let parts: Result<Vec<f64>, _> = value.split(',').map(str::parse).collect();
-                let [mass, x, y, z]: [f64; 4] =
-                    parts?.try_into().map_err(|_| anyhow::anyhow!("--payload takes kg and three numbers in mm"))?;
-                found.payload = Payload { mass, p_sc: Vector3::new(x, y, z) * 1e-3, ..WEIGHTLESS };
+                let [mass, x, y, z]: [f64; 4] = parts?
+                    .try_into()
+                    .map_err(|_| anyhow::anyhow!("--payload takes kg and three numbers in mm"))?;
+                found.payload = Payload {
+                    mass,
+                    p_sc: Vector3::new(x, y, z) * 1e-3,
+                    ..WEIGHTLESS
+                };
             }
             _ => anyhow::bail!("{flag} is unknown"),
         }
@@ -88,19 +108,46 @@ fn arguments() -> anyhow::Result<Arguments> {
 }
 
 fn main() -> anyhow::Result<()> {
-    let Arguments { address, record, version, start, payload } = arguments()?;
+    let Arguments {
+        address,
+        record,
+        version,
+        start,
+        payload,
+    } = arguments()?;
     let mesh = Plate::default().mesh(CHORD)?;
     let surface = MeshSurface::new(&mesh)?;
-    let body = Body::new(&surface, ArmParams { payload, ..ArmParams::default() }, start)?;
+    let body = Body::new(
+        &surface,
+        ArmParams {
+            payload,
+            ..ArmParams::default()
+        },
+        start,
+    )?;
     let controller = Controller::new(body, version, Record::new(record.as_deref())?);
-    let served = Mutex::new(Served { controller, streams: Vec::new(), sockets: Vec::new() });
-    let listen = |port| TcpListener::bind((address.as_str(), port)).with_context(|| format!("{address}:{port}"));
+    let served = Mutex::new(Served {
+        controller,
+        streams: Vec::new(),
+        sockets: Vec::new(),
+    });
+    let listen = |port| {
+        TcpListener::bind((address.as_str(), port)).with_context(|| format!("{address}:{port}"))
+    };
     let (rtde, dashboard, script) = (listen(RTDE)?, listen(DASHBOARD)?, listen(SCRIPT)?);
     println!("ready");
     thread::scope(|scope| {
         let (served, address) = (&served, &address);
-        scope.spawn(move || accept(rtde, served, |socket, number| rtde::serve(socket, number, served)));
-        scope.spawn(move || accept(dashboard, served, |socket, _| dashboard::serve(socket, served)));
+        scope.spawn(move || {
+            accept(rtde, served, |socket, number| {
+                rtde::serve(socket, number, served)
+            })
+        });
+        scope.spawn(move || {
+            accept(dashboard, served, |socket, _| {
+                dashboard::serve(socket, served)
+            })
+        });
         scope.spawn(move || accept(script, served, |socket, _| take_programs(socket, served)));
         scope.spawn(move || {
             for line in stdin().lines().map_while(Result::ok) {
@@ -117,8 +164,14 @@ fn main() -> anyhow::Result<()> {
         let mut last = Instant::now();
         loop {
             // a machine that was late is late for good: a period is never made up for
-            thread::sleep((last + period).saturating_duration_since(Instant::now()).max(LOOK));
-            let Ok(mut served) = served.lock() else { continue };
+            thread::sleep(
+                (last + period)
+                    .saturating_duration_since(Instant::now())
+                    .max(LOOK),
+            );
+            let Ok(mut served) = served.lock() else {
+                continue;
+            };
             if served.controller.may_tick() {
                 last = Instant::now();
                 served.tick();
@@ -128,18 +181,30 @@ fn main() -> anyhow::Result<()> {
 }
 
 /// Serves each client on a thread of its own.
-fn accept(listener: TcpListener, served: &Mutex<Served>, serve: impl Fn(TcpStream, u64) -> anyhow::Result<()> + Sync) {
+fn accept(
+    listener: TcpListener,
+    served: &Mutex<Served>,
+    serve: impl Fn(TcpStream, u64) -> anyhow::Result<()> + Sync,
+) {
     thread::scope(|scope| {
         for (number, socket) in (0..).zip(listener.incoming()) {
-            let (Ok(socket), Ok(mut served)) = (socket, served.lock()) else { continue };
-            let Ok(copy) = socket.try_clone() else { continue };
+            let (Ok(socket), Ok(mut served)) = (socket, served.lock()) else {
+                continue;
+            };
+            let Ok(copy) = socket.try_clone() else {
+                continue;
+            };
             if served.controller.faults.is_dead {
                 continue;
             }
             served.sockets.push(copy);
             let serve = &serve;
             // small packets, each wanted at once; a client that goes in the middle of an answer is no matter
-            scope.spawn(move || socket.set_nodelay(true).is_ok_and(|()| serve(socket, number).is_ok()));
+            scope.spawn(move || {
+                socket
+                    .set_nodelay(true)
+                    .is_ok_and(|()| serve(socket, number).is_ok())
+            });
         }
     });
 }
@@ -152,7 +217,9 @@ fn take_programs(socket: TcpStream, served: &Mutex<Served>) -> anyhow::Result<()
         program += &line;
         program.push('\n');
         if line == "end" {
-            let mut served = served.lock().map_err(|_| anyhow::anyhow!("the controller has ended"))?;
+            let mut served = served
+                .lock()
+                .map_err(|_| anyhow::anyhow!("the controller has ended"))?;
             served.controller.load(&std::mem::take(&mut program));
         }
     }
@@ -188,7 +255,11 @@ impl Served<'_> {
 
     /// Ends all connections that are there now.
     fn cut(&mut self, ports: &[u16]) {
-        let is_cut = |socket: &TcpStream| socket.local_addr().is_ok_and(|own| ports.contains(&own.port()));
+        let is_cut = |socket: &TcpStream| {
+            socket
+                .local_addr()
+                .is_ok_and(|own| ports.contains(&own.port()))
+        };
         for socket in self.sockets.extract_if(.., |socket| is_cut(socket)) {
             // one that has ended already is as good
             let _ = socket.shutdown(Shutdown::Both);

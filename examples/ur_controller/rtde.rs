@@ -22,7 +22,10 @@ impl Stream {
     /// Whether the client is still there.
     pub fn send(&mut self, states: &States) -> bool {
         let mut body = vec![1];
-        self.names.iter().filter_map(|name| value(states, name)).for_each(|(_, bytes)| body.extend(bytes));
+        self.names
+            .iter()
+            .filter_map(|name| value(states, name))
+            .for_each(|(_, bytes)| body.extend(bytes));
         self.socket.write_all(&packet(DATA, &body)).is_ok()
     }
 }
@@ -37,9 +40,19 @@ fn packet(kind: u8, body: &[u8]) -> Vec<u8> {
 
 /// Type and bytes of a variable; `None`: unknown here.
 fn value(states: &States, name: &str) -> Option<(&'static str, Vec<u8>)> {
-    let six = |values: &[f64; 6]| ("VECTOR6D", values.iter().flat_map(|v| v.to_be_bytes()).collect());
+    let six = |values: &[f64; 6]| {
+        (
+            "VECTOR6D",
+            values.iter().flat_map(|v| v.to_be_bytes()).collect(),
+        )
+    };
     let unsigned = |value: u32| ("UINT32", value.to_be_bytes().to_vec());
-    let register = |prefix: &str| name.strip_prefix(prefix)?.parse::<usize>().ok().filter(|i| *i < 48);
+    let register = |prefix: &str| {
+        name.strip_prefix(prefix)?
+            .parse::<usize>()
+            .ok()
+            .filter(|i| *i < 48)
+    };
     Some(match name {
         "timestamp" => ("DOUBLE", states.time.to_be_bytes().to_vec()),
         "actual_q" => six(&states.q),
@@ -53,7 +66,10 @@ fn value(states: &States, name: &str) -> Option<(&'static str, Vec<u8>)> {
         "runtime_state" => unsigned(if states.is_playing { 2 } else { 1 }),
         "target_speed_fraction" => ("DOUBLE", states.speed_fraction.to_be_bytes().to_vec()),
         "robot_mode" => ("INT32", 7i32.to_be_bytes().to_vec()),
-        _ => match (register("output_int_register_"), register("output_double_register_")) {
+        _ => match (
+            register("output_int_register_"),
+            register("output_double_register_"),
+        ) {
             (Some(at), _) => ("INT32", states.ints[at].to_be_bytes().to_vec()),
             (_, Some(at)) => ("DOUBLE", states.doubles[at].to_be_bytes().to_vec()),
             _ => return None,
@@ -72,8 +88,16 @@ enum Input {
 
 impl Input {
     fn of(name: &str) -> Option<(Self, &'static str)> {
-        let number = |prefix: &str| name.strip_prefix(prefix)?.parse::<usize>().ok().filter(|i| *i < 48);
-        match (number("input_int_register_"), number("input_double_register_")) {
+        let number = |prefix: &str| {
+            name.strip_prefix(prefix)?
+                .parse::<usize>()
+                .ok()
+                .filter(|i| *i < 48)
+        };
+        match (
+            number("input_int_register_"),
+            number("input_double_register_"),
+        ) {
             (Some(at), _) => Some((Self::Int(at), "INT32")),
             (_, Some(at)) => Some((Self::Double(at), "DOUBLE")),
             _ => (name == "external_force_torque").then_some((Self::Skipped(48), "VECTOR6D")),
@@ -90,15 +114,32 @@ pub fn serve(mut socket: TcpStream, number: u64, served: &Mutex<Served>) -> anyh
         if socket.read_exact(&mut body).is_err() {
             break;
         }
-        let mut served = served.lock().map_err(|_| anyhow::anyhow!("the controller has ended"))?;
-        let Served { controller, streams, .. } = &mut *served;
+        let mut served = served
+            .lock()
+            .map_err(|_| anyhow::anyhow!("the controller has ended"))?;
+        let Served {
+            controller,
+            streams,
+            ..
+        } = &mut *served;
         if controller.faults.is_deaf || controller.faults.is_unplugged {
             continue;
         }
-        let list = || String::from_utf8_lossy(&body).split(',').filter(|n| !n.is_empty()).map(str::to_owned).collect();
+        let list = || {
+            String::from_utf8_lossy(&body)
+                .split(',')
+                .filter(|n| !n.is_empty())
+                .map(str::to_owned)
+                .collect()
+        };
         let answer = match head[2] {
             b'V' => vec![1],
-            b'v' => controller.version.iter().chain(&[0]).flat_map(|part| part.to_be_bytes()).collect(),
+            b'v' => controller
+                .version
+                .iter()
+                .chain(&[0])
+                .flat_map(|part| part.to_be_bytes())
+                .collect(),
             OUTPUTS => {
                 names = body
                     .get(8..)
@@ -109,8 +150,10 @@ pub fn serve(mut socket: TcpStream, number: u64, served: &Mutex<Served>) -> anyh
                     .map(str::to_owned)
                     .collect();
                 let states = States::read(controller);
-                let types: Vec<_> =
-                    names.iter().map(|name| value(&states, name).map_or("NOT_FOUND", |(kind, _)| kind)).collect();
+                let types: Vec<_> = names
+                    .iter()
+                    .map(|name| value(&states, name).map_or("NOT_FOUND", |(kind, _)| kind))
+                    .collect();
                 [&[1], types.join(",").as_bytes()].concat()
             }
             INPUTS => {
@@ -125,7 +168,13 @@ pub fn serve(mut socket: TcpStream, number: u64, served: &Mutex<Served>) -> anyh
                         None => "NOT_FOUND",
                     })
                     .collect();
-                recipes.push(inputs.into_iter().flatten().map(|(input, _)| input).collect());
+                recipes.push(
+                    inputs
+                        .into_iter()
+                        .flatten()
+                        .map(|(input, _)| input)
+                        .collect(),
+                );
                 [&[recipes.len() as u8], types.join(",").as_bytes()].concat()
             }
             b'S' | b'P' => vec![1],
@@ -137,10 +186,15 @@ pub fn serve(mut socket: TcpStream, number: u64, served: &Mutex<Served>) -> anyh
         };
         socket.write_all(&packet(head[2], &answer))?;
         if head[2] == b'S' {
-            streams.push(Stream { socket: socket.try_clone()?, names: names.clone() });
+            streams.push(Stream {
+                socket: socket.try_clone()?,
+                names: names.clone(),
+            });
         }
     }
-    let mut served = served.lock().map_err(|_| anyhow::anyhow!("the controller has ended"))?;
+    let mut served = served
+        .lock()
+        .map_err(|_| anyhow::anyhow!("the controller has ended"))?;
     if served.controller.owner == Some(number) {
         served.controller.owner = None;
     }
@@ -148,8 +202,12 @@ pub fn serve(mut socket: TcpStream, number: u64, served: &Mutex<Served>) -> anyh
 }
 
 fn write(controller: &mut Controller, recipes: &[Vec<Input>], body: &[u8]) {
-    let Some((id, mut rest)) = body.split_first() else { return };
-    let Some(recipe) = recipes.get((*id as usize).wrapping_sub(1)) else { return };
+    let Some((id, mut rest)) = body.split_first() else {
+        return;
+    };
+    let Some(recipe) = recipes.get((*id as usize).wrapping_sub(1)) else {
+        return;
+    };
     let mut written = Vec::new();
     for input in recipe {
         let size = match input {
@@ -157,11 +215,17 @@ fn write(controller: &mut Controller, recipes: &[Vec<Input>], body: &[u8]) {
             Input::Double(_) => 8,
             Input::Skipped(size) => *size,
         };
-        let Some((bytes, after)) = rest.split_at_checked(size) else { return };
+        let Some((bytes, after)) = rest.split_at_checked(size) else {
+            return;
+        };
         rest = after;
         match (*input, bytes.try_into(), bytes.try_into()) {
-            (Input::Int(at), Ok(bytes), _) => written.push(Written::Int(at, i32::from_be_bytes(bytes))),
-            (Input::Double(at), _, Ok(bytes)) => written.push(Written::Double(at, f64::from_be_bytes(bytes))),
+            (Input::Int(at), Ok(bytes), _) => {
+                written.push(Written::Int(at, i32::from_be_bytes(bytes)))
+            }
+            (Input::Double(at), _, Ok(bytes)) => {
+                written.push(Written::Double(at, f64::from_be_bytes(bytes)))
+            }
             _ => {}
         }
     }

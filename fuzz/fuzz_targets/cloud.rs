@@ -8,10 +8,22 @@ use touchup_fuzz::file;
 use touchup_io::mesh_file::{MeshOrPoints, MeshUnit, read_mesh_or_points};
 
 fuzz_target!(|data: &[u8]| {
-    let Some((&kind, bytes)) = data.split_first() else { return };
-    let path = file(["scan.pcd", "scan.xyz", "scan.e57", "scan.ply"][usize::from(kind) % 4], bytes);
-    let Ok(MeshOrPoints::Points(cloud)) = read_mesh_or_points(&path, MeshUnit::Metre) else { return };
+    let Some((&kind, bytes)) = data.split_first() else {
+        return;
+    };
+    let path = file(
+        ["scan.pcd", "scan.xyz", "scan.e57", "scan.ply"][usize::from(kind) % 4],
+        bytes,
+    );
+    let Ok(MeshOrPoints::Points(cloud)) = read_mesh_or_points(&path, MeshUnit::Metre) else {
+        return;
+    };
     let points = cloud.positions;
     // of all formats the packed one says most: a field of a byte, 88 of which lie in one
-    assert!(points.len() <= 88 * bytes.len(), "{} points of {} bytes", points.len(), bytes.len());
+    assert!(
+        points.len() <= 88 * bytes.len(),
+        "{} points of {} bytes",
+        points.len(),
+        bytes.len()
+    );
 });

@@ -11,7 +11,10 @@ use touchup_session::session::found;
 
 fn detect(bytes: &mut Unstructured) -> Result<()> {
     let mut positions = closed_box([8e-3, 5e-3, 3e-3], 1).positions().to_vec();
-    let mut faces: Vec<[u32; 3]> = closed_box([8e-3, 5e-3, 3e-3], 1).faces().map(|(_, f)| f.map(|v| v.0)).collect();
+    let mut faces: Vec<[u32; 3]> = closed_box([8e-3, 5e-3, 3e-3], 1)
+        .faces()
+        .map(|(_, f)| f.map(|v| v.0))
+        .collect();
     for _ in 0..bytes.int_in_range(0..=24)? {
         let at = bytes.choose_index(positions.len())?;
         match bytes.arbitrary::<u8>()? % 4 {
@@ -24,7 +27,9 @@ fn detect(bytes: &mut Unstructured) -> Result<()> {
             }
         }
     }
-    let Ok((mesh, _)) = repair(positions, faces) else { return Ok(()) };
+    let Ok((mesh, _)) = repair(positions, faces) else {
+        return Ok(());
+    };
     let (detection, _) = found(&mesh, &[]);
     let number = format!("{detection:?}");
     assert!(!number.contains("NaN"), "{number}");

@@ -20,7 +20,13 @@ fuzz_target!(|data: &[u8]| {
     }
     let path = file("messages.mcap", &mcap_of(&messages));
     read_all(&path, &Topics::default());
-    read_all(&path, &Topics { markers: Some(MARKERS.into()), ..Topics::default() });
+    read_all(
+        &path,
+        &Topics {
+            markers: Some(MARKERS.into()),
+            ..Topics::default()
+        },
+    );
     for (pose, wrench) in [
         ("/odometry", "/bare_wrench"),
         ("/covariance", "/stylus/wrench"),
@@ -28,13 +34,35 @@ fuzz_target!(|data: &[u8]| {
         ("/state", "/state"),
     ]
     .into_iter()
-    .chain([("/bare_pose", "/bare_wrench"), ("/iiwa_pose", "/bare_wrench")])
-    {
-        read_all(&path, &Topics { pose: pose.into(), wrench: wrench.into(), markers: None });
+    .chain([
+        ("/bare_pose", "/bare_wrench"),
+        ("/iiwa_pose", "/bare_wrench"),
+    ]) {
+        read_all(
+            &path,
+            &Topics {
+                pose: pose.into(),
+                wrench: wrench.into(),
+                markers: None,
+            },
+        );
     }
-    let topics = Topics { pose: "/tf".into(), ..Topics::default() };
+    let topics = Topics {
+        pose: "/tf".into(),
+        ..Topics::default()
+    };
     for base in [None, Some("base".to_owned())] {
-        let frames = Some(TransformFrames { moving: "tool0".into(), base });
-        read_all(&path, RecordingLayout { topics: topics.clone(), frames, ..RecordingLayout::default() });
+        let frames = Some(TransformFrames {
+            moving: "tool0".into(),
+            base,
+        });
+        read_all(
+            &path,
+            RecordingLayout {
+                topics: topics.clone(),
+                frames,
+                ..RecordingLayout::default()
+            },
+        );
     }
 });

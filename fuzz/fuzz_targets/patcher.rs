@@ -21,7 +21,8 @@ fn patch(bytes: &mut Unstructured) -> Result<()> {
         params.uncertainty = None;
     }
     let mut patcher = Patcher::new(params).expect("settings in their range");
-    let mut contacts = ContactEstimator::new(ContactEstimatorParams::new(BALL)).expect("settings in their range");
+    let mut contacts =
+        ContactEstimator::new(ContactEstimatorParams::new(BALL)).expect("settings in their range");
     let (mut stamp_ns, mut at) = (0, Point3::new(0.0, 0.0, 2e-3 + BALL.radius));
     while !bytes.is_empty() {
         let sample = sample(bytes, &mut stamp_ns, at, 1e-3)?;
@@ -30,14 +31,23 @@ fn patch(bytes: &mut Unstructured) -> Result<()> {
             at = sample.pose_ot.translation.vector.into();
         }
         if bytes.ratio(1, 64)? {
-            let _ = if bytes.arbitrary()? { patcher.undo() } else { patcher.redo() };
+            let _ = if bytes.arbitrary()? {
+                patcher.undo()
+            } else {
+                patcher.redo()
+            };
         }
     }
     patcher.flush();
     let patched = patcher.patched(&scan, &tree).expect("a mesh");
     assert_is_somewhere(&patched.mesh);
     assert_eq!(open_edges(&patched.mesh), 0, "a closed part is open");
-    assert!(patched.columns().iter().all(|(_, column)| column.iter().all(|x| !x.is_nan())));
+    assert!(
+        patched
+            .columns()
+            .iter()
+            .all(|(_, column)| column.iter().all(|x| !x.is_nan()))
+    );
     Ok(())
 }
 

@@ -10,5 +10,11 @@ use touchup_io::recording::Topics;
 fuzz_target!(|data: &[u8]| {
     let path = file("recording", data);
     read_all(&path, &Topics::default());
-    read_all(&path, &Topics { markers: Some(MARKERS.into()), ..Topics::default() });
+    read_all(
+        &path,
+        &Topics {
+            markers: Some(MARKERS.into()),
+            ..Topics::default()
+        },
+    );
 });

@@ -5,7 +5,9 @@
 use libfuzzer_sys::arbitrary::{Result, Unstructured};
 use libfuzzer_sys::fuzz_target;
 use nalgebra::Point3;
-use touchup_core::haptic::{DynamicsParams, GuardParams, RefineParams, Refiner, StepRule, TipParams};
+use touchup_core::haptic::{
+    DynamicsParams, GuardParams, RefineParams, Refiner, StepRule, TipParams,
+};
 use touchup_core::mesh::TriMesh;
 use touchup_core::stylus::TipShape;
 use touchup_fuzz::{BALL, assert_is_somewhere, closed_box, sample, vector};
@@ -15,7 +17,11 @@ fn part(bytes: &mut Unstructured) -> Result<Option<TriMesh>> {
     if bytes.arbitrary()? {
         return Ok(Some(closed_box([4e-3, 3e-3, 2e-3], 4)));
     }
-    let mut positions = vec![Point3::origin(), Point3::new(1e-2, 0.0, 0.0), Point3::new(0.0, 1e-2, 0.0)];
+    let mut positions = vec![
+        Point3::origin(),
+        Point3::new(1e-2, 0.0, 0.0),
+        Point3::new(0.0, 1e-2, 0.0),
+    ];
     let mut faces = vec![[0, 1, 2]];
     for next in 3..3 + bytes.int_in_range(0..=9)? {
         let near = positions[bytes.choose_index(positions.len())?];
@@ -27,15 +33,40 @@ fn part(bytes: &mut Unstructured) -> Result<Option<TriMesh>> {
 
 fn settings(bytes: &mut Unstructured) -> Result<RefineParams> {
     let robust = RefineParams::robust(BALL);
-    let bounded = DynamicsParams { rule: StepRule::Bounded, ..robust.dynamics };
+    let bounded = DynamicsParams {
+        rule: StepRule::Bounded,
+        ..robust.dynamics
+    };
     let all = [
         robust,
-        RefineParams::robust(TipParams { stiffness: None, ..BALL }),
-        RefineParams { guard: None, ..robust },
-        RefineParams { guard: Some(GuardParams::default()), ..robust },
-        RefineParams { gate: None, turning: None, ..robust },
-        RefineParams { dynamics: bounded, ..robust },
-        RefineParams { shape: TipShape::Flat { edge_radius: 0.1e-3, length: 20e-3 }, ..robust },
+        RefineParams::robust(TipParams {
+            stiffness: None,
+            ..BALL
+        }),
+        RefineParams {
+            guard: None,
+            ..robust
+        },
+        RefineParams {
+            guard: Some(GuardParams::default()),
+            ..robust
+        },
+        RefineParams {
+            gate: None,
+            turning: None,
+            ..robust
+        },
+        RefineParams {
+            dynamics: bounded,
+            ..robust
+        },
+        RefineParams {
+            shape: TipShape::Flat {
+                edge_radius: 0.1e-3,
+                length: 20e-3,
+            },
+            ..robust
+        },
         RefineParams::paper(BALL),
     ];
     Ok(*bytes.choose(&all)?)
@@ -43,8 +74,12 @@ fn settings(bytes: &mut Unstructured) -> Result<RefineParams> {
 
 fn push_all(bytes: &mut Unstructured) -> Result<()> {
     let params = settings(bytes)?;
-    let Some(mesh) = part(bytes)? else { return Ok(()) };
-    let Ok(mut refiner) = Refiner::new(mesh, params) else { return Ok(()) };
+    let Some(mesh) = part(bytes)? else {
+        return Ok(());
+    };
+    let Ok(mut refiner) = Refiner::new(mesh, params) else {
+        return Ok(());
+    };
     let mut stamp_ns = 0;
     while !bytes.is_empty() {
         let vertices = refiner.mesh().positions();

@@ -10,7 +10,9 @@ use touchup_fuzz::closed_box;
 use touchup_session::scene::Scene;
 
 fuzz_target!(|yaml: &str| {
-    let Ok(scene) = Scene::from_yaml(yaml) else { return };
+    let Ok(scene) = Scene::from_yaml(yaml) else {
+        return;
+    };
     let _ = Synchroniser::new(scene.sync_params());
     let _ = scene.marker_filter();
     let _ = scene.probing();

@@ -5,17 +5,34 @@
 use libfuzzer_sys::arbitrary::{Result, Unstructured};
 use libfuzzer_sys::fuzz_target;
 use nalgebra::{Point3, Vector3};
-use touchup_core::haptic::{Along, ContactModel, DynamicsParams, FaceDynamics, FaceState, StepRule};
+use touchup_core::haptic::{
+    Along, ContactModel, DynamicsParams, FaceDynamics, FaceState, StepRule,
+};
 use touchup_fuzz::{number, vector};
 
 fn step(bytes: &mut Unstructured) -> Result<()> {
     let model = if bytes.arbitrary()? {
-        ContactModel::Spring { stiffness_n_per_m: number(bytes, 20e3)? }
+        ContactModel::Spring {
+            stiffness_n_per_m: number(bytes, 20e3)?,
+        }
     } else {
-        let (f_max_n, h_min_m, delta) = (number(bytes, 10.0)?, number(bytes, 1e-3)?, number(bytes, 10.0)?);
-        ContactModel::Sigmoid { f_max_n, h_min_m, delta }
+        let (f_max_n, h_min_m, delta) = (
+            number(bytes, 10.0)?,
+            number(bytes, 1e-3)?,
+            number(bytes, 10.0)?,
+        );
+        ContactModel::Sigmoid {
+            f_max_n,
+            h_min_m,
+            delta,
+        }
     };
-    let rules = [StepRule::Lie, StepRule::DriftCorrected, StepRule::Bounded, StepRule::DormandPrince];
+    let rules = [
+        StepRule::Lie,
+        StepRule::DriftCorrected,
+        StepRule::Bounded,
+        StepRule::DormandPrince,
+    ];
     let params = DynamicsParams {
         model,
         alpha_m_per_n_s: number(bytes, 0.1)?,
@@ -24,13 +41,29 @@ fn step(bytes: &mut Unstructured) -> Result<()> {
         along: *bytes.choose(&[Along::InitialNormal, Along::Force])?,
         take_out_rigid_offset: bytes.arbitrary()?,
     };
-    let Ok(dynamics) = FaceDynamics::new(params) else { return Ok(()) };
+    let Ok(dynamics) = FaceDynamics::new(params) else {
+        return Ok(());
+    };
     let normal = vector(bytes, 1.0)?;
-    let normal = if bytes.arbitrary()? { normal } else { normal.try_normalize(1e-9).unwrap_or(Vector3::z()) };
-    let face = FaceState { b: Point3::from(vector(bytes, 0.01)?), n: normal };
-    let (p, force, dt) = (Point3::from(vector(bytes, 0.01)?), vector(bytes, 5.0)?, number(bytes, 0.01)?);
+    let normal = if bytes.arbitrary()? {
+        normal
+    } else {
+        normal.try_normalize(1e-9).unwrap_or(Vector3::z())
+    };
+    let face = FaceState {
+        b: Point3::from(vector(bytes, 0.01)?),
+        n: normal,
+    };
+    let (p, force, dt) = (
+        Point3::from(vector(bytes, 0.01)?),
+        vector(bytes, 5.0)?,
+        number(bytes, 0.01)?,
+    );
     if let Ok(FaceState { b, n }) = dynamics.step(&face, &p, &force, dt) {
-        assert!(b.iter().all(|x| x.is_finite()) && (n.norm() - 1.0).abs() < 1e-6, "{params:?} {b:?} {n:?}");
+        assert!(
+            b.iter().all(|x| x.is_finite()) && (n.norm() - 1.0).abs() < 1e-6,
+            "{params:?} {b:?} {n:?}"
+        );
     }
     Ok(())
 }

@@ -8,8 +8,8 @@ use nalgebra::{Isometry3, Translation3};
 use touchup_core::diagnose::{InputMonitor, InputMonitorParams};
 use touchup_core::mesh::FaceTree;
 use touchup_core::stylus::{
-    CompensatorParams, ContactEstimator, ContactEstimatorParams, ContactGateParams, Message, Placement, StampedPose,
-    StampedWrench, SyncParams, Synchroniser, TipShape, Wrench,
+    CompensatorParams, ContactEstimator, ContactEstimatorParams, ContactGateParams, Message,
+    Placement, StampedPose, StampedWrench, SyncParams, Synchroniser, TipShape, Wrench,
 };
 use touchup_fuzz::{BALL, closed_box, number, rotation, vector};
 
@@ -34,8 +34,12 @@ fn pair(bytes: &mut Unstructured) -> Result<()> {
         capacity: 2 + usize::from(bytes.arbitrary::<u8>()?),
         ..SyncParams::default()
     };
-    let mut sync = if bytes.arbitrary()? { Synchroniser::new(params) } else { Synchroniser::in_order(params) }
-        .expect("settings in their range");
+    let mut sync = if bytes.arbitrary()? {
+        Synchroniser::new(params)
+    } else {
+        Synchroniser::in_order(params)
+    }
+    .expect("settings in their range");
     let monitored = InputMonitorParams {
         compensator: CompensatorParams::default(),
         tip: BALL,
@@ -46,13 +50,25 @@ fn pair(bytes: &mut Unstructured) -> Result<()> {
         sync: params,
     };
     let mut monitor = InputMonitor::new(monitored).expect("settings in their range");
-    let mut contacts = ContactEstimator::new(ContactEstimatorParams::new(BALL)).expect("settings in their range");
+    let mut contacts =
+        ContactEstimator::new(ContactEstimatorParams::new(BALL)).expect("settings in their range");
     let (mut last, mut newest) = (0, None);
     let mut take = |sync: &mut Synchroniser, monitor: &mut InputMonitor| {
         while let Some(sample) = sync.next_sample() {
-            assert!(newest < Some(sample.stamp_ns), "{newest:?}, then {}", sample.stamp_ns);
+            assert!(
+                newest < Some(sample.stamp_ns),
+                "{newest:?}, then {}",
+                sample.stamp_ns
+            );
             newest = Some(sample.stamp_ns);
-            assert!(sample.wrench.force.iter().chain(sample.pose_ot.translation.vector.iter()).all(|x| x.is_finite()));
+            assert!(
+                sample
+                    .wrench
+                    .force
+                    .iter()
+                    .chain(sample.pose_ot.translation.vector.iter())
+                    .all(|x| x.is_finite())
+            );
             assert!((sample.pose_ot.rotation.norm() - 1.0).abs() < 1e-6);
             monitor.sample(&sample);
             if let Ok(contact) = contacts.observe(&sample) {
@@ -63,10 +79,14 @@ fn pair(bytes: &mut Unstructured) -> Result<()> {
     while !bytes.is_empty() {
         let stamp_ns = stamp(bytes, &mut last)?;
         let message = if bytes.arbitrary()? {
-            let pose_ot = Isometry3::from_parts(Translation3::from(vector(bytes, 0.05)?), rotation(bytes)?);
+            let pose_ot =
+                Isometry3::from_parts(Translation3::from(vector(bytes, 0.05)?), rotation(bytes)?);
             Message::Pose(StampedPose { stamp_ns, pose_ot })
         } else {
-            let wrench = Wrench { force: vector(bytes, 5.0)?, torque: vector(bytes, 0.1)? };
+            let wrench = Wrench {
+                force: vector(bytes, 5.0)?,
+                torque: vector(bytes, 0.1)?,
+            };
             Message::Wrench(StampedWrench { stamp_ns, wrench })
         };
         monitor.message(&message);

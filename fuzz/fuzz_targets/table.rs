@@ -11,8 +11,16 @@ use touchup_io::touches_file::{read_touches, write_touches};
 
 fuzz_target!(|data: &[u8]| {
     let path = file("table", data);
-    for pairs in [read_pairs(&path), read_scan_points(&path)].into_iter().flatten() {
-        assert!(pairs.pairs.iter().all(|pair| pair.from.iter().chain(pair.to.iter()).all(|x| x.is_finite())));
+    for pairs in [read_pairs(&path), read_scan_points(&path)]
+        .into_iter()
+        .flatten()
+    {
+        assert!(pairs.pairs.iter().all(|pair| {
+            pair.from
+                .iter()
+                .chain(pair.to.iter())
+                .all(|x| x.is_finite())
+        }));
     }
     for (rotation, wrench) in read_static_poses(&path).unwrap_or_default() {
         assert!((rotation.norm() - 1.0).abs() < 1e-9 && wrench.force.iter().all(|x| x.is_finite()));
@@ -20,6 +28,9 @@ fuzz_target!(|data: &[u8]| {
     let _ = read_probed_touches(&path);
     if let Ok(touches) = read_touches(&path) {
         write_touches(&path, &touches).expect("a file that was read can be written");
-        assert_eq!(read_touches(&path).expect("it was written here").len(), touches.len());
+        assert_eq!(
+            read_touches(&path).expect("it was written here").len(),
+            touches.len()
+        );
     }
 });

@@ -7,5 +7,12 @@ use touchup_fuzz::file;
 use touchup_io::urdf::{ArmLinks, read_urdf};
 
 fuzz_target!(|data: &[u8]| {
-    let _ = read_urdf(&file("arm.urdf", data), &ArmLinks { base: "base", flange: "flange", radius: 0.05 });
+    let _ = read_urdf(
+        &file("arm.urdf", data),
+        &ArmLinks {
+            base: "base",
+            flange: "flange",
+            radius: 0.05,
+        },
+    );
 });

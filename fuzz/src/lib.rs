@@ -16,7 +16,10 @@ use touchup_core::stylus::{Message, Sample, Wrench};
 use touchup_io::recording::{Record, RecordingLayout, RecordingReader};
 
 /// The ball of the targets: radius in m, stiffness in N/m.
-pub const BALL: TipParams = TipParams { radius: 1.5e-3, stiffness: Some(20e3) };
+pub const BALL: TipParams = TipParams {
+    radius: 1.5e-3,
+    stiffness: Some(20e3),
+};
 
 /// Where floats end, and where their squares and products do.
 const ENDS: [f64; 14] = [
@@ -69,7 +72,11 @@ pub fn number(bytes: &mut Unstructured, usual: f64) -> Result<f64> {
 /// # Errors
 /// Where the bytes end.
 pub fn vector(bytes: &mut Unstructured, usual: f64) -> Result<Vector3<f64>> {
-    Ok(Vector3::new(number(bytes, usual)?, number(bytes, usual)?, number(bytes, usual)?))
+    Ok(Vector3::new(
+        number(bytes, usual)?,
+        number(bytes, usual)?,
+        number(bytes, usual)?,
+    ))
 }
 
 /// An orientation: mostly none, else four numbers, which need not have length 1.
@@ -91,7 +98,12 @@ pub fn rotation(bytes: &mut Unstructured) -> Result<UnitQuaternion<f64>> {
 ///
 /// # Errors
 /// Where the bytes end.
-pub fn sample(bytes: &mut Unstructured, stamp_ns: &mut i64, near: Point3<f64>, usual: f64) -> Result<Sample> {
+pub fn sample(
+    bytes: &mut Unstructured,
+    stamp_ns: &mut i64,
+    near: Point3<f64>,
+    usual: f64,
+) -> Result<Sample> {
     let step = match bytes.arbitrary::<u8>()? {
         0 => bytes.arbitrary()?,
         1 => 0,
@@ -99,10 +111,22 @@ pub fn sample(bytes: &mut Unstructured, stamp_ns: &mut i64, near: Point3<f64>, u
     };
     *stamp_ns = stamp_ns.saturating_add(step);
     let centre = near + vector(bytes, usual)?;
-    let force = if bytes.arbitrary()? { vector(bytes, 5.0)? } else { Vector3::zeros() };
-    let torque = if bytes.ratio(1, 8)? { vector(bytes, 0.1)? } else { Vector3::zeros() };
+    let force = if bytes.arbitrary()? {
+        vector(bytes, 5.0)?
+    } else {
+        Vector3::zeros()
+    };
+    let torque = if bytes.ratio(1, 8)? {
+        vector(bytes, 0.1)?
+    } else {
+        Vector3::zeros()
+    };
     let pose_ot = Isometry3::from_parts(Translation3::from(centre), rotation(bytes)?);
-    Ok(Sample { stamp_ns: *stamp_ns, pose_ot, wrench: Wrench { force, torque } })
+    Ok(Sample {
+        stamp_ns: *stamp_ns,
+        pose_ot,
+        wrench: Wrench { force, torque },
+    })
 }
 
 /// A closed box, each of its sides with `cells` × `cells` squares.
@@ -136,7 +160,8 @@ pub fn open_edges(mesh: &TriMesh) -> usize {
     let mut uses: HashMap<[u32; 2], i64> = HashMap::new();
     for (_, [a, b, c]) in mesh.faces() {
         for [from, to] in [[a.0, b.0], [b.0, c.0], [c.0, a.0]] {
-            *uses.entry([from.min(to), from.max(to)]).or_default() += if from < to { 1 } else { -1 };
+            *uses.entry([from.min(to), from.max(to)]).or_default() +=
+                if from < to { 1 } else { -1 };
         }
     }
     uses.values().filter(|&&balance| balance != 0).count()
@@ -146,16 +171,31 @@ pub fn open_edges(mesh: &TriMesh) -> usize {
 /// Where a vertex of the mesh has no place.
 pub fn assert_is_somewhere(mesh: &TriMesh) {
     let nowhere = mesh.positions().iter().position(|p| !is_place(p));
-    assert_eq!(nowhere, None, "a vertex is nowhere: {:?}", nowhere.map(|at| mesh.positions()[at]));
+    assert_eq!(
+        nowhere,
+        None,
+        "a vertex is nowhere: {:?}",
+        nowhere.map(|at| mesh.positions()[at])
+    );
 }
 
 /// Reads a recording to its end: what it says of itself and each message.
 pub fn read_all(path: &Path, layout: impl Into<RecordingLayout>) {
-    let Ok(mut reader) = RecordingReader::open(path, layout) else { return };
+    let Ok(mut reader) = RecordingReader::open(path, layout) else {
+        return;
+    };
     while let Some(record) = reader.next_record() {
         if let Ok(Record::Message(Message::Pose(pose))) = record {
-            assert!((pose.pose_ot.rotation.norm() - 1.0).abs() < 1e-6, "{pose:?}");
+            assert!(
+                (pose.pose_ot.rotation.norm() - 1.0).abs() < 1e-6,
+                "{pose:?}"
+            );
         }
     }
-    assert!(reader.bad_messages().values().all(|bad| bad.poses + bad.wrenches > 0));
+    assert!(
+        reader
+            .bad_messages()
+            .values()
+            .all(|bad| bad.poses + bad.wrenches > 0)
+    );
 }

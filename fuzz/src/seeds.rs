@@ -6,7 +6,9 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use rusqlite::{Connection, params};
-use touchup_core::stylus::{MarkerFrame, MarkerObservation, Message, StampedPose, StampedWrench, Wrench};
+use touchup_core::stylus::{
+    MarkerFrame, MarkerObservation, Message, StampedPose, StampedWrench, Wrench,
+};
 use touchup_io::recording::{Record, RecordingWriter, Topics};
 use touchup_session::scene::Scene;
 
@@ -31,7 +33,8 @@ pub const TOPICS: [(&str, &str); 12] = [
 
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
-const OBJ: &str = "v 0 0 0\nv 20 0 0\nv 0 20 0\nv 0 0 20\nf 1 3 2\nf 1 2 4\nf 2 3 4/1\nf -2//1 1 -1\n";
+const OBJ: &str =
+    "v 0 0 0\nv 20 0 0\nv 0 20 0\nv 0 0 20\nf 1 3 2\nf 1 2 4\nf 2 3 4/1\nf -2//1 1 -1\n";
 const STL: &str = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 20 0 0\nvertex 0 20 0\nendloop\nendfacet\n\
                    facet normal 0 0 1\nouter loop\nvertex 20 0 0\nvertex 20 20 0\nvertex 0 20 0\nendloop\nendfacet\nendsolid a\n";
 const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty float y\nproperty float z\nproperty float sigma_mm\n\
@@ -43,8 +46,7 @@ const PLY_POINTS: &str = "ply\nformat ascii 1.0\nelement vertex 2\nproperty floa
                           property float ny\nproperty float nz\nend_header\n0 0 0 0 0 1\n1 0 0 0 1 0\n";
 const PCD: &str = "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH 2\nHEIGHT 1\n\
                    VIEWPOINT 0 0 1 1 0 0 0\nPOINTS 2\nDATA ascii\n1 2 3 9\nnan 5 6 9\n";
-const PCD_PACKED: &str =
-    "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\nDATA binary_compressed\n";
+const PCD_PACKED: &str = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\nDATA binary_compressed\n";
 const METADATA: &str = "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  relative_file_paths:\n    - bag_0.mcap\n  \
                         duration: {nanoseconds: 1000000}\n  message_count: 2\n";
 const FEATURES: &str = r#"{"features":[{"id":1,"kind":"hole","center_mm":[1,2,3],"axis":[0,0,1],"diameter_mm":8.0,
@@ -70,7 +72,11 @@ fn e57_bytes() -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     let mut write = || -> e57::Result<()> {
         let mut writer = E57Writer::new(&mut bytes, "file")?;
-        let records = vec![Record::CARTESIAN_X_F64, Record::CARTESIAN_Y_F64, Record::CARTESIAN_Z_F64];
+        let records = vec![
+            Record::CARTESIAN_X_F64,
+            Record::CARTESIAN_Y_F64,
+            Record::CARTESIAN_Z_F64,
+        ];
         let mut scan = writer.add_pointcloud("scan", records)?;
         scan.set_transform(Some(Transform::default()));
         for x in [0.0, 1.0] {
@@ -89,13 +95,36 @@ pub fn mcap_of(messages: &[(u16, &[u8])]) -> Vec<u8> {
     record(&mut file, 1, &[&text("ros2"), &text("")]);
     for (id, (topic, kind)) in (0u16..).zip(TOPICS) {
         let schema = id + 1;
-        record(&mut file, 3, &[&schema.to_le_bytes(), &text(kind), &text("ros2msg"), &text("")]);
-        record(&mut file, 4, &[&id.to_le_bytes(), &schema.to_le_bytes(), &text(topic), &text("cdr"), &text("")]);
+        record(
+            &mut file,
+            3,
+            &[
+                &schema.to_le_bytes(),
+                &text(kind),
+                &text("ros2msg"),
+                &text(""),
+            ],
+        );
+        record(
+            &mut file,
+            4,
+            &[
+                &id.to_le_bytes(),
+                &schema.to_le_bytes(),
+                &text(topic),
+                &text("cdr"),
+                &text(""),
+            ],
+        );
     }
     for (number, (topic, payload)) in (0u32..).zip(messages) {
         let time = (u64::from(number) + 1) * 1_000_000;
         let times = [time.to_le_bytes(), time.to_le_bytes()].concat();
-        record(&mut file, 5, &[&topic.to_le_bytes(), &number.to_le_bytes(), &times, payload]);
+        record(
+            &mut file,
+            5,
+            &[&topic.to_le_bytes(), &number.to_le_bytes(), &times, payload],
+        );
     }
     file
 }
@@ -116,13 +145,26 @@ fn text(text: &str) -> Vec<u8> {
 /// # Panics
 /// Where it cannot be written into memory.
 pub fn mcap_bytes() -> Vec<u8> {
-    let topics = Topics { markers: Some(MARKERS.into()), ..Topics::default() };
-    let mut writer = RecordingWriter::new(Cursor::new(Vec::new()), &topics).expect("memory takes bytes");
+    let topics = Topics {
+        markers: Some(MARKERS.into()),
+        ..Topics::default()
+    };
+    let mut writer =
+        RecordingWriter::new(Cursor::new(Vec::new()), &topics).expect("memory takes bytes");
     for (stamp_ns, z) in [(1_000_000, 1e-3), (2_000_000, 2e-3)] {
-        let pose = StampedPose { stamp_ns, pose_ot: Isometry3::translation(0.0, 0.0, z) };
-        let wrench = Wrench { force: Vector3::z(), torque: Vector3::zeros() };
+        let pose = StampedPose {
+            stamp_ns,
+            pose_ot: Isometry3::translation(0.0, 0.0, z),
+        };
+        let wrench = Wrench {
+            force: Vector3::z(),
+            torque: Vector3::zeros(),
+        };
         let mut markers = MarkerFrame::new(stamp_ns);
-        markers.see(MarkerObservation { label: 3, position: Point3::new(0.0, 0.0, z) });
+        markers.see(MarkerObservation {
+            label: 3,
+            position: Point3::new(0.0, 0.0, z),
+        });
         for entry in [
             Record::from(Message::Pose(pose)),
             Message::Wrench(StampedWrench { stamp_ns, wrench }).into(),
@@ -147,38 +189,102 @@ fn bag_bytes() -> Vec<u8> {
     let record = |head: &[(&str, &[u8])], data: &[u8]| [sized(&fields(head)), sized(data)].concat();
     let mut bag = b"#ROSBAG V2.0\n".to_vec();
     bag.extend(record(
-        &[("op", &[3]), ("index_pos", &[0; 8]), ("conn_count", &[0; 4]), ("chunk_count", &[0; 4])],
+        &[
+            ("op", &[3]),
+            ("index_pos", &[0; 8]),
+            ("conn_count", &[0; 4]),
+            ("chunk_count", &[0; 4]),
+        ],
         b" ",
     ));
     let mut records = Vec::new();
     for (number, (topic, kind), numbers) in [(0u32, TOPICS[0], 7), (1, TOPICS[1], 6)] {
         let (kind, id) = (kind.replace("/msg/", "/"), number.to_le_bytes());
         let about = fields(&[("topic", topic.as_bytes()), ("type", kind.as_bytes())]);
-        records.extend(record(&[("op", &[7]), ("conn", &id), ("topic", topic.as_bytes())], &about));
-        let numbers: Vec<u8> = (1..=numbers).flat_map(|at| f64::from(u8::from(at == numbers)).to_le_bytes()).collect();
+        records.extend(record(
+            &[("op", &[7]), ("conn", &id), ("topic", topic.as_bytes())],
+            &about,
+        ));
+        let numbers: Vec<u8> = (1..=numbers)
+            .flat_map(|at| f64::from(u8::from(at == numbers)).to_le_bytes())
+            .collect();
         let message = [&[0; 12][..], &sized(b"part"), &numbers].concat();
-        records.extend(record(&[("op", &[2]), ("conn", &id), ("time", &[1, 0, 0, 0, 2, 0, 0, 0])], &message));
+        records.extend(record(
+            &[
+                ("op", &[2]),
+                ("conn", &id),
+                ("time", &[1, 0, 0, 0, 2, 0, 0, 0]),
+            ],
+            &message,
+        ));
     }
     let size = (records.len() as u32).to_le_bytes();
-    bag.extend(record(&[("op", &[5]), ("compression", b"none"), ("size", &size)], &records));
+    bag.extend(record(
+        &[("op", &[5]), ("compression", b"none"), ("size", &size)],
+        &records,
+    ));
     bag
 }
 
 /// Pose, wrench and cloud in CDR.
 fn payloads() -> [Vec<u8>; 3] {
-    let head = [&[0u8, 1, 0, 0][..], &1i32.to_le_bytes(), &2u32.to_le_bytes(), &text("part\0"), &[0; 3]].concat();
-    let numbers = |numbers: &[f64]| numbers.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<_>>();
+    let head = [
+        &[0u8, 1, 0, 0][..],
+        &1i32.to_le_bytes(),
+        &2u32.to_le_bytes(),
+        &text("part\0"),
+        &[0; 3],
+    ]
+    .concat();
+    let numbers = |numbers: &[f64]| {
+        numbers
+            .iter()
+            .flat_map(|x| x.to_le_bytes())
+            .collect::<Vec<_>>()
+    };
     let field = |name: &str, offset: u32| {
-        let fixed = [&offset.to_le_bytes()[..], &[7, 0, 0, 0], &1u32.to_le_bytes()].concat();
+        let fixed = [
+            &offset.to_le_bytes()[..],
+            &[7, 0, 0, 0],
+            &1u32.to_le_bytes(),
+        ]
+        .concat();
         [text(name), vec![0; 2], fixed].concat()
     };
     let fields = [field("x\0", 0), field("y\0", 4), field("z\0", 8)].concat();
-    let sizes = |sizes: &[u32]| sizes.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<_>>();
-    let point: Vec<u8> = [1f32, 2.0, 3.0].iter().flat_map(|x| x.to_le_bytes()).collect();
+    let sizes = |sizes: &[u32]| {
+        sizes
+            .iter()
+            .flat_map(|x| x.to_le_bytes())
+            .collect::<Vec<_>>()
+    };
+    let point: Vec<u8> = [1f32, 2.0, 3.0]
+        .iter()
+        .flat_map(|x| x.to_le_bytes())
+        .collect();
     [
-        [&head[..], &[0; 4], &numbers(&[1e-3, 2e-3, 3e-3, 0.0, 0.0, 0.0, 1.0])].concat(),
-        [&head[..], &[0; 4], &numbers(&[0.0, 0.0, 2.0, 0.0, 0.0, 0.01])].concat(),
-        [&head[..], &sizes(&[1, 1, 3]), &fields, &[0; 4], &sizes(&[12, 12, 12]), &point, &[1]].concat(),
+        [
+            &head[..],
+            &[0; 4],
+            &numbers(&[1e-3, 2e-3, 3e-3, 0.0, 0.0, 0.0, 1.0]),
+        ]
+        .concat(),
+        [
+            &head[..],
+            &[0; 4],
+            &numbers(&[0.0, 0.0, 2.0, 0.0, 0.0, 0.01]),
+        ]
+        .concat(),
+        [
+            &head[..],
+            &sizes(&[1, 1, 3]),
+            &fields,
+            &[0; 4],
+            &sizes(&[12, 12, 12]),
+            &point,
+            &[1],
+        ]
+        .concat(),
     ]
 }
 
@@ -190,15 +296,25 @@ fn database(path: &Path) -> rusqlite::Result<()> {
          CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB);",
     )?;
     for (id, ((name, kind), payload)) in (1i64..).zip(TOPICS.into_iter().zip(payloads())) {
-        db.execute("INSERT INTO topics VALUES (?1, ?2, ?3, 'cdr', '')", params![id, name, kind])?;
-        db.execute("INSERT INTO messages VALUES (?1, ?1, ?2, ?3)", params![id, id * 1000, payload])?;
+        db.execute(
+            "INSERT INTO topics VALUES (?1, ?2, ?3, 'cdr', '')",
+            params![id, name, kind],
+        )?;
+        db.execute(
+            "INSERT INTO messages VALUES (?1, ?1, ?2, ?3)",
+            params![id, id * 1000, payload],
+        )?;
     }
     Ok(())
 }
 
 /// Bytes that the targets of numbers read as touches of an ordinary size.
 fn numbers(seed: u8) -> Vec<u8> {
-    let byte = |k: u32| (k.wrapping_mul(2_654_435_761).wrapping_add(u32::from(seed) * 97) >> 13) as u8;
+    let byte = |k: u32| {
+        (k.wrapping_mul(2_654_435_761)
+            .wrapping_add(u32::from(seed) * 97)
+            >> 13) as u8
+    };
     (0..400).map(byte).collect()
 }
 
@@ -212,14 +328,36 @@ fn numbers(seed: u8) -> Vec<u8> {
 pub fn write(folder: &Path) -> std::io::Result<()> {
     let triangle = [[0f32; 3], [20.0, 0.0, 0.0], [0.0, 20.0, 0.0]].concat();
     let coordinates: Vec<u8> = triangle.iter().flat_map(|x| x.to_le_bytes()).collect();
-    let ply_binary = [PLY_BINARY.as_bytes(), &coordinates, &[3], &[0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0]].concat();
-    let stl_binary = [&[b' '; 80][..], &1u32.to_le_bytes(), &[0; 12], &coordinates, &[0; 2]].concat();
+    let ply_binary = [
+        PLY_BINARY.as_bytes(),
+        &coordinates,
+        &[3],
+        &[0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0],
+    ]
+    .concat();
+    let stl_binary = [
+        &[b' '; 80][..],
+        &1u32.to_le_bytes(),
+        &[0; 12],
+        &coordinates,
+        &[0; 2],
+    ]
+    .concat();
     let kind = |kind: u8, bytes: &[u8]| [&[kind], bytes].concat();
-    let message =
-        |(topic, payload): (u8, Vec<u8>)| [&[topic][..], &(payload.len() as u32).to_le_bytes(), &payload].concat();
+    let message = |(topic, payload): (u8, Vec<u8>)| {
+        [
+            &[topic][..],
+            &(payload.len() as u32).to_le_bytes(),
+            &payload,
+        ]
+        .concat()
+    };
     let messages: Vec<_> = (0u8..).zip(payloads()).map(message).collect();
     let template = Scene::template();
-    let mut scenes: Vec<_> = template.split("\n\n").map(|section| without_comments(section).into_bytes()).collect();
+    let mut scenes: Vec<_> = template
+        .split("\n\n")
+        .map(|section| without_comments(section).into_bytes())
+        .collect();
     scenes.push(b"contact: {}\ntip: {radius_mm: 1.5}\nrefine: {mode: paper}\npatch: {tolerance_mm: 0.04}\nmarkers: {positions_mm: [[0, 0, 0]]}".into());
     let touches = [touchup_io::touches_file::HEADER, "\n", TOUCHES].concat();
     let all: [(&str, Vec<Vec<u8>>); 16] = [
@@ -278,12 +416,21 @@ pub fn write(folder: &Path) -> std::io::Result<()> {
     let path = folder.join("recording/seed-db3");
     let _ = fs::remove_file(&path);
     database(&path).expect("SQLite makes a small database");
-    let words = template.split(|c: char| !(c.is_alphanumeric() || c == '_')).filter(|word| word.contains('_'));
-    fs::write(folder.join("scene.dict"), words.map(|word| format!("\"{word}\"\n")).collect::<String>())
+    let words = template
+        .split(|c: char| !(c.is_alphanumeric() || c == '_'))
+        .filter(|word| word.contains('_'));
+    fs::write(
+        folder.join("scene.dict"),
+        words
+            .map(|word| format!("\"{word}\"\n"))
+            .collect::<String>(),
+    )
 }
 
 fn without_comments(yaml: &str) -> String {
-    let lines = yaml.lines().filter(|line| !line.trim_start().starts_with("# ") && !line.trim().is_empty());
+    let lines = yaml
+        .lines()
+        .filter(|line| !line.trim_start().starts_with("# ") && !line.trim().is_empty());
     // a setting that is off is on in a seed
     lines.map(|line| line.replacen('#', "", 1) + "\n").collect()
 }

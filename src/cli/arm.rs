@@ -44,7 +44,8 @@ pub(super) enum RobotName {
 const LOCK_STEP: &str = "TOUCHUP_UR_LOCK_STEP";
 
 #[cfg(feature = "ur")]
-const NO_HOST: &str = "--robot ur needs robot.host and robot.site_packages in the scene (docs/ur.md)";
+const NO_HOST: &str =
+    "--robot ur needs robot.host and robot.site_packages in the scene (docs/ur.md)";
 
 /// The UR of a scene.
 ///
@@ -52,7 +53,9 @@ const NO_HOST: &str = "--robot ur needs robot.host and robot.site_packages in th
 /// [`CliError::usage`] where the scene names none, or touchup was built without it; [`CliError::arm`] where it does not answer.
 #[cfg(feature = "ur")]
 pub(super) fn connect_ur(scene: &Scene) -> Result<Box<dyn Arm + Send>, CliError> {
-    Ok(Box::new(UrArm::connect(&ur_params(scene)?).map_err(CliError::arm)?))
+    Ok(Box::new(
+        UrArm::connect(&ur_params(scene)?).map_err(CliError::arm)?,
+    ))
 }
 
 /// The UR of a scene, after its stop was cleared as far as a call can.
@@ -61,7 +64,9 @@ pub(super) fn connect_ur(scene: &Scene) -> Result<Box<dyn Arm + Send>, CliError>
 /// As [`connect_ur`]; [`CliError::stopped`] where it takes a hand at its panel.
 #[cfg(feature = "ur")]
 pub(super) fn recovered_ur(scene: &Scene) -> Result<Box<dyn Arm + Send>, CliError> {
-    Ok(Box::new(UrArm::recovered(&ur_params(scene)?).map_err(CliError::stopped)?))
+    Ok(Box::new(
+        UrArm::recovered(&ur_params(scene)?).map_err(CliError::stopped)?,
+    ))
 }
 
 #[cfg(feature = "ur")]
@@ -70,7 +75,9 @@ fn ur_params(scene: &Scene) -> Result<UrParams, CliError> {
     let robot = scene.robot.as_ref().filter(named).zip(scene.probing());
     let (robot, (cell, _)) = robot.ok_or_else(|| CliError::usage(NO_HOST))?;
     if robot.chain.is_some() {
-        return Err(CliError::usage("a UR is planned with as a UR: name it in robot.model of the scene, not a URDF"));
+        return Err(CliError::usage(
+            "a UR is planned with as a UR: name it in robot.model of the scene, not a URDF",
+        ));
     }
     Ok(UrParams {
         pose_ft: cell.pose_ft,
@@ -107,7 +114,9 @@ fn connect_ros2_control(scene: &Scene) -> Result<Box<dyn Arm + Send>, CliError> 
 
 #[cfg(not(any(feature = "ros", feature = "r2r")))]
 fn connect_ros2_control(_: &Scene) -> Result<Box<dyn Arm + Send>, CliError> {
-    Err(CliError::usage("this touchup was built without ROS: build it with the feature `ros`, its default"))
+    Err(CliError::usage(
+        "this touchup was built without ROS: build it with the feature `ros`, its default",
+    ))
 }
 
 /// The arm behind ros2_control of a scene.
@@ -115,14 +124,20 @@ fn connect_ros2_control(_: &Scene) -> Result<Box<dyn Arm + Send>, CliError> {
 /// # Errors
 /// [`CliError::usage`] where the scene names no arm; [`CliError::arm`] where it is not at command.
 #[cfg(any(feature = "ros", feature = "r2r"))]
-pub(super) fn ros2_control_arm(scene: &Scene, config: &NodeConfig) -> Result<Box<dyn Arm + Send>, CliError> {
-    const NONE: &str =
-        "an arm behind ros2_control needs the sections robot and tip in the scene (docs/ros2_control.md)";
+pub(super) fn ros2_control_arm(
+    scene: &Scene,
+    config: &NodeConfig,
+) -> Result<Box<dyn Arm + Send>, CliError> {
+    const NONE: &str = "an arm behind ros2_control needs the sections robot and tip in the scene (docs/ros2_control.md)";
     let of_scene = scene.robot.as_ref().zip(scene.probing());
     let (robot, (cell, params)) = of_scene.ok_or_else(|| CliError::usage(NONE))?;
     let control = robot.ros2_control.clone().unwrap_or_default();
     let joint_names = match &robot.chain {
-        Some(chain) => chain.joints().iter().map(|joint| joint.name.clone()).collect(),
+        Some(chain) => chain
+            .joints()
+            .iter()
+            .map(|joint| joint.name.clone())
+            .collect(),
         None => UR_JOINTS.map(Into::into).into(),
     };
     let params = Ros2ControlParams {
@@ -130,7 +145,11 @@ pub(super) fn ros2_control_arm(scene: &Scene, config: &NodeConfig) -> Result<Box
         joint_names,
         pose_ft: cell.pose_ft,
         pose_fs: control.pose_fs(),
-        payload: Payload { mass: robot.payload_mass, p_sc: robot.payload_centre, ..WEIGHTLESS },
+        payload: Payload {
+            mass: robot.payload_mass,
+            p_sc: robot.payload_centre,
+            ..WEIGHTLESS
+        },
         stiffness: params.touch.stiffness,
         latency: params.touch.latency,
         top_joint_speed: params.limits.joint_speed,
@@ -142,15 +161,28 @@ pub(super) fn ros2_control_arm(scene: &Scene, config: &NodeConfig) -> Result<Box
         },
         ..Ros2ControlParams::default()
     };
-    let ArmTopics { joint_states, wrench, trajectory } = &params.topics;
-    let port = crate::ros::arm_port(config, [joint_states, wrench], trajectory).map_err(CliError::arm)?;
-    Ok(Box::new(Ros2ControlArm::connect(&params, port).map_err(CliError::arm)?))
+    let ArmTopics {
+        joint_states,
+        wrench,
+        trajectory,
+    } = &params.topics;
+    let port =
+        crate::ros::arm_port(config, [joint_states, wrench], trajectory).map_err(CliError::arm)?;
+    Ok(Box::new(
+        Ros2ControlArm::connect(&params, port).map_err(CliError::arm)?,
+    ))
 }
 
 /// Of a UR from the base to the wrist, as its description names them.
 #[cfg(any(feature = "ros", feature = "r2r"))]
-const UR_JOINTS: [&str; 6] =
-    ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"];
+const UR_JOINTS: [&str; 6] = [
+    "shoulder_pan_joint",
+    "shoulder_lift_joint",
+    "elbow_joint",
+    "wrist_1_joint",
+    "wrist_2_joint",
+    "wrist_3_joint",
+];
 
 #[derive(Debug, Args)]
 pub(super) struct ArmArguments {
@@ -217,11 +249,28 @@ impl TruePayload {
     pub fn held_by(&self, arm: ArmParams, scene: &Scene) -> Result<ArmParams, CliError> {
         let robot = scene.robot.clone().unwrap_or_default();
         let (mass, centre) = (robot.payload_mass, robot.payload_centre);
-        let configured_payload = Payload { mass, p_sc: centre, ..WEIGHTLESS };
+        let configured_payload = Payload {
+            mass,
+            p_sc: centre,
+            ..WEIGHTLESS
+        };
         let written = |text: &String| millimetres("--truth-payload-centre-mm", text);
-        let p_sc = self.truth_payload_centre_mm.as_ref().map(written).transpose()?.unwrap_or(centre);
-        let payload = Payload { mass: self.truth_payload_kg.unwrap_or(mass), p_sc, ..WEIGHTLESS };
-        Ok(ArmParams { payload, configured_payload, ..arm })
+        let p_sc = self
+            .truth_payload_centre_mm
+            .as_ref()
+            .map(written)
+            .transpose()?
+            .unwrap_or(centre);
+        let payload = Payload {
+            mass: self.truth_payload_kg.unwrap_or(mass),
+            p_sc,
+            ..WEIGHTLESS
+        };
+        Ok(ArmParams {
+            payload,
+            configured_payload,
+            ..arm
+        })
     }
 }
 
@@ -230,9 +279,9 @@ impl CellArguments {
     pub fn scan(&self, scene: &Path) -> Result<(PathBuf, MeshUnit), CliError> {
         match &self.scan {
             Some(scan) => Ok((scan.clone(), self.mesh_unit)),
-            None => Scene::read(scene)?
-                .scan_file(scene)
-                .ok_or_else(|| CliError::usage("there is no scan: name it by --scan, or in the scene")),
+            None => Scene::read(scene)?.scan_file(scene).ok_or_else(|| {
+                CliError::usage("there is no scan: name it by --scan, or in the scene")
+            }),
         }
     }
 
@@ -252,9 +301,16 @@ impl CellArguments {
             RobotName::Sim => {
                 let part = self.part()?;
                 let surface = MeshSurface::new(&part)?;
-                let all = WithSpheres { part: &surface, spheres: &ready.spheres };
+                let all = WithSpheres {
+                    part: &surface,
+                    spheres: &ready.spheres,
+                };
                 let params = truth(ready.simulated_arm(self.seed, self.arm_errors))?;
-                work(&mut SimArm::new(&all, params, &ready.cell.above(&ready.with_spheres(&part)?))?)
+                work(&mut SimArm::new(
+                    &all,
+                    params,
+                    &ready.cell.above(&ready.with_spheres(&part)?),
+                )?)
             }
         }
     }
@@ -266,7 +322,11 @@ impl CellArguments {
         &self,
         robot: RobotName,
         scene: &Path,
-        Measurement { stage, kept, spheres }: Measurement<'_>,
+        Measurement {
+            stage,
+            kept,
+            spheres,
+        }: Measurement<'_>,
         truth: impl FnOnce(ArmParams, &Scene) -> Result<ArmParams, CliError>,
         work: impl FnOnce(&mut Prober<'_>) -> Result<T, E>,
     ) -> Result<(T, Cell), CliError> {
@@ -278,7 +338,12 @@ impl CellArguments {
         let signals = StopSignals::listen()?;
         let measured = self.with(robot, &ready, truth, |arm| {
             let mut world = SpotWorld::new(&ready, kept, &signals)?;
-            let measured = work(&mut Prober::new(arm, &ready.cell, &ready.params, &mut world));
+            let measured = work(&mut Prober::new(
+                arm,
+                &ready.cell,
+                &ready.params,
+                &mut world,
+            ));
             signals.arm_is_at_rest();
             world.finish(measured.map_err(Into::into))
         })?;
@@ -286,8 +351,11 @@ impl CellArguments {
     }
 
     fn part(&self) -> Result<TriMesh, CliError> {
-        let missing = || CliError::usage("--robot sim needs the part that it touches: --truth MESH");
+        let missing =
+            || CliError::usage("--robot sim needs the part that it touches: --truth MESH");
         let truth = self.truth.as_ref().ok_or_else(missing)?;
-        Ok(read_scan(truth, self.mesh_unit).map_err(CliError::truth)?.mesh)
+        Ok(read_scan(truth, self.mesh_unit)
+            .map_err(CliError::truth)?
+            .mesh)
     }
 }

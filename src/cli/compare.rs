@@ -16,8 +16,8 @@ use super::pictures::{file_name, today, view_from, write_coloured, write_picture
 use super::progress::WorkProgress;
 use super::{CliError, Losses, check_outputs, print_report, require};
 use crate::compare::{
-    CompareParams, Comparison, IndexedMesh, PictureLabel, PicturePanel, PictureParams, Regions, SupportRegion,
-    UnlikeExtents, colour_of, compare as compare_shapes,
+    CompareParams, Comparison, IndexedMesh, PictureLabel, PicturePanel, PictureParams, Regions,
+    SupportRegion, UnlikeExtents, colour_of, compare as compare_shapes,
 };
 use crate::io::features_file::{FeatureRecord, read_features};
 use crate::io::mesh_file::{MeshUnit, VertexColumn, read_vertex_columns};
@@ -74,7 +74,13 @@ pub(super) struct CompareArguments {
     #[arg(skip)]
     named: Vec<FeatureRecord>,
     /// From which direction the picture is taken, in the frame of TRUTH; by default the side that was touched
-    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', num_args = 3, allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        value_delimiter = ',',
+        num_args = 3,
+        allow_negative_numbers = true
+    )]
     view: Option<Vec<f64>>,
     /// Points spread over TRUTH; over MESH they are as dense
     #[arg(long, value_name = "N", default_value_t = SAMPLES, value_parser = clap::value_parser!(u32).range(100..=5_000_000))]
@@ -112,11 +118,17 @@ struct PlacedMesh {
 
 impl PlacedMesh {
     fn new(mesh: TriMesh) -> Self {
-        Self { tree: FaceTree::new_by(&mesh, &Threads), mesh }
+        Self {
+            tree: FaceTree::new_by(&mesh, &Threads),
+            mesh,
+        }
     }
 
     fn shape(&self) -> IndexedMesh<'_> {
-        IndexedMesh { mesh: &self.mesh, tree: &self.tree }
+        IndexedMesh {
+            mesh: &self.mesh,
+            tree: &self.tree,
+        }
     }
 }
 
@@ -136,8 +148,13 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
     arguments.check_outputs()?;
     let reading = WorkProgress::stage("read");
     let Scan { mesh: as_read, .. } = read_scan(&arguments.mesh, arguments.mesh_unit)?;
-    let Scan { mesh: truth, .. } = read_scan(&arguments.truth, arguments.truth_unit).map_err(CliError::truth)?;
-    let before = arguments.before.as_ref().map(|path| read_scan(path, arguments.mesh_unit)).transpose();
+    let Scan { mesh: truth, .. } =
+        read_scan(&arguments.truth, arguments.truth_unit).map_err(CliError::truth)?;
+    let before = arguments
+        .before
+        .as_ref()
+        .map(|path| read_scan(path, arguments.mesh_unit))
+        .transpose();
     let before = before?.map(|file| file.mesh);
     let regions = read_regions(&arguments.mesh, arguments.mesh_unit, &as_read)?;
     let units = [arguments.mesh_unit, arguments.truth_unit];
@@ -153,28 +170,66 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
         Align::Icp => aligned_by_icp(&as_read, truth.shape(), arguments.seed)?,
         Align::Features => {
             let alternative = arguments.alternative.map(usize::from);
-            aligned_by_features(&as_read, truth.shape(), arguments.seed, alternative, arguments.json)?
+            aligned_by_features(
+                &as_read,
+                truth.shape(),
+                arguments.seed,
+                alternative,
+                arguments.json,
+            )?
         }
         Align::Pairs => aligned_by_pairs(arguments.pairs()?)?,
     };
     let mesh = PlacedMesh::new(moved(&as_read, &pose));
     let before = before.map(|scan| PlacedMesh::new(moved(&scan, &pose)));
-    let (scanned, refined) = arguments.measure(&mesh, &truth, before.as_ref(), regions.as_deref())?;
+    let (scanned, refined) =
+        arguments.measure(&mesh, &truth, before.as_ref(), regions.as_deref())?;
     if let Some(path) = &arguments.picture {
         let labels = arguments.feature_labels(&pose)?;
-        let caption =
-            format!("{}; {}", today(), alignment.as_ref().map_or("not aligned".to_owned(), Alignment::in_short));
+        let caption = format!(
+            "{}; {}",
+            today(),
+            alignment
+                .as_ref()
+                .map_or("not aligned".to_owned(), Alignment::in_short)
+        );
         let before = before.as_ref().zip(scanned.as_ref());
-        arguments.draw(path, (&mesh, &refined), before, &caption, &labels, regions.as_deref())?;
+        arguments.draw(
+            path,
+            (&mesh, &refined),
+            before,
+            &caption,
+            &labels,
+            regions.as_deref(),
+        )?;
     }
     if let Some(path) = &arguments.coloured {
-        let colours: Vec<_> = refined.vertex_deviations.iter().map(|&d| colour_of(d, refined.range)).collect();
-        let in_mm: Vec<f32> = refined.vertex_deviations.iter().map(|d| (d * 1e3) as f32).collect();
-        let column = VertexColumn { name: "deviation_mm", values: in_mm.into() };
+        let colours: Vec<_> = refined
+            .vertex_deviations
+            .iter()
+            .map(|&d| colour_of(d, refined.range))
+            .collect();
+        let in_mm: Vec<f32> = refined
+            .vertex_deviations
+            .iter()
+            .map(|d| (d * 1e3) as f32)
+            .collect();
+        let column = VertexColumn {
+            name: "deviation_mm",
+            values: in_mm.into(),
+        };
         write_coloured(path, &as_read, arguments.mesh_unit, &colours, [column])?;
     }
-    let shapes = [(&*arguments.mesh, &as_read), (&*arguments.truth, &truth.mesh)];
-    Ok(CompareReport::of(shapes, alignment, scanned.as_ref(), &refined))
+    let shapes = [
+        (&*arguments.mesh, &as_read),
+        (&*arguments.truth, &truth.mesh),
+    ];
+    Ok(CompareReport::of(
+        shapes,
+        alignment,
+        scanned.as_ref(),
+        &refined,
+    ))
 }
 
 impl CompareArguments {
@@ -185,7 +240,17 @@ impl CompareArguments {
         let [mesh, truth] = ["refined.ply", "truth.ply"].map(|name| folder.join(name));
         let [before, picture] = ["scan.ply", "deviation.png"].map(|name| Some(folder.join(name)));
         let tolerance_mm = Some(TOLERANCE_MM);
-        Self { mesh, truth, before, picture, tolerance_mm, named, samples: SAMPLES, seed: 1, ..Self::default() }
+        Self {
+            mesh,
+            truth,
+            before,
+            picture,
+            tolerance_mm,
+            named,
+            samples: SAMPLES,
+            seed: 1,
+            ..Self::default()
+        }
     }
 
     /// Compares what the mesh was before, where there is that, and the mesh, in one range.
@@ -197,16 +262,32 @@ impl CompareArguments {
         regions: Option<&[SupportRegion]>,
     ) -> Result<(Option<Comparison>, Comparison), CliError> {
         let _measuring = WorkProgress::stage("measure");
-        let [range, tolerance] = [self.range_mm, self.tolerance_mm].map(|mm| mm.map(|mm| mm * 1e-3));
-        let params =
-            CompareParams { samples: self.samples as usize, seed: self.seed, range, tolerance, ..Default::default() };
-        let through = regions.map_or(Regions::Unknown, |regions| Regions::Of(mesh.shape(), regions));
-        let compared = |scan: &PlacedMesh| compare_shapes(scan.shape(), truth.shape(), through, &params, &Threads);
+        let [range, tolerance] =
+            [self.range_mm, self.tolerance_mm].map(|mm| mm.map(|mm| mm * 1e-3));
+        let params = CompareParams {
+            samples: self.samples as usize,
+            seed: self.seed,
+            range,
+            tolerance,
+            ..Default::default()
+        };
+        let through = regions.map_or(Regions::Unknown, |regions| {
+            Regions::Of(mesh.shape(), regions)
+        });
+        let compared = |scan: &PlacedMesh| {
+            compare_shapes(scan.shape(), truth.shape(), through, &params, &Threads)
+        };
         let before = before.map(compared).transpose()?;
         // the scale of what was shows how much better it is
-        let params = CompareParams { range: before.as_ref().map(|before| before.range).or(range), ..params };
+        let params = CompareParams {
+            range: before.as_ref().map(|before| before.range).or(range),
+            ..params
+        };
         let own = regions.map_or(Regions::Unknown, Regions::Own);
-        Ok((before, compare_shapes(mesh.shape(), truth.shape(), own, &params, &Threads)?))
+        Ok((
+            before,
+            compare_shapes(mesh.shape(), truth.shape(), own, &params, &Threads)?,
+        ))
     }
 
     /// Draws the deviations.
@@ -222,12 +303,28 @@ impl CompareArguments {
         regions: Option<&[SupportRegion]>,
     ) -> Result<(), CliError> {
         let _drawing = WorkProgress::stage("draw");
-        let title = format!("{} against {}", file_name(&self.mesh), file_name(&self.truth));
+        let title = format!(
+            "{} against {}",
+            file_name(&self.mesh),
+            file_name(&self.truth)
+        );
         let note = |compared| table::note(compared, self.tolerance_mm);
         let scan = before
             .zip(self.before.as_ref())
-            .map(|((scan, scanned), path)| (scan, scanned, format!("before: {}", file_name(path)), note(scanned)));
-        let now = (mesh, refined, format!("after: {}", file_name(&self.mesh)), note(refined));
+            .map(|((scan, scanned), path)| {
+                (
+                    scan,
+                    scanned,
+                    format!("before: {}", file_name(path)),
+                    note(scanned),
+                )
+            });
+        let now = (
+            mesh,
+            refined,
+            format!("after: {}", file_name(&self.mesh)),
+            note(refined),
+        );
         let panels: Vec<PicturePanel<'_>> = scan
             .iter()
             .chain([&now])
@@ -240,9 +337,14 @@ impl CompareArguments {
             })
             .collect();
         let is_touched = |region: &SupportRegion| *region == SupportRegion::Touched;
-        let weights = regions.filter(|regions| regions.iter().any(is_touched)).map(|regions| {
-            regions.iter().map(|region| if is_touched(region) { 1.0 } else { 0.0 }).collect::<Vec<f64>>()
-        });
+        let weights = regions
+            .filter(|regions| regions.iter().any(is_touched))
+            .map(|regions| {
+                regions
+                    .iter()
+                    .map(|region| if is_touched(region) { 1.0 } else { 0.0 })
+                    .collect::<Vec<f64>>()
+            });
         let params = PictureParams {
             title: &title,
             caption,
@@ -258,20 +360,40 @@ impl CompareArguments {
 
     /// The names of the features with their sizes, where the alignment brings them.
     fn feature_labels(&self, pose: &Isometry3<f64>) -> Result<Vec<PictureLabel>, CliError> {
-        let read = self.features.as_deref().map(read_features).transpose()?.unwrap_or_default();
+        let read = self
+            .features
+            .as_deref()
+            .map(read_features)
+            .transpose()?
+            .unwrap_or_default();
         let label = |feature: &FeatureRecord| {
-            let text = match (feature.kind.as_str(), feature.diameter_mm, feature.width_mm.zip(feature.length_mm)) {
+            let text = match (
+                feature.kind.as_str(),
+                feature.diameter_mm,
+                feature.width_mm.zip(feature.length_mm),
+            ) {
                 (kind @ ("hole" | "boss"), Some(diameter), _) => format!("{kind} Ø{diameter:.2}"),
-                (kind @ ("slot" | "pocket"), _, Some((width, length))) => format!("{kind} {width:.2} × {length:.2}"),
+                (kind @ ("slot" | "pocket"), _, Some((width, length))) => {
+                    format!("{kind} {width:.2} × {length:.2}")
+                }
                 _ => return None,
             };
-            Some(PictureLabel { place: pose * (Point3::from(feature.center_mm?) * 1e-3), text })
+            Some(PictureLabel {
+                place: pose * (Point3::from(feature.center_mm?) * 1e-3),
+                text,
+            })
         };
-        Ok(read.features.iter().chain(&self.named).filter_map(label).collect())
+        Ok(read
+            .features
+            .iter()
+            .chain(&self.named)
+            .filter_map(label)
+            .collect())
     }
 
     fn pairs(&self) -> Result<&Path, CliError> {
-        let missing = || CliError::usage("--align pairs needs a file: compare MESH TRUTH --align pairs FILE");
+        let missing =
+            || CliError::usage("--align pairs needs a file: compare MESH TRUTH --align pairs FILE");
         self.pairs.as_deref().ok_or_else(missing)
     }
 
@@ -279,16 +401,26 @@ impl CompareArguments {
         if self.align == Align::Pairs {
             self.pairs()?;
         } else if let Some(path) = &self.pairs {
-            return Err(CliError::usage(format!("{} is one file too many without --align pairs", path.display())));
+            return Err(CliError::usage(format!(
+                "{} is one file too many without --align pairs",
+                path.display()
+            )));
         }
         let is_allowed = self.alternative.is_none() || self.align == Align::Features;
-        require(is_allowed, "--alternative chooses among what --align features finds")
+        require(
+            is_allowed,
+            "--alternative chooses among what --align features finds",
+        )
     }
 
     /// Checks that the result can be written before the work begins.
     fn check_outputs(&self) -> Result<(), CliError> {
-        let outputs = [("--picture", ".png", &self.picture), ("--coloured", ".ply", &self.coloured)];
-        let [before, pairs, features] = [&self.before, &self.pairs, &self.features].map(Option::as_ref);
+        let outputs = [
+            ("--picture", ".png", &self.picture),
+            ("--coloured", ".ply", &self.coloured),
+        ];
+        let [before, pairs, features] =
+            [&self.before, &self.pairs, &self.features].map(Option::as_ref);
         let inputs = [Some(&self.mesh), Some(&self.truth), before, pairs, features];
         check_outputs(&outputs, &inputs, "compared: choose another place")?;
         view_from(self.view.as_ref()).map(drop)
@@ -303,7 +435,11 @@ fn positive(text: &str) -> Result<f64, String> {
 }
 
 /// Support of each vertex of a refined PLY; `None` for a mesh without it.
-fn read_regions(path: &Path, unit: MeshUnit, mesh: &TriMesh) -> Result<Option<Vec<SupportRegion>>, CliError> {
+fn read_regions(
+    path: &Path,
+    unit: MeshUnit,
+    mesh: &TriMesh,
+) -> Result<Option<Vec<SupportRegion>>, CliError> {
     let columns = read_vertex_columns(path, unit, mesh, ["support", "touched"])?;
     let of_support = |support: &f32| match *support {
         0.0 => SupportRegion::Untouched,
@@ -324,23 +460,36 @@ fn read_regions(path: &Path, unit: MeshUnit, mesh: &TriMesh) -> Result<Option<Ve
 }
 
 /// What to do where two shapes hardly show one part in one frame.
-fn advice_on(unlike: UnlikeExtents, [mesh_unit, truth_unit]: [MeshUnit; 2], align: Align) -> Option<String> {
+fn advice_on(
+    unlike: UnlikeExtents,
+    [mesh_unit, truth_unit]: [MeshUnit; 2],
+    align: Align,
+) -> Option<String> {
     const ALIKE: std::ops::Range<f64> = 0.6..1.7;
     let ratio = match unlike {
         UnlikeExtents::Size(ratio) => ratio,
         UnlikeExtents::Apart(_) if align == Align::None => {
-            return Some(format!("{unlike}: are both in one frame? --align features brings them together"));
+            return Some(format!(
+                "{unlike}: are both in one frame? --align features brings them together"
+            ));
         }
         UnlikeExtents::Apart(_) => return None,
     };
     let units = [MeshUnit::Millimetre, MeshUnit::Inch, MeshUnit::Metre];
-    let of_mesh = units.iter().filter(|u| ALIKE.contains(&(ratio * u.metres() / mesh_unit.metres())));
-    let of_truth = units.iter().filter(|u| ALIKE.contains(&(ratio / u.metres() * truth_unit.metres())));
+    let of_mesh = units
+        .iter()
+        .filter(|u| ALIKE.contains(&(ratio * u.metres() / mesh_unit.metres())));
+    let of_truth = units
+        .iter()
+        .filter(|u| ALIKE.contains(&(ratio / u.metres() * truth_unit.metres())));
     let flags: Vec<String> = of_mesh
         .map(|unit| format!("--mesh-unit {unit}"))
         .chain(of_truth.map(|unit| format!("--truth-unit {unit}")))
         .collect();
-    let advice =
-        if flags.is_empty() { "are these the same part?".to_owned() } else { format!("try {}", flags.join(" or ")) };
+    let advice = if flags.is_empty() {
+        "are these the same part?".to_owned()
+    } else {
+        format!("try {}", flags.join(" or "))
+    };
     Some(format!("{unlike}: {advice}"))
 }

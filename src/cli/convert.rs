@@ -59,13 +59,29 @@ struct TransformCounts {
 
 impl fmt::Display for Converted {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let frame =
-            |name: &str| if name.is_empty() { "a frame without a name".to_owned() } else { format!("{name:?}") };
-        let (poses, wrenches) = (counted(self.poses, "pose", "poses"), counted(self.wrenches, "wrench", "wrenches"));
-        let [pose_frame, wrench_frame] = [&self.pose_frame, &self.wrench_frame].map(|name| frame(name));
+        let frame = |name: &str| {
+            if name.is_empty() {
+                "a frame without a name".to_owned()
+            } else {
+                format!("{name:?}")
+            }
+        };
+        let (poses, wrenches) = (
+            counted(self.poses, "pose", "poses"),
+            counted(self.wrenches, "wrench", "wrenches"),
+        );
+        let [pose_frame, wrench_frame] =
+            [&self.pose_frame, &self.wrench_frame].map(|name| frame(name));
         writeln!(f, "{poses} in {pose_frame}, {wrenches} in {wrench_frame}")?;
-        if let Some(TransformCounts { interpolated, outside }) = self.transforms {
-            writeln!(f, "{interpolated} of the poses between transforms; {outside} stamps outside of them")?;
+        if let Some(TransformCounts {
+            interpolated,
+            outside,
+        }) = self.transforms
+        {
+            writeln!(
+                f,
+                "{interpolated} of the poses between transforms; {outside} stamps outside of them"
+            )?;
         }
         write!(f, "wrote {}", self.out.display())
     }
@@ -73,22 +89,56 @@ impl fmt::Display for Converted {
 
 /// The command: reads, writes and counts.
 pub(super) fn convert(arguments: &ConvertArguments) -> Result<Losses, CliError> {
-    let ConvertArguments { input, out, scene, recorded, stamp, json } = arguments;
+    let ConvertArguments {
+        input,
+        out,
+        scene,
+        recorded,
+        stamp,
+        json,
+    } = arguments;
     check_kept("INPUT", input, out)?;
     if is_table(out) {
         check_place(out)?;
         return convert_results(input, out, *json);
     }
-    check_outputs(&[("--out", ".mcap", &Some(out.clone()))], &[Some(input)], "read: choose another place")?;
-    let scene = scene.as_deref().map_or_else(|| Ok(Scene::default()), Scene::read)?;
+    check_outputs(
+        &[("--out", ".mcap", &Some(out.clone()))],
+        &[Some(input)],
+        "read: choose another place",
+    )?;
+    let scene = scene
+        .as_deref()
+        .map_or_else(|| Ok(Scene::default()), Scene::read)?;
     let layout = recorded.layout(&scene);
-    let topics = Topics { markers: layout.topics.markers.clone(), ..Topics::default() };
+    let topics = Topics {
+        markers: layout.topics.markers.clone(),
+        ..Topics::default()
+    };
     let mut reader = RecordingReader::open(input, layout)?.stamped_by(*stamp);
     let mut progress = WorkProgress::new("convert", reader.message_count());
     let copied = copy_recording(&mut reader, out, &topics, &mut || progress.step())?;
-    let CopiedRecording { poses, wrenches, pose_frame, wrench_frame, damage } = copied;
-    let transforms = reader.transform_counts().map(|[interpolated, outside]| TransformCounts { interpolated, outside });
-    let converted = Converted { poses, wrenches, pose_frame, wrench_frame, transforms, out: out.clone() };
+    let CopiedRecording {
+        poses,
+        wrenches,
+        pose_frame,
+        wrench_frame,
+        damage,
+    } = copied;
+    let transforms = reader
+        .transform_counts()
+        .map(|[interpolated, outside]| TransformCounts {
+            interpolated,
+            outside,
+        });
+    let converted = Converted {
+        poses,
+        wrenches,
+        pose_frame,
+        wrench_frame,
+        transforms,
+        out: out.clone(),
+    };
     print_report(*json, &converted, || converted.to_string())?;
     let mut losses: Losses = damage.iter().map(ToString::to_string).collect();
     losses.extend(reader.losses());
@@ -104,15 +154,24 @@ struct ConvertedTable {
 
 /// Features where the input is JSON, else touches.
 fn convert_results(input: &Path, out: &Path, json: bool) -> Result<Losses, CliError> {
-    let are_features = input.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
+    let are_features = input
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
     let table = match are_features {
         true => ResultTable::of_features(&read_features(input)?.features),
         false => ResultTable::of_touches_file(input)?,
     };
     table.write(out)?;
-    let converted = ConvertedTable { rows: table.rows(), out: out.to_owned() };
+    let converted = ConvertedTable {
+        rows: table.rows(),
+        out: out.to_owned(),
+    };
     print_report(json, &converted, || {
-        format!("{}\nwrote {}", counted(converted.rows as u64, "row", "rows"), out.display())
+        format!(
+            "{}\nwrote {}",
+            counted(converted.rows as u64, "row", "rows"),
+            out.display()
+        )
     })?;
     Ok(Losses::new())
 }

@@ -33,7 +33,10 @@ use crate::replay::Recording;
 use crate::ros::node::NodeEnd;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use crate::ros::parameters::ParameterValue;
-use crate::sim::{PathParams, Plate, ScanQuality, ScannerParams, StylusParams, Surface, measure_quality, plan_demo};
+use crate::sim::{
+    PathParams, Plate, ScanQuality, ScannerParams, StylusParams, Surface, measure_quality,
+    plan_demo,
+};
 
 /// Largest distance of the written plate's round walls from circles, m.
 const CHORD_ERROR: f64 = 10e-6;
@@ -83,14 +86,31 @@ reported! {
 
 /// The touching as an operator sees it, live on the page.
 #[cfg(any(feature = "ros", feature = "r2r"))]
-fn demo_on_page(web: &WebFlags, out: &std::path::Path, tip_radius: f64) -> Result<Losses, CliError> {
-    let mut parameters = parameters_of(&out.join("scan.ply"), MeshUnit::Millimetre, &out.join("sessions"))?;
-    parameters.set("tip_radius_mm", &ParameterValue::Double(tip_radius * 1e3)).map_err(CliError::usage)?;
-    let recording = Recording::open(&out.join("touch.mcap"), &Topics::default(), StampSource::Header)?;
+fn demo_on_page(
+    web: &WebFlags,
+    out: &std::path::Path,
+    tip_radius: f64,
+) -> Result<Losses, CliError> {
+    let mut parameters = parameters_of(
+        &out.join("scan.ply"),
+        MeshUnit::Millimetre,
+        &out.join("sessions"),
+    )?;
+    parameters
+        .set("tip_radius_mm", &ParameterValue::Double(tip_radius * 1e3))
+        .map_err(CliError::usage)?;
+    let recording = Recording::open(
+        &out.join("touch.mcap"),
+        &Topics::default(),
+        StampSource::Header,
+    )?;
     // the plate as it is: there the page can show how far off the scan was
     let web = web.with_nominal(out.join("truth.ply"));
     let NodeEnd { folder, report } = on_page(&web, parameters, recording, None)?;
-    print_result(&format!("{report}\nwrote {}", folder.join("refined.ply").display()))?;
+    print_result(&format!(
+        "{report}\nwrote {}",
+        folder.join("refined.ply").display()
+    ))?;
     Ok(Losses::new())
 }
 
@@ -102,10 +122,21 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     }
     let plate = Plate::default();
     let path = plan_demo(&plate, &PathParams::default())?;
-    let scanner = ScannerParams { seed: arguments.seed, ..ScannerParams::default() };
+    let scanner = ScannerParams {
+        seed: arguments.seed,
+        ..ScannerParams::default()
+    };
     let truth = plate.mesh(CHORD_ERROR)?;
     let stylus = StylusParams::default();
-    let Simulated { scan, touch } = write_simulation(&plate, &truth, &path, &scanner, &stylus, None, &arguments.out)?;
+    let Simulated { scan, touch } = write_simulation(
+        &plate,
+        &truth,
+        &path,
+        &scanner,
+        &stylus,
+        None,
+        &arguments.out,
+    )?;
 
     let (out, unit) = (&arguments.out, MeshUnit::Millimetre);
     #[cfg(any(feature = "ros", feature = "r2r"))]
@@ -113,9 +144,12 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
         return demo_on_page(&arguments.web, out, stylus.radius);
     }
     let (scan_file, recording) = (out.join("scan.ply"), out.join("touch.mcap"));
-    let mut files = RefineArguments::in_folder(scan_file, unit, recording, out, None, Topics::default());
+    let mut files =
+        RefineArguments::in_folder(scan_file, unit, recording, out, None, Topics::default());
     files.told.tip_radius_mm = Some(stylus.radius * 1e3);
-    let Refined { summary, losses, .. } = files.refined()?;
+    let Refined {
+        summary, losses, ..
+    } = files.refined()?;
     // measured is what was written
     let MeshFile { mesh: refined, .. } = read_mesh(&out.join("refined.ply"), unit)?;
 
@@ -137,13 +171,24 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
     };
     write_json(&out.join("summary.json"), &demo)?;
     let picture = out.join("deviation.png");
-    print_result(&format!("{demo}\nwrote {}; where it was wrong and is right: {}", out.display(), picture.display()))?;
+    print_result(&format!(
+        "{demo}\nwrote {}; where it was wrong and is right: {}",
+        out.display(),
+        picture.display()
+    ))?;
     Ok(losses)
 }
 
 impl fmt::Display for DemoSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let ScanErrors { faces, edge_median_mm, mean_mm, rms_mm, p95_mm, bias_mm } = &self.scan;
+        let ScanErrors {
+            faces,
+            edge_median_mm,
+            mean_mm,
+            rms_mm,
+            p95_mm,
+            bias_mm,
+        } = &self.scan;
         writeln!(
             f,
             "scan: {faces} faces of {edge_median_mm:.2} mm; distance from the part: mean {mean_mm:.2} mm, \
@@ -152,10 +197,24 @@ impl fmt::Display for DemoSummary {
         writeln!(f, "touched for {:.0} s of simulated time", self.touched_s)?;
         writeln!(f, "{}", self.refine)?;
         writeln!(f, "error in the touched region, mean (p95):")?;
-        let RegionError { part_to_mesh_mm: [pm, pm95], mesh_to_part_mm: [mp, mp95] } = self.before;
-        let RegionError { part_to_mesh_mm: [qm, qm95], mesh_to_part_mm: [mq, mq95] } = self.after;
-        writeln!(f, "  part to mesh {pm:.3} ({pm95:.3}) -> {qm:.3} ({qm95:.3}) mm, {:.1} times less", pm / qm)?;
-        writeln!(f, "  mesh to part {mp:.3} ({mp95:.3}) -> {mq:.3} ({mq95:.3}) mm, {:.1} times less", mp / mq)?;
+        let RegionError {
+            part_to_mesh_mm: [pm, pm95],
+            mesh_to_part_mm: [mp, mp95],
+        } = self.before;
+        let RegionError {
+            part_to_mesh_mm: [qm, qm95],
+            mesh_to_part_mm: [mq, mq95],
+        } = self.after;
+        writeln!(
+            f,
+            "  part to mesh {pm:.3} ({pm95:.3}) -> {qm:.3} ({qm95:.3}) mm, {:.1} times less",
+            pm / qm
+        )?;
+        writeln!(
+            f,
+            "  mesh to part {mp:.3} ({mp95:.3}) -> {mq:.3} ({mq95:.3}) mm, {:.1} times less",
+            mp / mq
+        )?;
         write!(f, "\n{}\n", self.found)
     }
 }
@@ -174,10 +233,16 @@ reported! {
 
 fn part_to_mesh_mm(touched: &TouchedRegion, mesh: &TriMesh) -> [f64; 2] {
     let tree = FaceTree::new(mesh);
-    let to_mesh = |p: &Point3<f64>| tree.closest(mesh, p, f64::INFINITY).map(|hit| (hit.point - p).norm());
+    let to_mesh = |p: &Point3<f64>| {
+        tree.closest(mesh, p, f64::INFINITY)
+            .map(|hit| (hit.point - p).norm())
+    };
     let mut distances: Vec<f64> = touched.contacts().iter().filter_map(to_mesh).collect();
     distances.sort_by(f64::total_cmp);
     let mean = distances.iter().sum::<f64>() / distances.len().max(1) as f64;
-    let p95 = distances.get(distances.len() * 95 / 100).copied().unwrap_or_default();
+    let p95 = distances
+        .get(distances.len() * 95 / 100)
+        .copied()
+        .unwrap_or_default();
     [mean * 1e3, p95 * 1e3]
 }

@@ -30,7 +30,8 @@ use crate::sim::{Plate, ScannerParams, SimArm, TruthFeature, TruthShape, WithSph
 /// Its scene, written beside the other files …
 const SCENE: &str = include_str!("../../config/probe.yaml");
 /// … with what is told of an arm that differs from it by errors of `ArmErrorSigmas::CALIBRATED`, and the record of its check.
-const CALIBRATED: &str = "  # what is not known of arm and place of the part, and what its check found
+const CALIBRATED: &str =
+    "  # what is not known of arm and place of the part, and what its check found
   check: check.json
   temperature_c: 21
   radius_sigma_mm: 0.002
@@ -50,7 +51,12 @@ const PERFECT: &str = "  # it comes to a place with no error of its own
 /// A flat spot of the plate.
 const SPOT: Point3<f64> = Point3::new(45e-3, 9e-3, 12e-3);
 /// Spheres around the plate, centres and diameter, mm.
-const SPHERES: [[f64; 3]; 4] = [[-70.0, 25.0, 20.0], [130.0, 25.0, 20.0], [30.0, -90.0, 40.0], [30.0, 150.0, 60.0]];
+const SPHERES: [[f64; 3]; 4] = [
+    [-70.0, 25.0, 20.0],
+    [130.0, 25.0, 20.0],
+    [30.0, -90.0, 40.0],
+    [30.0, 150.0, 60.0],
+];
 const DIAMETER: f64 = 25.0;
 /// Uncertainties are printed with this coverage factor.
 const COVERAGE: f64 = 2.0;
@@ -110,10 +116,14 @@ impl NumberError {
 pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
     let plate = Plate::default();
     create_folder(out).map_err(not_written(out))?;
-    let [truth_path, scan_path, scene_path] = ["truth.ply", "scan.ply", "scene.yaml"].map(|name| out.join(name));
+    let [truth_path, scan_path, scene_path] =
+        ["truth.ply", "scan.ply", "scene.yaml"].map(|name| out.join(name));
     let truth = plate.mesh(CHORD_ERROR)?;
     let scanning = WorkProgress::stage("scan");
-    let scanner = ScannerParams { seed, ..ScannerParams::default() };
+    let scanner = ScannerParams {
+        seed,
+        ..ScannerParams::default()
+    };
     let scanned = scan(&plate, &scanner)?;
     drop(scanning);
     for (path, mesh) in [(&truth_path, &truth), (&scan_path, &scanned)] {
@@ -121,14 +131,18 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
     }
     let scene = SCENE.replace(PERFECT, CALIBRATED);
     let write_scene = |text: &str| {
-        write_atomically(&scene_path, |file| file.write_all(text.as_bytes())).map_err(not_written(&scene_path))
+        write_atomically(&scene_path, |file| file.write_all(text.as_bytes()))
+            .map_err(not_written(&scene_path))
     };
     // the record of another run says nothing of this arm
     write_scene(&scene.replace(CHECK, ""))?;
 
     let features = plate.features();
     let mut rng = Pcg64::seed_from_u64(seed);
-    let flags: Vec<Flag> = (1..).zip(&features).map(|(id, feature)| clicked(id, feature, &mut rng)).collect();
+    let flags: Vec<Flag> = (1..)
+        .zip(&features)
+        .map(|(id, feature)| clicked(id, feature, &mut rng))
+        .collect();
     let probing = Probing {
         scene: &scene_path,
         scan: &scan_path,
@@ -138,12 +152,21 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
         is_forced: false,
         out,
     };
-    let spheres = SPHERES
-        .map(|centre| ReferenceSphere { centre: Point3::from(Vector3::from(centre) / 1e3), radius: DIAMETER / 2e3 });
+    let spheres = SPHERES.map(|centre| ReferenceSphere {
+        centre: Point3::from(Vector3::from(centre) / 1e3),
+        radius: DIAMETER / 2e3,
+    });
     let unchecked = probing.ready()?.beside(&spheres);
     let start = unchecked.cell.above(&unchecked.with_spheres(&truth)?);
-    let around = WithSpheres { part: &plate, spheres: &spheres };
-    let mut arm = SimArm::new(&around, unchecked.simulated_arm(seed, ArmErrorsName::Calibrated), &start)?;
+    let around = WithSpheres {
+        part: &plate,
+        spheres: &spheres,
+    };
+    let mut arm = SimArm::new(
+        &around,
+        unchecked.simulated_arm(seed, ArmErrorsName::Calibrated),
+        &start,
+    )?;
     let check = checked(&unchecked, &mut arm)?;
     write_json(&out.join("check.json"), &check)?;
     write_scene(&scene)?;
@@ -152,18 +175,30 @@ pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
     let now = arm.next_state().map_err(CliError::arm)?;
     probing.planned(&ready, &now)?;
     // nothing real moves: a signal ends it as any other verb
-    let Done { summary, probed, outcome } = probing.done(&ready, &mut arm, false, &StopSignals::default())?;
+    let Done {
+        summary,
+        probed,
+        outcome,
+    } = probing.done(&ready, &mut arm, false, &StopSignals::default())?;
     if summary.refine.is_none() {
         return outcome;
     }
 
-    let named = probed.iter().filter_map(feature_of).map(FeatureRecord::of).collect();
+    let named = probed
+        .iter()
+        .filter_map(feature_of)
+        .map(FeatureRecord::of)
+        .collect();
     compared(&CompareArguments::in_folder(out, named))?;
     let errors = flags.iter().zip(&features).map(|(flag, truth)| {
         let probed = probed.iter().find(|probed| probed.flag == flag.id);
         ProbedError::of(flag, truth, probed, probed.and_then(feature_of))
     });
-    let demo = RobotSummary { check, probing: summary, errors: errors.collect() };
+    let demo = RobotSummary {
+        check,
+        probing: summary,
+        errors: errors.collect(),
+    };
     write_json(&out.join("summary.json"), &demo)?;
     print_result(&format!(
         "{demo}\nwrote {}: plan.png is what the arm would do, touches.png what it did, deviation.png what is right now",
@@ -178,7 +213,13 @@ fn checked(ready: &Ready, arm: &mut dyn Arm) -> Result<CheckReport, CliError> {
     let mut world = ready.static_world()?;
     let mut prober = Prober::new(arm, &ready.cell, &ready.params, &mut world);
     let touches = touched(&mut prober, Some(&(SPOT, SPOT_TOUCHES)), &ready.spheres)?;
-    CheckReport::of(&touches, &ready.spheres, &ready.scene, None, Gates::default())
+    CheckReport::of(
+        &touches,
+        &ready.spheres,
+        &ready.scene,
+        None,
+        Gates::default(),
+    )
 }
 
 fn feature_of(probed: &Probed) -> Option<&Feature> {
@@ -188,9 +229,19 @@ fn feature_of(probed: &Probed) -> Option<&Feature> {
 /// One click near a feature, as a person makes it: a kind, and no size.
 fn clicked(id: u32, feature: &TruthFeature, rng: &mut Pcg64) -> Flag {
     let (angle, off) = (rng.random_range(0.0..TAU), rng.random_range(0.0..CLICK));
-    let top = if let TruthShape::Boss { height, .. } = feature.shape { height } else { 0.0 };
-    let place: Point3<f64> = feature.centre + Vector3::new(off * angle.cos(), off * angle.sin(), top);
-    Flag { id, kind: Some(kind_of(&feature.shape)), place, radius: CLICK }
+    let top = if let TruthShape::Boss { height, .. } = feature.shape {
+        height
+    } else {
+        0.0
+    };
+    let place: Point3<f64> =
+        feature.centre + Vector3::new(off * angle.cos(), off * angle.sin(), top);
+    Flag {
+        id,
+        kind: Some(kind_of(&feature.shape)),
+        place,
+        radius: CLICK,
+    }
 }
 
 /// Error of the place in the directions that its uncertainty is of, m: across the axis, of the step across its edge.
@@ -209,24 +260,46 @@ fn place_error(found: &Feature, truth: &TruthFeature) -> f64 {
 fn place_number(found: &Feature, truth: &TruthFeature) -> NumberError {
     let expanded_mm = COVERAGE * found.centre.std.unwrap_or(f64::NAN) * 1e3;
     let error_mm = place_error(found, truth) * 1e3;
-    NumberError { number: "place", true_mm: None, found_mm: None, error_mm, expanded_mm }
+    NumberError {
+        number: "place",
+        true_mm: None,
+        found_mm: None,
+        error_mm,
+        expanded_mm,
+    }
 }
 
 /// The sizes against the drawing.
 fn numbers(found: Option<&Feature>, truth: &TruthFeature) -> Vec<NumberError> {
-    let Some(found) = found else { return Vec::new() };
+    let Some(found) = found else {
+        return Vec::new();
+    };
     let number = |number, measured: &Option<Measured<f64>>, size: f64| {
-        let value = measured.as_ref().map_or(f64::NAN, |measured| measured.value);
-        let std = measured.as_ref().and_then(|measured| measured.std).unwrap_or(f64::NAN);
+        let value = measured
+            .as_ref()
+            .map_or(f64::NAN, |measured| measured.value);
+        let std = measured
+            .as_ref()
+            .and_then(|measured| measured.std)
+            .unwrap_or(f64::NAN);
         let (true_mm, found_mm) = (Some(size * 1e3), Some(value * 1e3));
-        NumberError { number, true_mm, found_mm, error_mm: (value - size) * 1e3, expanded_mm: COVERAGE * std * 1e3 }
+        NumberError {
+            number,
+            true_mm,
+            found_mm,
+            error_mm: (value - size) * 1e3,
+            expanded_mm: COVERAGE * std * 1e3,
+        }
     };
     match truth.shape {
         TruthShape::Hole { diameter, .. } | TruthShape::Boss { diameter, .. } => {
             vec![number("diameter", &found.diameter, diameter)]
         }
         TruthShape::Slot { width, length, .. } => {
-            vec![number("width", &found.width, width), number("length", &found.length, length)]
+            vec![
+                number("width", &found.width, width),
+                number("length", &found.length, length),
+            ]
         }
         TruthShape::Step { .. } => Vec::new(),
     }
@@ -236,22 +309,49 @@ impl fmt::Display for RobotSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}\n", self.check)?;
         writeln!(f, "{}", self.probing)?;
-        writeln!(f, "against the drawing, ± with a coverage factor of {COVERAGE}:")?;
+        writeln!(
+            f,
+            "against the drawing, ± with a coverage factor of {COVERAGE}:"
+        )?;
         writeln!(
             f,
             "  {:<13} {:>9} {:>8} {:>4} {:>5}  {:<9} {:>8} {:>9} {:>8} {:>8}",
-            "", "click mm", "touches", "s", "N", "number", "true mm", "found mm", "± mm", "error mm"
+            "",
+            "click mm",
+            "touches",
+            "s",
+            "N",
+            "number",
+            "true mm",
+            "found mm",
+            "± mm",
+            "error mm"
         )?;
         let or_none = |mm: Option<f64>| mm.map_or_else(|| "-".to_owned(), |mm| format!("{mm:.4}"));
         for error in &self.errors {
-            let ProbedError { name, click_mm, touches, duration_s, largest_force_n, numbers, .. } = error;
-            let mut before =
-                format!("{name:<13} {click_mm:>9.1} {touches:>8} {duration_s:>4.0} {largest_force_n:>5.1}");
+            let ProbedError {
+                name,
+                click_mm,
+                touches,
+                duration_s,
+                largest_force_n,
+                numbers,
+                ..
+            } = error;
+            let mut before = format!(
+                "{name:<13} {click_mm:>9.1} {touches:>8} {duration_s:>4.0} {largest_force_n:>5.1}"
+            );
             if numbers.is_empty() {
                 writeln!(f, "  {before}  not found")?;
             }
             for one in numbers {
-                let NumberError { number, true_mm, found_mm, error_mm, expanded_mm } = one;
+                let NumberError {
+                    number,
+                    true_mm,
+                    found_mm,
+                    error_mm,
+                    expanded_mm,
+                } = one;
                 let beyond = if one.holds() { "" } else { "  beyond its ±" };
                 let (true_mm, found_mm) = (or_none(*true_mm), or_none(*found_mm));
                 writeln!(

@@ -10,8 +10,8 @@ use super::pictures::{file_name, today, view_from, write_coloured, write_picture
 use super::progress::WorkProgress;
 use super::{CliError, Losses, check_outputs, counted, print_report, reported};
 use crate::compare::{
-    BadTouches, Class, Disagreement, DisagreementRegion, IndexedMesh, PicturePanel, PictureParams, RefinedShape,
-    RigidOffset, Scanner, VertexBasis, colour_of_class, disagreement,
+    BadTouches, Class, Disagreement, DisagreementRegion, IndexedMesh, PicturePanel, PictureParams,
+    RefinedShape, RigidOffset, Scanner, VertexBasis, colour_of_class, disagreement,
 };
 use crate::io::mesh_file::{MeshUnit, VertexColumn, read_vertex_columns};
 use crate::io::touches_file::read_touches;
@@ -41,7 +41,13 @@ pub(super) struct DisagreeArguments {
     #[arg(long, value_name = "PNG")]
     picture: Option<PathBuf>,
     /// From which direction the picture is taken; by default the side that was touched
-    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', num_args = 3, allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        value_delimiter = ',',
+        num_args = 3,
+        allow_negative_numbers = true
+    )]
     view: Option<Vec<f64>>,
     /// Prints one JSON object
     #[arg(long)]
@@ -135,21 +141,44 @@ pub(super) fn disagree(arguments: &DisagreeArguments) -> Result<Losses, CliError
 
     let measuring = WorkProgress::stage("compare");
     let [scan_tree, refined_tree] = [&scan, &refined].map(|mesh| FaceTree::new_by(mesh, &Threads));
-    let shape = IndexedMesh { mesh: &refined, tree: &refined_tree };
-    let found =
-        disagreement(IndexedMesh { mesh: &scan, tree: &scan_tree }, &RefinedShape { shape, known: &known }, &touches)?;
+    let shape = IndexedMesh {
+        mesh: &refined,
+        tree: &refined_tree,
+    };
+    let found = disagreement(
+        IndexedMesh {
+            mesh: &scan,
+            tree: &scan_tree,
+        },
+        &RefinedShape {
+            shape,
+            known: &known,
+        },
+        &touches,
+    )?;
     drop(measuring);
     arguments.draw(&refined, &found)?;
-    for (path, mesh, map) in
-        [(&arguments.coloured, &refined, &found.refined), (&arguments.coloured_scan, &scan, &found.scan)]
-    {
+    for (path, mesh, map) in [
+        (&arguments.coloured, &refined, &found.refined),
+        (&arguments.coloured_scan, &scan, &found.scan),
+    ] {
         let Some(path) = path else { continue };
-        let colours: Vec<_> = map.classes.iter().map(|&class| colour_of_class(class)).collect();
+        let colours: Vec<_> = map
+            .classes
+            .iter()
+            .map(|&class| colour_of_class(class))
+            .collect();
         let in_mm: Vec<f32> = map.disagreement.iter().map(|d| (d * 1e3) as f32).collect();
         let number: Vec<u8> = map.classes.iter().map(|&class| class as u8).collect();
         let columns = [
-            VertexColumn { name: "disagreement_mm", values: in_mm.into() },
-            VertexColumn { name: "class", values: number.into() },
+            VertexColumn {
+                name: "disagreement_mm",
+                values: in_mm.into(),
+            },
+            VertexColumn {
+                name: "class",
+                values: number.into(),
+            },
         ];
         write_coloured(path, mesh, unit, &colours, columns)?;
     }
@@ -161,7 +190,10 @@ pub(super) fn disagree(arguments: &DisagreeArguments) -> Result<Losses, CliError
 /// Support of each vertex.
 fn read_known(path: &Path, unit: MeshUnit, mesh: &TriMesh) -> Result<Vec<VertexBasis>, CliError> {
     let [support] = read_vertex_columns(path, unit, mesh, ["support"])?;
-    let why = format!("{} does not say what was touched: give the PLY that refine wrote", path.display());
+    let why = format!(
+        "{} does not say what was touched: give the PLY that refine wrote",
+        path.display()
+    );
     let whole = support.filter(|support| support.len() == mesh.vertex_slots());
     let support = whole.ok_or_else(|| CliError::usage(why))?;
     let known = |support: &f32| match *support {
@@ -180,24 +212,39 @@ impl DisagreeArguments {
             ("--coloured", ".ply", &self.coloured),
             ("--coloured-scan", ".ply", &self.coloured_scan),
         ];
-        check_outputs(&outputs, &[&self.scan, &self.refined, &self.touches].map(Some), "read")?;
+        check_outputs(
+            &outputs,
+            &[&self.scan, &self.refined, &self.touches].map(Some),
+            "read",
+        )?;
         view_from(self.view.as_ref()).map(drop)
     }
 
     fn draw(&self, refined: &TriMesh, found: &Disagreement) -> Result<(), CliError> {
-        let Some(path) = &self.picture else { return Ok(()) };
+        let Some(path) = &self.picture else {
+            return Ok(());
+        };
         let _drawing = WorkProgress::stage("draw");
         let map = &found.refined;
         let is_touched = |class: &Class| !matches!(class, Class::NeverTouched | Class::Unreachable);
-        let weights: Vec<f64> = map.classes.iter().map(|class| if is_touched(class) { 1.0 } else { 0.0 }).collect();
-        let range = found.scanner.map_or(1e-3, |scanner| (4.0 * scanner.noise + scanner.offset.abs()).max(1e-6));
+        let weights: Vec<f64> = map
+            .classes
+            .iter()
+            .map(|class| if is_touched(class) { 1.0 } else { 0.0 })
+            .collect();
+        let range = found.scanner.map_or(1e-3, |scanner| {
+            (4.0 * scanner.noise + scanner.offset.abs()).max(1e-6)
+        });
         let panel = |classes, title| PicturePanel {
             deviations: &map.disagreement,
             classes,
             title,
             ..PicturePanel::of(refined)
         };
-        let panels = [panel(Some(&map.classes[..]), "why"), panel(None, "touch - scan")];
+        let panels = [
+            panel(Some(&map.classes[..]), "why"),
+            panel(None, "touch - scan"),
+        ];
         let [refined_name, scan_name] = [&self.refined, &self.scan].map(|path| file_name(path));
         let params = PictureParams {
             title: &format!("where {refined_name} and the scan {scan_name} disagree"),
@@ -217,31 +264,63 @@ const MOST_LISTED: usize = 12;
 impl fmt::Display for DisagreeReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.scanner {
-            Some(ScannerReport { offset_mm, noise_mm, correlation_mm, edge_mm, sees_from_mm, places }) => writeln!(
+            Some(ScannerReport {
+                offset_mm,
+                noise_mm,
+                correlation_mm,
+                edge_mm,
+                sees_from_mm,
+                places,
+            }) => writeln!(
                 f,
                 "the scanner, by {} that it should see well: offset {offset_mm:+.3} mm, noise \
                  {noise_mm:.3} mm alike over {correlation_mm:.1} mm; edges of {edge_mm:.2} mm, so that what is narrower than \
                  {sees_from_mm:.1} mm may be closed over",
                 counted(*places, "touched place", "touched places")
             )?,
-            None => writeln!(f, "too little was touched to know how the scanner errs: nothing is called changed")?,
+            None => writeln!(
+                f,
+                "too little was touched to know how the scanner errs: nothing is called changed"
+            )?,
         }
-        if let Some(RigidOffsetReport { shift_mm: [x, y, z], turn_deg, .. }) = &self.rigid_offset {
+        if let Some(RigidOffsetReport {
+            shift_mm: [x, y, z],
+            turn_deg,
+            ..
+        }) = &self.rigid_offset
+        {
             let turn = Vector3::from(*turn_deg).norm();
             writeln!(
                 f,
                 "the scan as a whole lies off by ({x:.3}, {y:.3}, {z:.3}) mm and {turn:.3}°, which is taken off"
             )?;
         }
-        write!(f, "{:<14} {:>12} {:>12}", "class", "refined, mm2", "scan, mm2")?;
-        for ClassReport { class, refined_mm2, scan_mm2, .. } in &self.classes {
+        write!(
+            f,
+            "{:<14} {:>12} {:>12}",
+            "class", "refined, mm2", "scan, mm2"
+        )?;
+        for ClassReport {
+            class,
+            refined_mm2,
+            scan_mm2,
+            ..
+        } in &self.classes
+        {
             write!(f, "\n{class:<14} {refined_mm2:>12.1} {scan_mm2:>12.1}")?;
         }
         if !self.regions.is_empty() {
             write!(
                 f,
                 "\n{:<14} {:>24} {:>9} {:>9} {:>7} {:>8} {:>7} {:>9}",
-                "region", "center, mm", "area, mm2", "mean, mm", "sigmas", "lengths", "passes", "at edges"
+                "region",
+                "center, mm",
+                "area, mm2",
+                "mean, mm",
+                "sigmas",
+                "lengths",
+                "passes",
+                "at edges"
             )?;
         }
         for region in self.regions.iter().take(MOST_LISTED) {
@@ -261,7 +340,10 @@ impl fmt::Display for DisagreeReport {
         }
         more(f, self.regions.len(), ["region", "regions"])?;
         for bad in self.bad_touches.iter().take(MOST_LISTED) {
-            let ([x, y, z], touches) = (bad.center_mm, counted(bad.touches.len(), "touch", "touches"));
+            let ([x, y, z], touches) = (
+                bad.center_mm,
+                counted(bad.touches.len(), "touch", "touches"),
+            );
             write!(
                 f,
                 "\nbad touch at ({x:.1}, {y:.1}, {z:.1}) mm: {:+.3} mm or {:.0} standard deviations off, {touches} from \
@@ -276,6 +358,10 @@ impl fmt::Display for DisagreeReport {
 fn more(f: &mut fmt::Formatter<'_>, count: usize, [one, many]: [&str; 2]) -> fmt::Result {
     match count.saturating_sub(MOST_LISTED) {
         0 => Ok(()),
-        left => write!(f, "\n… and {left} more {}", if left == 1 { one } else { many }),
+        left => write!(
+            f,
+            "\n… and {left} more {}",
+            if left == 1 { one } else { many }
+        ),
     }
 }

@@ -65,7 +65,9 @@ impl fmt::Display for Diagnosis {
         if self.findings.is_empty() {
             return write!(f, "\nnothing speaks against scan and recording");
         }
-        self.findings.iter().try_for_each(|finding| write!(f, "\n{finding}"))
+        self.findings
+            .iter()
+            .try_for_each(|finding| write!(f, "\n{finding}"))
     }
 }
 
@@ -74,13 +76,26 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
     let (scene, told) = arguments.told.scene(arguments.scene.as_deref())?;
     let scan = read_scan(&arguments.scan, arguments.mesh_unit)?.mesh;
     let markers = marker_filter(&scene, arguments.recorded.markers_topic.as_deref())?;
-    let recording = Recording::open(&arguments.recording, arguments.recorded.layout(&scene), arguments.stamp)?;
+    let recording = Recording::open(
+        &arguments.recording,
+        arguments.recorded.layout(&scene),
+        arguments.stamp,
+    )?;
     let mut progress = WorkProgress::new("replay", recording.message_count());
     let found = check_input(recording, &scan, &scene, markers, &mut || progress.step())?;
-    let InputCheck { findings, clock_offset, losses } = found;
+    let InputCheck {
+        findings,
+        clock_offset,
+        losses,
+    } = found;
     let wrench_offset = clock_offset.map(|found| WrenchOffset::of(&found, &scene.sync_params()));
     let sure = findings.iter().filter(|finding| finding.is_sure).count();
-    let diagnosis = Diagnosis { is_sound: sure == 0, told, wrench_offset, findings };
+    let diagnosis = Diagnosis {
+        is_sound: sure == 0,
+        told,
+        wrench_offset,
+        findings,
+    };
     print_report(arguments.json, &diagnosis, || diagnosis.to_string())?;
     refuse_unsound(&diagnosis.findings, &arguments.scan, &arguments.recording)?;
     Ok(losses)
@@ -89,6 +104,13 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
 /// Refuses an input of which something is surely wrong.
 ///
 /// - `scan`, `recording`: to be named.
-pub(super) fn refuse_unsound(findings: &[InputFinding], scan: &Path, recording: &Path) -> Result<(), CliError> {
-    Ok(refinement::refuse_unsound(findings, InputNames { scan, recording })?)
+pub(super) fn refuse_unsound(
+    findings: &[InputFinding],
+    scan: &Path,
+    recording: &Path,
+) -> Result<(), CliError> {
+    Ok(refinement::refuse_unsound(
+        findings,
+        InputNames { scan, recording },
+    )?)
 }

@@ -63,18 +63,29 @@ impl CliError {
         let causes = successors(cause.and_then(Error::source), |&cause| cause.source());
         let mut of_system = causes.filter_map(|cause| cause.downcast_ref::<io::Error>());
         let hint = match kind {
-            "not_written" => Some("check that the folder exists, may be written to and has space left"),
-            _ if of_system.any(|cause| cause.kind() == ErrorKind::NotFound) => {
-                Some("check the path: no file is there; a relative path begins at the present folder")
+            "not_written" => {
+                Some("check that the folder exists, may be written to and has space left")
             }
-            "input" => Some("touchup doctor SCAN RECORDING says more; --force writes a result all the same"),
-            "stopped" => Some("look at the arm and at what is around it; a protective stop is released at its panel"),
+            _ if of_system.any(|cause| cause.kind() == ErrorKind::NotFound) => Some(
+                "check the path: no file is there; a relative path begins at the present folder",
+            ),
+            "input" => Some(
+                "touchup doctor SCAN RECORDING says more; --force writes a result all the same",
+            ),
+            "stopped" => Some(
+                "look at the arm and at what is around it; a protective stop is released at its panel",
+            ),
             "scene" => Some(
                 "the page \"The scene\" of the documentation (docs/scene.md) lists every parameter with its unit and range",
             ),
             _ => None,
         };
-        Self { kind, message: one_line(&message.to_string()), hint, exit_code }
+        Self {
+            kind,
+            message: one_line(&message.to_string()),
+            hint,
+            exit_code,
+        }
     }
 
     /// A well-formed flag with an impossible value.
@@ -89,12 +100,20 @@ impl CliError {
 
     /// A true part that cannot be read; it has a flag of its own.
     pub fn truth(error: ScanError) -> Self {
-        Self::new(("mesh", 3), error.to_string().replace("--mesh-unit", "--truth-unit"), Some(&error))
+        Self::new(
+            ("mesh", 3),
+            error.to_string().replace("--mesh-unit", "--truth-unit"),
+            Some(&error),
+        )
     }
 
     /// What is wrong in a file of a calibration.
     pub fn calibration(path: &Path, error: impl Display) -> Self {
-        Self::new(("calibration", 3), format!("{}: {error}", path.display()), None)
+        Self::new(
+            ("calibration", 3),
+            format!("{}: {error}", path.display()),
+            None,
+        )
     }
 
     /// What an arm, or its work, came to.
@@ -111,7 +130,9 @@ impl CliError {
     /// How the work of an arm ended before it was done.
     pub fn ended(ending: &Ending) -> Self {
         match ending {
-            Ending::Cancelled(request) => Self::new(INTERRUPTED, format_args!("interrupted: {request}"), None),
+            Ending::Cancelled(request) => {
+                Self::new(INTERRUPTED, format_args!("interrupted: {request}"), None)
+            }
             Ending::Stopped(_) => Self::new(STOPPED, ending, None),
             ending => Self::arm(ending),
         }
@@ -119,7 +140,10 @@ impl CliError {
 
     /// The same error with more of what the user has to know.
     pub fn with(self, more: impl Display) -> Self {
-        Self { message: one_line(&format!("{}; {more}", self.message)), ..self }
+        Self {
+            message: one_line(&format!("{}; {more}", self.message)),
+            ..self
+        }
     }
 
     /// Why a feature cannot be probed.
@@ -130,12 +154,19 @@ impl CliError {
 
 /// Refuses a command line unless `is_allowed`.
 pub(super) fn require(is_allowed: bool, why: impl Display) -> Result<(), CliError> {
-    if is_allowed { Ok(()) } else { Err(CliError::usage(why)) }
+    if is_allowed {
+        Ok(())
+    } else {
+        Err(CliError::usage(why))
+    }
 }
 
 /// Refuses the value of a flag that is not above 0.
 pub(super) fn require_positive(flag: &str, value: f64) -> Result<(), CliError> {
-    require(value > 0.0 && value.is_finite(), format_args!("{flag} {value} must be above 0"))
+    require(
+        value > 0.0 && value.is_finite(),
+        format_args!("{flag} {value} must be above 0"),
+    )
 }
 
 /// All words of `text` on one line.
@@ -151,7 +182,11 @@ pub(super) fn asks_for_json(arguments: &[OsString]) -> bool {
 /// Prints an error as one line on stderr.
 pub(super) fn print_error(as_json: bool, error: &CliError) -> u8 {
     let json = || serde_json::to_string(error).expect("a number and texts alone cannot fail");
-    let line = if as_json { json() } else { format!("touchup: {}", error.message) };
+    let line = if as_json {
+        json()
+    } else {
+        format!("touchup: {}", error.message)
+    };
     // a closed pipe has no reader left
     let _ = writeln!(stderr(), "{line}");
     error.exit_code
@@ -172,7 +207,15 @@ pub(super) fn print_parse_error(as_json: bool, error: &clap::Error) -> u8 {
     let message = text.split("\n\n").next().unwrap_or(&text);
     let message = one_line(message.trim_start_matches("error: "));
     let hint = Some("`touchup COMMAND --help` lists the flags of a command");
-    print_error(as_json, &CliError { kind: "usage", message, hint, exit_code })
+    print_error(
+        as_json,
+        &CliError {
+            kind: "usage",
+            message,
+            hint,
+            exit_code,
+        },
+    )
 }
 
 /// The errors of the rooms: kind and exit code of each, and what its message begins with.
@@ -251,7 +294,11 @@ errors_of_rooms! {
 
 impl From<SpotError> for CliError {
     fn from(error: SpotError) -> Self {
-        if let SpotError::Ended(ending) = &error { Self::ended(ending) } else { Self::arm(error) }
+        if let SpotError::Ended(ending) = &error {
+            Self::ended(ending)
+        } else {
+            Self::arm(error)
+        }
     }
 }
 
@@ -259,9 +306,11 @@ impl From<PayloadProbeError> for CliError {
     fn from(error: PayloadProbeError) -> Self {
         match &error {
             // nothing is retracted from free air
-            PayloadProbeError::Ended(Ending::Cancelled(_)) => {
-                Self::new(INTERRUPTED, "interrupted: the arm stopped in free air", None)
-            }
+            PayloadProbeError::Ended(Ending::Cancelled(_)) => Self::new(
+                INTERRUPTED,
+                "interrupted: the arm stopped in free air",
+                None,
+            ),
             PayloadProbeError::Ended(ending) => Self::ended(ending),
             PayloadProbeError::TooFew { .. } => Self::arm(error),
         }
@@ -288,7 +337,9 @@ impl From<SweepError> for CliError {
             SweepError::Features(error) => error.into(),
             SweepError::Simulated(error) => error.into(),
             SweepError::File(error @ FileError::Write { .. }) => Self::not_written(error),
-            SweepError::TooMany { .. } | SweepError::NoJob { .. } => Self::new(("usage", 2), &error, None),
+            SweepError::TooMany { .. } | SweepError::NoJob { .. } => {
+                Self::new(("usage", 2), &error, None)
+            }
             error => Self::new(("sweep", 3), &error, Some(&error)),
         }
     }
@@ -315,7 +366,9 @@ impl From<RefinementError> for CliError {
             RefinementError::Live(error) => error.into(),
             RefinementError::Outcome(error) => (*error).into(),
             RefinementError::NothingMoves => Self::new(("usage", 2), error, None),
-            RefinementError::Unsound { .. } | RefinementError::NoSample { .. } => Self::new(UNSOUND, error, None),
+            RefinementError::Unsound { .. } | RefinementError::NoSample { .. } => {
+                Self::new(UNSOUND, error, None)
+            }
         }
     }
 }

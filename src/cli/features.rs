@@ -66,7 +66,10 @@ pub(super) fn features(arguments: &FeaturesArguments) -> Result<Losses, CliError
         }
     }
     let Scan { mesh, repair, .. } = read_scan(&arguments.mesh, arguments.mesh_unit)?;
-    let touches = arguments.touches.as_deref().map_or_else(|| Ok(Vec::new()), read_touches)?;
+    let touches = arguments
+        .touches
+        .as_deref()
+        .map_or_else(|| Ok(Vec::new()), read_touches)?;
     let started = Instant::now();
     let (table, file) = match arguments.mode {
         FeaturesMode::Fitted => {
@@ -83,8 +86,13 @@ pub(super) fn features(arguments: &FeaturesArguments) -> Result<Losses, CliError
     if let Some(out) = &arguments.out {
         write_features_as_named(out, &file)?;
     }
-    let wrote = arguments.out.as_ref().map_or(String::new(), |out| format!("\nwrote {}", out.display()));
-    print_report(arguments.json, &file, || format!("mesh: {repair}\n{table}\nfound in {took_s:.2} s{wrote}"))?;
+    let wrote = arguments
+        .out
+        .as_ref()
+        .map_or(String::new(), |out| format!("\nwrote {}", out.display()));
+    print_report(arguments.json, &file, || {
+        format!("mesh: {repair}\n{table}\nfound in {took_s:.2} s{wrote}")
+    })?;
     Ok(Losses::new())
 }
 
@@ -93,8 +101,14 @@ impl FeaturesArguments {
     fn check(&self) -> Result<(), CliError> {
         let is_paper = self.mode == FeaturesMode::Paper;
         let is_above_0 = self.threshold_per_mm2 > 0.0 && self.threshold_per_mm2.is_finite();
-        require(self.clusters.is_none() || is_paper, "--clusters is for --mode paper")?;
-        require(self.touches.is_none() || !is_paper, "--touches measures features, and --mode paper has none")?;
+        require(
+            self.clusters.is_none() || is_paper,
+            "--clusters is for --mode paper",
+        )?;
+        require(
+            self.touches.is_none() || !is_paper,
+            "--touches measures features, and --mode paper has none",
+        )?;
         require(is_above_0, "--threshold-per-mm2 must be above 0")
     }
 
@@ -103,8 +117,11 @@ impl FeaturesArguments {
         let curvature = curvature(mesh);
         match self.clusters {
             Some(k) => {
-                let params =
-                    PaperParams { threshold: self.threshold_per_mm2 * 1e6, k: k as usize, ..PaperParams::default() };
+                let params = PaperParams {
+                    threshold: self.threshold_per_mm2 * 1e6,
+                    k: k as usize,
+                    ..PaperParams::default()
+                };
                 paper_clusters(mesh, &curvature, &params)
             }
             None => clusters(mesh, &curvature, &ClusterParams::default()),
@@ -115,28 +132,55 @@ impl FeaturesArguments {
 /// Clusters as text.
 fn cluster_table(FeatureFile { clusters, .. }: &FeatureFile) -> String {
     if clusters.is_empty() {
-        return "no vertex is curved enough: a lower --threshold-per-mm2, or leave --clusters out".to_owned();
+        return "no vertex is curved enough: a lower --threshold-per-mm2, or leave --clusters out"
+            .to_owned();
     }
-    let head =
-        format!("{}\n{:>28}  {:>8}  bent", counted(clusters.len(), "cluster", "clusters"), "center, mm", "vertices");
+    let head = format!(
+        "{}\n{:>28}  {:>8}  bent",
+        counted(clusters.len(), "cluster", "clusters"),
+        "center, mm",
+        "vertices"
+    );
     let rows = clusters.iter().map(|cluster| {
         let [x, y, z] = cluster.center_mm;
-        let bent = cluster.convex.map_or("", |convex| if convex { "outward" } else { "inward" });
-        format!("{:>28}  {:>8}  {bent}", format!("{x:.2} {y:.2} {z:.2}"), cluster.vertices)
+        let bent = cluster
+            .convex
+            .map_or("", |convex| if convex { "outward" } else { "inward" });
+        format!(
+            "{:>28}  {:>8}  {bent}",
+            format!("{x:.2} {y:.2} {z:.2}"),
+            cluster.vertices
+        )
     });
     iter::once(head).chain(rows).collect::<Vec<_>>().join("\n")
 }
 
 /// Features as text.
-fn feature_table(Detection { features, unexplained }: &Detection) -> String {
+fn feature_table(
+    Detection {
+        features,
+        unexplained,
+    }: &Detection,
+) -> String {
     let mut lines = Vec::new();
     if features.is_empty() {
         lines.push("no features".to_owned());
     } else {
-        let counts: Vec<_> = Kind::ALL.into_iter().filter_map(|kind| count(features, kind)).collect();
+        let counts: Vec<_> = Kind::ALL
+            .into_iter()
+            .filter_map(|kind| count(features, kind))
+            .collect();
         lines.push(format!("features: {}", counts.join(", ")));
-        lines.push(format!("{:>4}  {:<7} {:>28}  {:<44} fitted to", "id", "kind", "center, mm", "size, mm"));
-        lines.extend(features.iter().filter(|feature| feature.kind != Kind::Plane).map(row));
+        lines.push(format!(
+            "{:>4}  {:<7} {:>28}  {:<44} fitted to",
+            "id", "kind", "center, mm", "size, mm"
+        ));
+        lines.extend(
+            features
+                .iter()
+                .filter(|feature| feature.kind != Kind::Plane)
+                .map(row),
+        );
     }
     if *unexplained > NOTABLE {
         lines.push(format!(
@@ -151,8 +195,15 @@ fn feature_table(Detection { features, unexplained }: &Detection) -> String {
 const NOTABLE: f64 = 0.05;
 
 fn count(features: &[Feature], kind: Kind) -> Option<String> {
-    let count = features.iter().filter(|feature| feature.kind == kind).count();
-    let ending = if matches!(kind, Kind::Boss | Kind::Notch) { "es" } else { "s" };
+    let count = features
+        .iter()
+        .filter(|feature| feature.kind == kind)
+        .count();
+    let ending = if matches!(kind, Kind::Boss | Kind::Notch) {
+        "es"
+    } else {
+        "s"
+    };
     (count > 0).then(|| counted(count, kind.name(), &format!("{}{ending}", kind.name())))
 }
 
@@ -163,7 +214,12 @@ fn row(feature: &Feature) -> String {
         FittedTo::Touches => format!("touches, {:.0} % touched", feature.touched * 100.0),
         FittedTo::Mesh => "mesh".to_owned(),
     };
-    format!("{:>4}  {:<7} {place:>28}  {:<44} {from}", feature.id, feature.kind.name(), size(feature))
+    format!(
+        "{:>4}  {:<7} {place:>28}  {:<44} {from}",
+        feature.id,
+        feature.kind.name(),
+        size(feature)
+    )
 }
 
 fn size(feature: &Feature) -> String {
@@ -187,7 +243,9 @@ fn size(feature: &Feature) -> String {
 }
 
 fn with_std(measured: &Measured<f64>) -> String {
-    let std = measured.std.map_or_else(String::new, |std| format!(" ± {:.3}", std * 1e3));
+    let std = measured
+        .std
+        .map_or_else(String::new, |std| format!(" ± {:.3}", std * 1e3));
     let bound = if measured.is_at_least { "≥ " } else { "" };
     format!("{bound}{:.3}{std}", measured.value * 1e3)
 }

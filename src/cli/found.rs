@@ -51,10 +51,19 @@ const COUNTED: [&str; 4] = ["hole", "slot", "pocket", "boss"];
 impl FoundTable {
     /// Looks for each true feature among the found ones.
     pub fn of(truth: &[TruthFeature], found: &[FeatureRecord]) -> Self {
-        let features: Vec<_> = truth.iter().map(|truth| FoundFeature::of(truth, nearest(truth, found))).collect();
-        let matched = |record: &&FeatureRecord| features.iter().any(|feature| feature.id == Some(record.id));
-        let counted = found.iter().filter(|record| COUNTED.contains(&record.kind.as_str()));
-        Self { invented: counted.filter(|record| !matched(record)).count(), features }
+        let features: Vec<_> = truth
+            .iter()
+            .map(|truth| FoundFeature::of(truth, nearest(truth, found)))
+            .collect();
+        let matched =
+            |record: &&FeatureRecord| features.iter().any(|feature| feature.id == Some(record.id));
+        let counted = found
+            .iter()
+            .filter(|record| COUNTED.contains(&record.kind.as_str()));
+        Self {
+            invented: counted.filter(|record| !matched(record)).count(),
+            features,
+        }
     }
 }
 
@@ -63,27 +72,52 @@ fn nearest<'a>(truth: &TruthFeature, found: &'a [FeatureRecord]) -> Option<&'a F
     let kind = kind_of(&truth.shape).name();
     let off = |record: &&FeatureRecord| off_mm(truth, record).unwrap_or(f64::INFINITY);
     let of_kind = found.iter().filter(|record| record.kind == kind);
-    of_kind.min_by(|a, b| off(a).total_cmp(&off(b))).filter(|record| off(record) < NEAR_MM)
+    of_kind
+        .min_by(|a, b| off(a).total_cmp(&off(b)))
+        .filter(|record| off(record) < NEAR_MM)
 }
 
 /// What the drawing says of a feature, beside what was found.
 fn numbers(truth: &TruthFeature, record: Option<&FeatureRecord>) -> Vec<FoundNumber> {
     let number = |name, truth: f64, value: fn(&FeatureRecord) -> Option<f64>| {
         let std = record.and_then(|record| record.std.get(name).copied());
-        let is_lower_bound = name == "depth_mm" && record.is_some_and(|record| record.depth_is_at_least == Some(true));
-        FoundNumber { name, truth: truth * 1e3, found: record.and_then(value), std, is_lower_bound }
+        let is_lower_bound = name == "depth_mm"
+            && record.is_some_and(|record| record.depth_is_at_least == Some(true));
+        FoundNumber {
+            name,
+            truth: truth * 1e3,
+            found: record.and_then(value),
+            std,
+            is_lower_bound,
+        }
     };
     let diameter = |d| number("diameter_mm", d, |record| record.diameter_mm);
     let depth = |d| number("depth_mm", d, |record| record.depth_mm);
     match truth.shape {
-        TruthShape::Hole { diameter: d, through: true, .. } => vec![diameter(d)],
-        TruthShape::Hole { diameter: d, depth: h, .. } => vec![diameter(d), depth(h)],
-        TruthShape::Slot { width, length, depth: h, .. } => vec![
+        TruthShape::Hole {
+            diameter: d,
+            through: true,
+            ..
+        } => vec![diameter(d)],
+        TruthShape::Hole {
+            diameter: d,
+            depth: h,
+            ..
+        } => vec![diameter(d), depth(h)],
+        TruthShape::Slot {
+            width,
+            length,
+            depth: h,
+            ..
+        } => vec![
             number("width_mm", width, |record| record.width_mm),
             number("length_mm", length, |record| record.length_mm),
             depth(h),
         ],
-        TruthShape::Boss { diameter: d, height } => vec![diameter(d), depth(height)],
+        TruthShape::Boss {
+            diameter: d,
+            height,
+        } => vec![diameter(d), depth(height)],
         TruthShape::Step { .. } => Vec::new(),
     }
 }
@@ -114,13 +148,24 @@ fn off_mm(truth: &TruthFeature, record: &FeatureRecord) -> Option<f64> {
 
 fn axis_off_deg(truth: &TruthFeature, record: &FeatureRecord) -> Option<f64> {
     let (axis, truth) = (Vector3::from(record.axis?), axis_of(truth));
-    Some(axis.cross(&truth).norm().atan2(axis.dot(&truth).abs()).to_degrees())
+    Some(
+        axis.cross(&truth)
+            .norm()
+            .atan2(axis.dot(&truth).abs())
+            .to_degrees(),
+    )
 }
 
 impl fmt::Display for FoundTable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:<14} {:>22} {:>26} {:>10}   center, axis off   touched", "feature", "true, mm", "found", "error")?;
-        self.features.iter().try_for_each(|feature| write!(f, "\n{feature}"))?;
+        write!(
+            f,
+            "{:<14} {:>22} {:>26} {:>10}   center, axis off   touched",
+            "feature", "true, mm", "found", "error"
+        )?;
+        self.features
+            .iter()
+            .try_for_each(|feature| write!(f, "\n{feature}"))?;
         match self.invented {
             0 => write!(f, "\nnone invented"),
             count => write!(f, "\n{count} invented"),
@@ -130,30 +175,44 @@ impl fmt::Display for FoundTable {
 
 impl fmt::Display for FoundFeature {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Some(_) = self.id else { return write!(f, "{:<14} not found", self.name) };
+        let Some(_) = self.id else {
+            return write!(f, "{:<14} not found", self.name);
+        };
         let place = format!(
             "{} {}",
-            self.center_off_mm.map_or(String::new(), |off| format!("{off:.3} mm")),
-            self.axis_off_deg.map_or(String::new(), |off| format!("{off:.2}°"))
+            self.center_off_mm
+                .map_or(String::new(), |off| format!("{off:.3} mm")),
+            self.axis_off_deg
+                .map_or(String::new(), |off| format!("{off:.2}°"))
         );
-        let touched = self.touched.map_or(String::new(), |share| format!("{:.0} %", share * 100.0));
+        let touched = self
+            .touched
+            .map_or(String::new(), |share| format!("{:.0} %", share * 100.0));
         let Some((first, others)) = self.numbers.split_first() else {
             return write!(f, "{:<14} {:>60}   {place:<18} {touched}", self.name, "");
         };
         write!(f, "{:<14} {first}   {place:<18} {touched}", self.name)?;
-        others.iter().try_for_each(|number| write!(f, "\n{:<14} {number}", ""))
+        others
+            .iter()
+            .try_for_each(|number| write!(f, "\n{:<14} {number}", ""))
     }
 }
 
 impl fmt::Display for FoundNumber {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let truth = format!("{} {:.3}", self.name.trim_end_matches("_mm"), self.truth);
-        let Some(found) = self.found else { return write!(f, "{truth:>22} {:>26} {:>10}", "not measured", "") };
+        let Some(found) = self.found else {
+            return write!(f, "{truth:>22} {:>26} {:>10}", "not measured", "");
+        };
         let shown = match self.std {
             Some(std) => format!("{found:.3} ± {std:.3}"),
             None if self.is_lower_bound => format!("≥ {found:.3}, no farther touched"),
             None => format!("{found:.3} (not touched)"),
         };
-        write!(f, "{truth:>22} {shown:>26} {:>10}", format!("{:+.3}", found - self.truth))
+        write!(
+            f,
+            "{truth:>22} {shown:>26} {:>10}",
+            format!("{:+.3}", found - self.truth)
+        )
     }
 }

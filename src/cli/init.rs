@@ -34,18 +34,37 @@ pub(super) struct InitArguments {
 
 /// The command: writes the scene.
 pub(super) fn init(arguments: &InitArguments) -> Result<Losses, CliError> {
-    let InitArguments { out, tip_radius_mm, stiffness_n_per_mm, scan_noise_mm, scan, mesh_unit } = arguments;
+    let InitArguments {
+        out,
+        tip_radius_mm,
+        stiffness_n_per_mm,
+        scan_noise_mm,
+        scan,
+        mesh_unit,
+    } = arguments;
     let is_there = out.symlink_metadata().is_ok();
-    require(!is_there, format!("{} is there already: name another file, or remove it", out.display()))?;
+    require(
+        !is_there,
+        format!(
+            "{} is there already: name another file, or remove it",
+            out.display()
+        ),
+    )?;
     check_place(out)?;
     let mut settings = vec![Setting::scalar("tip.radius_mm", tip_radius_mm)];
     settings.extend(stiffness_n_per_mm.map(|k| Setting::scalar("tip.stiffness_n_per_mm", k)));
-    settings.extend(scan.as_ref().map(|file| Setting::scalar("scan.file", format!("'{}'", file.display()))));
+    settings.extend(
+        scan.as_ref()
+            .map(|file| Setting::scalar("scan.file", format!("'{}'", file.display()))),
+    );
     settings.push(Setting::scalar("scan.unit", mesh_unit));
     settings.extend(scan_noise_mm.map(|noise| Setting::scalar("scan.noise_mm", noise)));
 
     let mut expected = Scene::default();
-    let (tip, part) = (expected.tip.get_or_insert_default(), expected.scan.get_or_insert_default());
+    let (tip, part) = (
+        expected.tip.get_or_insert_default(),
+        expected.scan.get_or_insert_default(),
+    );
     tip.ball.radius = tip_radius_mm / 1e3;
     if let Some(k) = stiffness_n_per_mm {
         tip.ball.stiffness = Some(k * 1e3);
@@ -57,6 +76,9 @@ pub(super) fn init(arguments: &InitArguments) -> Result<Losses, CliError> {
     expected.validate().map_err(CliError::usage)?;
     let text = Scene::edited(&Scene::template(), &settings, "touchup init", &expected)?;
     write_atomically(out, |file| file.write_all(text.as_bytes())).map_err(not_written(out))?;
-    print_result(&format!("wrote {0}: touchup refine --scene {0} --bag RECORDING --out refined.ply", out.display()))?;
+    print_result(&format!(
+        "wrote {0}: touchup refine --scene {0} --bag RECORDING --out refined.ply",
+        out.display()
+    ))?;
     Ok(Losses::new())
 }

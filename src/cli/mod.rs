@@ -63,8 +63,8 @@ pub use whatif::what_if_json;
 
 use error::{Losses, asks_for_json, print_error, print_parse_error, require, require_positive};
 use output::{
-    by_reason, check_kept, check_kept_by, check_outputs, check_place, not_written, notify, print_report, print_result,
-    write_json,
+    by_reason, check_kept, check_kept_by, check_outputs, check_place, not_written, notify,
+    print_report, print_result, write_json,
 };
 
 use std::ffi::OsString;
@@ -189,7 +189,15 @@ pub fn exit_code(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(losses) if losses.is_empty() => 0,
         Ok(losses) => {
             let message = format!("done with losses: {}", losses.join("; "));
-            print_error(as_json, &CliError { kind: "losses", message, hint: None, exit_code: 4 })
+            print_error(
+                as_json,
+                &CliError {
+                    kind: "losses",
+                    message,
+                    hint: None,
+                    exit_code: 4,
+                },
+            )
         }
         Err(error) => print_error(as_json, &error),
     }
@@ -250,16 +258,32 @@ impl Verb {
 fn ros_arguments(verb: &Verb, given: Vec<OsString>) -> Result<Vec<String>, CliError> {
     let is_allowed = given.is_empty() || verb.takes_ros_arguments();
     require(is_allowed, "--ros-args is for the verbs node and replay")?;
-    let not_text = |word: OsString| format!("--ros-args … {}: arguments of ROS are UTF-8", word.display());
-    given.into_iter().map(|word| word.into_string().map_err(|word| CliError::usage(not_text(word)))).collect()
+    let not_text = |word: OsString| {
+        format!(
+            "--ros-args … {}: arguments of ROS are UTF-8",
+            word.display()
+        )
+    };
+    given
+        .into_iter()
+        .map(|word| {
+            word.into_string()
+                .map_err(|word| CliError::usage(not_text(word)))
+        })
+        .collect()
 }
 
 /// The default log filter: that of `--log-level` behind `--ros-args`, else warnings.
 pub fn log_filter(arguments: &[OsString]) -> Targets {
     let (_, ros) = split(arguments);
     // the last one counts
-    let level = ros.iter().rposition(|word| *word == "--log-level").and_then(|at| ros.get(at + 1)?.to_str());
-    let level = level.and_then(|level| log_level(level).ok()?.parse().ok()).unwrap_or(LevelFilter::WARN);
+    let level = ros
+        .iter()
+        .rposition(|word| *word == "--log-level")
+        .and_then(|at| ros.get(at + 1)?.to_str());
+    let level = level
+        .and_then(|level| log_level(level).ok()?.parse().ok())
+        .unwrap_or(LevelFilter::WARN);
     // the libraries below say what is no matter of the user; the last three complain, whenever a node ends, about writers that have left
     // the graph already, and that a group was joined for each network and is not left for all of them at once; and about a topic that
     // turns to the type that others publish, which the node itself says

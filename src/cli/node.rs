@@ -12,14 +12,18 @@ use super::path_parameter::path;
 use super::signals::SignalledNode;
 use super::told::{ToldBy, ToldNumbers};
 use super::web::WebFlags;
-use super::{CliError, Losses, by_reason, counted, print_report, print_result, require, require_positive};
+use super::{
+    CliError, Losses, by_reason, counted, print_report, print_result, require, require_positive,
+};
 use crate::clock::Clock;
 use crate::live::Quantiles;
 use crate::mesh::TriMesh;
 use crate::ros;
 use crate::ros::arguments::NodeConfig;
 use crate::ros::inbox::{Arrivals, Inbox, inbox};
-use crate::ros::node::{ArmKind, ArmOfNode, INBOX, NodeEnd, NodeError, Prepared, SessionReport, mesh_unit};
+use crate::ros::node::{
+    ArmKind, ArmOfNode, INBOX, NodeEnd, NodeError, Prepared, SessionReport, mesh_unit,
+};
 use crate::ros::parameters::ParameterValue;
 use crate::ros::port::Port;
 use crate::scan::{Scan, read_scan};
@@ -50,25 +54,47 @@ pub(super) fn node(arguments: &NodeArguments, ros: &[String]) -> Result<Losses, 
     arguments.set_scene(&mut config)?;
     if let Some(radius_mm) = arguments.tip_radius_mm {
         require_positive("--tip-radius-mm", radius_mm)?;
-        config.parameters.set("tip_radius_mm", &ParameterValue::Double(radius_mm)).map_err(CliError::usage)?;
+        config
+            .parameters
+            .set("tip_radius_mm", &ParameterValue::Double(radius_mm))
+            .map_err(CliError::usage)?;
     }
     if !config.unused.is_empty() {
-        tracing::warn!("the parameter files name what this node does not have: {}", config.unused.join(", "));
+        tracing::warn!(
+            "the parameter files name what this node does not have: {}",
+            config.unused.join(", ")
+        );
     }
     let signals = SignalledNode::listen().map_err(NodeError::NoThread)?;
     let mut begin = |config: &NodeConfig| arguments.begin(config, &signals);
-    let (begun, opened) = arguments.web.begun(arguments.web_scans.as_deref(), &mut config, &mut begin)?;
-    let Begun { ready, nominal, inbox, arrivals, port, arm } = begun;
+    let (begun, opened) =
+        arguments
+            .web
+            .begun(arguments.web_scans.as_deref(), &mut config, &mut begin)?;
+    let Begun {
+        ready,
+        nominal,
+        inbox,
+        arrivals,
+        port,
+        arm,
+    } = begun;
     let (port, _page) = arguments.web.serve(opened, nominal, &ready, inbox, port)?;
     let running = ready.start(port, arrivals, arm)?;
-    let topics: Vec<_> = config.heard_topics().iter().filter_map(|name| config.resolve(name).ok()).collect();
+    let topics: Vec<_> = config
+        .heard_topics()
+        .iter()
+        .filter_map(|name| config.resolve(name).ok())
+        .collect();
     print_result(&format!(
         "{} listens to {}; Ctrl-C saves and ends it",
         config.place.full_name(),
         topics.join(" and ")
     ))?;
     let NodeEnd { folder, report } = running.join()?;
-    print_report(arguments.json, &report, || format!("{report}\nwrote {}", folder.join("refined.ply").display()))?;
+    print_report(arguments.json, &report, || {
+        format!("{report}\nwrote {}", folder.join("refined.ply").display())
+    })?;
     Ok(losses(&report))
 }
 
@@ -96,7 +122,10 @@ fn arm_of(config: &NodeConfig, scene: &Scene) -> Result<Option<ArmOfNode>, CliEr
     let kind = match robot {
         "sim" => {
             let part = config.parameters.string("sim_part");
-            require(!part.is_empty(), "robot:=sim needs the part that it touches: -p sim_part:=MESH")?;
+            require(
+                !part.is_empty(),
+                "robot:=sim needs the part that it touches: -p sim_part:=MESH",
+            )?;
             let unit = mesh_unit(&config.parameters);
             let Scan { mesh, .. } = read_scan(Path::new(part), unit).map_err(CliError::truth)?;
             ArmKind::Sim(Box::new(mesh))
@@ -104,7 +133,10 @@ fn arm_of(config: &NodeConfig, scene: &Scene) -> Result<Option<ArmOfNode>, CliEr
         "ros2_control" => ArmKind::Real(ros2_control_arm(scene, &config.beside("_driver"))?),
         _ => ArmKind::Real(connect_ur(scene)?),
     };
-    Ok(Some(ArmOfNode { kind, samples: ros::samples(&config.beside("_arm"))? }))
+    Ok(Some(ArmOfNode {
+        kind,
+        samples: ros::samples(&config.beside("_arm"))?,
+    }))
 }
 
 impl NodeArguments {
@@ -127,29 +159,55 @@ impl NodeArguments {
         arrivals: Arrivals,
     ) -> Result<Begun, CliError> {
         let (scan, faces) = ready.scan();
-        print_result(&format!("scan: {} with {faces} faces; session: {}", scan.display(), ready.folder().display()))?;
+        print_result(&format!(
+            "scan: {} with {faces} faces; session: {}",
+            scan.display(),
+            ready.folder().display()
+        ))?;
         print_result(&self.told(config, &ready).to_string())?;
-        print_result(&ready.cost(config.parameters.string("robot") != "none").to_string())?;
+        print_result(
+            &ready
+                .cost(config.parameters.string("robot") != "none")
+                .to_string(),
+        )?;
         let nominal = self.web.nominal(ready.mesh_unit())?;
         let port = ros::start(config, inbox.clone())?;
         let arm = arm_of(config, ready.scene())?;
-        Ok(Begun { ready, nominal, inbox, arrivals, port, arm })
+        Ok(Begun {
+            ready,
+            nominal,
+            inbox,
+            arrivals,
+            port,
+            arm,
+        })
     }
 
     /// What the mesh will depend on, and who told it.
     fn told(&self, config: &NodeConfig, ready: &Prepared) -> ToldNumbers {
         let is_set = config.parameters.double("tip_radius_mm") > 0.0;
         let by_flag = self.tip_radius_mm.filter(|_| is_set);
-        let radius_by = by_flag.map(|_| ToldBy::Flag).or(is_set.then_some(ToldBy::Parameter));
+        let radius_by = by_flag
+            .map(|_| ToldBy::Flag)
+            .or(is_set.then_some(ToldBy::Parameter));
         // without a scene the defaults are nobody's word
-        let yaml = if config.parameters.string("scene").is_empty() { "" } else { ready.scene_yaml() };
+        let yaml = if config.parameters.string("scene").is_empty() {
+            ""
+        } else {
+            ready.scene_yaml()
+        };
         ToldNumbers::of(ready.scene(), yaml, [radius_by, None, None])
     }
 
     /// The flag overrides files of parameters, which may name a scene for every node.
     fn set_scene(&self, config: &mut NodeConfig) -> Result<(), CliError> {
-        let Some(scene) = &self.scene else { return Ok(()) };
-        config.parameters.set("scene", &path(scene)?).map_err(CliError::usage)
+        let Some(scene) = &self.scene else {
+            return Ok(());
+        };
+        config
+            .parameters
+            .set("scene", &path(scene)?)
+            .map_err(CliError::usage)
     }
 }
 
@@ -158,12 +216,21 @@ fn losses(report: &SessionReport) -> Losses {
     let lost = [
         (wrenches, ["wrench", "wrenches"], "lost in transport"),
         (poses, ["pose", "poses"], "lost in transport"),
-        (samples, ["wrench or pose", "wrenches and poses"], "dropped: the computer is too slow"),
+        (
+            samples,
+            ["wrench or pose", "wrenches and poses"],
+            "dropped: the computer is too slow",
+        ),
         (others, ["other message", "other messages"], "dropped"),
-        (report.unrecorded, ["message", "messages"], "not in the session's recording"),
+        (
+            report.unrecorded,
+            ["message", "messages"],
+            "not in the session's recording",
+        ),
     ];
     let lost = lost.into_iter().filter(|(count, ..)| *count > 0);
-    lost.map(|(count, [one, many], how)| format!("{} {how}", counted(count, one, many))).collect()
+    lost.map(|(count, [one, many], how)| format!("{} {how}", counted(count, one, many)))
+        .collect()
 }
 
 impl fmt::Display for SessionReport {
@@ -171,19 +238,41 @@ impl fmt::Display for SessionReport {
         let wrenches = counted(self.lost[0], "wrench", "wrenches");
         let poses = counted(self.lost[1], "pose", "poses");
         let [poses_stale, wrenches_stale] = self.gaps.map(|gaps| counted(gaps, "time", "times"));
-        writeln!(f, "samples: {} accepted; refused: {}", self.accepted, by_reason(&self.refused))?;
+        writeln!(
+            f,
+            "samples: {} accepted; refused: {}",
+            self.accepted,
+            by_reason(&self.refused)
+        )?;
         writeln!(
             f,
             "lost in transport: {wrenches}, {poses}; streams stale: {wrenches_stale} wrenches, {poses_stale} poses"
         )?;
-        writeln!(f, "contacts: {}; updates cut back: {}", self.contacts, self.cut_back)?;
+        writeln!(
+            f,
+            "contacts: {}; updates cut back: {}",
+            self.contacts, self.cut_back
+        )?;
         let us = |ns: u64| ns as f64 * 1e-3;
-        let line = |Quantiles { median, p99, p999, max }: Quantiles| {
+        let line = |Quantiles {
+                        median,
+                        p99,
+                        p999,
+                        max,
+                    }: Quantiles| {
             let [median, p99, p999, max] = [median, p99, p999, max].map(us);
             format!("median {median:.1} us, p99 {p99:.1} us, p99.9 {p999:.1} us, max {max:.1} us")
         };
-        write!(f, "push: {}\narrival to mesh: {}", line(self.push_ns), line(self.latency_ns))?;
-        let patch = self.result.as_ref().and_then(|result| result.patch.as_ref());
+        write!(
+            f,
+            "push: {}\narrival to mesh: {}",
+            line(self.push_ns),
+            line(self.latency_ns)
+        )?;
+        let patch = self
+            .result
+            .as_ref()
+            .and_then(|result| result.patch.as_ref());
         patch.iter().try_for_each(|patch| write!(f, "\n{patch}"))
     }
 }

@@ -29,8 +29,17 @@ reported! {
 
 impl fmt::Display for WrenchOffset {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { wrench_offset_ms, sigma_ms, wrench_drift_ppm, wrench_drift_sigma_ppm, evidence } = *self;
-        write!(f, "the wrench seems to read {wrench_offset_ms:+.1} ± {sigma_ms:.1} ms beyond the pose")?;
+        let Self {
+            wrench_offset_ms,
+            sigma_ms,
+            wrench_drift_ppm,
+            wrench_drift_sigma_ppm,
+            evidence,
+        } = *self;
+        write!(
+            f,
+            "the wrench seems to read {wrench_offset_ms:+.1} ± {sigma_ms:.1} ms beyond the pose"
+        )?;
         match wrench_drift_sigma_ppm {
             None => write!(f, ", by {evidence} (sync.wrench_offset_ms; not applied)"),
             Some(ppm_sigma) => write!(
@@ -79,7 +88,9 @@ impl ScanOffset {
     pub fn of(found: Result<Registration, RegistrationError>) -> Self {
         match found {
             Ok(found) => Self::Found(FoundOffset::of(&found)),
-            Err(refused) => Self::Refused { refused: refused.to_string() },
+            Err(refused) => Self::Refused {
+                refused: refused.to_string(),
+            },
         }
     }
 }
@@ -87,15 +98,31 @@ impl ScanOffset {
 impl fmt::Display for ScanOffset {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let pairs = |values: &[f64; 3], sigmas: &[f64; 3]| {
-            values.iter().zip(sigmas).map(|(x, s)| format!("{x:+.3} ± {s:.3}")).collect::<Vec<_>>().join(", ")
+            values
+                .iter()
+                .zip(sigmas)
+                .map(|(x, s)| format!("{x:+.3} ± {s:.3}"))
+                .collect::<Vec<_>>()
+                .join(", ")
         };
         match self {
             Self::Refused { refused } => write!(f, "undetermined: {refused}"),
             Self::Found(found) => {
-                write!(f, "shift ({}) mm, ", pairs(&found.shift_mm, &found.shift_sigma_mm))?;
-                write!(f, "turn ({})°, ", pairs(&found.turn_deg, &found.turn_sigma_deg))?;
+                write!(
+                    f,
+                    "shift ({}) mm, ",
+                    pairs(&found.shift_mm, &found.shift_sigma_mm)
+                )?;
+                write!(
+                    f,
+                    "turn ({})°, ",
+                    pairs(&found.turn_deg, &found.turn_sigma_deg)
+                )?;
                 let [offset, sigma] = [found.surface_offset_mm, found.surface_offset_sigma_mm];
-                write!(f, "surface offset {offset:+.3} ± {sigma:.3} mm; not applied")
+                write!(
+                    f,
+                    "surface offset {offset:+.3} ± {sigma:.3} mm; not applied"
+                )
             }
         }
     }
@@ -111,7 +138,10 @@ pub(super) struct ContactPoints {
 
 impl ContactPoints {
     pub fn new(params: &RefineParams) -> Result<Self, SettingError> {
-        let registration = RegistrationParams { scan_noise: params.scan_noise, ..RegistrationParams::default() };
+        let registration = RegistrationParams {
+            scan_noise: params.scan_noise,
+            ..RegistrationParams::default()
+        };
         Ok(Self {
             registrar: Registrar::new(registration)?,
             slowest: params.sliding.unwrap_or_default().slowest,
@@ -122,7 +152,10 @@ impl ContactPoints {
     pub fn push(&mut self, sample: &ContactSample) {
         let ContactSample { ball, surface, .. } = sample;
         if let Some(surface) = surface.filter(|_| ball.velocity.norm() > self.slowest) {
-            self.registrar.push(&(ball.centre - surface.normal * self.radius), &surface.normal);
+            self.registrar.push(
+                &(ball.centre - surface.normal * self.radius),
+                &surface.normal,
+            );
         }
     }
 }

@@ -25,14 +25,22 @@ pub(super) fn print_report(
     report: &impl Serialize,
     in_words: impl FnOnce() -> String,
 ) -> Result<(), CliError> {
-    let json = || serde_json::to_string(report).expect("finite numbers and names alone cannot fail");
+    let json =
+        || serde_json::to_string(report).expect("finite numbers and names alone cannot fail");
     print_result(&if as_json { json() } else { in_words() })
 }
 
 /// Counts by their reasons, in words.
 pub(super) fn by_reason(counts: &BTreeMap<String, u64>) -> String {
-    let counts: Vec<_> = counts.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
-    if counts.is_empty() { "none".to_owned() } else { counts.join(", ") }
+    let counts: Vec<_> = counts
+        .iter()
+        .map(|(reason, count)| format!("{count} {reason}"))
+        .collect();
+    if counts.is_empty() {
+        "none".to_owned()
+    } else {
+        counts.join(", ")
+    }
 }
 
 /// One line on stderr that is no error.
@@ -42,7 +50,12 @@ pub(super) fn notify(line: &str) {
 
 /// Makes the error of a file or folder that cannot be written.
 pub(super) fn not_written(path: &Path) -> impl FnOnce(io::Error) -> CliError {
-    |source| CliError::not_written(FileError::Write { path: path.to_owned(), source })
+    |source| {
+        CliError::not_written(FileError::Write {
+            path: path.to_owned(),
+            source,
+        })
+    }
 }
 
 /// Writes a result as JSON.
@@ -57,7 +70,12 @@ pub(super) fn check_kept(flag: &str, input: &Path, output: &Path) -> Result<(), 
 }
 
 /// … by the flag `by`.
-pub(super) fn check_kept_by(by: &str, flag: &str, input: &Path, output: &Path) -> Result<(), CliError> {
+pub(super) fn check_kept_by(
+    by: &str,
+    flag: &str,
+    input: &Path,
+    output: &Path,
+) -> Result<(), CliError> {
     let path = output.display();
     let why = format!("{by} would write over {path}, which {flag} reads: choose another place");
     require(!is_same_file(input, output), why)
@@ -65,7 +83,9 @@ pub(super) fn check_kept_by(by: &str, flag: &str, input: &Path, output: &Path) -
 
 /// Checks that a file can be written.
 pub(super) fn check_place(path: &Path) -> Result<(), CliError> {
-    AtomicFile::create(path).map(drop).map_err(not_written(path))
+    AtomicFile::create(path)
+        .map(drop)
+        .map_err(not_written(path))
 }
 
 /// Checks names and places of outputs.
@@ -81,9 +101,18 @@ pub(super) fn check_outputs(
         let Some(path) = path else { continue };
         let shown = path.display();
         let is_of_kind = shown.to_string().to_ascii_lowercase().ends_with(ending);
-        require(is_of_kind, format_args!("{flag} {shown} must end in {ending}"))?;
-        let is_read = inputs.iter().flatten().any(|input| is_same_file(input, path));
-        require(!is_read, format_args!("{flag} would write over {shown}, which is {used}"))?;
+        require(
+            is_of_kind,
+            format_args!("{flag} {shown} must end in {ending}"),
+        )?;
+        let is_read = inputs
+            .iter()
+            .flatten()
+            .any(|input| is_same_file(input, path));
+        require(
+            !is_read,
+            format_args!("{flag} would write over {shown}, which is {used}"),
+        )?;
         check_place(path)?;
     }
     Ok(())

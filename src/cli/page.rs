@@ -32,7 +32,9 @@ pub(super) fn on_page(
     let ready = Prepared::new(parameters)?;
     let clock = Clock::system();
     let (inbox, arrivals) = inbox(INBOX, &clock);
-    SignalledNode::listen().map_err(NodeError::NoThread)?.set(Some(inbox.clone()));
+    SignalledNode::listen()
+        .map_err(NodeError::NoThread)?
+        .set(Some(inbox.clone()));
     let (port, touching) = in_process::start_unread(inbox.clone(), &clock);
     let (port, page) = web.serve(None, web.nominal(ready.mesh_unit())?, &ready, inbox, port)?;
     let running = ready.start(port, arrivals, None)?;
@@ -48,7 +50,10 @@ pub(super) fn on_page(
         // it is served until the program ends
         page
     };
-    let touching = Builder::new().name("touching".to_owned()).spawn(touch).map_err(NodeError::NoThread)?;
+    let touching = Builder::new()
+        .name("touching".to_owned())
+        .spawn(touch)
+        .map_err(NodeError::NoThread)?;
     let end = running.join()?;
     drop(touching);
     Ok(end)
@@ -57,10 +62,18 @@ pub(super) fn on_page(
 /// Parameters of a node on a scan.
 ///
 /// - `sessions`: folder in which sessions lie.
-pub(super) fn parameters_of(scan: &Path, unit: MeshUnit, sessions: &Path) -> Result<Parameters, CliError> {
+pub(super) fn parameters_of(
+    scan: &Path,
+    unit: MeshUnit,
+    sessions: &Path,
+) -> Result<Parameters, CliError> {
     let mut parameters = Parameters::default();
     let unit = ParameterValue::String(unit.name().to_owned());
-    for (name, value) in [("scan", path(scan)?), ("mesh_unit", unit), ("session_folder", path(sessions)?)] {
+    for (name, value) in [
+        ("scan", path(scan)?),
+        ("mesh_unit", unit),
+        ("session_folder", path(sessions)?),
+    ] {
         parameters.set(name, &value).map_err(CliError::usage)?;
     }
     Ok(parameters)

@@ -7,6 +7,13 @@ use crate::ros::parameters::ParameterValue;
 
 /// A path as a parameter.
 pub(super) fn path(path: &Path) -> Result<ParameterValue, CliError> {
-    let why = || CliError::usage(format!("{}: parameters of ROS are UTF-8, rename the file", path.display()));
-    Ok(ParameterValue::String(path.to_str().ok_or_else(why)?.to_owned()))
+    let why = || {
+        CliError::usage(format!(
+            "{}: parameters of ROS are UTF-8, rename the file",
+            path.display()
+        ))
+    };
+    Ok(ParameterValue::String(
+        path.to_str().ok_or_else(why)?.to_owned(),
+    ))
 }

@@ -15,18 +15,25 @@ use crate::mesh::TriMesh;
 
 /// The date of the system clock (UTC), as pictures carry it.
 pub(super) fn today() -> String {
-    DateTime::<Utc>::from(SystemTime::now()).format("%Y-%m-%d").to_string()
+    DateTime::<Utc>::from(SystemTime::now())
+        .format("%Y-%m-%d")
+        .to_string()
 }
 
 /// The last part of a path.
 pub(super) fn file_name(path: &Path) -> String {
-    path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned())
+    path.file_name()
+        .map_or(String::new(), |name| name.to_string_lossy().into_owned())
 }
 
 /// The direction that `--view` names.
 pub(super) fn view_from(view: Option<&Vec<f64>>) -> Result<Option<Vector3<f64>>, CliError> {
-    let is_direction = |view: &Vec<f64>| view.iter().all(|x| x.is_finite()) && view.iter().any(|x| *x != 0.0);
-    require(view.is_none_or(is_direction), "--view must be a direction, such as 1,-1,0.5")?;
+    let is_direction =
+        |view: &Vec<f64>| view.iter().all(|x| x.is_finite()) && view.iter().any(|x| *x != 0.0);
+    require(
+        view.is_none_or(is_direction),
+        "--view must be a direction, such as 1,-1,0.5",
+    )?;
     Ok(view.map(|view| Vector3::from_column_slice(view)))
 }
 
@@ -48,9 +55,18 @@ pub(super) fn write_coloured(
     colours: &[Rgb],
     further: impl IntoIterator<Item = VertexColumn>,
 ) -> Result<(), CliError> {
-    let channel = |at: usize| colours.iter().map(|colour| colour[at]).collect::<Vec<u8>>().into();
+    let channel = |at: usize| {
+        colours
+            .iter()
+            .map(|colour| colour[at])
+            .collect::<Vec<u8>>()
+            .into()
+    };
     let named = ["red", "green", "blue"].into_iter().enumerate();
-    let channels = named.map(|(at, name)| VertexColumn { name, values: channel(at) });
+    let channels = named.map(|(at, name)| VertexColumn {
+        name,
+        values: channel(at),
+    });
     let columns: Vec<_> = channels.chain(further).collect();
     write_mesh_with(path, mesh, &columns, None, unit).map_err(CliError::not_written)
 }

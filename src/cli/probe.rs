@@ -24,7 +24,12 @@ pub(super) struct ProbeArguments {
     #[arg(long, value_name = "YAML")]
     scene: PathBuf,
     /// Features to probe, in the frame of the scan: KIND@X,Y,Z or KIND@X,Y,Z,RADIUS in mm; repeat for each
-    #[arg(long = "feature", value_name = "FLAG", required = true, allow_hyphen_values = true)]
+    #[arg(
+        long = "feature",
+        value_name = "FLAG",
+        required = true,
+        allow_hyphen_values = true
+    )]
     features: Vec<String>,
     /// How far a feature may be from its flag, mm, where the flag does not say
     #[arg(long, value_name = "R", default_value_t = 3.0)]
@@ -60,7 +65,12 @@ pub(super) struct ProbeArguments {
     #[arg(long)]
     dry_run: bool,
     /// Where the ball is when the plan of --dry-run begins, in the frame of the scan, mm; default: 40 mm above the scan
-    #[arg(long, value_name = "X,Y,Z", requires = "dry_run", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        requires = "dry_run",
+        allow_hyphen_values = true
+    )]
     from_mm: Option<String>,
     /// Goes on with a probing that was broken off in the folder of --out: what is finished there is not probed again
     #[arg(long, conflicts_with = "dry_run")]
@@ -99,14 +109,19 @@ pub(super) fn probe(arguments: &ProbeArguments) -> Result<Losses, CliError> {
         probing.check_free()?;
     }
     let signals = StopSignals::listen()?;
-    cell.with(*robot, &ready, Ok, |arm| arguments.run(&probing, &ready, arm, &signals))
+    cell.with(*robot, &ready, Ok, |arm| {
+        arguments.run(&probing, &ready, arm, &signals)
+    })
 }
 
 impl ProbeArguments {
     fn flags(&self) -> Result<Vec<Flag>, CliError> {
         let radius = self.search_radius_mm / 1e3;
         require_positive("--search-radius-mm", self.search_radius_mm)?;
-        (1..).zip(&self.features).map(|(id, text)| flag_of(id, text, radius)).collect()
+        (1..)
+            .zip(&self.features)
+            .map(|(id, text)| flag_of(id, text, radius))
+            .collect()
     }
 
     /// A request can ask for less than the scene allows.
@@ -114,7 +129,11 @@ impl ProbeArguments {
         if let Some(temperature_c) = self.temperature_c {
             ready.at_temperature(temperature_c)?;
         }
-        let by = Narrower { force: self.max_force_n, time: self.max_duration_s, ..Narrower::default() };
+        let by = Narrower {
+            force: self.max_force_n,
+            time: self.max_duration_s,
+            ..Narrower::default()
+        };
         let wanted_mm = ready.tolerance_mm();
         ready.params = ready.params.narrowed(&by).map_err(CliError::usage)?;
         let params = &mut ready.params;
@@ -131,8 +150,17 @@ impl ProbeArguments {
         }
         if let Some(nominal) = &self.nominal {
             let is_more_than_even = self.confidence > 0.5 && self.confidence < 1.0;
-            require(is_more_than_even, format_args!("--confidence {} must be above 0.5 and below 1", self.confidence))?;
-            let rule = DecisionParams { confidence: self.confidence, ..DecisionParams::default() };
+            require(
+                is_more_than_even,
+                format_args!(
+                    "--confidence {} must be above 0.5 and below 1",
+                    self.confidence
+                ),
+            )?;
+            let rule = DecisionParams {
+                confidence: self.confidence,
+                ..DecisionParams::default()
+            };
             ready.params.goals = goals_of(nominal, flags, &ready.static_world()?, rule)?;
         }
         Ok(())
@@ -140,7 +168,11 @@ impl ProbeArguments {
 
     /// Plans with no arm at all: as from where `--from-mm` says.
     fn plan_alone(&self, probing: &Probing<'_>, ready: &Ready) -> Result<Losses, CliError> {
-        let from = self.from_mm.as_ref().map(|text| millimetres("--from-mm", text)).transpose()?;
+        let from = self
+            .from_mm
+            .as_ref()
+            .map(|text| millimetres("--from-mm", text))
+            .transpose()?;
         let (pose_bt, place) = ready.start(from.map(Point3::from));
         let [x, y, z] = (place * 1e3).coords.into();
         let why = || {
@@ -148,13 +180,23 @@ impl ProbeArguments {
                 "the arm does not reach ({x:.1} {y:.1} {z:.1}) mm, where the plan begins: name a place by --from-mm"
             )
         };
-        let now = ready.cell.at_rest(&pose_bt).ok_or_else(|| CliError::usage(why()))?;
+        let now = ready
+            .cell
+            .at_rest(&pose_bt)
+            .ok_or_else(|| CliError::usage(why()))?;
         let plans = probing.planned(ready, &now)?;
         if !self.dry_run {
             return ready.may_move().map(|()| Losses::new());
         }
         let picture = self.out.join("plan.png");
-        let report = DryRunReport::of(&ready.told, probing.flags, &plans, [x, y, z], self.nominal.is_some(), picture);
+        let report = DryRunReport::of(
+            &ready.told,
+            probing.flags,
+            &plans,
+            [x, y, z],
+            self.nominal.is_some(),
+            picture,
+        );
         print_report(self.json, &report, || report.to_string())?;
         Ok(Losses::new())
     }
@@ -168,12 +210,18 @@ impl ProbeArguments {
     ) -> Result<Losses, CliError> {
         let now = arm.next_state().map_err(CliError::arm)?;
         probing.planned(ready, &now)?;
-        let Done { summary, outcome, .. } = probing.done(ready, arm, self.resume, signals)?;
+        let Done {
+            summary, outcome, ..
+        } = probing.done(ready, arm, self.resume, signals)?;
         print_report(self.json, &summary, || {
             let names = ["plan.png", "touches.png", "probed.json"];
             let are_all = summary.refine.is_some();
-            let written = names.iter().filter(|name| are_all || **name != "touches.png");
-            let files: Vec<_> = written.map(|name| self.out.join(name).display().to_string()).collect();
+            let written = names
+                .iter()
+                .filter(|name| are_all || **name != "touches.png");
+            let files: Vec<_> = written
+                .map(|name| self.out.join(name).display().to_string())
+                .collect();
             format!("{summary}\nwrote {}", files.join(", "))
         })?;
         outcome
@@ -181,8 +229,7 @@ impl ProbeArguments {
 }
 
 /// A decision depends on what is measured.
-const AS_SCANNED: &str =
-    "the part is as the scan has it: a value nearer to its limits takes more touches until it is decided";
+const AS_SCANNED: &str = "the part is as the scan has it: a value nearer to its limits takes more touches until it is decided";
 
 reported! {
     /// What `--dry-run --json` prints.
@@ -222,34 +269,59 @@ struct Unreachable {
 
 impl Unreachable {
     fn touch(HeldBack { what, why }: &HeldBack) -> Option<Self> {
-        let PlannedMotion::Touch(number) = *what else { return None };
-        Some(Self { number, reason: why.clone() })
+        let PlannedMotion::Touch(number) = *what else {
+            return None;
+        };
+        Some(Self {
+            number,
+            reason: why.clone(),
+        })
     }
 
     fn slide(HeldBack { what, why }: &HeldBack) -> Option<Self> {
-        let PlannedMotion::Slide(number) = *what else { return None };
-        Some(Self { number, reason: why.clone() })
+        let PlannedMotion::Slide(number) = *what else {
+            return None;
+        };
+        Some(Self {
+            number,
+            reason: why.clone(),
+        })
     }
 }
 
 /// The verdict, then each feature and what cannot be reached.
 impl fmt::Display for DryRunReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let sum = |count: fn(&PlannedFeature) -> usize| self.features.iter().map(count).sum::<usize>();
+        let sum =
+            |count: fn(&PlannedFeature) -> usize| self.features.iter().map(count).sum::<usize>();
         let [touches, slides] = [sum(|one| one.touches), sum(|one| one.slides)];
         let touched = touches - sum(|one| one.unreachable_touches.len());
-        write!(f, "{touched} of {}", counted(touches, "planned touch", "planned touches"))?;
+        write!(
+            f,
+            "{touched} of {}",
+            counted(touches, "planned touch", "planned touches")
+        )?;
         if slides > 0 {
             let made = slides - sum(|one| one.unreachable_slides.len());
             write!(f, " and {made} of {}", counted(slides, "slide", "slides"))?;
         }
         writeln!(f, " can be made; nothing moved")?;
         let [x, y, z] = self.from_mm;
-        writeln!(f, "planned from ({x:.1} {y:.1} {z:.1}) mm by the scene alone, without asking an arm where it is")?;
+        writeln!(
+            f,
+            "planned from ({x:.1} {y:.1} {z:.1}) mm by the scene alone, without asking an arm where it is"
+        )?;
         writeln!(f, "{}", self.told)?;
-        self.assumes.iter().try_for_each(|assumes| writeln!(f, "assumed: {assumes}"))?;
+        self.assumes
+            .iter()
+            .try_for_each(|assumes| writeln!(f, "assumed: {assumes}"))?;
         for one in &self.features {
-            write!(f, "feature {}: {}", one.flag, counted(one.touches, "touch", "touches"))?;
+            write!(
+                f,
+                "feature {}: {}",
+                one.flag,
+                counted(one.touches, "touch", "touches")
+            )?;
             if one.slides > 0 {
                 write!(f, " and {}", counted(one.slides, "slide", "slides"))?;
             }
@@ -259,7 +331,10 @@ impl fmt::Display for DryRunReport {
                 let places = counted(one.beside_the_part_mm.len(), "place", "places");
                 writeln!(f, "  {places} left out: the scan has no part there")?;
             }
-            for (kind, unreachable) in [("touch", &one.unreachable_touches), ("slide", &one.unreachable_slides)] {
+            for (kind, unreachable) in [
+                ("touch", &one.unreachable_touches),
+                ("slide", &one.unreachable_slides),
+            ] {
                 for Unreachable { number, reason } in unreachable {
                     writeln!(f, "  {kind} {number}: {reason}")?;
                 }
@@ -280,22 +355,60 @@ mod tests {
     #[test]
     fn a_slide_that_cannot_be_made_is_no_touch() {
         let (entry, from) = (Point3::origin(), Point3::origin());
-        let touch = TouchPlan { entry, from, direction: Vector3::z_axis(), search: 1e-3, expected: None };
-        let held_back = [(PlannedMotion::Touch(1), "reason 1"), (PlannedMotion::Slide(0), "reason 2")];
-        let held_back = held_back.map(|(what, why)| HeldBack { what, why: why.to_owned() }).to_vec();
-        let plan = Plan { touches: vec![touch; 2], held_back, ..Plan::default() };
+        let touch = TouchPlan {
+            entry,
+            from,
+            direction: Vector3::z_axis(),
+            search: 1e-3,
+            expected: None,
+        };
+        let held_back = [
+            (PlannedMotion::Touch(1), "reason 1"),
+            (PlannedMotion::Slide(0), "reason 2"),
+        ];
+        let held_back = held_back
+            .map(|(what, why)| HeldBack {
+                what,
+                why: why.to_owned(),
+            })
+            .to_vec();
+        let plan = Plan {
+            touches: vec![touch; 2],
+            held_back,
+            ..Plan::default()
+        };
         let planned = PlannedFeature::of(7, &plan);
         let numbers = |unreachable: &[Unreachable]| -> Vec<(usize, String)> {
-            unreachable.iter().map(|one| (one.number, one.reason.clone())).collect()
+            unreachable
+                .iter()
+                .map(|one| (one.number, one.reason.clone()))
+                .collect()
         };
-        assert_eq!(numbers(&planned.unreachable_touches), [(1, "reason 1".to_owned())]);
-        assert_eq!(numbers(&planned.unreachable_slides), [(0, "reason 2".to_owned())]);
+        assert_eq!(
+            numbers(&planned.unreachable_touches),
+            [(1, "reason 1".to_owned())]
+        );
+        assert_eq!(
+            numbers(&planned.unreachable_slides),
+            [(0, "reason 2".to_owned())]
+        );
         let told = ToldNumbers::of(&Scene::default(), "", [None; 3]);
         let features = vec![planned];
-        let text =
-            DryRunReport { told, from_mm: [0.0; 3], features, assumes: None, picture: PathBuf::from("plan.png") }
-                .to_string();
-        assert!(text.starts_with("1 of 2 planned touches can be made; nothing moved\n"), "{text}");
-        assert!(text.contains("  touch 1: reason 1\n  slide 0: reason 2\n"), "{text}");
+        let text = DryRunReport {
+            told,
+            from_mm: [0.0; 3],
+            features,
+            assumes: None,
+            picture: PathBuf::from("plan.png"),
+        }
+        .to_string();
+        assert!(
+            text.starts_with("1 of 2 planned touches can be made; nothing moved\n"),
+            "{text}"
+        );
+        assert!(
+            text.contains("  touch 1: reason 1\n  slide 0: reason 2\n"),
+            "{text}"
+        );
     }
 }

@@ -31,7 +31,12 @@ impl WorkProgress {
             bar.set_style(style);
         }
         bar.set_message(what);
-        Self { bar, started: Instant::now(), steps: 0, waiting: stderr().is_terminal() }
+        Self {
+            bar,
+            started: Instant::now(),
+            steps: 0,
+            waiting: stderr().is_terminal(),
+        }
     }
 
     /// A stage that cannot say how far it is.

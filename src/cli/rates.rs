@@ -6,7 +6,9 @@ use std::time::{Duration, Instant};
 
 use super::{counted, reported};
 use crate::haptic::{RefineError, RefineParams};
-use crate::live::{Ended, Engine, Gate, Latencies, LiveCounts, LiveError, Pace, Quantiles, Renewal};
+use crate::live::{
+    Ended, Engine, Gate, Latencies, LiveCounts, LiveError, Pace, Quantiles, Renewal,
+};
 use crate::mesh::{FaceTree, TriMesh};
 use crate::reconstruct::PatcherParams;
 use crate::session::StrokeReplay;
@@ -59,15 +61,30 @@ impl Rates {
         if is_live {
             let scan = Arc::new((mesh.clone(), FaceTree::new_by(&mesh, &Threads)));
             let scan_bytes = scan.0.bytes() + scan.1.bytes();
-            renewal = Renewal::Beside { scan, pace: Pace::default(), room: ROOM, gate: Gate::default() };
-            real_time = Some(RealTime { scan_bytes, begun: None, behind: Latencies::new() });
+            renewal = Renewal::Beside {
+                scan,
+                pace: Pace::default(),
+                room: ROOM,
+                gate: Gate::default(),
+            };
+            real_time = Some(RealTime {
+                scan_bytes,
+                begun: None,
+                behind: Latencies::new(),
+            });
         }
-        Ok(Self { engine: Engine::new(mesh, refine, patch, renewal)?, real_time, stopped: None })
+        Ok(Self {
+            engine: Engine::new(mesh, refine, patch, renewal)?,
+            real_time,
+            stopped: None,
+        })
     }
 
     /// Memory of the scan and its tree that the patch has for itself, bytes.
     pub fn scan_bytes(&self) -> usize {
-        self.real_time.as_ref().map_or(0, |real_time| real_time.scan_bytes)
+        self.real_time
+            .as_ref()
+            .map_or(0, |real_time| real_time.scan_bytes)
     }
 
     /// Takes the next sample, in real time when it is due; returns whether it was refused, and how long that took.
@@ -78,7 +95,8 @@ impl Rates {
         let pushing = Instant::now();
         let pushed = self.engine.push(sample);
         let time = pushing.elapsed();
-        if let (Some(real_time), Some(until_ns)) = (&mut self.real_time, self.engine.patched_until_ns())
+        if let (Some(real_time), Some(until_ns)) =
+            (&mut self.real_time, self.engine.patched_until_ns())
             && let Ok(behind_ns) = u64::try_from(sample.stamp_ns.saturating_sub(until_ns))
         {
             real_time.behind.record(Duration::from_nanos(behind_ns));
@@ -95,7 +113,11 @@ impl Rates {
     /// Takes back and does again what was before the sample of this stamp, ns.
     pub fn change_strokes(&mut self, strokes: &mut StrokeReplay, before_ns: i64) {
         while let Some((_, is_undo)) = strokes.next_before(before_ns) {
-            let changed = if is_undo { self.engine.undo() } else { self.engine.redo() };
+            let changed = if is_undo {
+                self.engine.undo()
+            } else {
+                self.engine.redo()
+            };
             if let Err(error) = changed {
                 self.stopped = Some(error);
             }
@@ -107,7 +129,11 @@ impl Rates {
     /// # Errors
     /// [`LiveError::Stopped`] when it ended before.
     pub fn finish(self) -> Result<(Ended, Option<LiveSummary>), LiveError> {
-        let Self { engine, real_time, stopped } = self;
+        let Self {
+            engine,
+            real_time,
+            stopped,
+        } = self;
         if let Some(stopped) = stopped {
             return Err(stopped);
         }
@@ -121,7 +147,8 @@ impl Rates {
 impl RealTime {
     fn wait_for(&mut self, stamp_ns: i64) {
         let (begun, first_ns) = *self.begun.get_or_insert((Instant::now(), stamp_ns));
-        let due = Duration::from_nanos(u64::try_from(stamp_ns.saturating_sub(first_ns)).unwrap_or(0));
+        let due =
+            Duration::from_nanos(u64::try_from(stamp_ns.saturating_sub(first_ns)).unwrap_or(0));
         sleep(due.saturating_sub(begun.elapsed()));
     }
 }
@@ -131,6 +158,10 @@ impl std::fmt::Display for LiveSummary {
         let Quantiles { median, p99, .. } = self.behind_ns;
         let [median, p99] = [median, p99].map(|ns| ns as f64 * 1e-6);
         let renewals = counted(self.renewals, "renewal", "renewals");
-        write!(f, "live: patch {median:.0} ms behind, p99 {p99:.0} ms; {renewals}, {} of them late", self.late)
+        write!(
+            f,
+            "live: patch {median:.0} ms behind, p99 {p99:.0} ms; {renewals}, {} of them late",
+            self.late
+        )
     }
 }

@@ -28,15 +28,38 @@ pub(super) struct RecordedFlags {
 
 impl From<Topics> for RecordedFlags {
     fn from(topics: Topics) -> Self {
-        let Topics { pose, wrench, markers } = topics;
-        Self { wrench_topic: Some(wrench), pose_topic: Some(pose), markers_topic: markers, ..Self::default() }
+        let Topics {
+            pose,
+            wrench,
+            markers,
+        } = topics;
+        Self {
+            wrench_topic: Some(wrench),
+            pose_topic: Some(pose),
+            markers_topic: markers,
+            ..Self::default()
+        }
     }
 }
 
 impl RecordedFlags {
     /// What they name, and the scene of the columns of a table.
     pub fn layout(&self, scene: &Scene) -> RecordingLayout {
-        let Self { wrench_topic, pose_topic, pose_frame, base_frame, markers_topic } = self.clone();
-        RecordedAs { wrench_topic, pose_topic, pose_frame, base_frame, markers_topic, stamp: None }.layout(scene)
+        let Self {
+            wrench_topic,
+            pose_topic,
+            pose_frame,
+            base_frame,
+            markers_topic,
+        } = self.clone();
+        RecordedAs {
+            wrench_topic,
+            pose_topic,
+            pose_frame,
+            base_frame,
+            markers_topic,
+            stamp: None,
+        }
+        .layout(scene)
     }
 }

@@ -39,7 +39,10 @@ reported! {
 
 impl fmt::Display for Recovered {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { tip_mm: [x, y, z], force_n } = self;
+        let Self {
+            tip_mm: [x, y, z],
+            force_n,
+        } = self;
         write!(
             f,
             "nothing stops the arm any more, and nothing has moved: tip at ({x:.1} {y:.1} {z:.1}) mm in its base, {force_n:.1} N on its sensor; \

@@ -23,7 +23,10 @@ use super::recorded::RecordedFlags;
 use super::told::{ToldFlags, ToldNumbers};
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use super::web::WebFlags;
-use super::{CliError, Losses, by_reason, check_kept_by, check_place, counted, print_report, reported, require};
+use super::{
+    CliError, Losses, by_reason, check_kept_by, check_place, counted, print_report, reported,
+    require,
+};
 use crate::diagnose::{InputFinding, InputMonitor};
 use crate::haptic::Refiner;
 use crate::io::atomic::is_same_file;
@@ -32,14 +35,17 @@ use crate::io::recording::{StampSource, Topics};
 use crate::live::{Latencies, LiveError, Quantiles};
 use crate::mesh::{FaceTree, RepairReport, TriMesh};
 use crate::reconstruct::CloudSummary;
-use crate::refinement::{JudgedReplay, NOTHING_MOVES, RefinementInput, SampleTaker, TouchSource, reason_of_refusal};
+use crate::refinement::{
+    JudgedReplay, NOTHING_MOVES, RefinementInput, SampleTaker, TouchSource, reason_of_refusal,
+};
 use crate::replay::{Recording, Replayed, marker_filter};
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use crate::ros::node::NodeEnd;
 use crate::scan::{Scan, read_scan};
 use crate::scene::{LeftOut, Memory, Mode, Scene, SceneCost};
 use crate::session::{
-    Outcome, OutcomePlaces, PatchSummary, SessionRecord, StrokeChanges, StrokeReplay, UncertaintySummary,
+    Outcome, OutcomePlaces, PatchSummary, SessionRecord, StrokeChanges, StrokeReplay,
+    UncertaintySummary,
 };
 use crate::stylus::{ContactSample, MarkerCounts, Sample};
 use crate::threads::Threads;
@@ -181,20 +187,27 @@ pub(super) struct Refined {
     pub losses: Losses,
 }
 
-const NO_SCAN: &str = "there is no scan to refine: name it by --scan, or as `scan: { file: … }` in the scene";
+const NO_SCAN: &str =
+    "there is no scan to refine: name it by --scan, or as `scan: { file: … }` in the scene";
 
-const NO_PATCH: &str =
-    "--live lets the patch follow, and the scene has none: take `patch: off` or `mode: paper` out of it";
+const NO_PATCH: &str = "--live lets the patch follow, and the scene has none: take `patch: off` or `mode: paper` out of it";
 
 /// The command: refines, and prints the result.
 pub(super) fn refine(arguments: &RefineArguments) -> Result<Losses, CliError> {
     let arguments = arguments.clone().completed()?;
     #[cfg(any(feature = "ros", feature = "r2r"))]
     let arguments = arguments.after_the_page()?;
-    let Refined { repair, summary, losses } = arguments.refined()?;
+    let Refined {
+        repair,
+        summary,
+        losses,
+    } = arguments.refined()?;
     print_report(arguments.json, &summary, || {
-        let details =
-            if arguments.verbose { format!("\nscan file: {repair}\n{}", summary.details()) } else { String::new() };
+        let details = if arguments.verbose {
+            format!("\nscan file: {repair}\n{}", summary.details())
+        } else {
+            String::new()
+        };
         format!("{summary}{details}\nwrote {}", arguments.out.display())
     })?;
     Ok(losses)
@@ -215,7 +228,10 @@ impl Pushes {
         match pushed {
             Ok(()) => self.accepted += 1,
             Err(error) => {
-                *self.refused.entry(reason_of_refusal(&LiveError::Refine(error)).to_owned()).or_default() += 1
+                *self
+                    .refused
+                    .entry(reason_of_refusal(&LiveError::Refine(error)).to_owned())
+                    .or_default() += 1
             }
         }
     }
@@ -234,7 +250,8 @@ struct RateTaker {
 
 impl SampleTaker for RateTaker {
     fn take(&mut self, sample: &Sample) -> bool {
-        self.rates.change_strokes(&mut self.strokes, sample.stamp_ns);
+        self.rates
+            .change_strokes(&mut self.strokes, sample.stamp_ns);
         if !self.strokes.takes(sample.stamp_ns) {
             self.taken_out += 1;
             return false;
@@ -265,24 +282,50 @@ impl RefineArguments {
         topics: Topics,
     ) -> Self {
         let out = folder.join("refined.ply");
-        let [features_out, touches_out] = ["features.json", "touches.csv"].map(|name| Some(folder.join(name)));
-        let files = Self { scan, bag, out, mesh_unit, scene, features_out, touches_out, ..Self::default() };
-        Self { recorded: topics.into(), ..files }
+        let [features_out, touches_out] =
+            ["features.json", "touches.csv"].map(|name| Some(folder.join(name)));
+        let files = Self {
+            scan,
+            bag,
+            out,
+            mesh_unit,
+            scene,
+            features_out,
+            touches_out,
+            ..Self::default()
+        };
+        Self {
+            recorded: topics.into(),
+            ..files
+        }
     }
 
     /// With what the session to be resumed, or the scene, names in place of flags.
     fn completed(mut self) -> Result<Self, CliError> {
         if let Some(session) = self.resume.take() {
-            let SessionRecord { scan, mesh_unit, scene, recording, topics, strokes } = SessionRecord::open(&session)?;
+            let SessionRecord {
+                scan,
+                mesh_unit,
+                scene,
+                recording,
+                topics,
+                strokes,
+            } = SessionRecord::open(&session)?;
             (self.scan, self.mesh_unit, self.scene) = (scan, mesh_unit, Some(scene));
             (self.bag, self.recorded) = (recording, topics.into());
             self.strokes = strokes;
             if self.out.as_os_str().is_empty() {
                 self.out = session.join("refined.ply");
             }
-            self.features_out.get_or_insert_with(|| session.join("features.json"));
-            self.touches_out.get_or_insert_with(|| session.join("touches.csv"));
-        } else if let Some(path) = self.scene.as_ref().filter(|_| self.scan.as_os_str().is_empty()) {
+            self.features_out
+                .get_or_insert_with(|| session.join("features.json"));
+            self.touches_out
+                .get_or_insert_with(|| session.join("touches.csv"));
+        } else if let Some(path) = self
+            .scene
+            .as_ref()
+            .filter(|_| self.scan.as_os_str().is_empty())
+        {
             let scan = Scene::read(path)?.scan_file(path);
             (self.scan, self.mesh_unit) = scan.ok_or_else(|| CliError::usage(NO_SCAN))?;
         }
@@ -295,9 +338,18 @@ impl RefineArguments {
         if !self.web.is_wanted() {
             return Ok(self);
         }
-        require(self.live, "--web shows what is replayed in real time: say --live as well")?;
-        require(self.mode.is_none_or(|mode| mode == Mode::Robust), "--web shows the robust method alone")?;
-        require(self.strokes.is_empty(), "--web begins a session: resume the other one without it")?;
+        require(
+            self.live,
+            "--web shows what is replayed in real time: say --live as well",
+        )?;
+        require(
+            self.mode.is_none_or(|mode| mode == Mode::Robust),
+            "--web shows the robust method alone",
+        )?;
+        require(
+            self.strokes.is_empty(),
+            "--web begins a session: resume the other one without it",
+        )?;
         let (scene, _) = self.scene()?;
         self.check_out()?;
         let markers = marker_filter(&scene, self.recorded.markers_topic.as_deref())?;
@@ -305,16 +357,48 @@ impl RefineArguments {
         let folder = self.out.parent().unwrap_or(Path::new("")).join("sessions");
         let mut parameters = parameters_of(&self.scan, self.mesh_unit, &folder)?;
         // files that the scene names are relative to its folder
-        let beside = self.scene.as_deref().and_then(Path::parent).filter(|folder| !folder.as_os_str().is_empty());
+        let beside = self
+            .scene
+            .as_deref()
+            .and_then(Path::parent)
+            .filter(|folder| !folder.as_os_str().is_empty());
         let mut files = tempfile::Builder::new();
         files.suffix(".yaml");
-        let mut text = beside.map_or_else(|| files.tempfile(), |folder| files.tempfile_in(folder))?;
-        std::io::Write::write_all(&mut text, self.told.scene_text(self.scene.as_deref())?.as_bytes())?;
-        parameters.set("scene", &path(text.path())?).map_err(CliError::usage)?;
+        let mut text =
+            beside.map_or_else(|| files.tempfile(), |folder| files.tempfile_in(folder))?;
+        std::io::Write::write_all(
+            &mut text,
+            self.told.scene_text(self.scene.as_deref())?.as_bytes(),
+        )?;
+        parameters
+            .set("scene", &path(text.path())?)
+            .map_err(CliError::usage)?;
         let NodeEnd { folder, .. } = on_page(&self.web, parameters, recording, markers)?;
-        let Self { out, features_out, touches_out, registration, force, verbose, json, .. } = self;
-        let session = Self { resume: Some(folder), out, registration, force, verbose, json, ..Self::default() };
-        Self { features_out, touches_out, ..session }.completed()
+        let Self {
+            out,
+            features_out,
+            touches_out,
+            registration,
+            force,
+            verbose,
+            json,
+            ..
+        } = self;
+        let session = Self {
+            resume: Some(folder),
+            out,
+            registration,
+            force,
+            verbose,
+            json,
+            ..Self::default()
+        };
+        Self {
+            features_out,
+            touches_out,
+            ..session
+        }
+        .completed()
     }
 
     /// Reads, replays and writes.
@@ -322,7 +406,11 @@ impl RefineArguments {
         let (scene, told) = self.scene()?;
         self.check_out()?;
         let started = Instant::now();
-        let Scan { mesh, repair, cloud } = read_scan(&self.scan, self.mesh_unit)?;
+        let Scan {
+            mesh,
+            repair,
+            cloud,
+        } = read_scan(&self.scan, self.mesh_unit)?;
         let input = RefinementInput::new(scene, mesh)?;
         let markers = marker_filter(&input.scene, self.recorded.markers_topic.as_deref())?;
         let recording = Recording::open(&self.bag, self.recorded.layout(&input.scene), self.stamp)?;
@@ -334,27 +422,55 @@ impl RefineArguments {
             rates.engine.keep_strokes();
         }
         let load_s = started.elapsed().as_secs_f64();
-        let RefinementInput { scene, scan: as_scanned, cut } = &input;
+        let RefinementInput {
+            scene,
+            scan: as_scanned,
+            cut,
+        } = &input;
         let cost = self.cost(scene, &rates, as_scanned.bytes() + cut.bytes());
 
         let started = Instant::now();
         let mut progress = WorkProgress::new("replay", recording.message_count());
-        let contacts = self.registration.then(|| ContactPoints::new(&params)).transpose()?;
-        let mut taker =
-            RateTaker { rates, pushes: Pushes::default(), strokes: self.strokes.replay(), taken_out: 0, contacts };
-        let touches = TouchSource::Recorded { recording: Box::new(recording), markers: markers.map(Box::new) };
+        let contacts = self
+            .registration
+            .then(|| ContactPoints::new(&params))
+            .transpose()?;
+        let mut taker = RateTaker {
+            rates,
+            pushes: Pushes::default(),
+            strokes: self.strokes.replay(),
+            taken_out: 0,
+            contacts,
+        };
+        let touches = TouchSource::Recorded {
+            recording: Box::new(recording),
+            markers: markers.map(Box::new),
+        };
         let judged = input.replay(touches, &params, &mut taker, &mut || progress.step())?;
-        let JudgedReplay { mut replayed, monitor } = judged;
-        let RateTaker { mut rates, mut pushes, mut strokes, taken_out, contacts } = taker;
+        let JudgedReplay {
+            mut replayed,
+            monitor,
+        } = judged;
+        let RateTaker {
+            mut rates,
+            mut pushes,
+            mut strokes,
+            taken_out,
+            contacts,
+        } = taker;
         rates.change_strokes(&mut strokes, i64::MAX);
         let tree = FaceTree::new_by(as_scanned, &Threads);
         let findings = self.doubt(&monitor, as_scanned, &tree, pushes.accepted)?;
-        let registration = contacts.map(|contacts| ScanOffset::of(contacts.registrar.estimate(as_scanned, &tree)));
+        let registration =
+            contacts.map(|contacts| ScanOffset::of(contacts.registrar.estimate(as_scanned, &tree)));
         drop(tree);
         let (mut ended, live) = rates.finish()?;
         let replay_s = started.elapsed().as_secs_f64();
         let stage = WorkProgress::stage("reconstruct");
-        let patcher = ended.patcher.take().filter(|_| ended.refiner.counts().contacts > 0);
+        let patcher = ended
+            .patcher
+            .take()
+            .filter(|_| ended.refiner.counts().contacts > 0);
         if let Some(patcher) = patcher.as_ref().filter(|_| !self.force) {
             patcher.check_extent()?;
         }
@@ -377,7 +493,9 @@ impl RefineArguments {
         debug!(?counts, "replayed");
         pushes.refused.extend(std::mem::take(&mut replayed.refused));
         if counts.outside_region > 0 {
-            pushes.refused.insert("outside_region".to_owned(), counts.outside_region);
+            pushes
+                .refused
+                .insert("outside_region".to_owned(), counts.outside_region);
         }
         if taken_out > 0 {
             pushes.refused.insert("taken_out".to_owned(), taken_out);
@@ -388,8 +506,20 @@ impl RefineArguments {
             .map(|found| WrenchOffset::of(&found, &scene.sync_params()));
         let (run, input) = ((cost, [load_s, replay_s], live), (told, findings, cloud));
         let offsets = (wrench_offset, registration);
-        let summary = RefineSummary::of(run, &replayed, pushes, &ended.refiner, outcome, input, offsets);
-        Ok(Refined { repair, summary, losses: replayed.losses })
+        let summary = RefineSummary::of(
+            run,
+            &replayed,
+            pushes,
+            &ended.refiner,
+            outcome,
+            input,
+            offsets,
+        );
+        Ok(Refined {
+            repair,
+            summary,
+            losses: replayed.losses,
+        })
     }
 
     /// Warns of what is doubtful, and refuses what is surely wrong before anything is written.
@@ -402,7 +532,9 @@ impl RefineArguments {
     ) -> Result<Vec<InputFinding>, CliError> {
         let mut findings = monitor.findings(scan, tree);
         if self.touches_flaws {
-            let off_the_scan = findings.iter_mut().filter(|finding| finding.cause.is_read_off_the_scan());
+            let off_the_scan = findings
+                .iter_mut()
+                .filter(|finding| finding.cause.is_read_off_the_scan());
             off_the_scan.for_each(|finding| finding.is_sure = false);
             findings.sort_by_key(|finding| !finding.is_sure);
         }
@@ -420,12 +552,25 @@ impl RefineArguments {
     /// The stages built from the scene for these samples.
     fn cost(&self, scene: &Scene, rates: &Rates, scan_bytes: usize) -> SceneCost {
         let unused = [
-            LeftOut { part: "robot", reason: "a replay moves no arm" },
-            LeftOut { part: "markers", reason: "the recording is read for poses" },
+            LeftOut {
+                part: "robot",
+                reason: "a replay moves no arm",
+            },
+            LeftOut {
+                part: "markers",
+                reason: "the recording is read for poses",
+            },
         ];
-        let unused = if self.recorded.markers_topic.is_some() { &unused[..1] } else { &unused };
+        let unused = if self.recorded.markers_topic.is_some() {
+            &unused[..1]
+        } else {
+            &unused
+        };
         let memory = Memory::of(rates.engine.footprint(), scan_bytes + rates.scan_bytes());
-        SceneCost { parts: scene.built(unused, &crate::FEATURES), memory }
+        SceneCost {
+            parts: scene.built(unused, &crate::FEATURES),
+            memory,
+        }
     }
 
     /// Checks that the result can be written before the work begins.
@@ -442,14 +587,26 @@ impl RefineArguments {
             ("--features-out", self.features_out.as_ref()),
             ("--touches-out", self.touches_out.as_ref()),
         ];
-        let inputs = [("--scan", Some(&self.scan)), ("--bag", Some(&self.bag)), ("--scene", self.scene.as_ref())];
+        let inputs = [
+            ("--scan", Some(&self.scan)),
+            ("--bag", Some(&self.bag)),
+            ("--scene", self.scene.as_ref()),
+        ];
         let [outputs, inputs] = [outputs, inputs].map(|files| {
-            let named = files.into_iter().filter_map(|(flag, path)| Some((flag, path?)));
+            let named = files
+                .into_iter()
+                .filter_map(|(flag, path)| Some((flag, path?)));
             named.collect::<Vec<_>>()
         });
         for (at, (flag, out)) in outputs.iter().enumerate() {
-            if let Some((other, _)) = outputs[..at].iter().find(|(_, other)| other == out || is_same_file(other, out)) {
-                let why = format!("{flag} and {other} would both write {}: choose another place", out.display());
+            if let Some((other, _)) = outputs[..at]
+                .iter()
+                .find(|(_, other)| other == out || is_same_file(other, out))
+            {
+                let why = format!(
+                    "{flag} and {other} would both write {}: choose another place",
+                    out.display()
+                );
                 return Err(CliError::usage(why));
             }
             for (read, input) in &inputs {
@@ -480,7 +637,10 @@ impl RefineSummary {
                 None => format!("refined: {patch}"),
             },
             (None, contacts) => {
-                let (times, faces) = (counted(contacts, "time", "times"), counted(self.moved_faces, "face", "faces"));
+                let (times, faces) = (
+                    counted(contacts, "time", "times"),
+                    counted(self.moved_faces, "face", "faces"),
+                );
                 format!("refined: the stylus came into contact {times} and moved {faces}")
             }
         }
@@ -489,14 +649,31 @@ impl RefineSummary {
     /// Counts of samples, timings, and the stages built from the scene.
     fn details(&self) -> String {
         let (read, accepted, refused) = (self.samples, self.accepted, by_reason(&self.refused));
-        let Quantiles { median, p99, p999, max } = self.push_ns;
+        let Quantiles {
+            median,
+            p99,
+            p999,
+            max,
+        } = self.push_ns;
         let mut lines = vec![
             format!("samples: {read} read, {accepted} accepted; refused: {refused}"),
-            format!("faces moved: {}; updates cut back: {}", self.moved_faces, self.cut_back),
+            format!(
+                "faces moved: {}; updates cut back: {}",
+                self.moved_faces, self.cut_back
+            ),
         ];
-        lines.extend(self.patch.as_ref().map(|patch| format!("reconstruction: {:.2} s", patch.build_s)));
-        lines.push(format!("time of a sample: median {median} ns, p99 {p99} ns, p99.9 {p999} ns, max {max} ns"));
-        lines.push(format!("loaded in {:.2} s, replayed in {:.2} s", self.load_s, self.replay_s));
+        lines.extend(
+            self.patch
+                .as_ref()
+                .map(|patch| format!("reconstruction: {:.2} s", patch.build_s)),
+        );
+        lines.push(format!(
+            "time of a sample: median {median} ns, p99 {p99} ns, p99.9 {p999} ns, max {max} ns"
+        ));
+        lines.push(format!(
+            "loaded in {:.2} s, replayed in {:.2} s",
+            self.load_s, self.replay_s
+        ));
         lines.push(self.scene.to_string());
         lines.join("\n")
     }
@@ -506,19 +683,39 @@ impl RefineSummary {
 impl fmt::Display for RefineSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}\n{}", self.verdict(), self.told)?;
-        let last_outlier = self.uncertainty.as_ref().and_then(UncertaintySummary::last_outlier);
-        last_outlier.iter().try_for_each(|last| write!(f, "\n{last}"))?;
+        let last_outlier = self
+            .uncertainty
+            .as_ref()
+            .and_then(UncertaintySummary::last_outlier);
+        last_outlier
+            .iter()
+            .try_for_each(|last| write!(f, "\n{last}"))?;
         let friction = &self.friction;
-        friction.iter().try_for_each(|FrictionFound { mu, sigma }| write!(f, "\nfriction: {mu:.3} ± {sigma:.3}"))?;
-        if let Some(MarkerCounts { held, coasting, lost, relabelled, rejected }) = self.markers {
+        friction
+            .iter()
+            .try_for_each(|FrictionFound { mu, sigma }| {
+                write!(f, "\nfriction: {mu:.3} ± {sigma:.3}")
+            })?;
+        if let Some(MarkerCounts {
+            held,
+            coasting,
+            lost,
+            relabelled,
+            rejected,
+        }) = self.markers
+        {
             write!(
                 f,
                 "\nmarker frames: {held} held the pose, {coasting} coasted, {lost} without a pose; markers: {relabelled} \
                  relabelled, {rejected} rejected"
             )?;
         }
-        self.wrench_offset.iter().try_for_each(|clock| write!(f, "\nclock: {clock}"))?;
-        self.registration.iter().try_for_each(|registration| write!(f, "\nscan: {registration}"))?;
+        self.wrench_offset
+            .iter()
+            .try_for_each(|clock| write!(f, "\nclock: {clock}"))?;
+        self.registration
+            .iter()
+            .try_for_each(|registration| write!(f, "\nscan: {registration}"))?;
         self.live.iter().try_for_each(|live| write!(f, "\n{live}"))
     }
 }

@@ -55,7 +55,10 @@ pub(super) struct ReplayArguments {
 
 fn speed(text: &str) -> Result<f64, String> {
     let speed: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
-    (0.01..=100.0).contains(&speed).then_some(speed).ok_or_else(|| "it must be 0.01 to 100".to_owned())
+    (0.01..=100.0)
+        .contains(&speed)
+        .then_some(speed)
+        .ok_or_else(|| "it must be 0.01 to 100".to_owned())
 }
 
 /// What `--json` prints.
@@ -72,20 +75,39 @@ pub(super) struct Played {
 pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Losses, CliError> {
     let mut config = NodeConfig::named("touchup_replay", ros, |name| std::env::var(name).ok())?;
     let source = ParameterValue::String(arguments.source.clone());
-    config.parameters.set("source", &source).map_err(CliError::usage)?;
-    let scene = arguments.scene.as_deref().map_or_else(|| Ok(Scene::default()), Scene::read)?;
+    config
+        .parameters
+        .set("source", &source)
+        .map_err(CliError::usage)?;
+    let scene = arguments
+        .scene
+        .as_deref()
+        .map_or_else(|| Ok(Scene::default()), Scene::read)?;
     let markers = marker_filter(&scene, arguments.recorded.markers_topic.as_deref())?;
-    let recording = Recording::open(&arguments.recording, arguments.recorded.layout(&scene), StampSource::Header)?;
+    let recording = Recording::open(
+        &arguments.recording,
+        arguments.recorded.layout(&scene),
+        StampSource::Header,
+    )?;
     let mut port = ros::samples(&config)?;
     wait_for_listeners(&mut *port, &config, &arguments.recording);
 
-    let (played, replayed) = play(recording, markers, arguments.speed, &arguments.source, &*port)?;
+    let (played, replayed) = play(
+        recording,
+        markers,
+        arguments.speed,
+        &arguments.source,
+        &*port,
+    )?;
     let listeners = port.listeners();
     sleep(LINGER);
 
     let mut losses = replayed.losses;
     if played.unsent > 0 {
-        losses.push(format!("{} not taken by the network", counted(played.unsent, "message", "messages")));
+        losses.push(format!(
+            "{} not taken by the network",
+            counted(played.unsent, "message", "messages")
+        ));
     }
     if listeners.contains(&0) {
         losses.push("a subscriber left before the end".to_owned());
@@ -126,8 +148,9 @@ pub(super) fn play(
     };
     let mut order = StampOrder::default();
     let mut progress = WorkProgress::new("replay", recording.message_count());
-    let replayed =
-        each_message(recording, markers, &mut || progress.step(), |message| order.push(message, &mut publish))?;
+    let replayed = each_message(recording, markers, &mut || progress.step(), |message| {
+        order.push(message, &mut publish)
+    })?;
     order.finish(&mut publish);
     played.played_s = began.elapsed().as_secs_f64();
     Ok((played, replayed))
@@ -139,9 +162,13 @@ fn wait_for_listeners(port: &mut dyn SamplePort, config: &NodeConfig, recording:
     let mut is_reported = false;
     while port.listeners().contains(&0) {
         if !is_reported && began.elapsed() > REPORT_AFTER {
-            let topics = config.sample_topics().map(|name| config.resolve(name).unwrap_or_else(|_| name.to_owned()));
+            let topics = config
+                .sample_topics()
+                .map(|name| config.resolve(name).unwrap_or_else(|_| name.to_owned()));
             let (recording, topics) = (recording.display(), topics.join(" and "));
-            notify(&format!("{recording} waits for a node that listens to {topics} (touchup node); Ctrl-C gives up"));
+            notify(&format!(
+                "{recording} waits for a node that listens to {topics} (touchup node); Ctrl-C gives up"
+            ));
             is_reported = true;
         }
         sleep(LOOK);
@@ -172,7 +199,9 @@ impl StampOrder {
         let stream = &mut self.streams[usize::from(matches!(message, Message::Wrench(_)))];
         self.count += 1;
         stream.held.insert((stamp_ns, self.count), message);
-        let newest_ns = stream.newest_ns.map_or(stamp_ns, |newest_ns| newest_ns.max(stamp_ns));
+        let newest_ns = stream
+            .newest_ns
+            .map_or(stamp_ns, |newest_ns| newest_ns.max(stamp_ns));
         stream.newest_ns = Some(newest_ns);
         while let Some(first) = stream.held.first_entry()
             && first.key().0 <= newest_ns.saturating_sub(SyncParams::default().reorder_ns)
@@ -198,7 +227,11 @@ struct ReplayPace {
 
 impl ReplayPace {
     fn new(speed: f64) -> Self {
-        Self { speed, time: PlayedTime::default(), began: Instant::now() }
+        Self {
+            speed,
+            time: PlayedTime::default(),
+            began: Instant::now(),
+        }
     }
 
     /// Time since the beginning at which it is due. A stamp that goes back is due at once.
@@ -223,20 +256,43 @@ mod tests {
     fn each_stream_comes_in_the_order_of_its_stamps() {
         let ms = 1_000_000;
         let message = |stamp_ms: i64, is_wrench| match is_wrench {
-            true => Message::Wrench(StampedWrench { stamp_ns: stamp_ms * ms, wrench: Wrench::default() }),
-            false => Message::Pose(StampedPose { stamp_ns: stamp_ms * ms, pose_ot: Isometry3::identity() }),
+            true => Message::Wrench(StampedWrench {
+                stamp_ns: stamp_ms * ms,
+                wrench: Wrench::default(),
+            }),
+            false => Message::Pose(StampedPose {
+                stamp_ns: stamp_ms * ms,
+                pose_ot: Isometry3::identity(),
+            }),
         };
-        let recorded =
-            [(0, true), (5, false), (12, true), (9, true), (9, true), (30, true), (2, false), (3, true), (40, false)];
+        let recorded = [
+            (0, true),
+            (5, false),
+            (12, true),
+            (9, true),
+            (9, true),
+            (30, true),
+            (2, false),
+            (3, true),
+            (40, false),
+        ];
         let (mut order, mut replayed) = (StampOrder::default(), Vec::new());
-        let mut each =
-            |message: Message| replayed.push((message.stamp_ns() / ms, matches!(message, Message::Wrench(_))));
+        let mut each = |message: Message| {
+            replayed.push((
+                message.stamp_ns() / ms,
+                matches!(message, Message::Wrench(_)),
+            ))
+        };
         for (stamp_ms, is_wrench) in recorded {
             order.push(message(stamp_ms, is_wrench), &mut each);
         }
         order.finish(&mut each);
-        let of =
-            |wanted| replayed.iter().filter(move |(_, is_wrench)| *is_wrench == wanted).map(|(stamp_ms, _)| *stamp_ms);
+        let of = |wanted| {
+            replayed
+                .iter()
+                .filter(move |(_, is_wrench)| *is_wrench == wanted)
+                .map(|(stamp_ms, _)| *stamp_ms)
+        };
         // 3 is more than 20 ms behind: it comes where it came
         assert_eq!(of(true).collect::<Vec<_>>(), [0, 9, 9, 3, 12, 30]);
         assert_eq!(of(false).collect::<Vec<_>>(), [2, 5, 40]);
@@ -246,7 +302,18 @@ mod tests {
     fn messages_are_due_by_their_stamps_and_rests_are_shortened() {
         let s = 1_000_000_000;
         let mut pace = ReplayPace::new(2.0);
-        let stamps = [100 * s, 101 * s, 101 * s - 5, 101 * s, 103 * s, 3000 * s, 3001 * s, 7 * s, 9 * s, i64::MAX];
+        let stamps = [
+            100 * s,
+            101 * s,
+            101 * s - 5,
+            101 * s,
+            103 * s,
+            3000 * s,
+            3001 * s,
+            7 * s,
+            9 * s,
+            i64::MAX,
+        ];
         let due = stamps.map(|stamp| pace.due(stamp).as_secs_f64());
         assert_eq!(due, [0.0, 0.5, 0.5, 0.5, 1.5, 2.5, 3.0, 3.0, 4.0, 5.0]);
     }

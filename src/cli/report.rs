@@ -23,13 +23,31 @@ pub(super) struct HandedOver {
 
 /// The verb: ends with the exit code of that program.
 pub(super) fn report(arguments: &HandedOver) -> Result<Losses, CliError> {
-    let beside = std::env::current_exe().ok().map(|this| this.with_file_name(PROGRAM)).filter(|path| path.is_file());
+    let beside = std::env::current_exe()
+        .ok()
+        .map(|this| this.with_file_name(PROGRAM))
+        .filter(|path| path.is_file());
     let path = beside.unwrap_or_else(|| PROGRAM.into());
-    let status = Command::new(&path).args(&arguments.arguments).status().map_err(|source| {
-        let not_started = || format!("cannot start {}: {source}", path.display());
-        let is_missing = source.kind() == ErrorKind::NotFound;
-        CliError::new(("report", 1), if is_missing { MISSING.to_owned() } else { not_started() }, None)
-    })?;
+    let status = Command::new(&path)
+        .args(&arguments.arguments)
+        .status()
+        .map_err(|source| {
+            let not_started = || format!("cannot start {}: {source}", path.display());
+            let is_missing = source.kind() == ErrorKind::NotFound;
+            CliError::new(
+                ("report", 1),
+                if is_missing {
+                    MISSING.to_owned()
+                } else {
+                    not_started()
+                },
+                None,
+            )
+        })?;
     // what went wrong it has said itself
-    if status.success() { Ok(Losses::new()) } else { std::process::exit(status.code().unwrap_or(1)) }
+    if status.success() {
+        Ok(Losses::new())
+    } else {
+        std::process::exit(status.code().unwrap_or(1))
+    }
 }

@@ -20,13 +20,28 @@ use crate::scan::ScanError;
 ///
 /// # Errors
 /// The folder or the scene cannot be used.
-pub(super) fn set_up(server: &WebServer, scans: &Path, parameters: &Parameters) -> Result<Arc<NodeSetup>, CliError> {
-    let scene = Some(parameters.string("scene")).filter(|scene| !scene.is_empty()).map(Into::into);
+pub(super) fn set_up(
+    server: &WebServer,
+    scans: &Path,
+    parameters: &Parameters,
+) -> Result<Arc<NodeSetup>, CliError> {
+    let scene = Some(parameters.string("scene"))
+        .filter(|scene| !scene.is_empty())
+        .map(Into::into);
     let radius_mm = Some(parameters.double("tip_radius_mm")).filter(|mm| *mm > 0.0);
     let source = parameters.string("source");
     let (pose, wrench) = (format!("/{source}/pose"), format!("/{source}/wrench"));
-    let topics = Topics { pose, wrench, markers: None };
-    Ok(server.set_up(SetupParams { folder: scans.to_owned(), scene, radius_mm, topics })?)
+    let topics = Topics {
+        pose,
+        wrench,
+        markers: None,
+    };
+    Ok(server.set_up(SetupParams {
+        folder: scans.to_owned(),
+        scene,
+        radius_mm,
+        topics,
+    })?)
 }
 
 /// Waits until a node has begun that was set up on the page: what `begin` makes of it, and in `config` what that was made of. Whatever is
@@ -43,8 +58,14 @@ pub(super) fn set_up_on_page<B>(
     loop {
         let scene = setup.wait();
         // what was said on the page is in the scene, also the radius
-        for (name, value) in [("scene", path(&scene)?), ("tip_radius_mm", ParameterValue::Double(0.0))] {
-            config.parameters.set(name, &value).map_err(CliError::usage)?;
+        for (name, value) in [
+            ("scene", path(&scene)?),
+            ("tip_radius_mm", ParameterValue::Double(0.0)),
+        ] {
+            config
+                .parameters
+                .set(name, &value)
+                .map_err(CliError::usage)?;
         }
         match begin(config) {
             Ok(begun) => return Ok(begun),
@@ -60,10 +81,14 @@ pub(super) fn set_up_on_page<B>(
 
 /// Where on the page an error can be mended.
 fn step_of(error: &BeginError) -> SetupStep {
-    let BeginError::Node(error) = error else { return SetupStep::Start };
+    let BeginError::Node(error) = error else {
+        return SetupStep::Start;
+    };
     match error {
         NodeError::Scan(scan) => match **scan {
-            ScanError::File(MeshFileError::Implausible { .. } | MeshFileError::UnitOfE57 { .. }) => SetupStep::Unit,
+            ScanError::File(
+                MeshFileError::Implausible { .. } | MeshFileError::UnitOfE57 { .. },
+            ) => SetupStep::Unit,
             _ => SetupStep::Scan,
         },
         NodeError::Refine(_) => SetupStep::Scan,

@@ -23,11 +23,17 @@ use crate::ros::inbox::Inbox;
 use crate::ros::port::Arrival;
 
 /// Calls `each` on a thread of its own with the number of signals until then, from 1 on.
-pub(super) fn on_each_signal(kinds: &[SignalKind], mut each: impl FnMut(u32) + Send + 'static) -> io::Result<()> {
+pub(super) fn on_each_signal(
+    kinds: &[SignalKind],
+    mut each: impl FnMut(u32) + Send + 'static,
+) -> io::Result<()> {
     let runtime = runtime::Builder::new_current_thread().enable_io().build()?;
     let mut signals = {
         let _entered = runtime.enter();
-        kinds.iter().map(|kind| signal(*kind)).collect::<io::Result<Vec<_>>>()?
+        kinds
+            .iter()
+            .map(|kind| signal(*kind))
+            .collect::<io::Result<Vec<_>>>()?
     };
     let listen = move || {
         for count in 1.. {
@@ -35,7 +41,10 @@ pub(super) fn on_each_signal(kinds: &[SignalKind], mut each: impl FnMut(u32) + S
             each(count);
         }
     };
-    Builder::new().name("signals".to_owned()).spawn(listen).map(drop)
+    Builder::new()
+        .name("signals".to_owned())
+        .spawn(listen)
+        .map(drop)
 }
 
 /// The node that signals end; while there is none, a signal ends the program at once.
@@ -50,10 +59,16 @@ impl SignalledNode {
     pub fn listen() -> io::Result<Self> {
         let node = Arc::new(Mutex::new(None::<Inbox>));
         let heard = Arc::clone(&node);
-        let kinds = [SignalKind::interrupt(), SignalKind::terminate(), SignalKind::hangup()];
+        let kinds = [
+            SignalKind::interrupt(),
+            SignalKind::terminate(),
+            SignalKind::hangup(),
+        ];
         on_each_signal(&kinds, move |count| {
             let inbox = heard.lock().unwrap_or_else(PoisonError::into_inner).clone();
-            let Some(inbox) = inbox else { exit(i32::from(INTERRUPTED.1)) };
+            let Some(inbox) = inbox else {
+                exit(i32::from(INTERRUPTED.1))
+            };
             if count == 1 {
                 notify(
                     "ends and saves; a second signal ends it at once, or stops an arm that still retracts where it is",
@@ -78,9 +93,14 @@ impl SignalledNode {
 
 /// Waits for any of them.
 async fn any(signals: &mut [Signal]) {
-    poll_fn(|context| match signals.iter_mut().any(|signal| signal.poll_recv(context).is_ready()) {
-        true => Poll::Ready(()),
-        false => Poll::Pending,
+    poll_fn(|context| {
+        match signals
+            .iter_mut()
+            .any(|signal| signal.poll_recv(context).is_ready())
+        {
+            true => Poll::Ready(()),
+            false => Poll::Pending,
+        }
     })
     .await;
 }
@@ -110,8 +130,15 @@ impl StopSignals {
                 _ => "the arm stops and retracts; a second signal has it stay where it is",
             });
         };
-        let no_thread = |error| CliError::new(("signals", 1), format!("cannot listen to signals: {error}"), None);
-        on_each_signal(&[SignalKind::interrupt(), SignalKind::terminate()], each).map_err(no_thread)?;
+        let no_thread = |error| {
+            CliError::new(
+                ("signals", 1),
+                format!("cannot listen to signals: {error}"),
+                None,
+            )
+        };
+        on_each_signal(&[SignalKind::interrupt(), SignalKind::terminate()], each)
+            .map_err(no_thread)?;
         Ok(signals)
     }
 
@@ -142,7 +169,12 @@ mod tests {
     fn the_first_signal_retracts_and_the_second_has_the_arm_stay() {
         assert_eq!(
             [0, 1, 2, 3].map(request_of),
-            [None, Some(StopRequest::Retract), Some(StopRequest::Stay), Some(StopRequest::Stay)]
+            [
+                None,
+                Some(StopRequest::Retract),
+                Some(StopRequest::Stay),
+                Some(StopRequest::Stay)
+            ]
         );
     }
 }

@@ -18,8 +18,8 @@ use crate::io::recording::{Record, Topics, write_recording};
 use crate::mesh::TriMesh;
 use crate::scan::{Scan, read_scan};
 use crate::sim::{
-    CameraParams, DrawnWorld, Habit, MeshSurface, Moment, PathParams, ScannerParams, SimError, SimWorld, Stroke,
-    StylusParams, Surface, Touch, plan_sides, scan, see_markers, touch,
+    CameraParams, DrawnWorld, Habit, MeshSurface, Moment, PathParams, ScannerParams, SimError,
+    SimWorld, Stroke, StylusParams, Surface, Touch, plan_sides, scan, see_markers, touch,
 };
 use crate::stylus::{MarkerFrame, Message};
 
@@ -28,7 +28,8 @@ const TRUTH_NAME: &str = "truth.ply";
 /// File of the true contacts, in the output folder: of every so many ticks of 1 ms.
 const CONTACTS_NAME: &str = "truth_contacts.csv";
 const CONTACT_EVERY: usize = 10;
-const CONTACTS_HEAD: &str = "t_s,centre_x_mm,centre_y_mm,centre_z_mm,contact_x_mm,contact_y_mm,contact_z_mm\n";
+const CONTACTS_HEAD: &str =
+    "t_s,centre_x_mm,centre_y_mm,centre_z_mm,contact_x_mm,contact_y_mm,contact_z_mm\n";
 /// The hand moves 0.08 mm in each tick of the simulation: a smaller ball would go through the part and take for ever.
 const TIP_RADII_MM: RangeInclusive<f64> = 0.1..=100.0;
 /// Frame of the poses in the recordings.
@@ -89,7 +90,13 @@ pub struct SimulationSettings {
     #[arg(long, value_enum)]
     pub scanner: Option<ScannerKind>,
     /// Sides of the part from which the hand reaches it, by the axis that points there: z,x,-y
-    #[arg(long, value_name = "AXES", value_delimiter = ',', default_value = "z", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "AXES",
+        value_delimiter = ',',
+        default_value = "z",
+        allow_hyphen_values = true
+    )]
     pub sides: Vec<Side>,
 }
 
@@ -105,7 +112,9 @@ impl Default for SimulationSettings {
             scan_edge_mm: None,
             scan_noise_mm: None,
             scanner: None,
-            sides: vec![Side { towards: Vector3::z_axis() }],
+            sides: vec![Side {
+                towards: Vector3::z_axis(),
+            }],
         }
     }
 }
@@ -130,14 +139,18 @@ impl FromStr for Side {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let (sign, axis) = text.strip_prefix('-').map_or((1.0, text), |axis| (-1.0, axis));
+        let (sign, axis) = text
+            .strip_prefix('-')
+            .map_or((1.0, text), |axis| (-1.0, axis));
         let axis = match axis {
             "x" => Vector3::x(),
             "y" => Vector3::y(),
             "z" => Vector3::z(),
             _ => return Err(format!("{text} is no side: give x, -x, y, -y, z or -z")),
         };
-        Ok(Self { towards: Unit::new_unchecked(axis * sign) })
+        Ok(Self {
+            towards: Unit::new_unchecked(axis * sign),
+        })
     }
 }
 
@@ -145,9 +158,16 @@ impl FromStr for Side {
 pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError> {
     arguments.settings.check()?;
     check_kept("--truth", &arguments.truth, &arguments.out.join(TRUTH_NAME))?;
-    let Scan { mesh: truth, repair, .. } = read_scan(&arguments.truth, arguments.mesh_unit)?;
+    let Scan {
+        mesh: truth,
+        repair,
+        ..
+    } = read_scan(&arguments.truth, arguments.mesh_unit)?;
     if repair.boundary_edges > 0 {
-        warn!("{} edges of the part are open: near them inside and outside are guessed", repair.boundary_edges);
+        warn!(
+            "{} edges of the part are open: near them inside and outside are guessed",
+            repair.boundary_edges
+        );
     }
     let surface = MeshSurface::new(&truth)?;
     let world = arguments.settings.world()?;
@@ -155,14 +175,31 @@ pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError
     let stage = WorkProgress::stage("strokes");
     let path = world.path(&surface, &arguments.settings.sides)?;
     drop(stage);
-    let (out, SimulationWorld { scanner, stylus, drawn }) = (&arguments.out, world);
-    let Simulated { scan, touch } = write_simulation(&surface, &truth, &path, &scanner, &stylus, camera.as_ref(), out)?;
+    let (
+        out,
+        SimulationWorld {
+            scanner,
+            stylus,
+            drawn,
+        },
+    ) = (&arguments.out, world);
+    let Simulated { scan, touch } = write_simulation(
+        &surface,
+        &truth,
+        &path,
+        &scanner,
+        &stylus,
+        camera.as_ref(),
+        out,
+    )?;
     if let Some(drawn) = &drawn {
         write_told_scene(drawn, DrawnWorld::lever(&surface), &out.join("scene.yaml"))?;
         write_truth(drawn, &out.join("truth.json"))?;
     }
     let seconds = touch.moments.last().map_or(0.0, |moment| moment.t);
-    let of_world = drawn.as_ref().map_or_else(String::new, |drawn| format!("world: {}\n", drawn.world.name()));
+    let of_world = drawn.as_ref().map_or_else(String::new, |drawn| {
+        format!("world: {}\n", drawn.world.name())
+    });
     print_result(&format!(
         "{of_world}scan: {} faces\ntouched for {seconds:.0} s of simulated time: {} messages\nwrote {}",
         scan.face_count(),
@@ -181,8 +218,14 @@ struct SimulationWorld {
 
 impl SimulationWorld {
     fn path(&self, surface: &dyn Surface, sides: &[Side]) -> Result<Vec<Stroke>, SimError> {
-        let hand = PathParams { radius: self.stylus.radius, ..PathParams::default() };
-        let habit = self.drawn.as_ref().map_or(Habit::Slide, |drawn| drawn.habit);
+        let hand = PathParams {
+            radius: self.stylus.radius,
+            ..PathParams::default()
+        };
+        let habit = self
+            .drawn
+            .as_ref()
+            .map_or(Habit::Slide, |drawn| drawn.habit);
         let sides: Vec<_> = sides.iter().map(|side| side.towards).collect();
         plan_sides(surface, &sides, habit, &hand)
     }
@@ -213,12 +256,16 @@ impl SimulationSettings {
         let path = world.path(&surface, &self.sides)?;
         let scan = scan(&surface, &world.scanner)?;
         let touch = touch(&surface, &path, &world.stylus, world.scanner.seed)?;
-        let scene = world.drawn.map(|drawn| drawn.told_scene(DrawnWorld::lever(&surface)));
+        let scene = world
+            .drawn
+            .map(|drawn| drawn.told_scene(DrawnWorld::lever(&surface)));
         Ok(Simulation { scan, touch, scene })
     }
 
     fn check(&self) -> Result<(), CliError> {
-        let Some(given) = self.tip_radius_mm else { return Ok(()) };
+        let Some(given) = self.tip_radius_mm else {
+            return Ok(());
+        };
         let (smallest, largest) = (TIP_RADII_MM.start(), TIP_RADII_MM.end());
         let why = format!("--tip-radius-mm {given} must be {smallest} to {largest} mm");
         require(TIP_RADII_MM.contains(&given), why)
@@ -227,11 +274,20 @@ impl SimulationSettings {
     /// As it is drawn, with what is named put in place of it.
     fn world(&self) -> Result<SimulationWorld, CliError> {
         let off = OffFactor::joined(&self.told_off)?;
-        let mut drawn = self.world.map(|world| world.draw_told_off(self.seed, &off)).transpose()?;
+        let mut drawn = self
+            .world
+            .map(|world| world.draw_told_off(self.seed, &off))
+            .transpose()?;
         let usual = || (ScannerParams::default(), StylusParams::default());
-        let (mut scanner, mut stylus) = drawn.as_ref().map_or_else(usual, |drawn| (drawn.scanner, drawn.stylus));
+        let (mut scanner, mut stylus) = drawn
+            .as_ref()
+            .map_or_else(usual, |drawn| (drawn.scanner, drawn.stylus));
         if let Some(kind) = self.scanner {
-            scanner = if kind == ScannerKind::Good { ScannerParams::good() } else { ScannerParams::default() };
+            scanner = if kind == ScannerKind::Good {
+                ScannerParams::good()
+            } else {
+                ScannerParams::default()
+            };
             if let Some(drawn) = &mut drawn {
                 drawn.set_truth("scan_edge", scanner.edge);
                 drawn.set_truth("scan_noise", scanner.noise);
@@ -240,7 +296,12 @@ impl SimulationSettings {
         scanner.seed = self.seed;
         for (given, unit, name, place) in [
             (self.tip_radius_mm, 1e-3, "tip_radius", &mut stylus.radius),
-            (self.stiffness_n_per_mm, 1e3, "stiffness", &mut stylus.stiffness),
+            (
+                self.stiffness_n_per_mm,
+                1e3,
+                "stiffness",
+                &mut stylus.stiffness,
+            ),
             (self.friction, 1.0, "friction", &mut stylus.friction),
             (self.scan_edge_mm, 1e-3, "scan_edge", &mut scanner.edge),
             (self.scan_noise_mm, 1e-3, "scan_noise", &mut scanner.noise),
@@ -251,7 +312,11 @@ impl SimulationSettings {
                 drawn.set_truth(name, given * unit);
             }
         }
-        Ok(SimulationWorld { scanner, stylus, drawn })
+        Ok(SimulationWorld {
+            scanner,
+            stylus,
+            drawn,
+        })
     }
 }
 
@@ -280,19 +345,32 @@ pub(super) fn write_simulation(
     let touch = touch(surface, path, stylus, scanner.seed)?;
     let see = |camera| see_markers(&touch.moments, stylus.stiffness, camera, scanner.seed);
     let frames = camera.map_or_else(|| Ok(Vec::new()), see)?;
-    let topics = Topics { markers: camera.map(|_| MARKERS_TOPIC.to_owned()), ..Topics::default() };
+    let topics = Topics {
+        markers: camera.map(|_| MARKERS_TOPIC.to_owned()),
+        ..Topics::default()
+    };
     for (name, mesh) in [(TRUTH_NAME, truth), ("scan.ply", &scan)] {
-        write_mesh(&folder.join(name), mesh, MeshUnit::Millimetre).map_err(CliError::not_written)?;
+        write_mesh(&folder.join(name), mesh, MeshUnit::Millimetre)
+            .map_err(CliError::not_written)?;
     }
-    write_recording(&folder.join("touch.mcap"), &topics, OBJECT_FRAME, STYLUS_FRAME, merged(&touch.messages, frames))
-        .map_err(CliError::not_written)?;
+    write_recording(
+        &folder.join("touch.mcap"),
+        &topics,
+        OBJECT_FRAME,
+        STYLUS_FRAME,
+        merged(&touch.messages, frames),
+    )
+    .map_err(CliError::not_written)?;
     write_contacts(&touch.moments, &folder.join(CONTACTS_NAME))?;
     Ok(Simulated { scan, touch })
 }
 
 /// Writes where the ball really was and really touched: a line for each contact, mm, in O.
 fn write_contacts(moments: &[Moment], path: &Path) -> Result<(), CliError> {
-    let touched = moments.iter().step_by(CONTACT_EVERY).filter(|moment| !moment.contacts.is_empty());
+    let touched = moments
+        .iter()
+        .step_by(CONTACT_EVERY)
+        .filter(|moment| !moment.contacts.is_empty());
     let lines = touched.flat_map(|moment| {
         let centre = moment.pose_ot.translation.vector * 1e3;
         moment.contacts.iter().map(move |contact| {
@@ -303,8 +381,11 @@ fn write_contacts(moments: &[Moment], path: &Path) -> Result<(), CliError> {
             )
         })
     });
-    let text: String = std::iter::once(CONTACTS_HEAD.to_owned()).chain(lines).collect();
-    write_atomically(path, |out| std::io::Write::write_all(out, text.as_bytes())).map_err(not_written(path))
+    let text: String = std::iter::once(CONTACTS_HEAD.to_owned())
+        .chain(lines)
+        .collect();
+    write_atomically(path, |out| std::io::Write::write_all(out, text.as_bytes()))
+        .map_err(not_written(path))
 }
 
 /// Each frame of markers in front of the first message that is later.
@@ -312,9 +393,15 @@ fn merged(messages: &[Message], frames: Vec<MarkerFrame>) -> impl Iterator<Item 
     let mut frames = frames.into_iter().peekable();
     let last_ns = messages.iter().map(Message::stamp_ns).max();
     messages.iter().flat_map(move |message| {
-        let until_ns = if Some(message.stamp_ns()) == last_ns { i64::MAX } else { message.stamp_ns() };
+        let until_ns = if Some(message.stamp_ns()) == last_ns {
+            i64::MAX
+        } else {
+            message.stamp_ns()
+        };
         let before = std::iter::from_fn(|| frames.next_if(|frame| frame.stamp_ns < until_ns));
-        let before: Vec<_> = before.map(|frame| Record::Markers(Box::new(frame))).collect();
+        let before: Vec<_> = before
+            .map(|frame| Record::Markers(Box::new(frame)))
+            .collect();
         before.into_iter().chain([Record::Message(*message)])
     })
 }

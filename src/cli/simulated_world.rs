@@ -21,9 +21,16 @@ impl FromStr for OffFactor {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let (quantity, number) = text.rsplit_once('=').map_or((None, text), |(q, number)| (Some(q), number));
-        let factor = number.parse().map_err(|_| format!("{number} is no number: give 3, or radius=3"))?;
-        let this = Self { quantity: quantity.map(str::to_owned), factor };
+        let (quantity, number) = text
+            .rsplit_once('=')
+            .map_or((None, text), |(q, number)| (Some(q), number));
+        let factor = number
+            .parse()
+            .map_err(|_| format!("{number} is no number: give 3, or radius=3"))?;
+        let this = Self {
+            quantity: quantity.map(str::to_owned),
+            factor,
+        };
         this.set(&mut ToldOff::all(1.0))?;
         Ok(this)
     }
@@ -71,17 +78,27 @@ pub(super) fn world_named(name: &str) -> Result<SimWorld, String> {
 /// Writes the scene of what is told: for `refine --scene`.
 ///
 /// - `lever`: root mean square distance of the part from its origin, m.
-pub(super) fn write_told_scene(drawn: &DrawnWorld, lever: f64, path: &Path) -> Result<(), CliError> {
+pub(super) fn write_told_scene(
+    drawn: &DrawnWorld,
+    lever: f64,
+    path: &Path,
+) -> Result<(), CliError> {
     let text = drawn.told_scene(lever);
-    write_atomically(path, |out| std::io::Write::write_all(out, text.as_bytes())).map_err(super::not_written(path))
+    write_atomically(path, |out| std::io::Write::write_all(out, text.as_bytes()))
+        .map_err(super::not_written(path))
 }
 
 /// Writes each drawn value with its unit, and what was told of it; all in SI.
 pub(super) fn write_truth(drawn: &DrawnWorld, path: &Path) -> Result<(), CliError> {
     let (told, sensor) = (&drawn.told, &drawn.stylus.sensor);
     let value = |v: &DrawnValue| {
-        let told = v.told.map(|[told, std]| json!({ "value": told, "std": std }));
-        (v.name.to_owned(), json!({ "unit": v.unit, "truth": v.truth, "range": v.range, "told": told }))
+        let told = v
+            .told
+            .map(|[told, std]| json!({ "value": told, "std": std }));
+        (
+            v.name.to_owned(),
+            json!({ "unit": v.unit, "truth": v.truth, "range": v.range, "told": told }),
+        )
     };
     let values: serde_json::Map<String, Value> = drawn.values.iter().map(value).collect();
     let place = |pose: &nalgebra::Isometry3<f64>| {

@@ -11,7 +11,9 @@ use std::io::{self, BufRead, Write};
 use nalgebra::{Point3, Vector3};
 use serde::Deserialize;
 
-use crate::haptic::{Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule};
+use crate::haptic::{
+    Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule,
+};
 
 /// A longer line is not a sample.
 const LONGEST_LINE: u64 = 64 * 1024;
@@ -40,7 +42,9 @@ enum StepError {
     Json(#[from] serde_json::Error),
     #[error("missing field `{0}` (or give `k_n_per_m` for the linear spring)")]
     Missing(&'static str),
-    #[error("`{0}` and `k_n_per_m` exclude each other: one is of the sigmoid, the other of the linear spring")]
+    #[error(
+        "`{0}` and `k_n_per_m` exclude each other: one is of the sigmoid, the other of the linear spring"
+    )]
     TwoModels(&'static str),
     #[error("the line is longer than {LONGEST_LINE} bytes")]
     TooLong,
@@ -69,8 +73,17 @@ pub fn run(mut input: impl BufRead, mut output: impl Write) -> io::Result<()> {
             answer(&line)
         };
         match reply {
-            Ok(FaceState { b, n }) => writeln!(output, "{{\"b_m\":{},\"n\":{}}}", array(&b.coords), array(&n))?,
-            Err(error) => writeln!(output, "{}", serde_json::json!({ "error": error.to_string() }))?,
+            Ok(FaceState { b, n }) => writeln!(
+                output,
+                "{{\"b_m\":{},\"n\":{}}}",
+                array(&b.coords),
+                array(&n)
+            )?,
+            Err(error) => writeln!(
+                output,
+                "{}",
+                serde_json::json!({ "error": error.to_string() })
+            )?,
         }
         output.flush()?;
     }
@@ -86,20 +99,37 @@ fn answer(line: &[u8]) -> Result<FaceState, StepError> {
         along: question.along,
         take_out_rigid_offset: false,
     })?;
-    let face = FaceState { b: Point3::from(question.b_m), n: Vector3::from(question.n) };
-    Ok(dynamics.step(&face, &Point3::from(question.p_m), &Vector3::from(question.force_n), question.dt_s)?)
+    let face = FaceState {
+        b: Point3::from(question.b_m),
+        n: Vector3::from(question.n),
+    };
+    Ok(dynamics.step(
+        &face,
+        &Point3::from(question.p_m),
+        &Vector3::from(question.force_n),
+        question.dt_s,
+    )?)
 }
 
 fn model_of(question: &StepQuestion) -> Result<ContactModel, StepError> {
-    let sigmoid = [("h_min_m", question.h_min_m), ("delta", question.delta), ("f_max_n", question.f_max_n)];
+    let sigmoid = [
+        ("h_min_m", question.h_min_m),
+        ("delta", question.delta),
+        ("f_max_n", question.f_max_n),
+    ];
     if let Some(stiffness_n_per_m) = question.k_n_per_m {
         return match sigmoid.iter().find(|(_, value)| value.is_some()) {
             Some((name, _)) => Err(StepError::TwoModels(name)),
             None => Ok(ContactModel::Spring { stiffness_n_per_m }),
         };
     }
-    let [h_min_m, delta, f_max_n] = sigmoid.map(|(name, value)| value.ok_or(StepError::Missing(name)));
-    Ok(ContactModel::Sigmoid { f_max_n: f_max_n?, h_min_m: h_min_m?, delta: delta? })
+    let [h_min_m, delta, f_max_n] =
+        sigmoid.map(|(name, value)| value.ok_or(StepError::Missing(name)));
+    Ok(ContactModel::Sigmoid {
+        f_max_n: f_max_n?,
+        h_min_m: h_min_m?,
+        delta: delta?,
+    })
 }
 
 /// 17 significant digits name a double uniquely.
@@ -117,16 +147,29 @@ mod tests {
     fn replies(input: &str) -> Vec<String> {
         let mut output = Vec::new();
         run(input.as_bytes(), &mut output).unwrap();
-        String::from_utf8(output).unwrap().lines().map(String::from).collect()
+        String::from_utf8(output)
+            .unwrap()
+            .lines()
+            .map(String::from)
+            .collect()
     }
 
     #[test]
     fn every_line_gets_one_reply() {
         // after e^−1000 of the distance is left, b lies at the tip; an unended last line counts
         let good = SPRING.replace('\n', "");
-        let replies = replies(&format!("{good}\n\n{{}}\n{}\n{good}", good.replace("dt_s", "dt_ms")));
+        let replies = replies(&format!(
+            "{good}\n\n{{}}\n{}\n{good}",
+            good.replace("dt_s", "dt_ms")
+        ));
         let at_tip = r#"{"b_m":[0.0000000000000000e0,0.0000000000000000e0,1.0000000000000000e-3],"n":[0.0000000000000000e0,0.0000000000000000e0,1.0000000000000000e0]}"#;
-        assert_eq!((replies.len(), &*replies[0], &*replies[3]), (4, at_tip, at_tip));
-        assert!(replies[1].contains("missing field `p_m`") && replies[2].contains("unknown field `dt_ms`"));
+        assert_eq!(
+            (replies.len(), &*replies[0], &*replies[3]),
+            (4, at_tip, at_tip)
+        );
+        assert!(
+            replies[1].contains("missing field `p_m`")
+                && replies[2].contains("unknown field `dt_ms`")
+        );
     }
 }

@@ -36,8 +36,16 @@ impl ToldFlags {
             None => (Scene::default(), String::new()),
         };
         self.tell(&mut scene, &yaml)?;
-        let by_flag = [self.tip_radius_mm, self.stiffness_n_per_mm, self.scan_noise_mm];
-        let told = ToldNumbers::of(&scene, &yaml, by_flag.map(|flag| flag.map(|_| ToldBy::Flag)));
+        let by_flag = [
+            self.tip_radius_mm,
+            self.stiffness_n_per_mm,
+            self.scan_noise_mm,
+        ];
+        let told = ToldNumbers::of(
+            &scene,
+            &yaml,
+            by_flag.map(|flag| flag.map(|_| ToldBy::Flag)),
+        );
         Ok((scene, told))
     }
 }
@@ -73,9 +81,16 @@ impl ToldFlags {
             ("tip.stiffness_n_per_mm", self.stiffness_n_per_mm),
             ("scan.noise_mm", self.scan_noise_mm),
         ];
-        let settings: Vec<_> =
-            told.into_iter().filter_map(|(key, number)| Some(Setting::scalar(key, number?))).collect();
-        Ok(Scene::edited(&yaml, &settings, "given by flags", &expected)?)
+        let settings: Vec<_> = told
+            .into_iter()
+            .filter_map(|(key, number)| Some(Setting::scalar(key, number?)))
+            .collect();
+        Ok(Scene::edited(
+            &yaml,
+            &settings,
+            "given by flags",
+            &expected,
+        )?)
     }
 }
 
@@ -116,14 +131,23 @@ impl ToldNumbers {
     pub fn of(scene: &Scene, yaml: &str, others: [Option<ToldBy>; 3]) -> Self {
         let [by_radius, by_stiffness, by_noise] = others;
         let told = |value: f64, other: Option<ToldBy>, section: &str, key: &str| {
-            let by_scene = if Scene::names(yaml, section, key) { ToldBy::Scene } else { ToldBy::Default };
-            ToldNumber { value, source: other.unwrap_or(by_scene) }
+            let by_scene = if Scene::names(yaml, section, key) {
+                ToldBy::Scene
+            } else {
+                ToldBy::Default
+            };
+            ToldNumber {
+                value,
+                source: other.unwrap_or(by_scene),
+            }
         };
         let tip = scene.tip_params();
         let noise = scene.scan.as_ref().map_or(0.0, |scan| scan.quality.noise);
         Self {
             tip_radius_mm: told(tip.radius * 1e3, by_radius, "tip", "radius_mm"),
-            stiffness_n_per_mm: tip.stiffness.map(|k| told(k / 1e3, by_stiffness, "tip", "stiffness_n_per_mm")),
+            stiffness_n_per_mm: tip
+                .stiffness
+                .map(|k| told(k / 1e3, by_stiffness, "tip", "stiffness_n_per_mm")),
             scan_noise_mm: told(noise * 1e3, by_noise, "scan", "noise_mm"),
         }
     }
@@ -131,10 +155,22 @@ impl ToldNumbers {
 
 impl fmt::Display for ToldNumbers {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { tip_radius_mm: radius, stiffness_n_per_mm: stiffness, scan_noise_mm: noise } = self;
-        write!(f, "tip: radius {:.4} mm ({}), ", radius.value, radius.source)?;
+        let Self {
+            tip_radius_mm: radius,
+            stiffness_n_per_mm: stiffness,
+            scan_noise_mm: noise,
+        } = self;
+        write!(
+            f,
+            "tip: radius {:.4} mm ({}), ",
+            radius.value, radius.source
+        )?;
         match stiffness {
-            Some(stiffness) => write!(f, "stiffness {:.4} N/mm ({})", stiffness.value, stiffness.source)?,
+            Some(stiffness) => write!(
+                f,
+                "stiffness {:.4} N/mm ({})",
+                stiffness.value, stiffness.source
+            )?,
             None => write!(f, "rigid")?,
         }
         write!(f, "; scan: noise {:.3} mm ({})", noise.value, noise.source)

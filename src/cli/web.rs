@@ -38,8 +38,7 @@ impl WebServer {
 }
 
 #[cfg(not(feature = "web"))]
-const NOT_BUILT: &str =
-    "this touchup was built without the page: cargo install --locked --path . --features web (needs npm)";
+const NOT_BUILT: &str = "this touchup was built without the page: cargo install --locked --path . --features web (needs npm)";
 
 /// Where the page is served.
 #[derive(Clone, Debug, Default, Args)]
@@ -66,7 +65,10 @@ pub(super) struct WebFlags {
 
 fn address(text: &str) -> Result<SocketAddr, String> {
     let why = || "it must be an address and a port of this machine, as 192.168.0.7:8321".to_owned();
-    text.to_socket_addrs().map_err(|_| why())?.next().ok_or_else(why)
+    text.to_socket_addrs()
+        .map_err(|_| why())?
+        .next()
+        .ok_or_else(why)
 }
 
 impl WebFlags {
@@ -77,7 +79,10 @@ impl WebFlags {
 
     /// The same with a nominal part, unless one was named.
     pub fn with_nominal(&self, mesh: PathBuf) -> Self {
-        Self { web_nominal: self.web_nominal.clone().or(Some(mesh)), ..self.clone() }
+        Self {
+            web_nominal: self.web_nominal.clone().or(Some(mesh)),
+            ..self.clone()
+        }
     }
 
     /// Whether the setup on the page is needed: a page is wanted, and nobody named a scan.
@@ -115,10 +120,15 @@ impl WebFlags {
         begin: &mut dyn FnMut(&NodeConfig) -> Result<B, BeginError>,
     ) -> Result<(B, Option<WebServer>), CliError> {
         if !self.needs_setup(&config.parameters)? {
-            require(scans.is_none(), "--web-scans is for a node without a scan, and one is named")?;
+            require(
+                scans.is_none(),
+                "--web-scans is for a node without a scan, and one is named",
+            )?;
             return Ok((begin(config)?, None));
         }
-        let Some(server) = self.listening()? else { return Ok((begin(config)?, None)) };
+        let Some(server) = self.listening()? else {
+            return Ok((begin(config)?, None));
+        };
         let setup = set_up(&server, scans.unwrap_or(Path::new(".")), &config.parameters)?;
         self.announce(&server);
         Ok((set_up_on_page(&setup, config, begin)?, Some(server)))
@@ -135,7 +145,11 @@ impl WebFlags {
     /// - `unit`: of its file.
     #[cfg(feature = "web")]
     pub fn nominal(&self, unit: MeshUnit) -> Result<Option<TriMesh>, CliError> {
-        let nominal = self.web_nominal.as_deref().map(|path| read_scan(path, unit)).transpose();
+        let nominal = self
+            .web_nominal
+            .as_deref()
+            .map(|path| read_scan(path, unit))
+            .transpose();
         Ok(nominal.map_err(CliError::truth)?.map(|scan| scan.mesh))
     }
 
@@ -173,7 +187,11 @@ impl WebFlags {
             },
         };
         let scan = ready.scan().0.to_owned();
-        let session_folder = ready.folder().parent().map(PathBuf::from).unwrap_or_default();
+        let session_folder = ready
+            .folder()
+            .parent()
+            .map(PathBuf::from)
+            .unwrap_or_default();
         let (nominal_file, mesh_unit) = (self.web_nominal.clone(), ready.mesh_unit());
         let facts = NodeFacts {
             scan,
@@ -201,9 +219,16 @@ impl WebFlags {
     /// The server, where a page is wanted; it is not announced yet.
     #[cfg(feature = "web")]
     fn listening(&self) -> Result<Option<WebServer>, CliError> {
-        let Some(address) = self.web else { return Ok(None) };
+        let Some(address) = self.web else {
+            return Ok(None);
+        };
         let by_link = self.web_links || !address.ip().is_loopback();
-        let params = WebParams { address, names: self.web_name.clone(), by_link, certificate: self.certificate() };
+        let params = WebParams {
+            address,
+            names: self.web_name.clone(),
+            by_link,
+            certificate: self.certificate(),
+        };
         Ok(Some(WebServer::open(&params, notify)?))
     }
 
@@ -211,8 +236,13 @@ impl WebFlags {
     #[cfg(feature = "web")]
     fn announce(&self, server: &WebServer) {
         notify(&format!("page: {}", server.url()));
-        server.invitations().iter().for_each(|invitation| notify(invitation));
-        if self.certificate().is_none() && self.web.is_some_and(|address| !address.ip().is_loopback()) {
+        server
+            .invitations()
+            .iter()
+            .for_each(|invitation| notify(invitation));
+        if self.certificate().is_none()
+            && self.web.is_some_and(|address| !address.ip().is_loopback())
+        {
             notify(
                 "the page is not encrypted: use it in a network of your own, or give --web-certificate and --web-key",
             );

@@ -54,11 +54,20 @@ impl PartDrawing {
         if is_nominal_file(path) {
             let records = read_nominal(path)?;
             let drawn = |record: NominalRecord| {
-                drawn(record, params).map_err(|why| InspectionError::Drawing { path: path.to_owned(), why })
+                drawn(record, params).map_err(|why| InspectionError::Drawing {
+                    path: path.to_owned(),
+                    why,
+                })
             };
-            let characteristics: Vec<_> = records.into_iter().map(drawn).collect::<Result<_, _>>()?;
+            let characteristics: Vec<_> =
+                records.into_iter().map(drawn).collect::<Result<_, _>>()?;
             let features = features_of_records(&characteristics);
-            return Ok(Self { characteristics, features, file: inspected_file("drawing", path)?, notes: Vec::new() });
+            return Ok(Self {
+                characteristics,
+                features,
+                file: inspected_file("drawing", path)?,
+                notes: Vec::new(),
+            });
         }
         let has_tolerance = params.general.is_some() || params.tolerance_mm.is_some();
         if !has_tolerance {
@@ -73,22 +82,38 @@ impl PartDrawing {
         }
         if characteristics.is_empty() {
             let why = "no hole, slot, pocket, boss, notch or cylinder was found on it".to_owned();
-            return Err(InspectionError::Drawing { path: path.to_owned(), why });
+            return Err(InspectionError::Drawing {
+                path: path.to_owned(),
+                why,
+            });
         }
         let mut notes = Vec::new();
         if !left.is_empty() {
-            notes.push(format!("The general tolerance has no value for {}: not inspected.", left.join(", ")));
+            notes.push(format!(
+                "The general tolerance has no value for {}: not inspected.",
+                left.join(", ")
+            ));
         }
         let features = features_of_shapes(&found);
-        Ok(Self { characteristics, features, file: inspected_file("drawing (CAD mesh)", path)?, notes })
+        Ok(Self {
+            characteristics,
+            features,
+            file: inspected_file("drawing (CAD mesh)", path)?,
+            notes,
+        })
     }
 }
 
 /// The features that characteristics are about, and those that are datums alone.
 fn features_of_records(characteristics: &[Drawn]) -> Vec<DrawnFeature> {
     let mut features: Vec<(NominalRecord, DrawnFeature)> = Vec::new();
-    for Drawn { nominal, quantity, .. } in characteristics {
-        let at = features.iter().position(|(first, _)| first.is_of_the_same_feature(nominal));
+    for Drawn {
+        nominal, quantity, ..
+    } in characteristics
+    {
+        let at = features
+            .iter()
+            .position(|(first, _)| first.is_of_the_same_feature(nominal));
         let at = at.unwrap_or_else(|| {
             features.push((nominal.clone(), drawn_feature(nominal)));
             features.len() - 1
@@ -105,33 +130,59 @@ fn features_of_records(characteristics: &[Drawn]) -> Vec<DrawnFeature> {
             shape.axis = axis_of(nominal);
         }
     }
-    let datums = characteristics.iter().filter_map(|drawn| Some((&drawn.nominal.name, drawn.nominal.datum.as_ref()?)));
+    let datums = characteristics
+        .iter()
+        .filter_map(|drawn| Some((&drawn.nominal.name, drawn.nominal.datum.as_ref()?)));
     for (name, datum) in datums {
         let (kind, center_mm, feature) = (datum.kind.clone(), datum.center_mm, datum.feature);
-        let record =
-            NominalRecord { name: format!("datum of {name}"), kind, center_mm, feature, ..NominalRecord::default() };
-        if !features.iter().any(|(first, _)| first.is_of_the_same_feature(&record)) {
+        let record = NominalRecord {
+            name: format!("datum of {name}"),
+            kind,
+            center_mm,
+            feature,
+            ..NominalRecord::default()
+        };
+        if !features
+            .iter()
+            .any(|(first, _)| first.is_of_the_same_feature(&record))
+        {
             let names = vec![record.name.clone()];
-            features.push((record.clone(), DrawnFeature { names, ..drawn_feature(&record) }));
+            features.push((
+                record.clone(),
+                DrawnFeature {
+                    names,
+                    ..drawn_feature(&record)
+                },
+            ));
         }
     }
     features.into_iter().map(|(_, feature)| feature).collect()
 }
 
 fn drawn_feature(record: &NominalRecord) -> DrawnFeature {
-    let centre = record.center_mm.map_or_else(Point3::origin, |mm| Point3::from(mm) * 1e-3);
+    let centre = record
+        .center_mm
+        .map_or_else(Point3::origin, |mm| Point3::from(mm) * 1e-3);
     let shape = Feature {
         kind: record.kind().unwrap_or_default(),
         centre: measured(centre, None),
         axis: axis_of(record),
         ..Feature::default()
     };
-    DrawnFeature { names: Vec::new(), id: record.feature, shape, has_place: record.center_mm.is_some() }
+    DrawnFeature {
+        names: Vec::new(),
+        id: record.feature,
+        shape,
+        has_place: record.center_mm.is_some(),
+    }
 }
 
 /// As a unit vector.
 fn axis_of(record: &NominalRecord) -> Option<Measured<Vector3<f64>>> {
-    Some(measured(Vector3::from(record.axis?).try_normalize(0.0)?, None))
+    Some(measured(
+        Vector3::from(record.axis?).try_normalize(0.0)?,
+        None,
+    ))
 }
 
 /// Those of a CAD mesh, which are exact, by their kinds and numbers.
@@ -141,19 +192,31 @@ fn features_of_shapes(found: &[FeatureRecord]) -> Vec<DrawnFeature> {
         let count = counts.entry(record.kind.clone()).or_insert(0);
         *count += 1;
         let names = vec![format!("{} {count}", record.kind)];
-        Some(DrawnFeature { names, id: None, shape: shape_of(record)?, has_place: true })
+        Some(DrawnFeature {
+            names,
+            id: None,
+            shape: shape_of(record)?,
+            has_place: true,
+        })
     };
     found.iter().filter_map(feature).collect()
 }
 
 /// A characteristic with its own limits, or those of the general tolerance.
 fn drawn(nominal: NominalRecord, params: &DrawingParams) -> Result<Drawn, String> {
-    let quantity = nominal.quantity().ok_or_else(|| format!("{}: no such quantity", nominal.name))?;
+    let quantity = nominal
+        .quantity()
+        .ok_or_else(|| format!("{}: no such quantity", nominal.name))?;
     let (limits, from) = match nominal.tolerance() {
         NominalTolerance::Limits(limits) => (limits, "drawing".to_owned()),
         NominalTolerance::General => general_limits(&nominal, quantity, params)?,
     };
-    Ok(Drawn { nominal, quantity, limits, from })
+    Ok(Drawn {
+        nominal,
+        quantity,
+        limits,
+        from,
+    })
 }
 
 fn general_limits(
@@ -169,15 +232,25 @@ fn general_limits(
         ));
     }
     if !quantity.is_linear_size() {
-        return Err(format!("{name} has no tolerance, and the general one is for sizes, not for {quantity}: {own}"));
+        return Err(format!(
+            "{name} has no tolerance, and the general one is for sizes, not for {quantity}: {own}"
+        ));
     }
     let (half, from) = match (params.tolerance_mm, params.general) {
         (Some(tolerance), _) => (Some(tolerance), "--tolerance-mm".to_owned()),
         (None, Some(class)) => (class.linear_mm(nominal), class.name().to_owned()),
         (None, None) => (None, String::new()),
     };
-    let half = half.ok_or_else(|| format!("{name} has no tolerance, and {from} has none for {nominal} mm: {own}"))?;
-    Ok((ToleranceLimits { lower: Some(nominal - half), upper: Some(nominal + half) }, from))
+    let half = half.ok_or_else(|| {
+        format!("{name} has no tolerance, and {from} has none for {nominal} mm: {own}")
+    })?;
+    Ok((
+        ToleranceLimits {
+            lower: Some(nominal - half),
+            upper: Some(nominal + half),
+        },
+        from,
+    ))
 }
 
 fn features_of_mesh(path: &Path, params: &DrawingParams) -> Result<FeatureFile, InspectionError> {
@@ -192,7 +265,10 @@ const WITH_SIZES: [&str; 6] = ["hole", "slot", "pocket", "boss", "notch", "cylin
 fn of_features(features: &[FeatureRecord], params: &DrawingParams) -> Vec<NominalRecord> {
     let mut records = Vec::new();
     let mut counts = std::collections::BTreeMap::new();
-    for feature in features.iter().filter(|feature| WITH_SIZES.contains(&&*feature.kind)) {
+    for feature in features
+        .iter()
+        .filter(|feature| WITH_SIZES.contains(&&*feature.kind))
+    {
         let count = counts.entry(&feature.kind).or_insert(0);
         *count += 1;
         let (kind, count) = (&feature.kind, *count);
@@ -202,7 +278,9 @@ fn of_features(features: &[FeatureRecord], params: &DrawingParams) -> Vec<Nomina
             axis: feature.axis,
             ..NominalRecord::default()
         };
-        let depth = feature.depth_mm.filter(|_| feature.through != Some(true) && feature.depth_is_at_least.is_none());
+        let depth = feature
+            .depth_mm
+            .filter(|_| feature.through != Some(true) && feature.depth_is_at_least.is_none());
         let sizes = [
             (InspectedQuantity::Diameter, feature.diameter_mm),
             (InspectedQuantity::Width, feature.width_mm),
@@ -213,11 +291,26 @@ fn of_features(features: &[FeatureRecord], params: &DrawingParams) -> Vec<Nomina
             let Some(size) = size else { continue };
             let name = format!("{kind} {count} {}", quantity.parts().0);
             let nominal_mm = Some(rounded(size));
-            records.push(NominalRecord { name, quantity: quantity.name().to_owned(), nominal_mm, ..base.clone() });
+            records.push(NominalRecord {
+                name,
+                quantity: quantity.name().to_owned(),
+                nominal_mm,
+                ..base.clone()
+            });
         }
-        if let (Some(tolerance), "hole" | "slot" | "pocket" | "boss") = (params.position_mm, &**kind) {
-            let (name, quantity) = (format!("{kind} {count} position"), InspectedQuantity::Position.name().to_owned());
-            records.push(NominalRecord { name, quantity, tolerance_mm: Some(tolerance), ..base });
+        if let (Some(tolerance), "hole" | "slot" | "pocket" | "boss") =
+            (params.position_mm, &**kind)
+        {
+            let (name, quantity) = (
+                format!("{kind} {count} position"),
+                InspectedQuantity::Position.name().to_owned(),
+            );
+            records.push(NominalRecord {
+                name,
+                quantity,
+                tolerance_mm: Some(tolerance),
+                ..base
+            });
         }
     }
     records
@@ -250,7 +343,10 @@ pub fn template(
             (Some(tolerance), _) => Some(tolerance),
             (None, class) => class.and_then(|class| class.linear_mm(record.nominal())),
         };
-        NominalRecord { tolerance_mm: half, ..record }
+        NominalRecord {
+            tolerance_mm: half,
+            ..record
+        }
     };
     Ok(records.into_iter().map(with_tolerance).collect())
 }

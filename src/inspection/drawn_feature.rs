@@ -26,7 +26,13 @@ impl DrawnFeature {
 
     /// Diameter or width, m.
     pub fn size(&self) -> Option<f64> {
-        Some(self.shape.diameter.as_ref().or(self.shape.width.as_ref())?.value)
+        Some(
+            self.shape
+                .diameter
+                .as_ref()
+                .or(self.shape.width.as_ref())?
+                .value,
+        )
     }
 }
 
@@ -37,8 +43,13 @@ pub(super) fn shape_of(record: &FeatureRecord) -> Option<Feature> {
     Some(Feature {
         id: record.id,
         kind: Kind::of_name(&record.kind)?,
-        centre: measured(Point3::from(record.center_mm?) * 1e-3, std("center_mm", 1e-3)),
-        axis: record.axis.map(|axis| measured(Vector3::from(axis), std("axis_deg", 1f64.to_radians()))),
+        centre: measured(
+            Point3::from(record.center_mm?) * 1e-3,
+            std("center_mm", 1e-3),
+        ),
+        axis: record
+            .axis
+            .map(|axis| measured(Vector3::from(axis), std("axis_deg", 1f64.to_radians()))),
         direction: record.direction.map(Vector3::from),
         diameter: size(record.diameter_mm, "diameter_mm"),
         length: size(record.length_mm, "length_mm"),
@@ -52,5 +63,9 @@ pub(super) fn shape_of(record: &FeatureRecord) -> Option<Feature> {
 
 /// A number or place with its standard uncertainty.
 pub(super) fn measured<T: Default>(value: T, std: Option<f64>) -> Measured<T> {
-    Measured { value, std, ..Measured::default() }
+    Measured {
+        value,
+        std,
+        ..Measured::default()
+    }
 }

@@ -25,7 +25,9 @@ pub enum InspectionError {
     )]
     NoFeatures(PathBuf),
     /// A CAD mesh alone.
-    #[error("a CAD mesh has no tolerances: name a general one by --general iso2768-m or --tolerance-mm")]
+    #[error(
+        "a CAD mesh has no tolerances: name a general one by --general iso2768-m or --tolerance-mm"
+    )]
     NoTolerance,
     /// The system did not read a file.
     #[error("{}: {source}", path.display())]

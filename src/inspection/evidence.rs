@@ -42,7 +42,9 @@ pub(super) fn touch_evidence(
     let centre = Point3::from(feature.center_mm?);
     let axis = Vector3::from(feature.axis?);
     let numbers = runs.iter().flat_map(|[first, last]| *first..=*last);
-    let mut all: Vec<&ProbedPoint> = numbers.map(|number| touches.get(number as usize)).collect::<Option<_>>()?;
+    let mut all: Vec<&ProbedPoint> = numbers
+        .map(|number| touches.get(number as usize))
+        .collect::<Option<_>>()?;
     // of the touches behind a number those on its own surface: walls lie along the axis, floors and planes across it
     let is_flat = quantity == InspectedQuantity::Depth || feature.kind == "plane";
     all.retain(|touch| (touch.normal.dot(&axis).abs() > HALF_WAY) == is_flat);
@@ -51,49 +53,78 @@ pub(super) fn touch_evidence(
     }
     let seat = |touch: &ProbedPoint| touch.point * 1e3 - centre;
     let order = |at: usize| at as f64;
-    let (ideal, along, places): (_, _, Vec<[f64; 2]>) = match (quantity, feature.diameter_mm, feature.width_mm) {
-        (InspectedQuantity::Depth, ..) => {
-            let depth = feature.depth_mm?;
-            let level = if matches!(&*feature.kind, "boss" | "cylinder") { depth } else { -depth };
-            let seats: Vec<_> = all.iter().map(|touch| seat(touch)).collect();
-            let offs = off_two_planes(&seats, &axis, level);
-            (
-                "a plane at either end",
-                "touch, in order of time",
-                offs.into_iter().enumerate().map(|(at, off)| [order(at), off]).collect(),
-            )
-        }
-        (_, Some(diameter), _) => {
-            let [u, v] = across(&axis);
-            let place = |touch: &&ProbedPoint| {
-                let off = seat(touch);
-                let [x, y] = [off.dot(&u), off.dot(&v)];
-                [y.atan2(x).to_degrees(), x.hypot(y) - diameter / 2.0]
-            };
-            ("the fitted cylinder", "angle about the axis, °", all.iter().map(place).collect())
-        }
-        (_, None, Some(width)) => {
-            let length = feature.length_mm?;
-            let u = Vector3::from(feature.direction?);
-            let v = axis.cross(&u);
-            let is_slot = feature.kind == "slot";
-            let place = |touch: &&ProbedPoint| {
-                let off = seat(touch);
-                let [x, y] = [off.dot(&u), off.dot(&v)];
-                let round = x - x.clamp(-(length - width) / 2.0, (length - width) / 2.0);
-                let (side, end) = (y.abs() - width / 2.0, x.abs() - length / 2.0);
-                let straight = if side.abs() < end.abs() { side } else { end };
-                [x, if is_slot { round.hypot(y) - width / 2.0 } else { straight }]
-            };
-            ("the fitted walls", "along the slot, mm", all.iter().map(place).collect())
-        }
-        _ if feature.kind == "plane" => {
-            let places = all.iter().enumerate().map(|(at, touch)| [order(at), seat(touch).dot(&axis)]).collect();
-            ("the fitted plane", "touch, in order of time", places)
-        }
-        _ => return None,
+    let (ideal, along, places): (_, _, Vec<[f64; 2]>) =
+        match (quantity, feature.diameter_mm, feature.width_mm) {
+            (InspectedQuantity::Depth, ..) => {
+                let depth = feature.depth_mm?;
+                let level = if matches!(&*feature.kind, "boss" | "cylinder") {
+                    depth
+                } else {
+                    -depth
+                };
+                let seats: Vec<_> = all.iter().map(|touch| seat(touch)).collect();
+                let offs = off_two_planes(&seats, &axis, level);
+                (
+                    "a plane at either end",
+                    "touch, in order of time",
+                    offs.into_iter()
+                        .enumerate()
+                        .map(|(at, off)| [order(at), off])
+                        .collect(),
+                )
+            }
+            (_, Some(diameter), _) => {
+                let [u, v] = across(&axis);
+                let place = |touch: &&ProbedPoint| {
+                    let off = seat(touch);
+                    let [x, y] = [off.dot(&u), off.dot(&v)];
+                    [y.atan2(x).to_degrees(), x.hypot(y) - diameter / 2.0]
+                };
+                (
+                    "the fitted cylinder",
+                    "angle about the axis, °",
+                    all.iter().map(place).collect(),
+                )
+            }
+            (_, None, Some(width)) => {
+                let length = feature.length_mm?;
+                let u = Vector3::from(feature.direction?);
+                let v = axis.cross(&u);
+                let is_slot = feature.kind == "slot";
+                let place = |touch: &&ProbedPoint| {
+                    let off = seat(touch);
+                    let [x, y] = [off.dot(&u), off.dot(&v)];
+                    let round = x - x.clamp(-(length - width) / 2.0, (length - width) / 2.0);
+                    let (side, end) = (y.abs() - width / 2.0, x.abs() - length / 2.0);
+                    let straight = if side.abs() < end.abs() { side } else { end };
+                    [
+                        x,
+                        if is_slot {
+                            round.hypot(y) - width / 2.0
+                        } else {
+                            straight
+                        },
+                    ]
+                };
+                (
+                    "the fitted walls",
+                    "along the slot, mm",
+                    all.iter().map(place).collect(),
+                )
+            }
+            _ if feature.kind == "plane" => {
+                let places = all
+                    .iter()
+                    .enumerate()
+                    .map(|(at, touch)| [order(at), seat(touch).dot(&axis)])
+                    .collect();
+                ("the fitted plane", "touch, in order of time", places)
+            }
+            _ => return None,
+        };
+    let mean_square = |values: &mut dyn Iterator<Item = f64>| {
+        values.map(|x| x * x).sum::<f64>() / all.len() as f64
     };
-    let mean_square = |values: &mut dyn Iterator<Item = f64>| values.map(|x| x * x).sum::<f64>() / all.len() as f64;
     Some(TouchEvidence {
         ideal,
         along,
@@ -101,7 +132,11 @@ pub(super) fn touch_evidence(
         rms_mm: mean_square(&mut places.iter().map(|[_, off]| *off)).sqrt(),
         largest_mm: places.iter().map(|[_, off]| off.abs()).fold(0.0, f64::max),
         stated_mm: mean_square(&mut all.iter().map(|touch| touch.sigma * 1e3)).sqrt(),
-        drawn: places.iter().step_by(places.len().div_ceil(MOST_DRAWN)).copied().collect(),
+        drawn: places
+            .iter()
+            .step_by(places.len().div_ceil(MOST_DRAWN))
+            .copied()
+            .collect(),
     })
 }
 
@@ -120,15 +155,24 @@ fn off_two_planes(seats: &[Vector3<f64>], axis: &Vector3<f64>, level: f64) -> Ve
         }
         // fewer than three points, or those of a line, have their mean height
         let mean = Vector3::new(right.x / normal.m11.max(1.0), 0.0, 0.0);
-        normal.cholesky().map_or(mean, |factor| factor.solve(&right))
+        normal
+            .cholesky()
+            .map_or(mean, |factor| factor.solve(&right))
     };
     let planes = [plane(false), plane(true)];
-    seats.iter().map(|seat| seat.dot(axis) - row(seat).dot(&planes[usize::from(is_far(seat))])).collect()
+    seats
+        .iter()
+        .map(|seat| seat.dot(axis) - row(seat).dot(&planes[usize::from(is_far(seat))]))
+        .collect()
 }
 
 /// Two directions across an axis.
 fn across(axis: &Vector3<f64>) -> [Vector3<f64>; 2] {
-    let other = if axis.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
+    let other = if axis.x.abs() < 0.9 {
+        Vector3::x()
+    } else {
+        Vector3::y()
+    };
     let u = (other - axis * axis.dot(&other)).normalize();
     [u, axis.cross(&u)]
 }
@@ -148,18 +192,29 @@ pub(super) fn probed_behind<'a>(
         touch
             .begun_ns
             .zip(touch.ended_ns)
-            .is_some_and(|(begun, ended)| stamps.iter().any(|stamp| (begun..=ended).contains(stamp)))
+            .is_some_and(|(begun, ended)| {
+                stamps.iter().any(|stamp| (begun..=ended).contains(stamp))
+            })
     };
     probed.iter().filter(is_behind).collect()
 }
 
 /// Turns that touches leave out of a round wall, degrees: the widest gap.
 pub(super) fn widest_gap_deg(angles_deg: &[[f64; 2]]) -> f64 {
-    let mut angles: Vec<f64> = angles_deg.iter().map(|[angle, _]| angle.to_radians()).collect();
+    let mut angles: Vec<f64> = angles_deg
+        .iter()
+        .map(|[angle, _]| angle.to_radians())
+        .collect();
     angles.sort_by(f64::total_cmp);
-    let Some((first, last)) = angles.first().zip(angles.last()) else { return 360.0 };
+    let Some((first, last)) = angles.first().zip(angles.last()) else {
+        return 360.0;
+    };
     let wrapped = first + 2.0 * PI - last;
-    angles.windows(2).map(|pair| pair[1] - pair[0]).fold(wrapped, f64::max).to_degrees()
+    angles
+        .windows(2)
+        .map(|pair| pair[1] - pair[0])
+        .fold(wrapped, f64::max)
+        .to_degrees()
 }
 
 #[cfg(test)]
@@ -194,12 +249,22 @@ mod tests {
 
     #[test]
     fn a_touch_outside_of_the_fitted_cylinder_is_off_by_its_distance() {
-        let walls = [touch_on(14.01, 20.0, -1.0, -Vector3::x()), touch_on(10.0, 23.98, -2.0, -Vector3::y())];
+        let walls = [
+            touch_on(14.01, 20.0, -1.0, -Vector3::x()),
+            touch_on(10.0, 23.98, -2.0, -Vector3::y()),
+        ];
         let touches = [walls[0], walls[1], touch(18.0, 20.0, 0.0)];
-        let found = touch_evidence(InspectedQuantity::Diameter, &hole(), &[[0, 2]], &touches).unwrap();
-        assert_eq!(found.count, 2, "the one on the plane beside the hole is no touch of its wall");
+        let found =
+            touch_evidence(InspectedQuantity::Diameter, &hole(), &[[0, 2]], &touches).unwrap();
+        assert_eq!(
+            found.count, 2,
+            "the one on the plane beside the hole is no touch of its wall"
+        );
         let off: Vec<f64> = found.drawn.iter().map(|[_, off]| *off).collect();
-        assert!((off[0] - 0.01).abs() < 1e-9 && (off[1] + 0.02).abs() < 1e-9, "{off:?}");
+        assert!(
+            (off[0] - 0.01).abs() < 1e-9 && (off[1] + 0.02).abs() < 1e-9,
+            "{off:?}"
+        );
         assert!((found.rms_mm - ((0.01f64.powi(2) + 0.02f64.powi(2)) / 2.0).sqrt()).abs() < 1e-9);
         assert!((found.stated_mm - 0.01).abs() < 1e-12);
         assert!((widest_gap_deg(&found.drawn) - 270.0).abs() < 0.5);
@@ -213,12 +278,24 @@ mod tests {
         let floor = corners.map(|(x, y)| touch(x, y, -5.0 + if x == y { 0.002 } else { -0.002 }));
         let touches: Vec<_> = opening.into_iter().chain(floor).collect();
         let found = touch_evidence(InspectedQuantity::Depth, &hole(), &[[0, 7]], &touches).unwrap();
-        let off: Vec<f64> = found.drawn.iter().map(|[_, off]| (off * 1e6).round() / 1e6 + 0.0).collect();
+        let off: Vec<f64> = found
+            .drawn
+            .iter()
+            .map(|[_, off]| (off * 1e6).round() / 1e6 + 0.0)
+            .collect();
         assert_eq!(off, [0.0, 0.0, 0.0, 0.0, 0.002, -0.002, -0.002, 0.002]);
     }
 
     #[test]
     fn touches_that_are_not_in_the_file_give_no_plot() {
-        assert!(touch_evidence(InspectedQuantity::Diameter, &hole(), &[[0, 5]], &[touch(14.0, 20.0, 0.0)]).is_none());
+        assert!(
+            touch_evidence(
+                InspectedQuantity::Diameter,
+                &hole(),
+                &[[0, 5]],
+                &[touch(14.0, 20.0, 0.0)]
+            )
+            .is_none()
+        );
     }
 }

@@ -35,7 +35,12 @@ impl ReportFiles {
     /// All of them in a folder.
     pub fn in_folder(folder: &Path) -> Self {
         let [html, csv, json, qif] = Self::NAMES.map(|name| Some(folder.join(name)));
-        Self { html, csv, json, qif }
+        Self {
+            html,
+            csv,
+            json,
+            qif,
+        }
     }
 }
 
@@ -53,14 +58,20 @@ impl ReportFiles {
         let record = &inspected.record;
         let made = |_: &PathBuf| -> Result<String, InspectionError> {
             let calibration = calibration_of(source)?;
-            page(&ReportInput { inspected, source, calibration: &calibration, picture: *picture })
+            page(&ReportInput {
+                inspected,
+                source,
+                calibration: &calibration,
+                picture: *picture,
+            })
         };
         let html = self.html.as_ref().map(made).transpose()?;
         if let Some(path) = &self.csv {
             write_inspection_table(path, &record.characteristics, &record.frame())?;
         }
         if let Some(path) = &self.json {
-            let mut text = serde_json::to_string(record).expect("finite numbers and names alone cannot fail");
+            let mut text =
+                serde_json::to_string(record).expect("finite numbers and names alone cannot fail");
             text.push('\n');
             write_text(path, &text)?;
         }
@@ -75,5 +86,11 @@ impl ReportFiles {
 }
 
 fn write_text(path: &Path, text: &str) -> Result<(), InspectionError> {
-    write_text_file(path, text).map_err(|source| FileError::Write { path: path.to_owned(), source }.into())
+    write_text_file(path, text).map_err(|source| {
+        FileError::Write {
+            path: path.to_owned(),
+            source,
+        }
+        .into()
+    })
 }

@@ -18,7 +18,10 @@ pub(super) struct CharacteristicMeasurement {
 
 impl CharacteristicMeasurement {
     fn none(why: String) -> Self {
-        Self { why_none: Some(why), ..Self::default() }
+        Self {
+            why_none: Some(why),
+            ..Self::default()
+        }
     }
 }
 
@@ -35,15 +38,28 @@ pub(super) fn measurement(
     let not_measured = || {
         CharacteristicMeasurement::none(match &*feature.fitted_to {
             "mesh" => {
-                format!("{quantity} of feature {} was not measured, which was fitted to the mesh: touch it", feature.id)
+                format!(
+                    "{quantity} of feature {} was not measured, which was fitted to the mesh: touch it",
+                    feature.id
+                )
             }
-            _ => format!("{quantity} of feature {} was not measured: touch it", feature.id),
+            _ => format!(
+                "{quantity} of feature {} was not measured: touch it",
+                feature.id
+            ),
         })
     };
     let name = quantity.name();
     let own = |value: Option<f64>, is_at_least: bool| {
         let std = feature.std.get(name).copied();
-        (value.map(|value| MeasuredNumber { value, std, is_at_least }), runs_of(feature, name))
+        (
+            value.map(|value| MeasuredNumber {
+                value,
+                std,
+                is_at_least,
+            }),
+            runs_of(feature, name),
+        )
     };
     let (number, runs) = match quantity {
         InspectedQuantity::Diameter => own(feature.diameter_mm, false),
@@ -52,23 +68,41 @@ pub(super) fn measurement(
         InspectedQuantity::Depth => own(feature.depth_mm, feature.depth_is_at_least == Some(true)),
         InspectedQuantity::ConeAngle => own(feature.cone_angle_deg, false),
         InspectedQuantity::X | InspectedQuantity::Y | InspectedQuantity::Z => {
-            let axis = [InspectedQuantity::X, InspectedQuantity::Y, InspectedQuantity::Z]
-                .iter()
-                .position(|one| *one == quantity)
-                .unwrap_or(0);
-            (coordinate(feature, kind, axis), runs_of(feature, surface(feature)))
+            let axis = [
+                InspectedQuantity::X,
+                InspectedQuantity::Y,
+                InspectedQuantity::Z,
+            ]
+            .iter()
+            .position(|one| *one == quantity)
+            .unwrap_or(0);
+            (
+                coordinate(feature, kind, axis),
+                runs_of(feature, surface(feature)),
+            )
         }
         InspectedQuantity::Position => {
-            let number = feature.center_mm.zip(nominal_mm).and_then(|(centre, nominal)| {
-                let std = feature.std.get("center_mm").copied();
-                position(kind, &Point3::from(centre), feature.axis.map(Vector3::from), std, &Point3::from(nominal))
-            });
+            let number = feature
+                .center_mm
+                .zip(nominal_mm)
+                .and_then(|(centre, nominal)| {
+                    let std = feature.std.get("center_mm").copied();
+                    position(
+                        kind,
+                        &Point3::from(centre),
+                        feature.axis.map(Vector3::from),
+                        std,
+                        &Point3::from(nominal),
+                    )
+                });
             (number, runs_of(feature, surface(feature)))
         }
         InspectedQuantity::Roundness
         | InspectedQuantity::Cylindricity
         | InspectedQuantity::Straightness
-        | InspectedQuantity::Flatness => (form(feature, quantity), runs_of(feature, surface(feature))),
+        | InspectedQuantity::Flatness => {
+            (form(feature, quantity), runs_of(feature, surface(feature)))
+        }
         _ => {
             let Some(datum) = datum else {
                 return CharacteristicMeasurement::none("its datum was not found".to_owned());
@@ -78,14 +112,21 @@ pub(super) fn measurement(
     };
     match number {
         None => not_measured(),
-        number => CharacteristicMeasurement { number, why_none: None, runs },
+        number => CharacteristicMeasurement {
+            number,
+            why_none: None,
+            runs,
+        },
     }
 }
 
 /// The number of a feature whose touches are those on its surface.
 pub(super) fn surface(feature: &FeatureRecord) -> &'static str {
     let walls = ["diameter_mm", "width_mm"];
-    walls.into_iter().find(|name| feature.touches.contains_key(*name)).unwrap_or("center_mm")
+    walls
+        .into_iter()
+        .find(|name| feature.touches.contains_key(*name))
+        .unwrap_or("center_mm")
 }
 
 fn runs_of(feature: &FeatureRecord, name: &str) -> Vec<[u32; 2]> {
@@ -96,8 +137,13 @@ fn coordinate(feature: &FeatureRecord, kind: Kind, axis: usize) -> Option<Measur
     let value = feature.center_mm?[axis];
     let direction = Vector3::ith(axis, 1.0);
     let of_centre = feature.std.get("center_mm").copied();
-    let std = of_centre.and_then(|std| coordinate_std(kind, feature.axis.map(Vector3::from), std, &direction));
-    Some(MeasuredNumber { value, std, is_at_least: false })
+    let std = of_centre
+        .and_then(|std| coordinate_std(kind, feature.axis.map(Vector3::from), std, &direction));
+    Some(MeasuredNumber {
+        value,
+        std,
+        is_at_least: false,
+    })
 }
 
 fn form(feature: &FeatureRecord, quantity: InspectedQuantity) -> Option<MeasuredNumber> {
@@ -108,11 +154,18 @@ fn form(feature: &FeatureRecord, quantity: InspectedQuantity) -> Option<Measured
         InspectedQuantity::Straightness => form.straightness_mm,
         _ => form.flatness_mm,
     };
-    Some(MeasuredNumber { value: value?, std: form.std.get(quantity.name()).copied(), is_at_least: false })
+    Some(MeasuredNumber {
+        value: value?,
+        std: form.std.get(quantity.name()).copied(),
+        is_at_least: false,
+    })
 }
 
 /// A number of a relation by its name.
-pub(super) fn relation_number(relation: &RelationRecord, quantity: InspectedQuantity) -> Option<MeasuredNumber> {
+pub(super) fn relation_number(
+    relation: &RelationRecord,
+    quantity: InspectedQuantity,
+) -> Option<MeasuredNumber> {
     let value = match quantity {
         InspectedQuantity::Perpendicularity => relation.perpendicularity_mm,
         InspectedQuantity::Parallelism => relation.parallelism_mm,
@@ -122,7 +175,11 @@ pub(super) fn relation_number(relation: &RelationRecord, quantity: InspectedQuan
         InspectedQuantity::Angle => relation.angle_deg,
         _ => None,
     };
-    Some(MeasuredNumber { value: value?, std: relation.std.get(quantity.name()).copied(), is_at_least: false })
+    Some(MeasuredNumber {
+        value: value?,
+        std: relation.std.get(quantity.name()).copied(),
+        is_at_least: false,
+    })
 }
 
 fn related(
@@ -132,8 +189,13 @@ fn related(
     quantity: InspectedQuantity,
 ) -> CharacteristicMeasurement {
     let find = |of: u32, to: u32| {
-        let of_both = file.relations.iter().filter(|relation| relation.of == of && relation.to == to);
-        of_both.filter_map(|relation| Some((relation, relation_number(relation, quantity)?))).next()
+        let of_both = file
+            .relations
+            .iter()
+            .filter(|relation| relation.of == of && relation.to == to);
+        of_both
+            .filter_map(|relation| Some((relation, relation_number(relation, quantity)?)))
+            .next()
     };
     // between two axes the distance and the angle are the same from either
     let is_same_from_either = |relation: &RelationRecord| match quantity {
@@ -161,5 +223,9 @@ fn related(
     };
     let mut runs = runs_of(feature, surface(feature));
     runs.extend(runs_of(datum, surface(datum)));
-    CharacteristicMeasurement { number: Some(number), why_none: None, runs }
+    CharacteristicMeasurement {
+        number: Some(number),
+        why_none: None,
+        runs,
+    }
 }

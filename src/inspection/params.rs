@@ -60,7 +60,13 @@ impl InspectionParams {
     /// # Errors
     /// [`InspectionError::Setting`]
     pub fn check(&self) -> Result<(), InspectionError> {
-        let Self { drawing, decision, coverage_factor, match_mm, .. } = self;
+        let Self {
+            drawing,
+            decision,
+            coverage_factor,
+            match_mm,
+            ..
+        } = self;
         let lengths = [
             ("--k", Some(*coverage_factor)),
             ("--match-mm", Some(*match_mm)),
@@ -68,14 +74,21 @@ impl InspectionParams {
             ("--position-mm", drawing.position_mm),
         ];
         let is_positive = |number: f64| number > 0.0 && number.is_finite();
-        for (flag, number) in lengths.into_iter().filter_map(|(flag, number)| Some((flag, number?))) {
+        for (flag, number) in lengths
+            .into_iter()
+            .filter_map(|(flag, number)| Some((flag, number?)))
+        {
             if !is_positive(number) {
-                return Err(InspectionError::Setting(format!("{flag} {number} must be above 0")));
+                return Err(InspectionError::Setting(format!(
+                    "{flag} {number} must be above 0"
+                )));
             }
         }
         let confidence = decision.confidence;
         if !(confidence > 0.5 && confidence < 1.0) {
-            return Err(InspectionError::Setting(format!("--confidence {confidence} must be above 0.5 and below 1")));
+            return Err(InspectionError::Setting(format!(
+                "--confidence {confidence} must be above 0.5 and below 1"
+            )));
         }
         Ok(())
     }
@@ -87,7 +100,12 @@ impl InspectionParams {
 /// In words: the names that there are.
 pub fn general_tolerance(name: &str) -> Result<GeneralTolerance, String> {
     let class = GeneralTolerance::of_name(name);
-    class.ok_or_else(|| format!("take one of {}", GeneralTolerance::ALL.map(GeneralTolerance::name).join(", ")))
+    class.ok_or_else(|| {
+        format!(
+            "take one of {}",
+            GeneralTolerance::ALL.map(GeneralTolerance::name).join(", ")
+        )
+    })
 }
 
 /// The decision rule of a name.
@@ -96,5 +114,10 @@ pub fn general_tolerance(name: &str) -> Result<GeneralTolerance, String> {
 /// As [`general_tolerance`].
 pub fn decision_rule(name: &str) -> Result<DecisionRule, String> {
     let rule = DecisionRule::of_name(name);
-    rule.ok_or_else(|| format!("take one of {}", DecisionRule::ALL.map(DecisionRule::name).join(", ")))
+    rule.ok_or_else(|| {
+        format!(
+            "take one of {}",
+            DecisionRule::ALL.map(DecisionRule::name).join(", ")
+        )
+    })
 }

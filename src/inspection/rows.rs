@@ -13,7 +13,8 @@ use super::source::InspectionSource;
 use super::words::first_few;
 use super::{InspectionError, InspectionParams};
 use crate::conformity::{
-    Assessment, Decision, FeatureMatch, FeaturePlace, InspectedQuantity, SoughtFeature, assess, match_features,
+    Assessment, Decision, FeatureMatch, FeaturePlace, InspectedQuantity, SoughtFeature, assess,
+    match_features,
 };
 use crate::features::Kind;
 use crate::io::features_file::{FeatureFile, FeatureRecord};
@@ -57,12 +58,16 @@ pub fn inspected(
     let drawn = &drawing.characteristics;
     let align = |method| aligned(&drawing.features, &source.features, method, params.match_mm);
     let alignment = params.align.as_ref().map(align).transpose()?;
-    let file = alignment.as_ref().map_or(&source.features, |alignment| &alignment.features);
+    let file = alignment
+        .as_ref()
+        .map_or(&source.features, |alignment| &alignment.features);
     let groups = groups_of(drawn);
     let found = match_all(drawn, &groups, file, params.match_mm * 1e-3);
     let mut balloons = Vec::new();
-    let (mut characteristics, mut runs) =
-        (vec![CharacteristicRecord::default(); drawn.len()], vec![Vec::new(); drawn.len()]);
+    let (mut characteristics, mut runs) = (
+        vec![CharacteristicRecord::default(); drawn.len()],
+        vec![Vec::new(); drawn.len()],
+    );
     for (number, group) in (1..).zip(&groups) {
         let first = &drawn[group[0]].nominal;
         let matched = &found.features[number - 1];
@@ -70,34 +75,58 @@ pub fn inspected(
         let feature = found_feature(matched, &source.features);
         for (index, &at) in (1..).zip(group) {
             let place = format!("{number}.{index}");
-            let (record, behind) = characteristic(&drawn[at], place, matched, &found.datums[at], file, params);
+            let (record, behind) =
+                characteristic(&drawn[at], place, matched, &found.datums[at], file, params);
             (characteristics[at], runs[at]) = (record, behind);
         }
         balloons.push(Balloon {
             number,
             kind: first.kind.clone(),
-            place_mm: feature.and_then(|feature| feature.center_mm).or_else(|| in_mesh(first.center_mm?, &alignment)),
+            place_mm: feature
+                .and_then(|feature| feature.center_mm)
+                .or_else(|| in_mesh(first.center_mm?, &alignment)),
             feature: feature.map(|feature| feature.id),
             characteristics: group.clone(),
         });
     }
-    let matched: BTreeSet<u32> = balloons.iter().filter_map(|balloon| balloon.feature).collect();
+    let matched: BTreeSet<u32> = balloons
+        .iter()
+        .filter_map(|balloon| balloon.feature)
+        .collect();
     let quantities = drawn.iter().map(|drawn| drawn.quantity).collect();
-    let record = record_of(source, drawing, params, (characteristics, alignment), &matched);
-    Ok(Inspected { record, balloons, runs, quantities })
+    let record = record_of(
+        source,
+        drawing,
+        params,
+        (characteristics, alignment),
+        &matched,
+    );
+    Ok(Inspected {
+        record,
+        balloons,
+        runs,
+        quantities,
+    })
 }
 
 /// A place of the drawing in the frame of the mesh, mm.
 fn in_mesh(mm: [f64; 3], alignment: &Option<Alignment>) -> Option<[f64; 3]> {
-    let Some(alignment) = alignment else { return Some(mm) };
-    Some((alignment.motion.inverse_transform_point(&point(mm)) * 1e3).coords.into())
+    let Some(alignment) = alignment else {
+        return Some(mm);
+    };
+    Some(
+        (alignment.motion.inverse_transform_point(&point(mm)) * 1e3)
+            .coords
+            .into(),
+    )
 }
 
 /// Characteristics of the same feature of the drawing, in order of the first of each.
 fn groups_of(drawn: &[Drawn]) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (at, one) in drawn.iter().enumerate() {
-        let same = |group: &&mut Vec<usize>| drawn[group[0]].nominal.is_of_the_same_feature(&one.nominal);
+        let same =
+            |group: &&mut Vec<usize>| drawn[group[0]].nominal.is_of_the_same_feature(&one.nominal);
         match groups.iter_mut().find(same) {
             Some(group) => group.push(at),
             None => groups.push(vec![at]),
@@ -113,17 +142,30 @@ struct DrawingMatches {
     datums: Vec<Option<FeatureMatch>>,
 }
 
-fn match_all(drawn: &[Drawn], groups: &[Vec<usize>], file: &FeatureFile, reach: f64) -> DrawingMatches {
+fn match_all(
+    drawn: &[Drawn],
+    groups: &[Vec<usize>],
+    file: &FeatureFile,
+    reach: f64,
+) -> DrawingMatches {
     let places: Vec<_> = file.features.iter().filter_map(place_of).collect();
     let sought: Vec<_> = groups.iter().map(|group| sought_of(drawn, group)).collect();
     let features = match_features(&sought, &places, reach);
     let datum = |one: &Drawn| {
         let datum = one.nominal.datum.as_ref()?;
         let place = datum.center_mm.map(point);
-        let sought = SoughtFeature { kind: datum.kind()?, id: datum.feature, place, size: None };
+        let sought = SoughtFeature {
+            kind: datum.kind()?,
+            id: datum.feature,
+            place,
+            size: None,
+        };
         match_features(&[sought], &places, reach).pop()
     };
-    DrawingMatches { features, datums: drawn.iter().map(datum).collect() }
+    DrawingMatches {
+        features,
+        datums: drawn.iter().map(datum).collect(),
+    }
 }
 
 fn point(mm: [f64; 3]) -> Point3<f64> {
@@ -144,30 +186,67 @@ fn place_of(feature: &FeatureRecord) -> Option<FeaturePlace> {
 
 fn sought_of(drawn: &[Drawn], group: &[usize]) -> SoughtFeature {
     let first = &drawn[group[0]].nominal;
-    let is_size = |at: &&usize| matches!(drawn[**at].quantity, InspectedQuantity::Diameter | InspectedQuantity::Width);
-    let size = group.iter().find(is_size).map(|&at| drawn[at].nominal.nominal() * 1e-3);
-    SoughtFeature { kind: first.kind().unwrap_or_default(), id: first.feature, place: first.center_mm.map(point), size }
+    let is_size = |at: &&usize| {
+        matches!(
+            drawn[**at].quantity,
+            InspectedQuantity::Diameter | InspectedQuantity::Width
+        )
+    };
+    let size = group
+        .iter()
+        .find(is_size)
+        .map(|&at| drawn[at].nominal.nominal() * 1e-3);
+    SoughtFeature {
+        kind: first.kind().unwrap_or_default(),
+        id: first.feature,
+        place: first.center_mm.map(point),
+        size,
+    }
 }
 
 fn found_feature<'a>(matched: &FeatureMatch, file: &'a FeatureFile) -> Option<&'a FeatureRecord> {
-    let FeatureMatch::Found(id) = matched else { return None };
+    let FeatureMatch::Found(id) = matched else {
+        return None;
+    };
     file.features.iter().find(|feature| feature.id == *id)
 }
 
 /// Why a feature of the drawing has none that was measured.
-fn why_not(matched: &FeatureMatch, kind: &str, nominal: &NominalRecord, is_aligned: bool) -> String {
-    let place =
-        |center: Option<[f64; 3]>| center.map_or(String::new(), |[x, y, z]| format!(" near ({x:.1} {y:.1} {z:.1}) mm"));
+fn why_not(
+    matched: &FeatureMatch,
+    kind: &str,
+    nominal: &NominalRecord,
+    is_aligned: bool,
+) -> String {
+    let place = |center: Option<[f64; 3]>| {
+        center.map_or(String::new(), |[x, y, z]| {
+            format!(" near ({x:.1} {y:.1} {z:.1}) mm")
+        })
+    };
     match matched {
         FeatureMatch::Missing if nominal.feature.is_some() => {
-            format!("there is no {kind} {}: see the ids in the features", nominal.feature.unwrap_or_default())
+            format!(
+                "there is no {kind} {}: see the ids in the features",
+                nominal.feature.unwrap_or_default()
+            )
         }
         FeatureMatch::Missing => {
-            let or = if is_aligned { "" } else { ", or align drawing and mesh where they do not share a frame" };
-            format!("no {kind} was found{}: touch it{or}", place(nominal.center_mm))
+            let or = if is_aligned {
+                ""
+            } else {
+                ", or align drawing and mesh where they do not share a frame"
+            };
+            format!(
+                "no {kind} was found{}: touch it{or}",
+                place(nominal.center_mm)
+            )
         }
         FeatureMatch::Ambiguous(ids) => {
-            let ids = ids.iter().map(u32::to_string).collect::<Vec<_>>().join(" and ");
+            let ids = ids
+                .iter()
+                .map(u32::to_string)
+                .collect::<Vec<_>>()
+                .join(" and ");
             format!("it could be {kind} {ids}: name one in the column feature")
         }
         FeatureMatch::Shared(id) => {
@@ -187,20 +266,43 @@ fn characteristic(
     file: &FeatureFile,
     params: &InspectionParams,
 ) -> (CharacteristicRecord, Vec<[u32; 2]>) {
-    let Drawn { nominal, quantity, limits, from } = drawn;
+    let Drawn {
+        nominal,
+        quantity,
+        limits,
+        from,
+    } = drawn;
     let feature = found_feature(matched, file);
     let datum_feature = datum.as_ref().and_then(|datum| found_feature(datum, file));
     let measured = match (feature, datum, datum_feature) {
-        (None, ..) => missing(why_not(matched, &nominal.kind, nominal, params.align.is_some())),
+        (None, ..) => missing(why_not(
+            matched,
+            &nominal.kind,
+            nominal,
+            params.align.is_some(),
+        )),
         (Some(_), Some(datum), None) => {
             let record = nominal.datum.clone().unwrap_or_default();
-            let as_nominal =
-                NominalRecord { center_mm: record.center_mm, feature: record.feature, ..NominalRecord::default() };
-            missing(format!("datum: {}", why_not(datum, &record.kind, &as_nominal, params.align.is_some())))
+            let as_nominal = NominalRecord {
+                center_mm: record.center_mm,
+                feature: record.feature,
+                ..NominalRecord::default()
+            };
+            missing(format!(
+                "datum: {}",
+                why_not(datum, &record.kind, &as_nominal, params.align.is_some())
+            ))
         }
         (Some(feature), ..) => {
             let kind = nominal.kind().unwrap_or_default();
-            measurement(file, feature, kind, *quantity, nominal.center_mm, datum_feature)
+            measurement(
+                file,
+                feature,
+                kind,
+                *quantity,
+                nominal.center_mm,
+                datum_feature,
+            )
         }
     };
     let assessment = match &measured.number {
@@ -210,7 +312,8 @@ fn characteristic(
     let is_of_mesh = feature.is_some_and(|feature| feature.fitted_to == "mesh");
     let why = assessment.reason.map(|reason| match reason {
         crate::conformity::OpenReason::NoUncertainty if is_of_mesh => {
-            "it was fitted to the mesh, not to touches, so nothing says how far it is off: touch it".to_owned()
+            "it was fitted to the mesh, not to touches, so nothing says how far it is off: touch it"
+                .to_owned()
         }
         reason => reason.to_string(),
     });
@@ -227,7 +330,11 @@ fn characteristic(
         reason: measured.why_none.or(why),
         conformance_probability: assessment.conformance_probability,
         risk: assessment.risk(),
-        touches: measured.runs.iter().map(|[first, last]| (last - first + 1) as usize).sum(),
+        touches: measured
+            .runs
+            .iter()
+            .map(|[first, last]| (last - first + 1) as usize)
+            .sum(),
         fitted_to: feature.map_or(String::new(), |feature| feature.fitted_to.clone()),
         ..CharacteristicRecord::default()
     };
@@ -240,18 +347,26 @@ fn characteristic(
         ("actual", actual),
         ("deviation", actual.map(|actual| actual - nominal.nominal())),
         ("standard_uncertainty", std),
-        ("expanded_uncertainty", std.map(|std| std * params.coverage_factor)),
+        (
+            "expanded_uncertainty",
+            std.map(|std| std * params.coverage_factor),
+        ),
         ("acceptance_lower", assessment.acceptance.lower),
         ("acceptance_upper", assessment.acceptance.upper),
         ("rejection_lower", assessment.rejection.lower),
         ("rejection_upper", assessment.rejection.upper),
     ];
-    numbers.into_iter().for_each(|(name, number)| record.set(name, number));
+    numbers
+        .into_iter()
+        .for_each(|(name, number)| record.set(name, number));
     (record, measured.runs)
 }
 
 fn missing(why: String) -> CharacteristicMeasurement {
-    CharacteristicMeasurement { why_none: Some(why), ..CharacteristicMeasurement::default() }
+    CharacteristicMeasurement {
+        why_none: Some(why),
+        ..CharacteristicMeasurement::default()
+    }
 }
 
 /// Kinds that a drawing would have a characteristic for.
@@ -264,24 +379,49 @@ fn record_of(
     (characteristics, alignment): (Vec<CharacteristicRecord>, Option<Alignment>),
     matched: &BTreeSet<u32>,
 ) -> InspectionRecord {
-    let unused = alignment.iter().filter(|alignment| !alignment.unused.is_empty()).map(|alignment| {
-        format!(
-            "Not used for the alignment, as they were not found or not touched: {}.",
-            first_few(&alignment.unused, ", ")
-        )
-    });
-    let notes = source.notes.iter().chain(&drawing.notes).cloned().chain(unused).collect();
-    let count = |decision: Decision| characteristics.iter().filter(|one| one.decision == decision.name()).count();
-    let counts: BTreeMap<_, _> =
-        Decision::ALL.into_iter().map(|decision| (decision.name().to_owned(), count(decision))).collect();
+    let unused = alignment
+        .iter()
+        .filter(|alignment| !alignment.unused.is_empty())
+        .map(|alignment| {
+            format!(
+                "Not used for the alignment, as they were not found or not touched: {}.",
+                first_few(&alignment.unused, ", ")
+            )
+        });
+    let notes = source
+        .notes
+        .iter()
+        .chain(&drawing.notes)
+        .cloned()
+        .chain(unused)
+        .collect();
+    let count = |decision: Decision| {
+        characteristics
+            .iter()
+            .filter(|one| one.decision == decision.name())
+            .count()
+    };
+    let counts: BTreeMap<_, _> = Decision::ALL
+        .into_iter()
+        .map(|decision| (decision.name().to_owned(), count(decision)))
+        .collect();
     let verdict = match (count(Decision::Fail), count(Decision::Undecided)) {
         (0, 0) => Decision::Pass,
         (0, _) => Decision::Undecided,
         _ => Decision::Fail,
     };
-    let counted = source.features.features.iter().filter(|feature| COUNTED.contains(&&*feature.kind));
-    let without: Vec<_> = counted.map(|feature| feature.id).filter(|id| !matched.contains(id)).collect();
-    let files = [drawing.file.clone()].into_iter().chain(source.files.iter().cloned());
+    let counted = source
+        .features
+        .features
+        .iter()
+        .filter(|feature| COUNTED.contains(&&*feature.kind));
+    let without: Vec<_> = counted
+        .map(|feature| feature.id)
+        .filter(|id| !matched.contains(id))
+        .collect();
+    let files = [drawing.file.clone()]
+        .into_iter()
+        .chain(source.files.iter().cloned());
     InspectionRecord {
         part: params.part.clone(),
         serial: params.serial.clone(),

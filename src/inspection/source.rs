@@ -40,36 +40,69 @@ impl InspectionSource {
         let features = read_features(&features_path)?;
         let folder = features_path.parent().unwrap_or(Path::new("")).to_owned();
         let beside = |named: Option<&Path>, name: &str| {
-            named.map(Path::to_owned).or_else(|| Some(folder.join(name)).filter(|path| path.is_file()))
+            named
+                .map(Path::to_owned)
+                .or_else(|| Some(folder.join(name)).filter(|path| path.is_file()))
         };
         let [touches_path, mesh, scene] = named;
-        let (touches_path, mesh) = (beside(touches_path, touches_name), beside(mesh, "refined.ply"));
+        let (touches_path, mesh) = (
+            beside(touches_path, touches_name),
+            beside(mesh, "refined.ply"),
+        );
         let scene = beside(scene, "scene.yaml");
-        let touches = touches_path.as_deref().map_or_else(|| Ok(Vec::new()), read_touches)?;
+        let touches = touches_path
+            .as_deref()
+            .map_or_else(|| Ok(Vec::new()), read_touches)?;
         check_touches(&features, &touches, touches_path.as_deref())?;
         let probed_path = folder.join("probed_touches.jsonl");
-        let probed = read_probed_touches(&probed_path).map_err(|error| not_read(&probed_path, error))?;
+        let probed =
+            read_probed_touches(&probed_path).map_err(|error| not_read(&probed_path, error))?;
         let mut files = vec![inspected_file("features", &features_path)?];
         let probed_path = (!probed.is_empty()).then_some(probed_path);
-        let others =
-            [("touches", &touches_path), ("touches of the arm", &probed_path), ("mesh", &mesh), ("scene", &scene)];
+        let others = [
+            ("touches", &touches_path),
+            ("touches of the arm", &probed_path),
+            ("mesh", &mesh),
+            ("scene", &scene),
+        ];
         for (role, path) in others {
-            files.extend(path.as_deref().map(|path| inspected_file(role, path)).transpose()?);
+            files.extend(
+                path.as_deref()
+                    .map(|path| inspected_file(role, path))
+                    .transpose()?,
+            );
         }
-        Ok(Self { features, touches, probed, mesh, scene, files, notes: Vec::new() })
+        Ok(Self {
+            features,
+            touches,
+            probed,
+            mesh,
+            scene,
+            files,
+            notes: Vec::new(),
+        })
     }
 
     /// What an arm measured: the feature of each flag, by the number of the flag, and the touches that it was measured by.
-    fn of_probing(path: &Path, [_, mesh, scene]: [Option<&Path>; 3]) -> Result<Self, InspectionError> {
+    fn of_probing(
+        path: &Path,
+        [_, mesh, scene]: [Option<&Path>; 3],
+    ) -> Result<Self, InspectionError> {
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         let beside = |named: Option<&Path>, name: &str| {
-            named.map(Path::to_owned).or_else(|| Some(folder.join(name)).filter(|path| path.is_file()))
+            named
+                .map(Path::to_owned)
+                .or_else(|| Some(folder.join(name)).filter(|path| path.is_file()))
         };
         let text = read_text(path).map_err(|error| not_read(path, error))?;
         let ProbedFeatures { features } =
-            serde_json::from_str(&text).map_err(|source| InspectionError::Probed { path: path.to_owned(), source })?;
+            serde_json::from_str(&text).map_err(|source| InspectionError::Probed {
+                path: path.to_owned(),
+                source,
+            })?;
         let probed_path = folder.join("probed_touches.jsonl");
-        let probed = read_probed_touches(&probed_path).map_err(|error| not_read(&probed_path, error))?;
+        let probed =
+            read_probed_touches(&probed_path).map_err(|error| not_read(&probed_path, error))?;
         let (mut found, mut touches) = (FeatureFile::default(), Vec::new());
         for ProbedFeature { flag, feature } in features {
             let Some(feature) = feature else { continue };
@@ -83,23 +116,44 @@ impl InspectionSource {
         check_touches(&found, &touches, Some(&probed_path))?;
         let mut files = vec![inspected_file("features of the arm", path)?];
         let probed_path = probed_path.is_file().then_some(probed_path);
-        for (role, path) in [("touches of the arm", &probed_path), ("mesh", &mesh), ("scene", &scene)] {
-            files.extend(path.as_deref().map(|path| inspected_file(role, path)).transpose()?);
+        for (role, path) in [
+            ("touches of the arm", &probed_path),
+            ("mesh", &mesh),
+            ("scene", &scene),
+        ] {
+            files.extend(
+                path.as_deref()
+                    .map(|path| inspected_file(role, path))
+                    .transpose()?,
+            );
         }
         let note =
             "Measured by an arm: ids are the numbers of the flags; form and relations were not measured.".to_owned();
-        Ok(Self { features: found, touches, probed, mesh, scene, files, notes: vec![note] })
+        Ok(Self {
+            features: found,
+            touches,
+            probed,
+            mesh,
+            scene,
+            files,
+            notes: vec![note],
+        })
     }
 }
 
 fn not_read(path: &Path, source: io::Error) -> InspectionError {
-    InspectionError::File { path: path.to_owned(), source }
+    InspectionError::File {
+        path: path.to_owned(),
+        source,
+    }
 }
 
 /// The features of a folder, and how the file of their touches is called: those of a session that was ended or refined, else those that
 /// `~/save_mesh` has saved of one that runs.
-const IN_FOLDER: [(&str, &str); 2] =
-    [("features.json", "touches.csv"), ("refined.features.json", "refined.touches.csv")];
+const IN_FOLDER: [(&str, &str); 2] = [
+    ("features.json", "touches.csv"),
+    ("refined.features.json", "refined.touches.csv"),
+];
 
 /// The file of features that `path` is, or that is in the folder `path`, and the name of the touches beside it.
 fn features_of(path: &Path) -> Result<(PathBuf, &'static str), InspectionError> {
@@ -127,7 +181,11 @@ struct ProbedFeature {
 
 /// The file of a probing: it has the features that were flagged, also where few touches leave none in features.json.
 fn probed_file(path: &Path) -> Option<PathBuf> {
-    let probed = if path.is_dir() { path.join("probed.json") } else { path.to_owned() };
+    let probed = if path.is_dir() {
+        path.join("probed.json")
+    } else {
+        path.to_owned()
+    };
     (probed.file_name()? == "probed.json" && probed.is_file()).then_some(probed)
 }
 
@@ -155,7 +213,12 @@ fn point_of(touch: &TouchLine) -> ProbedPoint {
 fn renumbered(mut feature: FeatureRecord, id: u32, offset: u32) -> FeatureRecord {
     feature.id = id;
     let of_all = |number: &mut u32| *number = (*number + offset).saturating_sub(1);
-    feature.touches.values_mut().flatten().flatten().for_each(of_all);
+    feature
+        .touches
+        .values_mut()
+        .flatten()
+        .flatten()
+        .for_each(of_all);
     feature
 }
 
@@ -165,16 +228,38 @@ pub(super) fn inspected_file(role: &str, path: &Path) -> Result<InspectedFile, I
     let (_, crc32) = fingerprint(path).map_err(not_read)?;
     let bytes = Path::metadata(path).map_err(not_read)?.len();
     let (role, path) = (role.to_owned(), path.display().to_string());
-    Ok(InspectedFile { role, path, bytes, crc32: format!("{crc32:08x}") })
+    Ok(InspectedFile {
+        role,
+        path,
+        bytes,
+        crc32: format!("{crc32:08x}"),
+    })
 }
 
 /// Features name touches by number: a file of other touches is found where it is too short.
-fn check_touches(features: &FeatureFile, touches: &[ProbedPoint], path: Option<&Path>) -> Result<(), InspectionError> {
+fn check_touches(
+    features: &FeatureFile,
+    touches: &[ProbedPoint],
+    path: Option<&Path>,
+) -> Result<(), InspectionError> {
     let Some(path) = path else { return Ok(()) };
-    let runs = features.features.iter().flat_map(|feature| feature.touches.values().flatten());
-    let Some(last) = runs.map(|[_, last]| *last as usize).max() else { return Ok(()) };
+    let runs = features
+        .features
+        .iter()
+        .flat_map(|feature| feature.touches.values().flatten());
+    let Some(last) = runs.map(|[_, last]| *last as usize).max() else {
+        return Ok(());
+    };
     let (count, other) = (touches.len(), path.to_owned());
-    if last < count { Ok(()) } else { Err(InspectionError::OtherTouches { path: other, count, named: last }) }
+    if last < count {
+        Ok(())
+    } else {
+        Err(InspectionError::OtherTouches {
+            path: other,
+            count,
+            named: last,
+        })
+    }
 }
 
 #[cfg(test)]
@@ -183,7 +268,8 @@ mod tests {
 
     /// A feature of the mesh, and no touches.
     fn write(folder: &Path, features: &str, touches: &str) {
-        let text = r#"{"features": [{"id": 1, "kind": "hole", "diameter_mm": 8.0, "fitted_to": "mesh"}]}"#;
+        let text =
+            r#"{"features": [{"id": 1, "kind": "hole", "diameter_mm": 8.0, "fitted_to": "mesh"}]}"#;
         crate::io::session_folder::write_text_file(&folder.join(features), text).unwrap();
         crate::io::touches_file::write_touches(&folder.join(touches), &[]).unwrap();
     }
@@ -193,15 +279,32 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let read = || InspectionSource::read(folder.path(), [None; 3]);
         let why = read().map(drop).unwrap_err().to_string();
-        assert!(why.contains("has no features.json") && why.contains("once it was saved"), "{why}");
+        assert!(
+            why.contains("has no features.json") && why.contains("once it was saved"),
+            "{why}"
+        );
         let names = |source: InspectionSource| -> Vec<String> {
-            source.files.iter().map(|file| file.path.rsplit('/').next().unwrap_or_default().to_owned()).collect()
+            source
+                .files
+                .iter()
+                .map(|file| file.path.rsplit('/').next().unwrap_or_default().to_owned())
+                .collect()
         };
-        write(folder.path(), "refined.features.json", "refined.touches.csv");
-        assert_eq!(names(read().unwrap()), ["refined.features.json", "refined.touches.csv"]);
+        write(
+            folder.path(),
+            "refined.features.json",
+            "refined.touches.csv",
+        );
+        assert_eq!(
+            names(read().unwrap()),
+            ["refined.features.json", "refined.touches.csv"]
+        );
         write(folder.path(), "features.json", "touches.csv");
         assert_eq!(names(read().unwrap()), ["features.json", "touches.csv"]);
         let saved = InspectionSource::read(&folder.path().join("refined.features.json"), [None; 3]);
-        assert_eq!(names(saved.unwrap()), ["refined.features.json", "refined.touches.csv"]);
+        assert_eq!(
+            names(saved.unwrap()),
+            ["refined.features.json", "refined.touches.csv"]
+        );
     }
 }

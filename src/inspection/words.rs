@@ -10,7 +10,12 @@ const MOST_NAMED: usize = 8;
 
 /// The first names, and how many more there are.
 pub fn first_few(names: &[String], between: &str) -> String {
-    let shown = names.iter().take(MOST_NAMED).cloned().collect::<Vec<_>>().join(between);
+    let shown = names
+        .iter()
+        .take(MOST_NAMED)
+        .cloned()
+        .collect::<Vec<_>>()
+        .join(between);
     match names.len().saturating_sub(MOST_NAMED) {
         0 => shown,
         more => format!("{shown}{between}and {more} more"),

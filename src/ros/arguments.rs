@@ -154,7 +154,10 @@ impl NodeConfig {
     ///
     /// # Errors
     /// [`ArgumentError`]: the first thing that is wrong.
-    pub fn new(ros: &[String], variable: impl Fn(&str) -> Option<String>) -> Result<Self, ArgumentError> {
+    pub fn new(
+        ros: &[String],
+        variable: impl Fn(&str) -> Option<String>,
+    ) -> Result<Self, ArgumentError> {
         Self::named("touchup", ros, variable)
     }
 
@@ -162,9 +165,16 @@ impl NodeConfig {
     ///
     /// # Errors
     /// [`ArgumentError`]: the first thing that is wrong.
-    pub fn named(name: &str, ros: &[String], variable: impl Fn(&str) -> Option<String>) -> Result<Self, ArgumentError> {
+    pub fn named(
+        name: &str,
+        ros: &[String],
+        variable: impl Fn(&str) -> Option<String>,
+    ) -> Result<Self, ArgumentError> {
         let mut config = Self {
-            place: GraphPlace { namespace: String::new(), node: name.to_owned() },
+            place: GraphPlace {
+                namespace: String::new(),
+                node: name.to_owned(),
+            },
             domain_id: domain_id(variable("ROS_DOMAIN_ID"))?,
             localhost_only: localhost_only(&variable)?,
             remaps: Vec::new(),
@@ -174,8 +184,12 @@ impl NodeConfig {
         let mut overrides = Vec::new();
         let mut rest = ros.iter();
         while let Some(argument) = rest.next() {
-            let mut next =
-                |needs| rest.next().ok_or_else(|| ArgumentError::Missing { argument: argument.clone(), needs });
+            let mut next = |needs| {
+                rest.next().ok_or_else(|| ArgumentError::Missing {
+                    argument: argument.clone(),
+                    needs,
+                })
+            };
             match argument.as_str() {
                 "-r" | "--remap" => config.remap(next("FROM:=TO")?)?,
                 "-p" | "--param" => overrides.push(parameter(next("NAME:=VALUE")?)?),
@@ -187,9 +201,16 @@ impl NodeConfig {
                 }
                 known if KNOWN.contains(&known) => {}
                 _ => {
-                    let long: Vec<_> = KNOWN.iter().copied().filter(|known| known.len() > 2).collect();
+                    let long: Vec<_> = KNOWN
+                        .iter()
+                        .copied()
+                        .filter(|known| known.len() > 2)
+                        .collect();
                     let near = nearest(argument, &long);
-                    return Err(ArgumentError::Unknown { argument: argument.clone(), near });
+                    return Err(ArgumentError::Unknown {
+                        argument: argument.clone(),
+                        near,
+                    });
                 }
             }
         }
@@ -224,22 +245,37 @@ impl NodeConfig {
     /// Where wrenches and poses come from, not yet remapped: as [`Self::sample_topics`], or transforms.
     pub fn heard_topics(&self) -> [&'static str; 2] {
         let [wrench, pose] = self.sample_topics();
-        [wrench, if self.parameters.pose_frames().is_none() { pose } else { "/tf" }]
+        [
+            wrench,
+            if self.parameters.pose_frames().is_none() {
+                pose
+            } else {
+                "/tf"
+            },
+        ]
     }
 
     fn remap(&mut self, text: &str) -> Result<(), ArgumentError> {
         let form = "FROM:=TO, as in stylus/wrench:=/ft_sensor/wrench";
-        let malformed = || ArgumentError::Form { given: format!("--remap {text}"), form };
+        let malformed = || ArgumentError::Form {
+            given: format!("--remap {text}"),
+            form,
+        };
         let (from, to) = text.split_once(":=").ok_or_else(malformed)?;
         // NODE:FROM is for the node of that name alone
-        let (node, from) = from.split_once(':').map_or((None, from), |(node, from)| (Some(node), from));
+        let (node, from) = from
+            .split_once(':')
+            .map_or((None, from), |(node, from)| (Some(node), from));
         if from.is_empty() || to.is_empty() || from.contains(':') {
             return Err(malformed());
         }
         if node.is_some_and(|node| node != self.place.node) {
             return Ok(());
         }
-        let of_text = |source| ArgumentError::Name { text: text.to_owned(), source };
+        let of_text = |source| ArgumentError::Name {
+            text: text.to_owned(),
+            source,
+        };
         match from {
             "__node" | "__name" => {
                 checked(format!("/{to}")).map_err(of_text)?;
@@ -249,10 +285,21 @@ impl NodeConfig {
                 self.place.node = to.to_owned();
             }
             "__ns" => {
-                let whole = if to.starts_with('/') { to.to_owned() } else { format!("/{to}") };
-                self.place.namespace = if whole == "/" { String::new() } else { checked(whole).map_err(of_text)? };
+                let whole = if to.starts_with('/') {
+                    to.to_owned()
+                } else {
+                    format!("/{to}")
+                };
+                self.place.namespace = if whole == "/" {
+                    String::new()
+                } else {
+                    checked(whole).map_err(of_text)?
+                };
             }
-            _ => self.remaps.push(Remap { from: from.to_owned(), to: to.to_owned() }),
+            _ => self.remaps.push(Remap {
+                from: from.to_owned(),
+                to: to.to_owned(),
+            }),
         }
         Ok(())
     }
@@ -262,7 +309,9 @@ impl NodeConfig {
         for rule in &self.remaps {
             for name in [&rule.from, &rule.to] {
                 let text = format!("{}:={}", rule.from, rule.to);
-                self.place.expand(name).map_err(|source| ArgumentError::Name { text, source })?;
+                self.place
+                    .expand(name)
+                    .map_err(|source| ArgumentError::Name { text, source })?;
             }
         }
         Ok(())
@@ -270,11 +319,17 @@ impl NodeConfig {
 
     fn set(&mut self, overrides: Vec<Override>) -> Result<(), ArgumentError> {
         let full_name = self.place.full_name();
-        let is_mine = |given: &Override| matches(&given.nodes, &full_name) || given.nodes == self.place.node;
+        let is_mine =
+            |given: &Override| matches(&given.nodes, &full_name) || given.nodes == self.place.node;
         for given in overrides.into_iter().filter(is_mine) {
             match self.parameters.set(&given.name, &given.value) {
-                Err(ParameterError::Unknown { name, .. }) if given.is_file => self.unused.push(name),
-                other => other.map_err(|source| ArgumentError::Parameter { origin: given.origin, source })?,
+                Err(ParameterError::Unknown { name, .. }) if given.is_file => {
+                    self.unused.push(name)
+                }
+                other => other.map_err(|source| ArgumentError::Parameter {
+                    origin: given.origin,
+                    source,
+                })?,
             }
         }
         Ok(())
@@ -283,21 +338,42 @@ impl NodeConfig {
 
 fn parameter(text: &str) -> Result<Override, ArgumentError> {
     let form = "NAME:=VALUE, as in scan:=part.ply";
-    let malformed = || ArgumentError::Form { given: format!("-p {text}"), form };
+    let malformed = || ArgumentError::Form {
+        given: format!("-p {text}"),
+        form,
+    };
     let (name, value) = text.split_once(":=").ok_or_else(malformed)?;
     let (nodes, name) = name.split_once(':').unwrap_or(("/**", name));
     if name.is_empty() {
         return Err(malformed());
     }
     let value = ParameterValue::from_yaml(value);
-    Ok(Override { nodes: nodes.into(), name: name.into(), value, origin: format!("-p {text}"), is_file: false })
+    Ok(Override {
+        nodes: nodes.into(),
+        name: name.into(),
+        value,
+        origin: format!("-p {text}"),
+        is_file: false,
+    })
 }
 
 fn from_file(path: &Path) -> Result<Vec<Override>, ArgumentError> {
-    let text = parameters_file::read(path).map_err(|source| ArgumentError::Read { path: path.to_owned(), source })?;
-    let entries = yaml::entries(&text).map_err(|reason| ArgumentError::File { path: path.to_owned(), reason })?;
+    let text = parameters_file::read(path).map_err(|source| ArgumentError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    let entries = yaml::entries(&text).map_err(|reason| ArgumentError::File {
+        path: path.to_owned(),
+        reason,
+    })?;
     let origin = path.display().to_string();
-    let given = |(nodes, name, value)| Override { nodes, name, value, origin: origin.clone(), is_file: true };
+    let given = |(nodes, name, value)| Override {
+        nodes,
+        name,
+        value,
+        origin: origin.clone(),
+        is_file: true,
+    };
     Ok(entries.into_iter().map(given).collect())
 }
 
@@ -306,19 +382,37 @@ fn from_file(path: &Path) -> Result<Vec<Override>, ArgumentError> {
 /// # Errors
 /// [`ArgumentError::Form`] for a level that ROS does not have.
 pub fn log_level(text: &str) -> Result<&'static str, ArgumentError> {
-    let word = text.rsplit_once(":=").map_or(text, |(_, level)| level).to_lowercase();
-    let level = LEVELS.iter().find(|(name, _)| *name == word).map(|(_, level)| *level);
+    let word = text
+        .rsplit_once(":=")
+        .map_or(text, |(_, level)| level)
+        .to_lowercase();
+    let level = LEVELS
+        .iter()
+        .find(|(name, _)| *name == word)
+        .map(|(_, level)| *level);
     let form = "debug, info, warn, error or fatal";
-    level.ok_or_else(|| ArgumentError::Form { given: format!("--log-level {text}"), form })
+    level.ok_or_else(|| ArgumentError::Form {
+        given: format!("--log-level {text}"),
+        form,
+    })
 }
 
 /// Beyond that the ports of a domain lie over 65535.
 const LAST_DOMAIN: u16 = 232;
 
 fn domain_id(value: Option<String>) -> Result<u16, ArgumentError> {
-    let Some(value) = value.filter(|value| !value.is_empty()) else { return Ok(0) };
-    let malformed = || ArgumentError::Form { given: format!("ROS_DOMAIN_ID={value}"), form: "0 to 232" };
-    value.parse().ok().filter(|id| *id <= LAST_DOMAIN).ok_or_else(malformed)
+    let Some(value) = value.filter(|value| !value.is_empty()) else {
+        return Ok(0);
+    };
+    let malformed = || ArgumentError::Form {
+        given: format!("ROS_DOMAIN_ID={value}"),
+        form: "0 to 232",
+    };
+    value
+        .parse()
+        .ok()
+        .filter(|id| *id <= LAST_DOMAIN)
+        .ok_or_else(malformed)
 }
 
 fn localhost_only(variable: &impl Fn(&str) -> Option<String>) -> Result<bool, ArgumentError> {

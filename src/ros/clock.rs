@@ -12,8 +12,13 @@ pub fn stamp_ns(time: Time) -> i64 {
 
 /// The nearest stamp that a message can have.
 pub fn time(stamp_ns: i64) -> Time {
-    let sec = stamp_ns.div_euclid(1_000_000_000).clamp(i64::from(i32::MIN), i64::from(i32::MAX));
-    Time { sec: sec as i32, nanosec: stamp_ns.rem_euclid(1_000_000_000) as u32 }
+    let sec = stamp_ns
+        .div_euclid(1_000_000_000)
+        .clamp(i64::from(i32::MIN), i64::from(i32::MAX));
+    Time {
+        sec: sec as i32,
+        nanosec: stamp_ns.rem_euclid(1_000_000_000) as u32,
+    }
 }
 
 /// The time of ROS: the system's, or that of `/clock`.
@@ -26,7 +31,10 @@ pub struct RosClock {
 impl RosClock {
     /// - `is_simulated`: the parameter `use_sim_time`.
     pub fn new(is_simulated: bool) -> Self {
-        Self { is_simulated, simulated_ns: AtomicI64::new(0) }
+        Self {
+            is_simulated,
+            simulated_ns: AtomicI64::new(0),
+        }
     }
 
     /// Takes up what came on `/clock`.
@@ -39,7 +47,9 @@ impl RosClock {
         if self.is_simulated {
             return self.simulated_ns.load(Ordering::Relaxed);
         }
-        SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos() as i64)
+        SystemTime::now()
+            .duration_since(UNIX_EPOCH)
+            .map_or(0, |since| since.as_nanos() as i64)
     }
 }
 
@@ -54,6 +64,10 @@ mod tests {
         clock.set(Time { sec: 2, nanosec: 5 });
         assert_eq!(clock.now_ns(), 2_000_000_005);
         clock.set(Time { sec: 1, nanosec: 0 });
-        assert_eq!(clock.now_ns(), 1_000_000_000, "a recording that is played again");
+        assert_eq!(
+            clock.now_ns(),
+            1_000_000_000,
+            "a recording that is played again"
+        );
     }
 }

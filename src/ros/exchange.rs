@@ -56,7 +56,9 @@ impl Exchange {
         Arc::new(Self {
             inbox,
             // a name that is none is refused where the topic is listened to
-            sample_topics: config.sample_topics().map(|name| config.resolve(name).unwrap_or_default()),
+            sample_topics: config
+                .sample_topics()
+                .map(|name| config.resolve(name).unwrap_or_default()),
             mesh_patch_topic: config.resolve(MESH_PATCH_TOPIC).unwrap_or_default(),
             node_name: config.place.full_name(),
             clock: RosClock::new(config.parameters.bool("use_sim_time")),
@@ -106,7 +108,9 @@ impl Exchange {
         work: impl FnOnce(&Arc<Self>) + Send + 'static,
     ) -> io::Result<JoinHandle<()>> {
         let exchange = self.clone();
-        Builder::new().name(name.to_owned()).spawn(move || work(&exchange))
+        Builder::new()
+            .name(name.to_owned())
+            .spawn(move || work(&exchange))
     }
 
     /// Has the threads that send end when all is sent.
@@ -134,7 +138,9 @@ impl<C: Send + Sync> Port for Joined<C> {
     fn publish(&self, publication: Publication) {
         // the mesh, and touches with their curves, are large and may wait
         match publication {
-            Publication::Tile(_) | Publication::MeshPatch(_) | Publication::ProbeTouch(_) => &self.exchange.mesh,
+            Publication::Tile(_) | Publication::MeshPatch(_) | Publication::ProbeTouch(_) => {
+                &self.exchange.mesh
+            }
             _ => &self.exchange.urgent,
         }
         .put(publication);
@@ -161,7 +167,10 @@ impl<C: Send + Sync> Port for Joined<C> {
     }
 
     fn lost(&self) -> [u64; 2] {
-        self.exchange.lost.each_ref().map(|count| count.load(Ordering::Relaxed))
+        self.exchange
+            .lost
+            .each_ref()
+            .map(|count| count.load(Ordering::Relaxed))
     }
 
     fn unsent(&self) -> [u64; 2] {

@@ -92,7 +92,11 @@ pub fn start_unread(inbox: Inbox, clock: &Clock) -> (Arc<dyn Port>, OtherPartici
     start_keeping(0, inbox, clock)
 }
 
-fn start_keeping(most_kept: usize, inbox: Inbox, clock: &Clock) -> (Arc<dyn Port>, OtherParticipants) {
+fn start_keeping(
+    most_kept: usize,
+    inbox: Inbox,
+    clock: &Clock,
+) -> (Arc<dyn Port>, OtherParticipants) {
     let port = Arc::new(InProcess {
         published: Mutex::default(),
         most_kept,
@@ -174,7 +178,10 @@ mod tests {
         let answers = world.call(|reply| Call::Undo(UndoRequest { strokes: 2 }, reply));
         match arrivals.recv().unwrap() {
             Arrival::Call(Call::Undo(request, reply)) => {
-                reply.send(UndoResponse { strokes: request.strokes, ..Default::default() });
+                reply.send(UndoResponse {
+                    strokes: request.strokes,
+                    ..Default::default()
+                });
             }
             other => panic!("{other:?}"),
         }
@@ -210,10 +217,12 @@ mod tests {
         let (inbox, _arrivals) = inbox(1, &Clock::system());
         let (port, world) = start(inbox, &Clock::system());
         for strokes in 0..3 {
-            port.publish(Publication::Mismatch(crate::ros::messages::HapticMismatch {
-                mesh_version: strokes,
-                ..Default::default()
-            }));
+            port.publish(Publication::Mismatch(
+                crate::ros::messages::HapticMismatch {
+                    mesh_version: strokes,
+                    ..Default::default()
+                },
+            ));
         }
         let versions: Vec<u64> = world
             .published()

@@ -19,7 +19,8 @@ use crate::clock::Clock;
 /// Calls and changes of parameters that wait for the node at most.
 const MOST_CALLS: usize = 256;
 /// Why one more is refused.
-const FULL: &str = "too many calls wait for the node: nothing was done; call again when they are answered";
+const FULL: &str =
+    "too many calls wait for the node: nothing was done; call again when they are answered";
 /// Why a call is refused that came too late.
 const ENDED: &str = "the node ends: nothing was done";
 
@@ -73,14 +74,23 @@ pub fn inbox(samples: usize, clock: &Clock) -> (Inbox, Arrivals) {
         is_over: AtomicBool::new(false),
         stops: Arc::new(StopState::new(clock.clone())),
     });
-    (Inbox { to, shared: Arc::clone(&shared) }, Arrivals { from, shared })
+    (
+        Inbox {
+            to,
+            shared: Arc::clone(&shared),
+        },
+        Arrivals { from, shared },
+    )
 }
 
 /// Which room it takes; `None`: it always finds some.
 fn kind_of(arrival: &Arrival) -> Option<usize> {
     match arrival {
         Arrival::Shutdown => None,
-        Arrival::Call(_) | Arrival::SetParameter(..) | Arrival::Evidence(_) | Arrival::Replay(..) => Some(1),
+        Arrival::Call(_)
+        | Arrival::SetParameter(..)
+        | Arrival::Evidence(_)
+        | Arrival::Replay(..) => Some(1),
         _ => Some(0),
     }
 }
@@ -99,8 +109,13 @@ impl Inbox {
     /// As [`Self::put`], as soon as there is room. Whether the node still takes anything.
     pub fn put_patiently(&self, arrival: Arrival) -> bool {
         self.put_in(arrival, |shared, waiting, kind| {
-            let is_full = |waiting: &mut Waiting| !waiting.is_closed && waiting.counts[kind] >= shared.room[kind];
-            shared.taken.wait_while(waiting, is_full).unwrap_or_else(PoisonError::into_inner)
+            let is_full = |waiting: &mut Waiting| {
+                !waiting.is_closed && waiting.counts[kind] >= shared.room[kind]
+            };
+            shared
+                .taken
+                .wait_while(waiting, is_full)
+                .unwrap_or_else(PoisonError::into_inner)
         })
     }
 
@@ -109,7 +124,9 @@ impl Inbox {
         arrival: Arrival,
         wait: impl FnOnce(&'a Shared, MutexGuard<'a, Waiting>, usize) -> MutexGuard<'a, Waiting>,
     ) -> bool {
-        let Some(arrival) = self.stop(arrival) else { return true };
+        let Some(arrival) = self.stop(arrival) else {
+            return true;
+        };
         let (shared, kind) = (&*self.shared, kind_of(&arrival));
         let mut waiting = locked(&shared.waiting);
         if let Some(kind) = kind {
@@ -164,12 +181,19 @@ impl Inbox {
             Some(reason) => tracing::warn!(topic, "{reason}"),
             None => tracing::info!(topic, others = count, "who is on a topic has changed"),
         }
-        self.put(Arrival::Matched(Endpoint { topic, count, mismatch }));
+        self.put(Arrival::Matched(Endpoint {
+            topic,
+            count,
+            mismatch,
+        }));
     }
 
     /// As [`super::port::Port::dropped`].
     pub fn dropped(&self) -> [u64; 2] {
-        self.shared.dropped.each_ref().map(|count| count.load(Ordering::Relaxed))
+        self.shared
+            .dropped
+            .each_ref()
+            .map(|count| count.load(Ordering::Relaxed))
     }
 
     /// The port leaves: it puts nothing in any more.
@@ -186,7 +210,10 @@ impl Inbox {
 impl Arrivals {
     /// The next one. `None` when nothing can arrive any more.
     pub fn recv(&self) -> Option<Arrival> {
-        self.from.recv().ok().inspect(|arrival| self.note_taken(arrival))
+        self.from
+            .recv()
+            .ok()
+            .inspect(|arrival| self.note_taken(arrival))
     }
 
     /// The next one, when it is there.
@@ -194,15 +221,23 @@ impl Arrivals {
     /// # Errors
     /// As [`Receiver::try_recv`].
     pub fn try_recv(&self) -> Result<Arrival, TryRecvError> {
-        self.from.try_recv().inspect(|arrival| self.note_taken(arrival))
+        self.from
+            .try_recv()
+            .inspect(|arrival| self.note_taken(arrival))
     }
 
     /// The next one within a time.
     ///
     /// # Errors
     /// As [`Receiver::recv_timeout`].
-    pub fn recv_timeout(&self, clock: &Clock, timeout: Duration) -> Result<Arrival, RecvTimeoutError> {
-        clock.recv_timeout(&self.from, timeout).inspect(|arrival| self.note_taken(arrival))
+    pub fn recv_timeout(
+        &self,
+        clock: &Clock,
+        timeout: Duration,
+    ) -> Result<Arrival, RecvTimeoutError> {
+        clock
+            .recv_timeout(&self.from, timeout)
+            .inspect(|arrival| self.note_taken(arrival))
     }
 
     /// What stops the arm, and the samples.
@@ -223,7 +258,9 @@ impl Drop for Arrivals {
         // nothing is put in after this
         locked(&self.shared.waiting).is_closed = true;
         self.shared.taken.notify_all();
-        self.from.try_iter().for_each(|arrival| arrival.refuse(ProbeResult::SHUTDOWN, ENDED));
+        self.from
+            .try_iter()
+            .for_each(|arrival| arrival.refuse(ProbeResult::SHUTDOWN, ENDED));
     }
 }
 
@@ -232,7 +269,9 @@ mod tests {
     use std::time::Instant;
 
     use super::*;
-    use crate::ros::messages::{PoseStamped, ProbeFeatureRequest, ProbeGoal, TFMessage, TriggerResponse};
+    use crate::ros::messages::{
+        PoseStamped, ProbeFeatureRequest, ProbeGoal, TFMessage, TriggerResponse,
+    };
     use crate::ros::parameters::ParameterValue;
     use crate::ros::port::{Feedback, Goal, Reply};
 
@@ -247,18 +286,28 @@ mod tests {
     }
 
     #[test]
-    fn samples_that_find_no_room_are_counted_and_calls_have_room_of_their_own_in_the_order_of_all() {
+    fn samples_that_find_no_room_are_counted_and_calls_have_room_of_their_own_in_the_order_of_all()
+    {
         let (inbox, arrivals) = inbox(1, &Clock::system());
         assert!(inbox.put(pose()) && !inbox.put(pose()) && !inbox.put(pose()));
         assert!(!inbox.put(Arrival::Tf(TFMessage::default())));
         assert_eq!(inbox.dropped(), [2, 1]);
         assert!(inbox.put(Arrival::Call(Call::Reset(reply().0))));
-        assert!(inbox.put(Arrival::SetParameter("stale_ms".to_owned(), ParameterValue::Double(7.0), reply().0)));
+        assert!(inbox.put(Arrival::SetParameter(
+            "stale_ms".to_owned(),
+            ParameterValue::Double(7.0),
+            reply().0
+        )));
         assert!(matches!(arrivals.recv(), Some(Arrival::Pose(..))));
         assert!(inbox.put(pose()), "there is room again");
-        assert!(matches!(arrivals.recv(), Some(Arrival::Call(Call::Reset(_)))));
+        assert!(matches!(
+            arrivals.recv(),
+            Some(Arrival::Call(Call::Reset(_)))
+        ));
         assert!(matches!(arrivals.recv(), Some(Arrival::SetParameter(..))));
-        assert!(matches!(arrivals.try_recv(), Ok(Arrival::Pose(..))) && arrivals.try_recv().is_err());
+        assert!(
+            matches!(arrivals.try_recv(), Ok(Arrival::Pose(..))) && arrivals.try_recv().is_err()
+        );
     }
 
     #[test]
@@ -269,12 +318,20 @@ mod tests {
             (inbox.put(Arrival::Call(Call::Reset(to))), answer)
         };
         let waiting: Vec<_> = (0..MOST_CALLS).map(|_| ask()).collect();
-        assert!(waiting.iter().all(|(is_in, answer)| *is_in && answer.try_recv().is_err()));
+        assert!(
+            waiting
+                .iter()
+                .all(|(is_in, answer)| *is_in && answer.try_recv().is_err())
+        );
         let (is_in, answer) = ask();
         assert!(!is_in && answer.try_recv().unwrap().message == FULL);
-        assert!(inbox.put(pose()) && inbox.put(Arrival::Shutdown), "each has room of its own, the end always");
+        assert!(
+            inbox.put(pose()) && inbox.put(Arrival::Shutdown),
+            "each has room of its own, the end always"
+        );
         drop(arrivals);
-        let refused = |answer: &Receiver<TriggerResponse>| answer.try_recv().unwrap().message == ENDED;
+        let refused =
+            |answer: &Receiver<TriggerResponse>| answer.try_recv().unwrap().message == ENDED;
         assert!(waiting.iter().all(|(_, answer)| refused(answer)));
         assert!(refused(&ask().1) && !inbox.put(pose()) && !inbox.put_patiently(pose()));
     }
@@ -292,19 +349,49 @@ mod tests {
                 assert!(!said.success && said.message == ENDED, "{said:?}");
             })+};
         }
-        assert_refused!(Flag(Default::default()), Unflag(Default::default()), Detect(Default::default()), ArmState);
-        assert_refused!(Save(Default::default()), Resync(Default::default()), Undo(Default::default()), Reset);
+        assert_refused!(
+            Flag(Default::default()),
+            Unflag(Default::default()),
+            Detect(Default::default()),
+            ArmState
+        );
+        assert_refused!(
+            Save(Default::default()),
+            Resync(Default::default()),
+            Undo(Default::default()),
+            Reset
+        );
         assert_refused!(Redo(Default::default()), TakeOut(Default::default()));
         let (to, answer) = reply();
-        let order = ArmOrder::Feature(ProbeFeatureRequest { id: 7, ..Default::default() }, to);
+        let order = ArmOrder::Feature(
+            ProbeFeatureRequest {
+                id: 7,
+                ..Default::default()
+            },
+            to,
+        );
         inbox.put(Arrival::Call(Call::Arm(order)));
         let result = answer.try_recv().unwrap().result;
-        assert_eq!((result.id, result.code, result.message.as_str()), (7, ProbeResult::SHUTDOWN, ENDED));
+        assert_eq!(
+            (result.id, result.code, result.message.as_str()),
+            (7, ProbeResult::SHUTDOWN, ENDED)
+        );
         assert!(result.uncertainty.is_nan() && result.feature.diameter.is_nan());
         let ((accept, accepted), (result, ended)) = (reply(), reply());
         let (feedback, is_cancelled) = (Feedback(Box::new(|_| {})), Arc::default());
-        let goal = Goal { accept, feedback, result, is_cancelled };
-        inbox.put(Arrival::Call(Call::Arm(ArmOrder::Goal(ProbeGoal { ids: vec![7], ..Default::default() }, goal))));
+        let goal = Goal {
+            accept,
+            feedback,
+            result,
+            is_cancelled,
+        };
+        inbox.put(Arrival::Call(Call::Arm(ArmOrder::Goal(
+            ProbeGoal {
+                ids: vec![7],
+                ..Default::default()
+            },
+            goal,
+        ))));
         let (_, response) = ended.try_recv().unwrap();
         assert_eq!(
             (accepted.try_recv(), response.ids, response.codes),
@@ -320,7 +407,13 @@ mod tests {
         assert!(recover());
         inbox.stops().stop();
         // the node takes up the first call only now
-        assert!(inbox.stops().recover().unwrap_err().contains("call ~/recover again"));
+        assert!(
+            inbox
+                .stops()
+                .recover()
+                .unwrap_err()
+                .contains("call ~/recover again")
+        );
         assert!(inbox.stops().ready().is_err());
         assert!(recover());
         assert!(inbox.stops().recover().is_ok() && inbox.stops().ready().is_ok());

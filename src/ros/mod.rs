@@ -33,7 +33,9 @@ pub use exchange::RosError;
 
 /// Locks it. What is in it is whole whoever held it: nothing of ours panics while it does.
 fn locked<T>(mutex: &std::sync::Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    mutex
+        .lock()
+        .unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 #[cfg(all(feature = "r2r", not(all(feature = "ros", feature = "r2r-check"))))]
 pub use r2r::{arm_port, samples, start};

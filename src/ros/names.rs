@@ -9,7 +9,9 @@ pub enum NameError {
     #[error("\"{0}\" has an empty part: a name is words between single slashes")]
     EmptyPart(String),
     /// a part begins with a digit or has another sign than letters, digits and _
-    #[error("\"{name}\" has the part \"{part}\": letters, digits and single _ are allowed, no digit at the beginning")]
+    #[error(
+        "\"{name}\" has the part \"{part}\": letters, digits and single _ are allowed, no digit at the beginning"
+    )]
     BadPart {
         /// the whole
         name: String,
@@ -48,7 +50,9 @@ impl GraphPlace {
     /// [`NameError`] when what comes out is no name.
     pub fn expand(&self, name: &str) -> Result<String, NameError> {
         let name = name.replace("{node}", &self.node);
-        let name = name.replace("{ns}", &self.namespace).replace("{namespace}", &self.namespace);
+        let name = name
+            .replace("{ns}", &self.namespace)
+            .replace("{namespace}", &self.namespace);
         let whole = match name.strip_prefix('~') {
             Some("") => self.full_name(),
             Some(own) if own.starts_with('/') => self.full_name() + own,
@@ -75,14 +79,19 @@ impl GraphPlace {
 
 /// An absolute name, if it is one.
 pub(super) fn checked(whole: String) -> Result<String, NameError> {
-    let Some(parts) = whole.strip_prefix('/') else { return Err(NameError::EmptyPart(whole)) };
+    let Some(parts) = whole.strip_prefix('/') else {
+        return Err(NameError::EmptyPart(whole));
+    };
     for part in parts.split('/') {
         if part.is_empty() {
             return Err(NameError::EmptyPart(whole));
         }
         let is_word = part.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
         if !is_word || part.starts_with(|c: char| c.is_ascii_digit()) || part.contains("__") {
-            return Err(NameError::BadPart { part: part.to_owned(), name: whole });
+            return Err(NameError::BadPart {
+                part: part.to_owned(),
+                name: whole,
+            });
         }
     }
     Ok(whole)
@@ -93,15 +102,22 @@ pub(super) fn matches(pattern: &str, full_name: &str) -> bool {
     fn fits(pattern: &[&str], name: &[&str]) -> bool {
         match (pattern.split_first(), name.split_first()) {
             (None, None) => true,
-            (Some((&"**", rest)), _) => (0..=name.len()).any(|skipped| fits(rest, &name[skipped..])),
-            (Some((&part, rest)), Some((&word, others))) => (part == "*" || part == word) && fits(rest, others),
+            (Some((&"**", rest)), _) => {
+                (0..=name.len()).any(|skipped| fits(rest, &name[skipped..]))
+            }
+            (Some((&part, rest)), Some((&word, others))) => {
+                (part == "*" || part == word) && fits(rest, others)
+            }
             _ => false,
         }
     }
     let mut pattern: Vec<&str> = pattern.split('/').filter(|part| !part.is_empty()).collect();
     // two together mean the same as one, and take long
     pattern.dedup_by(|a, b| *a == "**" && *b == "**");
-    let name: Vec<&str> = full_name.split('/').filter(|part| !part.is_empty()).collect();
+    let name: Vec<&str> = full_name
+        .split('/')
+        .filter(|part| !part.is_empty())
+        .collect();
     fits(&pattern, &name)
 }
 
@@ -110,7 +126,10 @@ mod tests {
     use super::*;
 
     fn place(namespace: &str) -> GraphPlace {
-        GraphPlace { namespace: namespace.into(), node: "touchup".into() }
+        GraphPlace {
+            namespace: namespace.into(),
+            node: "touchup".into(),
+        }
     }
 
     #[test]
@@ -125,7 +144,11 @@ mod tests {
             ("/a/b", "{node}/x", "/a/b/touchup/x"),
         ];
         for (namespace, name, whole) in cases {
-            assert_eq!(place(namespace).expand(name).unwrap(), whole, "{namespace} {name}");
+            assert_eq!(
+                place(namespace).expand(name).unwrap(),
+                whole,
+                "{namespace} {name}"
+            );
         }
         for bad in ["", "/", "a//b", "a/", "~x", "1a", "a b", "a__b", "{x}"] {
             assert!(place("").expand(bad).is_err(), "{bad}");
@@ -134,10 +157,20 @@ mod tests {
 
     #[test]
     fn the_first_rule_that_fits_is_taken() {
-        let rule = |from: &str, to: &str| Remap { from: from.into(), to: to.into() };
-        let rules = [rule("stylus/wrench", "/ft/wrench"), rule("/bench/mesh", "view/mesh"), rule("mesh", "never")];
+        let rule = |from: &str, to: &str| Remap {
+            from: from.into(),
+            to: to.into(),
+        };
+        let rules = [
+            rule("stylus/wrench", "/ft/wrench"),
+            rule("/bench/mesh", "view/mesh"),
+            rule("mesh", "never"),
+        ];
         let place = place("/bench");
-        assert_eq!(place.resolve("stylus/wrench", &rules).unwrap(), "/ft/wrench");
+        assert_eq!(
+            place.resolve("stylus/wrench", &rules).unwrap(),
+            "/ft/wrench"
+        );
         assert_eq!(place.resolve("mesh", &rules).unwrap(), "/bench/view/mesh");
         assert_eq!(place.resolve("tip", &rules).unwrap(), "/bench/tip");
     }

@@ -57,7 +57,11 @@ impl PublicParameters {
         announce: impl Fn(&str, &ParameterValue) + Send + Sync + 'static,
     ) -> Arc<Self> {
         let values = Mutex::new(values.clone());
-        Arc::new(Self { exchange: exchange.clone(), values, announce: Box::new(announce) })
+        Arc::new(Self {
+            exchange: exchange.clone(),
+            values,
+            announce: Box::new(announce),
+        })
     }
 
     /// Asks the node for one after the other, and answers when all are done.
@@ -69,7 +73,9 @@ impl PublicParameters {
     ) {
         // what is refused here needs no answer of the node
         let (name, value) = loop {
-            let Some(next) = wanted.next() else { return answer.send(results) };
+            let Some(next) = wanted.next() else {
+                return answer.send(results);
+            };
             let checked = check(&locked(&self.values), &next);
             match checked {
                 Ok(value) => break (next.name, value),
@@ -87,24 +93,40 @@ impl PublicParameters {
             results.push(result(set));
             self.set(wanted, results, answer);
         });
-        exchange.inbox.put(Arrival::SetParameter(name, value, reply));
+        exchange
+            .inbox
+            .put(Arrival::SetParameter(name, value, reply));
     }
 
     /// All or none, as far as the table of parameters can say before any is set.
-    fn set_all(self: &Arc<Self>, wanted: Vec<Parameter>, reply: Reply<SetParametersAtomicallyResponse>) {
+    fn set_all(
+        self: &Arc<Self>,
+        wanted: Vec<Parameter>,
+        reply: Reply<SetParametersAtomicallyResponse>,
+    ) {
         let checked = if wanted.len() > MOST_NAMES {
-            Err(format!("{} parameters in one call: at most {MOST_NAMES}", wanted.len()))
+            Err(format!(
+                "{} parameters in one call: at most {MOST_NAMES}",
+                wanted.len()
+            ))
         } else {
             let values = locked(&self.values);
-            wanted.iter().try_for_each(|parameter| check(&values, parameter).map(drop))
+            wanted
+                .iter()
+                .try_for_each(|parameter| check(&values, parameter).map(drop))
         };
         let all_set = move |results: Vec<SetParametersResult>| {
-            let first = results.into_iter().find(|one| !one.successful).unwrap_or_else(|| result(Ok(())));
+            let first = results
+                .into_iter()
+                .find(|one| !one.successful)
+                .unwrap_or_else(|| result(Ok(())));
             reply.send(SetParametersAtomicallyResponse { result: first });
         };
         match checked {
             Err(_) => all_set(vec![result(checked)]),
-            Ok(()) => self.clone().set(wanted.into_iter(), Vec::new(), Reply::new(all_set)),
+            Ok(()) => self
+                .clone()
+                .set(wanted.into_iter(), Vec::new(), Reply::new(all_set)),
         }
     }
 }
@@ -113,8 +135,13 @@ impl PublicParameters {
 fn check(values: &Parameters, wanted: &Parameter) -> Result<ParameterValue, String> {
     let value = ours(&wanted.value).ok_or("no parameter of this node has a value of this type")?;
     let mut values = values.clone();
-    values.set_live(&wanted.name, &value).map_err(|error| error.to_string())?;
-    values.value(&wanted.name).cloned().ok_or_else(|| format!("there is no parameter \"{}\"", wanted.name))
+    values
+        .set_live(&wanted.name, &value)
+        .map_err(|error| error.to_string())?;
+    values
+        .value(&wanted.name)
+        .cloned()
+        .ok_or_else(|| format!("there is no parameter \"{}\"", wanted.name))
 }
 
 fn few(names: &[String]) -> &[String] {
@@ -122,38 +149,75 @@ fn few(names: &[String]) -> &[String] {
 }
 
 pub(super) fn result(result: Result<(), String>) -> SetParametersResult {
-    SetParametersResult { successful: result.is_ok(), reason: result.err().unwrap_or_default() }
+    SetParametersResult {
+        successful: result.is_ok(),
+        reason: result.err().unwrap_or_default(),
+    }
 }
 
 pub(super) fn get(values: &Parameters, request: &GetParametersRequest) -> GetParametersResponse {
-    GetParametersResponse { values: few(&request.names).iter().map(|name| raw(values.value(name))).collect() }
+    GetParametersResponse {
+        values: few(&request.names)
+            .iter()
+            .map(|name| raw(values.value(name)))
+            .collect(),
+    }
 }
 
 fn types(values: &Parameters, request: &GetParameterTypesRequest) -> GetParameterTypesResponse {
-    let types = few(&request.names).iter().map(|name| values.value(name).map_or(NOT_SET, type_of));
-    GetParameterTypesResponse { types: types.collect() }
+    let types = few(&request.names)
+        .iter()
+        .map(|name| values.value(name).map_or(NOT_SET, type_of));
+    GetParameterTypesResponse {
+        types: types.collect(),
+    }
 }
 
 /// Names with one of the prefixes; none of ours has a dot, so the depth matters to nobody.
 pub(super) fn list(request: &ListParametersRequest) -> ListParametersResponse {
-    let is_wanted = |name: &str| request.prefixes.is_empty() || request.prefixes.iter().any(|prefix| prefix == name);
-    let names = PARAMETERS.iter().map(|declared| declared.name.to_owned()).filter(|name| is_wanted(name)).collect();
-    ListParametersResponse { result: ListParametersResult { names, prefixes: Vec::new() } }
+    let is_wanted = |name: &str| {
+        request.prefixes.is_empty() || request.prefixes.iter().any(|prefix| prefix == name)
+    };
+    let names = PARAMETERS
+        .iter()
+        .map(|declared| declared.name.to_owned())
+        .filter(|name| is_wanted(name))
+        .collect();
+    ListParametersResponse {
+        result: ListParametersResult {
+            names,
+            prefixes: Vec::new(),
+        },
+    }
 }
 
 pub(super) fn describe_all(request: &DescribeParametersRequest) -> DescribeParametersResponse {
-    DescribeParametersResponse { descriptors: few(&request.names).iter().map(|name| describe(name)).collect() }
+    DescribeParametersResponse {
+        descriptors: few(&request.names)
+            .iter()
+            .map(|name| describe(name))
+            .collect(),
+    }
 }
 
 fn describe(name: &str) -> messages::ParameterDescriptor {
-    let mut described = messages::ParameterDescriptor { name: name.to_owned(), ..Default::default() };
-    let Ok(declared) = descriptor(name) else { return described };
+    let mut described = messages::ParameterDescriptor {
+        name: name.to_owned(),
+        ..Default::default()
+    };
+    let Ok(declared) = descriptor(name) else {
+        return described;
+    };
     described.r#type = type_of(&declared.default_value());
     described.description = declared.description.to_owned();
     described.read_only = declared.settable == Settable::AtStart;
     match declared.allowed {
         Allowed::Double(_, from_value, to_value) => {
-            described.floating_point_range = vec![FloatingPointRange { from_value, to_value, step: 0.0 }];
+            described.floating_point_range = vec![FloatingPointRange {
+                from_value,
+                to_value,
+                step: 0.0,
+            }];
         }
         Allowed::OneOf(_, words) => described.additional_constraints = words.join(", "),
         Allowed::Bool(_) | Allowed::String(_) | Allowed::SampleType(_) => {}
@@ -172,7 +236,10 @@ fn type_of(value: &ParameterValue) -> u8 {
 
 /// As it is on the wire; of `None` that it is not set.
 pub(super) fn raw(value: Option<&ParameterValue>) -> messages::ParameterValue {
-    let mut raw = messages::ParameterValue { r#type: value.map_or(NOT_SET, type_of), ..Default::default() };
+    let mut raw = messages::ParameterValue {
+        r#type: value.map_or(NOT_SET, type_of),
+        ..Default::default()
+    };
     match value {
         Some(ParameterValue::Bool(on)) => raw.bool_value = *on,
         Some(ParameterValue::Integer(whole)) => raw.integer_value = *whole,
@@ -199,7 +266,10 @@ mod tests {
     use super::*;
 
     fn wanted(name: &str, value: messages::ParameterValue) -> Parameter {
-        Parameter { name: name.to_owned(), value }
+        Parameter {
+            name: name.to_owned(),
+            value,
+        }
     }
 
     #[test]
@@ -212,7 +282,10 @@ mod tests {
         ];
         for (value, number) in values.into_iter().zip(1..) {
             let raw = raw(Some(&value));
-            assert_eq!(raw.r#type, number, "as rcl_interfaces/msg/ParameterType counts them");
+            assert_eq!(
+                raw.r#type, number,
+                "as rcl_interfaces/msg/ParameterType counts them"
+            );
             assert_eq!(ours(&raw), Some(value));
         }
         assert_eq!((raw(None).r#type, ours(&raw(None))), (0, None));
@@ -221,33 +294,62 @@ mod tests {
     #[test]
     fn a_list_is_refused_and_so_is_what_the_table_refuses() {
         let values = Parameters::default();
-        let list = messages::ParameterValue { r#type: 8, double_array_value: vec![1.0], ..raw(None) };
+        let list = messages::ParameterValue {
+            r#type: 8,
+            double_array_value: vec![1.0],
+            ..raw(None)
+        };
         let reason = check(&values, &wanted("view_rate_hz", list)).unwrap_err();
         assert_eq!(reason, "no parameter of this node has a value of this type");
         let high = raw(Some(&ParameterValue::Double(1e3)));
         let reason = check(&values, &wanted("view_rate_hz", high)).unwrap_err();
         assert_eq!(reason, "view_rate_hz is 1000.0: it may be 0.1 to 100");
         let whole = raw(Some(&ParameterValue::Integer(5)));
-        assert_eq!(check(&values, &wanted("view_rate_hz", whole)), Ok(ParameterValue::Double(5.0)));
+        assert_eq!(
+            check(&values, &wanted("view_rate_hz", whole)),
+            Ok(ParameterValue::Double(5.0))
+        );
     }
 
     #[test]
     fn descriptions_have_type_range_words_and_what_is_fixed() {
         let rate = describe("view_rate_hz");
         let range = &rate.floating_point_range[0];
-        assert_eq!((rate.r#type, rate.read_only, range.from_value, range.to_value), (3, false, 0.1, 100.0));
+        assert_eq!(
+            (
+                rate.r#type,
+                rate.read_only,
+                range.from_value,
+                range.to_value
+            ),
+            (3, false, 0.1, 100.0)
+        );
         let robot = describe("robot");
         assert_eq!((robot.r#type, robot.read_only), (4, true));
         assert_eq!(robot.additional_constraints, "none, sim, ur, ros2_control");
         assert_eq!(describe("use_sim_time").r#type, 1);
-        assert_eq!((describe("nothing").r#type, describe("nothing").name.as_str()), (0, "nothing"));
+        assert_eq!(
+            (
+                describe("nothing").r#type,
+                describe("nothing").name.as_str()
+            ),
+            (0, "nothing")
+        );
     }
 
     #[test]
     fn names_are_listed_all_or_those_that_are_asked_for() {
-        let all = list(&ListParametersRequest { prefixes: Vec::new(), depth: 0 }).result.names;
+        let all = list(&ListParametersRequest {
+            prefixes: Vec::new(),
+            depth: 0,
+        })
+        .result
+        .names;
         assert_eq!(all.len(), PARAMETERS.len());
-        let request = ListParametersRequest { prefixes: vec!["robot".into(), "none".into()], depth: 1 };
+        let request = ListParametersRequest {
+            prefixes: vec!["robot".into(), "none".into()],
+            depth: 1,
+        };
         assert_eq!(list(&request).result.names, ["robot"]);
     }
 }

@@ -114,39 +114,134 @@ pub struct ParameterDescriptor {
 pub const CELL_FRAME: &str = "cell";
 
 /// Names of the kinds of features by their numbers in messages.
-pub const KIND_NAMES: [&str; 10] =
-    ["unknown", "hole", "slot", "pocket", "boss", "edge", "corner", "plane", "cylinder", "notch"];
+pub const KIND_NAMES: [&str; 10] = [
+    "unknown", "hole", "slot", "pocket", "boss", "edge", "corner", "plane", "cylinder", "notch",
+];
 
 /// All parameters of the node, those of docs/ros.md and the one that every node has.
 pub const PARAMETERS: &[ParameterDescriptor] = {
     use Allowed::{Bool, Double, OneOf, SampleType, String};
-    const fn fixed(name: &'static str, allowed: Allowed, description: &'static str) -> ParameterDescriptor {
-        ParameterDescriptor { name, allowed, settable: Settable::AtStart, description }
+    const fn fixed(
+        name: &'static str,
+        allowed: Allowed,
+        description: &'static str,
+    ) -> ParameterDescriptor {
+        ParameterDescriptor {
+            name,
+            allowed,
+            settable: Settable::AtStart,
+            description,
+        }
     }
-    const fn live(name: &'static str, allowed: Allowed, description: &'static str) -> ParameterDescriptor {
-        ParameterDescriptor { name, allowed, settable: Settable::Live, description }
+    const fn live(
+        name: &'static str,
+        allowed: Allowed,
+        description: &'static str,
+    ) -> ParameterDescriptor {
+        ParameterDescriptor {
+            name,
+            allowed,
+            settable: Settable::Live,
+            description,
+        }
     }
     &[
-        fixed("scene", String(""), "the scene; empty: that of config/default.yaml"),
-        fixed("scan", String(""), "the mesh to be refined; empty: the one that the scene names"),
-        fixed("tip_radius_mm", Double(0.0, 0.0, 1_000.0), "radius of the ball; 0: the one that the scene names"),
-        fixed("mesh_unit", OneOf("mm", MeshUnit::WORDS), "unit of its coordinates"),
-        fixed("source", OneOf("stylus", &["stylus", "probe"]), "who touches"),
-        fixed("session_folder", String("sessions"), "where sessions go, each in a folder of its own"),
+        fixed(
+            "scene",
+            String(""),
+            "the scene; empty: that of config/default.yaml",
+        ),
+        fixed(
+            "scan",
+            String(""),
+            "the mesh to be refined; empty: the one that the scene names",
+        ),
+        fixed(
+            "tip_radius_mm",
+            Double(0.0, 0.0, 1_000.0),
+            "radius of the ball; 0: the one that the scene names",
+        ),
+        fixed(
+            "mesh_unit",
+            OneOf("mm", MeshUnit::WORDS),
+            "unit of its coordinates",
+        ),
+        fixed(
+            "source",
+            OneOf("stylus", &["stylus", "probe"]),
+            "who touches",
+        ),
+        fixed(
+            "session_folder",
+            String("sessions"),
+            "where sessions go, each in a folder of its own",
+        ),
         fixed("object_frame", String("object"), "frame of the mesh"),
-        fixed("tool_frame", String(""), "frame whose pose comes; empty: as source"),
-        fixed("pose_type", SampleType(SampleKind::Pose), "type of the poses; empty: as published"),
-        fixed("wrench_type", SampleType(SampleKind::Wrench), "type of the wrenches; empty: as published"),
-        fixed("pose_frame", String(""), "whose pose is taken from /tf, as tool0 or tool0 in base; empty: of a topic"),
-        live("view_rate_hz", Double(20.0, 0.1, 100.0), "tiles and tip markers"),
-        live("features_rate_hz", Double(5.0, 0.1, 100.0), "features while they change"),
-        live("mismatch_rate_hz", Double(0.0, 0.0, 10_000.0), "at most; 0: every sample"),
-        live("colour_by", OneOf("touched", &["touched", "mismatch"]), "colours of the mesh"),
-        live("stale_ms", Double(100.0, 1.0, 10_000.0), "a stream without a message for so long is stale"),
-        live("flag_kind", OneOf("hole", &KIND_NAMES), "what a clicked point flags"),
-        live("flag_radius_mm", Double(5.0, 0.1, 1_000.0), "how far around it is looked for"),
-        fixed("robot", OneOf("none", &["none", "sim", "ur", "ros2_control"]), "the arm"),
-        fixed("sim_part", String(""), "the part as it is, which a simulated arm touches"),
+        fixed(
+            "tool_frame",
+            String(""),
+            "frame whose pose comes; empty: as source",
+        ),
+        fixed(
+            "pose_type",
+            SampleType(SampleKind::Pose),
+            "type of the poses; empty: as published",
+        ),
+        fixed(
+            "wrench_type",
+            SampleType(SampleKind::Wrench),
+            "type of the wrenches; empty: as published",
+        ),
+        fixed(
+            "pose_frame",
+            String(""),
+            "whose pose is taken from /tf, as tool0 or tool0 in base; empty: of a topic",
+        ),
+        live(
+            "view_rate_hz",
+            Double(20.0, 0.1, 100.0),
+            "tiles and tip markers",
+        ),
+        live(
+            "features_rate_hz",
+            Double(5.0, 0.1, 100.0),
+            "features while they change",
+        ),
+        live(
+            "mismatch_rate_hz",
+            Double(0.0, 0.0, 10_000.0),
+            "at most; 0: every sample",
+        ),
+        live(
+            "colour_by",
+            OneOf("touched", &["touched", "mismatch"]),
+            "colours of the mesh",
+        ),
+        live(
+            "stale_ms",
+            Double(100.0, 1.0, 10_000.0),
+            "a stream without a message for so long is stale",
+        ),
+        live(
+            "flag_kind",
+            OneOf("hole", &KIND_NAMES),
+            "what a clicked point flags",
+        ),
+        live(
+            "flag_radius_mm",
+            Double(5.0, 0.1, 1_000.0),
+            "how far around it is looked for",
+        ),
+        fixed(
+            "robot",
+            OneOf("none", &["none", "sim", "ur", "ros2_control"]),
+            "the arm",
+        ),
+        fixed(
+            "sim_part",
+            String(""),
+            "the part as it is, which a simulated arm touches",
+        ),
         ParameterDescriptor {
             name: "allow_motion",
             allowed: Bool(false),
@@ -158,7 +253,11 @@ pub const PARAMETERS: &[ParameterDescriptor] = {
             OneOf("enhanced", &["enhanced", "cyclone"]),
             "header of services, as the RMW of the others has it (Fast DDS, Cyclone); not with r2r",
         ),
-        fixed("use_sim_time", Bool(false), "the time is that of the topic /clock"),
+        fixed(
+            "use_sim_time",
+            Bool(false),
+            "the time is that of the topic /clock",
+        ),
     ]
 };
 
@@ -243,7 +342,9 @@ impl ParameterDescriptor {
         match self.allowed {
             Allowed::Bool(on) => ParameterValue::Bool(on),
             Allowed::Double(number, ..) => ParameterValue::Double(number),
-            Allowed::String(word) | Allowed::OneOf(word, _) => ParameterValue::String(word.to_owned()),
+            Allowed::String(word) | Allowed::OneOf(word, _) => {
+                ParameterValue::String(word.to_owned())
+            }
             Allowed::SampleType(_) => ParameterValue::String(String::new()),
         }
     }
@@ -252,7 +353,11 @@ impl ParameterDescriptor {
     ///
     /// # Errors
     /// As [`Self::check`]; [`ParameterError::NotLive`], [`ParameterError::OnlyToFalse`].
-    pub fn change(&self, now: &ParameterValue, to: &ParameterValue) -> Result<ParameterValue, ParameterError> {
+    pub fn change(
+        &self,
+        now: &ParameterValue,
+        to: &ParameterValue,
+    ) -> Result<ParameterValue, ParameterError> {
         let (name, to) = (self.name, self.check(to)?);
         match self.settable {
             _ if to == *now => Ok(to),
@@ -270,31 +375,60 @@ impl ParameterDescriptor {
     pub fn check(&self, value: &ParameterValue) -> Result<ParameterValue, ParameterError> {
         let name = self.name;
         match (self.allowed, value) {
-            (Allowed::Double(_, from, to), ParameterValue::Double(number)) => within(name, *number, from, to),
+            (Allowed::Double(_, from, to), ParameterValue::Double(number)) => {
+                within(name, *number, from, to)
+            }
             // exact up to 2^53, far beyond every range
-            (Allowed::Double(_, from, to), ParameterValue::Integer(whole)) => within(name, *whole as f64, from, to),
-            (Allowed::OneOf(_, words), ParameterValue::String(word)) if !words.contains(&word.as_str()) => {
-                Err(ParameterError::Word { name, value: word.clone(), words })
+            (Allowed::Double(_, from, to), ParameterValue::Integer(whole)) => {
+                within(name, *whole as f64, from, to)
+            }
+            (Allowed::OneOf(_, words), ParameterValue::String(word))
+                if !words.contains(&word.as_str()) =>
+            {
+                Err(ParameterError::Word {
+                    name,
+                    value: word.clone(),
+                    words,
+                })
             }
             (Allowed::SampleType(kind), ParameterValue::String(type_name)) => {
                 let known = LiveType::of(kind, type_name);
-                known.map(|_| value.clone()).map_err(|why| ParameterError::SampleType { name, why })
+                known
+                    .map(|_| value.clone())
+                    .map_err(|why| ParameterError::SampleType { name, why })
             }
             (Allowed::Bool(_), ParameterValue::Bool(_))
-            | (Allowed::String(_) | Allowed::OneOf(..), ParameterValue::String(_)) => Ok(value.clone()),
+            | (Allowed::String(_) | Allowed::OneOf(..), ParameterValue::String(_)) => {
+                Ok(value.clone())
+            }
             _ => {
                 let (wanted, given) = (self.default_value().type_name(), value.type_name());
-                Err(ParameterError::Type { name, wanted, given, value: value.clone() })
+                Err(ParameterError::Type {
+                    name,
+                    wanted,
+                    given,
+                    value: value.clone(),
+                })
             }
         }
     }
 }
 
-fn within(name: &'static str, value: f64, from: f64, to: f64) -> Result<ParameterValue, ParameterError> {
+fn within(
+    name: &'static str,
+    value: f64,
+    from: f64,
+    to: f64,
+) -> Result<ParameterValue, ParameterError> {
     if (from..=to).contains(&value) {
         return Ok(ParameterValue::Double(value));
     }
-    Err(ParameterError::Range { name, value, from, to })
+    Err(ParameterError::Range {
+        name,
+        value,
+        from,
+        to,
+    })
 }
 
 /// What is declared of the parameter of that name.
@@ -302,10 +436,22 @@ fn within(name: &'static str, value: f64, from: f64, to: f64) -> Result<Paramete
 /// # Errors
 /// [`ParameterError::Unknown`], with the name that is meant when one is near.
 pub fn descriptor(name: &str) -> Result<&'static ParameterDescriptor, ParameterError> {
-    PARAMETERS.iter().find(|declared| declared.name == name).ok_or_else(|| {
-        let near = nearest(name, &PARAMETERS.iter().map(|declared| declared.name).collect::<Vec<_>>());
-        ParameterError::Unknown { name: name.to_owned(), near }
-    })
+    PARAMETERS
+        .iter()
+        .find(|declared| declared.name == name)
+        .ok_or_else(|| {
+            let near = nearest(
+                name,
+                &PARAMETERS
+                    .iter()
+                    .map(|declared| declared.name)
+                    .collect::<Vec<_>>(),
+            );
+            ParameterError::Unknown {
+                name: name.to_owned(),
+                near,
+            }
+        })
 }
 
 /// Values of all parameters. Each is what its descriptor allows.
@@ -314,7 +460,12 @@ pub struct Parameters(BTreeMap<&'static str, ParameterValue>);
 
 impl Default for Parameters {
     fn default() -> Self {
-        Self(PARAMETERS.iter().map(|declared| (declared.name, declared.default_value())).collect())
+        Self(
+            PARAMETERS
+                .iter()
+                .map(|declared| (declared.name, declared.default_value()))
+                .collect(),
+        )
     }
 }
 
@@ -335,7 +486,10 @@ impl Parameters {
     /// [`ParameterError`]; nothing is changed then.
     pub fn set_live(&mut self, name: &str, value: &ParameterValue) -> Result<(), ParameterError> {
         let declared = descriptor(name)?;
-        let now = self.0.entry(declared.name).or_insert_with(|| declared.default_value());
+        let now = self
+            .0
+            .entry(declared.name)
+            .or_insert_with(|| declared.default_value());
         *now = declared.change(now, value)?;
         Ok(())
     }
@@ -347,19 +501,29 @@ impl Parameters {
 
     /// One that is a word; empty for a name that is none.
     pub fn string(&self, name: &str) -> &str {
-        if let Some(ParameterValue::String(word)) = self.0.get(name) { word } else { "" }
+        if let Some(ParameterValue::String(word)) = self.0.get(name) {
+            word
+        } else {
+            ""
+        }
     }
 
     /// The frame whose pose is taken from transforms, and the one in which it is wanted: `tool0 in base`, or `tool0`, which is in the cell.
     pub fn pose_frames(&self) -> Option<[&str; 2]> {
         let named = self.string("pose_frame").trim();
-        let [frame, base] = named.split_once(" in ").map_or([named, CELL_FRAME], |(frame, base)| [frame, base]);
+        let [frame, base] = named
+            .split_once(" in ")
+            .map_or([named, CELL_FRAME], |(frame, base)| [frame, base]);
         (!named.is_empty()).then(|| [frame.trim(), base.trim()])
     }
 
     /// One that is a number; NaN for a name that is none.
     pub fn double(&self, name: &str) -> f64 {
-        if let Some(ParameterValue::Double(number)) = self.0.get(name) { *number } else { f64::NAN }
+        if let Some(ParameterValue::Double(number)) = self.0.get(name) {
+            *number
+        } else {
+            f64::NAN
+        }
     }
 
     /// One that is on or off; off for a name that is none.
@@ -396,16 +560,36 @@ mod tests {
     fn a_refused_value_says_why_and_changes_nothing() {
         let mut parameters = Parameters::default();
         let cases = [
-            ("view_rate_hz", ParameterValue::Double(0.05), "view_rate_hz is 0.05: it may be 0.1 to 100"),
-            ("view_rate_hz", ParameterValue::Double(f64::NAN), "view_rate_hz is NaN: it may be 0.1 to 100"),
-            ("view_rate_hz", ParameterValue::Bool(true), "view_rate_hz is a double, \"true\" is a bool"),
-            ("flag_kind", ParameterValue::String("holes".into()), "flag_kind is \"holes\": it may be unknown, hole, "),
+            (
+                "view_rate_hz",
+                ParameterValue::Double(0.05),
+                "view_rate_hz is 0.05: it may be 0.1 to 100",
+            ),
+            (
+                "view_rate_hz",
+                ParameterValue::Double(f64::NAN),
+                "view_rate_hz is NaN: it may be 0.1 to 100",
+            ),
+            (
+                "view_rate_hz",
+                ParameterValue::Bool(true),
+                "view_rate_hz is a double, \"true\" is a bool",
+            ),
+            (
+                "flag_kind",
+                ParameterValue::String("holes".into()),
+                "flag_kind is \"holes\": it may be unknown, hole, ",
+            ),
             (
                 "view_rate",
                 ParameterValue::Double(1.0),
                 "there is no parameter \"view_rate\": did you mean \"view_rate_hz\"?",
             ),
-            ("xyz", ParameterValue::Double(1.0), "there is no parameter \"xyz\""),
+            (
+                "xyz",
+                ParameterValue::Double(1.0),
+                "there is no parameter \"xyz\"",
+            ),
             (
                 "robot",
                 ParameterValue::String("sim".into()),
@@ -426,23 +610,35 @@ mod tests {
         parameters.set("allow_motion", &yes).unwrap();
         parameters.set_live("allow_motion", &yes).unwrap();
         parameters.set_live("allow_motion", &no).unwrap();
-        let why = parameters.set_live("allow_motion", &yes).unwrap_err().to_string();
-        assert!(why.contains("start it again with -p allow_motion:=true") && why.contains("scene"), "{why}");
+        let why = parameters
+            .set_live("allow_motion", &yes)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            why.contains("start it again with -p allow_motion:=true") && why.contains("scene"),
+            "{why}"
+        );
         assert!(!parameters.bool("allow_motion"));
     }
 
     #[test]
     fn a_whole_number_sets_a_double() {
         let mut parameters = Parameters::default();
-        parameters.set_live("stale_ms", &ParameterValue::Integer(250)).unwrap();
+        parameters
+            .set_live("stale_ms", &ParameterValue::Integer(250))
+            .unwrap();
         assert_eq!(parameters.double("stale_ms"), 250.0);
     }
 
     #[test]
     fn what_is_set_already_may_be_set_again() {
         let mut parameters = Parameters::default();
-        parameters.set("robot", &ParameterValue::String("sim".into())).unwrap();
-        parameters.set_live("robot", &ParameterValue::String("sim".into())).unwrap();
+        parameters
+            .set("robot", &ParameterValue::String("sim".into()))
+            .unwrap();
+        parameters
+            .set_live("robot", &ParameterValue::String("sim".into()))
+            .unwrap();
         assert_eq!(parameters.string("robot"), "sim");
     }
 }

@@ -6,13 +6,21 @@ use super::port::{ArmOrder, Arrival, Call, Goal, GoalEnd};
 /// A feature of which nothing is measured.
 pub fn unknown_feature(id: u32) -> Feature {
     let nan = f64::NAN;
-    let none = Vector3 { x: nan, y: nan, z: nan };
+    let none = Vector3 {
+        x: nan,
+        y: nan,
+        z: nan,
+    };
     Feature {
         id,
         status: Feature::STATUS_FLAGGED,
         fitted_to: Feature::FITTED_TO_NOTHING,
         search_radius: nan,
-        center: Point { x: nan, y: nan, z: nan },
+        center: Point {
+            x: nan,
+            y: nan,
+            z: nan,
+        },
         center_std: nan,
         axis: none,
         axis_std: nan,
@@ -39,7 +47,14 @@ pub fn unknown_feature(id: u32) -> Feature {
 /// - `code`: of [`ProbeResult`]
 pub fn not_probed(id: u32, code: u8, why: &str) -> ProbeResult {
     let feature = unknown_feature(id);
-    ProbeResult { id, code, message: why.to_owned(), feature, uncertainty: f64::NAN, ..ProbeResult::default() }
+    ProbeResult {
+        id,
+        code,
+        message: why.to_owned(),
+        feature,
+        uncertainty: f64::NAN,
+        ..ProbeResult::default()
+    }
 }
 
 impl Arrival {
@@ -61,14 +76,38 @@ impl Call {
     fn refuse(self, code: u8, why: &str) {
         let message = why.to_owned();
         match self {
-            Self::Flag(_, reply) => reply.send(FlagFeatureResponse { message, ..Default::default() }),
-            Self::Unflag(_, reply) => reply.send(UnflagFeatureResponse { message, ..Default::default() }),
-            Self::Detect(_, reply) => reply.send(DetectFeaturesResponse { message, ..Default::default() }),
-            Self::Save(_, reply) => reply.send(SaveMeshResponse { message, ..Default::default() }),
-            Self::Resync(_, reply) => reply.send(ResyncMeshResponse { message, ..Default::default() }),
-            Self::Undo(_, reply) | Self::Redo(_, reply) => reply.send(UndoResponse { message, ..Default::default() }),
-            Self::TakeOut(_, reply) => reply.send(TakeOutTouchResponse { message, ..Default::default() }),
-            Self::Reset(reply) | Self::ArmState(reply) => reply.send(TriggerResponse { message, ..Default::default() }),
+            Self::Flag(_, reply) => reply.send(FlagFeatureResponse {
+                message,
+                ..Default::default()
+            }),
+            Self::Unflag(_, reply) => reply.send(UnflagFeatureResponse {
+                message,
+                ..Default::default()
+            }),
+            Self::Detect(_, reply) => reply.send(DetectFeaturesResponse {
+                message,
+                ..Default::default()
+            }),
+            Self::Save(_, reply) => reply.send(SaveMeshResponse {
+                message,
+                ..Default::default()
+            }),
+            Self::Resync(_, reply) => reply.send(ResyncMeshResponse {
+                message,
+                ..Default::default()
+            }),
+            Self::Undo(_, reply) | Self::Redo(_, reply) => reply.send(UndoResponse {
+                message,
+                ..Default::default()
+            }),
+            Self::TakeOut(_, reply) => reply.send(TakeOutTouchResponse {
+                message,
+                ..Default::default()
+            }),
+            Self::Reset(reply) | Self::ArmState(reply) => reply.send(TriggerResponse {
+                message,
+                ..Default::default()
+            }),
             Self::Arm(order) => order.refuse(Header::default(), code, why),
         }
     }
@@ -81,17 +120,32 @@ impl ArmOrder {
     pub fn refuse(self, header: Header, code: u8, why: &str) {
         match self {
             Self::Feature(request, reply) => {
-                let result = ProbeResult { header, ..not_probed(request.id, code, why) };
+                let result = ProbeResult {
+                    header,
+                    ..not_probed(request.id, code, why)
+                };
                 reply.send(ProbeFeatureResponse { result });
             }
             Self::Goal(goal, Goal { accept, result, .. }) => {
                 accept.send(true);
                 let first = goal.ids.first().copied();
                 let (ids, codes) = first.map(|id| (id, code)).into_iter().unzip();
-                result.send((GoalEnd::Aborted, ProbeResponse { header, code, message: why.to_owned(), ids, codes }));
+                result.send((
+                    GoalEnd::Aborted,
+                    ProbeResponse {
+                        header,
+                        code,
+                        message: why.to_owned(),
+                        ids,
+                        codes,
+                    },
+                ));
             }
             Self::All(reply) | Self::Recover(reply) => {
-                reply.send(TriggerResponse { success: false, message: why.to_owned() });
+                reply.send(TriggerResponse {
+                    success: false,
+                    message: why.to_owned(),
+                });
             }
         }
     }

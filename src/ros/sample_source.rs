@@ -34,14 +34,20 @@ impl SampleSource {
             SampleKind::Wrench => name("wrench_type"),
         };
         // as in a recording: of two without headers both are in the same axes, else the wrench is in those of its sensor
-        let is_pose_unnamed =
-            || LiveType::of(SampleKind::Pose, &name("pose_type")).is_ok_and(|pose| !pose.has_header());
+        let is_pose_unnamed = || {
+            LiveType::of(SampleKind::Pose, &name("pose_type")).is_ok_and(|pose| !pose.has_header())
+        };
         let frame = match kind {
             SampleKind::Wrench if !is_pose_unnamed() => format!("{}_sensor", name("source")),
             _ => CELL_FRAME.to_owned(),
         };
         let (usual, known) = (LiveType::of(kind, "")?, LiveType::of(kind, &type_name)?);
-        Ok(Some(Self { kind, named: (!type_name.is_empty()).then_some(known), usual, frame }))
+        Ok(Some(Self {
+            kind,
+            named: (!type_name.is_empty()).then_some(known),
+            usual,
+            frame,
+        }))
     }
 
     /// The type to listen to before anybody publishes.
@@ -63,20 +69,42 @@ impl SampleSource {
             return (now, None);
         }
         if let Some(named) = self.named {
-            let parameter = if self.kind == SampleKind::Pose { "pose_type" } else { "wrench_type" };
-            let why = format!("somebody publishes {}, the parameter {parameter} names {}", published[0], named.name());
+            let parameter = if self.kind == SampleKind::Pose {
+                "pose_type"
+            } else {
+                "wrench_type"
+            };
+            let why = format!(
+                "somebody publishes {}, the parameter {parameter} names {}",
+                published[0],
+                named.name()
+            );
             return (now, Some(why));
         }
-        let known: Vec<_> = published.iter().map(|name| LiveType::of(self.kind, name)).collect();
+        let known: Vec<_> = published
+            .iter()
+            .map(|name| LiveType::of(self.kind, name))
+            .collect();
         match known.iter().find_map(|of| of.as_ref().ok()) {
             Some(readable) => (*readable, None),
-            None => (now, known.into_iter().find_map(Result::err).map(|why| format!("somebody publishes {why}"))),
+            None => (
+                now,
+                known
+                    .into_iter()
+                    .find_map(Result::err)
+                    .map(|why| format!("somebody publishes {why}")),
+            ),
         }
     }
 
     /// What goes to the node of a message on `topic`, read as `of`. A header that names no frame is refused there: only a type without
     /// one is in the frame of the parameters.
-    pub fn arrival(&self, topic: &'static str, of: LiveType, read: Result<LiveMessage, BadMessage>) -> Arrival {
+    pub fn arrival(
+        &self,
+        topic: &'static str,
+        of: LiveType,
+        read: Result<LiveMessage, BadMessage>,
+    ) -> Arrival {
         let LiveMessage { frame, message } = match read {
             Ok(read) => read,
             Err(BadMessage::Quaternion) => return self.refused("quaternion"),
@@ -91,7 +119,11 @@ impl SampleSource {
     }
 
     fn refused(&self, reason: &'static str) -> Arrival {
-        Arrival::Refused(usize::from(self.kind == SampleKind::Wrench), reason, Instant::now())
+        Arrival::Refused(
+            usize::from(self.kind == SampleKind::Wrench),
+            reason,
+            Instant::now(),
+        )
     }
 }
 
@@ -101,7 +133,10 @@ mod tests {
     use crate::stylus::{StampedWrench, Wrench};
 
     fn source(kind: SampleKind, arguments: &[&str]) -> Option<SampleSource> {
-        let arguments: Vec<_> = arguments.iter().flat_map(|one| ["-p".to_owned(), (*one).to_owned()]).collect();
+        let arguments: Vec<_> = arguments
+            .iter()
+            .flat_map(|one| ["-p".to_owned(), (*one).to_owned()])
+            .collect();
         SampleSource::of(&NodeConfig::new(&arguments, |_| None).unwrap(), kind).unwrap()
     }
 
@@ -114,40 +149,72 @@ mod tests {
         let (odometry, why) = poses.choose(first, ["sensor_msgs/msg/Imu", "nav_msgs/msg/Odometry"]);
         assert_eq!((odometry.name(), why), ("nav_msgs/msg/Odometry", None));
         // who publishes another type beside changes nothing, and who leaves neither
-        assert_eq!(poses.choose(odometry, [first.name(), odometry.name()]), (odometry, None));
+        assert_eq!(
+            poses.choose(odometry, [first.name(), odometry.name()]),
+            (odometry, None)
+        );
         assert_eq!(poses.choose(odometry, []), (odometry, None));
         let (stays, why) = poses.choose(first, ["sensor_msgs/msg/Imu"]);
         let why = why.unwrap();
-        assert!(stays == first && why.contains("sensor_msgs/msg/Imu, not geometry_msgs/msg/PoseStamped"), "{why}");
+        assert!(
+            stays == first
+                && why.contains("sensor_msgs/msg/Imu, not geometry_msgs/msg/PoseStamped"),
+            "{why}"
+        );
         let (_, why) = poses.choose(first, ["tf2_msgs/msg/TFMessage"]);
         assert!(why.unwrap().contains("pose_frame"));
     }
 
     #[test]
     fn a_type_that_is_named_stays() {
-        let wrenches = source(SampleKind::Wrench, &["wrench_type:=geometry_msgs/msg/Wrench"]).unwrap();
+        let wrenches = source(
+            SampleKind::Wrench,
+            &["wrench_type:=geometry_msgs/msg/Wrench"],
+        )
+        .unwrap();
         let first = wrenches.first_type();
         let (stays, why) = wrenches.choose(first, ["geometry_msgs/msg/WrenchStamped"]);
-        assert!(stays == first && why.unwrap().contains("the parameter wrench_type names geometry_msgs/msg/Wrench"));
+        assert!(
+            stays == first
+                && why
+                    .unwrap()
+                    .contains("the parameter wrench_type names geometry_msgs/msg/Wrench")
+        );
         assert_eq!(source(SampleKind::Pose, &["pose_frame:=tool0"]), None);
     }
 
     #[test]
     fn a_type_without_a_header_is_in_the_frame_of_the_parameters_and_no_other() {
         let frame = |arguments: &[&str], of: &str, own: &str| {
-            let wrench = StampedWrench { stamp_ns: 5, wrench: Wrench::default() };
-            let read = LiveMessage { frame: own.to_owned(), message: Message::Wrench(wrench) };
+            let wrench = StampedWrench {
+                stamp_ns: 5,
+                wrench: Wrench::default(),
+            };
+            let read = LiveMessage {
+                frame: own.to_owned(),
+                message: Message::Wrench(wrench),
+            };
             let of = LiveType::of(SampleKind::Wrench, of).unwrap();
-            match source(SampleKind::Wrench, arguments).unwrap().arrival("stylus/wrench", of, Ok(read)) {
+            match source(SampleKind::Wrench, arguments).unwrap().arrival(
+                "stylus/wrench",
+                of,
+                Ok(read),
+            ) {
                 Arrival::Wrench(wrench, _) => wrench.header.frame_id,
                 other => panic!("{other:?}"),
             }
         };
-        let (stamped, plain) = ("geometry_msgs/msg/WrenchStamped", "geometry_msgs/msg/Wrench");
+        let (stamped, plain) = (
+            "geometry_msgs/msg/WrenchStamped",
+            "geometry_msgs/msg/Wrench",
+        );
         assert_eq!(frame(&[], stamped, "ft"), "ft");
         assert_eq!(frame(&[], stamped, ""), "", "the node refuses it by name");
         assert_eq!(frame(&["source:=probe"], plain, ""), "probe_sensor");
-        assert_eq!(frame(&["pose_type:=geometry_msgs/msg/Pose"], plain, ""), "cell");
+        assert_eq!(
+            frame(&["pose_type:=geometry_msgs/msg/Pose"], plain, ""),
+            "cell"
+        );
     }
 
     #[test]
@@ -155,8 +222,17 @@ mod tests {
         let poses = source(SampleKind::Pose, &[]).unwrap();
         let of = poses.first_type();
         let arrival = |bad| poses.arrival("stylus/pose", of, Err(bad));
-        assert!(matches!(arrival(BadMessage::Quaternion), Arrival::Refused(0, "quaternion", _)));
-        assert!(matches!(arrival(BadMessage::Stamp), Arrival::Refused(0, "stamp", _)));
-        assert!(matches!(arrival(BadMessage::Malformed), Arrival::Unreadable("stylus/pose", _)));
+        assert!(matches!(
+            arrival(BadMessage::Quaternion),
+            Arrival::Refused(0, "quaternion", _)
+        ));
+        assert!(matches!(
+            arrival(BadMessage::Stamp),
+            Arrival::Refused(0, "stamp", _)
+        ));
+        assert!(matches!(
+            arrival(BadMessage::Malformed),
+            Arrival::Unreadable("stylus/pose", _)
+        ));
     }
 }

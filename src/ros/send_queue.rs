@@ -53,7 +53,9 @@ struct Waiting {
 
 impl Waiting {
     fn next(&mut self) -> Option<Outgoing> {
-        self.messages.pop_front().or_else(|| self.tiles.pop_front().map(Outgoing::Publication))
+        self.messages
+            .pop_front()
+            .or_else(|| self.tiles.pop_front().map(Outgoing::Publication))
     }
 
     fn put_back(&mut self, publication: Box<Publication>) {
@@ -86,7 +88,9 @@ impl SendQueue {
 
     /// Not sent because nobody took them fast enough, or because ROS refused them: tiles, others.
     pub fn unsent(&self) -> [u64; 2] {
-        self.unsent.each_ref().map(|count| count.load(Ordering::Relaxed))
+        self.unsent
+            .each_ref()
+            .map(|count| count.load(Ordering::Relaxed))
     }
 
     /// Tiles that wait now.
@@ -148,8 +152,9 @@ impl SendQueue {
     }
 
     fn take(&self) -> Option<Outgoing> {
-        let is_idle =
-            |waiting: &mut Waiting| waiting.messages.is_empty() && waiting.tiles.is_empty() && !waiting.is_closed;
+        let is_idle = |waiting: &mut Waiting| {
+            waiting.messages.is_empty() && waiting.tiles.is_empty() && !waiting.is_closed
+        };
         let waiting = self.more.wait_while(locked(&self.waiting), is_idle);
         waiting.unwrap_or_else(PoisonError::into_inner).next()
     }
@@ -163,13 +168,19 @@ mod tests {
     use crate::ros::messages::{HapticMismatch, Marker, MeshPatch};
 
     fn tile(id: i32, x: f64) -> Publication {
-        let mut marker = Marker { id, ..Marker::default() };
+        let mut marker = Marker {
+            id,
+            ..Marker::default()
+        };
         marker.pose.position.x = x;
         Publication::Tile(marker)
     }
 
     fn patch(version: u64) -> Publication {
-        Publication::MeshPatch(MeshPatch { version, ..MeshPatch::default() })
+        Publication::MeshPatch(MeshPatch {
+            version,
+            ..MeshPatch::default()
+        })
     }
 
     fn name(publication: &Publication) -> String {
@@ -199,16 +210,26 @@ mod tests {
             queue.put(publication);
         }
         assert_eq!(queue.tiles_waiting(), 3);
-        assert_eq!(sent(&queue), ["patch 1", "patch 2", "tile 7 at 1", "tile 3 at 2", "tile 7 at 3"]);
+        assert_eq!(
+            sent(&queue),
+            [
+                "patch 1",
+                "patch 2",
+                "tile 7 at 1",
+                "tile 3 at 2",
+                "tile 7 at 3"
+            ]
+        );
     }
 
     #[test]
     fn what_is_to_be_sent_later_goes_before_what_came_after_it() {
         let queue = SendQueue::default();
-        [patch(1), patch(2), tile(1, 0.0), tile(2, 0.0)].into_iter().for_each(|publication| queue.put(publication));
+        [patch(1), patch(2), tile(1, 0.0), tile(2, 0.0)]
+            .into_iter()
+            .for_each(|publication| queue.put(publication));
         let tried = Mutex::new(Vec::new());
-        let reaches_the_end =
-            |publication: &Publication| matches!(publication, Publication::Tile(tile) if tile.id == 2);
+        let reaches_the_end = |publication: &Publication| matches!(publication, Publication::Tile(tile) if tile.id == 2);
         queue.send(|publication| {
             let mut tried = tried.lock().unwrap();
             tried.push(name(&publication));
@@ -216,13 +237,21 @@ mod tests {
                 queue.close();
             }
             // each is taken at the second time
-            if tried.len() % 2 == 1 { Sent::Later(publication) } else { Sent::Done }
+            if tried.len() % 2 == 1 {
+                Sent::Later(publication)
+            } else {
+                Sent::Done
+            }
         });
         let tried = tried.into_inner().unwrap();
         let both = |name: &'static str| [name, name];
         let expected = [both("patch 1"), both("patch 2"), both("tile 1 at 0")].concat();
         assert_eq!(tried[..6], expected);
-        assert_eq!(tried[6..], ["tile 2 at 0"], "it was closed, and somebody listens too slowly");
+        assert_eq!(
+            tried[6..],
+            ["tile 2 at 0"],
+            "it was closed, and somebody listens too slowly"
+        );
         assert_eq!(queue.unsent(), [0, 0]);
     }
 
@@ -230,7 +259,10 @@ mod tests {
     fn what_there_is_no_room_for_is_counted() {
         let queue = SendQueue::default();
         (0..MOST as u32 + 3).for_each(|face| {
-            queue.put(Publication::Mismatch(HapticMismatch { face, ..HapticMismatch::default() }));
+            queue.put(Publication::Mismatch(HapticMismatch {
+                face,
+                ..HapticMismatch::default()
+            }));
         });
         (0..MOST_TILES as i32 + 2).for_each(|id| queue.put(tile(id, 0.0)));
         assert_eq!(queue.unsent(), [2, 3]);
@@ -244,7 +276,9 @@ mod tests {
     #[test]
     fn what_ros_refuses_is_counted_and_the_rest_goes() {
         let queue = SendQueue::default();
-        [patch(1), patch(2), tile(1, 0.0)].into_iter().for_each(|publication| queue.put(publication));
+        [patch(1), patch(2), tile(1, 0.0)]
+            .into_iter()
+            .for_each(|publication| queue.put(publication));
         queue.close();
         queue.send(|publication| match publication {
             Publication::MeshPatch(patch) if patch.version == 2 => Sent::Done,

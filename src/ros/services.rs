@@ -82,8 +82,12 @@ mod tests {
         ) -> Result<(), RosError> {
             if ["~/pause", "~/stop"].contains(&name) {
                 let (to, answer) = channel();
-                call(S::Request::default(), Reply::new(move |said| drop(to.send(said))));
-                self.0.push(format!("{name}: {:?}", answer.try_recv().unwrap()));
+                call(
+                    S::Request::default(),
+                    Reply::new(move |said| drop(to.send(said))),
+                );
+                self.0
+                    .push(format!("{name}: {:?}", answer.try_recv().unwrap()));
             }
             Ok(())
         }
@@ -96,19 +100,32 @@ mod tests {
         let mut calls = CallsStops(Vec::new());
         serve(&mut calls, &Arc::new(inbox.clone())).unwrap();
         let CallsStops(answers) = calls;
-        assert!(answers.len() == 2 && answers[0].contains("samples are taken"), "{answers:?}");
-        assert!(answers[1].contains("no arm configured") && inbox.stops().request().is_some(), "{answers:?}");
+        assert!(
+            answers.len() == 2 && answers[0].contains("samples are taken"),
+            "{answers:?}"
+        );
+        assert!(
+            answers[1].contains("no arm configured") && inbox.stops().request().is_some(),
+            "{answers:?}"
+        );
     }
 
     /// What stands between `before` and `after`, each time.
     fn between<'a>(text: &'a str, before: &'a str, after: char) -> BTreeSet<&'a str> {
-        text.split(before).skip(1).filter_map(|rest| rest.split_once(after)).map(|(name, _)| name).collect()
+        text.split(before)
+            .skip(1)
+            .filter_map(|rest| rest.split_once(after))
+            .map(|(name, _)| name)
+            .collect()
     }
 
     #[test]
     fn the_services_are_those_of_the_documentation() {
-        let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/ros.md")).unwrap();
-        let (code, _) = include_str!("services.rs").split_once("#[cfg(test)]").unwrap();
+        let text =
+            std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/ros.md")).unwrap();
+        let (code, _) = include_str!("services.rs")
+            .split_once("#[cfg(test)]")
+            .unwrap();
         assert_eq!(between(code, "\"~/", '"'), between(&text, "\n| `~/", '`'));
     }
 }

@@ -76,12 +76,15 @@ struct Stops {
 impl Stops {
     fn request(&self) -> Option<StopRequest> {
         let retract = self.is_ending || self.is_paused || !self.may_move;
-        self.stay.map(|_| StopRequest::Stay).or(retract.then_some(StopRequest::Retract))
+        self.stay
+            .map(|_| StopRequest::Stay)
+            .or(retract.then_some(StopRequest::Retract))
     }
 
     /// Whether a request before this one has the arm retract, or it does so by itself.
     fn goes_back(&self) -> bool {
-        self.motion == Motion::Retracts || (self.motion == Motion::Moves && self.request().is_some())
+        self.motion == Motion::Retracts
+            || (self.motion == Motion::Moves && self.request().is_some())
     }
 
     fn stay(&mut self, why: &'static str) {
@@ -89,7 +92,8 @@ impl Stops {
     }
 
     fn is_held(&self, clock: &Clock) -> bool {
-        self.beat.is_some_and(|beat| clock.since(beat) <= LONGEST_BEAT)
+        self.beat
+            .is_some_and(|beat| clock.since(beat) <= LONGEST_BEAT)
     }
 
     /// Why nobody hears a request, where nobody does.
@@ -99,7 +103,9 @@ impl Stops {
             ArmThread::Runs(looked) => {
                 let since = clock.since(*looked);
                 let seconds = since.as_secs_f64();
-                (since > HANGS).then(|| format!("nothing has come from the arm's thread for {seconds:.1} s: {BY_HAND}"))
+                (since > HANGS).then(|| {
+                    format!("nothing has come from the arm's thread for {seconds:.1} s: {BY_HAND}")
+                })
             }
             ArmThread::Ended(why) => Some(format!("the arm's thread has ended, {why}: {BY_HAND}")),
         }
@@ -129,21 +135,33 @@ impl StopState {
             beat: None,
             held_orders: 0,
         };
-        Self { clock, stops: Mutex::new(stops) }
+        Self {
+            clock,
+            stops: Mutex::new(stops),
+        }
     }
 
     /// `~/pause`: samples are passed over, what moves stops and retracts. It fails where the arm's thread does not hear it.
     pub fn pause(&self, is_paused: bool) -> SetBoolResponse {
         let mut stops = locked(&self.stops);
         stops.is_paused = is_paused;
-        let words = if is_paused { "paused: samples are passed over" } else { "samples are taken" };
+        let words = if is_paused {
+            "paused: samples are passed over"
+        } else {
+            "samples are taken"
+        };
         let done = match stops.thread {
             _ if !is_paused => Ok(""),
             ArmThread::None => Ok(""),
-            _ => stops.unheard(&self.clock).map_or(Ok("; the arm does not move, or stops and retracts"), Err),
+            _ => stops
+                .unheard(&self.clock)
+                .map_or(Ok("; the arm does not move, or stops and retracts"), Err),
         };
         let success = done.is_ok();
-        let message = done.map_or_else(|why| format!("{words}; but {why}"), |arm| words.to_owned() + arm);
+        let message = done.map_or_else(
+            |why| format!("{words}; but {why}"),
+            |arm| words.to_owned() + arm,
+        );
         SetBoolResponse { success, message }
     }
 
@@ -165,7 +183,10 @@ impl StopState {
             |why| format!("the stop is set; but {why}"),
             |()| "the arm stops and stays where it is: look, then call ~/recover".to_owned(),
         );
-        TriggerResponse { success: done.is_ok(), message }
+        TriggerResponse {
+            success: done.is_ok(),
+            message,
+        }
     }
 
     /// The parameter `allow_motion`: what moves stops and retracts; a retraction stops and stays.
@@ -201,7 +222,10 @@ impl StopState {
     pub fn hold_to_run(&self) -> Result<(), String> {
         let mut stops = locked(&self.stops);
         if !stops.is_held(&self.clock) {
-            return Err("the arm moves only while the button is held: hold it, then send the order".to_owned());
+            return Err(
+                "the arm moves only while the button is held: hold it, then send the order"
+                    .to_owned(),
+            );
         }
         stops.held_orders += 1;
         Ok(())
@@ -216,7 +240,11 @@ impl StopState {
     /// What is known of the arm: whether it may move, what it does, and why it stays where it is; `None` where there is none.
     pub fn arm(&self) -> Option<(bool, Motion, Option<&'static str>)> {
         let stops = locked(&self.stops);
-        (!matches!(stops.thread, ArmThread::None)).then_some((stops.may_move, stops.motion, stops.stay))
+        (!matches!(stops.thread, ArmThread::None)).then_some((
+            stops.may_move,
+            stops.motion,
+            stops.stay,
+        ))
     }
 
     /// The node is to end: what moves stops and retracts; asked for again, it stops and stays. Whether that is new: `false` when
@@ -256,9 +284,9 @@ impl StopState {
     pub fn recover(&self) -> Result<(), String> {
         let mut stops = locked(&self.stops);
         match stops.stay {
-            Some(why) if !stops.is_recovery_asked => {
-                Err(format!("{why} after ~/recover: the arm stays stopped; look, then call ~/recover again"))
-            }
+            Some(why) if !stops.is_recovery_asked => Err(format!(
+                "{why} after ~/recover: the arm stays stopped; look, then call ~/recover again"
+            )),
             _ => {
                 stops.stay = None;
                 Ok(())
@@ -302,9 +330,16 @@ impl StopState {
         let reasons = [
             (stops.is_ending, ProbeResult::SHUTDOWN, "the node ends"),
             (stops.is_paused, ProbeResult::PAUSED, "the node is paused"),
-            (!stops.may_move, ProbeResult::MOTION_NOT_ALLOWED, "the parameter allow_motion is off"),
+            (
+                !stops.may_move,
+                ProbeResult::MOTION_NOT_ALLOWED,
+                "the parameter allow_motion is off",
+            ),
         ];
-        reasons.into_iter().find(|(is_so, ..)| *is_so).map(|(_, code, why)| (code, why))
+        reasons
+            .into_iter()
+            .find(|(is_so, ..)| *is_so)
+            .map(|(_, code, why)| (code, why))
     }
 
     /// Whether the arm's thread hears what is asked of it.
@@ -323,7 +358,9 @@ impl StopState {
         let stops = locked(&self.stops);
         match (stops.unheard(&self.clock), stops.stay) {
             (Some(why), _) => Err(why),
-            (None, Some(why)) => Err(format!("the arm is stopped since this: {why}; look, then call ~/recover")),
+            (None, Some(why)) => Err(format!(
+                "the arm is stopped since this: {why}; look, then call ~/recover"
+            )),
             (None, None) => Ok(()),
         }
     }
@@ -337,7 +374,11 @@ mod tests {
     fn the_answers_say_whether_there_is_an_arm_and_whether_its_thread_hears_them() {
         let (clock, hand) = Clock::manual();
         let state = StopState::new(clock);
-        assert!(state.pause(true).success && !state.stop().success && state.stop().message.contains(NO_ARM));
+        assert!(
+            state.pause(true).success
+                && !state.stop().success
+                && state.stop().message.contains(NO_ARM)
+        );
         state.look();
         assert!(state.stop().success && state.pause(true).success && state.heard().is_ok());
         hand.advance(HANGS + Duration::from_millis(500));
@@ -347,22 +388,38 @@ mod tests {
             (state.heard().is_ok(), state.heard().unwrap_err()),
             (state.ready().is_ok(), state.ready().unwrap_err()),
         ] {
-            assert!(!success && message.contains("nothing has come from the arm's thread for 1.5 s"), "{message}");
+            assert!(
+                !success && message.contains("nothing has come from the arm's thread for 1.5 s"),
+                "{message}"
+            );
         }
-        assert_eq!(state.request(), Some(StopRequest::Stay), "it holds all the same");
+        assert_eq!(
+            state.request(),
+            Some(StopRequest::Stay),
+            "it holds all the same"
+        );
         assert!(state.pause(false).success);
         state.look();
         assert!(state.stop().success);
         state.end_arm("at its end");
         state.end_arm("later");
-        assert!(state.stop().message.contains("has ended, at its end"), "{}", state.stop().message);
+        assert!(
+            state.stop().message.contains("has ended, at its end"),
+            "{}",
+            state.stop().message
+        );
     }
 
     #[test]
     fn an_arm_that_is_held_to_run_stays_as_soon_as_the_beats_end_and_until_it_is_recovered() {
         let (clock, hand) = Clock::manual();
         let state = StopState::new(clock);
-        assert!(state.hold_to_run().unwrap_err().contains("while the button is held"));
+        assert!(
+            state
+                .hold_to_run()
+                .unwrap_err()
+                .contains("while the button is held")
+        );
         state.beat();
         state.hold_to_run().unwrap();
         for _ in 0..100 {
@@ -375,7 +432,11 @@ mod tests {
         hand.advance(Duration::from_millis(1));
         assert_eq!(state.request(), Some(StopRequest::Stay));
         state.beat();
-        assert_eq!(state.request(), Some(StopRequest::Stay), "a late beat moves nothing");
+        assert_eq!(
+            state.request(),
+            Some(StopRequest::Stay),
+            "a late beat moves nothing"
+        );
         state.end_hold();
         state.ask_recovery();
         state.recover().unwrap();
@@ -398,7 +459,10 @@ mod tests {
         assert!(state.interrupt() && !state.interrupt());
         state.enter(Motion::Retracts);
         assert_eq!(state.request(), Some(StopRequest::Retract));
-        assert!(state.interrupt() && !state.interrupt(), "the third waits for nothing");
+        assert!(
+            state.interrupt() && !state.interrupt(),
+            "the third waits for nothing"
+        );
         assert_eq!(state.request(), Some(StopRequest::Stay));
     }
 }

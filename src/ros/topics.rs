@@ -3,8 +3,8 @@
 use super::arguments::NodeConfig;
 use super::exchange::{Exchange, RosError};
 use super::messages::{
-    Clock, DiagnosticArray, FeatureArray, HapticMismatch, Marker, MarkerArray, MeshPatch, Path, PointStamped,
-    ProbeResult, ProbeTouch, TFMessage,
+    Clock, DiagnosticArray, FeatureArray, HapticMismatch, Marker, MarkerArray, MeshPatch, Path,
+    PointStamped, ProbeResult, ProbeTouch, TFMessage,
 };
 use super::port::{Arrival, MESH_PATCH_TOPIC, Publication};
 use super::sample_source::SampleSource;
@@ -26,15 +26,30 @@ pub(super) struct Topic {
 
 impl Topic {
     pub const fn best_effort(name: &'static str, depth: usize) -> Self {
-        Self { name, is_reliable: false, is_latched: false, depth }
+        Self {
+            name,
+            is_reliable: false,
+            is_latched: false,
+            depth,
+        }
     }
 
     const fn reliable(name: &'static str, depth: usize) -> Self {
-        Self { name, is_reliable: true, is_latched: false, depth }
+        Self {
+            name,
+            is_reliable: true,
+            is_latched: false,
+            depth,
+        }
     }
 
     const fn latched(name: &'static str, depth: usize) -> Self {
-        Self { name, is_reliable: true, is_latched: true, depth }
+        Self {
+            name,
+            is_reliable: true,
+            is_latched: true,
+            depth,
+        }
     }
 }
 
@@ -57,7 +72,11 @@ pub(super) trait Publishes<M> {
 /// A back end that listens to messages of one type.
 pub(super) trait Subscribes<M> {
     /// Listens: what comes goes to the inbox of the node.
-    fn subscribe(&mut self, topic: Topic, arrival: fn(&Exchange, M) -> Arrival) -> Result<(), RosError>;
+    fn subscribe(
+        &mut self,
+        topic: Topic,
+        arrival: fn(&Exchange, M) -> Arrival,
+    ) -> Result<(), RosError>;
 }
 
 /// A back end that listens to poses and wrenches of any type that gives them.
@@ -112,14 +131,24 @@ where
     let [wrench, pose] = config.sample_topics();
     for (topic, kind) in [(wrench, SampleKind::Wrench), (pose, SampleKind::Pose)] {
         let remedy = "name a type that can be read, or none";
-        let refused = |reason| RosError::Refused { call: "subscribing to a topic", reason, remedy };
+        let refused = |reason| RosError::Refused {
+            call: "subscribing to a topic",
+            reason,
+            remedy,
+        };
         if let Some(source) = SampleSource::of(config, kind).map_err(refused)? {
             back_end.subscribe_samples(Topic::best_effort(topic, SAMPLES), source)?;
         }
     }
-    back_end.subscribe(Topic::best_effort("/tf", SAMPLES), |_, message| Arrival::Tf(message))?;
-    back_end.subscribe(Topic::latched("/tf_static", 100), |_, message| Arrival::TfStatic(message))?;
-    back_end.subscribe(Topic::reliable("/clicked_point", 10), |_, message| Arrival::ClickedPoint(message))?;
+    back_end.subscribe(Topic::best_effort("/tf", SAMPLES), |_, message| {
+        Arrival::Tf(message)
+    })?;
+    back_end.subscribe(Topic::latched("/tf_static", 100), |_, message| {
+        Arrival::TfStatic(message)
+    })?;
+    back_end.subscribe(Topic::reliable("/clicked_point", 10), |_, message| {
+        Arrival::ClickedPoint(message)
+    })?;
     if config.parameters.bool("use_sim_time") {
         back_end.subscribe(Topic::best_effort("/clock", 1), |exchange, now: Clock| {
             exchange.clock.set(now.clock);
@@ -145,16 +174,21 @@ mod tests {
 
     #[test]
     fn the_quality_of_service_is_that_of_the_documentation() {
-        let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/ros.md")).unwrap();
+        let text =
+            std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/ros.md")).unwrap();
         let (_, table) = text.split_once("| topic | type | reliability |").unwrap();
         let mut documented: Vec<_> = table
             .lines()
             .skip(2)
             .take_while(|line| line.starts_with('|'))
             .map(|line| {
-                let cells: Vec<_> =
-                    line.trim_matches('|').split('|').map(|cell| cell.replace('`', "").trim().into()).collect();
-                let [name, _, reliability, durability, depth, _]: [String; 6] = cells.try_into().unwrap();
+                let cells: Vec<_> = line
+                    .trim_matches('|')
+                    .split('|')
+                    .map(|cell| cell.replace('`', "").trim().into())
+                    .collect();
+                let [name, _, reliability, durability, depth, _]: [String; 6] =
+                    cells.try_into().unwrap();
                 [name, reliability, durability, depth]
             })
             .collect();
@@ -163,11 +197,31 @@ mod tests {
         let mut here: Vec<_> = published
             .0
             .into_iter()
-            .map(|Topic { name, is_reliable, is_latched, depth }| {
-                let reliability = if is_reliable { "reliable" } else { "best effort" };
-                let durability = if is_latched { "transient local" } else { "volatile" };
-                [name.to_owned(), reliability.to_owned(), durability.to_owned(), depth.to_string()]
-            })
+            .map(
+                |Topic {
+                     name,
+                     is_reliable,
+                     is_latched,
+                     depth,
+                 }| {
+                    let reliability = if is_reliable {
+                        "reliable"
+                    } else {
+                        "best effort"
+                    };
+                    let durability = if is_latched {
+                        "transient local"
+                    } else {
+                        "volatile"
+                    };
+                    [
+                        name.to_owned(),
+                        reliability.to_owned(),
+                        durability.to_owned(),
+                        depth.to_string(),
+                    ]
+                },
+            )
             .collect();
         here.sort();
         documented.sort();

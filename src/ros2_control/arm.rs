@@ -8,8 +8,8 @@ use super::brake_plan::BrakePlan;
 use super::params::Ros2ControlParams;
 use super::reader::{JointSample, Measured, StateReader};
 use crate::probing::arm::{
-    Arm, ArmError, ArmState, Command, Freshness, Joints, MOST_JOINTS, Obedience, OrderedMotion, Safety,
-    velocity_towards,
+    Arm, ArmError, ArmState, Command, Freshness, Joints, MOST_JOINTS, Obedience, OrderedMotion,
+    Safety, velocity_towards,
 };
 use crate::ros::port::ArmPort;
 use crate::stylus::Wrench;
@@ -93,7 +93,9 @@ impl Ros2ControlArm {
         let (last, period) = rated(&mut reader, params)?;
         let begun = params.clock.now();
         // who listens is found somewhat later than who sends
-        while reader.port().order_listeners() == Some(0) && params.clock.since(begun) < params.connect {
+        while reader.port().order_listeners() == Some(0)
+            && params.clock.since(begun) < params.connect
+        {
             reader.next(params, params.silent)?;
         }
         if reader.port().order_listeners() == Some(0) {
@@ -101,10 +103,16 @@ impl Ros2ControlArm {
                 "nobody listens to {}: is joint_trajectory_controller active (`ros2 control list_controllers`)?",
                 params.topics.trajectory
             );
-            return Err(ArmError::Refused { what: "to connect", reason });
+            return Err(ArmError::Refused {
+                what: "to connect",
+                reason,
+            });
         }
         let plan = BrakePlan::rest(params.geometry.joint_count());
-        let plan = plan.ok_or(ArmError::Refused { what: "to connect", reason: "it has too many joints".to_owned() })?;
+        let plan = plan.ok_or(ArmError::Refused {
+            what: "to connect",
+            reason: "it has too many joints".to_owned(),
+        })?;
         let now = params.clock.now();
         Ok(Self {
             reader,
@@ -133,7 +141,10 @@ impl Ros2ControlArm {
         ArmState {
             stamp_ns: measured.sample.stamp_ns,
             pose_bt: pose_bf * self.params.pose_ft,
-            wrench_b: Wrench { force: pose_bf.rotation * force, torque: pose_bf.rotation * torque },
+            wrench_b: Wrench {
+                force: pose_bf.rotation * force,
+                torque: pose_bf.rotation * torque,
+            },
             raw_wrench_f: measured.wrench_f,
             joints: measured.sample.joints,
             safety: Safety::Normal,
@@ -142,9 +153,16 @@ impl Ros2ControlArm {
 
     /// What the sensor has but for the weight, in the flange.
     fn unweighed(&self, measured: &Measured) -> Wrench {
-        let r_bf = self.params.geometry.flange(&measured.sample.joints).rotation;
+        let r_bf = self
+            .params
+            .geometry
+            .flange(&measured.sample.joints)
+            .rotation;
         let (weight, raw) = (self.params.payload.weight_o(&r_bf), measured.wrench_f);
-        Wrench { force: raw.force - r_bf.inverse() * weight.force, torque: raw.torque - r_bf.inverse() * weight.torque }
+        Wrench {
+            force: raw.force - r_bf.inverse() * weight.force,
+            torque: raw.torque - r_bf.inverse() * weight.torque,
+        }
     }
 
     /// From the flange to the tip, m in B.
@@ -156,20 +174,34 @@ impl Ros2ControlArm {
     /// Velocity of the tip by that of the joints, m/s and rad/s in B.
     fn twist_of(&self, rates: &Joints) -> [f64; 6] {
         let mut all = SVector::<f64, MOST_JOINTS>::zeros();
-        rates.iter().enumerate().for_each(|(joint, rate)| all[joint] = *rate);
+        rates
+            .iter()
+            .enumerate()
+            .for_each(|(joint, rate)| all[joint] = *rate);
         let of_flange = self.params.geometry.jacobian(&self.last.sample.joints) * all;
         let angular = Vector3::new(of_flange[3], of_flange[4], of_flange[5]);
-        let linear = Vector3::new(of_flange[0], of_flange[1], of_flange[2]) + angular.cross(&self.arm_of_tip());
-        [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
+        let linear = Vector3::new(of_flange[0], of_flange[1], of_flange[2])
+            + angular.cross(&self.arm_of_tip());
+        [
+            linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
+        ]
     }
 
     /// Velocity of the joints by that of the tip, rad/s.
     fn rates_of(&self, [x, y, z, a, b, c]: [f64; 6]) -> Result<Joints, ArmError> {
         let angular = Vector3::new(a, b, c);
         let of_flange = Vector3::new(x, y, z) - angular.cross(&self.arm_of_tip());
-        let refused = |reason| ArmError::Refused { what: "a velocity", reason };
-        let rates = self.params.geometry.turning(&self.last.sample.joints, &of_flange, &angular);
-        let rates = rates.ok_or_else(|| refused("the arm is in a singularity: begin from another pose".to_owned()))?;
+        let refused = |reason| ArmError::Refused {
+            what: "a velocity",
+            reason,
+        };
+        let rates = self
+            .params
+            .geometry
+            .turning(&self.last.sample.joints, &of_flange, &angular);
+        let rates = rates.ok_or_else(|| {
+            refused("the arm is in a singularity: begin from another pose".to_owned())
+        })?;
         let most = self.params.top_joint_speed;
         match rates.iter().position(|rate| rate.abs() > most) {
             Some(joint) => Err(refused(format!(
@@ -184,7 +216,8 @@ impl Ros2ControlArm {
 
     /// Velocity of the joints that the controller should have by now, rad/s.
     fn ordered_now(&self, now: Instant) -> Joints {
-        self.plan.velocity(now.saturating_duration_since(self.planned_at).as_secs_f64())
+        self.plan
+            .velocity(now.saturating_duration_since(self.planned_at).as_secs_f64())
     }
 
     /// Changes of velocity take no shorter, s: the controller may be behind what it is thought to do by its share of the latency.
@@ -192,7 +225,12 @@ impl Ros2ControlArm {
         (2.0 * self.period).max(0.5 * self.params.latency)
     }
 
-    fn go(&mut self, twist: [f64; 6], acceleration: f64, motion: &OrderedMotion) -> Result<(), ArmError> {
+    fn go(
+        &mut self,
+        twist: [f64; 6],
+        acceleration: f64,
+        motion: &OrderedMotion,
+    ) -> Result<(), ArmError> {
         let to = self.rates_of(twist)?;
         if self.is_early(motion) {
             return Ok(());
@@ -216,7 +254,8 @@ impl Ros2ControlArm {
 
     /// Whether the order before is of the same kind, and too young to be replaced.
     fn is_early(&self, motion: &OrderedMotion) -> bool {
-        let same = |doing: &OrderedMotion| std::mem::discriminant(doing) == std::mem::discriminant(motion);
+        let same =
+            |doing: &OrderedMotion| std::mem::discriminant(doing) == std::mem::discriminant(motion);
         let age = self.params.clock.since(self.planned_at).as_secs_f64();
         age < ORDER_EVERY && self.doing.as_ref().is_some_and(same)
     }
@@ -224,8 +263,13 @@ impl Ros2ControlArm {
     fn send(&mut self, plan: BrakePlan, motion: &OrderedMotion) -> Result<(), ArmError> {
         let now = self.params.clock.now();
         self.way.follow(&self.plan, self.planned_at, now);
-        self.obedience.order(motion, now.saturating_duration_since(self.begun));
-        if !self.reader.port().publish_trajectory(plan.message(&self.params.joint_names)) {
+        self.obedience
+            .order(motion, now.saturating_duration_since(self.begun));
+        if !self
+            .reader
+            .port()
+            .publish_trajectory(plan.message(&self.params.joint_names))
+        {
             return Err(ArmError::Dropped { what: "orders" });
         }
         (self.plan, self.planned_at, self.doing) = (plan, now, Some(*motion));
@@ -238,13 +282,20 @@ impl Ros2ControlArm {
         let now = self.params.clock.now();
         let twist = self.twist_of(&self.last.sample.rates);
         let pose = self.seen(&self.last).pose_bt;
-        if let Some(fault) = self.obedience.see(&pose, &twist, now.saturating_duration_since(self.begun)) {
+        if let Some(fault) =
+            self.obedience
+                .see(&pose, &twist, now.saturating_duration_since(self.begun))
+        {
             return Err(fault);
         }
         self.way.follow(&self.plan, self.planned_at, now);
         if let Some([ordered, moved]) = self.way.ignored(&self.last.sample.joints, now) {
             let topic = self.params.topics.trajectory.clone();
-            return Err(ArmError::Ignores { topic, ordered_deg: ordered.to_degrees(), moved_deg: moved.to_degrees() });
+            return Err(ArmError::Ignores {
+                topic,
+                ordered_deg: ordered.to_degrees(),
+                moved_deg: moved.to_degrees(),
+            });
         }
         Ok(self.seen(&self.last))
     }
@@ -258,7 +309,9 @@ impl Ros2ControlArm {
         while clock.since(begun) < BRAKING {
             // an order that is not sent is one that the trajectory before does without: it ends at rest
             let _ = self.stop(FAULT_STOP);
-            let Some(sample) = self.reader.watch(&self.params, AGAIN) else { continue };
+            let Some(sample) = self.reader.watch(&self.params, AGAIN) else {
+                continue;
+            };
             if std::mem::replace(&mut last_ns, sample.stamp_ns) == sample.stamp_ns {
                 // the same again says nothing of now
                 continue;
@@ -274,7 +327,10 @@ impl Ros2ControlArm {
             }
         }
         let fault = match moving {
-            Some(speed) => ArmError::GoesOn { mm_per_s: speed * 1e3, first: first.to_string() },
+            Some(speed) => ArmError::GoesOn {
+                mm_per_s: speed * 1e3,
+                first: first.to_string(),
+            },
             None => first,
         };
         self.fault = Some(fault.clone());
@@ -294,54 +350,99 @@ impl Ros2ControlArm {
             return refuse(format!("{speed} m/s is not from 0 to {most} m/s"));
         }
         if acceleration.is_nan() || acceleration <= 0.0 || acceleration > TOP_ACCELERATION {
-            return refuse(format!("{acceleration} m/s² is not above 0 and up to {TOP_ACCELERATION} m/s²"));
+            return refuse(format!(
+                "{acceleration} m/s² is not above 0 and up to {TOP_ACCELERATION} m/s²"
+            ));
         }
         Ok(())
     }
 
     fn obey(&mut self, command: &Command) -> Result<(), ArmError> {
-        let refuse = |what, reason: &str| Err(ArmError::Refused { what, reason: reason.to_owned() });
+        let refuse = |what, reason: &str| {
+            Err(ArmError::Refused {
+                what,
+                reason: reason.to_owned(),
+            })
+        };
         match *command {
             Command::Stop { deceleration } => {
                 self.check("a stop", 0.0, deceleration)?;
                 self.stop(deceleration)
             }
-            Command::Velocity { linear, acceleration } => {
+            Command::Velocity {
+                linear,
+                acceleration,
+            } => {
                 self.check("a velocity", linear.norm(), acceleration)?;
                 self.go_at([linear.x, linear.y, linear.z, 0.0, 0.0, 0.0], acceleration)
             }
-            Command::Line { to, speed, acceleration } => {
+            Command::Line {
+                to,
+                speed,
+                acceleration,
+            } => {
                 self.check("a line", speed, acceleration)?;
-                let is_pose =
-                    to.translation.vector.iter().chain(to.rotation.coords.iter()).all(|part| part.is_finite());
+                let is_pose = to
+                    .translation
+                    .vector
+                    .iter()
+                    .chain(to.rotation.coords.iter())
+                    .all(|part| part.is_finite());
                 if !is_pose {
                     return refuse("a line", "its end is no pose");
                 }
                 let from = self.seen(&self.last).pose_bt;
                 let settling = SETTLING * self.params.latency;
-                self.go_at(velocity_towards(&from, &to, [speed, acceleration], settling), acceleration)
+                self.go_at(
+                    velocity_towards(&from, &to, [speed, acceleration], settling),
+                    acceleration,
+                )
             }
-            Command::Press { axis, force, feed, speed } => {
+            Command::Press {
+                axis,
+                force,
+                feed,
+                speed,
+            } => {
                 self.check("a press", feed.norm().max(speed), PRESS_ACCELERATION)?;
                 if !(0.0..=self.params.top_force).contains(&force) {
-                    return refuse("a press", &format!("{force} N is not from 0 to {} N", self.params.top_force));
+                    return refuse(
+                        "a press",
+                        &format!("{force} N is not from 0 to {} N", self.params.top_force),
+                    );
                 }
-                let Some(axis) = axis.try_normalize(0.5).filter(|axis| axis.iter().all(|part| part.is_finite())) else {
+                let Some(axis) = axis
+                    .try_normalize(0.5)
+                    .filter(|axis| axis.iter().all(|part| part.is_finite()))
+                else {
                     return refuse("a press", "its axis is no direction");
                 };
                 // dF/dt = K v: with v = (F − F_now)/(K T) the force comes to its end with T, stable while T is some latencies
                 let felt = -self.seen(&self.last).wrench_b.force.dot(&axis);
-                let gain = 1.0 / (CALM * self.params.stiffness * (self.params.latency + self.period));
+                let gain =
+                    1.0 / (CALM * self.params.stiffness * (self.params.latency + self.period));
                 let across = feed - axis * feed.dot(&axis);
                 let v = axis * ((force - felt) * gain).clamp(-speed, speed) + across;
-                let motion = OrderedMotion::Press { axis, speed, feed: across, acceleration: PRESS_ACCELERATION };
+                let motion = OrderedMotion::Press {
+                    axis,
+                    speed,
+                    feed: across,
+                    acceleration: PRESS_ACCELERATION,
+                };
                 self.go([v.x, v.y, v.z, 0.0, 0.0, 0.0], PRESS_ACCELERATION, &motion)
             }
         }
     }
 
     fn go_at(&mut self, twist: [f64; 6], acceleration: f64) -> Result<(), ArmError> {
-        self.go(twist, acceleration, &OrderedMotion::Move { twist, acceleration })
+        self.go(
+            twist,
+            acceleration,
+            &OrderedMotion::Move {
+                twist,
+                acceleration,
+            },
+        )
     }
 
     fn zero(&mut self) -> Result<(), ArmError> {
@@ -351,7 +452,10 @@ impl Ros2ControlArm {
             self.await_state()?;
             if self.speed_of(&self.last.sample) > STANDING {
                 let reason = "the arm moves: its sensor is zeroed at rest".to_owned();
-                return Err(ArmError::Refused { what: "to zero its sensor", reason });
+                return Err(ArmError::Refused {
+                    what: "to zero its sensor",
+                    reason,
+                });
             }
             let free = self.unweighed(&self.last);
             let half = &mut halves[number * 2 / ZEROING];
@@ -361,18 +465,29 @@ impl Ros2ControlArm {
         let [first, second] = halves;
         let change = (second.force - first.force).norm();
         if change > CALM_FORCE {
-            let reason =
-                format!("what it feels at rest changes by {change:.1} N: something moves the tip, or its cable");
-            return Err(ArmError::Refused { what: "to zero its sensor", reason });
+            let reason = format!(
+                "what it feels at rest changes by {change:.1} N: something moves the tip, or its cable"
+            );
+            return Err(ArmError::Refused {
+                what: "to zero its sensor",
+                reason,
+            });
         }
-        self.tare = Wrench { force: (first.force + second.force) * 0.5, torque: (first.torque + second.torque) * 0.5 };
+        self.tare = Wrench {
+            force: (first.force + second.force) * 0.5,
+            torque: (first.torque + second.torque) * 0.5,
+        };
         Ok(())
     }
 }
 
 impl Way {
     fn from(from: Joints, now: Instant) -> Self {
-        Self { from, ordered: SVector::zeros(), until: now }
+        Self {
+            from,
+            ordered: SVector::zeros(),
+            until: now,
+        }
     }
 
     /// The orders of a plan up to now count.
@@ -388,7 +503,12 @@ impl Way {
         if ordered < ORDERED {
             return None;
         }
-        let moved = joints.iter().zip(self.from.iter()).map(|(to, from)| (to - from).powi(2)).sum::<f64>().sqrt();
+        let moved = joints
+            .iter()
+            .zip(self.from.iter())
+            .map(|(to, from)| (to - from).powi(2))
+            .sum::<f64>()
+            .sqrt();
         *self = Self::from(*joints, now);
         (moved < FOLLOWED * ordered).then_some([ordered, moved])
     }
@@ -396,12 +516,18 @@ impl Way {
 
 /// How long a change of the velocity of the tip takes, s.
 fn lasting([x, y, z, a, b, c]: &[f64; 6], acceleration: f64) -> f64 {
-    let (linear, angular) = (Vector3::new(*x, *y, *z).norm(), Vector3::new(*a, *b, *c).norm());
+    let (linear, angular) = (
+        Vector3::new(*x, *y, *z).norm(),
+        Vector3::new(*a, *b, *c).norm(),
+    );
     (linear / acceleration).max(angular / TURN_ACCELERATION)
 }
 
 /// The first states, and their period, s.
-fn rated(reader: &mut StateReader, params: &Ros2ControlParams) -> Result<(Measured, f64), ArmError> {
+fn rated(
+    reader: &mut StateReader,
+    params: &Ros2ControlParams,
+) -> Result<(Measured, f64), ArmError> {
     let mut last = reader.next(params, params.connect)?;
     let mut apart = Vec::with_capacity(RATED);
     for _ in 0..RATED {
@@ -417,7 +543,10 @@ fn rated(reader: &mut StateReader, params: &Ros2ControlParams) -> Result<(Measur
         let reason = format!(
             "{topic} comes with {hz:.0} Hz, and {needed:.0} Hz are needed: raise update_rate of the controller manager"
         );
-        return Err(ArmError::Refused { what: "to connect", reason });
+        return Err(ArmError::Refused {
+            what: "to connect",
+            reason,
+        });
     }
     Ok((last, period))
 }
@@ -438,10 +567,16 @@ impl Arm for Ros2ControlArm {
             Some(fault) => return Err(fault.clone()),
             None => {}
         }
-        self.reader.drain(&self.params).map_err(|error| self.fail(error))?;
+        self.reader
+            .drain(&self.params)
+            .map_err(|error| self.fail(error))?;
         let followed_s = self.last.sample.stamp_ns as f64 * 1e-9;
         // the order before ends at rest, where none is sent
-        if is_stop || self.freshness.may_send(followed_s, (self.reader.newest_s(), 0.0))? {
+        if is_stop
+            || self
+                .freshness
+                .may_send(followed_s, (self.reader.newest_s(), 0.0))?
+        {
             self.obey(command)?;
         }
         Ok(())
@@ -466,7 +601,10 @@ impl Arm for Ros2ControlArm {
         let speed = self.speed_of(&last.sample);
         if speed > STANDING {
             let first = "it is to recover".to_owned();
-            return Err(ArmError::GoesOn { mm_per_s: speed * 1e3, first });
+            return Err(ArmError::GoesOn {
+                mm_per_s: speed * 1e3,
+                first,
+            });
         }
         let now = self.params.clock.now();
         self.plan = BrakePlan::stopping(last.sample.joints.mapped(|_, _| 0.0), self.least_ramp());

@@ -24,7 +24,10 @@ pub(super) struct BrakePlan {
 impl BrakePlan {
     /// At rest.
     pub fn rest(count: usize) -> Option<Self> {
-        Some(Self { begin: Joints::of(&[0.0; MOST_JOINTS][..count.min(MOST_JOINTS)])?, points: Vec::new() })
+        Some(Self {
+            begin: Joints::of(&[0.0; MOST_JOINTS][..count.min(MOST_JOINTS)])?,
+            points: Vec::new(),
+        })
     }
 
     /// From a velocity to another, which is kept for [`HOLD`], and to rest.
@@ -32,12 +35,18 @@ impl BrakePlan {
     /// - `ramp`, `brake`: how long the changes take, s, above zero.
     pub fn going(from: Joints, to: Joints, ramp: f64, brake: f64) -> Self {
         let still = to.mapped(|_, _| 0.0);
-        Self { begin: from, points: vec![(ramp, to), (ramp + HOLD, to), (ramp + HOLD + brake, still)] }
+        Self {
+            begin: from,
+            points: vec![(ramp, to), (ramp + HOLD, to), (ramp + HOLD + brake, still)],
+        }
     }
 
     /// From a velocity to rest.
     pub fn stopping(from: Joints, ramp: f64) -> Self {
-        Self { begin: from, points: vec![(ramp, from.mapped(|_, _| 0.0))] }
+        Self {
+            begin: from,
+            points: vec![(ramp, from.mapped(|_, _| 0.0))],
+        }
     }
 
     /// Velocity so long after the order, rad/s.
@@ -46,11 +55,17 @@ impl BrakePlan {
         for &(at, velocity) in &self.points {
             if after < at {
                 let share = ((after - before.0) / (at - before.0)).max(0.0);
-                return before.1.mapped(|joint, rate| rate + (velocity[joint] - rate) * share);
+                return before
+                    .1
+                    .mapped(|joint, rate| rate + (velocity[joint] - rate) * share);
             }
             before = (at, velocity);
         }
-        if self.points.is_empty() { self.begin } else { before.1 }
+        if self.points.is_empty() {
+            self.begin
+        } else {
+            before.1
+        }
     }
 
     /// Way of the joints from one time after the order to another, rad: the velocity is linear between points, so the middle of
@@ -58,7 +73,10 @@ impl BrakePlan {
     pub fn way(&self, from: f64, to: f64) -> SVector<f64, MOST_JOINTS> {
         let middle = self.velocity(f64::midpoint(from, to));
         let mut way = SVector::zeros();
-        middle.iter().enumerate().for_each(|(joint, rate)| way[joint] = rate * (to - from));
+        middle
+            .iter()
+            .enumerate()
+            .for_each(|(joint, rate)| way[joint] = rate * (to - from));
         way
     }
 
@@ -79,7 +97,10 @@ impl BrakePlan {
 
 fn length(seconds: f64) -> Duration {
     let ns = (seconds * 1e9).round() as i64;
-    Duration { sec: (ns / 1_000_000_000) as i32, nanosec: (ns % 1_000_000_000) as u32 }
+    Duration {
+        sec: (ns / 1_000_000_000) as i32,
+        nanosec: (ns % 1_000_000_000) as u32,
+    }
 }
 
 #[cfg(test)]
@@ -92,12 +113,23 @@ mod tests {
         let plan = BrakePlan::going([0.0; 6].into(), [0.2; 6].into(), 0.1, 0.04);
         let at = |after| plan.velocity(after)[0];
         let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
-        assert!(near(at(0.05), 0.1) && near(at(0.13), 0.2) && near(at(0.18), 0.1), "{plan:?}");
+        assert!(
+            near(at(0.05), 0.1) && near(at(0.13), 0.2) && near(at(0.18), 0.1),
+            "{plan:?}"
+        );
         assert_eq!((at(0.2), at(9.0)), (0.0, 0.0));
         let message = plan.message(&["a".into()]);
         let last = message.points.last().unwrap();
-        assert_eq!((&last.velocities[..], last.time_from_start.nanosec), (&[0.0; 6][..], 200_000_000));
-        assert!(message.points.iter().all(|point| point.positions.is_empty()));
+        assert_eq!(
+            (&last.velocities[..], last.time_from_start.nanosec),
+            (&[0.0; 6][..], 200_000_000)
+        );
+        assert!(
+            message
+                .points
+                .iter()
+                .all(|point| point.positions.is_empty())
+        );
         let stop = BrakePlan::stopping(plan.velocity(0.13), 0.02).message(&["a".into()]);
         assert_eq!((stop.points.len(), stop.points[0].velocities[0]), (1, 0.0));
     }

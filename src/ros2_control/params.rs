@@ -67,11 +67,17 @@ impl Default for Ros2ControlParams {
                 trajectory: "/joint_trajectory_controller/joint_trajectory".to_owned(),
             },
             geometry: UrGeometry::UR5E.into(),
-            joint_names: (1..=6).map(|number| format!("joint{number}").into()).collect(),
+            joint_names: (1..=6)
+                .map(|number| format!("joint{number}").into())
+                .collect(),
             pose_ft: Isometry3::from_parts(Vector3::new(0.0, 0.0, 0.15).into(), upright),
             wrench_frame: "tool0".to_owned(),
             pose_fs: Isometry3::identity(),
-            payload: Payload { mass: 0.25, p_sc: Vector3::new(0.0, 0.0, 0.05), gravity_o },
+            payload: Payload {
+                mass: 0.25,
+                p_sc: Vector3::new(0.0, 0.0, 0.05),
+                gravity_o,
+            },
             stiffness: 15e3,
             latency: 20e-3,
             // the limit of collaborative operation at reduced speed
@@ -89,23 +95,54 @@ impl Default for Ros2ControlParams {
 impl Ros2ControlParams {
     /// Checks the parameters before anything is listened to.
     pub(super) fn check(&self) -> Result<(), ArmError> {
-        let refuse = |reason: String| Err(ArmError::Refused { what: "its parameters", reason });
+        let refuse = |reason: String| {
+            Err(ArmError::Refused {
+                what: "its parameters",
+                reason,
+            })
+        };
         let (joints, names) = (self.geometry.joint_count(), self.joint_names.len());
         if joints != names {
-            return refuse(format!("the arm has {joints} joints, and {names} are named"));
+            return refuse(format!(
+                "the arm has {joints} joints, and {names} are named"
+            ));
         }
         let numbers = [
             ("the stiffness", self.stiffness, 10.0, 1e7, "N/m"),
             ("the latency", self.latency, 1e-3, 0.2, "s"),
             ("the largest speed", self.top_speed, 1e-3, 1.0, "m/s"),
             ("the largest force", self.top_force, 0.1, 150.0, "N"),
-            ("the largest speed of a joint", self.top_joint_speed, 1e-2, 20.0, "rad/s"),
-            ("the time to connect", self.connect.as_secs_f64(), 0.1, 60.0, "s"),
-            ("the time between two states", self.silent.as_secs_f64(), 0.02, 0.2, "s"),
+            (
+                "the largest speed of a joint",
+                self.top_joint_speed,
+                1e-2,
+                20.0,
+                "rad/s",
+            ),
+            (
+                "the time to connect",
+                self.connect.as_secs_f64(),
+                0.1,
+                60.0,
+                "s",
+            ),
+            (
+                "the time between two states",
+                self.silent.as_secs_f64(),
+                0.02,
+                0.2,
+                "s",
+            ),
         ];
         // what is no number is in no range
-        let wrong = numbers.iter().find(|(_, value, low, high, _)| !(low..=high).contains(&value));
-        let Some((what, value, low, high, unit)) = wrong else { return Ok(()) };
-        refuse(format!("{what} is {value} {unit}; it must be from {low} to {high} {unit}"))
+        let wrong = numbers
+            .iter()
+            .find(|(_, value, low, high, _)| !(low..=high).contains(&value));
+        let Some((what, value, low, high, unit)) = wrong else {
+            return Ok(());
+        };
+        refuse(format!(
+            "{what} is {value} {unit}; it must be from {low} to {high} {unit}"
+        ))
     }
 }

@@ -81,7 +81,9 @@ impl StateReader {
 
     /// Stamp of the newest joints, s.
     pub fn newest_s(&self) -> f64 {
-        self.joints.stamp_ns().map_or(f64::NAN, |stamp_ns| stamp_ns as f64 * 1e-9)
+        self.joints
+            .stamp_ns()
+            .map_or(f64::NAN, |stamp_ns| stamp_ns as f64 * 1e-9)
     }
 
     /// The next state.
@@ -90,13 +92,20 @@ impl StateReader {
     ///
     /// # Errors
     /// What [`TopicAge`] says; [`ArmError::Unreadable`].
-    pub fn next(&mut self, params: &Ros2ControlParams, silent: Duration) -> Result<Measured, ArmError> {
+    pub fn next(
+        &mut self,
+        params: &Ros2ControlParams,
+        silent: Duration,
+    ) -> Result<Measured, ArmError> {
         loop {
             if let Some(measured) = self.paired(params)? {
                 return Ok(measured);
             }
             let now = params.clock.now();
-            let patience = self.joints.patience(silent, now)?.min(self.wrench.patience(silent, now)?);
+            let patience = self
+                .joints
+                .patience(silent, now)?
+                .min(self.wrench.patience(silent, now)?);
             if let Some(report) = self.port.next_report(patience) {
                 self.take(report, params)?;
             }
@@ -126,7 +135,9 @@ impl StateReader {
         let now = params.clock.now();
         match report {
             ArmReport::Joints(message) => {
-                let Some(sample) = self.sample(&message, params)? else { return Ok(()) };
+                let Some(sample) = self.sample(&message, params)? else {
+                    return Ok(());
+                };
                 if self.joints.see(sample.stamp_ns, params.silent, now)? {
                     keep(&mut self.waiting, sample, WAITING);
                 }
@@ -148,15 +159,24 @@ impl StateReader {
 
     /// The oldest joints that wait, with the wrench next to them in time.
     fn paired(&mut self, params: &Ros2ControlParams) -> Result<Option<Measured>, ArmError> {
-        let Some(sample) = self.waiting.front().copied() else { return Ok(None) };
-        let Some(&(newest_ns, _)) = self.wrenches.back() else { return Ok(None) };
+        let Some(sample) = self.waiting.front().copied() else {
+            return Ok(None);
+        };
+        let Some(&(newest_ns, _)) = self.wrenches.back() else {
+            return Ok(None);
+        };
         let apart_ns = |stamp_ns: i64| stamp_ns.saturating_sub(sample.stamp_ns).saturating_abs();
         let most_ns = params.silent.as_nanos() as i64;
         if newest_ns < sample.stamp_ns.saturating_sub(SAME_NS) && apart_ns(newest_ns) <= most_ns {
             return Ok(None);
         }
-        let nearest = self.wrenches.iter().min_by_key(|(stamp_ns, _)| apart_ns(*stamp_ns));
-        let Some(&(stamp_ns, wrench_f)) = nearest else { return Ok(None) };
+        let nearest = self
+            .wrenches
+            .iter()
+            .min_by_key(|(stamp_ns, _)| apart_ns(*stamp_ns));
+        let Some(&(stamp_ns, wrench_f)) = nearest else {
+            return Ok(None);
+        };
         if apart_ns(stamp_ns) > most_ns {
             let apart_ms = apart_ns(stamp_ns) as f64 * 1e-6;
             let joints = &params.topics.joint_states;
@@ -164,15 +184,25 @@ impl StateReader {
                 "its stamps are {apart_ms:.0} ms from those of {joints}: both have to come from one controller manager, \
                  or from clocks that agree"
             );
-            return Err(ArmError::Unreadable { topic: params.topics.wrench.clone(), reason });
+            return Err(ArmError::Unreadable {
+                topic: params.topics.wrench.clone(),
+                reason,
+            });
         }
         self.waiting.pop_front();
         Ok(Some(Measured { sample, wrench_f }))
     }
 
     /// The joints of the arm in a message; `None` where it has none of them, as that of a gripper.
-    fn sample(&mut self, message: &JointState, params: &Ros2ControlParams) -> Result<Option<JointSample>, ArmError> {
-        let unreadable = |reason| ArmError::Unreadable { topic: params.topics.joint_states.clone(), reason };
+    fn sample(
+        &mut self,
+        message: &JointState,
+        params: &Ros2ControlParams,
+    ) -> Result<Option<JointSample>, ArmError> {
+        let unreadable = |reason| ArmError::Unreadable {
+            topic: params.topics.joint_states.clone(),
+            reason,
+        };
         let place_of = |name: &Arc<str>| message.name.iter().position(|other| **other == **name);
         let places: Vec<_> = params.joint_names.iter().map(place_of).collect();
         if places.iter().all(Option::is_none) {
@@ -180,34 +210,58 @@ impl StateReader {
         }
         if let Some(missing) = places.iter().position(Option::is_none) {
             let name = &params.joint_names[missing];
-            return Err(unreadable(format!("the joint {name} is missing in a message that has others of the arm")));
+            return Err(unreadable(format!(
+                "the joint {name} is missing in a message that has others of the arm"
+            )));
         }
         let of = |values: &[f64]| {
             let mut joints = [0.0; MOST_JOINTS];
             for (joint, place) in joints.iter_mut().zip(&places) {
-                *joint = values.get((*place)?).copied().filter(|value| value.is_finite())?;
+                *joint = values
+                    .get((*place)?)
+                    .copied()
+                    .filter(|value| value.is_finite())?;
             }
             Joints::of(&joints[..places.len()])
         };
         let joints = of(&message.position);
-        let joints = joints.ok_or_else(|| unreadable("a position of its joints is missing or no number".to_owned()))?;
+        let joints = joints.ok_or_else(|| {
+            unreadable("a position of its joints is missing or no number".to_owned())
+        })?;
         let stamp_ns = nanoseconds(&message.header);
         let rates = of(&message.velocity).unwrap_or_else(|| self.difference(stamp_ns, &joints));
-        if self.places.back().is_some_and(|(last_ns, _)| *last_ns >= stamp_ns) {
+        if self
+            .places
+            .back()
+            .is_some_and(|(last_ns, _)| *last_ns >= stamp_ns)
+        {
             self.places.clear();
         }
-        while self.places.get(1).is_some_and(|(then_ns, _)| stamp_ns.saturating_sub(*then_ns) >= BASE_NS) {
+        while self
+            .places
+            .get(1)
+            .is_some_and(|(then_ns, _)| stamp_ns.saturating_sub(*then_ns) >= BASE_NS)
+        {
             self.places.pop_front();
         }
         keep(&mut self.places, (stamp_ns, joints), WAITING);
-        Ok(Some(JointSample { stamp_ns, joints, rates }))
+        Ok(Some(JointSample {
+            stamp_ns,
+            joints,
+            rates,
+        }))
     }
 
     /// Velocities from places, rad/s; zero where there are none before.
     fn difference(&self, stamp_ns: i64, joints: &Joints) -> Joints {
-        let then = self.places.front().filter(|(then_ns, _)| *then_ns < stamp_ns);
+        let then = self
+            .places
+            .front()
+            .filter(|(then_ns, _)| *then_ns < stamp_ns);
         joints.mapped(|joint, angle| match then {
-            Some((then_ns, before)) => (angle - before[joint]) / (stamp_ns.saturating_sub(*then_ns) as f64 * 1e-9),
+            Some((then_ns, before)) => {
+                (angle - before[joint]) / (stamp_ns.saturating_sub(*then_ns) as f64 * 1e-9)
+            }
             None => 0.0,
         })
     }
@@ -225,8 +279,16 @@ fn nanoseconds(header: &Header) -> i64 {
 }
 
 /// What the sensor S has, in the axes of the flange F about its origin: f_F = R_FS f_S, τ_F = R_FS τ_S + p_FS × f_F.
-fn wrench_in_flange(message: &WrenchStamped, params: &Ros2ControlParams) -> Result<Wrench, ArmError> {
-    let unreadable = |reason| Err(ArmError::Unreadable { topic: params.topics.wrench.clone(), reason });
+fn wrench_in_flange(
+    message: &WrenchStamped,
+    params: &Ros2ControlParams,
+) -> Result<Wrench, ArmError> {
+    let unreadable = |reason| {
+        Err(ArmError::Unreadable {
+            topic: params.topics.wrench.clone(),
+            reason,
+        })
+    };
     let (named, wanted) = (&message.header.frame_id, &params.wrench_frame);
     if named != wanted {
         return unreadable(format!(
@@ -235,8 +297,15 @@ fn wrench_in_flange(message: &WrenchStamped, params: &Ros2ControlParams) -> Resu
         ));
     }
     let (force, torque) = (&message.wrench.force, &message.wrench.torque);
-    let (force, torque) = (Vector3::new(force.x, force.y, force.z), Vector3::new(torque.x, torque.y, torque.z));
-    if !force.iter().chain(torque.iter()).all(|part| part.is_finite()) {
+    let (force, torque) = (
+        Vector3::new(force.x, force.y, force.z),
+        Vector3::new(torque.x, torque.y, torque.z),
+    );
+    if !force
+        .iter()
+        .chain(torque.iter())
+        .all(|part| part.is_finite())
+    {
         return unreadable("it has a part that is no number".to_owned());
     }
     let force = params.pose_fs.rotation * force;

@@ -29,7 +29,14 @@ pub(super) struct TopicAge {
 impl TopicAge {
     pub fn new(topic: &str, now: Instant) -> Self {
         let topic = topic.to_owned();
-        Self { topic, begun: now, last_ns: None, least_delay: f64::INFINITY, heard_at: now, came_at: now }
+        Self {
+            topic,
+            begun: now,
+            last_ns: None,
+            least_delay: f64::INFINITY,
+            heard_at: now,
+            came_at: now,
+        }
     }
 
     /// A message came; returns whether it is new.
@@ -37,12 +44,16 @@ impl TopicAge {
     /// - `late`: from so much on, s.
     pub fn see(&mut self, stamp_ns: i64, late: Duration, now: Instant) -> Result<bool, ArmError> {
         self.came_at = now;
-        let since_last_ns = self.last_ns.map_or(1, |last_ns| stamp_ns.saturating_sub(last_ns));
+        let since_last_ns = self
+            .last_ns
+            .map_or(1, |last_ns| stamp_ns.saturating_sub(last_ns));
         if since_last_ns == 0 {
             return Ok(false);
         }
         if since_last_ns < 0 {
-            return Err(ArmError::WentBack { back_ms: -since_last_ns as f64 * 1e-6 });
+            return Err(ArmError::WentBack {
+                back_ms: -since_last_ns as f64 * 1e-6,
+            });
         }
         let arrived = now.saturating_duration_since(self.begun).as_secs_f64();
         let delay = arrived - stamp_ns as f64 * 1e-9;
@@ -52,10 +63,16 @@ impl TopicAge {
         self.least_delay = least.min(delay);
         let topic = || self.topic.clone();
         if least - delay > JUMP && least.is_finite() {
-            return Err(ArmError::JumpedAhead { topic: topic(), ahead_ms: (least - delay) * 1e3 });
+            return Err(ArmError::JumpedAhead {
+                topic: topic(),
+                ahead_ms: (least - delay) * 1e3,
+            });
         }
         if delay - least > late.as_secs_f64() {
-            return Err(ArmError::Late { topic: topic(), late_ms: (delay - least) * 1e3 });
+            return Err(ArmError::Late {
+                topic: topic(),
+                late_ms: (delay - least) * 1e3,
+            });
         }
         Ok(true)
     }
@@ -77,7 +94,10 @@ impl TopicAge {
         if now.saturating_duration_since(self.came_at) < silent && self.last_ns.is_some() {
             return Err(ArmError::Stale);
         }
-        Err(ArmError::TopicSilent { topic: self.topic.clone(), silent_ms: waited.as_secs_f64() * 1e3 })
+        Err(ArmError::TopicSilent {
+            topic: self.topic.clone(),
+            silent_ms: waited.as_secs_f64() * 1e3,
+        })
     }
 }
 
@@ -106,25 +126,42 @@ mod tests {
         let at = |ms| begun + Duration::from_millis(ms);
         assert_eq!(age.clone().see(1000 * MS, SILENT, at(1066)), Ok(true));
         let late = age.see(1000 * MS, SILENT, at(1068)).unwrap_err();
-        assert!(matches!(&late, ArmError::Late { late_ms, .. } if (late_ms - 61.0).abs() < 0.1), "{late}");
+        assert!(
+            matches!(&late, ArmError::Late { late_ms, .. } if (late_ms - 61.0).abs() < 0.1),
+            "{late}"
+        );
     }
 
     #[test]
     fn a_stamp_that_jumps_is_named_by_its_direction() {
         let (mut age, begun) = steady();
         let now = begun + Duration::from_millis(1007);
-        let ahead = age.clone().see(1000 * MS + 300 * MS, SILENT, now).unwrap_err();
-        assert!(matches!(ahead, ArmError::JumpedAhead { ahead_ms, .. } if (ahead_ms - 300.0).abs() < 0.1));
-        assert_eq!(age.see(990 * MS, SILENT, now), Err(ArmError::WentBack { back_ms: 8.0 }));
+        let ahead = age
+            .clone()
+            .see(1000 * MS + 300 * MS, SILENT, now)
+            .unwrap_err();
+        assert!(
+            matches!(ahead, ArmError::JumpedAhead { ahead_ms, .. } if (ahead_ms - 300.0).abs() < 0.1)
+        );
+        assert_eq!(
+            age.see(990 * MS, SILENT, now),
+            Err(ArmError::WentBack { back_ms: 8.0 })
+        );
     }
 
     #[test]
     fn a_silent_topic_and_one_that_says_the_same_again_are_told_apart() {
         let (mut age, begun) = steady();
         let at = |ms| begun + Duration::from_millis(ms);
-        assert_eq!(age.patience(SILENT, at(1025)), Ok(Duration::from_millis(40)));
+        assert_eq!(
+            age.patience(SILENT, at(1025)),
+            Ok(Duration::from_millis(40))
+        );
         let silent = age.patience(SILENT, at(1065)).unwrap_err();
-        assert!(matches!(silent, ArmError::TopicSilent { silent_ms, .. } if silent_ms == 60.0), "{silent}");
+        assert!(
+            matches!(silent, ArmError::TopicSilent { silent_ms, .. } if silent_ms == 60.0),
+            "{silent}"
+        );
         assert_eq!(age.see(998 * MS, SILENT, at(1064)), Ok(false));
         assert_eq!(age.patience(SILENT, at(1065)), Err(ArmError::Stale));
     }

@@ -15,7 +15,9 @@ use super::params::UrParams;
 use super::priority;
 use super::probe::probe;
 use super::protocol::{Action, UrState, pose_of, vector_of};
-use crate::probing::arm::{Arm, ArmError, ArmState, Command, Freshness, Safety, Slowed, velocity_towards};
+use crate::probing::arm::{
+    Arm, ArmError, ArmState, Command, Freshness, Safety, Slowed, velocity_towards,
+};
 use crate::stylus::Wrench;
 
 /// Time between two states, s: an e-Series sends them at 500 Hz.
@@ -61,7 +63,11 @@ impl UrArm {
             return Err(UrError::Stopped(safety));
         }
         let client = Client::start(params, dashboard)?;
-        let next = || client.next_state(params.deadlines.connect).map_err(|error| UrError::Client(error.to_string()));
+        let next = || {
+            client
+                .next_state(params.deadlines.connect)
+                .map_err(|error| UrError::Client(error.to_string()))
+        };
         let mut last = next()?;
         // one may be left out
         let mut least_s = f64::INFINITY;
@@ -71,7 +77,11 @@ impl UrArm {
             last = state;
         }
         if least_s > PERIOD * SAME_PERIOD {
-            return Err(UrError::Rate { host: params.host.clone(), hz: 1.0 / least_s, needed_hz: 1.0 / PERIOD });
+            return Err(UrError::Rate {
+                host: params.host.clone(),
+                hz: 1.0 / least_s,
+                needed_hz: 1.0 / PERIOD,
+            });
         }
         if !client.is_lock_step {
             let late = loop {
@@ -82,7 +92,11 @@ impl UrArm {
             };
             let StartLateness { usual_ms, worst_ms } = late;
             if !late.is_tolerable() {
-                return Err(UrError::Busy { host: params.host.clone(), usual_ms, worst_ms });
+                return Err(UrError::Busy {
+                    host: params.host.clone(),
+                    usual_ms,
+                    worst_ms,
+                });
             }
             tracing::info!(usual_ms, worst_ms, "states of the arm come late by");
             if let Err(error) = priority::raise(priority::CALLER, false) {
@@ -90,9 +104,16 @@ impl UrArm {
             }
         }
         if let Some(slowed) = last.slowed() {
-            tracing::warn!("{slowed}: links, searches and retractions take as much longer, and may end as not arrived");
+            tracing::warn!(
+                "{slowed}: links, searches and retractions take as much longer, and may end as not arrived"
+            );
         }
-        Ok(Self { params: params.clone(), client, last, freshness: Freshness::new(PERIOD) })
+        Ok(Self {
+            params: params.clone(),
+            client,
+            last,
+            freshness: Freshness::new(PERIOD),
+        })
     }
 
     /// Clears the stop of an arm, as far as a call can, and connects as [`Self::connect`]. Nothing moves.
@@ -118,7 +139,8 @@ impl UrArm {
     fn unlock(params: &UrParams) -> Result<(), ArmError> {
         let silent_ms = params.deadlines.dashboard.as_millis() as u64;
         let lost = |_: UrError| ArmError::Lost { silent_ms };
-        let mut dashboard = Dashboard::connect(&params.host, params.deadlines.dashboard).map_err(lost)?;
+        let mut dashboard =
+            Dashboard::connect(&params.host, params.deadlines.dashboard).map_err(lost)?;
         let clock = &params.clock;
         let begun = clock.now();
         loop {
@@ -151,7 +173,11 @@ impl Arm for UrArm {
         let order = order_of(command, &self.last, &self.params)?;
         let is_stop = matches!(command, Command::Stop { .. });
         // a stop is right whenever it comes
-        if is_stop || self.freshness.may_send(self.last.stamp_s, self.client.newest())? {
+        if is_stop
+            || self
+                .freshness
+                .may_send(self.last.stamp_s, self.client.newest())?
+        {
             self.client.order(order)?;
         }
         Ok(())
@@ -172,8 +198,10 @@ impl Arm for UrArm {
     /// pressed: back off, then [`crate::probing::arm::Watched::zero`].
     fn recover(&mut self) -> Result<(), ArmError> {
         Self::unlock(&self.params)?;
-        self.client.close("was ended for a restart, and that failed");
-        *self = Self::connect(&self.params).map_err(|error| refused("to recover", error.to_string()))?;
+        self.client
+            .close("was ended for a restart, and that failed");
+        *self = Self::connect(&self.params)
+            .map_err(|error| refused("to recover", error.to_string()))?;
         Ok(())
     }
 
@@ -187,7 +215,10 @@ impl Arm for UrArm {
 }
 
 fn refused(what: &'static str, reason: impl Into<String>) -> ArmError {
-    ArmError::Refused { what, reason: reason.into() }
+    ArmError::Refused {
+        what,
+        reason: reason.into(),
+    }
 }
 
 /// What a state says of the arm.
@@ -209,28 +240,55 @@ pub(super) fn seen(state: &UrState) -> ArmState {
 /// The order that a command is.
 ///
 /// - `last`: the state that it follows.
-pub(super) fn order_of(command: &Command, last: &UrState, params: &UrParams) -> Result<Action, ArmError> {
+pub(super) fn order_of(
+    command: &Command,
+    last: &UrState,
+    params: &UrParams,
+) -> Result<Action, ArmError> {
     match *command {
-        Command::Line { to, speed, acceleration } => {
+        Command::Line {
+            to,
+            speed,
+            acceleration,
+        } => {
             check(params, "a line", speed, acceleration)?;
             let is_pose = vector_of(&to).iter().all(|part| part.is_finite());
             if !is_pose {
                 return Err(refused("a line", "its end is no pose"));
             }
             Ok(Action::Move {
-                twist: velocity_towards(&pose_of(last.pose), &to, [speed, acceleration], SETTLING_TIME),
+                twist: velocity_towards(
+                    &pose_of(last.pose),
+                    &to,
+                    [speed, acceleration],
+                    SETTLING_TIME,
+                ),
                 acceleration,
             })
         }
-        Command::Velocity { linear, acceleration } => {
+        Command::Velocity {
+            linear,
+            acceleration,
+        } => {
             check(params, "a velocity", linear.norm(), acceleration)?;
-            Ok(Action::Move { twist: [linear.x, linear.y, linear.z, 0.0, 0.0, 0.0], acceleration })
+            Ok(Action::Move {
+                twist: [linear.x, linear.y, linear.z, 0.0, 0.0, 0.0],
+                acceleration,
+            })
         }
-        Command::Press { axis, force, feed, speed } => {
+        Command::Press {
+            axis,
+            force,
+            feed,
+            speed,
+        } => {
             check(params, "a press", feed.norm().max(speed), FEED_ACCELERATION)?;
             if !(0.0..=params.top_force).contains(&force) {
                 let most = params.top_force;
-                return Err(refused("a press", format!("{force} N is not from 0 to {most} N")));
+                return Err(refused(
+                    "a press",
+                    format!("{force} N is not from 0 to {most} N"),
+                ));
             }
             let Some(frame) = frame_along(&axis) else {
                 return Err(refused("a press", "its axis is no direction"));
@@ -253,24 +311,43 @@ pub(super) fn order_of(command: &Command, last: &UrState, params: &UrParams) -> 
     }
 }
 
-fn check(params: &UrParams, what: &'static str, speed: f64, acceleration: f64) -> Result<(), ArmError> {
+fn check(
+    params: &UrParams,
+    what: &'static str,
+    speed: f64,
+    acceleration: f64,
+) -> Result<(), ArmError> {
     let most = params.top_speed;
     if !(0.0..=most).contains(&speed) {
-        return Err(refused(what, format!("{speed} m/s is not from 0 to {most} m/s")));
+        return Err(refused(
+            what,
+            format!("{speed} m/s is not from 0 to {most} m/s"),
+        ));
     }
     if acceleration.is_nan() || acceleration <= 0.0 || acceleration > TOP_ACCELERATION {
-        return Err(refused(what, format!("{acceleration} m/s² is not above 0 and up to {TOP_ACCELERATION} m/s²")));
+        return Err(refused(
+            what,
+            format!("{acceleration} m/s² is not above 0 and up to {TOP_ACCELERATION} m/s²"),
+        ));
     }
     Ok(())
 }
 
 /// Some orientation in B whose z is a direction; `None`: it is none.
 fn frame_along(axis: &Vector3<f64>) -> Option<UnitQuaternion<f64>> {
-    let axis = axis.try_normalize(0.5).filter(|axis| axis.iter().all(|part| part.is_finite()))?;
-    let aside = if axis.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
+    let axis = axis
+        .try_normalize(0.5)
+        .filter(|axis| axis.iter().all(|part| part.is_finite()))?;
+    let aside = if axis.x.abs() < 0.7 {
+        Vector3::x()
+    } else {
+        Vector3::y()
+    };
     let across = aside.cross(&axis).normalize();
     let turn = nalgebra::Matrix3::from_columns(&[axis.cross(&across) * -1.0, across, axis]);
-    Some(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn)))
+    Some(UnitQuaternion::from_rotation_matrix(
+        &Rotation3::from_matrix_unchecked(turn),
+    ))
 }
 
 #[cfg(test)]
@@ -279,7 +356,12 @@ mod tests {
 
     #[test]
     fn the_frame_of_a_press_has_its_z_along_the_axis() {
-        for axis in [-Vector3::z(), Vector3::x(), -Vector3::y(), Vector3::new(0.6, 0.0, -0.8)] {
+        for axis in [
+            -Vector3::z(),
+            Vector3::x(),
+            -Vector3::y(),
+            Vector3::new(0.6, 0.0, -0.8),
+        ] {
             let frame = frame_along(&axis).unwrap();
             assert!((frame * Vector3::z() - axis).norm() < 1e-12, "{axis}");
         }

@@ -50,7 +50,12 @@ impl Client {
             // an interrupt from the terminal is for the parent, which stops the arm first
             .process_group(0)
             .spawn()
-            .map_err(|error| UrError::Client(format!("does not start ({}): {error}", params.program.display())))?;
+            .map_err(|error| {
+                UrError::Client(format!(
+                    "does not start ({}): {error}",
+                    params.program.display()
+                ))
+            })?;
         let (Some(mut orders), Some(lines), Some(words)) =
             (child.stdin.take(), child.stdout.take(), child.stderr.take())
         else {
@@ -73,7 +78,10 @@ impl Client {
             be_in_time(is_lock_step);
             for line in BufReader::new(lines).lines().map_while(Result::ok) {
                 let Ok(report) = serde_json::from_str::<ClientReport>(&line) else {
-                    tracing::warn!(line, "the program that speaks to the arm said what is no report");
+                    tracing::warn!(
+                        line,
+                        "the program that speaks to the arm said what is no report"
+                    );
                     continue;
                 };
                 if sender.send(report).is_err() {
@@ -86,26 +94,50 @@ impl Client {
                 tracing::debug!(line, "from ur-rtde");
             }
         });
-        let (clock, hand) = (is_lock_step && !params.clock.is_manual()).then(Clock::manual).unzip();
+        let (clock, hand) = (is_lock_step && !params.clock.is_manual())
+            .then(Clock::manual)
+            .unzip();
         let clock = clock.unwrap_or_else(|| params.clock.clone());
         let shared = Arc::new(SharedGuard::new(params.deadlines, clock));
         let id = child.id();
-        let guard = Guard { child, host: params.host.clone(), dashboard, shared: shared.clone(), hand };
+        let guard = Guard {
+            child,
+            host: params.host.clone(),
+            dashboard,
+            shared: shared.clone(),
+            hand,
+        };
         let guard = thread::spawn(move || {
             be_in_time(is_lock_step);
             guard.watch(&reports)
         });
-        let client = Self { shared, orders: Some(orders), guard: Some(guard), halt: None, is_lock_step, id };
+        let client = Self {
+            shared,
+            orders: Some(orders),
+            guard: Some(guard),
+            halt: None,
+            is_lock_step,
+            id,
+        };
         sent.map_err(|error| UrError::Client(format!("does not listen: {error}")))?;
-        let known = client.wait(params.deadlines.connect + params.deadlines.beat, |known| known.is_ready);
+        let known = client.wait(params.deadlines.connect + params.deadlines.beat, |known| {
+            known.is_ready
+        });
         match known.broken.clone() {
             None if known.is_ready => {}
             Some(ClientLoss::Wheel(reason)) => {
-                return Err(UrError::Wheel { site_packages: params.site_packages.clone(), reason });
+                return Err(UrError::Wheel {
+                    site_packages: params.site_packages.clone(),
+                    reason,
+                });
             }
             Some(ClientLoss::Tool(reason)) => return Err(UrError::Tool(reason)),
-            Some(ClientLoss::Arm(ArmError::Client { reason })) => return Err(UrError::Client(reason)),
-            Some(ClientLoss::Arm(error)) => return Err(UrError::Client(format!("lost the arm at once: {error}"))),
+            Some(ClientLoss::Arm(ArmError::Client { reason })) => {
+                return Err(UrError::Client(reason));
+            }
+            Some(ClientLoss::Arm(error)) => {
+                return Err(UrError::Client(format!("lost the arm at once: {error}")));
+            }
             None => return Err(UrError::Client("says nothing".to_owned())),
         }
         drop(known);
@@ -113,15 +145,23 @@ impl Client {
     }
 
     /// Waits until something is so, or the client is broken, or the time is over.
-    fn wait(&self, deadline: Duration, is_so: impl Fn(&GuardState) -> bool) -> MutexGuard<'_, GuardState> {
+    fn wait(
+        &self,
+        deadline: Duration,
+        is_so: impl Fn(&GuardState) -> bool,
+    ) -> MutexGuard<'_, GuardState> {
         let SharedGuard { changed, clock, .. } = &*self.shared;
-        clock.wait_while(changed, self.shared.known(), deadline, |known| known.broken.is_none() && !is_so(known))
+        clock.wait_while(changed, self.shared.known(), deadline, |known| {
+            known.broken.is_none() && !is_so(known)
+        })
     }
 
     /// The next state, the oldest that has not been given yet.
     pub fn next_state(&self, deadline: Duration) -> Result<UrState, ArmError> {
         let has_ended = |known: &GuardState| known.has_ended(self.shared.clock.now());
-        let mut known = self.wait(deadline, |known| !known.states.is_empty() || has_ended(known));
+        let mut known = self.wait(deadline, |known| {
+            !known.states.is_empty() || has_ended(known)
+        });
         if let Some(broken) = &known.broken {
             return Err(broken.error());
         }
@@ -157,13 +197,18 @@ impl Client {
         let number = known.send(&what, self.shared.clock.now());
         drop(known);
         let sent = match &mut self.orders {
-            Some(orders) => line_of(&Order { number, what }).and_then(|line| orders.write_all(&line)),
+            Some(orders) => {
+                line_of(&Order { number, what }).and_then(|line| orders.write_all(&line))
+            }
             None => Err(std::io::ErrorKind::BrokenPipe.into()),
         };
         if sent.is_err() {
             // its end is found by the guard, which knows the reason
             let known = self.wait(ZEROING, |_| false);
-            return Err(known.broken.as_ref().map_or(ArmError::Lost { silent_ms: 0 }, ClientLoss::error));
+            return Err(known
+                .broken
+                .as_ref()
+                .map_or(ArmError::Lost { silent_ms: 0 }, ClientLoss::error));
         }
         Ok(number)
     }
@@ -172,7 +217,10 @@ impl Client {
     pub fn ask(&mut self, what: Action) -> Result<(), ArmError> {
         let number = self.order(what)?;
         let known = self.wait(ZEROING + FAREWELL, |known| known.done >= number);
-        known.broken.as_ref().map_or(Ok(()), |broken| Err(broken.error()))
+        known
+            .broken
+            .as_ref()
+            .map_or(Ok(()), |broken| Err(broken.error()))
     }
 
     /// Ends it, and with it the program of the controller; later calls return the reason.
@@ -182,7 +230,11 @@ impl Client {
         self.orders = None;
         self.end_guard();
         self.shared.ask_no_more();
-        let closed = || ClientLoss::Arm(ArmError::Client { reason: reason.to_owned() });
+        let closed = || {
+            ClientLoss::Arm(ArmError::Client {
+                reason: reason.to_owned(),
+            })
+        };
         self.shared.known().broken.get_or_insert_with(closed);
     }
 
@@ -227,12 +279,21 @@ mod tests {
     #[test]
     fn a_greeting_alone_starts_no_lock_step() {
         let folder = tempfile::tempdir().unwrap();
-        let (program, first_line) = (folder.path().join("client"), folder.path().join("first_line"));
-        fs::write(&program, format!("#!/bin/sh\nhead -n 1 > {}\n", first_line.display())).unwrap();
+        let (program, first_line) = (
+            folder.path().join("client"),
+            folder.path().join("first_line"),
+        );
+        fs::write(
+            &program,
+            format!("#!/bin/sh\nhead -n 1 > {}\n", first_line.display()),
+        )
+        .unwrap();
         fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
-        for (is_allowed, greeting) in
-            [(false, "in lock step"), (true, "Universal Robots Dashboard Server"), (true, "a test in lock step")]
-        {
+        for (is_allowed, greeting) in [
+            (false, "in lock step"),
+            (true, "Universal Robots Dashboard Server"),
+            (true, "a test in lock step"),
+        ] {
             let (host, listener) = listen();
             let greets = thread::spawn(move || {
                 let (mut socket, _) = listener.accept().unwrap();
@@ -241,13 +302,23 @@ mod tests {
             });
             let deadline = Duration::from_secs(60);
             let dashboard = Dashboard::connect(&host, deadline).unwrap();
-            let params =
-                UrParams { program: program.clone(), is_lock_step: is_allowed, ..UrParams::new(&host, "none") };
+            let params = UrParams {
+                program: program.clone(),
+                is_lock_step: is_allowed,
+                ..UrParams::new(&host, "none")
+            };
             let ended = Client::start(&params, dashboard).err().unwrap();
-            assert!(matches!(&ended, UrError::Client(reason) if reason.contains("has ended")), "{ended}");
-            let begin: serde_json::Value = serde_json::from_slice(&fs::read(&first_line).unwrap()).unwrap();
+            assert!(
+                matches!(&ended, UrError::Client(reason) if reason.contains("has ended")),
+                "{ended}"
+            );
+            let begin: serde_json::Value =
+                serde_json::from_slice(&fs::read(&first_line).unwrap()).unwrap();
             let is_both = is_allowed && greeting.ends_with("in lock step");
-            assert_eq!(begin["is_lock_step"], is_both, "allowed: {is_allowed}, greeted: {greeting}");
+            assert_eq!(
+                begin["is_lock_step"], is_both,
+                "allowed: {is_allowed}, greeted: {greeting}"
+            );
             drop(greets.join().unwrap());
         }
     }

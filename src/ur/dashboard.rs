@@ -28,14 +28,23 @@ impl Dashboard {
     /// - `deadline`: of this and of each answer.
     pub fn connect(host: &str, deadline: Duration) -> Result<Self, UrError> {
         let socket = socket(host, PORT, "dashboard", deadline)?;
-        let mut dashboard =
-            Self { host: host.to_owned(), replies: BufReader::new(socket), is_lock_step: false, is_silent: false };
+        let mut dashboard = Self {
+            host: host.to_owned(),
+            replies: BufReader::new(socket),
+            is_lock_step: false,
+            is_silent: false,
+        };
         dashboard.is_lock_step = dashboard.line()?.ends_with(LOCK_STEP);
         Ok(dashboard)
     }
 
     fn unreachable(&self, reason: impl ToString) -> UrError {
-        UrError::Unreachable { host: self.host.clone(), port: PORT, service: "dashboard", reason: reason.to_string() }
+        UrError::Unreachable {
+            host: self.host.clone(),
+            port: PORT,
+            service: "dashboard",
+            reason: reason.to_string(),
+        }
     }
 
     fn line(&mut self) -> Result<String, UrError> {
@@ -44,14 +53,18 @@ impl Dashboard {
             Ok(0) => Err(self.unreachable("it closed the connection")),
             Ok(_) => Ok(line.trim().to_owned()),
             Err(error) => {
-                self.is_silent = matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut);
+                self.is_silent =
+                    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut);
                 Err(self.unreachable(error))
             }
         }
     }
 
     fn ask(&mut self, what: &str) -> Result<String, UrError> {
-        let sent = self.replies.get_mut().write_all(format!("{what}\n").as_bytes());
+        let sent = self
+            .replies
+            .get_mut()
+            .write_all(format!("{what}\n").as_bytes());
         sent.map_err(|error| self.unreachable(error))?;
         self.line()
     }
@@ -84,14 +97,27 @@ impl Dashboard {
     /// Whether the controller takes orders from outside.
     pub fn check_remote(&mut self) -> Result<(), UrError> {
         let answer = self.ask("is in remote control")?;
-        if answer == "true" { Ok(()) } else { Err(UrError::Local { host: self.host.clone() }) }
+        if answer == "true" {
+            Ok(())
+        } else {
+            Err(UrError::Local {
+                host: self.host.clone(),
+            })
+        }
     }
 
     /// Whether the arm has power and its brakes are open.
     pub fn check_power(&mut self) -> Result<(), UrError> {
         let mode = self.ask("robotmode")?;
         let is_running = mode.ends_with("RUNNING");
-        if is_running { Ok(()) } else { Err(UrError::Off { host: self.host.clone(), mode }) }
+        if is_running {
+            Ok(())
+        } else {
+            Err(UrError::Off {
+                host: self.host.clone(),
+                mode,
+            })
+        }
     }
 
     /// Status of the safety system.
@@ -101,7 +127,9 @@ impl Dashboard {
         Ok(match status {
             "NORMAL" | "REDUCED" => Safety::Normal,
             "PROTECTIVE_STOP" => Safety::ProtectiveStop,
-            "ROBOT_EMERGENCY_STOP" | "SYSTEM_EMERGENCY_STOP" | "SAFEGUARD_STOP" => Safety::OperatorStop,
+            "ROBOT_EMERGENCY_STOP" | "SYSTEM_EMERGENCY_STOP" | "SAFEGUARD_STOP" => {
+                Safety::OperatorStop
+            }
             _ if status.contains("SAFEGUARD") => Safety::OperatorStop,
             _ => Safety::Fault,
         })
@@ -116,7 +144,12 @@ impl Dashboard {
 }
 
 /// A connection whose reads and writes end after the deadline.
-pub(super) fn socket(host: &str, port: u16, service: &'static str, deadline: Duration) -> Result<TcpStream, UrError> {
+pub(super) fn socket(
+    host: &str,
+    port: u16,
+    service: &'static str,
+    deadline: Duration,
+) -> Result<TcpStream, UrError> {
     let connect = || {
         let mut last = std::io::Error::other("the name has no address");
         for address in (host, port).to_socket_addrs()? {
@@ -149,7 +182,11 @@ pub(super) mod tests {
     /// Where a dashboard may be that the test plays, on an address of its own.
     pub fn listen() -> (String, TcpListener) {
         let host = |number: u8| format!("127.9.{}.{number}", std::process::id() % 250 + 1);
-        let free = |host: String| TcpListener::bind((host.as_str(), PORT)).ok().map(|listener| (host, listener));
+        let free = |host: String| {
+            TcpListener::bind((host.as_str(), PORT))
+                .ok()
+                .map(|listener| (host, listener))
+        };
         (1..250).map(host).find_map(free).unwrap()
     }
 }

@@ -20,7 +20,9 @@ pub enum UrError {
         unit: &'static str,
     },
     /// No server listens or answers there.
-    #[error("{host}:{port} ({service}): {reason}; check that the controller is on, the cable and the address")]
+    #[error(
+        "{host}:{port} ({service}): {reason}; check that the controller is on, the cable and the address"
+    )]
     Unreachable {
         /// of the controller
         host: String,
@@ -32,7 +34,9 @@ pub enum UrError {
         reason: String,
     },
     /// A controller that this was not made for.
-    #[error("the controller at {host} runs version {found}; an e-Series with PolyScope 5.9 or a later 5 is needed")]
+    #[error(
+        "the controller at {host} runs version {found}; an e-Series with PolyScope 5.9 or a later 5 is needed"
+    )]
     Version {
         /// of the controller
         host: String,
@@ -72,7 +76,9 @@ pub enum UrError {
         host: String,
     },
     /// It cannot move.
-    #[error("the arm at {host} is not running ({mode}): power it on and release its brakes at its panel")]
+    #[error(
+        "the arm at {host} is not running ({mode}): power it on and release its brakes at its panel"
+    )]
     Off {
         /// of the controller
         host: String,

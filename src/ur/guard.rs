@@ -108,13 +108,21 @@ impl Asker {
         let (over, is_over) = channel();
         let ask = move || {
             while is_over.recv_timeout(AGAIN) == Err(RecvTimeoutError::Timeout) {
-                if Dashboard::connect(&host, deadline).and_then(|mut dashboard| dashboard.stop()).is_ok() {
-                    tracing::warn!("the dashboard, which had not answered, has stopped the program of the arm");
+                if Dashboard::connect(&host, deadline)
+                    .and_then(|mut dashboard| dashboard.stop())
+                    .is_ok()
+                {
+                    tracing::warn!(
+                        "the dashboard, which had not answered, has stopped the program of the arm"
+                    );
                     break;
                 }
             }
         };
-        Self { over: Some(over), thread: Some(thread::spawn(ask)) }
+        Self {
+            over: Some(over),
+            thread: Some(thread::spawn(ask)),
+        }
     }
 }
 
@@ -150,7 +158,9 @@ impl ClientLoss {
     pub fn error(&self) -> ArmError {
         match self {
             Self::Arm(error) => error.clone(),
-            Self::Wheel(reason) | Self::Tool(reason) => ArmError::Client { reason: reason.clone() },
+            Self::Wheel(reason) | Self::Tool(reason) => ArmError::Client {
+                reason: reason.clone(),
+            },
         }
     }
 
@@ -162,13 +172,32 @@ impl ClientLoss {
 /// What of an order shows in the velocity of the arm.
 fn ordered(what: &Action) -> OrderedMotion {
     match *what {
-        Action::Move { twist, acceleration } => OrderedMotion::Move { twist, acceleration },
-        Action::Press { frame, speed, feed, acceleration, .. } => {
+        Action::Move {
+            twist,
+            acceleration,
+        } => OrderedMotion::Move {
+            twist,
+            acceleration,
+        },
+        Action::Press {
+            frame,
+            speed,
+            feed,
+            acceleration,
+            ..
+        } => {
             let axis = pose_of(frame).rotation * Vector3::z();
-            OrderedMotion::Press { axis, speed, feed: feed.into(), acceleration }
+            OrderedMotion::Press {
+                axis,
+                speed,
+                feed: feed.into(),
+                acceleration,
+            }
         }
         Action::Stop { deceleration } => OrderedMotion::Stop { deceleration },
-        Action::Zero => OrderedMotion::Stop { deceleration: ZEROING_STOP },
+        Action::Zero => OrderedMotion::Stop {
+            deceleration: ZEROING_STOP,
+        },
     }
 }
 
@@ -200,7 +229,8 @@ impl GuardState {
     pub fn send(&mut self, what: &Action, now: Instant) -> u64 {
         self.sent += 1;
         self.waiting_since.get_or_insert(now);
-        self.obedience.order(&ordered(what), now.saturating_duration_since(self.begun_at));
+        self.obedience
+            .order(&ordered(what), now.saturating_duration_since(self.begun_at));
         if *what == Action::Zero {
             self.asked = Some(self.sent);
         }
@@ -214,12 +244,17 @@ impl GuardState {
 
     /// Whether the program of the controller does not run, for long enough that the reason would have arrived.
     pub fn has_ended(&self, now: Instant) -> bool {
-        self.ended_since.is_some_and(|since| now.saturating_duration_since(since) > ENDED)
+        self.ended_since
+            .is_some_and(|since| now.saturating_duration_since(since) > ENDED)
     }
 
     /// Why it does not.
     pub fn ended(&self) -> ArmError {
-        if self.was_paused { ArmError::ProgramPaused } else { ArmError::ProgramEnded }
+        if self.was_paused {
+            ArmError::ProgramPaused
+        } else {
+            ArmError::ProgramEnded
+        }
     }
 
     /// Notes a state of a client that is ready; whether it is the first in which something else stops a program that is still there.
@@ -247,7 +282,11 @@ impl GuardState {
         match (self.closing_since, self.is_ready) {
             (Some(since), _) => (Some(since), FAREWELL, "it does not end"),
             (_, true) => (None, self.deadlines.beat, "nothing from it"),
-            (_, false) => (Some(self.begun_at), self.deadlines.connect, "it is not ready"),
+            (_, false) => (
+                Some(self.begun_at),
+                self.deadlines.connect,
+                "it is not ready",
+            ),
         }
     }
 
@@ -276,7 +315,10 @@ impl GuardState {
                 let disobeys = self.is_ready && !self.has_halted && state.may_move();
                 let since = now.saturating_duration_since(self.begun_at);
                 let pose = pose_of(state.pose);
-                if let Some(fault) = disobeys.then(|| self.obedience.see(&pose, &state.velocity, since)).flatten() {
+                if let Some(fault) = disobeys
+                    .then(|| self.obedience.see(&pose, &state.velocity, since))
+                    .flatten()
+                {
                     return Some(ClientLoss::Arm(fault));
                 }
             }
@@ -296,18 +338,30 @@ impl GuardState {
             ClientReport::BadWheel { reason } => return Some(ClientLoss::Wheel(reason)),
             ClientReport::BadTool { reason } => return Some(ClientLoss::Tool(reason)),
             ClientReport::Failed { call, reason } => {
-                return Some(ClientLoss::client(format!("was refused a call: {call}: {reason}")));
+                return Some(ClientLoss::client(format!(
+                    "was refused a call: {call}: {reason}"
+                )));
             }
         }
-        let since = |at: Option<Instant>| at.map_or(Duration::ZERO, |at| now.saturating_duration_since(at));
+        let since =
+            |at: Option<Instant>| at.map_or(Duration::ZERO, |at| now.saturating_duration_since(at));
         let silent = since(self.fresh_at);
         if self.is_ready && silent > self.deadlines.silent {
-            return Some(ClientLoss::Arm(ArmError::Lost { silent_ms: silent.as_millis() as u64 }));
+            return Some(ClientLoss::Arm(ArmError::Lost {
+                silent_ms: silent.as_millis() as u64,
+            }));
         }
-        let patience = if self.asked.is_some() { ZEROING } else { self.deadlines.order };
+        let patience = if self.asked.is_some() {
+            ZEROING
+        } else {
+            self.deadlines.order
+        };
         let waited = since(self.waiting_since);
         (waited > patience).then(|| {
-            ClientLoss::client(format!("hangs: a call of ur-rtde has not returned for {} ms", waited.as_millis()))
+            ClientLoss::client(format!(
+                "hangs: a call of ur-rtde has not returned for {} ms",
+                waited.as_millis()
+            ))
         })
     }
 
@@ -337,12 +391,18 @@ impl Guard {
         let broken = loop {
             let patience = self.shared.known().patience(clock.now());
             // lines may come and come from a client that is never ready or never ends
-            let report =
-                if patience.is_zero() { Err(RecvTimeoutError::Timeout) } else { clock.recv_timeout(reports, patience) };
+            let report = if patience.is_zero() {
+                Err(RecvTimeoutError::Timeout)
+            } else {
+                clock.recv_timeout(reports, patience)
+            };
             let broken = match report {
                 Ok(report) => {
                     if let (Some(hand), ClientReport::State(state)) = (&self.hand, &report) {
-                        hand.advance(Duration::try_from_secs_f64(state.stamp_s - stamp_s).unwrap_or_default());
+                        hand.advance(
+                            Duration::try_from_secs_f64(state.stamp_s - stamp_s)
+                                .unwrap_or_default(),
+                        );
                         stamp_s = state.stamp_s;
                     }
                     let mut known = self.shared.known();
@@ -360,10 +420,17 @@ impl Guard {
                     broken
                 }
                 // it ended on request
-                Err(RecvTimeoutError::Disconnected) if self.shared.known().closing_since.is_some() => break None,
+                Err(RecvTimeoutError::Disconnected)
+                    if self.shared.known().closing_since.is_some() =>
+                {
+                    break None;
+                }
                 Err(RecvTimeoutError::Timeout) => Some(self.shared.known().missed()),
                 Err(RecvTimeoutError::Disconnected) => {
-                    let end = self.child.wait().map_or_else(|error| error.to_string(), |status| status.to_string());
+                    let end = self
+                        .child
+                        .wait()
+                        .map_or_else(|error| error.to_string(), |status| status.to_string());
                     Some(ClientLoss::client(format!("has ended ({end})")))
                 }
             };
@@ -371,7 +438,9 @@ impl Guard {
                 break broken;
             }
             if !self.dashboard.is_open() {
-                break Some(ClientLoss::Arm(ArmError::Dropped { what: "its dashboard" }));
+                break Some(ClientLoss::Arm(ArmError::Dropped {
+                    what: "its dashboard",
+                }));
             }
         };
         // nothing feeds the arm any more from here on; one that has ended already is as good
@@ -392,10 +461,16 @@ impl Guard {
         let (host, deadline) = (&self.host, self.shared.known().deadlines.dashboard);
         let stopped = self.dashboard.stop().or_else(|error| {
             // one that was closed, not one that is silent, may be there again
-            if self.dashboard.is_silent { Err(error) } else { Dashboard::connect(host, deadline)?.stop() }
+            if self.dashboard.is_silent {
+                Err(error)
+            } else {
+                Dashboard::connect(host, deadline)?.stop()
+            }
         });
         match stopped {
-            Ok(()) => Halt::Dashboard { took: self.shared.clock.since(begun) },
+            Ok(()) => Halt::Dashboard {
+                took: self.shared.clock.since(begun),
+            },
             Err(error) => {
                 tracing::error!(
                     %error,

@@ -44,7 +44,13 @@ pub(super) struct Lateness {
 
 impl Lateness {
     pub fn new(now: Instant) -> Self {
-        Self { begun: now, first_s: Vec::new(), least_s: [f64::INFINITY; 2], since: now, newest_s: f64::INFINITY }
+        Self {
+            begun: now,
+            first_s: Vec::new(),
+            least_s: [f64::INFINITY; 2],
+            since: now,
+            newest_s: f64::INFINITY,
+        }
     }
 
     /// A state has come.
@@ -62,15 +68,24 @@ impl Lateness {
     /// Of the newest state, s.
     pub fn newest_s(&self) -> f64 {
         let least = self.least_s[0].min(self.least_s[1]);
-        if least.is_finite() { self.newest_s - least } else { 0.0 }
+        if least.is_finite() {
+            self.newest_s - least
+        } else {
+            0.0
+        }
     }
 
     /// Of the first states; `None`: not all of them have come.
     pub fn at_start(&self) -> Option<StartLateness> {
         let mut late = self.first_s.clone();
         late.sort_by(f64::total_cmp);
-        let usual = late.get(LOOKED_AT * 99 / 100 - 1).filter(|_| late.len() == LOOKED_AT)?;
-        Some(StartLateness { usual_ms: usual * 1e3, worst_ms: late.last()? * 1e3 })
+        let usual = late
+            .get(LOOKED_AT * 99 / 100 - 1)
+            .filter(|_| late.len() == LOOKED_AT)?;
+        Some(StartLateness {
+            usual_ms: usual * 1e3,
+            worst_ms: late.last()? * 1e3,
+        })
     }
 }
 
@@ -93,14 +108,26 @@ mod tests {
 
     #[test]
     fn one_in_two_hundred_that_is_10_ms_late_is_tolerable_and_one_in_fifty_is_not() {
-        let each = |every: usize, ms: f64| after(LOOKED_AT, move |number| if number % every == 3 { ms } else { 0.0 });
-        for (every, ms, usual_ms, is_tolerable) in
-            [(200, 10.0, 0.0, true), (50, 10.0, 10.0, false), (50, 3.0, 3.0, true), (300, 25.0, 0.0, false)]
-        {
+        let each = |every: usize, ms: f64| {
+            after(
+                LOOKED_AT,
+                move |number| if number % every == 3 { ms } else { 0.0 },
+            )
+        };
+        for (every, ms, usual_ms, is_tolerable) in [
+            (200, 10.0, 0.0, true),
+            (50, 10.0, 10.0, false),
+            (50, 3.0, 3.0, true),
+            (300, 25.0, 0.0, false),
+        ] {
             let found = each(every, ms).at_start().unwrap();
             assert!((found.usual_ms - usual_ms).abs() < 1e-3, "{found:?}");
             assert!((found.worst_ms - ms).abs() < 1e-3, "{found:?}");
-            assert_eq!(found.is_tolerable(), is_tolerable, "each {every}th by {ms} ms: {found:?}");
+            assert_eq!(
+                found.is_tolerable(),
+                is_tolerable,
+                "each {every}th by {ms} ms: {found:?}"
+            );
         }
         assert_eq!(after(LOOKED_AT - 1, |_| 0.0).at_start(), None);
     }
@@ -109,13 +136,25 @@ mod tests {
     fn a_constant_delay_that_begins_shows_and_a_clock_that_goes_faster_does_not() {
         // from the 1000th on
         let late = after(1100, |number| if number < 1000 { 0.5 } else { 40.5 });
-        assert!((late.newest_s() - 40e-3).abs() < 1e-6, "{}", late.newest_s());
+        assert!(
+            (late.newest_s() - 40e-3).abs() < 1e-6,
+            "{}",
+            late.newest_s()
+        );
         // 50 millionths for an hour are 180 ms: of that the memory of at most ten seconds keeps 0.5 ms
         let drifting = after(1_800_000, |number| number as f64 * 2.0 * 50e-6);
         assert!(drifting.newest_s() < 0.51e-3, "{}", drifting.newest_s());
         assert_eq!(after(0, |_| 0.0).newest_s(), 0.0);
         // a clock that stands still while states come, as that of a test
-        let ahead = after(LOOKED_AT, |number| -2.0 * number as f64).at_start().unwrap();
-        assert_eq!(ahead, StartLateness { usual_ms: 0.0, worst_ms: 0.0 });
+        let ahead = after(LOOKED_AT, |number| -2.0 * number as f64)
+            .at_start()
+            .unwrap();
+        assert_eq!(
+            ahead,
+            StartLateness {
+                usual_ms: 0.0,
+                worst_ms: 0.0
+            }
+        );
     }
 }

@@ -43,7 +43,8 @@ pub struct UrParams {
 impl UrParams {
     /// A probe of 150 mm and 0.25 kg, held upright; to be set to what is mounted.
     pub fn new(host: impl Into<String>, site_packages: impl Into<PathBuf>) -> Self {
-        let upright = nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        let upright =
+            nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
         Self {
             host: host.into(),
             site_packages: site_packages.into(),
@@ -65,21 +66,50 @@ impl UrParams {
 
     /// Checks the parameters before anything is connected.
     pub(super) fn check(&self) -> Result<(), UrError> {
-        let within = |what: &'static str, value: f64, lowest: f64, highest: f64, unit: &'static str| {
-            // what is no number is in no range
-            let is_in = (lowest..=highest).contains(&value);
-            if is_in { Ok(()) } else { Err(UrError::BadParameter { what, value, lowest, highest, unit }) }
-        };
+        let within =
+            |what: &'static str, value: f64, lowest: f64, highest: f64, unit: &'static str| {
+                // what is no number is in no range
+                let is_in = (lowest..=highest).contains(&value);
+                if is_in {
+                    Ok(())
+                } else {
+                    Err(UrError::BadParameter {
+                        what,
+                        value,
+                        lowest,
+                        highest,
+                        unit,
+                    })
+                }
+            };
         let place = self.pose_ft.translation.vector;
-        within("the tip's distance from the flange", place.norm(), 0.0, 1.0, "m")?;
+        within(
+            "the tip's distance from the flange",
+            place.norm(),
+            0.0,
+            1.0,
+            "m",
+        )?;
         within("the payload", self.mass, 0.0, 16.0, "kg")?;
         // three zeros would leave the centre as it is
-        within("the distance of the payload's centre", self.centre.norm(), 1e-6, 1.0, "m")?;
+        within(
+            "the distance of the payload's centre",
+            self.centre.norm(),
+            1e-6,
+            1.0,
+            "m",
+        )?;
         within("the largest speed", self.top_speed, 1e-3, 1.0, "m/s")?;
         within("the largest force", self.top_force, 0.1, 150.0, "N")?;
         within("the damping of force mode", self.damping, 0.0, 1.0, "")?;
         within("the gain of force mode", self.gain, 0.0, 2.0, "")?;
-        let Deadlines { connect, beat, silent, order, dashboard } = self.deadlines;
+        let Deadlines {
+            connect,
+            beat,
+            silent,
+            order,
+            dashboard,
+        } = self.deadlines;
         let times = [
             ("the time to connect", connect, 30.0),
             ("the time between two beats", beat, 0.2),
@@ -87,7 +117,9 @@ impl UrParams {
             ("the time of an order", order, 1.0),
             ("the time of an answer of the dashboard", dashboard, 5.0),
         ];
-        times.into_iter().try_for_each(|(what, time, most)| within(what, time.as_secs_f64(), 0.01, most, "s"))
+        times
+            .into_iter()
+            .try_for_each(|(what, time, most)| within(what, time.as_secs_f64(), 0.01, most, "s"))
     }
 }
 

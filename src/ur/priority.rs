@@ -19,7 +19,12 @@ pub(super) const CALLER: i32 = 30;
 /// # Errors
 /// Of the system: `EPERM` where it is not allowed.
 pub(super) fn raise(priority: i32, inherits: bool) -> io::Result<()> {
-    let policy = libc::SCHED_FIFO | if inherits { 0 } else { libc::SCHED_RESET_ON_FORK };
+    let policy = libc::SCHED_FIFO
+        | if inherits {
+            0
+        } else {
+            libc::SCHED_RESET_ON_FORK
+        };
     let mut param = std::mem::MaybeUninit::<libc::sched_param>::zeroed();
     // SAFETY: all zeros is a value of this plain struct; 0 is the calling thread, and the kernel only reads `param`, which outlives
     // the call
@@ -27,7 +32,11 @@ pub(super) fn raise(priority: i32, inherits: bool) -> io::Result<()> {
         (*param.as_mut_ptr()).sched_priority = priority;
         libc::sched_setscheduler(0, policy, param.as_ptr())
     };
-    if result == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
+    if result == 0 {
+        Ok(())
+    } else {
+        Err(io::Error::last_os_error())
+    }
 }
 
 /// What has to be done where [`raise`] was refused.
@@ -46,8 +55,16 @@ mod tests {
     fn scheduled() -> (i32, i32) {
         let stat = std::fs::read_to_string("/proc/thread-self/stat").unwrap();
         // the second field is a name in parentheses, which may have blanks
-        let fields: Vec<_> = stat.rsplit_once(')').unwrap().1.split_whitespace().collect();
-        (fields[40 - 3].parse().unwrap(), fields[41 - 3].parse().unwrap())
+        let fields: Vec<_> = stat
+            .rsplit_once(')')
+            .unwrap()
+            .1
+            .split_whitespace()
+            .collect();
+        (
+            fields[40 - 3].parse().unwrap(),
+            fields[41 - 3].parse().unwrap(),
+        )
     }
 
     /// A thread is what the kernel says it is, whether this user may have it or not; one that it starts is so only where it is asked.
@@ -56,7 +73,11 @@ mod tests {
         for inherits in [false, true] {
             let (granted, own, started) = std::thread::spawn(move || {
                 let granted = raise(1, inherits);
-                (granted, scheduled(), std::thread::spawn(scheduled).join().unwrap())
+                (
+                    granted,
+                    scheduled(),
+                    std::thread::spawn(scheduled).join().unwrap(),
+                )
             })
             .join()
             .unwrap();
@@ -77,7 +98,10 @@ mod tests {
     #[test]
     fn who_may_not_have_it_is_told_what_to_do() {
         let words = remedy(&io::Error::from_raw_os_error(libc::EPERM));
-        assert!(words.contains("rtprio 50") && words.contains("limits.conf"), "{words}");
+        assert!(
+            words.contains("rtprio 50") && words.contains("limits.conf"),
+            "{words}"
+        );
         assert!(raise(1000, false).is_err(), "no such priority");
     }
 }

@@ -20,26 +20,49 @@ const STATES: usize = 3;
 /// Refuses a controller that is silent, or not of the kind that is needed.
 pub(super) fn probe(host: &str, deadline: Duration) -> Result<(), UrError> {
     let mut socket = socket(host, PORT, "RTDE", deadline)?;
-    let reason = |reason: String| UrError::Unreachable { host: host.to_owned(), port: PORT, service: "RTDE", reason };
+    let reason = |reason: String| UrError::Unreachable {
+        host: host.to_owned(),
+        port: PORT,
+        service: "RTDE",
+        reason,
+    };
     let mut talk = || -> std::io::Result<(Vec<u32>, Vec<f64>)> {
         ask(&mut socket, b'V', &PROTOCOL)?;
         let version = ask(&mut socket, b'v', &[])?;
-        let version = version.chunks_exact(4).map(|part| u32::from_be_bytes([part[0], part[1], part[2], part[3]]));
+        let version = version
+            .chunks_exact(4)
+            .map(|part| u32::from_be_bytes([part[0], part[1], part[2], part[3]]));
         let version = version.collect();
-        ask(&mut socket, b'O', &[&125f64.to_be_bytes()[..], b"timestamp"].concat())?;
+        ask(
+            &mut socket,
+            b'O',
+            &[&125f64.to_be_bytes()[..], b"timestamp"].concat(),
+        )?;
         ask(&mut socket, b'S', &[])?;
         let mut stamps = Vec::new();
         while stamps.len() < STATES {
             // number of the recipe, then the stamp
             let state = wait(&mut socket, b'U')?;
-            stamps.extend(state.get(1..9).and_then(|stamp| stamp.try_into().ok()).map(f64::from_be_bytes));
+            stamps.extend(
+                state
+                    .get(1..9)
+                    .and_then(|stamp| stamp.try_into().ok())
+                    .map(f64::from_be_bytes),
+            );
         }
         Ok((version, stamps))
     };
     let (version, stamps) = talk().map_err(|error| reason(error.to_string()))?;
     if !matches!(version[..], [5, minor, ..] if minor >= OLDEST) {
-        let found = version.iter().map(u32::to_string).collect::<Vec<_>>().join(".");
-        return Err(UrError::Version { host: host.to_owned(), found });
+        let found = version
+            .iter()
+            .map(u32::to_string)
+            .collect::<Vec<_>>()
+            .join(".");
+        return Err(UrError::Version {
+            host: host.to_owned(),
+            found,
+        });
     }
     if stamps.first() == stamps.last() {
         return Err(reason("its clock has stopped".to_owned()));
@@ -59,7 +82,8 @@ fn wait(socket: &mut TcpStream, kind: u8) -> std::io::Result<Vec<u8>> {
     loop {
         let mut head = [0; 3];
         socket.read_exact(&mut head)?;
-        let mut body = vec![0; usize::from(u16::from_be_bytes([head[0], head[1]])).saturating_sub(head.len())];
+        let mut body =
+            vec![0; usize::from(u16::from_be_bytes([head[0], head[1]])).saturating_sub(head.len())];
         socket.read_exact(&mut body)?;
         if head[2] == kind {
             return Ok(body);

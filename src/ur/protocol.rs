@@ -43,7 +43,13 @@ pub enum Action {
     /// Goes with a velocity, until the next order or until orders stay away.
     Move { twist: [f64; 6], acceleration: f64 },
     /// Presses along z of a frame of B and goes with a velocity.
-    Press { frame: [f64; 6], force_n: f64, speed: f64, feed: [f64; 3], acceleration: f64 },
+    Press {
+        frame: [f64; 6],
+        force_n: f64,
+        speed: f64,
+        feed: [f64; 3],
+        acceleration: f64,
+    },
     /// To rest.
     Stop { deceleration: f64 },
     /// Zeroes the sensor, at rest.
@@ -130,7 +136,10 @@ impl UrState {
     pub fn slowed(&self) -> Option<Slowed> {
         let is_reduced = self.safety_bits & REDUCED_BIT != 0;
         let is_slow = is_reduced || self.speed_fraction < FULL;
-        is_slow.then_some(Slowed { slider_percent: self.speed_fraction * 100.0, is_reduced })
+        is_slow.then_some(Slowed {
+            slider_percent: self.speed_fraction * 100.0,
+            is_reduced,
+        })
     }
 
     /// Whether it does what it is ordered to.
@@ -145,7 +154,11 @@ impl UrState {
 
     /// Norm of its velocity, m/s and rad/s together.
     pub fn speed(&self) -> f64 {
-        self.velocity.iter().map(|part| part * part).sum::<f64>().sqrt()
+        self.velocity
+            .iter()
+            .map(|part| part * part)
+            .sum::<f64>()
+            .sqrt()
     }
 
     /// Meaning of the bits of the safety system; the gravest counts.
@@ -178,12 +191,19 @@ pub(super) mod tests {
     #[test]
     fn a_pose_comes_back_from_its_vector() {
         // half a turn about x, and one that a vector of roll, pitch and yaw would have otherwise
-        for vector in [[0.1, -0.2, 0.3, std::f64::consts::PI, 0.0, 0.0], [0.0, 0.0, 0.5, 0.7, -1.1, 0.4]] {
+        for vector in [
+            [0.1, -0.2, 0.3, std::f64::consts::PI, 0.0, 0.0],
+            [0.0, 0.0, 0.5, 0.7, -1.1, 0.4],
+        ] {
             let back = vector_of(&pose_of(vector));
-            assert!(vector.iter().zip(back).all(|(a, b)| (a - b).abs() < 1e-12), "{vector:?} {back:?}");
+            assert!(
+                vector.iter().zip(back).all(|(a, b)| (a - b).abs() < 1e-12),
+                "{vector:?} {back:?}"
+            );
         }
         // a quarter turn about z takes x to y
-        let turned = pose_of([0.0, 0.0, 0.0, 0.0, 0.0, std::f64::consts::FRAC_PI_2]).rotation * Vector3::x();
+        let turned =
+            pose_of([0.0, 0.0, 0.0, 0.0, 0.0, std::f64::consts::FRAC_PI_2]).rotation * Vector3::x();
         assert!((turned - Vector3::y()).norm() < 1e-15, "{turned}");
     }
 
@@ -202,7 +222,13 @@ pub(super) mod tests {
 
     #[test]
     fn the_gravest_of_the_bits_counts() {
-        let safety = |safety_bits| UrState { safety_bits, ..STATE }.safety();
+        let safety = |safety_bits| {
+            UrState {
+                safety_bits,
+                ..STATE
+            }
+            .safety()
+        };
         assert_eq!(safety(1), Safety::Normal);
         // reduced mode
         assert_eq!(safety(0b10), Safety::Normal);
@@ -214,22 +240,43 @@ pub(super) mod tests {
     #[test]
     fn a_slider_below_its_end_and_reduced_mode_are_named() {
         let words = |speed_fraction, safety_bits| {
-            UrState { speed_fraction, safety_bits, ..STATE }.slowed().map(|by| by.to_string())
+            UrState {
+                speed_fraction,
+                safety_bits,
+                ..STATE
+            }
+            .slowed()
+            .map(|by| by.to_string())
         };
         assert_eq!(words(1.0, 1), None);
         assert_eq!(words(0.05, 1).unwrap(), "its speed slider is at 5 %");
         assert_eq!(words(1.0, 0b10).unwrap(), "its safety is in reduced mode");
-        assert_eq!(words(0.4, 0b10).unwrap(), "its speed slider is at 40 % and its safety in reduced mode");
+        assert_eq!(
+            words(0.4, 0b10).unwrap(),
+            "its speed slider is at 40 % and its safety in reduced mode"
+        );
     }
 
     #[test]
     fn lines_come_back_as_they_went() {
         let state = STATE;
         let line = serde_json::to_string(&ClientReport::State(Box::new(state))).unwrap();
-        assert_eq!(serde_json::from_str::<ClientReport>(&line).unwrap(), ClientReport::State(Box::new(state)));
+        assert_eq!(
+            serde_json::from_str::<ClientReport>(&line).unwrap(),
+            ClientReport::State(Box::new(state))
+        );
         assert!(!line.contains('\n'));
-        let order = Order { number: 1, what: Action::Move { twist: [0.1; 6], acceleration: 0.5 } };
+        let order = Order {
+            number: 1,
+            what: Action::Move {
+                twist: [0.1; 6],
+                acceleration: 0.5,
+            },
+        };
         let line = serde_json::to_string(&order).unwrap();
-        assert_eq!(line, r#"{"number":1,"what":{"Move":{"twist":[0.1,0.1,0.1,0.1,0.1,0.1],"acceleration":0.5}}}"#);
+        assert_eq!(
+            line,
+            r#"{"number":1,"what":{"Move":{"twist":[0.1,0.1,0.1,0.1,0.1,0.1],"acceleration":0.5}}}"#
+        );
     }
 }

@@ -21,7 +21,10 @@ fn chain_of(frames: &[Isometry3<f64>], ranges: &[[f64; 2]], radius: f64) -> Seri
         range: Some(*range),
     };
     let joints: Vec<_> = origins.iter().zip(ranges).enumerate().map(joint).collect();
-    let link = |number: usize| ChainLink { name: format!("link{number}").into(), body: None };
+    let link = |number: usize| ChainLink {
+        name: format!("link{number}").into(),
+        body: None,
+    };
     SerialChain::new(joints, (0..=ranges.len()).map(link).collect(), *end, radius).unwrap()
 }
 
@@ -45,7 +48,10 @@ pub fn ur_chain(ur: &UrGeometry, radius: f64) -> SerialChain {
 pub fn seven_joints() -> SerialChain {
     let before_joint = |a: f64, d: f64, alpha: f64| {
         let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), alpha);
-        Isometry3::from_parts(Translation3::from(Vector3::new(a, 0.0, 0.0) + tilt * Vector3::new(0.0, 0.0, d)), tilt)
+        Isometry3::from_parts(
+            Translation3::from(Vector3::new(a, 0.0, 0.0) + tilt * Vector3::new(0.0, 0.0, d)),
+            tilt,
+        )
     };
     let quarter = FRAC_PI_2;
     let frames = [

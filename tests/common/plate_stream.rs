@@ -6,11 +6,12 @@ use std::sync::Mutex;
 use nalgebra::Isometry3;
 use touchup::mesh::TriMesh;
 use touchup::sim::{
-    Lines, PathParams, Plate, RasterRegion, ScannerParams, Stroke, StylusParams, Surface, Touch, plan_demo, raster,
-    scan, touch,
+    Lines, PathParams, Plate, RasterRegion, ScannerParams, Stroke, StylusParams, Surface, Touch,
+    plan_demo, raster, scan, touch,
 };
 use touchup::stylus::{
-    ContactEstimator, ContactEstimatorParams, ContactSample, Sample, SyncParams, Synchroniser, TipParams, TipShape,
+    ContactEstimator, ContactEstimatorParams, ContactSample, Sample, SyncParams, Synchroniser,
+    TipParams, TipShape,
 };
 
 /// A scan of the demo plate and the contacts on the plate.
@@ -25,28 +26,64 @@ pub struct PlateStream {
 /// that let it sink into them a little.
 fn path(stylus: &StylusParams) -> Vec<Stroke> {
     let plate = Plate::default();
-    let hand = PathParams { radius: stylus.radius, ..PathParams::default() };
+    let hand = PathParams {
+        radius: stylus.radius,
+        ..PathParams::default()
+    };
     if !matches!(stylus.shape, TipShape::Cone { .. }) {
         return plan_demo(&plate, &hand).unwrap();
     }
-    let (low, high, frame_ov) = ([0.009, 0.008].into(), [0.065, 0.042].into(), Isometry3::identity());
-    let region = RasterRegion { frame_ov, low, high, floor: 8e-3, clear: 20e-3 };
-    let hand = PathParams { pitch: 1e-3, ..hand };
-    [Lines::AlongX, Lines::AlongY].iter().flat_map(|lines| raster(&region, *lines, &hand).unwrap()).collect()
+    let (low, high, frame_ov) = (
+        [0.009, 0.008].into(),
+        [0.065, 0.042].into(),
+        Isometry3::identity(),
+    );
+    let region = RasterRegion {
+        frame_ov,
+        low,
+        high,
+        floor: 8e-3,
+        clear: 20e-3,
+    };
+    let hand = PathParams {
+        pitch: 1e-3,
+        ..hand
+    };
+    [Lines::AlongX, Lines::AlongY]
+        .iter()
+        .flat_map(|lines| raster(&region, *lines, &hand).unwrap())
+        .collect()
 }
 
 /// The contact state of each sample, for a tip of this radius (m) and stiffness (N/m).
 pub fn contacts_of(radius: f64, stiffness: Option<f64>, samples: &[Sample]) -> Vec<ContactSample> {
     let params = ContactEstimatorParams::new(TipParams { radius, stiffness });
     let mut estimator = ContactEstimator::new(params).unwrap();
-    samples.iter().map(|sample| *estimator.observe(sample).unwrap()).collect()
+    samples
+        .iter()
+        .map(|sample| *estimator.observe(sample).unwrap())
+        .collect()
 }
 
 /// The plate as the scanner of the demo sees it; of each seed it is made once.
 pub fn plate_scan(seed: u64) -> TriMesh {
     static SCANS: Mutex<BTreeMap<u64, TriMesh>> = Mutex::new(BTreeMap::new());
-    let scanned = || scan(&Plate::default(), &ScannerParams { seed, ..ScannerParams::default() }).unwrap();
-    SCANS.lock().unwrap().entry(seed).or_insert_with(scanned).clone()
+    let scanned = || {
+        scan(
+            &Plate::default(),
+            &ScannerParams {
+                seed,
+                ..ScannerParams::default()
+            },
+        )
+        .unwrap()
+    };
+    SCANS
+        .lock()
+        .unwrap()
+        .entry(seed)
+        .or_insert_with(scanned)
+        .clone()
 }
 
 /// With the simulator's ground truth.
@@ -65,5 +102,12 @@ pub fn stream_of(part: &dyn Surface, stylus: &StylusParams, seed: u64) -> (Plate
     }
     sync.finish();
     samples.extend(std::iter::from_fn(|| sync.next_sample()));
-    (PlateStream { scan: plate_scan(seed), noise: ScannerParams::default().noise, samples }, touch)
+    (
+        PlateStream {
+            scan: plate_scan(seed),
+            noise: ScannerParams::default().noise,
+            samples,
+        },
+        touch,
+    )
 }

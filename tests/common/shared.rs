@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 /// A file or folder below `../shared/data`; `None`, with [`skip`], where it is not there.
 pub fn shared(below: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(below);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../shared/data")
+        .join(below);
     if path.exists() {
         return Some(path);
     }
@@ -15,5 +17,8 @@ pub fn shared(below: &str) -> Option<PathBuf> {
 /// Reports that this test was skipped: `tests/all.sh` counts the line as a skipped test, not as a passed one.
 pub fn skip(reason: &str) {
     let thread = std::thread::current();
-    println!("SKIPPED: {}: {reason}", thread.name().unwrap_or("a thread of a test"));
+    println!(
+        "SKIPPED: {}: {reason}",
+        thread.name().unwrap_or("a thread of a test")
+    );
 }

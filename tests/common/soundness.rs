@@ -30,10 +30,15 @@ pub fn soundness(mesh: &TriMesh) -> Soundness {
             links.entry(c[i]).or_default().push([b, c[(i + 2) % 3]]);
         }
     }
-    let bad =
-        |directions: &&Vec<bool>| directions.len() > 2 || (directions.len() == 2 && directions[0] == directions[1]);
+    let bad = |directions: &&Vec<bool>| {
+        directions.len() > 2 || (directions.len() == 2 && directions[0] == directions[1])
+    };
     Soundness {
-        rims: edges.iter().filter(|(_, d)| d.len() == 1).map(|(edge, _)| *edge).collect(),
+        rims: edges
+            .iter()
+            .filter(|(_, d)| d.len() == 1)
+            .map(|(edge, _)| *edge)
+            .collect(),
         bad_edges: edges.values().filter(bad).count(),
         bad_vertices: links.values().filter(|link| fans(link) != 1).count(),
         euler: links.len() as i64 - edges.len() as i64 + mesh.face_count() as i64,
@@ -44,8 +49,9 @@ pub fn soundness(mesh: &TriMesh) -> Soundness {
 fn fans(link: &[[u32; 2]]) -> usize {
     let mut parts: Vec<BTreeSet<u32>> = Vec::new();
     for ends in link {
-        let (mut joined, apart): (Vec<_>, Vec<_>) =
-            parts.into_iter().partition(|part: &BTreeSet<u32>| ends.iter().any(|end| part.contains(end)));
+        let (mut joined, apart): (Vec<_>, Vec<_>) = parts
+            .into_iter()
+            .partition(|part: &BTreeSet<u32>| ends.iter().any(|end| part.contains(end)));
         let mut part: BTreeSet<u32> = joined.drain(..).flatten().collect();
         part.extend(ends);
         parts = apart;
@@ -57,7 +63,9 @@ fn fans(link: &[[u32; 2]]) -> usize {
 /// Length of the rims, m.
 pub fn rim_length(mesh: &TriMesh, rims: &BTreeSet<[u32; 2]>) -> f64 {
     let p = mesh.positions();
-    rims.iter().map(|[a, b]| (p[*a as usize] - p[*b as usize]).norm()).sum()
+    rims.iter()
+        .map(|[a, b]| (p[*a as usize] - p[*b as usize]).norm())
+        .sum()
 }
 
 /// Six times the volume of a tetrahedron.
@@ -81,8 +89,10 @@ fn meet(mesh: &TriMesh, f: FaceId, g: FaceId, slack: f64) -> bool {
     let (tf, tg) = (mesh.triangle(f), mesh.triangle(g));
     let common: Vec<usize> = (0..3).filter(|&i| cg.contains(&cf[i])).collect();
     match common.len() {
-        0 => (0..3)
-            .any(|i| pierces(&tf[i], &tf[(i + 1) % 3], &tg, slack) || pierces(&tg[i], &tg[(i + 1) % 3], &tf, slack)),
+        0 => (0..3).any(|i| {
+            pierces(&tf[i], &tf[(i + 1) % 3], &tg, slack)
+                || pierces(&tg[i], &tg[(i + 1) % 3], &tf, slack)
+        }),
         1 => {
             let i = common[0];
             let j = (0..3).find(|&j| cg[j] == cf[i]).unwrap();
@@ -103,7 +113,11 @@ fn meet(mesh: &TriMesh, f: FaceId, g: FaceId, slack: f64) -> bool {
 /// Pairs of faces that meet where they should not, among pairs of which `is_watched` holds for one.
 ///
 /// Boxes are swept along x; the test is exact up to volumes of 10⁻¹² of the cube of `size` (m).
-pub fn intersections(mesh: &TriMesh, size: f64, is_watched: impl Fn(FaceId) -> bool) -> Vec<[FaceId; 2]> {
+pub fn intersections(
+    mesh: &TriMesh,
+    size: f64,
+    is_watched: impl Fn(FaceId) -> bool,
+) -> Vec<[FaceId; 2]> {
     let slack = 1e-12 * size.powi(3);
     let mut boxes: Vec<(FaceId, Vector3<f64>, Vector3<f64>, bool)> = mesh
         .faces()
@@ -115,7 +129,9 @@ pub fn intersections(mesh: &TriMesh, size: f64, is_watched: impl Fn(FaceId) -> b
     boxes.sort_by(|a, b| a.1.x.total_cmp(&b.1.x));
     let mut found = Vec::new();
     for (i, (f, lo, hi, watched)) in boxes.iter().enumerate() {
-        for (g, other_lo, other_hi, other_watched) in boxes[i + 1..].iter().take_while(|other| other.1.x <= hi.x) {
+        for (g, other_lo, other_hi, other_watched) in
+            boxes[i + 1..].iter().take_while(|other| other.1.x <= hi.x)
+        {
             let apart = (1..3).any(|k| other_lo[k] > hi[k] || lo[k] > other_hi[k]);
             if !apart && (*watched || *other_watched) && meet(mesh, *f, *g, slack) {
                 found.push([*f, *g]);

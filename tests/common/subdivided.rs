@@ -15,7 +15,10 @@ pub fn subdivided(mesh: &TriMesh, place: impl Fn(Point3<f64>) -> Point3<f64>) ->
         let middle = [0, 1, 2].map(|i| {
             let (a, b) = (c[i], c[(i + 1) % 3]);
             *middles.entry([a.min(b), a.max(b)]).or_insert_with(|| {
-                positions.push(place(nalgebra::center(&mesh.positions()[a as usize], &mesh.positions()[b as usize])));
+                positions.push(place(nalgebra::center(
+                    &mesh.positions()[a as usize],
+                    &mesh.positions()[b as usize],
+                )));
                 positions.len() as u32 - 1
             })
         });

@@ -6,7 +6,8 @@ use rand_pcg::Pcg64;
 use touchup::haptic::{GuardParams, RefineParams, Refiner, RoiSize, TipParams};
 use touchup::mesh::TriMesh;
 use touchup::stylus::{
-    BiasParams, MarkerBody, MarkerFilter, MarkerFrame, MarkerObservation, MarkerParams, Sample, StampedPose, Wrench,
+    BiasParams, MarkerBody, MarkerFilter, MarkerFrame, MarkerObservation, MarkerParams, Sample,
+    StampedPose, Wrench,
 };
 use touchup_report::allocations::asked;
 
@@ -21,7 +22,10 @@ fn requests() -> u64 {
 const PATH: i64 = 2_000;
 /// Times that the path is gone again.
 const ROUNDS: i64 = 5;
-const TIP: TipParams = TipParams { radius: 1.5e-3, stiffness: Some(20e3) };
+const TIP: TipParams = TipParams {
+    radius: 1.5e-3,
+    stiffness: Some(20e3),
+};
 
 /// A figure of eight on the true plane z = 0, pressed with 2 N for four fifths of the path and lifted off for the rest;
 /// the scan lies up to 0.3 mm off.
@@ -30,8 +34,15 @@ fn sample(tick: i64) -> Sample {
     let force = if tick % PATH < PATH * 4 / 5 { 2.0 } else { 0.0 };
     let height = TIP.radius - force / 20e3 + if force > 0.0 { 0.0 } else { -0.1e-3 };
     let pose_ot = Isometry3::translation(8e-3 * turn.sin(), 6e-3 * (2.0 * turn).sin(), height);
-    let wrench = Wrench { force: Vector3::z() * force, torque: Vector3::zeros() };
-    Sample { stamp_ns: tick * 1_000_000, pose_ot, wrench }
+    let wrench = Wrench {
+        force: Vector3::z() * force,
+        torque: Vector3::zeros(),
+    };
+    Sample {
+        stamp_ns: tick * 1_000_000,
+        pose_ot,
+        wrench,
+    }
 }
 
 fn scan() -> TriMesh {
@@ -65,12 +76,30 @@ fn the_counter_counts() {
 
 #[test]
 fn no_sample_allocates_once_warm() {
-    let paper =
-        RefineParams { largest_move_edges: 2.6, guard: Some(GuardParams::default()), ..RefineParams::paper(TIP) };
-    let tracked = RefineParams { bias: Some(BiasParams::default()), ..RefineParams::robust(TIP) };
-    for (mode, params) in [("robust", RefineParams::robust(TIP)), ("paper", paper), ("bias", tracked)] {
-        for roi in [RoiSize::OneRing, RoiSize::Radius(1.5e-3), RoiSize::Radius(4e-3)] {
-            assert_eq!(allocations(RefineParams { roi, ..params }), 0, "{mode} {roi:?}");
+    let paper = RefineParams {
+        largest_move_edges: 2.6,
+        guard: Some(GuardParams::default()),
+        ..RefineParams::paper(TIP)
+    };
+    let tracked = RefineParams {
+        bias: Some(BiasParams::default()),
+        ..RefineParams::robust(TIP)
+    };
+    for (mode, params) in [
+        ("robust", RefineParams::robust(TIP)),
+        ("paper", paper),
+        ("bias", tracked),
+    ] {
+        for roi in [
+            RoiSize::OneRing,
+            RoiSize::Radius(1.5e-3),
+            RoiSize::Radius(4e-3),
+        ] {
+            assert_eq!(
+                allocations(RefineParams { roi, ..params }),
+                0,
+                "{mode} {roi:?}"
+            );
         }
     }
 }
@@ -78,8 +107,20 @@ fn no_sample_allocates_once_warm() {
 /// Frames with occlusion, outliers, losses and new first poses.
 #[test]
 fn no_marker_frame_allocates() {
-    let markers_t = [[28, 0, 120], [-20, 22, 128], [-16, -26, 140], [18, 24, 155], [-30, 2, 168], [6, -22, 180]];
-    let body = MarkerBody::new(markers_t.map(|p| Point3::from(p.map(|x| f64::from(x) * 1e-3))).to_vec()).unwrap();
+    let markers_t = [
+        [28, 0, 120],
+        [-20, 22, 128],
+        [-16, -26, 140],
+        [18, 24, 155],
+        [-30, 2, 168],
+        [6, -22, 180],
+    ];
+    let body = MarkerBody::new(
+        markers_t
+            .map(|p| Point3::from(p.map(|x| f64::from(x) * 1e-3)))
+            .to_vec(),
+    )
+    .unwrap();
     let mut filter = MarkerFilter::new(body.clone(), MarkerParams::default()).unwrap();
     let (mut poses, mut last) = (0_u64, None::<StampedPose>);
     let before = requests() + 1;
@@ -90,7 +131,13 @@ fn no_marker_frame_allocates() {
             let is_seen = (i / 20 + label as i64) % 4 != 0 && i % 400 < 350;
             let far = if label as i64 == i % 50 { 0.1 } else { 0.0 };
             let position = pose_ot * marker + Vector3::x() * far;
-            assert!(!is_seen || frame.see(MarkerObservation { label: label as u32, position }));
+            assert!(
+                !is_seen
+                    || frame.see(MarkerObservation {
+                        label: label as u32,
+                        position
+                    })
+            );
         }
         filter.push(&frame, |pose| {
             poses += 1;
@@ -98,5 +145,9 @@ fn no_marker_frame_allocates() {
         });
     }
     assert_eq!(requests() - before, 0);
-    assert!(poses > 5000 && filter.counts().lost > 100 && filter.counts().rejected > 100, "{:?}", filter.counts());
+    assert!(
+        poses > 5000 && filter.counts().lost > 100 && filter.counts().rejected > 100,
+        "{:?}",
+        filter.counts()
+    );
 }

@@ -21,7 +21,10 @@ const MAY_USE: &[(&str, &str)] = &[
     ("live", "clock stylus mesh reconstruct haptic"),
     ("plan", "numeric parameters stylus mesh features conformity"),
     ("arm", "numeric parameters stylus plan"),
-    ("execute", "numeric parameters stylus mesh features calibrate plan arm"),
+    (
+        "execute",
+        "numeric parameters stylus mesh features calibrate plan arm",
+    ),
     ("sim", "numeric stylus mesh calibrate diagnose arm"),
     ("form", "numeric"),
     ("features", "numeric stylus mesh form"),
@@ -30,16 +33,37 @@ const MAY_USE: &[(&str, &str)] = &[
     ("compare", "numeric stylus mesh align features"),
     ("calibrate", "numeric stylus mesh align"),
     ("diagnose", "numeric stylus mesh"),
-    ("io", "numeric parameters stylus mesh form features conformity align arm execute"),
+    (
+        "io",
+        "numeric parameters stylus mesh form features conformity align arm execute",
+    ),
     ("scan", "mesh reconstruct io threads"),
-    ("scene", "parameters stylus mesh reconstruct haptic diagnose plan arm execute sim io"),
+    (
+        "scene",
+        "parameters stylus mesh reconstruct haptic diagnose plan arm execute sim io",
+    ),
     ("replay", "numeric stylus io scene"),
-    ("session", "clock numeric stylus mesh reconstruct haptic live features io threads scan replay"),
-    ("refinement", "stylus mesh reconstruct haptic live diagnose threads scene replay session"),
-    ("sweep", "stylus mesh features compare sim io threads scan scene replay session refinement"),
+    (
+        "session",
+        "clock numeric stylus mesh reconstruct haptic live features io threads scan replay",
+    ),
+    (
+        "refinement",
+        "stylus mesh reconstruct haptic live diagnose threads scene replay session",
+    ),
+    (
+        "sweep",
+        "stylus mesh features compare sim io threads scan scene replay session refinement",
+    ),
     ("html", ""),
-    ("inspection", "html numeric stylus mesh features conformity align compare io scan scene session"),
-    ("calibration", "stylus align calibrate execute io scene replay"),
+    (
+        "inspection",
+        "html numeric stylus mesh features conformity align compare io scan scene session",
+    ),
+    (
+        "calibration",
+        "stylus align calibrate execute io scene replay",
+    ),
     ("input_check", "stylus mesh diagnose threads scene replay"),
     (
         "report",
@@ -71,8 +95,23 @@ const PURE: &[&str] = &["touchup-core", "touchup-sim"];
 const MAY_USE_PYTHON: &[&str] = &["src/ur/child/", "crates/touchup-python/"];
 
 /// What a pure crate may not name.
-const IMPURE_PATHS: &[&str] = &["std::fs", "std::thread", "std::env", "std::io", "std::net", "std::process"];
-const IMPURE_NAMES: &[&str] = &["Instant", "SystemTime", "println", "eprintln", "print", "eprint", "dbg"];
+const IMPURE_PATHS: &[&str] = &[
+    "std::fs",
+    "std::thread",
+    "std::env",
+    "std::io",
+    "std::net",
+    "std::process",
+];
+const IMPURE_NAMES: &[&str] = &[
+    "Instant",
+    "SystemTime",
+    "println",
+    "eprintln",
+    "print",
+    "eprint",
+    "dbg",
+];
 
 /// The only places with file access.
 const MAY_OPEN_FILES: &[&str] = &["crates/touchup-io/", "crates/touchup-session/src/scene/"];
@@ -138,7 +177,11 @@ fn string_length(rest: &str, before: &str) -> Option<usize> {
         if raw[hashes..].starts_with('"') {
             let end = format!("\"{}", "#".repeat(hashes));
             let body = 1 + hashes + 1;
-            return Some(rest[body..].find(&end).map_or(rest.len(), |at| body + at + end.len()));
+            return Some(
+                rest[body..]
+                    .find(&end)
+                    .map_or(rest.len(), |at| body + at + end.len()),
+            );
         }
     }
     let quote = rest.chars().next()?;
@@ -201,7 +244,9 @@ fn tokens(code: &str) -> Vec<&str> {
     let mut tokens = Vec::new();
     let mut rest = code.trim_start();
     while !rest.is_empty() {
-        let word = rest.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(rest.len());
+        let word = rest
+            .find(|c: char| !c.is_alphanumeric() && c != '_')
+            .unwrap_or(rest.len());
         let length = match word {
             0 if rest.starts_with("::") => 2,
             0 => rest.chars().next().map_or(1, char::len_utf8),
@@ -215,7 +260,9 @@ fn tokens(code: &str) -> Vec<&str> {
 
 /// The names that follow `at` (just behind a `::`): one, or each of a group in braces.
 fn names_at<'a>(tokens: &[&'a str], at: usize) -> Vec<&'a str> {
-    let Some(&first) = tokens.get(at) else { return Vec::new() };
+    let Some(&first) = tokens.get(at) else {
+        return Vec::new();
+    };
     if first != "{" {
         return vec![first];
     }
@@ -262,22 +309,45 @@ impl<'a> Place<'a> {
             None => ("touchup", file.strip_prefix("src/").unwrap()),
         };
         if let Some((_, room)) = WHOLE.iter().find(|(name, _)| *name == package) {
-            return Self { package, room, depth: 0, has_siblings: false };
+            return Self {
+                package,
+                room,
+                depth: 0,
+                has_siblings: false,
+            };
         }
         let path = path.strip_suffix(".rs").unwrap();
         let path = path.strip_suffix("/mod").unwrap_or(path);
         if path == "lib" || path == "main" {
-            return Self { package, room: "", depth: 0, has_siblings: false };
+            return Self {
+                package,
+                room: "",
+                depth: 0,
+                has_siblings: false,
+            };
         }
         let inner = path.strip_prefix("probing/").unwrap_or(path);
-        let room = if inner == "probing" { "" } else { inner.split('/').next().unwrap() };
-        Self { package, room, depth: path.split('/').count(), has_siblings: inner != path }
+        let room = if inner == "probing" {
+            ""
+        } else {
+            inner.split('/').next().unwrap()
+        };
+        Self {
+            package,
+            room,
+            depth: path.split('/').count(),
+            has_siblings: inner != path,
+        }
     }
 }
 
 /// Crates that are one room each, and its name.
-const WHOLE: &[(&str, &str)] =
-    &[("touchup-sim", "sim"), ("touchup-io", "io"), ("touchup-report", "report"), ("touchup-python", "python")];
+const WHOLE: &[(&str, &str)] = &[
+    ("touchup-sim", "sim"),
+    ("touchup-io", "io"),
+    ("touchup-report", "report"),
+    ("touchup-python", "python"),
+];
 
 /// Crates with several rooms, as other crates name them.
 const WITH_ROOMS: &[&str] = &["touchup_core", "touchup_session"];
@@ -288,11 +358,15 @@ const WITH_ROOMS: &[&str] = &["touchup_core", "touchup_session"];
 fn rooms_reached<'a>(tokens: &[&'a str], depth: usize, has_siblings: bool) -> Vec<&'a str> {
     let mut rooms = Vec::new();
     for at in 0..tokens.len() {
-        if at >= 2 && tokens[at - 1] == "::" && (tokens[at - 2] == "super" || tokens[at] == "crate") {
+        if at >= 2 && tokens[at - 1] == "::" && (tokens[at - 2] == "super" || tokens[at] == "crate")
+        {
             continue;
         }
         let is_path = tokens.get(at + 1) == Some(&"::");
-        let supers = tokens[at..].chunks(2).take_while(|pair| *pair == ["super", "::"]).count();
+        let supers = tokens[at..]
+            .chunks(2)
+            .take_while(|pair| *pair == ["super", "::"])
+            .count();
         if is_path && (WITH_ROOMS.contains(&tokens[at]) || tokens[at] == "crate" && depth > 0) {
             rooms.extend(names_at(tokens, at + 2));
         } else if supers > 0 && depth > 0 && supers + usize::from(has_siblings) >= depth {
@@ -303,7 +377,12 @@ fn rooms_reached<'a>(tokens: &[&'a str], depth: usize, has_siblings: bool) -> Ve
         if tokens[at] == "probing" && is_path && follows {
             rooms.extend(names_at(tokens, at + 2));
         }
-        rooms.extend(WHOLE.iter().filter(|(name, _)| name.replace('-', "_") == tokens[at]).map(|(_, room)| *room));
+        rooms.extend(
+            WHOLE
+                .iter()
+                .filter(|(name, _)| name.replace('-', "_") == tokens[at])
+                .map(|(_, room)| *room),
+        );
     }
     rooms
 }
@@ -316,30 +395,50 @@ fn breaches(file: &str, source: &str) -> Vec<String> {
     let mut found = Vec::new();
     if !place.room.is_empty() {
         let Some((room, allowed)) = MAY_USE.iter().find(|(room, _)| *room == place.room) else {
-            return vec![format!("{file}: the room {} is not in the table of tests/rooms/layers.rs", place.room)];
+            return vec![format!(
+                "{file}: the room {} is not in the table of tests/rooms/layers.rs",
+                place.room
+            )];
         };
         let is_room = |name: &&str| MAY_USE.iter().any(|(room, _)| room == name);
         let reached = rooms_reached(&tokens, place.depth, place.has_siblings).into_iter();
-        let wrong = reached.filter(|name| is_room(name) && name != room && allowed.split(' ').all(|one| one != *name));
+        let wrong = reached.filter(|name| {
+            is_room(name) && name != room && allowed.split(' ').all(|one| one != *name)
+        });
         found.extend(wrong.map(|name| format!("{file}: {room} may not use {name}")));
     }
     let is_pure = PURE.contains(&place.package);
     let is_in = |starts: &[&str]| starts.iter().any(|start| file.starts_with(start));
     for at in 0..tokens.len() {
         let is_std = tokens[at] == "std" && tokens.get(at + 1) == Some(&"::");
-        for name in if is_std { names_at(&tokens, at + 2) } else { Vec::new() } {
+        for name in if is_std {
+            names_at(&tokens, at + 2)
+        } else {
+            Vec::new()
+        } {
             let path = format!("std::{name}");
             let is_impure = is_pure && IMPURE_PATHS.contains(&path.as_str());
             let is_entry = file == "src/main.rs";
-            if is_impure || (name == "fs" && !is_in(MAY_OPEN_FILES) && !is_in(MAY_ASK_THE_SYSTEM) && !is_entry) {
+            if is_impure
+                || (name == "fs"
+                    && !is_in(MAY_OPEN_FILES)
+                    && !is_in(MAY_ASK_THE_SYSTEM)
+                    && !is_entry)
+            {
                 found.push(format!("{file} may not use {path}"));
             }
         }
         if is_pure && IMPURE_NAMES.contains(&tokens[at]) {
-            found.push(format!("{file}: {} is pure and may not use {}", place.package, tokens[at]));
+            found.push(format!(
+                "{file}: {} is pure and may not use {}",
+                place.package, tokens[at]
+            ));
         }
         if tokens[at] == "pyo3" && !is_in(MAY_USE_PYTHON) {
-            found.push(format!("{file}: Python is in {} alone", MAY_USE_PYTHON.join(", ")));
+            found.push(format!(
+                "{file}: Python is in {} alone",
+                MAY_USE_PYTHON.join(", ")
+            ));
         }
     }
     found
@@ -355,7 +454,12 @@ fn sources(folder: &str) -> Vec<(String, String)> {
             if path.is_dir() {
                 folders.push(path);
             } else if path.extension().is_some_and(|e| e == "rs") {
-                let name = path.strip_prefix(&root).unwrap().to_str().unwrap().to_owned();
+                let name = path
+                    .strip_prefix(&root)
+                    .unwrap()
+                    .to_str()
+                    .unwrap()
+                    .to_owned();
                 found.push((name, fs::read_to_string(path).unwrap()));
             }
         }
@@ -381,7 +485,9 @@ fn paths_at<'a>(tokens: &[&'a str], at: &mut usize, before: &[&'a str]) -> Vec<V
                 *at += 1;
                 return paths;
             }
-            word if word.starts_with(|c: char| c.is_alphanumeric() || c == '_' || c == '*') => path.push(word),
+            word if word.starts_with(|c: char| c.is_alphanumeric() || c == '_' || c == '*') => {
+                path.push(word)
+            }
             _ => break,
         }
         if tokens.get(*at) != Some(&"::") {
@@ -393,7 +499,10 @@ fn paths_at<'a>(tokens: &[&'a str], at: &mut usize, before: &[&'a str]) -> Vec<V
 }
 
 /// What a module names of its crate, as paths from the root: what it uses, and what it has by `use`, of other crates too.
-fn paths_of<'a>(module: &[&'a str], modules: &Modules<'a>) -> (Vec<Vec<&'a str>>, Vec<Vec<&'a str>>) {
+fn paths_of<'a>(
+    module: &[&'a str],
+    modules: &Modules<'a>,
+) -> (Vec<Vec<&'a str>>, Vec<Vec<&'a str>>) {
     let tokens = &modules[module];
     let (mut used, mut imported) = (Vec::new(), Vec::new());
     let (mut at, mut is_public) = (0, false);
@@ -402,7 +511,8 @@ fn paths_of<'a>(module: &[&'a str], modules: &Modules<'a>) -> (Vec<Vec<&'a str>>
         let is_use = at > 0 && tokens[at - 1] == "use";
         let is_own = |first: &'a str| modules.contains_key(&[module, &[first]].concat());
         let is_visibility = tokens[..at].ends_with(&["pub", "(", "in"]);
-        let is_path = !is_visibility && matches!(tokens[at], "crate" | "super" | "self") || is_own(tokens[at]);
+        let is_path = !is_visibility && matches!(tokens[at], "crate" | "super" | "self")
+            || is_own(tokens[at]);
         match tokens[at] {
             "pub" => is_public = true,
             "fn" | "mod" | "struct" | ";" | "{" => is_public = false,
@@ -436,7 +546,11 @@ fn paths_of<'a>(module: &[&'a str], modules: &Modules<'a>) -> (Vec<Vec<&'a str>>
 /// The module that a file below `src` is.
 fn module_in(file: &str) -> Vec<&str> {
     let path = file.trim_end_matches(".rs").trim_end_matches("/mod");
-    if path == "lib" { Vec::new() } else { path.split('/').collect() }
+    if path == "lib" {
+        Vec::new()
+    } else {
+        path.split('/').collect()
+    }
 }
 
 /// The module in which what a path names is defined: its longest start that is one, through what modules import, for themselves or
@@ -448,10 +562,15 @@ fn module_of<'a>(
 ) -> Vec<&'a str> {
     let mut path = path.to_vec();
     loop {
-        let depth = (0..=path.len()).rev().find(|&depth| modules.contains_key(&path[..depth])).unwrap_or(0);
+        let depth = (0..=path.len())
+            .rev()
+            .find(|&depth| modules.contains_key(&path[..depth]))
+            .unwrap_or(0);
         let named = path.len().min(depth + 1);
         match imported.get(&path[..named]) {
-            Some(origin) if named > depth && *origin != path[..named] => path = [origin, &path[named..]].concat(),
+            Some(origin) if named > depth && *origin != path[..named] => {
+                path = [origin, &path[named..]].concat()
+            }
             _ => return path[..depth].to_vec(),
         }
     }
@@ -461,95 +580,160 @@ fn module_of<'a>(
 ///
 /// - `sources`: paths below `src` and code.
 fn circles(sources: &[(String, String)]) -> Vec<String> {
-    let modules: Modules = sources.iter().map(|(file, code)| (module_in(file), tokens(code))).collect();
-    let paths: Vec<_> = modules.keys().map(|name| (name, paths_of(name, &modules))).collect();
+    let modules: Modules = sources
+        .iter()
+        .map(|(file, code)| (module_in(file), tokens(code)))
+        .collect();
+    let paths: Vec<_> = modules
+        .keys()
+        .map(|name| (name, paths_of(name, &modules)))
+        .collect();
     let imported = paths.iter().flat_map(|(name, (_, imported))| {
-        imported.iter().map(|origin| ([name, &origin[origin.len() - 1..]].concat(), origin.clone()))
+        imported
+            .iter()
+            .map(|origin| ([name, &origin[origin.len() - 1..]].concat(), origin.clone()))
     });
     let imported: BTreeMap<_, _> = imported.collect();
     let mut uses: BTreeMap<_, BTreeSet<_>> = BTreeMap::new();
     for (name, (used, _)) in &paths {
         let others = used.iter().map(|path| module_of(path, &modules, &imported));
-        uses.insert((*name).clone(), others.filter(|other| other != *name).collect());
+        uses.insert(
+            (*name).clone(),
+            others.filter(|other| other != *name).collect(),
+        );
     }
     // who is used by nobody left, or uses nobody left, is in no circle
     loop {
         let left: BTreeSet<_> = uses.keys().cloned().collect();
         let used: BTreeSet<_> = uses.values().flatten().cloned().collect();
-        uses.values_mut().for_each(|others| others.retain(|other| left.contains(other)));
+        uses.values_mut()
+            .for_each(|others| others.retain(|other| left.contains(other)));
         uses.retain(|name, others| !others.is_empty() && used.contains(name));
         if uses.len() == left.len() {
             break;
         }
     }
-    uses.iter().map(|(name, others)| format!("{} uses {:?}", name.join("/"), others)).collect()
+    uses.iter()
+        .map(|(name, others)| format!("{} uses {:?}", name.join("/"), others))
+        .collect()
 }
 
 #[test]
 fn every_room_keeps_to_the_flow_of_data() {
-    let files = ["src", "crates"]
-        .map(|folder| sources(folder).into_iter().map(move |(file, source)| (format!("{folder}/{file}"), source)));
-    let files: Vec<_> =
-        files.into_iter().flatten().filter(|(file, _)| file.starts_with("src/") || file.contains("/src/")).collect();
+    let files = ["src", "crates"].map(|folder| {
+        sources(folder)
+            .into_iter()
+            .map(move |(file, source)| (format!("{folder}/{file}"), source))
+    });
+    let files: Vec<_> = files
+        .into_iter()
+        .flatten()
+        .filter(|(file, _)| file.starts_with("src/") || file.contains("/src/"))
+        .collect();
     for (room, _) in MAY_USE {
         assert!(
             files.iter().any(|(file, _)| Place::of(file).room == *room),
             "no file is in the room {room} of the table"
         );
     }
-    let tests: BTreeSet<_> = files.iter().flat_map(|(file, source)| modules_of_tests(file, source)).collect();
-    let is_of_tests = |file: &str| Path::new(file).with_extension("").ancestors().any(|module| tests.contains(module));
+    let tests: BTreeSet<_> = files
+        .iter()
+        .flat_map(|(file, source)| modules_of_tests(file, source))
+        .collect();
+    let is_of_tests = |file: &str| {
+        Path::new(file)
+            .with_extension("")
+            .ancestors()
+            .any(|module| tests.contains(module))
+    };
     let of_program = files.iter().filter(|(file, _)| !is_of_tests(file));
-    let found: Vec<_> = of_program.flat_map(|(file, source)| breaches(file, source)).collect();
+    let found: Vec<_> = of_program
+        .flat_map(|(file, source)| breaches(file, source))
+        .collect();
     assert!(found.is_empty(), "\n{}", found.join("\n"));
 }
 
 /// The modules that a file has for its tests alone, without extension: those that it declares below `#[cfg(test)]`. They and all that is
 /// below them may use all rooms.
 fn modules_of_tests(file: &str, source: &str) -> Vec<PathBuf> {
-    let folder = file.strip_suffix("/mod.rs").or(file.strip_suffix("/lib.rs")).or(file.strip_suffix(".rs"));
-    let declared = source.split("#[cfg(test)]").skip(1).filter_map(|after| after.trim_start().strip_prefix("mod "));
-    let name = |after: &str| after.split_once(';').map(|(name, _)| name.to_owned()).filter(|name| !name.contains('{'));
-    declared.filter_map(name).map(|name| Path::new(folder.unwrap_or_default()).join(name)).collect()
+    let folder = file
+        .strip_suffix("/mod.rs")
+        .or(file.strip_suffix("/lib.rs"))
+        .or(file.strip_suffix(".rs"));
+    let declared = source
+        .split("#[cfg(test)]")
+        .skip(1)
+        .filter_map(|after| after.trim_start().strip_prefix("mod "));
+    let name = |after: &str| {
+        after
+            .split_once(';')
+            .map(|(name, _)| name.to_owned())
+            .filter(|name| !name.contains('{'))
+    };
+    declared
+        .filter_map(name)
+        .map(|name| Path::new(folder.unwrap_or_default()).join(name))
+        .collect()
 }
 
 #[test]
 fn modules_of_tests_alone_are_known() {
-    let source =
-        "#[cfg(test)]\nmod scripted;\nmod b;\n#[cfg(test)]\nmod tests {\n    mod inner;\n}\n#[cfg(test)]\nmod more;\n";
+    let source = "#[cfg(test)]\nmod scripted;\nmod b;\n#[cfg(test)]\nmod tests {\n    mod inner;\n}\n#[cfg(test)]\nmod more;\n";
     let of_control = ["src/ur/control/scripted", "src/ur/control/more"].map(PathBuf::from);
     assert_eq!(modules_of_tests("src/ur/control.rs", source), of_control);
-    assert_eq!(modules_of_tests("src/ur/mod.rs", "#[cfg(test)]\nmod a;"), [PathBuf::from("src/ur/a")]);
+    assert_eq!(
+        modules_of_tests("src/ur/mod.rs", "#[cfg(test)]\nmod a;"),
+        [PathBuf::from("src/ur/a")]
+    );
 }
 
 const CORE: &str = "crates/touchup-core/src";
 
 /// A file of the core below its `src`, or a path from the root of the repository.
 fn path_of(file: &str) -> String {
-    if file.starts_with("src/") || file.starts_with("crates/") { file.to_owned() } else { format!("{CORE}/{file}") }
+    if file.starts_with("src/") || file.starts_with("crates/") {
+        file.to_owned()
+    } else {
+        format!("{CORE}/{file}")
+    }
 }
 
 #[test]
 fn a_breach_is_found_however_it_is_written() {
     let bad = [
         ("stylus/sync.rs", "use crate::mesh::TriMesh;"),
-        ("stylus/sync.rs", "use crate::{mesh::{TriMesh, FaceId}, stylus::Sample};"),
+        (
+            "stylus/sync.rs",
+            "use crate::{mesh::{TriMesh, FaceId}, stylus::Sample};",
+        ),
         ("stylus/sync.rs", "fn f() -> crate :: reconstruct::Error {}"),
         ("stylus/sync.rs", "use super::super::mesh;"),
         ("stylus/mod.rs", "use super::{stylus, mesh};"),
         ("mesh.rs", "use super::haptic;"),
         ("mesh/repair/weld.rs", "use super::super::super::stylus;"),
-        ("crates/touchup-session/src/scene/mod.rs", "use crate::live;"),
+        (
+            "crates/touchup-session/src/scene/mod.rs",
+            "use crate::live;",
+        ),
         ("src/ros/node/mod.rs", "use crate::cli;"),
         ("haptic/mod.rs", "use std::fs::File;"),
         ("haptic/mod.rs", "use std::{collections::HashMap, thread};"),
         ("haptic/mod.rs", "let t = std::time::Instant::now();"),
-        ("crates/touchup-sim/src/lib.rs", "let t = SystemTime::now();"),
-        ("crates/touchup-sim/src/arm.rs", "let home = std::env::var(\"HOME\");"),
+        (
+            "crates/touchup-sim/src/lib.rs",
+            "let t = SystemTime::now();",
+        ),
+        (
+            "crates/touchup-sim/src/arm.rs",
+            "let home = std::env::var(\"HOME\");",
+        ),
         ("mesh/mod.rs", "/* a */ println!(\"{x}\");"),
         ("mesh/mod.rs", "let c = '\"'; println!(\"{c}\");"),
         ("mesh/mod.rs", "fn f<'a>(x: &'a str) { dbg!(x) }"),
-        ("mesh/mod.rs", "#[cfg(test)] mod tests { fn f() { { } } } use crate::reconstruct;"),
+        (
+            "mesh/mod.rs",
+            "#[cfg(test)] mod tests { fn f() { { } } } use crate::reconstruct;",
+        ),
         ("src/cli/demo.rs", "std::fs::write(path, text)"),
         ("probing/arm/touching.rs", "use std::thread;"),
         ("src/ur/client.rs", "use pyo3::Python;"),
@@ -557,10 +741,22 @@ fn a_breach_is_found_however_it_is_written() {
         ("src/ur/setup.rs", "std::fs::read(path)"),
         ("src/ur/arm.rs", "use crate::cli::demo;"),
         ("src/ur/arm.rs", "use crate::sim::Plate;"),
-        ("crates/touchup-sim/src/arm.rs", "use touchup_core::reconstruct::Patcher;"),
-        ("crates/touchup-sim/src/arm.rs", "use touchup_core::{mesh::TriMesh, features::Kind};"),
-        ("crates/touchup-session/src/scene/mod.rs", "fn f() -> touchup_core::features::Kind {}"),
-        ("crates/touchup-session/src/session/mod.rs", "use touchup_sim::Plate;"),
+        (
+            "crates/touchup-sim/src/arm.rs",
+            "use touchup_core::reconstruct::Patcher;",
+        ),
+        (
+            "crates/touchup-sim/src/arm.rs",
+            "use touchup_core::{mesh::TriMesh, features::Kind};",
+        ),
+        (
+            "crates/touchup-session/src/scene/mod.rs",
+            "fn f() -> touchup_core::features::Kind {}",
+        ),
+        (
+            "crates/touchup-session/src/session/mod.rs",
+            "use touchup_sim::Plate;",
+        ),
         ("cellar/mod.rs", ""),
     ];
     for (file, source) in bad {
@@ -572,19 +768,47 @@ fn a_breach_is_found_however_it_is_written() {
 #[test]
 fn what_is_allowed_is_let_through() {
     let good = [
-        ("haptic/mod.rs", "use crate::stylus::Sample; use crate::{mesh::TriMesh, haptic::Update}; use super::mesh;"),
-        ("stylus/sync.rs", "// use crate::mesh\n/* std::fs /* nested */ crate::io */ /// [`crate::haptic::Refiner`]\n"),
-        ("stylus/sync.rs", "let s = \"crate::mesh println! \\\" std::fs\"; let r = r#\"std::fs \" crate::mesh\"#;"),
-        ("stylus/sync.rs", "use super::mesh_like; use super::super::stylus::sync;"),
-        ("mesh/mod.rs", "#[cfg(test)] mod tests { use crate::reconstruct; fn f() { println!(\"}\"); } } fn g() {}"),
-        ("crates/touchup-io/src/lib.rs", "use std::fs; use std::io::Read;"),
-        ("src/cli/refine.rs", "let t = std::time::Instant::now(); println!(\"x\");"),
-        ("src/ur/client.rs", "use std::{thread, process}; use std::time::Instant; use crate::probing::arm::ArmError;"),
+        (
+            "haptic/mod.rs",
+            "use crate::stylus::Sample; use crate::{mesh::TriMesh, haptic::Update}; use super::mesh;",
+        ),
+        (
+            "stylus/sync.rs",
+            "// use crate::mesh\n/* std::fs /* nested */ crate::io */ /// [`crate::haptic::Refiner`]\n",
+        ),
+        (
+            "stylus/sync.rs",
+            "let s = \"crate::mesh println! \\\" std::fs\"; let r = r#\"std::fs \" crate::mesh\"#;",
+        ),
+        (
+            "stylus/sync.rs",
+            "use super::mesh_like; use super::super::stylus::sync;",
+        ),
+        (
+            "mesh/mod.rs",
+            "#[cfg(test)] mod tests { use crate::reconstruct; fn f() { println!(\"}\"); } } fn g() {}",
+        ),
+        (
+            "crates/touchup-io/src/lib.rs",
+            "use std::fs; use std::io::Read;",
+        ),
+        (
+            "src/cli/refine.rs",
+            "let t = std::time::Instant::now(); println!(\"x\");",
+        ),
+        (
+            "src/ur/client.rs",
+            "use std::{thread, process}; use std::time::Instant; use crate::probing::arm::ArmError;",
+        ),
         ("src/ur/child/library.rs", "use pyo3::Python;"),
         ("src/main.rs", "use std::fs; fn main() { println!() }"),
     ];
     for (file, source) in good {
-        assert_eq!(breaches(&path_of(file), source), Vec::<String>::new(), "{file}: {source}");
+        assert_eq!(
+            breaches(&path_of(file), source),
+            Vec::<String>::new(),
+            "{file}: {source}"
+        );
     }
 }
 
@@ -593,29 +817,96 @@ fn files_of_a_crate_use_one_another_one_way() {
     let crates = fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("crates")).unwrap();
     let crates = crates.map(|entry| format!("crates/{}/src", entry.unwrap().file_name().display()));
     for folder in crates.chain(["src".to_owned()]) {
-        let files: Vec<_> = sources(&folder).into_iter().map(|(file, source)| (file, code_of(&source))).collect();
+        let files: Vec<_> = sources(&folder)
+            .into_iter()
+            .map(|(file, source)| (file, code_of(&source)))
+            .collect();
         let found = circles(&files);
-        assert!(found.is_empty(), "{folder} has circles:\n{}", found.join("\n"));
+        assert!(
+            found.is_empty(),
+            "{folder} has circles:\n{}",
+            found.join("\n")
+        );
     }
 }
 
 #[test]
 fn a_circle_is_found_however_it_is_closed() {
     let room = |a: &str, b: &str, parent: &str| {
-        let files = [("lib.rs", "pub mod mesh;"), ("mesh/mod.rs", parent), ("mesh/a.rs", a), ("mesh/b.rs", b)];
+        let files = [
+            ("lib.rs", "pub mod mesh;"),
+            ("mesh/mod.rs", parent),
+            ("mesh/a.rs", a),
+            ("mesh/b.rs", b),
+        ];
         circles(&files.map(|(file, code)| (file.to_owned(), code.to_owned()))).len()
     };
     let gives_on = "mod a; mod b; pub use a::{A, F}; pub(crate) use b::B;";
-    assert_eq!(room("use super::b::B;", "use super::a::{self, A};", gives_on), 2);
-    assert_eq!(room("use super::B;", "fn f() -> crate::mesh::A {}", gives_on), 2, "through what the parent gives on");
-    assert_eq!(room("use crate::mesh::{b::{B, C}, D};", "use super::{A};", "mod a; mod b; pub use a::A;"), 2);
-    assert_eq!(room("use super::Own;", "", "mod a; mod b; use a::A; pub struct Own;"), 2, "parent and child");
-    assert_eq!(room("use super::Own;", "", "mod a; mod b; fn f() { a::f() } pub struct Own;"), 2);
+    assert_eq!(
+        room("use super::b::B;", "use super::a::{self, A};", gives_on),
+        2
+    );
+    assert_eq!(
+        room("use super::B;", "fn f() -> crate::mesh::A {}", gives_on),
+        2,
+        "through what the parent gives on"
+    );
+    assert_eq!(
+        room(
+            "use crate::mesh::{b::{B, C}, D};",
+            "use super::{A};",
+            "mod a; mod b; pub use a::A;"
+        ),
+        2
+    );
+    assert_eq!(
+        room(
+            "use super::Own;",
+            "",
+            "mod a; mod b; use a::A; pub struct Own;"
+        ),
+        2,
+        "parent and child"
+    );
+    assert_eq!(
+        room(
+            "use super::Own;",
+            "",
+            "mod a; mod b; fn f() { a::f() } pub struct Own;"
+        ),
+        2
+    );
     let imports = "mod a; mod b; use a::A; use b::B; use serde::Serialize;";
-    assert_eq!(room("use super::B;", "use super::A;", imports), 2, "through what the parent has for itself");
-    let files = [("lib.rs", "mod a; mod b;"), ("a.rs", "use super::b::B;"), ("b.rs", "use crate::a::A;")];
-    assert_eq!(circles(&files.map(|(file, code)| (file.to_owned(), code.to_owned()))).len(), 2, "from room to room");
+    assert_eq!(
+        room("use super::B;", "use super::A;", imports),
+        2,
+        "through what the parent has for itself"
+    );
+    let files = [
+        ("lib.rs", "mod a; mod b;"),
+        ("a.rs", "use super::b::B;"),
+        ("b.rs", "use crate::a::A;"),
+    ];
+    assert_eq!(
+        circles(&files.map(|(file, code)| (file.to_owned(), code.to_owned()))).len(),
+        2,
+        "from room to room"
+    );
     assert_eq!(room("use super::b::B;", "", gives_on), 0);
-    assert_eq!(room("use super::{B, Serialize}; pub(in crate::mesh) struct A;", "", imports), 0);
-    assert_eq!(room("use super::Own; use super::B;", "", "mod a; mod b; pub use a::A; pub struct Own;"), 0);
+    assert_eq!(
+        room(
+            "use super::{B, Serialize}; pub(in crate::mesh) struct A;",
+            "",
+            imports
+        ),
+        0
+    );
+    assert_eq!(
+        room(
+            "use super::Own; use super::B;",
+            "",
+            "mod a; mod b; pub use a::A; pub struct Own;"
+        ),
+        0
+    );
 }

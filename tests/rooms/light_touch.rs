@@ -13,7 +13,10 @@ use touchup::stylus::{Sample, Wrench};
 
 use crate::common::grid;
 
-const TIP: TipParams = TipParams { radius: 1.5e-3, stiffness: Some(2e4) };
+const TIP: TipParams = TipParams {
+    radius: 1.5e-3,
+    stiffness: Some(2e4),
+};
 /// How much lower than the scan the ball goes, m.
 const BELOW: f64 = 1e-3;
 
@@ -27,8 +30,15 @@ fn slide(seconds: f64, noise: f64, force: impl Fn(f64) -> f64) -> Vec<Sample> {
         let t = ms as f64 * 1e-3;
         let along = 20e-3 * (2.0 * (t % 1.0) - 1.0).abs();
         let pose_ot = Isometry3::translation(along - 10e-3, 1e-3 * t - 4e-3, TIP.radius - BELOW);
-        let wrench = Wrench { force: Vector3::z() * force(t) + gauss(), torque: Vector3::zeros() };
-        Sample { stamp_ns: ms * 1_000_000, pose_ot, wrench }
+        let wrench = Wrench {
+            force: Vector3::z() * force(t) + gauss(),
+            torque: Vector3::zeros(),
+        };
+        Sample {
+            stamp_ns: ms * 1_000_000,
+            pose_ot,
+            wrench,
+        }
     };
     (0..(seconds * 1e3) as i64).map(at).collect()
 }
@@ -36,17 +46,31 @@ fn slide(seconds: f64, noise: f64, force: impl Fn(f64) -> f64) -> Vec<Sample> {
 /// The mesh as moved, and the surface that the patch makes of the samples.
 fn refined(scan: &TriMesh, samples: &[Sample]) -> (TriMesh, TriMesh) {
     let patch = PatcherParams::new(TIP.radius, TIP.stiffness, 0.3e-3);
-    let mut engine = Engine::new(scan.clone(), RefineParams::robust(TIP), Some(patch), Renewal::AtEnd).unwrap();
+    let mut engine = Engine::new(
+        scan.clone(),
+        RefineParams::robust(TIP),
+        Some(patch),
+        Renewal::AtEnd,
+    )
+    .unwrap();
     for sample in samples {
         engine.push(sample).unwrap();
     }
     let mut ended = engine.finish().unwrap();
-    let patched = ended.patcher.take().unwrap().patched(scan, &FaceTree::new(scan)).unwrap();
+    let patched = ended
+        .patcher
+        .take()
+        .unwrap()
+        .patched(scan, &FaceTree::new(scan))
+        .unwrap();
     (ended.mesh().into_owned(), patched.mesh)
 }
 
 fn lowest(mesh: &TriMesh) -> f64 {
-    mesh.positions().iter().map(|p| p.z).fold(f64::INFINITY, f64::min)
+    mesh.positions()
+        .iter()
+        .map(|p| p.z)
+        .fold(f64::INFINITY, f64::min)
 }
 
 #[test]
@@ -56,10 +80,16 @@ fn a_light_touch_leaves_the_scan_as_it_was_and_free_motion_does_not() {
         let touched = slide(8.0, noise, |t| 0.22 + 0.02 * (9.0 * t).sin());
         let (moved, patched) = refined(&scan, &touched);
         assert!(moved.positions() == scan.positions(), "noise {noise} N");
-        assert!(patched.positions() == scan.positions(), "patch at a noise of {noise} N");
+        assert!(
+            patched.positions() == scan.positions(),
+            "patch at a noise of {noise} N"
+        );
         let free = slide(8.0, noise, |_| 0.0);
         let (moved, patched) = refined(&scan, &free);
-        assert!(lowest(&moved) < -0.8 * BELOW && lowest(&patched) < -0.8 * BELOW, "noise {noise} N");
+        assert!(
+            lowest(&moved) < -0.8 * BELOW && lowest(&patched) < -0.8 * BELOW,
+            "noise {noise} N"
+        );
     }
 }
 
@@ -67,30 +97,61 @@ fn a_light_touch_leaves_the_scan_as_it_was_and_free_motion_does_not() {
 /// centres, a radius too high.
 #[test]
 fn a_real_recording_of_light_touches_does_not_carve() {
-    let Some(file) = crate::shared::shared("force/vu_dvrk_exploration/KidneyZ4-21Oct.csv") else { return };
+    let Some(file) = crate::shared::shared("force/vu_dvrk_exploration/KidneyZ4-21Oct.csv") else {
+        return;
+    };
     let text = fs::read_to_string(file).unwrap();
-    let rows: Vec<Vec<f64>> =
-        text.lines().skip(1).map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect();
+    let rows: Vec<Vec<f64>> = text
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect())
+        .collect();
     let mut samples: Vec<Sample> = Vec::new();
     for row in &rows {
         let stamp_ns = (row[0] * 1e13) as i64 + (row[1] * 1e9) as i64;
         if samples.last().is_none_or(|last| last.stamp_ns < stamp_ns) {
             let pose_ot = Isometry3::translation(row[2] * 1e-3, row[3] * 1e-3, row[4] * 1e-3);
-            let wrench = Wrench { force: Vector3::new(row[5], row[6], row[7]), torque: Vector3::zeros() };
-            samples.push(Sample { stamp_ns, pose_ot, wrench });
+            let wrench = Wrench {
+                force: Vector3::new(row[5], row[6], row[7]),
+                torque: Vector3::zeros(),
+            };
+            samples.push(Sample {
+                stamp_ns,
+                pose_ot,
+                wrench,
+            });
         }
     }
-    let centres: Vec<Point3<f64>> = samples.iter().map(|s| s.pose_ot.translation.vector.into()).collect();
-    let low = centres.iter().fold(Point3::new(1.0, 1.0, 1.0), |low, p| low.inf(p));
-    let high = centres.iter().fold(Point3::new(-1.0, -1.0, -1.0), |high, p| high.sup(p));
+    let centres: Vec<Point3<f64>> = samples
+        .iter()
+        .map(|s| s.pose_ot.translation.vector.into())
+        .collect();
+    let low = centres
+        .iter()
+        .fold(Point3::new(1.0, 1.0, 1.0), |low, p| low.inf(p));
+    let high = centres
+        .iter()
+        .fold(Point3::new(-1.0, -1.0, -1.0), |high, p| high.sup(p));
     let size = high - low;
     let height = centres.iter().map(|p| p.z).sum::<f64>() / centres.len() as f64;
-    let plane = grid((size.x.max(size.y) * 1e3).ceil() as u32, 1e-3, |_, _| height);
+    let plane = grid((size.x.max(size.y) * 1e3).ceil() as u32, 1e-3, |_, _| {
+        height
+    });
     let middle = (low.coords + high.coords) / 2.0;
-    let positions = plane.positions().iter().map(|p| p + Vector3::new(middle.x, middle.y, 0.0)).collect();
-    let faces = plane.faces().map(|(_, corners)| corners.map(|corner| corner.0)).collect();
+    let positions = plane
+        .positions()
+        .iter()
+        .map(|p| p + Vector3::new(middle.x, middle.y, 0.0))
+        .collect();
+    let faces = plane
+        .faces()
+        .map(|(_, corners)| corners.map(|corner| corner.0))
+        .collect();
     let scan = TriMesh::new(positions, faces).unwrap();
-    let tip = TipParams { radius: 3.15e-3, stiffness: None };
+    let tip = TipParams {
+        radius: 3.15e-3,
+        stiffness: None,
+    };
     let mut refiner = Refiner::new(scan.clone(), RefineParams::robust(tip)).unwrap();
     for sample in &samples {
         refiner.push(sample).unwrap();

@@ -22,10 +22,19 @@ impl Sweep {
     }
 
     fn named(grid: &str, [scan, recording]: [&str; 2]) -> Self {
-        let sweep = Self { folder: tempfile::tempdir().unwrap() };
+        let sweep = Self {
+            folder: tempfile::tempdir().unwrap(),
+        };
         fs::write(sweep.path(scan), flat_scan()).unwrap();
         let messages = touch(UnitQuaternion::identity(), false);
-        write_recording(&sweep.path(recording), &Topics::default(), "object", "stylus", messages).unwrap();
+        write_recording(
+            &sweep.path(recording),
+            &Topics::default(),
+            "object",
+            "stylus",
+            messages,
+        )
+        .unwrap();
         let files = format!("scan: {scan}\nrecordings: [{recording}]\n");
         fs::write(sweep.path("grid.yaml"), files + grid).unwrap();
         sweep
@@ -40,7 +49,16 @@ impl Sweep {
     }
 
     fn plan(&self) -> Output {
-        touchup(&["sweep", "plan", &self.name("grid.yaml"), "--out", &self.name("jobs.jsonl")], "")
+        touchup(
+            &[
+                "sweep",
+                "plan",
+                &self.name("grid.yaml"),
+                "--out",
+                &self.name("jobs.jsonl"),
+            ],
+            "",
+        )
     }
 
     /// The lines of a plan that is made.
@@ -48,27 +66,51 @@ impl Sweep {
         let planned = self.plan();
         assert_eq!((code(&planned), text(&planned.stderr)), (0, ""));
         let lines = fs::read_to_string(self.path("jobs.jsonl")).unwrap();
-        lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+        lines
+            .lines()
+            .map(|line| serde_json::from_str(line).unwrap())
+            .collect()
     }
 
     fn ids(&self) -> Vec<String> {
-        self.jobs().iter().map(|job| job["id"].as_str().unwrap().to_owned()).collect()
+        self.jobs()
+            .iter()
+            .map(|job| job["id"].as_str().unwrap().to_owned())
+            .collect()
     }
 
     fn run(&self, flags: &[&str]) -> Output {
-        touchup(&[&["sweep", "run", &self.name("jobs.jsonl")], flags].concat(), "")
+        touchup(
+            &[&["sweep", "run", &self.name("jobs.jsonl")], flags].concat(),
+            "",
+        )
     }
 
     fn run_in_background(&self, flags: &[&str]) -> std::process::Child {
         let mut command = Command::new(env!("CARGO_BIN_EXE_touchup"));
-        command.args(["sweep", "run", &self.name("jobs.jsonl")]).args(flags);
-        command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+        command
+            .args(["sweep", "run", &self.name("jobs.jsonl")])
+            .args(flags);
+        command
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap()
     }
 
     /// Each file of a result by its name.
     fn result(&self, results: &str, id: &str) -> BTreeMap<String, Vec<u8>> {
-        let entries = fs::read_dir(self.path(results).join(id)).unwrap().map(Result::unwrap);
-        entries.map(|entry| (entry.file_name().into_string().unwrap(), fs::read(entry.path()).unwrap())).collect()
+        let entries = fs::read_dir(self.path(results).join(id))
+            .unwrap()
+            .map(Result::unwrap);
+        entries
+            .map(|entry| {
+                (
+                    entry.file_name().into_string().unwrap(),
+                    fs::read(entry.path()).unwrap(),
+                )
+            })
+            .collect()
     }
 
     /// What lies in the folder of the results, hidden names too.
@@ -78,8 +120,10 @@ impl Sweep {
 }
 
 fn names_in(folder: &Path) -> Vec<String> {
-    let mut names: Vec<_> =
-        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    let mut names: Vec<_> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
     names.sort();
     names
 }
@@ -95,16 +139,30 @@ fn a_plan_has_every_setting_with_every_recording_in_the_order_of_the_alphabet() 
     );
     fs::copy(sweep.path("touch.mcap"), sweep.path("again.mcap")).unwrap();
     let planned = touchup(
-        &["sweep", "plan", &sweep.name("grid.yaml"), &sweep.name("again.mcap"), "--out", &sweep.name("jobs.jsonl")],
+        &[
+            "sweep",
+            "plan",
+            &sweep.name("grid.yaml"),
+            &sweep.name("again.mcap"),
+            "--out",
+            &sweep.name("jobs.jsonl"),
+        ],
         "",
     );
     assert_eq!(code(&planned), 0, "{}", text(&planned.stderr));
     let lines = fs::read_to_string(sweep.path("jobs.jsonl")).unwrap();
-    let jobs: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let jobs: Vec<Value> = lines
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
     assert_eq!(jobs.len(), 3 * 2 * 2);
     let row = |job: &Value| {
         let number = |key: &str| job["keys"][key].as_f64().unwrap();
-        (number("contact.on_n"), number("tip.stiffness_n_per_mm"), job["recording"].as_str().unwrap().to_owned())
+        (
+            number("contact.on_n"),
+            number("tip.stiffness_n_per_mm"),
+            job["recording"].as_str().unwrap().to_owned(),
+        )
     };
     let expected = [
         (0.4, 10.0, "touch.mcap"),
@@ -114,9 +172,19 @@ fn a_plan_has_every_setting_with_every_recording_in_the_order_of_the_alphabet() 
         (0.6, 10.0, "touch.mcap"),
     ];
     let first: Vec<_> = jobs.iter().take(5).map(row).collect();
-    assert_eq!(first, expected.map(|(on, k, name)| (on, k, name.to_owned())));
-    assert_eq!(jobs[0]["id"], jobs[1]["id"], "recordings of the same content are one job");
-    assert!(jobs.iter().zip(0_u64..).all(|(job, number)| job["job"] == number));
+    assert_eq!(
+        first,
+        expected.map(|(on, k, name)| (on, k, name.to_owned()))
+    );
+    assert_eq!(
+        jobs[0]["id"], jobs[1]["id"],
+        "recordings of the same content are one job"
+    );
+    assert!(
+        jobs.iter()
+            .zip(0_u64..)
+            .all(|(job, number)| job["job"] == number)
+    );
     assert_eq!(jobs[0]["scan"], "scan.ply");
 }
 
@@ -125,20 +193,39 @@ fn a_plan_has_every_setting_with_every_recording_in_the_order_of_the_alphabet() 
 fn ids_depend_on_content_and_not_on_paths() {
     let one = Sweep::new("scene: a.yaml\nkeys: { contact.on_n: [0.4, 0.5] }\n");
     fs::write(one.path("a.yaml"), "tip: { radius_mm: 1.5 }\n").unwrap();
-    let other = Sweep::named("scene: deep/b.yaml\nkeys: { contact.on_n: [0.4, 0.5] }\n", ["part.ply", "monday.mcap"]);
+    let other = Sweep::named(
+        "scene: deep/b.yaml\nkeys: { contact.on_n: [0.4, 0.5] }\n",
+        ["part.ply", "monday.mcap"],
+    );
     fs::create_dir(other.path("deep")).unwrap();
-    fs::write(other.path("deep/b.yaml"), "# the same in other words\ntip:\n  radius_mm: 1.50\nsync:\n").unwrap();
+    fs::write(
+        other.path("deep/b.yaml"),
+        "# the same in other words\ntip:\n  radius_mm: 1.50\nsync:\n",
+    )
+    .unwrap();
     assert_eq!(one.ids(), other.ids());
-    let sum = Command::new("sha256sum").arg(one.path("touch.mcap")).output().unwrap();
-    assert_eq!(one.jobs()[0]["recording_sha256"].as_str(), text(&sum.stdout).split_whitespace().next());
+    let sum = Command::new("sha256sum")
+        .arg(one.path("touch.mcap"))
+        .output()
+        .unwrap();
+    assert_eq!(
+        one.jobs()[0]["recording_sha256"].as_str(),
+        text(&sum.stdout).split_whitespace().next()
+    );
 
     let before = other.ids();
     fs::write(other.path("deep/b.yaml"), "tip: { radius_mm: 1.6 }\n").unwrap();
-    assert!(other.ids().iter().zip(&before).all(|(a, b)| a != b), "another scene");
+    assert!(
+        other.ids().iter().zip(&before).all(|(a, b)| a != b),
+        "another scene"
+    );
     fs::write(other.path("deep/b.yaml"), "tip: { radius_mm: 1.5 }\n").unwrap();
     assert_eq!(other.ids(), before);
     fs::write(other.path("part.ply"), flat_scan() + "\n").unwrap();
-    assert!(other.ids().iter().zip(&before).all(|(a, b)| a != b), "another scan");
+    assert!(
+        other.ids().iter().zip(&before).all(|(a, b)| a != b),
+        "another scan"
+    );
 }
 
 #[test]
@@ -147,15 +234,29 @@ fn a_misspelt_key_is_refused_with_its_line_and_the_key_that_is_meant() {
     let refused = sweep.plan();
     let said = text(&refused.stderr);
     assert_eq!((code(&refused), text(&refused.stdout)), (3, ""));
-    assert!(said.contains("grid.yaml: line 5: tip.stifness_n_per_mm"), "{said}");
-    assert!(said.contains("did you mean `stiffness_n_per_mm`?"), "{said}");
+    assert!(
+        said.contains("grid.yaml: line 5: tip.stifness_n_per_mm"),
+        "{said}"
+    );
+    assert!(
+        said.contains("did you mean `stiffness_n_per_mm`?"),
+        "{said}"
+    );
     assert!(!sweep.path("jobs.jsonl").exists());
     for (grid, code_of, expected) in [
         ("keys: { tip.radius_mm: -1 }\n", 3, "tip.radius_mm is -1"),
         ("keys: {}\n", 3, "the radius of the ball is not known"),
         ("keyes: {}\n", 3, "did you mean `keys`?"),
-        ("keys: { tip.radius_mm: { from: 1, to: 2 } }\n", 3, "a grid needs steps"),
-        ("keys: { robot.speed_mm_per_s: [1] }\n", 3, "changes nothing of a refinement"),
+        (
+            "keys: { tip.radius_mm: { from: 1, to: 2 } }\n",
+            3,
+            "a grid needs steps",
+        ),
+        (
+            "keys: { robot.speed_mm_per_s: [1] }\n",
+            3,
+            "changes nothing of a refinement",
+        ),
         (
             "keys: { tip.radius_mm: { from: 1, to: 2, steps: 1001 }, contact.on_n: { from: 1, to: 2, steps: 1000 } }\n",
             2,
@@ -165,7 +266,11 @@ fn a_misspelt_key_is_refused_with_its_line_and_the_key_that_is_meant() {
         let sweep = Sweep::new(grid);
         let refused = sweep.plan();
         assert_eq!(code(&refused), code_of, "{grid}: {}", text(&refused.stderr));
-        assert!(text(&refused.stderr).contains(expected), "{grid}: {}", text(&refused.stderr));
+        assert!(
+            text(&refused.stderr).contains(expected),
+            "{grid}: {}",
+            text(&refused.stderr)
+        );
     }
 }
 
@@ -185,17 +290,25 @@ fn a_result_has_the_same_bytes_wherever_and_under_whatever_names_it_is_made() {
     }
     let result = one.result("results", id);
     let names: Vec<_> = result.keys().map(String::as_str).collect();
-    assert_eq!(names, ["features.json", "job.json", "refined.ply", "summary.json"]);
+    assert_eq!(
+        names,
+        ["features.json", "job.json", "refined.ply", "summary.json"]
+    );
     assert_eq!(result, other.result("results", id));
     for (name, bytes) in &result {
         let said = String::from_utf8_lossy(bytes);
-        let is_named =
-            [one.folder.path(), other.folder.path()].iter().any(|folder| said.contains(folder.to_str().unwrap()));
+        let is_named = [one.folder.path(), other.folder.path()]
+            .iter()
+            .any(|folder| said.contains(folder.to_str().unwrap()));
         assert!(!is_named && !said.contains("mcap"), "{name}");
     }
     let summary: Value = serde_json::from_slice(&result["summary.json"]).unwrap();
     assert_eq!(
-        (&summary["samples"], &summary["accepted"], &summary["contacts"]),
+        (
+            &summary["samples"],
+            &summary["accepted"],
+            &summary["contacts"]
+        ),
         (&1001.into(), &1001.into(), &1.into())
     );
 
@@ -215,8 +328,22 @@ fn a_job_is_what_refine_does() {
     assert_eq!(code(&sweep.run(&[])), 0);
     let [scan, bag, out, features] =
         ["scan.ply", "touch.mcap", "refined.ply", "features.json"].map(|name| sweep.name(name));
-    let flags = ["--features-out", &features, "--tip-radius-mm", "1.5", "--stiffness-n-per-mm", "20"];
-    let refined = touchup(&[&["refine", "--scan", &scan, "--bag", &bag, "--out", &out], &flags[..]].concat(), "");
+    let flags = [
+        "--features-out",
+        &features,
+        "--tip-radius-mm",
+        "1.5",
+        "--stiffness-n-per-mm",
+        "20",
+    ];
+    let refined = touchup(
+        &[
+            &["refine", "--scan", &scan, "--bag", &bag, "--out", &out],
+            &flags[..],
+        ]
+        .concat(),
+        "",
+    );
     assert_eq!(code(&refined), 0);
     let result = sweep.result("results", &id);
     for name in ["refined.ply", "features.json"] {
@@ -229,16 +356,34 @@ fn a_job_is_what_refine_does() {
 fn a_killed_job_leaves_nothing_half_and_the_next_one_gives_the_same_bytes() {
     let sweep = Sweep::new(ONE_JOB);
     let id = sweep.ids().remove(0);
-    assert_eq!(code(&sweep.run(&["--job", "0", "--results", &sweep.name("clean")])), 0);
+    assert_eq!(
+        code(&sweep.run(&["--job", "0", "--results", &sweep.name("clean")])),
+        0
+    );
     let clean = sweep.result("clean", &id);
     fs::rename(sweep.path("scan.ply"), sweep.path("kept.ply")).unwrap();
-    assert!(Command::new("mkfifo").arg(sweep.path("scan.ply")).status().unwrap().success());
+    assert!(
+        Command::new("mkfifo")
+            .arg(sweep.path("scan.ply"))
+            .status()
+            .unwrap()
+            .success()
+    );
     let left = |suffix: &str| {
-        let names = if sweep.path("results").exists() { sweep.names_in("results") } else { Vec::new() };
-        names.into_iter().find(|name| name.ends_with(suffix)).map(|name| sweep.path("results").join(name))
+        let names = if sweep.path("results").exists() {
+            sweep.names_in("results")
+        } else {
+            Vec::new()
+        };
+        names
+            .into_iter()
+            .find(|name| name.ends_with(suffix))
+            .map(|name| sweep.path("results").join(name))
     };
     let mut job = sweep.run_in_background(&["--job", "0"]);
-    let part = std::iter::repeat_with(|| left(".part")).find_map(|part| part).unwrap();
+    let part = std::iter::repeat_with(|| left(".part"))
+        .find_map(|part| part)
+        .unwrap();
     job.kill().unwrap();
     job.wait().unwrap();
     assert!(part.is_dir() && !sweep.path("results").join(&id).exists());
@@ -264,10 +409,18 @@ fn a_killed_job_leaves_nothing_half_and_the_next_one_gives_the_same_bytes() {
 fn two_runs_of_one_job_at_once_are_one_result() {
     let sweep = Sweep::new(ONE_JOB);
     let id = sweep.ids().remove(0);
-    let jobs: Vec<_> = (0..4).map(|_| sweep.run_in_background(&["--job", "0", "--json"])).collect();
-    let ended: Vec<_> = jobs.into_iter().map(|job| job.wait_with_output().unwrap()).collect();
+    let jobs: Vec<_> = (0..4)
+        .map(|_| sweep.run_in_background(&["--job", "0", "--json"]))
+        .collect();
+    let ended: Vec<_> = jobs
+        .into_iter()
+        .map(|job| job.wait_with_output().unwrap())
+        .collect();
     assert!(ended.iter().all(|one| code(one) == 0));
-    let made = ended.iter().filter(|one| one_object(one)["was_there"] == false).count();
+    let made = ended
+        .iter()
+        .filter(|one| one_object(one)["was_there"] == false)
+        .count();
     assert_eq!(made, 1, "the others waited for it");
     assert_eq!(sweep.names_in("results"), [id]);
 }
@@ -282,14 +435,30 @@ fn a_file_that_is_not_what_was_planned_is_refused_and_nothing_is_written() {
         fs::write(sweep.path(name), [&kept[..], b" "].concat()).unwrap();
         let refused = sweep.run(&["--job", "0"]);
         let said = text(&refused.stderr);
-        assert!(code(&refused) == 3 && said.contains(name) && said.contains("not what was planned"), "{said}");
+        assert!(
+            code(&refused) == 3 && said.contains(name) && said.contains("not what was planned"),
+            "{said}"
+        );
         fs::write(sweep.path(name), kept).unwrap();
     }
-    assert!(sweep.names_in("results").iter().all(|name| name.starts_with('.')));
+    assert!(
+        sweep
+            .names_in("results")
+            .iter()
+            .all(|name| name.starts_with('.'))
+    );
     let none = sweep.run(&["--job", "1"]);
-    assert!(code(&none) == 2 && text(&none.stderr).contains("has no job 1: it has 1"), "{}", text(&none.stderr));
+    assert!(
+        code(&none) == 2 && text(&none.stderr).contains("has no job 1: it has 1"),
+        "{}",
+        text(&none.stderr)
+    );
     let line = fs::read_to_string(sweep.path("jobs.jsonl")).unwrap();
-    fs::write(sweep.path("jobs.jsonl"), line.replace("\"keys\":{}", "\"keys\":{\"contact.on_n\":0.9}")).unwrap();
+    fs::write(
+        sweep.path("jobs.jsonl"),
+        line.replace("\"keys\":{}", "\"keys\":{\"contact.on_n\":0.9}"),
+    )
+    .unwrap();
     let other = sweep.run(&["--job", "0"]);
     assert!(
         code(&other) == 3 && text(&other.stderr).contains("not the one that its id names"),
@@ -332,55 +501,109 @@ fn a_job_that_fails_is_in_the_table_with_its_reason_and_a_missing_one_is_named()
         let ran = sweep.run(&[]);
         assert_eq!(code(&ran), 4);
         assert!(
-            text(&ran.stderr).contains("job 1 failed: the recording on the scan: the contacts reach 2.00 N"),
+            text(&ran.stderr)
+                .contains("job 1 failed: the recording on the scan: the contacts reach 2.00 N"),
             "{}",
             text(&ran.stderr)
         );
     }
     let one = sweep.run(&["--job", "1"]);
-    assert!(code(&one) == 3 && text(&one.stderr).contains("job 1 failed"), "{}", text(&one.stderr));
-    assert_eq!(sweep.result("results", &ids[1]).keys().collect::<Vec<_>>(), ["failed.json", "job.json"]);
+    assert!(
+        code(&one) == 3 && text(&one.stderr).contains("job 1 failed"),
+        "{}",
+        text(&one.stderr)
+    );
+    assert_eq!(
+        sweep.result("results", &ids[1]).keys().collect::<Vec<_>>(),
+        ["failed.json", "job.json"]
+    );
 
     assert_eq!(code(&table("table.csv")), 0);
     let csv = fs::read_to_string(sweep.path("table.csv")).unwrap();
     let rows: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
     assert_eq!(rows.len(), 3);
-    let first = ["job", "id", "recording", "seed", "contact.on_n", "tip.radius_mm", "failed"];
+    let first = [
+        "job",
+        "id",
+        "recording",
+        "seed",
+        "contact.on_n",
+        "tip.radius_mm",
+        "failed",
+    ];
     assert_eq!(rows[0][..7], first);
-    assert_eq!(rows[1][..7], ["0", &*ids[0], "touch.mcap", "", "0.4", "1.5", ""]);
+    assert_eq!(
+        rows[1][..7],
+        ["0", &*ids[0], "touch.mcap", "", "0.4", "1.5", ""]
+    );
     assert_eq!(rows[2][..6], ["1", &*ids[1], "touch.mcap", "", "3", "1.5"]);
     let samples = rows[0].iter().position(|name| *name == "samples").unwrap();
     assert_eq!((rows[1][samples], rows[2][samples]), ("1001", ""));
-    let features: Value = serde_json::from_slice(&sweep.result("results", &ids[0])["features.json"]).unwrap();
-    let listed = fs::read_to_string(sweep.path("features.csv")).unwrap().lines().count();
-    assert_eq!(listed.saturating_sub(1), features["features"].as_array().unwrap().len());
+    let features: Value =
+        serde_json::from_slice(&sweep.result("results", &ids[0])["features.json"]).unwrap();
+    let listed = fs::read_to_string(sweep.path("features.csv"))
+        .unwrap()
+        .lines()
+        .count();
+    assert_eq!(
+        listed.saturating_sub(1),
+        features["features"].as_array().unwrap().len()
+    );
     assert_eq!(code(&table("table.parquet")), 0);
-    assert!(fs::read(sweep.path("table.parquet")).unwrap().starts_with(b"PAR1"));
+    assert!(
+        fs::read(sweep.path("table.parquet"))
+            .unwrap()
+            .starts_with(b"PAR1")
+    );
 
     fs::remove_dir_all(sweep.path("results").join(&ids[0])).unwrap();
     let less = table("less.csv");
-    assert!(code(&less) == 4 && text(&less.stderr).contains("1 job has no result: 0"), "{}", text(&less.stderr));
-    assert_eq!(fs::read_to_string(sweep.path("less.csv")).unwrap().lines().count(), 2);
+    assert!(
+        code(&less) == 4 && text(&less.stderr).contains("1 job has no result: 0"),
+        "{}",
+        text(&less.stderr)
+    );
+    assert_eq!(
+        fs::read_to_string(sweep.path("less.csv"))
+            .unwrap()
+            .lines()
+            .count(),
+        2
+    );
 }
 
 // ---- whatif -----------------------------------------------------------------------------------------------------
 
 /// A result as a job leaves it: a sheet of 21 × 21 vertices that rises by `step` mm from column to column, known to `sigma` mm.
-fn sheet_result(folder: &Path, scan: &str, stiffness: i32, step: f64, sigma: f64, features: &Value) -> String {
+fn sheet_result(
+    folder: &Path,
+    scan: &str,
+    stiffness: i32,
+    step: f64,
+    sigma: f64,
+    features: &Value,
+) -> String {
     fs::create_dir(folder).unwrap();
     let mut lines = flat_scan().lines().map(str::to_owned).collect::<Vec<_>>();
     let head = lines.iter().position(|line| line == "end_header").unwrap();
     for line in &mut lines[head + 1..head + 1 + 21 * 21] {
         let place: Vec<f64> = line.split(' ').map(|word| word.parse().unwrap()).collect();
-        *line = format!("{} {} {} {sigma}", place[0], place[1], (place[0] + 10.0) * step);
+        *line = format!(
+            "{} {} {} {sigma}",
+            place[0],
+            place[1],
+            (place[0] + 10.0) * step
+        );
     }
     lines.insert(head - 2, "property float sigma_mm".to_owned());
     fs::write(folder.join("refined.ply"), lines.join("\n") + "\n").unwrap();
     let record = json!({ "id": "0", "touchup": "0", "scan_sha256": scan, "mesh_unit": "mm", "recording_sha256": "1", "recorded": {},
         "scene": { "tip": { "radius_mm": 1.5, "stiffness_n_per_mm": stiffness } } });
-    for (name, value) in
-        [("job.json", &record), ("features.json", &json!({ "features": features })), ("summary.json", &json!({}))]
-    {
+    for (name, value) in [
+        ("job.json", &record),
+        ("features.json", &json!({ "features": features })),
+        ("summary.json", &json!({})),
+    ] {
         fs::write(folder.join(name), value.to_string()).unwrap();
     }
     folder.to_str().unwrap().to_owned()
@@ -400,42 +623,108 @@ fn vertices_and_features_that_moved_by_more_than_the_larger_plus_minus_are_count
     let b = sheet_result(&at("b"), "s", 10, 0.01, 0.05, &hole(6.05, 0.02));
     let [page, vertices, features, mesh] =
         ["page.html", "v.csv", "f.csv", "m.ply"].map(|name| at(name).to_str().unwrap().to_owned());
-    let outs = ["--out", &page, "--vertices-out", &vertices, "--features-out", &features, "--mesh-out", &mesh];
+    let outs = [
+        "--out",
+        &page,
+        "--vertices-out",
+        &vertices,
+        "--features-out",
+        &features,
+        "--mesh-out",
+        &mesh,
+    ];
     let found = touchup(&[&["whatif", &a, &b, "--json"], &outs[..]].concat(), "");
     assert_eq!((code(&found), text(&found.stderr)), (0, ""));
     let report = one_object(&found);
-    assert_eq!(report["keys"], json!({ "tip.stiffness_n_per_mm": [20, 10] }));
-    assert_eq!((&report["vertices_a"]["vertices"], &report["vertices_a"]["moved"]), (&441.into(), &210.into()));
-    assert!(report.get("vertices_b").is_none(), "both have the same vertices");
+    assert_eq!(
+        report["keys"],
+        json!({ "tip.stiffness_n_per_mm": [20, 10] })
+    );
+    assert_eq!(
+        (
+            &report["vertices_a"]["vertices"],
+            &report["vertices_a"]["moved"]
+        ),
+        (&441.into(), &210.into())
+    );
+    assert!(
+        report.get("vertices_b").is_none(),
+        "both have the same vertices"
+    );
     let near = |value: &Value, expected: f64| (value.as_f64().unwrap() - expected).abs() < 1e-6;
     assert!(
-        near(&report["vertices_a"]["farthest_mm"], 0.2) && near(&report["vertices_a"]["farthest_plus_minus_mm"], 0.1),
+        near(&report["vertices_a"]["farthest_mm"], 0.2)
+            && near(&report["vertices_a"]["farthest_plus_minus_mm"], 0.1),
         "{report}"
     );
-    assert_eq!((&report["features_moved"], &report["features"][0]["numbers"][2]["moved"]), (&1.into(), &true.into()));
+    assert_eq!(
+        (
+            &report["features_moved"],
+            &report["features"][0]["numbers"][2]["moved"]
+        ),
+        (&1.into(), &true.into())
+    );
 
     let rows = fs::read_to_string(&vertices).unwrap();
-    assert_eq!(rows.lines().next(), Some("mesh,vertex,x_mm,y_mm,z_mm,displacement_mm,plus_minus_mm,moved"));
-    assert_eq!((rows.lines().count(), rows.lines().filter(|row| row.ends_with(",true")).count()), (442, 210));
-    assert_eq!(fs::read_to_string(&features).unwrap().lines().filter(|row| row.contains(",true")).count(), 1);
+    assert_eq!(
+        rows.lines().next(),
+        Some("mesh,vertex,x_mm,y_mm,z_mm,displacement_mm,plus_minus_mm,moved")
+    );
+    assert_eq!(
+        (
+            rows.lines().count(),
+            rows.lines().filter(|row| row.ends_with(",true")).count()
+        ),
+        (442, 210)
+    );
+    assert_eq!(
+        fs::read_to_string(&features)
+            .unwrap()
+            .lines()
+            .filter(|row| row.contains(",true"))
+            .count(),
+        1
+    );
     assert!(String::from_utf8_lossy(&fs::read(&mesh).unwrap()).contains("displacement_mm"));
     let html = fs::read_to_string(&page).unwrap();
-    for expected in
-        ["What if tip.stiffness_n_per_mm is 10 instead of 20?", "210 of 441", "hole 4", "data:image/png;base64,"]
-    {
+    for expected in [
+        "What if tip.stiffness_n_per_mm is 10 instead of 20?",
+        "210 of 441",
+        "hole 4",
+        "data:image/png;base64,",
+    ] {
         assert!(html.contains(expected), "{expected}");
     }
-    assert!(!html.contains("<script") && !html.contains("http"), "it asks for nothing outside of it");
+    assert!(
+        !html.contains("<script") && !html.contains("http"),
+        "it asks for nothing outside of it"
+    );
     let words = touchup(&["whatif", &a, &b], "");
-    assert!(text(&words.stdout).contains("diameter_mm 6.000 → 6.050 (+0.050, ± 0.040)"), "{}", text(&words.stdout));
+    assert!(
+        text(&words.stdout).contains("diameter_mm 6.000 → 6.050 (+0.050, ± 0.040)"),
+        "{}",
+        text(&words.stdout)
+    );
 
     let other = sheet_result(&at("c"), "t", 20, 0.0, 0.02, &json!([]));
     let refused = touchup(&["whatif", &a, &other], "");
-    assert!(code(&refused) == 2 && text(&refused.stderr).contains("different scans"), "{}", text(&refused.stderr));
+    assert!(
+        code(&refused) == 2 && text(&refused.stderr).contains("different scans"),
+        "{}",
+        text(&refused.stderr)
+    );
     let none = touchup(&["whatif", &a, folder.path().to_str().unwrap()], "");
-    assert!(code(&none) == 3 && text(&none.stderr).contains("is no result of a job"), "{}", text(&none.stderr));
+    assert!(
+        code(&none) == 3 && text(&none.stderr).contains("is no result of a job"),
+        "{}",
+        text(&none.stderr)
+    );
     let number = touchup(&["whatif", "0", "1"], "");
-    assert!(code(&number) == 2 && text(&number.stderr).contains("need --jobs"), "{}", text(&number.stderr));
+    assert!(
+        code(&number) == 2 && text(&number.stderr).contains("need --jobs"),
+        "{}",
+        text(&number.stderr)
+    );
 }
 
 /// The stylus is bent by 2 N: of 20 N/mm by 0.1 mm, of 10 N/mm by 0.2 mm. So the touched place comes out 0.1 mm higher.
@@ -444,13 +733,36 @@ fn a_softer_stylus_lifts_the_touched_place_by_the_difference_of_its_bending() {
     let sweep = Sweep::new("keys: { tip.radius_mm: 1.5, tip.stiffness_n_per_mm: [20, 10] }\n");
     assert_eq!(sweep.jobs().len(), 2);
     assert_eq!(code(&sweep.run(&[])), 0);
-    let found = touchup(&["whatif", "0", "1", "--jobs", &sweep.name("jobs.jsonl"), "--json"], "");
+    let found = touchup(
+        &[
+            "whatif",
+            "0",
+            "1",
+            "--jobs",
+            &sweep.name("jobs.jsonl"),
+            "--json",
+        ],
+        "",
+    );
     assert_eq!((code(&found), text(&found.stderr)), (0, ""));
     let report = one_object(&found);
-    assert_eq!(report["keys"], json!({ "tip.stiffness_n_per_mm": [20, 10] }));
+    assert_eq!(
+        report["keys"],
+        json!({ "tip.stiffness_n_per_mm": [20, 10] })
+    );
     let farthest = report["vertices_b"]["farthest_mm"].as_f64().unwrap();
     assert!((farthest - 0.1).abs() < 0.01, "{report}");
-    let same = touchup(&["whatif", "0", "0", "--jobs", &sweep.name("jobs.jsonl"), "--json"], "");
+    let same = touchup(
+        &[
+            "whatif",
+            "0",
+            "0",
+            "--jobs",
+            &sweep.name("jobs.jsonl"),
+            "--json",
+        ],
+        "",
+    );
     assert_eq!(one_object(&same)["vertices_a"]["moved"], 0);
     assert_eq!(one_object(&same)["keys"], json!({}));
 }
@@ -463,27 +775,61 @@ fn the_plate_touched_by_a_softer_stylus_grows_everywhere_by_its_bending() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let keys = "keys: { tip.radius_mm: 1.5, tip.stiffness_n_per_mm: [20, 15] }\n";
-    fs::write(at("grid.yaml"), format!("simulate: {{ part: plate, seeds: [1] }}\n{keys}")).unwrap();
-    let planned = touchup(&["sweep", "plan", &at("grid.yaml"), "--out", &at("jobs.jsonl")], "");
+    fs::write(
+        at("grid.yaml"),
+        format!("simulate: {{ part: plate, seeds: [1] }}\n{keys}"),
+    )
+    .unwrap();
+    let planned = touchup(
+        &[
+            "sweep",
+            "plan",
+            &at("grid.yaml"),
+            "--out",
+            &at("jobs.jsonl"),
+        ],
+        "",
+    );
     assert_eq!(code(&planned), 0, "{}", text(&planned.stderr));
     assert_eq!(code(&touchup(&["sweep", "run", &at("jobs.jsonl")], "")), 0);
     // the plan has the stiffnesses as they are listed
-    let report = one_object(&touchup(&["whatif", "0", "1", "--jobs", &at("jobs.jsonl"), "--json"], ""));
-    assert_eq!(report["keys"], json!({ "tip.stiffness_n_per_mm": [20, 15] }));
+    let report = one_object(&touchup(
+        &["whatif", "0", "1", "--jobs", &at("jobs.jsonl"), "--json"],
+        "",
+    ));
+    assert_eq!(
+        report["keys"],
+        json!({ "tip.stiffness_n_per_mm": [20, 15] })
+    );
     let features = report["features"].as_array().unwrap();
     let number = |feature: &Value, name: &str| {
         let numbers = feature["numbers"].as_array().unwrap();
-        numbers.iter().find(|number| number["name"] == name).cloned().unwrap()
+        numbers
+            .iter()
+            .find(|number| number["name"] == name)
+            .cloned()
+            .unwrap()
     };
-    let top =
-        features.iter().find(|one| one["kind"] == "plane" && one["center_mm"][2].as_f64().unwrap() > 11.9).unwrap();
+    let top = features
+        .iter()
+        .find(|one| one["kind"] == "plane" && one["center_mm"][2].as_f64().unwrap() > 11.9)
+        .unwrap();
     let rise = number(top, "center_mm")["change"].as_f64().unwrap();
-    assert!(number(top, "center_mm")["moved"] == true && rise > 0.0, "{top}");
-    for (kind, name, sign) in [("hole", "diameter_mm", -2.0), ("slot", "width_mm", -2.0), ("boss", "diameter_mm", 2.0)]
-    {
+    assert!(
+        number(top, "center_mm")["moved"] == true && rise > 0.0,
+        "{top}"
+    );
+    for (kind, name, sign) in [
+        ("hole", "diameter_mm", -2.0),
+        ("slot", "width_mm", -2.0),
+        ("boss", "diameter_mm", 2.0),
+    ] {
         for feature in features.iter().filter(|one| one["kind"] == kind) {
             let size = number(feature, name);
-            let (change, known) = (size["change"].as_f64().unwrap(), size["plus_minus"].as_f64().unwrap());
+            let (change, known) = (
+                size["change"].as_f64().unwrap(),
+                size["plus_minus"].as_f64().unwrap(),
+            );
             assert!(
                 (change - sign * rise).abs() <= known && size["moved"] == true,
                 "{kind}: {change} for {rise} ± {known}"
@@ -500,15 +846,36 @@ fn the_plate_touched_by_a_softer_stylus_grows_everywhere_by_its_bending() {
 fn a_simulated_part_is_that_of_the_demo_by_its_seed() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    fs::write(at("grid.yaml"), "simulate: { part: plate, seeds: [3, 1] }\nkeys: { tip.radius_mm: [1.5, 1.6] }\n")
-        .unwrap();
-    let planned = touchup(&["sweep", "plan", &at("grid.yaml"), "--out", &at("jobs.jsonl")], "");
+    fs::write(
+        at("grid.yaml"),
+        "simulate: { part: plate, seeds: [3, 1] }\nkeys: { tip.radius_mm: [1.5, 1.6] }\n",
+    )
+    .unwrap();
+    let planned = touchup(
+        &[
+            "sweep",
+            "plan",
+            &at("grid.yaml"),
+            "--out",
+            &at("jobs.jsonl"),
+        ],
+        "",
+    );
     assert_eq!((code(&planned), text(&planned.stderr)), (0, ""));
     let lines = fs::read_to_string(at("jobs.jsonl")).unwrap();
-    let seeds: Vec<_> =
-        lines.lines().map(|line| serde_json::from_str::<Value>(line).unwrap()["seed"].as_u64().unwrap()).collect();
+    let seeds: Vec<_> = lines
+        .lines()
+        .map(|line| {
+            serde_json::from_str::<Value>(line).unwrap()["seed"]
+                .as_u64()
+                .unwrap()
+        })
+        .collect();
     assert_eq!(seeds, [3, 1, 3, 1]);
-    assert_eq!(names_in(&folder.path().join("simulated")), ["plate_1", "plate_3"]);
+    assert_eq!(
+        names_in(&folder.path().join("simulated")),
+        ["plate_1", "plate_3"]
+    );
     assert_ne!(
         fs::read(at("simulated/plate_1/scan.ply")).unwrap(),
         fs::read(at("simulated/plate_3/scan.ply")).unwrap()

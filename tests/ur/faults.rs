@@ -32,7 +32,10 @@ fn without_commands_the_arm_stops() {
         stand_in.send("mark silence of the caller");
         let silence = stand_in.record_between("mark silence of the caller", "stop requested");
         let after = silence[silence.len() - 1].time - silence[0].time;
-        println!("the caller is silent: stop requested after {:.0} ms", after * 1e3);
+        println!(
+            "the caller is silent: stop requested after {:.0} ms",
+            after * 1e3
+        );
         // to the nanosecond: a difference of two times is rounded
         let after_ns = (after * 1e9).round();
         assert!((20e6..50e6).contains(&after_ns), "{after_ns}");
@@ -63,7 +66,14 @@ fn a_released_arm_stops() {
 
 /// Goes on and on at 20 mm/s, away from the part, for some seconds of the arm.
 fn move_for(arm: &mut UrArm, seconds: f64) {
-    go_for(arm, seconds, &Command::Velocity { linear: Vector3::new(0.0, 0.0, 20e-3), acceleration: 1.0 });
+    go_for(
+        arm,
+        seconds,
+        &Command::Velocity {
+            linear: Vector3::new(0.0, 0.0, 20e-3),
+            acceleration: 1.0,
+        },
+    );
 }
 
 /// Commands zero velocity, for some seconds of the arm.
@@ -96,16 +106,35 @@ fn broken_off(arm: &mut UrArm, mut happen: impl FnMut()) -> ProbeError {
             happen();
         }
     };
-    let mut onlooker = Onlooker { seen: &mut seen, stop_request: || None };
+    let mut onlooker = Onlooker {
+        seen: &mut seen,
+        stop_request: || None,
+    };
     let mut watched = Watched::new(arm, limits(), &mut onlooker);
     let up = at([x, y, 200e-3]);
-    let went = watched.line("going up", &up, SPEED, &TouchParams::default(), limits().force);
+    let went = watched.line(
+        "going up",
+        &up,
+        SPEED,
+        &TouchParams::default(),
+        limits().force,
+    );
     // one that goes on takes what it passes for its end
-    went.and_then(|()| watched.dwell("standing", 1.0, &mut |_| {})).err().unwrap()
+    went.and_then(|()| watched.dwell("standing", 1.0, &mut |_| {}))
+        .err()
+        .unwrap()
 }
 
 fn is_lost(error: &ProbeError) -> bool {
-    matches!(error, ProbeError::Arm { error: ArmError::Lost { silent_ms: 81..=100 }, .. })
+    matches!(
+        error,
+        ProbeError::Arm {
+            error: ArmError::Lost {
+                silent_ms: 81..=100
+            },
+            ..
+        }
+    )
 }
 
 fn is_dropped(error: &ProbeError, says: &str) -> bool {
@@ -126,7 +155,13 @@ fn is_stopped_by(error: &ProbeError, why: Safety) -> bool {
 }
 
 fn has_ended(error: &ProbeError) -> bool {
-    matches!(error, ProbeError::Arm { error: ArmError::ProgramEnded, .. })
+    matches!(
+        error,
+        ProbeError::Arm {
+            error: ArmError::ProgramEnded,
+            ..
+        }
+    )
 }
 
 /// Whose time passes until a fault is noticed.
@@ -166,16 +201,46 @@ struct Fault {
 #[test]
 fn after_each_fault_the_arm_is_at_rest_and_the_reported_reason_is_true() {
     use By::{Client, Controller, Dashboard, Pause, Watchdog};
-    let fault = |name, happens, passes, by, is_true| Fault { name, happens, passes, by, is_true };
-    let is_stopped: [IsTrue; 2] =
-        [|e| is_stopped_by(e, Safety::ProtectiveStop), |e| is_stopped_by(e, Safety::OperatorStop)];
+    let fault = |name, happens, passes, by, is_true| Fault {
+        name,
+        happens,
+        passes,
+        by,
+        is_true,
+    };
+    let is_stopped: [IsTrue; 2] = [
+        |e| is_stopped_by(e, Safety::ProtectiveStop),
+        |e| is_stopped_by(e, Safety::OperatorStop),
+    ];
     let faults = [
-        fault("connections dropped", "drop", Passes::Nothing, Dashboard, is_dropped_somewhere),
-        fault("connection of the dashboard dropped", "undash", Passes::Nothing, Dashboard, |e| {
-            is_dropped(e, "dashboard")
-        }),
-        fault("states silent", "silent", Passes::Guard(0), Dashboard, is_lost),
-        fault("half open: states come, orders do not arrive", "deaf", Passes::Controller(150), Watchdog, has_ended),
+        fault(
+            "connections dropped",
+            "drop",
+            Passes::Nothing,
+            Dashboard,
+            is_dropped_somewhere,
+        ),
+        fault(
+            "connection of the dashboard dropped",
+            "undash",
+            Passes::Nothing,
+            Dashboard,
+            |e| is_dropped(e, "dashboard"),
+        ),
+        fault(
+            "states silent",
+            "silent",
+            Passes::Guard(0),
+            Dashboard,
+            is_lost,
+        ),
+        fault(
+            "half open: states come, orders do not arrive",
+            "deaf",
+            Passes::Controller(150),
+            Watchdog,
+            has_ended,
+        ),
         fault(
             "cable pulled: nothing in either direction, no dashboard",
             "unplug",
@@ -183,27 +248,115 @@ fn after_each_fault_the_arm_is_at_rest_and_the_reported_reason_is_true() {
             Watchdog,
             is_lost,
         ),
-        fault("controller without power", "die", Passes::Nothing, Controller, is_dropped_somewhere),
+        fault(
+            "controller without power",
+            "die",
+            Passes::Nothing,
+            Controller,
+            is_dropped_somewhere,
+        ),
         // later the watchdog is sooner
-        fault("program of the controller hangs", "stuck", Passes::Controller(80), Dashboard, |e| {
-            is_client(e, "has not returned")
-        }),
-        fault("program hangs, its motion lives, and it takes every order", "hung", Passes::Nothing, Dashboard, |e| {
-            matches!(e, ProbeError::Arm { error: ArmError::Disobeys { .. }, .. })
-        }),
-        fault("program paused at the panel", "pause", Passes::Nothing, Pause, |e| {
-            matches!(e, ProbeError::Arm { error: ArmError::ProgramPaused, .. })
-        }),
-        fault("safeguard: a door is opened", "open", Passes::Nothing, Pause, is_stopped[1]),
-        fault("protective stop", "protective", Passes::Nothing, Controller, is_stopped[0]),
-        fault("operator's stop", "operator", Passes::Nothing, Controller, is_stopped[1]),
-        fault("force spike of 40 N", "spike 40", Passes::Nothing, Client, |e| {
-            matches!(e, ProbeError::Limit { error: LimitError::Force { .. }, .. })
-        }),
-        fault("program stopped at the panel", "halt", Passes::Nothing, Controller, has_ended),
-        fault("client killed (SIGKILL)", "KILL", Passes::Nothing, Dashboard, |e| is_client(e, "signal: 9")),
-        fault("client crashed (SIGABRT)", "ABRT", Passes::Nothing, Dashboard, |e| is_client(e, "signal: 6")),
-        fault("client hangs (SIGSTOP)", "STOP", Passes::GuardAlone, Dashboard, |e| is_client(e, "hangs")),
+        fault(
+            "program of the controller hangs",
+            "stuck",
+            Passes::Controller(80),
+            Dashboard,
+            |e| is_client(e, "has not returned"),
+        ),
+        fault(
+            "program hangs, its motion lives, and it takes every order",
+            "hung",
+            Passes::Nothing,
+            Dashboard,
+            |e| {
+                matches!(
+                    e,
+                    ProbeError::Arm {
+                        error: ArmError::Disobeys { .. },
+                        ..
+                    }
+                )
+            },
+        ),
+        fault(
+            "program paused at the panel",
+            "pause",
+            Passes::Nothing,
+            Pause,
+            |e| {
+                matches!(
+                    e,
+                    ProbeError::Arm {
+                        error: ArmError::ProgramPaused,
+                        ..
+                    }
+                )
+            },
+        ),
+        fault(
+            "safeguard: a door is opened",
+            "open",
+            Passes::Nothing,
+            Pause,
+            is_stopped[1],
+        ),
+        fault(
+            "protective stop",
+            "protective",
+            Passes::Nothing,
+            Controller,
+            is_stopped[0],
+        ),
+        fault(
+            "operator's stop",
+            "operator",
+            Passes::Nothing,
+            Controller,
+            is_stopped[1],
+        ),
+        fault(
+            "force spike of 40 N",
+            "spike 40",
+            Passes::Nothing,
+            Client,
+            |e| {
+                matches!(
+                    e,
+                    ProbeError::Limit {
+                        error: LimitError::Force { .. },
+                        ..
+                    }
+                )
+            },
+        ),
+        fault(
+            "program stopped at the panel",
+            "halt",
+            Passes::Nothing,
+            Controller,
+            has_ended,
+        ),
+        fault(
+            "client killed (SIGKILL)",
+            "KILL",
+            Passes::Nothing,
+            Dashboard,
+            |e| is_client(e, "signal: 9"),
+        ),
+        fault(
+            "client crashed (SIGABRT)",
+            "ABRT",
+            Passes::Nothing,
+            Dashboard,
+            |e| is_client(e, "signal: 6"),
+        ),
+        fault(
+            "client hangs (SIGSTOP)",
+            "STOP",
+            Passes::GuardAlone,
+            Dashboard,
+            |e| is_client(e, "hangs"),
+        ),
     ];
     println!("| fault | reported | stopped by | at rest after |");
     println!("|---|---|---|---|");
@@ -213,7 +366,13 @@ fn after_each_fault_the_arm_is_at_rest_and_the_reported_reason_is_true() {
 }
 
 fn one_fault(packages: &Path, fault: &Fault) -> Result<(), ProbeError> {
-    let Fault { name, happens, passes, by, is_true } = *fault;
+    let Fault {
+        name,
+        happens,
+        passes,
+        by,
+        is_true,
+    } = *fault;
     let mut stand_in = StandIn::start(&["--start-mm", "45,8,40"]);
     let mut params = stand_in.params(packages);
     if happens == "stuck" {
@@ -238,7 +397,9 @@ fn one_fault(packages: &Path, fault: &Fault) -> Result<(), ProbeError> {
         if let Passes::Controller(ms) | Passes::Guard(ms) = passes {
             stand_in.run(ms);
         }
-        passing = hand.take().map(|hand| Passing::begin(hand, matches!(passes, Passes::Guard(_))));
+        passing = hand
+            .take()
+            .map(|hand| Passing::begin(hand, matches!(passes, Passes::Guard(_))));
     });
     drop(passing);
     let halt = arm.halt();
@@ -256,10 +417,17 @@ fn one_fault(packages: &Path, fault: &Fault) -> Result<(), ProbeError> {
         None => "nothing else, nor has to",
     };
     let by_whom = stand_in.record_after(event).swap_remove(0).event;
-    println!("| {name} | {error} | {by_whom}; by the guard: {stopped} | {:.0} ms |", stood * 1e3);
+    println!(
+        "| {name} | {error} | {by_whom}; by the guard: {stopped} | {:.0} ms |",
+        stood * 1e3
+    );
     assert!(is_true(&error), "{name}: {error}");
     assert!(stood < most, "{name}: after {stood} s");
-    assert_eq!(matches!(halt, Some(Halt::Dashboard { .. })), matches!(by, By::Dashboard), "{name}: {halt:?}");
+    assert_eq!(
+        matches!(halt, Some(Halt::Dashboard { .. })),
+        matches!(by, By::Dashboard),
+        "{name}: {halt:?}"
+    );
     Ok(())
 }
 
@@ -267,7 +435,11 @@ fn one_fault(packages: &Path, fault: &Fault) -> Result<(), ProbeError> {
 /// a dashboard its program is gone by then; without one the client brakes it as soon as it is resumed, and its watchdog ends it.
 #[test]
 fn an_arm_that_was_paused_does_not_go_on_when_it_is_resumed() {
-    for (pause, resume, is_mute) in [("pause", "resume", false), ("open", "shut", false), ("open", "shut", true)] {
+    for (pause, resume, is_mute) in [
+        ("pause", "resume", false),
+        ("open", "shut", false),
+        ("open", "shut", true),
+    ] {
         with_library(|packages| {
             let mut stand_in = StandIn::start(&["--start-mm", "45,8,40"]);
             let mut arm = stand_in.connect(packages);
@@ -289,11 +461,24 @@ fn an_arm_that_was_paused_does_not_go_on_when_it_is_resumed() {
             }
             stand_in.send("mark later");
             let record = stand_in.record_between("mark resumes", "mark later");
-            let way = record.iter().map(|line| (line.place - record[0].place).norm()).fold(0.0, f64::max);
-            let moved = record.iter().rfind(|line| line.speed > 0.0).map_or(0.0, |line| line.time - record[0].time);
-            println!("{pause}, then {resume}: {:.2} mm within {:.0} ms; {error}", way * 1e3, moved * 1e3);
+            let way = record
+                .iter()
+                .map(|line| (line.place - record[0].place).norm())
+                .fold(0.0, f64::max);
+            let moved = record
+                .iter()
+                .rfind(|line| line.speed > 0.0)
+                .map_or(0.0, |line| line.time - record[0].time);
+            println!(
+                "{pause}, then {resume}: {:.2} mm within {:.0} ms; {error}",
+                way * 1e3,
+                moved * 1e3
+            );
             let (most_way, most_time) = if is_mute { (2e-3, 0.2) } else { (0.0, 0.0) };
-            assert!(way <= most_way && moved <= most_time, "{pause}: {way} m, until {moved} s");
+            assert!(
+                way <= most_way && moved <= most_time,
+                "{pause}: {way} m, until {moved} s"
+            );
             if !is_mute {
                 arm.recover().unwrap();
                 move_for(&mut arm, 0.2);
@@ -327,7 +512,10 @@ impl Passing {
                 thread::sleep(Duration::from_millis(1));
             }
         });
-        Self { is_over, thread: Some(thread) }
+        Self {
+            is_over,
+            thread: Some(thread),
+        }
     }
 }
 
@@ -354,7 +542,10 @@ fn the_watchdog_stops_an_uncommanded_arm() {
         stand_in.run(150);
         let record = stand_in.record_between("mark stopped", "program stops: watchdog after 10");
         let before = &record[..record.len() - 1];
-        assert!(before.iter().all(|line| line.speed > 19e-3), "it went on until then");
+        assert!(
+            before.iter().all(|line| line.speed > 19e-3),
+            "it went on until then"
+        );
         stand_in.stands_in("program stops: watchdog", BRAKES);
         hand.advance(Duration::from_millis(80));
         let passing = Passing::begin(hand, false);
@@ -382,7 +573,9 @@ fn a_killed_controller_is_reported() {
 }
 
 fn signal(id: u32, name: &str) {
-    let status = std::process::Command::new("kill").args([format!("-{name}"), id.to_string()]).status();
+    let status = std::process::Command::new("kill")
+        .args([format!("-{name}"), id.to_string()])
+        .status();
     assert!(status.unwrap().success(), "kill -{name} {id}");
 }
 
@@ -393,18 +586,33 @@ fn after_a_protective_stop_it_is_recovered() {
         let mut arm = stand_in.connect(packages);
         let error = broken_off(&mut arm, || stand_in.send("protective"));
         assert!(is_stopped_by(&error, Safety::ProtectiveStop), "{error}");
-        let up = Command::Velocity { linear: Vector3::new(0.0, 0.0, 10e-3), acceleration: 1.0 };
-        assert_eq!(arm.command(&up), Err(ArmError::Stopped { safety: Safety::ProtectiveStop }));
+        let up = Command::Velocity {
+            linear: Vector3::new(0.0, 0.0, 10e-3),
+            acceleration: 1.0,
+        };
+        assert_eq!(
+            arm.command(&up),
+            Err(ArmError::Stopped {
+                safety: Safety::ProtectiveStop
+            })
+        );
         let moved = |record: Vec<Line>| record.iter().any(|line| line.speed > 0.0);
         stand_in.stands_in("program stops: a safety plane", BRAKES);
         stand_in.send("mark recovering");
         arm.recover().unwrap();
         rest_for(&mut arm, 0.1);
         stand_in.send("mark recovered");
-        assert!(!moved(stand_in.record_between("mark recovering", "mark recovered")), "recovery moves nothing");
+        assert!(
+            !moved(stand_in.record_between("mark recovering", "mark recovered")),
+            "recovery moves nothing"
+        );
         // tool, payload and watchdog are set again: it touches as it did before
         let record = touched(&mut arm, &above(5e-3))?;
-        assert!(matches!(record.outcome, TouchOutcome::Contact { .. }), "{:?}", record.outcome);
+        assert!(
+            matches!(record.outcome, TouchOutcome::Contact { .. }),
+            "{:?}",
+            record.outcome
+        );
         Ok(())
     });
 }
@@ -430,13 +638,27 @@ fn a_stopped_arm_is_recovered_by_a_verb_and_nothing_moves() {
         stand_in.send("release");
         stand_in.send("protective");
         let refused = UrArm::connect(&stand_in.params(packages)).err().unwrap();
-        assert!(matches!(refused, UrError::Stopped(Safety::ProtectiveStop)), "{refused}");
+        assert!(
+            matches!(refused, UrError::Stopped(Safety::ProtectiveStop)),
+            "{refused}"
+        );
         let recovered = recover();
-        assert_eq!(recovered.status.code(), Some(0), "{}", String::from_utf8_lossy(&recovered.stderr));
+        assert_eq!(
+            recovered.status.code(),
+            Some(0),
+            "{}",
+            String::from_utf8_lossy(&recovered.stderr)
+        );
         let state: serde_json::Value = serde_json::from_slice(&recovered.stdout).unwrap();
         // in the base of the arm
-        assert!((state["tip_mm"][2].as_f64().unwrap() - 90.0).abs() < 0.1, "{state}");
-        assert!(stand_in.record().iter().all(|line| line.speed == 0.0), "nothing moves");
+        assert!(
+            (state["tip_mm"][2].as_f64().unwrap() - 90.0).abs() < 0.1,
+            "{state}"
+        );
+        assert!(
+            stand_in.record().iter().all(|line| line.speed == 0.0),
+            "nothing moves"
+        );
         stand_in.connect(packages);
         Ok(())
     });
@@ -449,9 +671,17 @@ fn after_a_lost_client_it_is_recovered() {
         let mut arm = stand_in.connect(packages);
         for fault in ["KILL", "drop"] {
             let client = arm.client_id();
-            let error =
-                broken_off(&mut arm, || if fault == "KILL" { signal(client, fault) } else { stand_in.send(fault) });
-            assert!(is_client(&error, "signal") || is_dropped_somewhere(&error), "{error}");
+            let error = broken_off(&mut arm, || {
+                if fault == "KILL" {
+                    signal(client, fault)
+                } else {
+                    stand_in.send(fault)
+                }
+            });
+            assert!(
+                is_client(&error, "signal") || is_dropped_somewhere(&error),
+                "{error}"
+            );
             arm.recover().unwrap();
             assert_ne!(arm.client_id(), client);
             move_for(&mut arm, 0.2);
@@ -476,13 +706,17 @@ fn after_an_ended_program_it_is_recovered() {
             });
             assert!(has_ended(&error), "{error}");
             stand_in.stands_in("program stops", BRAKES);
-            let [mended, recovered] = ["mend", "mark recovered"].map(|mark| format!("{mark} after {fault}"));
+            let [mended, recovered] =
+                ["mend", "mark recovered"].map(|mark| format!("{mark} after {fault}"));
             stand_in.send(&mended);
             arm.recover().unwrap();
             rest_for(&mut arm, 0.5);
             stand_in.send(&recovered);
             let record = stand_in.record_between(&mended, &recovered);
-            assert!(record.iter().all(|line| line.speed == 0.0), "recovery moves nothing");
+            assert!(
+                record.iter().all(|line| line.speed == 0.0),
+                "recovery moves nothing"
+            );
             move_for(&mut arm, 0.2);
         }
         Ok(())
@@ -500,7 +734,14 @@ fn a_second_client_is_refused_and_disturbs_nothing() {
         // up and down: how long that takes is no matter
         for speed in [20e-3, -20e-3].into_iter().cycle() {
             let linear = Vector3::new(0.0, 0.0, speed);
-            go_for(&mut arm, 0.1, &Command::Velocity { linear, acceleration: 1.0 });
+            go_for(
+                &mut arm,
+                0.1,
+                &Command::Velocity {
+                    linear,
+                    acceleration: 1.0,
+                },
+            );
             if second.is_finished() {
                 break;
             }
@@ -520,9 +761,17 @@ fn an_operators_stop_is_released_by_the_operator_alone() {
         let mut arm = stand_in.connect(packages);
         let error = broken_off(&mut arm, || stand_in.send("operator"));
         assert!(is_stopped_by(&error, Safety::OperatorStop), "{error}");
-        assert_eq!(arm.recover(), Err(ArmError::Stopped { safety: Safety::OperatorStop }));
+        assert_eq!(
+            arm.recover(),
+            Err(ArmError::Stopped {
+                safety: Safety::OperatorStop
+            })
+        );
         let refused = UrArm::connect(&stand_in.params(packages)).err().unwrap();
-        assert!(matches!(refused, UrError::Stopped(Safety::OperatorStop)), "{refused}");
+        assert!(
+            matches!(refused, UrError::Stopped(Safety::OperatorStop)),
+            "{refused}"
+        );
         stand_in.send("release");
         arm.recover().unwrap();
         move_for(&mut arm, 0.2);
@@ -537,11 +786,26 @@ fn a_speed_slider_is_named_where_the_arm_does_not_arrive() {
         let mut stand_in = StandIn::start(&["--start-mm", "45,8,40"]);
         let mut arm = stand_in.connect(packages);
         stand_in.send("slider 5");
-        let mut onlooker = Onlooker { seen: |_: &_| {}, stop_request: || None };
+        let mut onlooker = Onlooker {
+            seen: |_: &_| {},
+            stop_request: || None,
+        };
         let mut watched = Watched::new(&mut arm, limits(), &mut onlooker);
         let up = at([PLACE[0], PLACE[1], 50e-3]);
-        let error = watched.line("going up", &up, SPEED, &TouchParams::default(), limits().force).err().unwrap();
-        assert!(error.to_string().ends_with(": its speed slider is at 5 %"), "{error}");
+        let error = watched
+            .line(
+                "going up",
+                &up,
+                SPEED,
+                &TouchParams::default(),
+                limits().force,
+            )
+            .err()
+            .unwrap();
+        assert!(
+            error.to_string().ends_with(": its speed slider is at 5 %"),
+            "{error}"
+        );
         Ok(())
     });
 }

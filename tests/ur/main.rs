@@ -19,7 +19,8 @@ use std::path::Path;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use stand_in::{StandIn, limits, packages};
 use touchup::probing::arm::{
-    OnsetVerdict, ProbeError, StopRequest, TouchOutcome, TouchParams, TouchRecord, TouchTarget, Watched,
+    OnsetVerdict, ProbeError, StopRequest, TouchOutcome, TouchParams, TouchRecord, TouchTarget,
+    Watched,
 };
 use touchup::sim::ArmParams;
 use touchup::ur::UrArm;
@@ -59,7 +60,12 @@ where
 
 fn above(height: f64) -> TouchTarget {
     let [x, y] = PLACE;
-    TouchTarget { standoff_bt: at([x, y, TOP + height]), direction: -Vector3::z_axis(), search: 8e-3, expected: None }
+    TouchTarget {
+        standoff_bt: at([x, y, TOP + height]),
+        direction: -Vector3::z_axis(),
+        search: 8e-3,
+        expected: None,
+    }
 }
 
 /// Runs with ur-rtde, or reports that this test was skipped.
@@ -71,7 +77,10 @@ fn with_library(body: impl FnOnce(&Path) -> Result<(), ProbeError>) {
 }
 
 fn touched(arm: &mut UrArm, target: &TouchTarget) -> Result<TouchRecord, ProbeError> {
-    let mut onlooker = Onlooker { seen: |_: &_| {}, stop_request: || None };
+    let mut onlooker = Onlooker {
+        seen: |_: &_| {},
+        stop_request: || None,
+    };
     let mut watched = Watched::new(arm, limits(), &mut onlooker);
     watched.zero()?;
     watched.touch(target, &TouchParams::default())
@@ -83,14 +92,32 @@ fn a_touch_finds_the_surface() {
         let stand_in = StandIn::start(&[]);
         let mut arm = stand_in.connect(packages);
         let record = touched(&mut arm, &above(5e-3))?;
-        let TouchOutcome::Contact { onset, centre, force_b } = &record.outcome else { panic!("{:?}", record.outcome) };
+        let TouchOutcome::Contact {
+            onset,
+            centre,
+            force_b,
+        } = &record.outcome
+        else {
+            panic!("{:?}", record.outcome)
+        };
         let found = ArmParams::default().pose_bo.inverse_transform_point(centre);
         let error = found.z - (TOP + ArmParams::default().radius);
-        println!("{:.1} um off, {:.1} N at most, {onset:?}", error * 1e6, record.peak_force);
+        println!(
+            "{:.1} um off, {:.1} N at most, {onset:?}",
+            error * 1e6,
+            record.peak_force
+        );
         assert_eq!(onset.verdict, OnsetVerdict::Clean, "{onset:?}");
         assert!(error.abs() < 25e-6, "{error}");
-        assert!(force_b.normalize().z > 0.95, "the part pushes back: {force_b}");
-        assert!(record.peak_force < 2.0 * TouchParams::default().force, "{}", record.peak_force);
+        assert!(
+            force_b.normalize().z > 0.95,
+            "the part pushes back: {force_b}"
+        );
+        assert!(
+            record.peak_force < 2.0 * TouchParams::default().force,
+            "{}",
+            record.peak_force
+        );
         Ok(())
     });
 }
@@ -101,7 +128,9 @@ fn where_nothing_is_that_is_the_answer() {
         let stand_in = StandIn::start(&[]);
         let mut arm = stand_in.connect(packages);
         let record = touched(&mut arm, &above(13e-3))?;
-        let TouchOutcome::Miss { travel } = record.outcome else { panic!("{:?}", record.outcome) };
+        let TouchOutcome::Miss { travel } = record.outcome else {
+            panic!("{:?}", record.outcome)
+        };
         assert!((travel - 8e-3).abs() < 0.3e-3, "{travel}");
         Ok(())
     });
@@ -116,17 +145,33 @@ fn an_obstacle_stops_it() {
         stand_in.send("mark begin");
         let error = touched(&mut arm, &above(-3e-3)).err().unwrap();
         stand_in.send("mark commanded");
-        let ProbeError::Obstacle { place_mm, force_n, .. } = error else { panic!("{error}") };
-        let expected = ArmParams::default().pose_bo * Point3::new(0.0, 0.0, TOP + ArmParams::default().radius) * 1e3;
-        assert!((place_mm[2] - expected.z).abs() < 0.5 && force_n > 1.0, "{place_mm:?}, {force_n} N");
+        let ProbeError::Obstacle {
+            place_mm, force_n, ..
+        } = error
+        else {
+            panic!("{error}")
+        };
+        let expected = ArmParams::default().pose_bo
+            * Point3::new(0.0, 0.0, TOP + ArmParams::default().radius)
+            * 1e3;
+        assert!(
+            (place_mm[2] - expected.z).abs() < 0.5 && force_n > 1.0,
+            "{place_mm:?}, {force_n} N"
+        );
         let record = stand_in.record_between("mark begin", "mark commanded");
-        assert!(record.iter().any(|line| line.force > 1.0), "the part was touched");
+        assert!(
+            record.iter().any(|line| line.force > 1.0),
+            "the part was touched"
+        );
         assert!(
             record.iter().all(|line| line.force < limits().force),
             "the part is not pressed by more than the limit"
         );
         // from the stop command, as slow as it searches
-        stand_in.stands_in("stop requested", TouchParams::default().search_speed / limits().acceleration + LATENCY);
+        stand_in.stands_in(
+            "stop requested",
+            TouchParams::default().search_speed / limits().acceleration + LATENCY,
+        );
         Ok(())
     });
 }

@@ -2,7 +2,9 @@
 
 use crate::Onlooker;
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
-use touchup::probing::arm::{Arm, Command, ProbeError, SlideEnding, SlideTarget, StopRequest, TouchParams, Watched};
+use touchup::probing::arm::{
+    Arm, Command, ProbeError, SlideEnding, SlideTarget, StopRequest, TouchParams, Watched,
+};
 use touchup::probing::plan::Station;
 use touchup::sim::ArmParams;
 
@@ -20,7 +22,10 @@ fn a_line_ends_at_its_place_and_turn() {
         let place = at([x - 20e-3, y + 10e-3, 40e-3]).translation;
         let to = Isometry3::from_parts(place, turn);
         let begun = arm.next_state().unwrap();
-        let mut onlooker = Onlooker { seen: |_: &_| {}, stop_request: || None };
+        let mut onlooker = Onlooker {
+            seen: |_: &_| {},
+            stop_request: || None,
+        };
         stand_in.send("mark begin");
         let mut watched = Watched::new(&mut arm, limits(), &mut onlooker);
         watched.line("going there", &to, 50e-3, &TouchParams::default(), 5.0)?;
@@ -34,9 +39,17 @@ fn a_line_ends_at_its_place_and_turn() {
         let from = begun.pose_bt.translation.vector;
         let along = (place.vector - from).normalize();
         let record = stand_in.record_between("mark begin", "mark end");
-        let aside = record.iter().map(|line| (line.place - from).cross(&along).norm()).fold(0.0, f64::max);
+        let aside = record
+            .iter()
+            .map(|line| (line.place - from).cross(&along).norm())
+            .fold(0.0, f64::max);
         let top = record.iter().map(|line| line.speed).fold(0.0, f64::max);
-        println!("{:.0} um off, {:.0} um aside, {:.1} mm/s at most", off * 1e6, aside * 1e6, top * 1e3);
+        println!(
+            "{:.0} um off, {:.0} um aside, {:.1} mm/s at most",
+            off * 1e6,
+            aside * 1e6,
+            top * 1e3
+        );
         assert!(aside < 0.3e-3, "{aside}");
         assert!(top < 52e-3, "{top}");
         Ok(())
@@ -55,22 +68,49 @@ fn a_slide_goes_over_a_rim() {
             let normal = Vector3::new(angle.sin(), 0.0, angle.cos());
             let centre = Point3::new(x, 8e-3, z) + normal * ball;
             let normal = Unit::new_normalize(pose_bo.rotation * normal);
-            Station { centre: pose_bo * centre, normal }
+            Station {
+                centre: pose_bo * centre,
+                normal,
+            }
         };
         let share = |at: u32, count: u32| f64::from(at) / f64::from(count);
         let top = (0..=80).map(|at| station(52e-3 + 8e-3 * share(at, 80), TOP, 0.0));
-        let rim = (1..=30).map(|at| station(60e-3, TOP, std::f64::consts::FRAC_PI_2 * share(at, 30)));
-        let side = (1..=10).map(|at| station(60e-3, TOP - 1e-3 * share(at, 10), std::f64::consts::FRAC_PI_2));
+        let rim =
+            (1..=30).map(|at| station(60e-3, TOP, std::f64::consts::FRAC_PI_2 * share(at, 30)));
+        let side = (1..=10).map(|at| {
+            station(
+                60e-3,
+                TOP - 1e-3 * share(at, 10),
+                std::f64::consts::FRAC_PI_2,
+            )
+        });
         let stations: Vec<_> = top.chain(rim).chain(side).collect();
         let last = stations.len() - 1;
-        let target = SlideTarget { rotation: UnitQuaternion::identity(), stations, lift: 3e-3, give: 1.5e-3 };
-        let mut onlooker = Onlooker { seen: |_: &_| {}, stop_request: || None };
+        let target = SlideTarget {
+            rotation: UnitQuaternion::identity(),
+            stations,
+            lift: 3e-3,
+            give: 1.5e-3,
+        };
+        let mut onlooker = Onlooker {
+            seen: |_: &_| {},
+            stop_request: || None,
+        };
         let mut watched = Watched::new(&mut arm, limits(), &mut onlooker);
         watched.zero()?;
         let record = watched.slide(&target, &TouchParams::default())?;
-        println!("mean {:.2} N, {:.2} N off at most", record.mean_force, record.worst_force);
-        assert_eq!((record.ending, record.reached, watched.reached), (SlideEnding::Arrived, last, Some(last)));
-        assert!((record.mean_force - 3.0).abs() < 0.1 && record.worst_force < 0.3, "{record:?}");
+        println!(
+            "mean {:.2} N, {:.2} N off at most",
+            record.mean_force, record.worst_force
+        );
+        assert_eq!(
+            (record.ending, record.reached, watched.reached),
+            (SlideEnding::Arrived, last, Some(last))
+        );
+        assert!(
+            (record.mean_force - 3.0).abs() < 0.1 && record.worst_force < 0.3,
+            "{record:?}"
+        );
         Ok(())
     });
 }
@@ -94,7 +134,8 @@ fn a_slide_keeps_its_force() {
             let state = arm.next_state().unwrap();
             let passed = (state.stamp_ns - begun.stamp_ns) as f64 * 1e-9;
             assert!(passed < 20.0, "40 mm at 10 mm/s take longer");
-            arm.command(&press(if passed < 2.0 { 0.0 } else { 10e-3 })).unwrap();
+            arm.command(&press(if passed < 2.0 { 0.0 } else { 10e-3 }))
+                .unwrap();
             if passed > 2.2 {
                 let from = *start.get_or_insert(state.pose_bt.translation.x);
                 forces.push(state.wrench_b.force.z);
@@ -107,8 +148,14 @@ fn a_slide_keeps_its_force() {
         arm.command(&Command::Stop { deceleration: 1.0 }).unwrap();
         let mean = forces.iter().sum::<f64>() / forces.len() as f64;
         // the sensor's noise of 0.15 N is in each: over a tenth of a second it is 0.02 N
-        let worst = forces.windows(50).map(|w| (w.iter().sum::<f64>() / 50.0 - 5.0).abs()).fold(0.0, f64::max);
-        println!("{} states, mean {mean:.3} N, worst tenth of a second {worst:.3} N off", forces.len());
+        let worst = forces
+            .windows(50)
+            .map(|w| (w.iter().sum::<f64>() / 50.0 - 5.0).abs())
+            .fold(0.0, f64::max);
+        println!(
+            "{} states, mean {mean:.3} N, worst tenth of a second {worst:.3} N off",
+            forces.len()
+        );
         assert!((mean - 5.0).abs() < 0.1 && worst < 0.3, "{mean} {worst}");
         // neither the feed nor the force goes on, whatever is commanded after it
         stand_in.stands_in("mark over", 10e-3 / 1.0 + 2.0 * LATENCY);
@@ -123,8 +170,16 @@ fn a_press_is_never_lost() {
         let stand_in = StandIn::start(&["--start-mm", "10,5,13.6"]);
         let mut arm = stand_in.connect(packages);
         arm.zero_sensor().unwrap();
-        let press = Command::Press { axis: -Vector3::z(), force: 5.0, feed: Vector3::zeros(), speed: 5e-3 };
-        let up = Command::Velocity { linear: Vector3::new(0.0, 0.0, 5e-3), acceleration: 1.0 };
+        let press = Command::Press {
+            axis: -Vector3::z(),
+            force: 5.0,
+            feed: Vector3::zeros(),
+            speed: 5e-3,
+        };
+        let up = Command::Velocity {
+            linear: Vector3::new(0.0, 0.0, 5e-3),
+            acceleration: 1.0,
+        };
         for round in 0..20 {
             let mut force = 0.0;
             // half a second of pressing, a fifth of going up
@@ -138,7 +193,10 @@ fn a_press_is_never_lost() {
             assert!(force > 3.5, "round {round}: {force} N");
         }
         let lost = |line: &crate::stand_in::Line| line.event.contains("command 6 is never read");
-        assert!(!stand_in.record().iter().any(lost), "a press took no effect until it was said again");
+        assert!(
+            !stand_in.record().iter().any(lost),
+            "a press took no effect until it was said again"
+        );
         Ok(())
     });
 }
@@ -157,20 +215,37 @@ fn motion_is_streamed_at_500_hz() {
             // a swing of 1 Hz, which a stream that stalls would not follow
             let t = (last.stamp_ns - begun.stamp_ns) as f64 * 1e-9;
             let linear = Vector3::x() * 20e-3 * (std::f64::consts::TAU * t).sin();
-            arm.command(&Command::Velocity { linear, acceleration: 1.0 }).unwrap();
+            arm.command(&Command::Velocity {
+                linear,
+                acceleration: 1.0,
+            })
+            .unwrap();
             last = arm.next_state().unwrap();
             states.push(last);
         }
-        let gaps = states.windows(2).map(|w| (w[1].stamp_ns - w[0].stamp_ns) as f64 * 1e-6);
+        let gaps = states
+            .windows(2)
+            .map(|w| (w[1].stamp_ns - w[0].stamp_ns) as f64 * 1e-6);
         let worst = gaps.fold(0.0, f64::max);
-        println!("{} states in 2 s, {worst:.0} ms between two at most", states.len());
-        assert!(states.len() >= 990 && worst < 20.0, "{} states, {worst} ms", states.len());
+        println!(
+            "{} states in 2 s, {worst:.0} ms between two at most",
+            states.len()
+        );
+        assert!(
+            states.len() >= 990 && worst < 20.0,
+            "{} states, {worst} ms",
+            states.len()
+        );
         stand_in.send("mark end");
         let record = stand_in.record_between("mark begin", "mark end");
         // the travel of half a swing: 20 mm/s / pi
         let xs: Vec<f64> = record.iter().map(|line| line.place.x).collect();
-        let travel = xs.iter().fold(f64::MIN, |a, b| a.max(*b)) - xs.iter().fold(f64::MAX, |a, b| a.min(*b));
-        assert!((travel - 20e-3 / std::f64::consts::PI).abs() < 0.3e-3, "{travel}");
+        let travel =
+            xs.iter().fold(f64::MIN, |a, b| a.max(*b)) - xs.iter().fold(f64::MAX, |a, b| a.min(*b));
+        assert!(
+            (travel - 20e-3 / std::f64::consts::PI).abs() < 0.3e-3,
+            "{travel}"
+        );
         Ok(())
     });
 }
@@ -190,10 +265,16 @@ fn a_cancelled_move_brakes_to_rest() {
                 is_cancelled.set(true);
             }
         };
-        let mut onlooker = Onlooker { seen: &mut seen, stop_request: asked };
+        let mut onlooker = Onlooker {
+            seen: &mut seen,
+            stop_request: asked,
+        };
         let mut watched = Watched::new(&mut arm, limits(), &mut onlooker);
         let down = at([x, y, 30e-3]);
-        let error = watched.line("going down", &down, 50e-3, &TouchParams::default(), 5.0).err().unwrap();
+        let error = watched
+            .line("going down", &down, 50e-3, &TouchParams::default(), 5.0)
+            .err()
+            .unwrap();
         assert!(matches!(error, ProbeError::Cancelled { .. }), "{error}");
         // 50 mm/s at 0.5 m/s², as shipped, are 100 ms
         stand_in.stands_in("mark cancelled", 50e-3 / limits().acceleration + LATENCY);
@@ -211,7 +292,11 @@ fn a_stop_while_it_accelerates_is_not_put_off() {
         let mut last = begun;
         while last.stamp_ns - begun.stamp_ns < 200_000_000 {
             let linear = Vector3::new(0.0, 0.0, 0.2);
-            arm.command(&Command::Velocity { linear, acceleration: 0.2 }).unwrap();
+            arm.command(&Command::Velocity {
+                linear,
+                acceleration: 0.2,
+            })
+            .unwrap();
             last = arm.next_state().unwrap();
         }
         stand_in.send("mark stop");

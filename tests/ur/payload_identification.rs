@@ -26,20 +26,50 @@ fn a_ur_identifies_the_payload_on_its_flange() {
             .arg(path("calibrated.yaml"))
             .output()
             .unwrap();
-        assert_eq!(done.status.code(), Some(0), "{}", String::from_utf8_lossy(&done.stderr));
+        assert_eq!(
+            done.status.code(),
+            Some(0),
+            "{}",
+            String::from_utf8_lossy(&done.stderr)
+        );
         let found: Value = serde_json::from_slice(&done.stdout).unwrap();
         println!("{found}");
-        let (mass, std) = (found["mass_kg"].as_f64().unwrap(), found["mass_std_kg"].as_f64().unwrap());
-        assert!((mass - 1.17).abs() < 3.0 * std && std < 1e-3, "{mass} ± {std} kg");
+        let (mass, std) = (
+            found["mass_kg"].as_f64().unwrap(),
+            found["mass_std_kg"].as_f64().unwrap(),
+        );
+        assert!(
+            (mass - 1.17).abs() < 3.0 * std && std < 1e-3,
+            "{mass} ± {std} kg"
+        );
         for (axis, expected) in [3.0, -2.0, 42.0].into_iter().enumerate() {
-            let [value, std] = ["value", "std"].map(|part| found["centre_mm"][part][axis].as_f64().unwrap());
-            assert!((value - expected).abs() < 3.0 * std, "{axis}: {value} ± {std} mm");
+            let [value, std] =
+                ["value", "std"].map(|part| found["centre_mm"][part][axis].as_f64().unwrap());
+            assert!(
+                (value - expected).abs() < 3.0 * std,
+                "{axis}: {value} ± {std} mm"
+            );
         }
-        assert!(fs::read_to_string(path("calibrated.yaml")).unwrap().contains("payload_kg: 1.1"));
+        assert!(
+            fs::read_to_string(path("calibrated.yaml"))
+                .unwrap()
+                .contains("payload_kg: 1.1")
+        );
         // the client set the payload of the scene once, when it started
-        let events: Vec<String> = stand_in.record().into_iter().map(|line| line.event).collect();
-        let payloads: Vec<&str> = events.iter().map(String::as_str).filter(|event| event.contains("payload")).collect();
-        assert!(matches!(payloads[..], [only] if only.contains("payload 0.25 kg")), "{payloads:?}");
+        let events: Vec<String> = stand_in
+            .record()
+            .into_iter()
+            .map(|line| line.event)
+            .collect();
+        let payloads: Vec<&str> = events
+            .iter()
+            .map(String::as_str)
+            .filter(|event| event.contains("payload"))
+            .collect();
+        assert!(
+            matches!(payloads[..], [only] if only.contains("payload 0.25 kg")),
+            "{payloads:?}"
+        );
         Ok(())
     });
 }

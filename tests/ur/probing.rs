@@ -15,8 +15,17 @@ use super::with_library;
 pub fn cell(stand_in: &StandIn, packages: &Path) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let scanned = scan(&Plate::default(), &ScannerParams::default()).unwrap();
-    write_mesh(&folder.path().join("scan.ply"), &scanned, MeshUnit::Millimetre).unwrap();
-    let robot = format!("robot:\n  host: {}\n  site_packages: {}\n", stand_in.address, packages.display());
+    write_mesh(
+        &folder.path().join("scan.ply"),
+        &scanned,
+        MeshUnit::Millimetre,
+    )
+    .unwrap();
+    let robot = format!(
+        "robot:\n  host: {}\n  site_packages: {}\n",
+        stand_in.address,
+        packages.display()
+    );
     let scene = include_str!("../../config/probe.yaml").replace("robot:\n", &robot);
     std::fs::write(folder.path().join("scene.yaml"), scene).unwrap();
     folder
@@ -31,7 +40,14 @@ fn a_ur_probes_a_hole_from_one_click() {
         let out = folder.path().join("out");
         let done = Command::new(env!("CARGO_BIN_EXE_touchup"))
             .env("TOUCHUP_UR_LOCK_STEP", "1")
-            .args(["probe", "--robot", "ur", "--feature", "hole@17.5,34.8,12", "--json"])
+            .args([
+                "probe",
+                "--robot",
+                "ur",
+                "--feature",
+                "hole@17.5,34.8,12",
+                "--json",
+            ])
             .arg("--scene")
             .arg(folder.path().join("scene.yaml"))
             .arg("--out")
@@ -39,14 +55,22 @@ fn a_ur_probes_a_hole_from_one_click() {
             .output()
             .unwrap();
         let stderr = String::from_utf8_lossy(&done.stderr).into_owned();
-        let summary: Value = serde_json::from_slice(&done.stdout).unwrap_or_else(|_| panic!("{stderr}"));
+        let summary: Value =
+            serde_json::from_slice(&done.stdout).unwrap_or_else(|_| panic!("{stderr}"));
         let hole = &summary["features"][0];
         assert_eq!(hole["code"], "tolerance_reached", "{stderr}");
         let number = |key: &str| hole["feature"][key].as_f64().unwrap();
-        let centre: Vec<f64> =
-            hole["feature"]["center_mm"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
+        let centre: Vec<f64> = hole["feature"]["center_mm"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|x| x.as_f64().unwrap())
+            .collect();
         let off = (centre[0] - 16.0).hypot(centre[1] - 36.0);
-        let (touches, force) = (hole["touches"].as_u64().unwrap(), hole["largest_force_n"].as_f64().unwrap());
+        let (touches, force) = (
+            hole["touches"].as_u64().unwrap(),
+            hole["largest_force_n"].as_f64().unwrap(),
+        );
         println!(
             "{touches} touches, {:.0} s, {force:.1} N; place {off:.4} mm, diameter {:+.4} mm",
             hole["duration_s"].as_f64().unwrap(),

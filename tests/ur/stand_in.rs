@@ -25,7 +25,11 @@ static NEXT: AtomicU8 = AtomicU8::new(2);
 pub fn packages() -> Result<&'static Path, &'static str> {
     static PACKAGES: LazyLock<Result<PathBuf, String>> = LazyLock::new(|| {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("ur");
-        let setup = Command::new(env!("CARGO_BIN_EXE_touchup")).args(["ur", "setup"]).arg(folder).output().unwrap();
+        let setup = Command::new(env!("CARGO_BIN_EXE_touchup"))
+            .args(["ur", "setup"])
+            .arg(folder)
+            .output()
+            .unwrap();
         let output = String::from_utf8(setup.stdout).unwrap();
         match output.trim().strip_prefix("site_packages: ") {
             Some(packages) if setup.status.success() => Ok(packages.into()),
@@ -64,7 +68,11 @@ pub struct StandIn {
 impl StandIn {
     /// - `arguments`: further ones.
     pub fn start(arguments: &[&str]) -> Self {
-        let program = std::env::current_exe().unwrap().parent().unwrap().join("../examples/ur_controller");
+        let program = std::env::current_exe()
+            .unwrap()
+            .parent()
+            .unwrap()
+            .join("../examples/ur_controller");
         assert!(
             program.exists(),
             "with --test alone, first: cargo build --features ur --example ur_controller, of the same profile"
@@ -80,8 +88,17 @@ impl StandIn {
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
-        let (orders, answers) = (child.stdin.take().unwrap(), BufReader::new(child.stdout.take().unwrap()));
-        let mut stand_in = Self { child, orders, answers, record, address };
+        let (orders, answers) = (
+            child.stdin.take().unwrap(),
+            BufReader::new(child.stdout.take().unwrap()),
+        );
+        let mut stand_in = Self {
+            child,
+            orders,
+            answers,
+            record,
+            address,
+        };
         assert_eq!(stand_in.answer(), "ready");
         stand_in
     }
@@ -134,7 +151,14 @@ impl StandIn {
                 let mut number = || words.next().unwrap().parse::<f64>().unwrap();
                 let (time, place) = (number(), Vector3::new(number(), number(), number()));
                 let (speed, turn, force) = (number(), number(), number());
-                Line { time, place, speed, turn, force, event: words.next().unwrap().to_owned() }
+                Line {
+                    time,
+                    place,
+                    speed,
+                    turn,
+                    force,
+                    event: words.next().unwrap().to_owned(),
+                }
             })
             .collect()
     }
@@ -149,13 +173,21 @@ impl StandIn {
             std::thread::sleep(Duration::from_millis(20));
         }
         let record = self.record();
-        let events: Vec<_> = record.iter().filter(|line| !line.event.is_empty()).collect();
-        panic!("{what} is never in the record, which ends at {:?}: {events:#?}", record.last());
+        let events: Vec<_> = record
+            .iter()
+            .filter(|line| !line.event.is_empty())
+            .collect();
+        panic!(
+            "{what} is never in the record, which ends at {:?}: {events:#?}",
+            record.last()
+        );
     }
 
     /// Waits for an event; the record from there on.
     pub fn record_after(&self, event: &str) -> Vec<Line> {
-        self.wait(event, |record| Some(record[position(record, event)?..].to_vec()))
+        self.wait(event, |record| {
+            Some(record[position(record, event)?..].to_vec())
+        })
     }
 
     /// The record from one event up to another that comes after it.
@@ -171,7 +203,9 @@ impl StandIn {
         let moves = |line: &Line| line.speed > 0.0 || line.turn > 0.0;
         let (at_event, stood) = self.wait(&format!("an arm at rest after `{event}`"), |record| {
             let at = record.iter().rposition(|line| line.event.contains(event))?;
-            let still = record[at..].windows(STANDING).position(|lines| !lines.iter().any(moves))?;
+            let still = record[at..]
+                .windows(STANDING)
+                .position(|lines| !lines.iter().any(moves))?;
             let last = record[at + still.saturating_sub(1)].time;
             Some((record[at].clone(), last - record[at].time))
         });
@@ -182,7 +216,11 @@ impl StandIn {
     /// As [`Self::stood_after`], which has to be within some seconds.
     pub fn stands_in(&self, event: &str, seconds: f64) {
         let stood = self.stood_after(event);
-        println!("{event}: at rest after {:.0} ms of at most {:.0}", stood * 1e3, seconds * 1e3);
+        println!(
+            "{event}: at rest after {:.0} ms of at most {:.0}",
+            stood * 1e3,
+            seconds * 1e3
+        );
         assert!(stood < seconds, "{event}: at rest after {stood} s");
     }
 }
@@ -203,7 +241,10 @@ fn free_address() -> String {
     for _ in 0..100 {
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
         let address = format!("127.0.{}.{}", std::process::id() % 250 + 1, number);
-        if PORTS.iter().all(|port| TcpListener::bind((address.as_str(), *port)).is_ok()) {
+        if PORTS
+            .iter()
+            .all(|port| TcpListener::bind((address.as_str(), *port)).is_ok())
+        {
             return address;
         }
     }
@@ -212,5 +253,9 @@ fn free_address() -> String {
 
 /// Around the plate of the stand-in; all else as it is shipped.
 pub fn limits() -> Limits {
-    Limits { lowest: Point3::new(-0.6, -0.3, 0.0), highest: Point3::new(-0.2, 0.2, 0.4), ..Limits::default() }
+    Limits {
+        lowest: Point3::new(-0.6, -0.3, 0.0),
+        highest: Point3::new(-0.2, 0.2, 0.4),
+        ..Limits::default()
+    }
 }

@@ -33,7 +33,9 @@ use std::path::PathBuf;
 
 use nalgebra::{Point3, Vector3};
 use serde::Deserialize;
-use serde::de::{DeserializeOwned, DeserializeSeed, Deserializer, Error, MapAccess, Unexpected, Visitor};
+use serde::de::{
+    DeserializeOwned, DeserializeSeed, Deserializer, Error, MapAccess, Unexpected, Visitor,
+};
 
 /// A parameter outside the range in which it has a meaning.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -56,7 +58,11 @@ impl SettingError {
         if inside && value.is_finite() {
             return Ok(());
         }
-        Err(SettingError { name: name.to_owned(), value, allowed: allowed.to_owned() })
+        Err(SettingError {
+            name: name.to_owned(),
+            value,
+            allowed: allowed.to_owned(),
+        })
     }
 }
 
@@ -66,8 +72,13 @@ struct Number(f64);
 impl fmt::Display for Number {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let rounded = format!("{:.11e}", self.0).parse().unwrap_or(self.0);
-        let is_plain = rounded == 0.0 || !rounded.is_finite() || (1e-4..1e6).contains(&rounded.abs());
-        if is_plain { write!(f, "{rounded}") } else { write!(f, "{rounded:e}") }
+        let is_plain =
+            rounded == 0.0 || !rounded.is_finite() || (1e-4..1e6).contains(&rounded.abs());
+        if is_plain {
+            write!(f, "{rounded}")
+        } else {
+            write!(f, "{rounded:e}")
+        }
     }
 }
 
@@ -165,18 +176,28 @@ pub struct Parameter {
 impl Parameter {
     /// Section and key.
     pub fn name(&self) -> String {
-        if self.section.is_empty() { self.key.to_owned() } else { format!("{}.{}", self.section, self.key) }
+        if self.section.is_empty() {
+            self.key.to_owned()
+        } else {
+            format!("{}.{}", self.section, self.key)
+        }
     }
 
     /// What it does: the first paragraph of its documentation.
     pub fn summary(&self) -> String {
-        let lines = self.doc.iter().map(|line| line.trim()).take_while(|line| !line.is_empty());
+        let lines = self
+            .doc
+            .iter()
+            .map(|line| line.trim())
+            .take_while(|line| !line.is_empty());
         lines.collect::<Vec<_>>().join(" ")
     }
 
     /// What it may be: a range, or words; empty where anything may be.
     pub fn allowed(&self) -> String {
-        let Some([low, high]) = self.range else { return self.words.join(", ") };
+        let Some([low, high]) = self.range else {
+            return self.words.join(", ");
+        };
         format!("{} to {}", Number(low), Number(high))
     }
 }
@@ -255,7 +276,11 @@ impl Value for i64 {
 
     fn of(written: f64, unit: Unit) -> Self {
         // 1 ms is exactly 10⁶ ns, where 0.001 s is rounded
-        if written.is_nan() { Self::MIN } else { (written * unit.to_si(NS)).round() as Self }
+        if written.is_nan() {
+            Self::MIN
+        } else {
+            (written * unit.to_si(NS)).round() as Self
+        }
     }
 
     fn yaml(&self, unit: Unit) -> Option<String> {
@@ -342,7 +367,14 @@ impl<T: Value> Value for Vec<T> {
 }
 
 fn list<T: Value>(values: &[T], unit: Unit) -> String {
-    format!("[{}]", values.iter().filter_map(|one| one.yaml(unit)).collect::<Vec<_>>().join(", "))
+    format!(
+        "[{}]",
+        values
+            .iter()
+            .filter_map(|one| one.yaml(unit))
+            .collect::<Vec<_>>()
+            .join(", ")
+    )
 }
 
 impl<T: Value> Value for Option<T> {
@@ -394,7 +426,11 @@ pub trait Section: Default {
     ///
     /// # Errors
     /// Those of the deserializer.
-    fn read_key<'de, A: MapAccess<'de>>(&mut self, key: &str, map: &mut A) -> Result<bool, A::Error>;
+    fn read_key<'de, A: MapAccess<'de>>(
+        &mut self,
+        key: &str,
+        map: &mut A,
+    ) -> Result<bool, A::Error>;
 }
 
 /// Refuses the first number of the value of `key` that is not in its range.
@@ -403,16 +439,36 @@ pub trait Section: Default {
 /// [`SettingError`]
 pub fn check<T: Value>(value: &T, key: &str, declared: &[Parameter]) -> Result<(), SettingError> {
     value.check()?;
-    let Some(one) = declared.iter().find(|one| one.key == key) else { return Ok(()) };
-    let Some([low, high]) = one.range.map(|range| range.map(|limit| one.unit.to_si(limit))) else { return Ok(()) };
-    let Some(si) = value.numbers().into_iter().find(|si| !(low..=high).contains(si)) else { return Ok(()) };
+    let Some(one) = declared.iter().find(|one| one.key == key) else {
+        return Ok(());
+    };
+    let Some([low, high]) = one
+        .range
+        .map(|range| range.map(|limit| one.unit.to_si(limit)))
+    else {
+        return Ok(());
+    };
+    let Some(si) = value
+        .numbers()
+        .into_iter()
+        .find(|si| !(low..=high).contains(si))
+    else {
+        return Ok(());
+    };
     let what_else = match &one.default {
         _ if !one.hint.is_empty() => one.hint.to_owned(),
         None => "it is left out by default".to_owned(),
         Some(default) => format!("the default is {default}"),
     };
-    let allowed = format!("{}; {what_else}", format!("{} {}", one.allowed(), one.unit.symbol).trim_end());
-    Err(SettingError { name: one.name(), value: one.unit.of_si(si), allowed })
+    let allowed = format!(
+        "{}; {what_else}",
+        format!("{} {}", one.allowed(), one.unit.symbol).trim_end()
+    );
+    Err(SettingError {
+        name: one.name(),
+        value: one.unit.of_si(si),
+        allowed,
+    })
 }
 
 /// Reads a section; what is not named keeps its default.
@@ -472,16 +528,26 @@ impl<'de, S: Section> Visitor<'de> for WrittenSectionVisitor<S> {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
-        SectionVisitor(PhantomData).visit_map(map).map(WrittenSection::Keys)
+        SectionVisitor(PhantomData)
+            .visit_map(map)
+            .map(WrittenSection::Keys)
     }
 
     fn visit_str<E: Error>(self, word: &str) -> Result<Self::Value, E> {
-        if word == "off" { Ok(WrittenSection::Off) } else { Err(E::invalid_value(Unexpected::Str(word), &self)) }
+        if word == "off" {
+            Ok(WrittenSection::Off)
+        } else {
+            Err(E::invalid_value(Unexpected::Str(word), &self))
+        }
     }
 
     // off is a boolean of YAML 1.1
     fn visit_bool<E: Error>(self, is_on: bool) -> Result<Self::Value, E> {
-        if is_on { Err(E::invalid_value(Unexpected::Bool(is_on), &self)) } else { Ok(WrittenSection::Off) }
+        if is_on {
+            Err(E::invalid_value(Unexpected::Bool(is_on), &self))
+        } else {
+            Ok(WrittenSection::Off)
+        }
     }
 }
 
@@ -504,7 +570,11 @@ impl Visitor<'_> for KnownKey {
     }
 
     fn visit_str<E: Error>(self, key: &str) -> Result<&'static str, E> {
-        self.0.iter().find(|known| **known == key).copied().ok_or_else(|| E::unknown_field(key, self.0))
+        self.0
+            .iter()
+            .find(|known| **known == key)
+            .copied()
+            .ok_or_else(|| E::unknown_field(key, self.0))
     }
 }
 

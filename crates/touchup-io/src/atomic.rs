@@ -31,19 +31,31 @@ impl AtomicFile {
             return refused(io::ErrorKind::InvalidInput, "the path names no file".into());
         };
         if fs::metadata(&target).is_ok_and(|m| !m.is_file()) {
-            return refused(io::ErrorKind::InvalidInput, "it is there already and is not a plain file".into());
+            return refused(
+                io::ErrorKind::InvalidInput,
+                "it is there already and is not a plain file".into(),
+            );
         }
         let folder = folder_of(&target);
         if !folder.is_dir() {
-            return refused(io::ErrorKind::NotFound, format!("there is no folder {}: make it first", folder.display()));
+            return refused(
+                io::ErrorKind::NotFound,
+                format!("there is no folder {}: make it first", folder.display()),
+            );
         }
         let stem = format!(".{}.", name.display());
         remove_left(folder, &stem);
         let prefix = format!("{stem}{}-", std::process::id());
-        let beside =
-            tempfile::Builder::new().prefix(&prefix).suffix(".part").make_in(folder, |path| File::create_new(path))?;
+        let beside = tempfile::Builder::new()
+            .prefix(&prefix)
+            .suffix(".part")
+            .make_in(folder, |path| File::create_new(path))?;
         let (file, temporary) = beside.into_parts();
-        Ok(Self { target, writer: BufWriter::with_capacity(1 << 16, file), temporary })
+        Ok(Self {
+            target,
+            writer: BufWriter::with_capacity(1 << 16, file),
+            temporary,
+        })
     }
 
     /// Brings everything to the disk and gives the file its name, in place of an older one.
@@ -53,7 +65,9 @@ impl AtomicFile {
     pub fn commit(mut self) -> io::Result<()> {
         self.writer.flush()?;
         self.writer.get_ref().sync_all()?;
-        self.temporary.persist(&self.target).map_err(|error| error.error)?;
+        self.temporary
+            .persist(&self.target)
+            .map_err(|error| error.error)?;
         // the new name is on the disk once its folder is; some file systems cannot be asked for that
         let _ = File::open(folder_of(&self.target)).and_then(|folder| folder.sync_all());
         Ok(())
@@ -85,7 +99,10 @@ impl Seek for AtomicFile {
 ///
 /// # Errors
 /// Those of [`AtomicFile`] and of `write`.
-pub fn write_atomically(path: &Path, write: impl FnOnce(&mut AtomicFile) -> io::Result<()>) -> io::Result<()> {
+pub fn write_atomically(
+    path: &Path,
+    write: impl FnOnce(&mut AtomicFile) -> io::Result<()>,
+) -> io::Result<()> {
     let mut file = AtomicFile::create(path)?;
     write(&mut file)?;
     file.commit()
@@ -119,20 +136,32 @@ fn followed(path: &Path) -> io::Result<PathBuf> {
             Err(_) => return Ok(target),
         }
     }
-    Err(io::Error::new(io::ErrorKind::InvalidInput, "its links lead in a circle"))
+    Err(io::Error::new(
+        io::ErrorKind::InvalidInput,
+        "its links lead in a circle",
+    ))
 }
 
 /// Removes temporary files `stem`PID-….part of processes that are gone. Where that cannot be known they stay.
 pub(super) fn remove_left(folder: &Path, stem: &str) {
-    let (processes, Ok(entries)) = (Path::new("/proc"), fs::read_dir(folder)) else { return };
+    let (processes, Ok(entries)) = (Path::new("/proc"), fs::read_dir(folder)) else {
+        return;
+    };
     if !processes.join("self").exists() {
         return;
     }
     for entry in entries.flatten() {
         let name = entry.file_name();
-        let rest = name.to_str().and_then(|name| name.strip_prefix(stem)?.strip_suffix(".part"));
-        let Some((process, _)) = rest.and_then(|rest| rest.split_once('-')) else { continue };
-        if process.parse::<u32>().is_ok_and(|id| !processes.join(id.to_string()).exists()) {
+        let rest = name
+            .to_str()
+            .and_then(|name| name.strip_prefix(stem)?.strip_suffix(".part"));
+        let Some((process, _)) = rest.and_then(|rest| rest.split_once('-')) else {
+            continue;
+        };
+        if process
+            .parse::<u32>()
+            .is_ok_and(|id| !processes.join(id.to_string()).exists())
+        {
             // who may not remove it leaves it
             let _ = fs::remove_file(entry.path());
         }
@@ -151,7 +180,10 @@ mod tests {
     use super::*;
 
     fn names(folder: &Path) -> Vec<String> {
-        fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect()
+        fs::read_dir(folder)
+            .unwrap()
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect()
     }
 
     #[test]
@@ -164,18 +196,37 @@ mod tests {
         assert_eq!(names(folder.path()).len(), 2);
         drop(file);
         assert_eq!(names(folder.path()), ["a.txt"]);
-        let failed = write_atomically(&path, |w| w.write_all(b"half").and(Err(io::Error::other("disk full"))));
+        let failed = write_atomically(&path, |w| {
+            w.write_all(b"half").and(Err(io::Error::other("disk full")))
+        });
         assert_eq!(failed.unwrap_err().to_string(), "disk full");
-        assert_eq!((fs::read_to_string(&path).unwrap().as_str(), names(folder.path()).len()), ("old", 1));
+        assert_eq!(
+            (
+                fs::read_to_string(&path).unwrap().as_str(),
+                names(folder.path()).len()
+            ),
+            ("old", 1)
+        );
         write_atomically(&path, |w| w.write_all(b"new")).unwrap();
-        assert_eq!((fs::read_to_string(&path).unwrap().as_str(), names(folder.path()).len()), ("new", 1));
+        assert_eq!(
+            (
+                fs::read_to_string(&path).unwrap().as_str(),
+                names(folder.path()).len()
+            ),
+            ("new", 1)
+        );
     }
 
     #[test]
     fn places_that_cannot_hold_a_file_are_refused() {
         let folder = tempfile::tempdir().unwrap();
-        let missing = AtomicFile::create(&folder.path().join("no/a.txt")).unwrap_err().to_string();
-        assert!(missing.starts_with("there is no folder") && missing.ends_with("no: make it first"), "{missing}");
+        let missing = AtomicFile::create(&folder.path().join("no/a.txt"))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            missing.starts_with("there is no folder") && missing.ends_with("no: make it first"),
+            "{missing}"
+        );
         let taken = AtomicFile::create(folder.path()).unwrap_err().to_string();
         assert!(taken.contains("not a plain file"), "{taken}");
         assert!(names(folder.path()).is_empty());
@@ -197,7 +248,9 @@ mod tests {
             ".a.txt.notes.part".to_owned(),
             format!("a.txt.{gone}-x1.part"),
         ];
-        stay.iter().chain([&left]).for_each(|name| fs::write(folder.path().join(name), "half").unwrap());
+        stay.iter()
+            .chain([&left])
+            .for_each(|name| fs::write(folder.path().join(name), "half").unwrap());
         write_atomically(&folder.path().join("a.txt"), |w| w.write_all(b"new")).unwrap();
         let mut expected = stay.to_vec();
         expected.push("a.txt".to_owned());
@@ -212,16 +265,28 @@ mod tests {
     fn a_link_to_no_file_yet_is_followed() {
         let folder = tempfile::tempdir().unwrap();
         fs::create_dir(folder.path().join("there")).unwrap();
-        let (far, link, first) =
-            (folder.path().join("there/a.txt"), folder.path().join("link"), folder.path().join("first"));
+        let (far, link, first) = (
+            folder.path().join("there/a.txt"),
+            folder.path().join("link"),
+            folder.path().join("first"),
+        );
         std::os::unix::fs::symlink("there/a.txt", &link).unwrap();
         std::os::unix::fs::symlink("link", &first).unwrap();
         write_atomically(&first, |w| w.write_all(b"new")).unwrap();
         assert_eq!(fs::read_to_string(&far).unwrap(), "new");
-        assert!([&link, &first].iter().all(|path| fs::symlink_metadata(path).unwrap().is_symlink()));
+        assert!(
+            [&link, &first]
+                .iter()
+                .all(|path| fs::symlink_metadata(path).unwrap().is_symlink())
+        );
         let round = folder.path().join("round");
         std::os::unix::fs::symlink("round", &round).unwrap();
-        assert!(write_atomically(&round, |w| w.write_all(b"new")).unwrap_err().to_string().contains("circle"));
+        assert!(
+            write_atomically(&round, |w| w.write_all(b"new"))
+                .unwrap_err()
+                .to_string()
+                .contains("circle")
+        );
     }
 
     #[cfg(unix)]

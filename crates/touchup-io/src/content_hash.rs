@@ -24,11 +24,19 @@ pub fn hash_of(bytes: &[u8]) -> String {
 /// # Errors
 /// [`FileError::Read`]
 pub fn content_hash(path: &Path) -> Result<String, FileError> {
-    let of_file = |path: &Path| file_hash(path).map_err(|source| FileError::Read { path: path.to_owned(), source });
+    let of_file = |path: &Path| {
+        file_hash(path).map_err(|source| FileError::Read {
+            path: path.to_owned(),
+            source,
+        })
+    };
     if !path.is_dir() {
         return of_file(path);
     }
-    let names = files_below(path).map_err(|source| FileError::Read { path: path.to_owned(), source })?;
+    let names = files_below(path).map_err(|source| FileError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
     let mut list = String::new();
     for name in names {
         list += &format!("{}  {}\n", of_file(&path.join(&name))?, name.display());
@@ -70,7 +78,10 @@ fn files_below(folder: &Path) -> io::Result<Vec<PathBuf>> {
 }
 
 fn hex(hash: Sha256) -> String {
-    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+    hash.finalize()
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect()
 }
 
 #[cfg(test)]
@@ -80,8 +91,14 @@ mod tests {
     /// The examples of FIPS 180-2, B.1, and of no bytes at all.
     #[test]
     fn hashes_are_those_of_the_standard() {
-        assert_eq!(hash_of(b"abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
-        assert_eq!(hash_of(b""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+        assert_eq!(
+            hash_of(b"abc"),
+            "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+        );
+        assert_eq!(
+            hash_of(b""),
+            "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"
+        );
     }
 
     #[test]
@@ -92,7 +109,13 @@ mod tests {
         fs::write(folder.path().join("a"), "abc").unwrap();
         let list = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad  a\n\
                     e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855  b/c\n";
-        assert_eq!(content_hash(folder.path()).unwrap(), hash_of(list.as_bytes()));
-        assert_eq!(content_hash(&folder.path().join("a")).unwrap(), hash_of(b"abc"));
+        assert_eq!(
+            content_hash(folder.path()).unwrap(),
+            hash_of(list.as_bytes())
+        );
+        assert_eq!(
+            content_hash(&folder.path().join("a")).unwrap(),
+            hash_of(b"abc")
+        );
     }
 }

@@ -15,6 +15,9 @@ mod tests {
 
     #[test]
     fn what_would_break_a_line_is_quoted() {
-        assert_eq!(csv_line(["a", "b, c", "d \"e\"", ""].into_iter()), "a,\"b, c\",\"d \"\"e\"\"\",");
+        assert_eq!(
+            csv_line(["a", "b, c", "d \"e\"", ""].into_iter()),
+            "a,\"b, c\",\"d \"\"e\"\"\","
+        );
     }
 }

@@ -91,7 +91,11 @@ reported! {
 }
 
 fn round_of(form: &Form) -> Option<&RoundForm> {
-    if let Form::Round(round) = form { Some(round) } else { None }
+    if let Form::Round(round) = form {
+        Some(round)
+    } else {
+        None
+    }
 }
 
 /// The deviations of a form by the names of their numbers.
@@ -104,16 +108,21 @@ fn deviations(form: &Form) -> impl Iterator<Item = (&'static str, Deviation)> {
         ],
         Form::Flat(flat) => [("flatness_mm", Some(flat.flatness)), ("", None), ("", None)],
     };
-    all.into_iter().filter_map(|(name, deviation)| Some((name, deviation?)))
+    all.into_iter()
+        .filter_map(|(name, deviation)| Some((name, deviation?)))
 }
 
 /// Width of the narrowest zone, mm.
 fn form_number(form: &Form, name: &str) -> Option<f64> {
-    deviations(form).find(|(own, _)| *own == name).map(|(_, deviation)| deviation.minimum_zone.value * 1e3)
+    deviations(form)
+        .find(|(own, _)| *own == name)
+        .map(|(_, deviation)| deviation.minimum_zone.value * 1e3)
 }
 
 fn estimates(form: &Form, number: impl Fn(Deviation) -> f64) -> BTreeMap<String, f64> {
-    deviations(form).map(|(name, deviation)| (name.to_owned(), number(deviation) * 1e3)).collect()
+    deviations(form)
+        .map(|(name, deviation)| (name.to_owned(), number(deviation) * 1e3))
+        .collect()
 }
 
 reported! {
@@ -159,11 +168,14 @@ fn relation_numbers(relation: &Relation) -> impl Iterator<Item = (&'static str, 
         ("distance_mm", relation.distance, 1e3),
         ("angle_deg", relation.angle, 1f64.to_degrees()),
     ];
-    all.into_iter().filter_map(|(name, estimate, unit)| Some((name, estimate?, unit)))
+    all.into_iter()
+        .filter_map(|(name, estimate, unit)| Some((name, estimate?, unit)))
 }
 
 fn relation_number(relation: &Relation, name: &str) -> Option<f64> {
-    relation_numbers(relation).find(|(own, ..)| *own == name).map(|(_, estimate, unit)| estimate.value * unit)
+    relation_numbers(relation)
+        .find(|(own, ..)| *own == name)
+        .map(|(_, estimate, unit)| estimate.value * unit)
 }
 
 reported! {
@@ -243,8 +255,13 @@ fn known(feature: &Feature) -> impl Iterator<Item = KnownNumber<'_>> {
         ("cone_angle_deg", &feature.cone_angle, 1f64.to_degrees()),
     ];
     let centre = note("center_mm", &feature.centre, 1e3);
-    let axis = feature.axis.as_ref().map(|axis| note("axis_deg", axis, 1f64.to_degrees()));
-    let numbers = numbers.into_iter().filter_map(|(name, number, unit)| Some(note(name, number.as_ref()?, unit)));
+    let axis = feature
+        .axis
+        .as_ref()
+        .map(|axis| note("axis_deg", axis, 1f64.to_degrees()));
+    let numbers = numbers
+        .into_iter()
+        .filter_map(|(name, number, unit)| Some(note(name, number.as_ref()?, unit)));
     [centre].into_iter().chain(axis).chain(numbers)
 }
 
@@ -258,7 +275,10 @@ fn point_mm(p: &Point3<f64>) -> [f64; 3] {
 
 /// Numbers in ascending order as runs, first and last.
 fn runs(numbers: &[u32]) -> Vec<[u32; 2]> {
-    numbers.chunk_by(|a, b| a + 1 == *b).map(|run| [run[0], run[run.len() - 1]]).collect()
+    numbers
+        .chunk_by(|a, b| a + 1 == *b)
+        .map(|run| [run[0], run[run.len() - 1]])
+        .collect()
 }
 
 impl FeatureFile {
@@ -266,12 +286,20 @@ impl FeatureFile {
     pub fn of(features: &[Feature], unexplained: f64) -> Self {
         let relations = relations(features).iter().map(RelationRecord::of).collect();
         let features = features.iter().map(FeatureRecord::of).collect();
-        Self { features, relations, unexplained: Some(unexplained), clusters: Vec::new() }
+        Self {
+            features,
+            relations,
+            unexplained: Some(unexplained),
+            clusters: Vec::new(),
+        }
     }
 
     /// Clusters alone.
     pub fn of_clusters(clusters: &[Cluster]) -> Self {
-        Self { clusters: clusters.iter().map(ClusterRecord::of).collect(), ..Self::default() }
+        Self {
+            clusters: clusters.iter().map(ClusterRecord::of).collect(),
+            ..Self::default()
+        }
     }
 }
 
@@ -280,7 +308,8 @@ impl FeatureFile {
 /// # Errors
 /// [`FileError::Write`].
 pub fn write_features(path: &Path, file: &FeatureFile) -> Result<(), FileError> {
-    let text = serde_json::to_string_pretty(file).expect("finite numbers and names alone cannot fail");
+    let text =
+        serde_json::to_string_pretty(file).expect("finite numbers and names alone cannot fail");
     write_file(path, |out| writeln!(out, "{text}"))
 }
 
@@ -290,7 +319,10 @@ pub fn write_features(path: &Path, file: &FeatureFile) -> Result<(), FileError> 
 /// [`FeaturesFileError`].
 pub fn read_features(path: &Path) -> Result<FeatureFile, FeaturesFileError> {
     let text = read_file(path)?;
-    serde_json::from_slice(&text).map_err(|source| FeaturesFileError::NoFeatures { path: path.to_owned(), source })
+    serde_json::from_slice(&text).map_err(|source| FeaturesFileError::NoFeatures {
+        path: path.to_owned(),
+        source,
+    })
 }
 
 #[cfg(test)]

@@ -59,20 +59,40 @@ pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, FileError> {
     let read = || {
         let file = File::open(path)?;
         let info = file.metadata()?;
-        let limit = if info.is_file() { MAX_FILE_BYTES } else { MAX_STREAM_BYTES };
+        let limit = if info.is_file() {
+            MAX_FILE_BYTES
+        } else {
+            MAX_STREAM_BYTES
+        };
         let mut bytes = Vec::new();
-        bytes.try_reserve(if info.is_file() { info.len().min(limit) as usize + 1 } else { 0 })?;
+        bytes.try_reserve(if info.is_file() {
+            info.len().min(limit) as usize + 1
+        } else {
+            0
+        })?;
         file.take(limit + 1).read_to_end(&mut bytes)?;
         if bytes.len() as u64 > limit {
-            let why = format!("it is longer than {} MiB, and no end is near: reduce it first", limit >> 20);
+            let why = format!(
+                "it is longer than {} MiB, and no end is near: reduce it first",
+                limit >> 20
+            );
             return Err(io::Error::new(io::ErrorKind::FileTooLarge, why));
         }
         Ok(bytes)
     };
-    read().map_err(|source| FileError::Read { path: path.to_owned(), source })
+    read().map_err(|source| FileError::Read {
+        path: path.to_owned(),
+        source,
+    })
 }
 
 /// As [`write_atomically`].
-pub(super) fn write_file(path: &Path, write: impl FnOnce(&mut AtomicFile) -> io::Result<()>) -> Result<(), FileError> {
-    write_atomically(path, write).map_err(|source| FileError::Write { path: path.to_owned(), source })
+pub(super) fn write_file(
+    path: &Path,
+    write: impl FnOnce(&mut AtomicFile) -> io::Result<()>,
+) -> Result<(), FileError> {
+    write_atomically(path, write).map_err(|source| FileError::Write {
+        path: path.to_owned(),
+        source,
+    })
 }

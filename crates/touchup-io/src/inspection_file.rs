@@ -86,9 +86,24 @@ pub struct AlignedFeatureRecord {
 impl InspectionRecord {
     /// What positions and coordinates are about: `mesh`, or the frame of the drawing.
     pub fn frame(&self) -> String {
-        let Some(AlignmentRecord { method, features, .. }) = &self.alignment else { return "mesh".to_owned() };
-        let datums = features.iter().map(|feature| format!(" {}", feature.feature)).collect::<String>();
-        format!("drawing by {method}{}", if method == "datums" { datums } else { String::new() })
+        let Some(AlignmentRecord {
+            method, features, ..
+        }) = &self.alignment
+        else {
+            return "mesh".to_owned();
+        };
+        let datums = features
+            .iter()
+            .map(|feature| format!(" {}", feature.feature))
+            .collect::<String>();
+        format!(
+            "drawing by {method}{}",
+            if method == "datums" {
+                datums
+            } else {
+                String::new()
+            }
+        )
     }
 }
 
@@ -169,14 +184,17 @@ impl CharacteristicRecord {
 
     /// A number by its name without the unit.
     pub fn number(&self, name: &str) -> Option<f64> {
-        self.numbers.get(&format!("{name}_{}", self.unit())).copied()
+        self.numbers
+            .get(&format!("{name}_{}", self.unit()))
+            .copied()
     }
 
     /// Puts a number down.
     pub fn set(&mut self, name: &str, number: Option<f64>) {
         debug_assert!(NUMBERS.contains(&name), "{name}");
         if let Some(number) = number {
-            self.numbers.insert(format!("{name}_{}", self.unit()), number);
+            self.numbers
+                .insert(format!("{name}_{}", self.unit()), number);
         }
     }
 
@@ -191,7 +209,9 @@ impl CharacteristicRecord {
             id(self.datum),
             self.quantity.clone(),
         ];
-        let numbers = units.iter().flat_map(|unit| NUMBERS.map(|name| self.numbers.get(&format!("{name}_{unit}"))));
+        let numbers = units
+            .iter()
+            .flat_map(|unit| NUMBERS.map(|name| self.numbers.get(&format!("{name}_{unit}"))));
         fields.extend(numbers.map(|number| text(number.copied())));
         fields.extend([
             u8::from(self.is_at_least).to_string(),
@@ -236,14 +256,24 @@ pub fn write_inspection_table(
         .into_iter()
         .filter(|unit| *unit == "mm" || characteristics.iter().any(|one| one.unit() == *unit))
         .collect();
-    let numbers = units.iter().flat_map(|unit| NUMBERS.map(|name| format!("{name}_{unit}")));
-    let header: Vec<String> =
-        BEFORE.map(str::to_owned).into_iter().chain(numbers).chain(BEHIND.map(str::to_owned)).collect();
+    let numbers = units
+        .iter()
+        .flat_map(|unit| NUMBERS.map(|name| format!("{name}_{unit}")));
+    let header: Vec<String> = BEFORE
+        .map(str::to_owned)
+        .into_iter()
+        .chain(numbers)
+        .chain(BEHIND.map(str::to_owned))
+        .collect();
     write_file(path, |out| {
         writeln!(out, "{}", csv_line(header.iter().map(String::as_str)))?;
-        characteristics
-            .iter()
-            .try_for_each(|one| writeln!(out, "{}", csv_line(one.fields(&units, frame).iter().map(String::as_str))))
+        characteristics.iter().try_for_each(|one| {
+            writeln!(
+                out,
+                "{}",
+                csv_line(one.fields(&units, frame).iter().map(String::as_str))
+            )
+        })
     })
 }
 
@@ -265,7 +295,10 @@ mod tests {
     #[test]
     fn units_stand_in_the_names_of_numbers() {
         let json = serde_json::to_value(record("a", "cone_angle_deg")).unwrap();
-        assert_eq!((json["nominal_deg"].as_f64(), json.get("nominal_mm")), (Some(8.0), None));
+        assert_eq!(
+            (json["nominal_deg"].as_f64(), json.get("nominal_mm")),
+            (Some(8.0), None)
+        );
         assert!(json.get("actual_deg").is_none() && json.get("risk").is_none());
     }
 
@@ -281,6 +314,10 @@ mod tests {
         assert!(!lengths.contains("_deg"), "{lengths}");
         let both = lines(&[record("a", "diameter_mm"), record("b", "angle_deg")]);
         let widths: Vec<_> = both.lines().map(|line| line.split(',').count()).collect();
-        assert_eq!(widths, [BEFORE.len() + 2 * NUMBERS.len() + BEHIND.len(); 3], "{both}");
+        assert_eq!(
+            widths,
+            [BEFORE.len() + 2 * NUMBERS.len() + BEHIND.len(); 3],
+            "{both}"
+        );
     }
 }

@@ -43,18 +43,31 @@ impl<T: DeserializeOwned> JsonLines<T> {
     /// # Errors
     /// [`FileError::Read`]
     pub fn open(path: &Path) -> Result<Self, FileError> {
-        let file = File::open(path).map_err(|source| FileError::Read { path: path.to_owned(), source })?;
-        Ok(Self { path: path.to_owned(), reader: Some(BufReader::new(file)), line: 0, of: PhantomData })
+        let file = File::open(path).map_err(|source| FileError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
+        Ok(Self {
+            path: path.to_owned(),
+            reader: Some(BufReader::new(file)),
+            line: 0,
+            of: PhantomData,
+        })
     }
 
     fn read(&mut self) -> Result<Option<T>, JsonLineError> {
-        let Some(reader) = &mut self.reader else { return Ok(None) };
+        let Some(reader) = &mut self.reader else {
+            return Ok(None);
+        };
         let mut line = Vec::new();
         loop {
             line.clear();
             self.line += 1;
             let read = reader.by_ref().take(LONGEST).read_until(b'\n', &mut line);
-            let count = read.map_err(|source| FileError::Read { path: self.path.clone(), source })?;
+            let count = read.map_err(|source| FileError::Read {
+                path: self.path.clone(),
+                source,
+            })?;
             if count == 0 {
                 return Ok(None);
             }
@@ -64,8 +77,15 @@ impl<T: DeserializeOwned> JsonLines<T> {
         }
         serde_json::from_slice(&line).map(Some).map_err(|error| {
             let why = error.to_string();
-            let why = why.rsplit_once(" at line ").map_or(&*why, |(why, _)| why).to_owned();
-            JsonLineError::Line { path: self.path.clone(), place: FilePlace::Line(self.line), why }
+            let why = why
+                .rsplit_once(" at line ")
+                .map_or(&*why, |(why, _)| why)
+                .to_owned();
+            JsonLineError::Line {
+                path: self.path.clone(),
+                place: FilePlace::Line(self.line),
+                why,
+            }
         })
     }
 }

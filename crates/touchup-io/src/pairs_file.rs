@@ -29,7 +29,10 @@ pub struct PairsFile {
 /// # Errors
 /// [`TableError`], with the line.
 pub fn read_pairs(path: &Path) -> Result<PairsFile, TableError> {
-    pairs(path, read_table(path, &[SCAN, SPACE].concat(), &[NAME, SIGMA])?)
+    pairs(
+        path,
+        read_table(path, &[SCAN, SPACE].concat(), &[NAME, SIGMA])?,
+    )
 }
 
 /// Reads the points on the scan alone, each with itself; columns of space are ignored.
@@ -39,16 +42,25 @@ pub fn read_pairs(path: &Path) -> Result<PairsFile, TableError> {
 pub fn read_scan_points(path: &Path) -> Result<PairsFile, TableError> {
     let more = [&[NAME, SIGMA], &SPACE[..]].concat();
     let mut rows = read_table(path, &SCAN, &more)?;
-    rows.iter_mut().for_each(|row| row.numbers.extend_from_within(..));
+    rows.iter_mut()
+        .for_each(|row| row.numbers.extend_from_within(..));
     pairs(path, rows)
 }
 
 fn pairs(path: &Path, rows: Vec<Row>) -> Result<PairsFile, TableError> {
     let mut file = PairsFile::default();
     for row in rows {
-        let pair = pair(&row).map_err(|why| TableError::Line { path: path.to_owned(), line: row.line, why })?;
+        let pair = pair(&row).map_err(|why| TableError::Line {
+            path: path.to_owned(),
+            line: row.line,
+            why,
+        })?;
         file.pairs.push(pair);
-        file.names.push(row.more[0].clone().unwrap_or_else(|| file.pairs.len().to_string()));
+        file.names.push(
+            row.more[0]
+                .clone()
+                .unwrap_or_else(|| file.pairs.len().to_string()),
+        );
     }
     Ok(file)
 }
@@ -56,10 +68,16 @@ fn pairs(path: &Path, rows: Vec<Row>) -> Result<PairsFile, TableError> {
 fn pair(row: &Row) -> Result<PointPair, String> {
     let sigma = row.number(1, SIGMA)?;
     if sigma.is_some_and(|sigma| sigma <= 0.0) {
-        return Err(format!("{SIGMA} must be more than 0; leave it empty where it is not known"));
+        return Err(format!(
+            "{SIGMA} must be more than 0; leave it empty where it is not known"
+        ));
     }
     let point = |first: usize| Point3::from_slice(&row.numbers[first..first + 3]) / 1e3;
-    Ok(PointPair { from: point(0), to: point(3), sigma: sigma.map(|sigma| sigma / 1e3) })
+    Ok(PointPair {
+        from: point(0),
+        to: point(3),
+        sigma: sigma.map(|sigma| sigma / 1e3),
+    })
 }
 
 #[cfg(test)]
@@ -81,8 +99,22 @@ mod tests {
         let PairsFile { pairs, names } = read(text).unwrap();
         assert_eq!(names, ["hole A", "2"]);
         let from = Point3::new(0.001, 0.002, 0.003);
-        assert_eq!(pairs[0], PointPair { from, to: Point3::new(0.004, 0.005, 0.006), sigma: Some(0.0005) });
-        assert_eq!(pairs[1], PointPair { from, to: Point3::new(0.004, 0.005, -0.006), sigma: None });
+        assert_eq!(
+            pairs[0],
+            PointPair {
+                from,
+                to: Point3::new(0.004, 0.005, 0.006),
+                sigma: Some(0.0005)
+            }
+        );
+        assert_eq!(
+            pairs[1],
+            PointPair {
+                from,
+                to: Point3::new(0.004, 0.005, -0.006),
+                sigma: None
+            }
+        );
     }
 
     #[test]
@@ -92,19 +124,45 @@ mod tests {
             ("# only this\n".into(), 1, "nothing in it"),
             ("scan_x_mm,scan_y_mm\n".into(), 1, "scan_z_mm is missing"),
             (HEADER.replace(',', ";"), 1, "set apart by commas"),
-            (HEADER.replace("space_x_mm", "space_x_m"), 1, "\"space_x_m\""),
+            (
+                HEADER.replace("space_x_mm", "space_x_m"),
+                1,
+                "\"space_x_m\"",
+            ),
             (format!("{HEADER},scan_x_mm"), 1, "twice"),
-            (format!("{HEADER}\n1,2,3,4,5,6\n1,2,3,4,5\n"), 3, "5 values for 6 columns"),
-            (format!("{HEADER}\n1,2,3,4,5,six\n"), 2, "space_z_mm is \"six\""),
+            (
+                format!("{HEADER}\n1,2,3,4,5,6\n1,2,3,4,5\n"),
+                3,
+                "5 values for 6 columns",
+            ),
+            (
+                format!("{HEADER}\n1,2,3,4,5,six\n"),
+                2,
+                "space_z_mm is \"six\"",
+            ),
             (format!("{HEADER}\n1,2,3,4,5,nan\n"), 2, "must be a number"),
             (format!("{HEADER}\n\n1,2,3,1e999,5,6\n"), 3, "space_x_mm"),
-            (format!("{HEADER},sigma_mm\n1,2,3,4,5,6,0\n"), 2, "more than 0"),
-            (format!("{HEADER},sigma_mm\n1,2,3,4,5,6,x\n"), 2, "sigma_mm is \"x\""),
+            (
+                format!("{HEADER},sigma_mm\n1,2,3,4,5,6,0\n"),
+                2,
+                "more than 0",
+            ),
+            (
+                format!("{HEADER},sigma_mm\n1,2,3,4,5,6,x\n"),
+                2,
+                "sigma_mm is \"x\"",
+            ),
         ];
         for (text, line, named) in cases {
             let message = read(&text).unwrap_err().to_string();
-            assert!(message.contains(&format!("line {line}: ")) && message.contains(named), "{text}: {message}");
+            assert!(
+                message.contains(&format!("line {line}: ")) && message.contains(named),
+                "{text}: {message}"
+            );
         }
-        assert!(matches!(read_pairs("no.csv".as_ref()), Err(TableError::Io(_))));
+        assert!(matches!(
+            read_pairs("no.csv".as_ref()),
+            Err(TableError::Io(_))
+        ));
     }
 }

@@ -57,12 +57,21 @@ reported! {
 
 impl fmt::Display for TouchLine {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { index, verdict, centre_mm, sigma_mm, reason, .. } = self;
+        let Self {
+            index,
+            verdict,
+            centre_mm,
+            sigma_mm,
+            reason,
+            ..
+        } = self;
         write!(f, "touch {index}: {verdict}")?;
         if let (Some([x, y, z]), Some(sigma)) = (centre_mm, sigma_mm) {
             write!(f, ", centre at ({x:.3} {y:.3} {z:.3}) ± {sigma:.3} mm")?;
         }
-        reason.iter().try_for_each(|reason| write!(f, ", does not count: {reason}"))
+        reason
+            .iter()
+            .try_for_each(|reason| write!(f, ", does not count: {reason}"))
     }
 }
 
@@ -71,7 +80,11 @@ fn moment(moment: &TouchMoment) -> [f64; 4] {
 }
 
 fn onset(touch: &ProbedTouch) -> Option<&Onset> {
-    if let TouchOutcome::Contact { onset, .. } = &touch.record.as_ref()?.outcome { Some(onset) } else { None }
+    if let TouchOutcome::Contact { onset, .. } = &touch.record.as_ref()?.outcome {
+        Some(onset)
+    } else {
+        None
+    }
 }
 
 fn verdict(touch: &ProbedTouch) -> &'static str {
@@ -102,7 +115,12 @@ impl TouchLog {
     /// # Errors
     /// Of the file.
     pub fn create(path: &Path, ball_radius: f64) -> io::Result<Self> {
-        Ok(Self { path: path.to_owned(), file: File::create(path)?, ball_radius, counts: BTreeMap::new() })
+        Ok(Self {
+            path: path.to_owned(),
+            file: File::create(path)?,
+            ball_radius,
+            counts: BTreeMap::new(),
+        })
     }
 
     /// Goes on behind the touches of a file, which are counted on; what a crash left of a line is removed.
@@ -120,7 +138,12 @@ impl TouchLog {
         }
         let file = OpenOptions::new().append(true).open(path)?;
         file.set_len(whole.len() as u64)?;
-        Ok(Self { path: path.to_owned(), file, ball_radius, counts })
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+            ball_radius,
+            counts,
+        })
     }
 
     /// Appends a touch, which is on the disk when this returns.
@@ -132,7 +155,10 @@ impl TouchLog {
     pub fn append(&mut self, flag: u32, touch: &ProbedTouch, offset_ns: i64) -> io::Result<()> {
         let count = self.counts.entry(flag).or_default();
         let mut line = Vec::new();
-        write_line(&TouchLine::of(flag, *count, touch, self.ball_radius, offset_ns), &mut line)?;
+        write_line(
+            &TouchLine::of(flag, *count, touch, self.ball_radius, offset_ns),
+            &mut line,
+        )?;
         *count += 1;
         self.file.write_all(&line)?;
         self.file.sync_data()
@@ -161,12 +187,18 @@ pub fn read_probed_touches(path: &Path) -> io::Result<Vec<TouchLine>> {
 }
 
 fn touches_of(lines: &[u8]) -> io::Result<Vec<TouchLine>> {
-    serde_json::Deserializer::from_slice(lines).into_iter().map(|line| Ok(line?)).collect()
+    serde_json::Deserializer::from_slice(lines)
+        .into_iter()
+        .map(|line| Ok(line?))
+        .collect()
 }
 
 /// Without what a crash left of the last line.
 fn whole_lines(text: &[u8]) -> &[u8] {
-    let end = text.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
+    let end = text
+        .iter()
+        .rposition(|byte| *byte == b'\n')
+        .map_or(0, |at| at + 1);
     &text[..end]
 }
 
@@ -176,12 +208,24 @@ fn whole_lines(text: &[u8]) -> &[u8] {
 ///
 /// # Errors
 /// Of the file.
-pub fn append_probed_touches(probed: &Probed, ball_radius: f64, offset_ns: i64, path: &Path) -> io::Result<()> {
+pub fn append_probed_touches(
+    probed: &Probed,
+    ball_radius: f64,
+    offset_ns: i64,
+    path: &Path,
+) -> io::Result<()> {
     let mut lines = Vec::new();
     for (index, touch) in probed.touches.iter().enumerate() {
-        write_line(&TouchLine::of(probed.flag, index, touch, ball_radius, offset_ns), &mut lines)?;
+        write_line(
+            &TouchLine::of(probed.flag, index, touch, ball_radius, offset_ns),
+            &mut lines,
+        )?;
     }
-    OpenOptions::new().create(true).append(true).open(path)?.write_all(&lines)
+    OpenOptions::new()
+        .create(true)
+        .append(true)
+        .open(path)?
+        .write_all(&lines)
 }
 
 fn write_line(touch: &TouchLine, out: &mut dyn Write) -> io::Result<()> {
@@ -198,13 +242,28 @@ mod tests {
 
     fn refused(reason: &str) -> ProbedTouch {
         let (entry, from) = (Point3::origin(), Point3::new(1e-3, 2e-3, 3e-3));
-        let planned = TouchPlan { entry, from, direction: Vector3::z_axis(), search: 4e-3, expected: None };
-        ProbedTouch { planned, record: None, centre: None, deviation: None, refused: Some(reason.to_owned()) }
+        let planned = TouchPlan {
+            entry,
+            from,
+            direction: Vector3::z_axis(),
+            search: 4e-3,
+            expected: None,
+        };
+        ProbedTouch {
+            planned,
+            record: None,
+            centre: None,
+            deviation: None,
+            refused: Some(reason.to_owned()),
+        }
     }
 
     fn read(path: &Path) -> Vec<(u32, usize, Option<String>)> {
         let touches = read_probed_touches(path).unwrap();
-        touches.into_iter().map(|touch| (touch.flag, touch.index, touch.reason)).collect()
+        touches
+            .into_iter()
+            .map(|touch| (touch.flag, touch.index, touch.reason))
+            .collect()
     }
 
     #[test]
@@ -226,7 +285,10 @@ mod tests {
         assert_eq!(log.count(), 1);
         log.append(2, &refused("b"), 0).unwrap();
         log.append(1, &refused("b"), 0).unwrap();
-        assert_eq!(read(&path), [(1, 0, first), (2, 0, second.clone()), (1, 1, second)]);
+        assert_eq!(
+            read(&path),
+            [(1, 0, first), (2, 0, second.clone()), (1, 1, second)]
+        );
         assert_eq!(std::fs::read(&path).unwrap()[..whole.len()], whole);
     }
 }

@@ -33,13 +33,21 @@ struct Ids {
 
 fn ids(at: usize) -> Ids {
     let first = RESULTS + 1 + 4 * at;
-    Ids { definition: first, nominal: first + 1, item: first + 2, measurement: first + 3 }
+    Ids {
+        definition: first,
+        nominal: first + 1,
+        item: first + 2,
+        measurement: first + 3,
+    }
 }
 
 fn document(record: &InspectionRecord) -> String {
     let all = &record.characteristics;
     let each = |aspect: fn(&CharacteristicRecord, &Ids) -> String| {
-        all.iter().enumerate().map(|(at, one)| aspect(one, &ids(at))).collect::<String>()
+        all.iter()
+            .enumerate()
+            .map(|(at, one)| aspect(one, &ids(at)))
+            .collect::<String>()
     };
     let (count, last) = (all.len(), ids(all.len()).definition - 1);
     let status = match &*record.verdict {
@@ -65,10 +73,9 @@ fn document(record: &InspectionRecord) -> String {
         motion,
     ];
     let of_component = attributes(told("part", &record.part));
-    let serial = record
-        .serial
-        .as_ref()
-        .map_or(String::new(), |serial| format!("<SerialNumber>{}</SerialNumber>", escaped(serial)));
+    let serial = record.serial.as_ref().map_or(String::new(), |serial| {
+        format!("<SerialNumber>{}</SerialNumber>", escaped(serial))
+    });
     format!(
         r#"<?xml version="1.0" encoding="UTF-8"?>
 <QIFDocument xmlns="http://qifstandards.org/xsd/qif3" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:schemaLocation="http://qifstandards.org/xsd/qif3 QIFApplications/QIFDocument.xsd" versionQIF="3.0.0" idMax="{last}">
@@ -124,7 +131,9 @@ fn name_of(one: &CharacteristicRecord) -> &'static str {
         Some(InspectedQuantity::Depth) if one.kind == "boss" => "Height",
         Some(InspectedQuantity::Depth) => "Depth",
         Some(InspectedQuantity::ConeAngle) => "Angle",
-        Some(InspectedQuantity::X | InspectedQuantity::Y | InspectedQuantity::Z) => "LinearCoordinate",
+        Some(InspectedQuantity::X | InspectedQuantity::Y | InspectedQuantity::Z) => {
+            "LinearCoordinate"
+        }
         Some(InspectedQuantity::Position) => "Position",
         Some(InspectedQuantity::Roundness) => "Circularity",
         Some(InspectedQuantity::Cylindricity) => "Cylindricity",
@@ -154,17 +163,21 @@ fn definition(one: &CharacteristicRecord, ids: &Ids) -> String {
         let is_plane = one.kind == "plane";
         let (material, shape) = match name_of(one) {
             "Position" => ("<MaterialCondition>REGARDLESS</MaterialCondition>", round),
-            "Perpendicularity" | "Parallelism" if is_plane => {
-                ("<MaterialCondition>REGARDLESS</MaterialCondition>", "<ZoneShape><PlanarZone/></ZoneShape>")
+            "Perpendicularity" | "Parallelism" if is_plane => (
+                "<MaterialCondition>REGARDLESS</MaterialCondition>",
+                "<ZoneShape><PlanarZone/></ZoneShape>",
+            ),
+            "Perpendicularity" | "Parallelism" => {
+                ("<MaterialCondition>REGARDLESS</MaterialCondition>", round)
             }
-            "Perpendicularity" | "Parallelism" => ("<MaterialCondition>REGARDLESS</MaterialCondition>", round),
             "Coaxiality" | "Concentricity" | "Straightness" => ("", round),
             _ => ("", ""),
         };
         format!("{width}{material}{shape}")
     } else {
-        let limit =
-            |name: &str, value: Option<f64>| value.map_or(String::new(), |value| format!("<{name}>{value}</{name}>"));
+        let limit = |name: &str, value: Option<f64>| {
+            value.map_or(String::new(), |value| format!("<{name}>{value}</{name}>"))
+        };
         let (max, min) = (limit("MaxValue", upper), limit("MinValue", lower));
         format!("<Tolerance>{max}{min}<DefinedAsLimit>true</DefinedAsLimit></Tolerance>")
     };
@@ -172,16 +185,25 @@ fn definition(one: &CharacteristicRecord, ids: &Ids) -> String {
 }
 
 fn nominal(one: &CharacteristicRecord, ids: &Ids) -> String {
-    let mut content = format!("<CharacteristicDefinitionId>{}</CharacteristicDefinitionId>", ids.definition);
+    let mut content = format!(
+        "<CharacteristicDefinitionId>{}</CharacteristicDefinitionId>",
+        ids.definition
+    );
     let quantity = InspectedQuantity::of_name(&one.quantity);
     if !quantity.is_some_and(InspectedQuantity::is_zone) {
-        let _ = write!(content, "<TargetValue>{}</TargetValue>", one.number("nominal").unwrap_or(0.0));
+        let _ = write!(
+            content,
+            "<TargetValue>{}</TargetValue>",
+            one.number("nominal").unwrap_or(0.0)
+        );
     }
     content += match quantity {
         Some(InspectedQuantity::X) => "<Direction>XAXIS</Direction>",
         Some(InspectedQuantity::Y) => "<Direction>YAXIS</Direction>",
         Some(InspectedQuantity::Z) => "<Direction>ZAXIS</Direction>",
-        Some(InspectedQuantity::Distance | InspectedQuantity::Angle) => "<AnalysisMode>THREEDIMENSIONAL</AnalysisMode>",
+        Some(InspectedQuantity::Distance | InspectedQuantity::Angle) => {
+            "<AnalysisMode>THREEDIMENSIONAL</AnalysisMode>"
+        }
         _ => "",
     };
     aspect(one, "Nominal", ids.nominal, &content)
@@ -207,9 +229,12 @@ fn measurement(one: &CharacteristicRecord, ids: &Ids) -> String {
         _ if actual.is_none() => "NOT_ANALYZED",
         _ => "INDETERMINATE",
     };
-    let bound = actual.filter(|_| one.is_at_least).map(|bound| ("lower_bound", bound.to_string()));
-    let probability =
-        one.conformance_probability.map(|probability| ("conformance_probability", probability.to_string()));
+    let bound = actual
+        .filter(|_| one.is_at_least)
+        .map(|bound| ("lower_bound", bound.to_string()));
+    let probability = one
+        .conformance_probability
+        .map(|probability| ("conformance_probability", probability.to_string()));
     let reason = one.reason.clone().map(|reason| ("reason", reason));
     let mut content = attributes([bound, probability, reason].into_iter().flatten());
     let _ = write!(
@@ -221,11 +246,14 @@ fn measurement(one: &CharacteristicRecord, ids: &Ids) -> String {
     if let Some(actual) = actual.filter(|_| !one.is_at_least) {
         let accuracy = one
             .number("standard_uncertainty")
-            .map_or(String::new(), |u| format!(" combinedUncertainty=\"{u}\" meanError=\"0\""));
+            .map_or(String::new(), |u| {
+                format!(" combinedUncertainty=\"{u}\" meanError=\"0\"")
+            });
         let _ = write!(content, "<Value{accuracy}>{actual}</Value>");
     }
     if name_of(one) == "LinearCoordinate" {
-        content += "<TypeOfCoordinates><CoordinateEnum>CARTESIAN_3D</CoordinateEnum></TypeOfCoordinates>";
+        content +=
+            "<TypeOfCoordinates><CoordinateEnum>CARTESIAN_3D</CoordinateEnum></TypeOfCoordinates>";
     }
     aspect(one, "Measurement", ids.measurement, &content)
 }
@@ -234,12 +262,21 @@ fn measurement(one: &CharacteristicRecord, ids: &Ids) -> String {
 fn attributes(all: impl IntoIterator<Item = (&'static str, String)>) -> String {
     let each: Vec<_> = all
         .into_iter()
-        .map(|(name, value)| format!("<AttributeStr name=\"touchup.{name}\" value=\"{}\"/>", escaped(&value)))
+        .map(|(name, value)| {
+            format!(
+                "<AttributeStr name=\"touchup.{name}\" value=\"{}\"/>",
+                escaped(&value)
+            )
+        })
         .collect();
     if each.is_empty() {
         String::new()
     } else {
-        format!("<Attributes n=\"{}\">{}</Attributes>", each.len(), each.concat())
+        format!(
+            "<Attributes n=\"{}\">{}</Attributes>",
+            each.len(),
+            each.concat()
+        )
     }
 }
 
@@ -270,10 +307,19 @@ fn document_id(record: &InspectionRecord) -> String {
     const BASIS: u128 = 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d;
     const PRIME: u128 = 0x0000_0000_0100_0000_0000_0000_0000_013b;
     let text = serde_json::to_vec(record).unwrap_or_default();
-    let hash = text.iter().fold(BASIS, |hash, byte| (hash ^ u128::from(*byte)).wrapping_mul(PRIME));
+    let hash = text.iter().fold(BASIS, |hash, byte| {
+        (hash ^ u128::from(*byte)).wrapping_mul(PRIME)
+    });
     let marked = hash & !(0xf << 76) & !(0b11 << 62) | 8 << 76 | 0b10 << 62;
     let hex = format!("{marked:032x}");
-    [&hex[..8], &hex[8..12], &hex[12..16], &hex[16..20], &hex[20..]].join("-")
+    [
+        &hex[..8],
+        &hex[8..12],
+        &hex[12..16],
+        &hex[16..20],
+        &hex[20..],
+    ]
+    .join("-")
 }
 
 #[cfg(test)]
@@ -290,13 +336,23 @@ mod tests {
                 decision: "undecided".to_owned(),
                 ..CharacteristicRecord::default()
             };
-            let numbers =
-                [("nominal", 8.0), ("upper_limit", 8.1), ("actual", 8.000_000_1), ("standard_uncertainty", 1e-9)];
-            numbers.into_iter().for_each(|(name, number)| one.set(name, Some(number)));
+            let numbers = [
+                ("nominal", 8.0),
+                ("upper_limit", 8.1),
+                ("actual", 8.000_000_1),
+                ("standard_uncertainty", 1e-9),
+            ];
+            numbers
+                .into_iter()
+                .for_each(|(name, number)| one.set(name, Some(number)));
             one
         };
         let characteristics = InspectedQuantity::ALL.iter().map(characteristic).collect();
-        InspectionRecord { characteristics, verdict: "undecided".to_owned(), ..InspectionRecord::default() }
+        InspectionRecord {
+            characteristics,
+            verdict: "undecided".to_owned(),
+            ..InspectionRecord::default()
+        }
     }
 
     #[test]
@@ -304,13 +360,24 @@ mod tests {
         let record = record();
         let text = document(&record);
         let document = roxmltree::Document::parse(&text).unwrap();
-        let ids: Vec<usize> = document.descendants().filter_map(|node| node.attribute("id")?.parse().ok()).collect();
+        let ids: Vec<usize> = document
+            .descendants()
+            .filter_map(|node| node.attribute("id")?.parse().ok())
+            .collect();
         let mut once = ids.clone();
         once.sort_unstable();
         once.dedup();
         assert_eq!(once.len(), ids.len(), "an id is there twice");
-        assert_eq!(document.root_element().attribute("idMax"), Some(&*once.last().unwrap().to_string()));
-        let by_id = |id: &str| document.descendants().find(|node| node.attribute("id") == Some(id)).unwrap();
+        assert_eq!(
+            document.root_element().attribute("idMax"),
+            Some(&*once.last().unwrap().to_string())
+        );
+        let by_id = |id: &str| {
+            document
+                .descendants()
+                .find(|node| node.attribute("id") == Some(id))
+                .unwrap()
+        };
         let refer = |node: roxmltree::Node<'_, '_>, name: &str| {
             node.children()
                 .find(|child| child.has_tag_name(("http://qifstandards.org/xsd/qif3", name)))
@@ -321,16 +388,27 @@ mod tests {
         };
         let measurements: Vec<_> = document
             .descendants()
-            .filter(|node| node.tag_name().name().ends_with("CharacteristicMeasurement"))
+            .filter(|node| {
+                node.tag_name()
+                    .name()
+                    .ends_with("CharacteristicMeasurement")
+            })
             .collect();
         assert_eq!(measurements.len(), InspectedQuantity::ALL.len());
         for node in measurements {
-            let kind = node.tag_name().name().trim_end_matches("Measurement").to_owned();
+            let kind = node
+                .tag_name()
+                .name()
+                .trim_end_matches("Measurement")
+                .to_owned();
             let item = by_id(&refer(node, "CharacteristicItemId"));
             let nominal = by_id(&refer(item, "CharacteristicNominalId"));
             let definition = by_id(&refer(nominal, "CharacteristicDefinitionId"));
             let names = [item, nominal, definition].map(|node| node.tag_name().name().to_owned());
-            assert_eq!(names, ["Item", "Nominal", "Definition"].map(|aspect| format!("{kind}{aspect}")));
+            assert_eq!(
+                names,
+                ["Item", "Nominal", "Definition"].map(|aspect| format!("{kind}{aspect}"))
+            );
         }
     }
 
@@ -338,14 +416,23 @@ mod tests {
     #[test]
     fn small_numbers_are_written_without_exponent() {
         let text = document(&record());
-        assert!(text.contains("combinedUncertainty=\"0.000000001\""), "{text}");
+        assert!(
+            text.contains("combinedUncertainty=\"0.000000001\""),
+            "{text}"
+        );
     }
 
     #[test]
     fn the_identifier_is_a_uuid_that_follows_the_results() {
         let first = document_id(&record());
         assert_eq!(first, document_id(&record()));
-        assert_ne!(first, document_id(&InspectionRecord { serial: Some("2".to_owned()), ..record() }));
+        assert_ne!(
+            first,
+            document_id(&InspectionRecord {
+                serial: Some("2".to_owned()),
+                ..record()
+            })
+        );
         assert_eq!((first.len(), &first[14..15]), (36, "8"));
         assert!("89ab".contains(&first[19..20]), "{first}");
     }

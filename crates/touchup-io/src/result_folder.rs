@@ -76,9 +76,17 @@ pub fn claim(folder: &Path, name: &str, again: bool) -> Result<Claim, FileError>
             remove_left(folder, &prefix);
         }
         let temporary = temporary_in(folder, &prefix)?;
-        Ok(Claim::Ours(ClaimedFolder { place: place.clone(), prefix, temporary, _lock: lock }))
+        Ok(Claim::Ours(ClaimedFolder {
+            place: place.clone(),
+            prefix,
+            temporary,
+            _lock: lock,
+        }))
     };
-    claimed().map_err(|source| FileError::Write { path: place.clone(), source })
+    claimed().map_err(|source| FileError::Write {
+        path: place.clone(),
+        source,
+    })
 }
 
 /// Ending of temporary folders.
@@ -101,9 +109,15 @@ impl ClaimedFolder {
             let folder = temporary_in(self.place.parent().unwrap_or(Path::new(".")), &self.prefix)?;
             let path = folder.path().join(name.file_name().unwrap_or_default());
             fs::write(&path, bytes)?;
-            Ok(FileBeside { path, _folder: folder })
+            Ok(FileBeside {
+                path,
+                _folder: folder,
+            })
         };
-        written().map_err(|source| FileError::Write { path: name.to_owned(), source })
+        written().map_err(|source| FileError::Write {
+            path: name.to_owned(),
+            source,
+        })
     }
 
     /// Gives the folder its name. Another one that has come there meanwhile stays, unless it is to be replaced.
@@ -113,7 +127,12 @@ impl ClaimedFolder {
     /// # Errors
     /// [`FileError::Write`]
     pub fn publish(self, again: bool) -> Result<PathBuf, FileError> {
-        let Self { place, prefix, temporary, _lock } = self;
+        let Self {
+            place,
+            prefix,
+            temporary,
+            _lock,
+        } = self;
         let publish = || {
             let folder = place.parent().unwrap_or(Path::new("."));
             sync(temporary.path());
@@ -131,7 +150,10 @@ impl ClaimedFolder {
             sync(folder);
             Ok(())
         };
-        publish().map_err(|source| FileError::Write { path: place.clone(), source })?;
+        publish().map_err(|source| FileError::Write {
+            path: place.clone(),
+            source,
+        })?;
         Ok(place)
     }
 }
@@ -157,7 +179,9 @@ impl NameLock {
             let file = File::options().create(true).append(true).open(&path)?;
             match file.try_lock() {
                 Err(TryLockError::WouldBlock) => file.lock()?,
-                Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => return Ok(None),
+                Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {
+                    return Ok(None);
+                }
                 Err(TryLockError::Error(error)) => return Err(error),
                 Ok(()) => {}
             }
@@ -180,7 +204,8 @@ impl Drop for NameLock {
 fn is_at(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
     let number = |of: fs::Metadata| (of.dev(), of.ino());
-    file.metadata().is_ok_and(|own| fs::metadata(path).is_ok_and(|there| number(own) == number(there)))
+    file.metadata()
+        .is_ok_and(|own| fs::metadata(path).is_ok_and(|there| number(own) == number(there)))
 }
 
 /// There an open file cannot be removed.
@@ -193,7 +218,10 @@ fn is_at(_: &File, _: &Path) -> bool {
 fn remove_left(folder: &Path, prefix: &str) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
-        if name.to_str().is_some_and(|name| name.starts_with(prefix) && name.ends_with(PART)) {
+        if name
+            .to_str()
+            .is_some_and(|name| name.starts_with(prefix) && name.ends_with(PART))
+        {
             // who may not remove it leaves it
             let _ = fs::remove_dir_all(entry.path());
         }
@@ -205,14 +233,18 @@ mod tests {
     use super::*;
 
     fn names(folder: &Path) -> Vec<String> {
-        let mut names: Vec<_> =
-            fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        let mut names: Vec<_> = fs::read_dir(folder)
+            .unwrap()
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect();
         names.sort();
         names
     }
 
     fn ours(claim: Claim) -> ClaimedFolder {
-        let Claim::Ours(claimed) = claim else { panic!("it is there already") };
+        let Claim::Ours(claimed) = claim else {
+            panic!("it is there already")
+        };
         claimed
     }
 
@@ -221,15 +253,31 @@ mod tests {
         let results = tempfile::tempdir().unwrap();
         let claimed = ours(claim(results.path(), "a", false).unwrap());
         fs::write(claimed.path().join("x"), "1").unwrap();
-        let beside = claimed.file_beside(Path::new("far/scan.ply"), b"ply").unwrap();
+        let beside = claimed
+            .file_beside(Path::new("far/scan.ply"), b"ply")
+            .unwrap();
         assert!(beside.path().ends_with("scan.ply") && fs::read(beside.path()).unwrap() == b"ply");
-        let left = beside.path().parent().unwrap().file_name().unwrap().to_str().unwrap().to_owned();
-        assert!(left.starts_with(".a.") && left.ends_with(PART), "{left}: the next claim removes it");
+        let left = beside
+            .path()
+            .parent()
+            .unwrap()
+            .file_name()
+            .unwrap()
+            .to_str()
+            .unwrap()
+            .to_owned();
+        assert!(
+            left.starts_with(".a.") && left.ends_with(PART),
+            "{left}: the next claim removes it"
+        );
         assert!(!results.path().join("a").exists());
         claimed.publish(false).unwrap();
         drop(beside);
         assert_eq!(names(results.path()), ["a"]);
-        assert!(matches!(claim(results.path(), "a", false).unwrap(), Claim::Done(_)));
+        assert!(matches!(
+            claim(results.path(), "a", false).unwrap(),
+            Claim::Done(_)
+        ));
         let again = ours(claim(results.path(), "a", true).unwrap());
         fs::write(again.path().join("x"), "2").unwrap();
         again.publish(true).unwrap();
@@ -242,7 +290,8 @@ mod tests {
         let results = tempfile::tempdir().unwrap();
         let claimed = ours(claim(results.path(), "a", false).unwrap());
         std::thread::scope(|scope| {
-            let other = scope.spawn(|| matches!(claim(results.path(), "a", false).unwrap(), Claim::Done(_)));
+            let other = scope
+                .spawn(|| matches!(claim(results.path(), "a", false).unwrap(), Claim::Done(_)));
             claimed.publish(false).unwrap();
             assert!(other.join().unwrap());
         });
@@ -256,7 +305,9 @@ mod tests {
             fs::create_dir(results.path().join(left)).unwrap();
         }
         fs::write(results.path().join(".a.lock"), "").unwrap();
-        ours(claim(results.path(), "a", false).unwrap()).publish(false).unwrap();
+        ours(claim(results.path(), "a", false).unwrap())
+            .publish(false)
+            .unwrap();
         assert_eq!(names(results.path()), [".b.x1.part", "a"]);
     }
 }

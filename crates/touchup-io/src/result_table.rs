@@ -58,10 +58,20 @@ impl ResultTable {
     pub fn with_columns_of(row: &[(String, Value)]) -> Self {
         let mut cells = Vec::new();
         for (name, value) in row {
-            let value = if value.is_null() { &Value::Bool(false) } else { value };
+            let value = if value.is_null() {
+                &Value::Bool(false)
+            } else {
+                value
+            };
             flatten(name, value, &mut cells);
         }
-        Self { columns: cells.into_iter().map(|(name, _)| (name, Vec::new())).collect(), rows: 0 }
+        Self {
+            columns: cells
+                .into_iter()
+                .map(|(name, _)| (name, Vec::new()))
+                .collect(),
+            rows: 0,
+        }
     }
 
     /// A row for each feature; what is nested has its name behind that of what it is in, with `.` between, coordinates `_x`, `_y`, `_z`.
@@ -80,7 +90,10 @@ impl ResultTable {
     /// A row for each touch, with the columns and the digits of a file of touches.
     pub fn of_touches(touches: &[ProbedPoint]) -> Self {
         let mut table = Self::default();
-        let lines = touches.iter().enumerate().map(|(number, touch)| touches_file::line_of(touch, number));
+        let lines = touches
+            .iter()
+            .enumerate()
+            .map(|(number, touch)| touches_file::line_of(touch, number));
         lines.for_each(|line| table.add_touch(&line));
         table
     }
@@ -96,29 +109,42 @@ impl ResultTable {
     }
 
     fn add_touch(&mut self, line: &str) {
-        let named = touches_file::HEADER.split(',').zip(line.split(',').map(str::trim));
-        self.add_row(named.map(|(name, value)| (name.to_owned(), touch_cell(name, value))).collect());
+        let named = touches_file::HEADER
+            .split(',')
+            .zip(line.split(',').map(str::trim));
+        self.add_row(
+            named
+                .map(|(name, value)| (name.to_owned(), touch_cell(name, value)))
+                .collect(),
+        );
     }
 
     /// A row of values by their names, each name once; what is nested is named as of features, and `Null` is no value.
     pub fn add_json(&mut self, row: &[(String, Value)]) {
         let mut cells = Vec::new();
-        row.iter().for_each(|(name, value)| flatten(name, value, &mut cells));
+        row.iter()
+            .for_each(|(name, value)| flatten(name, value, &mut cells));
         self.add_row(cells);
     }
 
     fn add_row(&mut self, cells: Vec<(String, Cell)>) {
         for (name, cell) in cells {
-            let at = self.columns.iter().position(|(known, _)| *known == name).unwrap_or_else(|| {
-                self.columns.push((name, Vec::new()));
-                self.columns.len() - 1
-            });
+            let at = self
+                .columns
+                .iter()
+                .position(|(known, _)| *known == name)
+                .unwrap_or_else(|| {
+                    self.columns.push((name, Vec::new()));
+                    self.columns.len() - 1
+                });
             let column = &mut self.columns[at].1;
             column.resize(self.rows, None);
             column.push(Some(cell));
         }
         self.rows += 1;
-        self.columns.iter_mut().for_each(|(_, column)| column.resize(self.rows, None));
+        self.columns
+            .iter_mut()
+            .for_each(|(_, column)| column.resize(self.rows, None));
     }
 
     /// How many rows.
@@ -144,15 +170,26 @@ impl ResultTable {
     /// # Errors
     /// [`ResultTableError`]
     pub fn write(&self, path: &Path) -> Result<(), ResultTableError> {
-        let bytes = if has_ending(path, "parquet") { self.parquet()? } else { self.csv().into_bytes() };
+        let bytes = if has_ending(path, "parquet") {
+            self.parquet()?
+        } else {
+            self.csv().into_bytes()
+        };
         let written = write_atomically(path, |out| out.write_all(&bytes));
-        Ok(written.map_err(|source| FileError::Write { path: path.to_owned(), source })?)
+        Ok(written.map_err(|source| FileError::Write {
+            path: path.to_owned(),
+            source,
+        })?)
     }
 
     fn csv(&self) -> String {
         let mut text = csv_line(self.columns.iter().map(|(name, _)| name.as_str())) + "\n";
         for row in 0..self.rows {
-            let values: Vec<_> = self.columns.iter().map(|(_, column)| text_of(column[row].as_ref())).collect();
+            let values: Vec<_> = self
+                .columns
+                .iter()
+                .map(|(_, column)| text_of(column[row].as_ref()))
+                .collect();
             text += &csv_line(values.iter().map(String::as_str));
             text.push('\n');
         }
@@ -166,7 +203,8 @@ pub fn is_table(path: &Path) -> bool {
 }
 
 fn has_ending(path: &Path, ending: &str) -> bool {
-    path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending))
+    path.extension()
+        .is_some_and(|found| found.eq_ignore_ascii_case(ending))
 }
 
 /// Writes features in the form that the ending names, as a whole or not at all: a table where it [is one](is_table), else JSON.
@@ -184,7 +222,10 @@ pub fn write_features_as_named(path: &Path, file: &FeatureFile) -> Result<(), Re
 ///
 /// # Errors
 /// [`ResultTableError`]
-pub fn write_touches_as_named(path: &Path, touches: &[ProbedPoint]) -> Result<(), ResultTableError> {
+pub fn write_touches_as_named(
+    path: &Path,
+    touches: &[ProbedPoint],
+) -> Result<(), ResultTableError> {
     match has_ending(path, "parquet") {
         true => ResultTable::of_touches(touches).write(path),
         false => Ok(write_touches(path, touches)?),
@@ -232,7 +273,11 @@ fn flatten(name: &str, value: &Value, cells: &mut Vec<(String, Cell)>) {
         Value::Array(_) => add(Cell::Text(value.to_string())),
         Value::Object(values) => {
             for (key, value) in values {
-                let inner = if name.is_empty() { key.clone() } else { format!("{name}.{key}") };
+                let inner = if name.is_empty() {
+                    key.clone()
+                } else {
+                    format!("{name}.{key}")
+                };
                 flatten(&inner, value, cells);
             }
         }
@@ -246,9 +291,10 @@ mod tests {
     #[test]
     fn what_is_nested_has_its_name_and_what_is_missing_is_empty() {
         let mut table = ResultTable::default();
-        for json in
-            [r#"{"id":1,"center_mm":[1,2.5,3],"size":{"diameter_mm":5.5}}"#, r#"{"id":2,"kind":"a, b","ids":[1,2]}"#]
-        {
+        for json in [
+            r#"{"id":1,"center_mm":[1,2.5,3],"size":{"diameter_mm":5.5}}"#,
+            r#"{"id":2,"kind":"a, b","ids":[1,2]}"#,
+        ] {
             let mut cells = Vec::new();
             flatten("", &serde_json::from_str(json).unwrap(), &mut cells);
             cells.sort_by(|a, b| a.0.cmp(&b.0));
@@ -262,7 +308,10 @@ mod tests {
 
     #[test]
     fn a_column_that_is_named_is_there_without_a_value() {
-        let row = [("job".to_owned(), Value::from(7)), ("failed".to_owned(), Value::Null)];
+        let row = [
+            ("job".to_owned(), Value::from(7)),
+            ("failed".to_owned(), Value::Null),
+        ];
         let mut table = ResultTable::with_columns_of(&row);
         table.add_json(&row);
         assert_eq!(table.csv(), "job,failed\n7,\n");

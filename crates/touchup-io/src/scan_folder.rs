@@ -116,7 +116,10 @@ impl ScanFolder {
         let path = fs::canonicalize(path)?;
         match path.is_dir() {
             true => Ok(Self { path }),
-            false => Err(io::Error::new(io::ErrorKind::NotADirectory, "it is no folder")),
+            false => Err(io::Error::new(
+                io::ErrorKind::NotADirectory,
+                "it is no folder",
+            )),
         }
     }
 
@@ -133,20 +136,37 @@ impl ScanFolder {
         let mut found = Vec::new();
         for entry in fs::read_dir(&self.path)? {
             // a file that goes meanwhile is not there
-            let Ok((name, about)) = entry.and_then(|entry| Ok((entry.file_name(), entry.metadata()?))) else {
+            let Ok((name, about)) =
+                entry.and_then(|entry| Ok((entry.file_name(), entry.metadata()?)))
+            else {
                 continue;
             };
-            let Ok(name) = name.into_string() else { continue };
+            let Ok(name) = name.into_string() else {
+                continue;
+            };
             let bytes = match about.is_dir() {
                 _ if !is_plain_name(&name) => None,
                 true if kind == FolderFileKind::Recording => bag_bytes(&self.path.join(&name)),
-                _ => (about.is_file() && FolderFileKind::of_name(&name) == Some(kind)).then_some(about.len()),
+                _ => (about.is_file() && FolderFileKind::of_name(&name) == Some(kind))
+                    .then_some(about.len()),
             };
             let since = |time: SystemTime| time.duration_since(UNIX_EPOCH).ok();
-            let modified_s = about.modified().ok().and_then(since).map(|since| since.as_secs());
-            found.extend(bytes.map(|bytes| FolderFile { name, bytes, modified_s }));
+            let modified_s = about
+                .modified()
+                .ok()
+                .and_then(since)
+                .map(|since| since.as_secs());
+            found.extend(bytes.map(|bytes| FolderFile {
+                name,
+                bytes,
+                modified_s,
+            }));
         }
-        found.sort_by(|a, b| b.modified_s.cmp(&a.modified_s).then_with(|| a.name.cmp(&b.name)));
+        found.sort_by(|a, b| {
+            b.modified_s
+                .cmp(&a.modified_s)
+                .then_with(|| a.name.cmp(&b.name))
+        });
         found.truncate(MOST_LISTED);
         Ok(found)
     }
@@ -163,10 +183,12 @@ impl ScanFolder {
         // a link may lead anywhere
         match fs::symlink_metadata(&path) {
             Ok(about) if about.is_file() && FolderFileKind::of_name(name) == Some(kind) => Ok(path),
-            Ok(about) if about.is_dir() && kind == FolderFileKind::Recording => match own_files(&path) {
-                Some(_) => Ok(path),
-                None => Err(ScanFolderError::NotABag(name.to_owned())),
-            },
+            Ok(about) if about.is_dir() && kind == FolderFileKind::Recording => {
+                match own_files(&path) {
+                    Some(_) => Ok(path),
+                    None => Err(ScanFolderError::NotABag(name.to_owned())),
+                }
+            }
             _ => Err(ScanFolderError::NotThere(name.to_owned())),
         }
     }
@@ -174,7 +196,8 @@ impl ScanFolder {
     /// The place of a plain file of that name, where there is one.
     pub fn plain_file(&self, name: &str) -> Option<PathBuf> {
         let path = self.path.join(name);
-        let is_there = is_plain_name(name) && fs::symlink_metadata(&path).is_ok_and(|about| about.is_file());
+        let is_there =
+            is_plain_name(name) && fs::symlink_metadata(&path).is_ok_and(|about| about.is_file());
         is_there.then_some(path)
     }
 
@@ -184,7 +207,9 @@ impl ScanFolder {
             1 => self.path.join(format!("{stem}.{extension}")),
             _ => self.path.join(format!("{stem}-{number}.{extension}")),
         };
-        let free = (1u32..).map(named).find(|path| fs::symlink_metadata(path).is_err());
+        let free = (1u32..)
+            .map(named)
+            .find(|path| fs::symlink_metadata(path).is_err());
         free.unwrap_or_else(|| self.path.join(format!("{stem}.{extension}")))
     }
 
@@ -196,7 +221,12 @@ impl ScanFolder {
     ///
     /// # Errors
     /// [`ScanFolderError`]
-    pub fn begin_upload(&self, name: &str, is_scan: bool, most: u64) -> Result<ScanUpload, ScanFolderError> {
+    pub fn begin_upload(
+        &self,
+        name: &str,
+        is_scan: bool,
+        most: u64,
+    ) -> Result<ScanUpload, ScanFolderError> {
         let name = cleaned(name, is_scan)?;
         remove_left(&self.path, UPLOAD_STEM);
         let prefix = format!("{UPLOAD_STEM}{}-", std::process::id());
@@ -205,7 +235,14 @@ impl ScanFolder {
             .suffix(".part")
             .make_in(&self.path, |path| File::create_new(path))?;
         let (file, temporary) = made.into_parts();
-        Ok(ScanUpload { folder: self.path.clone(), name, file, temporary, bytes: 0, most })
+        Ok(ScanUpload {
+            folder: self.path.clone(),
+            name,
+            file,
+            temporary,
+            bytes: 0,
+            most,
+        })
     }
 }
 
@@ -213,7 +250,9 @@ impl ScanFolder {
 fn bag_bytes(folder: &Path) -> Option<u64> {
     let (mut bytes, mut is_recording) = (0, false);
     for entry in fs::read_dir(folder).ok()?.flatten().take(MOST_LOOKED_AT) {
-        let Some(about) = entry.metadata().ok().filter(fs::Metadata::is_file) else { continue };
+        let Some(about) = entry.metadata().ok().filter(fs::Metadata::is_file) else {
+            continue;
+        };
         bytes += about.len();
         is_recording |= entry.file_name().to_str().is_some_and(is_of_recording);
     }
@@ -223,7 +262,9 @@ fn bag_bytes(folder: &Path) -> Option<u64> {
 /// A name as the folder has it.
 fn cleaned(name: &str, is_scan: bool) -> Result<String, ScanFolderError> {
     if !is_plain_name(name) || name.len() > LONGEST_NAME {
-        return Err(ScanFolderError::NotAPlainName(name.chars().take(LONGEST_NAME).collect()));
+        return Err(ScanFolderError::NotAPlainName(
+            name.chars().take(LONGEST_NAME).collect(),
+        ));
     }
     match FolderFileKind::of_name(name) {
         Some(kind) if (kind == FolderFileKind::Scan) == is_scan => {}
@@ -231,7 +272,10 @@ fn cleaned(name: &str, is_scan: bool) -> Result<String, ScanFolderError> {
         _ => return Err(ScanFolderError::NotARecording(name.to_owned())),
     }
     let is_plain = |c: char| c.is_alphanumeric() || "-_.()+ ".contains(c);
-    Ok(name.chars().map(|c| if is_plain(c) { c } else { '_' }).collect())
+    Ok(name
+        .chars()
+        .map(|c| if is_plain(c) { c } else { '_' })
+        .collect())
 }
 
 /// A file on its way; dropped before it is whole, nothing is left of it.
@@ -264,14 +308,26 @@ impl ScanUpload {
     /// # Errors
     /// [`ScanFolderError::System`]; nothing is left then.
     pub fn commit(self) -> Result<String, ScanFolderError> {
-        let Self { folder, name, file, mut temporary, .. } = self;
+        let Self {
+            folder,
+            name,
+            file,
+            mut temporary,
+            ..
+        } = self;
         file.sync_all()?;
         let (stem, extension) = name.rsplit_once('.').unwrap_or((&name, ""));
         for number in 1..=MOST_OF_A_NAME {
-            let free = if number == 1 { name.clone() } else { format!("{stem}-{number}.{extension}") };
+            let free = if number == 1 {
+                name.clone()
+            } else {
+                format!("{stem}-{number}.{extension}")
+            };
             match temporary.persist_noclobber(folder.join(&free)) {
                 Ok(()) => return Ok(free),
-                Err(taken) if taken.error.kind() == io::ErrorKind::AlreadyExists => temporary = taken.path,
+                Err(taken) if taken.error.kind() == io::ErrorKind::AlreadyExists => {
+                    temporary = taken.path
+                }
                 Err(other) => return Err(other.error.into()),
             }
         }
@@ -295,33 +351,76 @@ mod tests {
         let folder = ScanFolder::open(place.path()).unwrap();
         assert_eq!(uploaded(&folder, "part.ply", "one").unwrap(), "part.ply");
         assert_eq!(uploaded(&folder, "part.ply", "two").unwrap(), "part-2.ply");
-        assert_eq!(uploaded(&folder, "part.ply", "three").unwrap(), "part-3.ply");
-        assert!(matches!(uploaded(&folder, "part.ply", "eleven char").unwrap_err(), ScanFolderError::TooLarge(10)));
+        assert_eq!(
+            uploaded(&folder, "part.ply", "three").unwrap(),
+            "part-3.ply"
+        );
+        assert!(matches!(
+            uploaded(&folder, "part.ply", "eleven char").unwrap_err(),
+            ScanFolderError::TooLarge(10)
+        ));
         let mut upload = folder.begin_upload("other.stl", true, 10).unwrap();
         upload.add(b"half").unwrap();
         drop(upload);
-        let mut names: Vec<_> = fs::read_dir(place.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        let mut names: Vec<_> = fs::read_dir(place.path())
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name())
+            .collect();
         names.sort();
         assert_eq!(names, ["part-2.ply", "part-3.ply", "part.ply"]);
-        assert_eq!(fs::read_to_string(place.path().join("part.ply")).unwrap(), "one");
+        assert_eq!(
+            fs::read_to_string(place.path().join("part.ply")).unwrap(),
+            "one"
+        );
     }
 
     #[test]
     fn names_that_lead_elsewhere_or_are_no_scan_are_refused_and_odd_ones_are_cleaned() {
         let place = tempfile::tempdir().unwrap();
         let folder = ScanFolder::open(place.path()).unwrap();
-        for name in ["../part.ply", "/part.ply", "a/b.ply", "..", "", ".part.ply", "a\\b.ply", "a\nb.ply"] {
-            assert!(matches!(uploaded(&folder, name, "x").unwrap_err(), ScanFolderError::NotAPlainName(_)), "{name}");
+        for name in [
+            "../part.ply",
+            "/part.ply",
+            "a/b.ply",
+            "..",
+            "",
+            ".part.ply",
+            "a\\b.ply",
+            "a\nb.ply",
+        ] {
+            assert!(
+                matches!(
+                    uploaded(&folder, name, "x").unwrap_err(),
+                    ScanFolderError::NotAPlainName(_)
+                ),
+                "{name}"
+            );
         }
         for name in ["part", "part.exe", "scene.yaml", "touch.mcap"] {
-            assert!(matches!(uploaded(&folder, name, "x").unwrap_err(), ScanFolderError::NotAScan(_)), "{name}");
+            assert!(
+                matches!(
+                    uploaded(&folder, name, "x").unwrap_err(),
+                    ScanFolderError::NotAScan(_)
+                ),
+                "{name}"
+            );
         }
-        assert_eq!(uploaded(&folder, "Gehäuse 7 (neu)'$.STL", "x").unwrap(), "Gehäuse 7 (neu)__.STL");
-        let beside = |name| folder.begin_upload(name, false, 10).and_then(ScanUpload::commit);
+        assert_eq!(
+            uploaded(&folder, "Gehäuse 7 (neu)'$.STL", "x").unwrap(),
+            "Gehäuse 7 (neu)__.STL"
+        );
+        let beside = |name| {
+            folder
+                .begin_upload(name, false, 10)
+                .and_then(ScanUpload::commit)
+        };
         assert_eq!(beside("swing.mcap").unwrap(), "swing.mcap");
         assert_eq!(beside("points.csv").unwrap(), "points.csv");
         for name in ["part.ply", "scene.yaml", "swing"] {
-            assert!(matches!(beside(name).unwrap_err(), ScanFolderError::NotARecording(_)), "{name}");
+            assert!(
+                matches!(beside(name).unwrap_err(), ScanFolderError::NotARecording(_)),
+                "{name}"
+            );
         }
     }
 
@@ -332,7 +431,10 @@ mod tests {
         let is_known = |extension: &str| {
             let path = place.path().join(format!("part.{extension}"));
             fs::write(&path, "nothing of it").unwrap();
-            !matches!(read_mesh_or_points(&path, MeshUnit::Metre), Err(MeshFileError::UnknownFormat { .. }))
+            !matches!(
+                read_mesh_or_points(&path, MeshUnit::Metre),
+                Err(MeshFileError::UnknownFormat { .. })
+            )
         };
         assert!(SCAN_EXTENSIONS.iter().all(|extension| is_known(extension)));
         assert!(!is_known("md") && !is_known("yaml"));
@@ -347,11 +449,24 @@ mod tests {
         }
         fs::create_dir(place.path().join("folder.ply")).unwrap();
         std::os::unix::fs::symlink("/etc/hostname", place.path().join("link.ply")).unwrap();
-        let names = |kind| folder.list(kind).unwrap().into_iter().map(|file| file.name).collect::<Vec<_>>();
+        let names = |kind| {
+            folder
+                .list(kind)
+                .unwrap()
+                .into_iter()
+                .map(|file| file.name)
+                .collect::<Vec<_>>()
+        };
         assert_eq!(names(FolderFileKind::Scan), ["part.ply"]);
         assert_eq!(names(FolderFileKind::Recording), ["touch.mcap"]);
         assert!(folder.file("part.ply", FolderFileKind::Scan).is_ok());
-        for name in ["link.ply", "folder.ply", "touch.mcap", "none.ply", "../part.ply"] {
+        for name in [
+            "link.ply",
+            "folder.ply",
+            "touch.mcap",
+            "none.ply",
+            "../part.ply",
+        ] {
             assert!(folder.file(name, FolderFileKind::Scan).is_err(), "{name}");
         }
     }
@@ -365,34 +480,60 @@ mod tests {
             let bag = place.path().join(name);
             fs::create_dir(&bag).unwrap();
             fs::write(bag.join("bag_0.mcap"), "0123456789").unwrap();
-            let metadata = format!("rosbag2_bagfile_information:\n  relative_file_paths: [{listed}]\n");
+            let metadata =
+                format!("rosbag2_bagfile_information:\n  relative_file_paths: [{listed}]\n");
             fs::write(bag.join("metadata.yaml"), metadata).unwrap();
             bag
         };
         make("whole", "bag_0.mcap");
         // as early versions of rosbag2 name them
         make("early", "early/bag_0.mcap");
-        for (name, listed) in [("up", "../outside.mcap"), ("root", "/etc/hostname"), ("lost", "bag_1.mcap")] {
+        for (name, listed) in [
+            ("up", "../outside.mcap"),
+            ("root", "/etc/hostname"),
+            ("lost", "bag_1.mcap"),
+        ] {
             make(name, listed);
         }
         let linked = make("linked", "bag_1.mcap");
-        std::os::unix::fs::symlink(place.path().join("outside.mcap"), linked.join("bag_1.mcap")).unwrap();
+        std::os::unix::fs::symlink(place.path().join("outside.mcap"), linked.join("bag_1.mcap"))
+            .unwrap();
         fs::create_dir(place.path().join("photos")).unwrap();
         std::os::unix::fs::symlink(place.path().join("whole"), place.path().join("link")).unwrap();
         let mut found = folder.list(FolderFileKind::Recording).unwrap();
         found.sort_by(|a, b| a.name.cmp(&b.name));
         let names: Vec<_> = found.iter().map(|file| &*file.name).collect();
-        assert_eq!(names, ["early", "linked", "lost", "outside.mcap", "root", "up", "whole"]);
+        assert_eq!(
+            names,
+            [
+                "early",
+                "linked",
+                "lost",
+                "outside.mcap",
+                "root",
+                "up",
+                "whole"
+            ]
+        );
         assert!(found[6].bytes > 10);
         for name in ["whole", "early"] {
-            assert_eq!(folder.file(name, FolderFileKind::Recording).unwrap(), folder.path().join(name));
+            assert_eq!(
+                folder.file(name, FolderFileKind::Recording).unwrap(),
+                folder.path().join(name)
+            );
         }
         for name in ["up", "root", "lost", "linked"] {
             let refused = folder.file(name, FolderFileKind::Recording).unwrap_err();
-            assert!(matches!(refused, ScanFolderError::NotABag(_)), "{name}: {refused}");
+            assert!(
+                matches!(refused, ScanFolderError::NotABag(_)),
+                "{name}: {refused}"
+            );
         }
         for name in ["photos", "link", "."] {
-            assert!(folder.file(name, FolderFileKind::Recording).is_err(), "{name}");
+            assert!(
+                folder.file(name, FolderFileKind::Recording).is_err(),
+                "{name}"
+            );
         }
         assert!(folder.file("whole", FolderFileKind::Scan).is_err());
     }

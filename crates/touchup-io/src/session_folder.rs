@@ -13,7 +13,9 @@ const MOST_BYTES: u64 = 64 << 20;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PlaceError {
     /// Absolute, with folders in it, or none at all.
-    #[error("\"{0}\" is not the name of a file in the session's folder: give a plain name such as refined.ply")]
+    #[error(
+        "\"{0}\" is not the name of a file in the session's folder: give a plain name such as refined.ply"
+    )]
     NotAPlainName(String),
     /// There is something of that name that is no file, as a link.
     #[error("\"{0}\" is there and is no plain file: choose another name")]
@@ -39,7 +41,11 @@ impl SessionFolder {
         fs::create_dir_all(parent)?;
         let parent = fs::canonicalize(parent)?;
         for number in 1u32.. {
-            let name = if number == 1 { name.to_owned() } else { format!("{name}-{number}") };
+            let name = if number == 1 {
+                name.to_owned()
+            } else {
+                format!("{name}-{number}")
+            };
             let path = parent.join(&name);
             match fs::create_dir(&path) {
                 Ok(()) => return Ok(Self { path, name }),
@@ -58,9 +64,15 @@ impl SessionFolder {
         let path = parent.join(name);
         // a link may lead anywhere
         if !is_plain_name(name) || !fs::symlink_metadata(&path).is_ok_and(|there| there.is_dir()) {
-            return Err(io::Error::new(io::ErrorKind::NotFound, "there is no session of this name"));
+            return Err(io::Error::new(
+                io::ErrorKind::NotFound,
+                "there is no session of this name",
+            ));
         }
-        Ok(Self { path, name: name.to_owned() })
+        Ok(Self {
+            path,
+            name: name.to_owned(),
+        })
     }
 
     /// Where it is.
@@ -111,7 +123,10 @@ impl SessionFolder {
     /// # Errors
     /// Whatever the system reports.
     pub fn append_line(&self, name: &str, line: &str) -> io::Result<()> {
-        let mut file = OpenOptions::new().create(true).append(true).open(self.path.join(name))?;
+        let mut file = OpenOptions::new()
+            .create(true)
+            .append(true)
+            .open(self.path.join(name))?;
         file.write_all(format!("{line}\n").as_bytes())?;
         file.sync_data()
     }
@@ -140,16 +155,28 @@ impl HandedIn {
     /// Whatever the system reports, and names that could lead elsewhere.
     pub fn new(session: &SessionFolder, name: &str, most: u64) -> io::Result<Self> {
         if !is_plain_name(name) {
-            return Err(io::Error::new(io::ErrorKind::InvalidInput, PlaceError::NotAPlainName(name.to_owned())));
+            return Err(io::Error::new(
+                io::ErrorKind::InvalidInput,
+                PlaceError::NotAPlainName(name.to_owned()),
+            ));
         }
         for left in fs::read_dir(session.path())?.filter_map(Result::ok) {
-            if left.file_name().to_string_lossy().starts_with(HANDED_IN) && left.file_type()?.is_dir() {
+            if left.file_name().to_string_lossy().starts_with(HANDED_IN)
+                && left.file_type()?.is_dir()
+            {
                 fs::remove_dir_all(left.path())?;
             }
         }
-        let folder = tempfile::Builder::new().prefix(HANDED_IN).tempdir_in(session.path())?;
+        let folder = tempfile::Builder::new()
+            .prefix(HANDED_IN)
+            .tempdir_in(session.path())?;
         let path = folder.path().join(name);
-        Ok(Self { file: File::create_new(&path)?, path, room: most, _folder: folder })
+        Ok(Self {
+            file: File::create_new(&path)?,
+            path,
+            room: most,
+            _folder: folder,
+        })
     }
 
     /// Adds a piece.
@@ -158,7 +185,8 @@ impl HandedIn {
     /// Whatever the system reports; [`io::ErrorKind::FileTooLarge`] for more than it may have.
     pub fn add(&mut self, piece: &[u8]) -> io::Result<()> {
         let left = self.room.checked_sub(piece.len() as u64);
-        self.room = left.ok_or_else(|| io::Error::new(io::ErrorKind::FileTooLarge, "the file is too large"))?;
+        self.room = left
+            .ok_or_else(|| io::Error::new(io::ErrorKind::FileTooLarge, "the file is too large"))?;
         self.file.write_all(piece)
     }
 
@@ -191,14 +219,17 @@ pub fn list_sessions(parent: &Path) -> io::Result<Vec<ListedSession>> {
     for entry in fs::read_dir(parent)? {
         let entry = entry?;
         let name = entry.file_name().into_string().unwrap_or_default();
-        if still_there(entry.file_type())?.is_some_and(|kind| kind.is_dir()) && is_plain_name(&name) {
+        if still_there(entry.file_type())?.is_some_and(|kind| kind.is_dir()) && is_plain_name(&name)
+        {
             names.push(name);
         }
     }
     names.sort();
     names.reverse();
     names.truncate(MOST_LISTED);
-    let listed = names.into_iter().filter_map(|name| still_there(listed(parent, name)).transpose());
+    let listed = names
+        .into_iter()
+        .filter_map(|name| still_there(listed(parent, name)).transpose());
     listed.collect()
 }
 
@@ -211,11 +242,17 @@ fn still_there<T>(found: io::Result<T>) -> io::Result<Option<T>> {
 }
 
 fn listed(parent: &Path, name: String) -> io::Result<ListedSession> {
-    let mut session = ListedSession { name, bytes: 0, files: Vec::new() };
+    let mut session = ListedSession {
+        name,
+        bytes: 0,
+        files: Vec::new(),
+    };
     for entry in fs::read_dir(parent.join(&session.name))? {
         let entry = entry?;
         let file = entry.file_name().into_string().unwrap_or_default();
-        let Some(about) = still_there(entry.metadata())? else { continue };
+        let Some(about) = still_there(entry.metadata())? else {
+            continue;
+        };
         if about.is_file() && is_plain_name(&file) {
             session.bytes += about.len();
             session.files.push(file);
@@ -231,13 +268,19 @@ fn listed(parent: &Path, name: String) -> io::Result<ListedSession> {
 /// Whatever the system reports, and names that could lead elsewhere.
 pub fn open_file(parent: &Path, session: &str, file: &str) -> io::Result<(File, u64)> {
     if !is_plain_name(session) || !is_plain_name(file) {
-        return Err(io::Error::new(io::ErrorKind::NotFound, "this is not the name of a file of a session"));
+        return Err(io::Error::new(
+            io::ErrorKind::NotFound,
+            "this is not the name of a file of a session",
+        ));
     }
     let folder = parent.join(session);
     let path = folder.join(file);
     // a link may lead anywhere
     if !fs::symlink_metadata(&folder)?.is_dir() || !fs::symlink_metadata(&path)?.is_file() {
-        return Err(io::Error::new(io::ErrorKind::NotFound, "this is no plain file of a session"));
+        return Err(io::Error::new(
+            io::ErrorKind::NotFound,
+            "this is no plain file of a session",
+        ));
     }
     let opened = File::open(path)?;
     let length = opened.metadata()?.len();
@@ -249,7 +292,9 @@ pub(super) fn is_plain_name(name: &str) -> bool {
     let mut parts = Path::new(name).components();
     matches!((parts.next(), parts.next()), (Some(Component::Normal(part)), None) if part == name)
         && !name.starts_with('.')
-        && !name.chars().any(|c| c.is_control() || c == '\\' || c == '"')
+        && !name
+            .chars()
+            .any(|c| c.is_control() || c == '\\' || c == '"')
 }
 
 /// Writes a text file as a whole.
@@ -281,7 +326,11 @@ pub fn read_text(path: &Path) -> io::Result<String> {
 /// # Errors
 /// Whatever the system reports.
 pub fn fingerprint(path: &Path) -> io::Result<(PathBuf, u32)> {
-    let (mut file, mut crc, mut buffer) = (File::open(path)?, crc32fast::Hasher::new(), vec![0; 1 << 16]);
+    let (mut file, mut crc, mut buffer) = (
+        File::open(path)?,
+        crc32fast::Hasher::new(),
+        vec![0; 1 << 16],
+    );
     loop {
         match file.read(&mut buffer)? {
             0 => return Ok((fs::canonicalize(path)?, crc.finalize())),
@@ -301,9 +350,12 @@ mod tests {
     /// Two sessions, a link to elsewhere, a hidden folder, and a file that is no session.
     fn sessions() -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
-        for (name, file, text) in
-            [("one", "a.ply", "ply"), ("two", "b.json", "{}"), ("two", "a.ply", "ply\n"), (".hidden", "x", "x")]
-        {
+        for (name, file, text) in [
+            ("one", "a.ply", "ply"),
+            ("two", "b.json", "{}"),
+            ("two", "a.ply", "ply\n"),
+            (".hidden", "x", "x"),
+        ] {
             fs::create_dir_all(folder.path().join(name)).unwrap();
             write_text_file(&folder.path().join(name).join(file), text).unwrap();
         }
@@ -323,7 +375,13 @@ mod tests {
             bytes,
             files: files.iter().map(|&file| file.to_owned()).collect(),
         };
-        assert_eq!(listed, [session("two", 6, &["a.ply", "b.json"]), session("one", 3, &["a.ply"])]);
+        assert_eq!(
+            listed,
+            [
+                session("two", 6, &["a.ply", "b.json"]),
+                session("one", 3, &["a.ply"])
+            ]
+        );
     }
 
     #[test]
@@ -352,10 +410,17 @@ mod tests {
         assert!(!left.exists(), "what another one left is gone");
         file.add(b"abc").unwrap();
         file.add(b"de").unwrap();
-        assert_eq!(file.add(b"f").unwrap_err().kind(), io::ErrorKind::FileTooLarge);
+        assert_eq!(
+            file.add(b"f").unwrap_err().kind(),
+            io::ErrorKind::FileTooLarge
+        );
         assert_eq!(fs::read(file.path()).unwrap(), b"abcde");
         assert!(file.path().ends_with("part.stl") && file.path().starts_with(session.path()));
-        assert_eq!(list_sessions(folder.path()).unwrap()[0].files, ["a.ply", "b.json"], "nobody lists it");
+        assert_eq!(
+            list_sessions(folder.path()).unwrap()[0].files,
+            ["a.ply", "b.json"],
+            "nobody lists it"
+        );
         let path = file.path().to_owned();
         drop(file);
         assert!(!path.exists() && !path.parent().unwrap().exists());
@@ -367,8 +432,21 @@ mod tests {
     #[test]
     fn only_sessions_in_the_folder_are_opened() {
         let folder = sessions();
-        assert_eq!(SessionFolder::open(folder.path(), "one").unwrap().path(), folder.path().join("one"));
-        for name in ["linked", ".hidden", "..", "", "one/", "one/../two", "/etc", "notes.txt", "missing"] {
+        assert_eq!(
+            SessionFolder::open(folder.path(), "one").unwrap().path(),
+            folder.path().join("one")
+        );
+        for name in [
+            "linked",
+            ".hidden",
+            "..",
+            "",
+            "one/",
+            "one/../two",
+            "/etc",
+            "notes.txt",
+            "missing",
+        ] {
             assert!(SessionFolder::open(folder.path(), name).is_err(), "{name}");
         }
     }
@@ -395,7 +473,10 @@ mod tests {
             ("two", "a.ply\0"),
             ("missing", "a.ply"),
         ] {
-            assert!(open_file(folder.path(), session, file).is_err(), "{session}/{file}");
+            assert!(
+                open_file(folder.path(), session, file).is_err(),
+                "{session}/{file}"
+            );
         }
     }
 }

@@ -12,7 +12,9 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use super::table::{Row, TableError, read_table};
 use touchup_core::stylus::Wrench;
 
-const COLUMNS: [&str; 10] = ["qx", "qy", "qz", "qw", "fx_n", "fy_n", "fz_n", "tx_nm", "ty_nm", "tz_nm"];
+const COLUMNS: [&str; 10] = [
+    "qx", "qy", "qz", "qw", "fx_n", "fy_n", "fz_n", "tx_nm", "ty_nm", "tz_nm",
+];
 /// A quaternion may be off from 1 by this: components printed with three digits.
 const UNIT_TOLERANCE: f64 = 1e-2;
 
@@ -22,17 +24,31 @@ const UNIT_TOLERANCE: f64 = 1e-2;
 /// [`TableError`], with the line.
 pub fn read_static_poses(path: &Path) -> Result<Vec<(UnitQuaternion<f64>, Wrench)>, TableError> {
     let rows = read_table(path, &COLUMNS, &[])?;
-    let line = |row: Row| pose(&row).map_err(|why| TableError::Line { path: path.to_owned(), line: row.line, why });
+    let line = |row: Row| {
+        pose(&row).map_err(|why| TableError::Line {
+            path: path.to_owned(),
+            line: row.line,
+            why,
+        })
+    };
     rows.into_iter().map(line).collect()
 }
 
 fn pose(row: &Row) -> Result<(UnitQuaternion<f64>, Wrench), String> {
-    let [x, y, z, w, fx, fy, fz, tx, ty, tz] = row.numbers[..] else { return Err("a column is missing".to_owned()) };
+    let [x, y, z, w, fx, fy, fz, tx, ty, tz] = row.numbers[..] else {
+        return Err("a column is missing".to_owned());
+    };
     let quaternion = Quaternion::new(w, x, y, z);
     if (quaternion.norm() - 1.0).abs() > UNIT_TOLERANCE {
-        return Err(format!("qx, qy, qz, qw have length {:.3} and not 1: no orientation", quaternion.norm()));
+        return Err(format!(
+            "qx, qy, qz, qw have length {:.3} and not 1: no orientation",
+            quaternion.norm()
+        ));
     }
-    let wrench = Wrench { force: Vector3::new(fx, fy, fz), torque: Vector3::new(tx, ty, tz) };
+    let wrench = Wrench {
+        force: Vector3::new(fx, fy, fz),
+        torque: Vector3::new(tx, ty, tz),
+    };
     Ok((UnitQuaternion::from_quaternion(quaternion), wrench))
 }
 
@@ -51,7 +67,10 @@ impl StaticPoseLog {
     pub fn create(path: &Path) -> io::Result<Self> {
         let mut file = File::create(path)?;
         writeln!(file, "{}", COLUMNS.join(","))?;
-        Ok(Self { path: path.to_owned(), file })
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+        })
     }
 
     /// Appends a pose, which is on the disk when this returns.
@@ -72,7 +91,11 @@ impl StaticPoseLog {
 /// A static pose as a line of such a file, without its end.
 pub fn static_pose_line(rotation: &UnitQuaternion<f64>, wrench: &Wrench) -> String {
     // x, y, z, w
-    let numbers = rotation.coords.iter().chain(&wrench.force).chain(&wrench.torque);
+    let numbers = rotation
+        .coords
+        .iter()
+        .chain(&wrench.force)
+        .chain(&wrench.torque);
     numbers.map(f64::to_string).collect::<Vec<_>>().join(",")
 }
 
@@ -86,7 +109,10 @@ mod tests {
         let path = folder.path().join("segments.csv");
         let pose = |angle: f64| {
             let force = Vector3::new(0.1 / 3.0, -11.476_543_21, angle);
-            let wrench = Wrench { force, torque: force.cross(&Vector3::new(1e-3, 0.02, 0.3)) };
+            let wrench = Wrench {
+                force,
+                torque: force.cross(&Vector3::new(1e-3, 0.02, 0.3)),
+            };
             (UnitQuaternion::from_euler_angles(angle, 0.3, -1.2), wrench)
         };
         let mut log = StaticPoseLog::create(&path).unwrap();
@@ -98,7 +124,10 @@ mod tests {
         let read = read_static_poses(&path).unwrap();
         for ((rotation, wrench), expected) in read.iter().zip([0.1, 0.2].map(pose)) {
             // its length is made 1 again
-            assert!(rotation.angle_to(&expected.0) < 1e-15 && *wrench == expected.1, "{rotation} {wrench:?}");
+            assert!(
+                rotation.angle_to(&expected.0) < 1e-15 && *wrench == expected.1,
+                "{rotation} {wrench:?}"
+            );
         }
         assert_eq!(read.len(), 2);
     }

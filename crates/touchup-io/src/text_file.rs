@@ -10,7 +10,10 @@ use super::file_error::{FileError, read_file, write_file};
 pub fn read_text(path: &Path) -> Result<String, FileError> {
     let no_text = |error| {
         let source = std::io::Error::new(std::io::ErrorKind::InvalidData, error);
-        FileError::Read { path: path.to_owned(), source }
+        FileError::Read {
+            path: path.to_owned(),
+            source,
+        }
     };
     String::from_utf8(read_file(path)?).map_err(no_text)
 }

@@ -49,7 +49,10 @@ pub enum TouchesFileError {
 pub fn write_touches(path: &Path, touches: &[ProbedPoint]) -> Result<(), FileError> {
     write_file(path, |out| {
         writeln!(out, "{HEADER}")?;
-        touches.iter().enumerate().try_for_each(|(number, touch)| writeln!(out, "{}", line_of(touch, number)))
+        touches
+            .iter()
+            .enumerate()
+            .try_for_each(|(number, touch)| writeln!(out, "{}", line_of(touch, number)))
     })
 }
 
@@ -61,10 +64,23 @@ pub fn as_written(touches: &[ProbedPoint]) -> Vec<ProbedPoint> {
 }
 
 pub(crate) fn line_of(touch: &ProbedPoint, number: usize) -> String {
-    let ProbedPoint { stamp_ns, stroke, centre, radius, point, normal, sigma, calibration, place, weight, .. } = touch;
+    let ProbedPoint {
+        stamp_ns,
+        stroke,
+        centre,
+        radius,
+        point,
+        normal,
+        sigma,
+        calibration,
+        place,
+        weight,
+        ..
+    } = touch;
     let triple = |v: Vector3<f64>| format!("{:.6},{:.6},{:.6}", v.x, v.y, v.z);
     let [centre, point, normal] = [centre.coords * 1e3, point.coords * 1e3, *normal].map(triple);
-    let [radius, sigma, calibration, place] = [radius, sigma, calibration, place].map(|length| length * 1e3);
+    let [radius, sigma, calibration, place] =
+        [radius, sigma, calibration, place].map(|length| length * 1e3);
     let rejected = u8::from(touch.is_rejected);
     format!(
         "{number},{stamp_ns},{stroke},{centre},{radius},{point},{normal},{sigma:.6},{calibration:.6},{place:.6},{weight:.4},\
@@ -81,7 +97,10 @@ pub fn read_touches(path: &Path) -> Result<Vec<ProbedPoint>, TouchesFileError> {
 }
 
 /// Reads touches, and gives the line of each as it is in the file.
-pub(crate) fn read_lines(path: &Path, mut line_read: impl FnMut(&str)) -> Result<Vec<ProbedPoint>, TouchesFileError> {
+pub(crate) fn read_lines(
+    path: &Path,
+    mut line_read: impl FnMut(&str),
+) -> Result<Vec<ProbedPoint>, TouchesFileError> {
     let own = || path.to_owned();
     let text = read_file(path)?;
     let text = String::from_utf8_lossy(&text);
@@ -91,9 +110,16 @@ pub(crate) fn read_lines(path: &Path, mut line_read: impl FnMut(&str)) -> Result
         return Err(TouchesFileError::NoTouches { path: own() });
     }
     let mut touches = Vec::new();
-    for (at, line) in lines.enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+    for (at, line) in lines
+        .enumerate()
+        .filter(|(_, line)| !line.trim().is_empty())
+    {
         let touch = touch_of(line, touches.len()).and_then(|touch| in_order(&touches, touch));
-        touches.push(touch.map_err(|what| TouchesFileError::BadLine { path: own(), line: at + 2, what })?);
+        touches.push(touch.map_err(|what| TouchesFileError::BadLine {
+            path: own(),
+            line: at + 2,
+            what,
+        })?);
         line_read(line);
     }
     Ok(touches)
@@ -101,30 +127,53 @@ pub(crate) fn read_lines(path: &Path, mut line_read: impl FnMut(&str)) -> Result
 
 /// Touches come in order of time, and all within a span that ns can count.
 fn in_order(before: &[ProbedPoint], touch: ProbedPoint) -> Result<ProbedPoint, String> {
-    let (Some(first), Some(last)) = (before.first(), before.last()) else { return Ok(touch) };
-    let ProbedPoint { stamp_ns, stroke, .. } = touch;
+    let (Some(first), Some(last)) = (before.first(), before.last()) else {
+        return Ok(touch);
+    };
+    let ProbedPoint {
+        stamp_ns, stroke, ..
+    } = touch;
     if stamp_ns < last.stamp_ns || stroke < last.stroke {
         let (before_ns, before) = (last.stamp_ns, last.stroke);
         return Err(format!(
             "stamp_ns {stamp_ns}, stroke {stroke} after {before_ns}, {before}: touches are not in order of time"
         ));
     }
-    stamp_ns.checked_sub(first.stamp_ns).map(|_| touch).ok_or_else(|| "stamp_ns 292 years after the first".to_owned())
+    stamp_ns
+        .checked_sub(first.stamp_ns)
+        .map(|_| touch)
+        .ok_or_else(|| "stamp_ns 292 years after the first".to_owned())
 }
 
 fn touch_of(line: &str, number: usize) -> Result<ProbedPoint, String> {
-    let (names, fields): (Vec<_>, Vec<_>) = (HEADER.split(',').collect(), line.split(',').map(str::trim).collect());
+    let (names, fields): (Vec<_>, Vec<_>) = (
+        HEADER.split(',').collect(),
+        line.split(',').map(str::trim).collect(),
+    );
     if fields.len() != names.len() {
-        return Err(format!("{} fields, a touch has {}", fields.len(), names.len()));
+        return Err(format!(
+            "{} fields, a touch has {}",
+            fields.len(),
+            names.len()
+        ));
     }
     if fields[0].parse() != Ok(number) {
-        return Err(format!("touch {} where {number} comes: features name touches by number", fields[0]));
+        return Err(format!(
+            "touch {} where {number} comes: features name touches by number",
+            fields[0]
+        ));
     }
-    let integer =
-        |at: usize| fields[at].parse::<i64>().map_err(|_| format!("{} {:?} is no whole number", names[at], fields[at]));
+    let integer = |at: usize| {
+        fields[at]
+            .parse::<i64>()
+            .map_err(|_| format!("{} {:?} is no whole number", names[at], fields[at]))
+    };
     let real = |at: usize| match fields[at].parse::<f64>() {
         Ok(x) if x.is_finite() => Ok(x),
-        _ => Err(format!("{} {:?} is no finite number", names[at], fields[at])),
+        _ => Err(format!(
+            "{} {:?} is no finite number",
+            names[at], fields[at]
+        )),
     };
     let not_negative = |at: usize| match real(at)? {
         x if x >= 0.0 => Ok(x),
@@ -132,10 +181,13 @@ fn touch_of(line: &str, number: usize) -> Result<ProbedPoint, String> {
     };
     let triple = |at: usize| Ok::<_, String>(Vector3::new(real(at)?, real(at + 1)?, real(at + 2)?));
     let normal = triple(10)?;
-    let normal = normal.try_normalize(0.5).ok_or("the normal has no length")?;
+    let normal = normal
+        .try_normalize(0.5)
+        .ok_or("the normal has no length")?;
     Ok(ProbedPoint {
         stamp_ns: integer(1)?,
-        stroke: u32::try_from(integer(2)?).map_err(|_| format!("stroke {} is no number of a stroke", fields[2]))?,
+        stroke: u32::try_from(integer(2)?)
+            .map_err(|_| format!("stroke {} is no number of a stroke", fields[2]))?,
         centre: Point3::from(triple(3)? * 1e-3),
         radius: not_negative(6)? * 1e-3,
         point: Point3::from(triple(7)? * 1e-3),

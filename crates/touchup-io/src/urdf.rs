@@ -68,7 +68,9 @@ pub enum DescriptionError {
         known: String,
     },
     /// The flange is no part of what stands on the base.
-    #[error("from the link `{flange}` no joints lead down to the link `{base}`: they end at `{end}`")]
+    #[error(
+        "from the link `{flange}` no joints lead down to the link `{base}`: they end at `{end}`"
+    )]
     NotConnected {
         /// from where
         flange: String,
@@ -99,11 +101,23 @@ pub enum DescriptionError {
 pub fn read_urdf(path: &Path, links: &ArmLinks<'_>) -> Result<SerialChain, UrdfError> {
     let mut text = Vec::new();
     let read = File::open(path).and_then(|file| file.take(LARGEST + 1).read_to_end(&mut text));
-    read.map_err(|source| UrdfError::Read { path: path.to_owned(), source })?;
-    let text = String::from_utf8(text).ok().filter(|text| text.len() as u64 <= LARGEST);
-    let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let chain = text.ok_or(DescriptionError::NoText).and_then(|text| chain_of(&text, &name, links));
-    chain.map_err(|error| UrdfError::In { path: path.to_owned(), error })
+    read.map_err(|source| UrdfError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    let text = String::from_utf8(text)
+        .ok()
+        .filter(|text| text.len() as u64 <= LARGEST);
+    let name = path
+        .file_name()
+        .map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let chain = text
+        .ok_or(DescriptionError::NoText)
+        .and_then(|text| chain_of(&text, &name, links));
+    chain.map_err(|error| UrdfError::In {
+        path: path.to_owned(),
+        error,
+    })
 }
 
 /// The arm of a text.
@@ -112,15 +126,31 @@ pub fn read_urdf(path: &Path, links: &ArmLinks<'_>) -> Result<SerialChain, UrdfE
 fn chain_of(text: &str, name: &str, links: &ArmLinks<'_>) -> Result<SerialChain, DescriptionError> {
     let document = Document::parse(text)?;
     let robot = document.root_element();
-    if robot.namespaces().any(|space| space.uri().contains("xacro")) && text.contains("xacro:") {
+    if robot
+        .namespaces()
+        .any(|space| space.uri().contains("xacro"))
+        && text.contains("xacro:")
+    {
         return Err(DescriptionError::Xacro(name.to_owned()));
     }
     let named = |tag: &'static str| move |node: &Node<'_, '_>| node.has_tag_name(tag);
-    let link_of = |name: &str| robot.children().filter(named("link")).find(|link| link.attribute("name") == Some(name));
+    let link_of = |name: &str| {
+        robot
+            .children()
+            .filter(named("link"))
+            .find(|link| link.attribute("name") == Some(name))
+    };
     for name in [links.base, links.flange] {
         if link_of(name).is_none() {
-            let known: Vec<_> = robot.children().filter(named("link")).filter_map(|it| it.attribute("name")).collect();
-            return Err(DescriptionError::NoLink { name: name.to_owned(), known: known.join(", ") });
+            let known: Vec<_> = robot
+                .children()
+                .filter(named("link"))
+                .filter_map(|it| it.attribute("name"))
+                .collect();
+            return Err(DescriptionError::NoLink {
+                name: name.to_owned(),
+                known: known.join(", "),
+            });
         }
     }
     // from the flange down to the base
@@ -128,7 +158,11 @@ fn chain_of(text: &str, name: &str, links: &ArmLinks<'_>) -> Result<SerialChain,
     while at != links.base {
         let is_below = |joint: &Node<'_, '_>| linked(joint, "child") == Some(at);
         // a link is the child of one joint: who goes round in a circle has met all of them
-        let below = robot.children().filter(named("joint")).find(is_below).filter(|_| way.len() < MOST_JOINTS);
+        let below = robot
+            .children()
+            .filter(named("joint"))
+            .find(is_below)
+            .filter(|_| way.len() < MOST_JOINTS);
         let parent = below.and_then(|joint| Some((joint, linked(&joint, "parent")?)));
         let Some((joint, parent)) = parent else {
             let [flange, base, end] = [links.flange, links.base, at].map(str::to_owned);
@@ -138,12 +172,18 @@ fn chain_of(text: &str, name: &str, links: &ArmLinks<'_>) -> Result<SerialChain,
         at = parent;
     }
     let (mut joints, mut pose) = (Vec::new(), Isometry3::identity());
-    let mut chain_links = vec![ChainLink { name: links.base.into(), body: link_of(links.base).and_then(body) }];
+    let mut chain_links = vec![ChainLink {
+        name: links.base.into(),
+        body: link_of(links.base).and_then(body),
+    }];
     for (joint, child) in way.into_iter().rev() {
         pose *= origin(&joint)?;
         if let Some(turning) = turning(&joint, pose)? {
             joints.push(turning);
-            chain_links.push(ChainLink { name: child.into(), body: link_of(child).and_then(body) });
+            chain_links.push(ChainLink {
+                name: child.into(),
+                body: link_of(child).and_then(body),
+            });
             pose = Isometry3::identity();
         }
     }
@@ -163,28 +203,54 @@ fn part<'a, 'b>(node: &Node<'a, 'b>, tag: &str) -> Option<Node<'a, 'b>> {
 
 fn fault(joint: &Node<'_, '_>, what: impl Into<String>) -> DescriptionError {
     let line = joint.document().text_pos_at(joint.range().start).row;
-    DescriptionError::Joint { joint: joint.attribute("name").unwrap_or_default().to_owned(), line, what: what.into() }
+    DescriptionError::Joint {
+        joint: joint.attribute("name").unwrap_or_default().to_owned(),
+        line,
+        what: what.into(),
+    }
 }
 
 /// Numbers of an attribute; `None` where it is there and is something else.
-fn numbers<const N: usize>(node: Option<Node<'_, '_>>, key: &str, default: [f64; N]) -> Option<[f64; N]> {
-    let Some(text) = node.and_then(|node| node.attribute(key)) else { return Some(default) };
-    let parsed = text.split_whitespace().map(|word| word.parse().ok().filter(|x: &f64| x.is_finite()));
+fn numbers<const N: usize>(
+    node: Option<Node<'_, '_>>,
+    key: &str,
+    default: [f64; N],
+) -> Option<[f64; N]> {
+    let Some(text) = node.and_then(|node| node.attribute(key)) else {
+        return Some(default);
+    };
+    let parsed = text
+        .split_whitespace()
+        .map(|word| word.parse().ok().filter(|x: &f64| x.is_finite()));
     parsed.collect::<Option<Vec<f64>>>()?.try_into().ok()
 }
 
 fn pose_of(node: &Node<'_, '_>) -> Option<Isometry3<f64>> {
     let origin = part(node, "origin");
-    let ([x, y, z], [roll, pitch, yaw]) = (numbers(origin, "xyz", [0.0; 3])?, numbers(origin, "rpy", [0.0; 3])?);
-    Some(Isometry3::from_parts(Vector3::new(x, y, z).into(), UnitQuaternion::from_euler_angles(roll, pitch, yaw)))
+    let ([x, y, z], [roll, pitch, yaw]) = (
+        numbers(origin, "xyz", [0.0; 3])?,
+        numbers(origin, "rpy", [0.0; 3])?,
+    );
+    Some(Isometry3::from_parts(
+        Vector3::new(x, y, z).into(),
+        UnitQuaternion::from_euler_angles(roll, pitch, yaw),
+    ))
 }
 
 fn origin(joint: &Node<'_, '_>) -> Result<Isometry3<f64>, DescriptionError> {
-    pose_of(joint).ok_or_else(|| fault(joint, "its origin is not three numbers of xyz and three of rpy"))
+    pose_of(joint).ok_or_else(|| {
+        fault(
+            joint,
+            "its origin is not three numbers of xyz and three of rpy",
+        )
+    })
 }
 
 /// A joint that turns; `None` for a fixed one.
-fn turning(joint: &Node<'_, '_>, origin: Isometry3<f64>) -> Result<Option<ChainJoint>, DescriptionError> {
+fn turning(
+    joint: &Node<'_, '_>,
+    origin: Isometry3<f64>,
+) -> Result<Option<ChainJoint>, DescriptionError> {
     let kind = joint.attribute("type").unwrap_or_default();
     let range = match kind {
         "fixed" => return Ok(None),
@@ -194,7 +260,12 @@ fn turning(joint: &Node<'_, '_>, origin: Isometry3<f64>) -> Result<Option<ChainJ
             let [low, high] = ["lower", "upper"].map(|key| numbers(limit, key, [f64::NAN]));
             match (low, high) {
                 (Some([low]), Some([high])) if low < high => Some([low, high]),
-                _ => return Err(fault(joint, "it is revolute and has no limit with lower below upper, in rad")),
+                _ => {
+                    return Err(fault(
+                        joint,
+                        "it is revolute and has no limit with lower below upper, in rad",
+                    ));
+                }
             }
         }
         other => {
@@ -205,21 +276,35 @@ fn turning(joint: &Node<'_, '_>, origin: Isometry3<f64>) -> Result<Option<ChainJ
         }
     };
     if part(joint, "mimic").is_some() {
-        return Err(fault(joint, "it mimics another: each joint of the arm has to be its own"));
+        return Err(fault(
+            joint,
+            "it mimics another: each joint of the arm has to be its own",
+        ));
     }
     let axis = numbers(part(joint, "axis"), "xyz", [1.0, 0.0, 0.0]).map(Vector3::from);
     let axis = axis
         .and_then(|axis| UnitVector3::try_new(axis, 1e-6))
         .ok_or_else(|| fault(joint, "its axis is no direction"))?;
     let name: Arc<str> = joint.attribute("name").unwrap_or_default().into();
-    Ok(Some(ChainJoint { name, origin, axis, range }))
+    Ok(Some(ChainJoint {
+        name,
+        origin,
+        axis,
+        range,
+    }))
 }
 
 /// The capsule around the shape that a link collides with, in its frame, where it has a single one that is no mesh.
 fn body(link: Node<'_, '_>) -> Option<Capsule> {
-    let mut shapes = link.children().filter(|child| child.has_tag_name("collision"));
-    let (shape, None) = (shapes.next()?, shapes.next()) else { return None };
-    let geometry = part(&shape, "geometry")?.children().find(Node::is_element)?;
+    let mut shapes = link
+        .children()
+        .filter(|child| child.has_tag_name("collision"));
+    let (shape, None) = (shapes.next()?, shapes.next()) else {
+        return None;
+    };
+    let geometry = part(&shape, "geometry")?
+        .children()
+        .find(Node::is_element)?;
     let number = |key| numbers(Some(geometry), key, [f64::NAN]).map(|[number]| number);
     let (half, radius) = match geometry.tag_name().name() {
         "sphere" => (Vector3::zeros(), number("radius")?),
@@ -233,8 +318,14 @@ fn body(link: Node<'_, '_>) -> Option<Capsule> {
         }
         _ => return None,
     };
-    let (pose, is_shape) = (pose_of(&shape)?, half.iter().all(|x| x.is_finite()) && radius > 0.0);
-    is_shape.then(|| Capsule { ends: [-half, half].map(|end| pose * Point3::from(end)), radius })
+    let (pose, is_shape) = (
+        pose_of(&shape)?,
+        half.iter().all(|x| x.is_finite()) && radius > 0.0,
+    );
+    is_shape.then(|| Capsule {
+        ends: [-half, half].map(|end| pose * Point3::from(end)),
+        radius,
+    })
 }
 
 #[cfg(test)]
@@ -262,7 +353,11 @@ mod tests {
           <axis xyz="0 0 1"/></joint>
         <joint name="flange" type="fixed"><parent link="l6"/><child link="tool0"/></joint>
       </robot>"#;
-    const LINKS: ArmLinks<'_> = ArmLinks { base: "base_link", flange: "tool0", radius: 0.05 };
+    const LINKS: ArmLinks<'_> = ArmLinks {
+        base: "base_link",
+        flange: "tool0",
+        radius: 0.05,
+    };
 
     fn error_of(text: &str, links: &ArmLinks<'_>) -> String {
         chain_of(text, "arm.xacro", links).unwrap_err().to_string()
@@ -276,9 +371,13 @@ mod tests {
         assert_eq!(names, ["pan", "lift", "elbow", "w1", "w2", "w3"]);
         assert_eq!(chain.joints()[2].range, Some([-3.1, 3.1]));
         assert_eq!(chain.joints()[5].range, None);
-        for joints in [[0.0; 6], [0.3, -1.2, 1.4, -0.9, 1.1, 0.4], [-2.0, 0.4, -1.1, 2.2, -0.7, 3.0]] {
-            let difference =
-                chain.flange(&joints.into()).to_homogeneous() - UrGeometry::UR5E.flange(&joints).to_homogeneous();
+        for joints in [
+            [0.0; 6],
+            [0.3, -1.2, 1.4, -0.9, 1.1, 0.4],
+            [-2.0, 0.4, -1.1, 2.2, -0.7, 3.0],
+        ] {
+            let difference = chain.flange(&joints.into()).to_homogeneous()
+                - UrGeometry::UR5E.flange(&joints).to_homogeneous();
             assert!(difference.norm() < 1e-12, "{joints:?}: {difference}");
         }
     }
@@ -287,33 +386,71 @@ mod tests {
     fn a_link_with_one_simple_shape_has_its_body_and_others_lie_between_their_joints() {
         let document = Document::parse(UR5E).unwrap();
         let link = |name| {
-            document.descendants().find(|node| node.has_tag_name("link") && node.attribute("name") == Some(name))
+            document
+                .descendants()
+                .find(|node| node.has_tag_name("link") && node.attribute("name") == Some(name))
         };
         let body = body(link("l2").unwrap()).unwrap();
         // a cylinder of 400 mm along −x, 138 mm beside the shoulder
         let [a, b] = body.ends.map(|end| end.coords);
         assert!(
-            (a - Vector3::new(-0.4, 0.0, 0.138)).norm() < 1e-12 && (b - Vector3::new(0.0, 0.0, 0.138)).norm() < 1e-12
+            (a - Vector3::new(-0.4, 0.0, 0.138)).norm() < 1e-12
+                && (b - Vector3::new(0.0, 0.0, 0.138)).norm() < 1e-12
         );
         assert_eq!(body.radius, 0.06);
         assert!(super::body(link("l3").unwrap()).is_none());
         let boxed = r#"<link name="a"><collision><geometry><box size="0.03 0.04 0.2"/></geometry></collision></link>"#;
         let boxed = super::body(Document::parse(boxed).unwrap().root_element()).unwrap();
-        assert!((boxed.radius - 0.025).abs() < 1e-15 && boxed.ends[1] == Point3::new(0.0, 0.0, 0.1));
+        assert!(
+            (boxed.radius - 0.025).abs() < 1e-15 && boxed.ends[1] == Point3::new(0.0, 0.0, 0.1)
+        );
     }
 
     #[test]
     fn what_is_no_arm_is_refused_with_name_and_line() {
         let wrong = |from: &str, to: &str| error_of(&UR5E.replacen(from, to, 1), &LINKS);
-        let prismatic = wrong(r#"name="elbow" type="revolute""#, r#"name="elbow" type="prismatic""#);
-        assert!(prismatic.starts_with("joint `elbow`, line 10: it is of type `prismatic`"), "{prismatic}");
-        assert!(wrong(r#"lower="-3.1""#, "").contains("joint `elbow`, line 10: it is revolute and has no limit"));
-        assert!(wrong(r#"<axis xyz="0 0 2"/>"#, r#"<axis xyz="0 0"/>"#).contains("joint `lift`, line 8: its axis"));
-        assert!(wrong(r#"<parent link="l3"/>"#, r#"<parent link="nowhere"/>"#).contains("they end at `nowhere`"));
-        assert!(wrong(r#"<parent link="base"/>"#, r#"<parent link="tool0"/>"#).contains("no joints lead down"));
-        let none = error_of(UR5E, &ArmLinks { flange: "flange", ..LINKS });
-        assert!(none.starts_with("there is no link `flange`; there are base_link, base, l1"), "{none}");
-        let short = error_of(UR5E, &ArmLinks { flange: "l4", ..LINKS });
+        let prismatic = wrong(
+            r#"name="elbow" type="revolute""#,
+            r#"name="elbow" type="prismatic""#,
+        );
+        assert!(
+            prismatic.starts_with("joint `elbow`, line 10: it is of type `prismatic`"),
+            "{prismatic}"
+        );
+        assert!(
+            wrong(r#"lower="-3.1""#, "")
+                .contains("joint `elbow`, line 10: it is revolute and has no limit")
+        );
+        assert!(
+            wrong(r#"<axis xyz="0 0 2"/>"#, r#"<axis xyz="0 0"/>"#)
+                .contains("joint `lift`, line 8: its axis")
+        );
+        assert!(
+            wrong(r#"<parent link="l3"/>"#, r#"<parent link="nowhere"/>"#)
+                .contains("they end at `nowhere`")
+        );
+        assert!(
+            wrong(r#"<parent link="base"/>"#, r#"<parent link="tool0"/>"#)
+                .contains("no joints lead down")
+        );
+        let none = error_of(
+            UR5E,
+            &ArmLinks {
+                flange: "flange",
+                ..LINKS
+            },
+        );
+        assert!(
+            none.starts_with("there is no link `flange`; there are base_link, base, l1"),
+            "{none}"
+        );
+        let short = error_of(
+            UR5E,
+            &ArmLinks {
+                flange: "l4",
+                ..LINKS
+            },
+        );
         assert!(short.starts_with("the arm has 4 turning joints"), "{short}");
         let macros = r#"<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:include filename="a"/></robot>"#;
         assert!(error_of(macros, &LINKS).contains("`xacro arm.xacro > arm.urdf`"));

@@ -4,13 +4,17 @@ use std::borrow::Cow;
 
 use nalgebra::{Isometry3, Point3, Quaternion, Vector3};
 use numpy::ndarray::ArrayView2;
-use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{
+    Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
+    PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use touchup::cli::CliError;
 use touchup_core::mesh::{TriMesh, VertexId};
 use touchup_core::stylus::{
-    Message, ProbedPoint, Sample, SampleError, StampedPose, StampedWrench, Wrench, WrenchFrame, measured_rotation,
+    Message, ProbedPoint, Sample, SampleError, StampedPose, StampedWrench, Wrench, WrenchFrame,
+    measured_rotation,
 };
 
 use crate::failure::usage;
@@ -18,9 +22,17 @@ use crate::failure::usage;
 /// Vertices, V × 3, m, and faces, F × 3.
 pub type MeshArrays<'py> = (PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, u32>);
 /// Stamps, N, ns; positions, N × 3, m; orientations, N × 4, x y z w.
-pub type PoseArrays<'py> = (PyReadonlyArray1<'py, i64>, PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, f64>);
+pub type PoseArrays<'py> = (
+    PyReadonlyArray1<'py, i64>,
+    PyReadonlyArray2<'py, f64>,
+    PyReadonlyArray2<'py, f64>,
+);
 /// Stamps, M, ns; forces, M × 3, N; torques, M × 3, N·m.
-pub type WrenchArrays<'py> = (PyReadonlyArray1<'py, i64>, PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, f64>);
+pub type WrenchArrays<'py> = (
+    PyReadonlyArray1<'py, i64>,
+    PyReadonlyArray2<'py, f64>,
+    PyReadonlyArray2<'py, f64>,
+);
 /// Vertices and faces as they are worked on.
 pub type MeshVecs = (Vec<Point3<f64>>, Vec<[u32; 3]>);
 
@@ -35,14 +47,19 @@ pub fn rows<'a, const N: usize, T: Element + Copy + Default>(
     let view: ArrayView2<'_, T> = array.as_array();
     if view.ncols() != N {
         let [rows, columns] = [view.nrows(), view.ncols()];
-        return Err(usage(format!("{name} is an array of shape ({rows}, {columns}); it must be (N, {N})")));
+        return Err(usage(format!(
+            "{name} is an array of shape ({rows}, {columns}); it must be (N, {N})"
+        )));
     }
     if let Ok(numbers) = array.as_slice() {
         return Ok(Cow::Borrowed(numbers.as_chunks().0));
     }
     let row = |row: numpy::ndarray::ArrayView1<'_, T>| {
         let mut values = [T::default(); N];
-        values.iter_mut().zip(row).for_each(|(to, from)| *to = *from);
+        values
+            .iter_mut()
+            .zip(row)
+            .for_each(|(to, from)| *to = *from);
         values
     };
     Ok(Cow::Owned(view.rows().into_iter().map(row).collect()))
@@ -55,9 +72,10 @@ pub fn rows<'a, const N: usize, T: Element + Copy + Default>(
 pub fn of_equal_length(first: (&str, usize), others: &[(&str, usize)]) -> Result<(), CliError> {
     match others.iter().find(|(_, length)| *length != first.1) {
         None => Ok(()),
-        Some((name, length)) => {
-            Err(usage(format!("{name} has {length} rows and {} has {}: they must have as many", first.0, first.1)))
-        }
+        Some((name, length)) => Err(usage(format!(
+            "{name} has {length} rows and {} has {}: they must have as many",
+            first.0, first.1
+        ))),
     }
 }
 
@@ -68,7 +86,10 @@ pub fn of_equal_length(first: (&str, usize), others: &[(&str, usize)]) -> Result
 pub fn mesh_vecs((vertices, faces): &MeshArrays<'_>, name: &str) -> Result<MeshVecs, CliError> {
     let vertices = rows::<3, f64>(vertices, &format!("vertices of {name}"))?;
     let faces = rows::<3, u32>(faces, &format!("faces of {name}"))?;
-    Ok((vertices.iter().copied().map(Point3::from).collect(), faces.into_owned()))
+    Ok((
+        vertices.iter().copied().map(Point3::from).collect(),
+        faces.into_owned(),
+    ))
 }
 
 /// A mesh as it is, without repair, so that vertices keep their numbers.
@@ -100,13 +121,25 @@ impl Compact {
         for vertex in mesh.faces().flat_map(|(_, corners)| corners) {
             numbers[vertex.0 as usize] = 0;
         }
-        let slots: Vec<usize> = (0..numbers.len()).filter(|&slot| numbers[slot] != UNUSED).collect();
+        let slots: Vec<usize> = (0..numbers.len())
+            .filter(|&slot| numbers[slot] != UNUSED)
+            .collect();
         for (number, &slot) in (0..).zip(&slots) {
             numbers[slot] = number;
         }
-        let vertices = slots.iter().map(|&slot| mesh.position(VertexId(slot as u32)).coords.into()).collect();
-        let faces = mesh.faces().map(|(_, corners)| corners.map(|vertex| numbers[vertex.0 as usize])).collect();
-        Self { vertices, faces, slots }
+        let vertices = slots
+            .iter()
+            .map(|&slot| mesh.position(VertexId(slot as u32)).coords.into())
+            .collect();
+        let faces = mesh
+            .faces()
+            .map(|(_, corners)| corners.map(|vertex| numbers[vertex.0 as usize]))
+            .collect();
+        Self {
+            vertices,
+            faces,
+            slots,
+        }
     }
 
     /// A number of each vertex out of one of each slot; nothing of nothing.
@@ -128,7 +161,10 @@ impl Compact {
 ///
 /// # Errors
 /// Those of NumPy.
-pub fn matrix<const N: usize, T: Element>(py: Python<'_>, rows: Vec<[T; N]>) -> PyResult<Bound<'_, PyArray2<T>>> {
+pub fn matrix<const N: usize, T: Element>(
+    py: Python<'_>,
+    rows: Vec<[T; N]>,
+) -> PyResult<Bound<'_, PyArray2<T>>> {
     let count = rows.len();
     PyArray1::from_vec(py, rows.into_flattened()).reshape([count, N])
 }
@@ -137,7 +173,10 @@ pub fn matrix<const N: usize, T: Element>(py: Python<'_>, rows: Vec<[T; N]>) -> 
 #[inline]
 pub fn pose(position: [f64; 3], [x, y, z, w]: [f64; 4]) -> Option<Isometry3<f64>> {
     let rotation = measured_rotation(Quaternion::new(w, x, y, z))?;
-    Some(Isometry3::from_parts(Vector3::from(position).into(), rotation))
+    Some(Isometry3::from_parts(
+        Vector3::from(position).into(),
+        rotation,
+    ))
 }
 
 /// A sample of numbers.
@@ -152,14 +191,24 @@ pub fn sample(
     [force, torque]: [[f64; 3]; 2],
 ) -> Result<Sample, SampleError> {
     let pose_ot = pose(position, xyzw).ok_or_else(|| no_rotation(stamp_ns, xyzw))?;
-    Ok(Sample { stamp_ns, pose_ot, wrench: Wrench { force: force.into(), torque: torque.into() } })
+    Ok(Sample {
+        stamp_ns,
+        pose_ot,
+        wrench: Wrench {
+            force: force.into(),
+            torque: torque.into(),
+        },
+    })
 }
 
 #[cold]
 fn no_rotation(stamp_ns: i64, xyzw: [f64; 4]) -> SampleError {
     match xyzw.iter().map(|x| x * x).sum::<f64>().sqrt() {
         norm if norm.is_finite() => SampleError::NotARotation { norm, stamp_ns },
-        _ => SampleError::NotFinite { what: "orientation", stamp_ns },
+        _ => SampleError::NotFinite {
+            what: "orientation",
+            stamp_ns,
+        },
     }
 }
 
@@ -167,21 +216,42 @@ fn no_rotation(stamp_ns: i64, xyzw: [f64; 4]) -> SampleError {
 ///
 /// # Errors
 /// For another shape, and for what is no rotation.
-pub fn messages(poses: &PoseArrays<'_>, wrenches: &WrenchArrays<'_>) -> Result<Vec<Message>, CliError> {
+pub fn messages(
+    poses: &PoseArrays<'_>,
+    wrenches: &WrenchArrays<'_>,
+) -> Result<Vec<Message>, CliError> {
     let positions = rows::<3, f64>(&poses.1, "position")?;
     let orientations = rows::<4, f64>(&poses.2, "orientation_xyzw")?;
-    let (forces, torques) = (rows::<3, f64>(&wrenches.1, "force")?, rows::<3, f64>(&wrenches.2, "torque")?);
-    let given = [("position", positions.len()), ("orientation_xyzw", orientations.len())];
+    let (forces, torques) = (
+        rows::<3, f64>(&wrenches.1, "force")?,
+        rows::<3, f64>(&wrenches.2, "torque")?,
+    );
+    let given = [
+        ("position", positions.len()),
+        ("orientation_xyzw", orientations.len()),
+    ];
     of_equal_length(("pose_stamp_ns", poses.0.len()), &given)?;
-    of_equal_length(("wrench_stamp_ns", wrenches.0.len()), &[("force", forces.len()), ("torque", torques.len())])?;
+    of_equal_length(
+        ("wrench_stamp_ns", wrenches.0.len()),
+        &[("force", forces.len()), ("torque", torques.len())],
+    )?;
     let mut all = Vec::with_capacity(positions.len() + forces.len());
-    for ((&stamp_ns, position), xyzw) in poses.0.as_array().iter().zip(&*positions).zip(&*orientations) {
-        let pose_ot =
-            pose(*position, *xyzw).ok_or_else(|| recording_error(no_rotation(stamp_ns, *xyzw), "pose", all.len()))?;
+    for ((&stamp_ns, position), xyzw) in poses
+        .0
+        .as_array()
+        .iter()
+        .zip(&*positions)
+        .zip(&*orientations)
+    {
+        let pose_ot = pose(*position, *xyzw)
+            .ok_or_else(|| recording_error(no_rotation(stamp_ns, *xyzw), "pose", all.len()))?;
         all.push(Message::Pose(StampedPose { stamp_ns, pose_ot }));
     }
     for ((&stamp_ns, force), torque) in wrenches.0.as_array().iter().zip(&*forces).zip(&*torques) {
-        let wrench = Wrench { force: (*force).into(), torque: (*torque).into() };
+        let wrench = Wrench {
+            force: (*force).into(),
+            torque: (*torque).into(),
+        };
         all.push(Message::Wrench(StampedWrench { stamp_ns, wrench }));
     }
     // stable: of one stamp the pose stays first
@@ -190,7 +260,12 @@ pub fn messages(poses: &PoseArrays<'_>, wrenches: &WrenchArrays<'_>) -> Result<V
 }
 
 fn recording_error(error: SampleError, what: &str, row: usize) -> CliError {
-    CliError { kind: "recording", message: format!("{what} {row}: {error}"), hint: None, exit_code: 3 }
+    CliError {
+        kind: "recording",
+        message: format!("{what} {row}: {error}"),
+        hint: None,
+        exit_code: 3,
+    }
 }
 
 /// In which axes wrenches are.
@@ -201,7 +276,9 @@ pub fn wrench_frame(name: &str) -> Result<WrenchFrame, CliError> {
     match name {
         "sensor" => Ok(WrenchFrame::Sensor),
         "object" => Ok(WrenchFrame::Object),
-        other => Err(usage(format!("wrench_frame {other:?} must be \"sensor\" or \"object\""))),
+        other => Err(usage(format!(
+            "wrench_frame {other:?} must be \"sensor\" or \"object\""
+        ))),
     }
 }
 
@@ -209,7 +286,11 @@ pub fn wrench_frame(name: &str) -> Result<WrenchFrame, CliError> {
 ///
 /// # Errors
 /// Those of NumPy.
-pub fn messages_into(messages: &[Message], frame: WrenchFrame, into: &Bound<'_, PyDict>) -> PyResult<()> {
+pub fn messages_into(
+    messages: &[Message],
+    frame: WrenchFrame,
+    into: &Bound<'_, PyDict>,
+) -> PyResult<()> {
     let py = into.py();
     let (mut poses, mut wrenches) = (Vec::new(), Vec::new());
     for message in messages {
@@ -220,14 +301,42 @@ pub fn messages_into(messages: &[Message], frame: WrenchFrame, into: &Bound<'_, 
     }
     let place = |pose: &&StampedPose| -> [f64; 3] { pose.pose_ot.translation.vector.into() };
     let turn = |pose: &&StampedPose| -> [f64; 4] { pose.pose_ot.rotation.coords.into() };
-    into.set_item("pose_stamp_ns", PyArray1::from_iter(py, poses.iter().map(|pose| pose.stamp_ns)))?;
-    into.set_item("position", matrix::<3, f64>(py, poses.iter().map(place).collect())?)?;
-    into.set_item("orientation_xyzw", matrix::<4, f64>(py, poses.iter().map(turn).collect())?)?;
-    into.set_item("wrench_stamp_ns", PyArray1::from_iter(py, wrenches.iter().map(|wrench| wrench.stamp_ns)))?;
-    for (name, vector) in [("force", (|of| of.force) as fn(Wrench) -> Vector3<f64>), ("torque", |of| of.torque)] {
-        into.set_item(name, matrix::<3, f64>(py, wrenches.iter().map(|of| vector(of.wrench).into()).collect())?)?;
+    into.set_item(
+        "pose_stamp_ns",
+        PyArray1::from_iter(py, poses.iter().map(|pose| pose.stamp_ns)),
+    )?;
+    into.set_item(
+        "position",
+        matrix::<3, f64>(py, poses.iter().map(place).collect())?,
+    )?;
+    into.set_item(
+        "orientation_xyzw",
+        matrix::<4, f64>(py, poses.iter().map(turn).collect())?,
+    )?;
+    into.set_item(
+        "wrench_stamp_ns",
+        PyArray1::from_iter(py, wrenches.iter().map(|wrench| wrench.stamp_ns)),
+    )?;
+    for (name, vector) in [
+        ("force", (|of| of.force) as fn(Wrench) -> Vector3<f64>),
+        ("torque", |of| of.torque),
+    ] {
+        into.set_item(
+            name,
+            matrix::<3, f64>(
+                py,
+                wrenches.iter().map(|of| vector(of.wrench).into()).collect(),
+            )?,
+        )?;
     }
-    into.set_item("wrench_frame", if frame == WrenchFrame::Object { "object" } else { "sensor" })
+    into.set_item(
+        "wrench_frame",
+        if frame == WrenchFrame::Object {
+            "object"
+        } else {
+            "sensor"
+        },
+    )
 }
 
 /// What an array has of each touch, by its name.
@@ -237,10 +346,19 @@ type Column<T> = (&'static str, fn(&ProbedPoint) -> T);
 ///
 /// # Errors
 /// Those of NumPy.
-pub fn touches_array<'py>(py: Python<'py>, touches: &[ProbedPoint]) -> PyResult<Bound<'py, PyDict>> {
+pub fn touches_array<'py>(
+    py: Python<'py>,
+    touches: &[ProbedPoint],
+) -> PyResult<Bound<'py, PyDict>> {
     let into = PyDict::new(py);
-    into.set_item("stamp_ns", PyArray1::from_iter(py, touches.iter().map(|touch| touch.stamp_ns)))?;
-    into.set_item("stroke", PyArray1::from_iter(py, touches.iter().map(|touch| touch.stroke)))?;
+    into.set_item(
+        "stamp_ns",
+        PyArray1::from_iter(py, touches.iter().map(|touch| touch.stamp_ns)),
+    )?;
+    into.set_item(
+        "stroke",
+        PyArray1::from_iter(py, touches.iter().map(|touch| touch.stroke)),
+    )?;
     let triples: [Column<[f64; 3]>; 3] = [
         ("centre", |touch| touch.centre.coords.into()),
         ("point", |touch| touch.point.coords.into()),
@@ -259,7 +377,10 @@ pub fn touches_array<'py>(py: Python<'py>, touches: &[ProbedPoint]) -> PyResult<
     for (name, number) in numbers {
         into.set_item(name, PyArray1::from_iter(py, touches.iter().map(number)))?;
     }
-    into.set_item("is_rejected", PyArray1::from_iter(py, touches.iter().map(|touch| touch.is_rejected)))?;
+    into.set_item(
+        "is_rejected",
+        PyArray1::from_iter(py, touches.iter().map(|touch| touch.is_rejected)),
+    )?;
     Ok(into)
 }
 
@@ -268,7 +389,10 @@ pub fn touches_array<'py>(py: Python<'py>, touches: &[ProbedPoint]) -> PyResult<
 /// # Errors
 /// Where an array is missing, or of another type or shape.
 pub fn touches_of(from: &Bound<'_, PyDict>) -> PyResult<Result<Vec<ProbedPoint>, CliError>> {
-    let item = |name: &str| from.get_item(name)?.ok_or_else(|| pyo3::exceptions::PyKeyError::new_err(name.to_owned()));
+    let item = |name: &str| {
+        from.get_item(name)?
+            .ok_or_else(|| pyo3::exceptions::PyKeyError::new_err(name.to_owned()))
+    };
     let stamps: PyReadonlyArray1<'_, i64> = item("stamp_ns")?.extract()?;
     let strokes: PyReadonlyArray1<'_, u32> = item("stroke")?.extract()?;
     let rejected: PyReadonlyArray1<'_, bool> = item("is_rejected")?.extract()?;
@@ -284,8 +408,13 @@ pub fn touches_of(from: &Bound<'_, PyDict>) -> PyResult<Result<Vec<ProbedPoint>,
         let array: PyReadonlyArray1<'_, f64> = item(name)?.extract()?;
         Ok::<Vec<f64>, PyErr>(array.as_array().to_vec())
     };
-    let [radius, sigma, calibration, place, weight] =
-        [column("radius")?, column("sigma")?, column("calibration_sigma")?, column("place_sigma")?, column("weight")?];
+    let [radius, sigma, calibration, place, weight] = [
+        column("radius")?,
+        column("sigma")?,
+        column("calibration_sigma")?,
+        column("place_sigma")?,
+        column("weight")?,
+    ];
     let lengths = [
         ("stroke", strokes.len()),
         ("is_rejected", rejected.len()),
@@ -321,5 +450,6 @@ pub fn touches_of(from: &Bound<'_, PyDict>) -> PyResult<Result<Vec<ProbedPoint>,
 /// A value of JSON as its text; the package reads it.
 pub fn json(value: &impl serde::Serialize) -> Result<String, CliError> {
     // what is reported holds finite numbers and names alone
-    serde_json::to_string(value).map_err(|error| usage(format!("the report cannot be written: {error}")))
+    serde_json::to_string(value)
+        .map_err(|error| usage(format!("the report cannot be written: {error}")))
 }

@@ -14,12 +14,19 @@ use tracing_subscriber::util::SubscriberInitExt;
 #[pyfunction]
 pub fn run_command(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
     py.detach(|| {
-        let wanted: Option<Targets> = std::env::var("RUST_LOG").ok().and_then(|levels| levels.parse().ok());
+        let wanted: Option<Targets> = std::env::var("RUST_LOG")
+            .ok()
+            .and_then(|levels| levels.parse().ok());
         let filter = wanted.unwrap_or_else(|| log_filter(&arguments));
-        let lines =
-            tracing_subscriber::fmt::layer().with_writer(stderr).with_ansi(stderr().is_terminal()).without_time();
+        let lines = tracing_subscriber::fmt::layer()
+            .with_writer(stderr)
+            .with_ansi(stderr().is_terminal())
+            .without_time();
         // a second command in one process keeps the log of the first
-        let _ = tracing_subscriber::registry().with(lines).with(filter).try_init();
+        let _ = tracing_subscriber::registry()
+            .with(lines)
+            .with(filter)
+            .try_init();
         exit_code(arguments)
     })
 }

@@ -31,10 +31,17 @@ const MOST_WARNINGS: usize = 100;
 
 /// The exception of an error.
 pub fn exception(py: Python<'_>, error: CliError) -> PyErr {
-    let CliError { kind, message, hint, exit_code } = error;
+    let CliError {
+        kind,
+        message,
+        hint,
+        exit_code,
+    } = error;
     let exception = TouchupError::new_err(message);
     let value = exception.value(py);
-    let set = value.setattr("kind", kind).and_then(|()| value.setattr("hint", hint));
+    let set = value
+        .setattr("kind", kind)
+        .and_then(|()| value.setattr("hint", hint));
     match set.and_then(|()| value.setattr("exit_code", exit_code)) {
         Ok(()) => exception,
         Err(other) => other,
@@ -43,16 +50,26 @@ pub fn exception(py: Python<'_>, error: CliError) -> PyErr {
 
 /// What a caller got wrong.
 pub fn usage(message: String) -> CliError {
-    CliError { kind: "usage", message, hint: None, exit_code: 2 }
+    CliError {
+        kind: "usage",
+        message,
+        hint: None,
+        exit_code: 2,
+    }
 }
 
 /// Does `work` while other threads may have the interpreter; what it warns of comes as warnings after it.
 ///
 /// # Errors
 /// Its error as an exception; a warning that the user has turned into one.
-pub fn at_work<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T, CliError> + Send) -> PyResult<T> {
+pub fn at_work<T: Send>(
+    py: Python<'_>,
+    work: impl FnOnce() -> Result<T, CliError> + Send,
+) -> PyResult<T> {
     let lines = WarningLines::default();
-    let subscriber = tracing_subscriber::registry().with(lines.clone()).with(LevelFilter::WARN);
+    let subscriber = tracing_subscriber::registry()
+        .with(lines.clone())
+        .with(LevelFilter::WARN);
     let done = py.detach(|| tracing::subscriber::with_default(subscriber, work));
     let warned = warn(py, &lines.take());
     let done = done.map_err(|error| exception(py, error))?;
@@ -80,7 +97,8 @@ struct WarningLines {
 
 impl WarningLines {
     fn take(&self) -> Vec<String> {
-        let mut lines = std::mem::take(&mut *self.lines.lock().unwrap_or_else(PoisonError::into_inner));
+        let mut lines =
+            std::mem::take(&mut *self.lines.lock().unwrap_or_else(PoisonError::into_inner));
         if lines.len() > MOST_WARNINGS {
             let more = lines.len() - MOST_WARNINGS;
             lines.truncate(MOST_WARNINGS);
@@ -93,7 +111,12 @@ impl WarningLines {
 impl<S: Subscriber> Layer<S> for WarningLines {
     fn on_event(&self, event: &Event<'_>, _: Context<'_, S>) {
         // of the program's crates, this one included, whose name begins with `_`
-        if !event.metadata().target().trim_start_matches('_').starts_with("touchup") {
+        if !event
+            .metadata()
+            .target()
+            .trim_start_matches('_')
+            .starts_with("touchup")
+        {
             return;
         }
         let mut line = LineOfEvent(String::new());

@@ -14,8 +14,8 @@ use touchup_session::replay::{RecordedAs, Recording};
 use touchup_session::scan::{Scan, read_scan};
 
 use crate::arrays::{
-    Compact, MeshArrays, PoseArrays, WrenchArrays, mesh_of, messages, messages_into, of_equal_length, touches_array,
-    touches_of, wrench_frame,
+    Compact, MeshArrays, PoseArrays, WrenchArrays, mesh_of, messages, messages_into,
+    of_equal_length, touches_array, touches_of, wrench_frame,
 };
 use crate::failure::{at_work, exception, usage, warn};
 use crate::scenes::source;
@@ -25,7 +25,8 @@ use crate::scenes::source;
 /// # Errors
 /// For another word.
 pub fn unit_of(name: &str) -> Result<MeshUnit, CliError> {
-    MeshUnit::of_name(name).ok_or_else(|| usage(format!("unit {name:?} must be \"mm\", \"m\" or \"inch\"")))
+    MeshUnit::of_name(name)
+        .ok_or_else(|| usage(format!("unit {name:?} must be \"mm\", \"m\" or \"inch\"")))
 }
 
 /// Where in a recording the poses and wrenches are, as JSON.
@@ -33,7 +34,8 @@ pub fn unit_of(name: &str) -> Result<MeshUnit, CliError> {
 /// # Errors
 /// For a name that there is not.
 pub fn recorded_as(json: &str) -> Result<(RecordedAs, StampSource), CliError> {
-    let recorded: RecordedAs = serde_json::from_str(json).map_err(|error| usage(error.to_string()))?;
+    let recorded: RecordedAs =
+        serde_json::from_str(json).map_err(|error| usage(error.to_string()))?;
     let stamps = recorded.checked_stamps().map_err(usage)?;
     Ok((recorded, stamps))
 }
@@ -52,8 +54,17 @@ pub fn read_mesh<'py>(py: Python<'py>, path: PathBuf, unit: &str) -> PyResult<Bo
     let compact = Compact::of(&mesh);
     let [sigma, support] = columns;
     let into = PyDict::new(py);
-    let sigma = sigma.map(|mm| mm.iter().map(|mm| f64::from(*mm) * 1e-3).collect::<Vec<f64>>());
-    let support = support.map(|numbers| numbers.iter().map(|number| *number as u8).collect::<Vec<u8>>());
+    let sigma = sigma.map(|mm| {
+        mm.iter()
+            .map(|mm| f64::from(*mm) * 1e-3)
+            .collect::<Vec<f64>>()
+    });
+    let support = support.map(|numbers| {
+        numbers
+            .iter()
+            .map(|number| *number as u8)
+            .collect::<Vec<u8>>()
+    });
     set_columns(&into, &compact, sigma.as_deref(), support.as_deref())?;
     compact.into_dict(&into)?;
     into.set_item("repair", repair)?;
@@ -71,8 +82,12 @@ pub fn set_columns(
     support: Option<&[u8]>,
 ) -> PyResult<()> {
     let py = into.py();
-    let sigma = sigma.and_then(|of_slots| compact.column(of_slots)).map(|of| PyArray1::from_vec(py, of));
-    let support = support.and_then(|of_slots| compact.column(of_slots)).map(|of| PyArray1::from_vec(py, of));
+    let sigma = sigma
+        .and_then(|of_slots| compact.column(of_slots))
+        .map(|of| PyArray1::from_vec(py, of));
+    let support = support
+        .and_then(|of_slots| compact.column(of_slots))
+        .map(|of| PyArray1::from_vec(py, of));
     into.set_item("sigma", sigma)?;
     into.set_item("support", support)
 }
@@ -88,21 +103,44 @@ pub fn write_mesh(
     sigma: Option<PyReadonlyArray1<'_, f64>>,
     support: Option<PyReadonlyArray1<'_, u8>>,
 ) -> PyResult<()> {
-    let (sigma, support) = (sigma.map(|of| of.as_array().to_vec()), support.map(|of| of.as_array().to_vec()));
+    let (sigma, support) = (
+        sigma.map(|of| of.as_array().to_vec()),
+        support.map(|of| of.as_array().to_vec()),
+    );
     let mesh = mesh_of(&mesh, "the mesh").map_err(|error| exception(py, error))?;
     at_work(py, || {
         let mut columns = Vec::new();
         if let Some(support) = support {
-            of_equal_length(("vertices", mesh.vertex_slots()), &[("support", support.len())])?;
-            let touched = support.iter().map(|number| [0.0, 1.0, 0.5, 0.5][usize::from(*number).min(3)]);
-            columns.push(VertexColumn { name: "touched", values: touched.collect::<Vec<f32>>().into() });
-            let numbers = support.iter().map(|number| f32::from(*number)).collect::<Vec<_>>();
-            columns.push(VertexColumn { name: "support", values: numbers.into() });
+            of_equal_length(
+                ("vertices", mesh.vertex_slots()),
+                &[("support", support.len())],
+            )?;
+            let touched = support
+                .iter()
+                .map(|number| [0.0, 1.0, 0.5, 0.5][usize::from(*number).min(3)]);
+            columns.push(VertexColumn {
+                name: "touched",
+                values: touched.collect::<Vec<f32>>().into(),
+            });
+            let numbers = support
+                .iter()
+                .map(|number| f32::from(*number))
+                .collect::<Vec<_>>();
+            columns.push(VertexColumn {
+                name: "support",
+                values: numbers.into(),
+            });
         }
         if let Some(sigma) = sigma {
             of_equal_length(("vertices", mesh.vertex_slots()), &[("sigma", sigma.len())])?;
-            let in_mm = sigma.iter().map(|sigma| (sigma * 1e3) as f32).collect::<Vec<_>>();
-            columns.push(VertexColumn { name: "sigma_mm", values: in_mm.into() });
+            let in_mm = sigma
+                .iter()
+                .map(|sigma| (sigma * 1e3) as f32)
+                .collect::<Vec<_>>();
+            columns.push(VertexColumn {
+                name: "sigma_mm",
+                values: in_mm.into(),
+            });
         }
         write_mesh_with(&path, &mesh, &columns, None, unit_of(unit)?).map_err(CliError::not_written)
     })
@@ -150,10 +188,20 @@ pub fn write_recording(
     let read = || Ok((messages(&poses, &wrenches)?, wrench_frame(frame)?));
     let (all, frame) = read().map_err(|error| exception(py, error))?;
     at_work(py, || {
-        let of_wrench = if frame == WrenchFrame::Object { "object" } else { "stylus" };
+        let of_wrench = if frame == WrenchFrame::Object {
+            "object"
+        } else {
+            "stylus"
+        };
         let records = all.into_iter().map(Record::Message);
-        touchup_io::recording::write_recording(&path, &Topics::default(), "object", of_wrench, records)
-            .map_err(CliError::not_written)
+        touchup_io::recording::write_recording(
+            &path,
+            &Topics::default(),
+            "object",
+            of_wrench,
+            records,
+        )
+        .map_err(CliError::not_written)
     })
 }
 
@@ -168,5 +216,9 @@ pub fn read_touches<'py>(py: Python<'py>, path: PathBuf) -> PyResult<Bound<'py, 
 #[pyfunction]
 pub fn write_touches(py: Python<'_>, path: PathBuf, touches: &Bound<'_, PyDict>) -> PyResult<()> {
     let touches = touches_of(touches)?.map_err(|error| exception(py, error))?;
-    at_work(py, || Ok(touchup_io::result_table::write_touches_as_named(&path, &touches)?))
+    at_work(py, || {
+        Ok(touchup_io::result_table::write_touches_as_named(
+            &path, &touches,
+        )?)
+    })
 }

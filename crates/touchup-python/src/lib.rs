@@ -38,7 +38,9 @@ mod _touchup {
     #[pymodule_export]
     use crate::failure::{TouchupError, TouchupWarning};
     #[pymodule_export]
-    use crate::files::{read_mesh, read_recording, read_touches, write_mesh, write_recording, write_touches};
+    use crate::files::{
+        read_mesh, read_recording, read_touches, write_mesh, write_recording, write_touches,
+    };
     #[pymodule_export]
     use crate::measuring::{align, align_pairs, compare, features};
     #[pymodule_export]

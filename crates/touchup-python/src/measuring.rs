@@ -7,12 +7,12 @@ use pyo3::types::PyDict;
 use serde_json::json;
 use touchup::cli::{CliError, comparison_json};
 use touchup_core::align::{
-    FeaturesError, FeaturesParams, IcpParams, OrientedSample, PairsParams, PointPair, Surfaces, align_features,
-    fit_pairs, icp,
+    FeaturesError, FeaturesParams, IcpParams, OrientedSample, PairsParams, PointPair, Surfaces,
+    align_features, fit_pairs, icp,
 };
 use touchup_core::compare::{
-    CompareParams, IndexedMesh, Regions, SupportRegion, UnlikeExtents, compare as compare_shapes, sample_surface,
-    surface_area,
+    CompareParams, IndexedMesh, Regions, SupportRegion, UnlikeExtents, compare as compare_shapes,
+    sample_surface, surface_area,
 };
 use touchup_core::features::detect;
 use touchup_core::mesh::{FaceTree, TriMesh};
@@ -20,7 +20,9 @@ use touchup_io::mesh_file::{MeshFile, MeshUnit, repaired};
 use touchup_session::session::found;
 use touchup_session::threads::Threads;
 
-use crate::arrays::{MeshArrays, json as to_json, matrix, mesh_of, mesh_vecs, of_equal_length, rows, touches_of};
+use crate::arrays::{
+    MeshArrays, json as to_json, matrix, mesh_of, mesh_vecs, of_equal_length, rows, touches_of,
+};
 use crate::failure::{at_work, exception, usage};
 use crate::scenes::shown;
 
@@ -32,12 +34,21 @@ const POINTS_EACH: f64 = 20_000.0;
 /// Holes, slots, pockets, bosses, edges, corners and planes of a mesh, as JSON.
 #[pyfunction]
 #[pyo3(signature = (mesh, touches))]
-pub fn features(py: Python<'_>, mesh: MeshArrays<'_>, touches: Option<&Bound<'_, PyDict>>) -> PyResult<String> {
+pub fn features(
+    py: Python<'_>,
+    mesh: MeshArrays<'_>,
+    touches: Option<&Bound<'_, PyDict>>,
+) -> PyResult<String> {
     let (vertices, faces) = mesh_vecs(&mesh, "the mesh").map_err(|error| exception(py, error))?;
-    let touches = touches.map(touches_of).transpose()?.transpose().map_err(|error| exception(py, error))?;
+    let touches = touches
+        .map(touches_of)
+        .transpose()?
+        .transpose()
+        .map_err(|error| exception(py, error))?;
     at_work(py, || {
         // others keep a corner of each triangle by itself, which makes an edge of every side
-        let MeshFile { mesh, .. } = repaired(&shown(None, "the mesh"), MeshUnit::Metre, vertices, faces)?;
+        let MeshFile { mesh, .. } =
+            repaired(&shown(None, "the mesh"), MeshUnit::Metre, vertices, faces)?;
         to_json(&found(&mesh, &touches.unwrap_or_default()).1)
     })
 }
@@ -50,11 +61,17 @@ struct Indexed {
 
 impl Indexed {
     fn new(mesh: TriMesh) -> Self {
-        Self { tree: FaceTree::new_by(&mesh, &Threads), mesh }
+        Self {
+            tree: FaceTree::new_by(&mesh, &Threads),
+            mesh,
+        }
     }
 
     fn shape(&self) -> IndexedMesh<'_> {
-        IndexedMesh { mesh: &self.mesh, tree: &self.tree }
+        IndexedMesh {
+            mesh: &self.mesh,
+            tree: &self.tree,
+        }
     }
 }
 
@@ -76,7 +93,10 @@ pub fn compare<'py>(
         let (mesh, truth) = (mesh_of(&mesh, "the mesh")?, mesh_of(&truth, "the truth")?);
         let support = support.map(|support| support.as_array().to_vec());
         if let Some(support) = &support {
-            of_equal_length(("vertices", mesh.vertex_slots()), &[("support", support.len())])?;
+            of_equal_length(
+                ("vertices", mesh.vertex_slots()),
+                &[("support", support.len())],
+            )?;
         }
         for (name, given) in [("range_mm", range_mm), ("tolerance_mm", tolerance_mm)] {
             if let Some(value) = given.filter(|value| !(*value > 0.0 && value.is_finite())) {
@@ -87,7 +107,9 @@ pub fn compare<'py>(
     };
     let (mesh, truth, support) = read().map_err(|error| exception(py, error))?;
     let (report, deviations) = at_work(py, || {
-        UnlikeExtents::of(&mesh, &truth).into_iter().for_each(remark);
+        UnlikeExtents::of(&mesh, &truth)
+            .into_iter()
+            .for_each(remark);
         let (mesh, truth) = (Indexed::new(mesh), Indexed::new(truth));
         let region = |number: &u8| match number {
             0 => SupportRegion::Untouched,
@@ -97,9 +119,18 @@ pub fn compare<'py>(
         let regions: Option<Vec<_>> = support.map(|support| support.iter().map(region).collect());
         let regions = regions.as_deref().map_or(Regions::Unknown, Regions::Own);
         let [range, tolerance] = [range_mm, tolerance_mm].map(|mm| mm.map(|mm| mm * 1e-3));
-        let params = CompareParams { samples, seed, range, tolerance, ..CompareParams::default() };
+        let params = CompareParams {
+            samples,
+            seed,
+            range,
+            tolerance,
+            ..CompareParams::default()
+        };
         let compared = compare_shapes(mesh.shape(), truth.shape(), regions, &params, &Threads)?;
-        Ok((comparison_json(&compared).to_string(), compared.vertex_deviations))
+        Ok((
+            comparison_json(&compared).to_string(),
+            compared.vertex_deviations,
+        ))
     })?;
     let into = PyDict::new(py);
     into.set_item("report", report)?;
@@ -110,13 +141,25 @@ pub fn compare<'py>(
 fn remark(unlike: UnlikeExtents) {
     match unlike {
         UnlikeExtents::Size(_) => tracing::warn!("{unlike}: are both in m, and of the same part?"),
-        UnlikeExtents::Apart(_) => tracing::warn!("{unlike}: are both in one frame? touchup.align finds the motion"),
+        UnlikeExtents::Apart(_) => {
+            tracing::warn!("{unlike}: are both in one frame? touchup.align finds the motion")
+        }
     }
 }
 
 fn spread(mesh: &TriMesh, count: f64, seed: u64) -> Vec<OrientedSample> {
-    let samples = sample_surface(mesh, count / surface_area(mesh).max(f64::MIN_POSITIVE), seed);
-    samples.iter().map(|sample| OrientedSample { point: sample.point, normal: mesh.normal(sample.face) }).collect()
+    let samples = sample_surface(
+        mesh,
+        count / surface_area(mesh).max(f64::MIN_POSITIVE),
+        seed,
+    );
+    samples
+        .iter()
+        .map(|sample| OrientedSample {
+            point: sample.point,
+            normal: mesh.normal(sample.face),
+        })
+        .collect()
 }
 
 /// The rigid motion that brings `source` onto `target`: by point to plane from about the right place, or by features from anywhere.
@@ -130,17 +173,33 @@ pub fn align<'py>(
     alternative: Option<usize>,
     seed: u64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let read = || Ok((mesh_of(&source, "the source")?, mesh_of(&target, "the target")?));
+    let read = || {
+        Ok((
+            mesh_of(&source, "the source")?,
+            mesh_of(&target, "the target")?,
+        ))
+    };
     let (source, target) = read().map_err(|error| exception(py, error))?;
     let (motion, report) = at_work(py, || {
-        let unlike = UnlikeExtents::of(&source, &target).filter(|unlike| matches!(unlike, UnlikeExtents::Size(_)));
+        let unlike = UnlikeExtents::of(&source, &target)
+            .filter(|unlike| matches!(unlike, UnlikeExtents::Size(_)));
         unlike.into_iter().for_each(remark);
         let target = Indexed::new(target);
         match method {
             "icp" => {
-                let points: Vec<_> = spread(&source, POINTS, seed).iter().map(|p| p.point).collect();
+                let points: Vec<_> = spread(&source, POINTS, seed)
+                    .iter()
+                    .map(|p| p.point)
+                    .collect();
                 let start = Isometry3::identity();
-                let fit = icp(&points, &target.mesh, &target.tree, &start, &IcpParams::default(), &Threads)?;
+                let fit = icp(
+                    &points,
+                    &target.mesh,
+                    &target.tree,
+                    &start,
+                    &IcpParams::default(),
+                    &Threads,
+                )?;
                 let undetermined = fit.undetermined().count();
                 Ok((
                     fit.source_to_target,
@@ -151,7 +210,9 @@ pub fn align<'py>(
                 ))
             }
             "features" => by_features(&source, &target, alternative, seed),
-            other => Err(usage(format!("method {other:?} must be \"icp\" or \"features\""))),
+            other => Err(usage(format!(
+                "method {other:?} must be \"icp\" or \"features\""
+            ))),
         }
     })?;
     let into = PyDict::new(py);
@@ -169,20 +230,25 @@ fn by_features(
     let own = detect(source, &FaceTree::new_by(source, &Threads), &[]).features;
     let theirs = detect(&target.mesh, &target.tree, &[]).features;
     let points = spread(source, POINTS_EACH, seed);
-    let surfaces = Surfaces { points: &points, target: &target.mesh, tree: &target.tree };
+    let surfaces = Surfaces {
+        points: &points,
+        target: &target.mesh,
+        tree: &target.tree,
+    };
     let found = match align_features(&own, &theirs, Some(&surfaces), &FeaturesParams::default()) {
         Ok(only) => vec![only],
-        Err(FeaturesError::Ambiguous { alternatives } | FeaturesError::FreeTurn { alternatives, .. })
-            if alternative.is_some() =>
-        {
-            alternatives
-        }
+        Err(
+            FeaturesError::Ambiguous { alternatives }
+            | FeaturesError::FreeTurn { alternatives, .. },
+        ) if alternative.is_some() => alternatives,
         Err(error) => return Err(error.into()),
     };
     let number = alternative.unwrap_or(1);
     let Some(chosen) = number.checked_sub(1).and_then(|at| found.get(at)) else {
         let count = found.len();
-        return Err(usage(format!("alternative {number} is not there: {count} found, counted from 1")));
+        return Err(usage(format!(
+            "alternative {number} is not there: {count} found, counted from 1"
+        )));
     };
     let report = json!({
         "method": "features",
@@ -196,7 +262,10 @@ fn by_features(
     Ok((chosen.source_to_target, report))
 }
 
-fn homogeneous<'py>(py: Python<'py>, motion: &Isometry3<f64>) -> PyResult<Bound<'py, numpy::PyArray2<f64>>> {
+fn homogeneous<'py>(
+    py: Python<'py>,
+    motion: &Isometry3<f64>,
+) -> PyResult<Bound<'py, numpy::PyArray2<f64>>> {
     // rows of the transpose are the columns that are stored
     let rows: [[f64; 4]; 4] = motion.to_homogeneous().transpose().into();
     matrix(py, rows.to_vec())
@@ -210,10 +279,19 @@ pub fn align_pairs<'py>(
     target: PyReadonlyArray2<'_, f64>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let read = || {
-        let (from, to) = (rows::<3, f64>(&source, "source_points")?, rows::<3, f64>(&target, "target_points")?);
-        of_equal_length(("source_points", from.len()), &[("target_points", to.len())])?;
-        let pair =
-            |(from, to): (&[f64; 3], &[f64; 3])| PointPair { from: (*from).into(), to: (*to).into(), sigma: None };
+        let (from, to) = (
+            rows::<3, f64>(&source, "source_points")?,
+            rows::<3, f64>(&target, "target_points")?,
+        );
+        of_equal_length(
+            ("source_points", from.len()),
+            &[("target_points", to.len())],
+        )?;
+        let pair = |(from, to): (&[f64; 3], &[f64; 3])| PointPair {
+            from: (*from).into(),
+            to: (*to).into(),
+            sigma: None,
+        };
         Ok(from.iter().zip(&*to).map(pair).collect())
     };
     let pairs: Vec<PointPair> = read().map_err(|error| exception(py, error))?;
@@ -229,6 +307,9 @@ pub fn align_pairs<'py>(
     into.set_item("matrix", homogeneous(py, &fit.motion)?)?;
     let report = json!({ "method": "pairs", "rms_mm": fit.rms * 1e3, "undetermined": 0 });
     into.set_item("report", report.to_string())?;
-    into.set_item("residuals", matrix::<3, f64>(py, fit.residuals.iter().map(|of| (*of).into()).collect())?)?;
+    into.set_item(
+        "residuals",
+        matrix::<3, f64>(py, fit.residuals.iter().map(|of| (*of).into()).collect())?,
+    )?;
     Ok(into)
 }

@@ -75,14 +75,23 @@ impl Update {
     }
 
     fn __repr__(&self) -> String {
-        let face = self.face().map_or_else(|| "None".to_owned(), |face| face.to_string());
-        format!("Update(case={:?}, face={face}, moved={})", self.case(), if self.moved() { "True" } else { "False" })
+        let face = self
+            .face()
+            .map_or_else(|| "None".to_owned(), |face| face.to_string());
+        format!(
+            "Update(case={:?}, face={face}, moved={})",
+            self.case(),
+            if self.moved() { "True" } else { "False" }
+        )
     }
 }
 
 impl Update {
     fn vector(&self, of: fn(&Mismatch) -> Vector3<f64>) -> Option<[f64; 3]> {
-        self.update.mismatch.as_ref().map(|mismatch| of(mismatch).into())
+        self.update
+            .mismatch
+            .as_ref()
+            .map(|mismatch| of(mismatch).into())
     }
 }
 
@@ -92,7 +101,11 @@ fn numbers<const N: usize>(given: &Bound<'_, PyAny>, name: &str) -> PyResult<[f6
         let mut values = [0.0; N];
         let is_whole = array.get_owned(N).is_none();
         let mut known = (0..N).map(|at| array.get_owned(at));
-        if is_whole && values.iter_mut().all(|to| known.next().flatten().map(|x| *to = x).is_some()) {
+        if is_whole
+            && values
+                .iter_mut()
+                .all(|to| known.next().flatten().map(|x| *to = x).is_some())
+        {
             return Ok(values);
         }
     } else if let Ok(tuple) = given.cast::<PyTuple>()
@@ -130,7 +143,12 @@ struct Pushed {
 impl Pushed {
     fn with_capacity(count: usize) -> Self {
         let (case, face) = (Vec::with_capacity(count), Vec::with_capacity(count));
-        Self { case, face, distance: Vec::with_capacity(count), ..Self::default() }
+        Self {
+            case,
+            face,
+            distance: Vec::with_capacity(count),
+            ..Self::default()
+        }
     }
 
     #[inline]
@@ -141,7 +159,9 @@ impl Pushed {
         };
         match updated {
             Ok(update) => {
-                let mismatch = update.mismatch.map(|mismatch| (i64::from(mismatch.face.0), mismatch.distance));
+                let mismatch = update
+                    .mismatch
+                    .map(|mismatch| (i64::from(mismatch.face.0), mismatch.distance));
                 self.append(update.case as u8, mismatch);
             }
             Err(error) => self.refuse(&error),
@@ -159,7 +179,8 @@ impl Pushed {
     #[cold]
     fn refuse(&mut self, error: &LiveError) {
         *self.refused.entry(reason_of_refusal(error)).or_default() += 1;
-        self.first_refusal.get_or_insert_with(|| (self.case.len(), error.to_string()));
+        self.first_refusal
+            .get_or_insert_with(|| (self.case.len(), error.to_string()));
         self.append(REFUSED, None);
     }
 }
@@ -179,7 +200,11 @@ enum RefinerState {
 
 impl RefinerState {
     fn open(&mut self) -> Option<&mut JudgedRefinement> {
-        if let Self::Open(refinement) = self { Some(refinement) } else { None }
+        if let Self::Open(refinement) = self {
+            Some(refinement)
+        } else {
+            None
+        }
     }
 
     fn counts(&self) -> RefineCounts {
@@ -195,11 +220,18 @@ impl Refiner {
     fn locked(&self, py: Python<'_>) -> MutexGuard<'_, RefinerState> {
         match self.state.try_lock() {
             Ok(guard) => guard,
-            Err(_) => self.state.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner),
+            Err(_) => self
+                .state
+                .lock_py_attached(py)
+                .unwrap_or_else(PoisonError::into_inner),
         }
     }
 
-    fn in_use<T>(&self, py: Python<'_>, with: impl FnOnce(&mut JudgedRefinement) -> PyResult<T>) -> PyResult<T> {
+    fn in_use<T>(
+        &self,
+        py: Python<'_>,
+        with: impl FnOnce(&mut JudgedRefinement) -> PyResult<T>,
+    ) -> PyResult<T> {
         match self.locked(py).open() {
             Some(refinement) => with(refinement),
             None => Err(exception(py, finished())),
@@ -222,10 +254,18 @@ struct SampleRows<'a> {
 }
 
 impl<'a> SampleRows<'a> {
-    fn of((stamps, position, orientation, force, torque): &'a SampleArrays<'_>) -> Result<Self, CliError> {
-        let stamp_ns = stamps.as_slice().map_or_else(|_| Cow::Owned(stamps.as_array().to_vec()), Cow::Borrowed);
+    fn of(
+        (stamps, position, orientation, force, torque): &'a SampleArrays<'_>,
+    ) -> Result<Self, CliError> {
+        let stamp_ns = stamps
+            .as_slice()
+            .map_or_else(|_| Cow::Owned(stamps.as_array().to_vec()), Cow::Borrowed);
         let orientation = rows(orientation, "orientation_xyzw")?;
-        let (position, force, torque) = (rows(position, "position")?, rows(force, "force")?, rows(torque, "torque")?);
+        let (position, force, torque) = (
+            rows(position, "position")?,
+            rows(force, "force")?,
+            rows(torque, "torque")?,
+        );
         let lengths = [
             ("position", position.len()),
             ("orientation_xyzw", orientation.len()),
@@ -233,16 +273,34 @@ impl<'a> SampleRows<'a> {
             ("torque", torque.len()),
         ];
         of_equal_length(("stamp_ns", stamp_ns.len()), &lengths)?;
-        Ok(Self { stamp_ns, position, orientation, force, torque })
+        Ok(Self {
+            stamp_ns,
+            position,
+            orientation,
+            force,
+            torque,
+        })
     }
 
     /// The samples of some rows; where one is none, why.
-    fn part(&self, rows: Range<usize>) -> impl ExactSizeIterator<Item = Result<Sample, SampleError>> {
-        let (position, orientation) = (&self.position[rows.clone()], &self.orientation[rows.clone()]);
+    fn part(
+        &self,
+        rows: Range<usize>,
+    ) -> impl ExactSizeIterator<Item = Result<Sample, SampleError>> {
+        let (position, orientation) = (
+            &self.position[rows.clone()],
+            &self.orientation[rows.clone()],
+        );
         let (force, torque) = (&self.force[rows.clone()], &self.torque[rows.clone()]);
-        self.stamp_ns[rows].iter().zip(position).zip(orientation).zip(force).zip(torque).map(
-            |((((stamp_ns, position), xyzw), force), torque)| sample(*stamp_ns, *position, *xyzw, [*force, *torque]),
-        )
+        self.stamp_ns[rows]
+            .iter()
+            .zip(position)
+            .zip(orientation)
+            .zip(force)
+            .zip(torque)
+            .map(|((((stamp_ns, position), xyzw), force), torque)| {
+                sample(*stamp_ns, *position, *xyzw, [*force, *torque])
+            })
     }
 
     fn len(&self) -> usize {
@@ -262,10 +320,18 @@ impl Refiner {
         scan_file: Option<(std::path::PathBuf, String)>,
         frame: &str,
     ) -> PyResult<Self> {
-        let read = || Ok((ScanSource::of(scan, scan_file)?, source(scene_text, scene_path)?, wrench_frame(frame)?));
+        let read = || {
+            Ok((
+                ScanSource::of(scan, scan_file)?,
+                source(scene_text, scene_path)?,
+                wrench_frame(frame)?,
+            ))
+        };
         let (scan, scene, frame) = read().map_err(|error| exception(py, error))?;
         let refinement = at_work(py, || refinement(scan, &scene, frame))?;
-        Ok(Self { state: Mutex::new(RefinerState::Open(refinement.into())) })
+        Ok(Self {
+            state: Mutex::new(RefinerState::Open(refinement.into())),
+        })
     }
 
     /// Takes the next sample and moves the mesh by it.
@@ -299,7 +365,11 @@ impl Refiner {
     }
 
     /// Takes many samples, one after the other; a refused one is counted and changes nothing.
-    fn _push_many<'py>(&self, py: Python<'py>, samples: SampleArrays<'_>) -> PyResult<Bound<'py, PyDict>> {
+    fn _push_many<'py>(
+        &self,
+        py: Python<'py>,
+        samples: SampleArrays<'_>,
+    ) -> PyResult<Bound<'py, PyDict>> {
         let rows = SampleRows::of(&samples).map_err(|error| exception(py, error))?;
         let mut pushed = Pushed::with_capacity(rows.len());
         let mut chunk = Vec::with_capacity(CHUNK.min(rows.len()));
@@ -311,8 +381,12 @@ impl Refiner {
             let (state, pushed, chunk) = (&self.state, &mut pushed, &chunk);
             let is_open = py.detach(move || {
                 let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
-                let Some(refinement) = state.open() else { return false };
-                chunk.iter().for_each(|sample| pushed.push(refinement, sample));
+                let Some(refinement) = state.open() else {
+                    return false;
+                };
+                chunk
+                    .iter()
+                    .for_each(|sample| pushed.push(refinement, sample));
                 true
             });
             if !is_open {
@@ -342,7 +416,9 @@ impl Refiner {
 
     /// The mesh as the samples so far have moved it.
     fn _mesh<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let compact = self.in_use(py, |refinement| Ok(Compact::of(refinement.refinement.engine.mesh())))?;
+        let compact = self.in_use(py, |refinement| {
+            Ok(Compact::of(refinement.refinement.engine.mesh()))
+        })?;
         let into = PyDict::new(py);
         compact.into_dict(&into)?;
         Ok(into)

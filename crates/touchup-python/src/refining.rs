@@ -10,7 +10,8 @@ use touchup_core::mesh::TriMesh;
 use touchup_core::stylus::{Message, WrenchFrame};
 use touchup_io::mesh_file::{MeshFile, MeshUnit, repaired};
 use touchup_session::refinement::{
-    FinishedRefinement, InputNames, JudgedRefinement, RefinedScan, RefinementInput, TouchSource, refine as refine_scan,
+    FinishedRefinement, InputNames, JudgedRefinement, RefinedScan, RefinementInput, TouchSource,
+    refine as refine_scan,
 };
 use touchup_session::replay::{Recording, marker_filter};
 use touchup_session::scan::{read_scan, warn_of_left_out};
@@ -18,7 +19,8 @@ use touchup_session::scene::Scene;
 use touchup_session::session::RefinedMesh;
 
 use crate::arrays::{
-    Compact, MeshArrays, MeshVecs, PoseArrays, WrenchArrays, mesh_vecs, messages, touches_array, wrench_frame,
+    Compact, MeshArrays, MeshVecs, PoseArrays, WrenchArrays, mesh_vecs, messages, touches_array,
+    wrench_frame,
 };
 use crate::failure::{at_work, exception, usage};
 use crate::files::{recorded_as, set_columns, unit_of};
@@ -37,7 +39,10 @@ impl ScanSource {
     ///
     /// # Errors
     /// Where it is both or neither.
-    pub fn of(arrays: Option<MeshArrays<'_>>, file: Option<(PathBuf, String)>) -> Result<Self, CliError> {
+    pub fn of(
+        arrays: Option<MeshArrays<'_>>,
+        file: Option<(PathBuf, String)>,
+    ) -> Result<Self, CliError> {
         match (arrays, file) {
             (Some(arrays), None) => Ok(Self::Arrays(mesh_vecs(&arrays, "the scan")?)),
             (None, Some((path, unit))) => Ok(Self::File(path, unit_of(&unit)?)),
@@ -69,7 +74,11 @@ fn input_of(scan: ScanSource, scene: &SceneSource) -> Result<RefinementInput, Cl
 ///
 /// # Errors
 /// As `touchup refine`.
-pub fn refinement(scan: ScanSource, scene: &SceneSource, frame: WrenchFrame) -> Result<JudgedRefinement, CliError> {
+pub fn refinement(
+    scan: ScanSource,
+    scene: &SceneSource,
+    frame: WrenchFrame,
+) -> Result<JudgedRefinement, CliError> {
     Ok(JudgedRefinement::new(input_of(scan, scene)?, frame)?)
 }
 
@@ -81,8 +90,18 @@ pub struct Reported {
 
 impl From<RefinedScan> for Reported {
     fn from(refined: RefinedScan) -> Self {
-        let RefinedScan { finished, replayed, accepted, refused, findings } = refined;
-        let FinishedRefinement { mesh, counts, friction } = finished;
+        let RefinedScan {
+            finished,
+            replayed,
+            accepted,
+            refused,
+            findings,
+        } = refined;
+        let FinishedRefinement {
+            mesh,
+            counts,
+            friction,
+        } = finished;
         let friction = friction.map(|found| json!({ "mu": found.mu, "sigma": found.sigma }));
         let mut summary = Map::new();
         let mut note = |name: &str, value: Value| summary.insert(name.to_owned(), value);
@@ -113,7 +132,17 @@ impl Reported {
     /// # Errors
     /// Those of NumPy.
     pub fn into_dict(self, py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
-        let Self { mesh: RefinedMesh { mesh, support, sigma, touches, .. }, summary } = self;
+        let Self {
+            mesh:
+                RefinedMesh {
+                    mesh,
+                    support,
+                    sigma,
+                    touches,
+                    ..
+                },
+            summary,
+        } = self;
         let into = PyDict::new(py);
         let compact = Compact::of(&mesh);
         let support: Vec<u8> = support.iter().map(|support| *support as u8).collect();
@@ -127,8 +156,15 @@ impl Reported {
 
 /// Where samples come from.
 enum Touching {
-    File { recording: Box<Recording>, path: PathBuf, markers: Option<String> },
-    Messages { all: Vec<Message>, frame: WrenchFrame },
+    File {
+        recording: Box<Recording>,
+        path: PathBuf,
+        markers: Option<String>,
+    },
+    Messages {
+        all: Vec<Message>,
+        frame: WrenchFrame,
+    },
 }
 
 /// Refines, and judges the recording as `touchup refine` does.
@@ -140,19 +176,40 @@ fn refined(
     touching: impl FnOnce(&Scene) -> Result<Touching, CliError>,
     force: bool,
 ) -> Result<Reported, CliError> {
-    let scan_name = if let ScanSource::File(path, _) = &scan { path.clone() } else { shown(None, "the scan") };
+    let scan_name = if let ScanSource::File(path, _) = &scan {
+        path.clone()
+    } else {
+        shown(None, "the scan")
+    };
     let input = input_of(scan, scene)?;
     let (touches, recording_name) = match touching(&input.scene)? {
-        Touching::File { recording, path, markers } => {
+        Touching::File {
+            recording,
+            path,
+            markers,
+        } => {
             let markers = marker_filter(&input.scene, markers.as_deref())?.map(Box::new);
             (TouchSource::Recorded { recording, markers }, path)
         }
-        Touching::Messages { all, frame } => {
-            (TouchSource::Messages { messages: all, wrench_frame: frame }, shown(None, "the recording"))
-        }
+        Touching::Messages { all, frame } => (
+            TouchSource::Messages {
+                messages: all,
+                wrench_frame: frame,
+            },
+            shown(None, "the recording"),
+        ),
     };
-    let names = InputNames { scan: &scan_name, recording: &recording_name };
-    Ok(warned(refine_scan(input, touches, names, force, &mut || {})?))
+    let names = InputNames {
+        scan: &scan_name,
+        recording: &recording_name,
+    };
+    Ok(warned(refine_scan(
+        input,
+        touches,
+        names,
+        force,
+        &mut || {},
+    )?))
 }
 
 /// Judges and reconstructs what was pushed.
@@ -161,13 +218,26 @@ fn refined(
 /// As [`refine`].
 pub fn finish_refinement(refinement: JudgedRefinement, force: bool) -> Result<Reported, CliError> {
     let (scan, recording) = (shown(None, "the scan"), shown(None, "the samples"));
-    Ok(warned(refinement.finish(InputNames { scan: &scan, recording: &recording }, force)?))
+    Ok(warned(refinement.finish(
+        InputNames {
+            scan: &scan,
+            recording: &recording,
+        },
+        force,
+    )?))
 }
 
 /// Says what is doubtful, and what was lost.
 fn warned(refined: RefinedScan) -> Reported {
-    refined.findings.iter().for_each(|finding| tracing::warn!("{finding}"));
-    refined.replayed.losses.iter().for_each(|loss| tracing::warn!("{loss}"));
+    refined
+        .findings
+        .iter()
+        .for_each(|finding| tracing::warn!("{finding}"));
+    refined
+        .replayed
+        .losses
+        .iter()
+        .for_each(|loss| tracing::warn!("{loss}"));
     refined.into()
 }
 
@@ -176,7 +246,10 @@ fn warned(refined: RefinedScan) -> Reported {
 /// Returns `vertices` (V, 3) m, `faces` (F, 3), `sigma` (V,) m, `support` (V,), `touches` and `summary`.
 #[pyfunction]
 #[pyo3(signature = (scene_text, scene_path, scan, scan_file, poses, wrenches, frame, recording_file, force))]
-#[expect(clippy::too_many_arguments, reason = "what the package passes on: each of both sources, or nothing")]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "what the package passes on: each of both sources, or nothing"
+)]
 pub fn refine<'py>(
     py: Python<'py>,
     scene_text: Option<String>,
@@ -191,10 +264,16 @@ pub fn refine<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let read = || {
         let all = match (poses, wrenches) {
-            (Some(poses), Some(wrenches)) => Some((messages(&poses, &wrenches)?, wrench_frame(frame)?)),
+            (Some(poses), Some(wrenches)) => {
+                Some((messages(&poses, &wrenches)?, wrench_frame(frame)?))
+            }
             _ => None,
         };
-        Ok((ScanSource::of(scan, scan_file)?, source(scene_text, scene_path)?, all))
+        Ok((
+            ScanSource::of(scan, scan_file)?,
+            source(scene_text, scene_path)?,
+            all,
+        ))
     };
     let (scan, scene, all) = read().map_err(|error| exception(py, error))?;
     let reported = at_work(py, || {
@@ -203,9 +282,15 @@ pub fn refine<'py>(
             (None, Some((path, recorded))) => {
                 let (recorded, stamps) = recorded_as(&recorded)?;
                 let recording = Box::new(Recording::open(&path, recorded.layout(scene), stamps)?);
-                Ok(Touching::File { recording, path, markers: recorded.markers_topic })
+                Ok(Touching::File {
+                    recording,
+                    path,
+                    markers: recorded.markers_topic,
+                })
             }
-            _ => Err(usage("a recording is a Recording of arrays, or the path of a file".to_owned())),
+            _ => Err(usage(
+                "a recording is a Recording of arrays, or the path of a file".to_owned(),
+            )),
         };
         refined(scan, &scene, touching, force)
     })?;

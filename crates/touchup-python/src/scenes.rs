@@ -38,17 +38,20 @@ impl SceneSource {
     /// As [`Self::parsed`], and where the radius of the ball is not known.
     pub fn read(&self) -> Result<Scene, CliError> {
         let (mut scene, text) = self.parsed()?;
-        scene.tell_radius(&text, None).map_err(|error| match error {
-            SceneError::NoRadius => CliError {
-                kind: "usage",
-                message: "the radius of the ball is not known: give tip.radius_mm in the scene, as \
+        scene
+            .tell_radius(&text, None)
+            .map_err(|error| match error {
+                SceneError::NoRadius => CliError {
+                    kind: "usage",
+                    message:
+                        "the radius of the ball is not known: give tip.radius_mm in the scene, as \
                           scene={\"tip\": {\"radius_mm\": 1.5}}"
-                    .to_owned(),
-                hint: None,
-                exit_code: 2,
-            },
-            error => error.into(),
-        })?;
+                            .to_owned(),
+                    hint: None,
+                    exit_code: 2,
+                },
+                error => error.into(),
+            })?;
         Ok(scene)
     }
 }
@@ -80,8 +83,9 @@ fn declared(parameter: &Parameter) -> Value {
 #[pyfunction]
 pub fn default_scene(py: Python<'_>) -> PyResult<String> {
     at_work(py, || {
-        let scene: Value = serde_saphyr::from_str(&Scene::template())
-            .map_err(|error| crate::failure::usage(format!("the template of the scene cannot be read: {error}")))?;
+        let scene: Value = serde_saphyr::from_str(&Scene::template()).map_err(|error| {
+            crate::failure::usage(format!("the template of the scene cannot be read: {error}"))
+        })?;
         arrays::json(&scene)
     })
 }
@@ -101,7 +105,9 @@ pub fn source(text: Option<String>, path: Option<PathBuf>) -> Result<SceneSource
     match (text, path) {
         (Some(text), None) => Ok(SceneSource::Text(text)),
         (None, Some(path)) => Ok(SceneSource::File(path)),
-        _ => Err(crate::failure::usage("a scene is a dictionary, or the path of a file".to_owned())),
+        _ => Err(crate::failure::usage(
+            "a scene is a dictionary, or the path of a file".to_owned(),
+        )),
     }
 }
 

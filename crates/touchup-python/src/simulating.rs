@@ -34,14 +34,20 @@ pub fn simulate<'py>(
         let settings = SimulationSettings {
             seed,
             world: world.as_deref().map(world_named).transpose()?,
-            told_off: told_off.iter().map(|text| text.parse::<OffFactor>().map_err(usage)).collect::<Result<_, _>>()?,
+            told_off: told_off
+                .iter()
+                .map(|text| text.parse::<OffFactor>().map_err(usage))
+                .collect::<Result<_, _>>()?,
             tip_radius_mm,
             stiffness_n_per_mm,
             friction,
             scan_edge_mm,
             scan_noise_mm,
             scanner: scanner.as_deref().map(scanner_named).transpose()?,
-            sides: sides.iter().map(|text| text.parse::<Side>().map_err(usage)).collect::<Result<_, _>>()?,
+            sides: sides
+                .iter()
+                .map(|text| text.parse::<Side>().map_err(usage))
+                .collect::<Result<_, _>>()?,
         };
         settings.simulated(&truth)
     })?;
@@ -56,13 +62,16 @@ pub fn simulate<'py>(
 
 fn world_named(name: &str) -> Result<SimWorld, CliError> {
     let names = SimWorld::ALL.map(SimWorld::name).join(", ");
-    SimWorld::named(name).ok_or_else(|| usage(format!("there is no world {name}: take one of {names}")))
+    SimWorld::named(name)
+        .ok_or_else(|| usage(format!("there is no world {name}: take one of {names}")))
 }
 
 fn scanner_named(name: &str) -> Result<ScannerKind, CliError> {
     match name {
         "cheap" => Ok(ScannerKind::Cheap),
         "good" => Ok(ScannerKind::Good),
-        other => Err(usage(format!("scanner {other:?} must be \"cheap\" or \"good\""))),
+        other => Err(usage(format!(
+            "scanner {other:?} must be \"cheap\" or \"good\""
+        ))),
     }
 }

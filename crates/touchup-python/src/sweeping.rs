@@ -18,7 +18,12 @@ use crate::files::set_columns;
 
 /// Writes the jobs of a sweep, and returns how many there are.
 #[pyfunction]
-pub fn sweep_plan(py: Python<'_>, grid: PathBuf, recordings: Vec<PathBuf>, out: PathBuf) -> PyResult<u64> {
+pub fn sweep_plan(
+    py: Python<'_>,
+    grid: PathBuf,
+    recordings: Vec<PathBuf>,
+    out: PathBuf,
+) -> PyResult<u64> {
     at_work(py, || plan_sweep(&grid, &recordings, &out))
 }
 
@@ -37,11 +42,23 @@ pub fn run_job<'py>(
     recording: Option<&[u8]>,
     again: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let JobReport { job, id, result, was_there, failed, summary } = at_work(py, || {
+    let JobReport {
+        job,
+        id,
+        result,
+        was_there,
+        failed,
+        summary,
+    } = at_work(py, || {
         let folder = JobsFile::folder(&jobs);
         let results = results.unwrap_or_else(|| folder.join("results"));
         let line = JobsFile::job(&jobs, job)?;
-        Ok(JobRunner::new(folder, results).run(&line, GivenInput { scan, recording }, again, &mut || {})?)
+        Ok(JobRunner::new(folder, results).run(
+            &line,
+            GivenInput { scan, recording },
+            again,
+            &mut || {},
+        )?)
     })?;
     let into = PyDict::new(py);
     into.set_item("job", job)?;
@@ -56,11 +73,23 @@ pub fn run_job<'py>(
 /// What came of all jobs, as JSON: a row for each job, one for each feature, and the number of those without a result.
 #[pyfunction]
 #[pyo3(signature = (jobs, results, with_features))]
-pub fn sweep_tables(py: Python<'_>, jobs: PathBuf, results: Option<PathBuf>, with_features: bool) -> PyResult<String> {
+pub fn sweep_tables(
+    py: Python<'_>,
+    jobs: PathBuf,
+    results: Option<PathBuf>,
+    with_features: bool,
+) -> PyResult<String> {
     at_work(py, || {
         let results = results.unwrap_or_else(|| JobsFile::folder(&jobs).join("results"));
-        let SweepTables { jobs, features, missing, .. } = tables_of(&jobs, &results, with_features)?;
-        to_json(&json!({ "jobs": jobs.json_rows(), "features": features.json_rows(), "missing": missing }))
+        let SweepTables {
+            jobs,
+            features,
+            missing,
+            ..
+        } = tables_of(&jobs, &results, with_features)?;
+        to_json(
+            &json!({ "jobs": jobs.json_rows(), "features": features.json_rows(), "missing": missing }),
+        )
     })
 }
 
@@ -77,7 +106,10 @@ pub fn what_if<'py>(py: Python<'py>, a: PathBuf, b: PathBuf) -> PyResult<Bound<'
     let into = PyDict::new(py);
     into.set_item("report", report)?;
     into.set_item("a", moved_mesh(py, &results[0], &found.of_a)?)?;
-    into.set_item("b", moved_mesh(py, &results[1], found.of_b.as_ref().unwrap_or(&found.of_a))?)?;
+    into.set_item(
+        "b",
+        moved_mesh(py, &results[1], found.of_b.as_ref().unwrap_or(&found.of_a))?,
+    )?;
     Ok(into)
 }
 
@@ -85,14 +117,23 @@ fn shown(path: &Path) -> String {
     path.to_string_lossy().into_owned()
 }
 
-fn moved_mesh<'py>(py: Python<'py>, result: &JobResult, displaced: &[Displacement]) -> PyResult<Bound<'py, PyDict>> {
+fn moved_mesh<'py>(
+    py: Python<'py>,
+    result: &JobResult,
+    displaced: &[Displacement],
+) -> PyResult<Bound<'py, PyDict>> {
     let (into, compact) = (PyDict::new(py), Compact::of(&result.mesh));
     let column = |of: fn(&Displacement) -> f64| {
         let values: Vec<f64> = displaced.iter().map(of).collect();
-        compact.column(&values).map(|values| PyArray1::from_vec(py, values))
+        compact
+            .column(&values)
+            .map(|values| PyArray1::from_vec(py, values))
     };
     into.set_item("displacement", column(|one| one.distance))?;
-    into.set_item("plus_minus", column(|one| one.sigma.map_or(f64::NAN, |_| one.plus_minus(COVERAGE))))?;
+    into.set_item(
+        "plus_minus",
+        column(|one| one.sigma.map_or(f64::NAN, |_| one.plus_minus(COVERAGE))),
+    )?;
     let mesh = PyDict::new(py);
     set_columns(&mesh, &compact, result.sigma.as_deref(), None)?;
     compact.into_dict(&mesh)?;

@@ -26,7 +26,10 @@ impl CountingAllocator {
         // a thread that ends has no counter any more
         let _ = ASKED.try_with(|asked| {
             let AllocationCounts { requests, bytes } = asked.get();
-            asked.set(AllocationCounts { requests: requests.wrapping_add(1), bytes: bytes.wrapping_add(size as u64) });
+            asked.set(AllocationCounts {
+                requests: requests.wrapping_add(1),
+                bytes: bytes.wrapping_add(size as u64),
+            });
         });
     }
 }

@@ -21,7 +21,8 @@ use touchup_report::mistakes::MistakesParams;
 use touchup_report::whole_scan::GivenPart;
 use touchup_report::work_precision::WorkPrecision;
 use touchup_report::{
-    Chapter, Effort, TableCell, convergence, cost, coverage, extremes, mistakes, stability, verdict, whole_scan,
+    Chapter, Effort, TableCell, convergence, cost, coverage, extremes, mistakes, stability,
+    verdict, whole_scan,
 };
 use touchup_session::replay::{Recording, ReplayError, each_sample};
 use touchup_session::scan::{ScanError, read_scan};
@@ -41,7 +42,10 @@ pub enum CommandError {
     #[error(transparent)]
     Replay(#[from] ReplayError),
     #[error("cannot write {}: {source}", path.display())]
-    Write { path: PathBuf, source: std::io::Error },
+    Write {
+        path: PathBuf,
+        source: std::io::Error,
+    },
     #[error(transparent)]
     Peers(#[from] PeersError),
     #[error(transparent)]
@@ -63,7 +67,8 @@ impl CommandError {
     }
 }
 
-const EXIT_CODES: &str = "Exit codes: 0 done, 1 result not written, 2 wrong usage, 3 bad input file";
+const EXIT_CODES: &str =
+    "Exit codes: 0 done, 1 result not written, 2 wrong usage, 3 bad input file";
 
 /// Measures error against run time, stability and cost on this machine, and writes page, plots and tables
 #[derive(Debug, Parser)]
@@ -150,7 +155,10 @@ pub fn report(arguments: &ReportArguments) -> Result<(), CommandError> {
         move |source| CommandError::Write { path, source }
     };
     if out.exists() && !out.is_dir() {
-        return Err(CommandError::Usage(format!("--out {} is a file: name a folder", out.display())));
+        return Err(CommandError::Usage(format!(
+            "--out {} is a file: name a folder",
+            out.display()
+        )));
     }
     // before minutes of measuring
     create_folder(out).map_err(write_error(out))?;
@@ -158,7 +166,9 @@ pub fn report(arguments: &ReportArguments) -> Result<(), CommandError> {
         machine: describe_machine(),
         commit: COMMIT.to_owned(),
         command: command(),
-        date: DateTime::<Utc>::from(SystemTime::now()).format("%Y-%m-%d %H:%M UTC").to_string(),
+        date: DateTime::<Utc>::from(SystemTime::now())
+            .format("%Y-%m-%d %H:%M UTC")
+            .to_string(),
         ..Report::default()
     };
     arguments.measure(&mut report, &mut lines_on_stderr())?;
@@ -169,9 +179,16 @@ pub fn report(arguments: &ReportArguments) -> Result<(), CommandError> {
     let text = if *json {
         serde_json::to_string(&report).map_err(ReportError::from)?
     } else {
-        let advice = report.advice.iter().flat_map(|table| table.rows.iter().map(|row| advice_line(row)));
+        let advice = report
+            .advice
+            .iter()
+            .flat_map(|table| table.rows.iter().map(|row| advice_line(row)));
         let lines: Vec<String> = advice.chain(report.verdict.iter().cloned()).collect();
-        format!("{}\n\nwrote {}", lines.join("\n\n"), out.join("report.html").display())
+        format!(
+            "{}\n\nwrote {}",
+            lines.join("\n\n"),
+            out.join("report.html").display()
+        )
     };
     // a reader that has gone away is no error of ours
     let _ = writeln!(stdout(), "{text}");
@@ -180,19 +197,40 @@ pub fn report(arguments: &ReportArguments) -> Result<(), CommandError> {
 
 /// "question: use this. Because …; cost …".
 fn advice_line(row: &[TableCell]) -> String {
-    let texts = row.iter().filter_map(|cell| if let TableCell::Text(text) = cell { Some(text.as_str()) } else { None });
-    texts.filter(|text| !text.is_empty()).collect::<Vec<_>>().join("\n  ")
+    let texts = row.iter().filter_map(|cell| {
+        if let TableCell::Text(text) = cell {
+            Some(text.as_str())
+        } else {
+            None
+        }
+    });
+    texts
+        .filter(|text| !text.is_empty())
+        .collect::<Vec<_>>()
+        .join("\n  ")
 }
 
 impl ReportArguments {
     /// Adds every selected chapter, in the order of the page.
-    fn measure(&self, report: &mut Report, progress: &mut dyn FnMut(&str)) -> Result<(), CommandError> {
-        let effort = Effort { is_quick: self.quick };
+    fn measure(
+        &self,
+        report: &mut Report,
+        progress: &mut dyn FnMut(&str),
+    ) -> Result<(), CommandError> {
+        let effort = Effort {
+            is_quick: self.quick,
+        };
         let is_wanted = |part| self.only.is_empty() || self.only.contains(&part);
         let given = self.given()?;
         // first, for they need what may not be there, and nothing measured is lost by that
-        let environment = self.peers_env.clone().unwrap_or_else(|| self.out.join("peers-env"));
-        let peers = self.peers.then(|| peers(effort, &environment, progress)).transpose()?;
+        let environment = self
+            .peers_env
+            .clone()
+            .unwrap_or_else(|| self.out.join("peers-env"));
+        let peers = self
+            .peers
+            .then(|| peers(effort, &environment, progress))
+            .transpose()?;
         let mut add = |chapter: Chapter, verdict: Vec<String>| {
             report.chapters.push(chapter);
             report.verdict.extend(verdict);
@@ -201,8 +239,8 @@ impl ReportArguments {
             let measured = WorkPrecision::measure(effort, progress);
             add(measured.chapter(), measured.verdict());
         }
-        let scans =
-            is_wanted(ReportChapter::WholeScan).then(|| whole_scan::whole_scan(effort, given.as_ref(), progress));
+        let scans = is_wanted(ReportChapter::WholeScan)
+            .then(|| whole_scan::whole_scan(effort, given.as_ref(), progress));
         let scans = scans.transpose().map_err(CommandError::WholeScan)?;
         if let Some(measured) = &scans {
             add(measured.chapter(), verdict::of_whole_scans(measured));
@@ -211,7 +249,8 @@ impl ReportArguments {
             let measured = convergence::convergence(effort, progress);
             add(measured.chapter(), verdict::of_convergence(&measured));
         }
-        let stability = is_wanted(ReportChapter::Stability).then(|| stability::stability(effort, progress));
+        let stability =
+            is_wanted(ReportChapter::Stability).then(|| stability::stability(effort, progress));
         if let Some(measured) = &stability {
             add(measured.chapter(), verdict::of_stability(measured));
             progress("extremes");
@@ -225,36 +264,62 @@ impl ReportArguments {
         }
         if is_wanted(ReportChapter::Coverage) {
             let mut params = CoverageParams::of(effort);
-            params.seeds = self.seeds.as_ref().map_or(params.seeds, |seeds| seeds.0.clone());
+            params.seeds = self
+                .seeds
+                .as_ref()
+                .map_or(params.seeds, |seeds| seeds.0.clone());
             let measured = coverage::coverage(params, progress);
             add(measured.chapter(), verdict::of_coverage(&measured));
         }
         if is_wanted(ReportChapter::Mistakes) {
             let mut params = MistakesParams::of(effort);
-            params.seeds = self.seeds.as_ref().map_or(params.seeds, |seeds| seeds.0.clone());
+            params.seeds = self
+                .seeds
+                .as_ref()
+                .map_or(params.seeds, |seeds| seeds.0.clone());
             let measured = mistakes::mistakes(params, progress);
             add(measured.chapter(), verdict::of_mistakes(&measured));
         }
         if let Some(measured) = peers {
             add(measured.chapter(), verdict::of_peers(&measured));
         }
-        report.advice = scans.and_then(|scans| verdict::advice(&scans, stability.as_ref(), cost.as_ref()));
+        report.advice =
+            scans.and_then(|scans| verdict::advice(&scans, stability.as_ref(), cost.as_ref()));
         Ok(())
     }
 
     /// The case that is given by files.
     fn given(&self) -> Result<Option<GivenPart>, CommandError> {
-        let (Some(scan), Some(truth), Some(bag)) = (&self.scan, &self.truth, &self.bag) else { return Ok(None) };
-        let scene = self.scene.as_deref().map_or_else(|| Ok(Scene::default()), Scene::read)?;
-        let recording = Recording::open(bag, &Topics::default(), StampSource::Header).map_err(ReplayError::from)?;
-        let no_refine = || CommandError::Usage("the scene says `refine: off`: take that out of it".to_owned());
-        let params = scene.refine_params(recording.wrench_frame).ok_or_else(no_refine)?;
+        let (Some(scan), Some(truth), Some(bag)) = (&self.scan, &self.truth, &self.bag) else {
+            return Ok(None);
+        };
+        let scene = self
+            .scene
+            .as_deref()
+            .map_or_else(|| Ok(Scene::default()), Scene::read)?;
+        let recording = Recording::open(bag, &Topics::default(), StampSource::Header)
+            .map_err(ReplayError::from)?;
+        let no_refine =
+            || CommandError::Usage("the scene says `refine: off`: take that out of it".to_owned());
+        let params = scene
+            .refine_params(recording.wrench_frame)
+            .ok_or_else(no_refine)?;
         let mut samples = Vec::new();
-        each_sample(recording, scene.placement(), scene.sync_params(), None, &mut || {}, &mut |_| (), |sample| {
-            samples.push(*sample)
-        })?;
+        each_sample(
+            recording,
+            scene.placement(),
+            scene.sync_params(),
+            None,
+            &mut || {},
+            &mut |_| (),
+            |sample| samples.push(*sample),
+        )?;
         Ok(Some(GivenPart {
-            name: scan.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+            name: scan
+                .file_stem()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned(),
             scan: read_scan(scan, self.mesh_unit)?.mesh,
             truth: read_scan(truth, self.mesh_unit)?.mesh,
             samples,
@@ -269,13 +334,22 @@ impl ReportArguments {
 fn lines_on_stderr() -> impl FnMut(&str) {
     let started = Instant::now();
     move |what| {
-        let _ = writeln!(stderr(), "{:>6.1} s  {what}", started.elapsed().as_secs_f64());
+        let _ = writeln!(
+            stderr(),
+            "{:>6.1} s  {what}",
+            started.elapsed().as_secs_f64()
+        );
     }
 }
 
 /// As it could be called again.
 fn command() -> String {
-    let arguments = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
+    let arguments = std::env::args_os()
+        .skip(1)
+        .map(|word| word.to_string_lossy().into_owned());
     let arguments = arguments.filter(|word| word != "--json");
-    std::iter::once("touchup-report".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
+    std::iter::once("touchup-report".to_owned())
+        .chain(arguments)
+        .collect::<Vec<_>>()
+        .join(" ")
 }

@@ -11,16 +11,38 @@ pub fn of_figure(figure: &Figure) -> String {
     let (x, y) = (&figure.x.column, &figure.y.column);
     match &figure.drawing {
         Drawing::Curves(series) => {
-            let marks = series.iter().flat_map(|series| series.marks.iter().map(move |mark| (&series.name, mark)));
-            let rows = marks.map(|(name, mark)| vec![name.as_str().into(), mark.x.into(), mark.y.into()]);
-            lines(&[("series", ALONE), (x, WITH_SPREAD), (y, WITH_SPREAD)], "_", rows)
+            let marks = series
+                .iter()
+                .flat_map(|series| series.marks.iter().map(move |mark| (&series.name, mark)));
+            let rows =
+                marks.map(|(name, mark)| vec![name.as_str().into(), mark.x.into(), mark.y.into()]);
+            lines(
+                &[("series", ALONE), (x, WITH_SPREAD), (y, WITH_SPREAD)],
+                "_",
+                rows,
+            )
         }
         Drawing::Maps { share_of, panels } => {
             let rows = panels.iter().flat_map(|panel| {
-                let cells = panel.ys.iter().flat_map(|y| panel.xs.iter().map(move |x| [*x, *y])).zip(&panel.shares);
-                cells.map(|([x, y], share)| vec![panel.name.as_str().into(), x.into(), y.into(), (*share).into()])
+                let cells = panel
+                    .ys
+                    .iter()
+                    .flat_map(|y| panel.xs.iter().map(move |x| [*x, *y]))
+                    .zip(&panel.shares);
+                cells.map(|([x, y], share)| {
+                    vec![
+                        panel.name.as_str().into(),
+                        x.into(),
+                        y.into(),
+                        (*share).into(),
+                    ]
+                })
             });
-            lines(&["panel", x, y, &format!("share of {share_of}")].map(|head| (head, ALONE)), "", rows)
+            lines(
+                &["panel", x, y, &format!("share of {share_of}")].map(|head| (head, ALONE)),
+                "",
+                rows,
+            )
         }
     }
 }
@@ -28,7 +50,10 @@ pub fn of_figure(figure: &Figure) -> String {
 /// The cells of a table; a column with spreads has two more behind it.
 pub fn of_table(table: &Table) -> String {
     let heads = table.heads.iter().enumerate().map(|(column, head)| {
-        let has_spread = table.rows.iter().any(|row| matches!(row.get(column), Some(TableCell::Spread(_))));
+        let has_spread = table
+            .rows
+            .iter()
+            .any(|row| matches!(row.get(column), Some(TableCell::Spread(_))));
         (head.as_str(), if has_spread { WITH_SPREAD } else { ALONE })
     });
     lines(&heads.collect::<Vec<_>>(), ", ", table.rows.iter().cloned())
@@ -37,12 +62,26 @@ pub fn of_table(table: &Table) -> String {
 /// Heads, and a line for each row.
 ///
 /// - `heads`: each with how many columns it has; those of a spread are named after it and `separator`.
-fn lines(heads: &[(&str, usize)], separator: &str, rows: impl Iterator<Item = Vec<TableCell>>) -> String {
+fn lines(
+    heads: &[(&str, usize)],
+    separator: &str,
+    rows: impl Iterator<Item = Vec<TableCell>>,
+) -> String {
     let names = heads.iter().flat_map(|&(head, columns)| {
-        let names = [head.to_owned(), format!("{head}{separator}p10"), format!("{head}{separator}p90")];
+        let names = [
+            head.to_owned(),
+            format!("{head}{separator}p10"),
+            format!("{head}{separator}p90"),
+        ];
         names.map(|name| quoted(&name)).into_iter().take(columns)
     });
-    let cells = rows.map(|row| line(row.iter().zip(heads).flat_map(|(cell, (_, columns))| values(cell, *columns))));
+    let cells = rows.map(|row| {
+        line(
+            row.iter()
+                .zip(heads)
+                .flat_map(|(cell, (_, columns))| values(cell, *columns)),
+        )
+    });
     line(names) + &cells.collect::<String>()
 }
 
@@ -59,12 +98,20 @@ fn values(cell: &TableCell, columns: usize) -> Vec<String> {
 
 /// To the last digit; empty where it is none.
 fn number(value: f64) -> String {
-    if value.is_finite() { format!("{value:?}") } else { String::new() }
+    if value.is_finite() {
+        format!("{value:?}")
+    } else {
+        String::new()
+    }
 }
 
 fn quoted(text: &str) -> String {
     let needs_quotes = text.contains([',', '"', '\n', '\r']);
-    if needs_quotes { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+    if needs_quotes {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
 }
 
 fn line(values: impl IntoIterator<Item = String>) -> String {

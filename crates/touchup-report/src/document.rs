@@ -30,19 +30,26 @@ impl Report {
     }
 
     pub(super) fn tables(&self) -> impl Iterator<Item = &Table> {
-        self.advice.iter().chain(self.chapters.iter().flat_map(|chapter| &chapter.tables))
+        self.advice
+            .iter()
+            .chain(self.chapters.iter().flat_map(|chapter| &chapter.tables))
     }
 
     /// One look for each series, the same in all figures.
     pub(super) fn looks(&self) -> Looks {
         Looks::of(self.figures().filter_map(|figure| match &figure.drawing {
-            Drawing::Curves(series) => Some(series.iter().map(|series| series.name.as_str()).collect()),
+            Drawing::Curves(series) => {
+                Some(series.iter().map(|series| series.name.as_str()).collect())
+            }
             Drawing::Maps { .. } => None,
         }))
     }
 
     /// What every picture says about where it is from.
     pub(super) fn provenance(&self) -> String {
-        format!("{} · commit {} · {}", self.machine, self.commit, self.command)
+        format!(
+            "{} · commit {} · {}",
+            self.machine, self.commit, self.command
+        )
     }
 }

@@ -11,7 +11,10 @@ pub(crate) struct Double2 {
 }
 
 /// ln 2
-const LN_2: Double2 = Double2 { high: std::f64::consts::LN_2, low: 2.319_046_813_846_299_6e-17 };
+const LN_2: Double2 = Double2 {
+    high: std::f64::consts::LN_2,
+    low: 2.319_046_813_846_299_6e-17,
+};
 /// The argument of the series of the exponential is halved so often.
 const HALVINGS: i32 = 9;
 /// Terms of that series: (ln 2 / 1024)¹² / 12! is 2e-47.
@@ -21,7 +24,10 @@ const TERMS: u32 = 11;
 fn two_sum(a: f64, b: f64) -> Double2 {
     let high = a + b;
     let part = high - a;
-    Double2 { high, low: (a - (high - part)) + (b - part) }
+    Double2 {
+        high,
+        low: (a - (high - part)) + (b - part),
+    }
 }
 
 impl From<f64> for Double2 {
@@ -44,7 +50,10 @@ impl Neg for Double2 {
     type Output = Self;
 
     fn neg(self) -> Self {
-        Self { high: -self.high, low: -self.low }
+        Self {
+            high: -self.high,
+            low: -self.low,
+        }
     }
 }
 
@@ -61,7 +70,8 @@ impl Mul for Double2 {
 
     fn mul(self, other: Self) -> Self {
         let high = self.high * other.high;
-        let low = self.high.mul_add(other.high, -high) + (self.high * other.low + self.low * other.high);
+        let low =
+            self.high.mul_add(other.high, -high) + (self.high * other.low + self.low * other.high);
         two_sum(high, low)
     }
 }
@@ -84,7 +94,10 @@ impl Double2 {
         let twos = (self.high / LN_2.high).round();
         let small = self - LN_2 * twos.into();
         let scale = 0.5f64.powi(HALVINGS);
-        let x = Self { high: small.high * scale, low: small.low * scale };
+        let x = Self {
+            high: small.high * scale,
+            low: small.low * scale,
+        };
         // e^x − 1 by its series, then (e^x − 1) ← (e^x − 1)² + 2 (e^x − 1), which keeps its digits
         let mut sum = Self::from(0.0);
         for k in (1..=TERMS).rev() {
@@ -93,9 +106,15 @@ impl Double2 {
         for _ in 0..HALVINGS {
             sum = sum * sum + sum + sum;
         }
-        let (half, rest) = (2f64.powi(twos as i32 / 2), 2f64.powi(twos as i32 - twos as i32 / 2));
+        let (half, rest) = (
+            2f64.powi(twos as i32 / 2),
+            2f64.powi(twos as i32 - twos as i32 / 2),
+        );
         let result = sum + 1.0.into();
-        Self { high: result.high * half * rest, low: result.low * half * rest }
+        Self {
+            high: result.high * half * rest,
+            low: result.low * half * rest,
+        }
     }
 
     /// Natural logarithm; of a positive number.
@@ -132,22 +151,44 @@ mod tests {
     /// Digits from tables: e, ln 10, and 1/3.
     #[test]
     fn thirty_digits_of_known_numbers() {
-        let off = |value: Double2, high: f64, low: f64| (value - Double2 { high, low }).value().abs();
+        let off =
+            |value: Double2, high: f64, low: f64| (value - Double2 { high, low }).value().abs();
         // e = 2.71828182845904523536028747135266249…
-        assert!(off(Double2::from(1.0).exp(), std::f64::consts::E, 1.445_646_891_729_250_2e-16) < 1e-30);
+        assert!(
+            off(
+                Double2::from(1.0).exp(),
+                std::f64::consts::E,
+                1.445_646_891_729_250_2e-16
+            ) < 1e-30
+        );
         // ln 10 = 2.30258509299404568401799145468436420…
-        assert!(off(Double2::from(10.0).ln(), std::f64::consts::LN_10, -2.170_756_223_382_249e-16) < 1e-30);
+        assert!(
+            off(
+                Double2::from(10.0).ln(),
+                std::f64::consts::LN_10,
+                -2.170_756_223_382_249e-16
+            ) < 1e-30
+        );
         let third = Double2::from(1.0) / 3.0.into();
         assert!((third * 3.0.into() - 1.0.into()).value().abs() < 1e-31);
         // √2 = 1.41421356237309504880168872420969807…
-        assert!(off(Double2::from(2.0).sqrt(), std::f64::consts::SQRT_2, -9.667_293_313_452_913e-17) < 1e-31);
+        assert!(
+            off(
+                Double2::from(2.0).sqrt(),
+                std::f64::consts::SQRT_2,
+                -9.667_293_313_452_913e-17
+            ) < 1e-31
+        );
     }
 
     #[test]
     fn the_logarithm_undoes_the_exponential() {
         for x in [-600.0, -37.5, -1.0, -1e-9, 1e-12, 0.3, 5.0, 88.8, 650.0] {
             let back = Double2::from(x).exp().ln();
-            assert!((back - x.into()).value().abs() < 1e-30 * x.abs().max(1.0), "{x}: {back:?}");
+            assert!(
+                (back - x.into()).value().abs() < 1e-30 * x.abs().max(1.0),
+                "{x}: {back:?}"
+            );
         }
     }
 }

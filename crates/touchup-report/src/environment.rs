@@ -21,7 +21,10 @@ pub enum PeersError {
     #[error(transparent)]
     UnknownLine(#[from] UnknownLine),
     #[error("cannot write {}: {source}", path.display())]
-    Write { path: PathBuf, source: std::io::Error },
+    Write {
+        path: PathBuf,
+        source: std::io::Error,
+    },
     #[error("touchup itself: {0}")]
     Touchup(#[from] RefineError),
 }
@@ -29,7 +32,11 @@ pub enum PeersError {
 /// Measures touchup and the peers in turns, on 100k faces and, unless it is to be quick, on 1M.
 ///
 /// `environment`: folder of the virtual environment; made and filled where it is not yet.
-pub fn peers(effort: Effort, environment: &Path, progress: &mut dyn FnMut(&str)) -> Result<Peers, PeersError> {
+pub fn peers(
+    effort: Effort,
+    environment: &Path,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Peers, PeersError> {
     progress("peers: virtual environment");
     let python = make_environment(environment)?;
     let sizes: &[usize] = effort.choose(&[100_000], &[100_000, 1_000_000]);
@@ -40,9 +47,18 @@ pub fn peers(effort: Effort, environment: &Path, progress: &mut dyn FnMut(&str))
         progress(&format!("peers: libraries at {faces} faces"));
         let printed = run_script(&python, &input)?;
         progress(&format!("peers: touchup again at {faces} faces"));
-        Ok(PeersAtSize::read(&input, [before, input.measure("after")?], &printed)?)
+        Ok(PeersAtSize::read(
+            &input,
+            [before, input.measure("after")?],
+            &printed,
+        )?)
     };
-    Ok(Peers { sizes: sizes.iter().map(at_size).collect::<Result<_, PeersError>>()? })
+    Ok(Peers {
+        sizes: sizes
+            .iter()
+            .map(at_size)
+            .collect::<Result<_, PeersError>>()?,
+    })
 }
 
 /// The interpreter of an environment that has the packages.
@@ -51,16 +67,28 @@ fn make_environment(folder: &Path) -> Result<PathBuf, PeersError> {
     if !python.exists() {
         set_up(Command::new("python3").arg("-m").arg("venv").arg(folder))?;
     }
-    let install = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--only-binary=:all:"];
+    let install = [
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--disable-pip-version-check",
+        "--only-binary=:all:",
+    ];
     set_up(Command::new(&python).args(install).args(PACKAGES))?;
     Ok(python)
 }
 
 fn set_up(command: &mut Command) -> Result<(), PeersError> {
-    let Err(reason) = run(command) else { return Ok(()) };
+    let Err(reason) = run(command) else {
+        return Ok(());
+    };
     let words = std::iter::once(command.get_program()).chain(command.get_args());
     let words: Vec<_> = words.map(|word| word.to_string_lossy()).collect();
-    Err(PeersError::Setup { command: words.join(" "), reason })
+    Err(PeersError::Setup {
+        command: words.join(" "),
+        reason,
+    })
 }
 
 /// What a program printed, or the last line that it said before it failed.
@@ -83,7 +111,10 @@ fn run_script(python: &Path, input: &PeersInput) -> Result<String, PeersError> {
         write_atomically(&path, |to| to.write_all(&bytes)).map_err(write_error(path))?;
     }
     let mut command = Command::new(python);
-    command.args(["-c", SCRIPT]).arg(folder.path()).arg(input.distances.len().to_string());
+    command
+        .args(["-c", SCRIPT])
+        .arg(folder.path())
+        .arg(input.distances.len().to_string());
     run(&mut command).map_err(PeersError::Script)
 }
 
@@ -97,6 +128,9 @@ mod tests {
         let file = folder.path().join("taken");
         std::fs::write(&file, "no folder").unwrap();
         let error = make_environment(&file.join("env")).unwrap_err().to_string();
-        assert!(error.contains("python3 -m venv") && error.contains("PyPI"), "{error}");
+        assert!(
+            error.contains("python3 -m venv") && error.contains("PyPI"),
+            "{error}"
+        );
     }
 }

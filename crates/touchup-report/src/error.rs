@@ -43,7 +43,9 @@ pub enum MeasureError {
     #[error("no temporary folder for a recording: {0}; name one with room by TMPDIR")]
     Folder(std::io::Error),
     /// A scene without `refine`.
-    #[error("a scene that moves nothing has no cost of a push: it needs `refine`, and `patch` for the patch")]
+    #[error(
+        "a scene that moves nothing has no cost of a push: it needs `refine`, and `patch` for the patch"
+    )]
     NothingMoves,
     /// No block of samples.
     #[error("nothing was timed: the raster of the ball is not on the plate, or has no samples")]

@@ -16,7 +16,9 @@ pub struct Extremes {
 
 /// Feeds all extremes.
 pub fn extremes() -> Extremes {
-    Extremes { rows: [face::rows(), mesh::rows()].concat() }
+    Extremes {
+        rows: [face::rows(), mesh::rows()].concat(),
+    }
 }
 
 impl Extremes {
@@ -31,7 +33,12 @@ impl Extremes {
         let verdict = if wrong.is_empty() {
             format!("All {} extremes got the right answer.", self.rows.len())
         } else {
-            format!("MISSED: {} of {} extremes got a wrong answer: {}.", wrong.len(), self.rows.len(), wrong.join("; "))
+            format!(
+                "MISSED: {} of {} extremes got a wrong answer: {}.",
+                wrong.len(),
+                self.rows.len(),
+                wrong.join("; ")
+            )
         };
         Chapter::of("Extremes", vec![verdict], vec![], vec![self.table()])
     }

@@ -26,12 +26,20 @@ pub struct Axis {
 impl Axis {
     /// An axis of equal differences.
     pub fn linear(label: &str, column: &str) -> Self {
-        Self { label: label.to_owned(), column: column.to_owned(), scale: Scale::Linear }
+        Self {
+            label: label.to_owned(),
+            column: column.to_owned(),
+            scale: Scale::Linear,
+        }
     }
 
     /// An axis of equal ratios.
     pub fn log(label: &str, column: &str) -> Self {
-        Self { label: label.to_owned(), column: column.to_owned(), scale: Scale::Log }
+        Self {
+            label: label.to_owned(),
+            column: column.to_owned(),
+            scale: Scale::Log,
+        }
     }
 }
 
@@ -51,14 +59,26 @@ impl Spread {
     /// Of values that were measured; `None` where there are none.
     pub fn of(mut values: Vec<f64>) -> Option<Self> {
         values.sort_by(f64::total_cmp);
-        let at = |share: f64| values.get(((values.len().checked_sub(1)?) as f64 * share).round() as usize).copied();
-        Some(Self { median: at(0.5)?, p10: at(0.1)?, p90: at(0.9)? })
+        let at = |share: f64| {
+            values
+                .get(((values.len().checked_sub(1)?) as f64 * share).round() as usize)
+                .copied()
+        };
+        Some(Self {
+            median: at(0.5)?,
+            p10: at(0.1)?,
+            p90: at(0.9)?,
+        })
     }
 
     /// All three times a factor that is not negative.
     #[must_use]
     pub fn times(self, factor: f64) -> Self {
-        Self { median: self.median * factor, p10: self.p10 * factor, p90: self.p90 * factor }
+        Self {
+            median: self.median * factor,
+            p10: self.p10 * factor,
+            p90: self.p90 * factor,
+        }
     }
 
     /// Median, 10th and 90th percentile.
@@ -69,7 +89,11 @@ impl Spread {
 
 impl From<f64> for Spread {
     fn from(value: f64) -> Self {
-        Self { median: value, p10: value, p90: value }
+        Self {
+            median: value,
+            p10: value,
+            p90: value,
+        }
     }
 }
 
@@ -85,7 +109,10 @@ pub struct Mark {
 impl Mark {
     /// At values with a spread or without.
     pub fn at(x: impl Into<Spread>, y: impl Into<Spread>) -> Self {
-        Self { x: x.into(), y: y.into() }
+        Self {
+            x: x.into(),
+            y: y.into(),
+        }
     }
 }
 
@@ -116,8 +143,16 @@ pub struct Series {
 
 impl Series {
     /// Of marks in the order in which they are joined.
-    pub fn new(name: impl Into<String>, stroke: LineStroke, marks: impl IntoIterator<Item = Mark>) -> Self {
-        Self { name: name.into(), stroke, marks: marks.into_iter().collect() }
+    pub fn new(
+        name: impl Into<String>,
+        stroke: LineStroke,
+        marks: impl IntoIterator<Item = Mark>,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            stroke,
+            marks: marks.into_iter().collect(),
+        }
     }
 }
 
@@ -170,13 +205,23 @@ impl Figure {
     /// Begins one with what is drawn.
     pub fn of(id: impl Into<String>, drawing: Drawing) -> Self {
         let [x, y] = [Axis::linear("", ""), Axis::linear("", "")];
-        Self { id: id.into(), title: String::new(), caption: String::new(), x, y, drawing }
+        Self {
+            id: id.into(),
+            title: String::new(),
+            caption: String::new(),
+            x,
+            y,
+            drawing,
+        }
     }
 
     /// Above it.
     #[must_use]
     pub fn title(self, title: impl Into<String>) -> Self {
-        Self { title: title.into(), ..self }
+        Self {
+            title: title.into(),
+            ..self
+        }
     }
 
     /// What is to the right, and what is upward.
@@ -188,7 +233,10 @@ impl Figure {
     /// Below it.
     #[must_use]
     pub fn caption(self, caption: impl Into<String>) -> Self {
-        Self { caption: caption.into(), ..self }
+        Self {
+            caption: caption.into(),
+            ..self
+        }
     }
 }
 
@@ -252,7 +300,16 @@ impl Table {
         let [id, title] = [id, title].map(str::to_owned);
         let rows: Vec<R> = rows.into_iter().collect();
         let cells = vec![Vec::new(); rows.len()];
-        TableOf { rows, table: Self { id, title, caption: String::new(), heads: Vec::new(), rows: cells } }
+        TableOf {
+            rows,
+            table: Self {
+                id,
+                title,
+                caption: String::new(),
+                heads: Vec::new(),
+                rows: cells,
+            },
+        }
     }
 }
 
@@ -265,7 +322,11 @@ pub struct TableOf<R> {
 impl<R: Copy> TableOf<R> {
     /// Adds a column: its head with the unit, and what it shows of each row.
     #[must_use]
-    pub fn column<C: Into<TableCell>>(mut self, head: impl Into<String>, cell: impl Fn(R) -> C) -> Self {
+    pub fn column<C: Into<TableCell>>(
+        mut self,
+        head: impl Into<String>,
+        cell: impl Fn(R) -> C,
+    ) -> Self {
         self.table.heads.push(head.into());
         for (cells, row) in self.table.rows.iter_mut().zip(&self.rows) {
             cells.push(cell(*row).into());
@@ -275,7 +336,10 @@ impl<R: Copy> TableOf<R> {
 
     /// The table, with what is below it.
     pub fn caption(self, caption: impl Into<String>) -> Table {
-        Table { caption: caption.into(), ..self.table }
+        Table {
+            caption: caption.into(),
+            ..self.table
+        }
     }
 }
 
@@ -295,6 +359,11 @@ pub struct Chapter {
 impl Chapter {
     /// Of its parts, in order.
     pub fn of(title: &str, text: Vec<String>, figures: Vec<Figure>, tables: Vec<Table>) -> Self {
-        Self { title: title.to_owned(), text, figures, tables }
+        Self {
+            title: title.to_owned(),
+            text,
+            figures,
+            tables,
+        }
     }
 }

@@ -39,7 +39,10 @@ impl Report {
         let looks = self.looks();
         let mut files = Vec::new();
         let mut add = |id: &str, ending: &str, text: String| {
-            files.push(OutputFile { name: format!("{id}.{ending}"), bytes: text.into_bytes() });
+            files.push(OutputFile {
+                name: format!("{id}.{ending}"),
+                bytes: text.into_bytes(),
+            });
         };
         add("report", "html", page::html(self));
         add("report", "json", serde_json::to_string_pretty(self)? + "\n");
@@ -57,7 +60,11 @@ impl Report {
         let tables = self.tables().map(|table| &table.id);
         let mut seen = BTreeSet::from(["report"]);
         for id in self.figures().map(|figure| &figure.id).chain(tables) {
-            if id.is_empty() || !id.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_') {
+            if id.is_empty()
+                || !id
+                    .bytes()
+                    .all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_')
+            {
                 return Err(ReportError::BadName(id.clone()));
             }
             if !seen.insert(id) {

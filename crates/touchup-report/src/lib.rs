@@ -26,7 +26,8 @@ pub mod whole_scan;
 pub mod work_precision;
 
 pub use figure::{
-    Axis, Chapter, Drawing, Figure, LineStroke, Mark, Panel, Scale, Series, Spread, Table, TableCell, TableOf,
+    Axis, Chapter, Drawing, Figure, LineStroke, Mark, Panel, Scale, Series, Spread, Table,
+    TableCell, TableOf,
 };
 
 /// How much is measured.

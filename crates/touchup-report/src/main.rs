@@ -27,7 +27,11 @@ fn main() -> ExitCode {
     match report(&arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            let _ = writeln!(stderr(), "touchup-report: {}", error.to_string().replace('\n', " "));
+            let _ = writeln!(
+                stderr(),
+                "touchup-report: {}",
+                error.to_string().replace('\n', " ")
+            );
             ExitCode::from(error.exit_code())
         }
     }

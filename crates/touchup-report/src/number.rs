@@ -27,14 +27,19 @@ pub fn three_digits(value: f64) -> String {
 /// 10 with a raised exponent: 10⁻⁷.
 pub fn power_of_ten(exponent: i32) -> String {
     let digits = exponent.unsigned_abs().to_string();
-    let raised = digits.bytes().map(|digit| RAISED[usize::from(digit - b'0')]);
+    let raised = digits
+        .bytes()
+        .map(|digit| RAISED[usize::from(digit - b'0')]);
     let sign = if exponent < 0 { "⁻" } else { "" };
     format!("10{sign}{}", raised.collect::<String>())
 }
 
 /// The smallest and the largest; `None` where there are none.
 pub fn range(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
-    values.into_iter().map(|value| (value, value)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+    values
+        .into_iter()
+        .map(|value| (value, value))
+        .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
 #[cfg(test)]

@@ -31,7 +31,9 @@ pub(super) fn html(report: &Report) -> String {
     page += &head(report);
     let advice = report.advice.as_ref().map_or_else(String::new, table);
     let verdict = text(&report.verdict);
-    page += &format!("<h2 id=\"summary\">Verdict</h2>\n<div class=\"verdict\">\n{advice}{verdict}</div>\n");
+    page += &format!(
+        "<h2 id=\"summary\">Verdict</h2>\n<div class=\"verdict\">\n{advice}{verdict}</div>\n"
+    );
     page += &contents(&report.chapters);
     let (looks, provenance) = (report.looks(), report.provenance());
     for (number, chapter) in report.chapters.iter().enumerate() {
@@ -43,11 +45,25 @@ pub(super) fn html(report: &Report) -> String {
 fn head(report: &Report) -> String {
     let lines = [
         ("machine", escaped(&report.machine)),
-        ("commit", format!("<code>{}</code>", escaped(&report.commit))),
-        ("command", format!("<code>{}</code>", escaped(&report.command))),
+        (
+            "commit",
+            format!("<code>{}</code>", escaped(&report.commit)),
+        ),
+        (
+            "command",
+            format!("<code>{}</code>", escaped(&report.command)),
+        ),
         ("date", escaped(&report.date)),
-        ("numbers", "<a href=\"report.json\">report.json</a>, and a CSV for every figure and table".to_owned()),
-        ("times", "median; bars and small numbers are the 10th and 90th percentile of the repeats".to_owned()),
+        (
+            "numbers",
+            "<a href=\"report.json\">report.json</a>, and a CSV for every figure and table"
+                .to_owned(),
+        ),
+        (
+            "times",
+            "median; bars and small numbers are the 10th and 90th percentile of the repeats"
+                .to_owned(),
+        ),
     ];
     let lines = lines.map(|(name, value)| format!("<tr><td>{name}</td><td>{value}</td></tr>\n"));
     format!("<table class=\"head\">\n{}</table>\n", lines.concat())
@@ -55,7 +71,11 @@ fn head(report: &Report) -> String {
 
 fn contents(chapters: &[Chapter]) -> String {
     let line = |(number, chapter): (usize, &Chapter)| {
-        format!("<li><a href=\"#{}\">{}</a></li>\n", anchor(number), escaped(&chapter.title))
+        format!(
+            "<li><a href=\"#{}\">{}</a></li>\n",
+            anchor(number),
+            escaped(&chapter.title)
+        )
     };
     let lines: String = chapters.iter().enumerate().map(line).collect();
     format!("<h2>Contents</h2>\n<ol>\n{lines}</ol>\n")
@@ -66,14 +86,26 @@ fn anchor(number: usize) -> String {
 }
 
 fn chapter(number: usize, chapter: &Chapter, looks: &Looks, provenance: &str) -> String {
-    let title = format!("<h2 id=\"{}\">{}. {}</h2>\n", anchor(number), number + 1, escaped(&chapter.title));
-    let figures: String = chapter.figures.iter().map(|figure| self::figure(figure, looks, provenance)).collect();
+    let title = format!(
+        "<h2 id=\"{}\">{}. {}</h2>\n",
+        anchor(number),
+        number + 1,
+        escaped(&chapter.title)
+    );
+    let figures: String = chapter
+        .figures
+        .iter()
+        .map(|figure| self::figure(figure, looks, provenance))
+        .collect();
     let tables: String = chapter.tables.iter().map(table).collect();
     title + &text(&chapter.text) + &figures + &tables
 }
 
 fn text(paragraphs: &[String]) -> String {
-    paragraphs.iter().map(|paragraph| format!("<p>{}</p>\n", escaped(paragraph))).collect()
+    paragraphs
+        .iter()
+        .map(|paragraph| format!("<p>{}</p>\n", escaped(paragraph)))
+        .collect()
 }
 
 fn figure(figure: &Figure, looks: &Looks, provenance: &str) -> String {
@@ -87,8 +119,13 @@ fn figure(figure: &Figure, looks: &Looks, provenance: &str) -> String {
 
 fn table(table: &Table) -> String {
     let (id, title, caption) = (&table.id, escaped(&table.title), escaped(&table.caption));
-    let heads: String = table.heads.iter().map(|head| format!("<th>{}</th>", escaped(head))).collect();
-    let row = |row: &Vec<TableCell>| format!("<tr>{}</tr>\n", row.iter().map(cell).collect::<String>());
+    let heads: String = table
+        .heads
+        .iter()
+        .map(|head| format!("<th>{}</th>", escaped(head)))
+        .collect();
+    let row =
+        |row: &Vec<TableCell>| format!("<tr>{}</tr>\n", row.iter().map(cell).collect::<String>());
     let rows: String = table.rows.iter().map(row).collect();
     format!(
         "<h3 id=\"{id}\">{title}</h3>\n<div class=\"wide\"><table class=\"numbers\">\n<tr>{heads}</tr>\n{rows}</table></div>\n\
@@ -102,7 +139,10 @@ fn cell(cell: &TableCell) -> String {
         TableCell::Number(value) => format!("<td class=\"n\">{}</td>", three_digits(*value)),
         TableCell::Spread(Spread { median, p10, p90 }) => {
             let ends = format!("{} – {}", three_digits(*p10), three_digits(*p90));
-            format!("<td class=\"n\">{}<span class=\"spread\">{ends}</span></td>", three_digits(*median))
+            format!(
+                "<td class=\"n\">{}<span class=\"spread\">{ends}</span></td>",
+                three_digits(*median)
+            )
         }
         TableCell::Empty => "<td></td>".to_owned(),
     }

@@ -62,8 +62,16 @@ impl HeldFace {
         let (travel, exponent, farthest_m) = plane.follow(self.dt_s)?;
         let along = plane.along_axis.map(|x| (x * travel).value());
         let [towards, across] = plane.cosine_and_sine(exponent);
-        let n = Vector3::from_fn(|i, _| (plane.towards[i] * towards + plane.across[i] * across).value());
-        Some(Reference { face: FaceState { b: Point3::from(along), n }, farthest_m })
+        let n = Vector3::from_fn(|i, _| {
+            (plane.towards[i] * towards + plane.across[i] * across).value()
+        });
+        Some(Reference {
+            face: FaceState {
+                b: Point3::from(along),
+                n,
+            },
+            farthest_m,
+        })
     }
 }
 
@@ -82,7 +90,11 @@ fn dot(a: &Wide3, b: &Wide3) -> Double2 {
 /// Length, and direction; zero where there is none.
 fn split(a: &Wide3) -> (Double2, Wide3) {
     let length = dot(a, a).sqrt();
-    if length.high == 0.0 { (length, *a) } else { (length, a.map(|x| x / length)) }
+    if length.high == 0.0 {
+        (length, *a)
+    } else {
+        (length, a.map(|x| x / length))
+    }
 }
 
 /// The plane of normal and force.
@@ -117,10 +129,23 @@ impl<'a> ForcePlane<'a> {
         } else {
             return None;
         };
-        let along_axis = if held.params.along == Along::Force { towards } else { normal };
+        let along_axis = if held.params.along == Along::Force {
+            towards
+        } else {
+            normal
+        };
         let in_plane = |v: &Wide3| [dot(v, &towards), dot(v, &across)];
         let (arm, along) = (in_plane(&wide(&held.arm)), in_plane(&along_axis));
-        Some(Self { held, magnitude, towards, across, along_axis, half_tangent, arm, along })
+        Some(Self {
+            held,
+            magnitude,
+            towards,
+            across,
+            along_axis,
+            half_tangent,
+            arm,
+            along,
+        })
     }
 
     /// cos θ and sin θ after the exponent x.
@@ -136,22 +161,42 @@ impl<'a> ForcePlane<'a> {
         if tangent.high > 1.0 {
             let inverse = one / tangent;
             let length = one + inverse * inverse;
-            return [(inverse * inverse - one) / length, (inverse + inverse) / length];
+            return [
+                (inverse * inverse - one) / length,
+                (inverse + inverse) / length,
+            ];
         }
         let length = one + tangent * tangent;
-        [(one - tangent * tangent) / length, (tangent + tangent) / length]
+        [
+            (one - tangent * tangent) / length,
+            (tangent + tangent) / length,
+        ]
     }
 
     /// f, N, and df/dh, N/m.
     fn expected(&self, h: Double2) -> (Double2, f64) {
         let one = Double2::from(1.0);
         match self.held.params.model {
-            ContactModel::Spring { stiffness_n_per_m } => (-h * stiffness_n_per_m.into(), -stiffness_n_per_m),
-            ContactModel::Sigmoid { f_max_n, h_min_m, delta } => {
+            ContactModel::Spring { stiffness_n_per_m } => {
+                (-h * stiffness_n_per_m.into(), -stiffness_n_per_m)
+            }
+            ContactModel::Sigmoid {
+                f_max_n,
+                h_min_m,
+                delta,
+            } => {
                 let u = h / h_min_m.into() + delta.into();
                 let size = if u.high > 0.0 { u } else { -u };
-                let e = if size.high > LARGEST_EXPONENT { Double2::from(0.0) } else { (-size).exp() };
-                let share = if u.high > 0.0 { e / (one + e) } else { one / (one + e) };
+                let e = if size.high > LARGEST_EXPONENT {
+                    Double2::from(0.0)
+                } else {
+                    (-size).exp()
+                };
+                let share = if u.high > 0.0 {
+                    e / (one + e)
+                } else {
+                    one / (one + e)
+                };
                 let slope = (e / ((one + e) * (one + e))).value();
                 (share * f_max_n.into(), -f_max_n / h_min_m * slope)
             }
@@ -161,9 +206,15 @@ impl<'a> ForcePlane<'a> {
     /// The rates of both unknowns, and their derivatives.
     fn rate(&self, y: &Pair) -> (Pair, Matrix2<f64>) {
         let params = &self.held.params;
-        let (alpha, beta) = (Double2::from(params.alpha_m_per_n_s), Double2::from(params.beta_per_n2_s));
+        let (alpha, beta) = (
+            Double2::from(params.alpha_m_per_n_s),
+            Double2::from(params.beta_per_n2_s),
+        );
         let [cosine, sine] = self.cosine_and_sine(y[1]);
-        let arm = [self.arm[0] - self.along[0] * y[0], self.arm[1] - self.along[1] * y[0]];
+        let arm = [
+            self.arm[0] - self.along[0] * y[0],
+            self.arm[1] - self.along[1] * y[0],
+        ];
         let (f, slope) = self.expected(arm[0] * cosine + arm[1] * sine);
         let turning = beta * self.magnitude;
         let rate = [alpha * (self.magnitude * cosine - f), turning * f];
@@ -193,7 +244,10 @@ impl<'a> ForcePlane<'a> {
                 self.held.arm.norm() + self.held.force.norm() / stiffness_n_per_m
             }
         };
-        let fastest = jacobian.amax().max(rate[0].high.abs() / length).max(rate[1].high.abs());
+        let fastest = jacobian
+            .amax()
+            .max(rate[0].high.abs() / length)
+            .max(rate[1].high.abs());
         let mut dt = end.min(1e-3 / fastest.max(f64::MIN_POSITIVE));
         for _ in 0..MOST_STEPS {
             let left = (Double2::from(end) - time).value();
@@ -201,8 +255,12 @@ impl<'a> ForcePlane<'a> {
                 return Some((y[0], y[1], farthest));
             }
             let step = dt.min(left);
-            let size =
-                |next: &Pair| [farthest.max(next[0].high.abs()).max(f64::MIN_POSITIVE), next[1].high.abs().max(1.0)];
+            let size = |next: &Pair| {
+                [
+                    farthest.max(next[0].high.abs()).max(f64::MIN_POSITIVE),
+                    next[1].high.abs().max(1.0),
+                ]
+            };
             let halves = self.step(&y, step, &size).and_then(|whole| {
                 let middle = self.step(&y, 0.5 * step, &size)?;
                 let halves = self.step(&middle, 0.5 * step, &size)?;
@@ -245,15 +303,19 @@ impl<'a> ForcePlane<'a> {
                 (0..2).for_each(|k| residual[2 * i + k] = sum[k].value());
             }
             // an implicit method damps what grows, where the step is long
-            let growth = slopes.iter().map(|(_, jacobian)| growth(jacobian)).fold(0.0, f64::max);
+            let growth = slopes
+                .iter()
+                .map(|(_, jacobian)| growth(jacobian))
+                .fold(0.0, f64::max);
             let change = matrix.lu().solve(&residual)?;
             for (i, z) in z.iter_mut().enumerate() {
                 (0..2).for_each(|k| z[k] = z[k] + change[2 * i + k].into());
             }
             let end = [y[0] + z[STAGES - 1][0], y[1] + z[STAGES - 1][1]];
             let sizes = size(&end);
-            let left =
-                (0..STAGES).flat_map(|i| [0, 1].map(|k| (change[2 * i + k] / sizes[k]).abs())).fold(0.0, f64::max);
+            let left = (0..STAGES)
+                .flat_map(|i| [0, 1].map(|k| (change[2 * i + k] / sizes[k]).abs()))
+                .fold(0.0, f64::max);
             if left <= CONVERGED || left <= 0.1 * AGREEMENT && left > 0.5 * last {
                 return (growth * dt <= LONGEST_GROWTH).then_some(end);
             }
@@ -268,7 +330,11 @@ impl<'a> ForcePlane<'a> {
 
 /// The larger real part of both eigenvalues.
 fn growth(jacobian: &Matrix2<f64>) -> f64 {
-    jacobian.complex_eigenvalues().iter().map(|value| value.re).fold(f64::MIN, f64::max)
+    jacobian
+        .complex_eigenvalues()
+        .iter()
+        .map(|value| value.re)
+        .fold(f64::MIN, f64::max)
 }
 
 /// a_ij = ∫ of the jth Lagrange polynomial from 0 to c_i.
@@ -280,17 +346,30 @@ static WEIGHTS: LazyLock<[[Double2; STAGES]; STAGES]> = LazyLock::new(|| {
     let mut ends = nodes;
     for k in 0..STAGES {
         let divisor = Double2::from((k + 1) as f64);
-        columns.push(powers.iter().copied().chain(ends.iter().map(|&end| end / divisor)).collect());
+        columns.push(
+            powers
+                .iter()
+                .copied()
+                .chain(ends.iter().map(|&end| end / divisor))
+                .collect(),
+        );
         (0..STAGES).for_each(|i| (powers[i], ends[i]) = (powers[i] * nodes[i], ends[i] * nodes[i]));
     }
     for pivot in 0..STAGES {
-        let largest =
-            (pivot..STAGES).max_by(|&a, &b| columns[a][pivot].high.abs().total_cmp(&columns[b][pivot].high.abs()));
+        let largest = (pivot..STAGES).max_by(|&a, &b| {
+            columns[a][pivot]
+                .high
+                .abs()
+                .total_cmp(&columns[b][pivot].high.abs())
+        });
         columns.swap(pivot, largest.unwrap_or(pivot));
         let row = columns[pivot].clone();
         for (_, other) in columns.iter_mut().enumerate().filter(|(k, _)| *k != pivot) {
             let factor = other[pivot] / row[pivot];
-            other.iter_mut().zip(&row).for_each(|(x, r)| *x = *x - factor * *r);
+            other
+                .iter_mut()
+                .zip(&row)
+                .for_each(|(x, r)| *x = *x - factor * *r);
         }
     }
     std::array::from_fn(|i| std::array::from_fn(|j| columns[j][STAGES + i] / columns[j][j]))
@@ -311,7 +390,9 @@ fn nodes() -> [Double2; STAGES] {
     };
     let mut zeros = Vec::new();
     let count = 1000;
-    let place = |i: usize| Double2::from(-1.0) + Double2::from(2.0 * i as f64) / (count as f64 + 0.5).into();
+    let place = |i: usize| {
+        Double2::from(-1.0) + Double2::from(2.0 * i as f64) / (count as f64 + 0.5).into()
+    };
     for i in 0..count {
         let (mut low, mut high) = (place(i), place(i + 1));
         if (difference(low).high > 0.0) == (difference(high).high > 0.0) {
@@ -319,7 +400,11 @@ fn nodes() -> [Double2; STAGES] {
         }
         for _ in 0..110 {
             let middle = (low + high) * 0.5.into();
-            if (difference(low).high > 0.0) == (difference(middle).high > 0.0) { low = middle } else { high = middle }
+            if (difference(low).high > 0.0) == (difference(middle).high > 0.0) {
+                low = middle
+            } else {
+                high = middle
+            }
         }
         zeros.push((low + one) * 0.5.into());
     }
@@ -351,17 +436,27 @@ mod tests {
     fn a_spring_without_tilt_has_its_closed_form() {
         let (stiffness, alpha, dt) = (2e4, 0.3, 1e-3);
         let params = DynamicsParams {
-            model: ContactModel::Spring { stiffness_n_per_m: stiffness },
+            model: ContactModel::Spring {
+                stiffness_n_per_m: stiffness,
+            },
             alpha_m_per_n_s: alpha,
             beta_per_n2_s: 7.0,
             take_out_rigid_offset: false,
             ..DynamicsParams::default()
         };
-        let held =
-            HeldFace { params, normal: Vector3::z(), arm: Vector3::z() * 1e-3, force: Vector3::z() * 2.0, dt_s: dt };
+        let held = HeldFace {
+            params,
+            normal: Vector3::z(),
+            arm: Vector3::z() * 1e-3,
+            force: Vector3::z() * 2.0,
+            dt_s: dt,
+        };
         let exact = (1e-3 + 2.0 / stiffness) * -(-alpha * stiffness * dt).exp_m1();
         let found = held.reference().unwrap();
-        assert!((found.face.b.z - exact).abs() < 4.0 * f64::EPSILON * exact, "{found:?}, {exact}");
+        assert!(
+            (found.face.b.z - exact).abs() < 4.0 * f64::EPSILON * exact,
+            "{found:?}, {exact}"
+        );
         assert_eq!(found.face.n, Vector3::z());
     }
 }

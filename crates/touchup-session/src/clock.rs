@@ -72,8 +72,18 @@ impl Clock {
 
     fn moved_by_hand(is_lock_step: bool) -> (Self, ManualClock) {
         let (waits, changed) = (Mutex::default(), Condvar::new());
-        let manual = Arc::new(Manual { begun: Instant::now(), is_lock_step, waits, changed });
-        (Self { manual: Some(manual.clone()) }, ManualClock(manual))
+        let manual = Arc::new(Manual {
+            begun: Instant::now(),
+            is_lock_step,
+            waits,
+            changed,
+        });
+        (
+            Self {
+                manual: Some(manual.clone()),
+            },
+            ManualClock(manual),
+        )
     }
 
     /// From here on time waits for the thread, or the piece of work, that this is handed to. A thread that waits on the clock
@@ -92,7 +102,9 @@ impl Clock {
 
     /// Now.
     pub fn now(&self) -> Instant {
-        self.manual.as_ref().map_or_else(Instant::now, |manual| manual.begun + manual.waits().elapsed)
+        self.manual
+            .as_ref()
+            .map_or_else(Instant::now, |manual| manual.begun + manual.waits().elapsed)
     }
 
     /// Time since `then`; zero where that is still to come.
@@ -102,21 +114,33 @@ impl Clock {
 
     /// Returns after `duration`.
     pub fn sleep(&self, duration: Duration) {
-        let Some(manual) = &self.manual else { return thread::sleep(duration) };
+        let Some(manual) = &self.manual else {
+            return thread::sleep(duration);
+        };
         let wait = manual.begin(duration);
         if manual.is_lock_step {
             return manual.move_to(wait.deadline, wait.number);
         }
         let waits = manual.waits();
-        drop(manual.changed.wait_while(waits, |waits| waits.elapsed < wait.deadline));
+        drop(
+            manual
+                .changed
+                .wait_while(waits, |waits| waits.elapsed < wait.deadline),
+        );
     }
 
     /// As [`Receiver::recv_timeout`]: what was sent before the deadline passed is received.
     ///
     /// # Errors
     /// As there.
-    pub fn recv_timeout<T>(&self, receiver: &Receiver<T>, timeout: Duration) -> Result<T, RecvTimeoutError> {
-        let Some(manual) = &self.manual else { return receiver.recv_timeout(timeout) };
+    pub fn recv_timeout<T>(
+        &self,
+        receiver: &Receiver<T>,
+        timeout: Duration,
+    ) -> Result<T, RecvTimeoutError> {
+        let Some(manual) = &self.manual else {
+            return receiver.recv_timeout(timeout);
+        };
         let wait = manual.begin(timeout);
         loop {
             let is_over = manual.waits().elapsed >= wait.deadline;
@@ -137,7 +161,10 @@ impl Clock {
         mut condition: impl FnMut(&mut T) -> bool,
     ) -> MutexGuard<'a, T> {
         let Some(manual) = &self.manual else {
-            return condvar.wait_timeout_while(guard, timeout, condition).unwrap_or_else(PoisonError::into_inner).0;
+            return condvar
+                .wait_timeout_while(guard, timeout, condition)
+                .unwrap_or_else(PoisonError::into_inner)
+                .0;
         };
         let wait = manual.begin(timeout);
         let mut guard = guard;
@@ -146,7 +173,10 @@ impl Clock {
             if !condition(&mut guard) || is_over {
                 return guard;
             }
-            guard = condvar.wait_timeout(guard, LOOK).unwrap_or_else(PoisonError::into_inner).0;
+            guard = condvar
+                .wait_timeout(guard, LOOK)
+                .unwrap_or_else(PoisonError::into_inner)
+                .0;
         }
     }
 }
@@ -191,10 +221,21 @@ impl Manual {
         self.wait_while(waits, |waits| waits.deadlines.len() < waits.workers)
     }
 
-    fn wait_while<'a>(&'a self, waits: MutexGuard<'a, Waits>, holds: impl Fn(&Waits) -> bool) -> MutexGuard<'a, Waits> {
-        let waited = self.changed.wait_timeout_while(waits, HUNG, |waits| holds(waits));
+    fn wait_while<'a>(
+        &'a self,
+        waits: MutexGuard<'a, Waits>,
+        holds: impl Fn(&Waits) -> bool,
+    ) -> MutexGuard<'a, Waits> {
+        let waited = self
+            .changed
+            .wait_timeout_while(waits, HUNG, |waits| holds(waits));
         let (waits, _) = waited.unwrap_or_else(PoisonError::into_inner);
-        assert!(!holds(&waits), "{} wait of {} that work: one hangs", waits.deadlines.len(), waits.workers);
+        assert!(
+            !holds(&waits),
+            "{} wait of {} that work: one hangs",
+            waits.deadlines.len(),
+            waits.workers
+        );
         waits
     }
 
@@ -204,7 +245,10 @@ impl Manual {
         waits.elapsed = waits.elapsed.max(to);
         self.changed.notify_all();
         let is_overdue = |waits: &Waits| {
-            waits.deadlines.iter().any(|(number, deadline)| *number != own && *deadline <= waits.elapsed)
+            waits
+                .deadlines
+                .iter()
+                .any(|(number, deadline)| *number != own && *deadline <= waits.elapsed)
         };
         drop(self.wait_while(waits, is_overdue));
     }
@@ -215,7 +259,11 @@ impl Manual {
         waits.next += 1;
         waits.deadlines.insert(number, deadline);
         self.changed.notify_all();
-        Wait { manual: self, number, deadline }
+        Wait {
+            manual: self,
+            number,
+            deadline,
+        }
     }
 }
 
@@ -249,7 +297,10 @@ mod tests {
         let begun = clock.now();
         assert_eq!(clock.since(begun), Duration::ZERO);
         hand.advance(3 * SECOND);
-        assert_eq!((clock.since(begun), clock.clone().since(begun)), (3 * SECOND, 3 * SECOND));
+        assert_eq!(
+            (clock.since(begun), clock.clone().since(begun)),
+            (3 * SECOND, 3 * SECOND)
+        );
     }
 
     #[test]
@@ -290,7 +341,10 @@ mod tests {
         });
         assert_eq!(timeout, Err(RecvTimeoutError::Timeout));
         drop(sender);
-        assert_eq!(clock.recv_timeout(&receiver, SECOND), Err(RecvTimeoutError::Disconnected));
+        assert_eq!(
+            clock.recv_timeout(&receiver, SECOND),
+            Err(RecvTimeoutError::Disconnected)
+        );
     }
 
     #[test]
@@ -298,8 +352,9 @@ mod tests {
         let (clock, _hand) = Clock::manual();
         let (value, changed) = (Mutex::new(0), Condvar::new());
         thread::scope(|scope| {
-            let waiting =
-                scope.spawn(|| *clock.wait_while(&changed, value.lock().unwrap(), SECOND, |value| *value == 0));
+            let waiting = scope.spawn(|| {
+                *clock.wait_while(&changed, value.lock().unwrap(), SECOND, |value| *value == 0)
+            });
             *value.lock().unwrap() = 5;
             changed.notify_all();
             assert_eq!(waiting.join().unwrap(), 5);
@@ -327,7 +382,10 @@ mod tests {
         });
         (0..3).for_each(|_| hand.advance(SECOND));
         thread.join().unwrap();
-        assert_eq!(receiver.try_iter().collect::<Vec<_>>(), [SECOND, 2 * SECOND, 3 * SECOND]);
+        assert_eq!(
+            receiver.try_iter().collect::<Vec<_>>(),
+            [SECOND, 2 * SECOND, 3 * SECOND]
+        );
         // no thread is left to wait for
         hand.advance(SECOND);
     }

@@ -62,5 +62,9 @@ pub fn check_input(
     let monitor = monitor.into_inner();
     let clock_offset = monitor.clock_offset();
     let findings = monitor.findings(scan, &FaceTree::new_by(scan, &Threads));
-    Ok(InputCheck { findings, clock_offset, losses: replayed.losses })
+    Ok(InputCheck {
+        findings,
+        clock_offset,
+        losses: replayed.losses,
+    })
 }

@@ -49,22 +49,40 @@ pub fn read_scan(path: &Path, unit: MeshUnit) -> Result<Scan, ScanError> {
         MeshOrPoints::Mesh(file) => {
             let MeshFile { mesh, repair } = *file;
             warn_of_left_out(path, &repair);
-            return Ok(Scan { mesh, repair, cloud: None });
+            return Ok(Scan {
+                mesh,
+                repair,
+                cloud: None,
+            });
         }
         MeshOrPoints::Points(cloud) => cloud,
     };
-    let no_surface = |source| ScanError::Cloud { path: path.into(), source };
-    let CloudSurface { positions, faces, summary } = surface_of_cloud(cloud, &Threads).map_err(no_surface)?;
+    let no_surface = |source| ScanError::Cloud {
+        path: path.into(),
+        source,
+    };
+    let CloudSurface {
+        positions,
+        faces,
+        summary,
+    } = surface_of_cloud(cloud, &Threads).map_err(no_surface)?;
     let MeshFile { mesh, repair } = repaired(path, unit, positions, faces)?;
     tracing::warn!("{}: {summary}", path.display());
-    Ok(Scan { mesh, repair, cloud: Some(summary) })
+    Ok(Scan {
+        mesh,
+        repair,
+        cloud: Some(summary),
+    })
 }
 
 /// Says of how many faces a corner was no place.
 pub fn warn_of_left_out(path: &Path, repair: &RepairReport) {
     if repair.dropped_not_finite > 0 {
         let faces = repair.dropped_not_finite;
-        tracing::warn!("{}: faces left out because the coordinates of a corner are no place: {faces}", path.display());
+        tracing::warn!(
+            "{}: faces left out because the coordinates of a corner are no place: {faces}",
+            path.display()
+        );
     }
 }
 
@@ -81,7 +99,14 @@ pub fn carried_over(
     mesh: &TriMesh,
     places: &[Point3<f64>],
 ) -> Result<(Vec<VertexColumn>, Option<Texture>), MeshFileError> {
-    let Some(appearance) = read_appearance(path, unit)? else { return Ok(Default::default()) };
-    let colours = appearance.colours_at(places, &Threads).map(VertexColumn::of_colours);
-    Ok((colours.unwrap_or_default(), appearance.texture_on(mesh, places, &Threads)))
+    let Some(appearance) = read_appearance(path, unit)? else {
+        return Ok(Default::default());
+    };
+    let colours = appearance
+        .colours_at(places, &Threads)
+        .map(VertexColumn::of_colours);
+    Ok((
+        colours.unwrap_or_default(),
+        appearance.texture_on(mesh, places, &Threads),
+    ))
 }

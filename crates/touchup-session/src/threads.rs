@@ -18,7 +18,11 @@ impl Workers for Threads {
     fn run(&self, jobs: Vec<Job<'_>>) {
         let helpers = self.count().min(jobs.len()).saturating_sub(1);
         let left = Mutex::new(VecDeque::from(jobs));
-        let next = || left.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
+        let next = || {
+            left.lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .pop_front()
+        };
         let work = || {
             while let Some(job) = next() {
                 job();

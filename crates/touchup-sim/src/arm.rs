@@ -88,12 +88,25 @@ settings! {
 }
 
 /// Nothing hangs on the flange; the base is upright.
-pub const WEIGHTLESS: Payload =
-    Payload { mass: 0.0, p_sc: Vector3::new(0.0, 0.0, 0.0), gravity_o: Vector3::new(0.0, 0.0, -9.81) };
+pub const WEIGHTLESS: Payload = Payload {
+    mass: 0.0,
+    p_sc: Vector3::new(0.0, 0.0, 0.0),
+    gravity_o: Vector3::new(0.0, 0.0, -9.81),
+};
 
 fn check_payload(payload: &Payload) -> Result<(), SimError> {
-    up_to("the payload", payload.mass, "kg", 100.0, "from zero to 100 kg")?;
-    not_negative("the distance of the payload's centre", payload.p_sc.norm(), "m")?;
+    up_to(
+        "the payload",
+        payload.mass,
+        "kg",
+        100.0,
+        "from zero to 100 kg",
+    )?;
+    not_negative(
+        "the distance of the payload's centre",
+        payload.p_sc.norm(),
+        "m",
+    )?;
     not_negative("gravity", payload.gravity_o.norm(), "m/s²")
 }
 
@@ -181,18 +194,31 @@ impl<'a> SimArm<'a> {
     ///
     /// # Errors
     /// [`SimError::BadParameter`]; [`SimError::OutOfReach`]; [`SimError::StartsInside`] when the ball would be in the part.
-    pub fn new(surface: &'a dyn Surface, params: ArmParams, start_bt: &Isometry3<f64>) -> Result<Self, SimError> {
+    pub fn new(
+        surface: &'a dyn Surface,
+        params: ArmParams,
+        start_bt: &Isometry3<f64>,
+    ) -> Result<Self, SimError> {
         params.check()?;
         let flange = start_bt * params.pose_ft.inverse();
-        let joints = params.geometry.most_dexterous(&flange).ok_or(SimError::OutOfReach)?;
+        let joints = params
+            .geometry
+            .most_dexterous(&flange)
+            .ok_or(SimError::OutOfReach)?;
         let pose_bo = params.pose_bo * params.errors.displacement();
         let geometry = params.errors.geometry(&params.geometry);
         let offset = params.ball_offset + params.errors.tip;
         let kinematic = kinematic_error(&geometry, &params, &joints);
         let ball = pose_bo.inverse_transform_point(&(kinematic * start_bt * Point3::from(offset)));
-        let (clearance_m, radius_m) = (surface.signed_distance(&ball), params.radius + params.errors.radius);
+        let (clearance_m, radius_m) = (
+            surface.signed_distance(&ball),
+            params.radius + params.errors.radius,
+        );
         if clearance_m < radius_m {
-            return Err(SimError::StartsInside { clearance_m, radius_m });
+            return Err(SimError::StartsInside {
+                clearance_m,
+                radius_m,
+            });
         }
         let mut approach_rng = Pcg64::seed_from_u64(params.seed ^ 0x2d31_6f0a_94c5_e87b);
         let late = (params.force_latency / STEP).round() as usize;
@@ -217,7 +243,9 @@ impl<'a> SimArm<'a> {
             tare: Vector3::zeros(),
             safety: Safety::Normal,
             waiting: VecDeque::new(),
-            doing: Command::Stop { deceleration: HARD_STOP },
+            doing: Command::Stop {
+                deceleration: HARD_STOP,
+            },
             heard_at: 0.0,
             faults: Vec::new(),
             spike: 0,
@@ -303,7 +331,11 @@ impl<'a> SimArm<'a> {
 
     fn begin_faults(&mut self) {
         let now = self.time;
-        let due: Vec<_> = self.faults.extract_if(.., |(at, _)| *at <= now).map(|(_, fault)| fault).collect();
+        let due: Vec<_> = self
+            .faults
+            .extract_if(.., |(at, _)| *at <= now)
+            .map(|(_, fault)| fault)
+            .collect();
         for fault in due {
             match fault {
                 ArmFault::LinkLost => self.is_lost = true,
@@ -324,13 +356,20 @@ impl<'a> SimArm<'a> {
             self.doing = command;
         }
         if self.time - self.heard_at > WATCHDOG || self.safety != Safety::Normal {
-            self.doing = Command::Stop { deceleration: HARD_STOP };
+            self.doing = Command::Stop {
+                deceleration: HARD_STOP,
+            };
             self.waiting.clear();
         }
         let (wanted, acceleration) = self.wanted();
         let is_stop = matches!(self.doing, Command::Stop { .. });
-        let most = acceleration.min(if is_stop { HARD_STOP } else { self.params.top_acceleration });
-        self.velocity += (wanted.cap_magnitude(self.params.top_speed) - self.velocity).cap_magnitude(most * STEP);
+        let most = acceleration.min(if is_stop {
+            HARD_STOP
+        } else {
+            self.params.top_acceleration
+        });
+        self.velocity += (wanted.cap_magnitude(self.params.top_speed) - self.velocity)
+            .cap_magnitude(most * STEP);
         if self.velocity.norm() > 0.0 {
             self.moved_at = self.time;
         }
@@ -340,15 +379,28 @@ impl<'a> SimArm<'a> {
 
     /// - `silent`: since when nothing came over the link, s.
     fn check_link(&self, silent: f64) -> Result<(), ArmError> {
-        if self.is_lost { Err(ArmError::Lost { silent_ms: (silent * 1e3) as u64 }) } else { Ok(()) }
+        if self.is_lost {
+            Err(ArmError::Lost {
+                silent_ms: (silent * 1e3) as u64,
+            })
+        } else {
+            Ok(())
+        }
     }
 
     /// Velocity that the command asks for now, and its acceleration.
     fn wanted(&mut self) -> (Vector3<f64>, f64) {
         match self.doing {
             Command::Stop { deceleration } => (Vector3::zeros(), deceleration),
-            Command::Velocity { linear, acceleration } => (linear, acceleration),
-            Command::Line { to, speed, acceleration } => {
+            Command::Velocity {
+                linear,
+                acceleration,
+            } => (linear, acceleration),
+            Command::Line {
+                to,
+                speed,
+                acceleration,
+            } => {
                 let left = to.translation.vector - self.nominal.translation.vector;
                 let distance = left.norm();
                 if distance < ARRIVED {
@@ -364,11 +416,19 @@ impl<'a> SimArm<'a> {
                 self.turn(&to.rotation, share);
                 (left * (next / distance), acceleration)
             }
-            Command::Press { axis, force, feed, speed } => {
+            Command::Press {
+                axis,
+                force,
+                feed,
+                speed,
+            } => {
                 let force_along = -self.contact_force().dot(&axis);
                 let late = self.params.command_latency + self.params.force_latency + PERIOD;
                 let gain = 1.0 / (CALM * self.params.stiffness * late);
-                (axis * ((force - force_along) * gain).clamp(-speed, speed) + feed, self.params.top_acceleration)
+                (
+                    axis * ((force - force_along) * gain).clamp(-speed, speed) + feed,
+                    self.params.top_acceleration,
+                )
             }
         }
     }
@@ -379,14 +439,19 @@ impl<'a> SimArm<'a> {
         let most = self.params.top_turn_speed * STEP;
         let by = (share * left.angle()).min(most);
         if let Some(axis) = left.axis().filter(|_| by > 0.0) {
-            self.nominal.rotation = UnitQuaternion::from_axis_angle(&axis, by) * self.nominal.rotation;
+            self.nominal.rotation =
+                UnitQuaternion::from_axis_angle(&axis, by) * self.nominal.rotation;
             self.moved_at = self.time;
         }
     }
 
     /// Where the ball would be if nothing bent, in O: by the true kinematics, the play and the error of this approach.
     fn unbent(&mut self) -> Point3<f64> {
-        let ArmParams { ball_offset, errors, .. } = &self.params;
+        let ArmParams {
+            ball_offset,
+            errors,
+            ..
+        } = &self.params;
         let ahead = self.nominal.translation.vector - self.driven;
         self.driven += ahead - ahead.cap_magnitude(errors.play);
         let tip = Isometry3::from_parts(self.driven.into(), self.nominal.rotation);
@@ -396,7 +461,8 @@ impl<'a> SimArm<'a> {
             self.touched = None;
             self.approach = gauss_vector(&mut self.approach_rng) * errors.repeatability;
         }
-        self.pose_bo.inverse_transform_point(&(place + self.approach))
+        self.pose_bo
+            .inverse_transform_point(&(place + self.approach))
     }
 
     /// The ball goes where the part lets it, and pulls.
@@ -404,7 +470,10 @@ impl<'a> SimArm<'a> {
         let (nominal, pose_bo) = (self.unbent(), self.pose_bo);
         let radius = self.params.radius + self.params.errors.radius;
         let (rest, contacts) = push_ball(self.surface, &self.ball, &nominal, radius);
-        let normal = contacts.iter().map(|c| c.normal * c.held_back).sum::<Vector3<f64>>();
+        let normal = contacts
+            .iter()
+            .map(|c| c.normal * c.held_back)
+            .sum::<Vector3<f64>>();
         let mut next = rest;
         if let Some(out) = normal.try_normalize(0.0) {
             // friction keeps it where it was, as far as it can
@@ -444,15 +513,33 @@ impl<'a> SimArm<'a> {
     fn read(&mut self) -> Wrench {
         let noise = gauss_vector(&mut self.rng) * self.params.force_noise;
         let shaft = self.nominal.rotation * Vector3::z();
-        let spike = if self.spike > 0 { shaft * self.spike_force } else { Vector3::zeros() };
+        let spike = if self.spike > 0 {
+            shaft * self.spike_force
+        } else {
+            Vector3::zeros()
+        };
         let torque_noise = gauss_vector(&mut self.torque_rng) * self.params.torque_noise;
-        let ArmParams { payload, pose_ft, ball_offset, errors, force_bias, torque_bias, .. } = &self.params;
+        let ArmParams {
+            payload,
+            pose_ft,
+            ball_offset,
+            errors,
+            force_bias,
+            torque_bias,
+            ..
+        } = &self.params;
         let r_bf = self.flange();
-        let (weight, contact) = (payload.weight_o(&r_bf), r_bf.inverse() * (self.contact_force() + spike));
+        let (weight, contact) = (
+            payload.weight_o(&r_bf),
+            r_bf.inverse() * (self.contact_force() + spike),
+        );
         let ball = pose_ft * Point3::from(ball_offset + errors.tip);
         Wrench {
             force: contact + r_bf.inverse() * (weight.force + noise) + force_bias,
-            torque: ball.coords.cross(&contact) + r_bf.inverse() * weight.torque + torque_bias + torque_noise,
+            torque: ball.coords.cross(&contact)
+                + r_bf.inverse() * weight.torque
+                + torque_bias
+                + torque_noise,
         }
     }
 
@@ -464,18 +551,42 @@ impl<'a> SimArm<'a> {
 
     fn state(&mut self, pose_bt: Isometry3<f64>, raw_wrench_f: Wrench) -> ArmState {
         let force = self.flange() * (self.unweighed(&raw_wrench_f) - self.tare);
-        let stamp_ns = if self.is_killed { self.last_stamp_ns } else { (self.time * 1e9).round() as i64 };
+        let stamp_ns = if self.is_killed {
+            self.last_stamp_ns
+        } else {
+            (self.time * 1e9).round() as i64
+        };
         self.last_stamp_ns = stamp_ns;
-        let wrench_b = Wrench { force, torque: Vector3::zeros() };
-        ArmState { stamp_ns, pose_bt, wrench_b, raw_wrench_f, joints: self.joints, safety: self.safety }
+        let wrench_b = Wrench {
+            force,
+            torque: Vector3::zeros(),
+        };
+        ArmState {
+            stamp_ns,
+            pose_bt,
+            wrench_b,
+            raw_wrench_f,
+            joints: self.joints,
+            safety: self.safety,
+        }
     }
 
     /// The joints that belong to the pose; the arm stops where there are none, or where they would have to jump.
     fn follow_joints(&mut self) {
         let flange = self.nominal * self.params.pose_ft.inverse();
         let most = self.params.top_joint_speed * PERIOD;
-        let is_near = |next: &Joints| next.iter().zip(self.joints.iter()).all(|(next, now)| (next - now).abs() <= most);
-        match self.params.geometry.nearest(&flange, &self.joints).ok().filter(is_near) {
+        let is_near = |next: &Joints| {
+            next.iter()
+                .zip(self.joints.iter())
+                .all(|(next, now)| (next - now).abs() <= most)
+        };
+        match self
+            .params
+            .geometry
+            .nearest(&flange, &self.joints)
+            .ok()
+            .filter(is_near)
+        {
             Some(next) => self.joints = next,
             None if self.safety == Safety::Normal => self.safety = Safety::ProtectiveStop,
             None => {}
@@ -510,9 +621,12 @@ impl Arm for SimArm<'_> {
         self.check_link(0.0)?;
         self.heard_at = self.time;
         if self.safety != Safety::Normal && !matches!(command, Command::Stop { .. }) {
-            return Err(ArmError::Stopped { safety: self.safety });
+            return Err(ArmError::Stopped {
+                safety: self.safety,
+            });
         }
-        self.waiting.push_back((self.time + self.params.command_latency, *command));
+        self.waiting
+            .push_back((self.time + self.params.command_latency, *command));
         Ok(())
     }
 
@@ -534,7 +648,9 @@ impl Arm for SimArm<'_> {
 
     fn recover(&mut self) -> Result<(), ArmError> {
         if self.is_killed {
-            return Err(ArmError::Stopped { safety: self.safety });
+            return Err(ArmError::Stopped {
+                safety: self.safety,
+            });
         }
         self.safety = Safety::Normal;
         self.is_lost = false;

@@ -111,13 +111,18 @@ impl ArmErrors {
     /// Where the part really is, from where it is told to be; maps O as told to O, in coordinates of O.
     pub fn displacement(&self) -> Isometry3<f64> {
         let about = self.turned_about.coords;
-        let turned = Isometry3::from_parts(Translation3::from(about + self.shift), UnitQuaternion::new(self.turn));
+        let turned = Isometry3::from_parts(
+            Translation3::from(about + self.shift),
+            UnitQuaternion::new(self.turn),
+        );
         turned * Translation3::from(-about)
     }
 
     /// An arm with its true lengths; of another than a UR they are as told.
     pub(super) fn geometry(&self, told: &ArmGeometry) -> ArmGeometry {
-        let ArmGeometry::Ur(told) = told else { return told.clone() };
+        let ArmGeometry::Ur(told) = told else {
+            return told.clone();
+        };
         let [d1, a2, a3, d4, d5, d6] = self.lengths;
         let truly = UrGeometry {
             d1: told.d1 + d1,

@@ -61,7 +61,15 @@ pub fn push_ball(
     to: &Point3<f64>,
     radius: f64,
 ) -> (Point3<f64>, Vec<BallContact>) {
-    push_balls(surface, from, to, &[TipBall { offset: Vector3::zeros(), radius }])
+    push_balls(
+        surface,
+        from,
+        to,
+        &[TipBall {
+            offset: Vector3::zeros(),
+            radius,
+        }],
+    )
 }
 
 /// As [`push_ball`], for balls that are fixed to each other: `from`, `to` and the result are their common origin.
@@ -85,7 +93,8 @@ pub(super) fn push_balls(
         let next = nearest_in_front(&mut planes, to);
         let moved = (next - x).norm();
         x = next;
-        let is_free = |ball: &TipBall| surface.signed_distance(&(x + ball.offset)) >= ball.radius - REST;
+        let is_free =
+            |ball: &TipBall| surface.signed_distance(&(x + ball.offset)) >= ball.radius - REST;
         if moved <= REST && balls.iter().all(is_free) {
             return (x, contacts(&planes));
         }
@@ -97,7 +106,12 @@ pub(super) fn push_balls(
 fn plane(middle: &Point3<f64>, s: &SurfacePoint, ball: &TipBall) -> Option<ContactPlane> {
     let normal = (middle - s.point).try_normalize(0.0)?;
     let level = normal.dot(&s.point.coords) + ball.radius - normal.dot(&ball.offset);
-    Some(ContactPlane { point: s.point, normal, level, held_back: 0.0 })
+    Some(ContactPlane {
+        point: s.point,
+        normal,
+        level,
+        held_back: 0.0,
+    })
 }
 
 /// The point nearest to `to` in front of all planes, and in each plane's `held_back` how much it takes part.
@@ -107,12 +121,20 @@ fn nearest_in_front(planes: &mut [ContactPlane], to: &Point3<f64>) -> Point3<f64
     let (mut x, mut active) = (*to, Vec::new());
     for _ in 0..JOINS {
         let slack = |p: &ContactPlane| p.normal.dot(&x.coords) - p.level;
-        let worst = (0..planes.len()).min_by(|&a, &b| slack(&planes[a]).total_cmp(&slack(&planes[b])));
-        let Some(worst) = worst.filter(|&w| slack(&planes[w]) < -BROKEN && !active.contains(&w)) else { break };
+        let worst =
+            (0..planes.len()).min_by(|&a, &b| slack(&planes[a]).total_cmp(&slack(&planes[b])));
+        let Some(worst) = worst.filter(|&w| slack(&planes[w]) < -BROKEN && !active.contains(&w))
+        else {
+            break;
+        };
         active.push(worst);
-        let Some((next, pushing)) = nearest_in_front_of_few(planes, &active, to) else { break };
+        let Some((next, pushing)) = nearest_in_front_of_few(planes, &active, to) else {
+            break;
+        };
         planes.iter_mut().for_each(|p| p.held_back = 0.0);
-        pushing.iter().for_each(|&(i, held_back)| planes[i].held_back = held_back);
+        pushing
+            .iter()
+            .for_each(|&(i, held_back)| planes[i].held_back = held_back);
         active.retain(|&i| planes[i].held_back > 0.0);
         x = next;
     }
@@ -120,24 +142,49 @@ fn nearest_in_front(planes: &mut [ContactPlane], to: &Point3<f64>) -> Point3<f64
 }
 
 /// The same for at most four planes, by trying every three, two and one of them; with the shares of those that push.
-fn nearest_in_front_of_few(planes: &[ContactPlane], few: &[usize], to: &Point3<f64>) -> Option<BallRest> {
-    (1u32..1 << few.len()).filter(|set| set.count_ones() <= 3).find_map(|set| {
-        let chosen: Vec<usize> = (0..few.len()).filter(|i| set >> i & 1 == 1).map(|i| few[i]).collect();
-        let mut normals = Matrix3::zeros();
-        let mut missing = Vector3::zeros();
-        for (row, &i) in chosen.iter().enumerate() {
-            normals.set_row(row, &planes[i].normal.transpose());
-            missing[row] = planes[i].level - planes[i].normal.dot(&to.coords);
-        }
-        // ones for the rows that are not used keep the matrix regular
-        let gram = normals * normals.transpose()
-            + Matrix3::from_fn(|r, c| if r == c && r >= chosen.len() { 1.0 } else { 0.0 });
-        let held_back = gram.determinant().gt(&PARALLEL).then(|| gram.try_inverse()).flatten()? * missing;
-        let x = to + normals.transpose() * held_back;
-        let clear = |&i: &usize| planes[i].normal.dot(&x.coords) >= planes[i].level - BROKEN;
-        let pushes = held_back.iter().all(|h| *h >= 0.0);
-        (pushes && few.iter().all(clear)).then(|| (x, chosen.into_iter().zip(held_back.iter().copied()).collect()))
-    })
+fn nearest_in_front_of_few(
+    planes: &[ContactPlane],
+    few: &[usize],
+    to: &Point3<f64>,
+) -> Option<BallRest> {
+    (1u32..1 << few.len())
+        .filter(|set| set.count_ones() <= 3)
+        .find_map(|set| {
+            let chosen: Vec<usize> = (0..few.len())
+                .filter(|i| set >> i & 1 == 1)
+                .map(|i| few[i])
+                .collect();
+            let mut normals = Matrix3::zeros();
+            let mut missing = Vector3::zeros();
+            for (row, &i) in chosen.iter().enumerate() {
+                normals.set_row(row, &planes[i].normal.transpose());
+                missing[row] = planes[i].level - planes[i].normal.dot(&to.coords);
+            }
+            // ones for the rows that are not used keep the matrix regular
+            let gram = normals * normals.transpose()
+                + Matrix3::from_fn(|r, c| {
+                    if r == c && r >= chosen.len() {
+                        1.0
+                    } else {
+                        0.0
+                    }
+                });
+            let held_back = gram
+                .determinant()
+                .gt(&PARALLEL)
+                .then(|| gram.try_inverse())
+                .flatten()?
+                * missing;
+            let x = to + normals.transpose() * held_back;
+            let clear = |&i: &usize| planes[i].normal.dot(&x.coords) >= planes[i].level - BROKEN;
+            let pushes = held_back.iter().all(|h| *h >= 0.0);
+            (pushes && few.iter().all(clear)).then(|| {
+                (
+                    x,
+                    chosen.into_iter().zip(held_back.iter().copied()).collect(),
+                )
+            })
+        })
 }
 
 /// The planes that push; pieces of the surface that meet in one point count once.
@@ -145,9 +192,16 @@ fn contacts(planes: &[ContactPlane]) -> Vec<BallContact> {
     let hardest = planes.iter().map(|p| p.held_back).fold(0.0, f64::max);
     let mut contacts: Vec<BallContact> = Vec::new();
     for p in planes.iter().filter(|p| p.held_back > IDLE * hardest) {
-        match contacts.iter_mut().find(|c| c.normal.dot(&p.normal) > 1.0 - IDLE) {
+        match contacts
+            .iter_mut()
+            .find(|c| c.normal.dot(&p.normal) > 1.0 - IDLE)
+        {
             Some(same) => same.held_back += p.held_back,
-            None => contacts.push(BallContact { point: p.point, normal: p.normal, held_back: p.held_back }),
+            None => contacts.push(BallContact {
+                point: p.point,
+                normal: p.normal,
+                held_back: p.held_back,
+            }),
         }
     }
     contacts

@@ -20,7 +20,8 @@ impl TipBending {
     pub fn bend(&self, r_ot: &UnitQuaternion<f64>, force_o: &Vector3<f64>) -> Vector3<f64> {
         let principal = r_ot * self.axes;
         // what the directions differ by beside the common part: nothing where they are alike
-        let extra = (principal.inverse() * force_o).component_mul(&self.shares.map(|share| share.recip() - 1.0));
+        let extra = (principal.inverse() * force_o)
+            .component_mul(&self.shares.map(|share| share.recip() - 1.0));
         (force_o + principal * extra) / self.stiffness
     }
 }

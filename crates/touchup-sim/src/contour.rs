@@ -30,7 +30,9 @@ pub(super) struct MeshDraft {
 /// The zero level of `field` by surface nets with cells of `side` (m): every cell that the level passes gets a vertex,
 /// every lattice edge that crosses it two triangles [Gibson 1998].
 pub(super) fn contour(field: &Field, side: f64) -> MeshDraft {
-    let count = field.nodes.map(|n| ((n - 1) as f64 * field.pitch / side).floor() as usize);
+    let count = field
+        .nodes
+        .map(|n| ((n - 1) as f64 * field.pitch / side).floor() as usize);
     let corner = |c: [usize; 3]| field.origin + Vector3::from(c.map(|i| i as f64)) * side;
     let corners = count.map(|n| n + 1);
     let index = |[i, j, k]: [usize; 3]| (k * corners[1] + j) * corners[0] + i;
@@ -39,9 +41,17 @@ pub(super) fn contour(field: &Field, side: f64) -> MeshDraft {
     let mut soup = MeshDraft::default();
     let mut vertex = vec![u32::MAX; values.len()];
     for cell in cells(count) {
-        let corner_of = |k: usize| [cell[0] + (k & 1), cell[1] + (k >> 1 & 1), cell[2] + (k >> 2)];
+        let corner_of = |k: usize| {
+            [
+                cell[0] + (k & 1),
+                cell[1] + (k >> 1 & 1),
+                cell[2] + (k >> 2),
+            ]
+        };
         // where the level crosses the cell's twelve edges
-        let edges = (0..8).flat_map(|k| [1, 2, 4].map(|bit| (k, k | bit))).filter(|(k, l)| k != l);
+        let edges = (0..8)
+            .flat_map(|k| [1, 2, 4].map(|bit| (k, k | bit)))
+            .filter(|(k, l)| k != l);
         let crossing = |(k, l): (usize, usize)| {
             let (c, d) = (corner_of(k), corner_of(l));
             let (u, v) = (values[index(c)], values[index(d)]);
@@ -68,7 +78,11 @@ pub(super) fn contour(field: &Field, side: f64) -> MeshDraft {
                 (cell[u], cell[v]) = (c[u] - du, c[v] - dv);
                 vertex[index(cell)]
             });
-            let [p, q, r, s] = if inside(c) { around } else { [around[3], around[2], around[1], around[0]] };
+            let [p, q, r, s] = if inside(c) {
+                around
+            } else {
+                [around[3], around[2], around[1], around[0]]
+            };
             soup.faces.extend([[p, q, r], [p, r, s]]);
         }
     }
@@ -102,15 +116,24 @@ impl MeshDraft {
     fn relax_mut(&mut self, vertex: u32, star: &[usize], field: &Field, side: f64) {
         let old = on_level(field, self.positions[vertex as usize], side);
         self.positions[vertex as usize] = old;
-        let corners = star.iter().flat_map(|&face| self.faces[face]).filter(|&v| v != vertex);
+        let corners = star
+            .iter()
+            .flat_map(|&face| self.faces[face])
+            .filter(|&v| v != vertex);
         let sum: Vector3<f64> = corners.map(|v| self.positions[v as usize] - old).sum();
         // inside the mesh every neighbour is counted twice
         let shift = sum * (EVEN / (2 * star.len()).max(1) as f64);
-        let normal = field.gradient(&old).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
+        let normal = field
+            .gradient(&old)
+            .try_normalize(0.0)
+            .unwrap_or_else(Vector3::zeros);
         let before = self.uprightness(star, &normal);
         let new = on_level(field, old + shift - normal * normal.dot(&shift), side);
         self.positions[vertex as usize] = new;
-        let normal = field.gradient(&new).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
+        let normal = field
+            .gradient(&new)
+            .try_normalize(0.0)
+            .unwrap_or_else(Vector3::zeros);
         if self.uprightness(star, &normal) < before.min(UPRIGHT) {
             self.positions[vertex as usize] = old;
         }
@@ -155,11 +178,16 @@ impl MeshDraft {
         let mut touched = vec![false; self.faces.len()];
         let mut fresh = BTreeSet::new();
         for (&(a, b), left) in edges.iter().filter(|((a, b), _)| a < b) {
-            let ([f], Some([g])) = (&left[..], edges.get(&(b, a)).map(|g| &g[..])) else { continue };
+            let ([f], Some([g])) = (&left[..], edges.get(&(b, a)).map(|g| &g[..])) else {
+                continue;
+            };
             let apex = |face: usize| self.faces[face].into_iter().find(|v| *v != a && *v != b);
-            let (Some(c), Some(d)) = (apex(*f), apex(*g)) else { continue };
-            let exists =
-                edges.contains_key(&(c, d)) || edges.contains_key(&(d, c)) || fresh.contains(&(c.min(d), c.max(d)));
+            let (Some(c), Some(d)) = (apex(*f), apex(*g)) else {
+                continue;
+            };
+            let exists = edges.contains_key(&(c, d))
+                || edges.contains_key(&(d, c))
+                || fresh.contains(&(c.min(d), c.max(d)));
             if touched[*f] || touched[*g] || exists || c == d || !self.flip_helps([a, b, c, d]) {
                 continue;
             }
@@ -177,13 +205,23 @@ impl MeshDraft {
             let normal = self.normal(face);
             normal.dot(&old) > 0.7 * normal.norm() * old.norm()
         };
-        angle(c) + angle(d) > std::f64::consts::PI + 1e-6 && upright([c, d, b]) && upright([d, c, a])
+        angle(c) + angle(d) > std::f64::consts::PI + 1e-6
+            && upright([c, d, b])
+            && upright([d, c, a])
     }
 
     /// Keeps the faces that are seen, with unseen patches of fewer than `fewest` faces between them, and without seen
     /// patches as small; pieces as small go in any case.
-    pub(super) fn retain_mut(&mut self, fewest: usize, is_seen: impl Fn(&[Point3<f64>; 3]) -> bool) {
-        let seen: Vec<bool> = self.faces.iter().map(|f| is_seen(&f.map(|v| self.positions[v as usize]))).collect();
+    pub(super) fn retain_mut(
+        &mut self,
+        fewest: usize,
+        is_seen: impl Fn(&[Point3<f64>; 3]) -> bool,
+    ) {
+        let seen: Vec<bool> = self
+            .faces
+            .iter()
+            .map(|f| is_seen(&f.map(|v| self.positions[v as usize])))
+            .collect();
         let pieces = self.patch_sizes(&vec![true; seen.len()]);
         let patches = self.patch_sizes(&seen);
         let kept = |face: usize| pieces[face] >= fewest && seen[face] != (patches[face] < fewest);
@@ -220,7 +258,11 @@ impl MeshDraft {
     /// Drops faces that turn their back on the field's gradient: folds.
     pub(super) fn drop_folds_mut(&mut self, field: &Field) {
         let upright = |face: &[u32; 3]| {
-            let middle = face.iter().map(|&v| self.positions[v as usize].coords).sum::<Vector3<f64>>() / 3.0;
+            let middle = face
+                .iter()
+                .map(|&v| self.positions[v as usize].coords)
+                .sum::<Vector3<f64>>()
+                / 3.0;
             let (normal, gradient) = (self.normal(*face), field.gradient(&middle.into()));
             normal.dot(&gradient) > FOLDED * normal.norm() * gradient.norm()
         };
@@ -240,7 +282,8 @@ impl MeshDraft {
         for (face, corners) in mesh.faces() {
             let triangle @ [a, b, c] = mesh.triangle(face);
             tree.faces_in_box(&a.inf(&b).inf(&c), &a.sup(&b).sup(&c), &mut near);
-            let apart = |other: &&FaceId| mesh.corners(**other).iter().all(|v| !corners.contains(v));
+            let apart =
+                |other: &&FaceId| mesh.corners(**other).iter().all(|v| !corners.contains(v));
             for other in near.faces.iter().filter(apart) {
                 if intersect(&triangle, &mesh.triangle(*other), 0.0) {
                     kept[face.0 as usize] = false;
@@ -258,8 +301,12 @@ impl MeshDraft {
         loop {
             let edges = self.edges();
             let open = |a: u32, b: u32| !edges.contains_key(&(b, a));
-            let pinched: Vec<bool> =
-                self.stars().iter().enumerate().map(|(v, star)| self.is_pinched(v as u32, star)).collect();
+            let pinched: Vec<bool> = self
+                .stars()
+                .iter()
+                .enumerate()
+                .map(|(v, star)| self.is_pinched(v as u32, star))
+                .collect();
             let before = self.faces.len();
             self.faces.retain(|&[a, b, c]| {
                 let sides = [(a, b), (b, c), (c, a)];
@@ -281,9 +328,14 @@ impl MeshDraft {
             (corners[(i + 1) % 3], corners[(i + 2) % 3])
         };
         let next: BTreeMap<u32, u32> = star.iter().map(side).collect();
-        let first = next.keys().find(|v| !next.values().any(|w| w == *v)).or(next.keys().next());
+        let first = next
+            .keys()
+            .find(|v| !next.values().any(|w| w == *v))
+            .or(next.keys().next());
         let Some(&start) = first else { return false };
-        let fan = std::iter::successors(next.get(&start), |at| next.get(*at).filter(|_| **at != start));
+        let fan = std::iter::successors(next.get(&start), |at| {
+            next.get(*at).filter(|_| **at != start)
+        });
         fan.take(star.len()).count() < star.len()
     }
 
@@ -302,10 +354,12 @@ impl MeshDraft {
                 at = after;
             }
             if at == start && rim.len() <= longest {
-                let sum: Vector3<f64> = rim.iter().map(|&v| self.positions[v as usize].coords).sum();
+                let sum: Vector3<f64> =
+                    rim.iter().map(|&v| self.positions[v as usize].coords).sum();
                 let middle = self.positions.len() as u32;
                 self.positions.push((sum / rim.len() as f64).into());
-                self.faces.extend((0..rim.len()).map(|i| [rim[i], rim[(i + 1) % rim.len()], middle]));
+                self.faces
+                    .extend((0..rim.len()).map(|i| [rim[i], rim[(i + 1) % rim.len()], middle]));
             }
         }
     }

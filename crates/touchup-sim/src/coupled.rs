@@ -19,14 +19,25 @@ pub struct GuidedStylus {
 impl Default for GuidedStylus {
     /// The paper gives no values; with these one face comes to rest within 40 s.
     fn default() -> Self {
-        Self { mobility_m_per_n_s: 0.01, stiffness_n_per_m: 100.0, contact_force_n: 2.0 }
+        Self {
+            mobility_m_per_n_s: 0.01,
+            stiffness_n_per_m: 100.0,
+            contact_force_n: 2.0,
+        }
     }
 }
 
 impl GuidedStylus {
     /// dp/dt, m/s, of the tip `p` under `force` (N, on the stylus) beside the face with barycentre `b` and normal `n`.
-    pub fn velocity(&self, p: &Point3<f64>, force: &Vector3<f64>, b: &Point3<f64>, n: &Vector3<f64>) -> Vector3<f64> {
-        self.mobility_m_per_n_s * (force + self.stiffness_n_per_m * (b - p) - self.contact_force_n * n)
+    pub fn velocity(
+        &self,
+        p: &Point3<f64>,
+        force: &Vector3<f64>,
+        b: &Point3<f64>,
+        n: &Vector3<f64>,
+    ) -> Vector3<f64> {
+        self.mobility_m_per_n_s
+            * (force + self.stiffness_n_per_m * (b - p) - self.contact_force_n * n)
     }
 
     /// The tip after `dt` (s) with the face held, by the classical Runge–Kutta method.

@@ -49,7 +49,9 @@ pub enum SimError {
         limit: usize,
     },
     /// The scan's triangles are so large that none is left.
-    #[error("edges of {edge_m:?} m leave nothing of a part that is {size_m:.3e} m long: use shorter ones")]
+    #[error(
+        "edges of {edge_m:?} m leave nothing of a part that is {size_m:.3e} m long: use shorter ones"
+    )]
     TooCoarse {
         /// longest side of the part, m
         size_m: f64,
@@ -57,7 +59,9 @@ pub enum SimError {
         edge_m: f64,
     },
     /// No surface was found in the part's bounds, or none that can be seen.
-    #[error("the scanner sees nothing of the part: check the view direction and the size of the holes it closes")]
+    #[error(
+        "the scanner sees nothing of the part: check the view direction and the size of the holes it closes"
+    )]
     NothingSeen,
     /// The simulated scan is not a mesh.
     #[error(transparent)]
@@ -66,12 +70,28 @@ pub enum SimError {
 
 /// Refuses values that are not finite or not above zero.
 pub(super) fn positive(name: &'static str, value: f64, unit: &'static str) -> Result<(), SimError> {
-    require(value.is_finite() && value > 0.0, name, value, unit, "greater than zero")
+    require(
+        value.is_finite() && value > 0.0,
+        name,
+        value,
+        unit,
+        "greater than zero",
+    )
 }
 
 /// Refuses values that are not finite or below zero.
-pub(super) fn not_negative(name: &'static str, value: f64, unit: &'static str) -> Result<(), SimError> {
-    require(value.is_finite() && value >= 0.0, name, value, unit, "zero or more")
+pub(super) fn not_negative(
+    name: &'static str,
+    value: f64,
+    unit: &'static str,
+) -> Result<(), SimError> {
+    require(
+        value.is_finite() && value >= 0.0,
+        name,
+        value,
+        unit,
+        "zero or more",
+    )
 }
 
 /// Refuses values that are not finite, below zero or beyond `largest`, which `allowed` names.
@@ -93,5 +113,14 @@ pub(super) fn require(
     unit: &'static str,
     allowed: &'static str,
 ) -> Result<(), SimError> {
-    if is_allowed { Ok(()) } else { Err(SimError::BadParameter { name, value, unit, allowed }) }
+    if is_allowed {
+        Ok(())
+    } else {
+        Err(SimError::BadParameter {
+            name,
+            value,
+            unit,
+            allowed,
+        })
+    }
 }

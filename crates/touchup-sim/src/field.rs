@@ -28,7 +28,12 @@ impl Field {
         band: f64,
     ) -> Self {
         let nodes = [0, 1, 2].map(|i| ((high[i] - low[i]) / pitch).ceil() as usize + 1);
-        let mut field = Self { nodes, origin: low, pitch, values: vec![band; nodes.iter().product()] };
+        let mut field = Self {
+            nodes,
+            origin: low,
+            pitch,
+            values: vec![band; nodes.iter().product()],
+        };
         let distance = |p: &Point3<f64>| surface.signed_distance(&(frame_ov * p));
         // from the middle of a block to its outermost node
         let half = (BLOCK - 1) as f64 / 2.0;
@@ -42,7 +47,8 @@ impl Field {
             for inner in cells(side) {
                 let node = [0, 1, 2].map(|i| first[i] + inner[i]);
                 let at = field.index(node);
-                field.values[at] = far.unwrap_or_else(|| distance(&field.node(node)).clamp(-band, band));
+                field.values[at] =
+                    far.unwrap_or_else(|| distance(&field.node(node)).clamp(-band, band));
             }
         }
         field
@@ -58,13 +64,22 @@ impl Field {
     }
 
     /// The values in runs of at most `length` nodes along x, each with the position of its first node, m, in V.
-    pub(super) fn runs_mut(&mut self, length: usize) -> impl Iterator<Item = (Point3<f64>, &mut [f64])> {
+    pub(super) fn runs_mut(
+        &mut self,
+        length: usize,
+    ) -> impl Iterator<Item = (Point3<f64>, &mut [f64])> {
         let ([width, height, _], origin, pitch) = (self.nodes, self.origin, self.pitch);
-        self.values.chunks_mut(width).enumerate().flat_map(move |(line, row)| {
-            let first = move |run: usize| [run * length, line % height, line / height];
-            let place = move |run: usize| origin + Vector3::from(first(run).map(|i| i as f64)) * pitch;
-            row.chunks_mut(length).enumerate().map(move |(run, values)| (place(run), values))
-        })
+        self.values
+            .chunks_mut(width)
+            .enumerate()
+            .flat_map(move |(line, row)| {
+                let first = move |run: usize| [run * length, line % height, line / height];
+                let place =
+                    move |run: usize| origin + Vector3::from(first(run).map(|i| i as f64)) * pitch;
+                row.chunks_mut(length)
+                    .enumerate()
+                    .map(move |(run, values)| (place(run), values))
+            })
     }
 
     /// Closes what is narrower than 2 `radius` (m) across z: in every layer a disc takes the smallest, then the largest.
@@ -103,7 +118,9 @@ impl Field {
                 let here = (at / stride) % self.nodes[axis];
                 let base = at - here * stride;
                 // beyond the grid its outermost value goes on
-                let term = |(w, i): (&f64, isize)| w * old[base + (here as isize + i).clamp(0, last) as usize * stride];
+                let term = |(w, i): (&f64, isize)| {
+                    w * old[base + (here as isize + i).clamp(0, last) as usize * stride]
+                };
                 *value = weights.iter().zip(-reach..).map(term).sum();
             }
         }
@@ -116,8 +133,11 @@ impl Field {
         let t = [0, 1, 2].map(|i| (q[i] - cell[i] as f64).clamp(0.0, 1.0));
         let corner = |k: usize| {
             let pick = |i: usize| k >> i & 1;
-            let weight: f64 = (0..3).map(|i| if pick(i) == 1 { t[i] } else { 1.0 - t[i] }).product();
-            weight * self.values[self.index([cell[0] + pick(0), cell[1] + pick(1), cell[2] + pick(2)])]
+            let weight: f64 = (0..3)
+                .map(|i| if pick(i) == 1 { t[i] } else { 1.0 - t[i] })
+                .product();
+            weight
+                * self.values[self.index([cell[0] + pick(0), cell[1] + pick(1), cell[2] + pick(2)])]
         };
         (0..8).map(corner).sum()
     }
@@ -149,8 +169,13 @@ impl Disc {
     /// `radius` in nodes; what reaches beyond the layer takes part in nothing and is left out.
     fn new(radius: f64, [width, height, _]: [usize; 3]) -> Self {
         let reach = (radius.floor() as usize).min(height - 1);
-        let half = |dy: usize| ((radius.powi(2) - (dy * dy) as f64).max(0.0).sqrt() as usize).min(width - 1);
-        Self { halves: (0..=reach).map(half).collect(), width }
+        let half = |dy: usize| {
+            ((radius.powi(2) - (dy * dy) as f64).max(0.0).sqrt() as usize).min(width - 1)
+        };
+        Self {
+            halves: (0..=reach).map(half).collect(),
+            width,
+        }
     }
 
     /// Every node takes the smallest value of the disc around it.
@@ -183,7 +208,10 @@ impl Runs {
     /// For windows of up to `half` nodes on both sides.
     fn new(half: usize, width: usize) -> Self {
         let count = (2 * half + 1).ilog2() as usize + 1;
-        Self { levels: vec![vec![f64::INFINITY; width + 2 * half]; count], margin: half }
+        Self {
+            levels: vec![vec![f64::INFINITY; width + 2 * half]; count],
+            margin: half,
+        }
     }
 
     fn of_row_mut(&mut self, row: &[f64]) {
@@ -226,7 +254,8 @@ mod tests {
             };
             let around = |node| {
                 let disc = cells(field.nodes).filter(move |&other| near(node, other));
-                disc.map(|other| values[field.index(other)]).fold(worst, pick)
+                disc.map(|other| values[field.index(other)])
+                    .fold(worst, pick)
             };
             cells(field.nodes).map(around).collect()
         };
@@ -238,8 +267,14 @@ mod tests {
     fn closing_is_the_largest_of_the_smallest_over_a_disc() {
         let nodes = [13, 9, 3];
         // no pattern: the fractional parts of multiples of the golden ratio
-        let values = (0..nodes.iter().product()).map(|i: usize| (i as f64 * 0.618_033_988_749_895).fract() - 0.5);
-        let field = Field { nodes, origin: Point3::origin(), pitch: 0.5, values: values.collect() };
+        let values = (0..nodes.iter().product())
+            .map(|i: usize| (i as f64 * 0.618_033_988_749_895).fract() - 0.5);
+        let field = Field {
+            nodes,
+            origin: Point3::origin(),
+            pitch: 0.5,
+            values: values.collect(),
+        };
         for radius in [0.0, 0.4, 0.5, 0.75, 1.2, 1.5, 2.3, 4.0, 6.4, 50.0, 1e300] {
             let mut found = field.clone();
             found.close_mut(radius);

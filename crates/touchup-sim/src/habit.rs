@@ -31,7 +31,10 @@ impl Habit {
     pub fn led(self, strokes: Vec<Stroke>) -> Vec<Stroke> {
         let pressed = |stroke: Stroke| match (self, stroke.press) {
             (Self::Slide, _) | (_, None) => vec![stroke],
-            (Self::Scrub, Some(_)) => vec![Stroke { points: scrubbed(&stroke.points), ..stroke }],
+            (Self::Scrub, Some(_)) => vec![Stroke {
+                points: scrubbed(&stroke.points),
+                ..stroke
+            }],
             (Self::Tap, Some(press)) => vec![tapped(&stroke, &press)],
         };
         strokes.into_iter().flat_map(pressed).collect()
@@ -50,23 +53,37 @@ fn lengths(line: &[Point3<f64>]) -> Vec<f64> {
 
 /// The point of the line at this length (m) of it.
 fn at_length(line: &[Point3<f64>], lengths: &[f64], s: f64) -> Point3<f64> {
-    let after = lengths.partition_point(|length| *length < s).clamp(1, line.len() - 1);
+    let after = lengths
+        .partition_point(|length| *length < s)
+        .clamp(1, line.len() - 1);
     let piece = lengths[after] - lengths[after - 1];
-    let share = if piece > 0.0 { ((s - lengths[after - 1]) / piece).clamp(0.0, 1.0) } else { 0.0 };
+    let share = if piece > 0.0 {
+        ((s - lengths[after - 1]) / piece).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
     line[after - 1] + (line[after] - line[after - 1]) * share
 }
 
 /// To and fro along a line, through each of its points that lie on the way.
 fn scrubbed(line: &[Point3<f64>]) -> Vec<Point3<f64>> {
     let lengths = lengths(line);
-    let Some(&whole) = lengths.last().filter(|_| line.len() > 1) else { return line.to_vec() };
+    let Some(&whole) = lengths.last().filter(|_| line.len() > 1) else {
+        return line.to_vec();
+    };
     let mut points = vec![line[0]];
     let mut s = 0.0;
     while s < whole {
         let forth = (s + FORTH).min(whole);
-        let back = if forth < whole { forth - BACK * FORTH } else { whole };
+        let back = if forth < whole {
+            forth - BACK * FORTH
+        } else {
+            whole
+        };
         let between = |low: f64, high: f64| {
-            (0..line.len()).filter(|&i| low < lengths[i] && lengths[i] < high).collect::<Vec<_>>()
+            (0..line.len())
+                .filter(|&i| low < lengths[i] && lengths[i] < high)
+                .collect::<Vec<_>>()
         };
         points.extend(between(s, forth).into_iter().map(|i| line[i]));
         points.push(at_length(line, &lengths, forth));
@@ -81,12 +98,18 @@ fn scrubbed(line: &[Point3<f64>]) -> Vec<Point3<f64>> {
 fn tapped(stroke: &Stroke, press: &Unit<Vector3<f64>>) -> Stroke {
     let line = &stroke.points;
     let lengths = lengths(line);
-    let Some(&whole) = lengths.last().filter(|_| line.len() > 1) else { return stroke.clone() };
+    let Some(&whole) = lengths.last().filter(|_| line.len() > 1) else {
+        return stroke.clone();
+    };
     let count = (whole / TAP_EVERY).ceil().max(1.0) as usize;
     let tap = |i: usize| {
         let p = at_length(line, &lengths, whole * i as f64 / count as f64);
         let above = p - press.into_inner() * LIFT;
         [above, p + press.into_inner() * INTO, above]
     };
-    Stroke { points: (0..=count).flat_map(tap).collect(), press: None, ..*stroke }
+    Stroke {
+        points: (0..=count).flat_map(tap).collect(),
+        press: None,
+        ..*stroke
+    }
 }

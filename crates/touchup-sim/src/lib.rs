@@ -45,7 +45,9 @@ pub use habit::Habit;
 pub use markers::{CameraParams, see_markers};
 pub use mesh_surface::MeshSurface;
 pub use mistake::{INPUT_MISTAKES, InputMistake, ToldRecording};
-pub use path::{Lines, PathParams, RasterRegion, Stroke, around_wall, plan_demo, plan_mesh, plan_walls, raster};
+pub use path::{
+    Lines, PathParams, RasterRegion, Stroke, around_wall, plan_demo, plan_mesh, plan_walls, raster,
+};
 pub use peaks::{Peaks, add_vertex_noise};
 pub use plate::{Plate, PlateStadium, TruthFeature, TruthShape};
 pub use scanner::{ScanQuality, ScannerParams, measure_quality, scan};

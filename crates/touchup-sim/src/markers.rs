@@ -105,7 +105,10 @@ pub fn see_markers(
                 _ => i,
             };
             if !is_hidden {
-                frame.see(MarkerObservation { label: label as u32, position });
+                frame.see(MarkerObservation {
+                    label: label as u32,
+                    position,
+                });
             }
         }
         frames.push(frame);
@@ -117,6 +120,13 @@ pub fn see_markers(
 fn seen_off(camera: &CameraParams, rng: &mut Pcg64) -> Vector3<f64> {
     let noise = gauss_vector(rng) * camera.noise;
     let direction = gauss_vector(rng).try_normalize(0.0).unwrap_or_default();
-    let (is_outlier, distance) = (uniform(rng, [0.0, 1.0]) < camera.outliers, uniform(rng, REFLECTION));
-    if is_outlier { direction * distance } else { noise }
+    let (is_outlier, distance) = (
+        uniform(rng, [0.0, 1.0]) < camera.outliers,
+        uniform(rng, REFLECTION),
+    );
+    if is_outlier {
+        direction * distance
+    } else {
+        noise
+    }
 }

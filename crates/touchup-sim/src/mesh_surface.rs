@@ -23,28 +23,46 @@ impl<'a> MeshSurface<'a> {
     /// # Errors
     /// [`MeshError::Empty`] for a mesh without a face.
     pub fn new(mesh: &'a TriMesh) -> Result<Self, SimError> {
-        let corners: Vec<_> = mesh.faces().flat_map(|(face, _)| mesh.triangle(face)).collect();
+        let corners: Vec<_> = mesh
+            .faces()
+            .flat_map(|(face, _)| mesh.triangle(face))
+            .collect();
         let bounds = Bounds::around(&corners).ok_or(MeshError::Empty)?;
-        Ok(Self { mesh, tree: FaceTree::new(mesh), bounds })
+        Ok(Self {
+            mesh,
+            tree: FaceTree::new(mesh),
+            bounds,
+        })
     }
 
     /// The closest face; `None` for a point that is not finite.
     fn closest_face(&self, p: &Point3<f64>) -> Option<FaceHit> {
-        self.tree.closest(self.mesh, p, f64::INFINITY).filter(|hit| hit.distance_squared.is_finite())
+        self.tree
+            .closest(self.mesh, p, f64::INFINITY)
+            .filter(|hit| hit.distance_squared.is_finite())
     }
 }
 
 impl Surface for MeshSurface<'_> {
     fn signed_distance(&self, p: &Point3<f64>) -> f64 {
-        let Some(hit) = self.closest_face(p) else { return f64::NAN };
+        let Some(hit) = self.closest_face(p) else {
+            return f64::NAN;
+        };
         let offset = p - hit.point;
-        offset.norm().copysign(offset.dot(&pseudo_normal(self.mesh, &hit)))
+        offset
+            .norm()
+            .copysign(offset.dot(&pseudo_normal(self.mesh, &hit)))
     }
 
     fn closest(&self, p: &Point3<f64>) -> SurfacePoint {
-        let nowhere = SurfacePoint { point: Vector3::repeat(f64::NAN).into(), normal: Vector3::repeat(f64::NAN) };
-        self.closest_face(p)
-            .map_or(nowhere, |hit| SurfacePoint { point: hit.point, normal: self.mesh.normal(hit.face) })
+        let nowhere = SurfacePoint {
+            point: Vector3::repeat(f64::NAN).into(),
+            normal: Vector3::repeat(f64::NAN),
+        };
+        self.closest_face(p).map_or(nowhere, |hit| SurfacePoint {
+            point: hit.point,
+            normal: self.mesh.normal(hit.face),
+        })
     }
 
     fn bounds(&self) -> Bounds {

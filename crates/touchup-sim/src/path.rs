@@ -99,33 +99,68 @@ impl RasterRegion {
 
 /// A free move from wherever the ball is.
 pub(super) fn free(points: Vec<Point3<f64>>) -> Stroke {
-    Stroke { points, speed: FREE_SPEED, press: None }
+    Stroke {
+        points,
+        speed: FREE_SPEED,
+        press: None,
+    }
 }
 
 /// Goes over a region in lines to and fro, pressing; begins and ends with a free move at the region's clear height.
 ///
 /// # Errors
 /// [`SimError::BadParameter`], also for more than 100,000 lines.
-pub fn raster(region: &RasterRegion, lines: Lines, params: &PathParams) -> Result<Vec<Stroke>, SimError> {
+pub fn raster(
+    region: &RasterRegion,
+    lines: Lines,
+    params: &PathParams,
+) -> Result<Vec<Stroke>, SimError> {
     params.check()?;
     let size = region.high - region.low;
-    let (length, width) = if lines == Lines::AlongX { (size.x, size.y) } else { (size.y, size.x) };
+    let (length, width) = if lines == Lines::AlongX {
+        (size.x, size.y)
+    } else {
+        (size.y, size.x)
+    };
     not_negative("the length of the region", length, "m")?;
     not_negative("the width of the region", width, "m")?;
     let count = (width / params.pitch).round().max(1.0);
-    up_to("the number of lines", count, "", MAX_LINES, "100000 or less: take a larger distance")?;
+    up_to(
+        "the number of lines",
+        count,
+        "",
+        MAX_LINES,
+        "100000 or less: take a larger distance",
+    )?;
     let count = count as usize;
     let corner = |i: usize, far: bool| {
-        let (s, t) = (if far { length } else { 0.0 }, width * i as f64 / count as f64);
-        region.low + if lines == Lines::AlongX { Vector2::new(s, t) } else { Vector2::new(t, s) }
+        let (s, t) = (
+            if far { length } else { 0.0 },
+            width * i as f64 / count as f64,
+        );
+        region.low
+            + if lines == Lines::AlongX {
+                Vector2::new(s, t)
+            } else {
+                Vector2::new(t, s)
+            }
     };
-    let track: Vec<_> = (0..=count).flat_map(|i| [corner(i, i % 2 == 1), corner(i, i % 2 == 0)]).collect();
+    let track: Vec<_> = (0..=count)
+        .flat_map(|i| [corner(i, i % 2 == 1), corner(i, i % 2 == 0)])
+        .collect();
     let (first, last) = (track[0], track[track.len() - 1]);
-    let points = track.into_iter().map(|q| region.at(q, region.floor)).collect();
+    let points = track
+        .into_iter()
+        .map(|q| region.at(q, region.floor))
+        .collect();
     let press = Some(Unit::new_unchecked(region.frame_ov * -Vector3::z()));
     Ok(vec![
         free(vec![region.at(first, region.clear)]),
-        Stroke { points, speed: params.speed, press },
+        Stroke {
+            points,
+            speed: params.speed,
+            press,
+        },
         // straight up first
         free(vec![region.at(last, region.clear)]),
     ])
@@ -142,8 +177,15 @@ pub fn around_wall(
     clear: f64,
     params: &PathParams,
 ) -> Vec<Stroke> {
-    let lean = if inside { params.lean - params.radius } else { params.radius - params.lean };
-    let track = PlateStadium { radius: outline.radius + lean, ..*outline };
+    let lean = if inside {
+        params.lean - params.radius
+    } else {
+        params.radius - params.lean
+    };
+    let track = PlateStadium {
+        radius: outline.radius + lean,
+        ..*outline
+    };
     let mut ring = track.polygon(CHORD * CHORD / (8.0 * track.radius));
     if params.turn < 1.0 {
         ring.truncate((ring.len() as f64 * params.turn).ceil() as usize + 1);
@@ -152,13 +194,24 @@ pub fn around_wall(
     }
     let centre = outline.centre();
     // from the middle of a hole, or from beside a boss
-    let start = if inside { centre } else { centre + (ring[0] - centre) * (1.0 + CLEARANCE / track.radius) };
+    let start = if inside {
+        centre
+    } else {
+        centre + (ring[0] - centre) * (1.0 + CLEARANCE / track.radius)
+    };
     let at = |q: Point2<f64>, z: f64| Point3::new(q.x, q.y, z);
     let mut strokes = vec![free(vec![at(start, clear)])];
     for &z in heights {
-        strokes.push(free(vec![at(start, clear.min(z + CLEARANCE)), at(start, z)]));
+        strokes.push(free(vec![
+            at(start, clear.min(z + CLEARANCE)),
+            at(start, z),
+        ]));
         let run = ring.iter().map(|&q| at(q, z)).collect();
-        strokes.push(Stroke { points: run, speed: params.wall_speed, press: None });
+        strokes.push(Stroke {
+            points: run,
+            speed: params.wall_speed,
+            press: None,
+        });
         strokes.push(free(vec![at(start, z)]));
     }
     strokes.push(free(vec![at(start, clear)]));
@@ -185,8 +238,16 @@ pub fn plan_demo(plate: &Plate, params: &PathParams) -> Result<Vec<Stroke>, SimE
     strokes.extend(raster(&features, Lines::AlongY, params)?);
     let step = plate.step_x;
     // across the edge in close lines, then along both of its sides
-    strokes.extend(raster(&region([step - 4e-3, 0.010], [step + 5e-3, 0.036]), Lines::AlongX, params)?);
-    strokes.extend(raster(&region([step - 1e-3, 0.010], [step + 2e-3, 0.036]), Lines::AlongY, params)?);
+    strokes.extend(raster(
+        &region([step - 4e-3, 0.010], [step + 5e-3, 0.036]),
+        Lines::AlongX,
+        params,
+    )?);
+    strokes.extend(raster(
+        &region([step - 1e-3, 0.010], [step + 2e-3, 0.036]),
+        Lines::AlongY,
+        params,
+    )?);
     strokes.extend(plan_walls(plate, params)?);
     Ok(strokes)
 }
@@ -198,12 +259,22 @@ pub fn plan_demo(plate: &Plate, params: &PathParams) -> Result<Vec<Stroke>, SimE
 pub fn plan_walls(plate: &Plate, params: &PathParams) -> Result<Vec<Stroke>, SimError> {
     params.check()?;
     let clear = plate.bounds().max.z + params.radius + CLEARANCE;
-    let walls = [(&plate.through, true), (&plate.blind, true), (&plate.slot, true), (&plate.boss, false)];
-    let reached =
-        walls.into_iter().filter(|(e, inside)| !inside || e.outline.radius + params.lean > params.radius + ROOM);
+    let walls = [
+        (&plate.through, true),
+        (&plate.blind, true),
+        (&plate.slot, true),
+        (&plate.boss, false),
+    ];
+    let reached = walls
+        .into_iter()
+        .filter(|(e, inside)| !inside || e.outline.radius + params.lean > params.radius + ROOM);
     let around = |(e, inside): (&Extrusion, bool)| {
         // near the floor (the ball touches floor and wall at once), halfway up, and just below the rim
-        let heights = [e.low + 0.9 * params.radius, (e.low + e.high) / 2.0, e.high - params.radius / 2.0];
+        let heights = [
+            e.low + 0.9 * params.radius,
+            (e.low + e.high) / 2.0,
+            e.high - params.radius / 2.0,
+        ];
         around_wall(&e.outline, inside, &heights, clear, params)
     };
     Ok(reached.flat_map(around).collect())
@@ -227,7 +298,10 @@ pub fn plan_mesh(
     let region = region_over(bounds, view, params.radius);
     let size = region.high - region.low;
     let needed = 2.0 * size.x * size.y / (params.speed * params.longest);
-    let params = PathParams { pitch: params.pitch.max(needed), ..*params };
+    let params = PathParams {
+        pitch: params.pitch.max(needed),
+        ..*params
+    };
     let mut strokes = raster(&region, Lines::AlongX, &params)?;
     strokes.extend(raster(&region, Lines::AlongY, &params)?);
     for stroke in strokes.iter_mut().filter(|stroke| stroke.press.is_some()) {
@@ -265,14 +339,21 @@ fn follow_heights(
     let at_depth = |p: Point3<f64>| {
         let q = region.frame_ov.inverse() * p;
         // beside the part the ball goes down the wall it left
-        level = first_contact(surface, region, &q.xy(), params.radius).unwrap_or(level - PIECE).max(region.floor);
+        level = first_contact(surface, region, &q.xy(), params.radius)
+            .unwrap_or(level - PIECE)
+            .max(region.floor);
         region.at(q.xy(), level - params.lean)
     };
     pieces.map(at_depth).collect()
 }
 
 /// z in V at which a ball coming down at (x, y) first touches; `None` when it passes the floor.
-pub(super) fn first_contact(surface: &dyn Surface, region: &RasterRegion, q: &Point2<f64>, radius: f64) -> Option<f64> {
+pub(super) fn first_contact(
+    surface: &dyn Surface,
+    region: &RasterRegion,
+    q: &Point2<f64>,
+    radius: f64,
+) -> Option<f64> {
     let mut z = region.clear;
     while z > region.floor {
         // the distance says how far the ball can go without touching
@@ -287,5 +368,8 @@ pub(super) fn first_contact(surface: &dyn Surface, region: &RasterRegion, q: &Po
 
 /// A frame in the middle of a box whose z axis points against the direction of view; any turn about it does.
 pub(super) fn looking_along(view: &Unit<Vector3<f64>>, bounds: &Bounds) -> Isometry3<f64> {
-    Isometry3::from_parts(bounds.centre().coords.into(), turned_to(&-view.into_inner()))
+    Isometry3::from_parts(
+        bounds.centre().coords.into(),
+        turned_to(&-view.into_inner()),
+    )
 }

@@ -51,7 +51,9 @@ impl Default for Peaks {
     fn default() -> Self {
         let nodes = ((SIDE + 2.0 * MARGIN) / PITCH).ceil() as usize + 1;
         let at = |i: usize| i as f64 * PITCH - SIDE / 2.0 - MARGIN;
-        let heights = (0..nodes * nodes).map(|k| jet(&Point2::new(at(k % nodes), at(k / nodes))).z).collect();
+        let heights = (0..nodes * nodes)
+            .map(|k| jet(&Point2::new(at(k % nodes), at(k / nodes))).z)
+            .collect();
         Self { heights, nodes }
     }
 }
@@ -69,8 +71,18 @@ impl Peaks {
     pub fn mesh(&self, edge: f64) -> Result<TriMesh, SimError> {
         positive("the edge length", edge, "m")?;
         let cells = (SIDE / edge).ceil();
-        require(cells <= MAX_CELLS, "the edge length", edge, "m", "25 µm or more")?;
-        Ok(height_field(cells as u32, |i| (f64::from(i) / cells - 0.5) * SIDE, |x, y| self.height(x, y))?)
+        require(
+            cells <= MAX_CELLS,
+            "the edge length",
+            edge,
+            "m",
+            "25 µm or more",
+        )?;
+        Ok(height_field(
+            cells as u32,
+            |i| (f64::from(i) / cells - 0.5) * SIDE,
+            |x, y| self.height(x, y),
+        )?)
     }
 
     /// Nodes of the starting grid that none of their neighbours beats in closeness to `p`, within `reach` (m) sideways.
@@ -79,12 +91,21 @@ impl Peaks {
         let index = |x: f64| (((x + SIDE / 2.0 + MARGIN) / PITCH).max(0.0) as usize).min(last);
         let at = |i: usize| i as f64 * PITCH - SIDE / 2.0 - MARGIN;
         let far = |i: usize, j: usize| {
-            Vector3::new(at(i) - p.x, at(j) - p.y, self.heights[j * self.nodes + i] - p.z).norm_squared()
+            Vector3::new(
+                at(i) - p.x,
+                at(j) - p.y,
+                self.heights[j * self.nodes + i] - p.z,
+            )
+            .norm_squared()
         };
         let around = |i: usize| i.saturating_sub(1)..=(i + 1).min(last);
-        let (is, js) = ([p.x - reach, p.x + reach].map(index), [p.y - reach, p.y + reach].map(index));
+        let (is, js) = (
+            [p.x - reach, p.x + reach].map(index),
+            [p.y - reach, p.y + reach].map(index),
+        );
         let up_to = |k: usize| (k + 1).min(last);
-        let nodes = (js[0]..=up_to(js[1])).flat_map(|j| (is[0]..=up_to(is[1])).map(move |i| (i, j)));
+        let nodes =
+            (js[0]..=up_to(js[1])).flat_map(|j| (is[0]..=up_to(is[1])).map(move |i| (i, j)));
         let lowest = nodes.filter(|&(i, j)| {
             let mine = far(i, j);
             around(j).all(|m| around(i).all(|k| far(k, m) >= mine))
@@ -109,14 +130,21 @@ pub fn add_vertex_noise(mesh: &mut TriMesh, noise: f64, offset: &Vector3<f64>, s
     let mut rng = Pcg64::seed_from_u64(seed);
     for vertex in 0..mesh.vertex_count() as u32 {
         let vertex = touchup_core::mesh::VertexId(vertex);
-        mesh.set_position(vertex, mesh.position(vertex) + gauss_vector(&mut rng) * noise + offset);
+        mesh.set_position(
+            vertex,
+            mesh.position(vertex) + gauss_vector(&mut rng) * noise + offset,
+        );
     }
 }
 
 /// The formula and its derivatives, scaled to m.
 fn jet(q: &Point2<f64>) -> Jet {
     let (x, y) = (q.x / UNIT, q.y / UNIT);
-    let mut sum = Jet { z: 0.0, slope: Vector2::zeros(), bend: Matrix2::zeros() };
+    let mut sum = Jet {
+        z: 0.0,
+        slope: Vector2::zeros(),
+        bend: Matrix2::zeros(),
+    };
     // a polynomial g times exp(−(x−a)² − (y−b)²), with the derivatives of g
     let mut add = |g: [f64; 6], a: f64, b: f64| {
         let [g, gx, gy, gxx, gxy, gyy] = g;
@@ -129,19 +157,46 @@ fn jet(q: &Point2<f64>) -> Jet {
         let yy = gyy + 2.0 * gy * v + g * (v * v - 2.0);
         sum.bend += Matrix2::new(xx, xy, xy, yy) * e;
     };
-    add([3.0 * (1.0 - x).powi(2), -6.0 * (1.0 - x), 0.0, 6.0, 0.0, 0.0], 0.0, -1.0);
+    add(
+        [
+            3.0 * (1.0 - x).powi(2),
+            -6.0 * (1.0 - x),
+            0.0,
+            6.0,
+            0.0,
+            0.0,
+        ],
+        0.0,
+        -1.0,
+    );
     let (x2, y3) = (x * x, y * y * y);
     let g = -10.0 * (x / 5.0 - x2 * x - y3 * y * y);
-    add([g, -2.0 + 30.0 * x2, 50.0 * y3 * y, 60.0 * x, 0.0, 200.0 * y3], 0.0, 0.0);
+    add(
+        [
+            g,
+            -2.0 + 30.0 * x2,
+            50.0 * y3 * y,
+            60.0 * x,
+            0.0,
+            200.0 * y3,
+        ],
+        0.0,
+        0.0,
+    );
     add([-1.0 / 3.0, 0.0, 0.0, 0.0, 0.0, 0.0], -1.0, 0.0);
     let scale = HEIGHT / (RANGE[1] - RANGE[0]);
     let middle = (RANGE[0] + RANGE[1]) / 2.0;
-    Jet { z: scale * (sum.z - middle), slope: sum.slope * (scale / UNIT), bend: sum.bend * (scale / UNIT / UNIT) }
+    Jet {
+        z: scale * (sum.z - middle),
+        slope: sum.slope * (scale / UNIT),
+        bend: sum.bend * (scale / UNIT / UNIT),
+    }
 }
 
 /// Newton's method for the stationary distance to `p`, damped so that the distance never grows.
 fn descend(p: &Point3<f64>, start: Point2<f64>) -> Point2<f64> {
-    let half_square = |q: &Point2<f64>, z: f64| ((q - p.xy()).norm_squared() + (z - p.z).powi(2)) / 2.0;
+    let half_square =
+        |q: &Point2<f64>, z: f64| ((q - p.xy()).norm_squared() + (z - p.z).powi(2)) / 2.0;
     let mut q = start;
     for _ in 0..MAX_STEPS {
         let j = jet(&q);
@@ -149,10 +204,18 @@ fn descend(p: &Point3<f64>, start: Point2<f64>) -> Point2<f64> {
         let tangent = Matrix2::identity() + j.slope * j.slope.transpose();
         let full = tangent + j.bend * (j.z - p.z);
         // without the bend the matrix is positive definite and the step goes down in any case
-        let hessian = if full.determinant() > 0.0 && full.trace() > 0.0 { full } else { tangent };
-        let step = hessian.try_inverse().map_or(gradient, |inverse| inverse * gradient);
+        let hessian = if full.determinant() > 0.0 && full.trace() > 0.0 {
+            full
+        } else {
+            tangent
+        };
+        let step = hessian
+            .try_inverse()
+            .map_or(gradient, |inverse| inverse * gradient);
         let now = half_square(&q, j.z);
-        let next = (0..40).map(|k| q - step * 0.5f64.powi(k)).find(|x| half_square(x, jet(x).z) < now);
+        let next = (0..40)
+            .map(|k| q - step * 0.5f64.powi(k))
+            .find(|x| half_square(x, jet(x).z) < now);
         let Some(next) = next else { return q };
         q = next;
     }
@@ -161,12 +224,17 @@ fn descend(p: &Point3<f64>, start: Point2<f64>) -> Point2<f64> {
 
 fn on_surface(q: &Point2<f64>) -> SurfacePoint {
     let j = jet(q);
-    SurfacePoint { point: Point3::new(q.x, q.y, j.z), normal: Vector3::new(-j.slope.x, -j.slope.y, 1.0).normalize() }
+    SurfacePoint {
+        point: Point3::new(q.x, q.y, j.z),
+        normal: Vector3::new(-j.slope.x, -j.slope.y, 1.0).normalize(),
+    }
 }
 
 impl Surface for Peaks {
     fn signed_distance(&self, p: &Point3<f64>) -> f64 {
-        (p - self.closest(p).point).norm().copysign(p.z - self.height(p.x, p.y))
+        (p - self.closest(p).point)
+            .norm()
+            .copysign(p.z - self.height(p.x, p.y))
     }
 
     fn closest(&self, p: &Point3<f64>) -> SurfacePoint {
@@ -174,16 +242,27 @@ impl Surface for Peaks {
         let reach = (p.z - self.height(p.x, p.y)).abs();
         self.dips(p, reach)
             .into_iter()
-            .min_by(|a, b| (p - a.point).norm_squared().total_cmp(&(p - b.point).norm_squared()))
+            .min_by(|a, b| {
+                (p - a.point)
+                    .norm_squared()
+                    .total_cmp(&(p - b.point).norm_squared())
+            })
             .expect("the search starts at least straight above or below the point")
     }
 
     fn bounds(&self) -> Bounds {
         let half = Vector3::new(SIDE, SIDE, HEIGHT) / 2.0;
-        Bounds { min: Point3::from(-half), max: Point3::from(half) }
+        Bounds {
+            min: Point3::from(-half),
+            max: Point3::from(half),
+        }
     }
 
     fn near(&self, p: &Point3<f64>, reach: f64, found: &mut Vec<SurfacePoint>) {
-        found.extend(self.dips(p, reach).into_iter().filter(|dip| (p - dip.point).norm() <= reach));
+        found.extend(
+            self.dips(p, reach)
+                .into_iter()
+                .filter(|dip| (p - dip.point).norm() <= reach),
+        );
     }
 }

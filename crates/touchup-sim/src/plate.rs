@@ -21,7 +21,11 @@ pub struct PlateStadium {
 
 impl PlateStadium {
     const fn disc(x: f64, y: f64, radius: f64) -> Self {
-        Self { from: Point2::new(x, y), to: Point2::new(x, y), radius }
+        Self {
+            from: Point2::new(x, y),
+            to: Point2::new(x, y),
+            radius,
+        }
     }
 
     /// Middle of the segment, m.
@@ -44,7 +48,9 @@ impl PlateStadium {
     fn outline(&self, q: &Point2<f64>) -> (Point2<f64>, Vector2<f64>) {
         let spine = self.spine(q);
         let across = self.to - self.from;
-        let square = Vector2::new(-across.y, across.x).try_normalize(0.0).unwrap_or_else(Vector2::x);
+        let square = Vector2::new(-across.y, across.x)
+            .try_normalize(0.0)
+            .unwrap_or_else(Vector2::x);
         let out = (q - spine).try_normalize(0.0).unwrap_or(square);
         (spine + out * self.radius, out)
     }
@@ -131,15 +137,35 @@ pub struct Plate {
 impl Default for Plate {
     fn default() -> Self {
         let high = 0.012;
-        let slot = PlateStadium { from: Point2::new(0.018, 0.014), to: Point2::new(0.032, 0.014), radius: 0.003 };
+        let slot = PlateStadium {
+            from: Point2::new(0.018, 0.014),
+            to: Point2::new(0.032, 0.014),
+            radius: 0.003,
+        };
         let mut plate = Self {
             size: Vector3::new(0.080, 0.050, high),
             step_x: 0.060,
             step_z: 0.009,
-            through: Extrusion { outline: PlateStadium::disc(0.016, 0.036, 0.004), low: 0.0, high },
-            blind: Extrusion { outline: PlateStadium::disc(0.032, 0.034, 0.003), low: 0.004, high },
-            slot: Extrusion { outline: slot, low: 0.007, high },
-            boss: Extrusion { outline: PlateStadium::disc(0.047, 0.025, 0.005), low: high, high: 0.016 },
+            through: Extrusion {
+                outline: PlateStadium::disc(0.016, 0.036, 0.004),
+                low: 0.0,
+                high,
+            },
+            blind: Extrusion {
+                outline: PlateStadium::disc(0.032, 0.034, 0.003),
+                low: 0.004,
+                high,
+            },
+            slot: Extrusion {
+                outline: slot,
+                low: 0.007,
+                high,
+            },
+            boss: Extrusion {
+                outline: PlateStadium::disc(0.047, 0.025, 0.005),
+                low: high,
+                high: 0.016,
+            },
             patches: Vec::new(),
         };
         plate.patches = plate.boundary();
@@ -156,7 +182,11 @@ impl Plate {
             name,
             centre: at(e, e.high),
             axis,
-            shape: TruthShape::Hole { diameter: 2.0 * e.outline.radius, depth: e.high - e.low, through },
+            shape: TruthShape::Hole {
+                diameter: 2.0 * e.outline.radius,
+                depth: e.high - e.low,
+                through,
+            },
         };
         let (slot, boss) = (&self.slot, &self.boss);
         let along = slot.outline.to - slot.outline.from;
@@ -166,41 +196,93 @@ impl Plate {
             depth: slot.high - slot.low,
             direction: Vector3::new(along.x, along.y, 0.0).normalize(),
         };
-        let boss_shape = TruthShape::Boss { diameter: 2.0 * boss.outline.radius, height: boss.high - boss.low };
-        let step_shape =
-            TruthShape::Step { height: self.size.z - self.step_z, length: self.size.y, direction: Vector3::y() };
+        let boss_shape = TruthShape::Boss {
+            diameter: 2.0 * boss.outline.radius,
+            height: boss.high - boss.low,
+        };
+        let step_shape = TruthShape::Step {
+            height: self.size.z - self.step_z,
+            length: self.size.y,
+            direction: Vector3::y(),
+        };
         let middle = Point3::new(self.step_x, self.size.y / 2.0, self.size.z);
         [
             hole("through-hole", &self.through, true),
             hole("blind hole", &self.blind, false),
-            TruthFeature { name: "slot", centre: at(slot, slot.high), axis, shape: slot_shape },
-            TruthFeature { name: "boss", centre: at(boss, boss.low), axis, shape: boss_shape },
-            TruthFeature { name: "step", centre: middle, axis, shape: step_shape },
+            TruthFeature {
+                name: "slot",
+                centre: at(slot, slot.high),
+                axis,
+                shape: slot_shape,
+            },
+            TruthFeature {
+                name: "boss",
+                centre: at(boss, boss.low),
+                axis,
+                shape: boss_shape,
+            },
+            TruthFeature {
+                name: "step",
+                centre: middle,
+                axis,
+                shape: step_shape,
+            },
         ]
     }
 
     /// Whether `p` is inside the material.
     fn is_inside(&self, p: &Point3<f64>) -> bool {
         let within = |e: &Extrusion| e.outline.contains(&p.xy()) && p.z < e.high;
-        let top = if p.x < self.step_x { self.size.z } else { self.step_z };
+        let top = if p.x < self.step_x {
+            self.size.z
+        } else {
+            self.step_z
+        };
         let over = |x: f64, size: f64| x > 0.0 && x < size;
         let in_block = over(p.x, self.size.x) && over(p.y, self.size.y) && over(p.z, top);
-        let cut = within(&self.through) || [&self.blind, &self.slot].into_iter().any(|e| within(e) && p.z > e.low);
+        let cut = within(&self.through)
+            || [&self.blind, &self.slot]
+                .into_iter()
+                .any(|e| within(e) && p.z > e.low);
         in_block && !cut || within(&self.boss) && p.z >= self.boss.low
     }
 
     fn boundary(&self) -> Vec<BoundaryPatch> {
         let (size, x, z) = (self.size, self.step_x, self.step_z);
-        let [through, blind, slot, boss] = [&self.through, &self.blind, &self.slot, &self.boss].map(|e| e.outline);
-        let flat = |axis: usize, side: f64, level: f64, low: [f64; 2], high: [f64; 2], holes: Vec<PlateStadium>| {
-            BoundaryPatch::Flat { axis, side, level, low: low.into(), high: high.into(), holes }
+        let [through, blind, slot, boss] =
+            [&self.through, &self.blind, &self.slot, &self.boss].map(|e| e.outline);
+        let flat = |axis: usize,
+                    side: f64,
+                    level: f64,
+                    low: [f64; 2],
+                    high: [f64; 2],
+                    holes: Vec<PlateStadium>| {
+            BoundaryPatch::Flat {
+                axis,
+                side,
+                level,
+                low: low.into(),
+                high: high.into(),
+                holes,
+            }
         };
-        let wall =
-            |e: &Extrusion, side: f64| BoundaryPatch::Wall { outline: e.outline, low: e.low, high: e.high, side };
+        let wall = |e: &Extrusion, side: f64| BoundaryPatch::Wall {
+            outline: e.outline,
+            low: e.low,
+            high: e.high,
+            side,
+        };
         let lid = |outline: PlateStadium, level: f64| BoundaryPatch::Lid { outline, level };
         vec![
             flat(2, -1.0, 0.0, [0.0, 0.0], [size.x, size.y], vec![through]),
-            flat(2, 1.0, size.z, [0.0, 0.0], [x, size.y], vec![through, blind, slot, boss]),
+            flat(
+                2,
+                1.0,
+                size.z,
+                [0.0, 0.0],
+                [x, size.y],
+                vec![through, blind, slot, boss],
+            ),
             flat(2, 1.0, z, [x, 0.0], [size.x, size.y], vec![]),
             flat(0, 1.0, x, [0.0, z], [size.y, size.z], vec![]),
             flat(0, -1.0, 0.0, [0.0, 0.0], [size.y, size.z], vec![]),
@@ -226,22 +308,44 @@ impl Plate {
 enum BoundaryPatch {
     /// A rectangle in the plane coordinate `axis` = `level`, without the discs and stadiums cut out of it; the two
     /// coordinates in it are those after `axis`, cyclically. `side`: +1 when the normal points along the axis.
-    Flat { axis: usize, side: f64, level: f64, low: Point2<f64>, high: Point2<f64>, holes: Vec<PlateStadium> },
+    Flat {
+        axis: usize,
+        side: f64,
+        level: f64,
+        low: Point2<f64>,
+        high: Point2<f64>,
+        holes: Vec<PlateStadium>,
+    },
     /// A stadium at a height, its normal along +z.
     Lid { outline: PlateStadium, level: f64 },
     /// The prism above an outline; `side`: +1 when the normal points away from the stadium.
-    Wall { outline: PlateStadium, low: f64, high: f64, side: f64 },
+    Wall {
+        outline: PlateStadium,
+        low: f64,
+        high: f64,
+        side: f64,
+    },
 }
 
 impl BoundaryPatch {
     /// The patch's point closest to `p`.
     fn closest(&self, p: &Point3<f64>) -> SurfacePoint {
         match self {
-            Self::Flat { axis, side, level, low, high, holes } => {
+            Self::Flat {
+                axis,
+                side,
+                level,
+                low,
+                high,
+                holes,
+            } => {
                 let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
                 let inside = Point2::new(p[u], p[v]).sup(low).inf(high);
                 // the cut-outs stay clear of the rim and of each other, so at most one holds the point
-                let free = holes.iter().find(|hole| hole.contains(&inside)).map_or(inside, |h| h.outline(&inside).0);
+                let free = holes
+                    .iter()
+                    .find(|hole| hole.contains(&inside))
+                    .map_or(inside, |h| h.outline(&inside).0);
                 let (mut point, mut normal) = (Point3::origin(), Vector3::zeros());
                 (point[*axis], point[u], point[v]) = (*level, free.x, free.y);
                 normal[*axis] = *side;
@@ -249,13 +353,28 @@ impl BoundaryPatch {
             }
             Self::Lid { outline, level } => {
                 let q = p.xy();
-                let q = if outline.contains(&q) { q } else { outline.outline(&q).0 };
-                SurfacePoint { point: Point3::new(q.x, q.y, *level), normal: Vector3::z() }
+                let q = if outline.contains(&q) {
+                    q
+                } else {
+                    outline.outline(&q).0
+                };
+                SurfacePoint {
+                    point: Point3::new(q.x, q.y, *level),
+                    normal: Vector3::z(),
+                }
             }
-            Self::Wall { outline, low, high, side } => {
+            Self::Wall {
+                outline,
+                low,
+                high,
+                side,
+            } => {
                 let (q, out) = outline.outline(&p.xy());
                 let point = Point3::new(q.x, q.y, p.z.clamp(*low, *high));
-                SurfacePoint { point, normal: Vector3::new(out.x, out.y, 0.0) * *side }
+                SurfacePoint {
+                    point,
+                    normal: Vector3::new(out.x, out.y, 0.0) * *side,
+                }
             }
         }
     }
@@ -264,24 +383,39 @@ impl BoundaryPatch {
 impl Surface for Plate {
     fn signed_distance(&self, p: &Point3<f64>) -> f64 {
         let distance = (p - self.closest(p).point).norm();
-        if self.is_inside(p) { -distance } else { distance }
+        if self.is_inside(p) {
+            -distance
+        } else {
+            distance
+        }
     }
 
     fn closest(&self, p: &Point3<f64>) -> SurfacePoint {
         self.patches
             .iter()
             .map(|patch| patch.closest(p))
-            .min_by(|a, b| (p - a.point).norm_squared().total_cmp(&(p - b.point).norm_squared()))
+            .min_by(|a, b| {
+                (p - a.point)
+                    .norm_squared()
+                    .total_cmp(&(p - b.point).norm_squared())
+            })
             .expect("a plate has patches")
     }
 
     fn bounds(&self) -> Bounds {
         let top = Point3::new(self.size.x, self.size.y, self.boss.high);
-        Bounds { min: Point3::origin(), max: top }
+        Bounds {
+            min: Point3::origin(),
+            max: top,
+        }
     }
 
     fn near(&self, p: &Point3<f64>, reach: f64, found: &mut Vec<SurfacePoint>) {
-        let near = self.patches.iter().map(|patch| patch.closest(p)).filter(|s| (p - s.point).norm() <= reach);
+        let near = self
+            .patches
+            .iter()
+            .map(|patch| patch.closest(p))
+            .filter(|s| (p - s.point).norm() <= reach);
         found.extend(near);
     }
 }

@@ -29,7 +29,10 @@ impl PlateStadium {
         if along.norm() == 0.0 {
             return (0..2 * half).map(|k| on(self.to, k)).collect();
         }
-        (0..=half).map(|k| on(self.to, k)).chain((half..=2 * half).map(|k| on(self.from, k))).collect()
+        (0..=half)
+            .map(|k| on(self.to, k))
+            .chain((half..=2 * half).map(|k| on(self.from, k)))
+            .collect()
     }
 }
 
@@ -43,11 +46,16 @@ impl MeshDraft {
     /// Adds the rings at both ends of an extrusion and the wall between them; returns (low, high).
     fn wall(&mut self, e: &Extrusion, chord_error: f64, outwards: bool) -> (Vec<u32>, Vec<u32>) {
         let polygon = e.outline.polygon(chord_error);
-        let [low, high] = [e.low, e.high].map(|z| self.add(polygon.iter().map(|q| Point3::new(q.x, q.y, z))));
+        let [low, high] =
+            [e.low, e.high].map(|z| self.add(polygon.iter().map(|q| Point3::new(q.x, q.y, z))));
         for i in 0..low.len() {
             let j = (i + 1) % low.len();
             let quad = [low[i], low[j], high[j], high[i]];
-            self.quad(if outwards { quad } else { [quad[3], quad[2], quad[1], quad[0]] });
+            self.quad(if outwards {
+                quad
+            } else {
+                [quad[3], quad[2], quad[1], quad[0]]
+            });
         }
         (low, high)
     }
@@ -57,7 +65,12 @@ impl MeshDraft {
     }
 
     /// Fills a plane face; `seen` gives the two coordinates of a point as seen from outside.
-    fn fill(&mut self, outline: &[u32], holes: &[Vec<u32>], seen: impl Fn(&Point3<f64>) -> Point2<f64>) {
+    fn fill(
+        &mut self,
+        outline: &[u32],
+        holes: &[Vec<u32>],
+        seen: impl Fn(&Point3<f64>) -> Point2<f64>,
+    ) {
         let points: Vec<_> = self.positions.iter().map(seen).collect();
         self.faces.extend(triangulate(&points, outline, holes));
     }
@@ -74,8 +87,16 @@ impl Plate {
         let mut b = MeshDraft::default();
         let (size, x, z) = (self.size, self.step_x, self.step_z);
         // the step's outline, seen along −y: counter-clockwise with x to the right and z up
-        let profile = [(0.0, 0.0), (size.x, 0.0), (size.x, z), (x, z), (x, size.z), (0.0, size.z)];
-        let [front, back] = [0.0, size.y].map(|y| b.add(profile.map(|(x, z)| Point3::new(x, y, z))));
+        let profile = [
+            (0.0, 0.0),
+            (size.x, 0.0),
+            (size.x, z),
+            (x, z),
+            (x, size.z),
+            (0.0, size.z),
+        ];
+        let [front, back] =
+            [0.0, size.y].map(|y| b.add(profile.map(|(x, z)| Point3::new(x, y, z))));
         b.fill(&front, &[], |p| Point2::new(p.x, p.z));
         let reversed = |ring: &[u32]| ring.iter().rev().copied().collect::<Vec<_>>();
         b.fill(&reversed(&back), &[], |p| Point2::new(-p.x, p.z));

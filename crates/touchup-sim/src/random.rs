@@ -21,13 +21,20 @@ impl Drift {
     pub(super) fn new(period: f64, rng: &mut Pcg64) -> Self {
         let mut share = || uniform(rng, [0.0, 1.0]);
         let turn = std::f64::consts::TAU;
-        Self { waves: [(); WAVES].map(|()| (turn / period * (2.0 * share() - 1.0).exp2(), turn * share())) }
+        Self {
+            waves: [(); WAVES]
+                .map(|()| (turn / period * (2.0 * share() - 1.0).exp2(), turn * share())),
+        }
     }
 
     /// Value at time `t` (s).
     pub(super) fn at(&self, t: f64) -> f64 {
         // each wave has mean square 1/2
-        self.waves.iter().map(|(rate, phase)| (rate * t + phase).sin()).sum::<f64>() * (2.0 / WAVES as f64).sqrt()
+        self.waves
+            .iter()
+            .map(|(rate, phase)| (rate * t + phase).sin())
+            .sum::<f64>()
+            * (2.0 / WAVES as f64).sqrt()
     }
 }
 
@@ -42,14 +49,24 @@ pub(super) struct SmoothField {
 impl SmoothField {
     /// - `length`: over which it stays alike, m.
     pub(super) fn new(length: f64, rng: &mut Pcg64) -> Self {
-        let mut wave = || (gauss_vector(rng) / length, std::f64::consts::TAU * uniform(rng, [0.0, 1.0]));
-        Self { waves: [(); FIELD_WAVES].map(|()| wave()) }
+        let mut wave = || {
+            (
+                gauss_vector(rng) / length,
+                std::f64::consts::TAU * uniform(rng, [0.0, 1.0]),
+            )
+        };
+        Self {
+            waves: [(); FIELD_WAVES].map(|()| wave()),
+        }
     }
 
     /// Value at `p` (m).
     pub(super) fn at(&self, p: &Point3<f64>) -> f64 {
         // each wave has mean square 1/2
-        self.waves.iter().map(|(k, phase)| (k.dot(&p.coords) + phase).sin()).sum::<f64>()
+        self.waves
+            .iter()
+            .map(|(k, phase)| (k.dot(&p.coords) + phase).sin())
+            .sum::<f64>()
             * (2.0 / FIELD_WAVES as f64).sqrt()
     }
 }

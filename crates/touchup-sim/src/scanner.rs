@@ -134,12 +134,17 @@ pub fn scan(surface: &dyn Surface, params: &ScannerParams) -> Result<TriMesh, Si
     }
     repair_mut(&mut soup, &field);
     for p in &mut soup.positions {
-        let normal = field.gradient(p).try_normalize(0.0).unwrap_or_else(Vector3::z);
+        let normal = field
+            .gradient(p)
+            .try_normalize(0.0)
+            .unwrap_or_else(Vector3::z);
         *p += normal * (gauss(&mut rng) * params.noise * params.white_share.sqrt());
     }
     let sight = sight_pairs(params.baseline);
     let is_lit = |corners: &_| sight.is_empty() || is_triangulated(&field, corners, &sight);
-    soup.retain_mut(FEWEST_FACES, |corners| !params.open_back || is_seen(&field, corners) && is_lit(corners));
+    soup.retain_mut(FEWEST_FACES, |corners| {
+        !params.open_back || is_seen(&field, corners) && is_lit(corners)
+    });
     soup.drop_crossings_mut()?;
     soup.tidy_mut();
     for _ in 0..params.missing {
@@ -150,16 +155,27 @@ pub fn scan(surface: &dyn Surface, params: &ScannerParams) -> Result<TriMesh, Si
         // what to change
         let (size_m, edge_m) = (surface.bounds().size().max(), params.edge);
         let is_coarse = edge_m > COARSE * size_m;
-        return Err(if is_coarse { SimError::TooCoarse { size_m, edge_m } } else { SimError::NothingSeen });
+        return Err(if is_coarse {
+            SimError::TooCoarse { size_m, edge_m }
+        } else {
+            SimError::NothingSeen
+        });
     }
     let slip_v = slip(params, &mut rng);
-    soup.positions.iter_mut().for_each(|p| *p = frame_ov * (slip_v * (*p * (1.0 + params.scale_error))));
+    soup.positions
+        .iter_mut()
+        .for_each(|p| *p = frame_ov * (slip_v * (*p * (1.0 + params.scale_error))));
     Ok(TriMesh::new(soup.positions, soup.faces)?)
 }
 
 /// Takes away what is within `radius` (m) of one of the vertices.
 fn lose_place_mut(soup: &mut MeshDraft, radius: f64, rng: &mut Pcg64) {
-    let Some(&[corner, ..]) = soup.faces.get(uniform(rng, [0.0, soup.faces.len() as f64]) as usize) else { return };
+    let Some(&[corner, ..]) = soup
+        .faces
+        .get(uniform(rng, [0.0, soup.faces.len() as f64]) as usize)
+    else {
+        return;
+    };
     let middle = soup.positions[corner as usize];
     let is_far = |&v: &u32| (soup.positions[v as usize] - middle).norm() > radius;
     soup.faces.retain(|face| face.iter().all(is_far));
@@ -182,10 +198,19 @@ fn scanned_field(
     let pitch = params.edge / NODES_PER_EDGE;
     let band = params.band();
     let bounds = surface.bounds().seen_from(frame_ov).grown(band);
-    let nodes: f64 = bounds.size().iter().map(|side| side / pitch + 2.0).product();
+    let nodes: f64 = bounds
+        .size()
+        .iter()
+        .map(|side| side / pitch + 2.0)
+        .product();
     if !nodes.is_finite() || nodes > MAX_NODES as f64 {
         let size_m = surface.bounds().size().max();
-        return Err(SimError::TooFine { size_m, margin_m: band, edge_m: params.edge, limit: MAX_NODES });
+        return Err(SimError::TooFine {
+            size_m,
+            margin_m: band,
+            edge_m: params.edge,
+            limit: MAX_NODES,
+        });
     }
     let mut field = Field::of_surface(surface, frame_ov, [bounds.min, bounds.max], pitch, band);
     field.close_mut(params.closes_holes_below / 2.0);
@@ -194,7 +219,9 @@ fn scanned_field(
     let (mean, deviation) = waves.spread(&mut field);
     let amplitude = params.noise * (1.0 - params.white_share).sqrt() / deviation;
     // far from the level the noise decides nothing
-    waves.for_each_near(&mut field, band, |d, wave| *d -= params.bias + (wave - mean) * amplitude);
+    waves.for_each_near(&mut field, band, |d, wave| {
+        *d -= params.bias + (wave - mean) * amplitude
+    });
     Ok(field)
 }
 
@@ -216,8 +243,12 @@ impl Waves {
             (vector, std::f64::consts::TAU * uniform(rng, [0.0, 1.0]))
         };
         let waves: Vec<(Vector3<f64>, f64)> = (0..WAVES).map(|_| wave()).collect();
-        let alphas = |k: &Vector3<f64>| std::array::from_fn::<_, RUN, _>(|i| k.x * pitch * i as f64);
-        let turns = waves.iter().map(|(k, _)| [alphas(k).map(f64::cos), alphas(k).map(f64::sin)]).collect();
+        let alphas =
+            |k: &Vector3<f64>| std::array::from_fn::<_, RUN, _>(|i| k.x * pitch * i as f64);
+        let turns = waves
+            .iter()
+            .map(|(k, _)| [alphas(k).map(f64::cos), alphas(k).map(f64::sin)])
+            .collect();
         Self { waves, turns }
     }
 
@@ -267,22 +298,34 @@ fn sight_pairs(baseline: f64) -> Vec<[Vector3<f64>; 2]> {
         return Vec::new();
     }
     let towards = |lean: f64, about: f64| {
-        Rotation3::from_axis_angle(&Vector3::z_axis(), about) * Vector3::new(lean.sin(), 0.0, lean.cos())
+        Rotation3::from_axis_angle(&Vector3::z_axis(), about)
+            * Vector3::new(lean.sin(), 0.0, lean.cos())
     };
-    let pair = |lean: f64, about: f64| [lean - baseline / 2.0, lean + baseline / 2.0].map(|lean| towards(lean, about));
+    let pair = |lean: f64, about: f64| {
+        [lean - baseline / 2.0, lean + baseline / 2.0].map(|lean| towards(lean, about))
+    };
     let abouts = (0..SIGHT_TURNS).map(|i| std::f64::consts::TAU * i as f64 / SIGHT_TURNS as f64);
-    abouts.flat_map(|about| SIGHT_LEANS.map(|lean| pair(lean, about))).collect()
+    abouts
+        .flat_map(|about| SIGHT_LEANS.map(|lean| pair(lean, about)))
+        .collect()
 }
 
 /// Whether both lines of a pair reach a face.
-fn is_triangulated(field: &Field, [a, b, c]: &[Point3<f64>; 3], pairs: &[[Vector3<f64>; 2]]) -> bool {
+fn is_triangulated(
+    field: &Field,
+    [a, b, c]: &[Point3<f64>; 3],
+    pairs: &[[Vector3<f64>; 2]],
+) -> bool {
     let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
-    let Some(normal) = field.gradient(&middle).try_normalize(0.0) else { return false };
+    let Some(normal) = field.gradient(&middle).try_normalize(0.0) else {
+        return false;
+    };
     let start = middle + normal * (2.0 * field.pitch);
     let top = field.node(field.nodes.map(|n| n - 1)).z;
     let reaches = |sight: &Vector3<f64>| {
         let steps = ((top - start.z) / (field.pitch * sight.z)).max(0.0) as usize;
-        normal.dot(sight) > 0.0 && (0..steps).all(|i| field.at(&(start + sight * (i as f64 * field.pitch))) > 0.0)
+        normal.dot(sight) > 0.0
+            && (0..steps).all(|i| field.at(&(start + sight * (i as f64 * field.pitch))) > 0.0)
     };
     pairs.iter().any(|pair| pair.iter().all(reaches))
 }
@@ -290,12 +333,16 @@ fn is_triangulated(field: &Field, [a, b, c]: &[Point3<f64>; 3], pairs: &[[Vector
 /// Whether a face looks towards the scanner and nothing occludes it.
 fn is_seen(field: &Field, [a, b, c]: &[Point3<f64>; 3]) -> bool {
     let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
-    let Some(normal) = field.gradient(&middle).try_normalize(0.0) else { return false };
+    let Some(normal) = field.gradient(&middle).try_normalize(0.0) else {
+        return false;
+    };
     // from a little off the face, so that it does not hide itself
     let start = middle + normal * (2.0 * field.pitch);
     let top = field.node(field.nodes.map(|n| n - 1)).z;
     let steps = ((top - start.z) / field.pitch).max(0.0) as usize;
-    normal.z > SEEN && (0..steps).all(|i| field.at(&(start + Vector3::z() * (i as f64 * field.pitch))) > -field.pitch)
+    normal.z > SEEN
+        && (0..steps)
+            .all(|i| field.at(&(start + Vector3::z() * (i as f64 * field.pitch))) > -field.pitch)
 }
 
 /// The rigid offset of the scan, about the middle of the part.
@@ -346,11 +393,24 @@ pub fn measure_quality(
         let corners @ [a, b, c] = mesh.triangle(face);
         edges.extend([(b - a).norm(), (c - b).norm(), (a - c).norm()].map(|length| (length, 1.0)));
         let area = mesh.double_area_normal(face).norm() / 8.0;
-        let at = |w: [f64; 3]| Point3::from((0..3).map(|i| corners[i].coords * w[i]).sum::<Vector3<f64>>());
-        points.extend(SAMPLES.map(at).iter().filter(|p| within(p)).map(|p| (surface.signed_distance(p), area)));
+        let at = |w: [f64; 3]| {
+            Point3::from(
+                (0..3)
+                    .map(|i| corners[i].coords * w[i])
+                    .sum::<Vector3<f64>>(),
+            )
+        };
+        points.extend(
+            SAMPLES
+                .map(at)
+                .iter()
+                .filter(|p| within(p))
+                .map(|p| (surface.signed_distance(p), area)),
+        );
     }
     let area: f64 = points.iter().map(|p| p.1).sum();
-    let mean_of = |f: &dyn Fn(f64) -> f64| points.iter().map(|(d, w)| f(*d) * w).sum::<f64>() / area;
+    let mean_of =
+        |f: &dyn Fn(f64) -> f64| points.iter().map(|(d, w)| f(*d) * w).sum::<f64>() / area;
     let (mean, rms) = (mean_of(&f64::abs), mean_of(&|d| d * d).sqrt());
     let mut sizes: Vec<_> = points.iter().map(|(d, w)| (d.abs(), *w)).collect();
     Some(ScanQuality {

@@ -82,7 +82,13 @@ settings! {
 }
 
 fn check_rate(name: &'static str, rate: f64) -> Result<(), SimError> {
-    require((1.0..=1e4).contains(&rate), name, rate, "1/s", "from 1 to 10000")
+    require(
+        (1.0..=1e4).contains(&rate),
+        name,
+        rate,
+        "1/s",
+        "from 1 to 10000",
+    )
 }
 
 impl SensorParams {
@@ -150,14 +156,31 @@ impl<'a> Sensor<'a> {
         let bias = [(); 3].map(|()| Drift::new(DRIFT_PERIOD, &mut rng));
         let mut own = Pcg64::seed_from_u64(seed ^ 0x77a9_de11_4c20_5b3d);
         let wander = [(); 3].map(|()| Drift::new(WANDER_PERIOD, &mut own));
-        Self { params, tip, bias, wander, played: Vector3::zeros(), rng }
+        Self {
+            params,
+            tip,
+            bias,
+            wander,
+            played: Vector3::zeros(),
+            rng,
+        }
     }
 
     /// All messages, in order of arrival.
     pub(super) fn record(mut self, moments: &[Moment]) -> Vec<Message> {
         let p = self.params;
-        let silent = Wire { period: 0.0, jitter: 0.0, clock: 0.0, clock_rate: 0.0, silent_until: f64::MIN };
-        let mut poses = Wire { period: p.pose_rate.recip(), jitter: p.jitter, ..silent };
+        let silent = Wire {
+            period: 0.0,
+            jitter: 0.0,
+            clock: 0.0,
+            clock_rate: 0.0,
+            silent_until: f64::MIN,
+        };
+        let mut poses = Wire {
+            period: p.pose_rate.recip(),
+            jitter: p.jitter,
+            ..silent
+        };
         let mut wrenches = Wire {
             period: p.wrench_rate.recip(),
             jitter: p.jitter / 2.0,
@@ -168,20 +191,31 @@ impl<'a> Sensor<'a> {
         let mut arrivals: Vec<(f64, Message)> = Vec::with_capacity(moments.len() * 2);
         let (mut pose_count, mut wrench_count) = (0, 0);
         loop {
-            let [pose_ns, wrench_ns] =
-                [(pose_count, p.pose_rate), (wrench_count, p.wrench_rate)].map(|(n, rate)| nanoseconds(n, rate));
-            let Some(moment) = moment_at(moments, pose_ns.min(wrench_ns)) else { break };
+            let [pose_ns, wrench_ns] = [(pose_count, p.pose_rate), (wrench_count, p.wrench_rate)]
+                .map(|(n, rate)| nanoseconds(n, rate));
+            let Some(moment) = moment_at(moments, pose_ns.min(wrench_ns)) else {
+                break;
+            };
             if pose_ns <= wrench_ns {
                 pose_count += 1;
                 let pose = self.pose(&moment);
                 let sent = self.send(&mut poses, moment.t);
-                arrivals
-                    .extend(sent.map(|(at, stamp_ns)| (at, Message::Pose(StampedPose { stamp_ns, pose_ot: pose }))));
+                arrivals.extend(sent.map(|(at, stamp_ns)| {
+                    (
+                        at,
+                        Message::Pose(StampedPose {
+                            stamp_ns,
+                            pose_ot: pose,
+                        }),
+                    )
+                }));
             } else {
                 wrench_count += 1;
                 let wrench = self.wrench(&moment);
                 let sent = self.send(&mut wrenches, moment.t);
-                arrivals.extend(sent.map(|(at, stamp_ns)| (at, Message::Wrench(StampedWrench { stamp_ns, wrench }))));
+                arrivals.extend(sent.map(|(at, stamp_ns)| {
+                    (at, Message::Wrench(StampedWrench { stamp_ns, wrench }))
+                }));
             }
         }
         arrivals.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -210,10 +244,21 @@ impl<'a> Sensor<'a> {
         let p = self.params;
         let bias = Vector3::from_fn(|i, _| self.bias[i].at(moment.t)) * p.force_bias + p.tare;
         let felt = moment.pose_ot.rotation.inverse() * moment.force_o;
-        self.played = felt.zip_map(&self.played, |f, last| last.clamp(f - p.force_play, f + p.force_play));
+        self.played = felt.zip_map(&self.played, |f, last| {
+            last.clamp(f - p.force_play, f + p.force_play)
+        });
         let force = self.played + bias + self.shake(p.force_noise);
-        let read = |f: f64| if p.force_step > 0.0 { (f / p.force_step).round() * p.force_step } else { f };
-        Wrench { force: force.map(read), torque: self.shake(p.torque_noise) }
+        let read = |f: f64| {
+            if p.force_step > 0.0 {
+                (f / p.force_step).round() * p.force_step
+            } else {
+                f
+            }
+        };
+        Wrench {
+            force: force.map(read),
+            torque: self.shake(p.torque_noise),
+        }
     }
 
     /// When a message arrives (s) and what its stamp says (ns); `None` when it is lost.
@@ -232,7 +277,9 @@ impl<'a> Sensor<'a> {
         }
         // an ideal wire keeps the order
         let ideal = p.late == 0.0;
-        let delay = LATENCY[0] + if ideal { 0.0 } else { LATENCY[1] * wait } + if late < p.late { extra } else { 0.0 };
+        let delay = LATENCY[0]
+            + if ideal { 0.0 } else { LATENCY[1] * wait }
+            + if late < p.late { extra } else { 0.0 };
         let seconds = t * (1.0 + wire.clock_rate) + wire.clock + jitter;
         Some((t + delay, p.start_ns + (seconds * 1e9).round() as i64))
     }
@@ -252,9 +299,22 @@ fn moment_at(moments: &[Moment], at_ns: u64) -> Option<Moment> {
     }
     let after = moments.get((at_ns / TICK_NS) as usize + 1)?;
     let pose_ot = Isometry3::from_parts(
-        before.pose_ot.translation.vector.lerp(&after.pose_ot.translation.vector, share).into(),
-        before.pose_ot.rotation.nlerp(&after.pose_ot.rotation, share),
+        before
+            .pose_ot
+            .translation
+            .vector
+            .lerp(&after.pose_ot.translation.vector, share)
+            .into(),
+        before
+            .pose_ot
+            .rotation
+            .nlerp(&after.pose_ot.rotation, share),
     );
     let force_o = before.force_o.lerp(&after.force_o, share);
-    Some(Moment { t: before.t + share * TICK, pose_ot, force_o, contacts: before.contacts.clone() })
+    Some(Moment {
+        t: before.t + share * TICK,
+        pose_ot,
+        force_o,
+        contacts: before.contacts.clone(),
+    })
 }

@@ -34,7 +34,10 @@ pub fn plan_sides(
             path.push(around(&bounds, &sides[at - 1], side, params.radius));
         }
         let view = -*side;
-        let params = PathParams { longest: params.longest * if at == 0 { 1.0 } else { ASIDE }, ..*params };
+        let params = PathParams {
+            longest: params.longest * if at == 0 { 1.0 } else { ASIDE },
+            ..*params
+        };
         path.extend(habit.led(plan_mesh(surface, &bounds, &view, &params)?));
         path.extend(plan_waterlines(surface, &bounds, &view, &params)?);
     }
@@ -42,9 +45,22 @@ pub fn plan_sides(
 }
 
 /// A free move from above one side of the part to above another, outside of the ball around the part.
-fn around(bounds: &Bounds, from: &Unit<Vector3<f64>>, to: &Unit<Vector3<f64>>, radius: f64) -> Stroke {
+fn around(
+    bounds: &Bounds,
+    from: &Unit<Vector3<f64>>,
+    to: &Unit<Vector3<f64>>,
+    radius: f64,
+) -> Stroke {
     let away = 1.5 * bounds.size().norm() / 2.0 + AWAY * radius;
     let is_opposite = from.dot(to) < -0.5;
-    let between = if is_opposite { Vector3::new(from.y, from.z, from.x) } else { **from + **to };
-    free([**from, between.normalize(), **to].map(|direction| bounds.centre() + direction * away).to_vec())
+    let between = if is_opposite {
+        Vector3::new(from.y, from.z, from.x)
+    } else {
+        **from + **to
+    };
+    free(
+        [**from, between.normalize(), **to]
+            .map(|direction| bounds.centre() + direction * away)
+            .to_vec(),
+    )
 }

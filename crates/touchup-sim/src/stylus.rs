@@ -64,15 +64,37 @@ settings! {
 }
 
 fn check_range([least, most]: [f64; 2], stiffness: f64) -> Result<(), SimError> {
-    up_to("the smallest force", least, "N", LARGEST_FORCE, "from zero to 1 kN")?;
-    up_to("the largest force", most - least, "N above the smallest", LARGEST_FORCE, "from zero to 1 kN")?;
-    up_to("the bending of the tip", most / stiffness, "m", LARGEST_BEND, "1 m or less: take a stiffer one")
+    up_to(
+        "the smallest force",
+        least,
+        "N",
+        LARGEST_FORCE,
+        "from zero to 1 kN",
+    )?;
+    up_to(
+        "the largest force",
+        most - least,
+        "N above the smallest",
+        LARGEST_FORCE,
+        "from zero to 1 kN",
+    )?;
+    up_to(
+        "the bending of the tip",
+        most / stiffness,
+        "m",
+        LARGEST_BEND,
+        "1 m or less: take a stiffer one",
+    )
 }
 
 impl StylusParams {
     /// How the tip bends.
     pub fn bending(&self) -> TipBending {
-        TipBending { stiffness: self.stiffness, shares: self.stiffness_shares, axes: self.stiffness_axes }
+        TipBending {
+            stiffness: self.stiffness,
+            shares: self.stiffness_shares,
+            axes: self.stiffness_axes,
+        }
     }
 }
 
@@ -127,7 +149,11 @@ impl Hand {
     fn new(seed: u64) -> Self {
         let mut rng = Pcg64::seed_from_u64(seed);
         let mut drift = |period: f64| Drift::new(period, &mut rng);
-        Self { force: drift(1.0), tilt: [(); 3].map(|()| drift(4.0)), stray: [(); 3].map(|()| drift(1.5)) }
+        Self {
+            force: drift(1.0),
+            tilt: [(); 3].map(|()| drift(4.0)),
+            stray: [(); 3].map(|()| drift(1.5)),
+        }
     }
 
     fn stray(&self, t: f64) -> Vector3<f64> {
@@ -156,13 +182,28 @@ struct Leading<'a> {
 ///
 /// # Errors
 /// [`SimError::BadParameter`], [`SimError::EmptyPath`], [`SimError::StartsInside`].
-pub fn touch(surface: &dyn Surface, path: &[Stroke], params: &StylusParams, seed: u64) -> Result<Touch, SimError> {
+pub fn touch(
+    surface: &dyn Surface,
+    path: &[Stroke],
+    params: &StylusParams,
+    seed: u64,
+) -> Result<Touch, SimError> {
     params.check()?;
-    path.iter().try_for_each(|stroke| positive("the speed of a stroke", stroke.speed, "m/s"))?;
+    path.iter()
+        .try_for_each(|stroke| positive("the speed of a stroke", stroke.speed, "m/s"))?;
     let farthest = path.iter().flat_map(|s| &s.points).flat_map(|p| p.iter());
-    farthest.copied().try_for_each(|x| not_negative("the size of a path's coordinate", x.abs(), "m"))?;
-    let start = path.iter().flat_map(|s| &s.points).next().ok_or(SimError::EmptyPath)?;
-    let shaft = path.iter().find_map(|s| s.press).map_or_else(Vector3::z, |press| -press.into_inner());
+    farthest
+        .copied()
+        .try_for_each(|x| not_negative("the size of a path's coordinate", x.abs(), "m"))?;
+    let start = path
+        .iter()
+        .flat_map(|s| &s.points)
+        .next()
+        .ok_or(SimError::EmptyPath)?;
+    let shaft = path
+        .iter()
+        .find_map(|s| s.press)
+        .map_or_else(Vector3::z, |press| -press.into_inner());
     let upright = turned_to(&shaft);
     let mut leading = Leading {
         surface,
@@ -170,7 +211,10 @@ pub fn touch(surface: &dyn Surface, path: &[Stroke], params: &StylusParams, seed
         hand: Hand::new(seed),
         upright,
         tip: SimTip::new(params.shape, params.radius, surface, start, upright)?,
-        friction: SmoothField::new(params.friction_length, &mut Pcg64::seed_from_u64(seed ^ 0x4b1d_f00d_29c4_e653)),
+        friction: SmoothField::new(
+            params.friction_length,
+            &mut Pcg64::seed_from_u64(seed ^ 0x4b1d_f00d_29c4_e653),
+        ),
         centre: *start,
         climbing: false,
         firmness: 0.0,
@@ -179,7 +223,11 @@ pub fn touch(surface: &dyn Surface, path: &[Stroke], params: &StylusParams, seed
     let mut is_caught = false;
     for stroke in path {
         if is_caught {
-            let Some(first) = stroke.points.first().filter(|p| stroke.press.is_none() && leading.is_beside(p)) else {
+            let Some(first) = stroke
+                .points
+                .first()
+                .filter(|p| stroke.press.is_none() && leading.is_beside(p))
+            else {
                 continue;
             };
             leading.go_around_to(first);
@@ -211,7 +259,9 @@ impl Leading<'_> {
         let turn = UnitQuaternion::rotation_between(&from, &to)
             .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&aside, std::f64::consts::PI));
         let count = (turn.angle() / BEND).ceil().max(1.0) as usize;
-        points.extend((1..=count).map(|i| middle + turn.powf(i as f64 / count as f64) * from * (2.0 * away)));
+        points.extend(
+            (1..=count).map(|i| middle + turn.powf(i as f64 / count as f64) * from * (2.0 * away)),
+        );
         points.push(*point);
         self.follow(&free(points));
     }
@@ -219,15 +269,28 @@ impl Leading<'_> {
     /// A direction in which the ball can leave straight for `away` (m); along the shaft where there is none.
     fn way_out(&self, away: f64) -> Vector3<f64> {
         let shaft = self.upright * Vector3::z();
-        let pushed = self.moments.iter().rev().find(|moment| !moment.contacts.is_empty());
-        let pushed = pushed.map_or(shaft, |moment| moment.contacts.iter().map(|contact| contact.normal).sum());
+        let pushed = self
+            .moments
+            .iter()
+            .rev()
+            .find(|moment| !moment.contacts.is_empty());
+        let pushed = pushed.map_or(shaft, |moment| {
+            moment.contacts.iter().map(|contact| contact.normal).sum()
+        });
         let signs = [0.0, 1.0, -1.0];
-        let around = signs.iter().flat_map(|x| signs.iter().flat_map(move |y| signs.map(|z| Vector3::new(*x, *y, z))));
-        let directions =
-            [pushed, shaft].into_iter().chain(around).filter_map(|way: Vector3<f64>| way.try_normalize(0.0));
+        let around = signs.iter().flat_map(|x| {
+            signs
+                .iter()
+                .flat_map(move |y| signs.map(|z| Vector3::new(*x, *y, z)))
+        });
+        let directions = [pushed, shaft]
+            .into_iter()
+            .chain(around)
+            .filter_map(|way: Vector3<f64>| way.try_normalize(0.0));
         let step = LOOK * self.params.radius;
         let is_free = |way: &Vector3<f64>| {
-            let mut at = (1..=(away / step).ceil() as usize).map(|i| self.centre + way * (i as f64 * step));
+            let mut at =
+                (1..=(away / step).ceil() as usize).map(|i| self.centre + way * (i as f64 * step));
             at.all(|x| self.surface.signed_distance(&x) > self.params.radius - GRAZE)
         };
         directions.clone().find(is_free).unwrap_or(shaft)
@@ -237,9 +300,17 @@ impl Leading<'_> {
     fn follow(&mut self, stroke: &Stroke) -> bool {
         // points in a row that were not reached, and how many may be
         let mut missed = 0;
-        let (most, most_at_end) = if stroke.press.is_some() { (CAUGHT_PRESSED, CAUGHT_PRESSED) } else { (CAUGHT, 1) };
+        let (most, most_at_end) = if stroke.press.is_some() {
+            (CAUGHT_PRESSED, CAUGHT_PRESSED)
+        } else {
+            (CAUGHT, 1)
+        };
         // a pressed stroke starts sideways of where the ball is, and sinks from there
-        let mut guide = stroke.press.and(stroke.points.first()).copied().unwrap_or(self.centre);
+        let mut guide = stroke
+            .press
+            .and(stroke.points.first())
+            .copied()
+            .unwrap_or(self.centre);
         for target in &stroke.points {
             let patience = PATIENCE + PATIENCE_FACTOR * (target - guide).norm() / stroke.speed;
             let until = self.moments.len() + (patience / TICK) as usize;
@@ -272,7 +343,11 @@ impl Leading<'_> {
             let depth = error.dot(&press);
             error -= *press * depth;
             self.climbing = error.norm() > if self.climbing { LAG } else { BLOCKED };
-            let wanted = if self.climbing { -SINK_SPEED } else { (depth * FOLLOW).clamp(-SINK_SPEED, SINK_SPEED) };
+            let wanted = if self.climbing {
+                -SINK_SPEED
+            } else {
+                (depth * FOLLOW).clamp(-SINK_SPEED, SINK_SPEED)
+            };
             sink = *press * wanted;
         }
         let velocity = sink + (error * FOLLOW).cap_magnitude(TOP_SPEED);
@@ -292,14 +367,28 @@ impl Leading<'_> {
     }
 
     /// Adds the moment's force and orientation to the record.
-    fn note(&mut self, t: f64, orientation: UnitQuaternion<f64>, sliding: Vector3<f64>, contacts: Vec<BallContact>) {
+    fn note(
+        &mut self,
+        t: f64,
+        orientation: UnitQuaternion<f64>,
+        sliding: Vector3<f64>,
+        contacts: Vec<BallContact>,
+    ) {
         let p = self.params;
         let goal = if contacts.is_empty() { 0.0 } else { 1.0 };
         self.firmness += (goal - self.firmness) * (TICK / FIRM);
-        let wanted = (p.force + p.force_variation * self.hand.force.at(t)).clamp(p.force_range[0], p.force_range[1]);
+        let wanted = (p.force + p.force_variation * self.hand.force.at(t))
+            .clamp(p.force_range[0], p.force_range[1]);
         let total: f64 = contacts.iter().map(|c| c.held_back).sum();
-        let varied = |c: &BallContact| (1.0 + p.friction_variation * self.friction.at(&c.point)).max(0.0);
-        let friction = |c: &BallContact| if p.friction_variation > 0.0 { p.friction * varied(c) } else { p.friction };
+        let varied =
+            |c: &BallContact| (1.0 + p.friction_variation * self.friction.at(&c.point)).max(0.0);
+        let friction = |c: &BallContact| {
+            if p.friction_variation > 0.0 {
+                p.friction * varied(c)
+            } else {
+                p.friction
+            }
+        };
         let force = |c: &BallContact| {
             let along = sliding - c.normal * sliding.dot(&c.normal);
             let drag = along * (friction(c) / (along.norm() + CREEP));
@@ -307,6 +396,11 @@ impl Leading<'_> {
         };
         let force_o = contacts.iter().map(force).sum::<Vector3<f64>>() * (wanted * self.firmness);
         let pose_ot = Isometry3::from_parts(self.centre.coords.into(), orientation);
-        self.moments.push(Moment { t, pose_ot, force_o, contacts });
+        self.moments.push(Moment {
+            t,
+            pose_ot,
+            force_o,
+            contacts,
+        });
     }
 }

@@ -25,14 +25,20 @@ impl Bounds {
     pub fn around<'a>(points: impl IntoIterator<Item = &'a Point3<f64>>) -> Option<Self> {
         points.into_iter().fold(None, |bounds, p| {
             let Bounds { min, max } = bounds.unwrap_or(Bounds { min: *p, max: *p });
-            Some(Bounds { min: min.inf(p), max: max.sup(p) })
+            Some(Bounds {
+                min: min.inf(p),
+                max: max.sup(p),
+            })
         })
     }
 
     /// The box with every side moved outwards by `margin` (m).
     pub fn grown(&self, margin: f64) -> Self {
         let by = Vector3::repeat(margin);
-        Self { min: self.min - by, max: self.max + by }
+        Self {
+            min: self.min - by,
+            max: self.max + by,
+        }
     }
 
     /// The box around this one along the axes of a frame V.
@@ -40,7 +46,10 @@ impl Bounds {
         let frame_vo = frame_ov.inverse();
         let half = frame_vo.rotation.to_rotation_matrix().matrix().abs() * self.size() / 2.0;
         let centre = frame_vo * self.centre();
-        Self { min: centre - half, max: centre + half }
+        Self {
+            min: centre - half,
+            max: centre + half,
+        }
     }
 
     /// Length of the sides, m.

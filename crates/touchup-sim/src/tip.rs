@@ -43,14 +43,26 @@ impl SimTip {
         upright: UnitQuaternion<f64>,
     ) -> Result<Self, SimError> {
         let balls = balls_of(&TipBody::new(shape, radius)?);
-        let clearance: Vec<f64> =
-            balls.iter().map(|ball| surface.signed_distance(&(start + upright * ball.offset)) - ball.radius).collect();
-        let least = clearance.iter().fold(f64::INFINITY, |least, x| least.min(*x));
+        let clearance: Vec<f64> = balls
+            .iter()
+            .map(|ball| surface.signed_distance(&(start + upright * ball.offset)) - ball.radius)
+            .collect();
+        let least = clearance
+            .iter()
+            .fold(f64::INFINITY, |least, x| least.min(*x));
         if least < 0.0 {
             let clearance_m = surface.signed_distance(start);
-            return Err(SimError::StartsInside { clearance_m, radius_m: clearance_m - least });
+            return Err(SimError::StartsInside {
+                clearance_m,
+                radius_m: clearance_m - least,
+            });
         }
-        Ok(Self { balls, clearance, place: (*start, upright), near: Vec::new() })
+        Ok(Self {
+            balls,
+            clearance,
+            place: (*start, upright),
+            near: Vec::new(),
+        })
     }
 
     /// Moves the tip, in its new orientation, from `from` towards `to`; returns where its origin comes to rest and the
@@ -87,11 +99,18 @@ impl SimTip {
 fn balls_of(tip: &TipBody) -> Vec<TipBall> {
     let radius = tip.radius();
     match tip.shape() {
-        TipShape::Ball => vec![TipBall { offset: Vector3::zeros(), radius }],
-        TipShape::Cone { half_angle, length } => {
-            stack([0.0, length], |height| radius.max(SHARP) + height * half_angle.sin()).collect()
-        }
-        TipShape::Flat { edge_radius, length } => {
+        TipShape::Ball => vec![TipBall {
+            offset: Vector3::zeros(),
+            radius,
+        }],
+        TipShape::Cone { half_angle, length } => stack([0.0, length], |height| {
+            radius.max(SHARP) + height * half_angle.sin()
+        })
+        .collect(),
+        TipShape::Flat {
+            edge_radius,
+            length,
+        } => {
             let edge = edge_radius.max(SHARP.min(radius / 2.0));
             let (mut wide, mut balls) = (edge, Vec::new());
             while wide < radius {
@@ -105,10 +124,18 @@ fn balls_of(tip: &TipBody) -> Vec<TipBall> {
 }
 
 /// Balls along the axis between two heights (m), of a radius that depends on the height.
-fn stack([from, to]: [f64; 2], radius: impl Fn(f64) -> f64 + Copy) -> impl Iterator<Item = TipBall> {
-    std::iter::successors(Some(from), move |height| Some(height + apart(radius(*height))))
-        .take_while(move |height| *height <= to)
-        .map(move |height| TipBall { offset: Vector3::z() * height, radius: radius(height) })
+fn stack(
+    [from, to]: [f64; 2],
+    radius: impl Fn(f64) -> f64 + Copy,
+) -> impl Iterator<Item = TipBall> {
+    std::iter::successors(Some(from), move |height| {
+        Some(height + apart(radius(*height)))
+    })
+    .take_while(move |height| *height <= to)
+    .map(move |height| TipBall {
+        offset: Vector3::z() * height,
+        radius: radius(height),
+    })
 }
 
 /// Distance between balls of this radius (m) in a row, m.
@@ -118,10 +145,15 @@ fn apart(radius: f64) -> f64 {
 
 /// Balls of one radius on a circle, resting on the face, as close to each other as those on the rim.
 fn ring(from_axis: f64, radius: f64, rim: f64) -> impl Iterator<Item = TipBall> {
-    let count = (AROUND as f64 * from_axis / rim.max(f64::MIN_POSITIVE)).ceil().clamp(1.0, AROUND as f64) as usize;
+    let count = (AROUND as f64 * from_axis / rim.max(f64::MIN_POSITIVE))
+        .ceil()
+        .clamp(1.0, AROUND as f64) as usize;
     (0..count).map(move |i| {
         let angle = TAU * i as f64 / count as f64;
-        TipBall { offset: Vector3::new(from_axis * angle.cos(), from_axis * angle.sin(), radius), radius }
+        TipBall {
+            offset: Vector3::new(from_axis * angle.cos(), from_axis * angle.sin(), radius),
+            radius,
+        }
     })
 }
 
@@ -132,23 +164,42 @@ mod tests {
 
     #[test]
     fn the_balls_fill_the_tip_and_do_not_stand_out() {
-        let flat = TipShape::Flat { edge_radius: 0.2e-3, length: 4e-3 };
-        let cone = TipShape::Cone { half_angle: 0.4, length: 5e-3 };
-        let up = TipPlace { centre: Point3::origin(), axis: Vector3::z() };
+        let flat = TipShape::Flat {
+            edge_radius: 0.2e-3,
+            length: 4e-3,
+        };
+        let cone = TipShape::Cone {
+            half_angle: 0.4,
+            length: 5e-3,
+        };
+        let up = TipPlace {
+            centre: Point3::origin(),
+            axis: Vector3::z(),
+        };
         // the end of a cone is cut off, its last ball bulges beyond
-        for (shape, radius, slack, highest) in
-            [(TipShape::Ball, 1.5e-3, 1e-12, 1.0), (flat, 2e-3, 5e-6, 0.0), (cone, 0.3e-3, 5e-6, -0.4)]
-        {
+        for (shape, radius, slack, highest) in [
+            (TipShape::Ball, 1.5e-3, 1e-12, 1.0),
+            (flat, 2e-3, 5e-6, 0.0),
+            (cone, 0.3e-3, 5e-6, -0.4),
+        ] {
             let tip = TipBody::new(shape, radius).unwrap();
             let balls = balls_of(&tip);
             for i in 0..200 {
-                let turn = UnitQuaternion::from_euler_angles(0.37 * f64::from(i), 0.91 * f64::from(i), 0.0);
+                let turn = UnitQuaternion::from_euler_angles(
+                    0.37 * f64::from(i),
+                    0.91 * f64::from(i),
+                    0.0,
+                );
                 let direction = turn * Vector3::z();
-                let reach = |ball: &TipBall| (ball.offset + direction * ball.radius).dot(&direction);
+                let reach =
+                    |ball: &TipBall| (ball.offset + direction * ball.radius).dot(&direction);
                 let farthest = balls.iter().map(reach).fold(f64::NEG_INFINITY, f64::max);
                 let wanted = tip.support(&up, &direction).coords.dot(&direction);
                 if direction.z < highest {
-                    assert!(farthest > wanted - slack && farthest < wanted + 1e-12, "{shape:?} {direction}");
+                    assert!(
+                        farthest > wanted - slack && farthest < wanted + 1e-12,
+                        "{shape:?} {direction}"
+                    );
                 }
             }
         }

@@ -80,20 +80,27 @@ pub fn plan_waterlines(
 ) -> Result<Vec<Stroke>, SimError> {
     params.check()?;
     let region = region_over(bounds, view, params.radius);
-    let step = (params.radius / HEIGHTS_PER_RADIUS).max((region.clear - region.floor) / MOST_HEIGHTS as f64);
+    let step = (params.radius / HEIGHTS_PER_RADIUS)
+        .max((region.clear - region.floor) / MOST_HEIGHTS as f64);
     let heights = ((region.clear - region.floor) / step).floor() as usize;
     let mut grid = Grid::new(surface, &region, params.radius);
     let at = |height: usize| region.clear - height as f64 * step;
-    let loops: Vec<Vec<Loop>> = (0..=heights).map(|height| grid.loops(height, at(height), params)).collect();
+    let loops: Vec<Vec<Loop>> = (0..=heights)
+        .map(|height| grid.loops(height, at(height), params))
+        .collect();
     let kept = within(&loops, step, params);
-    Ok(kept.into_iter().flat_map(|run| strokes(run, &region, at(run.height), params)).collect())
+    Ok(kept
+        .into_iter()
+        .flat_map(|run| strokes(run, &region, at(run.height), params))
+        .collect())
 }
 
 /// The loops that are run in [`PathParams::longest`]: no closer than the pitch, wider apart where that takes too long; the longest are left
 /// out where the last of each kind alone do.
 fn within<'a>(loops: &'a [Vec<Loop>], step: f64, params: &PathParams) -> Vec<&'a Loop> {
     let time = |run: &Loop| run.length * (1.0 + OVERLAP) / params.wall_speed;
-    let is_short = |kept: &Vec<&Loop>| kept.iter().map(|run| time(run)).sum::<f64>() <= params.longest;
+    let is_short =
+        |kept: &Vec<&Loop>| kept.iter().map(|run| time(run)).sum::<f64>() <= params.longest;
     let widths = (0..TRIES).map(|at| params.pitch * WIDER.powi(at));
     let mut kept = Vec::new();
     for pitch in widths {
@@ -110,7 +117,11 @@ fn within<'a>(loops: &'a [Vec<Loop>], step: f64, params: &PathParams) -> Vec<&'a
         left -= time(kept[at]);
         is_in[at] = left >= 0.0;
     }
-    kept.into_iter().zip(is_in).filter(|(_, is_in)| *is_in).map(|(run, _)| run).collect()
+    kept.into_iter()
+        .zip(is_in)
+        .filter(|(_, is_in)| *is_in)
+        .map(|(run, _)| run)
+        .collect()
 }
 
 /// The loops that do not repeat one above by less than so many heights, and the last of each kind.
@@ -119,12 +130,17 @@ fn thinned(loops: &[Vec<Loop>], every: f64) -> Vec<&Loop> {
     for (height, at_height) in loops.iter().enumerate() {
         for run in at_height {
             let every = every * if run.is_outer { OUTER_SPARSER } else { 1.0 };
-            let above = kept.iter().rev().find(|other| run.is_like(other)).map(|other| other.height);
+            let above = kept
+                .iter()
+                .rev()
+                .find(|other| run.is_like(other))
+                .map(|other| other.height);
             let is_far = above.is_none_or(|above| (height - above) as f64 >= every);
             let below = loops.get(height + 1).map_or(&[][..], Vec::as_slice);
             // the last above a floor
             let is_last = !below.iter().any(|other| run.is_like(other));
-            let is_apart = above.is_none_or(|above| (height - above) as f64 >= (every / 4.0).min(2.0));
+            let is_apart =
+                above.is_none_or(|above| (height - above) as f64 >= (every / 4.0).min(2.0));
             if is_far || is_last && is_apart && !run.is_outer {
                 kept.push(run);
             }
@@ -139,7 +155,15 @@ fn strokes(run: &Loop, region: &RasterRegion, z: f64, params: &PathParams) -> [S
     let entry = region.at(run.entry, z);
     let mut line: Vec<Point3<f64>> = run.points.iter().map(|&q| region.at(q, z)).collect();
     line.extend_from_within(..(line.len() as f64 * OVERLAP).ceil() as usize);
-    [free(vec![above, entry]), Stroke { points: line, speed: params.wall_speed, press: None }, free(vec![entry, above])]
+    [
+        free(vec![above, entry]),
+        Stroke {
+            points: line,
+            speed: params.wall_speed,
+            press: None,
+        },
+        free(vec![entry, above]),
+    ]
 }
 
 impl<'a> Grid<'a> {
@@ -147,9 +171,18 @@ impl<'a> Grid<'a> {
         let size = region.high - region.low;
         let pitch = (radius / NODES_PER_RADIUS).max((size.x * size.y / MOST_NODES).sqrt());
         let count = [size.x, size.y].map(|side| (side / pitch).ceil() as usize + 1);
-        let mut grid = Self { surface, region, pitch, count, reached: Vec::new(), known: Vec::new() };
+        let mut grid = Self {
+            surface,
+            region,
+            pitch,
+            count,
+            reached: Vec::new(),
+            known: Vec::new(),
+        };
         let nodes = count[0] * count[1];
-        let reached = |node: usize| first_contact(surface, region, &grid.at(node), radius).unwrap_or(region.floor);
+        let reached = |node: usize| {
+            first_contact(surface, region, &grid.at(node), radius).unwrap_or(region.floor)
+        };
         grid.reached = (0..nodes).map(reached).collect();
         grid.known = vec![[0.0, f64::INFINITY]; nodes];
         grid
@@ -177,7 +210,9 @@ impl<'a> Grid<'a> {
     /// The outlines at one height of where the ball can be.
     fn loops(&mut self, height: usize, z: f64, params: &PathParams) -> Vec<Loop> {
         let level = params.radius - params.lean;
-        let values: Vec<f64> = (0..self.reached.len()).map(|node| self.distance(node, z, level) - level).collect();
+        let values: Vec<f64> = (0..self.reached.len())
+            .map(|node| self.distance(node, z, level) - level)
+            .collect();
         let part = self.reachable(&values, z, params.lean);
         let next = self.segments(&values, &part);
         let mut loops: Vec<Loop> = closed(&next)
@@ -259,20 +294,42 @@ impl<'a> Grid<'a> {
         next
     }
 
-    fn loop_of(&self, height: usize, z: f64, mut points: Vec<Point2<f64>>, number: u32, part: &[u32]) -> Option<Loop> {
+    fn loop_of(
+        &self,
+        height: usize,
+        z: f64,
+        mut points: Vec<Point2<f64>>,
+        number: u32,
+        part: &[u32],
+    ) -> Option<Loop> {
         let is_entry = |&node: &usize| part[node] == number && self.reached[node] <= z;
         let far = |node: usize, p: &Point2<f64>| (self.at(node) - p).norm_squared();
         let first = *points.first()?;
-        let entry = (0..part.len()).filter(is_entry).min_by(|&a, &b| far(a, &first).total_cmp(&far(b, &first)))?;
+        let entry = (0..part.len())
+            .filter(is_entry)
+            .min_by(|&a, &b| far(a, &first).total_cmp(&far(b, &first)))?;
         let entry = self.at(entry);
         let to_entry = |p: &Point2<f64>| (p - entry).norm_squared();
-        let start = (0..points.len()).min_by(|&a, &b| to_entry(&points[a]).total_cmp(&to_entry(&points[b])))?;
+        let start = (0..points.len())
+            .min_by(|&a, &b| to_entry(&points[a]).total_cmp(&to_entry(&points[b])))?;
         points.rotate_left(start);
         points.push(points[0]);
-        let length = points.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum();
-        let sum = points.iter().fold(nalgebra::Vector2::zeros(), |sum, p| sum + p.coords);
+        let length = points
+            .windows(2)
+            .map(|ends| (ends[1] - ends[0]).norm())
+            .sum();
+        let sum = points
+            .iter()
+            .fold(nalgebra::Vector2::zeros(), |sum, p| sum + p.coords);
         let middle = (sum / points.len() as f64).into();
-        Some(Loop { height, points, entry, is_outer: number == 1, length, middle })
+        Some(Loop {
+            height,
+            points,
+            entry,
+            is_outer: number == 1,
+            length,
+            middle,
+        })
     }
 }
 

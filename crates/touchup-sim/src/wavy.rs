@@ -57,11 +57,18 @@ pub(super) fn height_field(
     height: impl Fn(f64, f64) -> f64,
 ) -> Result<TriMesh, MeshError> {
     let on = |i: u32, j: u32| Point3::new(at(i), at(j), height(at(i), at(j)));
-    let positions = (0..=n).flat_map(|j| (0..=n).map(move |i| (i, j))).map(|(i, j)| on(i, j)).collect();
+    let positions = (0..=n)
+        .flat_map(|j| (0..=n).map(move |i| (i, j)))
+        .map(|(i, j)| on(i, j))
+        .collect();
     let id = |i: u32, j: u32| j * (n + 1) + i;
     let cells = (0..n).flat_map(|j| (0..n).map(move |i| (i, j)));
-    let triangles = cells
-        .flat_map(|(i, j)| [[id(i, j), id(i + 1, j), id(i + 1, j + 1)], [id(i, j), id(i + 1, j + 1), id(i, j + 1)]]);
+    let triangles = cells.flat_map(|(i, j)| {
+        [
+            [id(i, j), id(i + 1, j), id(i + 1, j + 1)],
+            [id(i, j), id(i + 1, j + 1), id(i, j + 1)],
+        ]
+    });
     TriMesh::new(positions, triangles.collect())
 }
 
@@ -76,8 +83,15 @@ pub fn slide(i: usize, width: f64) -> Sample {
 pub fn slide_on(side: f64, i: usize, width: f64) -> Sample {
     let (contact, normal) = contact_on(side, i, width);
     let reported = contact + normal * (RADIUS - FORCE / STIFFNESS);
-    let wrench = Wrench { force: normal * FORCE, torque: Vector3::zeros() };
-    Sample { stamp_ns: i as i64 * STEP_NS, pose_ot: Isometry3::translation(reported.x, reported.y, reported.z), wrench }
+    let wrench = Wrench {
+        force: normal * FORCE,
+        torque: Vector3::zeros(),
+    };
+    Sample {
+        stamp_ns: i as i64 * STEP_NS,
+        pose_ot: Isometry3::translation(reported.x, reported.y, reported.z),
+        wrench,
+    }
 }
 
 /// Sample `i` of [`slide_on`] with evenly spread noise of the tracker, the same each time.
@@ -85,7 +99,9 @@ pub fn noisy_slide_on(side: f64, i: usize, width: f64) -> Sample {
     let mut sample = slide_on(side, i, width);
     let mut state = i as u64;
     let mut draw = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         ((state >> 33) as f64 / f64::from(1u32 << 31) - 0.5) * 12f64.sqrt() * NOISE
     };
     draw();
@@ -98,7 +114,12 @@ pub fn contact_on(side: f64, i: usize, width: f64) -> (Point3<f64>, Vector3<f64>
     let length = 0.8 * side;
     let travel = SPEED * i as f64 * STEP_NS as f64 * 1e-9;
     let (line, along) = ((travel / length).floor(), travel % length);
-    let x = 0.1 * side + if line % 2.0 == 0.0 { along } else { length - along };
+    let x = 0.1 * side
+        + if line % 2.0 == 0.0 {
+            along
+        } else {
+            length - along
+        };
     let y = 0.1 * side + (line * LINE) % width;
     let slope = 1e-6;
     let normal = Vector3::new(

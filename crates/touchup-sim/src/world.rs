@@ -153,7 +153,12 @@ impl Told {
     ///
     /// - `lever`: root mean square distance of the surface from O's origin, m.
     pub fn place_std(&self, lever: f64) -> f64 {
-        let CalibrationStds { tip_offset, shift, turn, .. } = self.stds;
+        let CalibrationStds {
+            tip_offset,
+            shift,
+            turn,
+            ..
+        } = self.stds;
         // of the turn's axis and the lever, two of three directions move a point, one of three along the normal
         let turned = turn * lever * (2.0f64 / 3.0).sqrt();
         tip_offset.hypot(shift).hypot(turned)
@@ -211,7 +216,13 @@ struct Draw {
 impl Draw {
     fn number(&mut self, name: &'static str, unit: &'static str, range: [f64; 2]) -> f64 {
         let truth = uniform(&mut self.rng, range);
-        self.values.push(DrawnValue { name, unit, truth, range, told: None });
+        self.values.push(DrawnValue {
+            name,
+            unit,
+            truth,
+            range,
+            told: None,
+        });
         truth
     }
 
@@ -221,26 +232,45 @@ impl Draw {
 
     fn rate(&mut self, name: &'static str, of: &[f64]) -> f64 {
         let truth = self.one_of(of);
-        let range = [of.iter().copied().fold(f64::MAX, f64::min), of.iter().copied().fold(0.0, f64::max)];
-        self.values.push(DrawnValue { name, unit: "1/s", truth, range, told: None });
+        let range = [
+            of.iter().copied().fold(f64::MAX, f64::min),
+            of.iter().copied().fold(0.0, f64::max),
+        ];
+        self.values.push(DrawnValue {
+            name,
+            unit: "1/s",
+            truth,
+            range,
+            told: None,
+        });
         truth
     }
 
     /// A vector of a length within the range, in any direction.
     fn vector(&mut self, name: &'static str, unit: &'static str, range: [f64; 2]) -> Vector3<f64> {
-        let direction = gauss_vector(&mut self.rng).try_normalize(0.0).unwrap_or_else(Vector3::z);
+        let direction = gauss_vector(&mut self.rng)
+            .try_normalize(0.0)
+            .unwrap_or_else(Vector3::z);
         direction * self.number(name, unit, range)
     }
 
     fn told(&mut self, name: &'static str, told: f64, std: f64) {
-        self.values.iter_mut().filter(|value| value.name == name).for_each(|value| value.told = Some([told, std]));
+        self.values
+            .iter_mut()
+            .filter(|value| value.name == name)
+            .for_each(|value| value.told = Some([told, std]));
     }
 }
 
 impl SimWorld {
     /// All of them.
-    pub const ALL: [Self; 5] =
-        [Self::WorkshopStylus, Self::OpticalTracker, Self::Ur, Self::SoftProbe, Self::CarelessOperator];
+    pub const ALL: [Self; 5] = [
+        Self::WorkshopStylus,
+        Self::OpticalTracker,
+        Self::Ur,
+        Self::SoftProbe,
+        Self::CarelessOperator,
+    ];
 
     /// The world of this name; `None` when there is none.
     pub fn named(name: &str) -> Option<Self> {
@@ -276,22 +306,49 @@ impl SimWorld {
     /// # Errors
     /// [`SimError::BadParameter`] for factors that are negative, not finite, or so large that what is told cannot be.
     pub fn draw_told_off(self, seed: u64, off: &ToldOff) -> Result<DrawnWorld, SimError> {
-        let ToldOff { radius, stiffness, tip_offset, registration, clock, tare } = *off;
+        let ToldOff {
+            radius,
+            stiffness,
+            tip_offset,
+            registration,
+            clock,
+            tare,
+        } = *off;
         for factor in [radius, stiffness, tip_offset, registration, clock, tare] {
             not_negative("the factor of what is told", factor, "")?;
         }
         let ranges = self.ranges();
-        let mut draw = Draw { rng: Pcg64::seed_from_u64(seed ^ TRUTH_STREAM), values: Vec::new() };
+        let mut draw = Draw {
+            rng: Pcg64::seed_from_u64(seed ^ TRUTH_STREAM),
+            values: Vec::new(),
+        };
         let stylus = draw.stylus(&ranges);
         let scanner = draw.scanner(&ranges, seed);
         let habit = draw.one_of(ranges.habits);
         let told = draw.what_is_told(&stylus, &scanner, &ranges.stds, off, seed);
         if !(told.radius > 0.0 && told.stiffness > 0.0) {
-            let (name, value) = if told.radius > 0.0 { ("stiffness", told.stiffness) } else { ("radius", told.radius) };
+            let (name, value) = if told.radius > 0.0 {
+                ("stiffness", told.stiffness)
+            } else {
+                ("radius", told.radius)
+            };
             let allowed = "greater than zero: take a smaller factor of what is told";
-            return Err(SimError::BadParameter { name, value, unit: "", allowed });
+            return Err(SimError::BadParameter {
+                name,
+                value,
+                unit: "",
+                allowed,
+            });
         }
-        Ok(DrawnWorld { world: self, seed, scanner, stylus, habit, told, values: draw.values })
+        Ok(DrawnWorld {
+            world: self,
+            seed,
+            scanner,
+            stylus,
+            habit,
+            told,
+            values: draw.values,
+        })
     }
 }
 
@@ -299,12 +356,17 @@ impl Draw {
     fn stylus(&mut self, of: &WorldRanges) -> StylusParams {
         let radius = self.number("tip_radius", "m", of.radius);
         let stiffness = self.number("stiffness", "N/m", of.stiffness);
-        let lateral = [self.number("lateral_share_1", "", of.lateral), self.number("lateral_share_2", "", of.lateral)];
+        let lateral = [
+            self.number("lateral_share_1", "", of.lateral),
+            self.number("lateral_share_2", "", of.lateral),
+        ];
         // so that `stiffness` is what the mean compliance of the three directions comes from
         let shares = Vector3::new(lateral[0], lateral[1], 1.0);
         let stiffness_shares = shares * (shares.map(f64::recip).sum() / 3.0);
-        let stiffness_axes =
-            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.number("lateral_turn", "rad", [0.0, 3.0]));
+        let stiffness_axes = UnitQuaternion::from_axis_angle(
+            &Vector3::z_axis(),
+            self.number("lateral_turn", "rad", [0.0, 3.0]),
+        );
         let force = self.number("hand_force", "N", of.force);
         StylusParams {
             radius,
@@ -325,7 +387,8 @@ impl Draw {
     }
 
     fn sensor(&mut self, of: &WorldRanges) -> SensorParams {
-        let turn = UnitQuaternion::from_scaled_axis(self.vector("scan_to_space_turn", "rad", [0.0, 3.0]));
+        let turn =
+            UnitQuaternion::from_scaled_axis(self.vector("scan_to_space_turn", "rad", [0.0, 3.0]));
         let place = self.vector("scan_to_space_distance", "m", [0.1, FARTHEST]);
         SensorParams {
             pose_noise: self.number("pose_noise", "m", of.pose_noise),
@@ -381,9 +444,12 @@ impl Draw {
         let sensor = &stylus.sensor;
         let radius = stylus.radius + gauss(&mut rng) * stds.radius * off.radius;
         let stiffness = stylus.stiffness * (1.0 + gauss(&mut rng) * stds.stiffness * off.stiffness);
-        let tip_offset = sensor.tip_offset + gauss_vector(&mut rng) * (stds.tip_offset * off.tip_offset);
+        let tip_offset =
+            sensor.tip_offset + gauss_vector(&mut rng) * (stds.tip_offset * off.tip_offset);
         let shift = gauss_vector(&mut rng) * (stds.shift * off.registration);
-        let turn = UnitQuaternion::from_scaled_axis(gauss_vector(&mut rng) * (stds.turn * off.registration));
+        let turn = UnitQuaternion::from_scaled_axis(
+            gauss_vector(&mut rng) * (stds.turn * off.registration),
+        );
         let wrench_clock = sensor.wrench_clock + gauss(&mut rng) * stds.clock * off.clock;
         let tare = sensor.tare + gauss_vector(&mut rng) * (stds.tare * off.tare);
         let scan_noise = scanner.noise * (1.0 + gauss(&mut rng) * stds.scan_noise).max(0.1);
@@ -392,7 +458,16 @@ impl Draw {
         self.told("wrench_clock", wrench_clock, stds.clock);
         self.told("scan_noise", scan_noise, stds.scan_noise * scanner.noise);
         let scan_to_space = sensor.scan_to_space * Isometry3::from_parts(shift.into(), turn);
-        Told { radius, stiffness, tip_offset, scan_to_space, wrench_clock, tare, scan_noise, stds: *stds }
+        Told {
+            radius,
+            stiffness,
+            tip_offset,
+            scan_to_space,
+            wrench_clock,
+            tare,
+            scan_noise,
+            stds: *stds,
+        }
     }
 }
 
@@ -401,8 +476,16 @@ impl DrawnWorld {
     ///
     /// - `name`: `tip_radius`, `stiffness`, `friction`, `scan_edge`, `scan_noise`; others stay as they are.
     pub fn set_truth(&mut self, name: &str, truth: f64) {
-        let Self { scanner, stylus, told, values, .. } = self;
-        let Some(value) = values.iter_mut().find(|value| value.name == name) else { return };
+        let Self {
+            scanner,
+            stylus,
+            told,
+            values,
+            ..
+        } = self;
+        let Some(value) = values.iter_mut().find(|value| value.name == name) else {
+            return;
+        };
         let before = std::mem::replace(&mut value.truth, truth);
         let share = truth / before;
         match name {
@@ -440,8 +523,17 @@ impl DrawnWorld {
     /// # Errors
     /// As [`plan_mesh`].
     pub fn strokes(&self, surface: &dyn Surface, longest: f64) -> Result<Vec<Stroke>, SimError> {
-        let hand = PathParams { radius: self.stylus.radius, longest, ..PathParams::default() };
-        Ok(self.habit.led(plan_mesh(surface, &surface.bounds(), &self.scanner.view, &hand)?))
+        let hand = PathParams {
+            radius: self.stylus.radius,
+            longest,
+            ..PathParams::default()
+        };
+        Ok(self.habit.led(plan_mesh(
+            surface,
+            &surface.bounds(),
+            &self.scanner.view,
+            &hand,
+        )?))
     }
 
     /// Touches a part along strokes, with the habit that they have.
@@ -458,10 +550,19 @@ impl DrawnWorld {
     ///
     /// # Errors
     /// As [`plan_mesh`], and for a share beyond 1.
-    pub fn strokes_on_plate(&self, plate: &Plate, longest: f64, turn: Option<f64>) -> Result<Vec<Stroke>, SimError> {
+    pub fn strokes_on_plate(
+        &self,
+        plate: &Plate,
+        longest: f64,
+        turn: Option<f64>,
+    ) -> Result<Vec<Stroke>, SimError> {
         let mut strokes = self.strokes(plate, longest)?;
         if let Some(turn) = turn {
-            let hand = PathParams { radius: self.stylus.radius, turn, ..PathParams::default() };
+            let hand = PathParams {
+                radius: self.stylus.radius,
+                turn,
+                ..PathParams::default()
+            };
             strokes.extend(plan_walls(plate, &hand)?);
         }
         Ok(strokes)
@@ -471,7 +572,12 @@ impl DrawnWorld {
     /// and by how much those of the three axes differ from that, √(Σ (Cᵢ − C̄)² / 3) / C̄, which one that presses along each of them sees.
     pub fn stiffness_std(&self) -> f64 {
         // their reciprocals have the mean 1
-        let uneven = self.stylus.stiffness_shares.map(|share| (share.recip() - 1.0).powi(2)).sum() / 3.0;
+        let uneven = self
+            .stylus
+            .stiffness_shares
+            .map(|share| (share.recip() - 1.0).powi(2))
+            .sum()
+            / 3.0;
         self.told.stds.stiffness.hypot(uneven.sqrt())
     }
 
@@ -484,7 +590,8 @@ impl DrawnWorld {
         let place = told.scan_to_space.translation.vector;
         let turn = told.scan_to_space.rotation.coords;
         // what may be left of the zero in all three axes together, and what the noise adds to it
-        let per_axis = 2.0 * told.stds.tare + sensor.force_bias + sensor.force_play + sensor.force_step / 2.0;
+        let per_axis =
+            2.0 * told.stds.tare + sensor.force_bias + sensor.force_play + sensor.force_step / 2.0;
         let free_n = 0.15f64.max(3f64.sqrt() * per_axis);
         let off_n = 0.22f64.max(free_n + 3.0 * sensor.force_noise);
         let on_n = 0.4f64.max(off_n + 3.0 * sensor.force_noise);
@@ -526,7 +633,13 @@ impl DrawnWorld {
     pub fn lever(surface: &dyn Surface) -> f64 {
         let bounds = surface.bounds();
         let corner = |i: usize| {
-            let pick = |axis: usize| if i >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
+            let pick = |axis: usize| {
+                if i >> axis & 1 == 0 {
+                    bounds.min[axis]
+                } else {
+                    bounds.max[axis]
+                }
+            };
             Point3::new(pick(0), pick(1), pick(2)).coords.norm_squared()
         };
         ((0..8).map(corner).sum::<f64>() / 8.0).sqrt()
@@ -600,7 +713,13 @@ impl SimWorld {
                 lost: [0.006, 0.03],
                 late: [0.008, 0.03],
                 gap_rate: [0.15, 0.5],
-                stds: CalibrationStds { tip_offset: 0.05e-3, shift: 0.06e-3, turn: 0.04 * DEGREE, clock: 1e-3, ..stds },
+                stds: CalibrationStds {
+                    tip_offset: 0.05e-3,
+                    shift: 0.06e-3,
+                    turn: 0.04 * DEGREE,
+                    clock: 1e-3,
+                    ..stds
+                },
                 ..WORKSHOP
             },
             Self::Ur => WorldRanges {
@@ -624,7 +743,13 @@ impl SimWorld {
                 gap_rate: [0.0, 0.02],
                 force: [3.0, 6.0],
                 habits: &[Habit::Slide, Habit::Tap],
-                stds: CalibrationStds { radius: 2e-6, tip_offset: 0.04e-3, shift: 0.05e-3, tare: 0.1, ..stds },
+                stds: CalibrationStds {
+                    radius: 2e-6,
+                    tip_offset: 0.04e-3,
+                    shift: 0.05e-3,
+                    tare: 0.1,
+                    ..stds
+                },
                 ..WORKSHOP
             },
             Self::SoftProbe => WorldRanges {
@@ -632,7 +757,11 @@ impl SimWorld {
                 lateral: [0.15, 0.4],
                 tip_offset: [0.15, 0.3],
                 force: [0.8, 1.8],
-                stds: CalibrationStds { stiffness: 0.06, tip_offset: 0.04e-3, ..stds },
+                stds: CalibrationStds {
+                    stiffness: 0.06,
+                    tip_offset: 0.04e-3,
+                    ..stds
+                },
                 ..WORKSHOP
             },
             Self::CarelessOperator => WorldRanges {
@@ -648,7 +777,13 @@ impl SimWorld {
                 tilt: [8.0 * DEGREE, 15.0 * DEGREE],
                 stray: [0.3e-3, 0.8e-3],
                 habits: &[Habit::Slide, Habit::Scrub, Habit::Tap],
-                stds: CalibrationStds { radius: 10e-6, stiffness: 0.1, shift: 0.1e-3, tare: 0.08, ..stds },
+                stds: CalibrationStds {
+                    radius: 10e-6,
+                    stiffness: 0.1,
+                    shift: 0.1e-3,
+                    tare: 0.08,
+                    ..stds
+                },
                 ..WORKSHOP
             },
         }

@@ -38,7 +38,11 @@ pub struct Motion {
 
 impl Motion {
     pub fn rest(acceleration: f64) -> Self {
-        Self { linear: Vector3::zeros(), angular: Vector3::zeros(), acceleration }
+        Self {
+            linear: Vector3::zeros(),
+            angular: Vector3::zeros(),
+            acceleration,
+        }
     }
 }
 
@@ -91,10 +95,16 @@ pub struct Body<'a> {
 
 impl<'a> Body<'a> {
     /// At rest, upright, with its ball at a place of O.
-    pub fn new(surface: &'a (dyn Surface + Sync), params: ArmParams, start: Point3<f64>) -> anyhow::Result<Self> {
+    pub fn new(
+        surface: &'a (dyn Surface + Sync),
+        params: ArmParams,
+        start: Point3<f64>,
+    ) -> anyhow::Result<Self> {
         let place = params.pose_bo * start;
         let nominal = Isometry3::from_parts(place.coords.into(), UnitQuaternion::identity());
-        let joints = params.geometry.most_dexterous(&(nominal * params.pose_ft.inverse()));
+        let joints = params
+            .geometry
+            .most_dexterous(&(nominal * params.pose_ft.inverse()));
         let late = (params.force_latency / STEP).round() as usize;
         Ok(Self {
             surface,
@@ -126,7 +136,8 @@ impl<'a> Body<'a> {
 
     /// A command of the program; the arm follows some milliseconds later.
     pub fn follow(&mut self, motion: Motion, force: Option<Force>) {
-        self.waiting.push_back((self.time + self.params.command_latency, motion, force));
+        self.waiting
+            .push_back((self.time + self.params.command_latency, motion, force));
     }
 
     /// A command that needs no program, followed at once.
@@ -161,7 +172,9 @@ impl<'a> Body<'a> {
         let r_bf = self.flange().rotation;
         let weight = |payload: &Payload| payload.weight_o(&r_bf).force;
         let load = weight(&self.params.payload) - weight(&self.configured_payload);
-        r_bf.inverse() * (self.contact_force() + load) + self.params.force_bias + Vector3::z() * self.drifted
+        r_bf.inverse() * (self.contact_force() + load)
+            + self.params.force_bias
+            + Vector3::z() * self.drifted
     }
 
     /// What is taken for the part's, N in B.
@@ -189,7 +202,8 @@ impl<'a> Body<'a> {
             self.waiting.pop_front();
             (self.motion, self.force) = (motion, force);
         }
-        let (mut wanted, mut acceleration) = (self.motion.linear * self.slider, self.motion.acceleration);
+        let (mut wanted, mut acceleration) =
+            (self.motion.linear * self.slider, self.motion.acceleration);
         if let Some(Force { axis, force, speed }) = self.force {
             let late = self.params.command_latency + self.params.force_latency + PERIOD;
             let gain = 1.0 / (4.0 * self.params.stiffness * late);
@@ -197,8 +211,10 @@ impl<'a> Body<'a> {
             wanted += axis * ((pressed * gain).clamp(-speed, speed) - wanted.dot(&axis));
             acceleration = self.params.top_acceleration;
         }
-        self.linear += (wanted.cap_magnitude(self.params.top_speed) - self.linear).cap_magnitude(acceleration * STEP);
-        self.angular += (self.motion.angular * self.slider - self.angular).cap_magnitude(TURN_ACCELERATION * STEP);
+        self.linear += (wanted.cap_magnitude(self.params.top_speed) - self.linear)
+            .cap_magnitude(acceleration * STEP);
+        self.angular += (self.motion.angular * self.slider - self.angular)
+            .cap_magnitude(TURN_ACCELERATION * STEP);
         // the velocity is that of the configured TCP
         let mut tool = self.flange() * self.tcp;
         let turn = UnitQuaternion::from_scaled_axis(self.angular * STEP);
@@ -214,18 +230,29 @@ impl<'a> Body<'a> {
         let params = &self.params;
         // in the part's own axes, which rise with it
         let up = Vector3::z() * self.raised;
-        let nominal = params.pose_bo.inverse_transform_point(&Point3::from(self.nominal.translation.vector)) - up;
+        let nominal = params
+            .pose_bo
+            .inverse_transform_point(&Point3::from(self.nominal.translation.vector))
+            - up;
         self.ball -= up;
         let (rest, contacts) = push_ball(self.surface, &self.ball, &nominal, params.radius);
-        let normal = contacts.iter().map(|c| c.normal * c.held_back).sum::<Vector3<f64>>();
+        let normal = contacts
+            .iter()
+            .map(|c| c.normal * c.held_back)
+            .sum::<Vector3<f64>>();
         let mut next = rest;
         if let Some(out) = normal.try_normalize(0.0) {
             let behind = self.ball - rest;
-            let kept = (behind - out * behind.dot(&out)).cap_magnitude(params.friction * normal.norm());
+            let kept =
+                (behind - out * behind.dot(&out)).cap_magnitude(params.friction * normal.norm());
             next = push_ball(self.surface, &rest, &(rest + kept), params.radius).0;
         }
         self.ball = next + up;
-        let force = if contacts.is_empty() { Vector3::zeros() } else { (next - nominal) * params.stiffness };
+        let force = if contacts.is_empty() {
+            Vector3::zeros()
+        } else {
+            (next - nominal) * params.stiffness
+        };
         self.forces.push_back(params.pose_bo.rotation * force);
         self.forces.pop_front();
     }
@@ -267,15 +294,31 @@ impl<'a> Body<'a> {
     /// `actual_TCP_force`, N in B; and `ft_raw_wrench`, N and N m in the flange about its origin.
     pub fn read_wrenches(&mut self) -> (Vector3<f64>, [Vector3<f64>; 2]) {
         let shaft = self.nominal.rotation * Vector3::z();
-        let spike = if self.spike > 0 { shaft * self.spike_force } else { Vector3::zeros() };
-        let (noise, torque_noise) =
-            (self.noise(self.params.force_noise + self.more_noise), self.noise(self.params.torque_noise));
-        let ArmParams { payload, pose_ft, force_bias, torque_bias, .. } = &self.params;
+        let spike = if self.spike > 0 {
+            shaft * self.spike_force
+        } else {
+            Vector3::zeros()
+        };
+        let (noise, torque_noise) = (
+            self.noise(self.params.force_noise + self.more_noise),
+            self.noise(self.params.torque_noise),
+        );
+        let ArmParams {
+            payload,
+            pose_ft,
+            force_bias,
+            torque_bias,
+            ..
+        } = &self.params;
         let r_bf = self.flange().rotation;
-        let (weight, contact) = (payload.weight_o(&r_bf), r_bf.inverse() * (self.contact_force() + spike));
+        let (weight, contact) = (
+            payload.weight_o(&r_bf),
+            r_bf.inverse() * (self.contact_force() + spike),
+        );
         let force = contact + r_bf.inverse() * (weight.force + noise) + force_bias;
         let lever = pose_ft.translation.vector;
-        let torque = lever.cross(&contact) + r_bf.inverse() * weight.torque + torque_bias + torque_noise;
+        let torque =
+            lever.cross(&contact) + r_bf.inverse() * weight.torque + torque_bias + torque_noise;
         (self.compensated() + spike + noise, [force, torque])
     }
 

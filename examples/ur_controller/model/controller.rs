@@ -169,7 +169,8 @@ impl<'a> Controller<'a> {
         if self.faults.is_deaf || self.faults.is_unplugged {
             return;
         }
-        self.coming_orders.push_back((self.body.time + self.faults.orders_late, written));
+        self.coming_orders
+            .push_back((self.body.time + self.faults.orders_late, written));
         self.take_orders();
     }
 
@@ -194,7 +195,8 @@ impl<'a> Controller<'a> {
     fn hear(&mut self, id: i32) {
         // an earlier command that it has not read yet is dropped
         if self.is_heard && matches!(self.ints_in[0], 6 | 10) && self.ints_in[0] != id {
-            self.record.event(&format!("command {} is never read", self.ints_in[0]));
+            self.record
+                .event(&format!("command {} is never read", self.ints_in[0]));
         }
         self.ints_in[0] = id;
         (self.heard_at, self.is_heard) = (self.body.time, true);
@@ -209,8 +211,10 @@ impl<'a> Controller<'a> {
     /// While a command is run it says nothing, and now and then it waits for another state before it does.
     pub fn may_tick(&mut self) -> bool {
         let id = self.ints_in[0];
-        let is_at_work = self.program.braking.is_some() || !matches!(id, 0 | 6 | 10) && !self.program.is_handled;
-        if !self.is_playing() || self.is_heard || is_at_work || self.body.time < self.granted_until {
+        let is_at_work =
+            self.program.braking.is_some() || !matches!(id, 0 | 6 | 10) && !self.program.is_handled;
+        if !self.is_playing() || self.is_heard || is_at_work || self.body.time < self.granted_until
+        {
             return true;
         }
         self.quiet_looks += 1;
@@ -218,7 +222,11 @@ impl<'a> Controller<'a> {
         let is_in_vain = self.owner.is_none() || self.faults.is_stuck || self.faults.is_hung;
         let [linear, angular] = self.body.velocity();
         let moves = linear.norm() + angular.norm() > 0.0;
-        let patience = if moves && !is_in_vain { QUIET_LOOKS_MOVING } else { QUIET_LOOKS };
+        let patience = if moves && !is_in_vain {
+            QUIET_LOOKS_MOVING
+        } else {
+            QUIET_LOOKS
+        };
         self.quiet_looks >= patience && (is_in_vain || self.body.time - self.heard_at < AHEAD)
     }
 
@@ -226,7 +234,10 @@ impl<'a> Controller<'a> {
     pub fn tick(&mut self) {
         (self.is_heard, self.quiet_looks) = (false, 0);
         if self.safety == Safety::Normal && self.body.is_over_its_force() {
-            self.stop_for(Safety::Protective, "force over the limit of the safety system");
+            self.stop_for(
+                Safety::Protective,
+                "force over the limit of the safety system",
+            );
         }
         self.take_orders();
         self.start_program();
@@ -240,8 +251,16 @@ impl<'a> Controller<'a> {
 
     /// The command in the registers is executed at once, also what an earlier program left there.
     fn start_program(&mut self) {
-        if self.program.starts_at.is_some_and(|at| at <= self.body.time) && self.safety == Safety::Normal {
-            self.program = Program { is_running: true, ..Program::default() };
+        if self
+            .program
+            .starts_at
+            .is_some_and(|at| at <= self.body.time)
+            && self.safety == Safety::Normal
+        {
+            self.program = Program {
+                is_running: true,
+                ..Program::default()
+            };
             self.heard_at = self.body.time;
             (self.ints_out[0], self.ints_out[2]) = (1, 0);
             self.record.event("program starts");
@@ -349,10 +368,13 @@ impl<'a> Controller<'a> {
             return;
         };
         let [linear, angular] = body.velocity();
-        let is_done = self.program.speeding.is_none_or(|(motion, until)| match until {
-            Some(until) => until <= now,
-            None => (motion.linear - linear).norm() + (motion.angular - angular).norm() < 1e-6,
-        });
+        let is_done = self
+            .program
+            .speeding
+            .is_none_or(|(motion, until)| match until {
+                Some(until) => until <= now,
+                None => (motion.linear - linear).norm() + (motion.angular - angular).norm() < 1e-6,
+            });
         if is_done {
             let until = (self.program.speed_time > 0.0).then_some(now + self.program.speed_time);
             self.program.speeding = Some((wanted, until));
@@ -366,10 +388,15 @@ impl<'a> Controller<'a> {
         self.ints_out[0] = 1;
         if id == 10 {
             let acceleration = self.doubles_in[6];
-            let motion = Motion { linear: self.vector(0), angular: self.vector(3), acceleration };
+            let motion = Motion {
+                linear: self.vector(0),
+                angular: self.vector(3),
+                acceleration,
+            };
             let goes = |motion: &Motion| motion.linear.norm() + motion.angular.norm() > 0.0;
             if !goes(&motion) && self.program.velocity.as_ref().is_none_or(goes) {
-                self.record.event(&format!("stop requested with {acceleration} m/s²"));
+                self.record
+                    .event(&format!("stop requested with {acceleration} m/s²"));
             }
             self.program.speed_time = self.doubles_in[7];
             self.program.velocity = Some(motion);
@@ -383,7 +410,11 @@ impl<'a> Controller<'a> {
         };
         let (force, speed) = (self.doubles_in[6 + axis], self.doubles_in[12 + axis]);
         let along = frame * Vector3::ith(axis, force.signum());
-        self.program.force = Some(Force { axis: along, force: force.abs(), speed });
+        self.program.force = Some(Force {
+            axis: along,
+            force: force.abs(),
+            speed,
+        });
     }
 
     fn regular(&mut self, id: i32) {
@@ -400,18 +431,26 @@ impl<'a> Controller<'a> {
                 self.body.tcp = Isometry3::from_parts(Translation3::from(self.vector(0)), turn);
             }
             40 => {
-                let (place, turn) = (self.body.tcp.translation.vector, self.body.tcp.rotation.scaled_axis());
+                let (place, turn) = (
+                    self.body.tcp.translation.vector,
+                    self.body.tcp.rotation.scaled_axis(),
+                );
                 self.doubles_out[..3].copy_from_slice(place.as_slice());
                 self.doubles_out[3..6].copy_from_slice(turn.as_slice());
             }
             17 => {
-                let payload =
-                    Payload { mass: self.doubles_in[0], p_sc: self.vector(1), ..self.body.configured_payload };
+                let payload = Payload {
+                    mass: self.doubles_in[0],
+                    p_sc: self.vector(1),
+                    ..self.body.configured_payload
+                };
                 self.body.configured_payload = payload;
                 self.record.event(&format!("payload {} kg", payload.mass));
             }
             // how force mode is tuned is not simulated
-            20 | 21 => self.record.event(&format!("set {id}: {:?}", &self.doubles_in[..4])),
+            20 | 21 => self
+                .record
+                .event(&format!("set {id}: {:?}", &self.doubles_in[..4])),
             35 => self.program.watchdog = Some(1.0 / self.doubles_in[0]),
             31 => self.stop_for(Safety::Protective, "requested by the client"),
             _ => self.stop_program(&format!("command {id} is not simulated")),
@@ -428,12 +467,19 @@ impl<'a> Controller<'a> {
 
     fn send_states(&mut self) {
         self.periods += 1;
-        let Faults { is_silent, is_unplugged, is_dead, states_late, .. } = self.faults;
+        let Faults {
+            is_silent,
+            is_unplugged,
+            is_dead,
+            states_late,
+            ..
+        } = self.faults;
         if is_silent || is_unplugged || is_dead {
             self.coming_states.clear();
         } else if self.periods.is_multiple_of(self.every) {
             let states = States::read(self);
-            self.coming_states.push_back((self.body.time + states_late, states));
+            self.coming_states
+                .push_back((self.body.time + states_late, states));
         }
     }
 }
@@ -441,5 +487,8 @@ impl<'a> Controller<'a> {
 /// The first of what is on its way, where its time has come.
 fn due<T>(coming: &mut VecDeque<(f64, T)>, now: f64) -> Option<T> {
     let is_due = coming.front().is_some_and(|(at, _)| *at <= now);
-    is_due.then(|| coming.pop_front()).flatten().map(|(_, what)| what)
+    is_due
+        .then(|| coming.pop_front())
+        .flatten()
+        .map(|(_, what)| what)
 }

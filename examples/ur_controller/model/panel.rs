@@ -61,7 +61,10 @@ pub fn happen(controller: &mut Controller, line: &str) {
         ["noise", force] => controller.body.more_noise = number(force),
         ["payload", kg] => {
             let set = controller.body.configured_payload;
-            controller.body.configured_payload = Payload { mass: number(kg), ..set };
+            controller.body.configured_payload = Payload {
+                mass: number(kg),
+                ..set
+            };
         }
         ["raise", mm] => controller.body.raise(number(mm) * 1e-3),
         ["mend", ..] => controller.faults = Default::default(),
@@ -78,7 +81,14 @@ pub fn answer(controller: &mut Controller, line: &str) -> String {
         "get serial number" => "20245500001".to_owned(),
         "is in remote control" => controller.is_remote.to_string(),
         "running" => format!("Program running: {}", controller.is_playing()),
-        "robotmode" => format!("Robotmode: {}", if controller.is_powered { "RUNNING" } else { "IDLE" }),
+        "robotmode" => format!(
+            "Robotmode: {}",
+            if controller.is_powered {
+                "RUNNING"
+            } else {
+                "IDLE"
+            }
+        ),
         "safetystatus" => match controller.safety {
             Safety::Normal if controller.is_reduced => "Safetystatus: REDUCED",
             Safety::Normal => "Safetystatus: NORMAL",
@@ -93,7 +103,12 @@ pub fn answer(controller: &mut Controller, line: &str) -> String {
         }
         "stop" => "Failed to execute: stop".to_owned(),
         "programState" if controller.is_playing() => "PLAYING".to_owned(),
-        "programState" => if controller.is_paused() { "PAUSED" } else { "STOPPED" }.to_owned(),
+        "programState" => if controller.is_paused() {
+            "PAUSED"
+        } else {
+            "STOPPED"
+        }
+        .to_owned(),
         "unlock protective stop" => {
             if controller.safety == Safety::Protective {
                 controller.safety = Safety::Normal;

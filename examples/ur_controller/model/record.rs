@@ -16,9 +16,15 @@ impl Record {
     pub fn new(path: Option<&Path>) -> std::io::Result<Self> {
         let mut out = path.map(File::create).transpose()?;
         if let Some(out) = &mut out {
-            writeln!(out, "time_s,x_m,y_m,z_m,speed_m_per_s,turn_rad_per_s,force_n,event")?;
+            writeln!(
+                out,
+                "time_s,x_m,y_m,z_m,speed_m_per_s,turn_rad_per_s,force_n,event"
+            )?;
         }
-        Ok(Self { out, event: String::new() })
+        Ok(Self {
+            out,
+            event: String::new(),
+        })
     }
 
     /// Goes into the next line.
@@ -31,9 +37,12 @@ impl Record {
         let event = std::mem::take(&mut self.event);
         let Some(out) = &mut self.out else { return };
         let ([linear, angular], place) = (body.velocity(), body.place());
-        let (speed, turn, force, time) = (linear.norm(), angular.norm(), body.true_force(), body.time);
-        let line =
-            format!("{time:.4},{:.7},{:.7},{:.7},{speed:.7},{turn:.7},{force:.3},{event}\n", place.x, place.y, place.z);
+        let (speed, turn, force, time) =
+            (linear.norm(), angular.norm(), body.true_force(), body.time);
+        let line = format!(
+            "{time:.4},{:.7},{:.7},{:.7},{speed:.7},{turn:.7},{force:.3},{event}\n",
+            place.x, place.y, place.z
+        );
         // a record that cannot be written ends the run of its reader, by its deadline
         let _ = out.write_all(line.as_bytes());
     }

@@ -25,7 +25,8 @@ impl States {
     pub fn read(controller: &mut Controller) -> Self {
         let pose = controller.body.read_pose();
         let (place, turn) = (pose.translation.vector, pose.rotation.scaled_axis());
-        let ([linear, angular], (force, [raw, torque])) = (controller.body.velocity(), controller.body.read_wrenches());
+        let ([linear, angular], (force, [raw, torque])) =
+            (controller.body.velocity(), controller.body.read_wrenches());
         let six = |a: Vector3<f64>, b: Vector3<f64>| [a.x, a.y, a.z, b.x, b.y, b.z];
         let safety_bits = match controller.safety {
             Safety::Normal => 1,
@@ -40,7 +41,11 @@ impl States {
             speed: six(linear, angular),
             force: six(force, Vector3::zeros()),
             raw: six(raw, torque),
-            safety_bits: if controller.is_reduced { safety_bits & !1 | 1 << 1 } else { safety_bits },
+            safety_bits: if controller.is_reduced {
+                safety_bits & !1 | 1 << 1
+            } else {
+                safety_bits
+            },
             speed_fraction: controller.body.slider,
             is_playing: controller.is_playing(),
             is_paused: controller.is_paused(),

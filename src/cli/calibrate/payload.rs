@@ -9,7 +9,8 @@ use super::super::probing::KeptMeasurements;
 use super::super::{CliError, Losses, require};
 use super::{CalibrationTarget, RecordingFlags};
 use crate::calibration::{
-    PayloadCalibrationParams, calibrate_payload, calibrate_payload_by_arm, calibrate_payload_by_table,
+    PayloadCalibrationParams, calibrate_payload, calibrate_payload_by_arm,
+    calibrate_payload_by_table,
 };
 use crate::scene::Scene;
 use crate::sim::ArmParams;
@@ -57,7 +58,13 @@ enum Axes {
 
 /// The verb.
 pub(super) fn payload(arguments: &PayloadArguments) -> Result<Losses, CliError> {
-    let PayloadArguments { bag, samples, source, target, .. } = arguments;
+    let PayloadArguments {
+        bag,
+        samples,
+        source,
+        target,
+        ..
+    } = arguments;
     let params = arguments.params()?;
     match (arguments.robot, bag, samples) {
         (Some(robot), ..) => payload_of_arm(arguments, robot, params.gravity),
@@ -69,21 +76,42 @@ pub(super) fn payload(arguments: &PayloadArguments) -> Result<Losses, CliError> 
             target.write(&draft, calibration)
         }
         (_, _, table) => {
-            let table = table.as_ref().expect("one of --bag, --samples and --robot is there");
+            let table = table
+                .as_ref()
+                .expect("one of --bag, --samples and --robot is there");
             let draft = target.open("--samples", table)?;
-            target.write(&draft, calibrate_payload_by_table(table, &draft.scene, params)?)
+            target.write(
+                &draft,
+                calibrate_payload_by_table(table, &draft.scene, params)?,
+            )
         }
     }
 }
 
 /// - `gravity`: m/s².
-fn payload_of_arm(arguments: &PayloadArguments, robot: RobotName, gravity: f64) -> Result<Losses, CliError> {
-    let PayloadArguments { cell, truth_payload, target, segments_out, .. } = arguments;
+fn payload_of_arm(
+    arguments: &PayloadArguments,
+    robot: RobotName,
+    gravity: f64,
+) -> Result<Losses, CliError> {
+    let PayloadArguments {
+        cell,
+        truth_payload,
+        target,
+        segments_out,
+        ..
+    } = arguments;
     let kept = KeptMeasurements::Segments(segments_out.as_deref());
     let (scene, draft) = target.open_for_arm()?;
     let truth = |arm: ArmParams, scene: &Scene| truth_payload.held_by(arm, scene);
-    let measurement = Measurement { stage: "identify the payload", kept, spheres: &[] };
-    let (readings, _) = cell.measure(robot, scene, measurement, truth, |prober| prober.measure_payload())?;
+    let measurement = Measurement {
+        stage: "identify the payload",
+        kept,
+        spheres: &[],
+    };
+    let (readings, _) = cell.measure(robot, scene, measurement, truth, |prober| {
+        prober.measure_payload()
+    })?;
     target.write(&draft, calibrate_payload_by_arm(&readings, gravity)?)
 }
 
@@ -96,6 +124,9 @@ impl PayloadArguments {
             Axes::Sensor => WrenchFrame::Sensor,
             Axes::Pose => WrenchFrame::Object,
         });
-        Ok(PayloadCalibrationParams { gravity, wrench_frame })
+        Ok(PayloadCalibrationParams {
+            gravity,
+            wrench_frame,
+        })
     }
 }

@@ -29,9 +29,18 @@ pub(in crate::cli) struct ScanArguments {
 
 /// The verb.
 pub(super) fn scan(arguments: &ScanArguments) -> Result<Losses, CliError> {
-    let ScanArguments { pairs, bag, sigma_mm, source, target } = arguments;
+    let ScanArguments {
+        pairs,
+        bag,
+        sigma_mm,
+        source,
+        target,
+    } = arguments;
     if let Some(sigma) = sigma_mm {
-        require((1e-6..=1e3).contains(sigma), format!("--sigma-mm is {sigma}; it must be 1e-6 to 1000 mm"))?;
+        require(
+            (1e-6..=1e3).contains(sigma),
+            format!("--sigma-mm is {sigma}; it must be 1e-6 to 1000 mm"),
+        )?;
     }
     let sigma = sigma_mm.map(|sigma| sigma / 1e3);
     let draft = target.open("--pairs", pairs)?;

@@ -26,8 +26,21 @@ pub(in crate::cli) struct StiffnessArguments {
 
 /// The verb.
 pub(super) fn stiffness(arguments: &StiffnessArguments) -> Result<Losses, CliError> {
-    let StiffnessArguments { arm, spot, touches, output, target } = arguments;
+    let StiffnessArguments {
+        arm,
+        spot,
+        touches,
+        output,
+        target,
+    } = arguments;
     let (scene, draft) = target.open_for_arm()?;
     let found = StiffnessFound::of(&repeated(arm, scene, spot, *touches, output)?);
-    target.write(&draft, Calibration { found, doubts: Vec::new(), losses: Vec::new() })
+    target.write(
+        &draft,
+        Calibration {
+            found,
+            doubts: Vec::new(),
+            losses: Vec::new(),
+        },
+    )
 }

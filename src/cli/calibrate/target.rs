@@ -13,7 +13,8 @@ use crate::io::atomic::write_atomically;
 use crate::scene::Scene;
 
 /// Error of a calibration with an arm but without a scene.
-const NO_SCENE: &str = "--scene is needed: it has the pose of the arm's base and the volume that it must never leave";
+const NO_SCENE: &str =
+    "--scene is needed: it has the pose of the arm's base and the volume that it must never leave";
 
 /// Where the result goes, and how it is printed.
 #[derive(Debug, Args)]
@@ -63,17 +64,31 @@ impl CalibrationTarget {
 
     /// Reads the scene, which a calibration with an arm needs, and returns its path too.
     pub fn open_for_arm(&self) -> Result<(&Path, DraftScene), CliError> {
-        let scene = self.scene.as_deref().ok_or_else(|| CliError::usage(NO_SCENE))?;
+        let scene = self
+            .scene
+            .as_deref()
+            .ok_or_else(|| CliError::usage(NO_SCENE))?;
         Ok((scene, self.open_scene()?))
     }
 
     /// Puts what was found into the scene and prints what it was; what the recording lacks.
-    pub fn write(&self, draft: &DraftScene, calibration: Calibration<impl Calibrated>) -> Result<Losses, CliError> {
-        let Calibration { found, doubts, losses } = calibration;
+    pub fn write(
+        &self,
+        draft: &DraftScene,
+        calibration: Calibration<impl Calibrated>,
+    ) -> Result<Losses, CliError> {
+        let Calibration {
+            found,
+            doubts,
+            losses,
+        } = calibration;
         doubts.iter().for_each(|doubt| warn!("{doubt}"));
         let text = calibrated_scene(&draft.text, &found, SystemTime::now())?;
-        write_atomically(&self.out, |file| file.write_all(text.as_bytes())).map_err(not_written(&self.out))?;
-        print_report(self.json, &found, || format!("{found}\nwrote {}", self.out.display()))?;
+        write_atomically(&self.out, |file| file.write_all(text.as_bytes()))
+            .map_err(not_written(&self.out))?;
+        print_report(self.json, &found, || {
+            format!("{found}\nwrote {}", self.out.display())
+        })?;
         Ok(losses)
     }
 }

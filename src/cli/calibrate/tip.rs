@@ -41,29 +41,57 @@ pub(in crate::cli) struct TipArguments {
 
 /// The verb.
 pub(super) fn tip(arguments: &TipArguments) -> Result<Losses, CliError> {
-    let TipArguments { bag, robot, spot, source, target, .. } = arguments;
+    let TipArguments {
+        bag,
+        robot,
+        spot,
+        source,
+        target,
+        ..
+    } = arguments;
     if let (Some(robot), Some(spot)) = (robot, spot) {
         return tip_by_arm(arguments, *robot, spot);
     }
     let bag = bag.as_ref().expect("one of --bag and --robot is there");
     let draft = target.open("--bag", bag)?;
-    let calibration =
-        source.calibrate(bag, &draft.scene, |recording, at_each| calibrate_tip(recording, &draft.scene, at_each))?;
+    let calibration = source.calibrate(bag, &draft.scene, |recording, at_each| {
+        calibrate_tip(recording, &draft.scene, at_each)
+    })?;
     target.write(&draft, calibration)
 }
 
 /// - `spot`: as it was written, X,Y,Z in mm.
 fn tip_by_arm(arguments: &TipArguments, robot: RobotName, spot: &str) -> Result<Losses, CliError> {
-    let TipArguments { cell, truth_tip_mm, output, target, .. } = arguments;
+    let TipArguments {
+        cell,
+        truth_tip_mm,
+        output,
+        target,
+        ..
+    } = arguments;
     let kept = KeptMeasurements::Touches(output.touches_out.as_deref());
-    let measurement = Measurement { stage: "touch", kept, spheres: &[] };
+    let measurement = Measurement {
+        stage: "touch",
+        kept,
+        spheres: &[],
+    };
     let place = Point3::from(millimetres("--spot", spot)?);
     let (scene, draft) = target.open_for_arm()?;
     let truth = |arm: ArmParams, _: &Scene| {
-        let Some(text) = truth_tip_mm else { return Ok(arm) };
+        let Some(text) = truth_tip_mm else {
+            return Ok(arm);
+        };
         let off = millimetres("--truth-tip-mm", text)? - arm.pose_ft.translation.vector;
-        Ok(ArmParams { ball_offset: arm.pose_ft.rotation.inverse() * off, ..arm })
+        Ok(ArmParams {
+            ball_offset: arm.pose_ft.rotation.inverse() * off,
+            ..arm
+        })
     };
-    let (measured, of_arm) = cell.measure(robot, scene, measurement, truth, |prober| prober.measure_tip(&place))?;
-    target.write(&draft, calibrate_tip_by_arm(&measured, &of_arm).map_err(CliError::arm)?)
+    let (measured, of_arm) = cell.measure(robot, scene, measurement, truth, |prober| {
+        prober.measure_tip(&place)
+    })?;
+    target.write(
+        &draft,
+        calibrate_tip_by_arm(&measured, &of_arm).map_err(CliError::arm)?,
+    )
 }

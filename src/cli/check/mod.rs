@@ -39,7 +39,11 @@ pub(super) struct CheckArguments {
     #[arg(long, value_name = "N", default_value_t = SPOT_TOUCHES, requires = "spot")]
     touches: usize,
     /// A sphere of known diameter within 2 mm of a place in the frame of the scan, mm; free from above, its post below; repeat for each place
-    #[arg(long = "sphere", value_name = "X,Y,Z,DIAMETER", allow_hyphen_values = true)]
+    #[arg(
+        long = "sphere",
+        value_name = "X,Y,Z,DIAMETER",
+        allow_hyphen_values = true
+    )]
     spheres: Vec<String>,
     /// Standard uncertainty of the diameters, µm
     #[arg(long, value_name = "U", default_value_t = Gates::default().diameter_sigma_um)]
@@ -70,18 +74,40 @@ pub(super) struct CheckedTouches {
 }
 
 pub(super) fn check(arguments: &CheckArguments) -> Result<Losses, CliError> {
-    let CheckArguments { arm, scene: path, temperature_c, out, output, json, .. } = arguments;
+    let CheckArguments {
+        arm,
+        scene: path,
+        temperature_c,
+        out,
+        output,
+        json,
+        ..
+    } = arguments;
     let gates = arguments.gates()?;
-    let spot = arguments.spot.as_ref().map(|spot| spot_of(spot, arguments.touches)).transpose()?;
-    let spheres = arguments.spheres.iter().map(|text| sphere_of(text)).collect::<Result<Vec<_>, _>>()?;
+    let spot = arguments
+        .spot
+        .as_ref()
+        .map(|spot| spot_of(spot, arguments.touches))
+        .transpose()?;
+    let spheres = arguments
+        .spheres
+        .iter()
+        .map(|text| sphere_of(text))
+        .collect::<Result<Vec<_>, _>>()?;
     if let Some(temperature_c) = temperature_c {
         check_temperature(*temperature_c)?;
     }
     let scene = Scene::read(path)?;
     let kept = KeptMeasurements::Touches(output.touches_out.as_deref());
-    let measurement = Measurement { stage: "touch", kept, spheres: &spheres };
+    let measurement = Measurement {
+        stage: "touch",
+        kept,
+        spheres: &spheres,
+    };
     let touch = |prober: &mut Prober<'_>| touched(prober, spot.as_ref(), &spheres);
-    let (touches, _) = arm.cell.measure(arm.robot, path, measurement, |arm, _| Ok(arm), touch)?;
+    let (touches, _) = arm
+        .cell
+        .measure(arm.robot, path, measurement, |arm, _| Ok(arm), touch)?;
     let report = CheckReport::of(&touches, &spheres, &scene, *temperature_c, gates)?;
     if let Some(out) = out {
         write_json(out, &report)?;
@@ -92,12 +118,24 @@ pub(super) fn check(arguments: &CheckArguments) -> Result<Losses, CliError> {
 
 impl CheckArguments {
     fn gates(&self) -> Result<Gates, CliError> {
-        let Self { gate_um, sphere_gate_um, diameter_sigma_um, .. } = *self;
+        let Self {
+            gate_um,
+            sphere_gate_um,
+            diameter_sigma_um,
+            ..
+        } = *self;
         require_positive("--gate-um", gate_um)?;
         require_positive("--sphere-gate-um", sphere_gate_um)?;
         let is_allowed = (0.0..=1e3).contains(&diameter_sigma_um);
-        require(is_allowed, format_args!("--diameter-sigma-um {diameter_sigma_um} must be 0 to 1000"))?;
-        Ok(Gates { spot_um: gate_um, sphere_um: sphere_gate_um, diameter_sigma_um })
+        require(
+            is_allowed,
+            format_args!("--diameter-sigma-um {diameter_sigma_um} must be 0 to 1000"),
+        )?;
+        Ok(Gates {
+            spot_um: gate_um,
+            sphere_um: sphere_gate_um,
+            diameter_sigma_um,
+        })
     }
 }
 
@@ -105,17 +143,25 @@ impl CheckArguments {
 fn spot_of(text: &str, touches: usize) -> Result<(Point3<f64>, usize), CliError> {
     let place = Point3::from(millimetres("--spot", text)?);
     let (least, most) = (TOUCHES.start(), TOUCHES.end());
-    require(TOUCHES.contains(&touches), format!("--touches {touches} must be {least} to {most}"))?;
+    require(
+        TOUCHES.contains(&touches),
+        format!("--touches {touches} must be {least} to {most}"),
+    )?;
     Ok((place, touches))
 }
 
 /// A sphere that was written X,Y,Z,DIAMETER in mm.
 fn sphere_of(text: &str) -> Result<ReferenceSphere, CliError> {
-    let wrong = || CliError::usage(format!("--sphere {text} is not X,Y,Z,DIAMETER in mm, with a diameter of 3 to 100"));
+    let wrong = || {
+        CliError::usage(format!(
+            "--sphere {text} is not X,Y,Z,DIAMETER in mm, with a diameter of 3 to 100"
+        ))
+    };
     match metres(text).ok_or_else(wrong)?[..] {
-        [x, y, z, diameter] if DIAMETERS.contains(&diameter) => {
-            Ok(ReferenceSphere { centre: Point3::new(x, y, z), radius: diameter / 2.0 })
-        }
+        [x, y, z, diameter] if DIAMETERS.contains(&diameter) => Ok(ReferenceSphere {
+            centre: Point3::new(x, y, z),
+            radius: diameter / 2.0,
+        }),
         _ => Err(wrong()),
     }
 }
@@ -126,11 +172,19 @@ pub(super) fn touched(
     spot: Option<&(Point3<f64>, usize)>,
     spheres: &[ReferenceSphere],
 ) -> Result<CheckedTouches, CliError> {
-    let spot = spot.map(|(place, count)| prober.repeat(place, *count)).transpose()?;
-    let mut touches = CheckedTouches { spot, spheres: Vec::new() };
+    let spot = spot
+        .map(|(place, count)| prober.repeat(place, *count))
+        .transpose()?;
+    let mut touches = CheckedTouches {
+        spot,
+        spheres: Vec::new(),
+    };
     for (number, sphere) in (1..).zip(spheres) {
-        let of_sphere = |error: SpotError| CliError::from(error).with(format_args!("that was sphere {number}"));
-        touches.spheres.push(prober.touch_sphere(sphere).map_err(of_sphere)?);
+        let of_sphere =
+            |error: SpotError| CliError::from(error).with(format_args!("that was sphere {number}"));
+        touches
+            .spheres
+            .push(prober.touch_sphere(sphere).map_err(of_sphere)?);
     }
     Ok(touches)
 }
@@ -148,9 +202,15 @@ pub(super) fn repeated(
     let (place, touches) = spot_of(spot, touches)?;
     let ArmArguments { robot, cell } = arm;
     let kept = KeptMeasurements::Touches(output.touches_out.as_deref());
-    let measurement = Measurement { stage: "touch", kept, spheres: &[] };
+    let measurement = Measurement {
+        stage: "touch",
+        kept,
+        spheres: &[],
+    };
     let repeat = |prober: &mut Prober<'_>| prober.repeat(&place, touches);
-    Ok(cell.measure(*robot, scene, measurement, |arm, _| Ok(arm), repeat)?.0)
+    Ok(cell
+        .measure(*robot, scene, measurement, |arm, _| Ok(arm), repeat)?
+        .0)
 }
 
 impl CheckReport {
@@ -162,32 +222,72 @@ impl CheckReport {
         temperature_c: Option<f64>,
         gates: Gates,
     ) -> Result<Self, CliError> {
-        let robot = scene.robot.as_ref().ok_or_else(|| CliError::usage("the scene names no `robot`"))?;
+        let robot = scene
+            .robot
+            .as_ref()
+            .ok_or_else(|| CliError::usage("the scene names no `robot`"))?;
         let shared = robot.pattern.shared;
         let readings_of = |(sphere, touched): (usize, &SphereTouches)| {
-            let reading = |centres: &Vec<_>| SphereReading { sphere, centres: centres.clone() };
-            touched.orientations.iter().map(|one| reading(&one.centres)).collect::<Vec<_>>()
+            let reading = |centres: &Vec<_>| SphereReading {
+                sphere,
+                centres: centres.clone(),
+            };
+            touched
+                .orientations
+                .iter()
+                .map(|one| reading(&one.centres))
+                .collect::<Vec<_>>()
         };
-        let readings: Vec<_> = touches.spheres.iter().enumerate().flat_map(readings_of).collect();
+        let readings: Vec<_> = touches
+            .spheres
+            .iter()
+            .enumerate()
+            .flat_map(readings_of)
+            .collect();
         let results = || {
-            let found = check_workspace(spheres, &readings, &shared.registered_at, gates.diameter_sigma_um * 1e-6);
-            let unreached = touches.spheres.iter().flat_map(|touched| &touched.not_reached).next();
+            let found = check_workspace(
+                spheres,
+                &readings,
+                &shared.registered_at,
+                gates.diameter_sigma_um * 1e-6,
+            );
+            let unreached = touches
+                .spheres
+                .iter()
+                .flat_map(|touched| &touched.not_reached)
+                .next();
             let found = found.map_err(|error| match unreached {
                 Some(unreached) => CliError::arm(error).with(unreached),
                 None => CliError::arm(error),
             })?;
             Ok::<_, CliError>(SphereResults::of(&found, spheres, &touches.spheres))
         };
-        let results = if spheres.is_empty() { None } else { Some(results()?) };
+        let results = if spheres.is_empty() {
+            None
+        } else {
+            Some(results()?)
+        };
         let temperature_c = temperature_c.or(robot.temperature_c);
         let record = CheckRecord::new(SystemTime::now(), &robot.model_name(), temperature_c);
         let told_mm = scene.tip.as_ref().map(|tip| tip.ball.radius * 1e3);
         let before = robot.check_record.as_ref();
-        let before_sigma_mm = before.and_then(|before| before.tip_radius_sigma_mm).unwrap_or(0.0);
+        let before_sigma_mm = before
+            .and_then(|before| before.tip_radius_sigma_mm)
+            .unwrap_or(0.0);
         let radii = [
             ("the scene tells", told_mm, shared.radius * 1e3),
-            ("the check before found", before.and_then(|before| before.tip_radius_mm), before_sigma_mm),
+            (
+                "the check before found",
+                before.and_then(|before| before.tip_radius_mm),
+                before_sigma_mm,
+            ),
         ];
-        Ok(Self::judged(record, touches.spot.as_ref(), results, gates, &radii))
+        Ok(Self::judged(
+            record,
+            touches.spot.as_ref(),
+            results,
+            gates,
+            &radii,
+        ))
     }
 }

@@ -6,7 +6,9 @@ use serde::Serialize;
 
 use crate::calibrate::{CheckedPlace, ReferenceSphere, SphereFit, WorkspaceCheck};
 use crate::cli::{Losses, reported};
-use crate::probing::execute::{NotReached, Repeatability, SphereOrientation, SphereTouches, SpotTouch};
+use crate::probing::execute::{
+    NotReached, Repeatability, SphereOrientation, SphereTouches, SpotTouch,
+};
 use crate::scene::CheckRecord;
 
 /// What a check has to keep, and how well the spheres are known.
@@ -23,7 +25,11 @@ pub(in crate::cli) struct Gates {
 impl Default for Gates {
     /// Of a UR, whose maker states ±0.03 mm: ten touches of 0.03 mm are within 0.15 mm in 98 of 100 checks.
     fn default() -> Self {
-        Self { spot_um: 150.0, sphere_um: 150.0, diameter_sigma_um: 1.0 }
+        Self {
+            spot_um: 150.0,
+            sphere_um: 150.0,
+            diameter_sigma_um: 1.0,
+        }
     }
 }
 
@@ -54,16 +60,23 @@ impl CheckReport {
         let spot = spot.map(CheckedSpot::of);
         // pooled, by the numbers that each is known by
         let scatters = [
-            spot.as_ref().map(|spot| (spot.std_um / 1e3, spot.touches.len() - 1)),
-            workspace.as_ref().map(|all| (all.repeatability_um / 1e3, all.degrees_of_freedom)),
+            spot.as_ref()
+                .map(|spot| (spot.std_um / 1e3, spot.touches.len() - 1)),
+            workspace
+                .as_ref()
+                .map(|all| (all.repeatability_um / 1e3, all.degrees_of_freedom)),
         ];
         let scatters: Vec<_> = scatters.into_iter().flatten().collect();
         let repeatability_degrees_of_freedom: usize = scatters.iter().map(|(_, count)| count).sum();
-        let squares: f64 = scatters.iter().map(|(std, count)| std * std * *count as f64).sum();
+        let squares: f64 = scatters
+            .iter()
+            .map(|(std, count)| std * std * *count as f64)
+            .sum();
         let failures = Self::failures(&gates, spot.as_ref(), workspace.as_ref());
         let jump = |all: &SphereResults| {
-            let jumped =
-                radii.iter().filter_map(|(whose, radius_mm, sigma_mm)| all.jump(whose, (*radius_mm)?, *sigma_mm));
+            let jumped = radii.iter().filter_map(|(whose, radius_mm, sigma_mm)| {
+                all.jump(whose, (*radius_mm)?, *sigma_mm)
+            });
             jumped.collect::<Vec<_>>()
         };
         let record = CheckRecord {
@@ -77,17 +90,32 @@ impl CheckReport {
             tip_radius_sigma_mm: workspace.as_ref().map(|all| all.tip_radius_sigma_mm),
             ..record
         };
-        Self { record, gates, spot, workspace }
+        Self {
+            record,
+            gates,
+            spot,
+            workspace,
+        }
     }
 
-    fn failures(gates: &Gates, spot: Option<&CheckedSpot>, workspace: Option<&SphereResults>) -> Vec<String> {
-        let Gates { spot_um, sphere_um, .. } = gates;
+    fn failures(
+        gates: &Gates,
+        spot: Option<&CheckedSpot>,
+        workspace: Option<&SphereResults>,
+    ) -> Vec<String> {
+        let Gates {
+            spot_um, sphere_um, ..
+        } = gates;
         let of_spot = spot.filter(|spot| spot.range_um > *spot_um).map(|CheckedSpot { range_um, .. }| {
             format!(
                 "the touches of one spot are {range_um:.1} µm apart, the gate is {spot_um} µm: look for play in probe, flange and joints"
             )
         });
-        let worst = workspace.and_then(|all| all.spheres.iter().max_by(|a, b| a.error_um().total_cmp(&b.error_um())));
+        let worst = workspace.and_then(|all| {
+            all.spheres
+                .iter()
+                .max_by(|a, b| a.error_um().total_cmp(&b.error_um()))
+        });
         let of_place = worst.filter(|sphere| sphere.error_um() > *sphere_um).map(|sphere| {
             format!(
                 "sphere {} is {:.1} µm from where the others have it, the gate is {sphere_um} µm: look at its place, or calibrate the arm",
@@ -101,13 +129,20 @@ impl CheckReport {
                 "the centre of a sphere scatters by {scatter_um:.1} µm when the probe leans, the gate is {sphere_um} µm: `touchup calibrate tip`"
             )
         });
-        [of_spot, of_place, of_turns].into_iter().flatten().collect()
+        [of_spot, of_place, of_turns]
+            .into_iter()
+            .flatten()
+            .collect()
     }
 
     /// Why the check did not pass, and what else should be looked at.
     pub(super) fn losses(&self) -> Losses {
-        let CheckRecord { failures, warnings, .. } = &self.record;
-        warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
+        let CheckRecord {
+            failures, warnings, ..
+        } = &self.record;
+        warnings
+            .iter()
+            .for_each(|warning| tracing::warn!("{warning}"));
         failures.clone()
     }
 }
@@ -199,7 +234,11 @@ reported! {
 impl SphereResults {
     /// Where the radius differs from another by more than chance.
     fn jump(&self, whose: &str, radius_mm: f64, sigma_mm: f64) -> Option<String> {
-        let Self { tip_radius_mm, tip_radius_sigma_mm, .. } = self;
+        let Self {
+            tip_radius_mm,
+            tip_radius_sigma_mm,
+            ..
+        } = self;
         let by_mm = tip_radius_mm - radius_mm;
         (by_mm.abs() > JUMPS * tip_radius_sigma_mm.hypot(sigma_mm)).then(|| {
             format!(
@@ -212,53 +251,106 @@ impl SphereResults {
 
 impl CheckedSphere {
     fn error_um(&self) -> f64 {
-        self.error_mm.map_or(0.0, |error| error.iter().map(|mm| mm * mm).sum::<f64>().sqrt() * 1e3)
+        self.error_mm.map_or(0.0, |error| {
+            error.iter().map(|mm| mm * mm).sum::<f64>().sqrt() * 1e3
+        })
     }
 }
 
 impl fmt::Display for CheckedSpot {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (number, touch) in (1..).zip(&self.touches) {
-            let CheckedTouch { side, deviation_um, std_um, verdict, .. } = touch;
+            let CheckedTouch {
+                side,
+                deviation_um,
+                std_um,
+                verdict,
+                ..
+            } = touch;
             let side = if *side > 0 { "one side" } else { "the other" };
-            writeln!(f, "touch {number:3} from {side}: {deviation_um:+6.1} µm ± {std_um:.1}, {verdict}")?;
+            writeln!(
+                f,
+                "touch {number:3} from {side}: {deviation_um:+6.1} µm ± {std_um:.1}, {verdict}"
+            )?;
         }
-        let Self { spot_mm: [x, y, z], range_um, std_um, reversal_um, stiffness_n_per_mm, .. } = self;
+        let Self {
+            spot_mm: [x, y, z],
+            range_um,
+            std_um,
+            reversal_um,
+            stiffness_n_per_mm,
+            ..
+        } = self;
         let count = self.touches.len();
         writeln!(
             f,
             "{count} touches of ({x:.1} {y:.1} {z:.1}) mm: {range_um:.1} µm apart, standard deviation {std_um:.1} µm"
         )?;
-        writeln!(f, "the sides differ by {reversal_um:+.1} µm; arm and probe have {stiffness_n_per_mm:.1} N/mm")
+        writeln!(
+            f,
+            "the sides differ by {reversal_um:+.1} µm; arm and probe have {stiffness_n_per_mm:.1} N/mm"
+        )
     }
 }
 
 impl fmt::Display for SphereResults {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for sphere in &self.spheres {
-            let CheckedSphere { sphere: number, told_mm: [x, y, z], orientations, not_reached, .. } = sphere;
+            let CheckedSphere {
+                sphere: number,
+                told_mm: [x, y, z],
+                orientations,
+                not_reached,
+                ..
+            } = sphere;
             let count = orientations.len();
-            write!(f, "sphere {number} at ({x:.1} {y:.1} {z:.1}) mm, {count} orientations: ")?;
+            write!(
+                f,
+                "sphere {number} at ({x:.1} {y:.1} {z:.1}) mm, {count} orientations: "
+            )?;
             match (sphere.found_mm, self.spheres.len()) {
                 (None, _) => writeln!(f, "not reached")?,
                 (Some([x, y, z]), 1) => writeln!(f, "found at ({x:.4} {y:.4} {z:.4})")?,
-                (Some(_), _) => writeln!(f, "{:.1} µm from where the others have it", sphere.error_um())?,
+                (Some(_), _) => writeln!(
+                    f,
+                    "{:.1} µm from where the others have it",
+                    sphere.error_um()
+                )?,
             }
-            not_reached.iter().try_for_each(|line| writeln!(f, "  left out: {line}"))?;
+            not_reached
+                .iter()
+                .try_for_each(|line| writeln!(f, "  left out: {line}"))?;
         }
-        let Self { repeatability_um, tip_radius_mm, tip_radius_sigma_mm, .. } = self;
-        writeln!(f, "one touch repeats within {repeatability_um:.1} µm (standard deviation)")?;
+        let Self {
+            repeatability_um,
+            tip_radius_mm,
+            tip_radius_sigma_mm,
+            ..
+        } = self;
+        writeln!(
+            f,
+            "one touch repeats within {repeatability_um:.1} µm (standard deviation)"
+        )?;
         if let Some(scatter_um) = self.orientation_scatter_um {
-            writeln!(f, "a centre scatters by {scatter_um:.1} µm along each axis when the probe leans")?;
+            writeln!(
+                f,
+                "a centre scatters by {scatter_um:.1} µm along each axis when the probe leans"
+            )?;
         }
-        writeln!(f, "radius of the ball {tip_radius_mm:.4} ± {tip_radius_sigma_mm:.4} mm")?;
+        writeln!(
+            f,
+            "radius of the ball {tip_radius_mm:.4} ± {tip_radius_sigma_mm:.4} mm"
+        )?;
         match self.growth_mm_per_m {
             Some(growth) => writeln!(
                 f,
                 "places are {growth:.3} mm/m less certain with the distance from robot.registered_at_mm, by {} numbers",
                 self.growth_degrees_of_freedom
             ),
-            None => writeln!(f, "one sphere says nothing of the growth over the workspace: touch it at several places"),
+            None => writeln!(
+                f,
+                "one sphere says nothing of the growth over the workspace: touch it at several places"
+            ),
         }
     }
 }
@@ -266,12 +358,26 @@ impl fmt::Display for SphereResults {
 impl fmt::Display for CheckReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.spot.iter().try_for_each(|spot| write!(f, "{spot}"))?;
-        self.workspace.iter().try_for_each(|all| write!(f, "{all}"))?;
-        let CheckRecord { passed, failures, warnings, .. } = &self.record;
-        warnings.iter().try_for_each(|warning| writeln!(f, "WARNING: {warning}"))?;
-        let Gates { spot_um, sphere_um, .. } = self.gates;
+        self.workspace
+            .iter()
+            .try_for_each(|all| write!(f, "{all}"))?;
+        let CheckRecord {
+            passed,
+            failures,
+            warnings,
+            ..
+        } = &self.record;
+        warnings
+            .iter()
+            .try_for_each(|warning| writeln!(f, "WARNING: {warning}"))?;
+        let Gates {
+            spot_um, sphere_um, ..
+        } = self.gates;
         match passed {
-            true => write!(f, "passed: the gates are {spot_um} µm for a spot, {sphere_um} µm for spheres"),
+            true => write!(
+                f,
+                "passed: the gates are {spot_um} µm for a spot, {sphere_um} µm for spheres"
+            ),
             false => write!(f, "FAILED: {}", failures.join("; ")),
         }
     }

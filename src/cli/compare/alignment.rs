@@ -8,8 +8,8 @@ use serde::Serialize;
 use tracing::warn;
 
 use crate::align::{
-    Alternative, FeaturesError, FeaturesParams, FreeTurn, IcpFit, IcpParams, Motion, OrientedSample, PairsParams,
-    Surfaces, align_features, fit_pairs, icp,
+    Alternative, FeaturesError, FeaturesParams, FreeTurn, IcpFit, IcpParams, Motion,
+    OrientedSample, PairsParams, Surfaces, align_features, fit_pairs, icp,
 };
 use crate::cli::progress::WorkProgress;
 use crate::cli::{CliError, counted, print_report, reported};
@@ -142,7 +142,14 @@ type Aligned = Result<(Isometry3<f64>, Option<Alignment>), CliError>;
 pub(super) fn aligned_by_icp(mesh: &TriMesh, truth: IndexedMesh<'_>, seed: u64) -> Aligned {
     let _aligning = WorkProgress::stage("align");
     let points: Vec<_> = spread(mesh, POINTS, seed).iter().map(|p| p.point).collect();
-    let fit = icp(&points, truth.mesh, truth.tree, &Isometry3::identity(), &IcpParams::default(), &Threads)?;
+    let fit = icp(
+        &points,
+        truth.mesh,
+        truth.tree,
+        &Isometry3::identity(),
+        &IcpParams::default(),
+        &Threads,
+    )?;
     let alignment = Alignment::of_icp("icp", &fit, points.len());
     alignment.warn();
     Ok((fit.source_to_target, Some(alignment)))
@@ -165,20 +172,29 @@ pub(super) fn aligned_by_features(
     let own = detect(mesh, &FaceTree::new_by(mesh, &Threads), &[]).features;
     let theirs = detect(truth.mesh, truth.tree, &[]).features;
     let points = spread(mesh, POINTS_EACH, seed);
-    let surfaces = Surfaces { points: &points, target: truth.mesh, tree: truth.tree };
-    let counts = [own.len(), theirs.len()];
-    let (found, undecided) = match align_features(&own, &theirs, Some(&surfaces), &FeaturesParams::default()) {
-        Ok(only) => (vec![only], None),
-        Err(
-            ref error @ (FeaturesError::Ambiguous { ref alternatives }
-            | FeaturesError::FreeTurn { ref alternatives, .. }),
-        ) => (alternatives.clone(), Some(error.clone())),
-        Err(error) => return Err(error.into()),
+    let surfaces = Surfaces {
+        points: &points,
+        target: truth.mesh,
+        tree: truth.tree,
     };
+    let counts = [own.len(), theirs.len()];
+    let (found, undecided) =
+        match align_features(&own, &theirs, Some(&surfaces), &FeaturesParams::default()) {
+            Ok(only) => (vec![only], None),
+            Err(
+                ref error @ (FeaturesError::Ambiguous { ref alternatives }
+                | FeaturesError::FreeTurn {
+                    ref alternatives, ..
+                }),
+            ) => (alternatives.clone(), Some(error.clone())),
+            Err(error) => return Err(error.into()),
+        };
     let chosen = match (alternative, undecided) {
         (Some(number), _) => found.get(number.wrapping_sub(1)).ok_or_else(|| {
             let motions = counted(found.len(), "motion was", "motions were");
-            CliError::usage(format!("--alternative {number} is not there: {motions} found"))
+            CliError::usage(format!(
+                "--alternative {number} is not there: {motions} found"
+            ))
         })?,
         (None, None) => &found[0],
         (None, Some(error)) => {
@@ -191,7 +207,10 @@ pub(super) fn aligned_by_features(
         Some(fit) => Alignment::of_icp("features", fit, points.len()),
         None => Alignment::of("features", &chosen.source_to_target),
     };
-    let alignment = Alignment { explained: Some(Explained::of(chosen, counts)), ..alignment };
+    let alignment = Alignment {
+        explained: Some(Explained::of(chosen, counts)),
+        ..alignment
+    };
     alignment.warn();
     Ok((chosen.source_to_target, Some(alignment)))
 }
@@ -202,17 +221,42 @@ pub(super) fn aligned_by_features(
 /// [`CliError`], [`CliError::calibration`].
 pub(super) fn aligned_by_pairs(path: &Path) -> Aligned {
     let file = read_pairs(path)?;
-    let fit = fit_pairs(&file.pairs, &PairsParams::default()).map_err(|error| CliError::calibration(path, error))?;
-    let numbered: Vec<String> = (1..=file.pairs.len()).map(|number| number.to_string()).collect();
-    let names = if file.names.len() == file.pairs.len() { &file.names } else { &numbered };
-    let residuals = names.iter().zip(&fit.residuals).map(|(name, residual)| Residual::of(name, residual)).collect();
-    let alignment = Alignment { residuals, rms_mm: Some(fit.rms * 1e3), ..Alignment::of("pairs", &fit.motion) };
+    let fit = fit_pairs(&file.pairs, &PairsParams::default())
+        .map_err(|error| CliError::calibration(path, error))?;
+    let numbered: Vec<String> = (1..=file.pairs.len())
+        .map(|number| number.to_string())
+        .collect();
+    let names = if file.names.len() == file.pairs.len() {
+        &file.names
+    } else {
+        &numbered
+    };
+    let residuals = names
+        .iter()
+        .zip(&fit.residuals)
+        .map(|(name, residual)| Residual::of(name, residual))
+        .collect();
+    let alignment = Alignment {
+        residuals,
+        rms_mm: Some(fit.rms * 1e3),
+        ..Alignment::of("pairs", &fit.motion)
+    };
     Ok((fit.motion, Some(alignment)))
 }
 
 fn spread(mesh: &TriMesh, count: f64, seed: u64) -> Vec<OrientedSample> {
-    let samples = sample_surface(mesh, count / surface_area(mesh).max(f64::MIN_POSITIVE), seed);
-    samples.iter().map(|sample| OrientedSample { point: sample.point, normal: mesh.normal(sample.face) }).collect()
+    let samples = sample_surface(
+        mesh,
+        count / surface_area(mesh).max(f64::MIN_POSITIVE),
+        seed,
+    );
+    samples
+        .iter()
+        .map(|sample| OrientedSample {
+            point: sample.point,
+            normal: mesh.normal(sample.face),
+        })
+        .collect()
 }
 
 /// The mesh after a motion.
@@ -228,35 +272,53 @@ pub(super) fn moved(mesh: &TriMesh, pose: &Isometry3<f64>) -> TriMesh {
 
 impl Alignment {
     fn of(method: &'static str, motion: &Isometry3<f64>) -> Self {
-        Self { method, motion: MotionReport::of(motion), ..Self::default() }
+        Self {
+            method,
+            motion: MotionReport::of(motion),
+            ..Self::default()
+        }
     }
 
     fn of_icp(method: &'static str, fit: &IcpFit, points: usize) -> Self {
         Self {
             rms_mm: Some(fit.rms * 1e3),
             fit: Some(FitReport::of(fit, points)),
-            undetermined: fit.undetermined().map(|motion| Loose::of(motion, fit)).collect(),
+            undetermined: fit
+                .undetermined()
+                .map(|motion| Loose::of(motion, fit))
+                .collect(),
             ..Self::of(method, &fit.source_to_target)
         }
     }
 
     /// The method and the residuals of the alignment.
     pub(super) fn in_short(&self) -> String {
-        let rms = self.rms_mm.map_or_else(String::new, |rms_mm| format!(", rms {rms_mm:.4} mm"));
+        let rms = self
+            .rms_mm
+            .map_or_else(String::new, |rms_mm| format!(", rms {rms_mm:.4} mm"));
         format!("aligned by {}{rms}", self.method)
     }
 
     /// The points that took part, where there were any.
     pub(super) fn details(&self) -> Option<String> {
-        let FitReport { points, inliers, rounds } = self.fit.as_ref()?;
-        Some(format!("aligned by {inliers} of {points} points, {}", counted(*rounds, "round", "rounds")))
+        let FitReport {
+            points,
+            inliers,
+            rounds,
+        } = self.fit.as_ref()?;
+        Some(format!(
+            "aligned by {inliers} of {points} points, {}",
+            counted(*rounds, "round", "rounds")
+        ))
     }
 
     fn warn(&self) {
         let count = self.undetermined.len();
         if count > 0 {
-            let (motions, these) =
-                (counted(count, "motion leaves", "motions leave"), if count == 1 { "this" } else { "these" });
+            let (motions, these) = (
+                counted(count, "motion leaves", "motions leave"),
+                if count == 1 { "this" } else { "these" },
+            );
             warn!("{motions} the mesh on the truth as it is: it stays where it is in {these}");
         }
     }
@@ -265,13 +327,34 @@ impl Alignment {
 impl fmt::Display for Alignment {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [x, y, z] = self.motion.translation_mm;
-        write!(f, "aligned by {}: shift ({x:.3}, {y:.3}, {z:.3}) mm", self.method)?;
-        self.explained.iter().try_for_each(|explained| write!(f, ", {explained}"))?;
-        self.rms_mm.iter().try_for_each(|rms_mm| write!(f, ", rms {rms_mm:.4} mm"))?;
-        for Residual { pair, residual_mm: [x, y, z], distance_mm } in &self.residuals {
-            write!(f, "\n  pair {pair}: off by ({x:.3}, {y:.3}, {z:.3}) mm, {distance_mm:.3} mm")?;
+        write!(
+            f,
+            "aligned by {}: shift ({x:.3}, {y:.3}, {z:.3}) mm",
+            self.method
+        )?;
+        self.explained
+            .iter()
+            .try_for_each(|explained| write!(f, ", {explained}"))?;
+        self.rms_mm
+            .iter()
+            .try_for_each(|rms_mm| write!(f, ", rms {rms_mm:.4} mm"))?;
+        for Residual {
+            pair,
+            residual_mm: [x, y, z],
+            distance_mm,
+        } in &self.residuals
+        {
+            write!(
+                f,
+                "\n  pair {pair}: off by ({x:.3}, {y:.3}, {z:.3}) mm, {distance_mm:.3} mm"
+            )?;
         }
-        for Loose { shift, turn_rad_per_mm, about_mm } in &self.undetermined {
+        for Loose {
+            shift,
+            turn_rad_per_mm,
+            about_mm,
+        } in &self.undetermined
+        {
             let [[a, b, c], [p, q, r], [x, y, z]] = [shift, turn_rad_per_mm, about_mm];
             write!(
                 f,
@@ -285,16 +368,29 @@ impl fmt::Display for Alignment {
 
 impl fmt::Display for Explained {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} of {}", self.explained_features, counted(self.mesh_features, "feature", "features"))?;
-        self.agreeing_share.iter().try_for_each(|share| write!(f, " and {:.1} % of the surface agree", share * 100.0))
+        write!(
+            f,
+            "{} of {}",
+            self.explained_features,
+            counted(self.mesh_features, "feature", "features")
+        )?;
+        self.agreeing_share
+            .iter()
+            .try_for_each(|share| write!(f, " and {:.1} % of the surface agree", share * 100.0))
     }
 }
 
 impl fmt::Display for Choices {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.free_turn {
-            None => writeln!(f, "these motions explain the mesh about equally well; --alternative K takes one")?,
-            Some(FreeTurnReport { axis: [a, b, c], through_mm: [x, y, z] }) => writeln!(
+            None => writeln!(
+                f,
+                "these motions explain the mesh about equally well; --alternative K takes one"
+            )?,
+            Some(FreeTurnReport {
+                axis: [a, b, c],
+                through_mm: [x, y, z],
+            }) => writeln!(
                 f,
                 "free to turn about ({a:.3}, {b:.3}, {c:.3}) through ({x:.2}, {y:.2}, {z:.2}) mm; --alternative K takes one \
                  with the turn that it has"
@@ -306,10 +402,20 @@ impl fmt::Display for Choices {
             "K", "shift, mm", "features", "surface", "rms, mm"
         )?;
         for choice in &self.ambiguous {
-            let three = |v: &[f64; 3], digits: usize| format!("{:.digits$} {:.digits$} {:.digits$}", v[0], v[1], v[2]);
-            let Explained { explained_features, mesh_features, agreeing_share, .. } = &choice.explained;
-            let surface = agreeing_share.map_or_else(String::new, |share| format!("{:.1} %", share * 100.0));
-            let rms = choice.rms_mm.map_or_else(String::new, |rms| format!("{rms:.4}"));
+            let three = |v: &[f64; 3], digits: usize| {
+                format!("{:.digits$} {:.digits$} {:.digits$}", v[0], v[1], v[2])
+            };
+            let Explained {
+                explained_features,
+                mesh_features,
+                agreeing_share,
+                ..
+            } = &choice.explained;
+            let surface =
+                agreeing_share.map_or_else(String::new, |share| format!("{:.1} %", share * 100.0));
+            let rms = choice
+                .rms_mm
+                .map_or_else(String::new, |rms| format!("{rms:.4}"));
             write!(
                 f,
                 "\n{:>2}  {:>30}  {:>8}  {surface:>7}  {rms:>8}   {:.2}° ({}), ({}) mm",

@@ -7,7 +7,9 @@ use nalgebra::Vector3;
 
 use super::alignment::Alignment;
 use crate::cli::{counted, reported};
-use crate::compare::{Comparison, Histogram, RegionComparison, Summary, SupportRegion, TiltSummary};
+use crate::compare::{
+    Comparison, Histogram, RegionComparison, Summary, SupportRegion, TiltSummary,
+};
 use crate::mesh::TriMesh;
 
 reported! {
@@ -46,7 +48,8 @@ pub(super) fn diagonal(mesh: &TriMesh) -> Vector3<f64> {
 
 /// What `--json` prints of one mesh as `after`, as JSON.
 pub fn comparison_json(comparison: &Comparison) -> serde_json::Value {
-    serde_json::to_value(ComparisonReport::of(comparison)).expect("finite numbers and names alone cannot fail")
+    serde_json::to_value(ComparisonReport::of(comparison))
+        .expect("finite numbers and names alone cannot fail")
 }
 
 reported! {
@@ -94,7 +97,10 @@ reported! {
 
 impl SummaryReport {
     fn without_sign(summary: &Summary) -> Self {
-        Self { bias_mm: None, ..Self::of(summary) }
+        Self {
+            bias_mm: None,
+            ..Self::of(summary)
+        }
     }
 }
 
@@ -128,21 +134,37 @@ fn name_of(region: Option<SupportRegion>) -> &'static str {
 
 /// The numbers of a picture: of the touched part where there is one, else of all.
 pub(super) fn shown(comparison: &Comparison) -> Option<&RegionComparison> {
-    let touched = comparison.regions.iter().find(|part| part.region == Some(SupportRegion::Touched));
+    let touched = comparison
+        .regions
+        .iter()
+        .find(|part| part.region == Some(SupportRegion::Touched));
     touched.or(comparison.regions.first())
 }
 
 /// Caption of a picture: the deviation, the share within tolerance, and what the colours clip.
 pub(super) fn note(comparison: &Comparison, tolerance_mm: Option<f64>) -> String {
-    let Some(part) = shown(comparison) else { return String::new() };
-    let Some(Summary { mean, p95, .. }) = part.mesh_to_truth else { return String::new() };
+    let Some(part) = shown(comparison) else {
+        return String::new();
+    };
+    let Some(Summary { mean, p95, .. }) = part.mesh_to_truth else {
+        return String::new();
+    };
     let (name, [mean, p95]) = (name_of(part.region), [mean, p95].map(|x| x * 1e3));
     let within = part.within_tolerance.zip(tolerance_mm);
     let within = within.map(|(share, mm)| format!("; {:.1} % within ±{mm} mm", share * 100.0));
-    let Histogram { counts, below, above, .. } = &part.histogram;
-    let beyond = (below + above) as f64 / (below + above + counts.iter().sum::<usize>()).max(1) as f64;
+    let Histogram {
+        counts,
+        below,
+        above,
+        ..
+    } = &part.histogram;
+    let beyond =
+        (below + above) as f64 / (below + above + counts.iter().sum::<usize>()).max(1) as f64;
     let within = within.unwrap_or_default();
-    format!("{name}: mean {mean:.3}, p95 {p95:.3} mm{within}; beyond the colours {:.1} %", beyond * 100.0)
+    format!(
+        "{name}: mean {mean:.3}, p95 {p95:.3} mm{within}; beyond the colours {:.1} %",
+        beyond * 100.0
+    )
 }
 
 const HEAD: &str = "                            mean      rms   median      p95      p99      max     bias    points";
@@ -152,11 +174,17 @@ impl CompareReport {
     pub(super) fn details(&self) -> String {
         let size = |(what, shape): (&str, &ShapeReport)| {
             let ([x, y, z], faces) = (shape.size_mm, counted(shape.faces, "face", "faces"));
-            format!("{what:5} {}: {faces}, {x:.1} x {y:.1} x {z:.1} mm", shape.file)
+            format!(
+                "{what:5} {}: {faces}, {x:.1} x {y:.1} x {z:.1} mm",
+                shape.file
+            )
         };
         let mut lines = vec![size(("mesh", &self.mesh)), size(("truth", &self.truth))];
         lines.extend(self.alignment.as_ref().and_then(Alignment::details));
-        lines.push(format!("distances in mm; bias +: too much material; {:.2} points/mm2", self.after.density_per_mm2));
+        lines.push(format!(
+            "distances in mm; bias +: too much material; {:.2} points/mm2",
+            self.after.density_per_mm2
+        ));
         lines.push(HEAD.to_owned());
         match &self.before {
             Some(before) => lines.push(format!("before\n{before}\nafter\n{}", self.after)),
@@ -173,18 +201,47 @@ impl fmt::Display for CompareReport {
         let shown = |(region, place)| Some((region, place, self.after.row(region)?));
         match places.into_iter().find_map(shown) {
             None => writeln!(f, "the mesh shows nothing of the true surface")?,
-            Some((region, place, (row, SummaryReport { mean_mm, p95_mm, .. }))) => {
+            Some((
+                region,
+                place,
+                (
+                    row,
+                    SummaryReport {
+                        mean_mm, p95_mm, ..
+                    },
+                ),
+            )) => {
                 let before = self.before.as_ref().and_then(|before| before.row(region));
-                write!(f, "the mesh is off by {mean_mm:.3} mm on average {place}, 95 % within {p95_mm:.3} mm")?;
-                if let Some((_, SummaryReport { mean_mm, p95_mm, .. })) = before {
-                    write!(f, "; before: mean {mean_mm:.3} mm, 95 % within {p95_mm:.3} mm")?;
+                write!(
+                    f,
+                    "the mesh is off by {mean_mm:.3} mm on average {place}, 95 % within {p95_mm:.3} mm"
+                )?;
+                if let Some((
+                    _,
+                    SummaryReport {
+                        mean_mm, p95_mm, ..
+                    },
+                )) = before
+                {
+                    write!(
+                        f,
+                        "; before: mean {mean_mm:.3} mm, 95 % within {p95_mm:.3} mm"
+                    )?;
                 }
-                let before = before.map_or(String::new(), |(row, _)| format!("; before: {}", row.worst()));
+                let before = before.map_or(String::new(), |(row, _)| {
+                    format!("; before: {}", row.worst())
+                });
                 writeln!(f, "\n{}{before}", row.worst())?;
             }
         }
-        write!(f, "the mesh shows {:.1} % of the true surface", (1.0 - self.after.unseen_share) * 100.0)?;
-        self.alignment.iter().try_for_each(|alignment| write!(f, "\n{alignment}"))
+        write!(
+            f,
+            "the mesh shows {:.1} % of the true surface",
+            (1.0 - self.after.unseen_share) * 100.0
+        )?;
+        self.alignment
+            .iter()
+            .try_for_each(|alignment| write!(f, "\n{alignment}"))
     }
 }
 
@@ -200,15 +257,33 @@ impl DeviationRow {
     /// What a part is accepted by.
     fn worst(&self) -> String {
         let errors = self.mesh_to_truth.as_ref();
-        let errors = errors.map(|errors| format!("rms {:.3} mm, at most {:.3} mm", errors.rms_mm, errors.max_mm));
-        let within = self.within_tolerance_share.map(|share| format!("{:.1} % in tolerance", share * 100.0));
-        errors.into_iter().chain(within).collect::<Vec<_>>().join(", ")
+        let errors = errors.map(|errors| {
+            format!(
+                "rms {:.3} mm, at most {:.3} mm",
+                errors.rms_mm, errors.max_mm
+            )
+        });
+        let within = self
+            .within_tolerance_share
+            .map(|share| format!("{:.1} % in tolerance", share * 100.0));
+        errors
+            .into_iter()
+            .chain(within)
+            .collect::<Vec<_>>()
+            .join(", ")
     }
 }
 
 impl fmt::Display for ComparisonReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.regions.iter().map(DeviationRow::to_string).collect::<Vec<_>>().join("\n"))
+        f.write_str(
+            &self
+                .regions
+                .iter()
+                .map(DeviationRow::to_string)
+                .collect::<Vec<_>>()
+                .join("\n"),
+        )
     }
 }
 
@@ -222,7 +297,10 @@ impl fmt::Display for DeviationRow {
             ("truth to cloud", &self.truth_to_cloud),
         ];
         let mut region = self.region;
-        for (what, summary) in rows.iter().filter_map(|(what, summary)| Some((what, (*summary).as_ref()?))) {
+        for (what, summary) in rows
+            .iter()
+            .filter_map(|(what, summary)| Some((what, (*summary).as_ref()?)))
+        {
             writeln!(f, "{region:9} {what:14} {summary}")?;
             region = "";
         }
@@ -230,7 +308,11 @@ impl fmt::Display for DeviationRow {
             writeln!(f, "{region:9} in tolerance   {:.2} %", share * 100.0)?;
         }
         match &self.normals {
-            Some(NormalsReport { median_deg, p95_deg, flipped_share }) => write!(
+            Some(NormalsReport {
+                median_deg,
+                p95_deg,
+                flipped_share,
+            }) => write!(
                 f,
                 "{region:9} normals        median {median_deg:.2}, p95 {p95_deg:.2} deg, flipped {:.3} %",
                 flipped_share * 100.0
@@ -242,7 +324,14 @@ impl fmt::Display for DeviationRow {
 
 impl fmt::Display for SummaryReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for x in [self.mean_mm, self.rms_mm, self.median_mm, self.p95_mm, self.p99_mm, self.max_mm] {
+        for x in [
+            self.mean_mm,
+            self.rms_mm,
+            self.median_mm,
+            self.p95_mm,
+            self.p99_mm,
+            self.max_mm,
+        ] {
             write!(f, "{x:9.4}")?;
         }
         match self.bias_mm {

@@ -9,7 +9,8 @@ use crate::cli::progress::WorkProgress;
 use crate::cli::{CliError, check_outputs};
 use crate::conformity::{DecisionParams, DecisionRule, GeneralTolerance};
 use crate::inspection::{
-    AlignmentMethod, DrawingParams, InspectionParams, InspectionSource, ReportFiles, decision_rule, general_tolerance,
+    AlignmentMethod, DrawingParams, InspectionParams, InspectionSource, ReportFiles, decision_rule,
+    general_tolerance,
 };
 use crate::io::mesh_file::MeshUnit;
 
@@ -74,7 +75,13 @@ pub(in crate::cli) struct InspectArguments {
     #[arg(long, value_name = "NAME")]
     pub operator: Option<String>,
     /// From which direction the picture is taken; by default the side that was touched
-    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', num_args = 3, allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        value_delimiter = ',',
+        num_args = 3,
+        allow_negative_numbers = true
+    )]
     pub view: Option<Vec<f64>>,
     /// Output: the report, one file of HTML that prints
     #[arg(long, value_name = "HTML")]
@@ -102,11 +109,22 @@ impl InspectArguments {
             self.scene.as_ref(),
         ];
         check_outputs(&outputs, &inputs, "read: choose another place")?;
-        let is_xml =
-            self.qif.as_ref().and_then(|path| path.extension()).is_some_and(|end| end.eq_ignore_ascii_case("xml"));
+        let is_xml = self
+            .qif
+            .as_ref()
+            .and_then(|path| path.extension())
+            .is_some_and(|end| end.eq_ignore_ascii_case("xml"));
         let ending = if is_xml { ".xml" } else { ".qif" };
-        check_outputs(&[("--qif", ending, &self.qif)], &inputs, "read: choose another place")?;
-        check_outputs(&[("--write-nominal", "", &self.write_nominal)], &inputs, "read: choose another place")?;
+        check_outputs(
+            &[("--qif", ending, &self.qif)],
+            &inputs,
+            "read: choose another place",
+        )?;
+        check_outputs(
+            &[("--write-nominal", "", &self.write_nominal)],
+            &inputs,
+            "read: choose another place",
+        )?;
         self.params().check()?;
         view_from(self.view.as_ref()).map(drop)
     }
@@ -120,7 +138,10 @@ impl InspectArguments {
                 tolerance_mm: self.tolerance_mm,
                 position_mm: self.position_mm,
             },
-            decision: DecisionParams { rule: self.rule, confidence: self.confidence },
+            decision: DecisionParams {
+                rule: self.rule,
+                confidence: self.confidence,
+            },
             coverage_factor: self.k,
             match_mm: self.match_mm,
             align: self.align.clone(),
@@ -132,13 +153,22 @@ impl InspectArguments {
 
     /// Where the report goes; JSON goes to stdout.
     pub(super) fn files(&self) -> ReportFiles {
-        ReportFiles { html: self.out.clone(), csv: self.csv.clone(), json: None, qif: self.qif.clone() }
+        ReportFiles {
+            html: self.out.clone(),
+            csv: self.csv.clone(),
+            json: None,
+            qif: self.qif.clone(),
+        }
     }
 
     /// Reads what was measured.
     pub(super) fn source(&self) -> Result<InspectionSource, CliError> {
         let _reading = WorkProgress::stage("read");
-        let named = [self.touches.as_deref(), self.mesh.as_deref(), self.scene.as_deref()];
+        let named = [
+            self.touches.as_deref(),
+            self.mesh.as_deref(),
+            self.scene.as_deref(),
+        ];
         Ok(InspectionSource::read(&self.features, named)?)
     }
 }

@@ -16,22 +16,39 @@ pub(super) fn inspect(arguments: &InspectArguments) -> Result<Losses, CliError> 
     arguments.check()?;
     let (source, params) = (arguments.source()?, arguments.params());
     if let Some(path) = &arguments.write_nominal {
-        return template::write(path, arguments.nominal.as_deref(), &source.features, &params.drawing);
+        return template::write(
+            path,
+            arguments.nominal.as_deref(),
+            &source.features,
+            &params.drawing,
+        );
     }
     let drawing = {
         let _reading = WorkProgress::stage("read the drawing");
-        let nominal = arguments.nominal.as_deref().ok_or_else(|| CliError::usage("--nominal is missing"))?;
+        let nominal = arguments
+            .nominal
+            .as_deref()
+            .ok_or_else(|| CliError::usage("--nominal is missing"))?;
         PartDrawing::read(nominal, &params.drawing)?
     };
     let inspected = inspected(&source, &drawing, &params)?;
     write(arguments, &source, &inspected)?;
-    print_report(arguments.json, &inspected.record, || summary::in_words(&inspected.record))?;
+    print_report(arguments.json, &inspected.record, || {
+        summary::in_words(&inspected.record)
+    })?;
     Ok(summary::losses(&inspected.record))
 }
 
 /// Writes the files that were asked for.
-fn write(arguments: &InspectArguments, source: &InspectionSource, inspected: &Inspected) -> Result<(), CliError> {
+fn write(
+    arguments: &InspectArguments,
+    source: &InspectionSource,
+    inspected: &Inspected,
+) -> Result<(), CliError> {
     let _writing = WorkProgress::stage("write the report");
-    let picture = PartPicture { mesh_unit: arguments.mesh_unit, view: view_from(arguments.view.as_ref())? };
+    let picture = PartPicture {
+        mesh_unit: arguments.mesh_unit,
+        view: view_from(arguments.view.as_ref())?,
+    };
     Ok(arguments.files().write(source, inspected, &picture)?)
 }

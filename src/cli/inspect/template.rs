@@ -15,7 +15,10 @@ pub(super) fn write(
     params: &DrawingParams,
 ) -> Result<Losses, CliError> {
     let mesh = nominal.filter(|nominal| !is_nominal_file(nominal));
-    require(nominal.is_none() || mesh.is_some(), "--write-nominal begins with a CAD mesh or with FEATURES")?;
+    require(
+        nominal.is_none() || mesh.is_some(),
+        "--write-nominal begins with a CAD mesh or with FEATURES",
+    )?;
     let records = template(mesh, measured, params)?;
     if records.is_empty() {
         return Err(CliError::from(NominalFileError::Empty(path.to_owned())));
@@ -31,6 +34,9 @@ pub(super) fn write(
     ];
     write_nominal(path, &records, &comment)?;
     let count = counted(records.len(), "characteristic", "characteristics");
-    print_result(&format!("wrote {}: {count}; fill in the tolerances", path.display()))?;
+    print_result(&format!(
+        "wrote {}: {count}; fill in the tolerances",
+        path.display()
+    ))?;
     Ok(Losses::new())
 }

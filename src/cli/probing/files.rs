@@ -26,7 +26,11 @@ const PAUSE_NS: i64 = 1_000_000_000;
 
 /// Those of the recording.
 pub(super) fn probe_topics() -> Topics {
-    Topics { pose: "/probe/pose".to_owned(), wrench: "/probe/wrench".to_owned(), markers: None }
+    Topics {
+        pose: "/probe/pose".to_owned(),
+        wrench: "/probe/wrench".to_owned(),
+        markers: None,
+    }
 }
 
 /// The open files.
@@ -46,26 +50,47 @@ impl ProbeFiles {
     ///
     /// - `ball_radius`: m.
     pub fn begin(out: &Path, ball_radius: f64) -> Result<Self, CliError> {
-        let recording =
-            SegmentedWriter::replace(&out.join(RECORDING), &probe_topics()).map_err(CliError::not_written)?;
+        let recording = SegmentedWriter::replace(&out.join(RECORDING), &probe_topics())
+            .map_err(CliError::not_written)?;
         let path = out.join(TOUCHES);
         let touches = TouchLog::create(&path, ball_radius).map_err(not_written(&path))?;
-        Ok(Self { touches, recording, offset_ns: None, last_ns: None, flushed_ns: i64::MIN })
+        Ok(Self {
+            touches,
+            recording,
+            offset_ns: None,
+            last_ns: None,
+            flushed_ns: i64::MIN,
+        })
     }
 
     /// Goes on with those of a folder.
     ///
     /// - `each`: receives the samples that are there.
-    pub fn resume(out: &Path, ball_radius: f64, each: &mut dyn FnMut(&Message)) -> Result<Self, CliError> {
+    pub fn resume(
+        out: &Path,
+        ball_radius: f64,
+        each: &mut dyn FnMut(&Message),
+    ) -> Result<Self, CliError> {
         let mut last_ns = None;
         let frames = [BASE_FRAME, PROBE_FRAME];
-        let recording = SegmentedWriter::resume(&out.join(RECORDING), &probe_topics(), frames, &mut |message| {
-            last_ns = last_ns.max(Some(message.stamp_ns()));
-            each(message);
-        })?;
+        let recording = SegmentedWriter::resume(
+            &out.join(RECORDING),
+            &probe_topics(),
+            frames,
+            &mut |message| {
+                last_ns = last_ns.max(Some(message.stamp_ns()));
+                each(message);
+            },
+        )?;
         let path = out.join(TOUCHES);
         let touches = TouchLog::resume(&path, ball_radius).map_err(not_written(&path))?;
-        Ok(Self { touches, recording, offset_ns: None, last_ns, flushed_ns: i64::MIN })
+        Ok(Self {
+            touches,
+            recording,
+            offset_ns: None,
+            last_ns,
+            flushed_ns: i64::MIN,
+        })
     }
 
     /// Writes a state as the messages of a probe: the pose in the base of the arm, as the scene says where the part is, and the wrench in
@@ -83,8 +108,12 @@ impl ProbeFiles {
         self.last_ns = Some(stamp_ns);
         let (pose, wrench) = state.as_probe(stamp_ns);
         let (pose, wrench) = (Message::Pose(pose), Message::Wrench(wrench));
-        self.recording.write(&pose, BASE_FRAME).map_err(CliError::not_written)?;
-        self.recording.write(&wrench, PROBE_FRAME).map_err(CliError::not_written)?;
+        self.recording
+            .write(&pose, BASE_FRAME)
+            .map_err(CliError::not_written)?;
+        self.recording
+            .write(&wrench, PROBE_FRAME)
+            .map_err(CliError::not_written)?;
         if stamp_ns.saturating_sub(self.flushed_ns) > FLUSH_EVERY_NS {
             self.recording.flush().map_err(CliError::not_written)?;
             self.flushed_ns = stamp_ns;
@@ -95,7 +124,9 @@ impl ProbeFiles {
     /// Writes a touch, after all samples of it.
     pub fn touched(&mut self, flag: u32, touch: &ProbedTouch) -> Result<(), CliError> {
         self.recording.sync().map_err(CliError::not_written)?;
-        let written = self.touches.append(flag, touch, self.offset_ns.unwrap_or(0));
+        let written = self
+            .touches
+            .append(flag, touch, self.offset_ns.unwrap_or(0));
         written.map_err(not_written(self.touches.path()))
     }
 

@@ -83,10 +83,23 @@ impl ProbingRequest {
             slides: params.slides,
             touch_sigma_mm: params.pattern.touch_sigma * 1e3,
             growth_mm_per_m: params.pattern.shared.growth * 1e3,
-            until_decided: params.goals.iter().map(|(flag, goal)| format!("{flag}: {goal:?}")).collect(),
+            until_decided: params
+                .goals
+                .iter()
+                .map(|(flag, goal)| format!("{flag}: {goal:?}"))
+                .collect(),
         };
         let flags = flags.iter().map(flag_record).collect();
-        Ok(Self { scene, scene_crc32, scan, scan_crc32, mesh_unit, is_simulated, flags, settings })
+        Ok(Self {
+            scene,
+            scene_crc32,
+            scan,
+            scan_crc32,
+            mesh_unit,
+            is_simulated,
+            flags,
+            settings,
+        })
     }
 
     /// What differs from the request before; `None`: nothing that matters.
@@ -94,19 +107,30 @@ impl ProbingRequest {
         let differences = [
             (self.is_simulated != before.is_simulated, "--robot"),
             (self.scene_crc32 != before.scene_crc32, "the scene"),
-            ((self.scan_crc32, self.mesh_unit) != (before.scan_crc32, before.mesh_unit), "the scan or its unit"),
+            (
+                (self.scan_crc32, self.mesh_unit) != (before.scan_crc32, before.mesh_unit),
+                "the scan or its unit",
+            ),
             (self.flags != before.flags, "the list of features"),
             (
                 self.settings != before.settings,
                 "tolerance, nominal values, touches, force, time, slides or the check of the arm",
             ),
         ];
-        differences.into_iter().find_map(|(differs, what)| differs.then_some(what))
+        differences
+            .into_iter()
+            .find_map(|(differs, what)| differs.then_some(what))
     }
 }
 
 fn not_read(path: &Path) -> impl FnOnce(std::io::Error) -> CliError {
-    move |error| CliError::new(("probing", 3), format_args!("{}: {error}", path.display()), Some(&error))
+    move |error| {
+        CliError::new(
+            ("probing", 3),
+            format_args!("{}: {error}", path.display()),
+            Some(&error),
+        )
+    }
 }
 
 /// The folder that `--out` names.
@@ -128,18 +152,29 @@ impl ProbingFolder<'_> {
         let is_own = self.path.join(REQUEST).exists() || !recording.exists();
         require(
             is_own,
-            format_args!("{} is there and of no probing: name another folder by --out", recording.display()),
+            format_args!(
+                "{} is there and of no probing: name another folder by --out",
+                recording.display()
+            ),
         )
     }
 
     /// Refuses to write over touches of a probing that was broken off.
     pub fn check_free(self) -> Result<(), CliError> {
-        let Some(request) = self.read::<ProbingRequest>(REQUEST)? else { return Ok(()) };
+        let Some(request) = self.read::<ProbingRequest>(REQUEST)? else {
+            return Ok(());
+        };
         let records = self.records()?;
-        let is_over =
-            |flag: &FlagRecord| records.iter().any(|record| record.flag == flag.flag && !record.is_broken_off());
+        let is_over = |flag: &FlagRecord| {
+            records
+                .iter()
+                .any(|record| record.flag == flag.flag && !record.is_broken_off())
+        };
         let is_done = request.flags.iter().all(is_over);
-        let finished = records.iter().filter(|record| !record.is_broken_off()).count();
+        let finished = records
+            .iter()
+            .filter(|record| !record.is_broken_off())
+            .count();
         let out = self.path.display();
         let why = format!(
             "{out} holds a probing that was broken off, with {finished} of {} features finished: go on with --resume, or name \
@@ -152,7 +187,11 @@ impl ProbingFolder<'_> {
     /// The features that are finished, where the probing of the folder is that which is asked for.
     pub fn resume(self, request: &ProbingRequest) -> Result<Vec<ProbedRecord>, CliError> {
         let out = self.path.display();
-        let none = || CliError::usage(format_args!("--resume: {out} holds no probing to go on with"));
+        let none = || {
+            CliError::usage(format_args!(
+                "--resume: {out} holds no probing to go on with"
+            ))
+        };
         let before = self.read::<ProbingRequest>(REQUEST)?.ok_or_else(none)?;
         if let Some(what) = request.difference(&before) {
             let why = format!(
@@ -178,7 +217,10 @@ impl ProbingFolder<'_> {
     }
 
     fn records(self) -> Result<Vec<ProbedRecord>, CliError> {
-        Ok(self.read::<ProbedFile>(RECORDS)?.unwrap_or_default().features)
+        Ok(self
+            .read::<ProbedFile>(RECORDS)?
+            .unwrap_or_default()
+            .features)
     }
 
     /// A file; `None` where it is not there.
@@ -189,7 +231,10 @@ impl ProbingFolder<'_> {
             return Ok(None);
         }
         let damaged = |error: serde_json::Error| {
-            let why = format!("{}: {error}; is that the folder of a probing?", path.display());
+            let why = format!(
+                "{}: {error}; is that the folder of a probing?",
+                path.display()
+            );
             CliError::new(("probing", 3), why, None)
         };
         serde_json::from_str(&text).map(Some).map_err(damaged)

@@ -49,8 +49,16 @@ impl<F: TakeStates> Follower<F> {
         let (events, received) = sync_channel(QUEUE);
         let has_failed = Arc::new(AtomicBool::new(false));
         let failure = Arc::clone(&has_failed);
-        Builder::new().name("follow arm".to_owned()).spawn(move || follow(&received, &failure))?;
-        Ok(Self { here: OnceCell::from(Box::new(follows)), events, is_patient, has_failed, is_behind: false })
+        Builder::new()
+            .name("follow arm".to_owned())
+            .spawn(move || follow(&received, &failure))?;
+        Ok(Self {
+            here: OnceCell::from(Box::new(follows)),
+            events,
+            is_patient,
+            has_failed,
+            is_behind: false,
+        })
     }
 
     /// Passes a state on.
@@ -97,7 +105,8 @@ impl<F: TakeStates> Follower<F> {
     fn returned(&self) -> Box<F> {
         let (to, back) = sync_channel(1);
         let _ = self.events.send(Event::Return(to));
-        back.recv().expect("the thread has it, and lives as long as the queue")
+        back.recv()
+            .expect("the thread has it, and lives as long as the queue")
     }
 }
 
@@ -148,7 +157,10 @@ mod tests {
     }
 
     fn state(stamp_ns: i64) -> ArmState {
-        let nothing = Wrench { force: Vector3::zeros(), torque: Vector3::zeros() };
+        let nothing = Wrench {
+            force: Vector3::zeros(),
+            torque: Vector3::zeros(),
+        };
         ArmState {
             stamp_ns,
             pose_bt: Isometry3::identity(),
@@ -162,7 +174,14 @@ mod tests {
     #[test]
     fn states_are_passed_on_while_nothing_is_taken_and_all_are_there_once_asked_for() {
         let (permit, permits) = channel();
-        let mut follower = Follower::new(Permitted { permits, taken: Vec::new() }, false).unwrap();
+        let mut follower = Follower::new(
+            Permitted {
+                permits,
+                taken: Vec::new(),
+            },
+            false,
+        )
+        .unwrap();
         for round in 0..3 {
             // a disk that hangs holds up nobody
             (0..100).for_each(|at| follower.on_state(&state(round * 100 + at)));
@@ -178,20 +197,40 @@ mod tests {
     #[test]
     fn a_full_queue_and_a_failure_have_the_arm_stop() {
         let (permit, permits) = channel();
-        let mut follower = Follower::new(Permitted { permits, taken: Vec::new() }, false).unwrap();
+        let mut follower = Follower::new(
+            Permitted {
+                permits,
+                taken: Vec::new(),
+            },
+            false,
+        )
+        .unwrap();
         // one is with the thread, so many wait, perhaps with the event that began it
         let mut sent = 0;
         while !follower.has_failed() {
             follower.on_state(&state(sent));
             sent += 1;
         }
-        assert!(follower.is_behind() && (QUEUE as i64..QUEUE as i64 + 3).contains(&sent), "{sent}");
+        assert!(
+            follower.is_behind() && (QUEUE as i64..QUEUE as i64 + 3).contains(&sent),
+            "{sent}"
+        );
         (0..sent).for_each(|_| permit.send(true).unwrap());
         // all but the last, which found no room
-        assert_eq!(follower.into_inner().taken, (0..sent - 1).collect::<Vec<_>>());
+        assert_eq!(
+            follower.into_inner().taken,
+            (0..sent - 1).collect::<Vec<_>>()
+        );
 
         let (permit, permits) = channel();
-        let mut follower = Follower::new(Permitted { permits, taken: Vec::new() }, true).unwrap();
+        let mut follower = Follower::new(
+            Permitted {
+                permits,
+                taken: Vec::new(),
+            },
+            true,
+        )
+        .unwrap();
         permit.send(false).unwrap();
         follower.on_state(&state(1));
         assert_eq!(follower.get().taken, [1]);

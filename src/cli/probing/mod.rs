@@ -71,9 +71,14 @@ impl Probing<'_> {
         let _planning = WorkProgress::stage("plan");
         let world = ready.static_world()?;
         let plan_of = |flag: &Flag| {
-            plan(&ready.cell, &ready.params, &world, flag, now, None).map_err(|error| CliError::plan(flag.id, error))
+            plan(&ready.cell, &ready.params, &world, flag, now, None)
+                .map_err(|error| CliError::plan(flag.id, error))
         };
-        let plans = self.flags.iter().map(plan_of).collect::<Result<Vec<_>, _>>()?;
+        let plans = self
+            .flags
+            .iter()
+            .map(plan_of)
+            .collect::<Result<Vec<_>, _>>()?;
         draw_plan(&ready.mesh, &plans, self.flags, &self.out.join("plan.png"))?;
         Ok(plans)
     }
@@ -95,7 +100,13 @@ impl Probing<'_> {
         signals: &StopSignals,
     ) -> Result<Done, CliError> {
         let folder = ProbingFolder { path: self.out };
-        let request = ProbingRequest::new(self.scene, (self.scan, self.unit), self.is_simulated, self.flags, ready)?;
+        let request = ProbingRequest::new(
+            self.scene,
+            (self.scan, self.unit),
+            self.is_simulated,
+            self.flags,
+            ready,
+        )?;
         let mut features = match is_resumed {
             true => folder.resume(&request)?,
             false => folder.check_own().map(|()| Vec::new())?,
@@ -114,7 +125,10 @@ impl Probing<'_> {
             features.push(ProbedRecord::of(&one, flag));
             features.sort_by_key(|record| record.flag);
             // kept as it is, whatever comes after it
-            let file = ProbedFile { features, check: Some(check.clone()) };
+            let file = ProbedFile {
+                features,
+                check: Some(check.clone()),
+            };
             folder.write(&file)?;
             features = file.features;
             let is_over = matches!(one.ending, Ending::Stopped(_) | Ending::Cancelled(_));
@@ -127,31 +141,49 @@ impl Probing<'_> {
         let touches = world.finish()?;
         let ended = probed.last().map(|last| &last.ending);
         if let Some(ending @ Ending::Cancelled(_)) = ended {
-            let finished = features.iter().filter(|record| record.is_finished()).count();
+            let finished = features
+                .iter()
+                .filter(|record| record.is_finished())
+                .count();
             let error = CliError::ended(ending).with(format_args!(
                 "{finished} of {} features are finished, the touches ({touches}) are in {}; --resume goes on",
                 self.flags.len(),
                 self.out.join(TOUCHES).display()
             ));
-            let summary = ProbingSummary { check, features, told: ready.told.clone(), refine: None };
-            return Ok(Done { summary, probed, outcome: Err(error) });
+            let summary = ProbingSummary {
+                check,
+                features,
+                told: ready.told.clone(),
+                refine: None,
+            };
+            return Ok(Done {
+                summary,
+                probed,
+                outcome: Err(error),
+            });
         }
         let touched = folder.touches()?;
         let (scan, scene) = (self.scan.to_owned(), Some(self.scene.to_owned()));
         let bag = self.out.join(RECORDING);
-        let mut arguments = RefineArguments::in_folder(scan, self.unit, bag, self.out, scene, probe_topics());
+        let mut arguments =
+            RefineArguments::in_folder(scan, self.unit, bag, self.out, scene, probe_topics());
         // an arm that met no surface has measured nothing that could be wrong: each feature says why
         arguments.force = self.is_forced || touched.iter().all(|touch| touch.centre_mm.is_none());
         // all but a plane is probed where the scan may lack it
         arguments.touches_flaws = self.flags.iter().any(|flag| flag.kind != Some(Kind::Plane));
         let (refine, mut losses, failed) = match arguments.refined() {
-            Ok(Refined { summary, losses, .. }) => (Some(summary), losses, None),
+            Ok(Refined {
+                summary, losses, ..
+            }) => (Some(summary), losses, None),
             Err(error) => (None, Losses::new(), Some(error)),
         };
         losses.extend(features.iter().filter_map(ProbedRecord::loss));
         let not_begun = self.flags.len() - features.len();
         if not_begun > 0 {
-            losses.push(format!("{not_begun} of {} flags were not begun", self.flags.len()));
+            losses.push(format!(
+                "{not_begun} of {} flags were not begun",
+                self.flags.len()
+            ));
         }
         let outcome = match (ended, failed) {
             (Some(ending @ Ending::Stopped(_)), failed) => {
@@ -166,36 +198,69 @@ impl Probing<'_> {
         };
         if refine.is_some() {
             let MeshFile { mesh, .. } = read_mesh(&self.out.join("refined.ply"), self.unit)?;
-            draw_touches(&mesh, &touched, &probed, self.flags, &self.out.join("touches.png"))?;
+            draw_touches(
+                &mesh,
+                &touched,
+                &probed,
+                self.flags,
+                &self.out.join("touches.png"),
+            )?;
         }
-        Ok(Done { summary: ProbingSummary { check, features, told: ready.told.clone(), refine }, probed, outcome })
+        Ok(Done {
+            summary: ProbingSummary {
+                check,
+                features,
+                told: ready.told.clone(),
+                refine,
+            },
+            probed,
+            outcome,
+        })
     }
 }
 
 /// Numbers that were written A,B,C in mm, m; `None` where one is no number.
 pub(super) fn metres(text: &str) -> Option<Vec<f64>> {
-    text.split(',').map(|mm| mm.parse::<f64>().ok().filter(|mm| mm.is_finite()).map(|mm| mm / 1e3)).collect()
+    text.split(',')
+        .map(|mm| {
+            mm.parse::<f64>()
+                .ok()
+                .filter(|mm| mm.is_finite())
+                .map(|mm| mm / 1e3)
+        })
+        .collect()
 }
 
 /// A place that was written X,Y,Z in mm, m.
 pub(super) fn millimetres(flag: &str, text: &str) -> Result<Vector3<f64>, CliError> {
     let place: Option<[f64; 3]> = metres(text).and_then(|place| place.try_into().ok());
-    place.map(Vector3::from).ok_or_else(|| CliError::usage(format!("{flag} {text} is not X,Y,Z in mm")))
+    place
+        .map(Vector3::from)
+        .ok_or_else(|| CliError::usage(format!("{flag} {text} is not X,Y,Z in mm")))
 }
 
 /// A flag of a command line.
 ///
 /// - `radius`: m, where it names none.
 pub(super) fn flag_of(id: u32, text: &str, radius: f64) -> Result<Flag, CliError> {
-    const FORM: &str =
-        "KIND@X,Y,Z or KIND@X,Y,Z,RADIUS in mm, with KIND hole, slot, pocket, boss, edge, plane or unknown";
+    const FORM: &str = "KIND@X,Y,Z or KIND@X,Y,Z,RADIUS in mm, with KIND hole, slot, pocket, boss, edge, plane or unknown";
     let wrong = || CliError::usage(format!("--feature {text} is not {FORM}"));
     let (name, numbers) = text.split_once('@').ok_or_else(wrong)?;
     let kind = Kind::of_name(name);
     match metres(numbers).ok_or_else(wrong)?[..] {
         _ if kind.is_none() && name != "unknown" => Err(wrong()),
-        [x, y, z] => Ok(Flag { id, kind, place: Point3::new(x, y, z), radius }),
-        [x, y, z, radius] if radius > 0.0 => Ok(Flag { id, kind, place: Point3::new(x, y, z), radius }),
+        [x, y, z] => Ok(Flag {
+            id,
+            kind,
+            place: Point3::new(x, y, z),
+            radius,
+        }),
+        [x, y, z, radius] if radius > 0.0 => Ok(Flag {
+            id,
+            kind,
+            place: Point3::new(x, y, z),
+            radius,
+        }),
         _ => Err(wrong()),
     }
 }

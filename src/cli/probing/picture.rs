@@ -40,8 +40,18 @@ fn write(
     path: &Path,
 ) -> Result<(), CliError> {
     let (mesh, paint) = drawing.finish()?;
-    let panel = PicturePanel { paint: Some(&paint), title: what, note, ..PicturePanel::of(&mesh) };
-    let params = PictureParams { title, from: Some(Vector3::from(FROM)), legend, ..PictureParams::default() };
+    let panel = PicturePanel {
+        paint: Some(&paint),
+        title: what,
+        note,
+        ..PicturePanel::of(&mesh)
+    };
+    let params = PictureParams {
+        title,
+        from: Some(Vector3::from(FROM)),
+        legend,
+        ..PictureParams::default()
+    };
     write_picture(path, &[panel], &params)
 }
 
@@ -54,7 +64,12 @@ fn flagged(drawing: &mut DrawnMesh, flags: &[Flag], size: f64) {
 }
 
 /// The scan with the planned path of the arm.
-pub(super) fn draw_plan(scan: &TriMesh, plans: &[Plan], flags: &[Flag], path: &Path) -> Result<(), CliError> {
+pub(super) fn draw_plan(
+    scan: &TriMesh,
+    plans: &[Plan],
+    flags: &[Flag],
+    path: &Path,
+) -> Result<(), CliError> {
     let size = diagonal(scan);
     let mut drawing = DrawnMesh::of(scan, PART);
     for plan in plans {
@@ -62,21 +77,33 @@ pub(super) fn draw_plan(scan: &TriMesh, plans: &[Plan], flags: &[Flag], path: &P
             drawing.line(&pair[0], &pair[1], LINE * size, PATH);
         }
         for (number, planned) in plan.touches.iter().enumerate() {
-            let is_held_back = plan.held_back.iter().any(|one| one.what == PlannedMotion::Touch(number));
+            let is_held_back = plan
+                .held_back
+                .iter()
+                .any(|one| one.what == PlannedMotion::Touch(number));
             let colour = if is_held_back { HELD_BACK } else { SEARCH };
             drawing.line(&planned.from, &planned.end(), LINE * size, colour);
         }
     }
     flagged(&mut drawing, flags, size);
     let touches: usize = plans.iter().map(|plan| plan.touches.len()).sum();
-    let note = format!("{} if the part is as the scan has it", counted(touches, "touch", "touches"));
+    let note = format!(
+        "{} if the part is as the scan has it",
+        counted(touches, "touch", "touches")
+    );
     let legend = [
         (FLAG, "flag"),
         (PATH, "path through free air"),
         (SEARCH, "search for the surface"),
         (HELD_BACK, "cannot be reached"),
     ];
-    write(drawing, ["what the arm would do", "the scan"], &note, &legend, path)
+    write(
+        drawing,
+        ["what the arm would do", "the scan"],
+        &note,
+        &legend,
+        path,
+    )
 }
 
 /// The refined mesh with the touches.
@@ -97,7 +124,10 @@ pub(super) fn draw_touches(
         let (end, colour) = match (touch.centre_mm, touch.accepted) {
             (Some(centre_mm), true) => (Point3::from(centre_mm) / 1e3, TOUCHED),
             (_, false) => (from, REFUSED),
-            (None, true) => (from + Vector3::from(touch.approach) * (touch.search_mm / 1e3), MISS),
+            (None, true) => (
+                from + Vector3::from(touch.approach) * (touch.search_mm / 1e3),
+                MISS,
+            ),
         };
         match colour {
             TOUCHED => touched += 1,
@@ -117,8 +147,19 @@ pub(super) fn draw_touches(
     let touched = counted(touched, "touch", "touches");
     let refused = counted(refused, "does not count", "do not count");
     let note = format!("{touched} reached the part, {missed} missed it, {refused}");
-    let legend = [(FLAG, "flag"), (TOUCHED, "touched"), (MISS, "nothing there"), (REFUSED, "does not count")];
-    write(drawing, ["what the arm touched", "the refined mesh"], &note, &legend, path)
+    let legend = [
+        (FLAG, "flag"),
+        (TOUCHED, "touched"),
+        (MISS, "nothing there"),
+        (REFUSED, "does not count"),
+    ];
+    write(
+        drawing,
+        ["what the arm touched", "the refined mesh"],
+        &note,
+        &legend,
+        path,
+    )
 }
 
 #[cfg(test)]

@@ -19,13 +19,19 @@ use crate::sim::ArmParams;
 
 /// How far the check of the arm can be relied on now; `None` without `robot`.
 fn standing(scene: &Scene) -> Option<CheckStanding> {
-    scene.robot.as_ref().map(|robot| robot.check_standing(SystemTime::now()))
+    scene
+        .robot
+        .as_ref()
+        .map(|robot| robot.check_standing(SystemTime::now()))
 }
 
 /// Refuses a value of `--temperature-c` that no cell has.
 pub(in crate::cli) fn check_temperature(temperature_c: f64) -> Result<(), CliError> {
     let is_allowed = (-50.0..=100.0).contains(&temperature_c);
-    require(is_allowed, format_args!("--temperature-c {temperature_c} must be -50 to 100"))
+    require(
+        is_allowed,
+        format_args!("--temperature-c {temperature_c} must be -50 to 100"),
+    )
 }
 
 /// A prepared probing.
@@ -45,8 +51,7 @@ pub(in crate::cli) struct Ready {
 const NO_ROBOT: &str = "the scene names no `robot`, so the pose of the arm's base and its allowed volume are unknown: add \
                         `robot:` to it (config/probe.yaml is an example)";
 
-const NO_MOTION: &str =
-    "the scene does not allow the arm to move: look at plan.png first, then put `allow_motion: true` under `robot`";
+const NO_MOTION: &str = "the scene does not allow the arm to move: look at plan.png first, then put `allow_motion: true` under `robot`";
 
 impl Ready {
     /// Reads scene and scan; the scene tells the radius of the ball.
@@ -56,12 +61,23 @@ impl Ready {
         let Scan { mesh, repair, .. } = read_scan(scan, unit)?;
         info!(%repair, "scan");
         let check = standing(&scene).ok_or_else(|| CliError::usage(NO_ROBOT))?;
-        Ok(Self { cell, params, scene, told, mesh, spheres: Vec::new(), check })
+        Ok(Self {
+            cell,
+            params,
+            scene,
+            told,
+            mesh,
+            spheres: Vec::new(),
+            check,
+        })
     }
 
     /// The same with spheres beside the part.
     pub fn beside(self, spheres: &[ReferenceSphere]) -> Self {
-        Self { spheres: spheres.to_vec(), ..self }
+        Self {
+            spheres: spheres.to_vec(),
+            ..self
+        }
     }
 
     /// The cell has this temperature, °C.
@@ -70,7 +86,10 @@ impl Ready {
     /// [`CliError::usage`] for none that a cell can have.
     pub fn at_temperature(&mut self, temperature_c: f64) -> Result<(), CliError> {
         check_temperature(temperature_c)?;
-        self.scene.robot.iter_mut().for_each(|robot| robot.temperature_c = Some(temperature_c));
+        self.scene
+            .robot
+            .iter_mut()
+            .for_each(|robot| robot.temperature_c = Some(temperature_c));
         self.check = standing(&self.scene).unwrap_or_else(|| self.check.clone());
         Ok(())
     }
@@ -78,7 +97,11 @@ impl Ready {
     /// A simulated arm of this cell.
     pub fn simulated_arm(&self, seed: u64, errors: ArmErrorsName) -> ArmParams {
         let errors = errors.drawn(self.params.pattern.shared.registered_at.into(), seed);
-        ArmParams { seed, errors, ..simulated_arm(&self.cell, &self.params) }
+        ArmParams {
+            seed,
+            errors,
+            ..simulated_arm(&self.cell, &self.params)
+        }
     }
 
     /// A mesh of the part, and the spheres beside it.
@@ -104,12 +127,18 @@ impl Ready {
 
     /// Target half width of the scene, mm.
     pub fn tolerance_mm(&self) -> f64 {
-        self.scene.robot.as_ref().map_or(f64::NAN, |robot| robot.tolerance * 1e3)
+        self.scene
+            .robot
+            .as_ref()
+            .map_or(f64::NAN, |robot| robot.tolerance * 1e3)
     }
 
     /// Whether the scene allows motion.
     pub fn is_motion_allowed(&self) -> bool {
-        self.scene.robot.as_ref().is_some_and(|robot| robot.allow_motion)
+        self.scene
+            .robot
+            .as_ref()
+            .is_some_and(|robot| robot.allow_motion)
     }
 
     /// Refuses to move where the scene does not allow it.

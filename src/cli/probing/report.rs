@@ -105,14 +105,18 @@ impl fmt::Display for ProbedCharacteristic {
         if let Some(value) = self.value_mm {
             write!(f, ": {value:.3} mm")?;
         }
-        self.expanded_uncertainty_mm.iter().try_for_each(|expanded| write!(f, " ± {expanded:.3} mm (k = 2)"))?;
+        self.expanded_uncertainty_mm
+            .iter()
+            .try_for_each(|expanded| write!(f, " ± {expanded:.3} mm (k = 2)"))?;
         match (self.lower_limit_mm, self.upper_limit_mm) {
             (Some(lower), Some(upper)) => write!(f, ", limits {lower:.3} to {upper:.3} mm")?,
             (Some(lower), None) => write!(f, ", at least {lower:.3} mm")?,
             (None, Some(upper)) => write!(f, ", at most {upper:.3} mm")?,
             (None, None) => {}
         }
-        self.reason.iter().try_for_each(|reason| write!(f, "; {reason}"))
+        self.reason
+            .iter()
+            .try_for_each(|reason| write!(f, "; {reason}"))
     }
 }
 
@@ -126,7 +130,10 @@ struct RejectedTouch {
 
 impl RejectedTouch {
     fn of((index, touch): (usize, &ProbedTouch)) -> Option<Self> {
-        Some(Self { index, reason: touch.refused.clone()? })
+        Some(Self {
+            index,
+            reason: touch.refused.clone()?,
+        })
     }
 }
 
@@ -161,10 +168,22 @@ impl ProbedRecord {
 
     /// Why it is not as it was asked for, where that is so.
     pub(super) fn loss(&self) -> Option<String> {
-        let failed: Vec<_> = self.characteristics.iter().filter(|one| one.decision == Decision::Fail.name()).collect();
+        let failed: Vec<_> = self
+            .characteristics
+            .iter()
+            .filter(|one| one.decision == Decision::Fail.name())
+            .collect();
         if !failed.is_empty() {
-            let failed = failed.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ");
-            let ending = if self.code == "decided" { String::new() } else { format!("; {}", self.ending) };
+            let failed = failed
+                .iter()
+                .map(ToString::to_string)
+                .collect::<Vec<_>>()
+                .join("; ");
+            let ending = if self.code == "decided" {
+                String::new()
+            } else {
+                format!("; {}", self.ending)
+            };
             return Some(format!("feature {}: {failed}{ending}", self.flag));
         }
         let is_as_asked = match self.code.as_str() {
@@ -258,22 +277,57 @@ fn code(ending: &Ending) -> &'static str {
 
 impl fmt::Display for ProbingSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let count = |wanted: Ending| self.features.iter().filter(|record| record.code == code(&wanted)).count();
+        let count = |wanted: Ending| {
+            self.features
+                .iter()
+                .filter(|record| record.code == code(&wanted))
+                .count()
+        };
         let features = counted(self.features.len(), "feature", "features");
-        if self.features.iter().any(|record| !record.characteristics.is_empty()) {
+        if self
+            .features
+            .iter()
+            .any(|record| !record.characteristics.is_empty())
+        {
             writeln!(f, "decided: {} of {features}", count(Ending::Decided))?;
         } else {
-            writeln!(f, "tolerance reached: {} of {features}", count(Ending::ToleranceReached))?;
+            writeln!(
+                f,
+                "tolerance reached: {} of {features}",
+                count(Ending::ToleranceReached)
+            )?;
         }
         for record in &self.features {
-            let ProbedRecord { flag, kind, touches, duration_s, largest_force_n, ending, .. } = record;
+            let ProbedRecord {
+                flag,
+                kind,
+                touches,
+                duration_s,
+                largest_force_n,
+                ending,
+                ..
+            } = record;
             write!(f, "{kind} {flag}: {ending}")?;
-            record.feature.iter().try_for_each(|feature| write!(f, ": {}", numbers(feature)))?;
-            record.characteristics.iter().try_for_each(|one| write!(f, "\n  {one}"))?;
+            record
+                .feature
+                .iter()
+                .try_for_each(|feature| write!(f, ": {}", numbers(feature)))?;
+            record
+                .characteristics
+                .iter()
+                .try_for_each(|one| write!(f, "\n  {one}"))?;
             let touches = counted(*touches, "touch", "touches");
-            write!(f, "\n  {touches}, {duration_s:.0} s, {largest_force_n:.1} N at most")?;
-            by_reason(&record.rejected_touches).iter().try_for_each(|line| write!(f, "\n  {line}"))?;
-            record.slides.iter().try_for_each(|slide| write!(f, "\n  {slide}"))?;
+            write!(
+                f,
+                "\n  {touches}, {duration_s:.0} s, {largest_force_n:.1} N at most"
+            )?;
+            by_reason(&record.rejected_touches)
+                .iter()
+                .try_for_each(|line| write!(f, "\n  {line}"))?;
+            record
+                .slides
+                .iter()
+                .try_for_each(|slide| write!(f, "\n  {slide}"))?;
             writeln!(f)?;
         }
         writeln!(f, "{}", self.check.summary)?;
@@ -303,10 +357,12 @@ fn by_reason(rejected: &[RejectedTouch]) -> Vec<String> {
 
 /// Growing numbers in words, with a range for each run of more than two: `0, 1, 4 to 9`.
 fn in_ranges(numbers: &[usize]) -> String {
-    let runs = numbers.chunk_by(|a, b| a + 1 == *b).flat_map(|run| match run {
-        [first, _, .., last] => vec![format!("{first} to {last}")],
-        few => few.iter().map(usize::to_string).collect(),
-    });
+    let runs = numbers
+        .chunk_by(|a, b| a + 1 == *b)
+        .flat_map(|run| match run {
+            [first, _, .., last] => vec![format!("{first} to {last}")],
+            few => few.iter().map(usize::to_string).collect(),
+        });
     runs.collect::<Vec<_>>().join(", ")
 }
 
@@ -314,8 +370,16 @@ impl fmt::Display for SlideRecordOfFile {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "slide of {:.0} mm: {}", self.length_mm, self.ending)?;
         match &self.forces {
-            Some(SlideForces { duration_s, mean_force_n, worst_force_error_n, .. }) => {
-                write!(f, " after {duration_s:.1} s, {mean_force_n:.2} N, at most {worst_force_error_n:.2} N off")
+            Some(SlideForces {
+                duration_s,
+                mean_force_n,
+                worst_force_error_n,
+                ..
+            }) => {
+                write!(
+                    f,
+                    " after {duration_s:.1} s, {mean_force_n:.2} N, at most {worst_force_error_n:.2} N off"
+                )
             }
             None => Ok(()),
         }
@@ -327,12 +391,17 @@ fn numbers(feature: &FeatureRecord) -> String {
     let with = |name: &str, value: Option<f64>, key: &str| {
         value.map(|value| match feature.std.get(key) {
             Some(std) => format!("{name}{value:.3} ± {std:.3}"),
-            None if key == "depth_mm" && feature.depth_is_at_least == Some(true) => format!("{name}≥ {value:.3}"),
+            None if key == "depth_mm" && feature.depth_is_at_least == Some(true) => {
+                format!("{name}≥ {value:.3}")
+            }
             None => format!("{name}{value:.3}"),
         })
     };
     let centre = feature.center_mm.map(|[x, y, z]| {
-        let std = feature.std.get("center_mm").map_or(String::new(), |std| format!(" ± {std:.3}"));
+        let std = feature
+            .std
+            .get("center_mm")
+            .map_or(String::new(), |std| format!(" ± {std:.3}"));
         format!("at ({x:.3} {y:.3} {z:.3}){std}")
     });
     let all = [
@@ -342,7 +411,10 @@ fn numbers(feature: &FeatureRecord) -> String {
         with("width ", feature.width_mm, "width_mm"),
         with("depth ", feature.depth_mm, "depth_mm"),
     ];
-    format!("{} mm", all.into_iter().flatten().collect::<Vec<_>>().join(", "))
+    format!(
+        "{} mm",
+        all.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    )
 }
 
 #[cfg(test)]
@@ -351,12 +423,26 @@ mod tests {
 
     #[test]
     fn touches_with_the_same_reason_are_one_line() {
-        let touch = |(index, reason): (usize, &str)| RejectedTouch { index, reason: reason.to_owned() };
-        let rejected =
-            [(0, "far"), (1, "an impact"), (2, "far"), (3, "far"), (5, "far"), (6, "far"), (7, "far"), (9, "far")];
+        let touch = |(index, reason): (usize, &str)| RejectedTouch {
+            index,
+            reason: reason.to_owned(),
+        };
+        let rejected = [
+            (0, "far"),
+            (1, "an impact"),
+            (2, "far"),
+            (3, "far"),
+            (5, "far"),
+            (6, "far"),
+            (7, "far"),
+            (9, "far"),
+        ];
         assert_eq!(
             by_reason(&rejected.map(touch)),
-            ["touches 0, 2, 3, 5 to 7, 9 do not count: far", "touch 1 does not count: an impact"]
+            [
+                "touches 0, 2, 3, 5 to 7, 9 do not count: far",
+                "touch 1 does not count: an impact"
+            ]
         );
         assert!(by_reason(&[]).is_empty());
     }

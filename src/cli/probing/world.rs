@@ -38,14 +38,37 @@ struct FollowingMesh {
 
 impl FollowingMesh {
     fn new(ready: &Ready, is_simulated: bool) -> Result<Self, CliError> {
-        let nothing = || CliError::usage("the scene says `refine: off`, so nothing would move the mesh");
-        let params = ready.scene.refine_params(WrenchFrame::Sensor).ok_or_else(nothing)?;
+        let nothing =
+            || CliError::usage("the scene says `refine: off`, so nothing would move the mesh");
+        let params = ready
+            .scene
+            .refine_params(WrenchFrame::Sensor)
+            .ok_or_else(nothing)?;
         // what a simulated arm does next does not depend on how fast this computer is; a real one goes on in that time
-        let pace = Pace { is_patient: is_simulated, every_ns: EVERY_NS, ..Pace::default() };
+        let pace = Pace {
+            is_patient: is_simulated,
+            every_ns: EVERY_NS,
+            ..Pace::default()
+        };
         let scan = Arc::new((ready.mesh.clone(), FaceTree::new_by(&ready.mesh, &Threads)));
-        let renewal = Renewal::Beside { scan, pace, room: ROOM, gate: Gate::default() };
-        let engine = Engine::new(ready.mesh.clone(), params, ready.scene.patcher_params(), renewal)?;
-        Ok(Self { engine, pose_ob: ready.cell.pose_bo.inverse(), pose: None, failed: None })
+        let renewal = Renewal::Beside {
+            scan,
+            pace,
+            room: ROOM,
+            gate: Gate::default(),
+        };
+        let engine = Engine::new(
+            ready.mesh.clone(),
+            params,
+            ready.scene.patcher_params(),
+            renewal,
+        )?;
+        Ok(Self {
+            engine,
+            pose_ob: ready.cell.pose_bo.inverse(),
+            pose: None,
+            failed: None,
+        })
     }
 
     /// Takes a message; a wrench comes behind the pose of the same state.
@@ -54,8 +77,14 @@ impl FollowingMesh {
             Message::Pose(pose) => return self.pose = Some(*pose),
             Message::Wrench(wrench) => wrench,
         };
-        let Some(pose) = self.pose.filter(|pose| pose.stamp_ns == wrench.stamp_ns) else { return };
-        let sample = Sample { stamp_ns: wrench.stamp_ns, pose_ot: self.pose_ob * pose.pose_ot, wrench: wrench.wrench };
+        let Some(pose) = self.pose.filter(|pose| pose.stamp_ns == wrench.stamp_ns) else {
+            return;
+        };
+        let sample = Sample {
+            stamp_ns: wrench.stamp_ns,
+            pose_ot: self.pose_ob * pose.pose_ot,
+            wrench: wrench.wrench,
+        };
         match self.engine.push(&sample) {
             Ok(_) | Err(LiveError::Refine(_)) => {}
             Err(error) => self.failed = Some(error),
@@ -73,7 +102,10 @@ struct Followed {
 impl TakeStates for Followed {
     fn take_state(&mut self, state: &ArmState) -> bool {
         match self.files.record(state) {
-            Ok(messages) => messages.iter().flatten().for_each(|message| self.mesh.take(message)),
+            Ok(messages) => messages
+                .iter()
+                .flatten()
+                .for_each(|message| self.mesh.take(message)),
             Err(error) => self.failed = Some(error),
         }
         self.failed.is_none() && self.mesh.failed.is_none()
@@ -102,15 +134,34 @@ impl<'a> LiveWorld<'a> {
             true => ProbeFiles::resume(out, ball_radius, &mut |message| mesh.take(message))?,
             false => ProbeFiles::begin(out, ball_radius)?,
         };
-        let followed = Follower::new(Followed { mesh, files, failed: None }, is_simulated);
-        let no_thread = |error| CliError::arm(format_args!("no thread for files and mesh can be had: {error}"));
-        Ok(Self { followed: followed.map_err(no_thread)?, signals, bar: Bar::new("probe", None) })
+        let followed = Follower::new(
+            Followed {
+                mesh,
+                files,
+                failed: None,
+            },
+            is_simulated,
+        );
+        let no_thread = |error| {
+            CliError::arm(format_args!(
+                "no thread for files and mesh can be had: {error}"
+            ))
+        };
+        Ok(Self {
+            followed: followed.map_err(no_thread)?,
+            signals,
+            bar: Bar::new("probe", None),
+        })
     }
 
     /// Ends the recording; returns how many touches were written.
     pub fn finish(self) -> Result<usize, CliError> {
         let is_behind = self.followed.is_behind();
-        let Followed { mesh, files, failed } = self.followed.into_inner();
+        let Followed {
+            mesh,
+            files,
+            failed,
+        } = self.followed.into_inner();
         let written = files.finish();
         match (failed, mesh.failed) {
             (Some(error), _) => Err(error),
@@ -131,7 +182,9 @@ impl Observer for LiveWorld<'_> {
     }
 
     fn stop_request(&self) -> Option<StopRequest> {
-        self.signals.request().max(self.followed.has_failed().then_some(StopRequest::Retract))
+        self.signals
+            .request()
+            .max(self.followed.has_failed().then_some(StopRequest::Retract))
     }
 }
 
@@ -141,7 +194,12 @@ impl World for LiveWorld<'_> {
     }
 
     fn closest_face(&self, place: &Point3<f64>, reach: f64) -> Option<FaceHit> {
-        self.followed.get().mesh.engine.refiner().closest_face(place, reach)
+        self.followed
+            .get()
+            .mesh
+            .engine
+            .refiner()
+            .closest_face(place, reach)
     }
 
     fn publish(&mut self, progress: &Progress) {
@@ -194,7 +252,8 @@ impl MeasurementLog {
     fn create(kept: KeptMeasurements, ball_radius: f64) -> Result<Self, CliError> {
         Ok(match kept {
             KeptMeasurements::Touches(path) => {
-                let create = |path: &Path| TouchLog::create(path, ball_radius).map_err(not_written(path));
+                let create =
+                    |path: &Path| TouchLog::create(path, ball_radius).map_err(not_written(path));
                 Self::Touches(path.map(create).transpose()?)
             }
             KeptMeasurements::Segments(path) => {
@@ -222,10 +281,21 @@ impl MeasurementLog {
 
 impl<'a> SpotWorld<'a> {
     /// - `kept`: what is measured, and where each of it is written as it is measured.
-    pub fn new(ready: &Ready, kept: KeptMeasurements, signals: &'a StopSignals) -> Result<Self, CliError> {
+    pub fn new(
+        ready: &Ready,
+        kept: KeptMeasurements,
+        signals: &'a StopSignals,
+    ) -> Result<Self, CliError> {
         let ball_radius = ready.params.pattern.ball_radius;
         let log = MeasurementLog::create(kept, ball_radius)?;
-        Ok(Self { scan: ready.static_world()?, signals, log, made: Vec::new(), ball_radius, failed: None })
+        Ok(Self {
+            scan: ready.static_world()?,
+            signals,
+            log,
+            made: Vec::new(),
+            ball_radius,
+            failed: None,
+        })
     }
 
     /// What was measured; where that was broken off what was measured until then is printed, unless a file has it.
@@ -234,10 +304,18 @@ impl<'a> SpotWorld<'a> {
         let [what, flag] = self.log.names();
         measured.map_err(|error| match (self.made.len(), self.log.path()) {
             (0, _) => error,
-            (count, Some(path)) => error.with(format_args!("the {what} ({count}) are in {}", path.display())),
+            (count, Some(path)) => error.with(format_args!(
+                "the {what} ({count}) are in {}",
+                path.display()
+            )),
             (count, None) => match print_result(&self.made.join("\n")) {
-                Ok(()) => error.with(format_args!("the {what} ({count}) are printed; {flag} keeps all of them")),
-                Err(lost) => error.with(format_args!("the {what} ({count}) are lost: {}", lost.message)),
+                Ok(()) => error.with(format_args!(
+                    "the {what} ({count}) are printed; {flag} keeps all of them"
+                )),
+                Err(lost) => error.with(format_args!(
+                    "the {what} ({count}) are lost: {}",
+                    lost.message
+                )),
             },
         })
     }
@@ -247,7 +325,9 @@ impl Observer for SpotWorld<'_> {
     fn on_state(&mut self, _: &ArmState) {}
 
     fn stop_request(&self) -> Option<StopRequest> {
-        self.signals.request().max(self.failed.as_ref().map(|_| StopRequest::Retract))
+        self.signals
+            .request()
+            .max(self.failed.as_ref().map(|_| StopRequest::Retract))
     }
 }
 
@@ -263,8 +343,11 @@ impl World for SpotWorld<'_> {
     fn publish(&mut self, _: &Progress) {}
 
     fn touched(&mut self, flag: u32, touch: &ProbedTouch) {
-        self.made.push(TouchLine::of(flag, self.made.len(), touch, self.ball_radius, 0).to_string());
-        let MeasurementLog::Touches(Some(log)) = &mut self.log else { return };
+        self.made
+            .push(TouchLine::of(flag, self.made.len(), touch, self.ball_radius, 0).to_string());
+        let MeasurementLog::Touches(Some(log)) = &mut self.log else {
+            return;
+        };
         // no recording has another clock
         if let Err(error) = log.append(flag, touch, 0) {
             self.failed = Some(not_written(log.path())(error));
@@ -272,8 +355,11 @@ impl World for SpotWorld<'_> {
     }
 
     fn weighed(&mut self, segment: &StaticPose) {
-        self.made.push(static_pose_line(&segment.r_wt, &segment.wrench));
-        let MeasurementLog::Segments(Some(log)) = &mut self.log else { return };
+        self.made
+            .push(static_pose_line(&segment.r_wt, &segment.wrench));
+        let MeasurementLog::Segments(Some(log)) = &mut self.log else {
+            return;
+        };
         if let Err(error) = log.append(&segment.r_wt, &segment.wrench) {
             self.failed = Some(not_written(log.path())(error));
         }

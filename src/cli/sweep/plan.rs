@@ -24,11 +24,18 @@ pub(in crate::cli) struct PlanArguments {
 }
 
 pub(in crate::cli) fn plan(arguments: &PlanArguments) -> Result<Losses, CliError> {
-    let PlanArguments { grid, recordings, out } = arguments;
+    let PlanArguments {
+        grid,
+        recordings,
+        out,
+    } = arguments;
     match out {
         Some(path) => {
             let jobs = counted(plan_sweep(grid, recordings, path)?, "job", "jobs");
-            print_result(&format!("wrote {0}: {jobs}; touchup sweep run {0}", path.display()))?;
+            print_result(&format!(
+                "wrote {0}: {jobs}; touchup sweep run {0}",
+                path.display()
+            ))?;
         }
         None => {
             let plan = checked(grid, recordings, Path::new(""))?;
@@ -51,7 +58,9 @@ pub(in crate::cli) fn plan(arguments: &PlanArguments) -> Result<Losses, CliError
 /// As the command line has them.
 pub fn plan_sweep(grid: &Path, recordings: &[PathBuf], out: &Path) -> Result<u64, CliError> {
     check_kept("GRID.yaml", grid, out)?;
-    recordings.iter().try_for_each(|recording| check_kept("RECORDING", recording, out))?;
+    recordings
+        .iter()
+        .try_for_each(|recording| check_kept("RECORDING", recording, out))?;
     check_place(out)?;
     let plan = checked(grid, recordings, &JobsFile::folder(out))?;
     let mut file = AtomicFile::create(out).map_err(not_written(out))?;

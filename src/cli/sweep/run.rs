@@ -35,7 +35,13 @@ pub(in crate::cli) struct RunArguments {
 const MOST_NAMED: usize = 20;
 
 pub(in crate::cli) fn run(arguments: &RunArguments) -> Result<Losses, CliError> {
-    let RunArguments { jobs, job, results, again, json } = arguments;
+    let RunArguments {
+        jobs,
+        job,
+        results,
+        again,
+        json,
+    } = arguments;
     let runner = JobRunner::new(JobsFile::folder(jobs), results_of(jobs, results.as_ref()));
     match job {
         Some(job) => run_one(&runner, jobs, *job, *again, *json),
@@ -43,14 +49,31 @@ pub(in crate::cli) fn run(arguments: &RunArguments) -> Result<Losses, CliError> 
     }
 }
 
-fn run_one(runner: &JobRunner, jobs: &Path, job: u64, again: bool, as_json: bool) -> Result<Losses, CliError> {
+fn run_one(
+    runner: &JobRunner,
+    jobs: &Path,
+    job: u64,
+    again: bool,
+    as_json: bool,
+) -> Result<Losses, CliError> {
     let job = JobsFile::job(jobs, job)?;
     let mut progress = WorkProgress::new("refine", None);
     let report = runner.run(&job, GivenInput::default(), again, &mut || progress.step())?;
     drop(progress);
-    let JobReport { job, id, result, was_there, failed, summary } = report;
+    let JobReport {
+        job,
+        id,
+        result,
+        was_there,
+        failed,
+        summary,
+    } = report;
     if let Some(why) = failed {
-        return Err(CliError::new(UNSOUND, format_args!("job {job} failed: {why}"), None));
+        return Err(CliError::new(
+            UNSOUND,
+            format_args!("job {job} failed: {why}"),
+            None,
+        ));
     }
     let losses = losses_of(&summary);
     if as_json {
@@ -64,8 +87,15 @@ fn run_one(runner: &JobRunner, jobs: &Path, job: u64, again: bool, as_json: bool
 }
 
 fn losses_of(summary: &Value) -> Losses {
-    let losses = summary.get("losses").and_then(Value::as_array).into_iter().flatten();
-    losses.filter_map(Value::as_str).map(str::to_owned).collect()
+    let losses = summary
+        .get("losses")
+        .and_then(Value::as_array)
+        .into_iter()
+        .flatten();
+    losses
+        .filter_map(Value::as_str)
+        .map(str::to_owned)
+        .collect()
 }
 
 /// What `--json` prints of all.
@@ -82,7 +112,12 @@ struct RunSummary {
     with_losses: u64,
 }
 
-fn run_all(runner: &JobRunner, jobs: &Path, again: bool, as_json: bool) -> Result<Losses, CliError> {
+fn run_all(
+    runner: &JobRunner,
+    jobs: &Path,
+    again: bool,
+    as_json: bool,
+) -> Result<Losses, CliError> {
     let mut summary = RunSummary::default();
     // every line is looked at before the first one is run
     let count = JobsFile::open(jobs)?.try_fold(0_u64, |count, job| job.map(|_| count + 1))?;
@@ -90,11 +125,20 @@ fn run_all(runner: &JobRunner, jobs: &Path, again: bool, as_json: bool) -> Resul
     let mut named = Losses::new();
     for job in JobsFile::open(jobs)? {
         let job = job?;
-        let JobReport { job, was_there, failed, summary: numbers, .. } =
-            runner.run(&job, GivenInput::default(), again, &mut || {})?;
+        let JobReport {
+            job,
+            was_there,
+            failed,
+            summary: numbers,
+            ..
+        } = runner.run(&job, GivenInput::default(), again, &mut || {})?;
         progress.step_now();
         summary.jobs += 1;
-        *(if was_there { &mut summary.were_there } else { &mut summary.ran }) += 1;
+        *(if was_there {
+            &mut summary.were_there
+        } else {
+            &mut summary.ran
+        }) += 1;
         let losses = losses_of(&numbers);
         summary.failed += u64::from(failed.is_some());
         summary.with_losses += u64::from(!losses.is_empty());
@@ -108,7 +152,13 @@ fn run_all(runner: &JobRunner, jobs: &Path, again: bool, as_json: bool) -> Resul
         named.push(format!("and {more} more"));
     }
     print_report(as_json, &summary, || {
-        let RunSummary { jobs, ran, were_there, failed, .. } = &summary;
+        let RunSummary {
+            jobs,
+            ran,
+            were_there,
+            failed,
+            ..
+        } = &summary;
         let jobs = counted(*jobs, "job", "jobs");
         format!("{jobs}: {ran} refined now, {were_there} had a result, {failed} of all failed")
     })?;

@@ -29,26 +29,59 @@ pub(in crate::cli) struct TableArguments {
 }
 
 pub(in crate::cli) fn table(arguments: &TableArguments) -> Result<Losses, CliError> {
-    let TableArguments { jobs, results, out, features_out, json } = arguments;
+    let TableArguments {
+        jobs,
+        results,
+        out,
+        features_out,
+        json,
+    } = arguments;
     check_table("--out", out, jobs)?;
-    features_out.iter().try_for_each(|path| check_table("--features-out", path, jobs))?;
-    require(features_out.as_ref() != Some(out), "--out and --features-out are the same file: choose another place")?;
+    features_out
+        .iter()
+        .try_for_each(|path| check_table("--features-out", path, jobs))?;
+    require(
+        features_out.as_ref() != Some(out),
+        "--out and --features-out are the same file: choose another place",
+    )?;
     let results = results_of(jobs, results.as_ref());
-    let SweepTables { jobs, features, failed, missing, first_missing } =
-        tables_of(jobs, &results, features_out.is_some())?;
+    let SweepTables {
+        jobs,
+        features,
+        failed,
+        missing,
+        first_missing,
+    } = tables_of(jobs, &results, features_out.is_some())?;
     jobs.write(out)?;
-    features_out.iter().try_for_each(|path| features.write(path))?;
+    features_out
+        .iter()
+        .try_for_each(|path| features.write(path))?;
     let rows = jobs.rows();
     let report = json!({ "rows": rows, "failed": failed, "missing": missing, "features": features.rows(), "out": out });
     print_report(*json, &report, || {
         let of_features = features_out.as_ref().map_or(String::new(), |path| {
-            format!("\nwrote {}: {}", path.display(), counted(features.rows() as u64, "feature", "features"))
+            format!(
+                "\nwrote {}: {}",
+                path.display(),
+                counted(features.rows() as u64, "feature", "features")
+            )
         });
         let rows = counted(rows as u64, "job", "jobs");
-        format!("wrote {}: {rows}, {failed} of them failed{of_features}", out.display())
+        format!(
+            "wrote {}: {rows}, {failed} of them failed{of_features}",
+            out.display()
+        )
     })?;
     let named: Vec<_> = first_missing.iter().map(u64::to_string).collect();
-    let more = if named.len() as u64 == missing { "" } else { ", …" };
+    let more = if named.len() as u64 == missing {
+        ""
+    } else {
+        ", …"
+    };
     let jobs = counted(missing, "job has", "jobs have");
-    Ok(if missing == 0 { Losses::new() } else { vec![format!("{jobs} no result: {}{more}", named.join(", "))] })
+    Ok(if missing == 0 {
+        Losses::new()
+    } else {
+        vec![format!("{jobs} no result: {}{more}", named.join(", "))]
+    })
 }

@@ -79,18 +79,40 @@ pub(super) fn what_if(arguments: &WhatIfArguments) -> Result<Losses, CliError> {
 
 impl WhatIfArguments {
     fn check(&self) -> Result<(), CliError> {
-        let tables = [("--vertices-out", &self.vertices_out), ("--features-out", &self.features_out)];
+        let tables = [
+            ("--vertices-out", &self.vertices_out),
+            ("--features-out", &self.features_out),
+        ];
         let jobs = self.jobs.as_deref().unwrap_or(Path::new(""));
         for (flag, path) in tables {
-            path.iter().try_for_each(|path| check_table(flag, path, jobs))?;
+            path.iter()
+                .try_for_each(|path| check_table(flag, path, jobs))?;
         }
-        let outputs = [("--out", ".html", &self.out), ("--mesh-out", ".ply", &self.mesh_out)];
-        check_outputs(&outputs, &[self.jobs.as_ref()], "the plan: choose another place")?;
-        let all = [("--out", &self.out), ("--mesh-out", &self.mesh_out), tables[0], tables[1]];
-        let all: Vec<_> = all.into_iter().filter_map(|(flag, path)| Some((flag, path.as_ref()?))).collect();
+        let outputs = [
+            ("--out", ".html", &self.out),
+            ("--mesh-out", ".ply", &self.mesh_out),
+        ];
+        check_outputs(
+            &outputs,
+            &[self.jobs.as_ref()],
+            "the plan: choose another place",
+        )?;
+        let all = [
+            ("--out", &self.out),
+            ("--mesh-out", &self.mesh_out),
+            tables[0],
+            tables[1],
+        ];
+        let all: Vec<_> = all
+            .into_iter()
+            .filter_map(|(flag, path)| Some((flag, path.as_ref()?)))
+            .collect();
         for (at, (flag, path)) in all.iter().enumerate() {
             if let Some((other, _)) = all[..at].iter().find(|(_, other)| other == path) {
-                let why = format!("{flag} and {other} would both write {}: choose another place", path.display());
+                let why = format!(
+                    "{flag} and {other} would both write {}: choose another place",
+                    path.display()
+                );
                 return Err(CliError::usage(why));
             }
         }
@@ -99,7 +121,9 @@ impl WhatIfArguments {
 
     /// The folders of both results.
     fn folders(&self) -> Result<[PathBuf; 2], CliError> {
-        let Some(jobs) = &self.jobs else { return self.given_folders() };
+        let Some(jobs) = &self.jobs else {
+            return self.given_folders();
+        };
         let results = results_of(jobs, self.results.as_ref());
         let folder = |name: &String| {
             let number = name.parse::<u64>();
@@ -109,8 +133,15 @@ impl WhatIfArguments {
             );
             let job = JobsFile::job(jobs, number.map_err(|_| CliError::usage(why))?)?;
             let folder = results.join(&job.id);
-            let why = format!("job {name} has no result: touchup sweep run {} --job {name}", jobs.display());
-            if folder.is_dir() { Ok(folder) } else { Err(CliError::new(("sweep", 3), why, None)) }
+            let why = format!(
+                "job {name} has no result: touchup sweep run {} --job {name}",
+                jobs.display()
+            );
+            if folder.is_dir() {
+                Ok(folder)
+            } else {
+                Err(CliError::new(("sweep", 3), why, None))
+            }
         };
         Ok([folder(&self.a)?, folder(&self.b)?])
     }
@@ -118,10 +149,15 @@ impl WhatIfArguments {
     fn given_folders(&self) -> Result<[PathBuf; 2], CliError> {
         let folders = [&self.a, &self.b].map(PathBuf::from);
         for folder in &folders {
-            let why = format!("{} is no folder of a result; numbers of jobs need --jobs JSONL", folder.display());
+            let why = format!(
+                "{} is no folder of a result; numbers of jobs need --jobs JSONL",
+                folder.display()
+            );
             require(folder.is_dir(), why)?;
             for (flag, path) in [("--out", &self.out), ("--mesh-out", &self.mesh_out)] {
-                path.iter().try_for_each(|path| check_kept_by(flag, "A or B", &folder.join("refined.ply"), path))?;
+                path.iter().try_for_each(|path| {
+                    check_kept_by(flag, "A or B", &folder.join("refined.ply"), path)
+                })?;
             }
         }
         Ok(folders)

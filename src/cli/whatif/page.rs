@@ -23,13 +23,30 @@ const STEPS: [(f64, Rgb, Rgb); 3] = [
 /// The colour of a place.
 pub(super) fn colour_at(one: &Displacement) -> Rgb {
     let known = one.plus_minus(K);
-    let ratio = if known > 0.0 { one.distance.abs() / known } else { f64::INFINITY };
-    let step = STEPS.iter().rev().find(|(from, ..)| one.is_moved(K) && ratio > *from);
-    step.map_or(STILL, |(_, inwards, outwards)| if one.distance < 0.0 { *inwards } else { *outwards })
+    let ratio = if known > 0.0 {
+        one.distance.abs() / known
+    } else {
+        f64::INFINITY
+    };
+    let step = STEPS
+        .iter()
+        .rev()
+        .find(|(from, ..)| one.is_moved(K) && ratio > *from);
+    step.map_or(STILL, |(_, inwards, outwards)| {
+        if one.distance < 0.0 {
+            *inwards
+        } else {
+            *outwards
+        }
+    })
 }
 
 /// The whole page.
-pub(super) fn page(report: &WhatIfReport, [a, b]: [&JobResult; 2], found: &WhatIf) -> io::Result<String> {
+pub(super) fn page(
+    report: &WhatIfReport,
+    [a, b]: [&JobResult; 2],
+    found: &WhatIf,
+) -> io::Result<String> {
     let mut pictures = figure("A", &a.mesh, &found.of_a, &report.vertices_a, report)?;
     if let (Some(of_b), Some(vertices)) = (&found.of_b, &report.vertices_b) {
         pictures += &figure("B", &b.mesh, of_b, vertices, report)?;
@@ -39,7 +56,10 @@ pub(super) fn page(report: &WhatIfReport, [a, b]: [&JobResult; 2], found: &WhatI
         format!("<h1>{}</h1>\n", escaped(&title)),
         verdict(report),
         keys(report),
-        format!("<h2>Where the surface moved</h2>\n{}<div class=\"pictures\">\n{pictures}</div>\n", legend()),
+        format!(
+            "<h2>Where the surface moved</h2>\n{}<div class=\"pictures\">\n{pictures}</div>\n",
+            legend()
+        ),
         features(report),
         how(report),
     ];
@@ -63,7 +83,9 @@ fn shown(value: &serde_json::Value) -> String {
 fn title(report: &WhatIfReport) -> String {
     let mut keys = report.keys.iter();
     match (keys.next(), keys.next()) {
-        (Some((key, [a, b])), None) => format!("What if {key} is {} instead of {}?", shown(b), shown(a)),
+        (Some((key, [a, b])), None) => {
+            format!("What if {key} is {} instead of {}?", shown(b), shown(a))
+        }
         (None, _) => "Two results of the same inputs".to_owned(),
         _ => format!("What if {} inputs change?", report.keys.len()),
     }
@@ -72,26 +94,46 @@ fn title(report: &WhatIfReport) -> String {
 fn verdict(report: &WhatIfReport) -> String {
     let shown = report.vertices_b.as_ref().unwrap_or(&report.vertices_a);
     let share = 100.0 * shown.moved as f64 / shown.vertices.max(1) as f64;
-    let farthest =
-        shown.farthest_mm.map_or("no vertex moves".to_owned(), |mm| format!("the farthest moves by {} mm", signed(mm)));
-    let alone = report.features.iter().filter(|one| one.id_a.is_none() || one.id_b.is_none()).count();
-    let tile = |number: String, what: String| format!("<div><b>{number}</b><span>{what}</span></div>\n");
+    let farthest = shown
+        .farthest_mm
+        .map_or("no vertex moves".to_owned(), |mm| {
+            format!("the farthest moves by {} mm", signed(mm))
+        });
+    let alone = report
+        .features
+        .iter()
+        .filter(|one| one.id_a.is_none() || one.id_b.is_none())
+        .count();
+    let tile =
+        |number: String, what: String| format!("<div><b>{number}</b><span>{what}</span></div>\n");
     let tiles = [
         tile(
             format!("{:.1} %", share),
-            format!("of the vertices move by more than their ±: {} of {}", shown.moved, shown.vertices),
+            format!(
+                "of the vertices move by more than their ±: {} of {}",
+                shown.moved, shown.vertices
+            ),
         ),
         tile(
-            shown.farthest_mm.map_or("–".to_owned(), |mm| format!("{} mm", signed(mm))),
             shown
-                .farthest_plus_minus_mm
-                .map_or(farthest, |known| format!("is the largest displacement, known to ± {known:.3} mm")),
+                .farthest_mm
+                .map_or("–".to_owned(), |mm| format!("{} mm", signed(mm))),
+            shown.farthest_plus_minus_mm.map_or(farthest, |known| {
+                format!("is the largest displacement, known to ± {known:.3} mm")
+            }),
         ),
         tile(
-            format!("{} of {}", report.features_moved - alone, report.features.len()),
+            format!(
+                "{} of {}",
+                report.features_moved - alone,
+                report.features.len()
+            ),
             "features have a number that moves by more than its ±".to_owned(),
         ),
-        tile(alone.to_string(), "features are found in one result alone".to_owned()),
+        tile(
+            alone.to_string(),
+            "features are found in one result alone".to_owned(),
+        ),
     ];
     format!("<div class=\"tiles\">\n{}</div>\n", tiles.concat())
 }
@@ -110,10 +152,15 @@ fn keys(report: &WhatIfReport) -> String {
         return "<p>Scan, recording, scene and version are the same in both.</p>\n".to_owned();
     }
     let row = |(key, [a, b]): (&String, &[serde_json::Value; 2])| {
-        vec![format!("<code>{}</code>", escaped(key)), escaped(&shown(a)), escaped(&shown(b))]
+        vec![
+            format!("<code>{}</code>", escaped(key)),
+            escaped(&shown(a)),
+            escaped(&shown(b)),
+        ]
     };
     let rows: Vec<_> = report.keys.iter().map(row).collect();
-    let of = |name: &str, which: &str| format!("{which} <span class=\"small\">{}</span>", escaped(name));
+    let of =
+        |name: &str, which: &str| format!("{which} <span class=\"small\">{}</span>", escaped(name));
     let head = ["Input".to_owned(), of(&report.a, "A"), of(&report.b, "B")];
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
     format!("<h2>What differs</h2>\n{}", table("keys", &head, &rows))
@@ -126,11 +173,28 @@ fn css(colour: Rgb) -> String {
 
 fn legend() -> String {
     let ends = ["1 to 2 ±", "2 to 4 ±", "over 4 ±"];
-    let chip = |colour: Rgb, text: &str| format!("<span><i style=\"background:{}\"></i>{text}</span>", css(colour));
-    let inwards = STEPS.iter().zip(ends).rev().map(|((_, colour, _), text)| chip(*colour, text));
-    let outwards = STEPS.iter().zip(ends).map(|((.., colour), text)| chip(*colour, text));
-    let all: String = inwards.chain([chip(STILL, "within ±")]).chain(outwards).collect();
-    format!("<p class=\"legend\"><em>← inwards, less material</em>{all}<em>outwards, more material →</em></p>\n")
+    let chip = |colour: Rgb, text: &str| {
+        format!(
+            "<span><i style=\"background:{}\"></i>{text}</span>",
+            css(colour)
+        )
+    };
+    let inwards = STEPS
+        .iter()
+        .zip(ends)
+        .rev()
+        .map(|((_, colour, _), text)| chip(*colour, text));
+    let outwards = STEPS
+        .iter()
+        .zip(ends)
+        .map(|((.., colour), text)| chip(*colour, text));
+    let all: String = inwards
+        .chain([chip(STILL, "within ±")])
+        .chain(outwards)
+        .collect();
+    format!(
+        "<p class=\"legend\"><em>← inwards, less material</em>{all}<em>outwards, more material →</em></p>\n"
+    )
 }
 
 fn figure(
@@ -141,14 +205,26 @@ fn figure(
     report: &WhatIfReport,
 ) -> io::Result<String> {
     let paint: Vec<Rgb> = displaced.iter().map(colour_at).collect();
-    let weights: Vec<f64> = displaced.iter().map(|one| if one.is_moved(K) { 1.0 } else { 0.0 }).collect();
-    let panel = PicturePanel { paint: Some(&paint), ..PicturePanel::of(mesh) };
+    let weights: Vec<f64> = displaced
+        .iter()
+        .map(|one| if one.is_moved(K) { 1.0 } else { 0.0 })
+        .collect();
+    let panel = PicturePanel {
+        paint: Some(&paint),
+        ..PicturePanel::of(mesh)
+    };
     let weights = (vertices.moved > 0).then_some(&*weights);
-    let params = PictureParams { width: WIDTH, weights, ..PictureParams::default() };
+    let params = PictureParams {
+        width: WIDTH,
+        weights,
+        ..PictureParams::default()
+    };
     let PartView { picture, .. } = draw_part(&panel, &params, &[]);
     let png = base64(&png_bytes(picture.size, &picture.pixels)?);
     let [width, height] = picture.size;
-    let MovedVertices { vertices, moved, .. } = vertices;
+    let MovedVertices {
+        vertices, moved, ..
+    } = vertices;
     let (which, against) = match (&report.vertices_b, name) {
         (None, _) => ("Both have the same vertices; this is A".to_owned(), "B"),
         (Some(_), "A") => ("The mesh of A".to_owned(), "B"),
@@ -162,10 +238,22 @@ fn figure(
 
 fn features(report: &WhatIfReport) -> String {
     let (moved, still): (Vec<_>, Vec<_>) = report.features.iter().partition(|one| one.is_moved());
-    let head = ["Feature", "Where, mm", "Number", "A", "B", "Change", "±", ""];
+    let head = [
+        "Feature",
+        "Where, mm",
+        "Number",
+        "A",
+        "B",
+        "Change",
+        "±",
+        "",
+    ];
     let shown = |features: &[&FeatureChange]| {
         let rows: Vec<_> = features.iter().flat_map(|feature| rows(feature)).collect();
-        format!("<div class=\"scroll\">{}</div>\n", table("features", &head, &rows))
+        format!(
+            "<div class=\"scroll\">{}</div>\n",
+            table("features", &head, &rows)
+        )
     };
     let first = match moved.len() {
         0 => "<p>No number of a feature moves by more than its ±, and both results find the same features.</p>\n"
@@ -175,7 +263,10 @@ fn features(report: &WhatIfReport) -> String {
     let rest = match still.len() {
         0 => String::new(),
         count => {
-            format!("<details><summary>{count} features that do not move</summary>\n{}</details>\n", shown(&still))
+            format!(
+                "<details><summary>{count} features that do not move</summary>\n{}</details>\n",
+                shown(&still)
+            )
         }
     };
     format!("<h2>Features</h2>\n{first}{rest}")
@@ -184,9 +275,11 @@ fn features(report: &WhatIfReport) -> String {
 fn rows(feature: &FeatureChange) -> Vec<Vec<String>> {
     let id = feature.id_a.or(feature.id_b).unwrap_or_default();
     let name = format!("<strong>{} {id}</strong>", escaped(&feature.kind));
-    let place = feature
-        .center_mm
-        .map_or("–".to_owned(), |place| place.map(|mm| format!("{mm:.1}").replace('-', "−")).join(", "));
+    let place = feature.center_mm.map_or("–".to_owned(), |place| {
+        place
+            .map(|mm| format!("{mm:.1}").replace('-', "−"))
+            .join(", ")
+    });
     let alone = match (feature.id_a, feature.id_b) {
         (Some(_), None) => Some("found in A alone"),
         (None, Some(_)) => Some("found in B alone"),
@@ -194,25 +287,56 @@ fn rows(feature: &FeatureChange) -> Vec<Vec<String>> {
     };
     if let Some(alone) = alone {
         let none = || String::new();
-        return vec![vec![name, place, none(), none(), none(), none(), none(), chip(alone)]];
+        return vec![vec![
+            name,
+            place,
+            none(),
+            none(),
+            none(),
+            none(),
+            none(),
+            chip(alone),
+        ]];
     }
     let row = |(at, number): (usize, &NumberChange)| {
-        let NumberChange { name: of, a, b, change, plus_minus, moved } = number;
+        let NumberChange {
+            name: of,
+            a,
+            b,
+            change,
+            plus_minus,
+            moved,
+        } = number;
         let (what, unit) = in_words(of);
         let value = |value: &Option<f64>| value.map_or("–".to_owned(), plain);
         let cells = vec![
             if at == 0 { name.clone() } else { String::new() },
-            if at == 0 { place.clone() } else { String::new() },
+            if at == 0 {
+                place.clone()
+            } else {
+                String::new()
+            },
             what,
             value(a),
             value(b),
-            format!("{} {unit}", if a.is_some() { signed(*change) } else { plain(*change) }),
+            format!(
+                "{} {unit}",
+                if a.is_some() {
+                    signed(*change)
+                } else {
+                    plain(*change)
+                }
+            ),
             plus_minus.map_or("not known".to_owned(), plain),
             if *moved { chip("moves") } else { String::new() },
         ];
         // the feature keeps its name and place
         let soft = |(at, cell): (usize, String)| {
-            if *moved || at < 2 { cell } else { format!("<span class=\"still\">{cell}</span>") }
+            if *moved || at < 2 {
+                cell
+            } else {
+                format!("<span class=\"still\">{cell}</span>")
+            }
         };
         cells.into_iter().enumerate().map(soft).collect()
     };
@@ -230,7 +354,14 @@ fn in_words(name: &str) -> (String, &'static str) {
         Some((what, "deg")) => (what, "°"),
         _ => (name, ""),
     };
-    (if what == "center" { "place".to_owned() } else { what.replace('_', " ") }, unit)
+    (
+        if what == "center" {
+            "place".to_owned()
+        } else {
+            what.replace('_', " ")
+        },
+        unit,
+    )
 }
 
 fn how(report: &WhatIfReport) -> String {

@@ -51,11 +51,15 @@ reported! {
 
 /// Those that are there.
 pub(super) fn vertices_of(mesh: &TriMesh) -> impl Iterator<Item = VertexId> {
-    (0..mesh.vertex_slots() as u32).map(VertexId).filter(|at| mesh.has_vertex(*at))
+    (0..mesh.vertex_slots() as u32)
+        .map(VertexId)
+        .filter(|at| mesh.has_vertex(*at))
 }
 
 fn farthest(mesh: &TriMesh, displaced: &[Displacement]) -> Option<(VertexId, Displacement)> {
-    let moved = vertices_of(mesh).map(|at| (at, displaced[at.0 as usize])).filter(|(_, one)| one.is_moved(K));
+    let moved = vertices_of(mesh)
+        .map(|at| (at, displaced[at.0 as usize]))
+        .filter(|(_, one)| one.is_moved(K));
     moved.max_by(|(_, one), (_, other)| one.distance.abs().total_cmp(&other.distance.abs()))
 }
 
@@ -67,7 +71,10 @@ impl WhatIfReport {
             keys: found.keys.clone(),
             k: K,
             vertices_a: MovedVertices::of(&a.mesh, &found.of_a),
-            vertices_b: found.of_b.as_ref().map(|of_b| MovedVertices::of(&b.mesh, of_b)),
+            vertices_b: found
+                .of_b
+                .as_ref()
+                .map(|of_b| MovedVertices::of(&b.mesh, of_b)),
             features_moved: found.features.iter().filter(|one| one.is_moved()).count(),
             features: found.features.clone(),
         }
@@ -80,7 +87,10 @@ impl WhatIfReport {
             Value::String(text) => text.clone(),
             other => other.to_string(),
         };
-        self.keys.iter().map(|(key, [a, b])| format!("{key}: {} → {}", shown(a), shown(b))).collect()
+        self.keys
+            .iter()
+            .map(|(key, [a, b])| format!("{key}: {} → {}", shown(a), shown(b)))
+            .collect()
     }
 }
 
@@ -100,10 +110,17 @@ impl fmt::Display for WhatIfReport {
             write!(f, "A and B are of the same inputs")?;
         }
         write!(f, "{}", self.differences().join("\n"))?;
-        let of_mesh = [("A", Some(&self.vertices_a)), ("B", self.vertices_b.as_ref())];
+        let of_mesh = [
+            ("A", Some(&self.vertices_a)),
+            ("B", self.vertices_b.as_ref()),
+        ];
         for (name, vertices) in of_mesh {
             let Some(vertices) = vertices else { continue };
-            let name = if self.vertices_b.is_some() { name } else { "both" };
+            let name = if self.vertices_b.is_some() {
+                name
+            } else {
+                "both"
+            };
             write!(f, "\n{}", vertices.in_words(name))?;
         }
         let all = counted(self.features.len(), "feature", "features");
@@ -112,7 +129,12 @@ impl fmt::Display for WhatIfReport {
             "\nfeatures: {} of {all} moved by more than their ± (k = {}), or are in one alone",
             self.features_moved, self.k
         )?;
-        for feature in self.features.iter().filter(|one| one.is_moved()).take(MOST_NAMED) {
+        for feature in self
+            .features
+            .iter()
+            .filter(|one| one.is_moved())
+            .take(MOST_NAMED)
+        {
             write!(f, "\n  {}", in_words(feature))?;
         }
         match self.features_moved.saturating_sub(MOST_NAMED) {
@@ -124,34 +146,65 @@ impl fmt::Display for WhatIfReport {
 
 impl MovedVertices {
     fn in_words(&self, name: &str) -> String {
-        let Self { vertices, moved, farthest_mm, farthest_plus_minus_mm, .. } = self;
+        let Self {
+            vertices,
+            moved,
+            farthest_mm,
+            farthest_plus_minus_mm,
+            ..
+        } = self;
         let by = if self.is_sigma_known {
             format!("by more than their ± (k = {K})")
         } else {
             "(no ± is known)".to_owned()
         };
         let most = farthest_mm.zip(*farthest_plus_minus_mm);
-        let most = most.map_or(String::new(), |(mm, known)| format!(", the farthest by {mm:+.3} mm (± {known:.3})"));
+        let most = most.map_or(String::new(), |(mm, known)| {
+            format!(", the farthest by {mm:+.3} mm (± {known:.3})")
+        });
         format!("vertices of {name}: {moved} of {vertices} moved {by}{most}")
     }
 }
 
 /// One feature with what moved of it.
 fn in_words(feature: &FeatureChange) -> String {
-    let FeatureChange { kind, id_a, id_b, center_mm, numbers } = feature;
-    let place = center_mm.map_or(String::new(), |[x, y, z]| format!(" at ({x:.1}, {y:.1}, {z:.1}) mm"));
+    let FeatureChange {
+        kind,
+        id_a,
+        id_b,
+        center_mm,
+        numbers,
+    } = feature;
+    let place = center_mm.map_or(String::new(), |[x, y, z]| {
+        format!(" at ({x:.1}, {y:.1}, {z:.1}) mm")
+    });
     match (id_a, id_b) {
         (Some(id), None) => format!("{kind} {id}{place}: found by A alone"),
         (None, Some(id)) => format!("{kind} {id}{place}: found by B alone"),
         (id, _) => {
-            let moved: Vec<_> = numbers.iter().filter(|number| number.moved).map(number_in_words).collect();
-            format!("{kind} {}{place}: {}", id.unwrap_or_default(), moved.join(", "))
+            let moved: Vec<_> = numbers
+                .iter()
+                .filter(|number| number.moved)
+                .map(number_in_words)
+                .collect();
+            format!(
+                "{kind} {}{place}: {}",
+                id.unwrap_or_default(),
+                moved.join(", ")
+            )
         }
     }
 }
 
 fn number_in_words(number: &NumberChange) -> String {
-    let NumberChange { name, a, b, change, plus_minus, .. } = number;
+    let NumberChange {
+        name,
+        a,
+        b,
+        change,
+        plus_minus,
+        ..
+    } = number;
     let known = plus_minus.map_or("± unknown".to_owned(), |known| format!("± {known:.3}"));
     match a.zip(*b) {
         Some((a, b)) => format!("{name} {a:.3} → {b:.3} ({change:+.3}, {known})"),

@@ -36,7 +36,11 @@ fn add_vertices(table: &mut ResultTable, name: &str, mesh: &TriMesh, displaced: 
             ("y_mm", number_of(place.y)),
             ("z_mm", number_of(place.z)),
             ("displacement_mm", number_of(one.distance * 1e3)),
-            ("plus_minus_mm", one.sigma.map_or(Value::Null, |_| number_of(one.plus_minus(K) * 1e3))),
+            (
+                "plus_minus_mm",
+                one.sigma
+                    .map_or(Value::Null, |_| number_of(one.plus_minus(K) * 1e3)),
+            ),
             ("moved", one.is_moved(K).into()),
         ];
         table.add_json(&row.map(|(name, value)| (name.to_owned(), value)));
@@ -51,13 +55,26 @@ pub(super) fn features_table(found: &WhatIf) -> ResultTable {
             ("kind", Value::from(feature.kind.clone())),
             ("id_a", feature.id_a.into()),
             ("id_b", feature.id_b.into()),
-            ("center_mm", feature.center_mm.map_or(Value::Null, |center| center.to_vec().into())),
+            (
+                "center_mm",
+                feature
+                    .center_mm
+                    .map_or(Value::Null, |center| center.to_vec().into()),
+            ),
         ];
         let named = |row: &[(&str, Value)]| {
-            row.iter().map(|(name, value)| ((*name).to_owned(), value.clone())).collect::<Vec<_>>()
+            row.iter()
+                .map(|(name, value)| ((*name).to_owned(), value.clone()))
+                .collect::<Vec<_>>()
         };
         if feature.numbers.is_empty() {
-            table.add_json(&[named(&of_feature), named(&[("moved", feature.is_moved().into())])].concat());
+            table.add_json(
+                &[
+                    named(&of_feature),
+                    named(&[("moved", feature.is_moved().into())]),
+                ]
+                .concat(),
+            );
         }
         for number in &feature.numbers {
             let of_number = [
@@ -80,7 +97,10 @@ pub(super) fn write_moved_mesh(path: &Path, b: &JobResult, found: &WhatIf) -> Re
     let colours: Vec<Rgb> = displaced.iter().map(colour_at).collect();
     let column = |name, of: fn(&Displacement) -> f64| {
         let values: Vec<f32> = displaced.iter().map(|one| of(one) as f32).collect();
-        VertexColumn { name, values: values.into() }
+        VertexColumn {
+            name,
+            values: values.into(),
+        }
     };
     let columns = [
         column("displacement_mm", |one| one.distance * 1e3),

@@ -77,7 +77,11 @@ fn in_words(error: &FeaturesError) -> String {
             "no motion brings the measured features onto the drawing: the best explains {explained} of {of}; check that both are the same \
              part in one unit, or {BY_NUMBER}"
         ),
-        FeaturesError::Mirrored { explained, mirrored, of } => format!(
+        FeaturesError::Mirrored {
+            explained,
+            mirrored,
+            of,
+        } => format!(
             "the measured features fit a mirror image of the drawing ({mirrored} of {of}) and no motion of it ({explained}): the sign of one \
              axis of the drawing is wrong, or it is the part's left-handed twin"
         ),

@@ -21,8 +21,13 @@ impl FromStr for AlignmentMethod {
         if text == "best-fit" {
             return Ok(Self::BestFit);
         }
-        let names = text.strip_prefix("datums=").ok_or_else(|| format!("take {FORMS}"))?;
-        let names: Vec<_> = names.split(',').map(|name| name.trim().to_owned()).collect();
+        let names = text
+            .strip_prefix("datums=")
+            .ok_or_else(|| format!("take {FORMS}"))?;
+        let names: Vec<_> = names
+            .split(',')
+            .map(|name| name.trim().to_owned())
+            .collect();
         match names.iter().any(String::is_empty) {
             true => Err(format!("a datum has no name: take {FORMS}")),
             false => Ok(Self::Datums(names)),
@@ -48,7 +53,11 @@ mod tests {
         for text in ["best-fit", "datums=top flatness,bore", "datums=A"] {
             assert_eq!(text.parse::<AlignmentMethod>().unwrap().to_string(), text);
         }
-        for (text, words) in [("icp", "take best-fit"), ("datums=", "no name"), ("datums=A,,B", "no name")] {
+        for (text, words) in [
+            ("icp", "take best-fit"),
+            ("datums=", "no name"),
+            ("datums=A,,B", "no name"),
+        ] {
             let why = text.parse::<AlignmentMethod>().unwrap_err();
             assert!(why.contains(words), "{why}");
         }

@@ -61,16 +61,22 @@ pub fn aligned(
     let reach = match_mm * 1e-3;
     let datums = match method {
         AlignmentMethod::BestFit => None,
-        AlignmentMethod::Datums(names) => {
-            Some(names.iter().map(|name| datum_of(drawn, name)).collect::<Result<Vec<_>, _>>()?)
-        }
+        AlignmentMethod::Datums(names) => Some(
+            names
+                .iter()
+                .map(|name| datum_of(drawn, name))
+                .collect::<Result<Vec<_>, _>>()?,
+        ),
     };
     let mut motion = start(drawn, &measured, datums.as_deref(), reach)?;
     let mut before = Vec::new();
     for _ in 0..MOST_ROUNDS {
         let matched = matched(drawn, &measured, &motion, reach);
         let used = match &datums {
-            None => matched.iter().filter_map(|one| one.as_ref().ok().cloned()).collect(),
+            None => matched
+                .iter()
+                .filter_map(|one| one.as_ref().ok().cloned())
+                .collect(),
             Some(datums) => of_datums(drawn, datums, &matched)?,
         };
         if used == before {
@@ -80,14 +86,25 @@ pub fn aligned(
         (motion, before) = (fit.motion, used);
     }
     let fit = fitted(drawn, &before, datums.is_some(), &motion)?;
-    let worst = before.iter().zip(&fit.residuals).max_by(|a, b| a.1.total_cmp(b.1));
+    let worst = before
+        .iter()
+        .zip(&fit.residuals)
+        .max_by(|a, b| a.1.total_cmp(b.1));
     if let Some((one, residual)) = worst.filter(|(_, residual)| **residual > reach) {
         let name = drawn[one.drawn].name().to_owned();
-        return Err(AlignmentError::Residual { name, residual_mm: residual * 1e3, limit_mm: match_mm });
+        return Err(AlignmentError::Residual {
+            name,
+            residual_mm: residual * 1e3,
+            limit_mm: match_mm,
+        });
     }
     let is_unused = |at: &usize| datums.is_none() && before.iter().all(|one| one.drawn != *at);
     let could_be = |at: &usize| is_aligned_by(drawn[*at].shape.kind) && drawn[*at].has_place;
-    let unused = (0..drawn.len()).filter(is_unused).filter(could_be).map(|at| drawn[at].name().to_owned()).collect();
+    let unused = (0..drawn.len())
+        .filter(is_unused)
+        .filter(could_be)
+        .map(|at| drawn[at].name().to_owned())
+        .collect();
     Ok(Alignment {
         features: moved(file, &measured, &before, &fit),
         motion: fit.motion,
@@ -106,18 +123,26 @@ fn start(
 ) -> Result<Isometry3<f64>, AlignmentError> {
     let is_wanted = |at: &usize| datums.is_none_or(|datums| datums.contains(at));
     let is_placed = |at: &usize| drawn[*at].has_place && is_aligned_by(drawn[*at].shape.kind);
-    let wanted: Vec<usize> = (0..drawn.len()).filter(is_wanted).filter(is_placed).collect();
+    let wanted: Vec<usize> = (0..drawn.len())
+        .filter(is_wanted)
+        .filter(is_placed)
+        .collect();
     if wanted.iter().any(|&at| drawn[at].id.is_none()) {
         return start_of_pattern(drawn, measured);
     }
     let named = wanted.into_iter().filter_map(|at| {
         let one = &drawn[at];
-        let found = measured.iter().find(|feature| Some(feature.id) == one.id && feature.kind == one.shape.kind)?;
+        let found = measured
+            .iter()
+            .find(|feature| Some(feature.id) == one.id && feature.kind == one.shape.kind)?;
         paired(at, one, found).ok()
     });
     let named: Vec<_> = named.collect();
     let pairs: Vec<_> = named.iter().map(|one| one.pair).collect();
-    start_of_named(&pairs, reach, |error| AlignmentError::Open { error, used: names_of(drawn, &named) })
+    start_of_named(&pairs, reach, |error| AlignmentError::Open {
+        error,
+        used: names_of(drawn, &named),
+    })
 }
 
 /// Each feature of the drawing with the measured one that it is after a motion, or why none can be used.
@@ -132,7 +157,11 @@ fn matched(
         kind: feature.kind,
         centre: motion * feature.centre.value,
         axis: feature.axis.as_ref().map(|axis| motion * axis.value),
-        size: feature.diameter.as_ref().or(feature.width.as_ref()).map(|size| size.value),
+        size: feature
+            .diameter
+            .as_ref()
+            .or(feature.width.as_ref())
+            .map(|size| size.value),
     };
     let places: Vec<_> = measured.iter().map(place).collect();
     let sought = |one: &DrawnFeature| SoughtFeature {
@@ -141,7 +170,11 @@ fn matched(
         place: one.has_place.then_some(one.shape.centre.value),
         size: one.size(),
     };
-    let matches = match_features(&drawn.iter().map(sought).collect::<Vec<_>>(), &places, reach);
+    let matches = match_features(
+        &drawn.iter().map(sought).collect::<Vec<_>>(),
+        &places,
+        reach,
+    );
     let each = drawn.iter().enumerate().zip(matches).map(|((at, one), found)| {
         let FeatureMatch::Found(id) = found else {
             return Err("no measured feature, or more than one, is where it should be: touch it, or name it in the column feature".to_owned());
@@ -156,13 +189,25 @@ fn matched(
 fn paired(drawn: usize, one: &DrawnFeature, feature: &Feature) -> Result<Matched, String> {
     let id = feature.id;
     if !is_aligned_by(one.shape.kind) {
-        return Err(format!("a {} is none: take a plane, hole, slot, pocket, boss or cylinder", one.shape.kind));
+        return Err(format!(
+            "a {} is none: take a plane, hole, slot, pocket, boss or cylinder",
+            one.shape.kind
+        ));
     }
     if !one.has_place {
-        return Err("the drawing does not say where it is: fill in center_x_mm, center_y_mm, center_z_mm".to_owned());
+        return Err(
+            "the drawing does not say where it is: fill in center_x_mm, center_y_mm, center_z_mm"
+                .to_owned(),
+        );
     }
-    let axis = feature.axis.as_ref().ok_or_else(|| format!("feature {id} has no axis"))?;
-    let place_std = feature.centre.std.ok_or_else(|| format!("feature {id} has no standard uncertainty: touch it"))?;
+    let axis = feature
+        .axis
+        .as_ref()
+        .ok_or_else(|| format!("feature {id} has no axis"))?;
+    let place_std = feature
+        .centre
+        .std
+        .ok_or_else(|| format!("feature {id} has no standard uncertainty: touch it"))?;
     let pair = DatumPair {
         kind: one.shape.kind,
         nominal: one.shape.centre.value,
@@ -176,10 +221,15 @@ fn paired(drawn: usize, one: &DrawnFeature, feature: &Feature) -> Result<Matched
 }
 
 fn datum_of(drawn: &[DrawnFeature], name: &str) -> Result<usize, AlignmentError> {
-    let found = drawn.iter().position(|one| one.names.iter().any(|known| known == name));
+    let found = drawn
+        .iter()
+        .position(|one| one.names.iter().any(|known| known == name));
     found.ok_or_else(|| {
         let all: Vec<String> = drawn.iter().map(|one| one.name().to_owned()).collect();
-        AlignmentError::NoSuchDatum { name: name.to_owned(), known: first_names(&all) }
+        AlignmentError::NoSuchDatum {
+            name: name.to_owned(),
+            known: first_names(&all),
+        }
     })
 }
 
@@ -189,7 +239,10 @@ fn of_datums(
     matched: &[Result<Matched, String>],
 ) -> Result<Vec<Matched>, AlignmentError> {
     let one = |&at: &usize| {
-        let bad = |why: &String| AlignmentError::BadDatum { name: drawn[at].name().to_owned(), why: why.clone() };
+        let bad = |why: &String| AlignmentError::BadDatum {
+            name: drawn[at].name().to_owned(),
+            why: why.clone(),
+        };
         matched[at].as_ref().cloned().map_err(bad)
     };
     datums.iter().map(one).collect()
@@ -203,29 +256,57 @@ fn fitted(
 ) -> Result<DatumFit, AlignmentError> {
     let pairs: Vec<_> = used.iter().map(|one| one.pair).collect();
     let all = 0..pairs.len();
-    let stages = if is_by_datums { all.map(|at| vec![at]).collect() } else { vec![all.collect()] };
-    fit_datums(&pairs, &stages, start).map_err(|error| AlignmentError::Open { error, used: names_of(drawn, used) })
+    let stages = if is_by_datums {
+        all.map(|at| vec![at]).collect()
+    } else {
+        vec![all.collect()]
+    };
+    fit_datums(&pairs, &stages, start).map_err(|error| AlignmentError::Open {
+        error,
+        used: names_of(drawn, used),
+    })
 }
 
 fn names_of(drawn: &[DrawnFeature], used: &[Matched]) -> String {
     if used.is_empty() {
         return "no touched feature at all".to_owned();
     }
-    first_names(&used.iter().map(|one| format!("{} ({})", drawn[one.drawn].name(), one.pair.kind)).collect::<Vec<_>>())
+    first_names(
+        &used
+            .iter()
+            .map(|one| format!("{} ({})", drawn[one.drawn].name(), one.pair.kind))
+            .collect::<Vec<_>>(),
+    )
 }
 
 fn first_names(names: &[String]) -> String {
     let more = names.len().saturating_sub(MOST_NAMED);
-    let shown = names.iter().take(MOST_NAMED).cloned().collect::<Vec<_>>().join(", ");
-    if more == 0 { shown } else { format!("{shown} and {more} more") }
+    let shown = names
+        .iter()
+        .take(MOST_NAMED)
+        .cloned()
+        .collect::<Vec<_>>()
+        .join(", ");
+    if more == 0 {
+        shown
+    } else {
+        format!("{shown} and {more} more")
+    }
 }
 
 /// All that was measured, in the frame of the drawing.
-fn moved(file: &FeatureFile, measured: &[Feature], used: &[Matched], fit: &DatumFit) -> FeatureFile {
+fn moved(
+    file: &FeatureFile,
+    measured: &[Feature],
+    used: &[Matched],
+    fit: &DatumFit,
+) -> FeatureFile {
     let mut file = file.clone();
     for record in &mut file.features {
-        let std =
-            measured.iter().find(|feature| feature.id == record.id).and_then(|feature| place_std(feature, used, fit));
+        let std = measured
+            .iter()
+            .find(|feature| feature.id == record.id)
+            .and_then(|feature| place_std(feature, used, fit));
         move_one(record, &fit.motion);
         if let Some(std) = std {
             record.std.insert("center_mm".to_owned(), std * 1e3);
@@ -239,29 +320,56 @@ fn place_std(feature: &Feature, used: &[Matched], fit: &DatumFit) -> Option<f64>
     if let Some(at) = used.iter().position(|one| one.id == feature.id) {
         return Some(fit.place_stds[at]);
     }
-    let axis = feature.axis.as_ref().map_or_else(Vector3::z, |axis| axis.value);
-    Some(fit.place_std(feature.kind, &(fit.motion * feature.centre.value), &(fit.motion * axis), feature.centre.std?))
+    let axis = feature
+        .axis
+        .as_ref()
+        .map_or_else(Vector3::z, |axis| axis.value);
+    Some(fit.place_std(
+        feature.kind,
+        &(fit.motion * feature.centre.value),
+        &(fit.motion * axis),
+        feature.centre.std?,
+    ))
 }
 
 fn move_one(record: &mut FeatureRecord, motion: &Isometry3<f64>) {
-    let place = |mm: [f64; 3]| -> [f64; 3] { ((motion * (Point3::from(mm) * 1e-3)) * 1e3).coords.into() };
+    let place =
+        |mm: [f64; 3]| -> [f64; 3] { ((motion * (Point3::from(mm) * 1e-3)) * 1e3).coords.into() };
     let direction = |v: [f64; 3]| -> [f64; 3] { (motion * Vector3::from(v)).into() };
     record.center_mm = record.center_mm.map(place);
     record.axis = record.axis.map(direction);
     record.direction = record.direction.map(direction);
-    record.points_mm.iter_mut().for_each(|point| *point = place(*point));
+    record
+        .points_mm
+        .iter_mut()
+        .for_each(|point| *point = place(*point));
 }
 
-fn record_of(drawn: &[DrawnFeature], used: &[Matched], fit: &DatumFit, method: &AlignmentMethod) -> AlignmentRecord {
+fn record_of(
+    drawn: &[DrawnFeature],
+    used: &[Matched],
+    fit: &DatumFit,
+    method: &AlignmentMethod,
+) -> AlignmentRecord {
     let turn = fit.motion.rotation.to_rotation_matrix();
-    let std = fit.covariance.diagonal().map(|variance| variance.max(0.0).sqrt());
-    let features = used.iter().zip(&fit.residuals).map(|(one, residual)| AlignedFeatureRecord {
-        name: drawn[one.drawn].name().to_owned(),
-        kind: one.pair.kind.name().to_owned(),
-        feature: one.id,
-        residual_mm: residual * 1e3,
-    });
-    let squares: f64 = fit.residuals.iter().map(|residual| residual * residual).sum();
+    let std = fit
+        .covariance
+        .diagonal()
+        .map(|variance| variance.max(0.0).sqrt());
+    let features = used
+        .iter()
+        .zip(&fit.residuals)
+        .map(|(one, residual)| AlignedFeatureRecord {
+            name: drawn[one.drawn].name().to_owned(),
+            kind: one.pair.kind.name().to_owned(),
+            feature: one.id,
+            residual_mm: residual * 1e3,
+        });
+    let squares: f64 = fit
+        .residuals
+        .iter()
+        .map(|residual| residual * residual)
+        .sum();
     AlignmentRecord {
         method: match method {
             AlignmentMethod::BestFit => "best-fit".to_owned(),

@@ -16,20 +16,31 @@ const ALONG: f64 = 0.985;
 
 /// The kinds that have an axis by which they are aligned.
 pub(super) fn is_aligned_by(kind: Kind) -> bool {
-    matches!(kind, Kind::Hole | Kind::Slot | Kind::Pocket | Kind::Boss | Kind::Cylinder | Kind::Plane)
+    matches!(
+        kind,
+        Kind::Hole | Kind::Slot | Kind::Pocket | Kind::Boss | Kind::Cylinder | Kind::Plane
+    )
 }
 
 /// By the pattern of all features: the motion that takes the measured ones onto the drawing.
 ///
 /// # Errors
 /// [`AlignmentError::NotFound`]
-pub(super) fn start_of_pattern(drawn: &[DrawnFeature], measured: &[Feature]) -> Result<Isometry3<f64>, AlignmentError> {
+pub(super) fn start_of_pattern(
+    drawn: &[DrawnFeature],
+    measured: &[Feature],
+) -> Result<Isometry3<f64>, AlignmentError> {
     let is_used = |feature: &&Feature| is_aligned_by(feature.kind);
     let own: Vec<Feature> = measured.iter().filter(is_used).cloned().collect();
-    let placed = drawn.iter().filter(|one| one.has_place).map(|one| &one.shape);
+    let placed = drawn
+        .iter()
+        .filter(|one| one.has_place)
+        .map(|one| &one.shape);
     let theirs: Vec<Feature> = placed.filter(is_used).cloned().collect();
     let found = align_features(&own, &theirs, None, &FeaturesParams::default());
-    found.map(|found| found.source_to_target).map_err(AlignmentError::NotFound)
+    found
+        .map(|found| found.source_to_target)
+        .map_err(AlignmentError::NotFound)
 }
 
 /// By features that the drawing names: from every turn by quarters the fit is tried, and what fits is taken.
@@ -46,10 +57,17 @@ pub(super) fn start_of_named(
     let mut fits: Vec<DatumFit> = Vec::new();
     let mut why = None;
     for turn in quarter_turns() {
-        match fit_datums(pairs, &[(0..pairs.len()).collect()], &over_one_another(pairs, turn)) {
+        match fit_datums(
+            pairs,
+            &[(0..pairs.len()).collect()],
+            &over_one_another(pairs, turn),
+        ) {
             Ok(fit) => {
-                let fits_drawing = fit.residuals.iter().all(|residual| *residual <= reach) && keeps_axes(pairs, &fit);
-                let is_new = |other: &DatumFit| fit.motion.rotation.angle_to(&other.motion.rotation) > SAME_TURN;
+                let fits_drawing = fit.residuals.iter().all(|residual| *residual <= reach)
+                    && keeps_axes(pairs, &fit);
+                let is_new = |other: &DatumFit| {
+                    fit.motion.rotation.angle_to(&other.motion.rotation) > SAME_TURN
+                };
                 if fits_drawing && fits.iter().all(is_new) {
                     fits.push(fit);
                 }
@@ -67,8 +85,16 @@ pub(super) fn start_of_named(
 /// Whether axes lie as the drawing has them, and planes face where they do there.
 fn keeps_axes(pairs: &[DatumPair], fit: &DatumFit) -> bool {
     let is_kept = |pair: &DatumPair| {
-        let cosine = pair.nominal_axis.map(|axis| (fit.motion * pair.measured_axis).dot(&axis));
-        cosine.is_none_or(|cosine| if pair.kind == Kind::Plane { cosine > ALONG } else { cosine.abs() > ALONG })
+        let cosine = pair
+            .nominal_axis
+            .map(|axis| (fit.motion * pair.measured_axis).dot(&axis));
+        cosine.is_none_or(|cosine| {
+            if pair.kind == Kind::Plane {
+                cosine > ALONG
+            } else {
+                cosine.abs() > ALONG
+            }
+        })
     };
     pairs.iter().all(is_kept)
 }
@@ -76,7 +102,11 @@ fn keeps_axes(pairs: &[DatumPair], fit: &DatumFit) -> bool {
 /// A turn about the middle of what was measured, which comes over that of the drawing.
 fn over_one_another(pairs: &[DatumPair], turn: UnitQuaternion<f64>) -> Isometry3<f64> {
     let middle = |place: fn(&DatumPair) -> Point3<f64>| {
-        pairs.iter().map(|pair| place(pair).coords).sum::<Vector3<f64>>() / pairs.len().max(1) as f64
+        pairs
+            .iter()
+            .map(|pair| place(pair).coords)
+            .sum::<Vector3<f64>>()
+            / pairs.len().max(1) as f64
     };
     let (from, to) = (middle(|pair| pair.measured), middle(|pair| pair.nominal));
     Isometry3::from_parts(Translation3::from(to - turn * from), turn)
@@ -84,12 +114,14 @@ fn over_one_another(pairs: &[DatumPair], turn: UnitQuaternion<f64>) -> Isometry3
 
 /// The 24 turns of a cube.
 fn quarter_turns() -> Vec<UnitQuaternion<f64>> {
-    let about =
-        |axis: Vector3<f64>, quarters: u32| UnitQuaternion::from_scaled_axis(axis * (FRAC_PI_2 * f64::from(quarters)));
+    let about = |axis: Vector3<f64>, quarters: u32| {
+        UnitQuaternion::from_scaled_axis(axis * (FRAC_PI_2 * f64::from(quarters)))
+    };
     let tops = (0..4)
         .map(|quarters| about(Vector3::x(), quarters))
         .chain([1, 3].map(|quarters| about(Vector3::y(), quarters)));
-    tops.flat_map(|top| (0..4).map(move |quarters| top * about(Vector3::z(), quarters))).collect()
+    tops.flat_map(|top| (0..4).map(move |quarters| top * about(Vector3::z(), quarters)))
+        .collect()
 }
 
 #[cfg(test)]
@@ -101,7 +133,10 @@ mod tests {
         let turns = quarter_turns();
         assert_eq!(turns.len(), 24);
         for (at, turn) in turns.iter().enumerate() {
-            assert!(turns[..at].iter().all(|other| other.angle_to(turn) > 1.0), "turn {at}");
+            assert!(
+                turns[..at].iter().all(|other| other.angle_to(turn) > 1.0),
+                "turn {at}"
+            );
         }
     }
 }

@@ -12,7 +12,13 @@ pub(super) fn alignment(record: &InspectionRecord) -> String {
             .to_owned();
     };
     let k = record.coverage_factor;
-    let AlignmentRecord { translation_mm, rotation_vector_deg, translation_std_mm, rotation_std_deg, .. } = found;
+    let AlignmentRecord {
+        translation_mm,
+        rotation_vector_deg,
+        translation_std_mm,
+        rotation_std_deg,
+        ..
+    } = found;
     let rows = ["x", "y", "z"].iter().enumerate().map(|(i, axis)| {
         let degrees = |number: f64| format!("{number:.4}").replace('-', "−");
         vec![
@@ -24,13 +30,21 @@ pub(super) fn alignment(record: &InspectionRecord) -> String {
         ]
     });
     let [x, y, z] = found.center_mm.map(|mm| shown(Some(mm)));
-    let features = found
-        .features
-        .iter()
-        .map(|one| vec![escaped(&one.name), escaped(&one.kind), one.feature.to_string(), shown(Some(one.residual_mm))]);
+    let features = found.features.iter().map(|one| {
+        vec![
+            escaped(&one.name),
+            escaped(&one.kind),
+            one.feature.to_string(),
+            shown(Some(one.residual_mm)),
+        ]
+    });
     let how = match &*found.method {
-        "datums" => "By datums in the order of the table: each fixes what those before it leave open.",
-        _ => "By a best fit: least squares over these features, weighted by their standard uncertainties.",
+        "datums" => {
+            "By datums in the order of the table: each fixes what those before it leave open."
+        }
+        _ => {
+            "By a best fit: least squares over these features, weighted by their standard uncertainties."
+        }
     };
     format!(
         "<h2>Alignment</h2>\n<p class=\"small\">{how} Positions and coordinates are about the frame of the drawing; the uncertainty of the alignment is in \
@@ -39,7 +53,15 @@ pub(super) fn alignment(record: &InspectionRecord) -> String {
          most.</p>\n{}{}",
         shown(Some(found.residual_rms_mm)),
         shown(Some(found.residual_max_mm)),
-        table("motion", &["Axis", "Shift, mm", "U, mm", "Rotation vector, °", "U, °"], &rows.collect::<Vec<_>>()),
-        table("aligned", &["Feature", "Kind", "Id", "Off its nominal place, mm"], &features.collect::<Vec<_>>()),
+        table(
+            "motion",
+            &["Axis", "Shift, mm", "U, mm", "Rotation vector, °", "U, °"],
+            &rows.collect::<Vec<_>>()
+        ),
+        table(
+            "aligned",
+            &["Feature", "Kind", "Id", "Off its nominal place, mm"],
+            &features.collect::<Vec<_>>()
+        ),
     )
 }

@@ -19,9 +19,21 @@ pub(super) struct DecisionLook {
 /// Bluish green, vermillion and yellow: told apart without red or green as well, and each has its sign and its word.
 pub(super) fn look_of(decision: &str) -> DecisionLook {
     match decision {
-        "pass" => DecisionLook { fill: "#00735a", ink: "#ffffff", sign: "✓" },
-        "fail" => DecisionLook { fill: "#b94a00", ink: "#ffffff", sign: "✗" },
-        _ => DecisionLook { fill: "#f3e26b", ink: "#1d2129", sign: "?" },
+        "pass" => DecisionLook {
+            fill: "#00735a",
+            ink: "#ffffff",
+            sign: "✓",
+        },
+        "fail" => DecisionLook {
+            fill: "#b94a00",
+            ink: "#ffffff",
+            sign: "✗",
+        },
+        _ => DecisionLook {
+            fill: "#f3e26b",
+            ink: "#1d2129",
+            sign: "?",
+        },
     }
 }
 
@@ -29,7 +41,9 @@ pub(super) fn look_of(decision: &str) -> DecisionLook {
 pub(super) fn chip(decision: &str) -> String {
     let DecisionLook { fill, ink, sign } = look_of(decision);
     let word = decision.to_uppercase();
-    format!("<span class=\"chip {decision}\" style=\"background:{fill};color:{ink}\">{sign} {word}</span>")
+    format!(
+        "<span class=\"chip {decision}\" style=\"background:{fill};color:{ink}\">{sign} {word}</span>"
+    )
 }
 
 /// A number with the digits that a drawing has; none: a dash.
@@ -53,7 +67,9 @@ pub(super) fn probability(share: f64) -> String {
 
 /// What a quantity is called in words.
 pub(super) fn in_words(quantity: &str) -> String {
-    InspectedQuantity::of_name(quantity).map_or(quantity, |quantity| quantity.parts().0).replace('_', " ")
+    InspectedQuantity::of_name(quantity)
+        .map_or(quantity, |quantity| quantity.parts().0)
+        .replace('_', " ")
 }
 
 pub(super) fn table_row(one: &CharacteristicRecord) -> Vec<String> {
@@ -68,18 +84,31 @@ pub(super) fn table_row(one: &CharacteristicRecord) -> Vec<String> {
         (None, _) => format!("≤ {}", number("upper_limit")),
     };
     let bound = if one.is_at_least { "≥ " } else { "" };
-    let actual = one.number("actual").map_or("–".to_owned(), |_| format!("{bound}{}", number("actual")));
-    let deviation = one.number("deviation").map_or("–".to_owned(), |off| minus(&format!("{off:+.3}")));
+    let actual = one
+        .number("actual")
+        .map_or("–".to_owned(), |_| format!("{bound}{}", number("actual")));
+    let deviation = one
+        .number("deviation")
+        .map_or("–".to_owned(), |off| minus(&format!("{off:+.3}")));
     let risk = match (&*one.decision, one.conformance_probability) {
         (_, None) => String::new(),
         ("undecided", Some(p)) => {
-            format!("risk if accepted {}, if rejected {}", probability(1.0 - p), probability(p))
+            format!(
+                "risk if accepted {}, if rejected {}",
+                probability(1.0 - p),
+                probability(p)
+            )
         }
         (_, Some(_)) => format!("risk {}", probability(one.risk.unwrap_or_default())),
     };
-    let why = one.reason.as_ref().map_or(String::new(), |why| format!("<span class=\"why\">{}</span>", escaped(why)));
-    let from =
-        if one.tolerance_from == "drawing" { String::new() } else { format!(" · {}", escaped(&one.tolerance_from)) };
+    let why = one.reason.as_ref().map_or(String::new(), |why| {
+        format!("<span class=\"why\">{}</span>", escaped(why))
+    });
+    let from = if one.tolerance_from == "drawing" {
+        String::new()
+    } else {
+        format!(" · {}", escaped(&one.tolerance_from))
+    };
     vec![
         escaped(&one.number),
         format!(
@@ -94,7 +123,10 @@ pub(super) fn table_row(one: &CharacteristicRecord) -> Vec<String> {
         deviation,
         number("expanded_uncertainty"),
         tolerance_bar(one),
-        format!("{}<span class=\"why\">{risk}</span>{why}", chip(&one.decision)),
+        format!(
+            "{}<span class=\"why\">{risk}</span>{why}",
+            chip(&one.decision)
+        ),
     ]
 }
 
@@ -117,7 +149,10 @@ pub(super) fn table(inspected: &Inspected) -> String {
     let key = "<p class=\"small\">Lengths in mm, angles in degrees. The number before the point is that of the balloon in the picture. Bar: grey is the tolerance zone \
                between its limits, green the acceptance zone that the guard bands leave, dot and line the measured value with ± U; ◀ ▶ beyond the drawing. ≥: a lower \
                bound, the end was not touched. Risk: the probability that the decision is wrong.</p>\n";
-    format!("<h2>Characteristics</h2>\n<div class=\"scroll\">{}</div>\n{key}", html_table("num", &head, &rows))
+    format!(
+        "<h2>Characteristics</h2>\n<div class=\"scroll\">{}</div>\n{key}",
+        html_table("num", &head, &rows)
+    )
 }
 
 #[cfg(test)]
@@ -133,11 +168,18 @@ mod tests {
         let colours = Decision::ALL
             .map(|decision| look_of(decision.name()).fill)
             .map(|hex| [byte(hex, 1), byte(hex, 3), byte(hex, 5)]);
-        assert!(least_difference(&colours) > 10.0, "{}", least_difference(&colours));
+        assert!(
+            least_difference(&colours) > 10.0,
+            "{}",
+            least_difference(&colours)
+        );
     }
 
     #[test]
     fn a_probability_is_never_rounded_to_certainty() {
-        assert_eq!([0.9999, 0.5, 1e-9].map(probability), ["&gt; 99.9 %", "50.0 %", "&lt; 0.1 %"]);
+        assert_eq!(
+            [0.9999, 0.5, 1e-9].map(probability),
+            ["&gt; 99.9 %", "50.0 %", "&lt; 0.1 %"]
+        );
     }
 }

@@ -18,8 +18,18 @@ use crate::inspection::InspectionError;
 /// The whole page.
 pub(super) fn page(input: &ReportInput<'_>) -> Result<String, InspectionError> {
     let record = &input.inspected.record;
-    let title = format!("Inspection report{}", record.part.as_ref().map_or(String::new(), |part| format!(": {part}")));
-    let foot = [record.part.as_deref(), record.serial.as_deref(), Some(&*record.date)];
+    let title = format!(
+        "Inspection report{}",
+        record
+            .part
+            .as_ref()
+            .map_or(String::new(), |part| format!(": {part}"))
+    );
+    let foot = [
+        record.part.as_deref(),
+        record.serial.as_deref(),
+        Some(&*record.date),
+    ];
     let foot = foot.into_iter().flatten().collect::<Vec<_>>().join(" · ");
     let mut body = String::new();
     body += &sections::head(record);

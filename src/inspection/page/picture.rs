@@ -34,18 +34,39 @@ pub(super) fn picture(input: &ReportInput<'_>) -> Result<String, InspectionError
     };
     let Scan { mesh, .. } = read_scan(path, input.picture.mesh_unit)?;
     let [touched] = read_vertex_columns(path, input.picture.mesh_unit, &mesh, ["touched"])?;
-    let is_touched =
-        |vertex: usize| touched.as_ref().and_then(|column| column.get(vertex)).is_some_and(|share| *share >= 1.0);
+    let is_touched = |vertex: usize| {
+        touched
+            .as_ref()
+            .and_then(|column| column.get(vertex))
+            .is_some_and(|share| *share >= 1.0)
+    };
     let slots = mesh.vertex_slots();
-    let paint: Vec<Rgb> = (0..slots).map(|vertex| if is_touched(vertex) { TOUCHED } else { SCANNED }).collect();
+    let paint: Vec<Rgb> = (0..slots)
+        .map(|vertex| if is_touched(vertex) { TOUCHED } else { SCANNED })
+        .collect();
     let weights: Option<Vec<f64>> = touched
         .as_ref()
         .filter(|column| column.iter().any(|share| *share >= 1.0))
-        .map(|_| (0..slots).map(|vertex| f64::from(u8::from(is_touched(vertex)))).collect());
-    let placed: Vec<_> = input.inspected.balloons.iter().filter(|balloon| balloon.place_mm.is_some()).collect();
-    let places: Vec<_> =
-        placed.iter().filter_map(|balloon| balloon.place_mm).map(|mm| Point3::from(mm) * 1e-3).collect();
-    let panel = PicturePanel { paint: Some(&paint), ..PicturePanel::of(&mesh) };
+        .map(|_| {
+            (0..slots)
+                .map(|vertex| f64::from(u8::from(is_touched(vertex))))
+                .collect()
+        });
+    let placed: Vec<_> = input
+        .inspected
+        .balloons
+        .iter()
+        .filter(|balloon| balloon.place_mm.is_some())
+        .collect();
+    let places: Vec<_> = placed
+        .iter()
+        .filter_map(|balloon| balloon.place_mm)
+        .map(|mm| Point3::from(mm) * 1e-3)
+        .collect();
+    let panel = PicturePanel {
+        paint: Some(&paint),
+        ..PicturePanel::of(&mesh)
+    };
     let params = PictureParams {
         width: WIDTH,
         from: input.picture.view,
@@ -53,8 +74,10 @@ pub(super) fn picture(input: &ReportInput<'_>) -> Result<String, InspectionError
         ..PictureParams::default()
     };
     let PartView { picture, places } = draw_part(&panel, &params, &places);
-    let png =
-        png_bytes(picture.size, &picture.pixels).map_err(|source| FileError::Write { path: path.clone(), source })?;
+    let png = png_bytes(picture.size, &picture.pixels).map_err(|source| FileError::Write {
+        path: path.clone(),
+        source,
+    })?;
     let [width, height] = picture.size.map(f64::from);
     let mut svg = format!(
         "<svg class=\"part\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"the part with numbered features\"><rect width=\"100%\" height=\"100%\" fill=\"#e9ecf0\"/><image x=\"{MARGIN}\" y=\"{MARGIN}\" width=\"{width}\" height=\"{height}\" href=\"data:image/png;base64,{}\"/>",
@@ -63,29 +86,62 @@ pub(super) fn picture(input: &ReportInput<'_>) -> Result<String, InspectionError
         base64(&png)
     );
     let is_inside = |[x, y]: &[f64; 2]| (0.0..=width).contains(x) && (0.0..=height).contains(y);
-    let (placed, places): (Vec<_>, Vec<_>) =
-        placed.into_iter().zip(places).filter(|(_, place)| is_inside(place)).unzip();
+    let (placed, places): (Vec<_>, Vec<_>) = placed
+        .into_iter()
+        .zip(places)
+        .filter(|(_, place)| is_inside(place))
+        .unzip();
     let seats = balloon_seats(&places, [width, height]);
     for ((balloon, place), seat) in placed.iter().zip(&places).zip(&seats) {
-        let decisions = balloon.characteristics.iter().map(|&at| &*input.inspected.record.characteristics[at].decision);
+        let decisions = balloon
+            .characteristics
+            .iter()
+            .map(|&at| &*input.inspected.record.characteristics[at].decision);
         let worst = decisions
-            .max_by_key(|name| Decision::ALL.iter().position(|decision| decision.name() == *name))
+            .max_by_key(|name| {
+                Decision::ALL
+                    .iter()
+                    .position(|decision| decision.name() == *name)
+            })
             .unwrap_or("undecided");
-        draw_balloon(&mut svg, balloon.number, worst, balloon.feature.is_some(), place.map(|x| x + MARGIN), *seat);
+        draw_balloon(
+            &mut svg,
+            balloon.number,
+            worst,
+            balloon.feature.is_some(),
+            place.map(|x| x + MARGIN),
+            *seat,
+        );
     }
     svg += "</svg>";
     let unseen = input.inspected.balloons.len() - placed.len();
-    let unseen =
-        if unseen == 0 { String::new() } else { format!(" {unseen} without a place on the mesh are not drawn.") };
+    let unseen = if unseen == 0 {
+        String::new()
+    } else {
+        format!(" {unseen} without a place on the mesh are not drawn.")
+    };
     let caption = format!(
         "Blue was touched, grey is the scan. A balloon has the colour and sign of the worst decision of its feature; dashed: not found, at its nominal place.{unseen}"
     );
-    Ok(format!("<figure>{svg}<figcaption>{caption}</figcaption></figure>\n"))
+    Ok(format!(
+        "<figure>{svg}<figcaption>{caption}</figcaption></figure>\n"
+    ))
 }
 
-fn draw_balloon(svg: &mut String, number: usize, decision: &str, is_found: bool, [x, y]: [f64; 2], [u, v]: [f64; 2]) {
+fn draw_balloon(
+    svg: &mut String,
+    number: usize,
+    decision: &str,
+    is_found: bool,
+    [x, y]: [f64; 2],
+    [u, v]: [f64; 2],
+) {
     let DecisionLook { fill, ink, sign } = look_of(decision);
-    let dash = if is_found { "" } else { " stroke-dasharray=\"6 4\"" };
+    let dash = if is_found {
+        ""
+    } else {
+        " stroke-dasharray=\"6 4\""
+    };
     let _ = write!(
         svg,
         "<path d=\"M{x:.1} {y:.1} L{u:.1} {v:.1}\" stroke=\"#1d2129\" stroke-width=\"2\"{dash}/><circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"5\" fill=\"#1d2129\" stroke=\"#fff\" stroke-width=\"2\"/>\
@@ -105,10 +161,14 @@ const APART: f64 = 2.8;
 /// - `size`: of the picture, pixels.
 fn balloon_seats(places: &[[f64; 2]], [width, height]: [f64; 2]) -> Vec<[f64; 2]> {
     let middle = [width / 2.0 + MARGIN, height / 2.0 + MARGIN];
-    let half = [width / 2.0 + MARGIN - 1.3 * RADIUS, height / 2.0 + MARGIN - 1.3 * RADIUS];
+    let half = [
+        width / 2.0 + MARGIN - 1.3 * RADIUS,
+        height / 2.0 + MARGIN - 1.3 * RADIUS,
+    ];
     let angle_of = |point: f64| TAU * point / OUTLINE_POINTS as f64 - PI;
-    let outline: Vec<_> =
-        (0..=OUTLINE_POINTS).map(|point| on_rectangle(angle_of(point as f64), half, middle)).collect();
+    let outline: Vec<_> = (0..=OUTLINE_POINTS)
+        .map(|point| on_rectangle(angle_of(point as f64), half, middle))
+        .collect();
     // from the first point along the outline to each
     let mut along = vec![0.0];
     for (one, next) in outline.iter().zip(&outline[1..]) {
@@ -116,15 +176,25 @@ fn balloon_seats(places: &[[f64; 2]], [width, height]: [f64; 2]) -> Vec<[f64; 2]
     }
     let mut seats: Vec<(usize, f64)> = places
         .iter()
-        .map(|[x, y]| ((y + MARGIN - middle[1]) / half[1]).atan2((x + MARGIN - middle[0]) / half[0]))
-        .map(|angle| along[((angle + PI) / TAU * OUTLINE_POINTS as f64).round() as usize % OUTLINE_POINTS])
+        .map(|[x, y]| {
+            ((y + MARGIN - middle[1]) / half[1]).atan2((x + MARGIN - middle[0]) / half[0])
+        })
+        .map(|angle| {
+            along[((angle + PI) / TAU * OUTLINE_POINTS as f64).round() as usize % OUTLINE_POINTS]
+        })
         .enumerate()
         .collect();
     seats.sort_by(|one, other| one.1.total_cmp(&other.1));
     let wanted: Vec<f64> = seats.iter().map(|(_, along)| *along).collect();
     let mut placed = vec![[0.0; 2]; places.len()];
-    for ((feature, _), seat) in seats.into_iter().zip(spread(&wanted, along[OUTLINE_POINTS], APART * RADIUS)) {
-        placed[feature] = outline[along.partition_point(|length| *length < seat).min(OUTLINE_POINTS)];
+    for ((feature, _), seat) in
+        seats
+            .into_iter()
+            .zip(spread(&wanted, along[OUTLINE_POINTS], APART * RADIUS))
+    {
+        placed[feature] = outline[along
+            .partition_point(|length| *length < seat)
+            .min(OUTLINE_POINTS)];
     }
     placed
 }
@@ -150,16 +220,27 @@ fn spread(wanted: &[f64], length: f64, apart: f64) -> Vec<f64> {
             pools.push(((mean * of as f64 + next * more as f64) / all as f64, all));
         }
     }
-    let means = pools.into_iter().flat_map(|(mean, of)| std::iter::repeat_n(mean, of));
-    let placed: Vec<f64> = means.enumerate().map(|(at, mean)| mean + at as f64 * apart).collect();
-    let reach = placed.last().zip(placed.first()).map_or(0.0, |(last, first)| last - first);
+    let means = pools
+        .into_iter()
+        .flat_map(|(mean, of)| std::iter::repeat_n(mean, of));
+    let placed: Vec<f64> = means
+        .enumerate()
+        .map(|(at, mean)| mean + at as f64 * apart)
+        .collect();
+    let reach = placed
+        .last()
+        .zip(placed.first())
+        .map_or(0.0, |(last, first)| last - first);
     let (first, step) = match placed.first() {
         // the last would stand on the first
         Some(first) if reach > length - apart => (*first, Some(length / count as f64)),
         Some(first) => (*first, None),
         None => (0.0, None),
     };
-    let place = |(at, place): (usize, f64)| step.map_or(place, |step| first + at as f64 * step).rem_euclid(length);
+    let place = |(at, place): (usize, f64)| {
+        step.map_or(place, |step| first + at as f64 * step)
+            .rem_euclid(length)
+    };
     placed.into_iter().enumerate().map(place).collect()
 }
 
@@ -177,13 +258,24 @@ mod tests {
 
     #[test]
     fn forty_balloons_keep_apart_and_inside() {
-        let places: Vec<_> = (0..40).map(|at| [500.0 + f64::from(at % 7), 300.0 + f64::from(at / 7)]).collect();
+        let places: Vec<_> = (0..40)
+            .map(|at| [500.0 + f64::from(at % 7), 300.0 + f64::from(at / 7)])
+            .collect();
         let seats = balloon_seats(&places, [1100.0, 600.0]);
         for (at, one) in seats.iter().enumerate() {
-            assert!((RADIUS..1100.0 + 2.0 * MARGIN - RADIUS).contains(&one[0]), "{one:?}");
-            assert!((RADIUS..600.0 + 2.0 * MARGIN - RADIUS).contains(&one[1]), "{one:?}");
+            assert!(
+                (RADIUS..1100.0 + 2.0 * MARGIN - RADIUS).contains(&one[0]),
+                "{one:?}"
+            );
+            assert!(
+                (RADIUS..600.0 + 2.0 * MARGIN - RADIUS).contains(&one[1]),
+                "{one:?}"
+            );
             for other in &seats[at + 1..] {
-                assert!((one[0] - other[0]).hypot(one[1] - other[1]) > 2.0 * RADIUS, "{one:?} {other:?}");
+                assert!(
+                    (one[0] - other[0]).hypot(one[1] - other[1]) > 2.0 * RADIUS,
+                    "{one:?} {other:?}"
+                );
             }
         }
     }
@@ -199,7 +291,12 @@ mod tests {
         assert_eq!(spread(&[0.0, 1.0, 2.0, 3.0], 20.0, 10.0).len(), 4);
         let mut around = spread(&[0.0, 1.0, 2.0, 3.0], 20.0, 10.0);
         around.sort_by(f64::total_cmp);
-        assert!(around.windows(2).all(|pair| pair[1] - pair[0] >= 5.0 - 1e-9), "{around:?}");
+        assert!(
+            around
+                .windows(2)
+                .all(|pair| pair[1] - pair[0] >= 5.0 - 1e-9),
+            "{around:?}"
+        );
         assert!(spread(&[], 100.0, 10.0).is_empty());
     }
 

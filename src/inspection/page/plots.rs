@@ -27,7 +27,10 @@ impl PlotAxes {
     }
 
     fn begin(&self, label: &str) -> String {
-        format!("<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{label}\">", SIZE[0], SIZE[1])
+        format!(
+            "<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{label}\">",
+            SIZE[0], SIZE[1]
+        )
     }
 
     /// Lines and numbers of both axes.
@@ -43,7 +46,11 @@ impl PlotAxes {
                 at + 3.0
             );
         }
-        for (x, anchor) in [(self.x[0], "start"), ((self.x[0] + self.x[1]) / 2.0, "middle"), (self.x[1], "end")] {
+        for (x, anchor) in [
+            (self.x[0], "start"),
+            ((self.x[0] + self.x[1]) / 2.0, "middle"),
+            (self.x[1], "end"),
+        ] {
             let number = shown(x, digits[0]);
             let _ = write!(
                 svg,
@@ -81,16 +88,29 @@ fn shown(number: f64, digits: usize) -> String {
 /// How far the touches are off the ideal surface, µm.
 pub(super) fn residual_plot(evidence: &TouchEvidence) -> String {
     let offs = evidence.drawn.iter().map(|[_, off]| off * 1e3);
-    let most = offs.fold(2.0 * evidence.stated_mm * 1e3, |most, off| most.max(off.abs())).max(1.0);
+    let most = offs
+        .fold(2.0 * evidence.stated_mm * 1e3, |most, off| {
+            most.max(off.abs())
+        })
+        .max(1.0);
     let step = 10f64.powf(most.log10().floor());
     let range = (most / step).ceil() * step;
     let [from, to] = evidence
         .drawn
         .iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], [x, _]| [low.min(*x), high.max(*x)]);
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], [x, _]| {
+            [low.min(*x), high.max(*x)]
+        });
     let is_angle = evidence.along.contains('°');
-    let x = if is_angle { [-180.0, 180.0] } else { [from, if to > from { to } else { from + 1.0 }] };
-    let axes = PlotAxes { x, y: [-range, range] };
+    let x = if is_angle {
+        [-180.0, 180.0]
+    } else {
+        [from, if to > from { to } else { from + 1.0 }]
+    };
+    let axes = PlotAxes {
+        x,
+        y: [-range, range],
+    };
     let mut svg = axes.begin("touches off the fitted surface");
     let band = (2.0 * evidence.stated_mm * 1e3).min(range);
     let _ = write!(
@@ -100,7 +120,11 @@ pub(super) fn residual_plot(evidence: &TouchEvidence) -> String {
         SIZE[0] - LEFT - 6.0,
         axes.y(-band) - axes.y(band)
     );
-    axes.draw(&mut svg, [evidence.along, "off, µm"], [0, usize::from(range < 2.0)]);
+    axes.draw(
+        &mut svg,
+        [evidence.along, "off, µm"],
+        [0, usize::from(range < 2.0)],
+    );
     for [along, off] in &evidence.drawn {
         let _ = write!(
             svg,
@@ -114,27 +138,49 @@ pub(super) fn residual_plot(evidence: &TouchEvidence) -> String {
 
 /// Force against the approach over the travel, of touches that count; `None` where no curve is there.
 pub(super) fn force_plot(touches: &[&TouchLine]) -> Option<String> {
-    let with_curve: Vec<_> =
-        touches.iter().filter(|touch| touch.accepted && touch.curve.len() > 1).take(MOST_CURVES).collect();
+    let with_curve: Vec<_> = touches
+        .iter()
+        .filter(|touch| touch.accepted && touch.curve.len() > 1)
+        .take(MOST_CURVES)
+        .collect();
     // counted from where the force is largest: contact lies there for all
     let moved = |touch: &TouchLine| -> Vec<[f64; 2]> {
-        let deepest = touch.curve.iter().map(|[_, travel, ..]| *travel).fold(f64::NEG_INFINITY, f64::max);
-        touch.curve.iter().map(|[_, travel, force, _]| [travel - deepest, *force]).collect()
+        let deepest = touch
+            .curve
+            .iter()
+            .map(|[_, travel, ..]| *travel)
+            .fold(f64::NEG_INFINITY, f64::max);
+        touch
+            .curve
+            .iter()
+            .map(|[_, travel, force, _]| [travel - deepest, *force])
+            .collect()
     };
     let curves: Vec<_> = with_curve.iter().map(|touch| moved(touch)).collect();
     let all = || curves.iter().flatten();
     let most = all().map(|[_, force]| *force).fold(0.5, f64::max);
     let least = all().map(|[_, force]| *force).fold(0.0, f64::min);
-    let from = all().map(|[travel, _]| *travel).fold(f64::INFINITY, f64::min);
+    let from = all()
+        .map(|[travel, _]| *travel)
+        .fold(f64::INFINITY, f64::min);
     if !from.is_finite() {
         return None;
     }
-    let axes = PlotAxes { x: [from.min(-0.1), 0.0], y: [least, most] };
+    let axes = PlotAxes {
+        x: [from.min(-0.1), 0.0],
+        y: [least, most],
+    };
     let mut svg = axes.begin("force over travel");
-    axes.draw(&mut svg, ["travel from the deepest point, mm", "force, N"], [2, 1]);
+    axes.draw(
+        &mut svg,
+        ["travel from the deepest point, mm", "force, N"],
+        [2, 1],
+    );
     for curve in &curves {
-        let points: String =
-            curve.iter().map(|[travel, force]| format!("{:.1},{:.1} ", axes.x(*travel), axes.y(*force))).collect();
+        let points: String = curve
+            .iter()
+            .map(|[travel, force]| format!("{:.1},{:.1} ", axes.x(*travel), axes.y(*force)))
+            .collect();
         let _ = write!(
             svg,
             "<polyline points=\"{}\" fill=\"none\" stroke=\"#0a4f8c\" stroke-opacity=\".45\" stroke-width=\".8\"/>",

@@ -25,7 +25,10 @@ pub(super) fn rule(record: &InspectionRecord) -> String {
         )
     };
     let is_there = |is_of: fn(InspectedQuantity) -> bool| {
-        record.characteristics.iter().any(|one| InspectedQuantity::of_name(&one.quantity).is_some_and(is_of))
+        record
+            .characteristics
+            .iter()
+            .any(|one| InspectedQuantity::of_name(&one.quantity).is_some_and(is_of))
     };
     let mut more = String::new();
     if is_there(InspectedQuantity::is_zone) {

@@ -17,11 +17,16 @@ pub(super) fn head(record: &InspectionRecord) -> String {
         ("Part", told(&record.part)),
         ("Serial number", told(&record.serial)),
         ("Operator", told(&record.operator)),
-        ("Date (UTC)", escaped(&record.date.replace('T', " ").replace('Z', ""))),
+        (
+            "Date (UTC)",
+            escaped(&record.date.replace('T', " ").replace('Z', "")),
+        ),
         ("Program", escaped(&record.program)),
         ("Decision rule", escaped(&rule_name(record))),
     ];
-    let facts: String = facts.map(|(name, value)| format!("<div><dt>{name}</dt><dd>{value}</dd></div>\n")).concat();
+    let facts: String = facts
+        .map(|(name, value)| format!("<div><dt>{name}</dt><dd>{value}</dd></div>\n"))
+        .concat();
     format!("<h1>Inspection report</h1>\n<dl class=\"facts\">\n{facts}</dl>\n")
 }
 
@@ -43,19 +48,33 @@ pub(super) fn verdict(record: &InspectionRecord) -> String {
         _ => ("?", "UNDECIDED"),
     };
     let names = |decision: Decision| {
-        let of_it = record.characteristics.iter().filter(|one| one.decision == decision.name());
-        let all: Vec<_> = of_it.map(|one| format!("{} {}", escaped(&one.number), escaped(&one.name))).collect();
+        let of_it = record
+            .characteristics
+            .iter()
+            .filter(|one| one.decision == decision.name());
+        let all: Vec<_> = of_it
+            .map(|one| format!("{} {}", escaped(&one.number), escaped(&one.name)))
+            .collect();
         first_few(&all, "; ")
     };
     let said = |decision: Decision, what: &str| match names(decision) {
         names if names.is_empty() => String::new(),
         names => format!("<p class=\"small\"><strong>{what}:</strong> {names}</p>"),
     };
-    let notes: String = record.notes.iter().map(|note| format!("<p class=\"small\">{}</p>", escaped(note))).collect();
+    let notes: String = record
+        .notes
+        .iter()
+        .map(|note| format!("<p class=\"small\">{}</p>", escaped(note)))
+        .collect();
     let without = match record.without_characteristic.len() {
         0 => String::new(),
         _ => {
-            let ids = record.without_characteristic.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
+            let ids = record
+                .without_characteristic
+                .iter()
+                .map(u32::to_string)
+                .collect::<Vec<_>>()
+                .join(", ");
             format!("<p class=\"small\">Measured, and not in the drawing: features {ids}.</p>")
         }
     };
@@ -73,16 +92,29 @@ const MOST_RELATIONS: usize = 24;
 
 /// Form and relations of the features in the drawing, also of what has no tolerance.
 pub(super) fn form_and_relations(input: &ReportInput<'_>) -> String {
-    let (file, k) = (&input.source.features, input.inspected.record.coverage_factor);
-    let balloon = |id: u32| input.inspected.balloons.iter().find(|balloon| balloon.feature == Some(id));
+    let (file, k) = (
+        &input.source.features,
+        input.inspected.record.coverage_factor,
+    );
+    let balloon = |id: u32| {
+        input
+            .inspected
+            .balloons
+            .iter()
+            .find(|balloon| balloon.feature == Some(id))
+    };
     let with_u = |number: &MeasuredNumber| match number.std {
         Some(std) => format!("{} ± {}", shown(Some(number.value)), shown(Some(std * k))),
         None => shown(Some(number.value)),
     };
     let mut forms = Vec::new();
     for one in &input.inspected.balloons {
-        let feature = one.feature.and_then(|id| file.features.iter().find(|feature| feature.id == id));
-        let Some(form) = feature.and_then(|feature| feature.form.as_ref()) else { continue };
+        let feature = one
+            .feature
+            .and_then(|id| file.features.iter().find(|feature| feature.id == id));
+        let Some(form) = feature.and_then(|feature| feature.form.as_ref()) else {
+            continue;
+        };
         let number = |quantity: InspectedQuantity, value: Option<f64>| {
             let number = value.map(|value| MeasuredNumber {
                 value,
@@ -103,19 +135,40 @@ pub(super) fn form_and_relations(input: &ReportInput<'_>) -> String {
     let name = |id: u32| {
         let feature = file.features.iter().find(|feature| feature.id == id);
         let kind = feature.map_or(String::new(), |feature| escaped(&feature.kind));
-        balloon(id).map_or_else(|| format!("{kind}, id {id}"), |balloon| format!("{} · {kind}", balloon.number))
+        balloon(id).map_or_else(
+            || format!("{kind}, id {id}"),
+            |balloon| format!("{} · {kind}", balloon.number),
+        )
     };
-    let quantities = InspectedQuantity::ALL.into_iter().filter(|quantity| quantity.needs_datum());
-    let of_balloons = file.relations.iter().filter(|relation| balloon(relation.of).is_some());
+    let quantities = InspectedQuantity::ALL
+        .into_iter()
+        .filter(|quantity| quantity.needs_datum());
+    let of_balloons = file
+        .relations
+        .iter()
+        .filter(|relation| balloon(relation.of).is_some());
     let all: Vec<_> = of_balloons
         .map(|relation| {
             let numbers = quantities.clone().filter_map(|quantity| {
                 let number = relation_number(relation, quantity)?;
-                let unit = if quantity.unit() == "deg" { "°" } else { " mm" };
-                Some(format!("{} {}{unit}", in_words(quantity.name()), with_u(&number)))
+                let unit = if quantity.unit() == "deg" {
+                    "°"
+                } else {
+                    " mm"
+                };
+                Some(format!(
+                    "{} {}{unit}",
+                    in_words(quantity.name()),
+                    with_u(&number)
+                ))
             });
             let numbers = numbers.collect::<Vec<_>>().join("; ");
-            vec![escaped(&relation.kind), name(relation.of), name(relation.to), numbers]
+            vec![
+                escaped(&relation.kind),
+                name(relation.of),
+                name(relation.to),
+                numbers,
+            ]
         })
         .collect();
     if forms.is_empty() && all.is_empty() {
@@ -127,13 +180,24 @@ pub(super) fn form_and_relations(input: &ReportInput<'_>) -> String {
     if !forms.is_empty() {
         html += &table(
             "",
-            &["Feature", "Roundness, mm", "Cylindricity, mm", "Straightness, mm", "Flatness, mm", "Touched"],
+            &[
+                "Feature",
+                "Roundness, mm",
+                "Cylindricity, mm",
+                "Straightness, mm",
+                "Flatness, mm",
+                "Touched",
+            ],
             &forms,
         );
     }
     if !all.is_empty() {
         html += "<h3>Relations</h3>\n";
-        html += &table("rel", &["Relation", "Of", "To", "Numbers"], &all[..all.len().min(MOST_RELATIONS)]);
+        html += &table(
+            "rel",
+            &["Relation", "Of", "To", "Numbers"],
+            &all[..all.len().min(MOST_RELATIONS)],
+        );
     }
     if all.len() > MOST_RELATIONS {
         html += &format!(
@@ -145,9 +209,20 @@ pub(super) fn form_and_relations(input: &ReportInput<'_>) -> String {
 }
 
 pub(super) fn calibration(lines: &[CalibrationLine]) -> String {
-    let rows: Vec<_> =
-        lines.iter().map(|line| vec![line.what.to_owned(), escaped(&line.value), escaped(&line.state)]).collect();
-    format!("<h2>State of the calibration</h2>\n{}", table("cal", &["What", "Value", "State and age"], &rows))
+    let rows: Vec<_> = lines
+        .iter()
+        .map(|line| {
+            vec![
+                line.what.to_owned(),
+                escaped(&line.value),
+                escaped(&line.state),
+            ]
+        })
+        .collect();
+    format!(
+        "<h2>State of the calibration</h2>\n{}",
+        table("cal", &["What", "Value", "State and age"], &rows)
+    )
 }
 
 pub(super) fn files(record: &InspectionRecord) -> String {
@@ -161,7 +236,10 @@ pub(super) fn files(record: &InspectionRecord) -> String {
     };
     let rows: Vec<_> = record.files.iter().map(row).collect();
     let note = "<p class=\"small\">The checksum tells files apart that were mixed up; it is no seal against who wants to deceive.</p>\n";
-    format!("<h2>Files</h2>\n{}{note}", table("files", &["What", "File", "Bytes", "CRC-32"], &rows))
+    format!(
+        "<h2>Files</h2>\n{}{note}",
+        table("files", &["What", "File", "Bytes", "CRC-32"], &rows)
+    )
 }
 
 pub(super) fn limits(record: &InspectionRecord) -> String {
@@ -181,6 +259,8 @@ pub(super) fn limits(record: &InspectionRecord) -> String {
         "Form and relations are those of what was touched; of the rest nothing is said.",
         frames,
     ];
-    let items: String = limits.map(|limit| format!("<li>{}</li>\n", limit.replace("  ", " "))).concat();
+    let items: String = limits
+        .map(|limit| format!("<li>{}</li>\n", limit.replace("  ", " ")))
+        .concat();
     format!("<h2>Limits</h2>\n<ul class=\"small\">\n{items}</ul>\n")
 }

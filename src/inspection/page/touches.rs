@@ -16,35 +16,64 @@ pub(super) fn touches(input: &ReportInput<'_>) -> String {
         return format!("<h2>Touches behind the numbers</h2>\n{why}");
     }
     let balloons = input.inspected.balloons.iter();
-    let parts: String = balloons.clone().map(|balloon| feature(input, balloon)).collect();
+    let parts: String = balloons
+        .clone()
+        .map(|balloon| feature(input, balloon))
+        .collect();
     let missing = balloons.filter(|balloon| balloon.feature.is_none());
-    let missing: Vec<_> = missing.map(|balloon| format!("{} · {}", balloon.number, escaped(&balloon.kind))).collect();
+    let missing: Vec<_> = missing
+        .map(|balloon| format!("{} · {}", balloon.number, escaped(&balloon.kind)))
+        .collect();
     let missing = match missing.len() {
         0 => String::new(),
-        _ => format!("<p class=\"small\">Not found, so without touches: {}.</p>\n", missing.join(", ")),
+        _ => format!(
+            "<p class=\"small\">Not found, so without touches: {}.</p>\n",
+            missing.join(", ")
+        ),
     };
     let note = "<p class=\"small\">Blue band: ± 2 standard deviations of a single touch as the measurement states them. Of many touches evenly chosen ones are drawn; the numbers are of all.</p>\n";
     format!("<h2>Touches behind the numbers</h2>\n{note}{missing}{parts}")
 }
 
 fn feature(input: &ReportInput<'_>, balloon: &Balloon) -> String {
-    let of_balloon = balloon.feature.and_then(|id| input.source.features.features.iter().find(|one| one.id == id));
-    let Some(found) = of_balloon else { return String::new() };
+    let of_balloon = balloon.feature.and_then(|id| {
+        input
+            .source
+            .features
+            .features
+            .iter()
+            .find(|one| one.id == id)
+    });
+    let Some(found) = of_balloon else {
+        return String::new();
+    };
     let mut rows = Vec::new();
     let mut figures = String::new();
     let mut drawn: Vec<(&[[u32; 2]], bool)> = Vec::new();
     for &at in &balloon.characteristics {
-        let (one, runs) = (&input.inspected.record.characteristics[at], &input.inspected.runs[at]);
+        let (one, runs) = (
+            &input.inspected.record.characteristics[at],
+            &input.inspected.runs[at],
+        );
         let quantity = input.inspected.quantities[at];
-        let evidence =
-            if quantity.needs_datum() { None } else { touch_evidence(quantity, found, runs, &input.source.touches) };
+        let evidence = if quantity.needs_datum() {
+            None
+        } else {
+            touch_evidence(quantity, found, runs, &input.source.touches)
+        };
         let micrometres = |mm: f64| format!("{:.1}", mm * 1e3);
         let of = |number: fn(&TouchEvidence) -> f64| {
-            evidence.as_ref().map_or("–".to_owned(), |found| micrometres(number(found)))
+            evidence
+                .as_ref()
+                .map_or("–".to_owned(), |found| micrometres(number(found)))
         };
         rows.push(vec![
             escaped(&one.number),
-            format!("{} <span class=\"small\">{}</span>", escaped(&one.name), in_words(&one.quantity)),
+            format!(
+                "{} <span class=\"small\">{}</span>",
+                escaped(&one.name),
+                in_words(&one.quantity)
+            ),
             one.touches.to_string(),
             of(|found| found.rms_mm),
             of(|found| found.largest_mm),
@@ -56,8 +85,8 @@ fn feature(input: &ReportInput<'_>, balloon: &Balloon) -> String {
             figures += &residual_figure(&evidence, &one.number);
         }
         let probed = probed_behind(&input.source.probed, runs, &input.source.touches);
-        if let Some(plot) =
-            force_plot(&probed).filter(|_| drawn.iter().filter(|(other, _)| *other == &**runs).count() <= 1)
+        if let Some(plot) = force_plot(&probed)
+            .filter(|_| drawn.iter().filter(|(other, _)| *other == &**runs).count() <= 1)
         {
             let rejected = probed.iter().filter(|touch| !touch.accepted).count();
             let count = counted(probed.len(), "touch", "touches");
@@ -67,7 +96,14 @@ fn feature(input: &ReportInput<'_>, balloon: &Balloon) -> String {
             );
         }
     }
-    let head = ["No.", "Characteristic", "Touches", "rms, µm", "largest, µm", "stated, µm"];
+    let head = [
+        "No.",
+        "Characteristic",
+        "Touches",
+        "rms, µm",
+        "largest, µm",
+        "stated, µm",
+    ];
     format!(
         "<section class=\"feature\"><h3>{} · {} <span class=\"small\">id {}, {}</span></h3>\n{}<div class=\"plots\">{figures}</div></section>\n",
         balloon.number,
@@ -87,11 +123,17 @@ fn fitted(feature: &FeatureRecord) -> String {
 
 fn residual_figure(evidence: &TouchEvidence, number: &str) -> String {
     let gap = if evidence.along.contains('°') {
-        format!("; widest gap {:.0}° of the turn", widest_gap_deg(&evidence.drawn))
+        format!(
+            "; widest gap {:.0}° of the turn",
+            widest_gap_deg(&evidence.drawn)
+        )
     } else {
         String::new()
     };
     let count = counted(evidence.count, "touch", "touches");
     let caption = format!("{}: {count} off {}{gap}", escaped(number), evidence.ideal);
-    format!("<figure>{}<figcaption>{caption}</figcaption></figure>\n", residual_plot(evidence))
+    format!(
+        "<figure>{}<figcaption>{caption}</figcaption></figure>\n",
+        residual_plot(evidence)
+    )
 }

@@ -19,7 +19,8 @@ const INNER: &str = "ros__parameters";
 /// Pattern of the nodes, name and value of every parameter in a file. Names of nested parameters are joined by dots.
 pub(super) fn entries(text: &str) -> Result<Vec<(String, String, ParameterValue)>, String> {
     // an empty file says nothing
-    let piece: Option<YamlPiece> = serde_saphyr::from_str(text).map_err(|error| error.to_string())?;
+    let piece: Option<YamlPiece> =
+        serde_saphyr::from_str(text).map_err(|error| error.to_string())?;
     let mut found = Vec::new();
     match piece {
         None | Some(YamlPiece::Nothing) => {}
@@ -28,14 +29,24 @@ pub(super) fn entries(text: &str) -> Result<Vec<(String, String, ParameterValue)
                 nodes_below(&key, below, &mut found)?;
             }
         }
-        Some(_) => return Err(format!("it must be nodes, each with {INNER}, as config/node.yaml is")),
+        Some(_) => {
+            return Err(format!(
+                "it must be nodes, each with {INNER}, as config/node.yaml is"
+            ));
+        }
     }
     Ok(found)
 }
 
-fn nodes_below(path: &str, piece: YamlPiece, found: &mut Vec<(String, String, ParameterValue)>) -> Result<(), String> {
+fn nodes_below(
+    path: &str,
+    piece: YamlPiece,
+    found: &mut Vec<(String, String, ParameterValue)>,
+) -> Result<(), String> {
     let YamlPiece::Map(entries) = piece else {
-        return Err(format!("\"{path}\" is no node: below it must be {INNER}, or a node"));
+        return Err(format!(
+            "\"{path}\" is no node: below it must be {INNER}, or a node"
+        ));
     };
     for (key, below) in entries {
         if key == INNER {
@@ -47,19 +58,30 @@ fn nodes_below(path: &str, piece: YamlPiece, found: &mut Vec<(String, String, Pa
     Ok(())
 }
 
-fn parameters_below(nodes: &str, prefix: &str, piece: YamlPiece, found: &mut Vec<(String, String, ParameterValue)>) {
+fn parameters_below(
+    nodes: &str,
+    prefix: &str,
+    piece: YamlPiece,
+    found: &mut Vec<(String, String, ParameterValue)>,
+) {
     match piece {
         YamlPiece::Map(entries) => {
             for (key, below) in entries {
-                let name = if prefix.is_empty() { key } else { format!("{prefix}.{key}") };
+                let name = if prefix.is_empty() {
+                    key
+                } else {
+                    format!("{prefix}.{key}")
+                };
                 parameters_below(nodes, &name, below, found);
             }
         }
         YamlPiece::Value(value) => found.push((nodes.to_owned(), prefix.to_owned(), value)),
         // no parameter of this node is a list: it is refused as a wrong word, or is for another node
-        YamlPiece::List => {
-            found.push((nodes.to_owned(), prefix.to_owned(), ParameterValue::String("[...]".to_owned())))
-        }
+        YamlPiece::List => found.push((
+            nodes.to_owned(),
+            prefix.to_owned(),
+            ParameterValue::String("[...]".to_owned()),
+        )),
         YamlPiece::Nothing => {}
     }
 }
@@ -88,7 +110,10 @@ impl<'de> Visitor<'de> for PieceVisitor {
     }
 
     fn visit_u64<E>(self, value: u64) -> Result<YamlPiece, E> {
-        Ok(YamlPiece::Value(i64::try_from(value).map_or(ParameterValue::Double(value as f64), ParameterValue::Integer)))
+        Ok(YamlPiece::Value(i64::try_from(value).map_or(
+            ParameterValue::Double(value as f64),
+            ParameterValue::Integer,
+        )))
     }
 
     fn visit_f64<E>(self, value: f64) -> Result<YamlPiece, E> {

@@ -8,8 +8,8 @@ use std::sync::{Arc, Mutex};
 
 use byteorder::LittleEndian;
 use ros2_client::action::{
-    ActionServerQosPolicies, CancelGoalRequest, CancelGoalResponse, GetResultResponse, GoalId, GoalInfo,
-    GoalStatusEnum, SendGoalRequest, SendGoalResponse,
+    ActionServerQosPolicies, CancelGoalRequest, CancelGoalResponse, GetResultResponse, GoalId,
+    GoalInfo, GoalStatusEnum, SendGoalRequest, SendGoalResponse,
 };
 use ros2_client::action_msgs::{CancelGoalResponseEnum, GoalStatus, GoalStatusArray};
 use ros2_client::builtin_interfaces::Time;
@@ -66,8 +66,16 @@ struct ProbeAction {
 
 /// The server of the action.
 pub(super) fn server(back_end: &mut DdsBackEnd<'_>) -> Result<Box<dyn Listener>, RosError> {
-    let DdsBackEnd { config, node, exchange, room, .. } = back_end;
-    let latched = SERVICE.durability(Durability::TransientLocal).history(History::KeepLast { depth: 1 });
+    let DdsBackEnd {
+        config,
+        node,
+        exchange,
+        room,
+        ..
+    } = back_end;
+    let latched = SERVICE
+        .durability(Durability::TransientLocal)
+        .history(History::KeepLast { depth: 1 });
     let qos = ActionServerQosPolicies {
         goal_service: SERVICE,
         result_service: SERVICE,
@@ -77,13 +85,23 @@ pub(super) fn server(back_end: &mut DdsBackEnd<'_>) -> Result<Box<dyn Listener>,
     };
     let name = dds_name(&config.resolve(PROBE)?)?;
     let type_name = ActionTypeName::new("touchup_msgs", "Probe");
-    let server = node.create_action_server(mapping(config), &name, &type_name, qos).during("offering an action")?;
-    let probe = ProbeAction { server, exchange: exchange.clone(), room: room.clone(), goals: Mutex::default() };
+    let server = node
+        .create_action_server(mapping(config), &name, &type_name, qos)
+        .during("offering an action")?;
+    let probe = ProbeAction {
+        server,
+        exchange: exchange.clone(),
+        room: room.clone(),
+        goals: Mutex::default(),
+    };
     Ok(Box::new(Arc::new(probe)))
 }
 
 impl Listener for Arc<ProbeAction> {
-    fn sources(&mut self, each: &mut dyn FnMut(&mut dyn Source) -> io::Result<()>) -> io::Result<()> {
+    fn sources(
+        &mut self,
+        each: &mut dyn FnMut(&mut dyn Source) -> io::Result<()>,
+    ) -> io::Result<()> {
         let probe = Self::get_mut(self).expect("sources are asked for before any goal is there");
         each(probe.server.goal_server())?;
         each(probe.server.cancel_server())?;
@@ -91,11 +109,28 @@ impl Listener for Arc<ProbeAction> {
     }
 
     fn take(&mut self) {
-        let (probe, ProbeAction { server, exchange, .. }) = (&*self, &**self);
+        let (
+            probe,
+            ProbeAction {
+                server, exchange, ..
+            },
+        ) = (&*self, &**self);
         let what = (PROBE, exchange, OTHER_MAPPING);
-        drain(what, || server.receive_goal(), |(id, request)| probe.ask(id, request));
-        drain(what, || server.receive_cancel_request(), |(id, request)| probe.cancel(id, &request));
-        drain(what, || server.receive_result_request(), |(id, request)| probe.wait_for(id, request.goal_id));
+        drain(
+            what,
+            || server.receive_goal(),
+            |(id, request)| probe.ask(id, request),
+        );
+        drain(
+            what,
+            || server.receive_cancel_request(),
+            |(id, request)| probe.cancel(id, &request),
+        );
+        drain(
+            what,
+            || server.receive_result_request(),
+            |(id, request)| probe.wait_for(id, request.goal_id),
+        );
     }
 }
 
@@ -140,21 +175,27 @@ impl ProbeAction {
             result: Reply::new(move |(end, response)| for_result.end(id, end, response)),
             is_cancelled,
         };
-        self.exchange.inbox.call(Call::Arm(ArmOrder::Goal(request.goal, goal)));
+        self.exchange
+            .inbox
+            .call(Call::Arm(ArmOrder::Goal(request.goal, goal)));
     }
 
     fn accept(self: &Arc<Self>, request_id: RmwRequestId, id: GoalId, accepted: bool) {
         let stamp = Time::now();
         let mut goals = locked(&self.goals);
         match goals.known.get_mut(&id) {
-            Some(known) if accepted => (known.status, known.accepted) = (GoalStatusEnum::Executing, stamp),
+            Some(known) if accepted => {
+                (known.status, known.accepted) = (GoalStatusEnum::Executing, stamp)
+            }
             // forgets one that was not taken up
             Some(known) if known.accepted == Time::ZERO => drop(goals.known.remove(&id)),
             _ => {}
         }
         drop(goals);
         let answer = SendGoalResponse { accepted, stamp };
-        self.answer("send_goal", move |server| server.send_goal_response(request_id, answer));
+        self.answer("send_goal", move |server| {
+            server.send_goal_response(request_id, answer)
+        });
     }
 
     fn end(self: &Arc<Self>, id: GoalId, end: GoalEnd, response: ProbeResponse) {
@@ -164,7 +205,9 @@ impl ProbeAction {
             GoalEnd::Aborted => GoalStatusEnum::Aborted,
         };
         let mut goals = locked(&self.goals);
-        let Some(known) = goals.known.get_mut(&id) else { return };
+        let Some(known) = goals.known.get_mut(&id) else {
+            return;
+        };
         (known.status, known.result) = (status, Some(response.clone()));
         let waiting = std::mem::take(&mut known.waiting);
         drop(goals);
@@ -179,33 +222,51 @@ impl ProbeAction {
     /// Somebody waits for the result of a goal.
     fn wait_for(self: &Arc<Self>, request_id: RmwRequestId, id: GoalId) {
         let (status, response) = match locked(&self.goals).known.get_mut(&id) {
-            Some(KnownGoal { result: None, waiting, .. }) if waiting.len() < MOST_WAITING => {
+            Some(KnownGoal {
+                result: None,
+                waiting,
+                ..
+            }) if waiting.len() < MOST_WAITING => {
                 waiting.push(request_id);
                 return;
             }
-            Some(KnownGoal { result: Some(response), status, .. }) => (*status, response.clone()),
+            Some(KnownGoal {
+                result: Some(response),
+                status,
+                ..
+            }) => (*status, response.clone()),
             _ => (GoalStatusEnum::Unknown, ProbeResponse::default()),
         };
         self.later(move |probe| probe.send_result(request_id, status, response));
     }
 
     fn send_result(&self, request_id: RmwRequestId, status: GoalStatusEnum, result: ProbeResponse) {
-        let answer = self.room.fit_packet("~/probe/_action/get_result", GetResultResponse { status, result });
+        let answer = self.room.fit_packet(
+            "~/probe/_action/get_result",
+            GetResultResponse { status, result },
+        );
         report("get_result", self.server.send_result(request_id, answer));
     }
 
     /// Somebody wants goals stopped; the node does it when it can.
     fn cancel(self: &Arc<Self>, request_id: RmwRequestId, request: &CancelGoalRequest) {
         let response = locked(&self.goals).cancel(wanted(request));
-        self.answer("cancel_goal", move |server| server.send_cancel_response(request_id, response));
+        self.answer("cancel_goal", move |server| {
+            server.send_cancel_response(request_id, response)
+        });
     }
 
     fn publish_status(&self) {
         let status = |(id, known): (&GoalId, &KnownGoal)| GoalStatus {
-            goal_info: GoalInfo { goal_id: *id, stamp: known.accepted },
+            goal_info: GoalInfo {
+                goal_id: *id,
+                stamp: known.accepted,
+            },
             status: known.status,
         };
-        let statuses = GoalStatusArray { status_list: locked(&self.goals).known.iter().map(status).collect() };
+        let statuses = GoalStatusArray {
+            status_list: locked(&self.goals).known.iter().map(status).collect(),
+        };
         if self.server.send_goal_statuses(statuses).is_err() {
             tracing::warn!("the states of the goals are not sent");
         }
@@ -223,8 +284,16 @@ fn report(service: &str, sent: Result<(), WriteError<()>>) {
 /// The fields of that message are closed to us; its bytes are not.
 fn wanted(request: &CancelGoalRequest) -> ([u8; 16], i64) {
     let bytes = cdr_encoding::to_vec::<_, LittleEndian>(request).unwrap_or_default();
-    let part = |from: usize| bytes.get(from..from + 4).and_then(|part| part.try_into().ok()).unwrap_or([0; 4]);
-    let uuid = bytes.get(..16).and_then(|part| part.try_into().ok()).unwrap_or([0; 16]);
+    let part = |from: usize| {
+        bytes
+            .get(from..from + 4)
+            .and_then(|part| part.try_into().ok())
+            .unwrap_or([0; 4])
+    };
+    let uuid = bytes
+        .get(..16)
+        .and_then(|part| part.try_into().ok())
+        .unwrap_or([0; 16]);
     let (sec, nanosec) = (i32::from_le_bytes(part(16)), u32::from_le_bytes(part(20)));
     (uuid, i64::from(sec) * 1_000_000_000 + i64::from(nanosec))
 }
@@ -234,10 +303,17 @@ impl Goals {
     fn add(&mut self, id: GoalId, is_cancelled: Arc<AtomicBool>) -> bool {
         if self.known.len() >= MOST_GOALS {
             let over = self.known.iter().filter(|(_, known)| known.is_over());
-            let Some(oldest) = over.min_by_key(|(_, known)| known.number).map(|(id, _)| *id) else { return false };
+            let Some(oldest) = over
+                .min_by_key(|(_, known)| known.number)
+                .map(|(id, _)| *id)
+            else {
+                return false;
+            };
             self.known.remove(&oldest);
         }
-        let Entry::Vacant(place) = self.known.entry(id) else { return false };
+        let Entry::Vacant(place) = self.known.entry(id) else {
+            return false;
+        };
         place.insert(KnownGoal {
             status: GoalStatusEnum::Accepted,
             accepted: Time::ZERO,
@@ -265,7 +341,10 @@ impl Goals {
             if all || (names_one && is_named(id)) || is_before {
                 known.is_cancelled.store(true, Ordering::Relaxed);
                 known.status = GoalStatusEnum::Canceling;
-                goals_canceling.push(GoalInfo { goal_id: *id, stamp: known.accepted });
+                goals_canceling.push(GoalInfo {
+                    goal_id: *id,
+                    stamp: known.accepted,
+                });
             }
         }
         let return_code = match self.known.iter().find(|(id, _)| is_named(id)) {
@@ -274,7 +353,10 @@ impl Goals {
             Some((_, known)) if known.is_over() => CancelGoalResponseEnum::GoalTerminated,
             _ => CancelGoalResponseEnum::Rejected,
         };
-        CancelGoalResponse { return_code, goals_canceling }
+        CancelGoalResponse {
+            return_code,
+            goals_canceling,
+        }
     }
 }
 
@@ -298,11 +380,18 @@ mod tests {
             assert!(goals.add(id, flag.clone()));
             flag
         });
-        ids.iter().zip([10, 20, 30]).for_each(|(id, ns)| at(&mut goals, *id, ns));
-        let canceled = |flags: &[Arc<AtomicBool>; 3]| flags.each_ref().map(|flag| flag.load(Ordering::Relaxed));
+        ids.iter()
+            .zip([10, 20, 30])
+            .for_each(|(id, ns)| at(&mut goals, *id, ns));
+        let canceled = |flags: &[Arc<AtomicBool>; 3]| {
+            flags.each_ref().map(|flag| flag.load(Ordering::Relaxed))
+        };
 
         let response = goals.cancel((*ids[2].uuid.as_bytes(), 0));
-        assert_eq!((response.return_code, response.goals_canceling.len()), (CancelGoalResponseEnum::None, 1));
+        assert_eq!(
+            (response.return_code, response.goals_canceling.len()),
+            (CancelGoalResponseEnum::None, 1)
+        );
         assert_eq!(canceled(&flags), [false, false, true]);
         goals.cancel(([0; 16], 10));
         assert_eq!(canceled(&flags), [true, false, true]);
@@ -315,9 +404,18 @@ mod tests {
         let (mut goals, id) = (Goals::default(), GoalId::new_random());
         assert!(goals.add(id, flag()));
         goals.known.get_mut(&id).unwrap().result = Some(ProbeResponse::default());
-        assert_eq!(goals.cancel((*id.uuid.as_bytes(), 0)).return_code, CancelGoalResponseEnum::GoalTerminated);
-        assert_eq!(goals.cancel(([7; 16], 0)).return_code, CancelGoalResponseEnum::UnknownGoal);
-        assert_eq!(goals.cancel(([0; 16], 0)).return_code, CancelGoalResponseEnum::Rejected);
+        assert_eq!(
+            goals.cancel((*id.uuid.as_bytes(), 0)).return_code,
+            CancelGoalResponseEnum::GoalTerminated
+        );
+        assert_eq!(
+            goals.cancel(([7; 16], 0)).return_code,
+            CancelGoalResponseEnum::UnknownGoal
+        );
+        assert_eq!(
+            goals.cancel(([0; 16], 0)).return_code,
+            CancelGoalResponseEnum::Rejected
+        );
     }
 
     #[test]

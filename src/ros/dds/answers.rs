@@ -46,12 +46,20 @@ impl Room {
     /// That of the networks of this computer.
     pub fn new(mapping: &ServiceMapping) -> Self {
         let is_for_services = *mapping != ServiceMapping::Cyclone;
-        Self { most: room(smallest_packet()), is_for_services, logged: Mutex::default() }
+        Self {
+            most: room(smallest_packet()),
+            is_for_services,
+            logged: Mutex::default(),
+        }
     }
 
     /// The answer of a service, or what of it there is room for.
     pub fn fit<A: Shrinkable>(&self, service: &'static str, answer: A) -> A {
-        if self.is_for_services { self.fit_packet(service, answer) } else { answer }
+        if self.is_for_services {
+            self.fit_packet(service, answer)
+        } else {
+            answer
+        }
     }
 
     /// The answer, or what of it fits into one packet.
@@ -79,9 +87,18 @@ pub(super) fn room(packet: usize) -> usize {
 
 /// Of all networks that are up now, as Linux has it; elsewhere that of Ethernet.
 fn smallest_packet() -> usize {
-    let read = |path: std::path::PathBuf| fs::read_to_string(path).map(|text| text.trim().to_owned()).ok();
-    let devices = fs::read_dir("/sys/class/net").into_iter().flatten().flatten();
-    let up = devices.filter(|device| read(device.path().join("operstate")).is_some_and(|state| state != "down"));
+    let read = |path: std::path::PathBuf| {
+        fs::read_to_string(path)
+            .map(|text| text.trim().to_owned())
+            .ok()
+    };
+    let devices = fs::read_dir("/sys/class/net")
+        .into_iter()
+        .flatten()
+        .flatten();
+    let up = devices.filter(|device| {
+        read(device.path().join("operstate")).is_some_and(|state| state != "down")
+    });
     let packets = up.filter_map(|device| read(device.path().join("mtu"))?.parse().ok());
     packets.fold(ETHERNET, usize::min)
 }
@@ -180,11 +197,13 @@ mod tests {
 
     use super::*;
     use crate::ros::messages::{
-        self, DescribeParametersRequest, Feature, GetParametersRequest, Header, ListParametersRequest,
-        ListParametersResult, Point, ProbeResult, SetParametersResult,
+        self, DescribeParametersRequest, Feature, GetParametersRequest, Header,
+        ListParametersRequest, ListParametersResult, Point, ProbeResult, SetParametersResult,
     };
     use crate::ros::parameter_services::{describe_all, get, list, result as set_result};
-    use crate::ros::parameters::{PARAMETERS, ParameterDescriptor, ParameterValue, Parameters, Settable};
+    use crate::ros::parameters::{
+        PARAMETERS, ParameterDescriptor, ParameterValue, Parameters, Settable,
+    };
 
     /// The smallest packet that a network of today has: what IPv6 asks for, and tunnels have.
     const TUNNEL: usize = 1280;
@@ -203,9 +222,15 @@ mod tests {
 
     fn result(message: String) -> ProbeResult {
         ProbeResult {
-            header: Header { frame_id: "object".to_owned(), ..Header::default() },
+            header: Header {
+                frame_id: "object".to_owned(),
+                ..Header::default()
+            },
             message,
-            feature: Feature { points: vec![Point::default(); 2], ..Feature::default() },
+            feature: Feature {
+                points: vec![Point::default(); 2],
+                ..Feature::default()
+            },
             ..ProbeResult::default()
         }
     }
@@ -213,30 +238,78 @@ mod tests {
     #[test]
     fn the_largest_answers_of_our_own_services_fit_into_one_packet() {
         // as long as the node makes a text of its own; a path may be longer
-        let message = || "a text of 300 letters, which is longer than what the node says by itself. ".repeat(4);
-        let header = Header { frame_id: "object".to_owned(), ..Header::default() };
+        let message = || {
+            "a text of 300 letters, which is longer than what the node says by itself. ".repeat(4)
+        };
+        let header = Header {
+            frame_id: "object".to_owned(),
+            ..Header::default()
+        };
         let (ids, codes) = ((0..128).collect::<Vec<u32>>(), vec![1; 128]);
-        let detected =
-            DetectFeaturesResponse { message: message(), ids: ids.clone(), ..DetectFeaturesResponse::default() };
-        let ended = ProbeResponse { header, code: 1, message: message(), ids, codes };
-        let goal = GoalInfo { goal_id: GoalId::new_random(), stamp: Time::ZERO };
+        let detected = DetectFeaturesResponse {
+            message: message(),
+            ids: ids.clone(),
+            ..DetectFeaturesResponse::default()
+        };
+        let ended = ProbeResponse {
+            header,
+            code: 1,
+            message: message(),
+            ids,
+            codes,
+        };
+        let goal = GoalInfo {
+            goal_id: GoalId::new_random(),
+            stamp: Time::ZERO,
+        };
         let cancelled = ros2_client::action_msgs::CancelGoalResponse {
             return_code: CancelGoalResponseEnum::None,
             goals_canceling: vec![goal; 32],
         };
         let path = "/home/somebody/sessions/2026-01-31T12-00-00/refined.ply".repeat(2);
-        let saved = SaveMeshResponse { message: message(), path, ..SaveMeshResponse::default() };
+        let saved = SaveMeshResponse {
+            message: message(),
+            path,
+            ..SaveMeshResponse::default()
+        };
         let points = vec![Point::default(); 24];
-        let found = TakeOutTouchResponse { message: message(), points, ..TakeOutTouchResponse::default() };
+        let found = TakeOutTouchResponse {
+            message: message(),
+            points,
+            ..TakeOutTouchResponse::default()
+        };
         let sizes = [
             ("detect_features", size(&detected)),
             ("take_out_touch", size(&found)),
-            ("probe_feature", size(&ProbeFeatureResponse { result: result(message()) })),
-            ("probe: get_result", size(&GetResultResponse { status: GoalStatusEnum::Succeeded, result: ended })),
+            (
+                "probe_feature",
+                size(&ProbeFeatureResponse {
+                    result: result(message()),
+                }),
+            ),
+            (
+                "probe: get_result",
+                size(&GetResultResponse {
+                    status: GoalStatusEnum::Succeeded,
+                    result: ended,
+                }),
+            ),
             ("probe: cancel_goal", size(&cancelled)),
-            ("probe: send_goal", size(&SendGoalResponse { accepted: true, stamp: Time::ZERO })),
+            (
+                "probe: send_goal",
+                size(&SendGoalResponse {
+                    accepted: true,
+                    stamp: Time::ZERO,
+                }),
+            ),
             ("save_mesh", size(&saved)),
-            ("probe_all, arm_state, recover, reset", size(&TriggerResponse { success: true, message: message() })),
+            (
+                "probe_all, arm_state, recover, reset",
+                size(&TriggerResponse {
+                    success: true,
+                    message: message(),
+                }),
+            ),
         ];
         for (service, bytes) in sizes {
             println!("{bytes:5} bytes of {} {service}", room(TUNNEL));
@@ -246,7 +319,10 @@ mod tests {
 
     #[test]
     fn a_text_that_is_too_long_is_cut_and_the_rest_of_the_answer_stays() {
-        let answer = fits(TriggerResponse { success: true, message: long() });
+        let answer = fits(TriggerResponse {
+            success: true,
+            message: long(),
+        });
         assert!(answer.success && answer.message.ends_with(" …") && answer.message.len() > 1000);
         assert!(long().starts_with(answer.message.trim_end_matches(" …")));
         let answer = fits(SaveMeshResponse {
@@ -256,48 +332,152 @@ mod tests {
             face_count: 7,
             ..SaveMeshResponse::default()
         });
-        assert_eq!((answer.success, answer.path.as_str(), answer.face_count), (true, "a/path", 7));
-        let answer = fits(SaveMeshResponse { message: long(), path: long(), ..SaveMeshResponse::default() });
+        assert_eq!(
+            (answer.success, answer.path.as_str(), answer.face_count),
+            (true, "a/path", 7)
+        );
+        let answer = fits(SaveMeshResponse {
+            message: long(),
+            path: long(),
+            ..SaveMeshResponse::default()
+        });
         assert!(answer.message.is_empty() && answer.path.ends_with(" …"));
-        let answer = fits(ProbeFeatureResponse { result: ProbeResult { id: 3, code: 40, ..result(long()) } });
-        assert_eq!((answer.result.id, answer.result.code, answer.result.feature.points.len()), (3, 40, 2));
+        let answer = fits(ProbeFeatureResponse {
+            result: ProbeResult {
+                id: 3,
+                code: 40,
+                ..result(long())
+            },
+        });
+        assert_eq!(
+            (
+                answer.result.id,
+                answer.result.code,
+                answer.result.feature.points.len()
+            ),
+            (3, 40, 2)
+        );
         let answer = fits(GetResultResponse {
             status: GoalStatusEnum::Aborted,
-            result: ProbeResponse { message: long(), ids: vec![5], codes: vec![40], ..ProbeResponse::default() },
+            result: ProbeResponse {
+                message: long(),
+                ids: vec![5],
+                codes: vec![40],
+                ..ProbeResponse::default()
+            },
         });
-        assert_eq!((answer.result.ids, answer.result.codes), (vec![5], vec![40]));
-        fits(DetectFeaturesResponse { message: long(), ids: (0..128).collect(), ..DetectFeaturesResponse::default() });
-        fits(ResyncMeshResponse { message: long(), ..ResyncMeshResponse::default() });
-        fits(UndoResponse { message: long(), ..UndoResponse::default() });
+        assert_eq!(
+            (answer.result.ids, answer.result.codes),
+            (vec![5], vec![40])
+        );
+        fits(DetectFeaturesResponse {
+            message: long(),
+            ids: (0..128).collect(),
+            ..DetectFeaturesResponse::default()
+        });
+        fits(ResyncMeshResponse {
+            message: long(),
+            ..ResyncMeshResponse::default()
+        });
+        fits(UndoResponse {
+            message: long(),
+            ..UndoResponse::default()
+        });
         let points = vec![Point::default(); 24];
-        let found = fits(TakeOutTouchResponse { message: long(), points, ..TakeOutTouchResponse::default() });
+        let found = fits(TakeOutTouchResponse {
+            message: long(),
+            points,
+            ..TakeOutTouchResponse::default()
+        });
         assert_eq!(found.points.len(), 24);
-        fits(FlagFeatureResponse { message: long(), ..FlagFeatureResponse::default() });
-        fits(UnflagFeatureResponse { message: long(), success: true });
-        fits(SetBoolResponse { message: long(), success: true });
-        let refused = SetParametersResult { successful: false, reason: long() };
-        assert!(fits(SetParametersAtomicallyResponse { result: refused }).result.reason.ends_with(" …"));
+        fits(FlagFeatureResponse {
+            message: long(),
+            ..FlagFeatureResponse::default()
+        });
+        fits(UnflagFeatureResponse {
+            message: long(),
+            success: true,
+        });
+        fits(SetBoolResponse {
+            message: long(),
+            success: true,
+        });
+        let refused = SetParametersResult {
+            successful: false,
+            reason: long(),
+        };
+        assert!(
+            fits(SetParametersAtomicallyResponse { result: refused })
+                .result
+                .reason
+                .ends_with(" …")
+        );
     }
 
     #[test]
     fn of_too_many_parameters_the_answer_is_empty_and_keeps_what_was_set() {
-        let value = || messages::ParameterValue { string_value: "a".repeat(100), ..Default::default() };
-        assert!(fits(GetParametersResponse { values: vec![value(); 20] }).values.is_empty());
-        assert!(fits(GetParameterTypesResponse { types: vec![0; 2000] }).types.is_empty());
+        let value = || messages::ParameterValue {
+            string_value: "a".repeat(100),
+            ..Default::default()
+        };
+        assert!(
+            fits(GetParametersResponse {
+                values: vec![value(); 20]
+            })
+            .values
+            .is_empty()
+        );
+        assert!(
+            fits(GetParameterTypesResponse {
+                types: vec![0; 2000]
+            })
+            .types
+            .is_empty()
+        );
         let names = vec!["a name of a parameter".to_owned(); 100];
-        let list = ListParametersResponse { result: ListParametersResult { names, prefixes: Vec::new() } };
+        let list = ListParametersResponse {
+            result: ListParametersResult {
+                names,
+                prefixes: Vec::new(),
+            },
+        };
         assert!(fits(list).result.names.is_empty());
-        let set = |successful| SetParametersResult { successful, reason: "a".repeat(100) };
-        let results = fits(SetParametersResponse { results: (0..20).map(|i| set(i % 2 == 0)).collect() }).results;
-        assert_eq!(results.iter().map(|one| one.successful).collect::<Vec<_>>(), [true, false].repeat(10));
-        assert!(fits(SetParametersResponse { results: vec![set(true); 1000] }).results.is_empty());
+        let set = |successful| SetParametersResult {
+            successful,
+            reason: "a".repeat(100),
+        };
+        let results = fits(SetParametersResponse {
+            results: (0..20).map(|i| set(i % 2 == 0)).collect(),
+        })
+        .results;
+        assert_eq!(
+            results.iter().map(|one| one.successful).collect::<Vec<_>>(),
+            [true, false].repeat(10)
+        );
+        assert!(
+            fits(SetParametersResponse {
+                results: vec![set(true); 1000]
+            })
+            .results
+            .is_empty()
+        );
     }
 
     #[test]
     fn the_mapping_of_cyclone_has_no_limit() {
-        let whole = GetParameterTypesResponse { types: vec![0; 100_000] };
-        let fit = |mapping| Room::new(&mapping).fit("~/get_parameter_types", whole.clone()).types.len();
-        assert_eq!([ServiceMapping::Cyclone, ServiceMapping::Enhanced].map(fit), [100_000, 0]);
+        let whole = GetParameterTypesResponse {
+            types: vec![0; 100_000],
+        };
+        let fit = |mapping| {
+            Room::new(&mapping)
+                .fit("~/get_parameter_types", whole.clone())
+                .types
+                .len()
+        };
+        assert_eq!(
+            [ServiceMapping::Cyclone, ServiceMapping::Enhanced].map(fit),
+            [100_000, 0]
+        );
     }
 
     #[test]
@@ -310,7 +490,10 @@ mod tests {
     }
 
     fn names() -> Vec<String> {
-        PARAMETERS.iter().map(|declared| declared.name.to_owned()).collect()
+        PARAMETERS
+            .iter()
+            .map(|declared| declared.name.to_owned())
+            .collect()
     }
 
     /// What `ros2 param dump` asks for.
@@ -326,8 +509,14 @@ mod tests {
     fn launched() -> Parameters {
         let mut values = Parameters::default();
         let share = "/home/somebody/ws/install/touchup/share/touchup/config/probe.yaml";
-        for (name, path) in [("scene", share), ("scan", "/home/somebody/scans/part.ply"), ("tool_frame", "probe_tip")] {
-            values.set(name, &ParameterValue::String(path.to_owned())).unwrap();
+        for (name, path) in [
+            ("scene", share),
+            ("scan", "/home/somebody/scans/part.ply"),
+            ("tool_frame", "probe_tip"),
+        ] {
+            values
+                .set(name, &ParameterValue::String(path.to_owned()))
+                .unwrap();
         }
         values
     }
@@ -336,20 +525,49 @@ mod tests {
     fn what_is_asked_of_all_parameters_fits_into_one_packet() {
         let mut described_briefly = described(names());
         described_briefly.reduce(room(ETHERNET));
-        let types = GetParameterTypesResponse { types: vec![0; PARAMETERS.len()] };
-        let live = PARAMETERS.iter().filter(|declared| declared.settable != Settable::AtStart);
-        let refused =
-            |one: &ParameterDescriptor| Parameters::default().set_live(one.name, &ParameterValue::Integer(-1));
-        let results = live.map(|one| set_result(refused(one).map_err(|why| why.to_string()))).collect();
+        let types = GetParameterTypesResponse {
+            types: vec![0; PARAMETERS.len()],
+        };
+        let live = PARAMETERS
+            .iter()
+            .filter(|declared| declared.settable != Settable::AtStart);
+        let refused = |one: &ParameterDescriptor| {
+            Parameters::default().set_live(one.name, &ParameterValue::Integer(-1))
+        };
+        let results = live
+            .map(|one| set_result(refused(one).map_err(|why| why.to_string())))
+            .collect();
         let sizes = [
-            ("list_parameters", size(&list(&ListParametersRequest { prefixes: Vec::new(), depth: 0 }))),
-            ("get_parameters of all, as they are declared", size(&all_values(&Parameters::default()))),
-            ("get_parameters of all, with paths", size(&all_values(&launched()))),
+            (
+                "list_parameters",
+                size(&list(&ListParametersRequest {
+                    prefixes: Vec::new(),
+                    depth: 0,
+                })),
+            ),
+            (
+                "get_parameters of all, as they are declared",
+                size(&all_values(&Parameters::default())),
+            ),
+            (
+                "get_parameters of all, with paths",
+                size(&all_values(&launched())),
+            ),
             ("get_parameter_types of all", size(&types)),
-            ("describe_parameters of all, without descriptions", size(&described_briefly)),
-            ("set_parameters of all that are live, refused", size(&SetParametersResponse { results })),
+            (
+                "describe_parameters of all, without descriptions",
+                size(&described_briefly),
+            ),
+            (
+                "set_parameters of all that are live, refused",
+                size(&SetParametersResponse { results }),
+            ),
         ];
-        println!("{} parameters; described in full: {} bytes", PARAMETERS.len(), size(&described(names())));
+        println!(
+            "{} parameters; described in full: {} bytes",
+            PARAMETERS.len(),
+            size(&described(names()))
+        );
         for (service, bytes) in sizes {
             println!("{bytes:5} bytes of {} {service}", room(ETHERNET));
             assert!(bytes <= room(ETHERNET), "{service}: {bytes} bytes");
@@ -359,13 +577,31 @@ mod tests {
         without_words.reduce(room(1400));
         assert_eq!(without_words.descriptors.len(), PARAMETERS.len());
         // nothing but the descriptions is left out
-        let of =
-            |one: &messages::ParameterDescriptor| (one.name.clone(), one.r#type, one.additional_constraints.clone());
+        let of = |one: &messages::ParameterDescriptor| {
+            (
+                one.name.clone(),
+                one.r#type,
+                one.additional_constraints.clone(),
+            )
+        };
         assert_eq!(
-            described_briefly.descriptors.iter().map(of).collect::<Vec<_>>(),
-            described(names()).descriptors.iter().map(of).collect::<Vec<_>>()
+            described_briefly
+                .descriptors
+                .iter()
+                .map(of)
+                .collect::<Vec<_>>(),
+            described(names())
+                .descriptors
+                .iter()
+                .map(of)
+                .collect::<Vec<_>>()
         );
-        assert!(described_briefly.descriptors.iter().all(|one| one.description.is_empty()));
+        assert!(
+            described_briefly
+                .descriptors
+                .iter()
+                .all(|one| one.description.is_empty())
+        );
     }
 
     #[test]

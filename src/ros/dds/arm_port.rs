@@ -57,42 +57,54 @@ impl Drop for DdsArm {
 ///
 /// # Errors
 /// [`RosError`]: a name that is none, no network, no thread.
-pub fn arm_port(config: &NodeConfig, reports: [&str; 2], orders: &str) -> Result<Box<dyn ArmPort>, RosError> {
+pub fn arm_port(
+    config: &NodeConfig,
+    reports: [&str; 2],
+    orders: &str,
+) -> Result<Box<dyn ArmPort>, RosError> {
     let (context, mut node) = join(config, NodeOptions::new().start_parameter_services(false))?;
     let status = context.domain_participant().status_listener();
     let heard = keep(BEST_EFFORT, DEPTH);
     let joints = make_topic::<JointState>(&node, &config.resolve(reports[0])?, &heard)?;
-    let mut joints =
-        node.create_subscription::<JointState>(&joints, Some(heard.clone())).during("subscribing to a topic")?;
+    let mut joints = node
+        .create_subscription::<JointState>(&joints, Some(heard.clone()))
+        .during("subscribing to a topic")?;
     let wrench = make_topic::<WrenchStamped>(&node, &config.resolve(reports[1])?, &heard)?;
-    let mut wrench =
-        node.create_subscription::<WrenchStamped>(&wrench, Some(heard)).during("subscribing to a topic")?;
+    let mut wrench = node
+        .create_subscription::<WrenchStamped>(&wrench, Some(heard))
+        .during("subscribing to a topic")?;
     // the newest order alone counts
     let sent = keep(URGENT, 1);
     let topic = make_topic::<JointTrajectory>(&node, &config.resolve(orders)?, &sent)?;
-    let orders = node.create_publisher(&topic, Some(sent)).during("publishing a topic")?;
+    let orders = node
+        .create_publisher(&topic, Some(sent))
+        .during("publishing a topic")?;
     let mut poll = Poll::new()?;
-    poll.registry().register(&mut joints, Token(0), Interest::READABLE)?;
-    poll.registry().register(&mut wrench, Token(1), Interest::READABLE)?;
+    poll.registry()
+        .register(&mut joints, Token(0), Interest::READABLE)?;
+    poll.registry()
+        .register(&mut wrench, Token(1), Interest::READABLE)?;
     let waker = Arc::new(Waker::new(poll.registry(), Token(2))?);
     let (sender, received) = sync_channel(WAITING);
     let is_over = Arc::new(AtomicBool::new(false));
     let over = is_over.clone();
-    let thread = Builder::new().name("touchup-arm-in".to_owned()).spawn(move || {
-        let mut events = Events::with_capacity(16);
-        while !over.load(Ordering::Relaxed) {
-            // what came before the registration wakes nobody
-            take(&joints, &sender, ArmReport::Joints);
-            take(&wrench, &sender, ArmReport::Wrench);
-            match poll.poll(&mut events, None) {
-                Err(error) if error.kind() != io::ErrorKind::Interrupted => {
-                    tracing::error!(%error, "nothing is heard of the arm any more");
-                    return;
+    let thread = Builder::new()
+        .name("touchup-arm-in".to_owned())
+        .spawn(move || {
+            let mut events = Events::with_capacity(16);
+            while !over.load(Ordering::Relaxed) {
+                // what came before the registration wakes nobody
+                take(&joints, &sender, ArmReport::Joints);
+                take(&wrench, &sender, ArmReport::Wrench);
+                match poll.poll(&mut events, None) {
+                    Err(error) if error.kind() != io::ErrorKind::Interrupted => {
+                        tracing::error!(%error, "nothing is heard of the arm any more");
+                        return;
+                    }
+                    _ => {}
                 }
-                _ => {}
             }
-        }
-    })?;
+        })?;
     Ok(Box::new(DdsArm {
         reports: received,
         orders,
@@ -106,7 +118,11 @@ pub fn arm_port(config: &NodeConfig, reports: [&str; 2], orders: &str) -> Result
 }
 
 /// Takes all that is there.
-fn take<M: RosMessage>(from: &Subscription<M>, to: &SyncSender<ArmReport>, report: fn(M) -> ArmReport) {
+fn take<M: RosMessage>(
+    from: &Subscription<M>,
+    to: &SyncSender<ArmReport>,
+    report: fn(M) -> ArmReport,
+) {
     loop {
         let report = match from.take() {
             Ok(Some((message, _))) => report(message),
@@ -124,13 +140,19 @@ impl ArmPort for DdsArm {
     }
 
     fn publish_trajectory(&mut self, order: JointTrajectory) -> bool {
-        self.orders.publish(order).inspect_err(|error| tracing::debug!(%error, "an order is not sent")).is_ok()
+        self.orders
+            .publish(order)
+            .inspect_err(|error| tracing::debug!(%error, "an order is not sent"))
+            .is_ok()
     }
 
     fn order_listeners(&mut self) -> Option<usize> {
         while let Some(event) = self.status.try_recv_status() {
             match event {
-                Event::RemoteReaderMatched { local_writer, remote_reader } if local_writer == self.orders.guid() => {
+                Event::RemoteReaderMatched {
+                    local_writer,
+                    remote_reader,
+                } if local_writer == self.orders.guid() => {
                     self.listeners.insert(remote_reader);
                 }
                 Event::ReaderLost { guid, .. } => {

@@ -61,7 +61,11 @@ pub(super) fn join(config: &NodeConfig, options: NodeOptions) -> Result<(Context
     let participant = builder.build().during("joining the domain")?;
     guard(before, config.localhost_only)?;
     let context = Context::from_domain_participant(participant).during("joining the graph")?;
-    let namespace = if config.place.namespace.is_empty() { "/" } else { &config.place.namespace };
+    let namespace = if config.place.namespace.is_empty() {
+        "/"
+    } else {
+        &config.place.namespace
+    };
     let name = NodeName::new(namespace, &config.place.node).during("naming the node")?;
     let node = context.new_node(name, options).during("making the node")?;
     Ok((context, node))
@@ -69,13 +73,20 @@ pub(super) fn join(config: &NodeConfig, options: NodeOptions) -> Result<(Context
 
 /// A node that others must not reach does not run where they do; without a filter for what is too large it does.
 fn guard(before: std::io::Result<OpenSockets>, localhost_only: bool) -> Result<(), RosError> {
-    let range = if localhost_only { Range::Computer } else { Range::Networks };
+    let range = if localhost_only {
+        Range::Computer
+    } else {
+        Range::Networks
+    };
     match before.and_then(|before| before.guard_since(range)) {
         Ok(guarded) => tracing::debug!(guarded, ?range, "sockets are guarded"),
         Err(error) if localhost_only => {
-            let remedy =
-                "unset ROS_AUTOMATIC_DISCOVERY_RANGE and ROS_LOCALHOST_ONLY where other computers may reach the node";
-            return Err(RosError::Refused { call: "binding to loopback", reason: error.to_string(), remedy });
+            let remedy = "unset ROS_AUTOMATIC_DISCOVERY_RANGE and ROS_LOCALHOST_ONLY where other computers may reach the node";
+            return Err(RosError::Refused {
+                call: "binding to loopback",
+                reason: error.to_string(),
+                remedy,
+            });
         }
         Err(error) => tracing::warn!(%error, "messages of any size are taken from the network"),
     }
@@ -89,9 +100,13 @@ mod tests {
     #[test]
     fn who_has_no_more_files_is_not_sent_to_the_network() {
         // EMFILE
-        let refused: Result<(), _> = Err(std::io::Error::from_raw_os_error(24)).during("publishing a topic");
+        let refused: Result<(), _> =
+            Err(std::io::Error::from_raw_os_error(24)).during("publishing a topic");
         let said = refused.unwrap_err().to_string();
-        assert!(said.contains("ulimit -n") && !said.contains("ip link"), "{said}");
+        assert!(
+            said.contains("ulimit -n") && !said.contains("ip link"),
+            "{said}"
+        );
         let refused: Result<(), _> = Err("no such interface").during("joining the domain");
         assert!(refused.unwrap_err().to_string().contains("ip link show lo"));
     }

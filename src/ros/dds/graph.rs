@@ -8,8 +8,8 @@ use std::time::Duration;
 use ros2_client::dds::rustdds::mio1::event::Source;
 use ros2_client::dds::rustdds::policy::Durability;
 use ros2_client::dds::rustdds::{
-    DomainParticipantStatusEvent as Event, DomainParticipantStatusListener, GUID, LostReason, QosPolicies, RTPSEntity,
-    StatusEvented, Topic, TopicDescription,
+    DomainParticipantStatusEvent as Event, DomainParticipantStatusListener, GUID, LostReason,
+    QosPolicies, RTPSEntity, StatusEvented, Topic, TopicDescription,
 };
 use ros2_client::{Context, ServiceMapping};
 
@@ -95,7 +95,10 @@ impl DdsGraph {
 
     /// A reader or writer of ours, and what its topic is called in ROS.
     pub fn add(&mut self, guid: GUID, topic: &Topic, name: String) {
-        self.topics.insert(topic.name(), (name.clone(), topic.get_type().name().to_owned()));
+        self.topics.insert(
+            topic.name(),
+            (name.clone(), topic.get_type().name().to_owned()),
+        );
         self.matched.insert(guid, (name, BTreeSet::new()));
     }
 
@@ -114,7 +117,10 @@ impl DdsGraph {
     /// How often they have changed, and which they are now.
     pub fn published_types(&self, topic: &str) -> Option<(u64, BTreeSet<String>)> {
         let published = self.published.get(topic)?;
-        Some((published.changes, published.writers.values().cloned().collect()))
+        Some((
+            published.changes,
+            published.writers.values().cloned().collect(),
+        ))
     }
 
     /// Why nothing of a topic can be read; reported when that is new.
@@ -126,8 +132,15 @@ impl DdsGraph {
             Some(why) => drop(self.unread.insert(name.to_owned(), why)),
             None => drop(self.unread.remove(name)),
         }
-        let locals: Vec<_> = self.matched.iter().filter(|(_, (of, _))| of == name).map(|(guid, _)| *guid).collect();
-        locals.into_iter().for_each(|local| self.report(local, None));
+        let locals: Vec<_> = self
+            .matched
+            .iter()
+            .filter(|(_, (of, _))| of == name)
+            .map(|(guid, _)| *guid)
+            .collect();
+        locals
+            .into_iter()
+            .for_each(|local| self.report(local, None));
     }
 
     /// How often it looks who is silent, where anybody may be.
@@ -153,16 +166,26 @@ impl DdsGraph {
             }
             // what the node itself publishes there says nothing
             Event::WriterDetected { writer }
-                if self.published.contains_key(&writer.topic_name) && writer.guid.prefix == self.own.prefix => {}
+                if self.published.contains_key(&writer.topic_name)
+                    && writer.guid.prefix == self.own.prefix => {}
             Event::WriterDetected { writer } if self.published.contains_key(&writer.topic_name) => {
                 self.note_published(writer.guid, &writer.topic_name, &writer.type_name);
             }
             Event::ReaderDetected { reader: other } | Event::WriterDetected { writer: other } => {
                 self.seen(other.guid, &other.topic_name, &other.type_name);
             }
-            Event::RemoteReaderMatched { local_writer: local, remote_reader: remote }
-            | Event::RemoteWriterMatched { local_reader: local, remote_writer: remote } => {
-                let is_new = self.matched.get_mut(&local).is_some_and(|(_, others)| others.insert(remote));
+            Event::RemoteReaderMatched {
+                local_writer: local,
+                remote_reader: remote,
+            }
+            | Event::RemoteWriterMatched {
+                local_reader: local,
+                remote_writer: remote,
+            } => {
+                let is_new = self
+                    .matched
+                    .get_mut(&local)
+                    .is_some_and(|(_, others)| others.insert(remote));
                 if is_new {
                     self.report(local, None);
                 }
@@ -178,20 +201,45 @@ impl DdsGraph {
                 self.callers.remove(&guid);
                 self.unmatch(|other| *other == guid);
             }
-            Event::RemoteReaderQosIncompatible { local_writer, requested_qos, offered_qos, remote_reader } => {
-                self.misfit(local_writer, remote_reader, &requested_qos, &offered_qos, "a listener");
+            Event::RemoteReaderQosIncompatible {
+                local_writer,
+                requested_qos,
+                offered_qos,
+                remote_reader,
+            } => {
+                self.misfit(
+                    local_writer,
+                    remote_reader,
+                    &requested_qos,
+                    &offered_qos,
+                    "a listener",
+                );
             }
-            Event::RemoteWriterQosIncompatible { local_reader, requested_qos, offered_qos, remote_writer } => {
-                self.misfit(local_reader, remote_writer, &requested_qos, &offered_qos, "a sender");
+            Event::RemoteWriterQosIncompatible {
+                local_reader,
+                requested_qos,
+                offered_qos,
+                remote_writer,
+            } => {
+                self.misfit(
+                    local_reader,
+                    remote_writer,
+                    &requested_qos,
+                    &offered_qos,
+                    "a sender",
+                );
             }
             _ => {}
         }
     }
 
     fn note_published(&mut self, writer: GUID, topic: &str, type_name: &str) {
-        let Some(published) = self.published.get_mut(topic) else { return };
+        let Some(published) = self.published.get_mut(topic) else {
+            return;
+        };
         let type_name = ros_type(type_name);
-        let is_room = published.writers.len() < MOST_WRITERS || published.writers.contains_key(&writer);
+        let is_room =
+            published.writers.len() < MOST_WRITERS || published.writers.contains_key(&writer);
         if is_room && published.writers.insert(writer, type_name.clone()) != Some(type_name) {
             published.changes += 1;
         }
@@ -214,9 +262,22 @@ impl DdsGraph {
         fewer.into_iter().for_each(|local| self.report(local, None));
     }
 
-    fn misfit(&mut self, local: GUID, remote: GUID, wanted: &QosPolicies, offered: &QosPolicies, who: &str) {
+    fn misfit(
+        &mut self,
+        local: GUID,
+        remote: GUID,
+        wanted: &QosPolicies,
+        offered: &QosPolicies,
+        who: &str,
+    ) {
         if self.reported.insert(remote) {
-            self.report(local, Some(format!("{who} does not fit: {}", difference(wanted, offered))));
+            self.report(
+                local,
+                Some(format!(
+                    "{who} does not fit: {}",
+                    difference(wanted, offered)
+                )),
+            );
         }
     }
 
@@ -227,40 +288,61 @@ impl DdsGraph {
         }
         let asked = service_of(topic, "rq", "Request");
         if self.callers.len() < MOST_CALLERS {
-            let what = [(asked, "a caller is heard"), (service_of(topic, "rr", "Reply"), "a caller can be answered")];
+            let what = [
+                (asked, "a caller is heard"),
+                (service_of(topic, "rr", "Reply"), "a caller can be answered"),
+            ];
             for (service, what) in what {
-                self.callers.extend(service.map(|service| (guid, (service.to_owned(), what))));
+                self.callers
+                    .extend(service.map(|service| (guid, (service.to_owned(), what))));
             }
         }
         if let Some((name, ours)) = self.topics.get(topic) {
             if ours != type_name && self.reported.insert(guid) {
-                let reason = format!("somebody has it with the type {type_name}, here it is {ours}");
+                let reason =
+                    format!("somebody has it with the type {type_name}, here it is {ours}");
                 let of_topic = self.matched.values().filter(|(own, _)| own == name);
                 let count = of_topic.map(|(_, others)| others.len()).sum();
-                self.exchange.inbox.report(name.clone(), count, Some(reason));
+                self.exchange
+                    .inbox
+                    .report(name.clone(), count, Some(reason));
             }
             return;
         }
-        let vendor = self.vendors.iter().find(|(participant, _)| participant.prefix == guid.prefix);
+        let vendor = self
+            .vendors
+            .iter()
+            .find(|(participant, _)| participant.prefix == guid.prefix);
         let wants = match vendor.map(|(_, vendor)| vendor) {
             Some(&CYCLONE_DDS) => ServiceMapping::Cyclone,
             Some(&FAST_DDS) => ServiceMapping::Enhanced,
             _ => return,
         };
         let Some(service) = asked else { return };
-        if self.services.iter().any(|own| own == service) && wants != self.mapping && self.reported.insert(guid) {
-            let right = if wants == ServiceMapping::Cyclone { "cyclone" } else { "enhanced" };
+        if self.services.iter().any(|own| own == service)
+            && wants != self.mapping
+            && self.reported.insert(guid)
+        {
+            let right = if wants == ServiceMapping::Cyclone {
+                "cyclone"
+            } else {
+                "enhanced"
+            };
             let reason = format!(
                 "somebody who calls it has another header: start this node with -p service_mapping:={right}, or all with one RMW"
             );
-            self.exchange.inbox.report(service.to_owned(), 1, Some(reason));
+            self.exchange
+                .inbox
+                .report(service.to_owned(), 1, Some(reason));
         }
     }
 
     fn report(&self, local: GUID, mismatch: Option<String>) {
         if let Some((name, others)) = self.matched.get(&local) {
             let mismatch = mismatch.or_else(|| self.unread.get(name).cloned());
-            self.exchange.inbox.report(name.clone(), others.len(), mismatch);
+            self.exchange
+                .inbox
+                .report(name.clone(), others.len(), mismatch);
         }
     }
 }
@@ -281,7 +363,8 @@ fn difference(wanted: &QosPolicies, offered: &QosPolicies) -> String {
     if wanted.is_reliable() && !offered.is_reliable() {
         return "it wants reliable, offered is best effort".to_owned();
     }
-    let latched = |qos: &QosPolicies| !matches!(qos.durability(), None | Some(Durability::Volatile));
+    let latched =
+        |qos: &QosPolicies| !matches!(qos.durability(), None | Some(Durability::Volatile));
     if latched(wanted) && !latched(offered) {
         return "it wants transient local, offered is volatile".to_owned();
     }
@@ -293,10 +376,16 @@ fn difference(wanted: &QosPolicies, offered: &QosPolicies) -> String {
 
 /// It is asked by the topics that follow what is published, on the same thread.
 impl Listener for Arc<Mutex<DdsGraph>> {
-    fn sources(&mut self, each: &mut dyn FnMut(&mut dyn Source) -> io::Result<()>) -> io::Result<()> {
+    fn sources(
+        &mut self,
+        each: &mut dyn FnMut(&mut dyn Source) -> io::Result<()>,
+    ) -> io::Result<()> {
         let mut graph = locked(self);
         each(graph.listener.as_status_source_mio1())?;
-        graph.keep_alive.iter_mut().try_for_each(|keep_alive| each(&mut keep_alive.socket))
+        graph
+            .keep_alive
+            .iter_mut()
+            .try_for_each(|keep_alive| each(&mut keep_alive.socket))
     }
 
     fn take(&mut self) {

@@ -17,7 +17,10 @@ use crate::ros::port::Arrival;
 /// Something that messages come from.
 pub(super) trait Listener: Send {
     /// Gives out what wakes the thread, once for all that came since it was last read empty. Asked for once, before anything is taken.
-    fn sources(&mut self, each: &mut dyn FnMut(&mut dyn Source) -> io::Result<()>) -> io::Result<()>;
+    fn sources(
+        &mut self,
+        each: &mut dyn FnMut(&mut dyn Source) -> io::Result<()>,
+    ) -> io::Result<()>;
 
     /// Takes all that is there.
     fn take(&mut self);
@@ -41,7 +44,10 @@ pub(super) fn listen(
 ) -> Result<(Arc<Waker>, JoinHandle<()>), RosError> {
     let mut poll = Poll::new()?;
     for (token, listener) in listeners.iter_mut().enumerate() {
-        listener.sources(&mut |source| poll.registry().register(source, Token(token), Interest::READABLE))?;
+        listener.sources(&mut |source| {
+            poll.registry()
+                .register(source, Token(token), Interest::READABLE)
+        })?;
     }
     let waker = Arc::new(Waker::new(poll.registry(), WAKE)?);
     let thread = exchange.thread("touchup-receive", move |exchange| {
@@ -68,7 +74,9 @@ pub(super) fn listen(
                     continue;
                 }
                 let registry = poll.registry();
-                let heard = listener.sources(&mut |source| registry.register(source, Token(token), Interest::READABLE));
+                let heard = listener.sources(&mut |source| {
+                    registry.register(source, Token(token), Interest::READABLE)
+                });
                 if let Err(error) = heard {
                     tracing::error!(%error, "a topic is not heard");
                 }
@@ -93,7 +101,11 @@ pub(super) fn drain<T>(
         match receive() {
             Ok(Some(message)) => take(message),
             Ok(None) => return,
-            Err(error) => drop(exchange.inbox.put(Arrival::Unreadable(name, format!("{error}{remark}")))),
+            Err(error) => drop(
+                exchange
+                    .inbox
+                    .put(Arrival::Unreadable(name, format!("{error}{remark}"))),
+            ),
         }
     }
 }
@@ -113,9 +125,15 @@ impl LastNumbers {
         if self.0.len() >= Self::MOST && !self.0.contains_key(&sender) {
             self.0.pop_first();
         }
-        let Some(last) = self.0.insert(sender, number) else { return 0 };
+        let Some(last) = self.0.insert(sender, number) else {
+            return 0;
+        };
         let gap = number.saturating_sub(last).saturating_sub(1);
-        if (1..=Self::LARGEST).contains(&gap) { gap as u64 } else { 0 }
+        if (1..=Self::LARGEST).contains(&gap) {
+            gap as u64
+        } else {
+            0
+        }
     }
 }
 
@@ -128,12 +146,20 @@ pub(super) struct HeardTopic<M: RosMessage> {
 }
 
 impl<M: RosMessage> Listener for HeardTopic<M> {
-    fn sources(&mut self, each: &mut dyn FnMut(&mut dyn Source) -> io::Result<()>) -> io::Result<()> {
+    fn sources(
+        &mut self,
+        each: &mut dyn FnMut(&mut dyn Source) -> io::Result<()>,
+    ) -> io::Result<()> {
         each(&mut self.subscription)
     }
 
     fn take(&mut self) {
-        let Self { name, subscription, exchange, arrival } = self;
+        let Self {
+            name,
+            subscription,
+            exchange,
+            arrival,
+        } = self;
         drain(
             (name, exchange, ""),
             || subscription.take(),
@@ -152,9 +178,19 @@ mod tests {
     fn gaps_are_counted_for_each_sender_alone() {
         let mut numbers = LastNumbers::default();
         let [a, b] = [Gid::default(), Gid::from([1; 16])];
-        let missing: Vec<u64> = [(a, 7), (a, 8), (b, 1), (a, 12), (b, 2), (a, 3), (a, 4), (b, i64::MAX), (b, i64::MIN)]
-            .map(|(sender, number)| numbers.missing(sender, number))
-            .into();
+        let missing: Vec<u64> = [
+            (a, 7),
+            (a, 8),
+            (b, 1),
+            (a, 12),
+            (b, 2),
+            (a, 3),
+            (a, 4),
+            (b, i64::MAX),
+            (b, i64::MIN),
+        ]
+        .map(|(sender, number)| numbers.missing(sender, number))
+        .into();
         assert_eq!(missing, [0, 0, 0, 3, 0, 0, 0, 0, 0]);
     }
 }

@@ -89,7 +89,10 @@ impl KeepAlive {
         let own_offset = offset + u32::from(participant_id) * PORTS_OF_A_PARTICIPANT;
         let ports = [MULTICAST_PORT + offset, UNICAST_PORT + own_offset].map(u16::try_from);
         let [Ok(port), Ok(own_port)] = ports else {
-            return Err(Error::new(ErrorKind::InvalidInput, "this domain has no such port"));
+            return Err(Error::new(
+                ErrorKind::InvalidInput,
+                "this domain has no such port",
+            ));
         };
         let socket = Socket::new(Domain::IPV4, Type::DGRAM, Some(Protocol::UDP))?;
         socket.set_reuse_address(true)?;
@@ -101,12 +104,20 @@ impl KeepAlive {
             tracing::debug!(%error, "no route for multicast yet");
         }
         let socket = MioSocket::from_std(socket.into());
-        Ok(Self { socket, own_port, known: BTreeMap::new(), datagram: vec![0; LARGEST_DATAGRAM] })
+        Ok(Self {
+            socket,
+            own_port,
+            known: BTreeMap::new(),
+            datagram: vec![0; LARGEST_DATAGRAM],
+        })
     }
 
     /// RustDDS has waited for it in vain.
     pub fn lost(&mut self, prefix: &[u8]) {
-        if let Some(known) = Prefix::try_from(prefix).ok().and_then(|prefix| self.known.get_mut(&prefix)) {
+        if let Some(known) = Prefix::try_from(prefix)
+            .ok()
+            .and_then(|prefix| self.known.get_mut(&prefix))
+        {
             known.state = PeerState::Lost;
         }
     }
@@ -134,11 +145,17 @@ impl KeepAlive {
     }
 
     fn hear(&mut self, datagram: &[u8], from: SocketAddr, now: Instant) {
-        let Some((prefix, lease)) = announcement(datagram) else { return };
+        let Some((prefix, lease)) = announcement(datagram) else {
+            return;
+        };
         if datagram.len() > LARGEST_ANNOUNCEMENT {
             return;
         }
-        if self.known.get(&prefix).is_some_and(|known| matches!(known.state, PeerState::Lost)) {
+        if self
+            .known
+            .get(&prefix)
+            .is_some_and(|known| matches!(known.state, PeerState::Lost))
+        {
             tracing::warn!(
                 address = %from.ip(),
                 "a program there was out of reach for too long and is not met again: start it anew, or this node"
@@ -149,7 +166,14 @@ impl KeepAlive {
         let datagram = datagram.to_vec();
         self.known.insert(
             prefix,
-            KnownParticipant { datagram, from, heard: now, lease, renewed: now, state: PeerState::Heard },
+            KnownParticipant {
+                datagram,
+                from,
+                heard: now,
+                lease,
+                renewed: now,
+                state: PeerState::Heard,
+            },
         );
     }
 
@@ -194,7 +218,9 @@ fn hand_over(datagram: &[u8], from: SocketAddr, port: u16) -> Result<()> {
         Ok(()) => way.local_addr()?.ip(),
         Err(_) => Ipv4Addr::LOCALHOST.into(),
     };
-    UdpSocket::bind((own, 0))?.send_to(datagram, (own, port)).map(drop)
+    UdpSocket::bind((own, 0))?
+        .send_to(datagram, (own, port))
+        .map(drop)
 }
 
 /// Length of the header of a message (RTPS 2.5, 9.4.4), which ends with who sends it.
@@ -218,7 +244,11 @@ const DEFAULT_LEASE: Duration = Duration::from_secs(60);
 
 fn short(bytes: &[u8], at: usize, is_little_endian: bool) -> Option<u16> {
     let bytes = *bytes.get(at..)?.first_chunk()?;
-    Some(if is_little_endian { u16::from_le_bytes(bytes) } else { u16::from_be_bytes(bytes) })
+    Some(if is_little_endian {
+        u16::from_le_bytes(bytes)
+    } else {
+        u16::from_be_bytes(bytes)
+    })
 }
 
 /// Who announces itself in an RTPS datagram, and its lease; `None` for anything else.
@@ -232,7 +262,11 @@ fn announcement(datagram: &[u8]) -> Option<(Prefix, Duration)> {
         let &[id, flags] = datagram.get(at..)?.first_chunk()?;
         let is_little_endian = flags & LITTLE_ENDIAN != 0;
         let length = usize::from(short(datagram, at + 2, is_little_endian)?);
-        let end = if length == 0 && id != PAD && id != INFO_TS { datagram.len() } else { at + 4 + length };
+        let end = if length == 0 && id != PAD && id != INFO_TS {
+            datagram.len()
+        } else {
+            at + 4 + length
+        };
         let body = datagram.get(at + 4..end)?;
         // more flags, where the data is, reader, writer
         if id == DATA && flags & HAS_DATA != 0 && body.get(8..12) == Some(&ANNOUNCER) {
@@ -246,8 +280,11 @@ fn announcement(datagram: &[u8]) -> Option<(Prefix, Duration)> {
             let mut lease = DEFAULT_LEASE;
             parameters(data.get(4..)?, is_little_endian, |id, value| {
                 if let (LEASE, Some(seconds)) = (id, value.first_chunk()) {
-                    let seconds =
-                        if is_little_endian { i32::from_le_bytes(*seconds) } else { i32::from_be_bytes(*seconds) };
+                    let seconds = if is_little_endian {
+                        i32::from_le_bytes(*seconds)
+                    } else {
+                        i32::from_be_bytes(*seconds)
+                    };
                     lease = Duration::from_secs(u64::try_from(seconds).unwrap_or(0));
                 }
             })?;
@@ -262,7 +299,11 @@ fn announcement(datagram: &[u8]) -> Option<(Prefix, Duration)> {
 }
 
 /// Reads a list of parameters, number and value; what comes after it.
-fn parameters(mut bytes: &[u8], is_little_endian: bool, mut each: impl FnMut(u16, &[u8])) -> Option<&[u8]> {
+fn parameters(
+    mut bytes: &[u8],
+    is_little_endian: bool,
+    mut each: impl FnMut(u16, &[u8]),
+) -> Option<&[u8]> {
     loop {
         let id = short(bytes, 0, is_little_endian)?;
         let length = usize::from(short(bytes, 2, is_little_endian)?);
@@ -285,25 +326,55 @@ mod tests {
     /// A timestamp, then an announcement with a lease, as RTPS 2.5 9.4.5 and 9.6.3 draw them.
     fn datagram(lease_s: i32, is_little_endian: bool, flags: u8) -> Vec<u8> {
         let flag = u8::from(is_little_endian);
-        let short = |value: u16| if is_little_endian { value.to_le_bytes() } else { value.to_be_bytes() };
-        let seconds = if is_little_endian { lease_s.to_le_bytes() } else { lease_s.to_be_bytes() };
+        let short = |value: u16| {
+            if is_little_endian {
+                value.to_le_bytes()
+            } else {
+                value.to_be_bytes()
+            }
+        };
+        let seconds = if is_little_endian {
+            lease_s.to_le_bytes()
+        } else {
+            lease_s.to_be_bytes()
+        };
         let header = [b"RTPS".as_slice(), &[2, 5, 1, 16], &SENDER].concat();
         let time = [&[0x09, flag], short(8).as_slice(), &[0; 8]].concat();
         let ids = [[0, 0, 0, 0], [0, 1, 0, 0xc2], [0, 0, 0, 0], [0, 0, 0, 1]].concat();
         let version = [short(0x15), short(4), [2, 5], [0, 0]].concat();
         let lease = [&short(2), &short(8), seconds.as_slice(), &[0; 4]].concat();
-        let list = [[0, 2 | flag, 0, 0].as_slice(), &version, &lease, &short(1), &short(0)].concat();
+        let list = [
+            [0, 2 | flag, 0, 0].as_slice(),
+            &version,
+            &lease,
+            &short(1),
+            &short(0),
+        ]
+        .concat();
         let body = [&[0, 0], &short(16), ids.as_slice(), &list].concat();
-        [header, time, vec![0x15, flag | flags], short(body.len() as u16).to_vec(), body].concat()
+        [
+            header,
+            time,
+            vec![0x15, flag | flags],
+            short(body.len() as u16).to_vec(),
+            body,
+        ]
+        .concat()
     }
 
     #[test]
     fn an_announcement_is_read_in_both_byte_orders() {
         for is_little_endian in [true, false] {
             let heard = datagram(10, is_little_endian, HAS_DATA);
-            assert_eq!(announcement(&heard), Some((SENDER, Duration::from_secs(10))));
+            assert_eq!(
+                announcement(&heard),
+                Some((SENDER, Duration::from_secs(10)))
+            );
         }
-        assert_eq!(announcement(&datagram(-1, true, HAS_DATA)), Some((SENDER, Duration::ZERO)));
+        assert_eq!(
+            announcement(&datagram(-1, true, HAS_DATA)),
+            Some((SENDER, Duration::ZERO))
+        );
     }
 
     #[test]
@@ -348,20 +419,30 @@ mod tests {
             keep_alive.own_port = own.local_addr().unwrap().port();
             let sender = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
             let from = sender.local_addr().unwrap();
-            Self { keep_alive, own, sender: Some(sender), from, begun: Instant::now() }
+            Self {
+                keep_alive,
+                own,
+                sender: Some(sender),
+                from,
+                begun: Instant::now(),
+            }
         }
 
         fn hear(&mut self, lease_s: i32, at_s: f64) {
             let now = self.begun + Duration::from_secs_f64(at_s);
-            self.keep_alive.hear(&datagram(lease_s, true, HAS_DATA), self.from, now);
+            self.keep_alive
+                .hear(&datagram(lease_s, true, HAS_DATA), self.from, now);
         }
 
         /// When something is handed over in a time, s.
         fn handed_over(&mut self, from_s: f64, until_s: f64) -> Vec<f64> {
-            let looks = (0..).map(|look| from_s + 0.5 * f64::from(look)).take_while(|at_s| *at_s < until_s);
+            let looks = (0..)
+                .map(|look| from_s + 0.5 * f64::from(look))
+                .take_while(|at_s| *at_s < until_s);
             let mut found = vec![];
             for at_s in looks {
-                self.keep_alive.look(self.begun + Duration::from_secs_f64(at_s));
+                self.keep_alive
+                    .look(self.begun + Duration::from_secs_f64(at_s));
                 let mut bytes = [0; 200];
                 if let Ok(length) = self.own.recv(&mut bytes) {
                     assert_eq!(announcement(&bytes[..length]).unwrap().0, SENDER);

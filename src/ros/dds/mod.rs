@@ -65,10 +65,15 @@ impl Drop for DdsConnection {
             // nobody may wait any more
             let _ = done.send(());
         };
-        let is_late = Builder::new().name("touchup-leave".to_owned()).spawn(leave).is_err()
+        let is_late = Builder::new()
+            .name("touchup-leave".to_owned())
+            .spawn(leave)
+            .is_err()
             || has_left.recv_timeout(LEAVES_WITHIN).is_err();
         if is_late {
-            tracing::warn!("the network is not left in order: others see the node until its lease is over");
+            tracing::warn!(
+                "the network is not left in order: others see the node until its lease is over"
+            );
         }
     }
 }
@@ -83,7 +88,10 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     }
     let exchange = Exchange::new(config, inbox);
     // its own parameter services know one mapping alone, and nothing of ranges
-    let options = declare(NodeOptions::new().start_parameter_services(false), &config.parameters);
+    let options = declare(
+        NodeOptions::new().start_parameter_services(false),
+        &config.parameters,
+    );
     let (context, node) = join(config, options)?;
     let mut back_end = DdsBackEnd {
         config,
@@ -102,13 +110,25 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     locked(&back_end.graph).services = back_end.names.clone();
     let announce = back_end.begun.clone();
     let announce = move |name: &str, value: &ParameterValue| {
-        if let Some(Err(reason)) = announce.get().map(|node| locked(node).set_parameter(name, native(value))) {
+        if let Some(Err(reason)) = announce
+            .get()
+            .map(|node| locked(node).set_parameter(name, native(value)))
+        {
             tracing::warn!(name, reason, "a change of a parameter is not announced");
         }
     };
-    parameter_services::serve(&mut back_end, &PublicParameters::new(&exchange, &config.parameters, announce))?;
+    parameter_services::serve(
+        &mut back_end,
+        &PublicParameters::new(&exchange, &config.parameters, announce),
+    )?;
     let probe = action::server(&mut back_end)?;
-    let DdsBackEnd { node, graph, begun, mut listeners, .. } = back_end;
+    let DdsBackEnd {
+        node,
+        graph,
+        begun,
+        mut listeners,
+        ..
+    } = back_end;
     listeners.push(probe);
     let node = Arc::new(Mutex::new(node));
     begun.get_or_init(|| node.clone());
@@ -118,14 +138,25 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     let mut threads = vec![listening];
     threads.extend(exchange.senders(urgent, mesh)?);
     threads.push(rosout::send(&node, &exchange)?);
-    let connection = DdsConnection { exchange: exchange.clone(), waker, threads, node: Some(node) };
-    Ok(Arc::new(Joined { exchange, _connection: connection }))
+    let connection = DdsConnection {
+        exchange: exchange.clone(),
+        waker,
+        threads,
+        node: Some(node),
+    };
+    Ok(Arc::new(Joined {
+        exchange,
+        _connection: connection,
+    }))
 }
 
 /// Declares the values to ros2-client, so that it announces their changes on `/parameter_events`.
 fn declare(options: NodeOptions, parameters: &Parameters) -> NodeOptions {
     PARAMETERS.iter().fold(options, |options, declared| {
-        let value = parameters.value(declared.name).cloned().unwrap_or(declared.default_value());
+        let value = parameters
+            .value(declared.name)
+            .cloned()
+            .unwrap_or(declared.default_value());
         options.declare_parameter(declared.name, native(&value))
     })
 }

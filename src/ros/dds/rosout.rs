@@ -18,7 +18,10 @@ use crate::ros::locked;
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 /// Starts the thread that sends lines of the log, in the name of the node.
-pub(super) fn send(node: &Arc<Mutex<Node>>, exchange: &Arc<Exchange>) -> Result<JoinHandle<()>, RosError> {
+pub(super) fn send(
+    node: &Arc<Mutex<Node>>,
+    exchange: &Arc<Exchange>,
+) -> Result<JoinHandle<()>, RosError> {
     let (node, lines) = (node.clone(), listen());
     // as loggers have it: `cell.touchup`
     let name = exchange.node_name.trim_start_matches('/').replace('/', ".");
@@ -28,7 +31,8 @@ pub(super) fn send(node: &Arc<Mutex<Node>>, exchange: &Arc<Exchange>) -> Result<
                 Ok(line) => {
                     let stamp = Time::from_nanos(exchange.clock.now_ns());
                     let level = level_of(line.level);
-                    locked(&node).rosout_raw(stamp, level, &name, &line.text, line.file, "", line.line);
+                    locked(&node)
+                        .rosout_raw(stamp, level, &name, &line.text, line.file, "", line.line);
                 }
                 Err(RecvTimeoutError::Timeout) if !exchange.inbox.is_over() => {}
                 Err(_) => break,

@@ -43,7 +43,10 @@ impl<'de> DeserializeSeed<'de> for Seed<'_> {
 
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<ReadMessage, D::Error> {
         // it is there by now, and no earlier
-        self.of.seed(self.clock.now_ns()).deserialize(deserializer).map(ReadMessage)
+        self.of
+            .seed(self.clock.now_ns())
+            .deserialize(deserializer)
+            .map(ReadMessage)
     }
 }
 
@@ -73,7 +76,9 @@ impl SubscribesSamples for DdsBackEnd<'_> {
         let (profile, whole) = (profile(topic), self.config.resolve(topic.name)?);
         let of = source.first_type();
         let announced = topic_of(of.name(), &self.node, &whole, &profile)?;
-        let subscription = self.node.create_subscription(&announced, Some(profile.clone()));
+        let subscription = self
+            .node
+            .create_subscription(&announced, Some(profile.clone()));
         let subscription = subscription.during("subscribing to a topic")?;
         let wire_name = announced.name();
         let mut graph = locked(&self.graph);
@@ -102,7 +107,11 @@ impl SubscribesSamples for DdsBackEnd<'_> {
 impl SampleTopic {
     /// Listens to another type from now on.
     fn listen_to(&mut self, of: LiveType) -> Result<(), RosError> {
-        let node = self.node.get().ok_or("the node begins").during("changing the type of a topic")?;
+        let node = self
+            .node
+            .get()
+            .ok_or("the node begins")
+            .during("changing the type of a topic")?;
         let mut node = locked(node);
         let announced = topic_of(of.name(), &node, &self.whole, &self.profile)?;
         let subscription = node.create_subscription(&announced, Some(self.profile.clone()));
@@ -116,15 +125,32 @@ impl SampleTopic {
 }
 
 impl Listener for SampleTopic {
-    fn sources(&mut self, each: &mut dyn FnMut(&mut dyn Source) -> io::Result<()>) -> io::Result<()> {
+    fn sources(
+        &mut self,
+        each: &mut dyn FnMut(&mut dyn Source) -> io::Result<()>,
+    ) -> io::Result<()> {
         each(&mut self.subscription)
     }
 
     fn take(&mut self) {
-        let Self { name, subscription, source, of, exchange, counter, numbers, .. } = self;
+        let Self {
+            name,
+            subscription,
+            source,
+            of,
+            exchange,
+            counter,
+            numbers,
+            ..
+        } = self;
         drain(
             (*name, exchange, ""),
-            || subscription.take_seed(Seed { of: *of, clock: &exchange.clock }),
+            || {
+                subscription.take_seed(Seed {
+                    of: *of,
+                    clock: &exchange.clock,
+                })
+            },
             |(ReadMessage(read), info)| {
                 let lost = numbers.missing(info.publisher_gid(), info.sequence_number());
                 exchange.lost[*counter].fetch_add(lost, Ordering::Relaxed);
@@ -139,11 +165,15 @@ impl Listener for SampleTopic {
             return false;
         }
         let graph = locked(&self.graph);
-        let Some((seen, published)) = graph.published_types(&self.wire_name).filter(|(seen, _)| *seen != self.seen)
+        let Some((seen, published)) = graph
+            .published_types(&self.wire_name)
+            .filter(|(seen, _)| *seen != self.seen)
         else {
             return false;
         };
-        let (of, unread) = self.source.choose(self.of, published.iter().map(String::as_str));
+        let (of, unread) = self
+            .source
+            .choose(self.of, published.iter().map(String::as_str));
         drop(graph);
         self.seen = seen;
         locked(&self.graph).set_unread(&self.whole, unread);
@@ -152,7 +182,11 @@ impl Listener for SampleTopic {
         }
         match self.listen_to(of) {
             Ok(()) => {
-                tracing::info!(topic = self.whole, type_name = of.name(), "listens to the type that is published");
+                tracing::info!(
+                    topic = self.whole,
+                    type_name = of.name(),
+                    "listens to the type that is published"
+                );
                 true
             }
             Err(error) => {

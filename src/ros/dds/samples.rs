@@ -35,14 +35,28 @@ pub fn samples(config: &NodeConfig) -> Result<Box<dyn SamplePort>, RosError> {
     let (context, mut node) = join(config, NodeOptions::new().start_parameter_services(false))?;
     let listener = context.domain_participant().status_listener();
     let [wrench, pose] = config.sample_topics();
-    let (wrench, pose) = (publisher(config, &mut node, wrench)?, publisher(config, &mut node, pose)?);
-    Ok(Box::new(DdsSamples { wrench, pose, listener, listeners: Default::default(), _node: node }))
+    let (wrench, pose) = (
+        publisher(config, &mut node, wrench)?,
+        publisher(config, &mut node, pose)?,
+    );
+    Ok(Box::new(DdsSamples {
+        wrench,
+        pose,
+        listener,
+        listeners: Default::default(),
+        _node: node,
+    }))
 }
 
-fn publisher<M: RosMessage>(config: &NodeConfig, node: &mut Node, name: &str) -> Result<Publisher<M>, RosError> {
+fn publisher<M: RosMessage>(
+    config: &NodeConfig,
+    node: &mut Node,
+    name: &str,
+) -> Result<Publisher<M>, RosError> {
     let qos = keep(BEST_EFFORT, DEPTH);
     let topic = make_topic::<M>(node, &config.resolve(name)?, &qos)?;
-    node.create_publisher(&topic, Some(qos)).during("publishing a topic")
+    node.create_publisher(&topic, Some(qos))
+        .during("publishing a topic")
 }
 
 fn send<M: RosMessage>(publisher: &Publisher<M>, message: M) -> bool {
@@ -65,7 +79,10 @@ impl SamplePort for DdsSamples {
         let writers = [self.wrench.guid(), self.pose.guid()];
         while let Some(event) = self.listener.try_recv_status() {
             match event {
-                Event::RemoteReaderMatched { local_writer, remote_reader } => {
+                Event::RemoteReaderMatched {
+                    local_writer,
+                    remote_reader,
+                } => {
                     let of = writers.iter().position(|writer| *writer == local_writer);
                     of.map(|stream| self.listeners[stream].insert(remote_reader));
                 }

@@ -41,23 +41,35 @@ where
     Q: ros2_client::Message + Clone + Send + Sync + 'static,
     A: Shrinkable + Send + Sync + 'static,
 {
-    fn sources(&mut self, each: &mut dyn FnMut(&mut dyn Source) -> io::Result<()>) -> io::Result<()> {
+    fn sources(
+        &mut self,
+        each: &mut dyn FnMut(&mut dyn Source) -> io::Result<()>,
+    ) -> io::Result<()> {
         match &mut self.server {
-            Server::Enhanced(server) => {
-                each(Arc::get_mut(server).expect("sources are asked for before any request is answered"))
-            }
+            Server::Enhanced(server) => each(
+                Arc::get_mut(server).expect("sources are asked for before any request is answered"),
+            ),
             Server::Cyclone(requests, _) => each(&mut **requests),
         }
     }
 
     fn take(&mut self) {
-        let Self { name, server, exchange, room, call } = self;
+        let Self {
+            name,
+            server,
+            exchange,
+            room,
+            call,
+        } = self;
         drain(
             (name, exchange, OTHER_MAPPING),
             || server.take(),
             |(request, send)| {
                 let (name, room) = (*name, room.clone());
-                call(request, exchange.reply(name, move |answer| send(room.fit(name, answer))));
+                call(
+                    request,
+                    exchange.reply(name, move |answer| send(room.fit(name, answer))),
+                );
             },
         );
     }
@@ -78,13 +90,20 @@ where
         let server = Server::<S::Request, S::Response>::new(self, name, S::TYPE_NAME);
         let (server, exchange, room) = (server?, self.exchange.clone(), self.room.clone());
         self.names.push(self.config.resolve(name)?);
-        self.listeners.push(Box::new(Service { name, server, exchange, room, call: Box::new(call) }));
+        self.listeners.push(Box::new(Service {
+            name,
+            server,
+            exchange,
+            room,
+            call: Box::new(call),
+        }));
         Ok(())
     }
 }
 
 /// As ROS 2 has it for services: nothing is lost, calls wait for each other.
-pub(super) const SERVICE: QosProfile = QosProfile::publisher_default().history(History::KeepLast { depth: 10 });
+pub(super) const SERVICE: QosProfile =
+    QosProfile::publisher_default().history(History::KeepLast { depth: 10 });
 
 /// A request or an answer as rmw_cyclonedds has it: whose call it is, and its number, stand before the message.
 #[derive(Clone, Serialize, Deserialize)]
@@ -111,23 +130,42 @@ where
     A: ros2_client::Message + Send + Sync + 'static,
 {
     /// - `name`: as in docs/ros.md
-    fn new(back_end: &mut DdsBackEnd<'_>, name: &str, [package, type_name]: [&str; 2]) -> Result<Self, RosError> {
-        let DdsBackEnd { config, context, node, .. } = back_end;
+    fn new(
+        back_end: &mut DdsBackEnd<'_>,
+        name: &str,
+        [package, type_name]: [&str; 2],
+    ) -> Result<Self, RosError> {
+        let DdsBackEnd {
+            config,
+            context,
+            node,
+            ..
+        } = back_end;
         let (whole, mapping) = (config.resolve(name)?, mapping(config));
         if mapping != ServiceMapping::Cyclone {
             let type_name = ServiceTypeName::new(package, type_name);
-            let server = node.create_server(mapping, &dds_name(&whole)?, &type_name, SERVICE, SERVICE);
-            return server.map(|server| Self::Enhanced(Arc::new(server))).during("offering a service");
+            let server =
+                node.create_server(mapping, &dds_name(&whole)?, &type_name, SERVICE, SERVICE);
+            return server
+                .map(|server| Self::Enhanced(Arc::new(server)))
+                .during("offering a service");
         }
         let topic = |name: String, part: &str| {
             let type_name = format!("{package}::srv::dds_::{type_name}_{part}_");
             let qos = QosPolicies::from(&SERVICE);
-            context.domain_participant().create_topic(name, type_name, &qos, TopicKind::NoKey).during("making a topic")
+            context
+                .domain_participant()
+                .create_topic(name, type_name, &qos, TopicKind::NoKey)
+                .during("making a topic")
         };
         let requests = topic(format!("rq{whole}Request"), "Request")?;
         let answers = topic(format!("rr{whole}Reply"), "Response")?;
-        let requests = node.create_subscription(&requests, Some(SERVICE)).during("offering a service")?;
-        let answers = node.create_publisher(&answers, Some(SERVICE)).during("offering a service")?;
+        let requests = node
+            .create_subscription(&requests, Some(SERVICE))
+            .during("offering a service")?;
+        let answers = node
+            .create_publisher(&answers, Some(SERVICE))
+            .during("offering a service")?;
         Ok(Self::Cyclone(Box::new(requests), Arc::new(answers)))
     }
     /// The next request that has come, and what answers it.
@@ -135,16 +173,35 @@ where
         Ok(match self {
             Self::Enhanced(server) => server.receive_request()?.map(|(id, request)| {
                 let server = server.clone();
-                let send = move |answer| server.send_response(id, answer).map_err(|error| error.to_string());
+                let send = move |answer| {
+                    server
+                        .send_response(id, answer)
+                        .map_err(|error| error.to_string())
+                };
                 (request, Box::new(send) as SendAnswer<A>)
             }),
-            Self::Cyclone(requests, answers) => requests.take()?.map(|(Headed { caller, number, message }, _)| {
-                let answers = answers.clone();
-                let send = move |message| {
-                    answers.publish(Headed { caller, number, message }).map_err(|error| error.to_string())
-                };
-                (message, Box::new(send) as SendAnswer<A>)
-            }),
+            Self::Cyclone(requests, answers) => requests.take()?.map(
+                |(
+                    Headed {
+                        caller,
+                        number,
+                        message,
+                    },
+                    _,
+                )| {
+                    let answers = answers.clone();
+                    let send = move |message| {
+                        answers
+                            .publish(Headed {
+                                caller,
+                                number,
+                                message,
+                            })
+                            .map_err(|error| error.to_string())
+                    };
+                    (message, Box::new(send) as SendAnswer<A>)
+                },
+            ),
         })
     }
 }

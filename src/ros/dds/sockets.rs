@@ -41,9 +41,13 @@ impl OpenSockets {
             let entry = entry.ok()?;
             let name = fs::read_link(entry.path()).ok()?;
             let number = entry.file_name().to_str()?.parse().ok()?;
-            name.to_str()?.starts_with("socket:").then_some((number, name))
+            name.to_str()?
+                .starts_with("socket:")
+                .then_some((number, name))
         };
-        Ok(Self(fs::read_dir("/proc/self/fd")?.filter_map(socket).collect()))
+        Ok(Self(
+            fs::read_dir("/proc/self/fd")?.filter_map(socket).collect(),
+        ))
     }
 
     /// Closes what UDP sockets that were opened since then leave open; how many there are.
@@ -58,8 +62,14 @@ impl OpenSockets {
             // that another thread has opened under this number meanwhile is no UDP socket, or is one that may be guarded as well
             let file = unsafe { BorrowedFd::borrow_raw(number) };
             let socket = SockRef::from(&file);
-            let address = socket.local_addr().ok().and_then(|address| address.as_socket());
-            if !matches!((socket.r#type(), address), (Ok(Type::DGRAM), Some(SocketAddr::V4(_)))) {
+            let address = socket
+                .local_addr()
+                .ok()
+                .and_then(|address| address.as_socket());
+            if !matches!(
+                (socket.r#type(), address),
+                (Ok(Type::DGRAM), Some(SocketAddr::V4(_)))
+            ) {
                 continue;
             }
             socket.attach_filter(&filter)?;
@@ -94,24 +104,58 @@ fn filter() -> Vec<SockFilter> {
     let is = |value, so, not| op(0x15, so, not, value);
     let is_at_least = |value, so, not| op(0x35, so, not, value);
     let is_little_endian = |so, not| op(0x45, so, not, 1);
-    let mut program = vec![length(), is_at_least(FIRST_SUBMESSAGE + 4, 1, 0), TAKEN, op(0x01, 0, 0, FIRST_SUBMESSAGE)];
+    let mut program = vec![
+        length(),
+        is_at_least(FIRST_SUBMESSAGE + 4, 1, 0),
+        TAKEN,
+        op(0x01, 0, 0, FIRST_SUBMESSAGE),
+    ];
     for _ in 0..MOST_SUBMESSAGES {
         // a whole header is left: length - 4 >= X
         program.extend([length(), op(0x14, 0, 0, 4), op(0x3d, 1, 0, 0), TAKEN]);
-        program.extend([byte(0), is(DATA_FRAG, 0, 9), byte(1), is_little_endian(0, 4)]);
+        program.extend([
+            byte(0),
+            is(DATA_FRAG, 0, 9),
+            byte(1),
+            is_little_endian(0, 4),
+        ]);
         program.extend([
             byte(DATA_SIZE + 3),
             is(0, 0, 4),
             byte(DATA_SIZE + 2),
             is_at_least(LARGEST_MESSAGE >> 16, 2, 3),
         ]);
-        program.extend([op(0x40, 0, 0, DATA_SIZE), is_at_least(LARGEST_MESSAGE, 0, 1), DROPPED]);
+        program.extend([
+            op(0x40, 0, 0, DATA_SIZE),
+            is_at_least(LARGEST_MESSAGE, 0, 1),
+            DROPPED,
+        ]);
         // its length into A, by way of the memory: the bytes in order, or the other way round
-        program.extend([byte(1), is_little_endian(0, 9), byte(3), op(0x64, 0, 0, 8), op(0x02, 0, 0, 1), byte(2)]);
-        program.extend([op(0x03, 0, 0, 0), op(0x61, 0, 0, 1), op(0x4c, 0, 0, 0), op(0x61, 0, 0, 0), op(0x05, 0, 0, 1)]);
+        program.extend([
+            byte(1),
+            is_little_endian(0, 9),
+            byte(3),
+            op(0x64, 0, 0, 8),
+            op(0x02, 0, 0, 1),
+            byte(2),
+        ]);
+        program.extend([
+            op(0x03, 0, 0, 0),
+            op(0x61, 0, 0, 1),
+            op(0x4c, 0, 0, 0),
+            op(0x61, 0, 0, 0),
+            op(0x05, 0, 0, 1),
+        ]);
         program.push(op(0x48, 0, 0, 2));
         // without a length it is the last one, but for the two that may be empty
-        program.extend([is(0, 0, 5), byte(0), is(PAD, 2, 0), is(INFO_TS, 1, 0), TAKEN, op(0x00, 0, 0, 0)]);
+        program.extend([
+            is(0, 0, 5),
+            byte(0),
+            is(PAD, 2, 0),
+            is(INFO_TS, 1, 0),
+            TAKEN,
+            op(0x00, 0, 0, 0),
+        ]);
         program.extend([op(0x04, 0, 0, 4), op(0x0c, 0, 0, 0), op(0x07, 0, 0, 0)]);
     }
     program.push(TAKEN);
@@ -128,25 +172,45 @@ mod tests {
     /// A submessage: its number, whether its numbers are little endian, what is in it.
     fn submessage(id: u8, is_little_endian: bool, body: &[u8]) -> Vec<u8> {
         let length = body.len() as u16;
-        let length = if is_little_endian { length.to_le_bytes() } else { length.to_be_bytes() };
+        let length = if is_little_endian {
+            length.to_le_bytes()
+        } else {
+            length.to_be_bytes()
+        };
         [&[id, u8::from(is_little_endian)], length.as_slice(), body].concat()
     }
 
     /// The fragment of a message of so many bytes.
     fn fragment(is_little_endian: bool, size: u32) -> Vec<u8> {
-        let size = if is_little_endian { size.to_le_bytes() } else { size.to_be_bytes() };
-        submessage(0x16, is_little_endian, &[[7; 28].as_slice(), &size, &[9; 16]].concat())
+        let size = if is_little_endian {
+            size.to_le_bytes()
+        } else {
+            size.to_be_bytes()
+        };
+        submessage(
+            0x16,
+            is_little_endian,
+            &[[7; 28].as_slice(), &size, &[9; 16]].concat(),
+        )
     }
 
     fn datagram(submessages: &[Vec<u8>]) -> Vec<u8> {
-        [b"RTPS".as_slice(), &[2, 5, 1, 16], &[3; 12], &submessages.concat()].concat()
+        [
+            b"RTPS".as_slice(),
+            &[2, 5, 1, 16],
+            &[3; 12],
+            &submessages.concat(),
+        ]
+        .concat()
     }
 
     /// Whether each passes the filter; after each comes one that does.
     fn passed(datagrams: &[Vec<u8>]) -> Vec<bool> {
         let before = OpenSockets::now().unwrap();
         let receiver = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
-        receiver.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        receiver
+            .set_read_timeout(Some(Duration::from_secs(20)))
+            .unwrap();
         assert!(before.guard_since(Range::Networks).unwrap() >= 1);
         let sender = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
         let receive = || {
@@ -156,7 +220,9 @@ mod tests {
         };
         let mut passes = |datagram: &Vec<u8>| {
             for bytes in [datagram.as_slice(), b"after it"] {
-                sender.send_to(bytes, receiver.local_addr().unwrap()).unwrap();
+                sender
+                    .send_to(bytes, receiver.local_addr().unwrap())
+                    .unwrap();
             }
             let first = receive();
             first != b"after it" && (first == *datagram && receive() == b"after it")
@@ -171,31 +237,59 @@ mod tests {
         for is_little_endian in [true, false] {
             let fragment = |size| fragment(is_little_endian, size);
             let alone = sizes.map(|size| datagram(&[fragment(size)]));
-            let behind = sizes.map(|size| datagram(&[time(!is_little_endian), time(is_little_endian), fragment(size)]));
+            let behind = sizes.map(|size| {
+                datagram(&[
+                    time(!is_little_endian),
+                    time(is_little_endian),
+                    fragment(size),
+                ])
+            });
             // an empty time, padding, and a submessage longer than a byte can say
-            let far = [submessage(0x09, true, &[]), submessage(0x01, false, &[]), submessage(0x15, true, &[0x16; 700])];
+            let far = [
+                submessage(0x09, true, &[]),
+                submessage(0x01, false, &[]),
+                submessage(0x15, true, &[0x16; 700]),
+            ];
             let far = datagram(&[far.concat(), fragment(u32::MAX)]);
             let second = datagram(&[fragment(1000), fragment(u32::MAX)]);
             let dropped = [alone.as_slice(), &behind, &[far, second]].concat();
-            assert_eq!(passed(&dropped), vec![false; dropped.len()], "little endian: {is_little_endian}");
+            assert_eq!(
+                passed(&dropped),
+                vec![false; dropped.len()],
+                "little endian: {is_little_endian}"
+            );
         }
     }
 
     #[test]
     fn all_else_passes() {
         for is_little_endian in [true, false] {
-            let fragments = [0, 1000, (1 << 20) - 1].map(|size| datagram(&[fragment(is_little_endian, size)]));
+            let fragments =
+                [0, 1000, (1 << 20) - 1].map(|size| datagram(&[fragment(is_little_endian, size)]));
             // the content of the last one looks like a fragment, as it may
-            let looks_like =
-                [submessage(0x06, is_little_endian, &[2; 24]), vec![0x15, u8::from(is_little_endian), 0, 0]];
+            let looks_like = [
+                submessage(0x06, is_little_endian, &[2; 24]),
+                vec![0x15, u8::from(is_little_endian), 0, 0],
+            ];
             let last = datagram(&[looks_like.concat(), fragment(is_little_endian, u32::MAX)]);
             let data = datagram(&[submessage(0x15, is_little_endian, &[0x16; 1000])]);
             let many = datagram(&vec![submessage(0x07, is_little_endian, &[0xff; 28]); 200]);
             let cut = datagram(&[submessage(0x15, is_little_endian, &[1; 20])])[..30].to_vec();
-            let others =
-                [last, data, many, cut, datagram(&[]), b"RTPS".to_vec(), b"no RTPS, but as long as a header".to_vec()];
+            let others = [
+                last,
+                data,
+                many,
+                cut,
+                datagram(&[]),
+                b"RTPS".to_vec(),
+                b"no RTPS, but as long as a header".to_vec(),
+            ];
             let all = [fragments.as_slice(), &others].concat();
-            assert_eq!(passed(&all), vec![true; all.len()], "little endian: {is_little_endian}");
+            assert_eq!(
+                passed(&all),
+                vec![true; all.len()],
+                "little endian: {is_little_endian}"
+            );
         }
     }
 
@@ -203,11 +297,21 @@ mod tests {
     fn of_this_computer_alone_what_comes_over_loopback_is_heard() {
         let before = OpenSockets::now().unwrap();
         let receiver = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).unwrap();
-        receiver.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        receiver
+            .set_read_timeout(Some(Duration::from_secs(20)))
+            .unwrap();
         assert!(before.guard_since(Range::Computer).unwrap() >= 1);
-        assert_eq!(SockRef::from(&receiver).device().unwrap(), Some(b"lo".to_vec()));
+        assert_eq!(
+            SockRef::from(&receiver).device().unwrap(),
+            Some(b"lo".to_vec())
+        );
         let sender = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
-        sender.send_to(b"here", (Ipv4Addr::LOCALHOST, receiver.local_addr().unwrap().port())).unwrap();
+        sender
+            .send_to(
+                b"here",
+                (Ipv4Addr::LOCALHOST, receiver.local_addr().unwrap().port()),
+            )
+            .unwrap();
         assert_eq!(receiver.recv(&mut [0; 8]).unwrap(), 4);
     }
 }

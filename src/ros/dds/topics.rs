@@ -13,14 +13,17 @@ use crate::ros::locked;
 use crate::ros::messages::RosMessage;
 use crate::ros::port::{Arrival, TILES_KEPT};
 use crate::ros::send_queue::Sent;
-use crate::ros::topics::{MESH, MESH_PATCH, PROBE_TOUCHES, Publisher, Publishes, Subscribes, Topic};
+use crate::ros::topics::{
+    MESH, MESH_PATCH, PROBE_TOUCHES, Publisher, Publishes, Subscribes, Topic,
+};
 
 pub(super) const BEST_EFFORT: QosProfile = QosProfile::subscription_default();
 /// The thread that sends what is urgent is not held up by who does not listen for longer than this.
 pub(super) const URGENT: QosProfile =
     BEST_EFFORT.reliability_reliable(WhenFull::Wait(std::time::Duration::from_millis(10)));
 /// The mesh waits for who listens slowly, then tries again.
-const PATIENT: QosProfile = BEST_EFFORT.reliability_reliable(WhenFull::Wait(std::time::Duration::from_millis(100)));
+const PATIENT: QosProfile =
+    BEST_EFFORT.reliability_reliable(WhenFull::Wait(std::time::Duration::from_millis(100)));
 
 pub(super) const fn keep(profile: QosProfile, depth: usize) -> QosProfile {
     profile.history(History::KeepLast { depth })
@@ -35,14 +38,21 @@ pub(super) fn profile(topic: Topic) -> QosProfile {
         true if [MESH, MESH_PATCH, PROBE_TOUCHES].contains(&topic) => PATIENT,
         true => URGENT,
     };
-    let profile = if topic.is_latched { profile.durability(Durability::TransientLocal) } else { profile };
+    let profile = if topic.is_latched {
+        profile.durability(Durability::TransientLocal)
+    } else {
+        profile
+    };
     keep(profile, limit(topic).unwrap_or(topic.depth))
 }
 
 /// Of large messages no more are on their way than this: RustDDS keeps each until everybody has it, and who listens slowly or is
 /// silent would see what was long ago, or lose some of many at once.
 fn limit(topic: Topic) -> Option<usize> {
-    [(MESH, TILES_KEPT), (PROBE_TOUCHES, TOUCHES_SENT)].into_iter().find(|(one, _)| *one == topic).map(|(_, most)| most)
+    [(MESH, TILES_KEPT), (PROBE_TOUCHES, TOUCHES_SENT)]
+        .into_iter()
+        .find(|(one, _)| *one == topic)
+        .map(|(_, most)| most)
 }
 
 impl<M: RosMessage> Publishes<M> for DdsBackEnd<'_> {
@@ -52,7 +62,10 @@ impl<M: RosMessage> Publishes<M> for DdsBackEnd<'_> {
         if let Some(most) = limit(topic) {
             announced = limited(&announced, most)?;
         }
-        let publisher = self.node.create_publisher::<M>(&announced, Some(profile)).during("publishing a topic")?;
+        let publisher = self
+            .node
+            .create_publisher::<M>(&announced, Some(profile))
+            .during("publishing a topic")?;
         let mut graph = locked(&self.graph);
         graph.add(publisher.guid(), &announced, whole);
         if topic == MESH {
@@ -71,14 +84,25 @@ impl<M: RosMessage> Publishes<M> for DdsBackEnd<'_> {
 }
 
 impl<M: RosMessage> Subscribes<M> for DdsBackEnd<'_> {
-    fn subscribe(&mut self, topic: Topic, arrival: fn(&Exchange, M) -> Arrival) -> Result<(), RosError> {
+    fn subscribe(
+        &mut self,
+        topic: Topic,
+        arrival: fn(&Exchange, M) -> Arrival,
+    ) -> Result<(), RosError> {
         let (profile, whole) = (profile(topic), self.config.resolve(topic.name)?);
         let announced = make_topic::<M>(&self.node, &whole, &profile)?;
-        let subscription = self.node.create_subscription::<M>(&announced, Some(profile));
+        let subscription = self
+            .node
+            .create_subscription::<M>(&announced, Some(profile));
         let subscription = subscription.during("subscribing to a topic")?;
         locked(&self.graph).add(subscription.guid(), &announced, whole);
         let (name, exchange) = (topic.name, self.exchange.clone());
-        self.listeners.push(Box::new(HeardTopic { name, subscription, exchange, arrival }));
+        self.listeners.push(Box::new(HeardTopic {
+            name,
+            subscription,
+            exchange,
+            arrival,
+        }));
         Ok(())
     }
 }
@@ -86,10 +110,24 @@ impl<M: RosMessage> Subscribes<M> for DdsBackEnd<'_> {
 /// The same topic with a limit, which a profile of ROS does not have.
 fn limited(topic: &rustdds::Topic, most: usize) -> Result<rustdds::Topic, RosError> {
     let most = most as i32;
-    let limits = ResourceLimits { max_samples: most, max_instances: 1, max_samples_per_instance: most };
-    let qos = topic.qos().modify_by(&QosPolicyBuilder::new().resource_limits(limits).build());
-    let participant = topic.participant().ok_or("the participant is gone").during("making a topic")?;
-    let limited = participant.create_topic(topic.name(), topic.get_type().name().to_owned(), &qos, TopicKind::NoKey);
+    let limits = ResourceLimits {
+        max_samples: most,
+        max_instances: 1,
+        max_samples_per_instance: most,
+    };
+    let qos = topic
+        .qos()
+        .modify_by(&QosPolicyBuilder::new().resource_limits(limits).build());
+    let participant = topic
+        .participant()
+        .ok_or("the participant is gone")
+        .during("making a topic")?;
+    let limited = participant.create_topic(
+        topic.name(),
+        topic.get_type().name().to_owned(),
+        &qos,
+        TopicKind::NoKey,
+    );
     limited.during("making a topic")
 }
 
@@ -110,8 +148,16 @@ pub(super) fn topic_of(
     qos: &QosProfile,
 ) -> Result<rustdds::Topic, RosError> {
     let mut parts = type_name.split('/');
-    let (package, type_name) = (parts.next().unwrap_or_default(), parts.next_back().unwrap_or_default());
-    node.create_topic(&dds_name(whole)?, MessageTypeName::new(package, type_name), qos).during("making a topic")
+    let (package, type_name) = (
+        parts.next().unwrap_or_default(),
+        parts.next_back().unwrap_or_default(),
+    );
+    node.create_topic(
+        &dds_name(whole)?,
+        MessageTypeName::new(package, type_name),
+        qos,
+    )
+    .during("making a topic")
 }
 
 /// The name as ros2-client has it.

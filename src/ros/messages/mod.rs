@@ -9,7 +9,9 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 /// A message with a name of its own.
-pub trait RosMessage: Clone + PartialEq + std::fmt::Debug + Serialize + DeserializeOwned + Send + 'static {
+pub trait RosMessage:
+    Clone + PartialEq + std::fmt::Debug + Serialize + DeserializeOwned + Send + 'static
+{
     /// as `ros2 interface show` takes it: package, kind, name
     const TYPE_NAME: &'static str;
 }

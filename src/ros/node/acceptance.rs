@@ -58,21 +58,42 @@ impl Acceptance {
     /// To be called from time to time while both streams come.
     ///
     /// - `accepted`, `refused`: since the session began.
-    pub fn judge(&mut self, now: Instant, accepted: u64, refused: BTreeMap<String, u64>) -> Verdict {
+    pub fn judge(
+        &mut self,
+        now: Instant,
+        accepted: u64,
+        refused: BTreeMap<String, u64>,
+    ) -> Verdict {
         let since = |at: Instant| now.saturating_duration_since(at);
-        if self.counted.front().is_some_and(|first| first.accepted > accepted) {
+        if self
+            .counted
+            .front()
+            .is_some_and(|first| first.accepted > accepted)
+        {
             // another session
             self.restart();
         }
-        while self.counted.get(1).is_some_and(|second| since(second.at) >= WINDOW) {
+        while self
+            .counted
+            .get(1)
+            .is_some_and(|second| since(second.at) >= WINDOW)
+        {
             self.counted.pop_front();
         }
         let verdict = match self.counted.front() {
             None => Verdict::Begins,
             Some(first) => first.verdict(since(first.at), accepted, &refused),
         };
-        if self.counted.back().is_none_or(|last| since(last.at) >= KEPT_EVERY) {
-            self.counted.push_back(Counted { at: now, accepted, refused });
+        if self
+            .counted
+            .back()
+            .is_none_or(|last| since(last.at) >= KEPT_EVERY)
+        {
+            self.counted.push_back(Counted {
+                at: now,
+                accepted,
+                refused,
+            });
         }
         verdict
     }
@@ -82,17 +103,27 @@ impl Counted {
     fn verdict(&self, over: Duration, accepted: u64, refused: &BTreeMap<String, u64>) -> Verdict {
         let accepted = accepted - self.accepted;
         let lately = |(reason, count): (&String, &u64)| {
-            (reason.clone(), count.saturating_sub(self.refused.get(reason).copied().unwrap_or(0)))
+            (
+                reason.clone(),
+                count.saturating_sub(self.refused.get(reason).copied().unwrap_or(0)),
+            )
         };
-        let refused: BTreeMap<String, u64> =
-            refused.iter().filter(|(reason, _)| !OF_OTHERS.contains(&reason.as_str())).map(lately).collect();
+        let refused: BTreeMap<String, u64> = refused
+            .iter()
+            .filter(|(reason, _)| !OF_OTHERS.contains(&reason.as_str()))
+            .map(lately)
+            .collect();
         let total: u64 = refused.values().sum();
         // what is wrong with the messages comes before what it has wrenches miss
         let is_cause = |(reason, count): &(&String, &u64)| {
             !is_of_pairing(reason) && total <= count.saturating_mul(FEWEST_OF_A_CAUSE)
         };
         let most = |(_, count): &(&String, &u64)| **count;
-        let main = refused.iter().filter(is_cause).max_by_key(most).or_else(|| refused.iter().max_by_key(most));
+        let main = refused
+            .iter()
+            .filter(is_cause)
+            .max_by_key(most)
+            .or_else(|| refused.iter().max_by_key(most));
         let main = main.map(|(reason, count)| (reason.clone(), *count));
         match main {
             _ if over < SETTLES => {
@@ -102,7 +133,11 @@ impl Counted {
                     Verdict::Begins
                 }
             }
-            Some((reason, count)) if total > accepted => Verdict::Refuses { reason, count, of: total + accepted },
+            Some((reason, count)) if total > accepted => Verdict::Refuses {
+                reason,
+                count,
+                of: total + accepted,
+            },
             _ if accepted == 0 => Verdict::PairsNone,
             _ => Verdict::Accepts,
         }
@@ -111,7 +146,10 @@ impl Counted {
 
 /// Whether a wrench found no poses around it.
 pub fn is_of_pairing(reason: &str) -> bool {
-    matches!(reason, "gap" | "no_pose_before" | "no_pose_after" | "overflow")
+    matches!(
+        reason,
+        "gap" | "no_pose_before" | "no_pose_after" | "overflow"
+    )
 }
 
 /// What a reason of refusal means, and what to do about it.
@@ -125,12 +163,16 @@ pub fn meaning(reason: &str) -> &'static str {
         }
         "quaternion" => "orientations are no rotations: normalise the quaternion at its source",
         "stamp" => "stamps are no time between 1970 and 2038: look at the clock of the source",
-        "duplicate" => "one stamp comes again and again: does the source fill header.stamp, and is it the only one?",
+        "duplicate" => {
+            "one stamp comes again and again: does the source fill header.stamp, and is it the only one?"
+        }
         "late" => "stamps are older than those before: is more than one source on the topic?",
         "not_finite" => "numbers are NaN or infinite: look at the source",
         "absurd" => "numbers are too large for a stylus: are they in m, N and N m?",
         "jump" => "stamps leap about: look at the clock of the source",
-        "gap" => "the two poses around a wrench are too far apart: send poses more often, or raise sync.largest_gap_ms",
+        "gap" => {
+            "the two poses around a wrench are too far apart: send poses more often, or raise sync.largest_gap_ms"
+        }
         "no_pose_before" | "no_pose_after" | "overflow" => "no pose is stamped like the wrenches",
         "axes_changed" => "wrenches come in other axes than before: call ~/reset",
         "unreadable" => "messages cannot be read: is the type of the topic right?",
@@ -168,23 +210,40 @@ mod tests {
             4..8 => refuse(refused, "gap"),
             _ => refuse(refused, "late"),
         });
-        let Verdict::Refuses { reason, count, of } = verdict else { panic!("{verdict:?}") };
+        let Verdict::Refuses { reason, count, of } = verdict else {
+            panic!("{verdict:?}")
+        };
         // the window is 2 s and up to 250 ms more
         assert_eq!((reason.as_str(), count * 10), ("late", of * 2));
         assert!((2000..=2250).contains(&of), "{of}");
-        let fewer =
-            after(5000, |at, accepted, refused| if at % 10 < 6 { *accepted += 1 } else { refuse(refused, "gap") });
+        let fewer = after(5000, |at, accepted, refused| {
+            if at % 10 < 6 {
+                *accepted += 1
+            } else {
+                refuse(refused, "gap")
+            }
+        });
         assert_eq!(fewer, Verdict::Accepts);
     }
 
     #[test]
     fn what_was_long_ago_does_not_count() {
-        let mended =
-            |at, accepted: &mut u64, refused: &mut _| if at < 1000 { refuse(refused, "gap") } else { *accepted += 1 };
+        let mended = |at, accepted: &mut u64, refused: &mut _| {
+            if at < 1000 {
+                refuse(refused, "gap")
+            } else {
+                *accepted += 1
+            }
+        };
         assert!(matches!(after(1500, mended), Verdict::Refuses { .. }));
         assert_eq!(after(3500, mended), Verdict::Accepts);
-        let broken =
-            |at, accepted: &mut u64, refused: &mut _| if at < 9000 { *accepted += 1 } else { refuse(refused, "gap") };
+        let broken = |at, accepted: &mut u64, refused: &mut _| {
+            if at < 9000 {
+                *accepted += 1
+            } else {
+                refuse(refused, "gap")
+            }
+        };
         assert!(matches!(after(11_000, broken), Verdict::Refuses { .. }));
         let none = |at, accepted: &mut u64, _: &mut _| *accepted += u64::from(at < 9000);
         assert_eq!(after(12_000, none), Verdict::PairsNone);
@@ -192,8 +251,14 @@ mod tests {
 
     #[test]
     fn a_begin_is_no_fault_and_refusals_of_other_messages_mean_nothing() {
-        assert_eq!(after(900, |_, _, refused| refuse(refused, "no_pose_before")), Verdict::Begins);
-        assert!(matches!(after(1000, |_, _, refused| refuse(refused, "no_pose_before")), Verdict::Refuses { .. }));
+        assert_eq!(
+            after(900, |_, _, refused| refuse(refused, "no_pose_before")),
+            Verdict::Begins
+        );
+        assert!(matches!(
+            after(1000, |_, _, refused| refuse(refused, "no_pose_before")),
+            Verdict::Refuses { .. }
+        ));
         let others = |at, accepted: &mut u64, refused: &mut _| {
             *accepted += u64::from(at % 10 == 0);
             refuse(refused, "bad_transform");

@@ -19,8 +19,9 @@ use crate::features::Kind;
 use crate::io::session_folder::SessionFolder;
 use crate::probing::execute::Flag;
 use crate::ros::messages::{
-    DetectFeaturesResponse, FlagFeatureRequest, FlagFeatureResponse, PointStamped, ProbeResult, ResyncMeshResponse,
-    SaveMeshRequest, SaveMeshResponse, UndoRequest, UndoResponse, UnflagFeatureResponse,
+    DetectFeaturesResponse, FlagFeatureRequest, FlagFeatureResponse, PointStamped, ProbeResult,
+    ResyncMeshResponse, SaveMeshRequest, SaveMeshResponse, UndoRequest, UndoResponse,
+    UnflagFeatureResponse,
 };
 use crate::ros::parameters::ParameterValue;
 use crate::ros::port::{Call, Endpoint, Reply};
@@ -46,9 +47,15 @@ impl RefinementWorker {
         match call {
             Call::Flag(request, reply) => match self.flag_of(&request) {
                 Ok(flag) => self.ask_features(FeatureInput::Flag(flag, Some(reply))),
-                Err(message) => reply.send(FlagFeatureResponse { success: false, message, id: 0 }),
+                Err(message) => reply.send(FlagFeatureResponse {
+                    success: false,
+                    message,
+                    id: 0,
+                }),
             },
-            Call::Unflag(request, reply) => self.ask_features(FeatureInput::Unflag(request.id, reply)),
+            Call::Unflag(request, reply) => {
+                self.ask_features(FeatureInput::Unflag(request.id, reply))
+            }
             Call::Detect(request, reply) => self.ask_features(FeatureInput::Detect(request, reply)),
             Call::Save(request, reply) => self.save(&request, reply),
             Call::Resync(_, reply) => self.resync(reply),
@@ -56,7 +63,9 @@ impl RefinementWorker {
             Call::Redo(request, reply) => reply.send(self.change_strokes(&request, false)),
             Call::TakeOut(request, reply) => self.take_out_touch(&request, reply),
             Call::Reset(reply) => {
-                let begun = self.begin_again().map(|name| format!("begun again: session {name}"));
+                let begun = self
+                    .begin_again()
+                    .map(|name| format!("begun again: session {name}"));
                 reply.send(trigger(begun.map_err(|error| error.to_string())));
             }
             Call::Arm(order) => {
@@ -74,14 +83,26 @@ impl RefinementWorker {
     }
 
     fn ask_features(&self, input: FeatureInput) {
-        let Err(TrySendError::Full(input) | TrySendError::Disconnected(input)) = self.features.try_send(input) else {
+        let Err(TrySendError::Full(input) | TrySendError::Disconnected(input)) =
+            self.features.try_send(input)
+        else {
             return;
         };
-        let message = "the thread of the features is behind: nothing was done; call again".to_owned();
+        let message =
+            "the thread of the features is behind: nothing was done; call again".to_owned();
         match input {
-            FeatureInput::Flag(_, Some(reply)) => reply.send(FlagFeatureResponse { message, ..Default::default() }),
-            FeatureInput::Unflag(_, reply) => reply.send(UnflagFeatureResponse { message, ..Default::default() }),
-            FeatureInput::Detect(_, reply) => reply.send(DetectFeaturesResponse { message, ..Default::default() }),
+            FeatureInput::Flag(_, Some(reply)) => reply.send(FlagFeatureResponse {
+                message,
+                ..Default::default()
+            }),
+            FeatureInput::Unflag(_, reply) => reply.send(UnflagFeatureResponse {
+                message,
+                ..Default::default()
+            }),
+            FeatureInput::Detect(_, reply) => reply.send(DetectFeaturesResponse {
+                message,
+                ..Default::default()
+            }),
             _ => warn!("{message}"),
         }
     }
@@ -89,14 +110,23 @@ impl RefinementWorker {
     fn flag_of(&self, request: &FlagFeatureRequest) -> Result<Flag, String> {
         let radius = self.search_radius(request.search_radius)?;
         let place = self.point_in_object(&request.point)?;
-        Ok(Flag { id: 0, kind: kind_of(request.kind)?, place, radius })
+        Ok(Flag {
+            id: 0,
+            kind: kind_of(request.kind)?,
+            place,
+            radius,
+        })
     }
 
     /// How far around a place is looked, m.
     ///
     /// - `given`: of a request; 0: the parameter.
     pub(super) fn search_radius(&self, given: f64) -> Result<f64, String> {
-        let radius = if given == 0.0 { self.flag_radius() } else { given };
+        let radius = if given == 0.0 {
+            self.flag_radius()
+        } else {
+            given
+        };
         let is_usable = radius > 0.0 && radius <= LARGEST_RADIUS;
         is_usable.then_some(radius).ok_or_else(|| {
             format!("search_radius is {radius} m: it may be up to {LARGEST_RADIUS} m, or 0 for flag_radius_mm")
@@ -108,14 +138,23 @@ impl RefinementWorker {
     }
 
     pub(super) fn point_in_object(&self, clicked: &PointStamped) -> Result<Point3<f64>, String> {
-        let stamp_ns = match stamp_ns(&clicked.header.stamp).ok_or("the stamp of the point is no time")? {
-            0 => self.session.last_ns.unwrap_or_else(|| self.port.now_ns()),
-            stamp_ns => stamp_ns,
-        };
-        let frame = self.resolver.object_from(&clicked.header.frame_id, stamp_ns).map_err(|why| why.to_string())?;
+        let stamp_ns =
+            match stamp_ns(&clicked.header.stamp).ok_or("the stamp of the point is no time")? {
+                0 => self.session.last_ns.unwrap_or_else(|| self.port.now_ns()),
+                stamp_ns => stamp_ns,
+            };
+        let frame = self
+            .resolver
+            .object_from(&clicked.header.frame_id, stamp_ns)
+            .map_err(|why| why.to_string())?;
         let point = frame * point_of(&clicked.point);
-        let is_sound = point.coords.iter().all(|x| x.abs() <= crate::stylus::LARGEST_POSITION);
-        is_sound.then_some(point).ok_or_else(|| "the point is not finite, or absurdly far".to_owned())
+        let is_sound = point
+            .coords
+            .iter()
+            .all(|x| x.abs() <= crate::stylus::LARGEST_POSITION);
+        is_sound
+            .then_some(point)
+            .ok_or_else(|| "the point is not finite, or absurdly far".to_owned())
     }
 
     /// RViz's Publish Point.
@@ -124,7 +163,15 @@ impl RefinementWorker {
         let kind = Kind::of_name(parameters.string("flag_kind"));
         match self.point_in_object(clicked) {
             Ok(place) => {
-                self.ask_features(FeatureInput::Flag(Flag { id: 0, kind, place, radius: self.flag_radius() }, None));
+                self.ask_features(FeatureInput::Flag(
+                    Flag {
+                        id: 0,
+                        kind,
+                        place,
+                        radius: self.flag_radius(),
+                    },
+                    None,
+                ));
             }
             Err(why) => {
                 warn!(why, "a clicked point was not taken");
@@ -135,7 +182,11 @@ impl RefinementWorker {
 
     fn resync(&mut self, reply: Reply<ResyncMeshResponse>) {
         let sent = self.view.try_send(ViewInput::Resync).is_ok();
-        let message = if sent { "it comes on mesh_patch" } else { "the view is behind: ask again" };
+        let message = if sent {
+            "it comes on mesh_patch"
+        } else {
+            "the view is behind: ask again"
+        };
         reply.send(ResyncMeshResponse {
             success: sent,
             message: message.to_owned(),
@@ -146,13 +197,20 @@ impl RefinementWorker {
 
     fn change_strokes(&mut self, request: &UndoRequest, is_undo: bool) -> UndoResponse {
         if self.is_taking_out() {
-            return UndoResponse { message: BUSY.to_owned(), ..Default::default() };
+            return UndoResponse {
+                message: BUSY.to_owned(),
+                ..Default::default()
+            };
         }
         let wanted = request.strokes.clamp(1, MOST_STROKES);
         let (mut strokes, mut why) = (0, None);
         while strokes < wanted {
             let engine = &mut self.session.engine;
-            let changed = if is_undo { engine.undo() } else { engine.redo() };
+            let changed = if is_undo {
+                engine.undo()
+            } else {
+                engine.redo()
+            };
             match changed {
                 Ok(true) => strokes += 1,
                 Ok(false) => break,
@@ -162,18 +220,33 @@ impl RefinementWorker {
                 }
             }
             let after_ns = self.session.last_ns.unwrap_or(i64::MIN);
-            let exchange = Exchange { after_ns, stroke_ns: self.session.engine.changed_stroke_ns() };
-            self.note_stroke(if is_undo { StrokeChange::Undo(exchange) } else { StrokeChange::Redo(exchange) });
+            let exchange = Exchange {
+                after_ns,
+                stroke_ns: self.session.engine.changed_stroke_ns(),
+            };
+            self.note_stroke(if is_undo {
+                StrokeChange::Undo(exchange)
+            } else {
+                StrokeChange::Redo(exchange)
+            });
         }
         self.session.version += u64::from(strokes > 0);
         let verb = if is_undo { "took back" } else { "did again" };
         let message = match (strokes, why) {
             (_, Some(why)) => why,
-            (0, None) => format!("there is no stroke to be {}", if is_undo { "taken back" } else { "done again" }),
+            (0, None) => format!(
+                "there is no stroke to be {}",
+                if is_undo { "taken back" } else { "done again" }
+            ),
             (1, None) => format!("{verb} 1 stroke"),
             (count, None) => format!("{verb} {count} strokes"),
         };
-        UndoResponse { success: strokes > 0, message, strokes, mesh_version: self.session.version }
+        UndoResponse {
+            success: strokes > 0,
+            message,
+            strokes,
+            mesh_version: self.session.version,
+        }
     }
 
     /// Ends the session beside the next one.
@@ -210,7 +283,10 @@ impl RefinementWorker {
     }
 
     fn save(&mut self, request: &SaveMeshRequest, reply: Reply<SaveMeshResponse>) {
-        let refused = |message| SaveMeshResponse { message, ..Default::default() };
+        let refused = |message| SaveMeshResponse {
+            message,
+            ..Default::default()
+        };
         match self.saving(request) {
             Ok(saved) => {
                 let work = move || reply.send(saved().unwrap_or_else(refused));
@@ -228,15 +304,25 @@ impl RefinementWorker {
         request: &SaveMeshRequest,
     ) -> Result<impl FnOnce() -> Result<SaveMeshResponse, String> + Send + use<>, String> {
         if self.side_work.count() >= MOST_SAVING {
-            return Err(format!("{MOST_SAVING} meshes are being saved: save again when they are done"));
+            return Err(format!(
+                "{MOST_SAVING} meshes are being saved: save again when they are done"
+            ));
         }
         let files = files_of(&self.session.folder, request)?;
-        let patcher = self.session.engine.copy_patcher().map_err(|error| error.to_string())?;
+        let patcher = self
+            .session
+            .engine
+            .copy_patcher()
+            .map_err(|error| error.to_string())?;
         self.send_edits();
         let snapshot = self.setup.shared.mesh.complete();
         // while the mesh moves on none of its versions is what is written
         let (engine, setup) = (&self.session.engine, Arc::clone(&self.setup));
-        let mesh_version = if engine.is_settled() { self.session.version } else { 0 };
+        let mesh_version = if engine.is_settled() {
+            self.session.version
+        } else {
+            0
+        };
         Ok(move || {
             let late = |_| "mesh and touches were not complete in time: save again".to_owned();
             let patcher = patcher.map(|patcher| setup.clock.recv_timeout(&patcher, COPY_WAIT));
@@ -244,7 +330,13 @@ impl RefinementWorker {
             let refined = match patcher {
                 // all of it comes from scan and patch
                 Some(_) => None,
-                None => Some(setup.clock.recv_timeout(&snapshot, COPY_WAIT).map_err(late)?.mesh()),
+                None => Some(
+                    setup
+                        .clock
+                        .recv_timeout(&snapshot, COPY_WAIT)
+                        .map_err(late)?
+                        .mesh(),
+                ),
             };
             let refined = refined.transpose().map_err(|why| why.to_string())?;
             let outcome = files.write(&setup, refined.as_ref().unwrap_or(&setup.scan.0), patcher);
@@ -261,9 +353,15 @@ impl RefinementWorker {
         })
     }
 
-    pub(super) fn set_parameter(&mut self, name: &str, value: &ParameterValue) -> Result<(), String> {
+    pub(super) fn set_parameter(
+        &mut self,
+        name: &str,
+        value: &ParameterValue,
+    ) -> Result<(), String> {
         let mut parameters = (*self.setup.shared.parameters()).clone();
-        parameters.set_live(name, value).map_err(|why| why.to_string())?;
+        parameters
+            .set_live(name, value)
+            .map_err(|why| why.to_string())?;
         self.mismatch_rate_hz = parameters.double("mismatch_rate_hz");
         self.setup.shared.set_parameters(parameters);
         self.setup.shared.offer(&self.view, ViewInput::Parameters);
@@ -272,7 +370,10 @@ impl RefinementWorker {
 
     pub(super) fn note_endpoint(&mut self, endpoint: Endpoint) {
         if let Some(why) = &endpoint.mismatch {
-            warn!(topic = endpoint.topic, why, "somebody on this topic cannot be heard");
+            warn!(
+                topic = endpoint.topic,
+                why, "somebody on this topic cannot be heard"
+            );
         }
         self.endpoints.insert(endpoint.topic.clone(), endpoint);
     }
@@ -280,11 +381,31 @@ impl RefinementWorker {
 
 /// The files of one call of `~/save_mesh`.
 fn files_of(folder: &SessionFolder, request: &SaveMeshRequest) -> Result<ResultFiles, String> {
-    let name = if request.name.is_empty() { DEFAULT_NAME } else { &request.name };
-    let place = |name: &str| folder.place(name, request.overwrite).map_err(|why| why.to_string());
+    let name = if request.name.is_empty() {
+        DEFAULT_NAME
+    } else {
+        &request.name
+    };
+    let place = |name: &str| {
+        folder
+            .place(name, request.overwrite)
+            .map_err(|why| why.to_string())
+    };
     let mesh = place(name)?;
     crate::io::mesh_file::check_target(&mesh).map_err(|why| why.to_string())?;
-    let stem = mesh.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-    let beside = |ending: &str| request.with_features.then(|| place(&format!("{stem}.{ending}"))).transpose();
-    Ok(ResultFiles { features: beside("features.json")?, touches: beside("touches.csv")?, mesh })
+    let stem = mesh
+        .file_stem()
+        .map(|stem| stem.to_string_lossy().into_owned())
+        .unwrap_or_default();
+    let beside = |ending: &str| {
+        request
+            .with_features
+            .then(|| place(&format!("{stem}.{ending}")))
+            .transpose()
+    };
+    Ok(ResultFiles {
+        features: beside("features.json")?,
+        touches: beside("touches.csv")?,
+        mesh,
+    })
 }

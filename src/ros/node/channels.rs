@@ -13,8 +13,8 @@ use crate::live::TouchDelta;
 use crate::probing::execute::Flag;
 use crate::probing::plan::NextTouch;
 use crate::ros::messages::{
-    DetectFeaturesRequest, DetectFeaturesResponse, DiagnosticArray, FeatureArray, FlagFeatureResponse, HapticMismatch,
-    UnflagFeatureResponse,
+    DetectFeaturesRequest, DetectFeaturesResponse, DiagnosticArray, FeatureArray,
+    FlagFeatureResponse, HapticMismatch, UnflagFeatureResponse,
 };
 use crate::ros::port::Reply;
 

@@ -4,8 +4,8 @@ use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vect
 
 use crate::ros::clock::{self, time};
 use crate::ros::messages::{
-    Header, Point, Pose, PoseStamped, Quaternion as QuaternionMsg, Time, TransformStamped, TriggerResponse,
-    Vector3 as Vector3Msg, Wrench as WrenchMsg, WrenchStamped,
+    Header, Point, Pose, PoseStamped, Quaternion as QuaternionMsg, Time, TransformStamped,
+    TriggerResponse, Vector3 as Vector3Msg, Wrench as WrenchMsg, WrenchStamped,
 };
 use crate::stylus::{FrameTransform, StampedPose, StampedWrench, Wrench, measured_rotation};
 
@@ -16,33 +16,63 @@ pub fn stamp_ns(time: &Time) -> Option<i64> {
 
 /// Header of what is published in `frame`.
 pub fn header(stamp_ns: i64, frame: &str) -> Header {
-    Header { stamp: time(stamp_ns), frame_id: frame.to_owned() }
+    Header {
+        stamp: time(stamp_ns),
+        frame_id: frame.to_owned(),
+    }
 }
 
 /// A pose as it was measured; `None` when its orientation is no rotation. The position may be anything.
 pub fn isometry(pose: &Pose) -> Option<Isometry3<f64>> {
     let (p, q) = (&pose.position, &pose.orientation);
     let rotation = measured_rotation(Quaternion::new(q.w, q.x, q.y, q.z))?;
-    Some(Isometry3::from_parts(Translation3::new(p.x, p.y, p.z), rotation))
+    Some(Isometry3::from_parts(
+        Translation3::new(p.x, p.y, p.z),
+        rotation,
+    ))
 }
 
 /// A link of a tree of frames; `None` where its stamp is no time, or its orientation no rotation.
 pub fn frame_transform(stamped: &TransformStamped) -> Option<FrameTransform> {
-    let TransformStamped { header, child_frame_id, transform } = stamped;
+    let TransformStamped {
+        header,
+        child_frame_id,
+        transform,
+    } = stamped;
     let Vector3Msg { x, y, z } = transform.translation;
-    let pose = isometry(&Pose { position: Point { x, y, z }, orientation: transform.rotation })?;
-    let (stamp_ns, parent, child) = (stamp_ns(&header.stamp)?, header.frame_id.clone(), child_frame_id.clone());
-    Some(FrameTransform { stamp_ns, parent, child, pose })
+    let pose = isometry(&Pose {
+        position: Point { x, y, z },
+        orientation: transform.rotation,
+    })?;
+    let (stamp_ns, parent, child) = (
+        stamp_ns(&header.stamp)?,
+        header.frame_id.clone(),
+        child_frame_id.clone(),
+    );
+    Some(FrameTransform {
+        stamp_ns,
+        parent,
+        child,
+        pose,
+    })
 }
 
 /// As a message has it.
 pub fn point(p: &Point3<f64>) -> Point {
-    Point { x: p.x, y: p.y, z: p.z }
+    Point {
+        x: p.x,
+        y: p.y,
+        z: p.z,
+    }
 }
 
 /// As a message has it.
 pub fn vector(v: &Vector3<f64>) -> Vector3Msg {
-    Vector3Msg { x: v.x, y: v.y, z: v.z }
+    Vector3Msg {
+        x: v.x,
+        y: v.y,
+        z: v.z,
+    }
 }
 
 /// Of a message.
@@ -57,26 +87,53 @@ pub fn vector_of(v: &Vector3Msg) -> Vector3<f64> {
 
 /// As a message has it.
 pub fn pose(position: &Point3<f64>, q: &UnitQuaternion<f64>) -> Pose {
-    Pose { position: point(position), orientation: QuaternionMsg { x: q.i, y: q.j, z: q.k, w: q.w } }
+    Pose {
+        position: point(position),
+        orientation: QuaternionMsg {
+            x: q.i,
+            y: q.j,
+            z: q.k,
+            w: q.w,
+        },
+    }
 }
 
 /// A pose of a recording as a message in `frame`.
 pub fn as_pose(stamped: &StampedPose, frame: &str) -> PoseStamped {
-    let Isometry3 { rotation, translation } = &stamped.pose_ot;
-    PoseStamped { header: header(stamped.stamp_ns, frame), pose: pose(&translation.vector.into(), rotation) }
+    let Isometry3 {
+        rotation,
+        translation,
+    } = &stamped.pose_ot;
+    PoseStamped {
+        header: header(stamped.stamp_ns, frame),
+        pose: pose(&translation.vector.into(), rotation),
+    }
 }
 
 /// A wrench of a recording as a message in the axes of `frame`.
 pub fn as_wrench(wrench: &StampedWrench, frame: &str) -> WrenchStamped {
     let Wrench { force, torque } = &wrench.wrench;
-    let wrench_msg = WrenchMsg { force: vector(force), torque: vector(torque) };
-    WrenchStamped { header: header(wrench.stamp_ns, frame), wrench: wrench_msg }
+    let wrench_msg = WrenchMsg {
+        force: vector(force),
+        torque: vector(torque),
+    };
+    WrenchStamped {
+        header: header(wrench.stamp_ns, frame),
+        wrench: wrench_msg,
+    }
 }
 
 /// Whether it is done, and how or why not.
 pub fn trigger(done: Result<String, String>) -> TriggerResponse {
-    TriggerResponse { success: done.is_ok(), message: done.unwrap_or_else(|why| why) }
+    TriggerResponse {
+        success: done.is_ok(),
+        message: done.unwrap_or_else(|why| why),
+    }
 }
 
 /// What has no meaning.
-pub const NO_VECTOR: Vector3Msg = Vector3Msg { x: f64::NAN, y: f64::NAN, z: f64::NAN };
+pub const NO_VECTOR: Vector3Msg = Vector3Msg {
+    x: f64::NAN,
+    y: f64::NAN,
+    z: f64::NAN,
+};

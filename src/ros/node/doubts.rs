@@ -14,7 +14,11 @@ use crate::ros::locked;
 /// The input is looked at so often.
 const LOOKED_EVERY: Duration = Duration::from_secs(5);
 /// What is no doubt while somebody may still come to touch something, or what the state of the streams says itself.
-const OF_OTHERS: [InputCause; 3] = [InputCause::NoContact, InputCause::NoSample, InputCause::StampsGoBack];
+const OF_OTHERS: [InputCause; 3] = [
+    InputCause::NoContact,
+    InputCause::NoSample,
+    InputCause::StampsGoBack,
+];
 
 /// What was found, and what looks for more.
 #[derive(Debug)]
@@ -29,18 +33,28 @@ pub struct InputDoubts {
 impl InputDoubts {
     /// Nothing was looked at yet.
     pub fn on(clock: &Clock) -> Self {
-        Self { work: SideWork::on(clock.clone()), looked: clock.now(), accepted: 0, found: Arc::default() }
+        Self {
+            work: SideWork::on(clock.clone()),
+            looked: clock.now(),
+            accepted: 0,
+            found: Arc::default(),
+        }
     }
 
     /// Looks at what came, on a thread of its own, where it is time and there is something new.
     pub fn look(&mut self, setup: &Setup, monitor: &InputMonitor, accepted: u64) {
         let now = setup.clock.now();
-        let is_due = now.saturating_duration_since(self.looked) >= LOOKED_EVERY && accepted != self.accepted;
+        let is_due =
+            now.saturating_duration_since(self.looked) >= LOOKED_EVERY && accepted != self.accepted;
         if !is_due || self.work.count() > 0 {
             return;
         }
         (self.looked, self.accepted) = (now, accepted);
-        let (monitor, scan, found) = (monitor.clone(), Arc::clone(&setup.scan), Arc::clone(&self.found));
+        let (monitor, scan, found) = (
+            monitor.clone(),
+            Arc::clone(&setup.scan),
+            Arc::clone(&self.found),
+        );
         let look = move || {
             let mut findings = monitor.findings(&scan.0, &scan.1);
             findings.retain(|finding| !OF_OTHERS.contains(&finding.cause));

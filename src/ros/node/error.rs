@@ -13,7 +13,9 @@ use crate::stylus::SettingError;
 #[derive(Debug, thiserror::Error)]
 pub enum NodeError {
     /// Neither the parameter `scan` nor the scene names one.
-    #[error("there is no scan to refine: name one by -p scan:=FILE, or as `scan: {{ file: … }}` in the scene")]
+    #[error(
+        "there is no scan to refine: name one by -p scan:=FILE, or as `scan: {{ file: … }}` in the scene"
+    )]
     NoScan,
     /// An arm must keep clear of the whole scan.
     #[error(
@@ -70,6 +72,8 @@ pub enum NodeError {
     #[error("no thread for the node: {0}; end other programs")]
     NoThread(#[from] std::io::Error),
     /// A thread ended by a fault.
-    #[error("a thread of the node ended by a fault of touchup: please report it with the session's folder")]
+    #[error(
+        "a thread of the node ended by a fault of touchup: please report it with the session's folder"
+    )]
     Stopped,
 }

@@ -20,12 +20,18 @@ const COPY_WAIT: Duration = Duration::from_secs(30);
 impl RefinementWorker {
     /// Begins to evaluate the variances when they are due, and passes on what was evaluated; never waits.
     pub(super) fn go_on_with_variance(&mut self, now: Instant) {
-        let is_done = self.variance.done.as_ref().is_some_and(|of| self.is_state(of));
+        let is_done = self
+            .variance
+            .done
+            .as_ref()
+            .is_some_and(|of| self.is_state(of));
         if let Some((of, made)) = self.variance.made.take() {
             match made.try_recv() {
                 // at most one is made at a time, also where the mesh has gone on
                 Err(TryRecvError::Empty) => self.variance.made = Some((of, made)),
-                Ok(variances) if self.is_state(&of) && self.is_at_rest(now) => self.send_variances(of, variances),
+                Ok(variances) if self.is_state(&of) && self.is_at_rest(now) => {
+                    self.send_variances(of, variances)
+                }
                 Ok(_) => {}
                 // without thread, mesh or evidence: the next change of the mesh tries again
                 Err(TryRecvError::Disconnected) => self.variance.done = Some(of),
@@ -42,14 +48,21 @@ impl RefinementWorker {
     /// Whether the mesh is complete, on its way to the view, and what a file would have.
     fn is_at_rest(&self, now: Instant) -> bool {
         let session = &self.session;
-        let is_sent = session.version == session.sent_version && session.engine.edits() == session.sent_edits;
+        let is_sent =
+            session.version == session.sent_version && session.engine.edits() == session.sent_edits;
         let is_quiet = now.saturating_duration_since(self.sampled) >= KNOWN_AFTER;
-        is_quiet && is_sent && session.engine.is_settled() && !self.is_taking_out() && self.fault.is_none()
+        is_quiet
+            && is_sent
+            && session.engine.is_settled()
+            && !self.is_taking_out()
+            && self.fault.is_none()
     }
 
     /// Whether somebody listens to `mesh_patch`.
     fn is_followed(&self) -> bool {
-        self.endpoints.get(self.port.mesh_patch_topic()).is_some_and(|endpoint| endpoint.count > 0)
+        self.endpoints
+            .get(self.port.mesh_patch_topic())
+            .is_some_and(|endpoint| endpoint.count > 0)
     }
 
     fn begin_variances(&mut self, state: VarianceState) {
@@ -63,14 +76,22 @@ impl RefinementWorker {
         let asked = state.clone();
         let work = move || {
             let snapshot = setup.clock.recv_timeout(&snapshot, COPY_WAIT).ok();
-            let Some(mesh) = snapshot.filter(|mesh| (&mesh.session, mesh.version) == (&asked.0, asked.1)) else {
+            let Some(mesh) =
+                snapshot.filter(|mesh| (&mesh.session, mesh.version) == (&asked.0, asked.1))
+            else {
                 return;
             };
-            let Ok(mut patcher) = setup.clock.recv_timeout(&copy, COPY_WAIT) else { return };
+            let Ok(mut patcher) = setup.clock.recv_timeout(&copy, COPY_WAIT) else {
+                return;
+            };
             patcher.flush();
             let places: Vec<_> = mesh.touched().collect();
-            let known = places.iter().map(|&(vertex, ..)| mesh.variance(vertex).to_bits());
-            let variances = evaluated(&mut patcher, &setup.scan, &places).into_iter().zip(known);
+            let known = places
+                .iter()
+                .map(|&(vertex, ..)| mesh.variance(vertex).to_bits());
+            let variances = evaluated(&mut patcher, &setup.scan, &places)
+                .into_iter()
+                .zip(known);
             let changed = variances.filter(|((_, variance), known)| variance.to_bits() != *known);
             let changed = changed.map(|(variance, _)| variance).collect();
             // its next version need not be a copy
@@ -91,7 +112,11 @@ impl RefinementWorker {
         }
         let version = version + 1;
         // a view that is behind gets them with the next evaluation
-        if self.view.try_send(ViewInput::Variances(Variances { version, of })).is_ok() {
+        if self
+            .view
+            .try_send(ViewInput::Variances(Variances { version, of }))
+            .is_ok()
+        {
             (self.session.version, self.session.sent_version) = (version, version);
             self.setup.shared.mesh.announce(version);
             self.variance.done = Some((session, version));

@@ -7,8 +7,8 @@ use crate::features::{Feature, FittedTo, Form, Kind, Measured, Relation, Relatio
 use crate::form::{Deviation, Estimate};
 use crate::probing::execute::Flag;
 use crate::ros::messages::{
-    ColorRGBA, Feature as FeatureMsg, FeatureArray, FormDeviation, Marker, MarkerArray, Point, Pose,
-    Relation as RelationMsg, Vector3 as Vector3Msg,
+    ColorRGBA, Feature as FeatureMsg, FeatureArray, FormDeviation, Marker, MarkerArray, Point,
+    Pose, Relation as RelationMsg, Vector3 as Vector3Msg,
 };
 use crate::ros::parameters::KIND_NAMES;
 use crate::ros::refusal::unknown_feature;
@@ -45,7 +45,9 @@ pub fn number_of(kind: Option<Kind>) -> u8 {
 pub fn kind_of(number: u8) -> Result<Option<Kind>, String> {
     let mut kinds = std::iter::once(None).chain(Kind::ALL.into_iter().map(Some));
     let most = KIND_NAMES.len() - 1;
-    kinds.find(|kind| number_of(*kind) == number).ok_or_else(|| format!("there is no kind {number}: 0 to {most} are"))
+    kinds
+        .find(|kind| number_of(*kind) == number)
+        .ok_or_else(|| format!("there is no kind {number}: 0 to {most} are"))
 }
 
 /// A feature that was found.
@@ -54,13 +56,19 @@ pub fn kind_of(number: u8) -> Result<Option<Kind>, String> {
 /// - `search_radius`: how far around it was looked when somebody flagged it, m.
 pub fn found(feature: &Feature, id: u32, search_radius: Option<f64>) -> FeatureMsg {
     let number = |measured: &Option<Measured<f64>>| measured.as_ref().map_or(f64::NAN, |m| m.value);
-    let std = |measured: &Option<Measured<f64>>| measured.as_ref().and_then(|m| m.std).unwrap_or(f64::NAN);
+    let std = |measured: &Option<Measured<f64>>| {
+        measured.as_ref().and_then(|m| m.std).unwrap_or(f64::NAN)
+    };
     let yes_no = |known: Option<bool>| match known {
         None => FeatureMsg::UNKNOWN,
         Some(false) => FeatureMsg::NO,
         Some(true) => FeatureMsg::YES,
     };
-    let sized = feature.diameter.as_ref().or(feature.width.as_ref()).map(|m| m.touches.len());
+    let sized = feature
+        .diameter
+        .as_ref()
+        .or(feature.width.as_ref())
+        .map(|m| m.touches.len());
     FeatureMsg {
         id,
         kind: number_of(Some(feature.kind)),
@@ -74,8 +82,15 @@ pub fn found(feature: &Feature, id: u32, search_radius: Option<f64>) -> FeatureM
         search_radius: search_radius.unwrap_or(f64::NAN),
         center: point(&feature.centre.value),
         center_std: feature.centre.std.unwrap_or(f64::NAN),
-        axis: feature.axis.as_ref().map_or(NO_VECTOR, |axis| vector(&axis.value)),
-        axis_std: feature.axis.as_ref().and_then(|axis| axis.std).unwrap_or(f64::NAN),
+        axis: feature
+            .axis
+            .as_ref()
+            .map_or(NO_VECTOR, |axis| vector(&axis.value)),
+        axis_std: feature
+            .axis
+            .as_ref()
+            .and_then(|axis| axis.std)
+            .unwrap_or(f64::NAN),
         direction: feature.direction.as_ref().map_or(NO_VECTOR, vector),
         diameter: number(&feature.diameter),
         diameter_std: std(&feature.diameter),
@@ -85,12 +100,18 @@ pub fn found(feature: &Feature, id: u32, search_radius: Option<f64>) -> FeatureM
         width_std: std(&feature.width),
         depth: number(&feature.depth),
         depth_std: std(&feature.depth),
-        depth_is_at_least: feature.depth.as_ref().is_some_and(|depth| depth.is_at_least),
+        depth_is_at_least: feature
+            .depth
+            .as_ref()
+            .is_some_and(|depth| depth.is_at_least),
         cone_angle: number(&feature.cone_angle),
         cone_angle_std: std(&feature.cone_angle),
         through: yes_no(feature.through),
         convex: yes_no(feature.is_convex),
-        group: feature.group.and_then(|group| i32::try_from(group).ok()).unwrap_or(FeatureMsg::NO_GROUP),
+        group: feature
+            .group
+            .and_then(|group| i32::try_from(group).ok())
+            .unwrap_or(FeatureMsg::NO_GROUP),
         points: feature.points.iter().map(point).collect(),
         form: feature.form.as_ref().map_or_else(Vec::new, form_deviations),
     }
@@ -109,7 +130,12 @@ fn form_deviations(form: &Form) -> Vec<FormDeviation> {
             round.undulations,
             round.lobes.clone(),
         ),
-        Form::Flat(flat) => (vec![(FormDeviation::FLATNESS, Some(flat.flatness))], flat.coverage, 0, Vec::new()),
+        Form::Flat(flat) => (
+            vec![(FormDeviation::FLATNESS, Some(flat.flatness))],
+            flat.coverage,
+            0,
+            Vec::new(),
+        ),
     };
     let message = |(characteristic, deviation): (u8, Option<Deviation>)| {
         let deviation = deviation?;
@@ -130,9 +156,18 @@ fn form_deviations(form: &Form) -> Vec<FormDeviation> {
 ///
 /// - `name_of`: the number by which a feature is known that the detector numbers so.
 pub fn related(relation: &Relation, name_of: impl Fn(u32) -> u32) -> RelationMsg {
-    let [zone, angle, distance, concentricity] =
-        [relation.zone, relation.angle, relation.distance, relation.concentricity]
-            .map(|estimate| estimate.unwrap_or(Estimate { value: f64::NAN, std: f64::NAN }));
+    let [zone, angle, distance, concentricity] = [
+        relation.zone,
+        relation.angle,
+        relation.distance,
+        relation.concentricity,
+    ]
+    .map(|estimate| {
+        estimate.unwrap_or(Estimate {
+            value: f64::NAN,
+            std: f64::NAN,
+        })
+    });
     RelationMsg {
         kind: match relation.kind {
             RelationKind::Perpendicularity => RelationMsg::PERPENDICULARITY,
@@ -165,7 +200,9 @@ pub fn flagged(flag: &Flag) -> FeatureMsg {
 
 /// What it is and its size at 95 %, mm: "hole Ø8.02 ± 0.04".
 pub fn label(feature: &FeatureMsg) -> String {
-    let kind = KIND_NAMES.get(usize::from(feature.kind)).unwrap_or(&"unknown");
+    let kind = KIND_NAMES
+        .get(usize::from(feature.kind))
+        .unwrap_or(&"unknown");
     if feature.status == FeatureMsg::STATUS_FLAGGED {
         return format!("{kind}?");
     }
@@ -176,15 +213,30 @@ pub fn label(feature: &FeatureMsg) -> String {
     if !feature.diameter.is_nan() {
         return format!("{kind} Ø{}", size(feature.diameter, feature.diameter_std));
     }
-    let sizes = [(feature.width, feature.width_std), (feature.length, feature.length_std)];
-    let sizes: Vec<_> = sizes.iter().filter(|(value, _)| !value.is_nan()).map(|&(v, std)| size(v, std)).collect();
-    if sizes.is_empty() { (*kind).to_owned() } else { format!("{kind} {}", sizes.join(" × ")) }
+    let sizes = [
+        (feature.width, feature.width_std),
+        (feature.length, feature.length_std),
+    ];
+    let sizes: Vec<_> = sizes
+        .iter()
+        .filter(|(value, _)| !value.is_nan())
+        .map(|&(v, std)| size(v, std))
+        .collect();
+    if sizes.is_empty() {
+        (*kind).to_owned()
+    } else {
+        format!("{kind} {}", sizes.join(" × "))
+    }
 }
 
 /// All features to look at; what was shown before goes.
 pub fn markers(features: &FeatureArray) -> MarkerArray {
     let frame = &features.header;
-    let mut markers = vec![Marker { header: frame.clone(), action: Marker::DELETEALL, ..Marker::default() }];
+    let mut markers = vec![Marker {
+        header: frame.clone(),
+        action: Marker::DELETEALL,
+        ..Marker::default()
+    }];
     for feature in &features.features {
         let base = Marker {
             header: frame.clone(),
@@ -198,9 +250,23 @@ pub fn markers(features: &FeatureArray) -> MarkerArray {
             let up = axis_of(feature);
             // the center of a boss is at its foot, and the label would be inside
             let is_boss = feature.kind == FeatureMsg::KIND_BOSS && !feature.depth.is_nan();
-            let place = point_of(&feature.center) + up * (LETTERS + if is_boss { feature.depth } else { 0.0 });
-            let white = ColorRGBA { r: 1.0, g: 1.0, b: 1.0, a: 1.0 };
-            markers.push(letters(&place, label(feature), white, Marker { ns: "labels".to_owned(), ..base }));
+            let place = point_of(&feature.center)
+                + up * (LETTERS + if is_boss { feature.depth } else { 0.0 });
+            let white = ColorRGBA {
+                r: 1.0,
+                g: 1.0,
+                b: 1.0,
+                a: 1.0,
+            };
+            markers.push(letters(
+                &place,
+                label(feature),
+                white,
+                Marker {
+                    ns: "labels".to_owned(),
+                    ..base
+                },
+            ));
         }
     }
     MarkerArray { markers }
@@ -210,8 +276,15 @@ pub fn markers(features: &FeatureArray) -> MarkerArray {
 pub fn ball(centre: Point, diameter: f64, base: Marker) -> Marker {
     Marker {
         r#type: Marker::SPHERE,
-        pose: Pose { position: centre, ..Pose::default() },
-        scale: Vector3Msg { x: diameter, y: diameter, z: diameter },
+        pose: Pose {
+            position: centre,
+            ..Pose::default()
+        },
+        scale: Vector3Msg {
+            x: diameter,
+            y: diameter,
+            z: diameter,
+        },
         ..base
     }
 }
@@ -220,8 +293,14 @@ pub fn ball(centre: Point, diameter: f64, base: Marker) -> Marker {
 pub fn letters(place: &Point3<f64>, text: String, color: ColorRGBA, base: Marker) -> Marker {
     Marker {
         r#type: Marker::TEXT_VIEW_FACING,
-        pose: Pose { position: point(place), ..Pose::default() },
-        scale: Vector3Msg { z: LETTERS, ..Vector3Msg::default() },
+        pose: Pose {
+            position: point(place),
+            ..Pose::default()
+        },
+        scale: Vector3Msg {
+            z: LETTERS,
+            ..Vector3Msg::default()
+        },
         color,
         text,
         ..base
@@ -230,8 +309,10 @@ pub fn letters(place: &Point3<f64>, text: String, color: ColorRGBA, base: Marker
 
 /// A part has dozens of edges and planes: those speak for themselves.
 fn has_label(feature: &FeatureMsg) -> bool {
-    !matches!(feature.kind, FeatureMsg::KIND_EDGE | FeatureMsg::KIND_CORNER | FeatureMsg::KIND_PLANE)
-        || feature.status == FeatureMsg::STATUS_FLAGGED
+    !matches!(
+        feature.kind,
+        FeatureMsg::KIND_EDGE | FeatureMsg::KIND_CORNER | FeatureMsg::KIND_PLANE
+    ) || feature.status == FeatureMsg::STATUS_FLAGGED
 }
 
 /// Red, green, blue of what is flagged, fitted to touches, and found on the mesh. None of them is a colour of the mesh, in front
@@ -265,11 +346,22 @@ fn body(feature: &FeatureMsg, base: &Marker) -> Option<Marker> {
 
 fn outline(feature: &FeatureMsg, base: &Marker) -> Marker {
     // an edge has the surface on two sides, of an opening it is all below
-    let up = if feature.kind == FeatureMsg::KIND_EDGE { Vector3::zeros() } else { axis_of(feature) * (0.5 * LINE) };
-    let raised = |p: &Point| Point { x: p.x + up.x, y: p.y + up.y, z: p.z + up.z };
+    let up = if feature.kind == FeatureMsg::KIND_EDGE {
+        Vector3::zeros()
+    } else {
+        axis_of(feature) * (0.5 * LINE)
+    };
+    let raised = |p: &Point| Point {
+        x: p.x + up.x,
+        y: p.y + up.y,
+        z: p.z + up.z,
+    };
     Marker {
         r#type: Marker::LINE_STRIP,
-        scale: Vector3Msg { x: LINE, ..Vector3Msg::default() },
+        scale: Vector3Msg {
+            x: LINE,
+            ..Vector3Msg::default()
+        },
         points: feature.points.iter().map(raised).collect(),
         ..base.clone()
     }
@@ -278,14 +370,26 @@ fn outline(feature: &FeatureMsg, base: &Marker) -> Marker {
 /// Up, where it has none.
 fn axis_of(feature: &FeatureMsg) -> Vector3<f64> {
     let axis = vector_of(&feature.axis);
-    if axis.iter().all(|x| x.is_finite()) { axis } else { Vector3::z() }
+    if axis.iter().all(|x| x.is_finite()) {
+        axis
+    } else {
+        Vector3::z()
+    }
 }
 
 fn cylinder(feature: &FeatureMsg, base: &Marker) -> Marker {
     let axis = axis_of(feature);
-    let height = if feature.depth.is_nan() { LINE } else { feature.depth };
+    let height = if feature.depth.is_nan() {
+        LINE
+    } else {
+        feature.depth
+    };
     // a hole goes down from its opening and is seen inside of it, a boss up from its foot and is seen around it
-    let (side, up) = if feature.kind == FeatureMsg::KIND_BOSS { (1.0, 0.5) } else { (-1.0, -0.5) };
+    let (side, up) = if feature.kind == FeatureMsg::KIND_BOSS {
+        (1.0, 0.5)
+    } else {
+        (-1.0, -0.5)
+    };
     let middle = point_of(&feature.center) + axis * (up * height + 0.5 * CLEAR);
     let diameter = feature.diameter + 2.0 * side * CLEAR;
     let turn = Rotation3::rotation_between(&Vector3::z(), &axis)
@@ -293,7 +397,11 @@ fn cylinder(feature: &FeatureMsg, base: &Marker) -> Marker {
     Marker {
         r#type: Marker::CYLINDER,
         pose: pose(&middle, &UnitQuaternion::from_rotation_matrix(&turn)),
-        scale: Vector3Msg { x: diameter, y: diameter, z: height + CLEAR },
+        scale: Vector3Msg {
+            x: diameter,
+            y: diameter,
+            z: height + CLEAR,
+        },
         ..base.clone()
     }
 }
@@ -307,7 +415,10 @@ mod tests {
     fn form_is_a_list_of_the_deviations_that_are_known() {
         let deviation = |zone, std, squares| Deviation {
             minimum_zone: Estimate { value: zone, std },
-            least_squares: Estimate { value: squares, std },
+            least_squares: Estimate {
+                value: squares,
+                std,
+            },
         };
         let round = RoundForm {
             roundness: deviation(50e-6, 4e-6, 52e-6),
@@ -318,28 +429,63 @@ mod tests {
             lobes: vec![2, 3],
         };
         let messages = form_deviations(&Form::Round(round));
-        let of = |at: usize| (messages[at].characteristic, messages[at].zone, messages[at].zone_std);
+        let of = |at: usize| {
+            (
+                messages[at].characteristic,
+                messages[at].zone,
+                messages[at].zone_std,
+            )
+        };
         assert_eq!(messages.len(), 2);
         assert_eq!(of(0), (FormDeviation::ROUNDNESS, 50e-6, 4e-6));
         assert_eq!(of(1), (FormDeviation::STRAIGHTNESS, 0.0, 3e-6));
-        assert!(messages.iter().all(|one| one.coverage == 0.75 && one.lobes == [2, 3]));
+        assert!(
+            messages
+                .iter()
+                .all(|one| one.coverage == 0.75 && one.lobes == [2, 3])
+        );
         assert_eq!(messages[0].least_squares, 52e-6);
     }
 
     #[test]
     fn a_relation_goes_by_the_names_of_the_features() {
-        let angle = Some(Estimate { value: 0.01, std: 0.002 });
+        let angle = Some(Estimate {
+            value: 0.01,
+            std: 0.002,
+        });
         let (zone, distance, concentricity) = (None, None, None);
-        let relation = Relation { kind: RelationKind::Distance, of: 4, to: 7, zone, angle, distance, concentricity };
+        let relation = Relation {
+            kind: RelationKind::Distance,
+            of: 4,
+            to: 7,
+            zone,
+            angle,
+            distance,
+            concentricity,
+        };
         let message = related(&relation, |id| if id == 4 { 40 } else { id });
-        assert_eq!((message.kind, message.of_feature, message.to_feature), (RelationMsg::DISTANCE, 40, 7));
+        assert_eq!(
+            (message.kind, message.of_feature, message.to_feature),
+            (RelationMsg::DISTANCE, 40, 7)
+        );
         assert_eq!((message.angle, message.angle_std), (0.01, 0.002));
-        assert!(message.zone.is_nan() && message.distance_std.is_nan() && message.concentricity.is_nan());
+        assert!(
+            message.zone.is_nan()
+                && message.distance_std.is_nan()
+                && message.concentricity.is_nan()
+        );
     }
 
     #[test]
     fn labels_read_as_on_a_drawing() {
-        let place = |id, kind| flagged(&Flag { id, kind: Some(kind), place: Point3::origin(), radius: 5e-3 });
+        let place = |id, kind| {
+            flagged(&Flag {
+                id,
+                kind: Some(kind),
+                place: Point3::origin(),
+                radius: 5e-3,
+            })
+        };
         let mut hole = place(3, Kind::Hole);
         assert_eq!(label(&hole), "hole?");
         hole.status = FeatureMsg::STATUS_FOUND;

@@ -17,8 +17,8 @@ use crate::mesh::{FaceTree, MeshError};
 use crate::probing::execute::Flag;
 use crate::probing::plan::{NextTouch, advise_next_touch};
 use crate::ros::messages::{
-    DetectFeaturesRequest, DetectFeaturesResponse, Feature as FeatureMsg, FeatureArray, FlagFeatureResponse,
-    UnflagFeatureResponse,
+    DetectFeaturesRequest, DetectFeaturesResponse, Feature as FeatureMsg, FeatureArray,
+    FlagFeatureResponse, UnflagFeatureResponse,
 };
 use crate::ros::parameters::KIND_NAMES;
 use crate::stylus::ProbedPoint;
@@ -62,7 +62,12 @@ pub struct FeatureWorker {
 
 impl FeatureWorker {
     /// Knows nothing yet.
-    pub fn new(clock: Clock, shared: Arc<Shared>, view: SyncSender<ViewInput>, session: String) -> Self {
+    pub fn new(
+        clock: Clock,
+        shared: Arc<Shared>,
+        view: SyncSender<ViewInput>,
+        session: String,
+    ) -> Self {
         let now = clock.now();
         Self {
             clock,
@@ -88,12 +93,16 @@ impl FeatureWorker {
     /// Runs until nobody sends anything any more.
     pub fn run(mut self, inputs: &Receiver<FeatureInput>) {
         loop {
-            let period = Duration::from_secs_f64(1.0 / self.shared.parameters().double("features_rate_hz"));
+            let period =
+                Duration::from_secs_f64(1.0 / self.shared.parameters().double("features_rate_hz"));
             match self.clock.recv_timeout(inputs, period) {
                 Ok(input) => {
                     self.take(input);
                     // what came at the same time is in the next look too
-                    inputs.try_iter().take(1000).for_each(|input| self.take(input));
+                    inputs
+                        .try_iter()
+                        .take(1000)
+                        .for_each(|input| self.take(input));
                 }
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return,
@@ -102,7 +111,11 @@ impl FeatureWorker {
                 // a mesh that cannot be had now is asked for again
                 let _ = self.look();
             }
-            if self.has_changes && self.published_at.is_none_or(|at| self.clock.since(at) >= period) {
+            if self.has_changes
+                && self
+                    .published_at
+                    .is_none_or(|at| self.clock.since(at) >= period)
+            {
                 (self.has_changes, self.published_at) = (false, Some(self.clock.now()));
                 self.publish();
             }
@@ -116,11 +129,18 @@ impl FeatureWorker {
                 self.has_changes |= !self.tracker.update(&self.touches).is_empty();
             }
             FeatureInput::Session(session) => {
-                *self = Self::new(self.clock.clone(), Arc::clone(&self.shared), self.view.clone(), session);
+                *self = Self::new(
+                    self.clock.clone(),
+                    Arc::clone(&self.shared),
+                    self.view.clone(),
+                    session,
+                );
             }
             FeatureInput::Flag(flag, reply) => {
                 let answer = self.flag(flag);
-                reply.into_iter().for_each(|reply| reply.send(answer.clone()));
+                reply
+                    .into_iter()
+                    .for_each(|reply| reply.send(answer.clone()));
             }
             FeatureInput::Unflag(id, reply) => {
                 reply.send(self.unflag(id));
@@ -158,24 +178,33 @@ impl FeatureWorker {
             Some(_) => {
                 let since_look = self.clock.since(self.looked_at);
                 let is_quiet = self.clock.since(self.changed_at) >= QUIET;
-                (is_quiet && since_look >= QUIET) || since_look >= QUIET.max(self.look_took) * LOOKS_APART
+                (is_quiet && since_look >= QUIET)
+                    || since_look >= QUIET.max(self.look_took) * LOOKS_APART
             }
         }
     }
 
     fn look(&mut self) -> Result<(), String> {
         let started = self.clock.now();
-        let snapshot = self.clock.recv_timeout(&self.shared.mesh.complete(), SNAPSHOT_WAIT).ok();
+        let snapshot = self
+            .clock
+            .recv_timeout(&self.shared.mesh.complete(), SNAPSHOT_WAIT)
+            .ok();
         let snapshot = snapshot.filter(|snapshot| snapshot.session == self.session);
-        let snapshot = snapshot.ok_or("the mesh was not complete in time: is it changing all the time?")?;
-        let mesh = snapshot.mesh().map_err(|error: MeshError| error.to_string())?;
+        let snapshot =
+            snapshot.ok_or("the mesh was not complete in time: is it changing all the time?")?;
+        let mesh = snapshot
+            .mesh()
+            .map_err(|error: MeshError| error.to_string())?;
         self.looked = Some((snapshot.version, snapshot.stamp_ns));
         // its next version need not be a copy
         drop(snapshot);
-        self.tracker.renew(&mesh, &FaceTree::new(&mesh), &self.touches);
+        self.tracker
+            .renew(&mesh, &FaceTree::new(&mesh), &self.touches);
         self.name_found_flags();
         let now = self.clock.now();
-        (self.look_took, self.looked_at, self.has_changes) = (now.saturating_duration_since(started), now, true);
+        (self.look_took, self.looked_at, self.has_changes) =
+            (now.saturating_duration_since(started), now, true);
         Ok(())
     }
 
@@ -193,9 +222,14 @@ impl FeatureWorker {
     /// no answer.
     fn nearest(&self, flag: &Flag, may_be: impl Fn(&Feature) -> bool) -> Option<&Feature> {
         let far = |feature: &&Feature| (feature.centre.value - flag.place).norm();
-        let is_meant =
-            |feature: &&Feature| flag.kind == Some(feature.kind) && far(feature) <= flag.radius && may_be(feature);
-        self.tracker.features().iter().filter(is_meant).min_by(|a, b| far(a).total_cmp(&far(b)))
+        let is_meant = |feature: &&Feature| {
+            flag.kind == Some(feature.kind) && far(feature) <= flag.radius && may_be(feature)
+        };
+        self.tracker
+            .features()
+            .iter()
+            .filter(is_meant)
+            .min_by(|a, b| far(a).total_cmp(&far(b)))
     }
 
     /// A feature that appears where somebody pointed goes by the number of that flag.
@@ -216,29 +250,56 @@ impl FeatureWorker {
         let kind = flag.kind.map_or("unknown", Kind::name);
         if self.flags.len() >= MOST_FLAGS {
             let message = format!("{MOST_FLAGS} places are flagged already: take some back");
-            return FlagFeatureResponse { success: false, message, id: 0 };
+            return FlagFeatureResponse {
+                success: false,
+                message,
+                id: 0,
+            };
         }
         self.has_changes = true;
-        if let Some(id) = self.nearest(&flag, |_| true).map(|feature| self.name_of(feature)) {
+        if let Some(id) = self
+            .nearest(&flag, |_| true)
+            .map(|feature| self.name_of(feature))
+        {
             self.radii.insert(id, flag.radius);
-            return FlagFeatureResponse { success: true, message: format!("flagged {kind} {id}, known before"), id };
+            return FlagFeatureResponse {
+                success: true,
+                message: format!("flagged {kind} {id}, known before"),
+                id,
+            };
         }
-        let same = |other: &Flag| other.kind == flag.kind && (other.place - flag.place).norm() <= flag.radius;
-        let again = self.flags.iter().find(|(_, other)| same(other)).map(|(id, _)| *id);
+        let same = |other: &Flag| {
+            other.kind == flag.kind && (other.place - flag.place).norm() <= flag.radius
+        };
+        let again = self
+            .flags
+            .iter()
+            .find(|(_, other)| same(other))
+            .map(|(id, _)| *id);
         let id = again.unwrap_or_else(|| self.tracker.fresh_id());
         self.flags.insert(id, Flag { id, ..flag });
-        FlagFeatureResponse { success: true, message: format!("flagged a place for a {kind}: number {id}"), id }
+        FlagFeatureResponse {
+            success: true,
+            message: format!("flagged a place for a {kind}: number {id}"),
+            id,
+        }
     }
 
     fn unflag(&mut self, id: u32) -> UnflagFeatureResponse {
-        let (was_place, was_found) = (self.flags.remove(&id).is_some(), self.radii.remove(&id).is_some());
+        let (was_place, was_found) = (
+            self.flags.remove(&id).is_some(),
+            self.radii.remove(&id).is_some(),
+        );
         let message = match (was_place, was_found) {
             (true, _) => format!("took flag {id} back"),
             (_, true) => format!("took the flag of {id} back; the feature stays"),
             _ => format!("nothing with the number {id} is flagged"),
         };
         self.has_changes |= was_place || was_found;
-        UnflagFeatureResponse { success: was_place || was_found, message }
+        UnflagFeatureResponse {
+            success: was_place || was_found,
+            message,
+        }
     }
 
     /// What is flagged, or has one of these numbers.
@@ -246,63 +307,126 @@ impl FeatureWorker {
         let default = self.shared.parameters().double("flag_radius_mm") / 1e3;
         let found = self.tracker.features().iter().map(|feature| {
             let id = self.name_of(feature);
-            let (kind, place, radius) = (Some(feature.kind), feature.centre.value, self.radii.get(&id).copied());
-            (radius.is_some(), Flag { id, kind, place, radius: radius.unwrap_or(default) })
+            let (kind, place, radius) = (
+                Some(feature.kind),
+                feature.centre.value,
+                self.radii.get(&id).copied(),
+            );
+            (
+                radius.is_some(),
+                Flag {
+                    id,
+                    kind,
+                    place,
+                    radius: radius.unwrap_or(default),
+                },
+            )
         });
         let is_wanted = |target: &Flag, is_flagged: bool| match ids.is_empty() {
-            true => is_flagged && !self.measured.get(&target.id).is_some_and(|measured| measured.is_done),
+            true => {
+                is_flagged
+                    && !self
+                        .measured
+                        .get(&target.id)
+                        .is_some_and(|measured| measured.is_done)
+            }
             false => ids.contains(&target.id),
         };
         let all = self.flags.values().map(|flag| (true, *flag)).chain(found);
-        let mut targets: Vec<_> = all.filter(|(flagged, target)| is_wanted(target, *flagged)).map(|(_, t)| t).collect();
+        let mut targets: Vec<_> = all
+            .filter(|(flagged, target)| is_wanted(target, *flagged))
+            .map(|(_, t)| t)
+            .collect();
         targets.sort_by_key(|target| ids.iter().position(|id| *id == target.id));
         targets
     }
 
-    fn answer(&self, request: &DetectFeaturesRequest, looked: Result<(), String>) -> DetectFeaturesResponse {
-        let FeatureArray { mut features, mesh_version, .. } = self.features();
+    fn answer(
+        &self,
+        request: &DetectFeaturesRequest,
+        looked: Result<(), String>,
+    ) -> DetectFeaturesResponse {
+        let FeatureArray {
+            mut features,
+            mesh_version,
+            ..
+        } = self.features();
         if let Err(message) = looked {
-            return DetectFeaturesResponse { message, mesh_version, ..Default::default() };
+            return DetectFeaturesResponse {
+                message,
+                mesh_version,
+                ..Default::default()
+            };
         }
-        features.retain(|feature| request.kinds.is_empty() || request.kinds.contains(&feature.kind));
+        features
+            .retain(|feature| request.kinds.is_empty() || request.kinds.contains(&feature.kind));
         let counts = KIND_NAMES.iter().zip(0u8..).filter_map(|(name, kind)| {
-            let is_such = |f: &&FeatureMsg| f.kind == kind && f.status != FeatureMsg::STATUS_FLAGGED;
+            let is_such =
+                |f: &&FeatureMsg| f.kind == kind && f.status != FeatureMsg::STATUS_FLAGGED;
             let count = features.iter().filter(is_such).count();
             (count > 0).then(|| format!("{count} {name}{}", if count == 1 { "" } else { "s" }))
         });
         let counts: Vec<_> = counts.collect();
-        let message = if counts.is_empty() { "nothing found".to_owned() } else { counts.join(", ") };
+        let message = if counts.is_empty() {
+            "nothing found".to_owned()
+        } else {
+            counts.join(", ")
+        };
         DetectFeaturesResponse {
             success: true,
             message,
             mesh_version,
             count: features.len() as u32,
-            ids: features.iter().map(|feature| feature.id).take(MOST_NAMED).collect(),
+            ids: features
+                .iter()
+                .map(|feature| feature.id)
+                .take(MOST_NAMED)
+                .collect(),
         }
     }
 
     fn features(&self) -> FeatureArray {
         let (version, stamp_ns) = self.looked.unwrap_or((1, 0));
-        let stamp_ns = self.touches.last().map_or(stamp_ns, |last| last.stamp_ns.max(stamp_ns));
+        let stamp_ns = self
+            .touches
+            .last()
+            .map_or(stamp_ns, |last| last.stamp_ns.max(stamp_ns));
         let known = self.tracker.features().iter().map(|feature| {
             let id = self.name_of(feature);
             found(feature, id, self.radii.get(&id).copied())
         });
         let measured = |id: u32| {
             let feature = &self.measured.get(&id)?.feature;
-            let radius = self.radii.get(&id).copied().or_else(|| self.flags.get(&id).map(|flag| flag.radius));
-            Some(FeatureMsg { status: FeatureMsg::STATUS_PROBED, ..found(feature, id, radius) })
+            let radius = self
+                .radii
+                .get(&id)
+                .copied()
+                .or_else(|| self.flags.get(&id).map(|flag| flag.radius));
+            Some(FeatureMsg {
+                status: FeatureMsg::STATUS_PROBED,
+                ..found(feature, id, radius)
+            })
         };
         // what an arm has measured is better than what the mesh shows
-        let mut features: Vec<_> =
-            known.chain(self.flags.values().map(flagged)).map(|one| measured(one.id).unwrap_or(one)).collect();
+        let mut features: Vec<_> = known
+            .chain(self.flags.values().map(flagged))
+            .map(|one| measured(one.id).unwrap_or(one))
+            .collect();
         // also one that is flagged no longer
         let is_listed = |id: &&u32| features.iter().any(|one| one.id == **id);
-        let others: Vec<_> = self.measured.keys().filter(|id| !is_listed(id)).filter_map(|&id| measured(id)).collect();
+        let others: Vec<_> = self
+            .measured
+            .keys()
+            .filter(|id| !is_listed(id))
+            .filter_map(|&id| measured(id))
+            .collect();
         features.extend(others);
         features.sort_by_key(|feature| feature.id);
         let related = |relation| related(relation, |id| self.name_of_id(id));
-        let relations = relations(self.tracker.features()).iter().map(related).collect();
+        let relations = relations(self.tracker.features())
+            .iter()
+            .map(related)
+            .collect();
         FeatureArray {
             header: header(stamp_ns, &self.shared.frame),
             session: self.session.clone(),
@@ -315,7 +439,10 @@ impl FeatureWorker {
 
     fn publish(&self) {
         // the view holds nothing back for long, and shows them even when it is late
-        let _ = self.view.send(ViewInput::Features(Arc::new(self.features()), self.next_touches()));
+        let _ = self.view.send(ViewInput::Features(
+            Arc::new(self.features()),
+            self.next_touches(),
+        ));
     }
 
     /// For each feature where a hand should touch next; of a flag its place.
@@ -324,10 +451,22 @@ impl FeatureWorker {
             let next = advise_next_touch(feature, &self.touches)?;
             Some((self.name_of(feature), next))
         });
-        let flagged =
-            self.flags.values().map(|flag| (flag.id, NextTouch { place: flag.place, normal: Vector3::zeros() }));
+        let flagged = self.flags.values().map(|flag| {
+            (
+                flag.id,
+                NextTouch {
+                    place: flag.place,
+                    normal: Vector3::zeros(),
+                },
+            )
+        });
         // what an arm has measured well enough needs no hand
-        let is_open = |id: &u32| !self.measured.get(id).is_some_and(|measured| measured.is_done);
+        let is_open = |id: &u32| {
+            !self
+                .measured
+                .get(id)
+                .is_some_and(|measured| measured.is_done)
+        };
         flagged.chain(found).filter(|(id, _)| is_open(id)).collect()
     }
 }

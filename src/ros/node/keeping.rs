@@ -16,7 +16,11 @@ pub enum Keeping {
 impl Keeping {
     /// What takes the session down; `None` where it is replayed.
     pub fn recorder(&self) -> Option<&SessionRecorder> {
-        if let Self::Recorded(recorder) = self { Some(recorder) } else { None }
+        if let Self::Recorded(recorder) = self {
+            Some(recorder)
+        } else {
+            None
+        }
     }
 
     /// Whether it is replayed.
@@ -26,7 +30,9 @@ impl Keeping {
 
     /// Messages missing in its recording so far.
     pub fn unrecorded(&self) -> Unrecorded {
-        self.recorder().map(SessionRecorder::unrecorded).unwrap_or_default()
+        self.recorder()
+            .map(SessionRecorder::unrecorded)
+            .unwrap_or_default()
     }
 }
 
@@ -46,13 +52,24 @@ impl ReplayedSession {
     /// - `recording`, `topics`: its messages, to make touches again without one that was taken out.
     /// - `changes`: of strokes, as its record has them.
     pub fn new(recording: PathBuf, topics: Topics, changes: StrokeChanges) -> Self {
-        Self { recording, topics, history: changes.history(), run: 1, seen_ns: None }
+        Self {
+            recording,
+            topics,
+            history: changes.history(),
+            run: 1,
+            seen_ns: None,
+        }
     }
 
     /// The same from the beginning, once more.
     pub fn again(&self) -> Self {
         let history = self.history.clone().again();
-        Self { history, run: self.run.saturating_add(1), seen_ns: None, ..self.clone() }
+        Self {
+            history,
+            run: self.run.saturating_add(1),
+            seen_ns: None,
+            ..self.clone()
+        }
     }
 
     /// How often it was begun, this time among them.
@@ -96,11 +113,20 @@ mod tests {
 
     #[test]
     fn strokes_change_after_the_sample_that_the_record_names_and_again_in_the_next_run() {
-        let exchange = |after_ns, stroke_ns| Exchange { after_ns, stroke_ns: Some(stroke_ns) };
+        let exchange = |after_ns, stroke_ns| Exchange {
+            after_ns,
+            stroke_ns: Some(stroke_ns),
+        };
         let changes = [
             StrokeChange::Undo(exchange(20, 10)),
             StrokeChange::Redo(exchange(20, 10)),
-            StrokeChange::TakeOut(Removal { after_ns: 35, stroke: StrokeSpan { from_ns: 30, until_ns: 40 } }),
+            StrokeChange::TakeOut(Removal {
+                after_ns: 35,
+                stroke: StrokeSpan {
+                    from_ns: 30,
+                    until_ns: 40,
+                },
+            }),
             StrokeChange::Undo(exchange(50, 45)),
             StrokeChange::Undo(exchange(70, 60)),
         ];
@@ -111,13 +137,24 @@ mod tests {
             assert_eq!(session.next_change_at_end(), None, "nothing has come");
             let mut seen = Vec::new();
             for stamp_ns in [10, 20, 21, 35, 50] {
-                seen.push(std::iter::from_fn(|| session.next_change_before(stamp_ns)).collect::<Vec<_>>());
+                seen.push(
+                    std::iter::from_fn(|| session.next_change_before(stamp_ns)).collect::<Vec<_>>(),
+                );
                 session.comes(stamp_ns);
             }
-            assert_eq!(seen, [&[], &[], &changes[..2], &[], &changes[2..3]].map(<[StrokeChange]>::to_vec));
-            assert_eq!(session.changes_so_far(), changes[..3].iter().copied().collect());
+            assert_eq!(
+                seen,
+                [&[], &[], &changes[..2], &[], &changes[2..3]].map(<[StrokeChange]>::to_vec)
+            );
+            assert_eq!(
+                session.changes_so_far(),
+                changes[..3].iter().copied().collect()
+            );
             // that of the sample at 70 belongs to what has not come
-            assert_eq!((session.next_change_at_end(), session.next_change_at_end()), (Some(changes[3]), None));
+            assert_eq!(
+                (session.next_change_at_end(), session.next_change_at_end()),
+                (Some(changes[3]), None)
+            );
             session = session.again();
         }
     }

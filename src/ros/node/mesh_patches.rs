@@ -32,7 +32,10 @@ struct FollowedIds {
 
 impl FollowedIds {
     fn of(slots: u32, is_there: impl Fn(u32) -> bool) -> Self {
-        Self { changed: IdSet::default(), had: (0..slots).map(is_there).collect() }
+        Self {
+            changed: IdSet::default(),
+            had: (0..slots).map(is_there).collect(),
+        }
     }
 
     /// What is to be set, and what is to be removed; from now on they have it.
@@ -73,14 +76,24 @@ impl MeshPatches {
     ///
     /// - `turned`: vertices that faces have begun to use by it, or use no more.
     pub fn note(&mut self, edits: &Edits, turned: &[u32]) {
-        turned.iter().for_each(|vertex| self.vertices.changed.insert(*vertex));
-        edits.vertices.iter().for_each(|(vertex, _)| self.vertices.changed.insert(*vertex));
-        edits.faces.iter().for_each(|(face, _)| self.faces.changed.insert(*face));
+        turned
+            .iter()
+            .for_each(|vertex| self.vertices.changed.insert(*vertex));
+        edits
+            .vertices
+            .iter()
+            .for_each(|(vertex, _)| self.vertices.changed.insert(*vertex));
+        edits
+            .faces
+            .iter()
+            .for_each(|(face, _)| self.faces.changed.insert(*face));
     }
 
     /// Remembers that something of vertices changed that are where they were.
     pub fn note_vertices(&mut self, vertices: impl IntoIterator<Item = u32>) {
-        vertices.into_iter().for_each(|vertex| self.vertices.changed.insert(vertex));
+        vertices
+            .into_iter()
+            .for_each(|vertex| self.vertices.changed.insert(vertex));
     }
 
     /// The change from what followers have to what the replica has, in parts; none when it is the same.
@@ -89,11 +102,26 @@ impl MeshPatches {
         if self.version == replica.version || is_same {
             return Vec::new();
         }
-        let [set, removed_vertices] = self.vertices.take(|vertex| replica.vertex(vertex).is_some());
+        let [set, removed_vertices] = self
+            .vertices
+            .take(|vertex| replica.vertex(vertex).is_some());
         let [faces, removed_faces] = self.faces.take(|face| replica.face(face).is_some());
-        let draft = DraftPatch { removed_faces, set, faces, removed_vertices };
+        let draft = DraftPatch {
+            removed_faces,
+            set,
+            faces,
+            removed_vertices,
+        };
         let base = std::mem::replace(&mut self.version, replica.version);
-        let part = |part| draft.part(part, replica, [base, self.version], frame, self.scan_variance);
+        let part = |part| {
+            draft.part(
+                part,
+                replica,
+                [base, self.version],
+                frame,
+                self.scan_variance,
+            )
+        };
         (0..draft.part_count()).map(part).collect()
     }
 
@@ -105,12 +133,17 @@ impl MeshPatches {
     ) -> impl Iterator<Item = MeshPatch> + Send + 'static + use<> {
         let [vertices, faces] = replica.slots();
         let draft = DraftPatch {
-            set: (0..vertices).filter(|&vertex| replica.vertex(vertex).is_some()).collect(),
-            faces: (0..faces).filter(|&face| replica.face(face).is_some()).collect(),
+            set: (0..vertices)
+                .filter(|&vertex| replica.vertex(vertex).is_some())
+                .collect(),
+            faces: (0..faces)
+                .filter(|&face| replica.face(face).is_some())
+                .collect(),
             ..DraftPatch::default()
         };
         let (version, variance) = (self.version, self.scan_variance);
-        (0..draft.part_count()).map(move |part| draft.part(part, &replica, [0, version], &frame, variance))
+        (0..draft.part_count())
+            .map(move |part| draft.part(part, &replica, [0, version], &frame, variance))
     }
 }
 
@@ -125,17 +158,37 @@ struct DraftPatch {
 
 impl DraftPatch {
     fn part_count(&self) -> u32 {
-        let lists = [&self.removed_faces, &self.set, &self.faces, &self.removed_vertices];
-        (lists.map(Vec::len).iter().sum::<usize>().div_ceil(OF_A_PART) as u32).max(1)
+        let lists = [
+            &self.removed_faces,
+            &self.set,
+            &self.faces,
+            &self.removed_vertices,
+        ];
+        (lists
+            .map(Vec::len)
+            .iter()
+            .sum::<usize>()
+            .div_ceil(OF_A_PART) as u32)
+            .max(1)
     }
 
     /// The four lists one after the other, cut into parts: so a face comes after its corners, and a vertex goes after all
     /// faces that used it.
-    fn part(&self, part: u32, replica: &MeshVersion, [base, version]: [u64; 2], frame: &str, scan: f32) -> MeshPatch {
+    fn part(
+        &self,
+        part: u32,
+        replica: &MeshVersion,
+        [base, version]: [u64; 2],
+        frame: &str,
+        scan: f32,
+    ) -> MeshPatch {
         let (mut from, mut to) = (part as usize * OF_A_PART, (part as usize + 1) * OF_A_PART);
         let mut cut = |list: &[u32]| {
             let ours = list[from.min(list.len())..to.min(list.len())].to_vec();
-            (from, to) = (from.saturating_sub(list.len()), to.saturating_sub(list.len()));
+            (from, to) = (
+                from.saturating_sub(list.len()),
+                to.saturating_sub(list.len()),
+            );
             ours
         };
         let [vertex_count, face_count] = replica.counts;
@@ -154,14 +207,27 @@ impl DraftPatch {
             face_count,
             ..MeshPatch::default()
         };
-        for (vertex, (position, support)) in
-            message.vertices.iter().filter_map(|&vertex| Some((vertex, replica.vertex(vertex)?)))
+        for (vertex, (position, support)) in message
+            .vertices
+            .iter()
+            .filter_map(|&vertex| Some((vertex, replica.vertex(vertex)?)))
         {
-            message.positions.extend(position.coords.iter().map(|x| *x as f32));
-            message.variance.push(if support == Support::Scan { scan } else { replica.variance(vertex) });
+            message
+                .positions
+                .extend(position.coords.iter().map(|x| *x as f32));
+            message.variance.push(if support == Support::Scan {
+                scan
+            } else {
+                replica.variance(vertex)
+            });
             message.support.push(number_of(support));
         }
-        message.corners = message.faces.iter().filter_map(|&face| replica.face(face)).flatten().collect();
+        message.corners = message
+            .faces
+            .iter()
+            .filter_map(|&face| replica.face(face))
+            .flatten()
+            .collect();
         message
     }
 }

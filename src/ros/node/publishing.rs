@@ -27,16 +27,26 @@ impl RefinementWorker {
         if let Err(
             TrySendError::Full(FeatureInput::Probed(changes))
             | TrySendError::Disconnected(FeatureInput::Probed(changes)),
-        ) = self.features.try_send(FeatureInput::Probed(std::mem::take(&mut self.session.probed)))
-        {
+        ) = self.features.try_send(FeatureInput::Probed(std::mem::take(
+            &mut self.session.probed,
+        ))) {
             self.session.probed = changes;
         }
     }
 
     pub(super) fn publish_mismatch(&mut self, update: &Update) {
-        let Some(tip) = self.session.engine.refiner().contact().map(|contact| contact.tip) else { return };
+        let Some(tip) = self
+            .session
+            .engine
+            .refiner()
+            .contact()
+            .map(|contact| contact.tip)
+        else {
+            return;
+        };
         let rate_hz = self.mismatch_rate_hz;
-        let is_due = rate_hz <= 0.0 || tip.stamp_ns.saturating_sub(self.mismatch_ns) as f64 * 1e-9 >= 1.0 / rate_hz;
+        let is_due = rate_hz <= 0.0
+            || tip.stamp_ns.saturating_sub(self.mismatch_ns) as f64 * 1e-9 >= 1.0 / rate_hz;
         if !is_due {
             return;
         }
@@ -60,7 +70,9 @@ impl RefinementWorker {
             rotational: vector(&of(|found| found.rotational)),
             signed_distance: found.map_or(f64::NAN, |found| found.distance),
         };
-        self.setup.shared.offer(&self.view, ViewInput::Mismatch(message));
+        self.setup
+            .shared
+            .offer(&self.view, ViewInput::Mismatch(message));
         let now = self.setup.clock.now();
         if now.saturating_duration_since(self.tip_published) >= TIP_EVERY {
             self.tip_published = now;
@@ -73,10 +85,19 @@ impl RefinementWorker {
         let radius = self.setup.scene.tip_params().radius;
         let closest = refiner.closest_face(&centre, TIP_REACH).map(|hit| {
             let off: Vector3<f64> = centre - hit.point;
-            let side = if off.dot(&refiner.mesh().normal(hit.face)) < 0.0 { -1.0 } else { 1.0 };
+            let side = if off.dot(&refiner.mesh().normal(hit.face)) < 0.0 {
+                -1.0
+            } else {
+                1.0
+            };
             (hit.point, side * off.norm() - radius)
         });
-        let tip = LastTip { stamp_ns, centre, radius, closest };
+        let tip = LastTip {
+            stamp_ns,
+            centre,
+            radius,
+            closest,
+        };
         self.setup.shared.offer(&self.view, ViewInput::Tip(tip));
     }
 
@@ -85,18 +106,23 @@ impl RefinementWorker {
         let is_idle = self.setup.clock.since(self.sampled) >= TORN_AFTER;
         while let Some(edits) = self.unsent.take().or_else(|| self.filled(is_idle)) {
             let complete = edits.is_complete.then_some(edits.version);
-            if let Err(TrySendError::Full(ViewInput::Edits(back))) = self.view.try_send(ViewInput::Edits(edits)) {
+            if let Err(TrySendError::Full(ViewInput::Edits(back))) =
+                self.view.try_send(ViewInput::Edits(edits))
+            {
                 self.unsent = Some(back);
                 return;
             }
-            complete.into_iter().for_each(|version| self.setup.shared.mesh.announce(version));
+            complete
+                .into_iter()
+                .for_each(|version| self.setup.shared.mesh.announce(version));
         }
     }
 
     /// The next changes, when one of those that go round is here and anything has changed.
     fn filled(&mut self, is_idle: bool) -> Option<Box<Edits>> {
         let edits_now = self.session.engine.edits();
-        let is_sent = self.session.sent_version == self.session.version && self.session.sent_edits == edits_now;
+        let is_sent = self.session.sent_version == self.session.version
+            && self.session.sent_edits == edits_now;
         if is_sent {
             return None;
         }
@@ -112,7 +138,8 @@ impl RefinementWorker {
             return None;
         }
         if edits.is_complete {
-            (self.session.sent_version, self.session.sent_edits) = (self.session.version, edits_now);
+            (self.session.sent_version, self.session.sent_edits) =
+                (self.session.version, edits_now);
         }
         Some(edits)
     }

@@ -62,7 +62,8 @@ impl ArrivedMessage {
     }
 
     fn stamp_ns(&self) -> Option<i64> {
-        let (Self::Pose(PoseStamped { header, .. }) | Self::Wrench(WrenchStamped { header, .. })) = self;
+        let (Self::Pose(PoseStamped { header, .. }) | Self::Wrench(WrenchStamped { header, .. })) =
+            self;
         stamp_ns(&header.stamp)
     }
 }
@@ -125,16 +126,29 @@ impl RefinementWorker {
         stops: Arc<StopState>,
     ) -> Self {
         let now = setup.clock.now();
-        let (object, tool, sensor) =
-            (setup.shared.frame.clone(), setup.tool.clone(), format!("{}_sensor", setup.source));
+        let (object, tool, sensor) = (
+            setup.shared.frame.clone(),
+            setup.tool.clone(),
+            format!("{}_sensor", setup.source),
+        );
         Self {
             mismatch_rate_hz: setup.shared.parameters().double("mismatch_rate_hz"),
             side_work: SideWork::on(setup.clock.clone()),
             taking_out: None,
             variance: VarianceWork::default(),
             doubts: InputDoubts::on(&setup.clock),
-            moving: setup.pose_frames.as_ref().map(|[frame, base]| MovingFrame::new(frame, base)),
-            resolver: FrameResolver::new(FrameNames { object, tool, sensor }, setup.scene.placement()),
+            moving: setup
+                .pose_frames
+                .as_ref()
+                .map(|[frame, base]| MovingFrame::new(frame, base)),
+            resolver: FrameResolver::new(
+                FrameNames {
+                    object,
+                    tool,
+                    sensor,
+                },
+                setup.scene.placement(),
+            ),
             setup,
             port,
             view,
@@ -204,10 +218,18 @@ impl RefinementWorker {
             }
             Arrival::Unreadable(topic, why) => self.count_unreadable(topic, &why),
             Arrival::Call(call) => self.call(call),
-            Arrival::SetParameter(name, value, reply) => reply.send(self.set_parameter(&name, &value)),
+            Arrival::SetParameter(name, value, reply) => {
+                reply.send(self.set_parameter(&name, &value))
+            }
             Arrival::Matched(endpoint) => self.note_endpoint(endpoint),
-            Arrival::Viewer => self.setup.shared.has_new_viewer.store(true, Ordering::Relaxed),
-            Arrival::Evidence(reply) => reply.send(self.session.engine.copy_patcher().ok().flatten()),
+            Arrival::Viewer => self
+                .setup
+                .shared
+                .has_new_viewer
+                .store(true, Ordering::Relaxed),
+            Arrival::Evidence(reply) => {
+                reply.send(self.session.engine.copy_patcher().ok().flatten())
+            }
             Arrival::Replay(step, reply) => reply.send(self.replay_step(step)),
             Arrival::Shutdown => return ControlFlow::Break(()),
         }
@@ -226,11 +248,18 @@ impl RefinementWorker {
     }
 
     fn transforms(&mut self, message: &TFMessage, is_static: bool) {
-        let links: Vec<FrameTransform> = message.transforms.iter().filter_map(frame_transform).collect();
+        let links: Vec<FrameTransform> = message
+            .transforms
+            .iter()
+            .filter_map(frame_transform)
+            .collect();
         let frames = &mut self.resolver.frames;
         let refused = match &mut self.moving {
             Some(moving) => moving.push(frames, &links, is_static),
-            None => links.iter().filter(|link| !frames.insert(link, is_static)).count() as u64,
+            None => links
+                .iter()
+                .filter(|link| !frames.insert(link, is_static))
+                .count() as u64,
         };
         let refused = refused + (message.transforms.len() - links.len()) as u64;
         (0..refused).for_each(|_| self.session.counters.refuse("bad_transform"));
@@ -272,17 +301,23 @@ impl RefinementWorker {
     /// Tries again what waits for a transform; gives up what has waited for too long.
     fn retry_waiting(&mut self) {
         let now = self.setup.clock.now();
-        let longest = Duration::from_secs_f64(self.setup.shared.parameters().double("stale_ms") / 1e3);
+        let longest =
+            Duration::from_secs_f64(self.setup.shared.parameters().double("stale_ms") / 1e3);
         for stream in 0..2 {
             while let Some((message, at)) = self.waiting[stream].pop_front() {
-                let Some(message) = self.place(message, at) else { continue };
+                let Some(message) = self.place(message, at) else {
+                    continue;
+                };
                 if now.saturating_duration_since(at) <= longest {
                     self.waiting[stream].push_front((message, at));
                     break;
                 }
                 self.session.counters.refuse("transform");
-                self.lost_transform =
-                    Some((now, "no transform of a moving frame has come up to the stamps of the messages".to_owned()));
+                self.lost_transform = Some((
+                    now,
+                    "no transform of a moving frame has come up to the stamps of the messages"
+                        .to_owned(),
+                ));
             }
         }
     }
@@ -323,7 +358,12 @@ impl RefinementWorker {
         let placed = self.resolver.placed(message);
         self.session.input.message(&placed);
         let is_taken = self.session.sync.push(placed);
-        if self.session.epoch.note(stream, message.stamp_ns(), is_taken, self.session.sync.newest_ns()) {
+        if self.session.epoch.note(
+            stream,
+            message.stamp_ns(),
+            is_taken,
+            self.session.sync.newest_ns(),
+        ) {
             warn!("the clock of both streams was set back: they are taken up where they are now");
             self.resolver.frames.forget_moving();
         }
@@ -348,7 +388,9 @@ impl RefinementWorker {
         let answer = self.session.engine.answer(sample);
         let answered = self.setup.clock.now();
         if let Some(at) = at {
-            self.session.latencies.record(answered.saturating_duration_since(at));
+            self.session
+                .latencies
+                .record(answered.saturating_duration_since(at));
         }
         self.sampled = begun;
         match answer {
@@ -362,7 +404,8 @@ impl RefinementWorker {
                 self.publish_mismatch(&update);
                 let following = self.setup.clock.now();
                 let followed = self.session.engine.follow();
-                let work = answered.saturating_duration_since(begun) + self.setup.clock.since(following);
+                let work =
+                    answered.saturating_duration_since(begun) + self.setup.clock.since(following);
                 self.session.pushes.record(work);
                 self.note_patch_behind(sample.stamp_ns);
                 match followed {
@@ -376,7 +419,9 @@ impl RefinementWorker {
     }
 
     fn note_patch_behind(&mut self, stamp_ns: i64) {
-        let Some(until_ns) = self.session.engine.patched_until_ns() else { return };
+        let Some(until_ns) = self.session.engine.patched_until_ns() else {
+            return;
+        };
         let behind = Duration::from_nanos(stamp_ns.saturating_sub(until_ns).max(0) as u64);
         self.session.behind.record(behind);
         self.session.behind_lately.record(behind);
@@ -390,7 +435,8 @@ impl RefinementWorker {
     /// Another state of the mesh has another version; touches that are new go to the features.
     fn note_changes(&mut self) {
         let edits = self.session.engine.edits();
-        self.session.version += u64::from(std::mem::replace(&mut self.session.edits, edits) != edits);
+        self.session.version +=
+            u64::from(std::mem::replace(&mut self.session.edits, edits) != edits);
         if let Some(changes) = self.session.engine.take_probed() {
             self.session.probed.extend(changes);
             self.send_probed();
@@ -406,7 +452,11 @@ impl RefinementWorker {
             if self.fault.is_none() && rested >= RESTS_AFTER {
                 // the mesh goes on to what the patch knows by then: what is shown is not left behind
                 let engine = &mut self.session.engine;
-                match if rested >= SETTLES_AFTER { engine.settle().map(drop) } else { engine.rest() } {
+                match if rested >= SETTLES_AFTER {
+                    engine.settle().map(drop)
+                } else {
+                    engine.rest()
+                } {
                     Ok(()) => self.note_changes(),
                     Err(error) => self.fail(&error),
                 }
@@ -421,9 +471,15 @@ impl RefinementWorker {
             }
         }
         // of a session that is replayed the streams rest when the replay does
-        if now.saturating_duration_since(self.diagnosed) >= DIAGNOSTICS_EVERY && !self.session.keeping.is_replayed() {
+        if now.saturating_duration_since(self.diagnosed) >= DIAGNOSTICS_EVERY
+            && !self.session.keeping.is_replayed()
+        {
             self.diagnosed = now;
-            self.doubts.look(&self.setup, &self.session.input, self.session.counters.accepted);
+            self.doubts.look(
+                &self.setup,
+                &self.session.input,
+                self.session.counters.accepted,
+            );
             self.publish_diagnostics();
         }
     }

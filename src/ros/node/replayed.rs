@@ -9,7 +9,8 @@ use crate::ros::port::{Arrival, Call, ReplayStep};
 use crate::session::{EvidenceSource, Removal, StrokeChange};
 
 /// What calls are answered.
-pub(super) const REPLAYED: &str = "this is the replay of a session, in which nothing can be changed";
+pub(super) const REPLAYED: &str =
+    "this is the replay of a session, in which nothing can be changed";
 
 impl RefinementWorker {
     /// Refuses a call.
@@ -31,7 +32,10 @@ impl RefinementWorker {
             return Err("this session is not replayed".to_owned());
         }
         match step {
-            ReplayStep::Again => self.begin_again().map(drop).map_err(|error| error.to_string()),
+            ReplayStep::Again => self
+                .begin_again()
+                .map(drop)
+                .map_err(|error| error.to_string()),
             ReplayStep::End => {
                 self.finish_samples();
                 self.change_strokes_as_recorded(ReplayedSession::next_change_at_end);
@@ -41,13 +45,28 @@ impl RefinementWorker {
     }
 
     /// Makes the changes of strokes that are next.
-    fn change_strokes_as_recorded(&mut self, mut next: impl FnMut(&mut ReplayedSession) -> Option<StrokeChange>) {
+    fn change_strokes_as_recorded(
+        &mut self,
+        mut next: impl FnMut(&mut ReplayedSession) -> Option<StrokeChange>,
+    ) {
         while let Keeping::Replayed(replayed) = &mut self.session.keeping {
             let Some(change) = next(replayed) else { return };
             let done = match change {
-                StrokeChange::Undo(_) => self.session.engine.undo().map(drop).map_err(|error| error.to_string()),
-                StrokeChange::Redo(_) => self.session.engine.redo().map(drop).map_err(|error| error.to_string()),
-                StrokeChange::TakeOut(removal) | StrokeChange::PutBack(removal) => self.remake_as_recorded(removal),
+                StrokeChange::Undo(_) => self
+                    .session
+                    .engine
+                    .undo()
+                    .map(drop)
+                    .map_err(|error| error.to_string()),
+                StrokeChange::Redo(_) => self
+                    .session
+                    .engine
+                    .redo()
+                    .map(drop)
+                    .map_err(|error| error.to_string()),
+                StrokeChange::TakeOut(removal) | StrokeChange::PutBack(removal) => {
+                    self.remake_as_recorded(removal)
+                }
             };
             match done {
                 Ok(()) => self.session.version += 1,
@@ -58,9 +77,14 @@ impl RefinementWorker {
 
     /// Makes the evidence again with or without a stroke, as the changes until then have it. Samples wait meanwhile.
     fn remake_as_recorded(&mut self, removal: Removal) -> Result<(), String> {
-        let Keeping::Replayed(replayed) = &self.session.keeping else { return Ok(()) };
+        let Keeping::Replayed(replayed) = &self.session.keeping else {
+            return Ok(());
+        };
         let engine = &mut self.session.engine;
-        let replay = engine.begin_replay().map_err(|error| error.to_string())?.ok_or(NO_PATCH)?;
+        let replay = engine
+            .begin_replay()
+            .map_err(|error| error.to_string())?
+            .ok_or(NO_PATCH)?;
         let (recording, topics) = replayed.recording();
         let source = EvidenceSource {
             recording,
@@ -69,7 +93,12 @@ impl RefinementWorker {
             sync: self.setup.scene.sync_params(),
             until_ns: removal.after_ns,
         };
-        let evidence = source.replayed(&replayed.changes_so_far(), replay).map_err(|error| error.to_string())?;
-        engine.end_replay(Some(evidence)).and_then(|_| engine.catch_up()).map_err(|error| error.to_string())
+        let evidence = source
+            .replayed(&replayed.changes_so_far(), replay)
+            .map_err(|error| error.to_string())?;
+        engine
+            .end_replay(Some(evidence))
+            .and_then(|_| engine.catch_up())
+            .map_err(|error| error.to_string())
     }
 }

@@ -59,7 +59,13 @@ impl Edits {
         stamp_ns: i64,
         may_be_torn: bool,
     ) -> Result<(), LiveError> {
-        let Self { vertices, faces, tiles, taken, .. } = self;
+        let Self {
+            vertices,
+            faces,
+            tiles,
+            taken,
+            ..
+        } = self;
         vertices.clear();
         faces.clear();
         tiles.clear();
@@ -82,7 +88,9 @@ impl Edits {
         }
         for &face in &taken.faces {
             note(face);
-            let corners = mesh.has_face(face).then(|| mesh.corners(face).map(|VertexId(corner)| corner));
+            let corners = mesh
+                .has_face(face)
+                .then(|| mesh.corners(face).map(|VertexId(corner)| corner));
             faces.push((face.0, corners));
         }
         self.is_complete = is_all && (may_be_torn || engine.is_whole());
@@ -166,7 +174,8 @@ impl MeshVersion {
             }
             let was = std::mem::replace(&mut self.corners[at], corners.unwrap_or(NO_FACE));
             let was = (was != NO_FACE).then_some(was);
-            self.counts[1] = self.counts[1] + u32::from(corners.is_some()) - u32::from(was.is_some());
+            self.counts[1] =
+                self.counts[1] + u32::from(corners.is_some()) - u32::from(was.is_some());
             for vertex in corners.into_iter().flatten() {
                 self.make_room(vertex);
                 let uses = &mut self.uses[vertex as usize];
@@ -186,7 +195,8 @@ impl MeshVersion {
             }
         }
         if edits.is_complete {
-            (self.version, self.shape_version, self.stamp_ns) = (edits.version, edits.version, edits.stamp_ns);
+            (self.version, self.shape_version, self.stamp_ns) =
+                (edits.version, edits.version, edits.stamp_ns);
         }
         turned
     }
@@ -194,9 +204,15 @@ impl MeshVersion {
     /// Takes variances up; which vertices have others now.
     pub fn apply_variances(&mut self, variances: &Variances) -> Vec<u32> {
         self.version = variances.version;
-        let known = variances.of.iter().filter(|(vertex, _)| self.vertex(*vertex).is_some()).copied();
+        let known = variances
+            .of
+            .iter()
+            .filter(|(vertex, _)| self.vertex(*vertex).is_some())
+            .copied();
         let known: Vec<_> = known.collect();
-        known.iter().for_each(|&(vertex, variance)| self.variance[vertex as usize] = variance);
+        known
+            .iter()
+            .for_each(|&(vertex, variance)| self.variance[vertex as usize] = variance);
         known.into_iter().map(|(vertex, _)| vertex).collect()
     }
 
@@ -224,19 +240,26 @@ impl MeshVersion {
 
     /// Variance along the normal of a vertex that was touched, m²; NaN where it is not known.
     pub fn variance(&self, vertex: u32) -> f32 {
-        self.variance.get(vertex as usize).copied().unwrap_or(f32::NAN)
+        self.variance
+            .get(vertex as usize)
+            .copied()
+            .unwrap_or(f32::NAN)
     }
 
     /// The vertices that do not rest on the scan: number, place, m, and what it rests on.
     pub fn touched(&self) -> impl Iterator<Item = (u32, Point3<f64>, Support)> + '_ {
-        let all = (0..self.positions.len() as u32).filter_map(|vertex| Some((vertex, self.vertex(vertex)?)));
+        let all = (0..self.positions.len() as u32)
+            .filter_map(|vertex| Some((vertex, self.vertex(vertex)?)));
         all.filter(|(_, (_, support))| *support != Support::Scan)
             .map(|(vertex, (place, support))| (vertex, place, support))
     }
 
     /// Corners of a face; `None` where there is none.
     pub fn face(&self, face: u32) -> Option<[u32; 3]> {
-        self.corners.get(face as usize).copied().filter(|corners| *corners != NO_FACE)
+        self.corners
+            .get(face as usize)
+            .copied()
+            .filter(|corners| *corners != NO_FACE)
     }
 
     /// As a mesh of its own: vertices keep their numbers, faces their order.
@@ -244,7 +267,12 @@ impl MeshVersion {
     /// # Errors
     /// [`MeshError`], when faces name vertices that are not there yet.
     pub fn mesh(&self) -> Result<TriMesh, MeshError> {
-        let faces = self.corners.iter().copied().filter(|corners| *corners != NO_FACE).collect();
+        let faces = self
+            .corners
+            .iter()
+            .copied()
+            .filter(|corners| *corners != NO_FACE)
+            .collect();
         TriMesh::new(self.positions.clone(), faces)
     }
 }
@@ -281,7 +309,13 @@ impl MeshReplica {
     /// The scan, before anything was touched, in no session yet.
     pub fn new(clock: Clock, scan: &TriMesh) -> Self {
         let mesh = Arc::new(MeshVersion::of(scan, ""));
-        let state = ReplicaState { mesh, session: 0, is_complete: true, is_closed: false, waiting: Vec::new() };
+        let state = ReplicaState {
+            mesh,
+            session: 0,
+            is_complete: true,
+            is_closed: false,
+            waiting: Vec::new(),
+        };
         Self {
             clock,
             state: Mutex::new(state),
@@ -370,7 +404,8 @@ impl MeshReplica {
 
     fn answer(&self, state: &mut ReplicaState) {
         self.version.store(state.mesh.version, Ordering::Relaxed);
-        self.shape_version.store(state.mesh.shape_version, Ordering::Relaxed);
+        self.shape_version
+            .store(state.mesh.shape_version, Ordering::Relaxed);
         if !state.is_complete {
             return;
         }
@@ -379,7 +414,10 @@ impl MeshReplica {
             let is_there = *wanted <= revision;
             if is_there {
                 // who asked may have gone
-                drop(reply.try_send(Snapshot { mesh: Arc::clone(mesh), _working: self.clock.begin_work() }));
+                drop(reply.try_send(Snapshot {
+                    mesh: Arc::clone(mesh),
+                    _working: self.clock.begin_work(),
+                }));
             }
             !is_there
         });
@@ -408,7 +446,13 @@ mod tests {
     /// A strip of triangles between two rows of `columns` vertices.
     fn strip(columns: u32) -> TriMesh {
         let at = |i: u32| Point3::new(f64::from(i / 2), f64::from(i % 2), 0.0);
-        let faces = (0..2 * columns - 2).map(|i| if i % 2 == 0 { [i, i + 2, i + 1] } else { [i, i + 1, i + 2] });
+        let faces = (0..2 * columns - 2).map(|i| {
+            if i % 2 == 0 {
+                [i, i + 2, i + 1]
+            } else {
+                [i, i + 1, i + 2]
+            }
+        });
         TriMesh::new((0..2 * columns).map(at).collect(), faces.collect()).unwrap()
     }
 
@@ -423,26 +467,53 @@ mod tests {
     fn every_change_of_the_mesh_is_in_it() {
         let scan = strip(1000);
         let mut replica = MeshVersion::of(&scan, "some");
-        let moved = |i: u32, step: u32| Point3::new(f64::from(i), f64::from(step), f64::from(i * step) * 0.1);
+        let moved = |i: u32, step: u32| {
+            Point3::new(f64::from(i), f64::from(step), f64::from(i * step) * 0.1)
+        };
         for step in 1..=3 {
             let place = |i: u32| Some((moved(i, step), Support::Touched));
             let vertices: Vec<_> = (0..2000).map(|i| (i, place(i))).collect();
             let mut edits = edits(&vertices, &[]);
             (edits.version, edits.is_complete) = (u64::from(step), step == 3);
             replica.apply(&edits);
-            assert!((0..2000).all(|i| replica.vertex(i) == place(i)), "step {step}");
+            assert!(
+                (0..2000).all(|i| replica.vertex(i) == place(i)),
+                "step {step}"
+            );
             // what is not complete is no version
             assert_eq!(replica.version, if step == 3 { 3 } else { 1 });
         }
-        let faces: Vec<_> = scan.faces().map(|(_, corners)| corners.map(|v| v.0)).collect();
+        let faces: Vec<_> = scan
+            .faces()
+            .map(|(_, corners)| corners.map(|v| v.0))
+            .collect();
         assert!((0..1998).all(|face| replica.face(face) == Some(faces[face as usize])));
-        assert_eq!((replica.counts, replica.slots()), ([2000, 1998], [2000, 1998]));
+        assert_eq!(
+            (replica.counts, replica.slots()),
+            ([2000, 1998], [2000, 1998])
+        );
         // the first vertex goes with its face, and one comes far beyond the last
         let new = (Point3::new(7.0, 8.0, 9.0), Support::Scan);
-        replica.apply(&edits(&[(0, None), (2500, Some(new))], &[(0, None), (2100, Some([1, 2, 2500]))]));
-        assert_eq!((replica.vertex(0), replica.vertex(2400), replica.vertex(2500)), (None, None, Some(new)));
-        assert_eq!((replica.face(0), replica.face(2050), replica.face(2100)), (None, None, Some([1, 2, 2500])));
-        assert_eq!((replica.counts, replica.slots()), ([2000, 1998], [2501, 2101]));
+        replica.apply(&edits(
+            &[(0, None), (2500, Some(new))],
+            &[(0, None), (2100, Some([1, 2, 2500]))],
+        ));
+        assert_eq!(
+            (
+                replica.vertex(0),
+                replica.vertex(2400),
+                replica.vertex(2500)
+            ),
+            (None, None, Some(new))
+        );
+        assert_eq!(
+            (replica.face(0), replica.face(2050), replica.face(2100)),
+            (None, None, Some([1, 2, 2500]))
+        );
+        assert_eq!(
+            (replica.counts, replica.slots()),
+            ([2000, 1998], [2501, 2101])
+        );
     }
 
     fn version(version: u64, is_complete: bool) -> Edits {
@@ -455,7 +526,10 @@ mod tests {
     fn who_reads_waits_for_what_was_announced_and_for_a_complete_state() {
         let replica = MeshReplica::new(Clock::system(), &strip(10));
         let read = |readers: &[Receiver<Snapshot>]| -> Vec<Option<u64>> {
-            readers.iter().map(|reader| reader.try_recv().ok().map(|snapshot| snapshot.version)).collect()
+            readers
+                .iter()
+                .map(|reader| reader.try_recv().ok().map(|snapshot| snapshot.version))
+                .collect()
         };
         assert_eq!(read(&[replica.complete()]), [Some(1)]);
         replica.announce(2);
@@ -468,7 +542,10 @@ mod tests {
         replica.apply(&version(3, false));
         assert_eq!((read(&readers), replica.version()), (vec![None, None], 2));
         replica.apply(&version(3, true));
-        assert_eq!((read(&readers), replica.version()), (vec![None, Some(3)], 3));
+        assert_eq!(
+            (read(&readers), replica.version()),
+            (vec![None, Some(3)], 3)
+        );
         // versions begin anew with a session
         replica.announce_session();
         let of_the_next = [replica.complete()];
@@ -482,21 +559,40 @@ mod tests {
         let replica = MeshReplica::new(Clock::system(), &strip(10));
         let touched = |x: f64| Some((Point3::new(x, 8.0, 9.0), Support::Touched));
         let mut moved = version(2, true);
-        moved.vertices.extend([(0, touched(1.0)), (1, touched(2.0)), (500, touched(3.0))]);
+        moved
+            .vertices
+            .extend([(0, touched(1.0)), (1, touched(2.0)), (500, touched(3.0))]);
         replica.apply(&moved);
-        let numbers: Vec<u32> = replica.now().0.touched().map(|(vertex, ..)| vertex).collect();
+        let numbers: Vec<u32> = replica
+            .now()
+            .0
+            .touched()
+            .map(|(vertex, ..)| vertex)
+            .collect();
         assert_eq!(numbers, [0, 1], "no face uses the last");
         replica.announce(3);
         let waiting = replica.complete();
-        let changed =
-            replica.apply_variances(&Variances { version: 3, of: vec![(0, 1e-10), (1, 4e-10), (500, 1e-10)] });
-        assert_eq!((changed, waiting.try_recv().unwrap().version), (vec![0, 1], 3));
+        let changed = replica.apply_variances(&Variances {
+            version: 3,
+            of: vec![(0, 1e-10), (1, 4e-10), (500, 1e-10)],
+        });
+        assert_eq!(
+            (changed, waiting.try_recv().unwrap().version),
+            (vec![0, 1], 3)
+        );
         assert_eq!((replica.version(), replica.shape_version()), (3, 2));
         let mut again = version(4, true);
         again.vertices.push((1, touched(2.5)));
         replica.apply(&again);
         let (mesh, _) = replica.now();
-        assert_eq!((mesh.variance(0), mesh.variance(1).is_nan(), mesh.variance(7).is_nan()), (1e-10, true, true));
+        assert_eq!(
+            (
+                mesh.variance(0),
+                mesh.variance(1).is_nan(),
+                mesh.variance(7).is_nan()
+            ),
+            (1e-10, true, true)
+        );
         assert_eq!(replica.shape_version(), 4);
     }
 
@@ -505,11 +601,19 @@ mod tests {
         let replica = MeshReplica::new(Clock::system(), &strip(10));
         let before = replica.complete().recv().unwrap();
         let mut moved = version(2, true);
-        moved.vertices.push((0, Some((Point3::new(7.0, 8.0, 9.0), Support::Touched))));
+        moved
+            .vertices
+            .push((0, Some((Point3::new(7.0, 8.0, 9.0), Support::Touched))));
         replica.apply(&moved);
         let after = replica.complete().recv().unwrap();
-        assert_eq!((before.version, before.vertex(0)), (1, Some((Point3::origin(), Support::Scan))));
-        assert_eq!((after.version, after.vertex(0)), (2, Some((Point3::new(7.0, 8.0, 9.0), Support::Touched))));
+        assert_eq!(
+            (before.version, before.vertex(0)),
+            (1, Some((Point3::origin(), Support::Scan)))
+        );
+        assert_eq!(
+            (after.version, after.vertex(0)),
+            (2, Some((Point3::new(7.0, 8.0, 9.0), Support::Touched)))
+        );
     }
 
     #[test]
@@ -520,6 +624,9 @@ mod tests {
         replica.close();
         assert!(waiting.recv().is_err() && replica.complete().recv().is_err());
         replica.announce(1);
-        assert!(replica.complete().recv().is_ok(), "what is there can be read");
+        assert!(
+            replica.complete().recv().is_ok(),
+            "what is there can be read"
+        );
     }
 }

@@ -133,14 +133,29 @@ impl Prepared {
     pub fn cost(&self, has_arm: bool) -> SceneCost {
         let Self { setup, session } = self;
         let unused = [
-            LeftOut { part: "clock", reason: "the node estimates none" },
-            LeftOut { part: "markers", reason: "poses come as such" },
-            LeftOut { part: "robot", reason: "no arm was asked for" },
+            LeftOut {
+                part: "clock",
+                reason: "the node estimates none",
+            },
+            LeftOut {
+                part: "markers",
+                reason: "poses come as such",
+            },
+            LeftOut {
+                part: "robot",
+                reason: "no arm was asked for",
+            },
         ];
         let unused = if has_arm { &unused[..2] } else { &unused };
         let (scan, tree) = &*setup.scan;
-        let memory = Memory::of(session.engine.refiner().footprint(), scan.bytes() + tree.bytes() + setup.cut.bytes());
-        SceneCost { parts: setup.scene.built(unused, &crate::FEATURES), memory }
+        let memory = Memory::of(
+            session.engine.refiner().footprint(),
+            scan.bytes() + tree.bytes() + setup.cut.bytes(),
+        );
+        SceneCost {
+            parts: setup.scene.built(unused, &crate::FEATURES),
+            memory,
+        }
     }
 
     /// Starts the threads.
@@ -151,28 +166,55 @@ impl Prepared {
     ///
     /// # Errors
     /// [`NodeError`]
-    pub fn start(self, port: Arc<dyn Port>, arrivals: Arrivals, arm: Option<ArmOfNode>) -> Result<Node, NodeError> {
+    pub fn start(
+        self,
+        port: Arc<dyn Port>,
+        arrivals: Arrivals,
+        arm: Option<ArmOfNode>,
+    ) -> Result<Node, NodeError> {
         let Self { setup, session } = self;
         let (folder, name) = (session.folder.path().to_owned(), session.name.clone());
         let (to_view, view_inputs) = sync_channel(VIEW_QUEUE);
         let (to_features, feature_inputs) = sync_channel(FEATURE_QUEUE);
         let (to_spare, spare) = sync_channel(EDITS_ROUND);
         for _ in 0..EDITS_ROUND {
-            to_spare.send(Box::<Edits>::default()).map_err(|_| NodeError::Stopped)?;
+            to_spare
+                .send(Box::<Edits>::default())
+                .map_err(|_| NodeError::Stopped)?;
         }
         let clock = setup.clock.clone();
         let stops = Arc::clone(arrivals.stops());
         // false is what every start allows
-        let _ = stops.allow(&ParameterValue::Bool(setup.shared.parameters().bool(ALLOW_MOTION)));
-        let view = View::new(clock.clone(), Arc::clone(&port), Arc::clone(&setup.shared), to_spare);
-        let features = FeatureWorker::new(clock.clone(), Arc::clone(&setup.shared), to_view.clone(), name);
-        let arm = arm.map(|arm| arm::start(&setup, &port, arm, to_features.clone(), &stops)).transpose()?;
+        let _ = stops.allow(&ParameterValue::Bool(
+            setup.shared.parameters().bool(ALLOW_MOTION),
+        ));
+        let view = View::new(
+            clock.clone(),
+            Arc::clone(&port),
+            Arc::clone(&setup.shared),
+            to_spare,
+        );
+        let features = FeatureWorker::new(
+            clock.clone(),
+            Arc::clone(&setup.shared),
+            to_view.clone(),
+            name,
+        );
+        let arm = arm
+            .map(|arm| arm::start(&setup, &port, arm, to_features.clone(), &stops))
+            .transpose()?;
         let (handle, arm) = arm.unzip();
-        let haptic = RefinementWorker::new(setup, port, session, to_view, to_features, spare, stops).with_arm(handle);
+        let haptic =
+            RefinementWorker::new(setup, port, session, to_view, to_features, spare, stops)
+                .with_arm(handle);
         let view = begin(&clock, "view", move || view.run(&view_inputs))?;
         let features = begin(&clock, "features", move || features.run(&feature_inputs))?;
         let haptic = begin(&clock, "haptic", move || haptic.run(arrivals))?;
-        Ok(Node { haptic, others: arm.into_iter().chain([features, view]).collect(), folder })
+        Ok(Node {
+            haptic,
+            others: arm.into_iter().chain([features, view]).collect(),
+            folder,
+        })
     }
 }
 
@@ -188,7 +230,10 @@ impl Node {
     /// [`NodeError`] when the result was not written, or a thread ended by a fault.
     pub fn join(self) -> Result<NodeEnd, NodeError> {
         let ended = self.haptic.join().map_err(|_| NodeError::Stopped)?;
-        self.others.into_iter().try_for_each(JoinHandle::join).map_err(|_| NodeError::Stopped)?;
+        self.others
+            .into_iter()
+            .try_for_each(JoinHandle::join)
+            .map_err(|_| NodeError::Stopped)?;
         ended
     }
 }

@@ -19,7 +19,9 @@ use crate::live::{Engine, Gate, Latencies, Pace, Quantiles, Renewal, TouchDelta}
 use crate::mesh::TriMesh;
 use crate::reconstruct::Patcher;
 use crate::ros::port::Port;
-use crate::session::{Outcome, OutcomeError, OutcomePlaces, SessionRecord, SessionRecorder, StrokeChanges, Unrecorded};
+use crate::session::{
+    Outcome, OutcomeError, OutcomePlaces, SessionRecord, SessionRecorder, StrokeChanges, Unrecorded,
+};
 use crate::stylus::{Synchroniser, WrenchFrame};
 
 /// What was refused and lost, and how long things took.
@@ -145,11 +147,27 @@ impl NodeSession {
         let parameters = setup.shared.parameters();
         let parent = PathBuf::from(parameters.string("session_folder"));
         let begun = SystemTime::now();
-        let folder = SessionFolder::create(&parent, &name_of(begun))
-            .map_err(|source| NodeError::Folder { path: parent, source })?;
-        SessionRecord::begin(&folder, &setup.scan_path, setup.mesh_unit, &setup.scene_yaml, &setup.topics, begun)?;
+        let folder = SessionFolder::create(&parent, &name_of(begun)).map_err(|source| {
+            NodeError::Folder {
+                path: parent,
+                source,
+            }
+        })?;
+        SessionRecord::begin(
+            &folder,
+            &setup.scan_path,
+            setup.mesh_unit,
+            &setup.scene_yaml,
+            &setup.topics,
+            begun,
+        )?;
         let recorder = SessionRecorder::start(&folder, &setup.topics, &setup.clock)?;
-        Self::of(setup, folder.name().to_owned(), folder, Keeping::Recorded(recorder))
+        Self::of(
+            setup,
+            folder.name().to_owned(),
+            folder,
+            Keeping::Recorded(recorder),
+        )
     }
 
     /// Begins one again that was recorded.
@@ -158,7 +176,11 @@ impl NodeSession {
     ///
     /// # Errors
     /// [`NodeError`]
-    pub fn replayed(setup: &Setup, folder: SessionFolder, replayed: ReplayedSession) -> Result<Self, NodeError> {
+    pub fn replayed(
+        setup: &Setup,
+        folder: SessionFolder,
+        replayed: ReplayedSession,
+    ) -> Result<Self, NodeError> {
         // followers take each run for another session; no folder is called so
         let name = format!("{}#{}", folder.name(), replayed.run());
         Self::of(setup, name, folder, Keeping::Replayed(Box::new(replayed)))
@@ -171,11 +193,18 @@ impl NodeSession {
     pub fn next(&self, setup: &Setup) -> Result<Self, NodeError> {
         match &self.keeping {
             Keeping::Recorded(_) => Self::begin(setup),
-            Keeping::Replayed(replayed) => Self::replayed(setup, self.folder.clone(), replayed.again()),
+            Keeping::Replayed(replayed) => {
+                Self::replayed(setup, self.folder.clone(), replayed.again())
+            }
         }
     }
 
-    fn of(setup: &Setup, name: String, folder: SessionFolder, keeping: Keeping) -> Result<Self, NodeError> {
+    fn of(
+        setup: &Setup,
+        name: String,
+        folder: SessionFolder,
+        keeping: Keeping,
+    ) -> Result<Self, NodeError> {
         let axes = WrenchFrame::default();
         let engine = engine_of(setup, axes)?;
         Ok(Self {
@@ -219,32 +248,65 @@ impl NodeSession {
     /// # Errors
     /// [`NodeError`] when the result could not be written; the recording is ended all the same.
     pub fn end(self, setup: &Setup, mut report: SessionReport) -> Result<SessionReport, NodeError> {
-        let Self { folder, keeping, engine, .. } = self;
-        let Keeping::Recorded(recorder) = keeping else { return Ok(report) };
-        let Unrecorded { messages, reason, .. } = recorder.finish();
+        let Self {
+            folder,
+            keeping,
+            engine,
+            ..
+        } = self;
+        let Keeping::Recorded(recorder) = keeping else {
+            return Ok(report);
+        };
+        let Unrecorded {
+            messages, reason, ..
+        } = recorder.finish();
         report.unrecorded = messages;
         let mut ended = engine.finish()?;
-        let patcher = ended.patcher.take().filter(|_| ended.refiner.counts().contacts > 0);
+        let patcher = ended
+            .patcher
+            .take()
+            .filter(|_| ended.refiner.counts().contacts > 0);
         let [mesh, features, touches] =
             ["refined.ply", "features.json", "touches.csv"].map(|name| folder.path().join(name));
-        let files = ResultFiles { mesh, features: Some(features), touches: Some(touches) };
-        let outcome = files.write(setup, &ended.mesh(), patcher).inspect_err(|_| {
-            if let Some(reason) = &reason {
-                tracing::error!("{messages} messages are not in the session's recording: {reason}");
-            }
-        })?;
+        let files = ResultFiles {
+            mesh,
+            features: Some(features),
+            touches: Some(touches),
+        };
+        let outcome = files
+            .write(setup, &ended.mesh(), patcher)
+            .inspect_err(|_| {
+                if let Some(reason) = &reason {
+                    tracing::error!(
+                        "{messages} messages are not in the session's recording: {reason}"
+                    );
+                }
+            })?;
         report.result = Some(outcome);
-        let text = serde_json::to_string_pretty(&report).expect("numbers and names alone cannot fail");
+        let text =
+            serde_json::to_string_pretty(&report).expect("numbers and names alone cannot fail");
         folder
             .write_text("report.json", &text)
-            .map_err(|source| NodeError::Folder { path: folder.path().to_owned(), source })?;
-        reason.map_or(Ok(report), |reason| Err(NodeError::Unrecorded { count: messages, reason }))
+            .map_err(|source| NodeError::Folder {
+                path: folder.path().to_owned(),
+                source,
+            })?;
+        reason.map_or(Ok(report), |reason| {
+            Err(NodeError::Unrecorded {
+                count: messages,
+                reason,
+            })
+        })
     }
 
     /// Everything that was not taken, by reason; those of poses begin with `pose_`.
     pub fn refused(&self) -> BTreeMap<String, u64> {
-        let mut refused: BTreeMap<_, _> =
-            self.counters.refused.iter().map(|(reason, count)| ((*reason).to_owned(), *count)).collect();
+        let mut refused: BTreeMap<_, _> = self
+            .counters
+            .refused
+            .iter()
+            .map(|(reason, count)| ((*reason).to_owned(), *count))
+            .collect();
         for (counts, prefix) in [(self.sync.counts(), ""), (self.sync.pose_counts(), "pose_")] {
             for (reason, count) in counts.reasons().into_iter().filter(|(_, count)| *count > 0) {
                 *refused.entry(format!("{prefix}{reason}")).or_default() += count;
@@ -257,7 +319,12 @@ impl NodeSession {
     ///
     /// - `gaps`: times that a stream was stale: poses, wrenches.
     pub fn report(&self, setup: &Setup, port: &dyn Port, gaps: [u64; 2]) -> SessionReport {
-        let Self { engine, sync, counters, .. } = self;
+        let Self {
+            engine,
+            sync,
+            counters,
+            ..
+        } = self;
         let counts = engine.refiner().counts();
         SessionReport {
             session: self.name.clone(),
@@ -290,11 +357,23 @@ const ROOM: usize = 1 << 18;
 ///
 /// - `axes`: those of the wrenches.
 fn engine_of(setup: &Setup, axes: WrenchFrame) -> Result<Engine, NodeError> {
-    let Setup { scan, scene, cut, clock, .. } = setup;
+    let Setup {
+        scan,
+        scene,
+        cut,
+        clock,
+        ..
+    } = setup;
     let refine = cut.refine_params(scene.refine_params(axes).ok_or(NodeError::NothingMoves)?);
-    let patch = scene.patcher_params().map(|params| cut.patcher_params(params));
-    let renewal =
-        Renewal::Beside { scan: Arc::clone(scan), pace: Pace::default(), room: ROOM, gate: Gate::open(clock) };
+    let patch = scene
+        .patcher_params()
+        .map(|params| cut.patcher_params(params));
+    let renewal = Renewal::Beside {
+        scan: Arc::clone(scan),
+        pace: Pace::default(),
+        room: ROOM,
+        gate: Gate::open(clock),
+    };
     let mut engine = Engine::new(scan.0.clone(), refine, patch, renewal)?;
     engine.watch();
     engine.keep_strokes();
@@ -327,7 +406,15 @@ impl ResultFiles {
         let (features, touches) = (self.features.as_deref(), self.touches.as_deref());
         let (unit, outside) = (setup.mesh_unit, setup.cut.outside.as_ref());
         let (mesh, scan) = (&self.mesh, &setup.scan_path);
-        let places = OutcomePlaces { mesh, unit, scan, features, touches, outside, must_change: false };
+        let places = OutcomePlaces {
+            mesh,
+            unit,
+            scan,
+            features,
+            touches,
+            outside,
+            must_change: false,
+        };
         Ok(match patcher {
             Some(patcher) => places.write_patched(&setup.scan.0, patcher)?,
             None => places.write_moved(&setup.scan.0, refined)?,
@@ -337,7 +424,9 @@ impl ResultFiles {
 
 /// "2026-11-20T22-14-10Z": sorts by time, and is a file name everywhere.
 fn name_of(time: SystemTime) -> String {
-    DateTime::<Utc>::from(time).format("%Y-%m-%dT%H-%M-%SZ").to_string()
+    DateTime::<Utc>::from(time)
+        .format("%Y-%m-%dT%H-%M-%SZ")
+        .to_string()
 }
 
 #[cfg(test)]

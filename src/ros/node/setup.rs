@@ -37,7 +37,8 @@ pub(crate) struct Setup {
 impl Setup {
     pub fn new(parameters: Parameters, clock: Clock) -> Result<Self, NodeError> {
         let scene_path = Path::new(parameters.string("scene"));
-        let (scene, scene_yaml) = scene_of(scene_path, parameters.double("tip_radius_mm")).map_err(Box::new)?;
+        let (scene, scene_yaml) =
+            scene_of(scene_path, parameters.double("tip_radius_mm")).map_err(Box::new)?;
         let (scan_path, mesh_unit) = match parameters.string("scan") {
             "" => scene.scan_file(scene_path).ok_or(NodeError::NoScan)?,
             path => (PathBuf::from(path), mesh_unit(&parameters)),
@@ -48,12 +49,21 @@ impl Setup {
         }
         let CutScan { mesh, cut } = scene.cut(mesh).map_err(Box::new)?;
         let tree = FaceTree::new(&mesh);
-        let source = if parameters.string("source") == "probe" { "probe" } else { "stylus" };
+        let source = if parameters.string("source") == "probe" {
+            "probe"
+        } else {
+            "stylus"
+        };
         let tool = match parameters.string("tool_frame") {
-            "" => parameters.pose_frames().map_or(source, |[frame, _]| frame).to_owned(),
+            "" => parameters
+                .pose_frames()
+                .map_or(source, |[frame, _]| frame)
+                .to_owned(),
             named => named.to_owned(),
         };
-        let pose_frames = parameters.pose_frames().map(|frames| frames.map(str::to_owned));
+        let pose_frames = parameters
+            .pose_frames()
+            .map(|frames| frames.map(str::to_owned));
         let known = scene.patcher_params().and_then(|params| params.uncertainty);
         let scan_sigma = known.map(|known| known.scan).filter(|sigma| *sigma > 0.0);
         let replica = MeshReplica::new(clock.clone(), &mesh);
@@ -66,7 +76,11 @@ impl Setup {
             scene,
             cut,
             scene_yaml,
-            topics: Topics { pose: format!("/{source}/pose"), wrench: format!("/{source}/wrench"), markers: None },
+            topics: Topics {
+                pose: format!("/{source}/pose"),
+                wrench: format!("/{source}/wrench"),
+                markers: None,
+            },
             source,
             tool,
             pose_frames,
@@ -86,7 +100,9 @@ fn scene_of(path: &Path, radius_mm: f64) -> Result<(Scene, String), SceneError> 
     let radius_mm = Some(radius_mm).filter(|mm| *mm > 0.0);
     scene.tell_radius(&yaml, radius_mm)?;
     scene.validate()?;
-    let Some(mm) = radius_mm else { return Ok((scene, yaml)) };
+    let Some(mm) = radius_mm else {
+        return Ok((scene, yaml));
+    };
     // what the text says, without the files that it names
     let mut expected = Scene::from_yaml(&yaml)?;
     expected.tell_radius(&yaml, radius_mm)?;

@@ -34,7 +34,10 @@ pub struct SideWork {
 impl SideWork {
     /// Nothing yet. Whatever waits does so on `clock`.
     pub fn on(clock: Clock) -> Self {
-        Self { clock, threads: Vec::new() }
+        Self {
+            clock,
+            threads: Vec::new(),
+        }
     }
 
     /// How much is under way now.

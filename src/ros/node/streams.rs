@@ -49,7 +49,9 @@ impl StreamWatch {
 
     /// To be called from time to time; whether the stream is stale.
     pub fn check(&mut self, now: Instant, stale: Duration) -> bool {
-        let is_stale = self.last.is_none_or(|last| now.saturating_duration_since(last) > stale);
+        let is_stale = self
+            .last
+            .is_none_or(|last| now.saturating_duration_since(last) > stale);
         self.gaps += u64::from(is_stale && !self.is_stale);
         self.is_stale = is_stale;
         let over = now.saturating_duration_since(self.since);
@@ -68,8 +70,8 @@ impl StreamWatch {
     /// How far the stamps of this stream are beyond those that come on the other at the same time, s; `None` before both have come.
     pub fn stamped_beyond(&self, other: &Self) -> Option<f64> {
         let ((ours_ns, ours), (theirs_ns, theirs)) = (self.stamped?, other.stamped?);
-        let between =
-            ours.saturating_duration_since(theirs).as_secs_f64() - theirs.saturating_duration_since(ours).as_secs_f64();
+        let between = ours.saturating_duration_since(theirs).as_secs_f64()
+            - theirs.saturating_duration_since(ours).as_secs_f64();
         Some((ours_ns as f64 - theirs_ns as f64) * 1e-9 - between)
     }
 
@@ -102,18 +104,31 @@ impl Epoch {
     /// message after it is to be shifted by another amount.
     ///
     /// - `newest_ns`: of both streams, as kept for good: a stamp that leaps and is given up again is none.
-    pub fn note(&mut self, stream: usize, stamp_ns: i64, is_taken: bool, newest_ns: Option<i64>) -> bool {
+    pub fn note(
+        &mut self,
+        stream: usize,
+        stamp_ns: i64,
+        is_taken: bool,
+        newest_ns: Option<i64>,
+    ) -> bool {
         self.newest_ns = self.newest_ns.max(newest_ns.unwrap_or(0));
         if is_taken {
             self.late = [0; 2];
             return false;
         }
         let is_behind = stamp_ns < self.newest_ns;
-        self.late[stream] = if is_behind { self.late[stream] + 1 } else { self.late[stream] };
+        self.late[stream] = if is_behind {
+            self.late[stream] + 1
+        } else {
+            self.late[stream]
+        };
         if self.late.iter().any(|&late| late < MOST_LATE) {
             return false;
         }
-        let shift_ns = self.newest_ns.saturating_add(BETWEEN_NS).saturating_sub(stamp_ns);
+        let shift_ns = self
+            .newest_ns
+            .saturating_add(BETWEEN_NS)
+            .saturating_sub(stamp_ns);
         self.shift_ns = self.shift_ns.saturating_add(shift_ns);
         self.late = [0; 2];
         self.jumps += 1;
@@ -131,13 +146,21 @@ mod tests {
     fn a_stream_is_stale_after_its_time_and_that_counts_once() {
         let (begun, stale) = (Instant::now(), 100 * MS);
         let mut stream = StreamWatch::new(begun);
-        assert!(stream.check(begun, stale) && stream.gaps == 0, "what never came is no gap");
+        assert!(
+            stream.check(begun, stale) && stream.gaps == 0,
+            "what never came is no gap"
+        );
         for round in 1..=3u32 {
             let came = begun + round * 1000 * MS;
             stream.arrive(came, None, came);
             assert!(!stream.check(came, stale) && !stream.check(came + stale, stale));
-            assert_eq!((stream.gaps, stream.age(came + stale)), (u64::from(round) - 1, Some(stale)));
-            assert!(stream.check(came + stale + MS, stale) && stream.check(came + 3 * stale, stale));
+            assert_eq!(
+                (stream.gaps, stream.age(came + stale)),
+                (u64::from(round) - 1, Some(stale))
+            );
+            assert!(
+                stream.check(came + stale + MS, stale) && stream.check(came + 3 * stale, stale)
+            );
             assert_eq!(stream.gaps, u64::from(round));
         }
     }

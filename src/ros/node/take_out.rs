@@ -22,10 +22,10 @@ const MOST_POINTS: usize = 24;
 pub(super) const MOST_ASKED: usize = 4;
 
 /// What other calls are answered meanwhile.
-pub(super) const BUSY: &str = "a touch is being taken out or put back: call again when that is done";
+pub(super) const BUSY: &str =
+    "a touch is being taken out or put back: call again when that is done";
 pub(super) const NOTHING_TOUCHED: &str = "nothing is touched yet that could be taken out";
-pub(super) const NO_PATCH: &str =
-    "the scene has no patch, so each touch has moved the mesh for good: `~/undo` takes the last ones back";
+pub(super) const NO_PATCH: &str = "the scene has no patch, so each touch has moved the mesh for good: `~/undo` takes the last ones back";
 
 /// A touch that is being taken out or put back.
 pub(super) struct TakingOut {
@@ -51,7 +51,10 @@ pub(super) enum WantedTouch {
 }
 
 pub(super) fn refused(message: String) -> TakeOutTouchResponse {
-    TakeOutTouchResponse { message, ..Default::default() }
+    TakeOutTouchResponse {
+        message,
+        ..Default::default()
+    }
 }
 
 pub(super) fn read<T, E>(received: Result<T, E>) -> Result<T, String> {
@@ -59,7 +62,10 @@ pub(super) fn read<T, E>(received: Result<T, E>) -> Result<T, String> {
 }
 
 pub(super) fn counted_contacts(count: usize) -> String {
-    format!("{count} {}", if count == 1 { "contact" } else { "contacts" })
+    format!(
+        "{count} {}",
+        if count == 1 { "contact" } else { "contacts" }
+    )
 }
 
 /// The touch-down that a request names, ns.
@@ -87,24 +93,44 @@ pub(super) fn touch_of(
         }
         WantedTouch::Near(place, radius) => {
             let far = |touch: &ProbedPoint| (touch.point - place).norm();
-            let within = patcher.probed().iter().map(|touch| (far(touch), touch)).filter(|(far, _)| far <= radius);
+            let within = patcher
+                .probed()
+                .iter()
+                .map(|touch| (far(touch), touch))
+                .filter(|(far, _)| far <= radius);
             // of several as near the last one
-            let nearest = within.min_by(|a, b| a.0.total_cmp(&b.0).then(b.1.stamp_ns.cmp(&a.1.stamp_ns)));
+            let nearest =
+                within.min_by(|a, b| a.0.total_cmp(&b.0).then(b.1.stamp_ns.cmp(&a.1.stamp_ns)));
             let why = || format!("nothing was touched within {:.1} mm of there", radius * 1e3);
             let (_, touch) = nearest.ok_or_else(why)?;
             patcher.stroke(touch.stroke).ok_or(NOTHING_TOUCHED)?
         }
     };
     let touches = touches_of(&patcher, span);
-    Ok((StrokeSpan { until_ns: span.until_ns.min(last_ns.saturating_add(1)), ..span }, touches))
+    Ok((
+        StrokeSpan {
+            until_ns: span.until_ns.min(last_ns.saturating_add(1)),
+            ..span
+        },
+        touches,
+    ))
 }
 
 /// The contacts of a stroke that are kept, in order of time.
 pub(super) fn touches_of(patcher: &Patcher, span: StrokeSpan) -> Vec<ProbedPoint> {
-    patcher.probed().iter().filter(|touch| span.contains(touch.stamp_ns)).copied().collect()
+    patcher
+        .probed()
+        .iter()
+        .filter(|touch| span.contains(touch.stamp_ns))
+        .copied()
+        .collect()
 }
 
-pub(super) fn answer_of(span: StrokeSpan, touches: &[ProbedPoint], message: String) -> TakeOutTouchResponse {
+pub(super) fn answer_of(
+    span: StrokeSpan,
+    touches: &[ProbedPoint],
+    message: String,
+) -> TakeOutTouchResponse {
     let shown = touches.len().min(MOST_POINTS);
     // from the first to the last one, evenly
     let at = |i: usize| i * (touches.len() - 1) / (shown - 1).max(1);

@@ -11,8 +11,8 @@ use tracing::warn;
 use super::refinement::RefinementWorker;
 use super::replayed::REPLAYED;
 use super::take_out::{
-    BUSY, MOST_ASKED, NO_PATCH, NOTHING_TOUCHED, READ_WAIT, Remade, TakingOut, WantedTouch, answer_of,
-    counted_contacts, named, read, refused, touch_of, touches_of,
+    BUSY, MOST_ASKED, NO_PATCH, NOTHING_TOUCHED, READ_WAIT, Remade, TakingOut, WantedTouch,
+    answer_of, counted_contacts, named, read, refused, touch_of, touches_of,
 };
 use crate::reconstruct::{Patcher, StrokeSpan};
 use crate::ros::messages::{TakeOutTouchRequest, TakeOutTouchResponse};
@@ -29,7 +29,11 @@ fn too_many(dropped: u64) -> String {
 
 impl RefinementWorker {
     /// Answers `~/take_out_touch`: now, or when the mesh shows it.
-    pub(super) fn take_out_touch(&mut self, request: &TakeOutTouchRequest, reply: Reply<TakeOutTouchResponse>) {
+    pub(super) fn take_out_touch(
+        &mut self,
+        request: &TakeOutTouchRequest,
+        reply: Reply<TakeOutTouchResponse>,
+    ) {
         if request.preview {
             match self.looking(request) {
                 Ok(look) => {
@@ -45,10 +49,17 @@ impl RefinementWorker {
         let (to, made) = channel();
         match self.remaking(request) {
             Ok(remake) => {
-                if let Err(error) = self.side_work.begin("take out", move || drop(to.send(remake()))) {
+                if let Err(error) = self
+                    .side_work
+                    .begin("take out", move || drop(to.send(remake())))
+                {
                     warn!(%error, "no thread to take a touch out on");
                 }
-                self.taking_out = Some(TakingOut { reply, made, answer: None });
+                self.taking_out = Some(TakingOut {
+                    reply,
+                    made,
+                    answer: None,
+                });
             }
             Err(message) => reply.send(refused(message)),
         }
@@ -61,17 +72,22 @@ impl RefinementWorker {
 
     /// Goes on with what is being taken out, as far as it is made; never waits.
     pub(super) fn go_on_taking_out(&mut self) {
-        let Some(taking_out) = &mut self.taking_out else { return };
+        let Some(taking_out) = &mut self.taking_out else {
+            return;
+        };
         if taking_out.answer.is_none() {
             let made = match taking_out.made.try_recv() {
                 Ok(made) => made,
                 Err(TryRecvError::Empty) => return,
-                Err(TryRecvError::Disconnected) => Err("there was no thread for it: call again".to_owned()),
+                Err(TryRecvError::Disconnected) => {
+                    Err("there was no thread for it: call again".to_owned())
+                }
             };
             match self.put_in_place(made) {
-                Ok(answer) => {
-                    self.taking_out.iter_mut().for_each(|taking_out| taking_out.answer = Some(answer.clone()))
-                }
+                Ok(answer) => self
+                    .taking_out
+                    .iter_mut()
+                    .for_each(|taking_out| taking_out.answer = Some(answer.clone())),
                 Err(message) => self.give_up_taking_out(&message),
             }
         }
@@ -84,24 +100,44 @@ impl RefinementWorker {
 
     /// Answers that it is done.
     fn end_taking_out(&mut self) {
-        if let Some(TakingOut { reply, answer: Some(answer), .. }) = self.taking_out.take() {
-            reply.send(TakeOutTouchResponse { mesh_version: self.session.version, ..answer });
+        if let Some(TakingOut {
+            reply,
+            answer: Some(answer),
+            ..
+        }) = self.taking_out.take()
+        {
+            reply.send(TakeOutTouchResponse {
+                mesh_version: self.session.version,
+                ..answer
+            });
         }
     }
 
     /// Answers that it was not done, unless the evidence is in its place already.
     pub(super) fn give_up_taking_out(&mut self, why: &str) {
-        let Some(TakingOut { reply, answer, .. }) = self.taking_out.take() else { return };
+        let Some(TakingOut { reply, answer, .. }) = self.taking_out.take() else {
+            return;
+        };
         reply.send(match answer {
-            Some(answer) => TakeOutTouchResponse { mesh_version: self.session.version, ..answer },
+            Some(answer) => TakeOutTouchResponse {
+                mesh_version: self.session.version,
+                ..answer
+            },
             None => refused(why.to_owned()),
         });
     }
 
-    fn put_in_place(&mut self, made: Result<Remade, String>) -> Result<TakeOutTouchResponse, String> {
+    fn put_in_place(
+        &mut self,
+        made: Result<Remade, String>,
+    ) -> Result<TakeOutTouchResponse, String> {
         let made = made.and_then(|made| self.check_recorded().map(|()| made));
         let (evidence, made) = match made {
-            Ok(Remade { evidence, change, answer }) => (Some(evidence), Ok((change, answer))),
+            Ok(Remade {
+                evidence,
+                change,
+                answer,
+            }) => (Some(evidence), Ok((change, answer))),
             Err(message) => (None, Err(message)),
         };
         let dropped = self.session.engine.end_replay(evidence).map_err(|error| {
@@ -136,10 +172,16 @@ impl RefinementWorker {
         if self.side_work.count() >= MOST_ASKED {
             return Err(BUSY.to_owned());
         }
-        let out = request.put_back.then(|| self.taken_out(request)).transpose()?;
+        let out = request
+            .put_back
+            .then(|| self.taken_out(request))
+            .transpose()?;
         let wanted = out.is_none().then(|| self.wanted(request)).transpose()?;
         let (copy, setup) = (self.copied_evidence()?, Arc::clone(&self.setup));
-        let (version, until_ns) = (self.session.version, self.session.last_ns.unwrap_or(i64::MIN));
+        let (version, until_ns) = (
+            self.session.version,
+            self.session.last_ns.unwrap_or(i64::MIN),
+        );
         Ok(move || {
             let patcher = read(setup.clock.recv_timeout(&copy, READ_WAIT))?;
             let (span, touches) = match (out, wanted) {
@@ -147,7 +189,10 @@ impl RefinementWorker {
                 (None, wanted) => touch_of(patcher, wanted.as_ref(), until_ns)?,
             };
             let message = counted_contacts(touches.len());
-            Ok(TakeOutTouchResponse { mesh_version: version, ..answer_of(span, &touches, message) })
+            Ok(TakeOutTouchResponse {
+                mesh_version: version,
+                ..answer_of(span, &touches, message)
+            })
         })
     }
 
@@ -163,13 +208,25 @@ impl RefinementWorker {
             return Err(fault.clone());
         }
         self.check_recorded()?;
-        let out = request.put_back.then(|| self.taken_out(request)).transpose()?;
+        let out = request
+            .put_back
+            .then(|| self.taken_out(request))
+            .transpose()?;
         let wanted = out.is_none().then(|| self.wanted(request)).transpose()?;
         let until_ns = self.session.last_ns.ok_or(NOTHING_TOUCHED)?;
         let copy = out.is_none().then(|| self.copied_evidence()).transpose()?;
-        let replay = self.session.engine.begin_replay().map_err(|error| error.to_string())?.ok_or(NO_PATCH)?;
+        let replay = self
+            .session
+            .engine
+            .begin_replay()
+            .map_err(|error| error.to_string())?
+            .ok_or(NO_PATCH)?;
         let recorder = self.session.keeping.recorder().ok_or(REPLAYED)?;
-        let (flushed, recording, setup) = (recorder.flushed(), recorder.recording(), Arc::clone(&self.setup));
+        let (flushed, recording, setup) = (
+            recorder.flushed(),
+            recorder.recording(),
+            Arc::clone(&self.setup),
+        );
         let mut changes: StrokeChanges = self.session.strokes.clone();
         Ok(move || {
             let found = copy.map(|copy| {
@@ -186,20 +243,36 @@ impl RefinementWorker {
             };
             let remade = |change| {
                 changes.push(change);
-                source.replayed(&changes, replay).map_err(|error| error.to_string())
+                source
+                    .replayed(&changes, replay)
+                    .map_err(|error| error.to_string())
             };
             Ok(match (found.transpose()?, out) {
                 (Some((span, touches)), _) => {
-                    let change = StrokeChange::TakeOut(Removal { after_ns: until_ns, stroke: span });
+                    let change = StrokeChange::TakeOut(Removal {
+                        after_ns: until_ns,
+                        stroke: span,
+                    });
                     let message = format!("took out 1 touch: {}", counted_contacts(touches.len()));
-                    Remade { evidence: remade(change)?, change, answer: answer_of(span, &touches, message) }
+                    Remade {
+                        evidence: remade(change)?,
+                        change,
+                        answer: answer_of(span, &touches, message),
+                    }
                 }
                 (None, Some(span)) => {
-                    let change = StrokeChange::PutBack(Removal { after_ns: until_ns, stroke: span });
+                    let change = StrokeChange::PutBack(Removal {
+                        after_ns: until_ns,
+                        stroke: span,
+                    });
                     let evidence = remade(change)?;
                     let touches = touches_of(evidence.patcher(), span);
                     let message = format!("put back 1 touch: {}", counted_contacts(touches.len()));
-                    Remade { evidence, change, answer: answer_of(span, &touches, message) }
+                    Remade {
+                        evidence,
+                        change,
+                        answer: answer_of(span, &touches, message),
+                    }
                 }
                 (None, None) => return Err(NOTHING_TOUCHED.to_owned()),
             })
@@ -208,7 +281,11 @@ impl RefinementWorker {
 
     /// A copy of what was touched, once it is made.
     fn copied_evidence(&mut self) -> Result<Receiver<Patcher>, String> {
-        let copy = self.session.engine.copy_patcher().map_err(|error| error.to_string())?;
+        let copy = self
+            .session
+            .engine
+            .copy_patcher()
+            .map_err(|error| error.to_string())?;
         copy.ok_or_else(|| NOTHING_TOUCHED.to_owned())
     }
 
@@ -241,7 +318,9 @@ impl RefinementWorker {
     fn taken_out(&self, request: &TakeOutTouchRequest) -> Result<StrokeSpan, String> {
         let mut taken_out = self.session.strokes.taken_out();
         match named(request)? {
-            None => taken_out.pop().ok_or_else(|| "no touch is taken out".to_owned()),
+            None => taken_out
+                .pop()
+                .ok_or_else(|| "no touch is taken out".to_owned()),
             Some(stamp_ns) => {
                 let found = taken_out.into_iter().find(|span| span.begins_at(stamp_ns));
                 found.ok_or_else(|| "no touch that is taken out has this stamp".to_owned())

@@ -83,7 +83,9 @@ impl Tiles {
 
     /// Everything is to be sent again.
     pub fn renew(&mut self, replica: &MeshVersion) {
-        (0..replica.slots()[1].div_ceil(FACES_OF_A_TILE).max(self.is_drawn.len() as u32))
+        (0..replica.slots()[1]
+            .div_ceil(FACES_OF_A_TILE)
+            .max(self.is_drawn.len() as u32))
             .for_each(|tile| self.again.push(tile));
     }
 
@@ -153,7 +155,9 @@ impl Tiles {
     ) {
         for _ in 0..most {
             let changed = self.changed.pop();
-            let Some(tile) = changed.or_else(|| self.again.pop()) else { return };
+            let Some(tile) = changed.or_else(|| self.again.pop()) else {
+                return;
+            };
             let at = tile as usize;
             if at >= self.is_drawn.len() {
                 self.is_drawn.resize(at + 1, false);
@@ -182,18 +186,33 @@ fn drawn(tile: u32, replica: &MeshVersion, by: ColourBy, mismatch: &[f32], frame
         id: tile as i32,
         r#type: Marker::TRIANGLE_LIST,
         action: Marker::ADD,
-        scale: Vector3Msg { x: 1.0, y: 1.0, z: 1.0 },
-        color: ColorRGBA { r: 0.7, g: 0.7, b: 0.7, a: 1.0 },
+        scale: Vector3Msg {
+            x: 1.0,
+            y: 1.0,
+            z: 1.0,
+        },
+        color: ColorRGBA {
+            r: 0.7,
+            g: 0.7,
+            b: 0.7,
+            a: 1.0,
+        },
         ..Marker::default()
     };
     for face in tile * FACES_OF_A_TILE..(tile + 1) * FACES_OF_A_TILE {
-        let Some(corners) = replica.face(face) else { continue };
-        let [Some(a), Some(b), Some(c)] = corners.map(|corner| replica.vertex(corner)) else { continue };
+        let Some(corners) = replica.face(face) else {
+            continue;
+        };
+        let [Some(a), Some(b), Some(c)] = corners.map(|corner| replica.vertex(corner)) else {
+            continue;
+        };
         let light = light(&[a.0, b.0, c.0]);
         for (position, support) in [a, b, c] {
             let colour = match by {
                 ColourBy::Touched => of_support(support),
-                ColourBy::Mismatch => of_mismatch(mismatch.get(face as usize).copied().unwrap_or(f32::NAN)),
+                ColourBy::Mismatch => {
+                    of_mismatch(mismatch.get(face as usize).copied().unwrap_or(f32::NAN))
+                }
             };
             let [r, g, b] = colour.map(|x| (x * light) as f32);
             marker.points.push(point(&position));
@@ -208,7 +227,10 @@ fn drawn(tile: u32, replica: &MeshVersion, by: ColourBy, mismatch: &[f32], frame
 
 /// Viewers draw coloured points as they are, without light: it is in the colour.
 fn light([a, b, c]: &[Point3<f64>; 3]) -> f64 {
-    let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
+    let normal = (b - a)
+        .cross(&(c - a))
+        .try_normalize(0.0)
+        .unwrap_or_default();
     AMBIENT + (1.0 - AMBIENT) * normal.dot(&LIGHT).abs().min(1.0)
 }
 
@@ -229,7 +251,11 @@ fn of_mismatch(distance: f32) -> [f64; 3] {
     }
     let share = (f64::from(distance) / FULL_MISMATCH).clamp(-1.0, 1.0);
     let faded = 1.0 - share.abs();
-    if share > 0.0 { [1.0, faded, faded] } else { [faded, faded, 1.0] }
+    if share > 0.0 {
+        [1.0, faded, faded]
+    } else {
+        [faded, faded, 1.0]
+    }
 }
 
 #[cfg(test)]
@@ -241,10 +267,19 @@ mod tests {
 
     #[test]
     fn states_and_the_features_before_them_are_apart_without_red_and_green() {
-        let states = [Support::Scan, Support::Touched, Support::Guessed, Support::Unreachable].map(of_support);
+        let states = [
+            Support::Scan,
+            Support::Touched,
+            Support::Guessed,
+            Support::Unreachable,
+        ]
+        .map(of_support);
         let features = feature_messages::COLOURS.map(|colour| colour.map(f64::from));
-        let colours: Vec<[u8; 3]> =
-            states.iter().chain(&features).map(|colour| colour.map(|x| (255.0 * x).round() as u8)).collect();
+        let colours: Vec<[u8; 3]> = states
+            .iter()
+            .chain(&features)
+            .map(|colour| colour.map(|x| (255.0 * x).round() as u8))
+            .collect();
         assert!(least_difference(&colours) > 23.0);
     }
 
@@ -252,14 +287,26 @@ mod tests {
     #[test]
     fn who_joins_late_is_sent_what_is_not_kept() {
         let corner = |i: u32| Point3::new(f64::from(i), f64::from(i % 2), 0.0);
-        let strip = (0..4 * FACES_OF_A_TILE).map(|i| if i % 2 == 0 { [i, i + 1, i + 2] } else { [i + 1, i, i + 2] });
-        let mesh = TriMesh::new((0..4 * FACES_OF_A_TILE + 2).map(corner).collect(), strip.collect()).unwrap();
+        let strip = (0..4 * FACES_OF_A_TILE).map(|i| {
+            if i % 2 == 0 {
+                [i, i + 1, i + 2]
+            } else {
+                [i + 1, i, i + 2]
+            }
+        });
+        let mesh = TriMesh::new(
+            (0..4 * FACES_OF_A_TILE + 2).map(corner).collect(),
+            strip.collect(),
+        )
+        .unwrap();
         let replica = MeshVersion::of(&mesh, "test");
         let mut tiles = Tiles::all_of(&replica);
         let mut sent = Vec::new();
         let take = |tiles: &mut Tiles, sent: &mut Vec<u32>| {
             let how = (ColourBy::Touched, "object");
-            tiles.take(usize::MAX, Instant::now(), &replica, how, |tile| sent.push(tile.id as u32));
+            tiles.take(usize::MAX, Instant::now(), &replica, how, |tile| {
+                sent.push(tile.id as u32)
+            });
         };
         take(&mut tiles, &mut sent);
         for tile in [2, 2, 0] {
@@ -268,8 +315,9 @@ mod tests {
         }
         assert_eq!(sent.len(), 7);
         for kept in 1..=8 {
-            let lost: Vec<u32> =
-                (0..4).filter(|tile| !sent.iter().rev().take(kept).any(|other| other == tile)).collect();
+            let lost: Vec<u32> = (0..4)
+                .filter(|tile| !sent.iter().rev().take(kept).any(|other| other == tile))
+                .collect();
             let mut again = Vec::new();
             let mut joined = tiles.clone();
             joined.renew_older_than(kept as u64);
@@ -287,10 +335,23 @@ mod tests {
     #[test]
     fn what_has_settled_is_sent_once_more_also_when_it_is_gone() {
         let corner = |i: u32| Point3::new(f64::from(i), f64::from(i % 2), 0.0);
-        let strip = (0..3 * FACES_OF_A_TILE).map(|i| if i % 2 == 0 { [i, i + 1, i + 2] } else { [i + 1, i, i + 2] });
-        let mesh = TriMesh::new((0..3 * FACES_OF_A_TILE + 2).map(corner).collect(), strip.collect()).unwrap();
+        let strip = (0..3 * FACES_OF_A_TILE).map(|i| {
+            if i % 2 == 0 {
+                [i, i + 1, i + 2]
+            } else {
+                [i + 1, i, i + 2]
+            }
+        });
+        let mesh = TriMesh::new(
+            (0..3 * FACES_OF_A_TILE + 2).map(corner).collect(),
+            strip.collect(),
+        )
+        .unwrap();
         let first = TriMesh::new(vec![corner(0), corner(1), corner(2)], vec![[0, 1, 2]]).unwrap();
-        let [whole, none] = [MeshVersion::of(&mesh, "test"), MeshVersion::of(&first, "test")];
+        let [whole, none] = [
+            MeshVersion::of(&mesh, "test"),
+            MeshVersion::of(&first, "test"),
+        ];
         let mut tiles = Tiles::all_of(&whole);
         let begun = Instant::now();
         let mut at = |seconds: u64, replica: &MeshVersion, changed: &[u32]| {
@@ -299,7 +360,9 @@ mod tests {
             tiles.renew_settled(now);
             let mut sent = Vec::new();
             let how = (ColourBy::Touched, "object");
-            tiles.take(usize::MAX, now, replica, how, |tile| sent.push((tile.id, tile.action)));
+            tiles.take(usize::MAX, now, replica, how, |tile| {
+                sent.push((tile.id, tile.action))
+            });
             sent.sort_unstable();
             sent
         };

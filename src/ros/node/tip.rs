@@ -15,43 +15,127 @@ const NEAR: f64 = 0.05;
 const TEXT_HEIGHT: f64 = 12e-3;
 
 /// Ball, text, the arrow to the mesh, and the one onto where to touch next.
-pub fn markers(tip: &LastTip, features: &FeatureArray, next: &NextTouches, frame: &str) -> MarkerArray {
+pub fn markers(
+    tip: &LastTip,
+    features: &FeatureArray,
+    next: &NextTouches,
+    frame: &str,
+) -> MarkerArray {
     let nearest = nearest(tip, features);
-    let base = Marker { header: header(tip.stamp_ns, frame), ns: "tip".to_owned(), ..Marker::default() };
-    let red = ColorRGBA { r: 0.9, g: 0.3, b: 0.2, a: 0.9 };
-    let ball = ball(point(&tip.centre), 2.0 * tip.radius.max(0.5e-3), Marker { color: red, ..base.clone() });
+    let base = Marker {
+        header: header(tip.stamp_ns, frame),
+        ns: "tip".to_owned(),
+        ..Marker::default()
+    };
+    let red = ColorRGBA {
+        r: 0.9,
+        g: 0.3,
+        b: 0.2,
+        a: 0.9,
+    };
+    let ball = ball(
+        point(&tip.centre),
+        2.0 * tip.radius.max(0.5e-3),
+        Marker {
+            color: red,
+            ..base.clone()
+        },
+    );
     let mut place = tip.centre;
     place.z += TEXT_HEIGHT;
-    let words = text(tip, nearest, nearest.is_some_and(|feature| next.contains_key(&feature.id)));
-    let yellow = ColorRGBA { r: 1.0, g: 0.95, b: 0.4, a: 1.0 };
-    let text = letters(&place, words, yellow, Marker { id: 1, ..base.clone() });
+    let words = text(
+        tip,
+        nearest,
+        nearest.is_some_and(|feature| next.contains_key(&feature.id)),
+    );
+    let yellow = ColorRGBA {
+        r: 1.0,
+        g: 0.95,
+        b: 0.4,
+        a: 1.0,
+    };
+    let text = letters(
+        &place,
+        words,
+        yellow,
+        Marker {
+            id: 1,
+            ..base.clone()
+        },
+    );
     let arrow = |id, drawn: Option<([f64; 2], ColorRGBA, [Point3<f64>; 2])>| {
-        let arrow = Marker { id, r#type: Marker::ARROW, ..base.clone() };
+        let arrow = Marker {
+            id,
+            r#type: Marker::ARROW,
+            ..base.clone()
+        };
         match drawn {
-            Some(([x, y], color, ends)) => {
-                Marker { scale: Vector3 { x, y, z: 0.0 }, color, points: ends.iter().map(point).collect(), ..arrow }
-            }
-            None => Marker { action: Marker::DELETE, ..arrow },
+            Some(([x, y], color, ends)) => Marker {
+                scale: Vector3 { x, y, z: 0.0 },
+                color,
+                points: ends.iter().map(point).collect(),
+                ..arrow
+            },
+            None => Marker {
+                action: Marker::DELETE,
+                ..arrow
+            },
         }
     };
     // at the surface it would hide what it points at
     let closest = tip
         .closest
         .filter(|(_, distance)| *distance > tip.radius)
-        .map(|(closest, _)| ([0.5e-3, 1.2e-3], ColorRGBA { r: 0.9, g: 0.9, b: 0.2, a: 0.9 }, [tip.centre, closest]));
+        .map(|(closest, _)| {
+            (
+                [0.5e-3, 1.2e-3],
+                ColorRGBA {
+                    r: 0.9,
+                    g: 0.9,
+                    b: 0.2,
+                    a: 0.9,
+                },
+                [tip.centre, closest],
+            )
+        });
     // onto the place, from outside; where nobody knows what is outside, from the tip
-    let there = nearest.and_then(|feature| next.get(&feature.id)).map(|NextTouch { place, normal }| {
-        let from = if *normal == nalgebra::Vector3::zeros() { tip.centre } else { place + normal * NEXT_LENGTH };
-        ([1.2e-3, 3e-3], ColorRGBA { r: 0.2, g: 0.9, b: 0.4, a: 1.0 }, [from, *place])
-    });
-    MarkerArray { markers: vec![ball, text, arrow(2, closest), arrow(3, there)] }
+    let there =
+        nearest
+            .and_then(|feature| next.get(&feature.id))
+            .map(|NextTouch { place, normal }| {
+                let from = if *normal == nalgebra::Vector3::zeros() {
+                    tip.centre
+                } else {
+                    place + normal * NEXT_LENGTH
+                };
+                (
+                    [1.2e-3, 3e-3],
+                    ColorRGBA {
+                        r: 0.2,
+                        g: 0.9,
+                        b: 0.4,
+                        a: 1.0,
+                    },
+                    [from, *place],
+                )
+            });
+    MarkerArray {
+        markers: vec![ball, text, arrow(2, closest), arrow(3, there)],
+    }
 }
 
 /// Takes all of [`markers`] away.
 pub fn no_markers(frame: &str) -> MarkerArray {
-    let gone =
-        |id| Marker { header: header(0, frame), ns: "tip".to_owned(), id, action: Marker::DELETE, ..Marker::default() };
-    MarkerArray { markers: (0..4).map(gone).collect() }
+    let gone = |id| Marker {
+        header: header(0, frame),
+        ns: "tip".to_owned(),
+        id,
+        action: Marker::DELETE,
+        ..Marker::default()
+    };
+    MarkerArray {
+        markers: (0..4).map(gone).collect(),
+    }
 }
 
 /// Length of the arrow onto the next place, m.
@@ -61,10 +145,14 @@ const NEXT_LENGTH: f64 = 10e-3;
 fn nearest<'a>(tip: &LastTip, features: &'a FeatureArray) -> Option<&'a Feature> {
     let far = |feature: &&Feature| (point_of(&feature.center) - tip.centre).norm();
     let is_asked = |feature: &&Feature| {
-        !feature.diameter.is_nan() || !feature.width.is_nan() || feature.status == Feature::STATUS_FLAGGED
+        !feature.diameter.is_nan()
+            || !feature.width.is_nan()
+            || feature.status == Feature::STATUS_FLAGGED
     };
     let asked = features.features.iter().filter(is_asked);
-    asked.min_by(|a, b| far(a).total_cmp(&far(b))).filter(|feature| far(feature) < NEAR)
+    asked
+        .min_by(|a, b| far(a).total_cmp(&far(b)))
+        .filter(|feature| far(feature) < NEAR)
 }
 
 /// "0.12 mm; hole Ø8.02 ± 0.04; next: green arrow": RViz puts lines 10 mm apart, however small the letters.
@@ -74,5 +162,7 @@ fn text(tip: &LastTip, nearest: Option<&Feature>, has_next: bool) -> String {
         None => "far from the mesh".to_owned(),
     };
     let next = if has_next { "; next: green arrow" } else { "" };
-    nearest.map_or(distance.clone(), |feature| format!("{distance}; {}{next}", label(feature)))
+    nearest.map_or(distance.clone(), |feature| {
+        format!("{distance}; {}{next}", label(feature))
+    })
 }

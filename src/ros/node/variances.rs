@@ -37,7 +37,14 @@ pub fn evaluated(
     (scan, tree): &(TriMesh, FaceTree),
     vertices: &[(u32, Point3<f64>, Support)],
 ) -> Vec<VertexVariance> {
-    let places: Vec<_> = vertices.iter().map(|&(_, place, support)| (place, support)).collect();
+    let places: Vec<_> = vertices
+        .iter()
+        .map(|&(_, place, support)| (place, support))
+        .collect();
     let sigmas = patcher.sigma_at(scan, tree, &places);
-    vertices.iter().zip(sigmas).map(|(&(vertex, ..), sigma)| (vertex, (sigma * sigma) as f32)).collect()
+    vertices
+        .iter()
+        .zip(sigmas)
+        .map(|(&(vertex, ..), sigma)| (vertex, (sigma * sigma) as f32))
+        .collect()
 }

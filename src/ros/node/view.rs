@@ -42,7 +42,12 @@ pub struct View {
 
 impl View {
     /// Shows nothing yet.
-    pub fn new(clock: Clock, port: Arc<dyn Port>, shared: Arc<Shared>, spare: SyncSender<Box<Edits>>) -> Self {
+    pub fn new(
+        clock: Clock,
+        port: Arc<dyn Port>,
+        shared: Arc<Shared>,
+        spare: SyncSender<Box<Edits>>,
+    ) -> Self {
         let (replica, _) = shared.mesh.now();
         Self {
             clock,
@@ -64,20 +69,30 @@ impl View {
     pub fn run(mut self, inputs: &Receiver<ViewInput>) {
         let mut due = self.clock.now();
         loop {
-            match self.clock.recv_timeout(inputs, due.saturating_duration_since(self.clock.now())) {
+            match self
+                .clock
+                .recv_timeout(inputs, due.saturating_duration_since(self.clock.now()))
+            {
                 Ok(input) => self.take(input),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => break,
             }
             if self.clock.now() >= due {
                 // ids fit each other only when all of a change has come
-                let period = Duration::from_secs_f64(1.0 / self.shared.parameters().double("view_rate_hz"));
-                due = self.clock.now() + if self.tick(false) { period.min(CATCH_UP) } else { period };
+                let period =
+                    Duration::from_secs_f64(1.0 / self.shared.parameters().double("view_rate_hz"));
+                due = self.clock.now()
+                    + if self.tick(false) {
+                        period.min(CATCH_UP)
+                    } else {
+                        period
+                    };
             }
         }
         self.tick(true);
         // nobody moves it any more
-        self.port.publish(Publication::Tip(tip::no_markers(&self.shared.frame)));
+        self.port
+            .publish(Publication::Tip(tip::no_markers(&self.shared.frame)));
         self.shared.mesh.close();
     }
 
@@ -86,12 +101,16 @@ impl View {
             ViewInput::Edits(edits) => {
                 self.patches.note(&edits, &self.shared.mesh.apply(&edits));
                 edits.tiles.iter().for_each(|&tile| self.tiles.note(tile));
-                edits.faces.iter().for_each(|(face, _)| self.tiles.forget_mismatch(*face));
+                edits
+                    .faces
+                    .iter()
+                    .for_each(|(face, _)| self.tiles.forget_mismatch(*face));
                 // as many come back as went out
                 let _ = self.spare.try_send(edits);
             }
             ViewInput::Variances(variances) => {
-                self.patches.note_vertices(self.shared.mesh.apply_variances(&variances));
+                self.patches
+                    .note_vertices(self.shared.mesh.apply_variances(&variances));
             }
             ViewInput::Session(replica) => {
                 self.tiles.restart(&replica);
@@ -102,18 +121,28 @@ impl View {
             }
             ViewInput::Mismatch(mismatch) => {
                 if self.colour_by == ColourBy::Mismatch && !mismatch.signed_distance.is_nan() {
-                    self.tiles.note_mismatch(mismatch.face, mismatch.signed_distance, &self.shared.mesh.now().0);
+                    self.tiles.note_mismatch(
+                        mismatch.face,
+                        mismatch.signed_distance,
+                        &self.shared.mesh.now().0,
+                    );
                 }
                 self.port.publish(Publication::Mismatch(mismatch));
             }
             ViewInput::Tip(tip) => self.tip = Some(tip),
             ViewInput::Features(features, next) => {
-                self.port.publish(Publication::Features((*features).clone()));
-                self.port.publish(Publication::FeatureMarkers(feature_messages::markers(&features)));
+                self.port
+                    .publish(Publication::Features((*features).clone()));
+                self.port
+                    .publish(Publication::FeatureMarkers(feature_messages::markers(
+                        &features,
+                    )));
                 (self.features, self.next) = (features, next);
             }
             ViewInput::Resync => self.asked_whole = true,
-            ViewInput::Diagnostics(diagnostics) => self.port.publish(Publication::Diagnostics(*diagnostics)),
+            ViewInput::Diagnostics(diagnostics) => {
+                self.port.publish(Publication::Diagnostics(*diagnostics))
+            }
             ViewInput::Parameters => {
                 let by = colour_by(&self.shared);
                 if std::mem::replace(&mut self.colour_by, by) != by {
@@ -129,7 +158,12 @@ impl View {
     fn tick(&mut self, is_last: bool) -> bool {
         let frame = self.shared.frame.as_str();
         if let Some(tip) = self.tip.take() {
-            self.port.publish(Publication::Tip(tip::markers(&tip, &self.features, &self.next, frame)));
+            self.port.publish(Publication::Tip(tip::markers(
+                &tip,
+                &self.features,
+                &self.next,
+                frame,
+            )));
         }
         let (replica, is_complete) = self.shared.mesh.now();
         if !is_complete {
@@ -140,11 +174,17 @@ impl View {
         }
         if self.whole.is_none() && std::mem::take(&mut self.asked_whole) {
             // the next change leads from what was sent last
-            self.whole = Some(Box::new(self.patches.whole(Arc::clone(&replica), frame.to_owned())));
+            self.whole = Some(Box::new(
+                self.patches.whole(Arc::clone(&replica), frame.to_owned()),
+            ));
         }
         if let Some(whole) = &mut self.whole {
             let parts = whole.by_ref().take(PARTS_AT_ONCE);
-            if parts.map(|part| self.port.publish(Publication::MeshPatch(part))).count() < PARTS_AT_ONCE {
+            if parts
+                .map(|part| self.port.publish(Publication::MeshPatch(part)))
+                .count()
+                < PARTS_AT_ONCE
+            {
                 self.whole = None;
             }
         }
@@ -153,10 +193,23 @@ impl View {
         }
         let now = self.clock.now();
         self.tiles.renew_settled(now);
-        let Self { tiles, colour_by, port, .. } = self;
-        let most = if is_last { usize::MAX } else { TILES_AHEAD.saturating_sub(port.tiles_waiting()) };
-        tiles.take(most, now, &replica, (*colour_by, frame), |tile| port.publish(Publication::Tile(tile)));
-        self.shared.tiles_waiting.store(self.tiles.waiting(), Ordering::Relaxed);
+        let Self {
+            tiles,
+            colour_by,
+            port,
+            ..
+        } = self;
+        let most = if is_last {
+            usize::MAX
+        } else {
+            TILES_AHEAD.saturating_sub(port.tiles_waiting())
+        };
+        tiles.take(most, now, &replica, (*colour_by, frame), |tile| {
+            port.publish(Publication::Tile(tile))
+        });
+        self.shared
+            .tiles_waiting
+            .store(self.tiles.waiting(), Ordering::Relaxed);
         self.tiles.waiting() > 0 || self.whole.is_some() || self.asked_whole
     }
 }

@@ -45,20 +45,32 @@ struct Cancels {
 type Running = Arc<Mutex<Vec<Cancels>>>;
 
 /// The server of the action: one source of goals, one of what is asked of those that run.
-pub(super) fn server(node: &mut Node, exchange: &Arc<Exchange>) -> Result<[PollSource; 2], RosError> {
-    let requests = node.create_action_server::<Action>(PROBE).during("offering an action")?;
+pub(super) fn server(
+    node: &mut Node,
+    exchange: &Arc<Exchange>,
+) -> Result<[PollSource; 2], RosError> {
+    let requests = node
+        .create_action_server::<Action>(PROBE)
+        .during("offering an action")?;
     let running = Running::default();
     let cancels = running.clone();
     let exchange = exchange.clone();
     let goals = source(requests, move |request: ActionServerGoalRequest<Action>| {
         let wanted = ProbeGoal::ours(request.goal.clone());
-        exchange.inbox.call(Call::Arm(ArmOrder::Goal(wanted, goal(request, &exchange, &running))));
+        exchange.inbox.call(Call::Arm(ArmOrder::Goal(
+            wanted,
+            goal(request, &exchange, &running),
+        )));
     });
     Ok([goals, Box::new(move || take_cancels(&mut locked(&cancels)))])
 }
 
 /// What the node answers with: it goes out from the thread that sends, so the answers keep their order.
-fn goal(request: ActionServerGoalRequest<Action>, exchange: &Arc<Exchange>, running: &Running) -> Goal {
+fn goal(
+    request: ActionServerGoalRequest<Action>,
+    exchange: &Arc<Exchange>,
+    running: &Running,
+) -> Goal {
     let is_cancelled = Arc::new(AtomicBool::new(false));
     let handle = Arc::new(GoalHandle {
         state: Mutex::new(GoalState::Asked(request)),
@@ -68,24 +80,35 @@ fn goal(request: ActionServerGoalRequest<Action>, exchange: &Arc<Exchange>, runn
     let [for_accept, for_feedback, for_result] = [handle.clone(), handle.clone(), handle];
     let (running, sending) = (running.clone(), exchange.clone());
     Goal {
-        accept: exchange.reply(PROBE, move |is_accepted| accept(&for_accept, is_accepted, &running)),
+        accept: exchange.reply(PROBE, move |is_accepted| {
+            accept(&for_accept, is_accepted, &running)
+        }),
         feedback: Feedback(Box::new(move |feedback| {
             let handle = for_feedback.clone();
-            sending.urgent.answer(Box::new(move || publish(&handle, feedback)));
+            sending
+                .urgent
+                .answer(Box::new(move || publish(&handle, feedback)));
         })),
-        result: exchange.reply(PROBE, move |(end, response)| finish(&for_result, end, response)),
+        result: exchange.reply(PROBE, move |(end, response)| {
+            finish(&for_result, end, response)
+        }),
         is_cancelled,
     }
 }
 
 fn accept(handle: &Arc<GoalHandle>, is_accepted: bool, running: &Running) -> r2r::Result<()> {
-    let GoalState::Asked(request) = handle.change(GoalState::Over) else { return Ok(()) };
+    let GoalState::Asked(request) = handle.change(GoalState::Over) else {
+        return Ok(());
+    };
     if !is_accepted {
         return request.reject();
     }
     let (goal, requests) = request.accept()?;
     handle.change(GoalState::Running(goal));
-    locked(running).push(Cancels { handle: handle.clone(), requests: Box::new(requests) });
+    locked(running).push(Cancels {
+        handle: handle.clone(),
+        requests: Box::new(requests),
+    });
     Ok(())
 }
 
@@ -99,14 +122,20 @@ fn publish(handle: &GoalHandle, feedback: ProbeFeedback) {
 }
 
 fn finish(handle: &GoalHandle, end: GoalEnd, response: ProbeResponse) -> r2r::Result<()> {
-    let GoalState::Running(mut goal) = handle.change(GoalState::Over) else { return Ok(()) };
+    let GoalState::Running(mut goal) = handle.change(GoalState::Over) else {
+        return Ok(());
+    };
     handle.is_over.store(true, Ordering::Relaxed);
     let cancelled = response.clone().theirs();
     // r2r lets go of a goal once its cancelling is confirmed: from then on no other end reaches who waits
     match end {
         GoalEnd::Canceled => goal.cancel(cancelled),
-        GoalEnd::Succeeded => goal.succeed(response.theirs()).or_else(|_| goal.cancel(cancelled)),
-        GoalEnd::Aborted => goal.abort(response.theirs()).or_else(|_| goal.cancel(cancelled)),
+        GoalEnd::Succeeded => goal
+            .succeed(response.theirs())
+            .or_else(|_| goal.cancel(cancelled)),
+        GoalEnd::Aborted => goal
+            .abort(response.theirs())
+            .or_else(|_| goal.cancel(cancelled)),
     }
 }
 

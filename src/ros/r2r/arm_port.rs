@@ -52,15 +52,25 @@ impl Drop for R2rArm {
 ///
 /// # Errors
 /// [`RosError`]: ROS does not start, no thread.
-pub fn arm_port(config: &NodeConfig, reports: [&str; 2], orders: &str) -> Result<Box<dyn ArmPort>, RosError> {
+pub fn arm_port(
+    config: &NodeConfig,
+    reports: [&str; 2],
+    orders: &str,
+) -> Result<Box<dyn ArmPort>, RosError> {
     let node = r2r::Node::create(context()?, &config.place.node, &config.place.namespace);
     let mut node = node.during("making the node")?;
     let heard = profile(Topic::best_effort("", DEPTH));
-    let joints = node.subscribe::<TheirJoints>(reports[0], heard.clone()).during("subscribing to a topic")?;
-    let wrench = node.subscribe::<TheirWrench>(reports[1], heard).during("subscribing to a topic")?;
+    let joints = node
+        .subscribe::<TheirJoints>(reports[0], heard.clone())
+        .during("subscribing to a topic")?;
+    let wrench = node
+        .subscribe::<TheirWrench>(reports[1], heard)
+        .during("subscribing to a topic")?;
     // the newest order alone counts
     let sent = r2r::qos::QosProfile::default().reliable().keep_last(1);
-    let orders = node.create_publisher::<TheirOrder>(orders, sent).during("publishing a topic")?;
+    let orders = node
+        .create_publisher::<TheirOrder>(orders, sent)
+        .during("publishing a topic")?;
     let (sender, received) = sync_channel(WAITING);
     let of_joints = sender.clone();
     // where there is no room the driver is late, and finds out by the stamps
@@ -72,14 +82,21 @@ pub fn arm_port(config: &NodeConfig, reports: [&str; 2], orders: &str) -> Result
     });
     let is_over = Arc::new(AtomicBool::new(false));
     let over = is_over.clone();
-    let thread = Builder::new().name("touchup-arm-in".to_owned()).spawn(move || {
-        while !over.load(Ordering::Relaxed) {
-            node.spin_once(NOTHING_CAME);
-            joints();
-            wrench();
-        }
-    })?;
-    Ok(Box::new(R2rArm { reports: received, orders, is_over, thread: Some(thread) }))
+    let thread = Builder::new()
+        .name("touchup-arm-in".to_owned())
+        .spawn(move || {
+            while !over.load(Ordering::Relaxed) {
+                node.spin_once(NOTHING_CAME);
+                joints();
+                wrench();
+            }
+        })?;
+    Ok(Box::new(R2rArm {
+        reports: received,
+        orders,
+        is_over,
+        thread: Some(thread),
+    }))
 }
 
 impl ArmPort for R2rArm {

@@ -16,7 +16,11 @@ pub(super) trait During<T> {
 impl<T> During<T> for r2r::Result<T> {
     fn during(self, call: &'static str) -> Result<T, RosError> {
         let remedy = "is the workspace sourced that has touchup_msgs?";
-        self.map_err(|error| RosError::Refused { call, reason: error.to_string(), remedy })
+        self.map_err(|error| RosError::Refused {
+            call,
+            reason: error.to_string(),
+            remedy,
+        })
     }
 }
 

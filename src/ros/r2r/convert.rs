@@ -19,7 +19,9 @@ pub(super) trait Convert: Sized {
 }
 
 /// A service that r2r offers.
-pub(super) trait R2rService: RosService<Request: Convert<Theirs: Clone>, Response: Convert> {
+pub(super) trait R2rService:
+    RosService<Request: Convert<Theirs: Clone>, Response: Convert>
+{
     /// its type there
     type Theirs: WrappedServiceTypeSupport<
             Request = <Self::Request as Convert>::Theirs,
@@ -120,11 +122,17 @@ mod tests {
     /// The same text from both sides: names, order and values of all fields, by the code that serde made for each. And the
     /// message itself comes back. Its fields are those that rosbags filled.
     fn both_agree<M: ours::RosMessage + Convert<Theirs: Clone + Serialize>>() {
-        let all = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/ros_cdr.json"));
+        let all = include_str!(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/tests/data/ros_cdr.json"
+        ));
         let mut all: serde_json::Value = serde_json::from_str(all).unwrap();
         let ours: M = serde_json::from_value(all[M::TYPE_NAME]["fields"].take()).unwrap();
         let theirs = ours.clone().theirs();
-        assert_eq!(serde_json::to_string(&theirs).unwrap(), serde_json::to_string(&ours).unwrap());
+        assert_eq!(
+            serde_json::to_string(&theirs).unwrap(),
+            serde_json::to_string(&ours).unwrap()
+        );
         assert_eq!(M::ours(theirs), ours);
     }
 
@@ -187,27 +195,48 @@ mod tests {
 
     #[test]
     fn a_marker_is_what_its_constants_say() {
-        let ours = ours::Marker { r#type: ours::Marker::TRIANGLE_LIST, frame_locked: true, ..Default::default() };
+        let ours = ours::Marker {
+            r#type: ours::Marker::TRIANGLE_LIST,
+            frame_locked: true,
+            ..Default::default()
+        };
         let theirs = ours.theirs();
         assert_eq!((theirs.type_, theirs.pose.orientation.w), (11, 1.0));
-        assert_eq!((theirs.frame_locked, theirs.mesh_use_embedded_materials), (true, false));
+        assert_eq!(
+            (theirs.frame_locked, theirs.mesh_use_embedded_materials),
+            (true, false)
+        );
     }
 
     #[test]
     fn a_zero_in_a_text_does_not_reach_c() {
-        let ours = ours::Header { frame_id: "a\0b".into(), ..Default::default() };
+        let ours = ours::Header {
+            frame_id: "a\0b".into(),
+            ..Default::default()
+        };
         assert_eq!(ours.theirs().frame_id, "ab");
     }
 
     #[test]
     fn the_build_of_the_documentation_has_every_package() {
-        let docs = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/ros.md")).unwrap();
-        let filter = docs.lines().find_map(|line| line.strip_prefix("export IDL_PACKAGE_FILTER=")).unwrap();
+        let docs =
+            std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/ros.md")).unwrap();
+        let filter = docs
+            .lines()
+            .find_map(|line| line.strip_prefix("export IDL_PACKAGE_FILTER="))
+            .unwrap();
         let built: Vec<_> = filter.trim_matches('"').split(';').collect();
-        let words =
-            include_str!(concat!(env!("OUT_DIR"), "/conversions.rs")).split(|c: char| !c.is_alphanumeric() && c != '_');
-        let is_package = |word: &&str| ["_msgs", "_srvs", "_interfaces"].iter().any(|end| word.ends_with(end));
-        let missing: Vec<_> = words.filter(is_package).filter(|package| !built.contains(package)).collect();
+        let words = include_str!(concat!(env!("OUT_DIR"), "/conversions.rs"))
+            .split(|c: char| !c.is_alphanumeric() && c != '_');
+        let is_package = |word: &&str| {
+            ["_msgs", "_srvs", "_interfaces"]
+                .iter()
+                .any(|end| word.ends_with(end))
+        };
+        let missing: Vec<_> = words
+            .filter(is_package)
+            .filter(|package| !built.contains(package))
+            .collect();
         assert_eq!(missing, Vec::<&str>::new());
     }
 }

@@ -33,7 +33,11 @@ pub(super) struct R2rGraph {
 
 impl R2rGraph {
     pub fn new(context: Context) -> Self {
-        Self { context, watched: Vec::new(), looked: Instant::now() }
+        Self {
+            context,
+            watched: Vec::new(),
+            looked: Instant::now(),
+        }
     }
 
     /// A topic that we publish.
@@ -44,8 +48,14 @@ impl R2rGraph {
     where
         T: WrappedTypesupport + 'static,
     {
-        let look: GraphQuery = Box::new(move |_| Ok((publisher.get_inter_process_subscription_count()?, None)));
-        self.watched.push(WatchedTopic { topic, is_mesh, look, reported: (0, None) });
+        let look: GraphQuery =
+            Box::new(move |_| Ok((publisher.get_inter_process_subscription_count()?, None)));
+        self.watched.push(WatchedTopic {
+            topic,
+            is_mesh,
+            look,
+            reported: (0, None),
+        });
     }
 
     /// A topic that we listen to.
@@ -62,7 +72,12 @@ impl R2rGraph {
             let misfits: Vec<String> = misfits.flatten().collect();
             Ok((senders.len() - misfits.len(), misfits.into_iter().next()))
         });
-        self.watched.push(WatchedTopic { topic, is_mesh: false, look, reported: (0, None) });
+        self.watched.push(WatchedTopic {
+            topic,
+            is_mesh: false,
+            look,
+            reported: (0, None),
+        });
     }
 
     /// Reports what has changed, when it is time to look again; whether ROS is still there.
@@ -71,7 +86,13 @@ impl R2rGraph {
             return true;
         }
         self.looked = Instant::now();
-        for WatchedTopic { topic, is_mesh, look, reported } in &mut self.watched {
+        for WatchedTopic {
+            topic,
+            is_mesh,
+            look,
+            reported,
+        } in &mut self.watched
+        {
             match look(node) {
                 Ok(seen) if seen != *reported => {
                     if *is_mesh && seen.0 > reported.0 {
@@ -89,9 +110,16 @@ impl R2rGraph {
 }
 
 /// Why what is sent does not reach who listens.
-fn misfit(wanted_type: &str, wanted: &QosProfile, type_name: &str, offered: &QosProfile) -> Option<String> {
+fn misfit(
+    wanted_type: &str,
+    wanted: &QosProfile,
+    type_name: &str,
+    offered: &QosProfile,
+) -> Option<String> {
     if type_name != wanted_type {
-        return Some(format!("it has the type {type_name}, here it is {wanted_type}"));
+        return Some(format!(
+            "it has the type {type_name}, here it is {wanted_type}"
+        ));
     }
     let best_effort = ReliabilityPolicy::BestEffort;
     if wanted.reliability == ReliabilityPolicy::Reliable && offered.reliability == best_effort {
@@ -119,17 +147,33 @@ mod tests {
             (wrench, &best_effort, &latched, None),
             (wrench, &reliable, &latched, None),
             (wrench, &latched, &latched, None),
-            (wrench, &reliable, &best_effort, Some("reliable is wanted here, it offers best effort")),
-            (wrench, &latched, &reliable, Some("transient local is wanted here, it offers volatile")),
+            (
+                wrench,
+                &reliable,
+                &best_effort,
+                Some("reliable is wanted here, it offers best effort"),
+            ),
+            (
+                wrench,
+                &latched,
+                &reliable,
+                Some("transient local is wanted here, it offers volatile"),
+            ),
             (
                 "geometry_msgs/msg/Wrench",
                 &best_effort,
                 &reliable,
-                Some("it has the type geometry_msgs/msg/Wrench, here it is geometry_msgs/msg/WrenchStamped"),
+                Some(
+                    "it has the type geometry_msgs/msg/Wrench, here it is geometry_msgs/msg/WrenchStamped",
+                ),
             ),
         ];
         for (sent, wanted, offered, reason) in cases {
-            assert_eq!(misfit(wrench, wanted, sent, offered).as_deref(), reason, "{wanted:?} {offered:?}");
+            assert_eq!(
+                misfit(wrench, wanted, sent, offered).as_deref(),
+                reason,
+                "{wanted:?} {offered:?}"
+            );
         }
     }
 }

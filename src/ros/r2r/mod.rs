@@ -65,19 +65,42 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     let context = context()?;
     let node = r2r::Node::create(context.clone(), &config.place.node, &config.place.namespace);
     let (node, graph) = (node.during("making the node")?, R2rGraph::new(context));
-    let mut back_end = R2rBackEnd { config, node, graph, exchange: exchange.clone(), sources: Vec::new() };
+    let mut back_end = R2rBackEnd {
+        config,
+        node,
+        graph,
+        exchange: exchange.clone(),
+        sources: Vec::new(),
+    };
     let (mesh, urgent) = (mesh(&mut back_end)?, urgent(&mut back_end)?);
     subscribe(config, &mut back_end)?;
     let announce = announce(&mut back_end.node, config.place.full_name(), &exchange)?;
     super::services::serve(&mut back_end, &Arc::new(exchange.inbox.clone()))?;
-    parameter_services::serve(&mut back_end, &PublicParameters::new(&exchange, &config.parameters, announce))?;
-    let R2rBackEnd { mut node, graph, mut sources, .. } = back_end;
+    parameter_services::serve(
+        &mut back_end,
+        &PublicParameters::new(&exchange, &config.parameters, announce),
+    )?;
+    let R2rBackEnd {
+        mut node,
+        graph,
+        mut sources,
+        ..
+    } = back_end;
     sources.extend(action::server(&mut node, &exchange)?);
-    let mut connection = R2rConnection { exchange: exchange.clone(), sending: Vec::new(), spinning: None };
-    let spinning = exchange.thread("touchup-spin", move |exchange| spin(node, sources, graph, exchange))?;
+    let mut connection = R2rConnection {
+        exchange: exchange.clone(),
+        sending: Vec::new(),
+        spinning: None,
+    };
+    let spinning = exchange.thread("touchup-spin", move |exchange| {
+        spin(node, sources, graph, exchange)
+    })?;
     connection.spinning = Some(spinning);
     connection.sending.extend(exchange.senders(urgent, mesh)?);
-    Ok(Arc::new(Joined { exchange, _connection: connection }))
+    Ok(Arc::new(Joined {
+        exchange,
+        _connection: connection,
+    }))
 }
 
 /// Publishes changes of parameters on `/parameter_events`.
@@ -86,13 +109,22 @@ fn announce(
     name: String,
     exchange: &Arc<Exchange>,
 ) -> Result<impl Fn(&str, &ParameterValue) + Send + Sync + 'static, RosError> {
-    let events = node.create_publisher("/parameter_events", r2r::qos::QosProfile::parameter_events());
-    let (events, exchange) = (Arc::new(Mutex::new(events.during("publishing a topic")?)), exchange.clone());
+    let events = node.create_publisher(
+        "/parameter_events",
+        r2r::qos::QosProfile::parameter_events(),
+    );
+    let (events, exchange) = (
+        Arc::new(Mutex::new(events.during("publishing a topic")?)),
+        exchange.clone(),
+    );
     Ok(move |parameter: &str, value: &ParameterValue| {
         let event = ParameterEvent {
             stamp: time(exchange.clock.now_ns()),
             node: name.clone(),
-            changed_parameters: vec![Parameter { name: parameter.to_owned(), value: raw(Some(value)) }],
+            changed_parameters: vec![Parameter {
+                name: parameter.to_owned(),
+                value: raw(Some(value)),
+            }],
             ..ParameterEvent::default()
         };
         let events = events.clone();
@@ -109,12 +141,19 @@ fn context() -> Result<r2r::Context, RosError> {
     let created = match std::panic::catch_unwind(r2r::Context::create) {
         Ok(context) => context.map_err(|error| error.to_string()),
         Err(panic) => {
-            let said = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref().copied());
+            let said = panic
+                .downcast_ref::<String>()
+                .map(String::as_str)
+                .or(panic.downcast_ref().copied());
             Err(said.unwrap_or("rcl_init failed").to_owned())
         }
     };
     let remedy = "is RMW_IMPLEMENTATION one that is installed?";
-    created.map_err(|reason| RosError::Refused { call: "ROS does not start", reason, remedy })
+    created.map_err(|reason| RosError::Refused {
+        call: "ROS does not start",
+        reason,
+        remedy,
+    })
 }
 
 /// So long it takes to notice that all is over when nothing comes; what comes wakes it at once.
@@ -125,14 +164,23 @@ const MOST_IN_VAIN: u32 = 160;
 const PAUSE: Duration = Duration::from_millis(2);
 
 /// The thread that takes what comes. There is always a subscription, or rcl would not wait at all (r2r issue 93).
-fn spin(mut node: r2r::Node, mut sources: Vec<PollSource>, mut graph: R2rGraph, exchange: &Exchange) {
+fn spin(
+    mut node: r2r::Node,
+    mut sources: Vec<PollSource>,
+    mut graph: R2rGraph,
+    exchange: &Exchange,
+) {
     let _reports_end = ReportsEnd(exchange);
     let mut in_vain = 0;
     while !exchange.inbox.is_over() {
         let began = Instant::now();
         node.spin_once(NOTHING_CAME);
         let has_come = sources.iter_mut().fold(false, |any, take| take() | any);
-        in_vain = if has_come || began.elapsed() >= NOTHING_CAME { 0 } else { u32::saturating_add(in_vain, 1) };
+        in_vain = if has_come || began.elapsed() >= NOTHING_CAME {
+            0
+        } else {
+            u32::saturating_add(in_vain, 1)
+        };
         // once the result of a goal is too old to be kept, rcl waits no more (r2r issue 136)
         if in_vain > MOST_IN_VAIN {
             std::thread::sleep(PAUSE);

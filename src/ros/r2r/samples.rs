@@ -30,15 +30,24 @@ pub fn samples(config: &NodeConfig) -> Result<Box<dyn SamplePort>, RosError> {
     let node = r2r::Node::create(context()?, &config.place.node, &config.place.namespace);
     let mut node = node.during("making the node")?;
     let [wrench, pose] = config.sample_topics();
-    let wrench =
-        node.create_publisher(wrench, profile(Topic::best_effort(wrench, DEPTH))).during("publishing a topic")?;
-    let pose = node.create_publisher(pose, profile(Topic::best_effort(pose, DEPTH))).during("publishing a topic")?;
-    Ok(Box::new(R2rSamples { wrench, pose, _node: node }))
+    let wrench = node
+        .create_publisher(wrench, profile(Topic::best_effort(wrench, DEPTH)))
+        .during("publishing a topic")?;
+    let pose = node
+        .create_publisher(pose, profile(Topic::best_effort(pose, DEPTH)))
+        .during("publishing a topic")?;
+    Ok(Box::new(R2rSamples {
+        wrench,
+        pose,
+        _node: node,
+    }))
 }
 
 /// None where rcl does not know.
 fn count<T: WrappedTypesupport + 'static>(publisher: &Publisher<T>) -> usize {
-    publisher.get_inter_process_subscription_count().unwrap_or_default()
+    publisher
+        .get_inter_process_subscription_count()
+        .unwrap_or_default()
 }
 
 impl SamplePort for R2rSamples {

@@ -15,13 +15,23 @@ impl<S: R2rService> Serves<S> for R2rBackEnd<'_> {
         name: &'static str,
         mut call: impl FnMut(S::Request, Reply<S::Response>) + Send + 'static,
     ) -> Result<(), RosError> {
-        let requests = self.node.create_service::<S::Theirs>(name, QosProfile::services_default());
+        let requests = self
+            .node
+            .create_service::<S::Theirs>(name, QosProfile::services_default());
         let requests = requests.during("offering a service")?;
         let exchange = self.exchange.clone();
-        self.sources.push(source(requests, move |request: ServiceRequest<S::Theirs>| {
-            let asked = S::Request::ours(request.message.clone());
-            call(asked, exchange.reply(name, move |answer: S::Response| request.respond(answer.theirs())));
-        }));
+        self.sources.push(source(
+            requests,
+            move |request: ServiceRequest<S::Theirs>| {
+                let asked = S::Request::ours(request.message.clone());
+                call(
+                    asked,
+                    exchange.reply(name, move |answer: S::Response| {
+                        request.respond(answer.theirs())
+                    }),
+                );
+            },
+        ));
         Ok(())
     }
 }

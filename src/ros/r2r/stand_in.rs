@@ -1,6 +1,9 @@
 //! What r2r generates of `touchup_msgs` and `std_srvs` where ROS is sourced, as far as the compiler looks: the fields, which
 //! `generate/` lists, and nothing behind them. For feature `r2r-check` alone; nothing here can run.
-#![expect(non_snake_case, reason = "services and actions are modules there, with the names of their files")]
+#![expect(
+    non_snake_case,
+    reason = "services and actions are modules there, with the names of their files"
+)]
 
 /// Functions that nothing here can do.
 macro_rules! needs_ros {

@@ -13,8 +13,16 @@ use crate::ros::send_queue::Sent;
 use crate::ros::topics::{MESH, Publisher, Publishes, Subscribes, SubscribesSamples, Topic};
 
 pub(super) fn profile(topic: Topic) -> QosProfile {
-    let profile = if topic.is_reliable { QosProfile::default().reliable() } else { QosProfile::sensor_data() };
-    let profile = if topic.is_latched { profile.transient_local() } else { profile };
+    let profile = if topic.is_reliable {
+        QosProfile::default().reliable()
+    } else {
+        QosProfile::sensor_data()
+    };
+    let profile = if topic.is_latched {
+        profile.transient_local()
+    } else {
+        profile
+    };
     profile.keep_last(topic.depth)
 }
 
@@ -23,14 +31,22 @@ where
     M: RosMessage + Convert<Theirs: WrappedTypesupport + 'static>,
 {
     fn publisher(&mut self, topic: Topic) -> Result<Publisher<M>, RosError> {
-        let publisher = self.node.create_publisher::<M::Theirs>(topic.name, profile(topic));
+        let publisher = self
+            .node
+            .create_publisher::<M::Theirs>(topic.name, profile(topic));
         let publisher = publisher.during("publishing a topic")?;
-        self.graph.watch_listeners(self.config.resolve(topic.name)?, topic == MESH, publisher.clone());
-        Ok(Box::new(move |message| match publisher.publish(&message.theirs()) {
-            Ok(()) => Sent::Done,
-            Err(error) => {
-                tracing::warn!(topic_type = M::TYPE_NAME, %error, "a message is not sent");
-                Sent::Refused
+        self.graph.watch_listeners(
+            self.config.resolve(topic.name)?,
+            topic == MESH,
+            publisher.clone(),
+        );
+        Ok(Box::new(move |message| {
+            match publisher.publish(&message.theirs()) {
+                Ok(()) => Sent::Done,
+                Err(error) => {
+                    tracing::warn!(topic_type = M::TYPE_NAME, %error, "a message is not sent");
+                    Sent::Refused
+                }
             }
         }))
     }
@@ -40,11 +56,18 @@ impl<M> Subscribes<M> for R2rBackEnd<'_>
 where
     M: RosMessage + Convert<Theirs: WrappedTypesupport + Send + 'static>,
 {
-    fn subscribe(&mut self, topic: Topic, arrival: fn(&Exchange, M) -> Arrival) -> Result<(), RosError> {
+    fn subscribe(
+        &mut self,
+        topic: Topic,
+        arrival: fn(&Exchange, M) -> Arrival,
+    ) -> Result<(), RosError> {
         let profile = profile(topic);
-        let messages = self.node.subscribe::<M::Theirs>(topic.name, profile.clone());
+        let messages = self
+            .node
+            .subscribe::<M::Theirs>(topic.name, profile.clone());
         let messages = messages.during("subscribing to a topic")?;
-        self.graph.watch_senders(self.config.resolve(topic.name)?, M::TYPE_NAME, profile);
+        self.graph
+            .watch_senders(self.config.resolve(topic.name)?, M::TYPE_NAME, profile);
         let exchange = self.exchange.clone();
         self.sources.push(source(messages, move |message| {
             exchange.inbox.put(arrival(&exchange, M::ours(message)));
@@ -57,18 +80,27 @@ impl SubscribesSamples for R2rBackEnd<'_> {
     /// With the type of who publishes when the node begins, if none is named: r2r finds the code for a type by its name, where it was built with it.
     fn subscribe_samples(&mut self, topic: Topic, samples: SampleSource) -> Result<(), RosError> {
         let (profile, whole) = (profile(topic), self.config.resolve(topic.name)?);
-        let known = self.node.get_publishers_info_by_topic(&whole, false).unwrap_or_default();
+        let known = self
+            .node
+            .get_publishers_info_by_topic(&whole, false)
+            .unwrap_or_default();
         let published = known.iter().map(|sender| sender.topic_type.as_str());
         let (of, unread) = samples.choose(samples.first_type(), published);
         if let Some(why) = unread {
             tracing::warn!(topic = whole, "{why}");
         }
-        let messages = self.node.subscribe_raw(topic.name, of.name(), profile.clone());
+        let messages = self
+            .node
+            .subscribe_raw(topic.name, of.name(), profile.clone());
         let messages = messages.during("subscribing to a topic")?;
         self.graph.watch_senders(whole, of.name(), profile);
         let (name, exchange) = (topic.name, self.exchange.clone());
         self.sources.push(source(messages, move |payload: Vec<u8>| {
-            exchange.inbox.put(samples.arrival(name, of, of.decode(&payload, exchange.clock.now_ns())));
+            exchange.inbox.put(samples.arrival(
+                name,
+                of,
+                of.decode(&payload, exchange.clock.now_ns()),
+            ));
         }));
         Ok(())
     }

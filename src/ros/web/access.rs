@@ -30,7 +30,9 @@ impl Secret {
     pub fn new() -> std::io::Result<Self> {
         let mut bytes = [0; 16];
         getrandom::fill(&mut bytes).map_err(std::io::Error::other)?;
-        Ok(Self(bytes.iter().map(|byte| format!("{byte:02x}")).collect()))
+        Ok(Self(
+            bytes.iter().map(|byte| format!("{byte:02x}")).collect(),
+        ))
     }
 
     /// As it is sent.
@@ -41,7 +43,8 @@ impl Secret {
     /// Whether it is that; it takes as long for every other one of its length.
     fn is(&self, given: &str) -> bool {
         let pairs = self.0.bytes().zip(given.bytes());
-        self.0.len() == given.len() && pairs.fold(0, |differing, (ours, theirs)| differing | (ours ^ theirs)) == 0
+        self.0.len() == given.len()
+            && pairs.fold(0, |differing, (ours, theirs)| differing | (ours ^ theirs)) == 0
     }
 }
 
@@ -75,7 +78,10 @@ impl Access {
             named.push(in_a_link(address.ip()));
         }
         let port = address.port();
-        let mut hosts: Vec<String> = named.iter().map(|name| format!("{}:{port}", name.to_lowercase())).collect();
+        let mut hosts: Vec<String> = named
+            .iter()
+            .map(|name| format!("{}:{port}", name.to_lowercase()))
+            .collect();
         if port == usual {
             hosts.extend(named.iter().map(|name| name.to_lowercase()));
         }
@@ -97,7 +103,9 @@ impl Access {
 
     /// Whether what asks was loaded from here: the value of `Origin`.
     pub fn is_origin(&self, origin: &str) -> bool {
-        origin.split_once("://").is_some_and(|(scheme, host)| scheme == self.scheme && self.is_host(host))
+        origin
+            .split_once("://")
+            .is_some_and(|(scheme, host)| scheme == self.scheme && self.is_host(host))
     }
 
     /// `http` or `https`.
@@ -130,12 +138,21 @@ impl Access {
             let at = links.iter().position(|(secret, _)| secret.is(token));
             at.and_then(|at| links.remove(at))
         };
-        let Some((_, role)) = used else { return Ok(None) };
+        let Some((_, role)) = used else {
+            return Ok(None);
+        };
         let cookie = Secret::new()?;
         remember(&self.cookies, &cookie, role);
-        let secure = if self.scheme == "https" { "; Secure" } else { "" };
-        let text =
-            format!("{}={}; HttpOnly; SameSite=Strict; Path=/; Max-Age=43200{secure}", self.cookie_name, cookie.text());
+        let secure = if self.scheme == "https" {
+            "; Secure"
+        } else {
+            ""
+        };
+        let text = format!(
+            "{}={}; HttpOnly; SameSite=Strict; Path=/; Max-Age=43200{secure}",
+            self.cookie_name,
+            cookie.text()
+        );
         Ok(Some((text, role)))
     }
 
@@ -144,10 +161,17 @@ impl Access {
         if !self.needs_cookie {
             return Some(Role::Operate);
         }
-        let pairs = cookies.split(';').filter_map(|pair| pair.trim().split_once('='));
+        let pairs = cookies
+            .split(';')
+            .filter_map(|pair| pair.trim().split_once('='));
         let known = locked(&self.cookies);
         let ours = pairs.filter(|(name, _)| *name == self.cookie_name);
-        let role = |value: &str| known.iter().find(|(secret, _)| secret.is(value)).map(|(_, role)| *role);
+        let role = |value: &str| {
+            known
+                .iter()
+                .find(|(secret, _)| secret.is(value))
+                .map(|(_, role)| *role)
+        };
         ours.into_iter().find_map(|(_, value)| role(value))
     }
 }
@@ -174,26 +198,52 @@ mod tests {
 
     fn access(address: &str) -> Access {
         let address: SocketAddr = address.parse().unwrap();
-        Access::new(address, &["cell.local".to_owned()], !address.ip().is_loopback(), false)
+        Access::new(
+            address,
+            &["cell.local".to_owned()],
+            !address.ip().is_loopback(),
+            false,
+        )
     }
 
     #[test]
     fn the_page_is_called_by_its_own_names_alone() {
         let loopback = access("127.0.0.1:8321");
-        for host in ["127.0.0.1:8321", "localhost:8321", "LOCALHOST:8321", "[::1]:8321", "cell.local:8321"] {
+        for host in [
+            "127.0.0.1:8321",
+            "localhost:8321",
+            "LOCALHOST:8321",
+            "[::1]:8321",
+            "cell.local:8321",
+        ] {
             assert!(loopback.is_host(host), "{host}");
             assert!(loopback.is_origin(&format!("http://{host}")), "{host}");
         }
-        for host in ["localhost", "localhost:80", "evil.example:8321", "127.0.0.1:8321.evil.example", "", "null"] {
+        for host in [
+            "localhost",
+            "localhost:80",
+            "evil.example:8321",
+            "127.0.0.1:8321.evil.example",
+            "",
+            "null",
+        ] {
             assert!(!loopback.is_host(host), "{host}");
         }
-        for origin in
-            ["null", "https://localhost:8321", "http://evil.example", "http://localhost:8321/", "localhost:8321"]
-        {
+        for origin in [
+            "null",
+            "https://localhost:8321",
+            "http://evil.example",
+            "http://localhost:8321/",
+            "localhost:8321",
+        ] {
             assert!(!loopback.is_origin(origin), "{origin}");
         }
         let lan = access("192.168.0.7:80");
-        assert!(lan.is_host("192.168.0.7") && lan.is_host("192.168.0.7:80") && !lan.is_host("127.0.0.1"));
+        assert!(
+            lan.is_host("192.168.0.7")
+                && lan.is_host("192.168.0.7:80")
+                && !lan.is_host("127.0.0.1")
+        );
     }
 
     #[test]
@@ -205,7 +255,10 @@ mod tests {
         let (cookie, role) = lan.pair(link.text()).unwrap().unwrap();
         assert!(lan.pair(link.text()).unwrap().is_none(), "it is used up");
         assert_eq!(role, Role::Look);
-        assert!(cookie.contains("; HttpOnly; SameSite=Strict") && !cookie.contains("Secure"), "{cookie}");
+        assert!(
+            cookie.contains("; HttpOnly; SameSite=Strict") && !cookie.contains("Secure"),
+            "{cookie}"
+        );
         let sent = cookie.split(';').next().unwrap();
         assert_eq!(lan.role(&format!("other=1; {sent}")), Some(Role::Look));
         assert_eq!(lan.role(&sent.replace("touchup_8321", "touchup_1")), None);

@@ -66,7 +66,10 @@ pub(super) struct Annotations {
 impl Annotations {
     /// - `folder`: in which sessions lie.
     pub fn new(folder: &Path) -> Self {
-        Self { folder: folder.to_owned(), current: Mutex::default() }
+        Self {
+            folder: folder.to_owned(),
+            current: Mutex::default(),
+        }
     }
 
     fn file(&self, session: &str) -> PathBuf {
@@ -78,8 +81,13 @@ impl Annotations {
         let mut current = locked(&self.current);
         if current.session != session {
             let text = read_text(&self.file(session)).unwrap_or_default();
-            let features = serde_json::from_str::<SessionAnnotations>(&text).unwrap_or_default().features;
-            *current = SessionAnnotations { session: session.to_owned(), features };
+            let features = serde_json::from_str::<SessionAnnotations>(&text)
+                .unwrap_or_default()
+                .features;
+            *current = SessionAnnotations {
+                session: session.to_owned(),
+                features,
+            };
         }
         current.clone()
     }
@@ -90,21 +98,35 @@ impl Annotations {
     ///
     /// # Errors
     /// In words: what is refused, or could not be written.
-    pub fn annotate(&self, session: &str, request: AnnotateRequest, feature: Option<Feature>) -> Result<(), String> {
-        let AnnotateRequest { id, name, mark, is_locked } = request;
+    pub fn annotate(
+        &self,
+        session: &str,
+        request: AnnotateRequest,
+        feature: Option<Feature>,
+    ) -> Result<(), String> {
+        let AnnotateRequest {
+            id,
+            name,
+            mark,
+            is_locked,
+        } = request;
         let feature = feature.ok_or_else(|| format!("there is no feature {id}"))?;
         let mut all = self.of(session);
         let annotation = all.features.entry(id).or_default();
         if let Some(name) = name {
             let name = name.trim();
             if name.chars().count() > LONGEST_NAME || name.chars().any(char::is_control) {
-                return Err(format!("a name has up to {LONGEST_NAME} characters in one line"));
+                return Err(format!(
+                    "a name has up to {LONGEST_NAME} characters in one line"
+                ));
             }
             name.clone_into(&mut annotation.name);
         }
         annotation.mark = mark.unwrap_or(annotation.mark);
         match is_locked {
-            Some(true) if annotation.locked.is_none() => annotation.locked = serde_json::to_value(feature).ok(),
+            Some(true) if annotation.locked.is_none() => {
+                annotation.locked = serde_json::to_value(feature).ok()
+            }
             Some(false) => annotation.locked = None,
             _ => {}
         }
@@ -116,7 +138,8 @@ impl Annotations {
         }
         let text = serde_json::to_string_pretty(&all).map_err(|error| error.to_string())?;
         let file = self.file(session);
-        write_text_file(&file, &text).map_err(|error| format!("cannot write {}: {error}", file.display()))?;
+        write_text_file(&file, &text)
+            .map_err(|error| format!("cannot write {}: {error}", file.display()))?;
         *locked(&self.current) = all;
         Ok(())
     }
@@ -127,7 +150,11 @@ mod tests {
     use super::*;
 
     fn hole(diameter: f64) -> Option<Feature> {
-        Some(Feature { id: 7, diameter, ..Feature::default() })
+        Some(Feature {
+            id: 7,
+            diameter,
+            ..Feature::default()
+        })
     }
 
     fn request(text: &str) -> AnnotateRequest {
@@ -139,17 +166,36 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         std::fs::create_dir(folder.path().join("one")).unwrap();
         let annotations = Annotations::new(folder.path());
-        annotations.annotate("one", request(r#"{"id": 7, "name": " bore A "}"#), hole(8.0)).unwrap();
-        annotations.annotate("one", request(r#"{"id": 7, "mark": "accepted", "is_locked": true}"#), hole(8.0)).unwrap();
+        annotations
+            .annotate(
+                "one",
+                request(r#"{"id": 7, "name": " bore A "}"#),
+                hole(8.0),
+            )
+            .unwrap();
+        annotations
+            .annotate(
+                "one",
+                request(r#"{"id": 7, "mark": "accepted", "is_locked": true}"#),
+                hole(8.0),
+            )
+            .unwrap();
         // what is locked stays as it was
-        annotations.annotate("one", request(r#"{"id": 7, "is_locked": true}"#), hole(9.0)).unwrap();
+        annotations
+            .annotate("one", request(r#"{"id": 7, "is_locked": true}"#), hole(9.0))
+            .unwrap();
         let again = Annotations::new(folder.path()).of("one").features;
         let Annotation { name, mark, locked } = &again[&7];
         assert_eq!((name.as_str(), *mark), ("bore A", Mark::Accepted));
         assert_eq!(locked.as_ref().unwrap()["diameter"], 8.0);
-        assert!(annotations.of("two").features.is_empty(), "another session knows nothing of it");
+        assert!(
+            annotations.of("two").features.is_empty(),
+            "another session knows nothing of it"
+        );
         let nothing = r#"{"id": 7, "name": "", "mark": "none", "is_locked": false}"#;
-        annotations.annotate("one", request(nothing), hole(8.0)).unwrap();
+        annotations
+            .annotate("one", request(nothing), hole(8.0))
+            .unwrap();
         assert!(annotations.of("one").features.is_empty());
     }
 
@@ -160,16 +206,27 @@ mod tests {
         let annotations = Annotations::new(folder.path());
         let long = format!(r#"{{"id": 7, "name": "{}"}}"#, "x".repeat(81));
         for (asked, feature, words) in [
-            (r#"{"id": 7, "mark": "accepted"}"#, None, "there is no feature 7"),
+            (
+                r#"{"id": 7, "mark": "accepted"}"#,
+                None,
+                "there is no feature 7",
+            ),
             (&long, hole(8.0), "up to 80 characters"),
             (r#"{"id": 7, "name": "a\nb"}"#, hole(8.0), "in one line"),
         ] {
-            let why = annotations.annotate("one", request(asked), feature).unwrap_err();
+            let why = annotations
+                .annotate("one", request(asked), feature)
+                .unwrap_err();
             assert!(why.contains(words), "{why}");
         }
-        let why = annotations.annotate("missing", request(r#"{"id": 7, "name": "a"}"#), hole(8.0)).unwrap_err();
+        let why = annotations
+            .annotate("missing", request(r#"{"id": 7, "name": "a"}"#), hole(8.0))
+            .unwrap_err();
         assert!(why.contains("cannot write"), "{why}");
-        assert!(annotations.of("one").features.is_empty() && annotations.of("missing").features.is_empty());
+        assert!(
+            annotations.of("one").features.is_empty()
+                && annotations.of("missing").features.is_empty()
+        );
         assert!(serde_json::from_str::<AnnotateRequest>(r#"{"id": 7, "lock": true}"#).is_err());
     }
 }

@@ -31,7 +31,13 @@ pub(super) fn begin<T: Send + 'static>(
 fn step_behind() {
     // SAFETY: both take numbers and no memory; who = 0 is the calling thread, as Linux has it, which ends at the last step. Where it is
     // refused the work is done all the same
-    unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, libc::getpriority(libc::PRIO_PROCESS, 0) + STEPS_BEHIND) };
+    unsafe {
+        libc::setpriority(
+            libc::PRIO_PROCESS,
+            0,
+            libc::getpriority(libc::PRIO_PROCESS, 0) + STEPS_BEHIND,
+        )
+    };
 }
 
 #[cfg(test)]
@@ -46,7 +52,10 @@ mod tests {
     #[test]
     fn the_work_and_what_it_begins_stand_behind_who_asked() {
         let before = steps();
-        let done = begin("test", || (steps(), std::thread::spawn(steps).join().unwrap())).unwrap();
+        let done = begin("test", || {
+            (steps(), std::thread::spawn(steps).join().unwrap())
+        })
+        .unwrap();
         // 19 is the last step
         let expected = (before + 5).min(19);
         assert_eq!(done.blocking_recv().unwrap(), (expected, expected));

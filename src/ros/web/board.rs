@@ -9,7 +9,8 @@ use tokio::sync::watch;
 use super::mesh_copy::{MeshCopy, MeshState, PageId, TouchedVertex};
 use crate::ros::locked;
 use crate::ros::messages::{
-    DiagnosticArray, Feature, FeatureArray, HapticMismatch, MarkerArray, MeshPatch, Path, ProbeResult, ProbeTouch,
+    DiagnosticArray, Feature, FeatureArray, HapticMismatch, MarkerArray, MeshPatch, Path,
+    ProbeResult, ProbeTouch,
 };
 use crate::ros::port::Publication;
 
@@ -112,10 +113,14 @@ impl Board {
                 Publication::Tip(tip) => topics.tip.write(number, tip),
                 Publication::Path(path) => topics.path.write(number, path),
                 Publication::Mismatch(mismatch) => topics.mismatch.write(number, mismatch),
-                Publication::Diagnostics(diagnostics) => topics.diagnostics.write(number, diagnostics),
+                Publication::Diagnostics(diagnostics) => {
+                    topics.diagnostics.write(number, diagnostics)
+                }
                 Publication::ProbeResult(result) => keep(&mut topics.results, number, result),
                 Publication::ProbeTouch(touch) => keep(&mut topics.touches, number, touch),
-                Publication::Tile(_) | Publication::FeatureMarkers(_) | Publication::MeshPatch(_) => return,
+                Publication::Tile(_)
+                | Publication::FeatureMarkers(_)
+                | Publication::MeshPatch(_) => return,
             }
         }
         self.changes.send_replace(());
@@ -153,7 +158,14 @@ impl Board {
     /// A feature as it was published last.
     pub fn feature(&self, id: u32) -> Option<Feature> {
         let topics = locked(&self.topics);
-        topics.features.1.as_ref()?.features.iter().find(|feature| feature.id == id).cloned()
+        topics
+            .features
+            .1
+            .as_ref()?
+            .features
+            .iter()
+            .find(|feature| feature.id == id)
+            .cloned()
     }
 
     /// A page comes.

@@ -18,7 +18,8 @@ pub(super) type Answer = Reply<Result<Value, String>>;
 type Service = Mutex<Box<dyn FnMut(Value, Answer) + Send>>;
 
 /// Why a call is refused.
-pub(super) const MAY_ONLY_LOOK: &str = "this page may look and not operate: open it by a link for operators";
+pub(super) const MAY_ONLY_LOOK: &str =
+    "this page may look and not operate: open it by a link for operators";
 /// What every page may ask.
 const ONLY_LOOKS: &[&str] = &["~/arm_state"];
 /// What moves an arm, unless it is a dry run: while it does, the page's button has to be held.
@@ -36,7 +37,10 @@ impl Calls {
     /// # Errors
     /// None here; other back ends may refuse a name.
     pub fn new(inbox: &Inbox) -> Result<Self, RosError> {
-        let mut calls = Self { services: BTreeMap::new(), inbox: inbox.clone() };
+        let mut calls = Self {
+            services: BTreeMap::new(),
+            inbox: inbox.clone(),
+        };
         serve(&mut calls, &Arc::new(inbox.clone()))?;
         Ok(calls)
     }
@@ -118,7 +122,10 @@ fn merge_fields(whole: &mut Map<String, Value>, given: Map<String, Value>) -> Re
     for (name, value) in given {
         let Some(field) = whole.get_mut(&name) else {
             let known: Vec<_> = whole.keys().map(String::as_str).collect();
-            return Err(format!("there is no field \"{name}\"; there are: {}", known.join(", ")));
+            return Err(format!(
+                "there is no field \"{name}\"; there are: {}",
+                known.join(", ")
+            ));
         };
         merge(field, value)?;
     }
@@ -145,9 +152,19 @@ mod tests {
         (Calls::new(&inbox).unwrap(), arrivals, hand)
     }
 
-    fn ask(calls: &Calls, role: Role, name: &str, request: Value) -> Receiver<Result<Value, String>> {
+    fn ask(
+        calls: &Calls,
+        role: Role,
+        name: &str,
+        request: Value,
+    ) -> Receiver<Result<Value, String>> {
         let (to, answer) = channel();
-        calls.call(role, name, request, Reply::new(move |said| drop(to.send(said))));
+        calls.call(
+            role,
+            name,
+            request,
+            Reply::new(move |said| drop(to.send(said))),
+        );
         answer
     }
 
@@ -155,23 +172,43 @@ mod tests {
     fn a_service_is_called_with_the_fields_that_are_given() {
         let (calls, arrivals, _hand) = calls();
         let answer = ask(&calls, Role::Operate, "~/undo", json!({ "strokes": 3 }));
-        let Some(Arrival::Call(Call::Undo(request, reply))) = arrivals.recv() else { panic!("no call") };
+        let Some(Arrival::Call(Call::Undo(request, reply))) = arrivals.recv() else {
+            panic!("no call")
+        };
         assert_eq!(request.strokes, 3);
-        reply.send(UndoResponse { success: true, strokes: 2, ..UndoResponse::default() });
+        reply.send(UndoResponse {
+            success: true,
+            strokes: 2,
+            ..UndoResponse::default()
+        });
         let said = answer.recv().unwrap().unwrap();
-        assert_eq!((&said["success"], &said["strokes"]), (&json!(true), &json!(2)));
+        assert_eq!(
+            (&said["success"], &said["strokes"]),
+            (&json!(true), &json!(2))
+        );
     }
 
     #[test]
     fn what_is_wrong_with_a_request_is_said_and_nothing_is_called() {
         let (calls, arrivals, _hand) = calls();
         for (name, request, words) in [
-            ("~/undo", json!({ "stroke": 3 }), "there is no field \"stroke\"; there are: strokes"),
+            (
+                "~/undo",
+                json!({ "stroke": 3 }),
+                "there is no field \"stroke\"; there are: strokes",
+            ),
             ("~/undo", json!({ "strokes": -1 }), "~/undo: invalid value"),
             ("~/undo", json!("all"), "~/undo: invalid type"),
-            ("~/format_disk", json!({}), "there is no service \"~/format_disk\""),
+            (
+                "~/format_disk",
+                json!({}),
+                "there is no service \"~/format_disk\"",
+            ),
         ] {
-            let said = ask(&calls, Role::Operate, name, request).recv().unwrap().unwrap_err();
+            let said = ask(&calls, Role::Operate, name, request)
+                .recv()
+                .unwrap()
+                .unwrap_err();
             assert!(said.contains(words), "{said}");
         }
         assert!(arrivals.try_recv().is_err());
@@ -180,8 +217,15 @@ mod tests {
     #[test]
     fn who_only_looks_changes_nothing() {
         let (calls, arrivals, _hand) = calls();
-        for name in calls.services.keys().filter(|name| !ONLY_LOOKS.contains(name)) {
-            let said = ask(&calls, Role::Look, name, json!({})).recv().unwrap().unwrap_err();
+        for name in calls
+            .services
+            .keys()
+            .filter(|name| !ONLY_LOOKS.contains(name))
+        {
+            let said = ask(&calls, Role::Look, name, json!({}))
+                .recv()
+                .unwrap()
+                .unwrap_err();
             assert!(said.contains("may look and not operate"), "{name}: {said}");
         }
         assert!(arrivals.try_recv().is_err());
@@ -194,14 +238,29 @@ mod tests {
         let (calls, arrivals, hand) = calls();
         let stops = arrivals.stops();
         let order = || ask(&calls, Role::Operate, "~/probe_feature", json!({ "id": 7 }));
-        assert!(order().recv().unwrap().unwrap_err().contains("while the button is held"));
-        let planned =
-            ask(&calls, Role::Operate, "~/probe_feature", json!({ "id": 7, "settings": { "dry_run": true } }));
-        assert!(matches!(arrivals.recv(), Some(Arrival::Call(Call::Arm(_)))), "a plan needs no hand");
+        assert!(
+            order()
+                .recv()
+                .unwrap()
+                .unwrap_err()
+                .contains("while the button is held")
+        );
+        let planned = ask(
+            &calls,
+            Role::Operate,
+            "~/probe_feature",
+            json!({ "id": 7, "settings": { "dry_run": true } }),
+        );
+        assert!(
+            matches!(arrivals.recv(), Some(Arrival::Call(Call::Arm(_)))),
+            "a plan needs no hand"
+        );
         drop(planned);
         stops.beat();
         let answer = order();
-        let Some(Arrival::Call(Call::Arm(ArmOrder::Feature(_, reply)))) = arrivals.recv() else { panic!("no order") };
+        let Some(Arrival::Call(Call::Arm(ArmOrder::Feature(_, reply)))) = arrivals.recv() else {
+            panic!("no order")
+        };
         hand.advance(LONGEST_BEAT * 2);
         assert_eq!(stops.request(), Some(StopRequest::Stay));
         stops.ask_recovery();
@@ -214,7 +273,8 @@ mod tests {
 
     #[test]
     fn fields_of_fields_can_be_left_out() {
-        let request: ProbeFeatureRequest = filled(json!({ "id": 7, "settings": { "dry_run": true } })).unwrap();
+        let request: ProbeFeatureRequest =
+            filled(json!({ "id": 7, "settings": { "dry_run": true } })).unwrap();
         assert!(request.id == 7 && request.settings.dry_run && request.settings.max_touches == 0);
     }
 }

@@ -58,7 +58,9 @@ pub(super) async fn serve(socket: WebSocket, site: Arc<Site>, role: Role) {
     let hearing = async {
         let mut rate = Rate::default();
         while let Ok(Some(Ok(message))) = timeout(GONE_AFTER, from_page.next()).await {
-            let Message::Text(text) = message else { continue };
+            let Message::Text(text) = message else {
+                continue;
+            };
             if !rate.allows(Instant::now()) {
                 tracing::warn!(page, "a page sends too much: it is cut off");
                 break;
@@ -78,15 +80,26 @@ pub(super) async fn serve(socket: WebSocket, site: Arc<Site>, role: Role) {
 fn hear(text: &str, site: &Site, role: Role, answers: &Sender<String>) {
     let asked = serde_json::from_str(text).map_err(|error| error.to_string());
     let (id, call, request) = match asked {
-        Ok(Asked { call: None, beat: Some(_), .. }) => {
+        Ok(Asked {
+            call: None,
+            beat: Some(_),
+            ..
+        }) => {
             if role == Role::Operate {
                 site.inbox.stops().beat();
             }
             return;
         }
-        Ok(Asked { id, call: Some(call), request, .. }) if !id.is_null() => (id, call, request),
+        Ok(Asked {
+            id,
+            call: Some(call),
+            request,
+            ..
+        }) if !id.is_null() => (id, call, request),
         refused => {
-            let why = refused.err().unwrap_or_else(|| "it has no id and call, and no beat".to_owned());
+            let why = refused
+                .err()
+                .unwrap_or_else(|| "it has no id and call, and no beat".to_owned());
             let said = json!({ "id": null, "error": format!("this is no call: {why}") });
             return drop(answers.try_send(said.to_string()));
         }
@@ -113,7 +126,8 @@ async fn send(
     let mut changes = site.board.changes();
     let mut frames = interval(FRAME);
     frames.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    let (mut seen, mut state, mut noted, mut signed) = (0, String::new(), String::new(), Instant::now());
+    let (mut seen, mut state, mut noted, mut signed) =
+        (0, String::new(), String::new(), Instant::now());
     let mut replayed = String::new();
     let mut known_state = MeshState::default();
     loop {
@@ -126,7 +140,11 @@ async fn send(
             state.clone_from(&now);
             messages.push(Message::text(now));
         }
-        let now = site.replay.as_ref().and_then(|replay| text_of("replay", &replay.shown())).unwrap_or_default();
+        let now = site
+            .replay
+            .as_ref()
+            .and_then(|replay| text_of("replay", &replay.shown()))
+            .unwrap_or_default();
         if now != replayed {
             replayed.clone_from(&now);
             messages.push(Message::text(now));
@@ -141,7 +159,10 @@ async fn send(
         let mesh = site.board.mesh_for(page);
         let has_more = mesh.is_some();
         // copied where there is something to compare with
-        let deviations = site.nominal.clone().and_then(|nominal| Some((nominal, mesh.clone()?)));
+        let deviations = site
+            .nominal
+            .clone()
+            .and_then(|nominal| Some((nominal, mesh.clone()?)));
         messages.extend(mesh.and_then(|patch| Some(Message::binary(frame_of(&patch)?))));
         if let Some((nominal, patch)) = deviations {
             // a millisecond for each thousand vertices, in which no other page is to wait
@@ -149,14 +170,22 @@ async fn send(
             messages.extend(frame.ok().flatten().map(Message::binary));
         }
         // what is known of vertices comes after them
-        if !has_more && let Some(known) = site.board.known().filter(|known| known.state != known_state) {
+        if !has_more
+            && let Some(known) = site
+                .board
+                .known()
+                .filter(|known| known.state != known_state)
+        {
             known_state.clone_from(&known.state);
             messages.extend(known.frames.iter().cloned().map(Message::binary));
         }
         if signed.elapsed() >= SIGN_OF_LIFE {
             signed = Instant::now();
             // the browser answers the one, the page sees the other
-            messages.extend([Message::Ping(Default::default()), Message::text(state.clone())]);
+            messages.extend([
+                Message::Ping(Default::default()),
+                Message::text(state.clone()),
+            ]);
         }
         for message in messages {
             // a full buffer of the system holds this page up, and nobody else
@@ -203,8 +232,14 @@ struct Rate {
 
 impl Rate {
     fn allows(&mut self, now: Instant) -> bool {
-        if self.began.is_none_or(|began| now.saturating_duration_since(began) >= Duration::from_secs(1)) {
-            *self = Self { began: Some(now), count: 0 };
+        if self
+            .began
+            .is_none_or(|began| now.saturating_duration_since(began) >= Duration::from_secs(1))
+        {
+            *self = Self {
+                began: Some(now),
+                count: 0,
+            };
         }
         self.count += 1;
         self.count <= MOST_PER_SECOND
@@ -218,18 +253,29 @@ mod tests {
     #[test]
     fn a_page_may_send_so_much_in_each_second_and_no_more() {
         let (mut rate, began) = (Rate::default(), Instant::now());
-        let count = |rate: &mut Rate, at| (0..2 * MOST_PER_SECOND).filter(|_| rate.allows(at)).count() as u32;
+        let count = |rate: &mut Rate, at| {
+            (0..2 * MOST_PER_SECOND).filter(|_| rate.allows(at)).count() as u32
+        };
         assert_eq!(count(&mut rate, began), MOST_PER_SECOND);
         assert_eq!(count(&mut rate, began + Duration::from_millis(999)), 0);
-        assert_eq!(count(&mut rate, began + Duration::from_secs(1)), MOST_PER_SECOND);
+        assert_eq!(
+            count(&mut rate, began + Duration::from_secs(1)),
+            MOST_PER_SECOND
+        );
     }
 
     #[test]
     fn arrays_of_a_mesh_patch_lie_at_multiples_of_their_size_in_a_frame() {
-        let patch = MeshPatch { vertices: vec![7, 8], positions: vec![0.25; 6], ..MeshPatch::default() };
+        let patch = MeshPatch {
+            vertices: vec![7, 8],
+            positions: vec![0.25; 6],
+            ..MeshPatch::default()
+        };
         let frame = frame_of(&patch).unwrap();
         assert_eq!(frame[..8], [MESH_PATCH, 0, 0, 0, 0, 1, 0, 0]);
-        let quarters = (0..frame.len() / 4).filter(|at| frame[4 * at..4 * at + 4] == 0.25f32.to_le_bytes()).count();
+        let quarters = (0..frame.len() / 4)
+            .filter(|at| frame[4 * at..4 * at + 4] == 0.25f32.to_le_bytes())
+            .count();
         assert_eq!(quarters, 6);
     }
 }

@@ -19,8 +19,11 @@ pub(super) fn sessions(folder: &Path, current: &str) -> io::Result<Vec<Value>> {
     let listed = list_sessions(folder)?;
     let shown = |ListedSession { name, bytes, files }: ListedSession| {
         // of the time of files nothing is taken: a copy has another one
-        let begun = SessionFacts::read(&folder.join(&name)).ok().and_then(|facts| facts.begun);
-        let mut session = json!({ "is_current": name == current, "name": name, "bytes": bytes, "files": files });
+        let begun = SessionFacts::read(&folder.join(&name))
+            .ok()
+            .and_then(|facts| facts.begun);
+        let mut session =
+            json!({ "is_current": name == current, "name": name, "bytes": bytes, "files": files });
         if let Some(begun) = begun {
             session["begun"] = begun.into();
         }
@@ -30,7 +33,9 @@ pub(super) fn sessions(folder: &Path, current: &str) -> io::Result<Vec<Value>> {
 }
 
 /// What is left to be read of a file, piece by piece, each on a thread that may wait for the disk.
-pub(super) fn body_of(file: impl Read + Send + 'static) -> impl Stream<Item = io::Result<Vec<u8>>> + Send {
+pub(super) fn body_of(
+    file: impl Read + Send + 'static,
+) -> impl Stream<Item = io::Result<Vec<u8>>> + Send {
     stream::unfold(Some(file), |file| async move {
         let mut file = file?;
         let read = move || {
@@ -39,7 +44,11 @@ pub(super) fn body_of(file: impl Read + Send + 'static) -> impl Stream<Item = io
             piece.truncate(count);
             Ok((piece, file))
         };
-        match tokio::task::spawn_blocking(read).await.map_err(io::Error::other).flatten() {
+        match tokio::task::spawn_blocking(read)
+            .await
+            .map_err(io::Error::other)
+            .flatten()
+        {
             Ok((piece, _)) if piece.is_empty() => None,
             Ok((piece, file)) => Some((Ok(piece), Some(file))),
             Err(error) => Some((Err(error), None)),

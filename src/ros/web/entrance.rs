@@ -43,9 +43,14 @@ pub(super) struct Entrance {
 impl Entrance {
     /// The role of who asks.
     pub fn role_of(&self, headers: &HeaderMap) -> Result<Role, Box<Response>> {
-        let cookies = headers.get(header::COOKIE).and_then(|value| value.to_str().ok()).unwrap_or_default();
+        let cookies = headers
+            .get(header::COOKIE)
+            .and_then(|value| value.to_str().ok())
+            .unwrap_or_default();
         let why = "this page was not let in: open it by a new link, which touchup prints, or another page makes";
-        self.access.role(cookies).ok_or_else(|| Box::new(refusal(StatusCode::UNAUTHORIZED, why)))
+        self.access
+            .role(cookies)
+            .ok_or_else(|| Box::new(refusal(StatusCode::UNAUTHORIZED, why)))
     }
 
     /// The link with a secret.
@@ -59,7 +64,9 @@ impl Entrance {
             true => self.link(self.access.invite(role)?.text()),
             false => self.base.clone(),
         };
-        let code = QrCode::new(&link).map(|code| rows(&code)).unwrap_or_default();
+        let code = QrCode::new(&link)
+            .map(|code| rows(&code))
+            .unwrap_or_default();
         Ok((link, code))
     }
 
@@ -74,31 +81,54 @@ impl Entrance {
     /// A new link in words, and as a QR code.
     pub fn invitation(&self, role: Role) -> io::Result<String> {
         let link = self.link(self.access.invite(role)?.text());
-        let code = QrCode::new(&link).map(|code| code.render::<Dense1x2>().build()).unwrap_or_default();
-        let code = if role == Role::Operate { format!("\n{code}") } else { String::new() };
-        Ok(format!("the next one may {} by {link}{code}", in_words(role)))
+        let code = QrCode::new(&link)
+            .map(|code| code.render::<Dense1x2>().build())
+            .unwrap_or_default();
+        let code = if role == Role::Operate {
+            format!("\n{code}")
+        } else {
+            String::new()
+        };
+        Ok(format!(
+            "the next one may {} by {link}{code}",
+            in_words(role)
+        ))
     }
 
     fn refused(&self, method: &Method, headers: &HeaderMap) -> Option<&'static str> {
-        let text = |name: HeaderName| headers.get(name).map(|value| value.to_str().unwrap_or_default());
+        let text = |name: HeaderName| {
+            headers
+                .get(name)
+                .map(|value| value.to_str().unwrap_or_default())
+        };
         if !text(header::HOST).is_some_and(|host| self.access.is_host(host)) {
             return Some(
                 "this page is called by another name: use the address that touchup printed, or allow the name by --web-name",
             );
         }
         // who changes something, or opens the socket, says where it was loaded from
-        let needs_origin = method != Method::GET && method != Method::HEAD || headers.contains_key(header::UPGRADE);
+        let needs_origin = method != Method::GET && method != Method::HEAD
+            || headers.contains_key(header::UPGRADE);
         match text(header::ORIGIN) {
             None if needs_origin => Some("a request without Origin is refused here"),
-            Some(origin) if !self.access.is_origin(origin) => Some("the request comes from another page"),
+            Some(origin) if !self.access.is_origin(origin) => {
+                Some("the request comes from another page")
+            }
             _ => None,
         }
     }
 }
 
 fn rows(code: &QrCode) -> Vec<String> {
-    let modules: Vec<char> = code.to_colors().into_iter().map(|colour| colour.select('1', '0')).collect();
-    modules.chunks(code.width()).map(String::from_iter).collect()
+    let modules: Vec<char> = code
+        .to_colors()
+        .into_iter()
+        .map(|colour| colour.select('1', '0'))
+        .collect();
+    modules
+        .chunks(code.width())
+        .map(String::from_iter)
+        .collect()
 }
 
 fn in_words(role: Role) -> &'static str {
@@ -111,22 +141,33 @@ fn in_words(role: Role) -> &'static str {
 /// What is served before and beside everything else: the page itself, and the way in.
 pub(super) fn routes(entrance: &Arc<Entrance>) -> Router {
     Router::new()
-        .route("/", get(|headers: HeaderMap| async move { asset("index.html", SEEN_AGAIN, &headers) }))
+        .route(
+            "/",
+            get(|headers: HeaderMap| async move { asset("index.html", SEEN_AGAIN, &headers) }),
+        )
         .route(
             "/assets/{name}",
-            get(|Path(name): Path<String>, headers: HeaderMap| async move { asset(&name, KEPT, &headers) }),
+            get(|Path(name): Path<String>, headers: HeaderMap| async move {
+                asset(&name, KEPT, &headers)
+            }),
         )
         // names of these have no checksum in them
         .route(
             "/{name}",
-            get(|Path(name): Path<String>, headers: HeaderMap| async move { asset(&name, SEEN_AGAIN, &headers) }),
+            get(|Path(name): Path<String>, headers: HeaderMap| async move {
+                asset(&name, SEEN_AGAIN, &headers)
+            }),
         )
         .route("/pair", get(pair))
         .with_state(Arc::clone(entrance))
 }
 
 /// Host and origin of every request; what goes out with every answer.
-pub(super) async fn check(State(entrance): State<Arc<Entrance>>, request: Request, next: Next) -> Response {
+pub(super) async fn check(
+    State(entrance): State<Arc<Entrance>>,
+    request: Request,
+    next: Next,
+) -> Response {
     let mut response = match entrance.refused(request.method(), request.headers()) {
         Some(why) => refusal(StatusCode::FORBIDDEN, why),
         None => next.run(request).await,
@@ -139,7 +180,10 @@ pub(super) async fn check(State(entrance): State<Arc<Entrance>>, request: Reques
     ];
     for (name, value) in constant {
         // a report has a stricter policy of its own
-        response.headers_mut().entry(name).or_insert(HeaderValue::from_static(value));
+        response
+            .headers_mut()
+            .entry(name)
+            .or_insert(HeaderValue::from_static(value));
     }
     response
 }
@@ -151,27 +195,44 @@ pub(super) async fn nothing() -> Response {
 
 /// `{"error": …}`.
 pub(super) fn refusal(status: StatusCode, why: &str) -> Response {
-    (status, [(header::CONTENT_TYPE, "application/json")], json!({ "error": why }).to_string()).into_response()
+    (
+        status,
+        [(header::CONTENT_TYPE, "application/json")],
+        json!({ "error": why }).to_string(),
+    )
+        .into_response()
 }
 
 /// An answer that no cache keeps.
 pub(super) fn as_json(value: &impl serde::Serialize) -> Response {
     let text = serde_json::to_string(value).unwrap_or_default();
-    ([(header::CONTENT_TYPE, "application/json"), (header::CACHE_CONTROL, "no-store")], text).into_response()
+    (
+        [
+            (header::CONTENT_TYPE, "application/json"),
+            (header::CACHE_CONTROL, "no-store"),
+        ],
+        text,
+    )
+        .into_response()
 }
 
 fn asset(name: &str, cache: &'static str, headers: &HeaderMap) -> Response {
     let Some(file) = PAGE.iter().find(|file| file.name == name) else {
         return refusal(StatusCode::NOT_FOUND, "the page has no such file");
     };
-    let head =
-        [(header::CONTENT_TYPE, file.content_type), (header::CACHE_CONTROL, cache), (header::VARY, "accept-encoding")];
+    let head = [
+        (header::CONTENT_TYPE, file.content_type),
+        (header::CACHE_CONTROL, cache),
+        (header::VARY, "accept-encoding"),
+    ];
     let accepts_gzip = headers
         .get(header::ACCEPT_ENCODING)
         .and_then(|value| value.to_str().ok())
         .is_some_and(|all| all.contains("gzip"));
     match file.gzip {
-        Some(gzip) if accepts_gzip => (head, [(header::CONTENT_ENCODING, "gzip")], gzip).into_response(),
+        Some(gzip) if accepts_gzip => {
+            (head, [(header::CONTENT_ENCODING, "gzip")], gzip).into_response()
+        }
         _ => (head, file.bytes).into_response(),
     }
 }
@@ -183,13 +244,26 @@ struct PairQuery {
 }
 
 /// A link that somebody follows.
-async fn pair(State(entrance): State<Arc<Entrance>>, Query(PairQuery { token }): Query<PairQuery>) -> Response {
+async fn pair(
+    State(entrance): State<Arc<Entrance>>,
+    Query(PairQuery { token }): Query<PairQuery>,
+) -> Response {
     match entrance.access.pair(&token) {
         Ok(Some((cookie, role))) => {
             entrance.note_paired(role);
-            (StatusCode::SEE_OTHER, [(header::SET_COOKIE, cookie), (header::LOCATION, "/".to_owned())]).into_response()
+            (
+                StatusCode::SEE_OTHER,
+                [
+                    (header::SET_COOKIE, cookie),
+                    (header::LOCATION, "/".to_owned()),
+                ],
+            )
+                .into_response()
         }
-        Ok(None) => refusal(StatusCode::FORBIDDEN, "this link is not valid, or was used: ask for a new one"),
+        Ok(None) => refusal(
+            StatusCode::FORBIDDEN,
+            "this link is not valid, or was used: ask for a new one",
+        ),
         Err(error) => refusal(StatusCode::SERVICE_UNAVAILABLE, &error.to_string()),
     }
 }

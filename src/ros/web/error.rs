@@ -10,7 +10,9 @@ use crate::ros::exchange::RosError;
 #[derive(Debug, thiserror::Error)]
 pub enum WebError {
     /// the address cannot be listened to
-    #[error("the page cannot be served at {address}: {source}; choose another address or port by --web")]
+    #[error(
+        "the page cannot be served at {address}: {source}; choose another address or port by --web"
+    )]
     Address {
         /// which
         address: SocketAddr,

@@ -41,7 +41,10 @@ pub(super) fn router(site: Arc<Site>, replays: Arc<Replays>) -> Router {
         .route("/api/setup", get(no_setup))
         .route("/api/sessions", get(list_sessions))
         .route("/api/sessions/{session}/{file}", get(download))
-        .route("/api/reports/{session}", get(reports::show).post(reports::make))
+        .route(
+            "/api/reports/{session}",
+            get(reports::show).post(reports::make),
+        )
         .with_state(site)
         .merge(page)
         .fallback(entrance::nothing)
@@ -50,7 +53,10 @@ pub(super) fn router(site: Arc<Site>, replays: Arc<Replays>) -> Router {
 
 /// The node runs: nothing is to be set up.
 async fn no_setup(State(site): State<Arc<Site>>, headers: HeaderMap) -> Response {
-    role_of(&site, &headers).map_or_else(|response| *response, |_| as_json(&json!({ "stage": "running" })))
+    role_of(&site, &headers).map_or_else(
+        |response| *response,
+        |_| as_json(&json!({ "stage": "running" })),
+    )
 }
 
 /// The role of who asks.
@@ -77,16 +83,24 @@ async fn upgrade(
         Err(response) => return *response,
     };
     let Some(place) = PagePlace::take(&site) else {
-        return refusal(StatusCode::SERVICE_UNAVAILABLE, "so many pages are open already: close one");
+        return refusal(
+            StatusCode::SERVICE_UNAVAILABLE,
+            "so many pages are open already: close one",
+        );
     };
-    let socket = socket.protocols([PROTOCOL]).max_message_size(LARGEST_MESSAGE).max_frame_size(LARGEST_MESSAGE);
-    socket.max_write_buffer_size(LARGEST_BACKLOG).on_upgrade(move |socket| async move {
-        match replay {
-            None => connection::serve(socket, site, role).await,
-            Some(session) => replay::serve(socket, &replays, &session).await,
-        }
-        drop(place);
-    })
+    let socket = socket
+        .protocols([PROTOCOL])
+        .max_message_size(LARGEST_MESSAGE)
+        .max_frame_size(LARGEST_MESSAGE);
+    socket
+        .max_write_buffer_size(LARGEST_BACKLOG)
+        .on_upgrade(move |socket| async move {
+            match replay {
+                None => connection::serve(socket, site, role).await,
+                Some(session) => replay::serve(socket, &replays, &session).await,
+            }
+            drop(place);
+        })
 }
 
 async fn state(State(site): State<Arc<Site>>, headers: HeaderMap) -> Response {
@@ -100,7 +114,10 @@ async fn list_sessions(State(site): State<Arc<Site>>, headers: HeaderMap) -> Res
     let (folder, current) = (site.session_folder.clone(), site.board.session());
     match tokio::task::spawn_blocking(move || sessions(&folder, &current)).await {
         Ok(Ok(listed)) => as_json(&Value::from(listed)),
-        Ok(Err(error)) => refusal(StatusCode::SERVICE_UNAVAILABLE, &format!("the sessions could not be read: {error}")),
+        Ok(Err(error)) => refusal(
+            StatusCode::SERVICE_UNAVAILABLE,
+            &format!("the sessions could not be read: {error}"),
+        ),
         Err(error) => refusal(StatusCode::SERVICE_UNAVAILABLE, &error.to_string()),
     }
 }
@@ -115,8 +132,10 @@ async fn download(
     }
     let folder = site.session_folder.clone();
     let name = file.clone();
-    let opened =
-        tokio::task::spawn_blocking(move || crate::io::session_folder::open_file(&folder, &session, &name)).await;
+    let opened = tokio::task::spawn_blocking(move || {
+        crate::io::session_folder::open_file(&folder, &session, &name)
+    })
+    .await;
     match opened {
         Ok(Ok((opened, length))) => {
             let disposition = format!("attachment; filename=\"{file}\"");

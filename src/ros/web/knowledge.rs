@@ -30,7 +30,8 @@ const BESIDE_OUTLIER: f64 = 1e-3;
 
 /// Evaluates each state at which the mesh rests, until it is dropped.
 pub(super) async fn follow(site: Arc<Site>) {
-    let (mut seen, mut still, mut done) = (MeshState::default(), Instant::now(), MeshState::default());
+    let (mut seen, mut still, mut done) =
+        (MeshState::default(), Instant::now(), MeshState::default());
     loop {
         sleep(LOOK).await;
         let state = site.board.shape_state();
@@ -44,27 +45,59 @@ pub(super) async fn follow(site: Arc<Site>) {
         done.clone_from(&state);
         let (to, copy) = oneshot::channel();
         // who asked is still there
-        site.inbox.put(Arrival::Evidence(Reply::new(move |copy| drop(to.send(copy)))));
+        site.inbox.put(Arrival::Evidence(Reply::new(move |copy| {
+            drop(to.send(copy))
+        })));
         let Ok(Some(copy)) = copy.await else { continue };
         let (scan, touched) = (Arc::clone(&site.scan_mesh), site.board.touched());
         // of a replay it may be, beside a session that goes on
-        let Ok(evaluated) = begin("knowledge", move || frames_of(&copy, &scan, &touched)) else { continue };
+        let Ok(evaluated) = begin("knowledge", move || frames_of(&copy, &scan, &touched)) else {
+            continue;
+        };
         if let Ok(frames) = evaluated.await {
             site.board.set_known(Known { state, frames });
         }
     }
 }
 
-fn frames_of(copy: &Receiver<Patcher>, scan: &(TriMesh, FaceTree), touched: &[TouchedVertex]) -> Vec<Vec<u8>> {
-    let Ok(mut patcher) = copy.recv_timeout(COPY_WAIT) else { return Vec::new() };
+fn frames_of(
+    copy: &Receiver<Patcher>,
+    scan: &(TriMesh, FaceTree),
+    touched: &[TouchedVertex],
+) -> Vec<Vec<u8>> {
+    let Ok(mut patcher) = copy.recv_timeout(COPY_WAIT) else {
+        return Vec::new();
+    };
     patcher.flush();
-    let places: Vec<_> = touched.iter().map(|(_, place, support)| (*place, *support)).collect();
+    let places: Vec<_> = touched
+        .iter()
+        .map(|(_, place, support)| (*place, *support))
+        .collect();
     let sigmas = patcher.sigma_at(&scan.0, &scan.1, &places);
-    let of_sigma: Vec<_> = touched.iter().zip(sigmas).map(|((vertex, ..), sigma)| (*vertex, sigma as f32)).collect();
+    let of_sigma: Vec<_> = touched
+        .iter()
+        .zip(sigmas)
+        .map(|((vertex, ..), sigma)| (*vertex, sigma as f32))
+        .collect();
     // no message is larger than one of the mesh
-    let sigma_frames = of_sigma.chunks(OF_A_MESSAGE).map(|part| frame(VertexNumber::Sigma, part.iter().copied()));
-    let outliers: Vec<_> = patcher.outliers().last().map(|outlier| outlier.point).collect();
-    let is_beside = |place: &Point3<f64>| outliers.iter().any(|point| (point - place).norm() < BESIDE_OUTLIER);
-    let beside = touched.iter().filter(|(_, place, _)| is_beside(place)).map(|(vertex, ..)| (*vertex, 1.0));
-    sigma_frames.chain([frame(VertexNumber::Outlier, beside)]).collect()
+    let sigma_frames = of_sigma
+        .chunks(OF_A_MESSAGE)
+        .map(|part| frame(VertexNumber::Sigma, part.iter().copied()));
+    let outliers: Vec<_> = patcher
+        .outliers()
+        .last()
+        .map(|outlier| outlier.point)
+        .collect();
+    let is_beside = |place: &Point3<f64>| {
+        outliers
+            .iter()
+            .any(|point| (point - place).norm() < BESIDE_OUTLIER)
+    };
+    let beside = touched
+        .iter()
+        .filter(|(_, place, _)| is_beside(place))
+        .map(|(vertex, ..)| (*vertex, 1.0));
+    sigma_frames
+        .chain([frame(VertexNumber::Outlier, beside)])
+        .collect()
 }

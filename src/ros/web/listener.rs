@@ -41,14 +41,21 @@ pub struct Certificate {
 impl Certificate {
     /// What accepts TLS by it.
     pub(super) fn acceptor(&self) -> Result<TlsAcceptor, WebError> {
-        let bad = |file: &Path, why: String| WebError::Certificate { file: file.to_owned(), why };
-        let chain = CertificateDer::pem_file_iter(&self.chain).and_then(Iterator::collect::<Result<Vec<_>, _>>);
+        let bad = |file: &Path, why: String| WebError::Certificate {
+            file: file.to_owned(),
+            why,
+        };
+        let chain = CertificateDer::pem_file_iter(&self.chain)
+            .and_then(Iterator::collect::<Result<Vec<_>, _>>);
         let chain = chain.map_err(|error| bad(&self.chain, error.to_string()))?;
         if chain.is_empty() {
             return Err(bad(&self.chain, "there is no certificate in it".to_owned()));
         }
-        let key = PrivateKeyDer::from_pem_file(&self.key).map_err(|error| bad(&self.key, error.to_string()))?;
-        let config = ServerConfig::builder().with_no_client_auth().with_single_cert(chain, key);
+        let key = PrivateKeyDer::from_pem_file(&self.key)
+            .map_err(|error| bad(&self.key, error.to_string()))?;
+        let config = ServerConfig::builder()
+            .with_no_client_auth()
+            .with_single_cert(chain, key);
         let config = config.map_err(|error| bad(&self.key, error.to_string()))?;
         Ok(TlsAcceptor::from(Arc::new(config)))
     }
@@ -78,7 +85,9 @@ impl Routes {
 pub(super) async fn serve(listener: TcpListener, tls: Option<TlsAcceptor>, routes: Routes) {
     let room = Arc::new(Semaphore::new(MOST_CONNECTIONS));
     loop {
-        let Ok(place) = Arc::clone(&room).acquire_owned().await else { return };
+        let Ok(place) = Arc::clone(&room).acquire_owned().await else {
+            return;
+        };
         let stream = match listener.accept().await {
             Ok((stream, _)) => stream,
             Err(error) => {
@@ -105,9 +114,14 @@ async fn connect(stream: TcpStream, tls: Option<TlsAcceptor>, routes: Routes) ->
     }
 }
 
-async fn answer(stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static, routes: Routes) -> io::Result<()> {
+async fn answer(
+    stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static,
+    routes: Routes,
+) -> io::Result<()> {
     let mut http = http1::Builder::new();
-    http.timer(TokioTimer::new()).header_read_timeout(HEAD_WITHIN).max_buf_size(64 << 10);
+    http.timer(TokioTimer::new())
+        .header_read_timeout(HEAD_WITHIN)
+        .max_buf_size(64 << 10);
     // a connection that stays open is answered by what is served when it asks
     let service = service_fn(move |request| TowerToHyperService::new(routes.now()).call(request));
     let connection = http.serve_connection(TokioIo::new(stream), service);

@@ -90,9 +90,18 @@ impl MeshCopy {
 
     fn begin(&mut self, patch: MeshPatch) {
         let pages = std::mem::take(&mut self.pages);
-        let pages = pages.into_keys().map(|page| (page, Lacking::default())).collect();
+        let pages = pages
+            .into_keys()
+            .map(|page| (page, Lacking::default()))
+            .collect();
         let (frame, session) = (patch.header.frame_id.clone(), patch.session.clone());
-        *self = Self { frame, session, pages, is_coming: true, ..Self::default() };
+        *self = Self {
+            frame,
+            session,
+            pages,
+            is_coming: true,
+            ..Self::default()
+        };
         self.part_of_whole(&patch);
     }
 
@@ -111,17 +120,26 @@ impl MeshCopy {
         let is_last = patch.part + 1 == patch.part_count;
         self.begun.push(patch);
         if is_last {
-            std::mem::take(&mut self.begun).iter().for_each(|patch| self.apply(patch));
+            std::mem::take(&mut self.begun)
+                .iter()
+                .for_each(|patch| self.apply(patch));
         }
     }
 
     fn apply(&mut self, patch: &MeshPatch) {
-        let mut is_shape =
-            !patch.removed_faces.is_empty() || !patch.faces.is_empty() || !patch.removed_vertices.is_empty();
+        let mut is_shape = !patch.removed_faces.is_empty()
+            || !patch.faces.is_empty()
+            || !patch.removed_vertices.is_empty();
         for &face in &patch.removed_faces {
             self.set_face(face, NO_FACE);
         }
-        let places = patch.positions.as_chunks().0.iter().zip(&patch.variance).zip(&patch.support);
+        let places = patch
+            .positions
+            .as_chunks()
+            .0
+            .iter()
+            .zip(&patch.variance)
+            .zip(&patch.support);
         for (&vertex, ((position, variance), support)) in patch.vertices.iter().zip(places) {
             let at = vertex as usize;
             if at >= self.support.len() {
@@ -130,7 +148,8 @@ impl MeshCopy {
                 self.support.resize(at + 1, NO_VERTEX);
             }
             is_shape |= (self.positions[at], self.support[at]) != (*position, *support);
-            (self.positions[at], self.variance[at], self.support[at]) = (*position, *variance, *support);
+            (self.positions[at], self.variance[at], self.support[at]) =
+                (*position, *variance, *support);
             self.lack_vertex(vertex);
         }
         for (&face, corners) in patch.faces.iter().zip(patch.corners.as_chunks().0) {
@@ -157,19 +176,27 @@ impl MeshCopy {
             self.corners.resize(at + 1, NO_FACE);
         }
         self.corners[at] = corners;
-        self.pages.values_mut().for_each(|lacking| lacking.faces.insert(face));
+        self.pages
+            .values_mut()
+            .for_each(|lacking| lacking.faces.insert(face));
     }
 
     fn lack_vertex(&mut self, vertex: u32) {
-        self.pages.values_mut().for_each(|lacking| lacking.vertices.insert(vertex));
+        self.pages
+            .values_mut()
+            .for_each(|lacking| lacking.vertices.insert(vertex));
     }
 
     /// A page that has nothing yet.
     pub fn join(&mut self, page: PageId) {
         let mut lacking = Lacking::default();
-        let vertices = (0..).zip(&self.support).filter(|(_, support)| **support != NO_VERTEX);
+        let vertices = (0..)
+            .zip(&self.support)
+            .filter(|(_, support)| **support != NO_VERTEX);
         vertices.for_each(|(vertex, _)| lacking.vertices.insert(vertex));
-        let faces = (0..).zip(&self.corners).filter(|(_, corners)| **corners != NO_FACE);
+        let faces = (0..)
+            .zip(&self.corners)
+            .filter(|(_, corners)| **corners != NO_FACE);
         faces.for_each(|(face, _)| lacking.faces.insert(face));
         self.pages.insert(page, lacking);
     }
@@ -188,8 +215,9 @@ impl MeshCopy {
     pub fn touched(&self) -> Vec<TouchedVertex> {
         let place = |at: usize| Point3::from(self.positions[at].map(f64::from));
         let vertices = (0..).zip(&self.support);
-        let touched =
-            vertices.filter_map(|(vertex, support)| Some((vertex, place(vertex as usize), known_by(*support)?)));
+        let touched = vertices.filter_map(|(vertex, support)| {
+            Some((vertex, place(vertex as usize), known_by(*support)?))
+        });
         touched.collect()
     }
 
@@ -206,7 +234,14 @@ impl MeshCopy {
         if self.is_coming || self.version == 0 {
             return None;
         }
-        let Self { pages, positions, variance, support, corners, .. } = self;
+        let Self {
+            pages,
+            positions,
+            variance,
+            support,
+            corners,
+            ..
+        } = self;
         let lacking = pages.get_mut(&page)?;
         let is_first_whole = lacking.version == 0 && lacking.part == 0;
         if lacking.vertices.is_empty() && lacking.faces.is_empty() && !is_first_whole {
@@ -224,15 +259,20 @@ impl MeshCopy {
             patch.support.push(support[at]);
         });
         let room = OF_A_MESSAGE - patch.vertices.len() - patch.removed_vertices.len();
-        lacking.faces.take(room, |face| match corners[face as usize] {
-            NO_FACE => patch.removed_faces.push(face),
-            corners => {
-                patch.faces.push(face);
-                patch.corners.extend(corners);
-            }
-        });
+        lacking
+            .faces
+            .take(room, |face| match corners[face as usize] {
+                NO_FACE => patch.removed_faces.push(face),
+                corners => {
+                    patch.faces.push(face);
+                    patch.corners.extend(corners);
+                }
+            });
         let left = lacking.vertices.len() + lacking.faces.len();
-        (patch.part, patch.part_count) = (lacking.part, lacking.part + 1 + left.div_ceil(OF_A_MESSAGE) as u32);
+        (patch.part, patch.part_count) = (
+            lacking.part,
+            lacking.part + 1 + left.div_ceil(OF_A_MESSAGE) as u32,
+        );
         (patch.base_version, patch.version) = (lacking.version, self.version);
         if left == 0 {
             (lacking.version, lacking.part) = (self.version, 0);
@@ -264,22 +304,46 @@ mod tests {
     impl Page {
         fn take(&mut self, patch: &MeshPatch) {
             if patch.base_version == 0 && patch.part == 0 {
-                *self = Self { session: patch.session.clone(), ..Self::default() };
+                *self = Self {
+                    session: patch.session.clone(),
+                    ..Self::default()
+                };
             }
             assert_eq!(self.session, patch.session);
-            self.faces.retain(|face, _| !patch.removed_faces.contains(face));
-            self.vertices.extend(patch.vertices.iter().copied().zip(patch.positions.as_chunks().0.iter().copied()));
-            self.faces.extend(patch.faces.iter().copied().zip(patch.corners.as_chunks().0.iter().copied()));
-            self.vertices.retain(|vertex, _| !patch.removed_vertices.contains(vertex));
+            self.faces
+                .retain(|face, _| !patch.removed_faces.contains(face));
+            self.vertices.extend(
+                patch
+                    .vertices
+                    .iter()
+                    .copied()
+                    .zip(patch.positions.as_chunks().0.iter().copied()),
+            );
+            self.faces.extend(
+                patch
+                    .faces
+                    .iter()
+                    .copied()
+                    .zip(patch.corners.as_chunks().0.iter().copied()),
+            );
+            self.vertices
+                .retain(|vertex, _| !patch.removed_vertices.contains(vertex));
         }
 
         /// Takes all that there is for it; in how many messages.
         fn catch_up(&mut self, copy: &mut MeshCopy, page: PageId) -> usize {
-            std::iter::from_fn(|| copy.next_for(page)).inspect(|patch| self.take(patch)).count()
+            std::iter::from_fn(|| copy.next_for(page))
+                .inspect(|patch| self.take(patch))
+                .count()
         }
     }
 
-    fn patch(session: &str, versions: [u64; 2], vertices: &[(u32, f32)], faces: &[(u32, [u32; 3])]) -> MeshPatch {
+    fn patch(
+        session: &str,
+        versions: [u64; 2],
+        vertices: &[(u32, f32)],
+        faces: &[(u32, [u32; 3])],
+    ) -> MeshPatch {
         MeshPatch {
             session: session.to_owned(),
             base_version: versions[0],
@@ -296,7 +360,12 @@ mod tests {
     }
 
     fn triangle(session: &str) -> MeshPatch {
-        patch(session, [0, 1], &[(0, 0.0), (1, 1.0), (2, 2.0)], &[(0, [0, 1, 2])])
+        patch(
+            session,
+            [0, 1],
+            &[(0, 0.0), (1, 1.0), (2, 2.0)],
+            &[(0, [0, 1, 2])],
+        )
     }
 
     #[test]
@@ -307,15 +376,27 @@ mod tests {
         let mut early = Page::default();
         assert_eq!(early.catch_up(&mut copy, 1), 1);
         for version in 2..100 {
-            copy.take(patch("a", [version - 1, version], &[(1, version as f32)], &[]));
+            copy.take(patch(
+                "a",
+                [version - 1, version],
+                &[(1, version as f32)],
+                &[],
+            ));
         }
         copy.join(2);
         let mut late = Page::default();
-        assert_eq!((early.catch_up(&mut copy, 1), late.catch_up(&mut copy, 2)), (1, 1));
+        assert_eq!(
+            (early.catch_up(&mut copy, 1), late.catch_up(&mut copy, 2)),
+            (1, 1)
+        );
         assert_eq!(early, late);
         assert_eq!(late.vertices[&1], [99.0; 3]);
         assert_eq!(late.catch_up(&mut copy, 2), 0);
-        copy.take(MeshPatch { removed_faces: vec![0], removed_vertices: vec![0], ..patch("a", [99, 100], &[], &[]) });
+        copy.take(MeshPatch {
+            removed_faces: vec![0],
+            removed_vertices: vec![0],
+            ..patch("a", [99, 100], &[], &[])
+        });
         early.catch_up(&mut copy, 1);
         assert_eq!((early.vertices.len(), early.faces.len()), (2, 0));
         copy.leave(1);
@@ -342,7 +423,11 @@ mod tests {
         copy.join(1);
         let mut page = Page::default();
         page.catch_up(&mut copy, 1);
-        let parts = |part| MeshPatch { part, part_count: 2, ..triangle("b") };
+        let parts = |part| MeshPatch {
+            part,
+            part_count: 2,
+            ..triangle("b")
+        };
         copy.take(parts(0));
         copy.take(patch("b", [1, 2], &[(2, 7.0)], &[]));
         copy.take(parts(1));
@@ -359,9 +444,15 @@ mod tests {
         copy.join(1);
         Page::default().catch_up(&mut copy, 1);
         assert_eq!(copy.shape_state(), ("a".to_owned(), 1));
-        copy.take(MeshPatch { variance: vec![1e-10], ..patch("a", [1, 2], &[(1, 1.0)], &[]) });
+        copy.take(MeshPatch {
+            variance: vec![1e-10],
+            ..patch("a", [1, 2], &[(1, 1.0)], &[])
+        });
         let shown = copy.next_for(1).unwrap();
-        assert_eq!((shown.version, shown.vertices, shown.variance), (2, vec![1], vec![1e-10]));
+        assert_eq!(
+            (shown.version, shown.vertices, shown.variance),
+            (2, vec![1], vec![1e-10])
+        );
         assert_eq!(copy.shape_state(), ("a".to_owned(), 1));
         copy.take(patch("a", [2, 3], &[(1, 1.5)], &[]));
         assert_eq!(copy.shape_state(), ("a".to_owned(), 3));
@@ -374,7 +465,11 @@ mod tests {
         copy.join(1);
         let mut page = Page::default();
         page.catch_up(&mut copy, 1);
-        let part = |part, x| MeshPatch { part, part_count: 2, ..patch("a", [1, 2], &[(part, x)], &[]) };
+        let part = |part, x| MeshPatch {
+            part,
+            part_count: 2,
+            ..patch("a", [1, 2], &[(part, x)], &[])
+        };
         copy.take(part(0, 3.0));
         assert!(copy.next_for(1).is_none());
         copy.take(part(1, 4.0));
@@ -386,7 +481,9 @@ mod tests {
     fn a_large_mesh_comes_in_parts_with_vertices_before_faces() {
         let count = OF_A_MESSAGE as u32 + 10;
         let vertices: Vec<_> = (0..count).map(|id| (id, id as f32)).collect();
-        let faces: Vec<_> = (0..count - 2).map(|id| (id, [id, id + 1, id + 2])).collect();
+        let faces: Vec<_> = (0..count - 2)
+            .map(|id| (id, [id, id + 1, id + 2]))
+            .collect();
         let mut copy = MeshCopy::default();
         copy.take(patch("a", [0, 1], &vertices, &faces));
         copy.join(1);
@@ -395,10 +492,18 @@ mod tests {
         while let Some(patch) = copy.next_for(1) {
             let last = (patch.part, patch.part_count);
             page.take(&patch);
-            assert!(page.faces.values().flatten().all(|corner| page.vertices.contains_key(corner)));
+            assert!(
+                page.faces
+                    .values()
+                    .flatten()
+                    .all(|corner| page.vertices.contains_key(corner))
+            );
             parts.push(last);
         }
         assert_eq!(parts, [(0, 3), (1, 3), (2, 3)]);
-        assert_eq!((page.vertices.len(), page.faces.len()), (vertices.len(), faces.len()));
+        assert_eq!(
+            (page.vertices.len(), page.faces.len()),
+            (vertices.len(), faces.len())
+        );
     }
 }

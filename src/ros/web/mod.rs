@@ -112,23 +112,53 @@ impl WebServer {
     /// # Errors
     /// [`WebError`]
     pub fn open(params: &WebParams, notify: fn(&str)) -> Result<Self, WebError> {
-        let tls = params.certificate.as_ref().map(Certificate::acceptor).transpose()?;
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
+        let tls = params
+            .certificate
+            .as_ref()
+            .map(Certificate::acceptor)
+            .transpose()?;
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_io()
+            .enable_time()
+            .build()?;
         let listener = runtime.block_on(TcpListener::bind(params.address));
-        let listener = listener.map_err(|source| WebError::Address { address: params.address, source })?;
+        let listener = listener.map_err(|source| WebError::Address {
+            address: params.address,
+            source,
+        })?;
         let address = listener.local_addr()?;
-        let names: Vec<String> = params.names.iter().cloned().chain(own_address(address)).collect();
+        let names: Vec<String> = params
+            .names
+            .iter()
+            .cloned()
+            .chain(own_address(address))
+            .collect();
         let access = Access::new(address, &names, params.by_link, tls.is_some());
-        let name = names.first().cloned().unwrap_or_else(|| in_a_link(address.ip()));
+        let name = names
+            .first()
+            .cloned()
+            .unwrap_or_else(|| in_a_link(address.ip()));
         let base = format!("{}://{name}:{}", access.scheme(), address.port());
-        let entrance = Arc::new(Entrance { access, base, notify, pages_so_far: AtomicU64::new(0) });
+        let entrance = Arc::new(Entrance {
+            access,
+            base,
+            notify,
+            pages_so_far: AtomicU64::new(0),
+        });
         let roles = [Role::Operate, Role::Look];
         let invitations = match entrance.access.needs_cookie() {
-            true => roles.map(|role| entrance.invitation(role)).into_iter().collect::<io::Result<_>>()?,
+            true => roles
+                .map(|role| entrance.invitation(role))
+                .into_iter()
+                .collect::<io::Result<_>>()?,
             false => Vec::new(),
         };
         let checked = from_fn_with_state(Arc::clone(&entrance), entrance::check);
-        let routes = Routes::new(entrance::routes(&entrance).fallback(entrance::nothing).layer(checked));
+        let routes = Routes::new(
+            entrance::routes(&entrance)
+                .fallback(entrance::nothing)
+                .layer(checked),
+        );
         let (stop, handle) = (Arc::new(Notify::new()), runtime.handle().clone());
         let (stopped, served) = (Arc::clone(&stop), routes.clone());
         let serve = move || {
@@ -141,7 +171,14 @@ impl WebServer {
             runtime.shutdown_background();
         };
         let thread = Some(Builder::new().name("touchup-web".to_owned()).spawn(serve)?);
-        Ok(Self { invitations, entrance, routes, runtime: handle, stop, thread })
+        Ok(Self {
+            invitations,
+            entrance,
+            routes,
+            runtime: handle,
+            stop,
+            thread,
+        })
     }
 
     /// Serves what a node is made ready with, until one is.
@@ -167,7 +204,11 @@ impl WebServer {
         whole: impl Iterator<Item = MeshPatch>,
         network: Arc<dyn Port>,
     ) -> Result<Arc<dyn Port>, WebError> {
-        let file = facts.scan.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let file = facts
+            .scan
+            .file_name()
+            .map(|name| name.to_string_lossy().into_owned())
+            .unwrap_or_default();
         let site = Arc::new(Site {
             board: Board::new(whole),
             calls: Calls::new(&inbox)?,
@@ -176,7 +217,11 @@ impl WebServer {
             annotations: Annotations::new(&facts.session_folder),
             nominal: facts.nominal.map(|mesh| Arc::new(Nominal::new(mesh))),
             reports: Reports::new(facts.nominal_file, facts.mesh_unit),
-            scan: ScanShown { file, faces: facts.scan_mesh.0.face_count(), is_size_confirmed: facts.is_size_confirmed },
+            scan: ScanShown {
+                file,
+                faces: facts.scan_mesh.0.face_count(),
+                is_size_confirmed: facts.is_size_confirmed,
+            },
             scan_mesh: facts.scan_mesh,
             session_folder: facts.session_folder,
             pages: AtomicUsize::new(0),
@@ -220,6 +265,10 @@ fn own_address(address: SocketAddr) -> Option<String> {
         return None;
     }
     // of a block for documentation (RFC 5737), so that the way out is that to other networks
-    let socket = UdpSocket::bind("0.0.0.0:0").and_then(|socket| socket.connect("192.0.2.1:9").map(|()| socket));
-    socket.and_then(|socket| socket.local_addr()).ok().map(|own| in_a_link(own.ip()))
+    let socket = UdpSocket::bind("0.0.0.0:0")
+        .and_then(|socket| socket.connect("192.0.2.1:9").map(|()| socket));
+    socket
+        .and_then(|socket| socket.local_addr())
+        .ok()
+        .map(|own| in_a_link(own.ip()))
 }

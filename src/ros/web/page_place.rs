@@ -15,7 +15,9 @@ impl PagePlace {
     /// Takes a place; `None`: there is none left.
     pub fn take(site: &Arc<Site>) -> Option<Self> {
         let is_there = |count: usize| (count < MOST_PAGES).then_some(count + 1);
-        let taken = site.pages.fetch_update(Ordering::Relaxed, Ordering::Relaxed, is_there);
+        let taken = site
+            .pages
+            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, is_there);
         taken.is_ok().then(|| Self(Arc::clone(site)))
     }
 }

@@ -14,7 +14,10 @@ pub(super) struct PagePort {
 impl Port for PagePort {
     fn publish(&self, publication: Publication) {
         // those are the mesh and the features again, drawn for RViz
-        if !matches!(publication, Publication::Tile(_) | Publication::FeatureMarkers(_)) {
+        if !matches!(
+            publication,
+            Publication::Tile(_) | Publication::FeatureMarkers(_)
+        ) {
             self.site.board.write(publication.clone());
         }
         self.network.publish(publication);

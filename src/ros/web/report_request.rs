@@ -64,11 +64,13 @@ impl ReportRequest {
         let mut params = InspectionParams::default();
         params.drawing.unit = self.unit.unwrap_or(unit);
         params.drawing.general = read("general", self.general.as_deref(), general_tolerance)?;
-        (params.drawing.tolerance_mm, params.drawing.position_mm) = (self.tolerance_mm, self.position_mm);
+        (params.drawing.tolerance_mm, params.drawing.position_mm) =
+            (self.tolerance_mm, self.position_mm);
         if params.drawing.general.is_some() && params.drawing.tolerance_mm.is_some() {
             return Err("general and tolerance_mm exclude each other: leave one out".to_owned());
         }
-        params.decision.rule = read("rule", self.rule.as_deref(), decision_rule)?.unwrap_or(params.decision.rule);
+        params.decision.rule =
+            read("rule", self.rule.as_deref(), decision_rule)?.unwrap_or(params.decision.rule);
         params.decision.confidence = self.confidence.unwrap_or(params.decision.confidence);
         params.coverage_factor = self.k.unwrap_or(params.coverage_factor);
         params.match_mm = self.match_mm.unwrap_or(params.match_mm);
@@ -86,7 +88,10 @@ impl ReportRequest {
     /// In words: another one is needed.
     pub fn upload(&self) -> Result<(&str, u64), String> {
         let name = Path::new(&self.file);
-        let ending = name.extension().map(|ending| ending.to_ascii_lowercase()).unwrap_or_default();
+        let ending = name
+            .extension()
+            .map(|ending| ending.to_ascii_lowercase())
+            .unwrap_or_default();
         let is_mesh = ["ply", "stl", "obj"].iter().any(|known| ending == *known);
         match is_nominal_file(name) {
             true => Ok((&self.file, LARGEST_TABLE)),
@@ -104,23 +109,43 @@ impl ReportRequest {
     /// In words: it is no such file, or a link to elsewhere.
     pub fn in_session(&self, session: &SessionFolder) -> Result<PathBuf, String> {
         if IN_SESSION.contains(&&*self.file) {
-            session.place(&self.file, true).map_err(|why| why.to_string())
+            session
+                .place(&self.file, true)
+                .map_err(|why| why.to_string())
         } else {
-            Err(format!("\"{}\": nominal values in the folder of a session are {}", self.file, IN_SESSION.join(" or ")))
+            Err(format!(
+                "\"{}\": nominal values in the folder of a session are {}",
+                self.file,
+                IN_SESSION.join(" or ")
+            ))
         }
     }
 }
 
 /// What a field says; an error names the field.
-fn read<T>(field: &str, text: Option<&str>, of: fn(&str) -> Result<T, String>) -> Result<Option<T>, String> {
-    text.map(of).transpose().map_err(|why| format!("{field}: {why}"))
+fn read<T>(
+    field: &str,
+    text: Option<&str>,
+    of: fn(&str) -> Result<T, String>,
+) -> Result<Option<T>, String> {
+    text.map(of)
+        .transpose()
+        .map_err(|why| format!("{field}: {why}"))
 }
 
 /// A text of one line; none where there is nothing in it.
 fn text(name: &str, given: &Option<String>) -> Result<Option<String>, String> {
-    let Some(text) = given.as_deref().map(str::trim).filter(|text| !text.is_empty()) else { return Ok(None) };
+    let Some(text) = given
+        .as_deref()
+        .map(str::trim)
+        .filter(|text| !text.is_empty())
+    else {
+        return Ok(None);
+    };
     if text.chars().count() > LONGEST_TEXT || text.chars().any(char::is_control) {
-        return Err(format!("{name} has up to {LONGEST_TEXT} characters in one line"));
+        return Err(format!(
+            "{name} has up to {LONGEST_TEXT} characters in one line"
+        ));
     }
     Ok(Some(text.to_owned()))
 }
@@ -136,10 +161,19 @@ mod tests {
     /// The defaults are those that `touchup inspect --help` names.
     #[test]
     fn what_is_left_out_is_as_on_the_command_line() {
-        let params = request(serde_json::json!({ "nominal": "part" })).params(MeshUnit::Inch).unwrap();
+        let params = request(serde_json::json!({ "nominal": "part" }))
+            .params(MeshUnit::Inch)
+            .unwrap();
         assert_eq!((params.coverage_factor, params.match_mm), (2.0, 1.5));
-        assert_eq!((params.decision.rule.name(), params.decision.confidence), ("iso14253", 0.95));
-        assert!(params.drawing.general.is_none() && params.drawing.unit == MeshUnit::Inch && params.part.is_none());
+        assert_eq!(
+            (params.decision.rule.name(), params.decision.confidence),
+            ("iso14253", 0.95)
+        );
+        assert!(
+            params.drawing.general.is_none()
+                && params.drawing.unit == MeshUnit::Inch
+                && params.part.is_none()
+        );
     }
 
     #[test]
@@ -150,7 +184,11 @@ mod tests {
             ("align", "icp".into(), "align: take best-fit, or datums="),
             ("confidence", 0.5.into(), "above 0.5 and below 1"),
             ("k", 0.0.into(), "--k 0 must be above 0"),
-            ("tolerance_mm", serde_json::json!(-1.0), "--tolerance-mm -1 must be above 0"),
+            (
+                "tolerance_mm",
+                serde_json::json!(-1.0),
+                "--tolerance-mm -1 must be above 0",
+            ),
             ("part", "x".repeat(201).into(), "up to 200 characters"),
             ("operator", "a\nb".into(), "in one line"),
         ] {
@@ -173,7 +211,10 @@ mod tests {
         }
         let parent = tempfile::tempdir().unwrap();
         let session = SessionFolder::create(parent.path(), "one").unwrap();
-        assert_eq!(named("nominal.json").in_session(&session).unwrap(), session.path().join("nominal.json"));
+        assert_eq!(
+            named("nominal.json").in_session(&session).unwrap(),
+            session.path().join("nominal.json")
+        );
         for file in ["../two/nominal.csv", "features.json", "/etc/passwd", ""] {
             assert!(named(file).in_session(&session).is_err(), "{file}");
         }

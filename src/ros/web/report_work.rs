@@ -6,13 +6,18 @@ use std::sync::Arc;
 use tokio::sync::Semaphore;
 
 use crate::inspection::{
-    InspectionError, InspectionParams, InspectionSource, PartDrawing, PartPicture, ReportFiles, inspected,
+    InspectionError, InspectionParams, InspectionSource, PartDrawing, PartPicture, ReportFiles,
+    inspected,
 };
 use crate::io::mesh_file::MeshUnit;
 use crate::io::session_folder::{HandedIn, SessionFolder};
 
 /// What was measured of a session that runs: as `~/save_mesh` writes it.
-const SAVED: [&str; 3] = ["refined.features.json", "refined.touches.csv", "refined.ply"];
+const SAVED: [&str; 3] = [
+    "refined.features.json",
+    "refined.touches.csv",
+    "refined.ply",
+];
 
 /// What reports need of the node.
 #[derive(Debug)]
@@ -28,12 +33,22 @@ pub(super) struct Reports {
 impl Reports {
     /// - `part`: the nominal part of the node, in its unit.
     pub fn new(part: Option<PathBuf>, mesh_unit: MeshUnit) -> Self {
-        Self { turn: Arc::new(Semaphore::new(1)), part, mesh_unit }
+        Self {
+            turn: Arc::new(Semaphore::new(1)),
+            part,
+            mesh_unit,
+        }
     }
 
     /// Name of the nominal part.
     pub fn part_name(&self) -> Option<String> {
-        Some(self.part.as_ref()?.file_name()?.to_string_lossy().into_owned())
+        Some(
+            self.part
+                .as_ref()?
+                .file_name()?
+                .to_string_lossy()
+                .into_owned(),
+        )
     }
 }
 
@@ -73,12 +88,18 @@ impl ReportWork {
     /// # Errors
     /// In the words of `touchup inspect`.
     pub fn run(self) -> Result<(), String> {
-        self.files().and_then(|files| self.write(&files).map_err(|error| self.in_words(&error)))
+        self.files()
+            .and_then(|files| self.write(&files).map_err(|error| self.in_words(&error)))
     }
 
     /// Its files; none of them is a link to elsewhere.
     fn files(&self) -> Result<ReportFiles, String> {
-        let place = |name: &&str| self.session.place(name, true).map(drop).map_err(|why| why.to_string());
+        let place = |name: &&str| {
+            self.session
+                .place(name, true)
+                .map(drop)
+                .map_err(|why| why.to_string())
+        };
         ReportFiles::NAMES.iter().try_for_each(place)?;
         Ok(ReportFiles::in_folder(self.session.path()))
     }
@@ -98,19 +119,30 @@ impl ReportWork {
             drawing.file.path = name_of(file.path());
         }
         let inspected = inspected(&source, &drawing, &self.params)?;
-        files.write(&source, &inspected, &PartPicture { mesh_unit: self.mesh_unit, view: None })
+        files.write(
+            &source,
+            &inspected,
+            &PartPicture {
+                mesh_unit: self.mesh_unit,
+                view: None,
+            },
+        )
     }
 
     /// An error, which names what was handed in as it was called there.
     fn in_words(&self, error: &InspectionError) -> String {
         let words = error.to_string();
         match &self.nominal {
-            NominalFile::HandedIn(file) => words.replace(&file.path().display().to_string(), &name_of(file.path())),
+            NominalFile::HandedIn(file) => {
+                words.replace(&file.path().display().to_string(), &name_of(file.path()))
+            }
             NominalFile::File(_) => words,
         }
     }
 }
 
 fn name_of(path: &Path) -> String {
-    path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+    path.file_name()
+        .map(|name| name.to_string_lossy().into_owned())
+        .unwrap_or_default()
 }

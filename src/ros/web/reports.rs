@@ -63,7 +63,9 @@ pub(super) async fn make(
         Ok(Role::Look) => return refusal(StatusCode::FORBIDDEN, MAY_ONLY_LOOK),
         Err(response) => return *response,
     }
-    let asked = query.map(|Query(asked)| asked).map_err(|error| Refused::bad(error.body_text()));
+    let asked = query
+        .map(|Query(asked)| asked)
+        .map_err(|error| Refused::bad(error.body_text()));
     let made = match asked {
         Ok(asked) => report(&site, &session, &asked, &headers, request.into_body()).await,
         Err(refused) => Err(refused),
@@ -89,37 +91,59 @@ async fn report(
     let is_current = session == site.board.session();
     let folder = SessionFolder::open(&site.session_folder, session);
     let session = folder.map_err(|error| Refused(StatusCode::NOT_FOUND, error.to_string()))?;
-    let own_unit = SessionFacts::read(session.path()).ok().map(|facts| facts.mesh_unit);
+    let own_unit = SessionFacts::read(session.path())
+        .ok()
+        .map(|facts| facts.mesh_unit);
     let mesh_unit = own_unit.unwrap_or_default();
     let mut params = asked.params(mesh_unit).map_err(Refused::bad)?;
     let nominal = match asked.nominal {
-        NominalSource::Upload => NominalFile::HandedIn(whole_within(handed_in(&session, asked, headers, body)).await?),
-        NominalSource::Session => NominalFile::File(asked.in_session(&session).map_err(Refused::bad)?),
+        NominalSource::Upload => {
+            NominalFile::HandedIn(whole_within(handed_in(&session, asked, headers, body)).await?)
+        }
+        NominalSource::Session => {
+            NominalFile::File(asked.in_session(&session).map_err(Refused::bad)?)
+        }
         NominalSource::Part => {
             let part = site.reports.part.clone();
             params.drawing.unit = site.reports.mesh_unit;
             NominalFile::File(part.ok_or_else(|| {
-                Refused::bad("the node has no nominal part: hand in one, or start it with --web-nominal")
+                Refused::bad(
+                    "the node has no nominal part: hand in one, or start it with --web-nominal",
+                )
             })?)
         }
     };
     if is_current {
         save(site).await?;
     }
-    let work = ReportWork { session, is_current, nominal, params, mesh_unit };
+    let work = ReportWork {
+        session,
+        is_current,
+        nominal,
+        params,
+        mesh_unit,
+    };
     let made = begin("report", move || {
         let made = work.run();
         drop(turn);
         made
     });
     let made = made.map_err(Refused::unavailable)?.await;
-    let made = made.map_err(|_| Refused::unavailable("the report was not made, by a fault of the program"))?;
+    let made = made
+        .map_err(|_| Refused::unavailable("the report was not made, by a fault of the program"))?;
     made.map(|()| is_current).map_err(Refused::bad)
 }
 
 /// What is handed in, unless it takes too long.
-async fn whole_within<F: Future<Output = Result<HandedIn, Refused>>>(file: F) -> Result<HandedIn, Refused> {
-    let late = |_| Refused::bad(format!("the file did not come whole within {} s", WHOLE_WITHIN.as_secs()));
+async fn whole_within<F: Future<Output = Result<HandedIn, Refused>>>(
+    file: F,
+) -> Result<HandedIn, Refused> {
+    let late = |_| {
+        Refused::bad(format!(
+            "the file did not come whole within {} s",
+            WHOLE_WITHIN.as_secs()
+        ))
+    };
     timeout(WHOLE_WITHIN, file).await.map_err(late)?
 }
 
@@ -131,8 +155,15 @@ async fn handed_in(
     body: Body,
 ) -> Result<HandedIn, Refused> {
     let (name, most) = asked.upload().map_err(Refused::bad)?;
-    let too_large = || Refused(StatusCode::PAYLOAD_TOO_LARGE, format!("{name} may have up to {} MB", most >> 20));
-    let length = headers.get(header::CONTENT_LENGTH).and_then(|length| length.to_str().ok()?.parse::<u64>().ok());
+    let too_large = || {
+        Refused(
+            StatusCode::PAYLOAD_TOO_LARGE,
+            format!("{name} may have up to {} MB", most >> 20),
+        )
+    };
+    let length = headers
+        .get(header::CONTENT_LENGTH)
+        .and_then(|length| length.to_str().ok()?.parse::<u64>().ok());
     if length.is_some_and(|length| length > most) {
         return Err(too_large());
     }
@@ -140,16 +171,22 @@ async fn handed_in(
     let mut pieces = body.into_data_stream();
     loop {
         let piece = timeout(PIECE_WITHIN, pieces.next()).await;
-        let Some(piece) = piece.map_err(|_| Refused::bad(format!("{name} did not come whole")))? else {
+        let Some(piece) = piece.map_err(|_| Refused::bad(format!("{name} did not come whole")))?
+        else {
             return Ok(file);
         };
-        let piece = piece.map_err(|error| Refused::bad(format!("{name} did not come whole: {error}")))?;
+        let piece =
+            piece.map_err(|error| Refused::bad(format!("{name} did not come whole: {error}")))?;
         // the disk may be slow
         let added = tokio::task::spawn_blocking(move || file.add(&piece).map(|()| file)).await;
         file = match added.map_err(io::Error::other).flatten() {
             Ok(file) => file,
             Err(error) if error.kind() == io::ErrorKind::FileTooLarge => return Err(too_large()),
-            Err(error) => return Err(Refused::unavailable(format!("{name} could not be written: {error}"))),
+            Err(error) => {
+                return Err(Refused::unavailable(format!(
+                    "{name} could not be written: {error}"
+                )));
+            }
         };
     }
 }
@@ -158,18 +195,32 @@ async fn handed_in(
 async fn save(site: &Site) -> Result<(), Refused> {
     let (to, saved) = oneshot::channel();
     let request = json!({ "overwrite": true, "with_features": true });
-    site.call(Role::Operate, "~/save_mesh", request, Reply::new(move |answer| drop(to.send(answer))));
+    site.call(
+        Role::Operate,
+        "~/save_mesh",
+        request,
+        Reply::new(move |answer| drop(to.send(answer))),
+    );
     let late = || Refused::unavailable("the session was not saved in time: ask again");
-    let answer = timeout(SAVED_WITHIN, saved).await.map_err(|_| late())?.map_err(|_| late())?;
+    let answer = timeout(SAVED_WITHIN, saved)
+        .await
+        .map_err(|_| late())?
+        .map_err(|_| late())?;
     let answer = answer.map_err(Refused::unavailable)?;
     match answer["success"].as_bool() {
         Some(true) => Ok(()),
-        _ => Err(Refused::unavailable(answer["message"].as_str().unwrap_or_default())),
+        _ => Err(Refused::unavailable(
+            answer["message"].as_str().unwrap_or_default(),
+        )),
     }
 }
 
 /// Shows a report: `GET /api/reports/SESSION`.
-pub(super) async fn show(State(site): State<Arc<Site>>, headers: HeaderMap, Path(session): Path<String>) -> Response {
+pub(super) async fn show(
+    State(site): State<Arc<Site>>,
+    headers: HeaderMap,
+    Path(session): Path<String>,
+) -> Response {
     if let Err(response) = site.entrance.role_of(&headers) {
         return *response;
     }
@@ -178,9 +229,15 @@ pub(super) async fn show(State(site): State<Arc<Site>>, headers: HeaderMap, Path
     match tokio::task::spawn_blocking(move || open_file(&folder, &session, html)).await {
         Ok(Ok((file, length))) => {
             let head = [
-                (header::CONTENT_TYPE, HeaderValue::from_static("text/html; charset=utf-8")),
+                (
+                    header::CONTENT_TYPE,
+                    HeaderValue::from_static("text/html; charset=utf-8"),
+                ),
                 (header::CONTENT_LENGTH, HeaderValue::from(length)),
-                (header::CONTENT_SECURITY_POLICY, HeaderValue::from_static(POLICY)),
+                (
+                    header::CONTENT_SECURITY_POLICY,
+                    HeaderValue::from_static(POLICY),
+                ),
                 (header::CACHE_CONTROL, HeaderValue::from_static("no-store")),
             ];
             (head, Body::from_stream(body_of(file))).into_response()

@@ -20,7 +20,8 @@ use crate::ros::inbox::Inbox;
 use crate::ros::stop::Motion;
 
 /// Why a call is refused where a session is replayed.
-const REPLAYED: &str = "this page replays a session, in which nothing can be changed: open the page of the node";
+const REPLAYED: &str =
+    "this page replays a session, in which nothing can be changed: open the page of the node";
 
 /// What all pages share.
 pub(super) struct Site {
@@ -74,11 +75,20 @@ impl Site {
     /// The topic `state` as it is for a page now.
     pub fn state(&self, role: Role) -> SiteState<'_> {
         let stops = self.inbox.stops();
-        let arm = stops.arm().map(|(may_move, motion, stays_because)| ArmShown { may_move, motion, stays_because });
+        let arm = stops
+            .arm()
+            .map(|(may_move, motion, stays_because)| ArmShown {
+                may_move,
+                motion,
+                stays_because,
+            });
         SiteState {
             role,
             program: concat!("touchup ", env!("CARGO_PKG_VERSION")),
-            session: self.replay.as_ref().map_or_else(|| self.board.session(), |replay| replay.session().to_owned()),
+            session: self.replay.as_ref().map_or_else(
+                || self.board.session(),
+                |replay| replay.session().to_owned(),
+            ),
             is_paused: stops.is_paused(),
             scan: &self.scan,
             nominal_part: self.reports.part_name(),
@@ -108,9 +118,11 @@ impl Site {
     }
 
     fn annotate(&self, request: Value) -> Result<Value, String> {
-        let request: AnnotateRequest = serde_json::from_value(request).map_err(|error| error.to_string())?;
+        let request: AnnotateRequest =
+            serde_json::from_value(request).map_err(|error| error.to_string())?;
         let feature = self.board.feature(request.id);
-        self.annotations.annotate(&self.board.session(), request, feature)?;
+        self.annotations
+            .annotate(&self.board.session(), request, feature)?;
         self.board.wake();
         Ok(json!({ "success": true, "message": "noted" }))
     }
@@ -122,8 +134,12 @@ impl Site {
         struct InviteRequest {
             role: Role,
         }
-        let InviteRequest { role } = serde_json::from_value(request).map_err(|error| error.to_string())?;
-        let (link, code) = self.entrance.invite(role).map_err(|error| error.to_string())?;
+        let InviteRequest { role } =
+            serde_json::from_value(request).map_err(|error| error.to_string())?;
+        let (link, code) = self
+            .entrance
+            .invite(role)
+            .map_err(|error| error.to_string())?;
         Ok(json!({ "link": link, "code": code }))
     }
 }

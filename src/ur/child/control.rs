@@ -97,7 +97,17 @@ impl<'a, C: Control> Driver<'a, C> {
     pub fn new(control: &'a C, shared: &'a ChildShared, begin: &'a Begin, clock: Clock) -> Self {
         let now = clock.now();
         let (doing, force_mode) = (Doing::Resting, None);
-        Self { control, shared, begin, clock, doing, force_mode, ordered: now, fed: now, pressed: now }
+        Self {
+            control,
+            shared,
+            begin,
+            clock,
+            doing,
+            force_mode,
+            ordered: now,
+            fed: now,
+            pressed: now,
+        }
     }
 
     /// Until the orders end.
@@ -119,7 +129,11 @@ impl<'a, C: Control> Driver<'a, C> {
     }
 
     fn check_connection(&self) -> Result<(), DriverEnd> {
-        if self.control.is_connected() { Ok(()) } else { Err(DriverEnd::Lost(Link::Control)) }
+        if self.control.is_connected() {
+            Ok(())
+        } else {
+            Err(DriverEnd::Lost(Link::Control))
+        }
     }
 
     /// Executes an order, or the action due without one.
@@ -129,7 +143,9 @@ impl<'a, C: Control> Driver<'a, C> {
         };
         self.ordered = self.clock.now();
         match self.serve(&order.what) {
-            Ok(()) if order.what == Action::Zero => self.shared.report(&ClientReport::Done { number: order.number }),
+            Ok(()) if order.what == Action::Zero => self.shared.report(&ClientReport::Done {
+                number: order.number,
+            }),
             Ok(()) => {}
             Err(error) => self.failed(&error)?,
         }
@@ -140,22 +156,42 @@ impl<'a, C: Control> Driver<'a, C> {
     fn serve(&mut self, what: &Action) -> Result<(), ChildError> {
         match *what {
             // what was stopped is not set going again, whoever resumes it
-            Action::Move { .. } | Action::Press { .. } if self.shared.has_halted.load(Ordering::Acquire) => {
+            Action::Move { .. } | Action::Press { .. }
+                if self.shared.has_halted.load(Ordering::Acquire) =>
+            {
                 self.brake(BRAKE)
             }
-            Action::Move { twist, acceleration } => {
+            Action::Move {
+                twist,
+                acceleration,
+            } => {
                 self.doing = Doing::Moving;
                 self.end_press()?;
                 self.control.speed(twist, acceleration)
             }
-            Action::Press { frame, force_n, speed, feed: [x, y, z], acceleration } => {
+            Action::Press {
+                frame,
+                force_n,
+                speed,
+                feed: [x, y, z],
+                acceleration,
+            } => {
                 let [.., a, b, c] = frame;
-                let force_mode = Some(ForceMode { turn: [a, b, c], force: force_n, speed });
+                let force_mode = Some(ForceMode {
+                    turn: [a, b, c],
+                    force: force_n,
+                    speed,
+                });
                 self.doing = Doing::Moving;
                 if self.force_mode != force_mode || self.clock.since(self.pressed) > REPEAT {
                     let [far, turned] = ASIDE;
                     self.force_mode = force_mode;
-                    self.control.press(frame, force_n, FIXED_FRAME, [far, far, speed, turned, turned, turned])?;
+                    self.control.press(
+                        frame,
+                        force_n,
+                        FIXED_FRAME,
+                        [far, far, speed, turned, turned, turned],
+                    )?;
                     self.pressed = self.clock.now();
                     self.control.wait(&self.clock, CYCLES);
                 }
@@ -178,18 +214,31 @@ impl<'a, C: Control> Driver<'a, C> {
         self.doing = Doing::Resting;
         let found = self.set_up().map_err(DriverEnd::NotReady)?;
         let tool = &self.begin.tool;
-        if found.iter().zip(tool).any(|(found, set)| (found - set).abs() > SAME_TOOL) {
+        if found
+            .iter()
+            .zip(tool)
+            .any(|(found, set)| (found - set).abs() > SAME_TOOL)
+        {
             return Err(DriverEnd::BadTool(format!("{found:?} and not {tool:?}")));
         }
         // last, for what is above takes its time
-        self.control.set_watchdog(WATCHDOG_HZ).map_err(DriverEnd::NotReady)?;
+        self.control
+            .set_watchdog(WATCHDOG_HZ)
+            .map_err(DriverEnd::NotReady)?;
         self.fed = self.clock.now();
         Ok(())
     }
 
     /// Returns the TCP as read back.
     fn set_up(&self) -> Result<[f64; 6], ChildError> {
-        let Begin { tool, mass_kg, centre_m, damping, gain, .. } = self.begin;
+        let Begin {
+            tool,
+            mass_kg,
+            centre_m,
+            damping,
+            gain,
+            ..
+        } = self.begin;
         self.control.set_payload(*mass_kg, *centre_m)?;
         self.control.set_tool(*tool)?;
         let found = self.control.tool()?;
@@ -210,12 +259,17 @@ impl<'a, C: Control> Driver<'a, C> {
 
     /// The last state, when it is of now.
     fn seen(&self) -> Option<UrState> {
-        self.shared.latest().filter(|latest| self.clock.since(latest.at) <= SEEN).map(|latest| latest.state)
+        self.shared
+            .latest()
+            .filter(|latest| self.clock.since(latest.at) <= SEEN)
+            .map(|latest| latest.state)
     }
 
     /// Nothing is fed that was not just seen to stand, at our command.
     fn feed(&mut self) -> Result<(), ChildError> {
-        let stands = self.seen().is_some_and(|state| state.may_move() && state.speed() < STANDS);
+        let stands = self
+            .seen()
+            .is_some_and(|state| state.may_move() && state.speed() < STANDS);
         if !stands || self.shared.has_halted.load(Ordering::Acquire) || !self.control.is_running() {
             return Ok(());
         }
@@ -229,14 +283,24 @@ impl<'a, C: Control> Driver<'a, C> {
         if self.doing == Doing::Resting && self.force_mode.is_none() {
             return self.feed();
         }
-        let since = if let Doing::Braking { since, .. } = self.doing { since } else { self.clock.now() };
+        let since = if let Doing::Braking { since, .. } = self.doing {
+            since
+        } else {
+            self.clock.now()
+        };
         // before any call: one that fails leaves it braking
-        self.doing = Doing::Braking { deceleration, since };
+        self.doing = Doing::Braking {
+            deceleration,
+            since,
+        };
         let state = self.seen();
         // a program that is paused hears nothing; the arm is braked as soon as it is resumed
         if state.is_some_and(|state| !state.is_playing()) {
             // where it is resumed its first states are those of an arm that does not move yet
-            self.doing = Doing::Braking { deceleration, since: self.clock.now() };
+            self.doing = Doing::Braking {
+                deceleration,
+                since: self.clock.now(),
+            };
             return Ok(());
         }
         self.end_press()?;
@@ -267,7 +331,11 @@ impl<'a, C: Control> Driver<'a, C> {
             self.brake(BRAKE)?;
             self.control.wait(&self.clock, TURN);
         }
-        if self.doing == Doing::Resting { Ok(()) } else { Err(ChildError::Moves { after: UPLOAD }) }
+        if self.doing == Doing::Resting {
+            Ok(())
+        } else {
+            Err(ChildError::Moves { after: UPLOAD })
+        }
     }
 
     /// A call was refused. When the program has ended or the arm is not allowed to move, the states say so; and the arm may still do
@@ -275,11 +343,18 @@ impl<'a, C: Control> Driver<'a, C> {
     fn failed(&mut self, error: &ChildError) -> Result<(), DriverEnd> {
         let begun = self.clock.now();
         if self.doing == Doing::Moving {
-            self.doing = Doing::Braking { deceleration: BRAKE, since: begun };
+            self.doing = Doing::Braking {
+                deceleration: BRAKE,
+                since: begun,
+            };
         }
         while self.clock.since(begun) < EXCUSE {
             self.check_connection()?;
-            if self.shared.latest().is_some_and(|latest| !latest.state.may_move()) {
+            if self
+                .shared
+                .latest()
+                .is_some_and(|latest| !latest.state.may_move())
+            {
                 return Ok(());
             }
             self.control.wait(&self.clock, TURN);

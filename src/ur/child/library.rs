@@ -38,7 +38,10 @@ const PAUSED: std::ops::RangeInclusive<u32> = 3..=5;
 const TORN_READS: usize = 3;
 
 fn failed(call: &'static str) -> impl Fn(PyErr) -> ChildError {
-    move |error| ChildError::Python { call, reason: error.to_string() }
+    move |error| ChildError::Python {
+        call,
+        reason: error.to_string(),
+    }
 }
 
 /// Finds the library in a folder of packages, and looks at its version.
@@ -49,16 +52,26 @@ pub fn load(site_packages: &Path) -> Result<(), ChildError> {
         os.call_method1("dup2", (2, 1)).map_err(failed("os.dup2"))?;
         let folder = site_packages.to_string_lossy();
         let site = py.import("site").map_err(failed("import site"))?;
-        site.call_method1("addsitedir", (folder.as_ref(),)).map_err(failed("site.addsitedir"))?;
-        let metadata = py.import("importlib.metadata").map_err(failed("import importlib.metadata"))?;
-        let found = metadata.call_method1("version", ("ur_rtde",)).map_err(failed("the version of ur-rtde"))?;
+        site.call_method1("addsitedir", (folder.as_ref(),))
+            .map_err(failed("site.addsitedir"))?;
+        let metadata = py
+            .import("importlib.metadata")
+            .map_err(failed("import importlib.metadata"))?;
+        let found = metadata
+            .call_method1("version", ("ur_rtde",))
+            .map_err(failed("the version of ur-rtde"))?;
         let found: String = found.extract().map_err(failed("the version of ur-rtde"))?;
         if found != WHEEL {
             let reason = format!("{found} is there, {WHEEL} is wanted");
-            return Err(ChildError::Python { call: "the version of ur-rtde", reason });
+            return Err(ChildError::Python {
+                call: "the version of ur-rtde",
+                reason,
+            });
         }
-        py.import("rtde_receive").map_err(failed("import rtde_receive"))?;
-        py.import("rtde_control").map_err(failed("import rtde_control"))?;
+        py.import("rtde_receive")
+            .map_err(failed("import rtde_receive"))?;
+        py.import("rtde_control")
+            .map_err(failed("import rtde_control"))?;
         Ok(())
     })
 }
@@ -66,7 +79,10 @@ pub fn load(site_packages: &Path) -> Result<(), ChildError> {
 /// Ends the process at once: the destructors of the library take a second, and after a lost link they crash.
 pub fn leave(code: i32) -> ! {
     // a Python that cannot even do that is killed
-    let _ = Python::attach(|py| py.import("os").and_then(|os| os.call_method1("_exit", (code,)).map(drop)));
+    let _ = Python::attach(|py| {
+        py.import("os")
+            .and_then(|os| os.call_method1("_exit", (code,)).map(drop))
+    });
     std::process::abort()
 }
 
@@ -77,10 +93,13 @@ impl Receive {
     /// Waits, without letting any other thread use Python, until the first state has come.
     pub fn connect(host: &str) -> Result<Self, ChildError> {
         Python::attach(|py| {
-            let module = py.import("rtde_receive").map_err(failed("import rtde_receive"))?;
+            let module = py
+                .import("rtde_receive")
+                .map_err(failed("import rtde_receive"))?;
             let arguments = (host, RATE_HZ, VARIABLES.to_vec(), false, false, 0);
             let made = module.call_method1("RTDEReceiveInterface", arguments);
-            made.map(|made| Self(made.unbind())).map_err(failed("RTDEReceiveInterface"))
+            made.map(|made| Self(made.unbind()))
+                .map_err(failed("RTDEReceiveInterface"))
         })
     }
 
@@ -137,7 +156,13 @@ pub trait Control {
     /// Goes with a velocity, m/s and rad/s in B, reached with an acceleration, m/s², until the next command.
     fn speed(&self, twist: [f64; 6], acceleration: f64) -> Result<(), ChildError>;
     /// Presses along z of a frame of B with a force, N; `limits`: speed along z, m/s, how far off across, m and rad.
-    fn press(&self, frame: [f64; 6], force: f64, kind: i32, limits: [f64; 6]) -> Result<(), ChildError>;
+    fn press(
+        &self,
+        frame: [f64; 6],
+        force: f64,
+        kind: i32,
+        limits: [f64; 6],
+    ) -> Result<(), ChildError>;
     /// Ends pressing. A velocity that was not stopped before goes on.
     fn end_press(&self) -> Result<(), ChildError>;
     /// Stops what `speed` began, with a deceleration, m/s²; returns when the arm is at rest.
@@ -171,21 +196,37 @@ impl RtdeControl {
     /// Uploads the program and waits until it runs; no other thread can use Python in that time.
     pub fn connect(host: &str) -> Result<Self, ChildError> {
         Python::attach(|py| {
-            let module = py.import("rtde_control").map_err(failed("import rtde_control"))?;
-            let made = module.call_method1("RTDEControlInterface", (host, RATE_HZ, FLAGS, CAP_PORT, 0));
-            made.map(|made| Self(made.unbind())).map_err(failed("RTDEControlInterface"))
+            let module = py
+                .import("rtde_control")
+                .map_err(failed("import rtde_control"))?;
+            let made =
+                module.call_method1("RTDEControlInterface", (host, RATE_HZ, FLAGS, CAP_PORT, 0));
+            made.map(|made| Self(made.unbind()))
+                .map_err(failed("RTDEControlInterface"))
         })
     }
 
-    fn done(&self, call: &'static str, arguments: impl for<'py> PyCallArgs<'py>) -> Result<(), ChildError> {
+    fn done(
+        &self,
+        call: &'static str,
+        arguments: impl for<'py> PyCallArgs<'py>,
+    ) -> Result<(), ChildError> {
         if self.call(call, arguments)? {
             return Ok(());
         }
-        Err(ChildError::Python { call, reason: "it returned false".to_owned() })
+        Err(ChildError::Python {
+            call,
+            reason: "it returned false".to_owned(),
+        })
     }
 
-    fn call(&self, name: &'static str, arguments: impl for<'py> PyCallArgs<'py>) -> Result<bool, ChildError> {
-        Python::attach(|py| self.0.call_method1(py, name, arguments)?.extract(py)).map_err(failed(name))
+    fn call(
+        &self,
+        name: &'static str,
+        arguments: impl for<'py> PyCallArgs<'py>,
+    ) -> Result<bool, ChildError> {
+        Python::attach(|py| self.0.call_method1(py, name, arguments)?.extract(py))
+            .map_err(failed(name))
     }
 }
 
@@ -204,9 +245,18 @@ impl Control for RtdeControl {
         self.done("speedL", (twist.to_vec(), acceleration, 1.0 / RATE_HZ))
     }
 
-    fn press(&self, frame: [f64; 6], force: f64, kind: i32, limits: [f64; 6]) -> Result<(), ChildError> {
+    fn press(
+        &self,
+        frame: [f64; 6],
+        force: f64,
+        kind: i32,
+        limits: [f64; 6],
+    ) -> Result<(), ChildError> {
         let (along_z, wrench) = (vec![0, 0, 1, 0, 0, 0], vec![0.0, 0.0, force, 0.0, 0.0, 0.0]);
-        self.done("forceMode", (frame.to_vec(), along_z, wrench, kind, limits.to_vec()))
+        self.done(
+            "forceMode",
+            (frame.to_vec(), along_z, wrench, kind, limits.to_vec()),
+        )
     }
 
     fn end_press(&self) -> Result<(), ChildError> {

@@ -33,19 +33,26 @@ use crate::clock::Clock;
 pub fn run() -> Result<(), ChildError> {
     let mut lines = BufReader::new(stdin()).lines().map_while(Result::ok);
     let first = lines.next().unwrap_or_default();
-    let begin: Begin = serde_json::from_str(&first).map_err(|error| ChildError::NoOrders(error.to_string()))?;
+    let begin: Begin =
+        serde_json::from_str(&first).map_err(|error| ChildError::NoOrders(error.to_string()))?;
     if !begin.is_lock_step {
         // for all threads, those of the library too; who started this process says where it is refused
         let _ = priority::raise(priority::CLIENT, true);
     }
-    let reports = stdout().as_fd().try_clone_to_owned().map_err(|error| ChildError::NoOrders(error.to_string()))?;
+    let reports = stdout()
+        .as_fd()
+        .try_clone_to_owned()
+        .map_err(|error| ChildError::NoOrders(error.to_string()))?;
     let shared = ChildShared::new(lines_to(reports.into()));
     if let Err(error) = library::load(&begin.site_packages) {
-        shared.report(&ClientReport::BadWheel { reason: error.to_string() });
+        shared.report(&ClientReport::BadWheel {
+            reason: error.to_string(),
+        });
         return Err(error);
     }
     // the constructor of control starts a program: only when states come
-    let connected = Receive::connect(&begin.host).and_then(|receive| Ok((receive, RtdeControl::connect(&begin.host)?)));
+    let connected = Receive::connect(&begin.host)
+        .and_then(|receive| Ok((receive, RtdeControl::connect(&begin.host)?)));
     let (receive, control) = connected.inspect_err(|error| shared.report(&failure(error)))?;
     let (sender, orders) = channel();
     let (clock, hand) = begin.is_lock_step.then(Clock::manual).unzip();

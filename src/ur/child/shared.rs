@@ -31,10 +31,15 @@ pub struct ChildShared {
 pub fn lines_to(pipe: PipeWriter) -> impl Fn(&ClientReport) + Send + Sync + 'static {
     let pipe = Mutex::new(pipe);
     move |report| {
-        let Ok(mut line) = serde_json::to_vec(report) else { return };
+        let Ok(mut line) = serde_json::to_vec(report) else {
+            return;
+        };
         line.push(b'\n');
         // when the reader is gone, stdin ends too
-        let _ = pipe.lock().unwrap_or_else(PoisonError::into_inner).write_all(&line);
+        let _ = pipe
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .write_all(&line);
     }
 }
 

@@ -16,20 +16,35 @@ const BEAT: Duration = Duration::from_millis(10);
 /// Until the connection is lost.
 ///
 /// - `clock`: of the driver; `hand`: that moves it, where it follows the controller.
-pub fn hand_on(receive: &Receive, shared: &ChildShared, clock: &Clock, hand: Option<&ManualClock>) -> ! {
+pub fn hand_on(
+    receive: &Receive,
+    shared: &ChildShared,
+    clock: &Clock,
+    hand: Option<&ManualClock>,
+) -> ! {
     // the heartbeat of this process follows the time of this machine
     let machine = Clock::system();
-    let mut last = LastReport { stamp_s: f64::INFINITY, at: machine.now() };
+    let mut last = LastReport {
+        stamp_s: f64::INFINITY,
+        at: machine.now(),
+    };
     loop {
         if !receive.is_connected() {
             shared.lost(Link::States);
         }
-        let state = receive.stamp().filter(|stamp| last.is_new(*stamp)).and_then(|_| receive.state(shared.number()));
+        let state = receive
+            .stamp()
+            .filter(|stamp| last.is_new(*stamp))
+            .and_then(|_| receive.state(shared.number()));
         if let Some(state) = state {
-            let passed = hand.map(|_| Duration::try_from_secs_f64(state.stamp_s - last.stamp_s).unwrap_or_default());
+            let passed = hand.map(|_| {
+                Duration::try_from_secs_f64(state.stamp_s - last.stamp_s).unwrap_or_default()
+            });
             shared.see(state, clock.now() + passed.unwrap_or_default());
             // who waits finds it there
-            hand.zip(passed).iter().for_each(|(hand, passed)| hand.advance(*passed));
+            hand.zip(passed)
+                .iter()
+                .for_each(|(hand, passed)| hand.advance(*passed));
         }
         if let Some(report) = last.next(state, shared.number(), machine.now()) {
             shared.report(&report);
@@ -50,7 +65,12 @@ impl LastReport {
     }
 
     /// The report due now.
-    pub fn next(&mut self, state: Option<UrState>, served: u64, now: Instant) -> Option<ClientReport> {
+    pub fn next(
+        &mut self,
+        state: Option<UrState>,
+        served: u64,
+        now: Instant,
+    ) -> Option<ClientReport> {
         let report = match state {
             Some(state) => {
                 self.stamp_s = state.stamp_s;
@@ -72,7 +92,10 @@ mod tests {
     #[test]
     fn a_state_is_reported_at_once_and_where_none_comes_a_beat_each_10_ms() {
         let (clock, hand) = Clock::manual();
-        let mut last = LastReport { stamp_s: f64::INFINITY, at: clock.now() };
+        let mut last = LastReport {
+            stamp_s: f64::INFINITY,
+            at: clock.now(),
+        };
         assert!(last.is_new(0.0));
         let state = last.next(Some(STATE), 7, clock.now());
         assert_eq!(state, Some(ClientReport::State(Box::new(STATE))));
@@ -82,6 +105,9 @@ mod tests {
             hand.advance(Duration::from_millis(1));
             beats.extend(last.next(None, 7, clock.now()).map(|report| (ms, report)));
         }
-        assert_eq!(beats, [11, 22, 33].map(|ms| (ms, ClientReport::Beat { served: 7 })));
+        assert_eq!(
+            beats,
+            [11, 22, 33].map(|ms| (ms, ClientReport::Beat { served: 7 }))
+        );
     }
 }

@@ -19,7 +19,11 @@ struct GuardBench {
 impl GuardBench {
     fn new() -> Self {
         let (clock, hand) = Clock::manual();
-        Self { known: GuardState::new(Deadlines::default(), clock.now()), clock, hand }
+        Self {
+            known: GuardState::new(Deadlines::default(), clock.now()),
+            clock,
+            hand,
+        }
     }
 
     fn ready() -> Self {
@@ -45,10 +49,18 @@ impl GuardBench {
 }
 
 fn state(program: ProgramState, safety_bits: u32, served: u64) -> ClientReport {
-    ClientReport::State(Box::new(UrState { program, safety_bits, served, ..STATE }))
+    ClientReport::State(Box::new(UrState {
+        program,
+        safety_bits,
+        served,
+        ..STATE
+    }))
 }
 
-const UP: Action = Action::Move { twist: [0.0, 0.0, 20e-3, 0.0, 0.0, 0.0], acceleration: 1.0 };
+const UP: Action = Action::Move {
+    twist: [0.0, 0.0, 20e-3, 0.0, 0.0, 0.0],
+    acceleration: 1.0,
+};
 
 #[test]
 fn a_client_has_ten_seconds_to_be_ready_and_from_then_on_80_ms_for_each_line() {
@@ -61,10 +73,16 @@ fn a_client_has_ten_seconds_to_be_ready_and_from_then_on_80_ms_for_each_line() {
     assert_eq!(bench.known.patience(bench.clock.now()), MS);
     bench.hand.advance(MS);
     assert_eq!(bench.known.patience(bench.clock.now()), Duration::ZERO);
-    assert_eq!(bench.known.missed(), ClientLoss::client("hangs: it is not ready for 10000 ms".to_owned()));
+    assert_eq!(
+        bench.known.missed(),
+        ClientLoss::client("hangs: it is not ready for 10000 ms".to_owned())
+    );
     assert_eq!(bench.take(ClientReport::Ready), None);
     assert_eq!(bench.known.patience(bench.clock.now()), 80 * MS);
-    assert_eq!(bench.known.missed(), ClientLoss::client("hangs: nothing from it for 80 ms".to_owned()));
+    assert_eq!(
+        bench.known.missed(),
+        ClientLoss::client("hangs: nothing from it for 80 ms".to_owned())
+    );
 }
 
 #[test]
@@ -73,7 +91,10 @@ fn states_that_stay_away_for_more_than_80_ms_are_a_lost_arm() {
     bench.hand.advance(50 * MS);
     assert_eq!(bench.take(state(Playing, 1, 0)), None);
     let broken = bench.until_broken(&ClientReport::Beat { served: 0 });
-    assert_eq!(broken, (81, ClientLoss::Arm(ArmError::Lost { silent_ms: 81 })));
+    assert_eq!(
+        broken,
+        (81, ClientLoss::Arm(ArmError::Lost { silent_ms: 81 }))
+    );
 }
 
 #[test]
@@ -85,7 +106,11 @@ fn a_call_that_does_not_return_for_more_than_120_ms_is_a_hanging_client() {
     // the first has returned: the time of the second begins
     assert_eq!(bench.take(state(Playing, 1, 1)), None);
     let broken = bench.until_broken(&state(Playing, 1, 1));
-    let hangs = |ms| ClientLoss::client(format!("hangs: a call of ur-rtde has not returned for {ms} ms"));
+    let hangs = |ms| {
+        ClientLoss::client(format!(
+            "hangs: a call of ur-rtde has not returned for {ms} ms"
+        ))
+    };
     assert_eq!(broken, (121, hangs(121)));
     // no running call, no deadline
     assert_eq!(bench.take(state(Playing, 1, 2)), None);
@@ -93,7 +118,10 @@ fn a_call_that_does_not_return_for_more_than_120_ms_is_a_hanging_client() {
     assert_eq!(bench.take(state(Playing, 1, 2)), None);
     // zeroing has three seconds, and what comes after it 120 ms again
     assert_eq!(bench.known.send(&Action::Zero, bench.clock.now()), 3);
-    assert_eq!(bench.until_broken(&state(Playing, 1, 2)), (3_001, hangs(3_001)));
+    assert_eq!(
+        bench.until_broken(&state(Playing, 1, 2)),
+        (3_001, hangs(3_001))
+    );
     assert_eq!(bench.take(ClientReport::Done { number: 3 }), None);
     assert_eq!(bench.known.done, 3);
     bench.known.send(&UP, bench.clock.now());
@@ -130,7 +158,10 @@ fn a_client_that_is_asked_to_end_has_a_second_and_a_half() {
     assert_eq!(bench.known.patience(bench.clock.now()), MS);
     bench.hand.advance(MS);
     assert_eq!(bench.known.patience(bench.clock.now()), Duration::ZERO);
-    assert_eq!(bench.known.missed(), ClientLoss::client("hangs: it does not end for 1500 ms".to_owned()));
+    assert_eq!(
+        bench.known.missed(),
+        ClientLoss::client("hangs: it does not end for 1500 ms".to_owned())
+    );
 }
 
 #[test]
@@ -139,7 +170,12 @@ fn untaken_states_are_the_newest_64() {
     for served in 0..100 {
         bench.take(state(Playing, 1, served));
     }
-    let served: Vec<u64> = bench.known.states.iter().map(|state| state.served).collect();
+    let served: Vec<u64> = bench
+        .known
+        .states
+        .iter()
+        .map(|state| state.served)
+        .collect();
     assert_eq!(served, (36..100).collect::<Vec<_>>());
 }
 
@@ -165,7 +201,10 @@ impl Watch {
                 if left > 0 {
                     continue;
                 }
-                for line in BufReader::new(socket.try_clone().unwrap()).lines().map_while(Result::ok) {
+                for line in BufReader::new(socket.try_clone().unwrap())
+                    .lines()
+                    .map_while(Result::ok)
+                {
                     ask.send(line).unwrap();
                     writeln!(socket, "Stopped").unwrap();
                 }
@@ -173,19 +212,40 @@ impl Watch {
         });
         let (clock, hand) = Clock::manual();
         // an answer of the dashboard is waited for in real time
-        let deadlines = Deadlines { dashboard: Duration::from_secs(60), ..Deadlines::default() };
+        let deadlines = Deadlines {
+            dashboard: Duration::from_secs(60),
+            ..Deadlines::default()
+        };
         let dashboard = Dashboard::connect(&host, deadlines.dashboard).unwrap();
         let shared = Arc::new(SharedGuard::new(deadlines, clock));
         let mut command = Command::new("sleep");
-        let child = command.arg("1000").stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let child = command
+            .arg("1000")
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
         let client = child.id();
         let (reports, lines) = channel();
-        let guard = Guard { child, host, dashboard, shared: shared.clone(), hand: None };
+        let guard = Guard {
+            child,
+            host,
+            dashboard,
+            shared: shared.clone(),
+            hand: None,
+        };
         let guard = thread::spawn(move || guard.watch(&lines));
         while hand.waiting() == 0 {
             thread::yield_now();
         }
-        Self { hand, shared, reports, asked, guard, client }
+        Self {
+            hand,
+            shared,
+            reports,
+            asked,
+            guard,
+            client,
+        }
     }
 
     /// Has a line come, and returns when the guard waits for the next one.
@@ -226,13 +286,18 @@ impl Watch {
         }
         let halt = self.guard.join().unwrap();
         let client = format!("/proc/{}", self.client);
-        assert!(!std::path::Path::new(&client).exists(), "the client is gone");
+        assert!(
+            !std::path::Path::new(&client).exists(),
+            "the client is gone"
+        );
         let broken = self.shared.known().broken.clone();
         (halt, broken, self.asked.iter().collect())
     }
 }
 
-const STOPPED: Option<Halt> = Some(Halt::Dashboard { took: Duration::ZERO });
+const STOPPED: Option<Halt> = Some(Halt::Dashboard {
+    took: Duration::ZERO,
+});
 
 #[test]
 fn a_missed_line_kills_the_client_and_stops_the_arm() {
@@ -244,7 +309,12 @@ fn a_missed_line_kills_the_client_and_stops_the_arm() {
     watch.acts_after(MS);
     let (halt, broken, asked) = watch.end();
     assert_eq!((halt, asked), (STOPPED, vec!["stop".to_owned()]));
-    assert_eq!(broken, Some(ClientLoss::client("hangs: nothing from it for 80 ms".to_owned())));
+    assert_eq!(
+        broken,
+        Some(ClientLoss::client(
+            "hangs: nothing from it for 80 ms".to_owned()
+        ))
+    );
 }
 
 #[test]
@@ -256,10 +326,16 @@ fn silent_states_stop_the_arm_though_lines_come() {
     watch.is_calm_after(40 * MS);
     watch.say(ClientReport::Beat { served: 0 });
     watch.is_calm_after(MS);
-    watch.reports.send(ClientReport::Beat { served: 0 }).unwrap();
+    watch
+        .reports
+        .send(ClientReport::Beat { served: 0 })
+        .unwrap();
     let (halt, broken, asked) = watch.end();
     assert_eq!((halt, asked), (STOPPED, vec!["stop".to_owned()]));
-    assert_eq!(broken, Some(ClientLoss::Arm(ArmError::Lost { silent_ms: 81 })));
+    assert_eq!(
+        broken,
+        Some(ClientLoss::Arm(ArmError::Lost { silent_ms: 81 }))
+    );
 }
 
 #[test]
@@ -269,7 +345,12 @@ fn a_client_that_is_never_ready_is_killed_and_no_other_program_is_stopped() {
     watch.acts_after(MS);
     let (halt, broken, asked) = watch.end();
     assert_eq!((halt, asked), (None, Vec::new()));
-    assert_eq!(broken, Some(ClientLoss::client("hangs: it is not ready for 10000 ms".to_owned())));
+    assert_eq!(
+        broken,
+        Some(ClientLoss::client(
+            "hangs: it is not ready for 10000 ms".to_owned()
+        ))
+    );
 }
 
 #[test]
@@ -282,7 +363,12 @@ fn a_client_that_does_not_end_is_killed_and_the_arm_stopped() {
     watch.acts_after(MS);
     let (halt, broken, asked) = watch.end();
     assert_eq!((halt, asked), (STOPPED, vec!["stop".to_owned()]));
-    assert_eq!(broken, Some(ClientLoss::client("hangs: it does not end for 1500 ms".to_owned())));
+    assert_eq!(
+        broken,
+        Some(ClientLoss::client(
+            "hangs: it does not end for 1500 ms".to_owned()
+        ))
+    );
 }
 
 #[test]
@@ -290,7 +376,13 @@ fn a_client_that_ends_on_request_is_no_fault() {
     let watch = Watch::begin(1);
     watch.say(ClientReport::Ready);
     watch.shared.known().close(watch.shared.clock.now());
-    let Watch { guard, reports, shared, asked, .. } = watch;
+    let Watch {
+        guard,
+        reports,
+        shared,
+        asked,
+        ..
+    } = watch;
     drop(reports);
     assert_eq!((guard.join().unwrap(), asked.iter().count()), (None, 0));
     assert!(shared.known().broken.is_none());
@@ -306,11 +398,20 @@ fn a_dashboard_that_was_closed_is_connected_again_to_stop_the_arm() {
     }
     let (halt, broken, asked) = watch.end();
     assert_eq!((halt, asked), (STOPPED, vec!["stop".to_owned()]));
-    assert_eq!(broken, Some(ClientLoss::Arm(ArmError::Dropped { what: "its dashboard" })));
+    assert_eq!(
+        broken,
+        Some(ClientLoss::Arm(ArmError::Dropped {
+            what: "its dashboard"
+        }))
+    );
 }
 
 fn moving(speed: f64, served: u64) -> ClientReport {
-    ClientReport::State(Box::new(UrState { velocity: [0.0, 0.0, speed, 0.0, 0.0, 0.0], served, ..STATE }))
+    ClientReport::State(Box::new(UrState {
+        velocity: [0.0, 0.0, speed, 0.0, 0.0, 0.0],
+        served,
+        ..STATE
+    }))
 }
 
 /// Every call returns, every line comes, and the arm goes on.
@@ -337,14 +438,21 @@ fn an_arm_that_does_not_do_what_it_is_ordered_to_is_stopped_by_the_dashboard() {
     }
     let (halt, broken, asked) = watch.end();
     assert_eq!((halt, asked), (STOPPED, vec!["stop".to_owned()]));
-    assert!(matches!(broken, Some(ClientLoss::Arm(ArmError::Disobeys { .. }))), "{broken:?}");
+    assert!(
+        matches!(broken, Some(ClientLoss::Arm(ArmError::Disobeys { .. }))),
+        "{broken:?}"
+    );
     assert!((100..=130).contains(&after), "{after} ms");
 }
 
 /// Whoever resumes it finds nothing to go on with.
 #[test]
 fn a_program_that_somebody_pauses_is_ended_once() {
-    for stopped in [state(Paused, 1, 0), state(Paused, 1 << 4, 0), state(Playing, 1 << 2, 0)] {
+    for stopped in [
+        state(Paused, 1, 0),
+        state(Paused, 1 << 4, 0),
+        state(Playing, 1 << 2, 0),
+    ] {
         let watch = Watch::begin(1);
         watch.say(ClientReport::Ready);
         watch.say(state(Playing, 1, 0));
@@ -356,7 +464,14 @@ fn a_program_that_somebody_pauses_is_ended_once() {
         watch.hand.advance(41 * MS);
         let reason = watch.shared.known().ended();
         let was_paused = matches!(&stopped, ClientReport::State(state) if state.program == Paused);
-        assert_eq!(reason, if was_paused { ArmError::ProgramPaused } else { ArmError::ProgramEnded });
+        assert_eq!(
+            reason,
+            if was_paused {
+                ArmError::ProgramPaused
+            } else {
+                ArmError::ProgramEnded
+            }
+        );
         assert!(watch.asked.try_recv().is_err() && watch.shared.known().broken.is_none());
         assert_eq!(watch.end_on_request(), None);
     }
@@ -373,7 +488,9 @@ fn a_mute_dashboard_is_asked_until_it_has_stopped_the_arm() {
             let (mut socket, _) = listener.accept().unwrap();
             writeln!(socket, "Connected: a test").unwrap();
             let mut line = String::new();
-            BufReader::new(socket.try_clone().unwrap()).read_line(&mut line).unwrap();
+            BufReader::new(socket.try_clone().unwrap())
+                .read_line(&mut line)
+                .unwrap();
             ask.send((number, line)).unwrap();
             if number == 2 {
                 writeln!(socket, "Stopped").unwrap();
@@ -381,16 +498,28 @@ fn a_mute_dashboard_is_asked_until_it_has_stopped_the_arm() {
             connections.push(socket);
         }
     });
-    let deadlines = Deadlines { dashboard: 50 * MS, ..Deadlines::default() };
+    let deadlines = Deadlines {
+        dashboard: 50 * MS,
+        ..Deadlines::default()
+    };
     let (clock, _hand) = Clock::manual();
     let dashboard = Dashboard::connect(&host, deadlines.dashboard).unwrap();
     let shared = Arc::new(SharedGuard::new(deadlines, clock));
     let child = Command::new("true").spawn().unwrap();
-    let mut guard = Guard { child, host, dashboard, shared: shared.clone(), hand: None };
+    let mut guard = Guard {
+        child,
+        host,
+        dashboard,
+        shared: shared.clone(),
+        hand: None,
+    };
     assert_eq!(guard.halt(), Halt::Watchdog);
     guard.child.wait().unwrap();
     serve.join().unwrap();
-    assert_eq!(asked.iter().collect::<Vec<_>>(), [0, 1, 2].map(|number| (number, "stop\n".to_owned())));
+    assert_eq!(
+        asked.iter().collect::<Vec<_>>(),
+        [0, 1, 2].map(|number| (number, "stop\n".to_owned()))
+    );
     shared.ask_no_more();
 }
 

@@ -31,7 +31,11 @@ fn pairs_of(motion: &Isometry3<f64>, sigma: f64, seed: u64) -> Vec<PointPair> {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     let pair = |p: &[f64; 3]| {
         let from = Point3::from(*p);
-        PointPair { from, to: motion * from + normal(&mut rng, sigma), sigma: None }
+        PointPair {
+            from,
+            to: motion * from + normal(&mut rng, sigma),
+            sigma: None,
+        }
     };
     PICKS.iter().map(pair).collect()
 }
@@ -90,15 +94,25 @@ fn the_stated_uncertainty_holds() {
     for given in [None, Some(0.4e-3)] {
         let mut squares = Vector6::zeros();
         for seed in 0..200 {
-            let params = PairsParams { sigma: given, ..PairsParams::default() };
+            let params = PairsParams {
+                sigma: given,
+                ..PairsParams::default()
+            };
             let found = fit_pairs(&pairs_of(&truth, 0.4e-3, seed), &params).unwrap();
             let error = error(&found, &truth);
-            squares += Vector6::from_fn(|i, _| error[i] * error[i] / found.covariance[(i, i)] / 200.0);
+            squares +=
+                Vector6::from_fn(|i, _| error[i] * error[i] / found.covariance[(i, i)] / 200.0);
         }
         let normalised = squares.map(f64::sqrt);
-        println!("normalised error, sigma given: {}: {normalised:.2?}", given.is_some());
+        println!(
+            "normalised error, sigma given: {}: {normalised:.2?}",
+            given.is_some()
+        );
         // of 200: ±3 standard errors of an rms are 15 %; t distributed with 15 degrees of freedom it is 7 % more
-        assert!(normalised.iter().all(|x| (0.85..1.25).contains(x)), "{normalised}");
+        assert!(
+            normalised.iter().all(|x| (0.85..1.25).contains(x)),
+            "{normalised}"
+        );
     }
 }
 
@@ -106,24 +120,48 @@ fn the_stated_uncertainty_holds() {
 #[test]
 fn a_sigma_that_the_residuals_contradict_is_not_believed() {
     let pairs = pairs_of(&motion(), 0.4e-3, 1);
-    let given =
-        |sigma| fit_pairs(&pairs, &PairsParams { sigma: Some(sigma), least_misfit: 1.0, ..PairsParams::default() });
+    let given = |sigma| {
+        fit_pairs(
+            &pairs,
+            &PairsParams {
+                sigma: Some(sigma),
+                least_misfit: 1.0,
+                ..PairsParams::default()
+            },
+        )
+    };
     assert_eq!(given(0.4e-3).unwrap().sigma, 0.4e-3);
     let (small, found) = (given(0.1e-3).unwrap(), fit(&pairs).unwrap());
-    assert!((small.sigma - found.sigma).abs() < 1e-12 && (small.covariance - found.covariance).amax() < 1e-18);
+    assert!(
+        (small.sigma - found.sigma).abs() < 1e-12
+            && (small.covariance - found.covariance).amax() < 1e-18
+    );
 }
 
 /// By hand: two pairs that count four times as much as the other two draw the shift to their mean.
 #[test]
 fn sigmas_are_weights() {
-    let square = [[0.0, 0.0, 0.0], [0.1, 0.1, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]];
+    let square = [
+        [0.0, 0.0, 0.0],
+        [0.1, 0.1, 0.0],
+        [0.1, 0.0, 0.0],
+        [0.0, 0.1, 0.0],
+    ];
     let pairs: Vec<_> = square
         .iter()
         .enumerate()
         .map(|(i, p)| {
-            let (dz, sigma) = if i < 2 { (0.0, 0.1e-3) } else { (0.5e-3, 0.2e-3) };
+            let (dz, sigma) = if i < 2 {
+                (0.0, 0.1e-3)
+            } else {
+                (0.5e-3, 0.2e-3)
+            };
             let from = Point3::from(*p);
-            PointPair { from, to: from + vector![0.0, 0.0, dz], sigma: Some(sigma) }
+            PointPair {
+                from,
+                to: from + vector![0.0, 0.0, dz],
+                sigma: Some(sigma),
+            }
         })
         .collect();
     let found = fit(&pairs).unwrap();
@@ -137,23 +175,62 @@ fn sigmas_are_weights() {
 #[test]
 fn what_determines_no_motion_is_refused() {
     let good = pairs_of(&motion(), 0.1e-3, 1);
-    assert_eq!(fit(&good[..2]).unwrap_err(), PairsError::TooFew { count: 2 });
+    assert_eq!(
+        fit(&good[..2]).unwrap_err(),
+        PairsError::TooFew { count: 2 }
+    );
     let mut bad = good.clone();
     bad[3].to.y = f64::NAN;
-    assert_eq!(fit(&bad).unwrap_err(), PairsError::BadPoint { pair: 4, side: PairSide::To });
+    assert_eq!(
+        fit(&bad).unwrap_err(),
+        PairsError::BadPoint {
+            pair: 4,
+            side: PairSide::To
+        }
+    );
     bad[3].to.y = 1e300;
-    assert_eq!(fit(&bad).unwrap_err(), PairsError::BadPoint { pair: 4, side: PairSide::To });
+    assert_eq!(
+        fit(&bad).unwrap_err(),
+        PairsError::BadPoint {
+            pair: 4,
+            side: PairSide::To
+        }
+    );
     let mut bad = good.clone();
     bad[1].sigma = Some(-1e-3);
-    assert_eq!(fit(&bad).unwrap_err(), PairsError::BadSigma { pair: 2, sigma_mm: -1.0 });
-    let nothing = PairsParams { sigma: Some(0.0), ..PairsParams::default() };
-    assert_eq!(fit_pairs(&good, &nothing).unwrap_err(), PairsError::BadGivenSigma { sigma_mm: 0.0 });
+    assert_eq!(
+        fit(&bad).unwrap_err(),
+        PairsError::BadSigma {
+            pair: 2,
+            sigma_mm: -1.0
+        }
+    );
+    let nothing = PairsParams {
+        sigma: Some(0.0),
+        ..PairsParams::default()
+    };
+    assert_eq!(
+        fit_pairs(&good, &nothing).unwrap_err(),
+        PairsError::BadGivenSigma { sigma_mm: 0.0 }
+    );
     let twice = [good[0], good[1], good[1]];
-    assert!(matches!(fit(&twice), Err(PairsError::Coincident { first: 2, second: 3, side: PairSide::From, .. })));
+    assert!(matches!(
+        fit(&twice),
+        Err(PairsError::Coincident {
+            first: 2,
+            second: 3,
+            side: PairSide::From,
+            ..
+        })
+    ));
     let line: Vec<_> = (0..6)
         .map(|i| {
             let from = Point3::new(0.02 * f64::from(i), 0.0, 0.3e-3 * f64::from(i % 2));
-            PointPair { from, to: motion() * from, sigma: None }
+            PointPair {
+                from,
+                to: motion() * from,
+                sigma: None,
+            }
         })
         .collect();
     assert!(matches!(fit(&line), Err(PairsError::Collinear { .. })));
@@ -162,9 +239,16 @@ fn what_determines_no_motion_is_refused() {
     bent[2].from.y += 6e-3;
     bent[2].to = motion() * bent[2].from;
     assert!(fit(&bent).is_ok());
-    let coarse = PairsParams { sigma: Some(1e-3), ..PairsParams::default() };
+    let coarse = PairsParams {
+        sigma: Some(1e-3),
+        ..PairsParams::default()
+    };
     let error = fit_pairs(&bent, &coarse).unwrap_err();
-    assert!(matches!(error, PairsError::Collinear { .. }) && error.to_string().contains("far off the line"), "{error}");
+    assert!(
+        matches!(error, PairsError::Collinear { .. })
+            && error.to_string().contains("far off the line"),
+        "{error}"
+    );
 }
 
 /// With five pairs or more the wrong one is named, whichever it is; fewer disagree.
@@ -175,16 +259,34 @@ fn a_pair_that_does_not_fit_is_named() {
             let mut pairs = pairs_of(&motion(), 0.2e-3, seed);
             pairs[wrong].to += vector![0.0, 4e-3, -3e-3];
             let error = fit(&pairs).unwrap_err();
-            let PairsError::Outlier { pair, distance_mm, others, rest_mm } = error else { panic!("{error}") };
+            let PairsError::Outlier {
+                pair,
+                distance_mm,
+                others,
+                rest_mm,
+            } = error
+            else {
+                panic!("{error}")
+            };
             assert_eq!((pair, others), (wrong + 1, 6), "{error}");
-            assert!((3.5..7.0).contains(&distance_mm) && rest_mm < 0.6, "{error}");
+            assert!(
+                (3.5..7.0).contains(&distance_mm) && rest_mm < 0.6,
+                "{error}"
+            );
         }
-        assert!(fit(&pairs_of(&motion(), 0.2e-3, seed)).is_ok(), "good picks, seed {seed}");
+        assert!(
+            fit(&pairs_of(&motion(), 0.2e-3, seed)).is_ok(),
+            "good picks, seed {seed}"
+        );
     }
     let mut four = pairs_of(&motion(), 0.2e-3, 3)[..4].to_vec();
     four[1].to.x += 15e-3;
     let error = fit(&four).unwrap_err();
-    assert!(matches!(error, PairsError::Disagree { .. }) && error.to_string().contains("5 pairs or more"), "{error}");
+    assert!(
+        matches!(error, PairsError::Disagree { .. })
+            && error.to_string().contains("5 pairs or more"),
+        "{error}"
+    );
     // picks that are all good to 1 mm only are good picks of a bad scan
     assert!((0..50).all(|seed| fit(&pairs_of(&motion(), 1e-3, seed)).is_ok()));
 }
@@ -195,28 +297,49 @@ fn a_hundred_thousand_pairs_are_fitted_at_once() {
     let mut rng = Pcg64Mcg::seed_from_u64(8);
     let pair = |_| {
         let from = Point3::from(normal(&mut rng, 0.1));
-        PointPair { from, to: motion() * from + normal(&mut rng, 0.2e-3), sigma: None }
+        PointPair {
+            from,
+            to: motion() * from + normal(&mut rng, 0.2e-3),
+            sigma: None,
+        }
     };
     let mut pairs: Vec<_> = (0..100_000).map(pair).collect();
     let found = fit(&pairs).unwrap();
     assert!(error(&found, &motion()).amax() < 1e-5 && (found.sigma / 0.2e-3 - 1.0).abs() < 0.01);
     pairs[4711].to.x += 5e-3;
-    assert!(matches!(fit(&pairs), Err(PairsError::Outlier { pair: 4712, .. })));
+    assert!(matches!(
+        fit(&pairs),
+        Err(PairsError::Outlier { pair: 4712, .. })
+    ));
 }
 
 #[test]
 fn units_and_mirrors_are_named() {
     let scaled = |factor: f64| {
         let pairs = pairs_of(&motion(), 0.1e-3, 5);
-        let to_unit = |pair: PointPair| PointPair { to: pair.to * factor, ..pair };
+        let to_unit = |pair: PointPair| PointPair {
+            to: pair.to * factor,
+            ..pair
+        };
         fit(&pairs.into_iter().map(to_unit).collect::<Vec<_>>()).unwrap_err()
     };
-    for (factor, named) in [(1000.0, "1000:"), (1e-3, "1/1000"), (25.4, "25.4:"), (1.0 / 25.4, "1/25.4"), (10.0, "cm")]
-    {
+    for (factor, named) in [
+        (1000.0, "1000:"),
+        (1e-3, "1/1000"),
+        (25.4, "25.4:"),
+        (1.0 / 25.4, "1/25.4"),
+        (10.0, "cm"),
+    ] {
         let error = scaled(factor);
-        assert!(matches!(error, PairsError::Scale { .. }) && error.to_string().contains(named), "{error}");
+        assert!(
+            matches!(error, PairsError::Scale { .. }) && error.to_string().contains(named),
+            "{error}"
+        );
     }
-    assert!(matches!(scaled(1.5), PairsError::Disagree { .. } | PairsError::Outlier { .. }));
+    assert!(matches!(
+        scaled(1.5),
+        PairsError::Disagree { .. } | PairsError::Outlier { .. }
+    ));
     let mut pairs = pairs_of(&motion(), 0.1e-3, 5);
     pairs.iter_mut().for_each(|pair| pair.to.y = -pair.to.y);
     let error = fit(&pairs).unwrap_err();

@@ -12,13 +12,18 @@ use touchup::io::mesh_file::{MeshUnit, read_mesh, write_mesh};
 use touchup::io::recording::{Record, RecordingReader, Topics, write_recording};
 use touchup::mesh::TriMesh;
 use touchup::stylus::{
-    MarkerFrame, MarkerObservation, Message, StampedPose, StampedWrench, SyncParams, Synchroniser, Wrench,
+    MarkerFrame, MarkerObservation, Message, StampedPose, StampedWrench, SyncParams, Synchroniser,
+    Wrench,
 };
 
 const DEFAULT_YAML: &str = include_str!("../../../config/default.yaml");
 
 fn touchup(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_touchup")).args(arguments).env_remove("RUST_LOG").output().unwrap()
+    Command::new(env!("CARGO_BIN_EXE_touchup"))
+        .args(arguments)
+        .env_remove("RUST_LOG")
+        .output()
+        .unwrap()
 }
 
 fn text(bytes: &[u8]) -> &str {
@@ -38,7 +43,10 @@ fn pose_wo() -> Isometry3<f64> {
 const OFFSET: Vector3<f64> = Vector3::new(2.1e-3, -1.3e-3, -0.1418);
 const WEIGHT_W: Vector3<f64> = Vector3::new(0.3, -0.2, -2.7);
 const CENTRE: Vector3<f64> = Vector3::new(4e-3, -11e-3, 52e-3);
-const BIAS: Wrench = Wrench { force: Vector3::new(-2.0, 3.5, 1.0), torque: Vector3::new(0.12, -0.3, 0.05) };
+const BIAS: Wrench = Wrench {
+    force: Vector3::new(-2.0, 3.5, 1.0),
+    torque: Vector3::new(0.12, -0.3, 0.05),
+};
 
 struct Case {
     folder: tempfile::TempDir,
@@ -47,13 +55,33 @@ struct Case {
 impl Case {
     /// A cube of 30 mm, scanned badly and touched.
     fn new() -> Self {
-        let case = Self { folder: tempfile::tempdir().unwrap() };
-        let corner = |i: u32| Point3::from([0, 1, 2].map(|axis| if i >> axis & 1 == 1 { 0.03 } else { 0.0 }));
-        let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        let faces = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        let case = Self {
+            folder: tempfile::tempdir().unwrap(),
+        };
+        let corner = |i: u32| {
+            Point3::from([0, 1, 2].map(|axis| if i >> axis & 1 == 1 { 0.03 } else { 0.0 }))
+        };
+        let faces = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        let faces = faces
+            .iter()
+            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+            .collect();
         let cube = TriMesh::new((0..8).map(corner).collect(), faces).unwrap();
         write_mesh(&case.path("part.ply"), &cube, MeshUnit::Millimetre).unwrap();
-        done(&touchup(&["simulate", "--truth", &case.name("part.ply"), "--out", &case.name("made")]));
+        done(&touchup(&[
+            "simulate",
+            "--truth",
+            &case.name("part.ply"),
+            "--out",
+            &case.name("made"),
+        ]));
         case
     }
 
@@ -66,32 +94,59 @@ impl Case {
     }
 
     fn touches(&self) -> Vec<Message> {
-        RecordingReader::open(&self.path("made/touch.mcap"), &Topics::default()).unwrap().map(Result::unwrap).collect()
+        RecordingReader::open(&self.path("made/touch.mcap"), &Topics::default())
+            .unwrap()
+            .map(Result::unwrap)
+            .collect()
     }
 
     fn record(&self, name: &str, wrench_frame: &str, messages: &[Message]) {
-        write_recording(&self.path(name), &Topics::default(), "space", wrench_frame, messages.iter().copied()).unwrap();
+        write_recording(
+            &self.path(name),
+            &Topics::default(),
+            "space",
+            wrench_frame,
+            messages.iter().copied(),
+        )
+        .unwrap();
     }
 
     fn refined(&self, bag: &str, scene: &str, out: &str) -> TriMesh {
-        let (scan, bag, scene, path) = (self.name("made/scan.ply"), self.name(bag), self.name(scene), self.name(out));
-        done(&touchup(&["refine", "--scan", &scan, "--bag", &bag, "--scene", &scene, "--out", &path, "--json"]));
-        read_mesh(&self.path(out), MeshUnit::Millimetre).unwrap().mesh
+        let (scan, bag, scene, path) = (
+            self.name("made/scan.ply"),
+            self.name(bag),
+            self.name(scene),
+            self.name(out),
+        );
+        done(&touchup(&[
+            "refine", "--scan", &scan, "--bag", &bag, "--scene", &scene, "--out", &path, "--json",
+        ]));
+        read_mesh(&self.path(out), MeshUnit::Millimetre)
+            .unwrap()
+            .mesh
     }
 
     /// `touchup calibrate …` from one scene into another.
     fn calibrate(&self, arguments: &[&str], scene: &str, out: &str) -> Output {
         let (scene, out) = (self.name(scene), self.name(out));
-        touchup(&[&["calibrate"], arguments, &["--scene", &scene, "--out", &out, "--json"]].concat())
+        touchup(
+            &[
+                &["calibrate"],
+                arguments,
+                &["--scene", &scene, "--out", &out, "--json"],
+            ]
+            .concat(),
+        )
     }
 }
 
 /// The recording as a tracker in space sees it: the pose of H, the wrench in the axes of the stylus.
 fn in_space(messages: &[Message], offset: Vector3<f64>) -> Vec<Message> {
     let moved = |message: &Message| match *message {
-        Message::Pose(StampedPose { stamp_ns, pose_ot }) => {
-            Message::Pose(StampedPose { stamp_ns, pose_ot: pose_wo() * pose_ot * Translation3::from(-offset) })
-        }
+        Message::Pose(StampedPose { stamp_ns, pose_ot }) => Message::Pose(StampedPose {
+            stamp_ns,
+            pose_ot: pose_wo() * pose_ot * Translation3::from(-offset),
+        }),
         wrench => wrench,
     };
     messages.iter().map(moved).collect()
@@ -116,11 +171,17 @@ fn turns(messages: &[Message]) -> BTreeMap<i64, UnitQuaternion<f64>> {
 }
 
 /// Each wrench that becomes a sample changed, by what `change` makes of the orientation at its stamp.
-fn changed(messages: &[Message], change: impl Fn(&UnitQuaternion<f64>, Wrench) -> Wrench) -> Vec<Message> {
+fn changed(
+    messages: &[Message],
+    change: impl Fn(&UnitQuaternion<f64>, Wrench) -> Wrench,
+) -> Vec<Message> {
     let turns = turns(messages);
     let change = |message: &Message| match *message {
         Message::Wrench(StampedWrench { stamp_ns, wrench }) if turns.contains_key(&stamp_ns) => {
-            Message::Wrench(StampedWrench { stamp_ns, wrench: change(&turns[&stamp_ns], wrench) })
+            Message::Wrench(StampedWrench {
+                stamp_ns,
+                wrench: change(&turns[&stamp_ns], wrench),
+            })
         }
         other => other,
     };
@@ -130,12 +191,18 @@ fn changed(messages: &[Message], change: impl Fn(&UnitQuaternion<f64>, Wrench) -
 /// Adds weight and bias to a contact wrench.
 fn loaded(r_wt: &UnitQuaternion<f64>, wrench: Wrench) -> Wrench {
     let weight = load(r_wt);
-    Wrench { force: wrench.force + weight.force, torque: wrench.torque + weight.torque }
+    Wrench {
+        force: wrench.force + weight.force,
+        torque: wrench.torque + weight.torque,
+    }
 }
 
 fn load(r_wt: &UnitQuaternion<f64>) -> Wrench {
     let weight = r_wt.inverse() * WEIGHT_W;
-    Wrench { force: weight + BIAS.force, torque: CENTRE.cross(&weight) + BIAS.torque }
+    Wrench {
+        force: weight + BIAS.force,
+        torque: CENTRE.cross(&weight) + BIAS.torque,
+    }
 }
 
 /// A pose and a wrench each 10 ms.
@@ -143,7 +210,10 @@ fn recording(count: i64, pose: impl Fn(i64) -> Isometry3<f64>) -> Vec<Message> {
     let pair = |i: i64| {
         let (stamp_ns, pose_ot) = (1_000_000_000 + i * 10_000_000, pose(i));
         let wrench = load(&pose_ot.rotation);
-        [Message::Pose(StampedPose { stamp_ns, pose_ot }), Message::Wrench(StampedWrench { stamp_ns, wrench })]
+        [
+            Message::Pose(StampedPose { stamp_ns, pose_ot }),
+            Message::Wrench(StampedWrench { stamp_ns, wrench }),
+        ]
     };
     (0..count).flat_map(pair).collect()
 }
@@ -153,7 +223,10 @@ fn static_segments() -> Vec<Message> {
     recording(12 * 150, |i| {
         let k = (i / 150) as f64;
         let turn = vector![(1.3 * k).sin(), (2.1 * k).cos(), (0.7 * k).sin()] * 1.5;
-        Isometry3::from_parts(Translation3::new(0.4, 0.1, 0.3), UnitQuaternion::from_scaled_axis(turn))
+        Isometry3::from_parts(
+            Translation3::new(0.4, 0.1, 0.3),
+            UnitQuaternion::from_scaled_axis(turn),
+        )
     })
 }
 
@@ -161,17 +234,28 @@ fn static_segments() -> Vec<Message> {
 fn swing() -> Vec<Message> {
     recording(3000, |i| {
         let t = i as f64 / 100.0;
-        let turn = UnitQuaternion::from_scaled_axis(vector![0.5 * t.sin(), 0.4 * (1.7 * t).cos(), 0.2]);
+        let turn =
+            UnitQuaternion::from_scaled_axis(vector![0.5 * t.sin(), 0.4 * (1.7 * t).cos(), 0.2]);
         Isometry3::from_parts((vector![0.3, 0.2, 0.05] - turn * OFFSET).into(), turn)
     })
 }
 
 fn pairs_csv() -> String {
-    let mut csv = "name,scan_x_mm,scan_y_mm,scan_z_mm,space_x_mm,space_y_mm,space_z_mm\n".to_owned();
-    for (name, p) in [("A", [0, 0, 0]), ("B", [30, 0, 0]), ("C", [30, 30, 0]), ("D", [0, 30, 30]), ("E", [15, 0, 30])] {
+    let mut csv =
+        "name,scan_x_mm,scan_y_mm,scan_z_mm,space_x_mm,space_y_mm,space_z_mm\n".to_owned();
+    for (name, p) in [
+        ("A", [0, 0, 0]),
+        ("B", [30, 0, 0]),
+        ("C", [30, 30, 0]),
+        ("D", [0, 30, 30]),
+        ("E", [15, 0, 30]),
+    ] {
         let p = p.map(f64::from);
         let q = (pose_wo() * Point3::from(p.map(|x| x / 1e3))).coords * 1e3;
-        csv += &format!("{name},{},{},{},{:.12},{:.12},{:.12}\n", p[0], p[1], p[2], q.x, q.y, q.z);
+        csv += &format!(
+            "{name},{},{},{},{:.12},{:.12},{:.12}\n",
+            p[0], p[1], p[2], q.x, q.y, q.z
+        );
     }
     csv
 }
@@ -180,7 +264,11 @@ fn pairs_csv() -> String {
 fn largest_difference(a: &TriMesh, b: &TriMesh) -> f64 {
     assert_eq!(a.positions().len(), b.positions().len());
     assert!(a.faces().eq(b.faces()), "the faces differ");
-    a.positions().iter().zip(b.positions()).map(|(p, q)| (p - q).norm()).fold(0.0, f64::max)
+    a.positions()
+        .iter()
+        .zip(b.positions())
+        .map(|(p, q)| (p - q).norm())
+        .fold(0.0, f64::max)
 }
 
 #[test]
@@ -188,23 +276,52 @@ fn a_calibrated_scene_gives_the_mesh_of_the_plain_recording() {
     let case = Case::new();
     fs::write(case.path("plain.yaml"), DEFAULT_YAML).unwrap();
     let plain = case.refined("made/touch.mcap", "plain.yaml", "plain.ply");
-    let scan = read_mesh(&case.path("made/scan.ply"), MeshUnit::Millimetre).unwrap().mesh;
-    assert!(plain.positions().len() != scan.positions().len(), "something was touched");
+    let scan = read_mesh(&case.path("made/scan.ply"), MeshUnit::Millimetre)
+        .unwrap()
+        .mesh;
+    assert!(
+        plain.positions().len() != scan.positions().len(),
+        "something was touched"
+    );
     fs::write(case.path("pairs.csv"), pairs_csv()).unwrap();
     case.record("static.mcap", "stylus", &static_segments());
     case.record("swing.mcap", "stylus", &swing());
-    let (pairs, held, swing) = (case.name("pairs.csv"), case.name("static.mcap"), case.name("swing.mcap"));
+    let (pairs, held, swing) = (
+        case.name("pairs.csv"),
+        case.name("static.mcap"),
+        case.name("swing.mcap"),
+    );
 
-    let report: Value =
-        serde_json::from_str(done(&case.calibrate(&["scan", "--pairs", &pairs], "plain.yaml", "scan.yaml"))).unwrap();
-    assert!(report["rms_mm"].as_f64().unwrap() < 1e-9 && report["pairs"][4]["name"] == "E", "{report}");
-    let report: Value =
-        serde_json::from_str(done(&case.calibrate(&["tip", "--bag", &swing], "plain.yaml", "tip.yaml"))).unwrap();
-    assert!((report["offset_mm"]["value"][2].as_f64().unwrap() + 141.8).abs() < 1e-7, "{report}");
-    let report: Value =
-        serde_json::from_str(done(&case.calibrate(&["payload", "--bag", &held], "plain.yaml", "payload.yaml")))
-            .unwrap();
-    assert!((report["weight_n"].as_f64().unwrap() - WEIGHT_W.norm()).abs() < 1e-9, "{report}");
+    let report: Value = serde_json::from_str(done(&case.calibrate(
+        &["scan", "--pairs", &pairs],
+        "plain.yaml",
+        "scan.yaml",
+    )))
+    .unwrap();
+    assert!(
+        report["rms_mm"].as_f64().unwrap() < 1e-9 && report["pairs"][4]["name"] == "E",
+        "{report}"
+    );
+    let report: Value = serde_json::from_str(done(&case.calibrate(
+        &["tip", "--bag", &swing],
+        "plain.yaml",
+        "tip.yaml",
+    )))
+    .unwrap();
+    assert!(
+        (report["offset_mm"]["value"][2].as_f64().unwrap() + 141.8).abs() < 1e-7,
+        "{report}"
+    );
+    let report: Value = serde_json::from_str(done(&case.calibrate(
+        &["payload", "--bag", &held],
+        "plain.yaml",
+        "payload.yaml",
+    )))
+    .unwrap();
+    assert!(
+        (report["weight_n"].as_f64().unwrap() - WEIGHT_W.norm()).abs() < 1e-9,
+        "{report}"
+    );
     assert_eq!(report["static_segments"], 12);
     // all three, the payload first: its gravity is in the axes of space and turns with the scan that comes after it
     done(&case.calibrate(&["scan", "--pairs", &pairs], "payload.yaml", "all.yaml"));
@@ -219,13 +336,20 @@ fn a_calibrated_scene_gives_the_mesh_of_the_plain_recording() {
     let other_tip: Vec<_> = moved
         .iter()
         .map(|message| match *message {
-            Message::Pose(pose) => Message::Pose(StampedPose { pose_ot: pose_wo().inverse() * pose.pose_ot, ..pose }),
+            Message::Pose(pose) => Message::Pose(StampedPose {
+                pose_ot: pose_wo().inverse() * pose.pose_ot,
+                ..pose
+            }),
             wrench => wrench,
         })
         .collect();
     case.record("tip.mcap", "stylus", &other_tip);
     case.record("all.mcap", "stylus", &changed(&moved, loaded));
-    for (bag, scene) in [("moved.mcap", "scan.yaml"), ("tip.mcap", "tip.yaml"), ("all.mcap", "all.yaml")] {
+    for (bag, scene) in [
+        ("moved.mcap", "scan.yaml"),
+        ("tip.mcap", "tip.yaml"),
+        ("all.mcap", "all.yaml"),
+    ] {
         let mesh = case.refined(bag, scene, "out.ply");
         let difference = largest_difference(&plain, &mesh);
         println!("{bag} with {scene}: {difference:e} m");
@@ -249,28 +373,71 @@ fn results_are_printed_and_written_and_bad_data_is_3() {
     let name = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (pairs, out) = (name("pairs.csv"), name("new.yaml"));
     fs::write(&pairs, pairs_csv()).unwrap();
-    let scan = |more: &[&str]| touchup(&[&["calibrate", "scan", "--pairs", &pairs, "--out", &out], more].concat());
+    let scan = |more: &[&str]| {
+        touchup(
+            &[
+                &["calibrate", "scan", "--pairs", &pairs, "--out", &out],
+                more,
+            ]
+            .concat(),
+        )
+    };
     let output = scan(&[]);
     let report = done(&output);
-    assert!(report.contains("residual, mm") && report.contains("rms 0.000 mm") && report.contains(&out), "{report}");
+    assert!(
+        report.contains("residual, mm") && report.contains("rms 0.000 mm") && report.contains(&out),
+        "{report}"
+    );
     let new = fs::read_to_string(&out).unwrap();
-    assert!(new.contains("# touchup calibrate scan: 5 pairs, residuals 0.000 mm rms"), "{new}");
+    assert!(
+        new.contains("# touchup calibrate scan: 5 pairs, residuals 0.000 mm rms"),
+        "{new}"
+    );
     // a whole scene, but for the radius of the ball, which nobody has told
     let scene = touchup::scene::Scene::read(Path::new(&out)).unwrap();
     assert!(scene.scan_to_space.is_some());
-    assert_eq!(touchup::scene::Scene { scan_to_space: None, ..scene }, touchup::scene::Scene::default());
-    assert!(!touchup::scene::Scene::names(&new, "tip", "radius_mm") && new.contains("#radius_mm"), "{new}");
+    assert_eq!(
+        touchup::scene::Scene {
+            scan_to_space: None,
+            ..scene
+        },
+        touchup::scene::Scene::default()
+    );
+    assert!(
+        !touchup::scene::Scene::names(&new, "tip", "radius_mm") && new.contains("#radius_mm"),
+        "{new}"
+    );
     // the same of a scene that is named and not there yet
     let named = name("named.yaml");
-    let scan_named = ["calibrate", "scan", "--pairs", &pairs, "--scene", &named, "--out", &named];
+    let scan_named = [
+        "calibrate",
+        "scan",
+        "--pairs",
+        &pairs,
+        "--scene",
+        &named,
+        "--out",
+        &named,
+    ];
     done(&touchup(&scan_named));
     assert_eq!(fs::read_to_string(&named).unwrap(), new);
 
     let refused = |output: Output, exit: i32, named: &str| {
         let report = text(&output.stderr);
-        assert_eq!((output.status.code(), text(&output.stdout)), (Some(exit), ""), "{report}");
-        assert!(report.contains(named) && report.lines().count() == 1, "{named}: {report}");
-        assert_eq!(fs::read_to_string(&out).unwrap(), new, "{named}: what was there stays");
+        assert_eq!(
+            (output.status.code(), text(&output.stdout)),
+            (Some(exit), ""),
+            "{report}"
+        );
+        assert!(
+            report.contains(named) && report.lines().count() == 1,
+            "{named}: {report}"
+        );
+        assert_eq!(
+            fs::read_to_string(&out).unwrap(),
+            new,
+            "{named}: what was there stays"
+        );
     };
     let lines: Vec<String> = pairs_csv().lines().map(str::to_owned).collect();
     let with = |lines: &[String]| fs::write(&pairs, lines.join("\n")).unwrap();
@@ -283,18 +450,57 @@ fn results_are_printed_and_written_and_bad_data_is_3() {
     with(&lines);
     refused(scan(&["--sigma-mm", "0"]), 2, "--sigma-mm");
     refused(scan(&["--scene", &name("no.yaml")]), 3, "no.yaml");
-    refused(touchup(&["calibrate", "scan", "--pairs", &pairs, "--out", &pairs]), 2, "which --pairs reads");
-    refused(touchup(&["calibrate", "scan", "--pairs", &pairs, "--out", &name("no/new.yaml")]), 1, "no folder");
+    refused(
+        touchup(&["calibrate", "scan", "--pairs", &pairs, "--out", &pairs]),
+        2,
+        "which --pairs reads",
+    );
+    refused(
+        touchup(&[
+            "calibrate",
+            "scan",
+            "--pairs",
+            &pairs,
+            "--out",
+            &name("no/new.yaml"),
+        ]),
+        1,
+        "no folder",
+    );
     let bag = name("none.mcap");
-    refused(touchup(&["calibrate", "tip", "--bag", &bag, "--out", &out]), 3, "none.mcap");
-    assert_eq!(touchup(&["calibrate", "payload", "--out", &out]).status.code(), Some(2));
+    refused(
+        touchup(&["calibrate", "tip", "--bag", &bag, "--out", &out]),
+        3,
+        "none.mcap",
+    );
+    assert_eq!(
+        touchup(&["calibrate", "payload", "--out", &out])
+            .status
+            .code(),
+        Some(2)
+    );
 
     // one orientation alone
     let resting = recording(500, |_| Isometry3::identity());
-    write_recording(&folder.path().join("rest.mcap"), &Topics::default(), "space", "stylus", resting).unwrap();
+    write_recording(
+        &folder.path().join("rest.mcap"),
+        &Topics::default(),
+        "space",
+        "stylus",
+        resting,
+    )
+    .unwrap();
     let rest = name("rest.mcap");
-    refused(touchup(&["calibrate", "tip", "--bag", &rest, "--out", &out]), 3, "swung by 0.0°");
-    refused(touchup(&["calibrate", "payload", "--bag", &rest, "--out", &out]), 3, "1 still phases");
+    refused(
+        touchup(&["calibrate", "tip", "--bag", &rest, "--out", &out]),
+        3,
+        "swung by 0.0°",
+    );
+    refused(
+        touchup(&["calibrate", "payload", "--bag", &rest, "--out", &out]),
+        3,
+        "1 still phases",
+    );
 }
 
 /// The stylus goes from point to point and dwells on each for 0.8 s, pressing with 2 N along the normal; the poses are
@@ -307,12 +513,23 @@ fn resting_on(points: &[(Point3<f64>, Vector3<f64>)]) -> Vec<Message> {
             let stamp_ns = 1_000_000_000 + (k as i64 * 1300 + tick) * 1_000_000;
             let presses = (250..1050).contains(&tick);
             let away = 80e-6 * (250 - tick).max(tick - 1050).max(0) as f64;
-            let force_o = if presses { normal * 2.0 } else { Vector3::zeros() };
+            let force_o = if presses {
+                normal * 2.0
+            } else {
+                Vector3::zeros()
+            };
             let turn = UnitQuaternion::from_scaled_axis(vector![0.1 * k as f64, 0.2, -0.3]);
             let centre = point + normal * (radius + away) - force_o / stiffness;
-            let pose_oh = Isometry3::from_parts(centre.coords.into(), turn) * Translation3::from(-OFFSET);
-            messages.push(Message::Pose(StampedPose { stamp_ns, pose_ot: pose_wo() * pose_oh }));
-            let wrench = Wrench { force: turn.inverse() * force_o, torque: Vector3::zeros() };
+            let pose_oh =
+                Isometry3::from_parts(centre.coords.into(), turn) * Translation3::from(-OFFSET);
+            messages.push(Message::Pose(StampedPose {
+                stamp_ns,
+                pose_ot: pose_wo() * pose_oh,
+            }));
+            let wrench = Wrench {
+                force: turn.inverse() * force_o,
+                torque: Vector3::zeros(),
+            };
             messages.push(Message::Wrench(StampedWrench { stamp_ns, wrench }));
         }
     }
@@ -336,17 +553,49 @@ fn points_can_be_picked_with_the_stylus() {
         csv += &format!("{},{},{}\n", mm.x, mm.y, mm.z);
     }
     fs::write(name("points.csv"), csv).unwrap();
-    let offset = format!("  offset_mm: [{}, {}, {}]\n", OFFSET.x * 1e3, OFFSET.y * 1e3, OFFSET.z * 1e3);
-    fs::write(name("tip.yaml"), DEFAULT_YAML.replace("tip:\n", &format!("tip:\n{offset}"))).unwrap();
+    let offset = format!(
+        "  offset_mm: [{}, {}, {}]\n",
+        OFFSET.x * 1e3,
+        OFFSET.y * 1e3,
+        OFFSET.z * 1e3
+    );
+    fs::write(
+        name("tip.yaml"),
+        DEFAULT_YAML.replace("tip:\n", &format!("tip:\n{offset}")),
+    )
+    .unwrap();
     let scan = |bag: &str, points: &[(Point3<f64>, Vector3<f64>)]| {
-        write_recording(Path::new(&name(bag)), &Topics::default(), "space", "stylus", resting_on(points)).unwrap();
+        write_recording(
+            Path::new(&name(bag)),
+            &Topics::default(),
+            "space",
+            "stylus",
+            resting_on(points),
+        )
+        .unwrap();
         let [pairs, bag, scene, out] = ["points.csv", bag, "tip.yaml", "out.yaml"].map(name);
-        touchup(&["calibrate", "scan", "--pairs", &pairs, "--bag", &bag, "--scene", &scene, "--out", &out, "--json"])
+        touchup(&[
+            "calibrate",
+            "scan",
+            "--pairs",
+            &pairs,
+            "--bag",
+            &bag,
+            "--scene",
+            &scene,
+            "--out",
+            &out,
+            "--json",
+        ])
     };
     let report: Value = serde_json::from_str(done(&scan("dwells.mcap", &points))).unwrap();
     assert!(report["rms_mm"].as_f64().unwrap() < 1e-6, "{report}");
-    let found: Vec<f64> =
-        report["scan_to_space"]["position_mm"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
+    let found: Vec<f64> = report["scan_to_space"]["position_mm"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|x| x.as_f64().unwrap())
+        .collect();
     let off = Vector3::from_column_slice(&found) - pose_wo().translation.vector * 1e3;
     assert!(off.norm() < 1e-5, "{off}");
     let output = scan("four.mcap", &points[..4]);
@@ -359,32 +608,62 @@ fn points_can_be_picked_with_the_stylus() {
 fn markers_in_space_refine_as_those_in_the_frame_of_the_scan() {
     let case = Case::new();
     let part = case.name("part.ply");
-    done(&touchup(&["simulate", "--truth", &part, "--out", &case.name("made"), "--markers"]));
-    let topics = Topics { markers: Some("/stylus/markers".to_owned()), ..Topics::default() };
+    done(&touchup(&[
+        "simulate",
+        "--truth",
+        &part,
+        "--out",
+        &case.name("made"),
+        "--markers",
+    ]));
+    let topics = Topics {
+        markers: Some("/stylus/markers".to_owned()),
+        ..Topics::default()
+    };
     let mut reader = RecordingReader::open(&case.path("made/touch.mcap"), &topics).unwrap();
     let moved = std::iter::from_fn(|| reader.next_record()).map(|record| match record.unwrap() {
         Record::Markers(frame) => {
             let mut in_space = MarkerFrame::new(frame.stamp_ns);
             for marker in frame.seen() {
-                in_space.see(MarkerObservation { position: pose_wo() * marker.position, ..*marker });
+                in_space.see(MarkerObservation {
+                    position: pose_wo() * marker.position,
+                    ..*marker
+                });
             }
             Record::Markers(Box::new(in_space))
         }
         message => message,
     });
     let records: Vec<_> = moved.collect();
-    write_recording(&case.path("space.mcap"), &topics, "space", "stylus", records).unwrap();
+    write_recording(
+        &case.path("space.mcap"),
+        &topics,
+        "space",
+        "stylus",
+        records,
+    )
+    .unwrap();
     let markers = format!("{DEFAULT_YAML}\nmarkers:\n");
     fs::write(case.path("markers.yaml"), &markers).unwrap();
     fs::write(case.path("pairs.csv"), pairs_csv()).unwrap();
-    done(&case.calibrate(&["scan", "--pairs", &case.name("pairs.csv")], "markers.yaml", "space.yaml"));
+    done(&case.calibrate(
+        &["scan", "--pairs", &case.name("pairs.csv")],
+        "markers.yaml",
+        "space.yaml",
+    ));
     let refined = |bag: &str, scene: &str| -> Value {
-        let [scan, bag, scene, out] = ["made/scan.ply", bag, scene, "out.ply"].map(|name| case.name(name));
-        let refine = ["refine", "--scan", &scan, "--bag", &bag, "--scene", &scene, "--out", &out, "--json"];
+        let [scan, bag, scene, out] =
+            ["made/scan.ply", bag, scene, "out.ply"].map(|name| case.name(name));
+        let refine = [
+            "refine", "--scan", &scan, "--bag", &bag, "--scene", &scene, "--out", &out, "--json",
+        ];
         let output = touchup(&[&refine[..], &["--markers-topic", "/stylus/markers"]].concat());
         serde_json::from_str(text(&output.stdout)).unwrap()
     };
-    let (plain, space) = (refined("made/touch.mcap", "markers.yaml"), refined("space.mcap", "space.yaml"));
+    let (plain, space) = (
+        refined("made/touch.mcap", "markers.yaml"),
+        refined("space.mcap", "space.yaml"),
+    );
     // markers are recorded in single precision, so that 1e-8 m is the achievable accuracy
     let ratio = |key: &str| space[key].as_f64().unwrap() / plain[key].as_f64().unwrap();
     assert!(plain["moved_faces"].as_u64().unwrap() > 1000, "{plain}");
@@ -396,22 +675,33 @@ fn markers_in_space_refine_as_those_in_the_frame_of_the_scan() {
 /// The real static poses of the room's tests, through the command line.
 #[test]
 fn real_static_poses_from_a_table() {
-    let Some(data) = crate::shared::shared("force/gravity_ati") else { return };
-    let [poses, wrenches] = ["pose_7.txt", "wrench_7.txt"].map(|name| fs::read_to_string(data.join(name)).unwrap());
+    let Some(data) = crate::shared::shared("force/gravity_ati") else {
+        return;
+    };
+    let [poses, wrenches] =
+        ["pose_7.txt", "wrench_7.txt"].map(|name| fs::read_to_string(data.join(name)).unwrap());
     let folder = tempfile::tempdir().unwrap();
     let mut csv = "qx,qy,qz,qw,fx_n,fy_n,fz_n,tx_nm,ty_nm,tz_nm\n".to_owned();
     for (pose, wrench) in poses.lines().zip(wrenches.lines()) {
         let turn: Vec<_> = pose.split(',').skip(3).collect();
         csv += &format!("{},{wrench}\n", turn.join(","));
     }
-    let [table, out] = ["poses.csv", "scene.yaml"].map(|name| folder.path().join(name).to_str().unwrap().to_owned());
+    let [table, out] = ["poses.csv", "scene.yaml"]
+        .map(|name| folder.path().join(name).to_str().unwrap().to_owned());
     fs::write(&table, csv).unwrap();
     let payload = ["calibrate", "payload", "--samples", &table, "--out", &out];
     let output = touchup(&payload);
     assert_eq!(output.status.code(), Some(3));
-    assert!(text(&output.stderr).contains("--wrench-axes pose"), "{}", text(&output.stderr));
+    assert!(
+        text(&output.stderr).contains("--wrench-axes pose"),
+        "{}",
+        text(&output.stderr)
+    );
     let output = touchup(&[&payload[..], &["--wrench-axes", "pose"]].concat());
     let report = done(&output);
     println!("{report}");
-    assert!(report.contains("weight      10.80") || report.contains("weight      10.81"), "{report}");
+    assert!(
+        report.contains("weight      10.80") || report.contains("weight      10.81"),
+        "{report}"
+    );
 }

@@ -7,8 +7,8 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64Mcg;
 use touchup::calibrate::{
-    PayloadError, PayloadParams, StaticPose, StaticSegmentFinder, StaticSegmentParams, TipError, TipFitParams,
-    VectorEstimate, fit_payload, fit_tip,
+    PayloadError, PayloadParams, StaticPose, StaticSegmentFinder, StaticSegmentParams, TipError,
+    TipFitParams, VectorEstimate, fit_payload, fit_tip,
 };
 use touchup::stylus::{Sample, Wrench, WrenchFrame};
 
@@ -42,7 +42,10 @@ fn load(r_wt: &UnitQuaternion<f64>, frame: WrenchFrame) -> Wrench {
     let (force, torque) = (weight_s + BIAS_F, CENTRE.cross(&weight_s) + BIAS_T);
     match frame {
         WrenchFrame::Sensor => Wrench { force, torque },
-        WrenchFrame::Object => Wrench { force: r_ws * force, torque: r_ws * torque },
+        WrenchFrame::Object => Wrench {
+            force: r_ws * force,
+            torque: r_ws * torque,
+        },
     }
 }
 
@@ -53,21 +56,36 @@ fn static_poses(count: usize, noise: [f64; 2], frame: WrenchFrame, seed: u64) ->
         let mut wrench = load(&r_wt, frame);
         wrench.force += normal(&mut rng, noise[0]);
         wrench.torque += normal(&mut rng, noise[1]);
-        StaticPose { r_wt, wrench, noise: Some(noise[0] * 10.0), samples: 100 }
+        StaticPose {
+            r_wt,
+            wrench,
+            noise: Some(noise[0] * 10.0),
+            samples: 100,
+        }
     };
     (0..count).map(|_| pose()).collect()
 }
 
 fn params(wrench_frame: WrenchFrame) -> PayloadParams {
-    PayloadParams { wrench_frame, r_ts: mounted(), ..PayloadParams::default() }
+    PayloadParams {
+        wrench_frame,
+        r_ts: mounted(),
+        ..PayloadParams::default()
+    }
 }
 
 #[test]
 fn exact_poses_give_the_payload_in_either_axes() {
     for frame in [WrenchFrame::Sensor, WrenchFrame::Object] {
         let found = fit_payload(&static_poses(12, [0.0, 0.0], frame, 1), &params(frame)).unwrap();
-        assert!((found.weight_w.value - WEIGHT).norm() < 1e-12 && (found.p_sc.value - CENTRE).norm() < 1e-13);
-        assert!((found.bias_force.value - BIAS_F).norm() < 1e-12 && (found.bias_torque.value - BIAS_T).norm() < 1e-13);
+        assert!(
+            (found.weight_w.value - WEIGHT).norm() < 1e-12
+                && (found.p_sc.value - CENTRE).norm() < 1e-13
+        );
+        assert!(
+            (found.bias_force.value - BIAS_F).norm() < 1e-12
+                && (found.bias_torque.value - BIAS_T).norm() < 1e-13
+        );
         let payload = found.payload();
         assert!((payload.mass - WEIGHT.norm() / 9.81).abs() < 1e-12);
         assert!((payload.gravity_o.norm() - 9.81).abs() < 1e-12 && found.rejected.is_empty());
@@ -82,7 +100,11 @@ fn uncertainties_of_the_payload_hold() {
         let poses = static_poses(12, [0.05, 0.004], WrenchFrame::Sensor, seed);
         let found = fit_payload(&poses, &params(WrenchFrame::Sensor)).unwrap();
         let part = |known: &VectorEstimate, truth: Vector3<f64>| {
-            (known.value - truth).component_div(&known.sigma).norm_squared() / 3.0 / 100.0
+            (known.value - truth)
+                .component_div(&known.sigma)
+                .norm_squared()
+                / 3.0
+                / 100.0
         };
         squares[0] += part(&found.weight_w, WEIGHT);
         squares[1] += part(&found.p_sc, CENTRE);
@@ -91,8 +113,13 @@ fn uncertainties_of_the_payload_hold() {
         squares[4] += ((found.weight[0] - WEIGHT.norm()) / found.weight[1]).powi(2) / 100.0;
     }
     let normalised = squares.map(f64::sqrt);
-    println!("normalised error of weight, centre, bias of force, of torque, |weight|: {normalised:.2?}");
-    assert!(normalised.iter().all(|x| (0.75..1.3).contains(x)), "{normalised:?}");
+    println!(
+        "normalised error of weight, centre, bias of force, of torque, |weight|: {normalised:.2?}"
+    );
+    assert!(
+        normalised.iter().all(|x| (0.75..1.3).contains(x)),
+        "{normalised:?}"
+    );
 }
 
 /// Exact torques: the centre is as well known as the weight that pulls at it, and no better.
@@ -102,12 +129,24 @@ fn the_centre_is_known_no_better_than_the_weight() {
     for seed in 0..100 {
         let poses = static_poses(12, [0.2, 1e-7], WrenchFrame::Sensor, seed);
         let found = fit_payload(&poses, &params(WrenchFrame::Sensor)).unwrap();
-        square += (found.p_sc.value - CENTRE).component_div(&found.p_sc.sigma).norm_squared() / 3.0 / 100.0;
+        square += (found.p_sc.value - CENTRE)
+            .component_div(&found.p_sc.sigma)
+            .norm_squared()
+            / 3.0
+            / 100.0;
         // p × w stays what it is where p shrinks as w grows
         shares.push(found.p_sc.sigma.norm() / CENTRE.norm() / (found.weight[1] / found.weight[0]));
     }
-    println!("normalised error {:.2}, shares of p over those of w {:.2?}", f64::sqrt(square), &shares[..5]);
-    assert!((0.75..1.3).contains(&f64::sqrt(square)), "{}", f64::sqrt(square));
+    println!(
+        "normalised error {:.2}, shares of p over those of w {:.2?}",
+        f64::sqrt(square),
+        &shares[..5]
+    );
+    assert!(
+        (0.75..1.3).contains(&f64::sqrt(square)),
+        "{}",
+        f64::sqrt(square)
+    );
     assert!(shares.iter().all(|share| *share > 0.9), "{shares:?}");
 }
 
@@ -121,7 +160,11 @@ fn poses_in_contact_are_left_out() {
         }
         let found = fit_payload(&poses, &params(WrenchFrame::Sensor)).unwrap();
         assert_eq!(found.rejected, [3, 4, 11]);
-        assert!((found.weight_w.value - WEIGHT).norm() < 0.06, "seed {seed}: {}", found.weight_w.value);
+        assert!(
+            (found.weight_w.value - WEIGHT).norm() < 0.06,
+            "seed {seed}: {}",
+            found.weight_w.value
+        );
     }
 }
 
@@ -129,34 +172,71 @@ fn poses_in_contact_are_left_out() {
 fn poses_that_do_not_determine_the_payload_are_refused() {
     let all = static_poses(12, [0.02, 0.002], WrenchFrame::Sensor, 2);
     let fitted = |poses: &[StaticPose]| fit_payload(poses, &params(WrenchFrame::Sensor));
-    assert_eq!(fitted(&all[..3]).unwrap_err(), PayloadError::TooFew { count: 3 });
+    assert_eq!(
+        fitted(&all[..3]).unwrap_err(),
+        PayloadError::TooFew { count: 3 }
+    );
     // turned about one axis alone
     let axis = vector![0.6, 0.0, 0.8];
     let one_axis: Vec<_> = (0..12)
         .map(|i| {
             let r_wt = UnitQuaternion::from_scaled_axis(axis * f64::from(i)) * all[0].r_wt;
-            StaticPose { r_wt, wrench: load(&r_wt, WrenchFrame::Sensor), ..all[0] }
+            StaticPose {
+                r_wt,
+                wrench: load(&r_wt, WrenchFrame::Sensor),
+                ..all[0]
+            }
         })
         .collect();
     let error = fitted(&one_axis).unwrap_err();
-    let PayloadError::TooAlike { tilt_deg, axis: named } = error else { panic!("{error}") };
-    assert!(tilt_deg < 1e-3 && (Vector3::from(named).dot(&axis).abs() - 1.0).abs() < 1e-6, "{error}");
+    let PayloadError::TooAlike {
+        tilt_deg,
+        axis: named,
+    } = error
+    else {
+        panic!("{error}")
+    };
+    assert!(
+        tilt_deg < 1e-3 && (Vector3::from(named).dot(&axis).abs() - 1.0).abs() < 1e-6,
+        "{error}"
+    );
     // nothing hangs on it
     let mut rng = Pcg64Mcg::seed_from_u64(3);
     let empty: Vec<_> = all
         .iter()
-        .map(|pose| StaticPose { wrench: Wrench { force: BIAS_F + normal(&mut rng, 0.02), torque: BIAS_T }, ..*pose })
+        .map(|pose| StaticPose {
+            wrench: Wrench {
+                force: BIAS_F + normal(&mut rng, 0.02),
+                torque: BIAS_T,
+            },
+            ..*pose
+        })
         .collect();
     assert!(matches!(fitted(&empty), Err(PayloadError::NoWeight { .. })));
     // the other axes
     let error = fit_payload(&all, &params(WrenchFrame::Object)).unwrap_err();
-    assert!(matches!(error, PayloadError::WrongAxes { other: "sensor", .. }), "{error}");
+    assert!(
+        matches!(
+            error,
+            PayloadError::WrongAxes {
+                other: "sensor",
+                ..
+            }
+        ),
+        "{error}"
+    );
     assert!(error.to_string().contains("--wrench-axes sensor"));
     // half of them lean on something
     let mut rng = Pcg64Mcg::seed_from_u64(4);
     let mut leaning = static_poses(21, [0.02, 0.002], WrenchFrame::Sensor, 2);
-    leaning.iter_mut().take(10).for_each(|pose| pose.wrench.force += normal(&mut rng, 3.0));
-    assert!(matches!(fitted(&leaning), Err(PayloadError::Inconsistent { .. } | PayloadError::NoWeight { .. })));
+    leaning
+        .iter_mut()
+        .take(10)
+        .for_each(|pose| pose.wrench.force += normal(&mut rng, 3.0));
+    assert!(matches!(
+        fitted(&leaning),
+        Err(PayloadError::Inconsistent { .. } | PayloadError::NoWeight { .. })
+    ));
 }
 
 /// A robot that turns to eight orientations and dwells in each for a second: the segments are found, the turning between
@@ -176,22 +256,38 @@ fn static_segments_of_a_recording_are_found() {
             let settling = (-f64::from(tick) / 100.0).exp();
             wrench.force += normal(&mut rng, 0.05) + vector![2.0, 0.0, 0.0] * settling;
             let pose_ot = Isometry3::from_parts(Vector3::zeros().into(), r_wt);
-            finder.push(&Sample { stamp_ns, pose_ot, wrench });
+            finder.push(&Sample {
+                stamp_ns,
+                pose_ot,
+                wrench,
+            });
         }
     }
     let poses = finder.finish();
     assert_eq!(poses.len(), 7);
     for (pose, turn) in poses.iter().zip(&turns) {
-        assert!(pose.r_wt.angle_to(turn) < 2e-3, "{}", pose.r_wt.angle_to(turn));
-        assert!((pose.noise.unwrap() - 0.05).abs() < 0.004 && pose.samples >= 600, "{pose:?}");
+        assert!(
+            pose.r_wt.angle_to(turn) < 2e-3,
+            "{}",
+            pose.r_wt.angle_to(turn)
+        );
+        assert!(
+            (pose.noise.unwrap() - 0.05).abs() < 0.004 && pose.samples >= 600,
+            "{pose:?}"
+        );
         assert!((pose.wrench.force - load(turn, WrenchFrame::Sensor).force).norm() < 0.05);
     }
 }
 
 /// Rows of numbers of a text file, below `../shared/data/force/gravity_ati`; `None`, said aloud, when that is not there.
 fn real(name: &str) -> Option<Vec<Vec<f64>>> {
-    let text = fs::read_to_string(crate::shared::shared(&format!("force/gravity_ati/{name}"))?).unwrap();
-    Some(text.lines().map(|line| line.split(',').map(|x| x.trim().parse().unwrap()).collect()).collect())
+    let text =
+        fs::read_to_string(crate::shared::shared(&format!("force/gravity_ati/{name}"))?).unwrap();
+    Some(
+        text.lines()
+            .map(|line| line.split(',').map(|x| x.trim().parse().unwrap()).collect())
+            .collect(),
+    )
 }
 
 fn turn_of(xyzw: &[f64]) -> UnitQuaternion<f64> {
@@ -202,7 +298,9 @@ fn turn_of(xyzw: &[f64]) -> UnitQuaternion<f64> {
 /// least squares (numpy) gives 10.807 N, residuals of 0.147 N rms per axis, and gravity along −z of the robot's base.
 #[test]
 fn seven_real_poses_give_the_payload_of_their_authors() {
-    let (Some(poses), Some(wrenches)) = (real("pose_7.txt"), real("wrench_7.txt")) else { return };
+    let (Some(poses), Some(wrenches)) = (real("pose_7.txt"), real("wrench_7.txt")) else {
+        return;
+    };
     assert_eq!((poses.len(), wrenches.len()), (7, 7));
     let pose = |(pose, wrench): (&Vec<f64>, &Vec<f64>)| StaticPose {
         r_wt: turn_of(&pose[3..7]),
@@ -214,15 +312,33 @@ fn seven_real_poses_give_the_payload_of_their_authors() {
         samples: 1,
     };
     let poses: Vec<_> = poses.iter().zip(&wrenches).map(pose).collect();
-    let in_pose_axes = PayloadParams { wrench_frame: WrenchFrame::Object, ..PayloadParams::default() };
+    let in_pose_axes = PayloadParams {
+        wrench_frame: WrenchFrame::Object,
+        ..PayloadParams::default()
+    };
     let found = fit_payload(&poses, &in_pose_axes).unwrap();
     println!("{:?} N, rms {:.4} N", found.weight, found.rms_force);
-    assert!((found.weight[0] - 10.80).abs() < 0.02 && found.weight[1] < 0.2, "{:?}", found.weight);
-    assert!((found.weight[0] - 10.806727).abs() < 1e-5, "numpy: {:?}", found.weight);
-    assert!((found.rms_force / 3f64.sqrt() - 0.1468989).abs() < 1e-6, "numpy: {}", found.rms_force);
+    assert!(
+        (found.weight[0] - 10.80).abs() < 0.02 && found.weight[1] < 0.2,
+        "{:?}",
+        found.weight
+    );
+    assert!(
+        (found.weight[0] - 10.806727).abs() < 1e-5,
+        "numpy: {:?}",
+        found.weight
+    );
+    assert!(
+        (found.rms_force / 3f64.sqrt() - 0.1468989).abs() < 1e-6,
+        "numpy: {}",
+        found.rms_force
+    );
     assert!(found.weight_w.value.z / found.weight[0] < -0.9999);
     let error = fit_payload(&poses, &PayloadParams::default()).unwrap_err();
-    assert!(matches!(error, PayloadError::WrongAxes { other: "pose", .. }), "{error}");
+    assert!(
+        matches!(error, PayloadError::WrongAxes { other: "pose", .. }),
+        "{error}"
+    );
 }
 
 /// Three minutes of the same set-up, the wrench in the sensor's own axes, settling slowly after each turn. Over all
@@ -230,15 +346,29 @@ fn seven_real_poses_give_the_payload_of_their_authors() {
 /// poses.
 #[test]
 fn a_real_stream_gives_the_same_payload_within_its_settling() {
-    let Some(rows) = real("GP2025.txt") else { return };
+    let Some(rows) = real("GP2025.txt") else {
+        return;
+    };
     let mut finder = StaticSegmentFinder::new(StaticSegmentParams::default());
     let mut poses = Vec::new();
     for row in &rows {
-        let (force, torque) = (Vector3::from_column_slice(&row[1..4]), Vector3::from_column_slice(&row[4..7]));
+        let (force, torque) = (
+            Vector3::from_column_slice(&row[1..4]),
+            Vector3::from_column_slice(&row[4..7]),
+        );
         let (r_wt, wrench) = (turn_of(&row[7..11]), Wrench { force, torque });
         let pose_ot = Isometry3::from_parts(Vector3::zeros().into(), r_wt);
-        finder.push(&Sample { stamp_ns: (row[0] * 1e9) as i64, pose_ot, wrench });
-        poses.push(StaticPose { r_wt, wrench, noise: None, samples: 1 });
+        finder.push(&Sample {
+            stamp_ns: (row[0] * 1e9) as i64,
+            pose_ot,
+            wrench,
+        });
+        poses.push(StaticPose {
+            r_wt,
+            wrench,
+            noise: None,
+            samples: 1,
+        });
     }
     let params = PayloadParams::default();
     let segments = finder.finish();
@@ -253,13 +383,29 @@ fn a_real_stream_gives_the_same_payload_within_its_settling() {
     }
     assert!(segments.len() >= 10, "{}", segments.len());
     for found in [&by_phases, &by_rows] {
-        assert!((found.weight[0] / 10.80 - 1.0).abs() < 0.065, "{:?}", found.weight);
+        assert!(
+            (found.weight[0] / 10.80 - 1.0).abs() < 0.065,
+            "{:?}",
+            found.weight
+        );
         assert!(found.weight_w.value.z / found.weight[0] < -0.999);
     }
     assert!((by_rows.weight[0] - 11.413).abs() < 0.1 && by_phases.rms_force < by_rows.rms_force);
-    let in_pose_axes = PayloadParams { wrench_frame: WrenchFrame::Object, ..params };
+    let in_pose_axes = PayloadParams {
+        wrench_frame: WrenchFrame::Object,
+        ..params
+    };
     let error = fit_payload(&poses, &in_pose_axes).unwrap_err();
-    assert!(matches!(error, PayloadError::WrongAxes { other: "sensor", .. }), "{error}");
+    assert!(
+        matches!(
+            error,
+            PayloadError::WrongAxes {
+                other: "sensor",
+                ..
+            }
+        ),
+        "{error}"
+    );
 }
 
 // ---- tip --------------------------------------------------------------------------------------------------------
@@ -268,13 +414,24 @@ const OFFSET: Vector3<f64> = Vector3::new(0.0021, -0.0013, -0.1418);
 const REST: Vector3<f64> = Vector3::new(0.31, 0.12, 0.05);
 
 /// A swing about the ball: to `tilt` rad about x and `share` of that about y, with white noise or noise that goes on.
-fn swing(count: u32, tilt: f64, share: f64, sigma: f64, memory: f64, seed: u64) -> Vec<Isometry3<f64>> {
+fn swing(
+    count: u32,
+    tilt: f64,
+    share: f64,
+    sigma: f64,
+    memory: f64,
+    seed: u64,
+) -> Vec<Isometry3<f64>> {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     let mut noise = normal(&mut rng, sigma);
     let pose = |i: u32| {
         let t = f64::from(i) / 150.0;
         noise = noise * memory + normal(&mut rng, sigma * (1.0 - memory * memory).sqrt());
-        let turn = UnitQuaternion::from_scaled_axis(vector![tilt * t.sin(), share * tilt * (1.7 * t).sin(), 0.3]);
+        let turn = UnitQuaternion::from_scaled_axis(vector![
+            tilt * t.sin(),
+            share * tilt * (1.7 * t).sin(),
+            0.3
+        ]);
         Isometry3::from_parts((REST - turn * OFFSET + noise).into(), turn)
     };
     (0..count).map(pose).collect()
@@ -282,8 +439,14 @@ fn swing(count: u32, tilt: f64, share: f64, sigma: f64, memory: f64, seed: u64) 
 
 #[test]
 fn an_exact_swing_gives_the_tip() {
-    let found = fit_tip(&swing(2000, 0.5, 1.0, 0.0, 0.0, 0), &TipFitParams::default()).unwrap();
-    assert!((found.offset.value - OFFSET).norm() < 1e-12 && (found.rest.value - REST).norm() < 1e-12);
+    let found = fit_tip(
+        &swing(2000, 0.5, 1.0, 0.0, 0.0, 0),
+        &TipFitParams::default(),
+    )
+    .unwrap();
+    assert!(
+        (found.offset.value - OFFSET).norm() < 1e-12 && (found.rest.value - REST).norm() < 1e-12
+    );
     assert_eq!(found.rejected, 0);
 }
 
@@ -293,16 +456,27 @@ fn uncertainties_of_the_tip_hold() {
     for memory in [0.0, 0.9] {
         let mut squares = [0.0; 2];
         for seed in 0..100 {
-            let found = fit_tip(&swing(3000, 0.4, 0.8, 0.1e-3, memory, seed), &TipFitParams::default()).unwrap();
+            let found = fit_tip(
+                &swing(3000, 0.4, 0.8, 0.1e-3, memory, seed),
+                &TipFitParams::default(),
+            )
+            .unwrap();
             let part = |known: &VectorEstimate, truth: Vector3<f64>| {
-                (known.value - truth).component_div(&known.sigma).norm_squared() / 3.0 / 100.0
+                (known.value - truth)
+                    .component_div(&known.sigma)
+                    .norm_squared()
+                    / 3.0
+                    / 100.0
             };
             squares[0] += part(&found.offset, OFFSET);
             squares[1] += part(&found.rest, REST);
         }
         let normalised = squares.map(f64::sqrt);
         println!("normalised error of offset and rest, memory {memory}: {normalised:.2?}");
-        assert!(normalised.iter().all(|x| (0.75..1.3).contains(x)), "{normalised:?}");
+        assert!(
+            normalised.iter().all(|x| (0.75..1.3).contains(x)),
+            "{normalised:?}"
+        );
     }
 }
 
@@ -320,15 +494,26 @@ fn slips_are_left_out() {
             pose.translation.vector += vector![3e-3, -4e-3, 0.0];
         }
         let found = fit_tip(&poses, &TipFitParams::default()).unwrap();
-        assert!((found.offset.value - OFFSET).norm() < 0.03e-3, "seed {seed}: {}", found.offset.value - OFFSET);
-        assert!((890..=910).contains(&found.rejected), "seed {seed}: {}", found.rejected);
+        assert!(
+            (found.offset.value - OFFSET).norm() < 0.03e-3,
+            "seed {seed}: {}",
+            found.offset.value - OFFSET
+        );
+        assert!(
+            (890..=910).contains(&found.rejected),
+            "seed {seed}: {}",
+            found.rejected
+        );
     }
 }
 
 #[test]
 fn swings_that_do_not_determine_the_tip_are_refused() {
     let fitted = |poses: &[Isometry3<f64>]| fit_tip(poses, &TipFitParams::default()).unwrap_err();
-    assert_eq!(fitted(&swing(5, 0.5, 1.0, 0.0, 0.0, 0)), TipError::TooFew { count: 5 });
+    assert_eq!(
+        fitted(&swing(5, 0.5, 1.0, 0.0, 0.0, 0)),
+        TipError::TooFew { count: 5 }
+    );
     // about one axis (x, turned by 0.3 rad about z): the offset along it is anything
     let hinge: Vec<_> = (0..500)
         .map(|i| {
@@ -337,16 +522,30 @@ fn swings_that_do_not_determine_the_tip_are_refused() {
         })
         .collect();
     let error = fitted(&hinge);
-    let TipError::TooSmall { swing_deg, axis, .. } = error else { panic!("{error}") };
+    let TipError::TooSmall {
+        swing_deg, axis, ..
+    } = error
+    else {
+        panic!("{error}")
+    };
     assert!(swing_deg < 1e-3 && axis[0].abs() > 0.999_999, "{error}");
     // to all sides, but by 4°: what lies across the shaft is seen least, since each of its axes tilts in one direction only
     let error = fitted(&swing(3000, 0.07, 1.0, 0.05e-3, 0.0, 1));
-    let TipError::TooSmall { swing_deg, axis, .. } = error else { panic!("{error}") };
-    assert!((2.0..6.0).contains(&swing_deg) && axis[2].abs() < 0.05, "{error}");
+    let TipError::TooSmall {
+        swing_deg, axis, ..
+    } = error
+    else {
+        panic!("{error}")
+    };
+    assert!(
+        (2.0..6.0).contains(&swing_deg) && axis[2].abs() < 0.05,
+        "{error}"
+    );
     // swung in free air about the hand
     let mut rng = Pcg64Mcg::seed_from_u64(7);
     let mut free = swing(2000, 0.5, 1.0, 0.0, 0.0, 0);
-    free.iter_mut().for_each(|pose| pose.translation.vector += normal(&mut rng, 8e-3));
+    free.iter_mut()
+        .for_each(|pose| pose.translation.vector += normal(&mut rng, 8e-3));
     assert!(matches!(fitted(&free), TipError::NotAtRest { .. }));
     let mut lost = swing(2000, 0.5, 1.0, 0.05e-3, 0.0, 0);
     lost[77].translation.vector.x = f64::NAN;

@@ -8,11 +8,13 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use proptest::prelude::*;
 use touchup::align::{IcpParams, icp};
 use touchup::compare::{
-    CompareError, CompareParams, Comparison, IndexedMesh, Picture, PictureLabel, PicturePanel, PictureParams, Regions,
-    Summary, SupportRegion, cloud_distances, colour_of, compare, deviations, draw_picture, sample_surface,
-    surface_area, tilts,
+    CompareError, CompareParams, Comparison, IndexedMesh, Picture, PictureLabel, PicturePanel,
+    PictureParams, Regions, Summary, SupportRegion, cloud_distances, colour_of, compare,
+    deviations, draw_picture, sample_surface, surface_area, tilts,
 };
-use touchup::io::mesh_file::{MeshUnit, VertexColumn, read_mesh, read_vertex_columns, write_mesh, write_mesh_with};
+use touchup::io::mesh_file::{
+    MeshUnit, VertexColumn, read_mesh, read_vertex_columns, write_mesh, write_mesh_with,
+};
 use touchup::io::png::write_png;
 use touchup::mesh::{Alone, FaceTree, Job, TriMesh, Workers};
 use touchup::sim::wavy;
@@ -21,7 +23,9 @@ use touchup::sim::wavy;
 fn square(cells: u32, height: f64) -> TriMesh {
     let row = cells + 1;
     let at = |i: u32| 20e-3 * f64::from(i) / f64::from(cells);
-    let positions = (0..row * row).map(|i| Point3::new(at(i % row), at(i / row), height)).collect();
+    let positions = (0..row * row)
+        .map(|i| Point3::new(at(i % row), at(i / row), height))
+        .collect();
     let faces = (0..cells * cells).flat_map(|i| {
         let a = i / cells * row + i % cells;
         [[a, a + 1, a + row], [a + 1, a + row + 1, a + row]]
@@ -31,9 +35,23 @@ fn square(cells: u32, height: f64) -> TriMesh {
 
 /// A cube of 10 mm, its lower corner at `at` (m), normals outside.
 fn cube(at: Vector3<f64>) -> TriMesh {
-    let corner = |i: u32| Point3::from(at + Vector3::new((i & 1).into(), (i >> 1 & 1).into(), (i >> 2).into()) * 10e-3);
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    let faces = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    let corner = |i: u32| {
+        Point3::from(
+            at + Vector3::new((i & 1).into(), (i >> 1 & 1).into(), (i >> 2).into()) * 10e-3,
+        )
+    };
+    let quads = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    let faces = quads
+        .iter()
+        .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+        .collect();
     TriMesh::new((0..8).map(corner).collect(), faces).unwrap()
 }
 
@@ -41,13 +59,26 @@ fn cube(at: Vector3<f64>) -> TriMesh {
 fn icosahedron(radius: f64) -> TriMesh {
     let golden = (1.0 + 5.0_f64.sqrt()) / 2.0;
     let mut positions = Vec::new();
-    for (a, b) in [(1.0, golden), (-1.0, golden), (1.0, -golden), (-1.0, -golden)] {
-        positions.extend([Point3::new(0.0, a, b), Point3::new(a, b, 0.0), Point3::new(b, 0.0, a)]);
+    for (a, b) in [
+        (1.0, golden),
+        (-1.0, golden),
+        (1.0, -golden),
+        (-1.0, -golden),
+    ] {
+        positions.extend([
+            Point3::new(0.0, a, b),
+            Point3::new(a, b, 0.0),
+            Point3::new(b, 0.0, a),
+        ]);
     }
-    let positions: Vec<_> = positions.iter().map(|p| Point3::from(p.coords.normalize() * radius)).collect();
+    let positions: Vec<_> = positions
+        .iter()
+        .map(|p| Point3::from(p.coords.normalize() * radius))
+        .collect();
     let near = |a: usize, b: usize| (positions[a] - positions[b]).norm() < 1.1 * radius;
     let mut faces = Vec::new();
-    for (a, b, c) in (0..12).flat_map(|a| (0..a).flat_map(move |b| (0..b).map(move |c| (a, b, c)))) {
+    for (a, b, c) in (0..12).flat_map(|a| (0..a).flat_map(move |b| (0..b).map(move |c| (a, b, c))))
+    {
         if near(a, b) && near(b, c) && near(c, a) {
             let [p, q, r] = [a, b, c].map(|i| positions[i].coords);
             let outward = (q - p).cross(&(r - p)).dot(&p) > 0.0;
@@ -60,38 +91,79 @@ fn icosahedron(radius: f64) -> TriMesh {
 
 fn compared(mesh: &TriMesh, truth: &TriMesh, params: &CompareParams) -> Comparison {
     let trees = [mesh, truth].map(FaceTree::new);
-    let shapes = [IndexedMesh { mesh, tree: &trees[0] }, IndexedMesh { mesh: truth, tree: &trees[1] }];
+    let shapes = [
+        IndexedMesh {
+            mesh,
+            tree: &trees[0],
+        },
+        IndexedMesh {
+            mesh: truth,
+            tree: &trees[1],
+        },
+    ];
     compare(shapes[0], shapes[1], Regions::Unknown, params, &Alone).unwrap()
 }
 
 /// A tetrahedron is so sharp that a place beside an edge or a corner may be behind one of its faces: it is outside all the same.
 #[test]
 fn beside_sharp_edges_and_corners_outside_is_outside() {
-    let corners = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
-    let positions: Vec<_> = corners.iter().map(|&corner| Point3::from(corner) * 10e-3).collect();
-    let mesh = TriMesh::new(positions.clone(), vec![[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]).unwrap();
+    let corners = [
+        [1.0, 1.0, 1.0],
+        [1.0, -1.0, -1.0],
+        [-1.0, 1.0, -1.0],
+        [-1.0, -1.0, 1.0],
+    ];
+    let positions: Vec<_> = corners
+        .iter()
+        .map(|&corner| Point3::from(corner) * 10e-3)
+        .collect();
+    let mesh = TriMesh::new(
+        positions.clone(),
+        vec![[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]],
+    )
+    .unwrap();
     let tree = FaceTree::new(&mesh);
     let normal = |face: usize| -Vector3::from(corners[[3, 2, 1, 0][face]]).normalize();
-    assert!(mesh.faces().enumerate().all(|(at, (face, _))| (mesh.normal(face) - normal(at)).norm() < 1e-12));
+    assert!(
+        mesh.faces()
+            .enumerate()
+            .all(|(at, (face, _))| (mesh.normal(face) - normal(at)).norm() < 1e-12)
+    );
     let mut places = Vec::new();
     for (a, b) in (0..4).flat_map(|a| (0..a).map(move |b| (a, b))) {
         let middle = nalgebra::center(&positions[a], &positions[b]);
         // the two faces at that edge are those that lack one of the other corners
-        let beside: Vec<_> = (0..4).filter(|&face| [3, 2, 1, 0][face] != a && [3, 2, 1, 0][face] != b).collect();
+        let beside: Vec<_> = (0..4)
+            .filter(|&face| [3, 2, 1, 0][face] != a && [3, 2, 1, 0][face] != b)
+            .collect();
         for share in [0.1, 0.5, 0.9] {
             let out = normal(beside[0]) * share + normal(beside[1]) * (1.0 - share);
             places.push((middle + out * 1e-3, out.norm() * 1e-3));
         }
     }
-    places.extend(positions.iter().map(|corner| (corner * 1.1, corner.coords.norm() * 0.1)));
+    places.extend(
+        positions
+            .iter()
+            .map(|corner| (corner * 1.1, corner.coords.norm() * 0.1)),
+    );
     let points: Vec<_> = places.iter().map(|(place, _)| *place).collect();
-    for (found, (place, expected)) in deviations(&points, &mesh, &tree, &Alone).unwrap().iter().zip(&places) {
-        assert!((found - expected).abs() < 1e-12, "{found} and not {expected} m at {place}");
+    for (found, (place, expected)) in deviations(&points, &mesh, &tree, &Alone)
+        .unwrap()
+        .iter()
+        .zip(&places)
+    {
+        assert!(
+            (found - expected).abs() < 1e-12,
+            "{found} and not {expected} m at {place}"
+        );
     }
 }
 
 fn few() -> CompareParams {
-    CompareParams { samples: 5_000, ..Default::default() }
+    CompareParams {
+        samples: 5_000,
+        ..Default::default()
+    }
 }
 
 #[test]
@@ -100,12 +172,28 @@ fn parallel_planes_are_as_far_apart_as_they_are() {
     for (height, side) in [(0.3e-3, 1.0), (-0.3e-3, -1.0)] {
         let found = compared(&square(7, height), &truth, &few());
         let all = &found.regions[0];
-        for summary in [&all.mesh_to_truth, &all.truth_to_mesh, &all.vertices_to_truth] {
-            let Summary { mean, rms, median, p95, p99, max, bias, .. } = summary.clone().unwrap();
+        for summary in [
+            &all.mesh_to_truth,
+            &all.truth_to_mesh,
+            &all.vertices_to_truth,
+        ] {
+            let Summary {
+                mean,
+                rms,
+                median,
+                p95,
+                p99,
+                max,
+                bias,
+                ..
+            } = summary.clone().unwrap();
             for size in [mean, rms, median, p95, p99, max] {
                 assert!((size - 0.3e-3).abs() < 1e-15, "{summary:?}");
             }
-            assert!((bias - side * 0.3e-3).abs() < 1e-15, "above is too much, below too little: {summary:?}");
+            assert!(
+                (bias - side * 0.3e-3).abs() < 1e-15,
+                "above is too much, below too little: {summary:?}"
+            );
         }
         let tilt = all.tilt.unwrap();
         assert_eq!((tilt.median, tilt.p95, tilt.flipped), (0.0, 0.0, 0.0));
@@ -126,7 +214,10 @@ fn a_mesh_inside_out_is_flipped_and_shows_nothing() {
     let found = compared(&mesh, &truth, &few());
     let tilt = found.regions[0].tilt.unwrap();
     // half of the area, within its rounding
-    assert!((tilt.flipped - 0.5).abs() < 1e-12 && (tilt.p95 - std::f64::consts::PI).abs() < 1e-12, "{tilt:?}");
+    assert!(
+        (tilt.flipped - 0.5).abs() < 1e-12 && (tilt.p95 - std::f64::consts::PI).abs() < 1e-12,
+        "{tilt:?}"
+    );
     assert!((found.unseen - 0.5).abs() < 0.01, "{}", found.unseen);
 }
 
@@ -141,10 +232,15 @@ fn a_ball_of_facets_has_the_distances_of_its_facets() {
     }
     // the radius of the ball inside an icosahedron over that around it: √((5 + 2√5) / 15)
     let in_radius = inner * ((5.0 + 2.0 * 5.0_f64.sqrt()) / 15.0).sqrt();
-    let above_facets: Vec<_> =
-        truth.faces().map(|(face, _)| Point3::from(truth.barycentre(face).coords.normalize() * outer)).collect();
+    let above_facets: Vec<_> = truth
+        .faces()
+        .map(|(face, _)| Point3::from(truth.barycentre(face).coords.normalize() * outer))
+        .collect();
     for deviation in deviations(&above_facets, &truth, &tree, &Alone).unwrap() {
-        assert!((deviation - (outer - in_radius)).abs() < 1e-16, "{deviation}");
+        assert!(
+            (deviation - (outer - in_radius)).abs() < 1e-16,
+            "{deviation}"
+        );
     }
     let centre = deviations(&[Point3::origin()], &truth, &tree, &Alone).unwrap()[0];
     assert!((centre + in_radius).abs() < 1e-16, "{centre}");
@@ -165,7 +261,11 @@ fn a_shifted_cube_is_off_where_it_sticks_out() {
     // depth of 1, a pyramid's frustum ∫ min(1, distance to the rim) = (100 + 10 · 8 + 64) / 3 · 1 below zero
     let [front, sides, behind] = [100.0, 4.0 * 5.0, -(100.0 + 80.0 + 64.0) / 3.0];
     let expected = (front + sides + behind) / 600.0 * 1e-3;
-    assert!((summary.bias - expected).abs() < 0.01e-3, "{} instead of {expected}", summary.bias);
+    assert!(
+        (summary.bias - expected).abs() < 0.01e-3,
+        "{} instead of {expected}",
+        summary.bias
+    );
 }
 
 #[test]
@@ -184,9 +284,18 @@ fn samples_are_even_and_come_again() {
     }
     for sample in &samples {
         let [a, b, c] = mesh.triangle(sample.face);
-        let parts = [(b, c), (c, a), (a, b)].map(|(s, e)| (s - sample.point).cross(&(e - sample.point)).z);
-        assert!(parts.iter().all(|part| *part >= -1e-18), "outside of its face: {sample:?}");
-        let nearest = mesh.corners(sample.face)[parts.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).unwrap().0];
+        let parts =
+            [(b, c), (c, a), (a, b)].map(|(s, e)| (s - sample.point).cross(&(e - sample.point)).z);
+        assert!(
+            parts.iter().all(|part| *part >= -1e-18),
+            "outside of its face: {sample:?}"
+        );
+        let nearest = mesh.corners(sample.face)[parts
+            .iter()
+            .enumerate()
+            .max_by(|a, b| a.1.total_cmp(b.1))
+            .unwrap()
+            .0];
         assert_eq!(sample.corner, nearest);
     }
 }
@@ -208,23 +317,44 @@ fn regions_are_separated_and_looked_up_for_the_scan() {
     let scan = square(20, 0.5e-3);
     let trees = [&mesh, &truth, &scan].map(FaceTree::new);
     let [after, part, before] =
-        [(&mesh, 0), (&truth, 1), (&scan, 2)].map(|(mesh, at)| IndexedMesh { mesh, tree: &trees[at] });
+        [(&mesh, 0), (&truth, 1), (&scan, 2)].map(|(mesh, at)| IndexedMesh {
+            mesh,
+            tree: &trees[at],
+        });
     let own = compare(after, part, Regions::Own(&regions), &few(), &Alone).unwrap();
     let through = compare(before, part, Regions::Of(after, &regions), &few(), &Alone).unwrap();
     for found in [&own, &through] {
         let names: Vec<_> = found.regions.iter().map(|part| part.region).collect();
-        assert_eq!(names, [None, Some(SupportRegion::Touched), Some(SupportRegion::Untouched)]);
+        assert_eq!(
+            names,
+            [
+                None,
+                Some(SupportRegion::Touched),
+                Some(SupportRegion::Untouched)
+            ]
+        );
         let points = |at: usize| found.regions[at].mesh_to_truth.clone().unwrap().points;
         assert_eq!(points(0), points(1) + points(2));
         // the border lies between the columns at 10 and 11 mm
-        assert!((points(1) as f64 / points(0) as f64 - 0.525).abs() < 0.02, "{}", points(1));
+        assert!(
+            (points(1) as f64 / points(0) as f64 - 0.525).abs() < 0.02,
+            "{}",
+            points(1)
+        );
     }
     let touched = own.regions[1].vertices_to_truth.clone().unwrap();
-    assert!(touched.max < 1e-17 && touched.points == 11 * 21, "{touched:?}");
+    assert!(
+        touched.max < 1e-17 && touched.points == 11 * 21,
+        "{touched:?}"
+    );
     let was = through.regions[1].mesh_to_truth.clone().unwrap();
     assert!((was.mean - 0.5e-3).abs() < 1e-15, "{was:?}");
     let same = own.regions[1].truth_to_mesh.clone().unwrap().points;
-    assert_eq!(through.regions[1].truth_to_mesh.clone().unwrap().points, same, "the same true places before and after");
+    assert_eq!(
+        through.regions[1].truth_to_mesh.clone().unwrap().points,
+        same,
+        "the same true places before and after"
+    );
 }
 
 #[test]
@@ -232,15 +362,40 @@ fn what_is_no_number_or_no_mesh_is_refused() {
     let mesh = square(1, 0.0);
     let tree = FaceTree::new(&mesh);
     let bad = [Point3::origin(), Point3::new(0.0, f64::INFINITY, 0.0)];
-    assert_eq!(deviations(&bad, &mesh, &tree, &Alone), Err(CompareError::NotFinite { point: 1 }));
-    assert_eq!(cloud_distances(&bad, &bad[..1], &Alone), Err(CompareError::NotFinite { point: 1 }));
+    assert_eq!(
+        deviations(&bad, &mesh, &tree, &Alone),
+        Err(CompareError::NotFinite { point: 1 })
+    );
+    assert_eq!(
+        cloud_distances(&bad, &bad[..1], &Alone),
+        Err(CompareError::NotFinite { point: 1 })
+    );
     let empty = TriMesh::new(vec![Point3::origin()], vec![]).unwrap();
     let nothing = FaceTree::new(&empty);
-    assert_eq!(deviations(&bad[..1], &empty, &nothing, &Alone), Err(CompareError::NoFaces));
+    assert_eq!(
+        deviations(&bad[..1], &empty, &nothing, &Alone),
+        Err(CompareError::NoFaces)
+    );
     assert_eq!(tilts(&mesh, &empty, &nothing), Err(CompareError::NoFaces));
-    let shapes = [IndexedMesh { mesh: &mesh, tree: &tree }, IndexedMesh { mesh: &empty, tree: &nothing }];
-    for (mesh, truth) in [(shapes[0], shapes[1]), (shapes[1], shapes[0]), (shapes[1], shapes[1])] {
-        assert_eq!(compare(mesh, truth, Regions::Unknown, &few(), &Alone), Err(CompareError::NoFaces));
+    let shapes = [
+        IndexedMesh {
+            mesh: &mesh,
+            tree: &tree,
+        },
+        IndexedMesh {
+            mesh: &empty,
+            tree: &nothing,
+        },
+    ];
+    for (mesh, truth) in [
+        (shapes[0], shapes[1]),
+        (shapes[1], shapes[0]),
+        (shapes[1], shapes[1]),
+    ] {
+        assert_eq!(
+            compare(mesh, truth, Regions::Unknown, &few(), &Alone),
+            Err(CompareError::NoFaces)
+        );
     }
 }
 
@@ -277,9 +432,19 @@ proptest! {
 
 /// A square in one colour on each half.
 fn picture_of(deviations: &[f64], mesh: &TriMesh, panels: usize) -> Picture {
-    let panel = PicturePanel { deviations, title: "a panel", note: "its note", ..PicturePanel::of(mesh) };
+    let panel = PicturePanel {
+        deviations,
+        title: "a panel",
+        note: "its note",
+        ..PicturePanel::of(mesh)
+    };
     let from = Some(Vector3::z());
-    let params = PictureParams { title: "a title", width: 800, from, ..PictureParams::default() };
+    let params = PictureParams {
+        title: "a title",
+        width: 800,
+        from,
+        ..PictureParams::default()
+    };
     draw_picture(&vec![panel; panels], &params)
 }
 
@@ -306,14 +471,26 @@ fn a_picture_shows_too_much_in_red_on_the_side_where_it_is() {
         .collect();
     let picture = picture_of(&sides, &mesh, 1);
     let [width, height] = picture.size;
-    assert_eq!((width, picture.pixels.len()), (800, 3 * (width * height) as usize));
+    assert_eq!(
+        (width, picture.pixels.len()),
+        (800, 3 * (width * height) as usize)
+    );
     let [left, right] = [width * 5 / 16, width * 11 / 16].map(|x| pixel(&picture, x, height / 2));
-    assert!(left[2] > left[0] + 40, "blue where there is too little: {left:?}");
-    assert!(right[0] > right[2] + 40, "red where there is too much: {right:?}");
+    assert!(
+        left[2] > left[0] + 40,
+        "blue where there is too little: {left:?}"
+    );
+    assert!(
+        right[0] > right[2] + 40,
+        "red where there is too much: {right:?}"
+    );
     // the bar of colours has both its ends, clear of light and shade
     for end in [colour_of(-1.0, 1.0), colour_of(1.0, 1.0)] {
         let near = |p: &[u8]| p.iter().zip(end).all(|(a, b)| a.abs_diff(b) < 6);
-        assert!(picture.pixels.chunks(3).filter(|p| near(p)).count() >= 20, "{end:?}");
+        assert!(
+            picture.pixels.chunks(3).filter(|p| near(p)).count() >= 20,
+            "{end:?}"
+        );
     }
     assert_eq!(picture, picture_of(&sides, &mesh, 1), "the same again");
 }
@@ -323,13 +500,27 @@ fn a_picture_shows_too_much_in_red_on_the_side_where_it_is() {
 fn a_label_marks_its_place() {
     let mesh = square(2, 0.0);
     let flat = vec![0.0; mesh.vertex_slots()];
-    let panel = PicturePanel { deviations: &flat, ..PicturePanel::of(&mesh) };
+    let panel = PicturePanel {
+        deviations: &flat,
+        ..PicturePanel::of(&mesh)
+    };
     let draw = |labels: &[PictureLabel]| {
         let from = Some(Vector3::z());
-        draw_picture(&[panel], &PictureParams { width: 800, from, labels, ..PictureParams::default() })
+        draw_picture(
+            &[panel],
+            &PictureParams {
+                width: 800,
+                from,
+                labels,
+                ..PictureParams::default()
+            },
+        )
     };
     // the middle of the square is the middle of its panel
-    let label = PictureLabel { place: Point3::new(10e-3, 10e-3, 0.0), text: "hole Ø8.00".to_owned() };
+    let label = PictureLabel {
+        place: Point3::new(10e-3, 10e-3, 0.0),
+        text: "hole Ø8.00".to_owned(),
+    };
     let [bare, labelled] = [draw(&[]), draw(&[label])];
     assert_eq!(bare.size, labelled.size);
     let changed: Vec<[u32; 2]> = (0..bare.size[0])
@@ -337,8 +528,16 @@ fn a_label_marks_its_place() {
         .filter(|[x, y]| pixel(&bare, *x, *y) != pixel(&labelled, *x, *y))
         .collect();
     let is_ink = |[x, y]: &&[u32; 2]| pixel(&labelled, *x, *y).iter().all(|&c| c < 60);
-    let place = changed.iter().filter(is_ink).map(|[x, _]| *x).min().unwrap();
-    assert!(place.abs_diff(bare.size[0] / 2) < 8, "the dot is the leftmost ink: {place}");
+    let place = changed
+        .iter()
+        .filter(is_ink)
+        .map(|[x, _]| *x)
+        .min()
+        .unwrap();
+    assert!(
+        place.abs_diff(bare.size[0] / 2) < 8,
+        "the dot is the leftmost ink: {place}"
+    );
     assert!(changed.len() > 1000, "a name is written: {}", changed.len());
 }
 
@@ -360,12 +559,18 @@ fn a_png_holds_the_pixels() {
     let path = folder.path().join("a.png");
     let pixels: Vec<u8> = (0..60).collect();
     write_png(&path, [5, 4], &pixels).unwrap();
-    let mut reader = png::Decoder::new(std::io::Cursor::new(fs::read(&path).unwrap())).read_info().unwrap();
+    let mut reader = png::Decoder::new(std::io::Cursor::new(fs::read(&path).unwrap()))
+        .read_info()
+        .unwrap();
     let mut read = vec![0; reader.output_buffer_size().unwrap()];
     let frame = reader.next_frame(&mut read).unwrap();
     assert_eq!((frame.width, frame.height, read), (5, 4, pixels.clone()));
     assert!(write_png(&path, [6, 4], &pixels).is_err());
-    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left over");
+    assert_eq!(
+        fs::read_dir(folder.path()).unwrap().count(),
+        1,
+        "nothing is left over"
+    );
 }
 
 #[test]
@@ -379,14 +584,27 @@ fn columns_come_back_by_vertex_through_repair() {
     fs::write(&path, text).unwrap();
     let unit = MeshUnit::Millimetre;
     let mesh = read_mesh(&path, unit).unwrap().mesh;
-    let [touched, red, none] = read_vertex_columns(&path, unit, &mesh, ["touched", "red", "sigma_mm"]).unwrap();
+    let [touched, red, none] =
+        read_vertex_columns(&path, unit, &mesh, ["touched", "red", "sigma_mm"]).unwrap();
     assert_eq!((touched.unwrap(), none), (vec![0.5, 1.0, 0.0, 0.25], None));
     assert_eq!(red.unwrap(), [1.0, 3.0, 4.0, 5.0]);
 
-    let colours = [("red", vec![0u8, 127, 255, 3]), ("green", vec![9; 4]), ("blue", vec![1, 2, 3, 4])];
-    let mut columns: Vec<_> =
-        colours.iter().map(|(name, values)| VertexColumn { name, values: values.clone().into() }).collect();
-    columns.push(VertexColumn { name: "deviation_mm", values: vec![0.5f32, -0.25, 0.0, 1e-3].into() });
+    let colours = [
+        ("red", vec![0u8, 127, 255, 3]),
+        ("green", vec![9; 4]),
+        ("blue", vec![1, 2, 3, 4]),
+    ];
+    let mut columns: Vec<_> = colours
+        .iter()
+        .map(|(name, values)| VertexColumn {
+            name,
+            values: values.clone().into(),
+        })
+        .collect();
+    columns.push(VertexColumn {
+        name: "deviation_mm",
+        values: vec![0.5f32, -0.25, 0.0, 1e-3].into(),
+    });
     let path = folder.path().join("b.ply");
     write_mesh_with(&path, &mesh, &columns, None, unit).unwrap();
     let again = read_mesh(&path, unit).unwrap().mesh;
@@ -395,17 +613,29 @@ fn columns_come_back_by_vertex_through_repair() {
         String::from_utf8_lossy(&written[..400])
             .contains("property uchar red\nproperty uchar green\nproperty uchar blue")
     );
-    let [red, deviation] = read_vertex_columns(&path, unit, &again, ["red", "deviation_mm"]).unwrap();
-    assert_eq!((red.unwrap(), deviation.unwrap()), (vec![0.0, 127.0, 255.0, 3.0], vec![0.5, -0.25, 0.0, 1e-3]));
+    let [red, deviation] =
+        read_vertex_columns(&path, unit, &again, ["red", "deviation_mm"]).unwrap();
+    assert_eq!(
+        (red.unwrap(), deviation.unwrap()),
+        (vec![0.0, 127.0, 255.0, 3.0], vec![0.5, -0.25, 0.0, 1e-3])
+    );
 }
 
 fn touchup(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_touchup")).args(arguments).env_remove("RUST_LOG").output().unwrap()
+    Command::new(env!("CARGO_BIN_EXE_touchup"))
+        .args(arguments)
+        .env_remove("RUST_LOG")
+        .output()
+        .unwrap()
 }
 
 fn parts_of(output: &Output) -> (i32, &str, &str) {
     let text = |bytes| std::str::from_utf8(bytes).unwrap();
-    (output.status.code().unwrap(), text(&output.stdout), text(&output.stderr))
+    (
+        output.status.code().unwrap(),
+        text(&output.stdout),
+        text(&output.stderr),
+    )
 }
 
 /// A plate of 20 mm as truth, and one 0.25 mm above it as mesh, in mm.
@@ -421,8 +651,18 @@ fn plates(folder: &Path) -> [String; 2] {
 fn compare_prints_numbers_and_writes_picture_and_colours() {
     let folder = tempfile::tempdir().unwrap();
     let [mesh, truth] = plates(folder.path());
-    let [picture, coloured] = ["a.png", "a.ply"].map(|name| folder.path().join(name).to_str().unwrap().to_owned());
-    let files = ["--picture", &picture, "--coloured", &coloured, "--before", &mesh, "--samples", "1000"];
+    let [picture, coloured] =
+        ["a.png", "a.ply"].map(|name| folder.path().join(name).to_str().unwrap().to_owned());
+    let files = [
+        "--picture",
+        &picture,
+        "--coloured",
+        &coloured,
+        "--before",
+        &mesh,
+        "--samples",
+        "1000",
+    ];
     let output = touchup(&[&["compare", &mesh, &truth, "--json"][..], &files].concat());
     let (code, out, err) = parts_of(&output);
     assert_eq!((code, err), (0, ""));
@@ -430,38 +670,95 @@ fn compare_prints_numbers_and_writes_picture_and_colours() {
     for what in ["before", "after"] {
         let all = &report[what]["regions"][0];
         assert_eq!(all["region"], "all");
-        for distance in ["mean_mm", "rms_mm", "median_mm", "p95_mm", "p99_mm", "max_mm", "bias_mm"] {
+        for distance in [
+            "mean_mm",
+            "rms_mm",
+            "median_mm",
+            "p95_mm",
+            "p99_mm",
+            "max_mm",
+            "bias_mm",
+        ] {
             let found = all["mesh_to_truth"][distance].as_f64().unwrap();
             assert!((found - 0.25).abs() < 1e-9, "{distance}: {found}");
         }
         assert_eq!(all["normals"]["flipped_share"], 0.0);
-        assert!(all["cloud_to_truth"].get("bias_mm").is_none(), "a cloud has no sides");
+        assert!(
+            all["cloud_to_truth"].get("bias_mm").is_none(),
+            "a cloud has no sides"
+        );
     }
     // all of it is 0.25 mm off
     for (tolerance, share) in [("0.3", 1.0), ("0.2", 0.0)] {
-        let output = touchup(&["compare", &mesh, &truth, "--json", "--samples", "1000", "--tolerance-mm", tolerance]);
+        let output = touchup(&[
+            "compare",
+            &mesh,
+            &truth,
+            "--json",
+            "--samples",
+            "1000",
+            "--tolerance-mm",
+            tolerance,
+        ]);
         let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-        assert_eq!(report["after"]["regions"][0]["within_tolerance_share"], share, "{tolerance}");
+        assert_eq!(
+            report["after"]["regions"][0]["within_tolerance_share"], share,
+            "{tolerance}"
+        );
     }
     let png = fs::read(&picture).unwrap();
-    assert_eq!((&png[1..4], u32::from_be_bytes(png[16..20].try_into().unwrap())), (&b"PNG"[..], 1600));
-    let again = read_mesh(Path::new(&coloured), MeshUnit::Millimetre).unwrap().mesh;
-    let [deviation] =
-        read_vertex_columns(Path::new(&coloured), MeshUnit::Millimetre, &again, ["deviation_mm"]).unwrap();
+    assert_eq!(
+        (
+            &png[1..4],
+            u32::from_be_bytes(png[16..20].try_into().unwrap())
+        ),
+        (&b"PNG"[..], 1600)
+    );
+    let again = read_mesh(Path::new(&coloured), MeshUnit::Millimetre)
+        .unwrap()
+        .mesh;
+    let [deviation] = read_vertex_columns(
+        Path::new(&coloured),
+        MeshUnit::Millimetre,
+        &again,
+        ["deviation_mm"],
+    )
+    .unwrap();
     assert_eq!(deviation.unwrap(), vec![0.25; 25]);
 
-    let output = touchup(&["compare", &mesh, &truth, "--samples", "1000", "--align", "icp"]);
+    let output = touchup(&[
+        "compare",
+        &mesh,
+        &truth,
+        "--samples",
+        "1000",
+        "--align",
+        "icp",
+    ]);
     let (code, out, err) = parts_of(&output);
     assert_eq!(code, 0);
     assert!(err.contains("3 motions leave the mesh"), "{err}");
-    assert!(out.contains("aligned by icp") && out.contains("not determined") && !out.contains("rounds"), "{out}");
+    assert!(
+        out.contains("aligned by icp") && out.contains("not determined") && !out.contains("rounds"),
+        "{out}"
+    );
 }
 
 #[test]
 fn compare_prints_a_verdict_and_with_v_the_table() {
     let folder = tempfile::tempdir().unwrap();
     let [mesh, truth] = plates(folder.path());
-    let arguments = ["compare", &mesh, &truth, "--samples", "1000", "--tolerance-mm", "0.3", "--before", &mesh];
+    let arguments = [
+        "compare",
+        &mesh,
+        &truth,
+        "--samples",
+        "1000",
+        "--tolerance-mm",
+        "0.3",
+        "--before",
+        &mesh,
+    ];
     let output = touchup(&arguments);
     let (code, verdict, err) = parts_of(&output);
     assert_eq!((code, err), (0, ""));
@@ -472,9 +769,18 @@ fn compare_prints_a_verdict_and_with_v_the_table() {
     let output = touchup(&[&arguments[..], &["-v"]].concat());
     let (code, out, err) = parts_of(&output);
     assert_eq!((code, err), (0, ""));
-    for row in ["mesh to truth", "truth to mesh", "vertices", "normals", "32 faces, 20.0 x 20.0 x 0.0 mm", "points/mm2"]
-    {
-        assert!(out.starts_with(verdict) && out.contains(row), "{row}: {out}");
+    for row in [
+        "mesh to truth",
+        "truth to mesh",
+        "vertices",
+        "normals",
+        "32 faces, 20.0 x 20.0 x 0.0 mm",
+        "points/mm2",
+    ] {
+        assert!(
+            out.starts_with(verdict) && out.contains(row),
+            "{row}: {out}"
+        );
     }
 }
 
@@ -486,24 +792,52 @@ fn a_refined_mesh_is_reported_by_support() {
     let mesh = square(4, 0.25e-3);
     let region_sizes = |columns: &[VertexColumn]| -> Vec<(String, u64)> {
         write_mesh_with(&path, &mesh, columns, None, MeshUnit::Millimetre).unwrap();
-        let output = touchup(&["compare", path.to_str().unwrap(), &truth, "--samples", "1000", "--json"]);
+        let output = touchup(&[
+            "compare",
+            path.to_str().unwrap(),
+            &truth,
+            "--samples",
+            "1000",
+            "--json",
+        ]);
         let (code, out, err) = parts_of(&output);
         assert_eq!((code, err), (0, ""));
         let report: serde_json::Value = serde_json::from_str(out).unwrap();
         let regions = report["after"]["regions"].as_array().unwrap().iter();
-        let points = |part: &serde_json::Value| part["vertices_to_truth"]["points"].as_u64().unwrap();
-        regions.map(|part| (part["region"].as_str().unwrap().to_owned(), points(part))).collect()
+        let points =
+            |part: &serde_json::Value| part["vertices_to_truth"]["points"].as_u64().unwrap();
+        regions
+            .map(|part| (part["region"].as_str().unwrap().to_owned(), points(part)))
+            .collect()
     };
     // 3 scanned, 10 touched, 7 guessed, 5 that the ball cannot reach, which are guessed too
-    let support: Vec<f32> =
-        [(0.0, 3), (1.0, 10), (2.0, 7), (3.0, 5)].iter().flat_map(|&(n, times)| vec![n; times]).collect();
-    let touched: Vec<f32> = [(0.0, 4), (1.0, 12), (0.5, 9)].iter().flat_map(|&(n, times)| vec![n; times]).collect();
-    let column = |name, values: &Vec<f32>| VertexColumn { name, values: values.clone().into() };
-    let named = |counts: [u64; 4]| -> Vec<(String, u64)> {
-        ["all", "touched", "guessed", "untouched"].iter().map(|name| (*name).to_owned()).zip(counts).collect()
+    let support: Vec<f32> = [(0.0, 3), (1.0, 10), (2.0, 7), (3.0, 5)]
+        .iter()
+        .flat_map(|&(n, times)| vec![n; times])
+        .collect();
+    let touched: Vec<f32> = [(0.0, 4), (1.0, 12), (0.5, 9)]
+        .iter()
+        .flat_map(|&(n, times)| vec![n; times])
+        .collect();
+    let column = |name, values: &Vec<f32>| VertexColumn {
+        name,
+        values: values.clone().into(),
     };
-    assert_eq!(region_sizes(&[column("touched", &touched), column("support", &support)]), named([25, 10, 12, 3]));
-    assert_eq!(region_sizes(&[column("touched", &touched)]), named([25, 12, 9, 4]));
+    let named = |counts: [u64; 4]| -> Vec<(String, u64)> {
+        ["all", "touched", "guessed", "untouched"]
+            .iter()
+            .map(|name| (*name).to_owned())
+            .zip(counts)
+            .collect()
+    };
+    assert_eq!(
+        region_sizes(&[column("touched", &touched), column("support", &support)]),
+        named([25, 10, 12, 3])
+    );
+    assert_eq!(
+        region_sizes(&[column("touched", &touched)]),
+        named([25, 12, 9, 4])
+    );
     assert_eq!(region_sizes(&[]), [("all".to_owned(), 25)]);
 }
 
@@ -511,10 +845,17 @@ fn a_refined_mesh_is_reported_by_support() {
 fn a_wrong_unit_is_suspected_with_the_flag_that_helps() {
     let folder = tempfile::tempdir().unwrap();
     let [mesh, truth] = plates(folder.path());
-    let (flag, output) = ("--truth-unit", touchup(&["compare", &mesh, &truth, "--truth-unit", "inch"]));
+    let (flag, output) = (
+        "--truth-unit",
+        touchup(&["compare", &mesh, &truth, "--truth-unit", "inch"]),
+    );
     let (code, _, err) = parts_of(&output);
     assert_eq!(code, 0);
-    assert!(err.contains("25.4 times smaller") && err.contains(&format!("try --mesh-unit inch or {flag} mm")), "{err}");
+    assert!(
+        err.contains("25.4 times smaller")
+            && err.contains(&format!("try --mesh-unit inch or {flag} mm")),
+        "{err}"
+    );
     // 20 000 mm: no work-piece, and the flag is the one of the truth
     let output = touchup(&["compare", &mesh, &truth, "--truth-unit", "m"]);
     let (code, out, err) = parts_of(&output);
@@ -542,8 +883,18 @@ fn bad_use_is_refused_before_any_work() {
         let (code, out, err) = parts_of(&output);
         assert_eq!((code, out), (2, ""), "{arguments:?}: {err}");
     }
-    assert_eq!(fs::read(&mesh).unwrap(), before, "an input is never written over");
-    let nowhere = touchup(&["compare", &mesh, &truth, "--picture", "/no/such/place/a.png"]);
+    assert_eq!(
+        fs::read(&mesh).unwrap(),
+        before,
+        "an input is never written over"
+    );
+    let nowhere = touchup(&[
+        "compare",
+        &mesh,
+        &truth,
+        "--picture",
+        "/no/such/place/a.png",
+    ]);
     assert_eq!(parts_of(&nowhere).0, 1);
     let missing = touchup(&["compare", &mesh, "/no/such/part.stl"]);
     assert_eq!(parts_of(&missing).0, 3);
@@ -566,7 +917,10 @@ impl Workers for SoMany {
 fn any_number_of_threads_finds_the_same_to_the_last_bit() {
     let mesh = wavy::wavy_plate(20_000).unwrap();
     let tree = FaceTree::new(&mesh);
-    let shape = IndexedMesh { mesh: &mesh, tree: &tree };
+    let shape = IndexedMesh {
+        mesh: &mesh,
+        tree: &tree,
+    };
     let points: Vec<Point3<f64>> = sample_surface(&mesh, 3e5, 1)
         .iter()
         .enumerate()
@@ -574,16 +928,44 @@ fn any_number_of_threads_finds_the_same_to_the_last_bit() {
         .collect();
     assert!(points.len() > 20_000);
     let bits = |workers: &dyn Workers| -> Vec<u64> {
-        deviations(&points, &mesh, &tree, workers).unwrap().into_iter().map(f64::to_bits).collect()
+        deviations(&points, &mesh, &tree, workers)
+            .unwrap()
+            .into_iter()
+            .map(f64::to_bits)
+            .collect()
     };
     let start = Isometry3::identity();
-    let register = |workers: &dyn Workers| icp(&points, &mesh, &tree, &start, &IcpParams::default(), workers);
+    let register = |workers: &dyn Workers| {
+        icp(
+            &points,
+            &mesh,
+            &tree,
+            &start,
+            &IcpParams::default(),
+            workers,
+        )
+    };
     let whole = |workers: &dyn Workers| compare(shape, shape, Regions::Unknown, &few(), workers);
     let (one, motion, all) = (bits(&Alone), register(&Alone), whole(&Alone));
     // one by one, in the order given
-    let by_hand = |p| tree.closest(&mesh, p, f64::INFINITY).unwrap().distance_squared.sqrt().to_bits();
-    assert!(points.iter().zip(&one).all(|(p, found)| by_hand(p) == found & (u64::MAX >> 1)));
-    for workers in [&SoMany(2) as &dyn Workers, &SoMany(3), &touchup::threads::Threads] {
+    let by_hand = |p| {
+        tree.closest(&mesh, p, f64::INFINITY)
+            .unwrap()
+            .distance_squared
+            .sqrt()
+            .to_bits()
+    };
+    assert!(
+        points
+            .iter()
+            .zip(&one)
+            .all(|(p, found)| by_hand(p) == found & (u64::MAX >> 1))
+    );
+    for workers in [
+        &SoMany(2) as &dyn Workers,
+        &SoMany(3),
+        &touchup::threads::Threads,
+    ] {
         assert!(bits(workers) == one && register(workers) == motion && whole(workers) == all);
     }
 }

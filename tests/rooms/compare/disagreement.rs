@@ -9,7 +9,9 @@ use serde_json::Value;
 use touchup::io::mesh_file::{MeshUnit, read_mesh, write_mesh};
 use touchup::io::recording::{Topics, write_recording};
 use touchup::mesh::{TriMesh, VertexId, repair};
-use touchup::sim::{MeshSurface, PathParams, Plate, ScannerParams, StylusParams, plan_mesh, scan, touch};
+use touchup::sim::{
+    MeshSurface, PathParams, Plate, ScannerParams, StylusParams, plan_mesh, scan, touch,
+};
 use touchup::stylus::Message;
 
 use crate::full::either;
@@ -34,20 +36,63 @@ struct Case {
 }
 
 impl Case {
-    fn new(scanned: &TriMesh, touched: &TriMesh, scanner: &ScannerParams, shake: impl Fn(&mut [Message])) -> Self {
-        let case = Self { folder: tempfile::tempdir().unwrap() };
-        let (before, now) = (MeshSurface::new(scanned).unwrap(), MeshSurface::new(touched).unwrap());
-        write_mesh(&case.path("scan.ply"), &scan(&before, scanner).unwrap(), MeshUnit::Millimetre).unwrap();
-        let path =
-            plan_mesh(&now, &touchup::sim::Surface::bounds(&now), &scanner.view, &PathParams::default()).unwrap();
-        let mut messages = touch(&now, &path, &StylusParams::default(), scanner.seed).unwrap().messages;
+    fn new(
+        scanned: &TriMesh,
+        touched: &TriMesh,
+        scanner: &ScannerParams,
+        shake: impl Fn(&mut [Message]),
+    ) -> Self {
+        let case = Self {
+            folder: tempfile::tempdir().unwrap(),
+        };
+        let (before, now) = (
+            MeshSurface::new(scanned).unwrap(),
+            MeshSurface::new(touched).unwrap(),
+        );
+        write_mesh(
+            &case.path("scan.ply"),
+            &scan(&before, scanner).unwrap(),
+            MeshUnit::Millimetre,
+        )
+        .unwrap();
+        let path = plan_mesh(
+            &now,
+            &touchup::sim::Surface::bounds(&now),
+            &scanner.view,
+            &PathParams::default(),
+        )
+        .unwrap();
+        let mut messages = touch(&now, &path, &StylusParams::default(), scanner.seed)
+            .unwrap()
+            .messages;
         shake(&mut messages);
-        write_recording(&case.path("touch.mcap"), &Topics::default(), "object", "stylus", messages).unwrap();
+        write_recording(
+            &case.path("touch.mcap"),
+            &Topics::default(),
+            "object",
+            "stylus",
+            messages,
+        )
+        .unwrap();
         let [scan, bag, out, csv] =
             ["scan.ply", "touch.mcap", "refined.ply", "touches.csv"].map(|name| case.text(name));
         let tip = ["--tip-radius-mm", "1.5", "--stiffness-n-per-mm", "20"];
         touchup(
-            &[&["refine", "--scan", &scan, "--bag", &bag, "--out", &out, "--touches-out", &csv], &tip[..]].concat(),
+            &[
+                &[
+                    "refine",
+                    "--scan",
+                    &scan,
+                    "--bag",
+                    &bag,
+                    "--out",
+                    &out,
+                    "--touches-out",
+                    &csv,
+                ],
+                &tip[..],
+            ]
+            .concat(),
         );
         case
     }
@@ -63,24 +108,48 @@ impl Case {
     fn disagree(&self) -> Value {
         let [scan, refined, csv, map] =
             ["scan.ply", "refined.ply", "touches.csv", "map.ply"].map(|name| self.text(name));
-        let report = touchup(&["disagree", &scan, &refined, "--touches", &csv, "--json", "--coloured", &map]);
+        let report = touchup(&[
+            "disagree",
+            &scan,
+            &refined,
+            "--touches",
+            &csv,
+            "--json",
+            "--coloured",
+            &map,
+        ]);
         serde_json::from_str(&report).unwrap()
     }
 }
 
 fn touchup(arguments: &[&str]) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_touchup")).args(arguments).env_remove("RUST_LOG").output().unwrap();
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    let output = Command::new(env!("CARGO_BIN_EXE_touchup"))
+        .args(arguments)
+        .env_remove("RUST_LOG")
+        .output()
+        .unwrap();
+    assert!(
+        output.status.success(),
+        "{arguments:?}: {}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     String::from_utf8(output.stdout).unwrap()
 }
 
 fn area(report: &Value, class: &str) -> f64 {
     let classes = report["classes"].as_array().unwrap();
-    classes.iter().find(|own| own["class"] == class).unwrap()["refined_mm2"].as_f64().unwrap()
+    classes.iter().find(|own| own["class"] == class).unwrap()["refined_mm2"]
+        .as_f64()
+        .unwrap()
 }
 
 fn regions<'a>(report: &'a Value, class: &'a str) -> Vec<&'a Value> {
-    report["regions"].as_array().unwrap().iter().filter(|own| own["class"] == class).collect()
+    report["regions"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|own| own["class"] == class)
+        .collect()
 }
 
 fn centre(region: &Value) -> Vector3<f64> {
@@ -102,9 +171,16 @@ fn moved(mesh: &TriMesh, place: impl Fn(Point3<f64>) -> Point3<f64>) -> TriMesh 
 
 /// A block of 60 mm × 40 mm × 12 mm, whose upper side follows `top` in x and z, mm.
 fn block(top: &[[f64; 2]]) -> TriMesh {
-    let outline: Vec<[f64; 2]> = [[0.0, 0.0], [60.0, 0.0]].into_iter().chain(top.iter().rev().copied()).collect();
+    let outline: Vec<[f64; 2]> = [[0.0, 0.0], [60.0, 0.0]]
+        .into_iter()
+        .chain(top.iter().rev().copied())
+        .collect();
     let count = outline.len() as u32;
-    let at = |y: f64| outline.iter().map(move |[x, z]| Point3::new(x * 1e-3, y, z * 1e-3));
+    let at = |y: f64| {
+        outline
+            .iter()
+            .map(move |[x, z]| Point3::new(x * 1e-3, y, z * 1e-3))
+    };
     let positions: Vec<_> = at(0.0).chain(at(40e-3)).collect();
     let sides = (0..count).flat_map(|i| {
         let j = (i + 1) % count;
@@ -114,7 +190,10 @@ fn block(top: &[[f64; 2]]) -> TriMesh {
     let mut faces: Vec<[u32; 3]> = sides.map(|[a, b, c]| [a, c, b]).collect();
     let ears = ears(&outline);
     faces.extend(ears.iter().map(|&[a, b, c]| [a, b, c]));
-    faces.extend(ears.iter().map(|&[a, b, c]| [a + count, c + count, b + count]));
+    faces.extend(
+        ears.iter()
+            .map(|&[a, b, c]| [a + count, c + count, b + count]),
+    );
     let (mesh, report) = repair(positions, faces).unwrap();
     assert_eq!(report.boundary_edges, 0);
     mesh
@@ -122,7 +201,9 @@ fn block(top: &[[f64; 2]]) -> TriMesh {
 
 /// Triangles of a simple polygon, by cutting ears.
 fn ears(outline: &[[f64; 2]]) -> Vec<[u32; 3]> {
-    let cross = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    let cross = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| {
+        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    };
     let mut left: Vec<usize> = (0..outline.len()).collect();
     let mut triangles = Vec::new();
     while left.len() >= 3 {
@@ -132,7 +213,10 @@ fn ears(outline: &[[f64; 2]]) -> Vec<[u32; 3]> {
             let [p, q, r] = [outline[a], outline[b], outline[c]];
             let inside = |at: &usize| {
                 let x = outline[*at];
-                ![a, b, c].contains(at) && cross(p, q, x) >= 0.0 && cross(q, r, x) >= 0.0 && cross(r, p, x) >= 0.0
+                ![a, b, c].contains(at)
+                    && cross(p, q, x) >= 0.0
+                    && cross(q, r, x) >= 0.0
+                    && cross(r, p, x) >= 0.0
             };
             cross(p, q, r) > 0.0 && !left.iter().any(inside)
         };
@@ -165,19 +249,32 @@ fn unchanged(kind: Scanner, seed: u64) -> &'static Unchanged {
     static CASES: [[OnceLock<Unchanged>; 3]; 2] = [const { [const { OnceLock::new() }; 3] }; 2];
     CASES[kind as usize][seed as usize - 1].get_or_init(|| {
         let scanner = match kind {
-            Scanner::Poor => ScannerParams { seed, ..Default::default() },
+            Scanner::Poor => ScannerParams {
+                seed,
+                ..Default::default()
+            },
             Scanner::Better => scanner(seed),
         };
         let case = Case::new(&plate(), &plate(), &scanner, |_| ());
         let report = case.disagree();
-        let map = read_mesh(&case.path("map.ply"), MeshUnit::Millimetre).unwrap().mesh;
+        let map = read_mesh(&case.path("map.ply"), MeshUnit::Millimetre)
+            .unwrap()
+            .mesh;
         let [scan, csv] = ["scan.ply", "touches.csv"].map(|name| case.text(name));
         let unmarked = Command::new(env!("CARGO_BIN_EXE_touchup"))
             .args(["disagree", &scan, &scan, "--touches", &csv])
             .output()
             .unwrap();
-        let unmarked = (unmarked.status.code(), String::from_utf8(unmarked.stderr).unwrap());
-        Unchanged { scanner, report, map, unmarked }
+        let unmarked = (
+            unmarked.status.code(),
+            String::from_utf8(unmarked.stderr).unwrap(),
+        );
+        Unchanged {
+            scanner,
+            report,
+            map,
+            unmarked,
+        }
     })
 }
 
@@ -185,17 +282,27 @@ fn unchanged(kind: Scanner, seed: u64) -> &'static Unchanged {
 fn a_part_that_was_not_changed_is_not_called_changed() {
     for seed in 1..=either(1, 3) {
         for kind in [Scanner::Poor, Scanner::Better] {
-            let Unchanged { scanner, report, .. } = unchanged(kind, seed);
+            let Unchanged {
+                scanner, report, ..
+            } = unchanged(kind, seed);
             assert_eq!(regions(report, "changed part").len(), 0, "{seed}: {report}");
             assert_eq!(area(report, "changed part"), 0.0);
             let touched = area(report, "agrees") + area(report, "scanner error");
             // noise at an edge cannot be distinguished from a small change, least of all that of a poor scanner
             let share = if scanner.noise > 0.3e-3 { 0.06 } else { 0.04 };
             let small = |class| area(report, class) < share * touched;
-            assert!(small("unsure") && small("bad touch"), "{seed}: {} {}", report["classes"], report["regions"]);
+            assert!(
+                small("unsure") && small("bad touch"),
+                "{seed}: {} {}",
+                report["classes"],
+                report["regions"]
+            );
             // the simulated value, as far as a few dozen independent places determine it
             let noise = report["scanner"]["noise_mm"].as_f64().unwrap();
-            assert!((0.5..1.6).contains(&(noise / (scanner.noise * 1e3))), "{seed}: {noise}");
+            assert!(
+                (0.5..1.6).contains(&(noise / (scanner.noise * 1e3))),
+                "{seed}: {noise}"
+            );
         }
     }
 }
@@ -203,33 +310,65 @@ fn a_part_that_was_not_changed_is_not_called_changed() {
 #[test]
 fn a_boss_that_was_milled_off_by_a_millimetre_is_found() {
     for seed in 1..=either(1, 3) {
-        let now = moved(&plate(), |p| if p.z > 15e-3 { p - Vector3::z() * 1e-3 } else { p });
+        let now = moved(&plate(), |p| {
+            if p.z > 15e-3 {
+                p - Vector3::z() * 1e-3
+            } else {
+                p
+            }
+        });
         let report = Case::new(&plate(), &now, &scanner(seed), |_| ()).disagree();
         let found = regions(&report, "changed part");
         assert_eq!(found.len(), 1, "{seed}: {report}");
         // the boss is at (47, 25) mm, 10 mm wide
-        assert!((centre(found[0]) - Vector3::new(47.0, 25.0, 15.0)).norm() < 1.0, "{seed}: {}", found[0]);
-        let (mean, area) = (found[0]["mean_mm"].as_f64().unwrap(), found[0]["area_mm2"].as_f64().unwrap());
-        assert!((-1.35..-0.8).contains(&mean), "{seed}: 1 mm, and the surface offset of the scan: {mean}");
-        assert!((20.0..100.0).contains(&area), "at most the top of 78.5 mm2 and its rim: {area}");
+        assert!(
+            (centre(found[0]) - Vector3::new(47.0, 25.0, 15.0)).norm() < 1.0,
+            "{seed}: {}",
+            found[0]
+        );
+        let (mean, area) = (
+            found[0]["mean_mm"].as_f64().unwrap(),
+            found[0]["area_mm2"].as_f64().unwrap(),
+        );
+        assert!(
+            (-1.35..-0.8).contains(&mean),
+            "{seed}: 1 mm, and the surface offset of the scan: {mean}"
+        );
+        assert!(
+            (20.0..100.0).contains(&area),
+            "at most the top of 78.5 mm2 and its rim: {area}"
+        );
     }
 }
 
 #[test]
 fn a_groove_that_was_cut_is_found() {
     let before = block(&[[0.0, 12.0], [60.0, 12.0]]);
-    let now = block(&[[0.0, 12.0], [22.0, 12.0], [22.0, 10.5], [38.0, 10.5], [38.0, 12.0], [60.0, 12.0]]);
+    let now = block(&[
+        [0.0, 12.0],
+        [22.0, 12.0],
+        [22.0, 10.5],
+        [38.0, 10.5],
+        [38.0, 12.0],
+        [60.0, 12.0],
+    ]);
     for seed in 1..=either(1, 3) {
         let report = Case::new(&before, &now, &scanner(seed), |_| ()).disagree();
         let found = regions(&report, "changed part");
         assert!(!found.is_empty(), "{seed}: {report}");
         for region in found {
             let centre = centre(region);
-            assert!((22.0..38.0).contains(&centre.x) && (centre.z - 10.5).abs() < 0.6, "{seed}: {region}");
+            assert!(
+                (22.0..38.0).contains(&centre.x) && (centre.z - 10.5).abs() < 0.6,
+                "{seed}: {region}"
+            );
         }
         // and nowhere else: the map agrees place by place
         let changed = area(&report, "changed part");
-        assert!((250.0..720.0).contains(&changed), "16 mm by 40 mm and its walls: {changed}");
+        assert!(
+            (250.0..720.0).contains(&changed),
+            "16 mm by 40 mm and its walls: {changed}"
+        );
     }
 }
 
@@ -256,7 +395,12 @@ fn spikes_of_the_pose_are_bad_touches() {
         let spiked = Case::new(&plate(), &plate(), &scanner(seed), shake).disagree();
         let count = |report: &Value| {
             let far = |bad: &&Value| bad["off_mm"].as_f64().unwrap() > 0.4;
-            report["bad_touches"].as_array().unwrap().iter().filter(far).count()
+            report["bad_touches"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .filter(far)
+                .count()
         };
         assert_eq!(count(plain), 0, "{seed}: {plain}");
         assert!(count(&spiked) >= 3, "{seed}: {}", spiked["bad_touches"]);
@@ -267,8 +411,16 @@ fn spikes_of_the_pose_are_bad_touches() {
 #[test]
 fn written_columns_match_the_report() {
     let Unchanged { report, map, .. } = unchanged(Scanner::Better, 1);
-    let all: f64 = report["classes"].as_array().unwrap().iter().map(|c| c["refined_mm2"].as_f64().unwrap()).sum();
-    let area: f64 = map.faces().map(|(face, _)| map.double_area_normal(face).norm() / 2.0).sum();
+    let all: f64 = report["classes"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|c| c["refined_mm2"].as_f64().unwrap())
+        .sum();
+    let area: f64 = map
+        .faces()
+        .map(|(face, _)| map.double_area_normal(face).norm() / 2.0)
+        .sum();
     assert!((all / (area * 1e6) - 1.0).abs() < 1e-4);
 }
 
@@ -276,7 +428,10 @@ fn written_columns_match_the_report() {
 fn a_mesh_without_marks_of_touch_is_refused() {
     let (code, message) = &unchanged(Scanner::Better, 1).unmarked;
     assert_eq!(*code, Some(2));
-    assert!(message.contains("give the PLY that refine wrote"), "{message}");
+    assert!(
+        message.contains("give the PLY that refine wrote"),
+        "{message}"
+    );
 }
 
 // The scan is turned by 0.15° and shifted by 0.2 mm, of which noise of 0.6 mm hides most: the reported offset is no more than
@@ -285,15 +440,29 @@ fn a_mesh_without_marks_of_touch_is_refused() {
 fn a_turned_scan_is_reported_only_as_far_as_the_turn_is_known() {
     let mut turned_found = 0;
     for seed in 1..=either(1, 3) {
-        let Unchanged { scanner, report, .. } = unchanged(Scanner::Poor, seed);
-        let vector = |name: &str| Vector3::from_fn(|i, _| report["rigid_offset"][name][i].as_f64().unwrap());
+        let Unchanged {
+            scanner, report, ..
+        } = unchanged(Scanner::Poor, seed);
+        let vector =
+            |name: &str| Vector3::from_fn(|i, _| report["rigid_offset"][name][i].as_f64().unwrap());
         if !report["rigid_offset"].is_null() {
             let far = vector("turn_deg").norm() - 0.15;
-            assert!(far < 3.0 * vector("turn_std_deg").norm(), "{seed}: {}", report["rigid_offset"]);
+            assert!(
+                far < 3.0 * vector("turn_std_deg").norm(),
+                "{seed}: {}",
+                report["rigid_offset"]
+            );
         }
-        let turned = ScannerParams { rigid_turn: 3f64.to_radians(), ..*scanner };
+        let turned = ScannerParams {
+            rigid_turn: 3f64.to_radians(),
+            ..*scanner
+        };
         let report = Case::new(&plate(), &plate(), &turned, |_| ()).disagree();
         turned_found += usize::from(!report["rigid_offset"].is_null());
     }
-    assert!(turned_found >= either(1, 2), "{turned_found} of {}", either(1, 3));
+    assert!(
+        turned_found >= either(1, 2),
+        "{turned_found} of {}",
+        either(1, 3)
+    );
 }

@@ -7,7 +7,9 @@ use proptest::prelude::*;
 use touchup::features::{Feature, Kind, detect};
 use touchup::io::features_file::{FeatureFile, FeaturesFileError, read_features, write_features};
 use touchup::io::file_error::FileError;
-use touchup::io::touches_file::{HEADER, TouchesFileError, as_written, read_touches, write_touches};
+use touchup::io::touches_file::{
+    HEADER, TouchesFileError, as_written, read_touches, write_touches,
+};
 use touchup::mesh::FaceTree;
 use touchup::sim::Plate;
 use touchup::stylus::ProbedPoint;
@@ -112,8 +114,10 @@ fn read(text: &str) -> Result<Vec<ProbedPoint>, TouchesFileError> {
     read_touches(file.path())
 }
 
-const GOOD: [&str; 18] =
-    ["0", "1000", "3", "1.5", "-2", "3e0", "1.5", "1", "2", "3", "0", "0", "1", "0.01", "0.002", "0.003", "0.5", "1"];
+const GOOD: [&str; 18] = [
+    "0", "1000", "3", "1.5", "-2", "3e0", "1.5", "1", "2", "3", "0", "0", "1", "0.01", "0.002",
+    "0.003", "0.5", "1",
+];
 
 /// A line with some fields changed.
 fn line(changed: &[(usize, &str)]) -> String {
@@ -138,9 +142,21 @@ fn a_line_is_read_by_its_columns() {
         weight: 0.5,
         is_rejected: true,
     };
-    let [read] = touches.as_slice() else { panic!("{touches:?}") };
-    assert!((read.centre - expected.centre).norm() < 1e-15 && (read.point - expected.point).norm() < 1e-15);
-    assert_eq!(ProbedPoint { centre: expected.centre, point: expected.point, ..*read }, expected);
+    let [read] = touches.as_slice() else {
+        panic!("{touches:?}")
+    };
+    assert!(
+        (read.centre - expected.centre).norm() < 1e-15
+            && (read.point - expected.point).norm() < 1e-15
+    );
+    assert_eq!(
+        ProbedPoint {
+            centre: expected.centre,
+            point: expected.point,
+            ..*read
+        },
+        expected
+    );
 }
 
 /// As other programs save it.
@@ -150,7 +166,11 @@ fn marks_of_other_programs_are_passed_over() {
     assert_eq!(plain.len(), 2);
     let spaced = line(&[]).replace(',', " , ");
     for text in [
-        format!("\u{feff}{HEADER}\r\n{}\r\n{}\r\n", line(&[]), line(&[(0, "1")])),
+        format!(
+            "\u{feff}{HEADER}\r\n{}\r\n{}\r\n",
+            line(&[]),
+            line(&[(0, "1")])
+        ),
         format!("{HEADER}\n\n{spaced}\n\n{}", line(&[(0, "1")])),
     ] {
         assert_eq!(read(&text).unwrap(), plain, "{text:?}");
@@ -169,11 +189,27 @@ fn damaged_lines_are_named() {
         (two(&whole.replace(',', ";")), 3, "1 fields"),
         (two(&line(&[(0, "2")])), 3, "touch 2 where 1 comes"),
         (two(&line(&[])), 3, "touch 0 where 1 comes"),
-        (format!("{HEADER}\n\n\n{whole}\n"), 4, "touch 1 where 0 comes"),
-        (later(&[(1, "1e3")]), 3, "stamp_ns \"1e3\" is no whole number"),
+        (
+            format!("{HEADER}\n\n\n{whole}\n"),
+            4,
+            "touch 1 where 0 comes",
+        ),
+        (
+            later(&[(1, "1e3")]),
+            3,
+            "stamp_ns \"1e3\" is no whole number",
+        ),
         (later(&[(1, "999")]), 3, "stamp"),
         (later(&[(1, "9223372036854775807")]), 0, ""),
-        (format!("{HEADER}\n{}\n{}\n", line(&[(1, "-9223372036854775808")]), whole), 3, "stamp"),
+        (
+            format!(
+                "{HEADER}\n{}\n{}\n",
+                line(&[(1, "-9223372036854775808")]),
+                whole
+            ),
+            3,
+            "stamp",
+        ),
         (later(&[(2, "-1")]), 3, "stroke"),
         (later(&[(2, "5000000000")]), 3, "stroke"),
         (later(&[(2, "2")]), 3, "stroke"),
@@ -194,7 +230,10 @@ fn damaged_lines_are_named() {
         match read(text) {
             Ok(_) => assert_eq!(*at, 0, "{named}: {text}"),
             Err(TouchesFileError::BadLine { line, what, .. }) => {
-                assert!(line == *at && what.contains(named), "{named}: line {line}, {what}");
+                assert!(
+                    line == *at && what.contains(named),
+                    "{named}: line {line}, {what}"
+                );
             }
             Err(other) => panic!("{named}: {other}"),
         }
@@ -204,23 +243,44 @@ fn damaged_lines_are_named() {
 #[test]
 fn another_header_is_refused() {
     let body = line(&[]);
-    for header in ["", "touch", &HEADER.replace("sigma", "Sigma"), &HEADER.replace(',', ";"), &HEADER[1..]] {
+    for header in [
+        "",
+        "touch",
+        &HEADER.replace("sigma", "Sigma"),
+        &HEADER.replace(',', ";"),
+        &HEADER[1..],
+    ] {
         let error = read(&format!("{header}\n{body}\n")).unwrap_err();
-        assert!(matches!(error, TouchesFileError::NoTouches { .. }), "{header}: {error}");
+        assert!(
+            matches!(error, TouchesFileError::NoTouches { .. }),
+            "{header}: {error}"
+        );
         assert!(error.to_string().contains("--touches-out"));
     }
-    assert!(matches!(read("").unwrap_err(), TouchesFileError::NoTouches { .. }));
+    assert!(matches!(
+        read("").unwrap_err(),
+        TouchesFileError::NoTouches { .. }
+    ));
     let folder = tempfile::tempdir().unwrap();
-    assert!(matches!(read_touches(folder.path()).unwrap_err(), TouchesFileError::File(FileError::Read { .. })));
+    assert!(matches!(
+        read_touches(folder.path()).unwrap_err(),
+        TouchesFileError::File(FileError::Read { .. })
+    ));
     let nowhere = folder.path().join("no/touches.csv");
-    assert!(matches!(write_touches(&nowhere, &[]).unwrap_err(), FileError::Write { .. }));
+    assert!(matches!(
+        write_touches(&nowhere, &[]).unwrap_err(),
+        FileError::Write { .. }
+    ));
 }
 
 /// The features of the drawing, one of them as if it had been touched.
 fn features() -> Vec<Feature> {
     let plate = Plate::default().mesh(10e-6).unwrap();
     let mut features = detect(&plate, &FaceTree::new(&plate), &[]).features;
-    let hole = features.iter_mut().find(|feature| feature.kind == Kind::Hole).unwrap();
+    let hole = features
+        .iter_mut()
+        .find(|feature| feature.kind == Kind::Hole)
+        .unwrap();
     hole.group = Some(7);
     let diameter = hole.diameter.as_mut().unwrap();
     (diameter.std, diameter.touches) = (Some(3.25e-6), vec![2, 3, 4, 9, 11, 12, u32::MAX]);
@@ -234,19 +294,47 @@ fn features_come_back_bit_by_bit() {
     let file = tempfile::NamedTempFile::new().unwrap();
     write_features(file.path(), &written).unwrap();
     let read = read_features(file.path()).unwrap();
-    assert_eq!(serde_json::to_value(&read).unwrap(), serde_json::to_value(&written).unwrap());
-    assert_eq!((read.features.len(), read.unexplained), (features.len(), Some(0.125)));
+    assert_eq!(
+        serde_json::to_value(&read).unwrap(),
+        serde_json::to_value(&written).unwrap()
+    );
+    assert_eq!(
+        (read.features.len(), read.unexplained),
+        (features.len(), Some(0.125))
+    );
     for (record, feature) in read.features.iter().zip(&features) {
-        assert_eq!((record.id, record.kind.as_str(), record.group), (feature.id, feature.kind.name(), feature.group));
+        assert_eq!(
+            (record.id, record.kind.as_str(), record.group),
+            (feature.id, feature.kind.name(), feature.group)
+        );
         let centre = feature.centre.value;
-        assert_eq!(record.center_mm.unwrap(), [centre.x * 1e3, centre.y * 1e3, centre.z * 1e3]);
-        assert_eq!(record.axis, feature.axis.as_ref().map(|axis| axis.value.into()));
-        assert_eq!(record.diameter_mm, feature.diameter.as_ref().map(|diameter| diameter.value * 1e3));
+        assert_eq!(
+            record.center_mm.unwrap(),
+            [centre.x * 1e3, centre.y * 1e3, centre.z * 1e3]
+        );
+        assert_eq!(
+            record.axis,
+            feature.axis.as_ref().map(|axis| axis.value.into())
+        );
+        assert_eq!(
+            record.diameter_mm,
+            feature
+                .diameter
+                .as_ref()
+                .map(|diameter| diameter.value * 1e3)
+        );
         assert_eq!(record.points_mm.len(), feature.points.len());
     }
-    let hole = read.features.iter().find(|record| record.group == Some(7)).unwrap();
+    let hole = read
+        .features
+        .iter()
+        .find(|record| record.group == Some(7))
+        .unwrap();
     assert!((hole.std["diameter_mm"] - 3.25e-3).abs() < 1e-18);
-    assert_eq!(hole.touches["diameter_mm"], [[2, 4], [9, 9], [11, 12], [u32::MAX, u32::MAX]]);
+    assert_eq!(
+        hole.touches["diameter_mm"],
+        [[2, 4], [9, 9], [11, 12], [u32::MAX, u32::MAX]]
+    );
     let bytes = fs::read(file.path()).unwrap();
     write_features(file.path(), &read).unwrap();
     assert_eq!(fs::read(file.path()).unwrap(), bytes);
@@ -260,15 +348,38 @@ fn files_of_others_are_read() {
         {"kind": "edge", "points_mm": [[0, 0, 0], [1, 0, 0]]}]}"#;
     fs::write(file.path(), text).unwrap();
     let read = read_features(file.path()).unwrap();
-    let [hole, edge] = read.features.as_slice() else { panic!("{read:?}") };
-    assert_eq!((hole.center_mm, hole.diameter_mm, hole.depth_mm), (Some([1.0, 2.5, 3.0]), Some(6.0), None));
-    assert_eq!((edge.points_mm.as_slice(), edge.axis), (&[[0.0; 3], [1.0, 0.0, 0.0]][..], None));
-    for damaged in ["", "{}", "[]", r#"{"features": [{"center_mm": [1, 2, 3]}]}"#, &text[..80]] {
+    let [hole, edge] = read.features.as_slice() else {
+        panic!("{read:?}")
+    };
+    assert_eq!(
+        (hole.center_mm, hole.diameter_mm, hole.depth_mm),
+        (Some([1.0, 2.5, 3.0]), Some(6.0), None)
+    );
+    assert_eq!(
+        (edge.points_mm.as_slice(), edge.axis),
+        (&[[0.0; 3], [1.0, 0.0, 0.0]][..], None)
+    );
+    for damaged in [
+        "",
+        "{}",
+        "[]",
+        r#"{"features": [{"center_mm": [1, 2, 3]}]}"#,
+        &text[..80],
+    ] {
         fs::write(file.path(), damaged).unwrap();
         let error = read_features(file.path()).unwrap_err();
-        assert!(matches!(error, FeaturesFileError::NoFeatures { .. }), "{damaged}: {error}");
-        assert!(error.to_string().contains("is no file of features"), "{error}");
+        assert!(
+            matches!(error, FeaturesFileError::NoFeatures { .. }),
+            "{damaged}: {error}"
+        );
+        assert!(
+            error.to_string().contains("is no file of features"),
+            "{error}"
+        );
     }
     let missing = read_features(&file.path().join("no.json")).unwrap_err();
-    assert!(matches!(missing, FeaturesFileError::File(FileError::Read { .. })));
+    assert!(matches!(
+        missing,
+        FeaturesFileError::File(FileError::Read { .. })
+    ));
 }

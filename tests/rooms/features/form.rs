@@ -21,7 +21,10 @@ const TOP: f64 = 12e-3;
 /// The through-hole is out of round by twice this, m, in three lobes.
 const LOBE: f64 = 25e-6;
 /// The blind hole leans by these, rad: 0.1°, which the touches of the demo show no better than to itself, and 0.6°.
-const LEANS: [f64; 2] = [0.1 * std::f64::consts::PI / 180.0, 0.6 * std::f64::consts::PI / 180.0];
+const LEANS: [f64; 2] = [
+    0.1 * std::f64::consts::PI / 180.0,
+    0.6 * std::f64::consts::PI / 180.0,
+];
 
 /// The plate with a through-hole out of round and a blind hole out of square: each point is moved by a small, smooth displacement.
 struct Worn {
@@ -36,14 +39,17 @@ fn window(rho: f64, [none_in, all_in, all_out, none_out]: [f64; 4]) -> f64 {
         let x = x.clamp(0.0, 1.0);
         x * x * (3.0 - 2.0 * x)
     };
-    step((rho - none_in) / (all_in - none_in)) * (1.0 - step((rho - all_out) / (none_out - all_out)))
+    step((rho - none_in) / (all_in - none_in))
+        * (1.0 - step((rho - all_out) / (none_out - all_out)))
 }
 
 /// Displacement of a place, m. It is the same for the centre of a ball and the wall that it touches, for both are at one angle and height.
 fn displacement(p: &Point3<f64>, lean: f64) -> Vector3<f64> {
     let from = |axis: [f64; 2]| Vector3::new(p.x - axis[0], p.y - axis[1], 0.0);
     let (through, blind) = (from(THROUGH), from(BLIND));
-    let lobes = LOBE * (3.0 * through.y.atan2(through.x)).cos() * window(through.norm(), [0.2e-3, 1e-3, 6e-3, 7e-3]);
+    let lobes = LOBE
+        * (3.0 * through.y.atan2(through.x)).cos()
+        * window(through.norm(), [0.2e-3, 1e-3, 6e-3, 7e-3]);
     let lean = lean.tan() * (p.z - TOP).min(0.0) * window(blind.norm(), [-2.0, -1.0, 5e-3, 6e-3]);
     through.try_normalize(0.0).unwrap_or_default() * lobes + Vector3::x() * lean
 }
@@ -52,10 +58,15 @@ impl Worn {
     fn moved(&self, s: SurfacePoint) -> SurfacePoint {
         const STEP: f64 = 1e-6;
         let slope = |axis: Vector3<f64>| {
-            (displacement(&(s.point + axis * STEP), self.lean) - displacement(&(s.point - axis * STEP), self.lean))
+            (displacement(&(s.point + axis * STEP), self.lean)
+                - displacement(&(s.point - axis * STEP), self.lean))
                 / (2.0 * STEP)
         };
-        let slopes = Matrix3::from_columns(&[slope(Vector3::x()), slope(Vector3::y()), slope(Vector3::z())]);
+        let slopes = Matrix3::from_columns(&[
+            slope(Vector3::x()),
+            slope(Vector3::y()),
+            slope(Vector3::z()),
+        ]);
         SurfacePoint {
             point: s.point + displacement(&s.point, self.lean),
             normal: (s.normal - slopes.tr_mul(&s.normal)).normalize(),
@@ -65,7 +76,8 @@ impl Worn {
 
 impl Surface for Worn {
     fn signed_distance(&self, p: &Point3<f64>) -> f64 {
-        self.plate.signed_distance(&(p - displacement(p, self.lean)))
+        self.plate
+            .signed_distance(&(p - displacement(p, self.lean)))
     }
 
     fn closest(&self, p: &Point3<f64>) -> SurfacePoint {
@@ -78,7 +90,8 @@ impl Surface for Worn {
 
     fn near(&self, p: &Point3<f64>, reach: f64, found: &mut Vec<SurfacePoint>) {
         let before = found.len();
-        self.plate.near(&(p - displacement(p, self.lean)), reach, found);
+        self.plate
+            .near(&(p - displacement(p, self.lean)), reach, found);
         found[before..].iter_mut().for_each(|s| *s = self.moved(*s));
     }
 }
@@ -87,16 +100,33 @@ impl Surface for Worn {
 /// caught at its rim goes on elsewhere.
 fn found(part: &dyn Surface, seed: u64) -> (Vec<Feature>, bool) {
     let stylus = StylusParams::default();
-    let (PlateStream { scan, noise, samples }, _) = stream_of(part, &stylus, seed);
+    let (
+        PlateStream {
+            scan,
+            noise,
+            samples,
+        },
+        _,
+    ) = stream_of(part, &stylus, seed);
     let mut params = PatcherParams::new(stylus.radius, Some(stylus.stiffness), noise);
-    params.uncertainty.as_mut().unwrap().calibration =
-        CalibrationParams { radius: 2e-6, place: 0.0, stiffness_share: 0.02 };
+    params.uncertainty.as_mut().unwrap().calibration = CalibrationParams {
+        radius: 2e-6,
+        place: 0.0,
+        stiffness_share: 0.02,
+    };
     let mut patcher = Patcher::new(params).unwrap();
-    contacts_of(stylus.radius, Some(stylus.stiffness), &samples).iter().for_each(|contact| patcher.push(contact));
+    contacts_of(stylus.radius, Some(stylus.stiffness), &samples)
+        .iter()
+        .for_each(|contact| patcher.push(contact));
     patcher.flush();
     let mesh = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap().mesh;
     let mut twelfths = [false; 12];
-    for point in patcher.probed().iter().map(|touch| touch.point).filter(|p| p.z < TOP - 1e-3) {
+    for point in patcher
+        .probed()
+        .iter()
+        .map(|touch| touch.point)
+        .filter(|p| p.z < TOP - 1e-3)
+    {
         let v = point.xy() - Point2::from(BLIND);
         if v.norm() < 4e-3 {
             let turn = (v.y.atan2(v.x) / std::f64::consts::TAU).rem_euclid(1.0);
@@ -104,7 +134,10 @@ fn found(part: &dyn Surface, seed: u64) -> (Vec<Feature>, bool) {
         }
     }
     let is_felt = twelfths.iter().filter(|is_felt| **is_felt).count() >= 10;
-    (detect(&mesh, &FaceTree::new(&mesh), patcher.probed()).features, is_felt)
+    (
+        detect(&mesh, &FaceTree::new(&mesh), patcher.probed()).features,
+        is_felt,
+    )
 }
 
 fn hole_at(features: &[Feature], axis: [f64; 2]) -> &Feature {
@@ -112,8 +145,16 @@ fn hole_at(features: &[Feature], axis: [f64; 2]) -> &Feature {
         let c = f.centre.value;
         f.kind == Kind::Hole && (c.x - axis[0]).hypot(c.y - axis[1]) < 1e-3
     };
-    let all = || features.iter().map(|f| (f.kind, f.centre.value)).collect::<Vec<_>>();
-    features.iter().find(is_there).unwrap_or_else(|| panic!("no hole at {axis:?} m: {:?}", all()))
+    let all = || {
+        features
+            .iter()
+            .map(|f| (f.kind, f.centre.value))
+            .collect::<Vec<_>>()
+    };
+    features
+        .iter()
+        .find(is_there)
+        .unwrap_or_else(|| panic!("no hole at {axis:?} m: {:?}", all()))
 }
 
 /// Errors over uncertainties, by name.
@@ -123,7 +164,12 @@ struct Ratios(Vec<(String, f64)>);
 impl Ratios {
     fn add(&mut self, name: &str, estimate: Estimate, truth: f64) {
         let Estimate { value, std } = estimate;
-        println!("{name:38} {:9.2} ± {:6.2}, true {:9.2} µm or µrad", value * UM, std * UM, truth * UM);
+        println!(
+            "{name:38} {:9.2} ± {:6.2}, true {:9.2} µm or µrad",
+            value * UM,
+            std * UM,
+            truth * UM
+        );
         assert!(std > 0.0 && std.is_finite(), "{name}");
         self.0.push((name.to_owned(), (value - truth) / std));
     }
@@ -136,27 +182,52 @@ fn known_errors_of_form_and_orientation_are_found_within_their_uncertainty() {
     let mut turned_away = 0;
     for (seed, lean) in (1..=seeds).flat_map(|seed| LEANS.map(|lean| (seed, lean))) {
         println!("seed {seed}, {:.1}°", lean.to_degrees());
-        let (features, is_felt) = found(&Worn { plate: Plate::default(), lean }, seed);
+        let (features, is_felt) = found(
+            &Worn {
+                plate: Plate::default(),
+                lean,
+            },
+            seed,
+        );
         if !is_felt {
             println!("the blind hole was not felt all around");
             turned_away += 1;
             continue;
         }
         let through = hole_at(&features, THROUGH);
-        let Some(Form::Round(form)) = &through.form else { panic!("{through:?}") };
+        let Some(Form::Round(form)) = &through.form else {
+            panic!("{through:?}")
+        };
         assert!(form.lobes.contains(&3) && form.coverage > 0.95, "{form:?}");
-        ratios.add("through-hole, roundness", form.roundness.minimum_zone, 2.0 * LOBE);
-        ratios.add("through-hole, about least squares", form.roundness.least_squares, 2.0 * LOBE);
+        ratios.add(
+            "through-hole, roundness",
+            form.roundness.minimum_zone,
+            2.0 * LOBE,
+        );
+        ratios.add(
+            "through-hole, about least squares",
+            form.roundness.least_squares,
+            2.0 * LOBE,
+        );
         let blind = hole_at(&features, BLIND);
         let boss = features.iter().find(|f| f.kind == Kind::Boss).unwrap();
         for feature in [blind, boss] {
-            let Some(Form::Round(form)) = &feature.form else { panic!("{feature:?}") };
-            ratios.add(&format!("{}, roundness", feature.kind.name()), form.roundness.minimum_zone, 0.0);
+            let Some(Form::Round(form)) = &feature.form else {
+                panic!("{feature:?}")
+            };
+            ratios.add(
+                &format!("{}, roundness", feature.kind.name()),
+                form.roundness.minimum_zone,
+                0.0,
+            );
         }
         for plane in features.iter().filter(|f| f.kind == Kind::Plane) {
             if let Some(Form::Flat(form)) = &plane.form {
                 ratios.add(
-                    &format!("plane {:.1?}, flatness", plane.axis.as_ref().unwrap().value.as_slice()),
+                    &format!(
+                        "plane {:.1?}, flatness",
+                        plane.axis.as_ref().unwrap().value.as_slice()
+                    ),
                     form.flatness.minimum_zone,
                     0.0,
                 );
@@ -164,29 +235,53 @@ fn known_errors_of_form_and_orientation_are_found_within_their_uncertainty() {
         }
 
         let all = relations(&features);
-        let is_of = |r: &&Relation, kind: RelationKind, of: &Feature| r.kind == kind && r.of == of.id;
-        let square = |of: &Feature| all.iter().find(|r| is_of(r, RelationKind::Perpendicularity, of)).unwrap();
+        let is_of =
+            |r: &&Relation, kind: RelationKind, of: &Feature| r.kind == kind && r.of == of.id;
+        let square = |of: &Feature| {
+            all.iter()
+                .find(|r| is_of(r, RelationKind::Perpendicularity, of))
+                .unwrap()
+        };
         for (feature, lean) in [(through, 0.0), (blind, lean), (boss, 0.0)] {
             let relation = square(feature);
             let element = feature.element.as_ref().unwrap();
             let length = nalgebra::distance(&element.extent[0], &element.extent[1]);
             let name = feature.kind.name();
-            ratios.add(&format!("{name}, perpendicularity"), relation.zone.unwrap(), length * lean.sin());
+            ratios.add(
+                &format!("{name}, perpendicularity"),
+                relation.zone.unwrap(),
+                length * lean.sin(),
+            );
             let angle = relation.angle.unwrap();
-            let off = Estimate { value: std::f64::consts::FRAC_PI_2 - angle.value, ..angle };
+            let off = Estimate {
+                value: std::f64::consts::FRAC_PI_2 - angle.value,
+                ..angle
+            };
             ratios.add(&format!("{name}, off square"), off, lean);
             let is_seen = off.value > 2.0 * off.std;
-            assert!(is_seen || lean < LEANS[1], "the lean of {lean} rad was not seen");
+            assert!(
+                is_seen || lean < LEANS[1],
+                "the lean of {lean} rad was not seen"
+            );
         }
-        let is_between = |r: &&Relation| [r.of, r.to] == [through.id, boss.id] || [r.of, r.to] == [boss.id, through.id];
+        let is_between = |r: &&Relation| {
+            [r.of, r.to] == [through.id, boss.id] || [r.of, r.to] == [boss.id, through.id]
+        };
         let apart = all.iter().find(is_between).unwrap();
         assert_eq!(apart.kind, RelationKind::Distance);
-        ratios.add("through-hole from boss", apart.distance.unwrap(), f64::hypot(31e-3, 11e-3));
+        ratios.add(
+            "through-hole from boss",
+            apart.distance.unwrap(),
+            f64::hypot(31e-3, 11e-3),
+        );
         for step in all.iter().filter(|r| r.kind == RelationKind::Parallelism) {
             let is_level = |id: u32| {
-                features.iter().any(|f| f.id == id && f.axis.as_ref().unwrap().value.z > 0.9 && f.centre.value.z > 8e-3)
+                features.iter().any(|f| {
+                    f.id == id && f.axis.as_ref().unwrap().value.z > 0.9 && f.centre.value.z > 8e-3
+                })
             };
-            let heights = [step.of, step.to].map(|id| features.iter().find(|f| f.id == id).unwrap().centre.value.z);
+            let heights = [step.of, step.to]
+                .map(|id| features.iter().find(|f| f.id == id).unwrap().centre.value.z);
             // the faces at 9, 12 and 16 mm
             if is_level(step.of) && is_level(step.to) {
                 let truth = ((heights[0] - heights[1]) * 1e3).abs().round() * 1e-3;
@@ -197,11 +292,22 @@ fn known_errors_of_form_and_orientation_are_found_within_their_uncertainty() {
     }
     let count = ratios.0.len() as f64;
     let rms = (ratios.0.iter().map(|(_, ratio)| ratio * ratio).sum::<f64>() / count).sqrt();
-    println!("rms of error over uncertainty: {rms:.2} of {count}; {turned_away} of {} times turned away", 2 * seeds);
+    println!(
+        "rms of error over uncertainty: {rms:.2} of {count}; {turned_away} of {} times turned away",
+        2 * seeds
+    );
     for (name, ratio) in &ratios.0 {
-        assert!(ratio.abs() < 4.0, "{name} is off by {ratio} of its uncertainty");
+        assert!(
+            ratio.abs() < 4.0,
+            "{name} is off by {ratio} of its uncertainty"
+        );
     }
     assert!(rms < 1.5, "{rms}");
     // last, so that the others are seen
-    assert_eq!(turned_away, 0, "times of {} that the hand did not come into the blind hole", 2 * seeds);
+    assert_eq!(
+        turned_away,
+        0,
+        "times of {} that the hand did not come into the blind hole",
+        2 * seeds
+    );
 }

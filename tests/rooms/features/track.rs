@@ -17,12 +17,19 @@ fn touched_plate(seed: u64) -> (TriMesh, Vec<ProbedPoint>) {
     let contacts = contacts_of(stylus.radius, Some(stylus.stiffness), &stream.samples);
     contacts.iter().for_each(|contact| patcher.push(contact));
     patcher.flush();
-    let patched = patcher.patched(&stream.scan, &FaceTree::new(&stream.scan)).unwrap();
+    let patched = patcher
+        .patched(&stream.scan, &FaceTree::new(&stream.scan))
+        .unwrap();
     (patched.mesh, patcher.probed().to_vec())
 }
 
 fn sizes(features: &[Feature]) -> Vec<(u32, Kind, f64)> {
-    let size = |f: &Feature| f.diameter.as_ref().or(f.width.as_ref()).map(|size| (f.id, f.kind, size.value));
+    let size = |f: &Feature| {
+        f.diameter
+            .as_ref()
+            .or(f.width.as_ref())
+            .map(|size| (f.id, f.kind, size.value))
+    };
     features.iter().filter_map(size).collect()
 }
 
@@ -44,14 +51,33 @@ fn new_touches_are_in_the_numbers_at_once() {
     }
     // true sizes of the plate: 8 and 6 mm, a slot of 6 mm, a boss of 10 mm
     let after = sizes(tracker.features());
-    let true_mm = |mm: f64| [6.0, 8.0, 10.0].map(|truth: f64| (truth - mm).abs()).into_iter().fold(f64::MAX, f64::min);
+    let true_mm = |mm: f64| {
+        [6.0, 8.0, 10.0]
+            .map(|truth: f64| (truth - mm).abs())
+            .into_iter()
+            .fold(f64::MAX, f64::min)
+    };
     for (id, kind, size) in &after {
         if changed.contains(id) {
-            assert!(true_mm(size * 1e3) < 0.03, "{kind:?} {id}: {} mm", size * 1e3);
+            assert!(
+                true_mm(size * 1e3) < 0.03,
+                "{kind:?} {id}: {} mm",
+                size * 1e3
+            );
             let feature = tracker.features().iter().find(|f| f.id == *id).unwrap();
             assert_eq!(feature.fitted_to, FittedTo::Touches);
-            let latest = feature.diameter.as_ref().or(feature.width.as_ref()).unwrap().touches.last().copied();
-            assert!(latest.is_some_and(|touch| touch as usize >= early.len()), "the new touches are named");
+            let latest = feature
+                .diameter
+                .as_ref()
+                .or(feature.width.as_ref())
+                .unwrap()
+                .touches
+                .last()
+                .copied();
+            assert!(
+                latest.is_some_and(|touch| touch as usize >= early.len()),
+                "the new touches are named"
+            );
         }
     }
     assert_eq!(before.len(), after.len());
@@ -60,7 +86,12 @@ fn new_touches_are_in_the_numbers_at_once() {
     assert_eq!(whole.len(), after.len());
     for ((id, kind, size), (other_id, other_kind, other)) in whole.iter().zip(&after) {
         assert_eq!((id, kind), (other_id, other_kind));
-        assert!((size - other).abs() < 0.02e-3, "{kind:?} {id}: {} and {} mm", size * 1e3, other * 1e3);
+        assert!(
+            (size - other).abs() < 0.02e-3,
+            "{kind:?} {id}: {} and {} mm",
+            size * 1e3,
+            other * 1e3
+        );
     }
 }
 
@@ -72,10 +103,17 @@ fn nothing_new_changes_nothing() {
     let first = tracker.renew(&mesh, &tree, &touches).to_vec();
     assert!(tracker.update(&touches).is_empty());
     assert_eq!(tracker.features(), first);
-    assert!(tracker.update(&touches[..100]).is_empty(), "a stroke was undone");
+    assert!(
+        tracker.update(&touches[..100]).is_empty(),
+        "a stroke was undone"
+    );
     // numbers of touches mean others now, and some are beyond the last
     let others: Vec<ProbedPoint> = touches.iter().step_by(2).copied().collect();
     assert!(tracker.update(&others).is_empty());
     assert_eq!(tracker.features(), first);
-    assert_eq!(tracker.renew(&mesh, &tree, &touches), first, "the same, by the same numbers");
+    assert_eq!(
+        tracker.renew(&mesh, &tree, &touches),
+        first,
+        "the same, by the same numbers"
+    );
 }

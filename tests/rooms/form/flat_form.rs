@@ -12,7 +12,8 @@ const SIDES: [f64; 2] = [20e-3, 12e-3];
 /// A raster of 15 lines with noise that groups of ten points share.
 fn touched(seed: u64, height: impl Fn(f64, f64) -> f64) -> FlatForm {
     let mut rng = rand_pcg::Pcg64::seed_from_u64(seed);
-    let mut normal = |sigma: f64| -> f64 { sigma * Distribution::<f64>::sample(&StandardNormal, &mut rng) };
+    let mut normal =
+        |sigma: f64| -> f64 { sigma * Distribution::<f64>::sample(&StandardNormal, &mut rng) };
     let turned = Rotation3::from_euler_angles(0.3, -0.8, 1.7);
     let mut points = Vec::new();
     for line in 0..15 {
@@ -22,7 +23,11 @@ fn touched(seed: u64, height: impl Fn(f64, f64) -> f64) -> FlatForm {
             for i in 0..10 {
                 let x = SIDES[0] * (f64::from(group * 10 + i) / 99.5 - 1.0);
                 let z = height(x, y) + shared + normal(5e-6);
-                points.push(FormPoint { point: turned * Point3::new(x, y, z), sigma: 11e-6, group: line * 20 + group });
+                points.push(FormPoint {
+                    point: turned * Point3::new(x, y, z),
+                    sigma: 11e-6,
+                    group: line * 20 + group,
+                });
             }
         }
     }
@@ -34,8 +39,13 @@ fn touched(seed: u64, height: impl Fn(f64, f64) -> f64) -> FlatForm {
 fn flatness_is_off_by_its_uncertainty() {
     let saddle = |x: f64, y: f64| 25e-6 * x * y / (SIDES[0] * SIDES[1]);
     let bow = |x: f64, _: f64| 60e-6 * (x / SIDES[0]).powi(2);
-    let wave = |x: f64, y: f64| 20e-6 * (4.0 * x / SIDES[0]).sin() + 10e-6 * (2.0 * y / SIDES[1]).cos();
-    for (name, height) in [("saddle", &saddle as &dyn Fn(f64, f64) -> f64), ("bow", &bow), ("wave", &wave)] {
+    let wave =
+        |x: f64, y: f64| 20e-6 * (4.0 * x / SIDES[0]).sin() + 10e-6 * (2.0 * y / SIDES[1]).cos();
+    for (name, height) in [
+        ("saddle", &saddle as &dyn Fn(f64, f64) -> f64),
+        ("bow", &bow),
+        ("wave", &wave),
+    ] {
         let at = |i: i32, side: f64| side * f64::from(i) / 30.0;
         let places = (-30..=30).flat_map(|i| (-30..=30).map(move |j| (i, j)));
         let points: Vec<_> = places
@@ -64,7 +74,9 @@ fn flatness_is_off_by_its_uncertainty() {
 
 #[test]
 fn a_flat_wall_is_found_flat_to_its_uncertainty() {
-    let all: Vec<Estimate> = (0..60).map(|seed| touched(seed, |_, _| 0.0).flatness.minimum_zone).collect();
+    let all: Vec<Estimate> = (0..60)
+        .map(|seed| touched(seed, |_, _| 0.0).flatness.minimum_zone)
+        .collect();
     let inside = all.iter().filter(|e| e.value <= e.std).count();
     println!("{inside} of 60 contain 0; std {:.1} µm", all[0].std * 1e6);
     assert!(inside >= 57, "{inside} of 60");

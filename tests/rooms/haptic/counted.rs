@@ -37,12 +37,21 @@ impl Counts {
 
 /// Tries a property, which panics where it does not hold, on `cases` cases; prints and returns what they showed.
 #[track_caller]
-pub fn tried<S: Strategy>(name: &str, cases: u32, strategy: S, property: impl Fn(S::Value) -> Shown) -> Counts
+pub fn tried<S: Strategy>(
+    name: &str,
+    cases: u32,
+    strategy: S,
+    property: impl Fn(S::Value) -> Shown,
+) -> Counts
 where
     S::Value: Clone,
 {
     let counts = Cell::new(Counts::default());
-    let config = ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() };
+    let config = ProptestConfig {
+        cases,
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    };
     let outcome = TestRunner::new(config).run(&strategy, |case| {
         counts.set(counts.get().add(property(case)));
         Ok(())

@@ -12,7 +12,10 @@ use touchup::stylus::{Sample, Wrench};
 use crate::common::grid;
 use crate::soundness::intersections;
 
-const TIP: TipParams = TipParams { radius: 1.5e-3, stiffness: Some(2e4) };
+const TIP: TipParams = TipParams {
+    radius: 1.5e-3,
+    stiffness: Some(2e4),
+};
 /// The scan lies this much above the part, m.
 const ABOVE: f64 = 0.3e-3;
 /// Half the side of the touched square, m.
@@ -34,17 +37,37 @@ fn scan() -> TriMesh {
 fn samples() -> impl Iterator<Item = Sample> {
     let (lines, steps) = (16, 240);
     (0..lines * steps).map(move |i| {
-        let (line, along) = (i / steps, f64::from(i % steps) / f64::from(steps) * 2.0 * TOUCHED - TOUCHED);
+        let (line, along) = (
+            i / steps,
+            f64::from(i % steps) / f64::from(steps) * 2.0 * TOUCHED - TOUCHED,
+        );
         let x = if line % 2 == 0 { along } else { -along };
-        let pose_ot = Isometry3::translation(x, f64::from(line) * 0.4e-3 - TOUCHED, TIP.radius - 2.0 / 2e4);
-        let wrench = Wrench { force: Vector3::z() * 2.0, torque: Vector3::zeros() };
-        Sample { stamp_ns: i64::from(i) * 1_000_000, pose_ot, wrench }
+        let pose_ot = Isometry3::translation(
+            x,
+            f64::from(line) * 0.4e-3 - TOUCHED,
+            TIP.radius - 2.0 / 2e4,
+        );
+        let wrench = Wrench {
+            force: Vector3::z() * 2.0,
+            torque: Vector3::zeros(),
+        };
+        Sample {
+            stamp_ns: i64::from(i) * 1_000_000,
+            pose_ot,
+            wrench,
+        }
     })
 }
 
 /// The mesh that the haptic update alone makes of a scan, and how many vertices it moved at most at one sample.
 fn touched(scan: &TriMesh) -> (TriMesh, usize) {
-    let mut engine = Engine::new(scan.clone(), RefineParams::robust(TIP), None, Renewal::AtEnd).unwrap();
+    let mut engine = Engine::new(
+        scan.clone(),
+        RefineParams::robust(TIP),
+        None,
+        Renewal::AtEnd,
+    )
+    .unwrap();
     let mut most = 0;
     for sample in samples() {
         engine.push(&sample).unwrap();
@@ -72,11 +95,25 @@ fn a_dense_scan_goes_where_it_was_touched_and_keeps_its_texture() {
     let coarse = grid(21, 0.76e-3, |_, _| ABOVE);
     let of_coarse = left(&coarse, &touched(&coarse).0, |_, _| 0.0);
     let of_dense = left(&scan, &mesh, texture);
-    println!("{} mm off the part, a coarse scan {} mm", of_dense * 1e3, of_coarse * 1e3);
-    assert!(of_dense < of_coarse + HEIGHT / 2.0, "{of_dense} m, on a coarse scan {of_coarse} m");
+    println!(
+        "{} mm off the part, a coarse scan {} mm",
+        of_dense * 1e3,
+        of_coarse * 1e3
+    );
+    assert!(
+        of_dense < of_coarse + HEIGHT / 2.0,
+        "{of_dense} m, on a coarse scan {of_coarse} m"
+    );
     for (before, after) in scan.positions().iter().zip(mesh.positions()) {
-        let (from_middle, aside) = (before.x.abs().max(before.y.abs()), (after - before).xy().norm());
-        assert!(aside < 0.05e-3, "{before} went {} mm to the side", aside * 1e3);
+        let (from_middle, aside) = (
+            before.x.abs().max(before.y.abs()),
+            (after - before).xy().norm(),
+        );
+        assert!(
+            aside < 0.05e-3,
+            "{before} went {} mm to the side",
+            aside * 1e3
+        );
         if from_middle > TOUCHED + TIP.radius + 2e-3 {
             assert_eq!(before, after, "nothing was touched here");
         }
@@ -94,19 +131,40 @@ fn the_paper_takes_every_face_as_it_is() {
 /// The largest distance of a vertex that a face uses from another mesh, m, where it is within `TOUCHED` of the middle.
 fn farthest(from: &TriMesh, to: &TriMesh) -> f64 {
     let tree = FaceTree::new(to);
-    let used = (0..from.vertex_slots() as u32).map(VertexId).filter(|&v| !from.star(v).is_empty());
-    let near = used.map(|v| from.position(v)).filter(|p| p.x.abs().max(p.y.abs()) < TOUCHED);
-    let off = |p: Point3<f64>| tree.closest(to, &p, 1.0).map_or(1.0, |hit| hit.distance_squared.sqrt());
+    let used = (0..from.vertex_slots() as u32)
+        .map(VertexId)
+        .filter(|&v| !from.star(v).is_empty());
+    let near = used
+        .map(|v| from.position(v))
+        .filter(|p| p.x.abs().max(p.y.abs()) < TOUCHED);
+    let off = |p: Point3<f64>| {
+        tree.closest(to, &p, 1.0)
+            .map_or(1.0, |hit| hit.distance_squared.sqrt())
+    };
     near.map(off).fold(0.0, f64::max)
 }
 
 /// An engine with a live patch and a mesh to look at.
 fn watched(scan: &TriMesh) -> Engine {
     let patch = PatcherParams::new(TIP.radius, TIP.stiffness, 0.1e-3);
-    let pace = Pace { is_patient: true, ..Pace::default() };
+    let pace = Pace {
+        is_patient: true,
+        ..Pace::default()
+    };
     let shared = Arc::new((scan.clone(), FaceTree::new(scan)));
-    let renewal = Renewal::Beside { scan: shared, pace, room: 1 << 14, gate: Gate::default() };
-    let mut engine = Engine::new(scan.clone(), RefineParams::robust(TIP), Some(patch), renewal).unwrap();
+    let renewal = Renewal::Beside {
+        scan: shared,
+        pace,
+        room: 1 << 14,
+        gate: Gate::default(),
+    };
+    let mut engine = Engine::new(
+        scan.clone(),
+        RefineParams::robust(TIP),
+        Some(patch),
+        renewal,
+    )
+    .unwrap();
     engine.watch();
     engine
 }
@@ -140,7 +198,10 @@ fn a_dense_scan_at_rest_is_shown_as_it_is_saved() {
             engine.catch_up().unwrap();
             while !engine.take_changes(1 << 20, &mut changes).unwrap() {}
         }
-        assert!(triangles(rested.mesh()) == triangles(other.mesh()), "sample {i}: the rest before left a trace");
+        assert!(
+            triangles(rested.mesh()) == triangles(other.mesh()),
+            "sample {i}: the rest before left a trace"
+        );
         while !rested.settle().unwrap() {
             std::thread::yield_now();
         }
@@ -151,10 +212,22 @@ fn a_dense_scan_at_rest_is_shown_as_it_is_saved() {
         let mut saved = rested.copy_patcher().unwrap().unwrap().recv().unwrap();
         saved.flush();
         let patched = saved.patched(&scan, &FaceTree::new(&scan)).unwrap();
-        assert!(triangles(rested.mesh()) == triangles(&patched.mesh), "sample {i}: not what is saved");
+        assert!(
+            triangles(rested.mesh()) == triangles(&patched.mesh),
+            "sample {i}: not what is saved"
+        );
         let shown = (0..rested.mesh().vertex_slots() as u32).map(VertexId);
-        let shown = shown.filter(|&v| rested.support(&scan, v) == Support::Touched).count();
-        assert_eq!(shown, patched.support.iter().filter(|&&support| support == Support::Touched).count());
+        let shown = shown
+            .filter(|&v| rested.support(&scan, v) == Support::Touched)
+            .count();
+        assert_eq!(
+            shown,
+            patched
+                .support
+                .iter()
+                .filter(|&&support| support == Support::Touched)
+                .count()
+        );
     }
     assert!(rests > 2, "{rests} rests");
 }
@@ -174,23 +247,41 @@ fn a_dense_scan_is_shown_with_its_own_faces_and_those_of_the_patch() {
     engine.catch_up().unwrap();
     while !engine.take_changes(200, &mut changes).unwrap() {}
     let (shown, working) = (engine.mesh(), engine.refiner().mesh());
-    assert!(working.face_count() < scan.face_count() / 5, "{}", working.face_count());
+    assert!(
+        working.face_count() < scan.face_count() / 5,
+        "{}",
+        working.face_count()
+    );
     // the texture, and how far coarse faces of the scan are off it
     let [there, back] = [farthest(shown, working), farthest(working, shown)];
-    assert!(there < 3.0 * HEIGHT && back < 3.0 * HEIGHT, "{there} {back}");
+    assert!(
+        there < 3.0 * HEIGHT && back < 3.0 * HEIGHT,
+        "{there} {back}"
+    );
     let mut gone = 0;
     for (face, corners) in scan.faces() {
-        let from_middle =
-            corners.map(|v| scan.position(v)).iter().map(|p| p.x.abs().max(p.y.abs())).fold(0.0, f64::max);
+        let from_middle = corners
+            .map(|v| scan.position(v))
+            .iter()
+            .map(|p| p.x.abs().max(p.y.abs()))
+            .fold(0.0, f64::max);
         let is_there = shown.has_face(face) && shown.corners(face) == corners;
         gone += usize::from(!is_there);
         if from_middle > TOUCHED + TIP.radius + 3e-3 {
-            assert!(is_there && corners.iter().all(|&v| shown.position(v) == scan.position(v)), "{face:?}");
+            assert!(
+                is_there
+                    && corners
+                        .iter()
+                        .all(|&v| shown.position(v) == scan.position(v)),
+                "{face:?}"
+            );
         }
     }
     // a square of 6 mm has 7200 faces of this scan
     assert!(gone > 5000, "{gone} faces of the scan are hidden");
     let touched = (0..shown.vertex_slots() as u32).map(VertexId);
-    let touched = touched.filter(|&v| engine.support(&scan, v) == Support::Touched).count();
+    let touched = touched
+        .filter(|&v| engine.support(&scan, v) == Support::Touched)
+        .count();
     assert!(touched > 100, "{touched} vertices shown as touched");
 }

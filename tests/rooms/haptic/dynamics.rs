@@ -5,15 +5,24 @@ use std::f64::consts::PI;
 
 use nalgebra::{Point3, Rotation3, Vector3};
 use proptest::prelude::*;
-use touchup::haptic::{Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule};
+use touchup::haptic::{
+    Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule,
+};
 use touchup::sim::coupled::GuidedStylus;
 
 use super::counted::{Shown, tried};
 
 const H_MIN: f64 = 0.5e-3;
 const F_MAX: f64 = 10.0;
-const SIGMOID: ContactModel = ContactModel::Sigmoid { f_max_n: F_MAX, h_min_m: H_MIN, delta: 5.0 };
-const UP: FaceState = FaceState { b: Point3::new(0.0, 0.0, 0.0), n: Vector3::new(0.0, 0.0, 1.0) };
+const SIGMOID: ContactModel = ContactModel::Sigmoid {
+    f_max_n: F_MAX,
+    h_min_m: H_MIN,
+    delta: 5.0,
+};
+const UP: FaceState = FaceState {
+    b: Point3::new(0.0, 0.0, 0.0),
+    n: Vector3::new(0.0, 0.0, 1.0),
+};
 
 fn paper(alpha: f64, beta: f64) -> DynamicsParams {
     DynamicsParams {
@@ -26,8 +35,17 @@ fn paper(alpha: f64, beta: f64) -> DynamicsParams {
     }
 }
 
-fn step(params: DynamicsParams, face: &FaceState, p: Point3<f64>, force: Vector3<f64>, dt: f64) -> FaceState {
-    FaceDynamics::new(params).unwrap().step(face, &p, &force, dt).unwrap()
+fn step(
+    params: DynamicsParams,
+    face: &FaceState,
+    p: Point3<f64>,
+    force: Vector3<f64>,
+    dt: f64,
+) -> FaceState {
+    FaceDynamics::new(params)
+        .unwrap()
+        .step(face, &p, &force, dt)
+        .unwrap()
 }
 
 fn above(u: f64) -> Point3<f64> {
@@ -44,13 +62,22 @@ fn angle(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
 
 #[track_caller]
 fn assert_near(value: f64, expected: f64, tolerance: f64) {
-    assert!((value - expected).abs() <= tolerance, "{value} is not {expected} within {tolerance}");
+    assert!(
+        (value - expected).abs() <= tolerance,
+        "{value} is not {expected} within {tolerance}"
+    );
 }
 
 #[test]
 fn without_force_u_plus_its_exponential_grows_with_time() {
     let params = paper(0.1, 0.0);
-    for (from, to) in [(-30.0, -29.0), (-3.0, 2.0), (0.0, 0.001), (1.0, 6.0), (8.0, 8.1)] {
+    for (from, to) in [
+        (-30.0, -29.0),
+        (-3.0, 2.0),
+        (0.0, 0.001),
+        (1.0, 6.0),
+        (8.0, 8.1),
+    ] {
         let (from, to): (f64, f64) = (from, to);
         let scaled = to + to.exp() - from - from.exp();
         let dt = scaled * H_MIN / (0.1 * F_MAX);
@@ -67,7 +94,9 @@ fn at_half_of_f_max_the_flow_is_a_hyperbolic_sine() {
     let to = 2.0 * ((from / 2.0).sinh() * (-scaled / 4.0).exp()).asinh();
     let dt = scaled * H_MIN / (0.1 * F_MAX);
     for sign in [1.0, -1.0] {
-        let moved = step(paper(0.1, 0.0), &UP, above(sign * from), press(5.0), dt).b.z;
+        let moved = step(paper(0.1, 0.0), &UP, above(sign * from), press(5.0), dt)
+            .b
+            .z;
         assert_near(moved / -H_MIN, sign * (to - from), 1e-14);
     }
 }
@@ -78,11 +107,21 @@ fn rigid_contact_leaves_the_paper_off_by_1_81_mm_and_the_robust_rule_on_the_surf
     let bias = 0.5e-3 * (5.0 - 4f64.ln());
     assert_near(bias, 1.81e-3, 5e-6);
     let tip = Point3::origin();
-    assert_near(step(paper(0.1, 0.1), &UP, tip, press(2.0), 1e6).b.z, bias, 1e-17);
+    assert_near(
+        step(paper(0.1, 0.1), &UP, tip, press(2.0), 1e6).b.z,
+        bias,
+        1e-17,
+    );
     assert_near(SIGMOID.rigid_offset(2.0), -bias, 1e-17);
-    let robust = DynamicsParams { take_out_rigid_offset: true, ..paper(0.1, 0.1) };
+    let robust = DynamicsParams {
+        take_out_rigid_offset: true,
+        ..paper(0.1, 0.1)
+    };
     for force_n in [0.0, 0.01, 2.0, 9.9, 10.0, 11.0, 1e9] {
-        let low = FaceState { b: Point3::new(0.0, 0.0, -1e-3), ..UP };
+        let low = FaceState {
+            b: Point3::new(0.0, 0.0, -1e-3),
+            ..UP
+        };
         assert_near(step(robust, &low, tip, press(force_n), 1e6).b.z, 0.0, 1e-17);
     }
     assert!(!SIGMOID.clamps(9.89) && SIGMOID.clamps(9.91) && SIGMOID.rigid_offset(1e9).is_finite());
@@ -92,7 +131,11 @@ fn rigid_contact_leaves_the_paper_off_by_1_81_mm_and_the_robust_rule_on_the_surf
 fn beyond_f_max_the_face_escapes_at_constant_speed() {
     // at u = −60 the face answers f_max to rounding: 12 N drive it at α · 2 N
     let params = paper(0.1, 0.0);
-    assert_near(step(params, &UP, above(-60.0), press(12.0), 3.0).b.z, 0.1 * 2.0 * 3.0, 1e-15);
+    assert_near(
+        step(params, &UP, above(-60.0), press(12.0), 3.0).b.z,
+        0.1 * 2.0 * 3.0,
+        1e-15,
+    );
     // at f_max exactly it creeps: e^−u grows as T
     let scaled = 100.0;
     let dt = scaled * H_MIN / (0.1 * F_MAX);
@@ -107,7 +150,15 @@ fn beyond_f_max_the_face_escapes_at_constant_speed() {
 fn a_pull_many_times_f_max_moves_the_face_away_at_its_own_rate() {
     // u grows from 13.85 by |c| T = 963 and by less than e^−13.85 T more
     let (u, c, scaled): (f64, f64, f64) = (13.85, -62.4, 15.43);
-    let moved = step(paper(0.1, 0.0), &UP, above(u), press(c * F_MAX), scaled * H_MIN / (0.1 * F_MAX)).b.z / -H_MIN;
+    let moved = step(
+        paper(0.1, 0.0),
+        &UP,
+        above(u),
+        press(c * F_MAX),
+        scaled * H_MIN / (0.1 * F_MAX),
+    )
+    .b
+    .z / -H_MIN;
     let more = moved + c * scaled;
     // ∫ e^−u dT with u growing at |c|; six roundings of 963
     assert_near(more, (-u).exp() / -c, 6.0 * 963.0 * f64::EPSILON);
@@ -115,9 +166,22 @@ fn a_pull_many_times_f_max_moves_the_face_away_at_its_own_rate() {
 
 #[test]
 fn a_spring_halves_its_distance_to_rest() {
-    let params = DynamicsParams { model: ContactModel::Spring { stiffness_n_per_m: 1e4 }, ..paper(0.1, 0.0) };
+    let params = DynamicsParams {
+        model: ContactModel::Spring {
+            stiffness_n_per_m: 1e4,
+        },
+        ..paper(0.1, 0.0)
+    };
     // rest at h = −F/k = −0.2 mm, from h = 1 mm; half after ln 2/(α k)
-    let moved = step(params, &UP, Point3::new(0.0, 0.0, 1e-3), press(2.0), 2f64.ln() / 1e3).b.z;
+    let moved = step(
+        params,
+        &UP,
+        Point3::new(0.0, 0.0, 1e-3),
+        press(2.0),
+        2f64.ln() / 1e3,
+    )
+    .b
+    .z;
     assert_near(moved, 0.6e-3, 1e-18);
 }
 
@@ -142,7 +206,11 @@ fn opposite_force_and_no_force_do_not_turn_and_a_long_one_turns_fully() {
     assert_eq!(step(params, &UP, deep, press(-2.0), 1e9).n, UP.n);
     assert_eq!(step(params, &UP, deep, Vector3::zeros(), 1e9).n, UP.n);
     let nearly = Vector3::new(1e-12, 0.0, -1.0);
-    assert_near((step(params, &UP, deep, nearly, 1e9).n - nearly).norm(), 0.0, 1e-15);
+    assert_near(
+        (step(params, &UP, deep, nearly, 1e9).n - nearly).norm(),
+        0.0,
+        1e-15,
+    );
 }
 
 #[test]
@@ -150,37 +218,92 @@ fn bad_input_is_named() {
     let dynamics = FaceDynamics::new(paper(0.1, 0.1)).unwrap();
     let refused = |face: FaceState, p, force, dt| dynamics.step(&face, &p, &force, dt).unwrap_err();
     let nan = Vector3::new(0.0, f64::NAN, 0.0);
-    assert_eq!(refused(UP, Point3::from(nan), press(1.0), 1.0), DynamicsError::NotFinite { what: "p" });
-    assert_eq!(refused(UP, Point3::origin(), nan, 1.0), DynamicsError::NotFinite { what: "force" });
     assert_eq!(
-        refused(FaceState { n: nan, ..UP }, Point3::origin(), press(1.0), 1.0),
+        refused(UP, Point3::from(nan), press(1.0), 1.0),
+        DynamicsError::NotFinite { what: "p" }
+    );
+    assert_eq!(
+        refused(UP, Point3::origin(), nan, 1.0),
+        DynamicsError::NotFinite { what: "force" }
+    );
+    assert_eq!(
+        refused(
+            FaceState { n: nan, ..UP },
+            Point3::origin(),
+            press(1.0),
+            1.0
+        ),
         DynamicsError::NotFinite { what: "n" }
     );
     assert_eq!(
-        refused(FaceState { n: press(2.0), ..UP }, Point3::origin(), press(1.0), 1.0),
+        refused(
+            FaceState {
+                n: press(2.0),
+                ..UP
+            },
+            Point3::origin(),
+            press(1.0),
+            1.0
+        ),
         DynamicsError::NotUnit { length: 2.0 }
     );
-    assert_eq!(refused(UP, Point3::origin(), press(1.0), -1.0), DynamicsError::BadTimeStep { dt_s: -1.0 });
+    assert_eq!(
+        refused(UP, Point3::origin(), press(1.0), -1.0),
+        DynamicsError::BadTimeStep { dt_s: -1.0 }
+    );
     let bad = |params| FaceDynamics::new(params).unwrap_err().to_string();
     assert!(bad(paper(-1.0, 0.1)).contains("alpha_m_per_n_s is -1"));
     assert!(
-        bad(DynamicsParams { model: ContactModel::Spring { stiffness_n_per_m: 0.0 }, ..paper(0.1, 0.1) })
-            .contains("k_n_per_m")
+        bad(DynamicsParams {
+            model: ContactModel::Spring {
+                stiffness_n_per_m: 0.0
+            },
+            ..paper(0.1, 0.1)
+        })
+        .contains("k_n_per_m")
     );
 }
 
 #[test]
 fn the_explicit_solver_gives_up_on_stiff_steps() {
-    let params = DynamicsParams { rule: StepRule::DormandPrince, ..paper(1e6, 0.1) };
-    let refused = FaceDynamics::new(params).unwrap().step(&UP, &above(0.0), &Vector3::new(1.0, 0.0, 2.0), 1.0);
-    assert!(matches!(refused, Err(DynamicsError::Stiff { .. })), "{refused:?}");
+    let params = DynamicsParams {
+        rule: StepRule::DormandPrince,
+        ..paper(1e6, 0.1)
+    };
+    let refused = FaceDynamics::new(params).unwrap().step(
+        &UP,
+        &above(0.0),
+        &Vector3::new(1.0, 0.0, 2.0),
+        1.0,
+    );
+    assert!(
+        matches!(refused, Err(DynamicsError::Stiff { .. })),
+        "{refused:?}"
+    );
 }
 
 /// Distance in units of h_min plus angle after 40 ms in `steps` steps, against the tight explicit solver.
 fn error_after(rule: StepRule, along: Along, offset: bool, steps: u32) -> f64 {
-    let params = DynamicsParams { rule, along, take_out_rigid_offset: offset, ..paper(0.05, 2.0) };
-    let (p, force) = (Point3::new(0.3e-3, -0.2e-3, -0.5e-3), Vector3::new(0.9, -0.4, 2.0));
-    let reference = step(DynamicsParams { rule: StepRule::DormandPrince, ..params }, &UP, p, force, 0.0);
+    let params = DynamicsParams {
+        rule,
+        along,
+        take_out_rigid_offset: offset,
+        ..paper(0.05, 2.0)
+    };
+    let (p, force) = (
+        Point3::new(0.3e-3, -0.2e-3, -0.5e-3),
+        Vector3::new(0.9, -0.4, 2.0),
+    );
+    let reference = step(
+        DynamicsParams {
+            rule: StepRule::DormandPrince,
+            ..params
+        },
+        &UP,
+        p,
+        force,
+        0.0,
+    );
     assert_eq!(reference, UP);
     let mut face = UP;
     // the direction a must stay that of the first step for the comparison: only `Force` is the same ODE throughout
@@ -189,7 +312,16 @@ fn error_after(rule: StepRule, along: Along, offset: bool, steps: u32) -> f64 {
     }
     let mut exact = UP;
     for _ in 0..4 {
-        exact = step(DynamicsParams { rule: StepRule::DormandPrince, ..params }, &exact, p, force, 0.01);
+        exact = step(
+            DynamicsParams {
+                rule: StepRule::DormandPrince,
+                ..params
+            },
+            &exact,
+            p,
+            force,
+            0.01,
+        );
     }
     (face.b - exact.b).norm() / H_MIN + angle(&face.n, &exact.n)
 }
@@ -208,13 +340,33 @@ fn lie_is_first_order_and_corrected_second() {
 
 #[test]
 fn the_corrected_step_stays_accurate_when_stiff() {
-    let model = ContactModel::Sigmoid { f_max_n: F_MAX, h_min_m: 1e-6, delta: 5.0 };
-    let params = |rule| DynamicsParams { model, rule, along: Along::Force, ..paper(0.1, 0.1) };
-    let (p, force) = (Point3::new(1e-3, 0.5e-3, -0.2e-3), Vector3::new(0.5, 0.3, 2.0));
-    let [lie, corrected, exact] = [StepRule::Lie, StepRule::DriftCorrected, StepRule::DormandPrince]
-        .map(|r| step(params(r), &UP, p, force, 5e-3));
+    let model = ContactModel::Sigmoid {
+        f_max_n: F_MAX,
+        h_min_m: 1e-6,
+        delta: 5.0,
+    };
+    let params = |rule| DynamicsParams {
+        model,
+        rule,
+        along: Along::Force,
+        ..paper(0.1, 0.1)
+    };
+    let (p, force) = (
+        Point3::new(1e-3, 0.5e-3, -0.2e-3),
+        Vector3::new(0.5, 0.3, 2.0),
+    );
+    let [lie, corrected, exact] = [
+        StepRule::Lie,
+        StepRule::DriftCorrected,
+        StepRule::DormandPrince,
+    ]
+    .map(|r| step(params(r), &UP, p, force, 5e-3));
     let error = |face: &FaceState| (face.b - exact.b).norm();
-    println!("5 ms at h_min 1e-3 mm: lie {:.1e} m, corrected {:.1e} m", error(&lie), error(&corrected));
+    println!(
+        "5 ms at h_min 1e-3 mm: lie {:.1e} m, corrected {:.1e} m",
+        error(&lie),
+        error(&corrected)
+    );
     assert!(error(&corrected) < 1e-9 && error(&lie) > 1e-8);
 }
 
@@ -228,13 +380,20 @@ fn unit() -> impl Strategy<Value = Vector3<f64>> {
 fn params() -> impl Strategy<Value = DynamicsParams> {
     let rule = prop_oneof![Just(StepRule::Lie), Just(StepRule::DriftCorrected)];
     let along = prop_oneof![Just(Along::InitialNormal), Just(Along::Force)];
-    let model = prop_oneof![Just(SIGMOID), Just(ContactModel::Spring { stiffness_n_per_m: 1e3 })];
-    (rule, along, model, any::<bool>()).prop_map(|(rule, along, model, take_out_rigid_offset)| DynamicsParams {
-        rule,
-        along,
-        model,
-        take_out_rigid_offset,
-        ..paper(0.1, 0.1)
+    let model = prop_oneof![
+        Just(SIGMOID),
+        Just(ContactModel::Spring {
+            stiffness_n_per_m: 1e3
+        })
+    ];
+    (rule, along, model, any::<bool>()).prop_map(|(rule, along, model, take_out_rigid_offset)| {
+        DynamicsParams {
+            rule,
+            along,
+            model,
+            take_out_rigid_offset,
+            ..paper(0.1, 0.1)
+        }
     })
 }
 
@@ -303,29 +462,77 @@ struct Sizes {
 }
 
 fn sizes(reach: f64) -> impl Strategy<Value = Sizes> {
-    let powers = prop::array::uniform7(-1.0..1.0f64).prop_map(move |shares| shares.map(|x| (reach * x).min(300.0)));
-    (powers, -1e9..1e9, any::<bool>()).prop_map(|(exponents, delta, spring)| Sizes { exponents, delta, spring })
+    let powers = prop::array::uniform7(-1.0..1.0f64)
+        .prop_map(move |shares| shares.map(|x| (reach * x).min(300.0)));
+    (powers, -1e9..1e9, any::<bool>()).prop_map(|(exponents, delta, spring)| Sizes {
+        exponents,
+        delta,
+        spring,
+    })
 }
 
 /// Finite and of length 1, turned in the plane of n and F, and no farther than α (|F| + f_max) t where a sigmoid expects f_max at the
 /// most.
-fn check_extremes(sizes: &Sizes, [n, f, side]: [Vector3<f64>; 3], params: DynamicsParams, may_overflow: bool) -> Shown {
-    let Sizes { exponents, delta, spring } = *sizes;
-    let [h_min_m, f_max_n, alpha_m_per_n_s, beta_per_n2_s, dt, size, far] = exponents.map(|x| 10f64.powf(x));
+fn check_extremes(
+    sizes: &Sizes,
+    [n, f, side]: [Vector3<f64>; 3],
+    params: DynamicsParams,
+    may_overflow: bool,
+) -> Shown {
+    let Sizes {
+        exponents,
+        delta,
+        spring,
+    } = *sizes;
+    let [
+        h_min_m,
+        f_max_n,
+        alpha_m_per_n_s,
+        beta_per_n2_s,
+        dt,
+        size,
+        far,
+    ] = exponents.map(|x| 10f64.powf(x));
     let model = if spring {
-        ContactModel::Spring { stiffness_n_per_m: h_min_m }
+        ContactModel::Spring {
+            stiffness_n_per_m: h_min_m,
+        }
     } else {
-        ContactModel::Sigmoid { f_max_n, h_min_m, delta }
+        ContactModel::Sigmoid {
+            f_max_n,
+            h_min_m,
+            delta,
+        }
     };
-    let params = DynamicsParams { model, alpha_m_per_n_s, beta_per_n2_s, ..params };
-    let face = FaceState { b: Point3::origin(), n };
+    let params = DynamicsParams {
+        model,
+        alpha_m_per_n_s,
+        beta_per_n2_s,
+        ..params
+    };
+    let face = FaceState {
+        b: Point3::origin(),
+        n,
+    };
     let (mut shown, mut refused) = (false, false);
-    for force in [size * f, f_max_n * f, f_max_n * n, -size * n, Vector3::zeros()] {
+    for force in [
+        size * f,
+        f_max_n * f,
+        f_max_n * n,
+        -size * n,
+        Vector3::zeros(),
+    ] {
         for p in [Point3::from(far * side), Point3::origin()] {
-            let Ok(after) = FaceDynamics::new(params).unwrap().step(&face, &p, &force, dt) else {
+            let Ok(after) = FaceDynamics::new(params)
+                .unwrap()
+                .step(&face, &p, &force, dt)
+            else {
                 // a spring that is drawn away from its rest goes there as e^αkt: only that is beyond the largest number
                 let is_away = spring && alpha_m_per_n_s * h_min_m * dt > 300.0;
-                assert!(is_away || may_overflow, "{sizes:?} with {params:?} is refused");
+                assert!(
+                    is_away || may_overflow,
+                    "{sizes:?} with {params:?} is refused"
+                );
                 refused = true;
                 continue;
             };
@@ -337,7 +544,11 @@ fn check_extremes(sizes: &Sizes, [n, f, side]: [Vector3<f64>; 3], params: Dynami
             let farthest = alpha_m_per_n_s * (force.norm() + f_max_n) * dt * (1.0 + 1e-9);
             // of sizes of which nothing underflows
             let is_bounded = !spring && params.rule == StepRule::Lie && !may_overflow;
-            assert!(!is_bounded || after.b.coords.norm() <= farthest, "{:?} farther than {farthest:e}", after.b);
+            assert!(
+                !is_bounded || after.b.coords.norm() <= farthest,
+                "{:?} farther than {farthest:e}",
+                after.b
+            );
             shown |= after.b != face.b || after.n != face.n;
         }
     }
@@ -352,24 +563,46 @@ fn check_extremes(sizes: &Sizes, [n, f, side]: [Vector3<f64>; 3], params: Dynami
 fn extremes_give_a_unit_normal_or_an_error() {
     let cases = |reach| (sizes(reach), [unit(), unit(), unit()], params());
     // the largest product is (α f_max t / h_min) of 10^120
-    let counts = tried("sizes of 1e-25 to 1e25", 2048, cases(25.0), |(sizes, directions, params)| {
-        check_extremes(&sizes, directions, params, false)
-    });
+    let counts = tried(
+        "sizes of 1e-25 to 1e25",
+        2048,
+        cases(25.0),
+        |(sizes, directions, params)| check_extremes(&sizes, directions, params, false),
+    );
     assert!(counts.values > 1500, "{counts:?}");
     // as far as numbers go: a product of four sizes may be as far from 1 as 10^100, and what is refused is one of those
-    let counts = tried("sizes of 1e-300 to 1e300", 2048, cases(300.0), |(sizes, directions, params)| {
-        let mut powers = sizes.exponents.map(f64::abs);
-        powers.sort_by(f64::total_cmp);
-        check_extremes(&sizes, directions, params, powers[3..].iter().sum::<f64>() > 100.0)
-    });
+    let counts = tried(
+        "sizes of 1e-300 to 1e300",
+        2048,
+        cases(300.0),
+        |(sizes, directions, params)| {
+            let mut powers = sizes.exponents.map(f64::abs);
+            powers.sort_by(f64::total_cmp);
+            check_extremes(
+                &sizes,
+                directions,
+                params,
+                powers[3..].iter().sum::<f64>() > 100.0,
+            )
+        },
+    );
     assert!(counts.values > 200, "{counts:?}");
 }
 
 /// A face in a saturated model goes at one of two speeds, −c where nothing is expected (u > 0) and 1 − c where f_max is (u < 0),
 /// until it is at u = 0, or for ever: by as much as the bend is wide, |ln| of the smallest number of c and 1 − c, it is not there.
 fn check_saturated(u: f64, c: f64, scaled: f64, rule: StepRule) -> Shown {
-    let params = DynamicsParams { rule, ..paper(0.1, 0.1) };
-    let after = step(params, &UP, above(u), press(c * F_MAX), scaled * H_MIN / (0.1 * F_MAX));
+    let params = DynamicsParams {
+        rule,
+        ..paper(0.1, 0.1)
+    };
+    let after = step(
+        params,
+        &UP,
+        above(u),
+        press(c * F_MAX),
+        scaled * H_MIN / (0.1 * F_MAX),
+    );
     let speed = |u: f64| if u > 0.0 { -c } else { 1.0 - c };
     let to_bend = -u / speed(u);
     let free = speed(u) * scaled;
@@ -378,24 +611,39 @@ fn check_saturated(u: f64, c: f64, scaled: f64, rule: StepRule) -> Shown {
     } else {
         // at the bend it is at rest, or goes on at the other speed
         let beyond = speed(-u);
-        -u + if (beyond > 0.0) == (speed(u) > 0.0) { beyond * (scaled - to_bend) } else { 0.0 }
+        -u + if (beyond > 0.0) == (speed(u) > 0.0) {
+            beyond * (scaled - to_bend)
+        } else {
+            0.0
+        }
     };
     let width = 40.0 + c.abs().min((1.0 - c).abs()).ln().abs();
     // where it goes on, the bend also costs time: as much as it is wide at the slower of both speeds
-    let delay = width * (1.0 + speed(-u).abs().max(speed(u).abs()) / speed(-u).abs().min(speed(u).abs()));
+    let delay =
+        width * (1.0 + speed(-u).abs().max(speed(u).abs()) / speed(-u).abs().min(speed(u).abs()));
     let tolerance = delay + 1e-12 * (u.abs() + moved.abs());
     let found = after.b.z / -H_MIN;
-    assert!((found - moved).abs() <= tolerance, "{found} {moved} ± {tolerance} from {u} at {c} after {scaled}");
-    if tolerance < 1e-2 * moved.abs() { Shown::Value } else { Shown::Little }
+    assert!(
+        (found - moved).abs() <= tolerance,
+        "{found} {moved} ± {tolerance} from {u} at {c} after {scaled}"
+    );
+    if tolerance < 1e-2 * moved.abs() {
+        Shown::Value
+    } else {
+        Shown::Little
+    }
 }
 
 #[test]
 fn saturated_depths_and_long_times_go_at_the_speeds_of_both_ends() {
     let rule = prop_oneof![Just(StepRule::Lie), Just(StepRule::DriftCorrected)];
     let scaled = (3.0..15.0f64).prop_map(|x| 10f64.powf(x));
-    let counts = tried("saturated", 4096, (-1e9..1e9, -3.0..3.0f64, scaled, rule), |(u, c, scaled, rule)| {
-        check_saturated(u, c, scaled, rule)
-    });
+    let counts = tried(
+        "saturated",
+        4096,
+        (-1e9..1e9, -3.0..3.0f64, scaled, rule),
+        |(u, c, scaled, rule)| check_saturated(u, c, scaled, rule),
+    );
     assert!(counts.values > 3000, "{counts:?}");
 }
 
@@ -414,9 +662,21 @@ fn shares() -> impl Strategy<Value = f64> {
 /// Two flows of a share of the time each are the one of all of it; and each travel lies between the rates of its ends, f by
 /// f_max e^(−u/2) / (2 cosh(u/2)), as h moves monotonically and f falls with h.
 fn check_sum(u: f64, c: f64, t: f64, first: f64, tilted: bool) -> Shown {
-    let model = ContactModel::Sigmoid { f_max_n: 1.0, h_min_m: 1.0, delta: 0.0 };
-    let along = if tilted { Along::Force } else { Along::InitialNormal };
-    let params = DynamicsParams { model, along, ..paper(1.0, 0.0) };
+    let model = ContactModel::Sigmoid {
+        f_max_n: 1.0,
+        h_min_m: 1.0,
+        delta: 0.0,
+    };
+    let along = if tilted {
+        Along::Force
+    } else {
+        Along::InitialNormal
+    };
+    let params = DynamicsParams {
+        model,
+        along,
+        ..paper(1.0, 0.0)
+    };
     let flow = |face: &FaceState, u, grow: f64, t: f64| {
         let force = grow * Vector3::new(if tilted { c.abs() } else { 0.0 }, 0.0, c);
         step(params, face, Point3::new(0.0, 0.0, u), force, t)
@@ -430,7 +690,13 @@ fn check_sum(u: f64, c: f64, t: f64, first: f64, tilted: bool) -> Shown {
         flow(&UP, u * ulps + 1e-15, 1.0, t).b - once.b,
         flow(&UP, u, ulps, t).b - once.b,
         flow(&UP, u, 1.0, ulps * t).b - once.b,
-        flow(&half, u * ulps + 1e-15 + 8e-16 * half.b.z.abs(), 1.0, (1.0 - first) * t).b - twice.b,
+        flow(
+            &half,
+            u * ulps + 1e-15 + 8e-16 * half.b.z.abs(),
+            1.0,
+            (1.0 - first) * t,
+        )
+        .b - twice.b,
     ];
     let rounding: f64 = moved.iter().map(|v| v.norm()).sum();
     assert!((twice.b - once.b).norm() <= 1e-12 * once.b.coords.norm() + 4.0 * rounding);
@@ -443,26 +709,41 @@ fn check_sum(u: f64, c: f64, t: f64, first: f64, tilted: bool) -> Shown {
     let travel = if tilted { up * c.signum() } else { up };
     let ends = [rate(u) * t, rate(u - once.b.z) * t];
     let [least, most] = [ends[0].min(ends[1]), ends[0].max(ends[1])];
-    let slack =
-        1e-12 * (least.abs() + most.abs()) + 64.0 * f64::EPSILON * (t * (1.0 + c.abs()) + u.abs()) + 4.0 * rounding;
-    assert!(travel >= least - slack && travel <= most + slack, "{travel} not in {least} … {most} from {u} at {c}, {t}");
-    let is_meaningful =
-        slack + rounding < 1e-3 * travel.abs() && least.abs().min(most.abs()) > 0.05 * least.abs().max(most.abs());
-    if is_meaningful { Shown::Value } else { Shown::Little }
+    let slack = 1e-12 * (least.abs() + most.abs())
+        + 64.0 * f64::EPSILON * (t * (1.0 + c.abs()) + u.abs())
+        + 4.0 * rounding;
+    assert!(
+        travel >= least - slack && travel <= most + slack,
+        "{travel} not in {least} … {most} from {u} at {c}, {t}"
+    );
+    let is_meaningful = slack + rounding < 1e-3 * travel.abs()
+        && least.abs().min(most.abs()) > 0.05 * least.abs().max(most.abs());
+    if is_meaningful {
+        Shown::Value
+    } else {
+        Shown::Little
+    }
 }
 
 #[test]
 fn position_flows_add_up_in_every_regime() {
     let depth = prop_oneof![-45.0..45.0, -700.0..700.0];
     let cases = (depth, shares(), -6.0..6.0f64, 0.05..0.95, any::<bool>());
-    let counts = tried("sums of flows", 20_000, cases, |(u, c, scaled, first, tilted)| {
-        check_sum(u, c, 10f64.powf(scaled), first, tilted)
-    });
+    let counts = tried(
+        "sums of flows",
+        20_000,
+        cases,
+        |(u, c, scaled, first, tilted)| check_sum(u, c, 10f64.powf(scaled), first, tilted),
+    );
     assert!(counts.values > 8_000, "{counts:?}");
 }
 
 /// Distance of the planes at the true barycentre, m, and angle between the normals, rad, before each millisecond.
-fn one_face(params: DynamicsParams, face: FaceState, seconds: u32) -> Result<Vec<(f64, f64)>, DynamicsError> {
+fn one_face(
+    params: DynamicsParams,
+    face: FaceState,
+    seconds: u32,
+) -> Result<Vec<(f64, f64)>, DynamicsError> {
     let dynamics = FaceDynamics::new(params)?;
     let stylus = GuidedStylus::default();
     let surface = |p: &Point3<f64>| SIGMOID.force(p.z) * Vector3::z();
@@ -489,12 +770,26 @@ fn tilted(b_mm: [f64; 3], tilt_deg: f64, azimuth: f64) -> FaceState {
 #[test]
 fn one_face_comes_to_the_true_plane_distance_first_then_normal() {
     // at rest a tilted face draws the tip F_c sin(tilt)/K aside: with larger tilts the distance waits for the normal
-    let starts = [([3.0, -2.0, 2.5], 20.0, 0.3), ([-1.0, 4.0, -3.0], 10.0, 2.0), ([0.5, 0.5, 4.0], 15.0, 4.0)];
+    let starts = [
+        ([3.0, -2.0, 2.5], 20.0, 0.3),
+        ([-1.0, 4.0, -3.0], 10.0, 2.0),
+        ([0.5, 0.5, 4.0], 15.0, 4.0),
+    ];
     for (b, tilt, azimuth) in starts {
         for along in [Along::InitialNormal, Along::Force] {
-            let errors = one_face(DynamicsParams { along, ..paper(0.1, 0.1) }, tilted(b, tilt, azimuth), 40).unwrap();
+            let errors = one_face(
+                DynamicsParams {
+                    along,
+                    ..paper(0.1, 0.1)
+                },
+                tilted(b, tilt, azimuth),
+                40,
+            )
+            .unwrap();
             let tenth = |error: fn(&(f64, f64)) -> f64| {
-                let below = errors.iter().position(|e| error(e) < 0.1 * error(&errors[0]));
+                let below = errors
+                    .iter()
+                    .position(|e| error(e) < 0.1 * error(&errors[0]));
                 1e-3 * below.map_or(f64::INFINITY, |sample| sample as f64)
             };
             let (distance_s, normal_s) = (tenth(|e| e.0), tenth(|e| e.1));
@@ -505,7 +800,10 @@ fn one_face_comes_to_the_true_plane_distance_first_then_normal() {
                 1e3 * distance,
                 normal.to_degrees()
             );
-            assert!(distance_s < 0.7 * normal_s, "the distance is corrected first");
+            assert!(
+                distance_s < 0.7 * normal_s,
+                "the distance is corrected first"
+            );
             // the surface is as soft as the model says, so nothing remains but what 40 s have not yet turned
             assert!(distance < 1e-9 && normal < 1e-5);
         }
@@ -520,10 +818,17 @@ fn moving_along_the_normal_runs_away_from_100_degrees_and_along_the_force_it_doe
         (Along::Force, [80.0, 120.0], true),
     ] {
         for tilt in tilts {
-            let params = DynamicsParams { along, ..paper(0.1, 0.1) };
+            let params = DynamicsParams {
+                along,
+                ..paper(0.1, 0.1)
+            };
             let errors = one_face(params, tilted([1.0, -1.0, 2.0], tilt, 1.3), 40).unwrap();
             let (distance, normal) = errors[errors.len() - 1];
-            println!("{along:?} from {tilt}°: after 40 s {:.1e} mm, {:.1e}°", 1e3 * distance, normal.to_degrees());
+            println!(
+                "{along:?} from {tilt}°: after 40 s {:.1e} mm, {:.1e}°",
+                1e3 * distance,
+                normal.to_degrees()
+            );
             assert_eq!(distance < 1e-6 && normal < 1e-4, bounded);
             assert_eq!(distance > 0.1, !bounded);
         }

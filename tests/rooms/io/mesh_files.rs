@@ -13,7 +13,9 @@ use MeshUnit::{Inch, Metre, Millimetre};
 /// Divergence theorem, from the middle of the first face so that a far offset does no harm.
 fn volume(mesh: &TriMesh) -> f64 {
     let anchor = mesh.barycentre(FaceId(0));
-    mesh.faces().map(|(f, _)| (mesh.barycentre(f) - anchor).dot(&mesh.double_area_normal(f)) / 6.0).sum()
+    mesh.faces()
+        .map(|(f, _)| (mesh.barycentre(f) - anchor).dot(&mesh.double_area_normal(f)) / 6.0)
+        .sum()
 }
 
 /// What a file gives.
@@ -91,21 +93,38 @@ const NASTY: [(&str, Gives); 54] = {
 
 #[test]
 fn every_nasty_file_gives_the_known_mesh_or_one_clear_line() {
-    let Some(folder) = shared("nasty") else { return };
+    let Some(folder) = shared("nasty") else {
+        return;
+    };
     for (name, gives) in &NASTY {
         let path = folder.join(name);
         match gives {
             Gives::Mesh(unit, wanted) => {
-                let MeshFile { mesh, repair: r } = read_mesh(&path, *unit).unwrap_or_else(|e| panic!("{e}"));
-                let got =
-                    [mesh.vertex_count(), mesh.face_count(), r.boundary_edges, r.boundary_loops, r.non_manifold_edges];
+                let MeshFile { mesh, repair: r } =
+                    read_mesh(&path, *unit).unwrap_or_else(|e| panic!("{e}"));
+                let got = [
+                    mesh.vertex_count(),
+                    mesh.face_count(),
+                    r.boundary_edges,
+                    r.boundary_loops,
+                    r.non_manifold_edges,
+                ];
                 assert_eq!(got, *wanted, "{name}: {r}");
-                assert!(r.boundary_edges + r.non_manifold_edges > 0 || volume(&mesh) > 0.0, "{name} is inside out");
+                assert!(
+                    r.boundary_edges + r.non_manifold_edges > 0 || volume(&mesh) > 0.0,
+                    "{name} is inside out"
+                );
             }
             Gives::Error(wanted) => {
                 let message = read_mesh(&path, Metre).unwrap_err().to_string();
-                assert!(message.contains(name) && message.ends_with(wanted), "{message}");
-                assert!(!message.contains('\n') && !message.contains('\r'), "{message}");
+                assert!(
+                    message.contains(name) && message.ends_with(wanted),
+                    "{message}"
+                );
+                assert!(
+                    !message.contains('\n') && !message.contains('\r'),
+                    "{message}"
+                );
             }
         }
     }
@@ -113,9 +132,13 @@ fn every_nasty_file_gives_the_known_mesh_or_one_clear_line() {
 
 #[test]
 fn no_nasty_file_was_forgotten() {
-    let Some(folder) = shared("nasty") else { return };
-    let mut names: Vec<_> =
-        std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    let Some(folder) = shared("nasty") else {
+        return;
+    };
+    let mut names: Vec<_> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .collect();
     names.sort();
     let mut known: Vec<_> = NASTY.iter().map(|(name, _)| *name).collect();
     known.sort();
@@ -124,13 +147,21 @@ fn no_nasty_file_was_forgotten() {
 
 #[test]
 fn flipped_facets_come_out_as_the_part_they_were_made_from() {
-    let (Some(nasty), Some(parts)) = (shared("nasty"), shared("parts/permissive")) else { return };
+    let (Some(nasty), Some(parts)) = (shared("nasty"), shared("parts/permissive")) else {
+        return;
+    };
     let part = read_mesh(&parts.join("trimesh_featuretype.STL"), Inch).unwrap();
     let flipped = read_mesh(&nasty.join("made_flipped_30pct.stl"), Inch).unwrap();
-    assert_eq!((part.repair.flipped_faces, part.mesh.face_count()), (0, 3476));
+    assert_eq!(
+        (part.repair.flipped_faces, part.mesh.face_count()),
+        (0, 3476)
+    );
     assert!((900..1200).contains(&flipped.repair.flipped_faces));
     for (face, _) in part.mesh.faces() {
-        assert_eq!(part.mesh.barycentre(face).map(|x| x as f32), flipped.mesh.barycentre(face).map(|x| x as f32));
+        assert_eq!(
+            part.mesh.barycentre(face).map(|x| x as f32),
+            flipped.mesh.barycentre(face).map(|x| x as f32)
+        );
         assert!(part.mesh.normal(face).dot(&flipped.mesh.normal(face)) > 0.999);
     }
 }
@@ -138,7 +169,9 @@ fn flipped_facets_come_out_as_the_part_they_were_made_from() {
 /// Counts of closed parts, from the index of the data (trimesh).
 #[test]
 fn real_parts_come_out_watertight() {
-    let Some(parts) = shared("parts/permissive") else { return };
+    let Some(parts) = shared("parts/permissive") else {
+        return;
+    };
     let closed = [
         ("trimesh_plate_holes.STL", Millimetre, 618, 1252, 1),
         ("trimesh_octagonal_pocket.stl", Metre, 1631, 3262, 1),
@@ -151,8 +184,16 @@ fn real_parts_come_out_watertight() {
     ];
     for (name, unit, vertices, faces, bodies) in closed {
         let MeshFile { mesh, repair: r } = read_mesh(&parts.join(name), unit).unwrap();
-        assert_eq!((mesh.vertex_count(), mesh.face_count(), r.boundary_edges), (vertices, faces, 0), "{name}: {r}");
-        assert_eq!((r.components, r.non_manifold_edges), (bodies, 0), "{name}: {r}");
+        assert_eq!(
+            (mesh.vertex_count(), mesh.face_count(), r.boundary_edges),
+            (vertices, faces, 0),
+            "{name}: {r}"
+        );
+        assert_eq!(
+            (r.components, r.non_manifold_edges),
+            (bodies, 0),
+            "{name}: {r}"
+        );
         assert!(volume(&mesh) > 0.0);
     }
 }
@@ -179,7 +220,10 @@ fn ball() -> TriMesh {
         }
     }
     let shift = Vector3::new(0.3, -1.0 / 3.0, 7e-3);
-    let positions = positions.into_iter().map(|p| Point3::from(p * 0.05 + shift)).collect();
+    let positions = positions
+        .into_iter()
+        .map(|p| Point3::from(p * 0.05 + shift))
+        .collect();
     repair(positions, faces).unwrap().0
 }
 
@@ -192,22 +236,51 @@ fn what_is_written_is_read_back() {
     let folder = tempfile::tempdir().unwrap();
     let ball = ball();
     // roundings of half a unit in the last place: none in metres, two in other units, one to f32 (and its unit)
-    let bounds = [("ply", 0.0, 2.0 * f64::EPSILON), ("obj", 0.0, 2.0 * f64::EPSILON), ("stl", 6e-8, 6.1e-8)];
+    let bounds = [
+        ("ply", 0.0, 2.0 * f64::EPSILON),
+        ("obj", 0.0, 2.0 * f64::EPSILON),
+        ("stl", 6e-8, 6.1e-8),
+    ];
     for (extension, in_metres, in_others) in bounds {
-        for (unit, bound) in [(Metre, in_metres), (Millimetre, in_others), (Inch, in_others)] {
+        for (unit, bound) in [
+            (Metre, in_metres),
+            (Millimetre, in_others),
+            (Inch, in_others),
+        ] {
             let path = folder.path().join(format!("ball.{extension}"));
             write_mesh(&path, &ball, unit).unwrap();
             let MeshFile { mesh, repair } = read_mesh(&path, unit).unwrap();
-            assert_eq!((mesh.vertex_count(), mesh.face_count()), (ball.vertex_count(), ball.face_count()));
-            assert_eq!((repair.flipped_faces, repair.boundary_edges, repair.components), (0, 0, 1));
-            for (read, written) in corners_of(&mesh).as_flattened().iter().zip(corners_of(&ball).as_flattened()) {
+            assert_eq!(
+                (mesh.vertex_count(), mesh.face_count()),
+                (ball.vertex_count(), ball.face_count())
+            );
+            assert_eq!(
+                (
+                    repair.flipped_faces,
+                    repair.boundary_edges,
+                    repair.components
+                ),
+                (0, 0, 1)
+            );
+            for (read, written) in corners_of(&mesh)
+                .as_flattened()
+                .iter()
+                .zip(corners_of(&ball).as_flattened())
+            {
                 for (a, b) in read.coords.iter().zip(written.coords.iter()) {
-                    assert!((a - b).abs() <= bound * b.abs(), "{extension} in {unit}: {a} for {b}");
+                    assert!(
+                        (a - b).abs() <= bound * b.abs(),
+                        "{extension} in {unit}: {a} for {b}"
+                    );
                 }
             }
             let first = std::fs::read(&path).unwrap();
             write_mesh(&path, &ball, unit).unwrap();
-            assert_eq!(first, std::fs::read(&path).unwrap(), "same mesh, same bytes");
+            assert_eq!(
+                first,
+                std::fs::read(&path).unwrap(),
+                "same mesh, same bytes"
+            );
         }
     }
 }
@@ -218,7 +291,10 @@ fn ply_keeps_the_order_and_leaves_out_what_was_removed() {
     let path = folder.path().join("Ball.PLY");
     let mut ball = ball();
     write_mesh(&path, &ball, Metre).unwrap();
-    assert_eq!(read_mesh(&path, Metre).unwrap().mesh.positions(), ball.positions());
+    assert_eq!(
+        read_mesh(&path, Metre).unwrap().mesh.positions(),
+        ball.positions()
+    );
     // the pole loses all its faces and goes with them
     for face in ball.star(VertexId(0)).to_vec() {
         ball.remove_face(face);
@@ -226,28 +302,44 @@ fn ply_keeps_the_order_and_leaves_out_what_was_removed() {
     write_mesh(&path, &ball, Metre).unwrap();
     let MeshFile { mesh, repair } = read_mesh(&path, Metre).unwrap();
     assert_eq!(mesh.positions(), &ball.positions()[1..]);
-    assert_eq!((mesh.face_count(), repair.unused_vertices, repair.boundary_loops), (ball.face_count(), 0, 1));
+    assert_eq!(
+        (
+            mesh.face_count(),
+            repair.unused_vertices,
+            repair.boundary_loops
+        ),
+        (ball.face_count(), 0, 1)
+    );
 }
 
 /// By hand: 4 vertices of three doubles and one float each follow the header; the one without a face is left out.
 #[test]
 fn columns_are_properties_of_the_vertices_in_ply() {
-    let p = [[0.0, 0.0], [1.0, 0.0], [9.0, 9.0], [0.0, 1.0], [1.0, 1.0]].map(|[x, y]| Point3::new(x, y, 0.0));
+    let p = [[0.0, 0.0], [1.0, 0.0], [9.0, 9.0], [0.0, 1.0], [1.0, 1.0]]
+        .map(|[x, y]| Point3::new(x, y, 0.0));
     let mesh = TriMesh::new(p.into(), vec![[0, 1, 3], [1, 4, 3]]).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.ply");
-    let column = VertexColumn { name: "touched", values: vec![0.0, 0.5, 9.0, 1.0, 0.25].into() };
+    let column = VertexColumn {
+        name: "touched",
+        values: vec![0.0, 0.5, 9.0, 1.0, 0.25].into(),
+    };
     write_mesh_with(&path, &mesh, &[column], None, Metre).unwrap();
     let bytes = std::fs::read(&path).unwrap();
     let end = b"end_header\n";
     let body = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
     assert!(
-        String::from_utf8_lossy(&bytes[..body]).contains("property double z\nproperty float touched\nelement face 2")
+        String::from_utf8_lossy(&bytes[..body])
+            .contains("property double z\nproperty float touched\nelement face 2")
     );
-    let value = |row: usize| f32::from_le_bytes(bytes[body + 28 * row + 24..][..4].try_into().unwrap());
+    let value =
+        |row: usize| f32::from_le_bytes(bytes[body + 28 * row + 24..][..4].try_into().unwrap());
     assert_eq!([0, 1, 2, 3].map(value), [0.0, 0.5, 1.0, 0.25]);
     let read = read_mesh(&path, Metre).unwrap().mesh;
-    assert_eq!((read.vertex_count(), corners_of(&read)), (4, corners_of(&mesh)));
+    assert_eq!(
+        (read.vertex_count(), corners_of(&read)),
+        (4, corners_of(&mesh))
+    );
 }
 
 /// A square of two triangles, the second one with an image of its own, as text of both kinds; colours by hand.
@@ -265,20 +357,37 @@ fn colours_and_textures_come_back_from_either_kind_of_file() {
                vt 0 0\nvt 1 0\nvt 0 1\nvt .25 .5\nvt .5 .5\nvt .25 .75\nusemtl x\nf 1/1 2/2 3/3\nusemtl y\nf 2/4 4/5 3/6\n";
     std::fs::write(at("in.ply"), ply).unwrap();
     std::fs::write(at("in.obj"), obj).unwrap();
-    std::fs::write(at("m.mtl"), "newmtl x\nmap_Kd a b.png\nnewmtl y\nmap_Kd sub/c.png\n").unwrap();
+    std::fs::write(
+        at("m.mtl"),
+        "newmtl x\nmap_Kd a b.png\nnewmtl y\nmap_Kd sub/c.png\n",
+    )
+    .unwrap();
     let colours = vec![[1, 2, 3], [4, 5, 6], [7, 8, 9], [255, 0, 128]];
-    let corners = vec![[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], [[0.25, 0.5], [0.5, 0.5], [0.25, 0.75]]];
+    let corners = vec![
+        [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]],
+        [[0.25, 0.5], [0.5, 0.5], [0.25, 0.75]],
+    ];
     let images = vec![at("a b.png"), at("sub/c.png")];
-    let texture = Texture { corners, shown: vec![0, 1], images };
+    let texture = Texture {
+        corners,
+        shown: vec![0, 1],
+        images,
+    };
     let check = |name: &str| {
-        let appearance = read_appearance(&at(name), Metre).unwrap().expect("it says how it looks");
+        let appearance = read_appearance(&at(name), Metre)
+            .unwrap()
+            .expect("it says how it looks");
         let mesh = read_mesh(&at(name), Metre).unwrap().mesh;
         assert_eq!(
             appearance.colours_at(mesh.positions(), &Alone),
             Some(VertexColours::Rgb(colours.clone())),
             "{name}"
         );
-        assert_eq!(appearance.texture_on(&mesh, mesh.positions(), &Alone), Some(texture.clone()), "{name}");
+        assert_eq!(
+            appearance.texture_on(&mesh, mesh.positions(), &Alone),
+            Some(texture.clone()),
+            "{name}"
+        );
         mesh
     };
     check("in.obj");
@@ -288,7 +397,11 @@ fn colours_and_textures_come_back_from_either_kind_of_file() {
         write_mesh_with(&at(name), &mesh, &columns, Some(&texture), Metre).unwrap();
         check(name);
     }
-    assert!(std::fs::read_to_string(at("out.mtl")).unwrap().contains("map_Kd sub/c.png"));
+    assert!(
+        std::fs::read_to_string(at("out.mtl"))
+            .unwrap()
+            .contains("map_Kd sub/c.png")
+    );
     // elsewhere the images have their whole names
     std::fs::create_dir(at("sub")).unwrap();
     write_mesh_with(&at("sub/out.ply"), &mesh, &columns, Some(&texture), Metre).unwrap();
@@ -304,15 +417,23 @@ fn colours_are_bytes_or_shares_and_all_vertices_have_one_or_none() {
         let path = folder.path().join(name);
         std::fs::write(&path, text).unwrap();
         let mesh = read_mesh(&path, Metre).unwrap().mesh;
-        read_appearance(&path, Metre).unwrap().and_then(|look| look.colours_at(mesh.positions(), &Alone))
+        read_appearance(&path, Metre)
+            .unwrap()
+            .and_then(|look| look.colours_at(mesh.positions(), &Alone))
     };
     let head = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
     let tail = "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
     let of = |kind: &str| {
-        format!("{head}property {kind} red\nproperty {kind} green\nproperty {kind} blue\nproperty {kind} alpha\n{tail}")
+        format!(
+            "{head}property {kind} red\nproperty {kind} green\nproperty {kind} blue\nproperty {kind} alpha\n{tail}"
+        )
     };
     let shares = of("float") + "0 0 0 0 .5 1 1\n1 0 0 .2 .4 .6 .8\n0 1 0 1 1 1 0\n3 0 1 2\n";
-    let expected = VertexColours::Rgba(vec![[0, 128, 255, 255], [51, 102, 153, 204], [255, 255, 255, 0]]);
+    let expected = VertexColours::Rgba(vec![
+        [0, 128, 255, 255],
+        [51, 102, 153, 204],
+        [255, 255, 255, 0],
+    ]);
     assert_eq!(read("shares.ply", &shares), Some(expected));
     let obj = |last: &str| format!("v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0{last}\nf 1 2 3\n");
     assert_eq!(read("some.obj", &obj("")), None);
@@ -328,9 +449,15 @@ fn colours_are_bytes_or_shares_and_all_vertices_have_one_or_none() {
 fn places_and_names_that_cannot_be_written_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let refusal = |name: &str| write_mesh(&folder.path().join(name), &ball(), Metre).unwrap_err();
-    assert!(matches!(refusal("ball.off"), MeshFileError::UnknownFormat { .. }));
+    assert!(matches!(
+        refusal("ball.off"),
+        MeshFileError::UnknownFormat { .. }
+    ));
     let message = refusal("missing/ball.ply").to_string();
-    assert!(message.contains("there is no folder") && message.contains("make it first"), "{message}");
+    assert!(
+        message.contains("there is no folder") && message.contains("make it first"),
+        "{message}"
+    );
     assert!(std::fs::read_dir(&folder).unwrap().next().is_none());
 }
 
@@ -348,7 +475,9 @@ fn ply_variants_are_read() {
     let header = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n";
     let face = "element face 1\nproperty list uchar int vertex_index\n";
     let count = |content: &str| read_text("a.ply", content.as_bytes()).map(|m| m.mesh.face_count());
-    let plain = format!("ply\nformat ascii 1.0\nobj_info x\n{header}{face}end_header\n{vertices}4 0 1 2 3\n");
+    let plain = format!(
+        "ply\nformat ascii 1.0\nobj_info x\n{header}{face}end_header\n{vertices}4 0 1 2 3\n"
+    );
     assert_eq!(count(&plain).unwrap(), 2);
     assert_eq!(count(&plain.replace('\n', "\r\n")).unwrap(), 2);
     assert_eq!(count(&plain.replace('\n', "\r")).unwrap(), 2);
@@ -365,19 +494,34 @@ fn ply_variants_are_read() {
     );
     let MeshFile { mesh, repair } = read_text("a.ply", strips.as_bytes()).unwrap();
     // faces 013, 312 and 012, of which the last is inverted
-    assert_eq!((mesh.face_count(), repair.boundary_edges, repair.flipped_faces), (3, 3, 1));
+    assert_eq!(
+        (
+            mesh.face_count(),
+            repair.boundary_edges,
+            repair.flipped_faces
+        ),
+        (3, 3, 1)
+    );
     let refusal = |content: &str| count(content).unwrap_err().to_string();
     assert!(
         refusal(&plain.replace("4 0 1 2 3", "4 0 1 2"))
             .ends_with("line 15: expected a number, found 'the end of the line'")
     );
-    assert!(refusal(&plain.replace("4 0 1 2 3", "4 0 1 2 3 9")).ends_with("expected the end of the line, found '9'"));
-    assert!(refusal(&plain.replace("4 0 1 2 3", "3 0 1 -2")).ends_with("expected a vertex number, found '-2'"));
+    assert!(
+        refusal(&plain.replace("4 0 1 2 3", "4 0 1 2 3 9"))
+            .ends_with("expected the end of the line, found '9'")
+    );
+    assert!(
+        refusal(&plain.replace("4 0 1 2 3", "3 0 1 -2"))
+            .ends_with("expected a vertex number, found '-2'")
+    );
     assert!(
         refusal(&plain.replace("4 0 1 2 3", "3 0 1 4"))
             .ends_with("face 0 uses vertex 4, but there are only 4 vertices")
     );
-    assert!(refusal(&plain.replace("vertex 4", "vertex 4000000000")).contains("4000000000 vertex rows"));
+    assert!(
+        refusal(&plain.replace("vertex 4", "vertex 4000000000")).contains("4000000000 vertex rows")
+    );
     assert!(
         refusal(&plain.replace("float z", "float w"))
             .ends_with("line 4: expected a vertex with x, y and z, found 'no property z'")
@@ -388,21 +532,36 @@ fn ply_variants_are_read() {
 #[test]
 fn obj_variants_are_read() {
     let read = |content: &[u8]| {
-        read_text("a.obj", content).map(|m| (m.mesh.vertex_count(), m.mesh.face_count(), m.repair.unused_vertices))
+        read_text("a.obj", content).map(|m| {
+            (
+                m.mesh.vertex_count(),
+                m.mesh.face_count(),
+                m.repair.unused_vertices,
+            )
+        })
     };
     // colours on some vertices only, with alpha, a weight, a comment in Latin-1, indices of normals that are not there
     let odd = b"# \xe9t\xe9\no a\nv 0 0 0 1 0 0\nv 1 0 0\n v 2 2 0 2\r\ng b\nv 0 1 0 1 0 0 1\nv 9 9 9\nusemtl x\nf 1//7 2//7 3//7 4//7";
     assert_eq!(read(odd).unwrap(), (4, 2, 1));
     let MeshFile { mesh, .. } = read_text("a.obj", odd).unwrap();
-    assert_eq!(mesh.position(VertexId(2)), Point3::new(1.0, 1.0, 0.0), "divided by its weight");
+    assert_eq!(
+        mesh.position(VertexId(2)),
+        Point3::new(1.0, 1.0, 0.0),
+        "divided by its weight"
+    );
     let refusal = |content: &str| read(content.as_bytes()).unwrap_err().to_string();
-    assert!(refusal("v 0 0 0\nv 1 0 0\nv 0 1\nf 1 2 3").contains("line 3: expected three coordinates"));
+    assert!(
+        refusal("v 0 0 0\nv 1 0 0\nv 0 1\nf 1 2 3").contains("line 3: expected three coordinates")
+    );
     assert!(refusal("v 0 0 0\nv 1 0 0\nv 0 1 0\n\nf 1 2 x").contains("line 5: expected a face"));
     assert!(
         refusal("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 -4")
             .ends_with("line 5: a face uses vertex -4, but there are only 3 vertices")
     );
-    assert!(refusal("v 0 0 0\nv 1 0 0\nv 0 1 0\nf\nf 1 2 0").contains("line 4: expected numbers of vertices"));
+    assert!(
+        refusal("v 0 0 0\nv 1 0 0\nv 0 1 0\nf\nf 1 2 0")
+            .contains("line 4: expected numbers of vertices")
+    );
 }
 
 #[test]
@@ -426,11 +585,19 @@ fn stl_with_more_than_its_header_announces_is_refused() {
 #[test]
 fn the_content_decides_where_the_name_lies() {
     let folder = tempfile::tempdir().unwrap();
-    for (written, named) in [("a.ply", "b.stl"), ("a.stl", "b.obj"), ("a.STL", "b.ply"), ("a.ply", "b.scan")] {
+    for (written, named) in [
+        ("a.ply", "b.stl"),
+        ("a.stl", "b.obj"),
+        ("a.STL", "b.ply"),
+        ("a.ply", "b.scan"),
+    ] {
         let (written, named) = (folder.path().join(written), folder.path().join(named));
         write_mesh(&written, &ball(), Metre).unwrap();
         std::fs::rename(&written, &named).unwrap();
-        assert_eq!(read_mesh(&named, Metre).unwrap().mesh.face_count(), ball().face_count());
+        assert_eq!(
+            read_mesh(&named, Metre).unwrap().mesh.face_count(),
+            ball().face_count()
+        );
     }
     // a binary file whose header begins like an ASCII one
     let path = folder.path().join("solid.stl");
@@ -438,18 +605,31 @@ fn the_content_decides_where_the_name_lies() {
     let mut bytes = std::fs::read(&path).unwrap();
     bytes[..19].copy_from_slice(b"solid a facet of it");
     std::fs::write(&path, &bytes).unwrap();
-    assert_eq!(read_mesh(&path, Metre).unwrap().mesh.face_count(), ball().face_count());
+    assert_eq!(
+        read_mesh(&path, Metre).unwrap().mesh.face_count(),
+        ball().face_count()
+    );
 }
 
 #[test]
 fn the_unit_must_fit_the_size_and_the_offset_does_not_matter() {
     let triangle = |side: f64, offset: f64| {
-        let obj = format!("v {0:?} {0:?} 0\nv {1:?} {0:?} 0\nv {0:?} {1:?} 0\nf 1 2 3\n", offset, offset + side);
-        read_text("a.obj", obj.as_bytes()).map(|m| m.mesh.face_count()).map_err(|e| e.to_string())
+        let obj = format!(
+            "v {0:?} {0:?} 0\nv {1:?} {0:?} 0\nv {0:?} {1:?} 0\nf 1 2 3\n",
+            offset,
+            offset + side
+        );
+        read_text("a.obj", obj.as_bytes())
+            .map(|m| m.mesh.face_count())
+            .map_err(|e| e.to_string())
     };
     assert_eq!(triangle(0.1, 0.0), Ok(1));
     assert_eq!(triangle(0.1, 1e6), Ok(1));
-    assert!(triangle(100.0, 0.0).unwrap_err().ends_with("probably in millimetres, try --mesh-unit mm"));
+    assert!(
+        triangle(100.0, 0.0)
+            .unwrap_err()
+            .ends_with("probably in millimetres, try --mesh-unit mm")
+    );
     assert!(triangle(1e-5, 0.0).unwrap_err().contains("too small"));
 }
 
@@ -496,5 +676,8 @@ proptest! {
 /// By the definitions of 1959: an inch is 25.4 mm.
 #[test]
 fn units_are_as_long_as_they_are_defined() {
-    assert_eq!([Metre, Millimetre, Inch].map(|unit| unit.metres()), [1.0, 0.001, 0.0254]);
+    assert_eq!(
+        [Metre, Millimetre, Inch].map(|unit| unit.metres()),
+        [1.0, 0.001, 0.0254]
+    );
 }

@@ -43,7 +43,10 @@ impl Copy {
         let ids = (0..mesh.vertex_slots() as u32).filter(|&v| mesh.has_vertex(VertexId(v)));
         Self {
             vertices: ids.map(|v| (v, mesh.position(VertexId(v)))).collect(),
-            faces: mesh.faces().map(|(face, corners)| (face.0, corners)).collect(),
+            faces: mesh
+                .faces()
+                .map(|(face, corners)| (face.0, corners))
+                .collect(),
         }
     }
 
@@ -65,7 +68,11 @@ impl Copy {
 
 fn square() -> TriMesh {
     let p = |x, y| Point3::new(x, y, 0.0);
-    TriMesh::new(vec![p(0., 0.), p(1., 0.), p(1., 1.), p(0., 1.)], vec![[0, 1, 2], [0, 2, 3]]).unwrap()
+    TriMesh::new(
+        vec![p(0., 0.), p(1., 0.), p(1., 1.), p(0., 1.)],
+        vec![[0, 1, 2], [0, 2, 3]],
+    )
+    .unwrap()
 }
 
 proptest! {
@@ -124,7 +131,10 @@ fn it_is_not_all_while_faces_are_left() {
     mesh.flip_face(FaceId(0));
     mesh.flip_face(FaceId(1));
     let mut changes = Changes::default();
-    assert!(!mesh.take_changes(1, &mut changes), "a face is left: {changes:?}");
+    assert!(
+        !mesh.take_changes(1, &mut changes),
+        "a face is left: {changes:?}"
+    );
     assert_eq!((changes.vertices.len(), changes.faces.len()), (1, 1));
     assert!(mesh.take_changes(1, &mut changes));
     assert_eq!((changes.vertices.len(), changes.faces.len()), (1, 2));

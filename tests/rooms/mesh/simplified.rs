@@ -9,7 +9,9 @@ use crate::soundness::soundness;
 
 /// V − E + F of a mesh in which every edge has two faces.
 fn euler(mesh: &TriMesh) -> i64 {
-    let used = (0..mesh.vertex_slots() as u32).filter(|&v| !mesh.star(VertexId(v)).is_empty()).count() as i64;
+    let used = (0..mesh.vertex_slots() as u32)
+        .filter(|&v| !mesh.star(VertexId(v)).is_empty())
+        .count() as i64;
     let faces = mesh.face_count() as i64;
     used - faces * 3 / 2 + faces
 }
@@ -24,14 +26,20 @@ fn moved(mesh: &TriMesh, place: impl Fn(Point3<f64>) -> Point3<f64>) -> TriMesh 
 
 #[test]
 fn a_closed_mesh_stays_closed_and_keeps_its_handles() {
-    for (mesh, expected, edge) in
-        [(icosphere(10.0, 6), 2, 1.0), (icosphere(10.0, 6), 2, 2.5), (torus(10.0, 3.0, [400, 130]), 0, 1.2)]
-    {
+    for (mesh, expected, edge) in [
+        (icosphere(10.0, 6), 2, 1.0),
+        (icosphere(10.0, 6), 2, 2.5),
+        (torus(10.0, 3.0, [400, 130]), 0, 1.2),
+    ] {
         let simplified = Simplified::new(&mesh, edge).unwrap().mesh;
         let soundness = soundness(&simplified);
         assert_eq!((soundness.rims.len(), euler(&simplified)), (0, expected));
         let faces = simplified.face_count();
-        assert!(faces * 5 < mesh.face_count(), "{faces} of {}", mesh.face_count());
+        assert!(
+            faces * 5 < mesh.face_count(),
+            "{faces} of {}",
+            mesh.face_count()
+        );
     }
 }
 
@@ -41,14 +49,21 @@ fn edges_are_about_as_long_as_asked_for_and_vertices_lie_on_the_surface() {
     let simplified = Simplified::new(&icosphere(radius, 6), edge).unwrap().mesh;
     let mut lengths = Vec::new();
     for (_, [a, b, c]) in simplified.faces() {
-        lengths.extend([(a, b), (b, c), (c, a)].map(|(p, q)| (simplified.position(p) - simplified.position(q)).norm()));
+        lengths.extend(
+            [(a, b), (b, c), (c, a)]
+                .map(|(p, q)| (simplified.position(p) - simplified.position(q)).norm()),
+        );
     }
     let mean = lengths.iter().sum::<f64>() / lengths.len() as f64;
     assert!((mean - edge).abs() < 0.15 * edge, "{mean}");
     // a cap of half an edge is this high
     let sag = edge * edge / (8.0 * radius);
     for p in simplified.positions() {
-        assert!((p.coords.norm() - radius).abs() < sag, "{}", p.coords.norm() - radius);
+        assert!(
+            (p.coords.norm() - radius).abs() < sag,
+            "{}",
+            p.coords.norm() - radius
+        );
     }
 }
 
@@ -62,7 +77,12 @@ fn an_edge_of_the_part_stays_sharp() {
         let off = (p.z + p.x.abs()).abs() / 2f64.sqrt();
         assert!(off < 0.02, "{p} is {off} off the roof");
     }
-    let at_ridge = simplified.positions().iter().filter(inside).filter(|p| p.x.abs() < 0.02).count();
+    let at_ridge = simplified
+        .positions()
+        .iter()
+        .filter(inside)
+        .filter(|p| p.x.abs() < 0.02)
+        .count();
     assert!(at_ridge >= 10, "{at_ridge} vertices on 10 mm of ridge");
 }
 
@@ -73,22 +93,41 @@ fn the_two_sides_of_a_thin_sheet_stay_apart() {
     let mut positions = side.positions().to_vec();
     positions.extend(side.positions().iter().map(|p| p + Vector3::z() * -0.15));
     let count = side.vertex_slots() as u32;
-    let mut faces: Vec<[u32; 3]> = side.faces().map(|(_, corners)| corners.map(|v| v.0)).collect();
-    faces.extend(side.faces().map(|(_, [a, b, c])| [a, c, b].map(|v| v.0 + count)));
-    let simplified = Simplified::new(&TriMesh::new(positions, faces).unwrap(), 0.8).unwrap().mesh;
+    let mut faces: Vec<[u32; 3]> = side
+        .faces()
+        .map(|(_, corners)| corners.map(|v| v.0))
+        .collect();
+    faces.extend(
+        side.faces()
+            .map(|(_, [a, b, c])| [a, c, b].map(|v| v.0 + count)),
+    );
+    let simplified = Simplified::new(&TriMesh::new(positions, faces).unwrap(), 0.8)
+        .unwrap()
+        .mesh;
     for (face, corners) in simplified.faces() {
         let heights = corners.map(|v| simplified.position(v).z);
-        assert!(heights.iter().all(|z| (z - heights[0]).abs() < 1e-9), "{face:?} joins the sides: {heights:?}");
+        assert!(
+            heights.iter().all(|z| (z - heights[0]).abs() < 1e-9),
+            "{face:?} joins the sides: {heights:?}"
+        );
     }
-    let top = simplified.faces().filter(|(_, corners)| simplified.position(corners[0]).z > -0.1).count();
+    let top = simplified
+        .faces()
+        .filter(|(_, corners)| simplified.position(corners[0]).z > -0.1)
+        .count();
     assert!((top as f64 / simplified.face_count() as f64 - 0.5).abs() < 0.05);
 }
 
 #[test]
 fn the_rim_of_an_open_mesh_stays_where_it_is() {
-    let simplified = Simplified::new(&grid(100, 0.1, |_, _| 0.0), 0.8).unwrap().mesh;
+    let simplified = Simplified::new(&grid(100, 0.1, |_, _| 0.0), 0.8)
+        .unwrap()
+        .mesh;
     let [lo, hi] = simplified.bounds();
-    assert!((lo - Point3::new(-5.0, -5.0, 0.0)).norm() < 0.5 && (hi - Point3::new(5.0, 5.0, 0.0)).norm() < 0.5);
+    assert!(
+        (lo - Point3::new(-5.0, -5.0, 0.0)).norm() < 0.5
+            && (hi - Point3::new(5.0, 5.0, 0.0)).norm() < 0.5
+    );
     let rims = soundness(&simplified).rims;
     assert!(!rims.is_empty());
     for v in rims.iter().flatten() {
@@ -124,11 +163,21 @@ fn fine_detail_rides_along_and_what_does_not_move_stays_bit_by_bit() {
     let mut dented = simplified.mesh.clone();
     let middle = (0..dented.vertex_slots() as u32)
         .map(VertexId)
-        .min_by(|a, b| dented.position(*a).coords.norm().total_cmp(&dented.position(*b).coords.norm()));
+        .min_by(|a, b| {
+            dented
+                .position(*a)
+                .coords
+                .norm()
+                .total_cmp(&dented.position(*b).coords.norm())
+        });
     let (middle, before) = (middle.unwrap(), dented.position(middle.unwrap()));
     dented.set_position(middle, before - Vector3::z() * 0.2);
     let dented = simplified.carry(&scan, &dented);
-    let gone = scan.positions().iter().zip(dented.positions()).filter(|(p, q)| p != q);
+    let gone = scan
+        .positions()
+        .iter()
+        .zip(dented.positions())
+        .filter(|(p, q)| p != q);
     let farthest = gone.map(|(p, _)| (p - before).norm()).fold(0.0, f64::max);
     assert!(farthest > 0.4 && farthest < 2.0, "{farthest}");
 }

@@ -13,12 +13,14 @@ use touchup::probing::arm::{Arm, ArmError, ArmState, Command};
 use touchup::ros::in_process::{OtherParticipants, start};
 use touchup::ros::inbox::inbox;
 use touchup::ros::messages::{
-    FlagFeatureRequest, Header, Point, PointStamped, ProbeFeatureRequest, ProbeFeedback, ProbeGoal, ProbeResponse,
-    ProbeResult, ProbeSettings,
+    FlagFeatureRequest, Header, Point, PointStamped, ProbeFeatureRequest, ProbeFeedback, ProbeGoal,
+    ProbeResponse, ProbeResult, ProbeSettings,
 };
 use touchup::ros::node::{ArmKind, ArmOfNode, Node, NodeEnd, Prepared};
 use touchup::ros::parameters::{ParameterValue, Parameters};
-use touchup::ros::port::{ArmOrder, Arrival, Call, Feedback, Goal, GoalEnd, Publication, Reply, SamplePort};
+use touchup::ros::port::{
+    ArmOrder, Arrival, Call, Feedback, Goal, GoalEnd, Publication, Reply, SamplePort,
+};
 use touchup::sim::{ArmParams, Plate, SimArm};
 
 use super::samples::bench::join;
@@ -41,11 +43,16 @@ pub struct Cell {
 impl Cell {
     /// The plate of the demo, its scan, a simulated arm.
     pub fn start(may_move: bool) -> Self {
-        Self::with(may_move, |_| ArmKind::Sim(Box::new(Plate::default().mesh(1e-5).unwrap())))
+        Self::with(may_move, |_| {
+            ArmKind::Sim(Box::new(Plate::default().mesh(1e-5).unwrap()))
+        })
     }
 
     pub fn with(may_move: bool, kind: impl FnOnce(&Clock) -> ArmKind) -> Self {
-        Self::on(may_move, |clock, world| ArmOfNode { kind: kind(clock), samples: Box::new(world.clone()) })
+        Self::on(may_move, |clock, world| ArmOfNode {
+            kind: kind(clock),
+            samples: Box::new(world.clone()),
+        })
     }
 
     pub fn on(may_move: bool, arm: impl FnOnce(&Clock, &OtherParticipants) -> ArmOfNode) -> Self {
@@ -59,24 +66,47 @@ impl Cell {
     }
 
     /// As [`Self::on`], whatever becomes of the arm.
-    pub fn begin(may_move: bool, arm: impl FnOnce(&Clock, &OtherParticipants) -> ArmOfNode) -> Self {
+    pub fn begin(
+        may_move: bool,
+        arm: impl FnOnce(&Clock, &OtherParticipants) -> ArmOfNode,
+    ) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
         write_mesh(&path("scan.ply"), &plate_scan(1), MeshUnit::Millimetre).unwrap();
-        std::fs::write(path("scene.yaml"), include_str!("../../../config/probe.yaml")).unwrap();
+        std::fs::write(
+            path("scene.yaml"),
+            include_str!("../../../config/probe.yaml"),
+        )
+        .unwrap();
         let mut parameters = Parameters::default();
-        let text = |value: &std::path::Path| ParameterValue::String(value.to_str().unwrap().to_owned());
+        let text =
+            |value: &std::path::Path| ParameterValue::String(value.to_str().unwrap().to_owned());
         parameters.set("scene", &text(&path("scene.yaml"))).unwrap();
-        parameters.set("session_folder", &text(&path("sessions"))).unwrap();
-        parameters.set("source", &ParameterValue::String("probe".to_owned())).unwrap();
-        parameters.set("allow_motion", &ParameterValue::Bool(may_move)).unwrap();
+        parameters
+            .set("session_folder", &text(&path("sessions")))
+            .unwrap();
+        parameters
+            .set("source", &ParameterValue::String("probe".to_owned()))
+            .unwrap();
+        parameters
+            .set("allow_motion", &ParameterValue::Bool(may_move))
+            .unwrap();
         let (clock, hand) = Clock::lock_step();
         let (inbox, arrivals) = inbox(FEW, &clock);
         let (port, world) = start(inbox, &clock);
         world.set_now_ns(1_000_000_000_000);
         let arm = arm(&clock, &world);
-        let node = Prepared::on(clock, parameters).unwrap().start(port, arrivals, Some(arm)).unwrap();
-        Self { node, world, hand, published: Vec::new(), _folder: folder }
+        let node = Prepared::on(clock, parameters)
+            .unwrap()
+            .start(port, arrivals, Some(arm))
+            .unwrap();
+        Self {
+            node,
+            world,
+            hand,
+            published: Vec::new(),
+            _folder: folder,
+        }
     }
 
     pub fn state(&self) -> (bool, String) {
@@ -87,31 +117,56 @@ impl Cell {
     /// Of the tip over the object's origin, mm.
     pub fn height(&self) -> f64 {
         let state = self.state().1;
-        let numbers: Vec<f64> = state.split([' ', '(', ')']).filter_map(|word| word.parse().ok()).collect();
+        let numbers: Vec<f64> = state
+            .split([' ', '(', ')'])
+            .filter_map(|word| word.parse().ok())
+            .collect();
         *numbers.last().unwrap()
     }
 
     pub fn flag(&self, kind: u8, [x, y, z]: [f64; 3]) -> u32 {
-        let header = Header { frame_id: "object".to_owned(), ..Header::default() };
+        let header = Header {
+            frame_id: "object".to_owned(),
+            ..Header::default()
+        };
         let request = FlagFeatureRequest {
             kind,
-            point: PointStamped { header, point: Point { x: x / 1e3, y: y / 1e3, z: z / 1e3 } },
+            point: PointStamped {
+                header,
+                point: Point {
+                    x: x / 1e3,
+                    y: y / 1e3,
+                    z: z / 1e3,
+                },
+            },
             search_radius: 3e-3,
         };
-        let answer = self.world.call(|reply| Call::Flag(request, reply)).recv().unwrap();
+        let answer = self
+            .world
+            .call(|reply| Call::Flag(request, reply))
+            .recv()
+            .unwrap();
         assert!(answer.success, "{}", answer.message);
         answer.id
     }
 
     pub fn probe(&self, id: u32, settings: ProbeSettings) -> ProbeResult {
         let request = ProbeFeatureRequest { id, settings };
-        self.world.call(|reply| Call::Arm(ArmOrder::Feature(request, reply))).recv().unwrap().result
+        self.world
+            .call(|reply| Call::Arm(ArmOrder::Feature(request, reply)))
+            .recv()
+            .unwrap()
+            .result
     }
 
     /// Sends a goal, and does something at its third touch, while the arm waits for that; how it ended.
     ///
     /// - `at_third`: gets what cancels the goal
-    pub fn goal(&self, ids: &[u32], at_third: impl FnOnce(&AtomicBool) + Send + 'static) -> (GoalEnd, ProbeResponse) {
+    pub fn goal(
+        &self,
+        ids: &[u32],
+        at_third: impl FnOnce(&AtomicBool) + Send + 'static,
+    ) -> (GoalEnd, ProbeResponse) {
         let (cancel, at_third) = (Arc::new(AtomicBool::new(false)), Mutex::new(Some(at_third)));
         let cancelled = Arc::clone(&cancel);
         self.send_goal(ids, cancelled, move |feedback| {
@@ -139,13 +194,23 @@ impl Cell {
             result: Reply::new(move |ended| drop(to.send(ended))),
             is_cancelled,
         };
-        let asked = ProbeGoal { ids: ids.to_vec(), settings: ProbeSettings::default() };
-        assert!(self.world.arrive_patiently(Arrival::Call(Call::Arm(ArmOrder::Goal(asked, goal)))));
+        let asked = ProbeGoal {
+            ids: ids.to_vec(),
+            settings: ProbeSettings::default(),
+        };
+        assert!(
+            self.world
+                .arrive_patiently(Arrival::Call(Call::Arm(ArmOrder::Goal(asked, goal))))
+        );
         result.recv_timeout(HUNG).unwrap()
     }
 
     pub fn recover(&self) -> (bool, String) {
-        let answer = self.world.call(|reply| Call::Arm(ArmOrder::Recover(reply))).recv().unwrap();
+        let answer = self
+            .world
+            .call(|reply| Call::Arm(ArmOrder::Recover(reply)))
+            .recv()
+            .unwrap();
         (answer.success, answer.message)
     }
 
@@ -205,7 +270,10 @@ impl SimulatedArm {
                 }
             }
         });
-        Self { asks, clock: clock.clone() }
+        Self {
+            asks,
+            clock: clock.clone(),
+        }
     }
 
     fn ask<T>(&self, what: impl FnOnce(SyncSender<T>) -> Asked) -> T {

@@ -13,7 +13,9 @@ use touchup::clock::Clock;
 use touchup::mesh::TriMesh;
 use touchup::probing::arm::{Arm, ArmError, ArmState, Command};
 use touchup::ros::in_process::OtherParticipants;
-use touchup::ros::messages::{Feature, PoseStamped, ProbeResponse, ProbeResult, ProbeSettings, UndoRequest};
+use touchup::ros::messages::{
+    Feature, PoseStamped, ProbeResponse, ProbeResult, ProbeSettings, UndoRequest,
+};
 use touchup::ros::node::{ArmKind, ArmOfNode};
 use touchup::ros::parameters::ParameterValue;
 use touchup::ros::port::{Arrival, Call, GoalEnd, Reply};
@@ -48,7 +50,11 @@ fn stop(world: &OtherParticipants, _: &AtomicBool) -> bool {
 fn forbid(world: &OtherParticipants, _: &AtomicBool) -> bool {
     let (to, answer) = sync_channel(1);
     let reply = Reply::new(move |said| drop(to.send(said)));
-    world.arrive(Arrival::SetParameter("allow_motion".to_owned(), ParameterValue::Bool(false), reply));
+    world.arrive(Arrival::SetParameter(
+        "allow_motion".to_owned(),
+        ParameterValue::Bool(false),
+        reply,
+    ));
     answer.try_recv() == Ok(Ok(()))
 }
 
@@ -92,15 +98,35 @@ impl NotedArm {
     /// Whether the moment has come.
     fn is_time(&self, when: When) -> bool {
         let notes = self.notes.lock().unwrap();
-        let told = |note: &Note| if let Note::Told(command) = note { Some(*command) } else { None };
+        let told = |note: &Note| {
+            if let Note::Told(command) = note {
+                Some(*command)
+            } else {
+                None
+            }
+        };
         let places: Vec<_> = notes.iter().rev().filter_map(place).take(SPAN).collect();
-        let Some(command) = notes.iter().rev().find_map(told).filter(|_| places.len() == SPAN) else { return false };
+        let Some(command) = notes
+            .iter()
+            .rev()
+            .find_map(told)
+            .filter(|_| places.len() == SPAN)
+        else {
+            return false;
+        };
         let speed = (places[0] - places[SPAN - 1]).norm() / (PERIOD * (SPAN - 1) as f64);
         match (when, command) {
             (When::Searching, Command::Velocity { linear, .. }) => {
                 let is_same = |note: &&Note| told(note).is_none_or(|told| told == command);
-                let begun = notes.iter().rev().take_while(is_same).filter_map(place).last();
-                begun.is_some_and(|begun| (places[0] - begun).norm() > DEEP && speed > 0.7 * linear.norm())
+                let begun = notes
+                    .iter()
+                    .rev()
+                    .take_while(is_same)
+                    .filter_map(place)
+                    .last();
+                begun.is_some_and(|begun| {
+                    (places[0] - begun).norm() > DEEP && speed > 0.7 * linear.norm()
+                })
             }
             (When::Retracting, Command::Line { .. }) => speed > BACK,
             _ => false,
@@ -109,15 +135,26 @@ impl NotedArm {
 }
 
 fn place(note: &Note) -> Option<Vector3<f64>> {
-    if let Note::State(place) = note { Some(*place) } else { None }
+    if let Note::State(place) = note {
+        Some(*place)
+    } else {
+        None
+    }
 }
 
 impl Arm for NotedArm {
     /// What happens does so after the state was measured, and before the node has it.
     fn next_state(&mut self) -> Result<ArmState, ArmError> {
         let state = self.arm.next_state()?;
-        self.notes.lock().unwrap().push(Note::State(state.pose_bt.translation.vector));
-        if self.events.first().is_some_and(|(when, _)| self.is_time(*when)) {
+        self.notes
+            .lock()
+            .unwrap()
+            .push(Note::State(state.pose_bt.translation.vector));
+        if self
+            .events
+            .first()
+            .is_some_and(|(when, _)| self.is_time(*when))
+        {
             self.notes.lock().unwrap().push(Note::Event);
             (self.events.remove(0).1)();
         }
@@ -175,15 +212,32 @@ fn probe_with(events: &[Event]) -> Ended {
             let (event, world, clock) = (*event, world.clone(), clock.clone());
             let (is_cancelled, release) = (Arc::clone(&is_cancelled), Arc::clone(&release));
             let happens: Happens = Box::new(move || {
-                release.lock().unwrap().get_or_insert_with(|| block(&world, &clock));
+                release
+                    .lock()
+                    .unwrap()
+                    .get_or_insert_with(|| block(&world, &clock));
                 assert!(event(&world, &is_cancelled), "it is answered at once");
             });
             (when, happens)
         };
-        let events = events.iter().zip([When::Searching, When::Retracting]).map(happens).collect();
-        let arm = NotedArm { arm: SimulatedArm::new(clock), notes: Arc::clone(&notes), events };
-        let samples = Lossy { world: world.clone(), clock: clock.clone() };
-        ArmOfNode { kind: ArmKind::Real(Box::new(arm)), samples: Box::new(samples) }
+        let events = events
+            .iter()
+            .zip([When::Searching, When::Retracting])
+            .map(happens)
+            .collect();
+        let arm = NotedArm {
+            arm: SimulatedArm::new(clock),
+            notes: Arc::clone(&notes),
+            events,
+        };
+        let samples = Lossy {
+            world: world.clone(),
+            clock: clock.clone(),
+        };
+        ArmOfNode {
+            kind: ArmKind::Real(Box::new(arm)),
+            samples: Box::new(samples),
+        }
     });
     let id = cell.flag(Feature::KIND_HOLE, [16.5, 36.0, 12.0]);
     let (end, response) = cell.send_goal(&[id], is_cancelled, |_| {});
@@ -191,13 +245,22 @@ fn probe_with(events: &[Event]) -> Ended {
     let blocked = release.lock().unwrap().take();
     drop(blocked.expect("something happened"));
     let notes = notes.lock().unwrap().clone();
-    Ended { cell, end, response, notes }
+    Ended {
+        cell,
+        end,
+        response,
+        notes,
+    }
 }
 
 impl Ended {
     /// What is noted from the event of this number on.
     fn since(&self, event: usize) -> &[Note] {
-        let mut events = self.notes.iter().enumerate().filter(|(_, note)| matches!(note, Note::Event));
+        let mut events = self
+            .notes
+            .iter()
+            .enumerate()
+            .filter(|(_, note)| matches!(note, Note::Event));
         let (at, _) = events.nth(event).expect("it happened");
         &self.notes[at + 1..]
     }
@@ -205,8 +268,13 @@ impl Ended {
     /// The arm is told to stop before it has given another state, and goes no farther than it needs to brake.
     fn assert_it_stops(&self, event: usize) {
         let since = self.since(event);
-        let first = since.iter().find(|note| !matches!(note, Note::Event)).unwrap();
-        assert!(matches!(first, Note::Told(Command::Stop { deceleration }) if *deceleration == BRAKES));
+        let first = since
+            .iter()
+            .find(|note| !matches!(note, Note::Event))
+            .unwrap();
+        assert!(
+            matches!(first, Note::Told(Command::Stop { deceleration }) if *deceleration == BRAKES)
+        );
         let before = &self.notes[..self.notes.len() - since.len()];
         let places: Vec<_> = before.iter().rev().filter_map(place).take(SPAN).collect();
         let went = (places[0] - places[SPAN - 1]) / (PERIOD * (SPAN - 1) as f64);
@@ -214,39 +282,81 @@ impl Ended {
         let speed = went.norm() + 2.0 * NOISE / (PERIOD * SPAN as f64);
         let braking = speed * (LATENCY + 2.0 * PERIOD) + speed * speed / (2.0 * BRAKES) + NOISE;
         let along = |place: Vector3<f64>| (place - places[0]).dot(&went.normalize());
-        let farthest = since.iter().filter_map(place).map(along).fold(0.0, f64::max);
-        assert!(farthest <= braking, "{:.3} mm on, {:.3} mm to brake", farthest * 1e3, braking * 1e3);
+        let farthest = since
+            .iter()
+            .filter_map(place)
+            .map(along)
+            .fold(0.0, f64::max);
+        assert!(
+            farthest <= braking,
+            "{:.3} mm on, {:.3} mm to brake",
+            farthest * 1e3,
+            braking * 1e3
+        );
     }
 
     /// Nothing moves the arm any more.
     fn assert_it_stays(&self, event: usize) {
         self.assert_it_stops(event);
         let since = self.since(event);
-        assert!(
-            since.iter().all(|note| matches!(note, Note::State(..) | Note::Event | Note::Told(Command::Stop { .. })))
-        );
+        assert!(since.iter().all(|note| matches!(
+            note,
+            Note::State(..) | Note::Event | Note::Told(Command::Stop { .. })
+        )));
     }
 
     /// The ball is in free air again.
     fn assert_it_is_out(&self) {
         let last = self.notes.iter().rev().find_map(place).unwrap();
-        let height = ArmParams::default().pose_bo.inverse_transform_point(&last.into()).z;
+        let height = ArmParams::default()
+            .pose_bo
+            .inverse_transform_point(&last.into())
+            .z;
         assert!(height > 14e-3, "it is {:.1} mm high", height * 1e3);
     }
 
     fn assert_ended(&self, end: GoalEnd, code: u8, why: &str) {
-        assert_eq!((self.end, self.response.code), (end, code), "{}", self.response.message);
-        assert!(self.response.message.contains(why), "{}", self.response.message);
+        assert_eq!(
+            (self.end, self.response.code),
+            (end, code),
+            "{}",
+            self.response.message
+        );
+        assert!(
+            self.response.message.contains(why),
+            "{}",
+            self.response.message
+        );
     }
 }
 
 #[test]
 fn each_event_stops_a_moving_arm_within_a_period_and_it_retracts() {
     let events: [(Event, GoalEnd, u8, &str); 4] = [
-        (pause, GoalEnd::Aborted, ProbeResult::CANCELLED, "the node is paused"),
-        (forbid, GoalEnd::Aborted, ProbeResult::CANCELLED, "allow_motion is off"),
-        (interrupt, GoalEnd::Aborted, ProbeResult::SHUTDOWN, "the node ends"),
-        (cancel, GoalEnd::Canceled, ProbeResult::CANCELLED, "stopped and retracted"),
+        (
+            pause,
+            GoalEnd::Aborted,
+            ProbeResult::CANCELLED,
+            "the node is paused",
+        ),
+        (
+            forbid,
+            GoalEnd::Aborted,
+            ProbeResult::CANCELLED,
+            "allow_motion is off",
+        ),
+        (
+            interrupt,
+            GoalEnd::Aborted,
+            ProbeResult::SHUTDOWN,
+            "the node ends",
+        ),
+        (
+            cancel,
+            GoalEnd::Canceled,
+            ProbeResult::CANCELLED,
+            "stopped and retracted",
+        ),
     ];
     for (event, end, code, why) in events {
         let ended = probe_with(&[event]);
@@ -268,10 +378,18 @@ fn a_call_of_stop_stops_a_moving_arm_within_a_period_and_it_stays_until_it_is_re
     );
     let Ended { cell, .. } = ended;
     let (is_ready, why) = cell.state();
-    assert!(!is_ready && why.contains("~/stop was called; look, then call ~/recover"), "{why}");
+    assert!(
+        !is_ready && why.contains("~/stop was called; look, then call ~/recover"),
+        "{why}"
+    );
     let id = cell.flag(Feature::KIND_HOLE, [32.0, 34.5, 12.0]);
     let refused = cell.probe(id, ProbeSettings::default());
-    assert_eq!(refused.code, ProbeResult::ARM_NOT_READY, "{}", refused.message);
+    assert_eq!(
+        refused.code,
+        ProbeResult::ARM_NOT_READY,
+        "{}",
+        refused.message
+    );
     assert!(cell.recover().0 && cell.state().0, "{}", cell.state().1);
     cell.end();
 }
@@ -297,16 +415,29 @@ fn a_retraction_goes_on_at_a_pause_a_cancel_and_the_first_signal() {
 fn a_retraction_stops_and_stays_at_a_stop_a_second_signal_and_where_motion_is_forbidden() {
     let events: [([Event; 2], &str); 4] = [
         ([cancel, stop], "~/stop was called"),
-        ([cancel, forbid], "allow_motion was taken away while the arm retracted"),
-        ([forbid, forbid], "allow_motion was taken away while the arm retracted"),
-        ([interrupt, interrupt], "the end of the node was asked for again"),
+        (
+            [cancel, forbid],
+            "allow_motion was taken away while the arm retracted",
+        ),
+        (
+            [forbid, forbid],
+            "allow_motion was taken away while the arm retracted",
+        ),
+        (
+            [interrupt, interrupt],
+            "the end of the node was asked for again",
+        ),
     ];
     for (events, why) in events {
         let ended = probe_with(&events);
         ended.assert_it_stops(0);
         ended.assert_it_stays(1);
         ended.assert_ended(GoalEnd::Aborted, ProbeResult::STOPPED_IN_PLACE, why);
-        assert!(ended.response.message.contains("stays where it is"), "{}", ended.response.message);
+        assert!(
+            ended.response.message.contains("stays where it is"),
+            "{}",
+            ended.response.message
+        );
         ended.cell.end();
     }
 }
@@ -316,9 +447,15 @@ fn an_arm_at_rest_that_was_stopped_begins_nothing() {
     let cell = Cell::start(true);
     let id = cell.flag(Feature::KIND_HOLE, [16.5, 36.0, 12.0]);
     assert!(cell.world.stops().stop().success);
-    assert_eq!(cell.probe(id, ProbeSettings::default()).code, ProbeResult::ARM_NOT_READY);
+    assert_eq!(
+        cell.probe(id, ProbeSettings::default()).code,
+        ProbeResult::ARM_NOT_READY
+    );
     assert!(cell.recover().0);
-    let few = ProbeSettings { max_touches: 3, ..ProbeSettings::default() };
+    let few = ProbeSettings {
+        max_touches: 3,
+        ..ProbeSettings::default()
+    };
     assert_eq!(cell.probe(id, few).code, ProbeResult::NOTHING_FOUND);
     cell.end();
 }
@@ -337,18 +474,29 @@ fn without_an_arm_s_thread_the_answers_say_so() {
         std::thread::yield_now();
     }
     let said = [
-        (cell.world.stops().stop().success, cell.world.stops().stop().message),
-        (cell.world.stops().pause(true).success, cell.world.stops().pause(true).message),
+        (
+            cell.world.stops().stop().success,
+            cell.world.stops().stop().message,
+        ),
+        (
+            cell.world.stops().pause(true).success,
+            cell.world.stops().pause(true).message,
+        ),
         cell.state(),
         cell.recover(),
     ];
     for (success, message) in said {
         assert!(
-            !success && message.contains("the arm's thread has ended") && message.contains("no part to touch"),
+            !success
+                && message.contains("the arm's thread has ended")
+                && message.contains("no part to touch"),
             "{message}"
         );
     }
     let id = cell.flag(Feature::KIND_HOLE, [16.5, 36.0, 12.0]);
-    assert_eq!(cell.probe(id, ProbeSettings::default()).code, ProbeResult::ARM_NOT_READY);
+    assert_eq!(
+        cell.probe(id, ProbeSettings::default()).code,
+        ProbeResult::ARM_NOT_READY
+    );
     cell.end();
 }

@@ -30,7 +30,10 @@ fn stamped(mut arrival: Arrival, stamp_ns: i64) -> Arrival {
         Arrival::Wrench(wrench, _) => &mut wrench.header,
         _ => panic!("neither pose nor wrench"),
     };
-    let (sec, nanosec) = (stamp_ns.div_euclid(SECOND) as i32, stamp_ns.rem_euclid(SECOND) as u32);
+    let (sec, nanosec) = (
+        stamp_ns.div_euclid(SECOND) as i32,
+        stamp_ns.rem_euclid(SECOND) as u32,
+    );
     header.stamp = Time { sec, nanosec };
     arrival
 }
@@ -53,23 +56,48 @@ fn a_stream_that_is_not_used_is_a_warning_with_its_cause() {
     let cases: [(&str, Fault, &[&str]); 10] = [
         (
             "poses 5 s behind",
-            |bench, m| stamped(bench.arrival(m), m.stamp_ns() - if is_pose(m) { 5 * SECOND } else { 0 }),
+            |bench, m| {
+                stamped(
+                    bench.arrival(m),
+                    m.stamp_ns() - if is_pose(m) { 5 * SECOND } else { 0 },
+                )
+            },
             &["poses are stamped", "behind the wrenches"],
         ),
         (
             "poses an hour ahead",
-            |bench, m| stamped(bench.arrival(m), m.stamp_ns() + if is_pose(m) { 3600 * SECOND } else { 0 }),
+            |bench, m| {
+                stamped(
+                    bench.arrival(m),
+                    m.stamp_ns() + if is_pose(m) { 3600 * SECOND } else { 0 },
+                )
+            },
             &["poses are stamped 3600.", "ahead of the wrenches"],
         ),
         (
             "wrenches an hour ahead",
-            |bench, m| stamped(bench.arrival(m), m.stamp_ns() + if is_pose(m) { 0 } else { 3600 * SECOND }),
+            |bench, m| {
+                stamped(
+                    bench.arrival(m),
+                    m.stamp_ns() + if is_pose(m) { 0 } else { 3600 * SECOND },
+                )
+            },
             &["poses are stamped 3600.", "behind the wrenches"],
         ),
-        ("no frames", |bench, m| empty_frame(bench.arrival(m)), &["no_frame", "fill frame_id"]),
+        (
+            "no frames",
+            |bench, m| empty_frame(bench.arrival(m)),
+            &["no_frame", "fill frame_id"],
+        ),
         (
             "poses without frame",
-            |bench, m| if is_pose(m) { empty_frame(bench.arrival(m)) } else { bench.arrival(m) },
+            |bench, m| {
+                if is_pose(m) {
+                    empty_frame(bench.arrival(m))
+                } else {
+                    bench.arrival(m)
+                }
+            },
             &["no_frame", "fill frame_id"],
         ),
         (
@@ -94,10 +122,20 @@ fn a_stream_that_is_not_used_is_a_warning_with_its_cause() {
             },
             &["not_finite", "NaN"],
         ),
-        ("no stamps", |bench, m| stamped(bench.arrival(m), 0), &["not stamped", "header.stamp"]),
+        (
+            "no stamps",
+            |bench, m| stamped(bench.arrival(m), 0),
+            &["not stamped", "header.stamp"],
+        ),
         (
             "poses without stamps",
-            |bench, m| if is_pose(m) { stamped(bench.arrival(m), 0) } else { bench.arrival(m) },
+            |bench, m| {
+                if is_pose(m) {
+                    stamped(bench.arrival(m), 0)
+                } else {
+                    bench.arrival(m)
+                }
+            },
             &["poses are not stamped"],
         ),
         (
@@ -109,9 +147,14 @@ fn a_stream_that_is_not_used_is_a_warning_with_its_cause() {
     let plate = Plate::touched(0.1);
     let messages = &plate.messages;
     let first_ns = messages[0].stamp_ns();
-    let some = messages.iter().take_while(|message| message.stamp_ns() - first_ns < 4 * SECOND);
+    let some = messages
+        .iter()
+        .take_while(|message| message.stamp_ns() - first_ns < 4 * SECOND);
     let some: Vec<Message> = some.copied().collect();
-    assert!(some.last().unwrap().stamp_ns() - first_ns > 3 * SECOND, "it lasts for some seconds");
+    assert!(
+        some.last().unwrap().stamp_ns() - first_ns > 3 * SECOND,
+        "it lasts for some seconds"
+    );
     let state_of = |fault: Fault| {
         let mut bench = Bench::start(&plate);
         let mut states = Vec::new();
@@ -127,10 +170,16 @@ fn a_stream_that_is_not_used_is_a_warning_with_its_cause() {
     for (name, fault, words) in cases {
         let (level, said) = state_of(fault);
         assert_eq!(level, DiagnosticStatus::WARN, "{name}: {said}");
-        assert!(words.iter().all(|word| said.contains(word)), "{name}: {said}");
+        assert!(
+            words.iter().all(|word| said.contains(word)),
+            "{name}: {said}"
+        );
     }
     let (level, said) = state_of(|bench, message| bench.arrival(message));
-    assert_eq!((level, said.as_str()), (DiagnosticStatus::OK, "runs: samples are taken"));
+    assert_eq!(
+        (level, said.as_str()),
+        (DiagnosticStatus::OK, "runs: samples are taken")
+    );
 }
 
 /// Samples are taken, and what they say of the part cannot be.
@@ -148,21 +197,31 @@ fn an_input_that_is_surely_wrong_is_an_error_with_its_cause() {
             vec![arrival]
         });
         let of_diagnostics = |published: &Publication| match published {
-            Publication::Diagnostics(message) => Some((message.status[0].level, message.status[0].message.clone())),
+            Publication::Diagnostics(message) => {
+                Some((message.status[0].level, message.status[0].message.clone()))
+            }
             _ => None,
         };
-        let states: Vec<_> = bench.published().iter().filter_map(of_diagnostics).collect();
+        let states: Vec<_> = bench
+            .published()
+            .iter()
+            .filter_map(of_diagnostics)
+            .collect();
         bench.end();
         states
     };
     let sound = states_of(1.0);
     assert!(
-        sound.len() > either(5, 10) && sound.iter().all(|(level, _)| *level != DiagnosticStatus::ERROR),
+        sound.len() > either(5, 10)
+            && sound
+                .iter()
+                .all(|(level, _)| *level != DiagnosticStatus::ERROR),
         "{sound:?}"
     );
     let reversed = states_of(-1.0);
     let (level, said) = reversed.last().unwrap();
-    let is_named = said.starts_with("doubts its input (wrench_sign)") && said.contains("reverse the wrench");
+    let is_named =
+        said.starts_with("doubts its input (wrench_sign)") && said.contains("reverse the wrench");
     assert!(*level == DiagnosticStatus::ERROR && is_named, "{said}");
 }
 
@@ -177,7 +236,11 @@ fn a_wrong_stamp_costs_itself_alone() {
         ("a pose 5 s ahead", true, &[5]),
         ("a wrench 5 s ahead", false, &[5]),
         ("a pose a year ahead", true, &[31_536_000]),
-        ("four poses of 2038", true, &[447_483_644, 447_483_645, 447_483_646, 447_483_647]),
+        (
+            "four poses of 2038",
+            true,
+            &[447_483_644, 447_483_645, 447_483_646, 447_483_647],
+        ),
         ("three wrenches half a minute ahead", false, &[30, 31, 32]),
     ];
     for &(name, of_poses, ahead) in &wrong[..either(2, wrong.len())] {
@@ -190,29 +253,61 @@ fn a_wrong_stamp_costs_itself_alone() {
             if number >= at && inserted == 0 && is_pose(message) == of_poses {
                 inserted = ahead.len();
                 let base = message.stamp_ns().div_euclid(SECOND) * SECOND;
-                let base = if ahead[0] > 1_000_000 { 1_700_000_000 * SECOND } else { base };
-                arrivals.extend(ahead.iter().map(|ahead| stamped(bench.arrival(message), base + ahead * SECOND)));
+                let base = if ahead[0] > 1_000_000 {
+                    1_700_000_000 * SECOND
+                } else {
+                    base
+                };
+                arrivals.extend(
+                    ahead
+                        .iter()
+                        .map(|ahead| stamped(bench.arrival(message), base + ahead * SECOND)),
+                );
             }
             arrivals
         });
         let (end, _) = bench.end();
         assert_eq!(inserted, ahead.len(), "{name}");
         let reason = if of_poses { "pose_jump" } else { "jump" };
-        assert_eq!(end.report.refused.get(reason), Some(&(inserted as u64)), "{name}: {:?}", end.report.refused);
-        assert_eq!((end.report.unrecorded, end.report.refused.get("pose_late")), (0, None), "{name}");
+        assert_eq!(
+            end.report.refused.get(reason),
+            Some(&(inserted as u64)),
+            "{name}: {:?}",
+            end.report.refused
+        );
+        assert_eq!(
+            (end.report.unrecorded, end.report.refused.get("pose_late")),
+            (0, None),
+            "{name}"
+        );
         assert!(read(&end.folder, "refined.ply") == expected, "{name}");
         let again = plate.path("again.ply");
-        refine(&["--resume".as_ref(), end.folder.as_os_str(), "--out".as_ref(), again.as_os_str()]);
-        assert!(std::fs::read(again).unwrap() == expected, "{name}, from the recording");
+        refine(&[
+            "--resume".as_ref(),
+            end.folder.as_os_str(),
+            "--out".as_ref(),
+            again.as_os_str(),
+        ]);
+        assert!(
+            std::fs::read(again).unwrap() == expected,
+            "{name}, from the recording"
+        );
     }
 }
 
 /// Vertices by their places and faces by theirs: what does not depend on how either are numbered.
 fn in_order(vertices: &BTreeMap<u32, [f32; 3]>, faces: impl Iterator<Item = [u32; 3]>) -> TriMesh {
-    let mut places: Vec<[u32; 3]> = vertices.values().map(|place| place.map(f32::to_bits)).collect();
+    let mut places: Vec<[u32; 3]> = vertices
+        .values()
+        .map(|place| place.map(f32::to_bits))
+        .collect();
     places.sort_unstable();
     places.dedup();
-    let number = |vertex: u32| places.binary_search(&vertices[&vertex].map(f32::to_bits)).unwrap() as u32;
+    let number = |vertex: u32| {
+        places
+            .binary_search(&vertices[&vertex].map(f32::to_bits))
+            .unwrap() as u32
+    };
     let mut faces: Vec<[u32; 3]> = faces
         .map(|corners| {
             let [a, b, c] = corners.map(number);
@@ -250,7 +345,9 @@ fn what_is_shown_becomes_what_is_saved_at_a_follower_that_loses_patches() {
         }
         seen = sent.len();
         if std::mem::take(&mut follower.asks) {
-            follower.asks = !bench.call(|reply| Call::Resync(ResyncMeshRequest::default(), reply)).success;
+            follower.asks = !bench
+                .call(|reply| Call::Resync(ResyncMeshRequest::default(), reply))
+                .success;
         }
     };
     for chunk in plate.messages.chunks(400) {
@@ -262,30 +359,56 @@ fn what_is_shown_becomes_what_is_saved_at_a_follower_that_loses_patches() {
         take(&mut bench, false, &mut follower);
         follower.tick();
     }
-    let request = SaveMeshRequest { name: "rested.ply".to_owned(), ..SaveMeshRequest::default() };
+    let request = SaveMeshRequest {
+        name: "rested.ply".to_owned(),
+        ..SaveMeshRequest::default()
+    };
     let saved = bench.call(|reply| Call::Save(request, reply));
     assert!(saved.success && !follower.is_waiting(), "{}", saved.message);
     assert_eq!(saved.mesh_version, follower.version);
     let counts = [follower.vertices.len() as u32, follower.faces.len() as u32];
-    assert_eq!([saved.vertex_count, saved.face_count], counts, "version {}", saved.mesh_version);
-    let file = read_mesh(Path::new(&saved.path), MeshUnit::Millimetre).unwrap().mesh;
-    let places =
-        |(vertex, place): (u32, &nalgebra::Point3<f64>)| (vertex, [place.x, place.y, place.z].map(|x| x as f32));
+    assert_eq!(
+        [saved.vertex_count, saved.face_count],
+        counts,
+        "version {}",
+        saved.mesh_version
+    );
+    let file = read_mesh(Path::new(&saved.path), MeshUnit::Millimetre)
+        .unwrap()
+        .mesh;
+    let places = |(vertex, place): (u32, &nalgebra::Point3<f64>)| {
+        (vertex, [place.x, place.y, place.z].map(|x| x as f32))
+    };
     let of_file = (0..).zip(file.positions()).map(places).collect();
-    let corners = file.faces().map(|(_, corners)| corners.map(|corner| corner.0));
+    let corners = file
+        .faces()
+        .map(|(_, corners)| corners.map(|corner| corner.0));
     let of_file = in_order(&of_file, corners);
     let of_follower = in_order(&follower.vertices, follower.faces.values().copied());
     let bytes = written(&of_file, &plate.path("file.ply"));
     assert!(bytes == written(&of_follower, &plate.path("follower.ply")));
-    println!("{lost} patches lost, {seen} sent; {} bytes at version {}", bytes.len(), follower.version);
+    println!(
+        "{lost} patches lost, {seen} sent; {} bytes at version {}",
+        bytes.len(),
+        follower.version
+    );
     assert!(lost > 10);
     // and the samples that come after it are taken as if nothing had been settled
     let (end, published) = bench.end();
     assert!(read(&end.folder, "refined.ply") == plate.refined("touch.mcap"));
-    let tip = published.iter().rev().find_map(|published| match published {
-        Publication::Tip(markers) => Some(markers.markers.iter().map(|marker| marker.action).collect::<Vec<_>>()),
-        _ => None,
-    });
+    let tip = published
+        .iter()
+        .rev()
+        .find_map(|published| match published {
+            Publication::Tip(markers) => Some(
+                markers
+                    .markers
+                    .iter()
+                    .map(|marker| marker.action)
+                    .collect::<Vec<_>>(),
+            ),
+            _ => None,
+        });
     assert_eq!(tip, Some(vec![Marker::DELETE; 4]), "no tip is left behind");
 }
 
@@ -298,12 +421,17 @@ fn a_mesh_that_settles_in_a_pause_goes_on_as_if_it_had_not() {
         bench.play(part);
         bench.pass(Duration::from_secs(2));
     }
-    let request = SaveMeshRequest { name: "rested.ply".to_owned(), ..SaveMeshRequest::default() };
+    let request = SaveMeshRequest {
+        name: "rested.ply".to_owned(),
+        ..SaveMeshRequest::default()
+    };
     let saved = bench.call(|reply| Call::Save(request, reply));
     assert!(saved.success && saved.mesh_version > 1, "{}", saved.message);
     let (end, _) = bench.end();
     let expected = plate.refined("touch.mcap");
-    assert!(read(&end.folder, "rested.ply") == expected && read(&end.folder, "refined.ply") == expected);
+    assert!(
+        read(&end.folder, "rested.ply") == expected && read(&end.folder, "refined.ply") == expected
+    );
 }
 
 /// The arm of the cell and somebody who plays a recording, on one topic.
@@ -311,22 +439,41 @@ fn a_mesh_that_settles_in_a_pause_goes_on_as_if_it_had_not() {
 fn samples_of_two_publishers_are_a_warning_with_the_topic() {
     let plate = Plate::touched(0.05);
     let mut bench = Bench::start(&plate);
-    let publishers = |count| Arrival::Matched(Endpoint { topic: "/stylus/pose".to_owned(), count, mismatch: None });
+    let publishers = |count| {
+        Arrival::Matched(Endpoint {
+            topic: "/stylus/pose".to_owned(),
+            count,
+            mismatch: None,
+        })
+    };
     bench.world.arrive_patiently(publishers(2));
     let (first, rest) = plate.messages.split_at(plate.messages.len() / 2);
     let state = |bench: &mut Bench| {
         let of = |published: &Publication| match published {
-            Publication::Diagnostics(message) => Some((message.status[0].level, message.status[0].message.clone())),
+            Publication::Diagnostics(message) => {
+                Some((message.status[0].level, message.status[0].message.clone()))
+            }
             _ => None,
         };
-        bench.published().iter().rev().find_map(of).expect("diagnostics come once a second")
+        bench
+            .published()
+            .iter()
+            .rev()
+            .find_map(of)
+            .expect("diagnostics come once a second")
     };
     bench.play(first);
     let (level, words) = state(&mut bench);
-    assert!(level == DiagnosticStatus::WARN && words.contains("2 publishers on /stylus/pose"), "{words}");
+    assert!(
+        level == DiagnosticStatus::WARN && words.contains("2 publishers on /stylus/pose"),
+        "{words}"
+    );
     bench.world.arrive_patiently(publishers(1));
     bench.play(rest);
-    assert_eq!(state(&mut bench), (DiagnosticStatus::OK, "runs: samples are taken".to_owned()));
+    assert_eq!(
+        state(&mut bench),
+        (DiagnosticStatus::OK, "runs: samples are taken".to_owned())
+    );
     bench.end();
 }
 
@@ -336,21 +483,38 @@ fn what_cannot_be_read_and_two_cells_can_be_told_apart() {
     let plate = Plate::touched(0.01);
     let mut bench = Bench::start(&plate);
     for _ in 0..500 {
-        bench.world.arrive_patiently(Arrival::Unreadable("stylus/wrench", "too short".to_owned()));
+        bench
+            .world
+            .arrive_patiently(Arrival::Unreadable("stylus/wrench", "too short".to_owned()));
     }
-    assert_eq!(bench.diagnostic("refused_unreadable").as_deref(), Some("500"));
+    assert_eq!(
+        bench.diagnostic("refused_unreadable").as_deref(),
+        Some("500")
+    );
     let of = |published: &Publication| match published {
-        Publication::Diagnostics(message) => Some((message.status[0].level, message.status[0].message.clone())),
+        Publication::Diagnostics(message) => {
+            Some((message.status[0].level, message.status[0].message.clone()))
+        }
         _ => None,
     };
     let (level, said) = bench.wait_for("diagnostics", of);
-    assert!(level == DiagnosticStatus::WARN && said.contains("is the type of the topic right?"), "{said}");
+    assert!(
+        level == DiagnosticStatus::WARN && said.contains("is the type of the topic right?"),
+        "{said}"
+    );
     let named = bench.wait_for("diagnostics", |published| match published {
-        Publication::Diagnostics(message) => {
-            Some((message.status[0].name.clone(), message.status[0].hardware_id.clone()))
-        }
+        Publication::Diagnostics(message) => Some((
+            message.status[0].name.clone(),
+            message.status[0].hardware_id.clone(),
+        )),
         _ => None,
     });
-    assert_eq!(named, ("touchup: session".to_owned(), "stylus of /touchup".to_owned()));
+    assert_eq!(
+        named,
+        (
+            "touchup: session".to_owned(),
+            "stylus of /touchup".to_owned()
+        )
+    );
     bench.end();
 }

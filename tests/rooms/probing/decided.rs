@@ -8,10 +8,13 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 use touchup::conformity::{
-    Decision, DecisionParams, InspectedQuantity, MeasuredNumber, ToleranceLimits, assess, measured_number,
+    Decision, DecisionParams, InspectedQuantity, MeasuredNumber, ToleranceLimits, assess,
+    measured_number,
 };
 use touchup::features::Kind;
-use touchup::features::fit::{Cylinder, Ends, FitParams, Freedom, Observation, Plane, Stadium, Surface, fit};
+use touchup::features::fit::{
+    Cylinder, Ends, FitParams, Freedom, Observation, Plane, Stadium, Surface, fit,
+};
 use touchup::probing::plan::{
     ArmUncertainty, DecisionGoal, Explorer, Found, PatternParams, Quantity, SoughtCharacteristic,
 };
@@ -45,8 +48,13 @@ const HOLE: Case = Case {
     value: 8e-3,
     half: 0.3e-3,
 };
-const BOSS: Case =
-    Case { name: "diameter of a boss", kind: Kind::Boss, flag: Point3::new(47e-3, 25e-3, 16e-3), value: 10e-3, ..HOLE };
+const BOSS: Case = Case {
+    name: "diameter of a boss",
+    kind: Kind::Boss,
+    flag: Point3::new(47e-3, 25e-3, 16e-3),
+    value: 10e-3,
+    ..HOLE
+};
 const SLOT: Case = Case {
     name: "width of a slot",
     kind: Kind::Slot,
@@ -69,12 +77,23 @@ const PLANE: Case = Case {
 /// The true value is off the middle of the tolerance by this share of its half.
 fn limits(case: &Case, share: f64) -> ToleranceLimits {
     let nominal = case.value - share * case.half;
-    ToleranceLimits { lower: Some(nominal - case.half), upper: Some(nominal + case.half) }
+    ToleranceLimits {
+        lower: Some(nominal - case.half),
+        upper: Some(nominal + case.half),
+    }
 }
 
 fn params(budget: usize) -> PatternParams {
-    let shared = ArmUncertainty { radius: RADIUS, ..ArmUncertainty::default() };
-    PatternParams { touch_sigma: TOUCH, budget, shared, ..PatternParams::default() }
+    let shared = ArmUncertainty {
+        radius: RADIUS,
+        ..ArmUncertainty::default()
+    };
+    PatternParams {
+        touch_sigma: TOUCH,
+        budget,
+        shared,
+        ..PatternParams::default()
+    }
 }
 
 /// Explores with noise of each touch, and a ball that differs from what is told; after each touch `look` sees what is known.
@@ -89,7 +108,8 @@ fn explored(
     let mut some = |most: f64| rng.random_range(-most..most);
     let flag = case.flag + Vector3::new(some(1e-3), some(1e-3), 0.0);
     let scan = flat([-10.0, 70.0], [-10.0, 60.0]);
-    let explorer = Explorer::new(Some(case.kind), &flag, &Vector3::z_axis(), params, &scan).unwrap();
+    let explorer =
+        Explorer::new(Some(case.kind), &flag, &Vector3::z_axis(), params, &scan).unwrap();
     let mut explorer = match goal {
         Some(goal) => explorer.until_decided(goal),
         None => explorer,
@@ -104,27 +124,68 @@ fn explored(
 }
 
 fn goal(case: &Case, limits: ToleranceLimits, confidence: f64) -> DecisionGoal {
-    let sought = SoughtCharacteristic { name: case.name.to_owned(), quantity: case.quantity, limits, nominal: None };
-    let params = DecisionParams { confidence, ..DecisionParams::default() };
-    DecisionGoal { characteristics: vec![sought], params }
+    let sought = SoughtCharacteristic {
+        name: case.name.to_owned(),
+        quantity: case.quantity,
+        limits,
+        nominal: None,
+    };
+    let params = DecisionParams {
+        confidence,
+        ..DecisionParams::default()
+    };
+    DecisionGoal {
+        characteristics: vec![sought],
+        params,
+    }
 }
 
 fn until_decided(case: &Case, share: f64, budget: usize, seed: u64) -> Found {
     let mut rng = Pcg64::seed_from_u64(seed);
-    explored(case, params(budget), Some(goal(case, limits(case, share), 0.95)), &mut rng, &mut |_| {})
+    explored(
+        case,
+        params(budget),
+        Some(goal(case, limits(case, share), 0.95)),
+        &mut rng,
+        &mut |_| {},
+    )
 }
 
 /// By one look alone.
 fn decision(number: &MeasuredNumber, limits: ToleranceLimits) -> Decision {
-    assess(number, limits, touchup::conformity::Distribution::Normal, &DecisionParams::default()).decision
+    assess(
+        number,
+        limits,
+        touchup::conformity::Distribution::Normal,
+        &DecisionParams::default(),
+    )
+    .decision
 }
 
 /// Until the number has an uncertainty that decides a value as near to a limit as `distance` in 95 of 100 cases: two guard bands.
-fn with_fixed_uncertainty(case: &Case, distance: f64, budget: usize, seed: u64) -> (usize, MeasuredNumber) {
+fn with_fixed_uncertainty(
+    case: &Case,
+    distance: f64,
+    budget: usize,
+    seed: u64,
+) -> (usize, MeasuredNumber) {
     let sigma = distance / (2.0 * 1.645);
-    let params = PatternParams { sigma, quantity: case.asked, ..params(budget) };
-    let found = explored(case, params, None, &mut Pcg64::seed_from_u64(seed), &mut |_| {});
-    (found.touches, measured_number(&found.feature.unwrap(), case.quantity, None).unwrap())
+    let params = PatternParams {
+        sigma,
+        quantity: case.asked,
+        ..params(budget)
+    };
+    let found = explored(
+        case,
+        params,
+        None,
+        &mut Pcg64::seed_from_u64(seed),
+        &mut |_| {},
+    );
+    (
+        found.touches,
+        measured_number(&found.feature.unwrap(), case.quantity, None).unwrap(),
+    )
 }
 
 /// Touches of a fixed pattern, evenly over the surface itself, with no search for it.
@@ -134,8 +195,10 @@ fn touched_evenly(case: &Case, seed: u64) -> MeasuredNumber {
     let mut rng = Pcg64::seed_from_u64(seed);
     let off = RADIUS * rng.sample::<f64, _>(StandardNormal);
     let places = |at: usize| {
-        let (turn, depth) =
-            (at as f64 / GRID as f64 * std::f64::consts::TAU, if at.is_multiple_of(2) { 1.2e-3 } else { 2.8e-3 });
+        let (turn, depth) = (
+            at as f64 / GRID as f64 * std::f64::consts::TAU,
+            if at.is_multiple_of(2) { 1.2e-3 } else { 2.8e-3 },
+        );
         (turn, depth)
     };
     let mut noise = || SIGMA.hypot(TOUCH) * rng.sample::<f64, _>(StandardNormal);
@@ -145,7 +208,10 @@ fn touched_evenly(case: &Case, seed: u64) -> MeasuredNumber {
         sigma: SIGMA.hypot(TOUCH),
         group: group as u32,
     };
-    let square = FitParams { axis_sigma: Some(PatternParams::default().square), ..FitParams::default() };
+    let square = FitParams {
+        axis_sigma: Some(PatternParams::default().square),
+        ..FitParams::default()
+    };
     let of_size = |value: f64, std: Option<f64>| MeasuredNumber {
         value,
         std: std.map(|std| std.hypot(2.0 * RADIUS)),
@@ -156,7 +222,10 @@ fn touched_evenly(case: &Case, seed: u64) -> MeasuredNumber {
             let plane = Plane::new(case.flag, &Vector3::z());
             let observations: Vec<_> = (0..GRID)
                 .map(|at| {
-                    let (turn, away) = (2.4 * at as f64, 3e-3 * ((at as f64 + 0.5) / GRID as f64).sqrt());
+                    let (turn, away) = (
+                        2.4 * at as f64,
+                        3e-3 * ((at as f64 + 0.5) / GRID as f64).sqrt(),
+                    );
                     let place = case.flag + Vector3::new(turn.cos(), turn.sin(), 0.0) * away;
                     observe(place, Vector3::z(), at)
                 })
@@ -164,11 +233,22 @@ fn touched_evenly(case: &Case, seed: u64) -> MeasuredNumber {
             let fitted = fit(&plane, &observations, &FitParams::default()).unwrap();
             let std = fitted.std_at(&case.flag).map(|std| std.hypot(RADIUS));
             let height = case.flag.z - fitted.surface.distance(&case.flag);
-            MeasuredNumber { value: height, std, is_at_least: false }
+            MeasuredNumber {
+                value: height,
+                std,
+                is_at_least: false,
+            }
         }
         Kind::Slot => {
             let sizes = [6e-3, 20e-3];
-            let truth = Stadium::new(case.flag, &Vector3::z(), &Vector3::x(), sizes, Ends::Round, true);
+            let truth = Stadium::new(
+                case.flag,
+                &Vector3::z(),
+                &Vector3::x(),
+                sizes,
+                Ends::Round,
+                true,
+            );
             let observations = evenly_on(&truth, &mut observe, |at| {
                 let (turn, depth) = places(at);
                 case.flag + Vector3::new(10e-3 * turn.cos(), 3.5e-3 * turn.sin(), -depth)
@@ -178,14 +258,22 @@ fn touched_evenly(case: &Case, seed: u64) -> MeasuredNumber {
         }
         _ => {
             let is_hole = case.kind == Kind::Hole;
-            let middle = Point3::new(case.flag.x, case.flag.y, if is_hole { TOP } else { TOP + 4e-3 });
+            let middle = Point3::new(
+                case.flag.x,
+                case.flag.y,
+                if is_hole { TOP } else { TOP + 4e-3 },
+            );
             let truth = Cylinder::new(middle, &Vector3::z(), case.value / 2.0, is_hole);
             let observations = evenly_on(&truth, &mut observe, |at| {
                 let (turn, depth) = places(at);
-                middle + Vector3::new(turn.cos(), turn.sin(), 0.0) * (case.value / 2.0) - Vector3::z() * depth
+                middle + Vector3::new(turn.cos(), turn.sin(), 0.0) * (case.value / 2.0)
+                    - Vector3::z() * depth
             });
             let fitted = fit(&truth, &observations, &square).unwrap();
-            of_size(2.0 * fitted.surface.radius, fitted.std_by(&[(Freedom::Size, 2.0)]))
+            of_size(
+                2.0 * fitted.surface.radius,
+                fitted.std_by(&[(Freedom::Size, 2.0)]),
+            )
         }
     }
 }
@@ -224,7 +312,13 @@ impl Tally {
 
     fn row(&self) -> String {
         let count = (self.right + self.wrong + self.open) as f64;
-        format!("{:.0}: {}, {}, {}", self.touches as f64 / count, self.right, self.wrong, self.open)
+        format!(
+            "{:.0}: {}, {}, {}",
+            self.touches as f64 / count,
+            self.right,
+            self.wrong,
+            self.open
+        )
     }
 }
 
@@ -239,34 +333,55 @@ fn deciding_takes_the_touches_that_the_distance_from_the_limit_asks_for() {
     let (mut wrong, mut decided) = (0, 0);
     for case in [HOLE, BOSS, SLOT, PLANE] {
         let mut touches = Vec::new();
-        let fixed: Vec<_> =
-            (0..seeds).map(|seed| with_fixed_uncertainty(&case, 0.1 * case.half, budget, seed)).collect();
+        let fixed: Vec<_> = (0..seeds)
+            .map(|seed| with_fixed_uncertainty(&case, 0.1 * case.half, budget, seed))
+            .collect();
         let even: Vec<_> = (0..seeds).map(|seed| touched_evenly(&case, seed)).collect();
         for share in [0.1, 0.5, 0.9, 1.1, 1.5] {
             let mut tallies: [Tally; 3] = Default::default();
             for seed in 0..seeds {
                 let (limits, conforms) = (limits(&case, share), share <= 1.0);
                 let found = until_decided(&case, share, budget, seed);
-                tallies[0].add(found.characteristics[0].assessment.decision, conforms, found.touches);
+                tallies[0].add(
+                    found.characteristics[0].assessment.decision,
+                    conforms,
+                    found.touches,
+                );
                 let (count, number) = &fixed[seed as usize];
                 tallies[1].add(decision(number, limits), conforms, *count);
                 tallies[2].add(decision(&even[seed as usize], limits), conforms, GRID);
             }
             let [a, b, c] = &tallies;
             let (name, half, percent) = (case.name, case.half * 1e3, share * 100.0);
-            writeln!(table, "| {name}, {half} mm | {percent:.0} % | {} | {} | {} |", a.row(), b.row(), c.row())
-                .unwrap();
+            writeln!(
+                table,
+                "| {name}, {half} mm | {percent:.0} % | {} | {} | {} |",
+                a.row(),
+                b.row(),
+                c.row()
+            )
+            .unwrap();
             (wrong, decided) = (wrong + a.wrong, decided + a.wrong + a.right);
             touches.push((a.touches, b.touches));
         }
         let far = [0, 4].map(|at| touches[at]);
         let name = case.name;
-        assert!(far.iter().all(|(goal, fixed)| 2 * goal < *fixed), "{name}: {touches:?}");
-        assert!(touches[2].0 > touches[0].0 && touches[3].0 > touches[4].0, "{name}: {touches:?}");
+        assert!(
+            far.iter().all(|(goal, fixed)| 2 * goal < *fixed),
+            "{name}: {touches:?}"
+        );
+        assert!(
+            touches[2].0 > touches[0].0 && touches[3].0 > touches[4].0,
+            "{name}: {touches:?}"
+        );
     }
     println!("touches on average: right, wrong, open of {seeds} seeds\n\n{table}");
     if let (true, Some(folder)) = (is_full(), std::env::var_os("TOUCHUP_RESULTS")) {
-        std::fs::write(std::path::Path::new(&folder).join("Touches_until_decided.md"), &table).unwrap();
+        std::fs::write(
+            std::path::Path::new(&folder).join("Touches_until_decided.md"),
+            &table,
+        )
+        .unwrap();
     }
     assert!(wrong * 20 <= decided, "{wrong} of {decided}");
 }
@@ -287,10 +402,21 @@ fn looking_after_each_touch_keeps_the_stated_risk() {
             // one that never ends, so that both are seen on the same touches
             let mut look = |explorer: &Explorer| {
                 let standing = explorer.characteristics();
-                let Some(number) = standing[0].measured else { return };
-                let rules = [0.95, confidence].map(|confidence| DecisionParams { confidence, ..Default::default() });
+                let Some(number) = standing[0].measured else {
+                    return;
+                };
+                let rules = [0.95, confidence].map(|confidence| DecisionParams {
+                    confidence,
+                    ..Default::default()
+                });
                 for (rule, first) in rules.iter().zip(&mut first) {
-                    let said = assess(&number, limits, touchup::conformity::Distribution::Normal, rule).decision;
+                    let said = assess(
+                        &number,
+                        limits,
+                        touchup::conformity::Distribution::Normal,
+                        rule,
+                    )
+                    .decision;
                     *first = first.or(Some(said).filter(|said| *said != Decision::Undecided));
                 }
             };
@@ -311,8 +437,15 @@ fn looking_after_each_touch_keeps_the_stated_risk() {
             share(kept[1])
         );
         let most = 0.05 + 2.33 * (0.05 * 0.95 / seeds as f64).sqrt();
-        assert!(kept.iter().all(|&count| share(count) < most), "{}: {kept:?} of {seeds}", case.name);
-        assert!(naive.iter().sum::<usize>() > kept.iter().sum(), "{naive:?} {kept:?}");
+        assert!(
+            kept.iter().all(|&count| share(count) < most),
+            "{}: {kept:?} of {seeds}",
+            case.name
+        );
+        assert!(
+            naive.iter().sum::<usize>() > kept.iter().sum(),
+            "{naive:?} {kept:?}"
+        );
     }
 }
 
@@ -321,16 +454,37 @@ fn looking_after_each_touch_keeps_the_stated_risk() {
 fn a_value_on_its_limit_stays_undecided_and_says_why() {
     let limits = limits(&HOLE, 1.0);
     let of = |radius: f64, seed: u64| {
-        let shared = ArmUncertainty { radius, ..ArmUncertainty::default() };
-        let params = PatternParams { shared, ..params(30) };
-        explored(&HOLE, params, Some(goal(&HOLE, limits, 0.95)), &mut Pcg64::seed_from_u64(seed), &mut |_| {})
+        let shared = ArmUncertainty {
+            radius,
+            ..ArmUncertainty::default()
+        };
+        let params = PatternParams {
+            shared,
+            ..params(30)
+        };
+        explored(
+            &HOLE,
+            params,
+            Some(goal(&HOLE, limits, 0.95)),
+            &mut Pcg64::seed_from_u64(seed),
+            &mut |_| {},
+        )
     };
-    let open = (0..20).map(|seed| of(0.0, seed)).filter(|found| found.characteristics[0].is_open()).collect::<Vec<_>>();
+    let open = (0..20)
+        .map(|seed| of(0.0, seed))
+        .filter(|found| found.characteristics[0].is_open())
+        .collect::<Vec<_>>();
     assert!(open.len() >= 16, "{}", open.len());
-    assert!(open.iter().all(|found| found.touches == 30 && !found.is_as_asked));
+    assert!(
+        open.iter()
+            .all(|found| found.touches == 30 && !found.is_as_asked)
+    );
     // 0.2 mm of the radius: a guard band wider than all of the tolerance
     let limited = of(0.2e-3, 3);
-    assert!(limited.characteristics[0].is_limited && limited.touches < 25, "{limited:?}");
+    assert!(
+        limited.characteristics[0].is_limited && limited.touches < 25,
+        "{limited:?}"
+    );
 }
 
 /// One touch fewer than the shape needs, and a value far beyond its limits: nothing is decided.
@@ -339,11 +493,16 @@ fn too_few_touches_for_the_shape_decide_nothing() {
     for budget in [12, 14] {
         for seed in 0..10 {
             let found = until_decided(&HOLE, 20.0, budget, seed);
-            let wall = found.feature.map_or(0, |feature| feature.diameter.unwrap().touches.len());
+            let wall = found
+                .feature
+                .map_or(0, |feature| feature.diameter.unwrap().touches.len());
             let one = &found.characteristics[0];
             // four touches of the surface around it are among them
             assert_eq!(one.measured.is_some(), wall >= 12, "{wall}: {one:?}");
-            assert!(wall >= 12 || one.assessment.decision == Decision::Undecided, "{one:?}");
+            assert!(
+                wall >= 12 || one.assessment.decision == Decision::Undecided,
+                "{one:?}"
+            );
         }
     }
 }

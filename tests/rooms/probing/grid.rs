@@ -6,7 +6,9 @@ use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
-use touchup::features::fit::{Cylinder, Ends, FitParams, Freedom, Observation, Plane, Stadium, Surface, fit};
+use touchup::features::fit::{
+    Cylinder, Ends, FitParams, Freedom, Observation, Plane, Stadium, Surface, fit,
+};
 use touchup::features::{Feature, Kind};
 use touchup::probing::plan::{Explorer, PatternParams, Quantity};
 use touchup::sim::{Plate, Surface as _};
@@ -32,9 +34,16 @@ fn even(at: usize) -> [f64; 2] {
 fn outline(half: f64, radius: f64, share: f64) -> (Point3<f64>, Vector3<f64>) {
     let (straight, round) = (2.0 * half, PI * radius);
     let gone = share * 2.0 * (straight + round);
-    let (gone, sign) = if gone < straight + round { (gone, 1.0) } else { (gone - straight - round, -1.0) };
-    let (x, angle) =
-        if gone < straight { (half - gone, FRAC_PI_2) } else { (-half, FRAC_PI_2 + (gone - straight) / radius) };
+    let (gone, sign) = if gone < straight + round {
+        (gone, 1.0)
+    } else {
+        (gone - straight - round, -1.0)
+    };
+    let (x, angle) = if gone < straight {
+        (half - gone, FRAC_PI_2)
+    } else {
+        (-half, FRAC_PI_2 + (gone - straight) / radius)
+    };
     let out = Vector3::new(angle.cos(), angle.sin(), 0.0) * sign;
     (Point3::new(x * sign, 0.0, 0.0) + out * radius, out)
 }
@@ -49,10 +58,20 @@ struct Opening {
     deep: f64,
 }
 
-const HOLE: Opening =
-    Opening { kind: Kind::Hole, middle: Point3::new(16e-3, 36e-3, TOP), half: 0.0, radius: 4e-3, deep: IN_HOLE };
-const SLOT: Opening =
-    Opening { kind: Kind::Slot, middle: Point3::new(25e-3, 14e-3, TOP), half: 7e-3, radius: 3e-3, deep: IN_SLOT };
+const HOLE: Opening = Opening {
+    kind: Kind::Hole,
+    middle: Point3::new(16e-3, 36e-3, TOP),
+    half: 0.0,
+    radius: 4e-3,
+    deep: IN_HOLE,
+};
+const SLOT: Opening = Opening {
+    kind: Kind::Slot,
+    middle: Point3::new(25e-3, 14e-3, TOP),
+    half: 7e-3,
+    radius: 3e-3,
+    deep: IN_SLOT,
+};
 
 /// Errors of place, size, second size, lean; m, and rad times 4 mm.
 type Errors = [f64; 4];
@@ -70,7 +89,8 @@ impl Opening {
         let place = |at: usize| even(first + at);
         let walls = (0..of_wall).map(|at| {
             let [along, down] = place(at);
-            outline(self.half, self.radius, along).0 - Vector3::z() * (HIGHEST + down * (self.deep - HIGHEST))
+            outline(self.half, self.radius, along).0
+                - Vector3::z() * (HIGHEST + down * (self.deep - HIGHEST))
         });
         let top = (of_wall..count).map(|at| {
             let [along, away] = place(at);
@@ -91,22 +111,46 @@ impl Opening {
         let touch = |surface: OnSurface<'_>, p: &Point3<f64>, rng: &mut Pcg64| {
             let (point, normal) = surface(&(as_scanned * p));
             let point = point + normal * (SIGMA * rng.sample::<f64, _>(StandardNormal));
-            Observation { point, offset: 0.0, sigma: SIGMA, group: rng.random() }
+            Observation {
+                point,
+                offset: 0.0,
+                sigma: SIGMA,
+                group: rng.random(),
+            }
         };
         let plane = Plane::new(self.middle, &Vector3::z());
-        let top: Vec<_> = tops.iter().map(|p| touch(&|p| (on(&plane, p), Vector3::z()), p, rng)).collect();
+        let top: Vec<_> = tops
+            .iter()
+            .map(|p| touch(&|p| (on(&plane, p), Vector3::z()), p, rng))
+            .collect();
         let top = fit(&plane, &top, &FitParams::default()).unwrap().surface;
-        let params = FitParams { axis_sigma: Some(SQUARE), ..FitParams::default() };
-        let met =
-            |center: Point3<f64>, axis: Vector3<f64>| center - axis * (top.distance(&center) / top.normal().dot(&axis));
+        let params = FitParams {
+            axis_sigma: Some(SQUARE),
+            ..FitParams::default()
+        };
+        let met = |center: Point3<f64>, axis: Vector3<f64>| {
+            center - axis * (top.distance(&center) / top.normal().dot(&axis))
+        };
         if self.kind == Kind::Hole {
             let truth = Cylinder::new(self.middle, &Vector3::z(), self.radius, true);
             let on_wall = |p: &Point3<f64>| (on(&truth, p), normal_of(&truth, &on(&truth, p)));
             let walls: Vec<_> = walls.iter().map(|p| touch(&on_wall, p, rng)).collect();
-            let guess = Cylinder::new(as_scanned.translation.vector.into(), &top.normal(), self.radius, true);
+            let guess = Cylinder::new(
+                as_scanned.translation.vector.into(),
+                &top.normal(),
+                self.radius,
+                true,
+            );
             let found = fit(&guess, &walls, &params).unwrap().surface;
-            let place = (met(found.center(), found.axis()) - self.middle).xy().norm();
-            return Some([place, 2.0 * (found.radius - self.radius), 0.0, found.axis().xy().norm() * 4e-3]);
+            let place = (met(found.center(), found.axis()) - self.middle)
+                .xy()
+                .norm();
+            return Some([
+                place,
+                2.0 * (found.radius - self.radius),
+                0.0,
+                found.axis().xy().norm() * 4e-3,
+            ]);
         }
         let sizes = [2.0 * self.radius, 2.0 * (self.radius + self.half)];
         let stadium = |center: Point3<f64>, axis: Vector3<f64>, along: Vector3<f64>| {
@@ -115,12 +159,23 @@ impl Opening {
         let truth = stadium(self.middle, Vector3::z(), Vector3::x());
         let on_wall = |p: &Point3<f64>| (on(&truth, p), normal_of(&truth, &on(&truth, p)));
         let walls: Vec<_> = walls.iter().map(|p| touch(&on_wall, p, rng)).collect();
-        let guess = stadium(as_scanned.translation.vector.into(), top.normal(), as_scanned.rotation * Vector3::x());
+        let guess = stadium(
+            as_scanned.translation.vector.into(),
+            top.normal(),
+            as_scanned.rotation * Vector3::x(),
+        );
         let fitted = fit(&guess, &walls, &params).unwrap();
         fitted.std(Freedom::Second)?;
         let found = fitted.surface;
-        let place = (met(found.center(), found.axis()) - self.middle).xy().norm();
-        Some([place, found.width - sizes[0], found.length - sizes[1], found.axis().xy().norm() * 4e-3])
+        let place = (met(found.center(), found.axis()) - self.middle)
+            .xy()
+            .norm();
+        Some([
+            place,
+            found.width - sizes[0],
+            found.length - sizes[1],
+            found.axis().xy().norm() * 4e-3,
+        ])
     }
 
     /// Errors of planned touches from a flag up to 2 mm beside it, and how many there were.
@@ -130,23 +185,46 @@ impl Opening {
         let flag = self.middle + Vector3::new(some(1.4e-3), some(1.4e-3), some(0.2e-3));
         let normal = Unit::new_normalize(Vector3::new(some(0.03), some(0.03), 1.0));
         // all touches are made
-        let params = PatternParams { sigma: 1e-9, quantity, touch_sigma: 1e-9, ..PatternParams::default() };
-        let mut search = Explorer::new(Some(self.kind), &flag, &normal, params, &plate_scan(1)).unwrap();
+        let params = PatternParams {
+            sigma: 1e-9,
+            quantity,
+            touch_sigma: 1e-9,
+            ..PatternParams::default()
+        };
+        let mut search =
+            Explorer::new(Some(self.kind), &flag, &normal, params, &plate_scan(1)).unwrap();
         while let Some(planned) = search.next_touch() {
             let noise: f64 = SIGMA * rng.sample::<f64, _>(StandardNormal);
-            search.take(&probe(&|p| plate.signed_distance(p), &planned, params.ball_radius, noise));
+            search.take(&probe(
+                &|p| plate.signed_distance(p),
+                &planned,
+                params.ball_radius,
+                noise,
+            ));
         }
         let found = search.found().unwrap();
-        let Feature { centre, axis, diameter, width, length, .. } = found.feature.unwrap();
+        let Feature {
+            centre,
+            axis,
+            diameter,
+            width,
+            length,
+            ..
+        } = found.feature.unwrap();
         let size = diameter.or(width).unwrap().value - 2.0 * self.radius;
         let second = length.map_or(0.0, |length| length.value - 2.0 * (self.radius + self.half));
         let place = (centre.value - self.middle).xy().norm();
-        ([place, size, second, axis.unwrap().value.xy().norm() * 4e-3], found.touches)
+        (
+            [place, size, second, axis.unwrap().value.xy().norm() * 4e-3],
+            found.touches,
+        )
     }
 }
 
 fn rms(errors: &[Errors]) -> Errors {
-    std::array::from_fn(|at| (errors.iter().map(|e| e[at].powi(2)).sum::<f64>() / errors.len() as f64).sqrt())
+    std::array::from_fn(|at| {
+        (errors.iter().map(|e| e[at].powi(2)).sum::<f64>() / errors.len() as f64).sqrt()
+    })
 }
 
 /// The place where an axis meets the surface is extrapolated from the wall between depths a and b. With touches of variance σ² in n places
@@ -161,19 +239,32 @@ fn no_plan_halves_the_error_of_a_grid_on_the_same_wall() {
         let bound = r / (1.0 + 3.0 * r * r).sqrt();
         // variance of the value at 0 of a line through values at depths, by its normal equations
         let at_zero = |depths: &[(f64, f64)]| {
-            let sum = |power: i32| depths.iter().map(|(z, weight)| weight * z.powi(power)).sum::<f64>();
+            let sum = |power: i32| {
+                depths
+                    .iter()
+                    .map(|(z, weight)| weight * z.powi(power))
+                    .sum::<f64>()
+            };
             sum(2) / (sum(0) * sum(2) - sum(1) * sum(1))
         };
         let count = 20_000;
         let even: Vec<_> = (0..count)
-            .map(|at| (low + (high - low) * (f64::from(at) + 0.5) / f64::from(count), 1.0 / f64::from(count)))
+            .map(|at| {
+                (
+                    low + (high - low) * (f64::from(at) + 0.5) / f64::from(count),
+                    1.0 / f64::from(count),
+                )
+            })
             .collect();
         let best = (1..1000)
             .map(|share| f64::from(share) / 1000.0)
             .map(|share| at_zero(&[(low.max(1e-12), share), (high, 1.0 - share)]))
             .fold(f64::INFINITY, f64::min);
         let ratio = (best / at_zero(&even)).sqrt();
-        assert!((ratio / bound - 1.0).abs() < 2e-3, "{low} to {high}: {ratio} is not {bound}");
+        assert!(
+            (ratio / bound - 1.0).abs() < 2e-3,
+            "{low} to {high}: {ratio} is not {bound}"
+        );
         assert!((0.5..0.578).contains(&bound), "{bound}");
     }
 }
@@ -199,9 +290,16 @@ fn planned_touches_are_better_than_a_grid_over_the_region() {
                 planned.push(errors);
                 grid.extend(opening.grid_errors(touches, &mut rng));
             }
-            println!("{name}: {} of {seeds} grids leave an end open", seeds as usize - grid.len());
+            println!(
+                "{name}: {} of {seeds} grids leave an end open",
+                seeds as usize - grid.len()
+            );
             let [planned, grid] = [rms(&planned), rms(&grid)];
-            for (at, number) in names.into_iter().enumerate().filter(|(_, number)| !number.is_empty()) {
+            for (at, number) in names
+                .into_iter()
+                .enumerate()
+                .filter(|(_, number)| !number.is_empty())
+            {
                 let ratio = planned[at] / grid[at];
                 let line = format!(
                     "{name}, for {}: {number} {:.2} µm planned, {:.2} µm grid, ratio {ratio:.2}",

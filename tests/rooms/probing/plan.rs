@@ -13,7 +13,8 @@ use touchup::features::fit::{
 use touchup::features::{Kind, Measured};
 use touchup::mesh::TriMesh;
 use touchup::probing::plan::{
-    Asked, Candidate, ExploreError, Explorer, Found, Knowledge, PatternParams, TouchPlan, TouchResult,
+    Asked, Candidate, ExploreError, Explorer, Found, Knowledge, PatternParams, TouchPlan,
+    TouchResult,
 };
 use touchup::sim::{Plate, Surface as _};
 
@@ -27,10 +28,22 @@ fn hole() -> Cylinder {
 
 /// Places on the wall of the hole, 24 around at 5 depths.
 fn wall() -> Vec<Candidate> {
-    let at = |angle: f64, depth: f64| Point3::new(16e-3 + 4e-3 * angle.cos(), 36e-3 + 4e-3 * angle.sin(), depth);
-    let places = (0..5)
-        .flat_map(|row| (0..24).map(move |column| (f64::from(column) / 24.0 * TAU, 2e-3 + 2e-3 * f64::from(row))));
-    places.map(|(angle, depth)| Candidate { point: at(angle, depth), sigma: SIGMA }).collect()
+    let at = |angle: f64, depth: f64| {
+        Point3::new(
+            16e-3 + 4e-3 * angle.cos(),
+            36e-3 + 4e-3 * angle.sin(),
+            depth,
+        )
+    };
+    let places = (0..5).flat_map(|row| {
+        (0..24).map(move |column| (f64::from(column) / 24.0 * TAU, 2e-3 + 2e-3 * f64::from(row)))
+    });
+    places
+        .map(|(angle, depth)| Candidate {
+            point: at(angle, depth),
+            sigma: SIGMA,
+        })
+        .collect()
 }
 
 /// Up to `count` touches, each as if those before had been made, until all is known as it is asked for.
@@ -44,7 +57,8 @@ fn plan<M: Surface>(
     let mut chosen = Vec::new();
     while chosen.len() < count
         && known.worst(asked) > 1.0
-        && let Some((best, _)) = known.best(surface, 0..candidates.len(), |&at| candidates[at], asked)
+        && let Some((best, _)) =
+            known.best(surface, 0..candidates.len(), |&at| candidates[at], asked)
     {
         known = known.with(surface, &candidates[best]);
         chosen.push(best);
@@ -58,7 +72,12 @@ fn sigma_of(known: &Knowledge, by: (Freedom, f64)) -> f64 {
 }
 
 fn observation(candidate: &Candidate, group: u32) -> Observation {
-    Observation { point: candidate.point, offset: 0.0, sigma: candidate.sigma, group }
+    Observation {
+        point: candidate.point,
+        offset: 0.0,
+        sigma: candidate.sigma,
+        group,
+    }
 }
 
 /// The fit has its covariance by another method: from all touches at once.
@@ -66,13 +85,26 @@ fn observation(candidate: &Candidate, group: u32) -> Observation {
 fn predicted_and_fitted_covariance_agree() {
     let (surface, wall) = (hole(), wall());
     let chosen: Vec<_> = wall.iter().step_by(7).copied().collect();
-    let known =
-        chosen.iter().fold(Knowledge::before::<Cylinder>(1.0, 10.0), |known, touch| known.with(&surface, touch));
-    let observations: Vec<_> = chosen.iter().zip(0..).map(|(touch, group)| observation(touch, group)).collect();
+    let known = chosen
+        .iter()
+        .fold(Knowledge::before::<Cylinder>(1.0, 10.0), |known, touch| {
+            known.with(&surface, touch)
+        });
+    let observations: Vec<_> = chosen
+        .iter()
+        .zip(0..)
+        .map(|(touch, group)| observation(touch, group))
+        .collect();
     let fitted = fit(&surface, &observations, &FitParams::default()).unwrap();
     for freedom in [Freedom::Size, Freedom::TiltX, Freedom::TiltY] {
-        let (ours, theirs) = (sigma_of(&known, (freedom, 1.0)), fitted.std(freedom).unwrap());
-        assert!((ours / theirs - 1.0).abs() < 1e-3, "{freedom:?}: {ours} {theirs}");
+        let (ours, theirs) = (
+            sigma_of(&known, (freedom, 1.0)),
+            fitted.std(freedom).unwrap(),
+        );
+        assert!(
+            (ours / theirs - 1.0).abs() < 1e-3,
+            "{freedom:?}: {ours} {theirs}"
+        );
     }
 }
 
@@ -82,12 +114,24 @@ fn the_tilt_of_a_plane_is_asked_at_its_corners() {
     let surface = Plane::new(Point3::origin(), &Vector3::z());
     let grid: Vec<_> = (0..81)
         .map(|at| Candidate {
-            point: Point3::new(f64::from(at % 9 - 4) * 1e-3, f64::from(at / 9 - 4) * 1e-3, 0.0),
+            point: Point3::new(
+                f64::from(at % 9 - 4) * 1e-3,
+                f64::from(at / 9 - 4) * 1e-3,
+                0.0,
+            ),
             sigma: SIGMA,
         })
         .collect();
-    let asked = Asked::default().and(&[(Freedom::TiltX, 1.0)], 1e-9).and(&[(Freedom::TiltY, 1.0)], 1e-9);
-    let (chosen, _) = plan(Knowledge::before::<Plane>(5e-3, 0.1), &surface, &grid, &asked, 2);
+    let asked = Asked::default()
+        .and(&[(Freedom::TiltX, 1.0)], 1e-9)
+        .and(&[(Freedom::TiltY, 1.0)], 1e-9);
+    let (chosen, _) = plan(
+        Knowledge::before::<Plane>(5e-3, 0.1),
+        &surface,
+        &grid,
+        &asked,
+        2,
+    );
     assert_eq!(chosen.len(), 2);
     for index in chosen {
         let p = grid[index].point;
@@ -104,12 +148,19 @@ fn touches_are_as_many_as_the_goal_asks_for() {
         let asked = Asked::default().and(&[(Freedom::Size, 2.0)], wanted);
         // those that found it
         let first: Vec<usize> = (0..120).step_by(17).collect();
-        let known =
-            first.iter().fold(Knowledge::before::<Cylinder>(3e-3, 0.05), |known, &at| known.with(&surface, &wall[at]));
+        let known = first
+            .iter()
+            .fold(Knowledge::before::<Cylinder>(3e-3, 0.05), |known, &at| {
+                known.with(&surface, &wall[at])
+            });
         let (mut chosen, known) = plan(known, &surface, &wall, &asked, 400);
         chosen.extend(first);
         let promised = sigma_of(&known, (Freedom::Size, 2.0));
-        assert!(promised <= wanted && chosen.len() < 400, "{} touches for {wanted}", chosen.len());
+        assert!(
+            promised <= wanted && chosen.len() < 400,
+            "{} touches for {wanted}",
+            chosen.len()
+        );
         let mut rng = Pcg64::seed_from_u64(7);
         let errors: Vec<f64> = (0..200)
             .map(|_| {
@@ -118,14 +169,28 @@ fn touches_are_as_many_as_the_goal_asks_for() {
                     let direction = -Vector3::new(by[0], by[1], 0.0);
                     let noise: f64 = StandardNormal.sample(&mut rng);
                     let point = wall[index].point + surface.pose_of * direction * (noise * SIGMA);
-                    observation(&Candidate { point, sigma: SIGMA }, group)
+                    observation(
+                        &Candidate {
+                            point,
+                            sigma: SIGMA,
+                        },
+                        group,
+                    )
                 });
                 let result: Vec<_> = result.collect();
-                2.0 * (fit(&surface, &result, &FitParams::default()).unwrap().surface.radius - surface.radius)
+                2.0 * (fit(&surface, &result, &FitParams::default())
+                    .unwrap()
+                    .surface
+                    .radius
+                    - surface.radius)
             })
             .collect();
         let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
-        assert!((rms / promised - 1.0).abs() < 0.2, "{} touches: promised {promised}, came {rms}", chosen.len());
+        assert!(
+            (rms / promised - 1.0).abs() < 0.2,
+            "{} touches: promised {promised}, came {rms}",
+            chosen.len()
+        );
         counts.push(chosen.len());
     }
     assert!(counts.is_sorted() && counts[0] < counts[2], "{counts:?}");
@@ -151,8 +216,9 @@ const LEAN: f64 = 0.02;
 /// Outward normal at a point, by differences of the distance.
 pub(super) fn normal_of<M: Surface>(surface: &M, p: &Point3<f64>) -> Vector3<f64> {
     let step = 1e-6;
-    let by =
-        |direction: Vector3<f64>| surface.distance(&(p + direction * step)) - surface.distance(&(p - direction * step));
+    let by = |direction: Vector3<f64>| {
+        surface.distance(&(p + direction * step)) - surface.distance(&(p - direction * step))
+    };
     Vector3::new(by(Vector3::x()), by(Vector3::y()), by(Vector3::z())).normalize()
 }
 
@@ -163,7 +229,11 @@ pub(super) fn on<M: Surface>(surface: &M, p: &Point3<f64>) -> Point3<f64> {
 
 /// Deviation of the numbers together, by the inverse of the information of all touches at once, with derivatives from differences of
 /// the distance of surfaces that are moved.
-fn sigma_by_differences<M: Surface>(truth: &M, touches: &[Point3<f64>], asked: &[(Freedom, f64, f64)]) -> f64 {
+fn sigma_by_differences<M: Surface>(
+    truth: &M,
+    touches: &[Point3<f64>],
+    asked: &[(Freedom, f64, f64)],
+) -> f64 {
     let mut information = SMatrix::<f64, FREEDOMS, FREEDOMS>::zeros();
     for freedom in Freedom::ALL {
         let at = freedom as usize;
@@ -175,15 +245,21 @@ fn sigma_by_differences<M: Surface>(truth: &M, touches: &[Point3<f64>], asked: &
     }
     for p in touches {
         let by = |at: usize| {
-            let [more, less] = [1e-7, -1e-7].map(|step| truth.moved(&Steps::ith(at, step)).distance(p));
-            if M::FREE[at] { (more - less) / 2e-7 } else { 0.0 }
+            let [more, less] =
+                [1e-7, -1e-7].map(|step| truth.moved(&Steps::ith(at, step)).distance(p));
+            if M::FREE[at] {
+                (more - less) / 2e-7
+            } else {
+                0.0
+            }
         };
         let g = Steps::from_fn(|at, _| by(at));
         information += g * g.transpose() / SIGMA.powi(2);
     }
     let covariance = information.try_inverse().unwrap();
-    let variance =
-        |(freedom, by, _): &(Freedom, f64, f64)| covariance[(*freedom as usize, *freedom as usize)] * by * by;
+    let variance = |(freedom, by, _): &(Freedom, f64, f64)| {
+        covariance[(*freedom as usize, *freedom as usize)] * by * by
+    };
     asked.iter().map(variance).sum::<f64>().sqrt()
 }
 
@@ -207,21 +283,39 @@ fn planned_over_grid<M: Surface>(case: &Case<M>) -> f64 {
         });
         let guess = case.truth.moved(&Steps::from(steps));
         let on_guess = |touches: &[Candidate]| -> Vec<Candidate> {
-            touches.iter().map(|touch| Candidate { point: on(&guess, &touch.point), ..*touch }).collect()
+            touches
+                .iter()
+                .map(|touch| Candidate {
+                    point: on(&guess, &touch.point),
+                    ..*touch
+                })
+                .collect()
         };
         let (first, places) = (on_guess(&case.first), on_guess(&case.places));
         let before = Knowledge::before::<M>(3e-3, LEAN);
-        let known = first.iter().fold(before, |known, touch| known.with(&guess, touch));
+        let known = first
+            .iter()
+            .fold(before, |known, touch| known.with(&guess, touch));
         let asked = case
             .asked
             .iter()
-            .fold(Asked::default(), |asked, (freedom, by, sigma)| asked.and(&[(*freedom, *by)], *sigma));
+            .fold(Asked::default(), |asked, (freedom, by, sigma)| {
+                asked.and(&[(*freedom, *by)], *sigma)
+            });
         let asked = asked.and_the_rest::<M>(1e-6, 3e-3);
         let (chosen, _) = plan(known, &guess, &places, &asked, count - first.len());
-        let planned: Vec<_> = first.iter().copied().chain(chosen.iter().map(|at| places[*at])).collect();
+        let planned: Vec<_> = first
+            .iter()
+            .copied()
+            .chain(chosen.iter().map(|at| places[*at]))
+            .collect();
         assert_eq!(planned.len(), count);
-        let landed =
-            |touches: &[Candidate]| touches.iter().map(|touch| on(&case.truth, &touch.point)).collect::<Vec<_>>();
+        let landed = |touches: &[Candidate]| {
+            touches
+                .iter()
+                .map(|touch| on(&case.truth, &touch.point))
+                .collect::<Vec<_>>()
+        };
         let patterns = [landed(&planned), landed(&on_guess(&case.grid))];
         for (which, pattern) in patterns.iter().enumerate() {
             variances[which] += sigma_by_differences(&case.truth, pattern, &case.asked).powi(2);
@@ -229,10 +323,18 @@ fn planned_over_grid<M: Surface>(case: &Case<M>) -> f64 {
                 let touch = |(p, group): (&Point3<f64>, u32)| {
                     let noise = rng.sample::<f64, _>(StandardNormal) * SIGMA;
                     let point = p + normal_of(&case.truth, p) * noise;
-                    Observation { point, offset: 0.0, sigma: SIGMA, group }
+                    Observation {
+                        point,
+                        offset: 0.0,
+                        sigma: SIGMA,
+                        group,
+                    }
                 };
                 let observations: Vec<_> = pattern.iter().zip(0..).map(touch).collect();
-                let params = FitParams { axis_sigma: Some(LEAN), ..FitParams::default() };
+                let params = FitParams {
+                    axis_sigma: Some(LEAN),
+                    ..FitParams::default()
+                };
                 let fitted = fit(&guess, &observations, &params).unwrap();
                 squares[which] += (case.error)(&fitted.surface, &case.truth).powi(2);
             }
@@ -241,7 +343,11 @@ fn planned_over_grid<M: Surface>(case: &Case<M>) -> f64 {
             let beginning = &patterns[0][..first.len()];
             let tried = (0..300).map(|_| {
                 let picked = case.places.iter().sample(&mut rng, count - first.len());
-                let pattern: Vec<_> = beginning.iter().copied().chain(picked.iter().map(|touch| touch.point)).collect();
+                let pattern: Vec<_> = beginning
+                    .iter()
+                    .copied()
+                    .chain(picked.iter().map(|touch| touch.point))
+                    .collect();
                 sigma_by_differences(&case.truth, &pattern, &case.asked)
             });
             random = tried.fold(f64::INFINITY, f64::min) / variances[0].sqrt();
@@ -261,20 +367,36 @@ fn planned_over_grid<M: Surface>(case: &Case<M>) -> f64 {
     );
     // 200 errors determine a deviation within a twentieth; χ² of 200 (or 400) leaves a fifth to chance once in 10,000
     for (rms, stated) in rms.iter().zip(stated) {
-        assert!((rms / stated - 1.0).abs() < 0.2, "{}: {rms} is not {stated}", case.name);
+        assert!(
+            (rms / stated - 1.0).abs() < 0.2,
+            "{}: {rms} is not {stated}",
+            case.name
+        );
     }
-    assert!(random > 0.95, "{}: random touches are better, {random}", case.name);
+    assert!(
+        random > 0.95,
+        "{}: random touches are better, {random}",
+        case.name
+    );
     rms[0] / rms[1]
 }
 
 /// Places all over a wall: an outline of the plane, and depths below the opening at z = 0.
 fn over(outline: &[Point3<f64>], depths: &[f64]) -> Vec<Candidate> {
-    let at = |p: &Point3<f64>, depth: f64| Candidate { point: Point3::new(p.x, p.y, -depth), sigma: SIGMA };
-    outline.iter().flat_map(|p| depths.iter().map(move |depth| at(p, *depth))).collect()
+    let at = |p: &Point3<f64>, depth: f64| Candidate {
+        point: Point3::new(p.x, p.y, -depth),
+        sigma: SIGMA,
+    };
+    outline
+        .iter()
+        .flat_map(|p| depths.iter().map(move |depth| at(p, *depth)))
+        .collect()
 }
 
 fn evenly(low: f64, high: f64, count: usize) -> Vec<f64> {
-    (0..count).map(|at| low + (high - low) * (at as f64 + 0.5) / count as f64).collect()
+    (0..count)
+        .map(|at| low + (high - low) * (at as f64 + 0.5) / count as f64)
+        .collect()
 }
 
 /// Outline of a slot of 20 × 6 mm about the origin, evenly along it.
@@ -302,7 +424,9 @@ fn outline(count: usize) -> Vec<Point3<f64>> {
 
 fn circle(count: usize) -> Vec<Point3<f64>> {
     let at = |k: usize| k as f64 / count as f64 * TAU;
-    (0..count).map(|k| Point3::new(4e-3 * at(k).cos(), 4e-3 * at(k).sin(), 0.0)).collect()
+    (0..count)
+        .map(|k| Point3::new(4e-3 * at(k).cos(), 4e-3 * at(k).sin(), 0.0))
+        .collect()
 }
 
 /// Where the axis goes through z = 0.
@@ -318,7 +442,16 @@ fn opening(hole: &Cylinder) -> Point3<f64> {
 fn planned_touches_beat_a_uniform_grid() {
     let depths = evenly(1e-3, 5e-3, 4);
     let fine: Vec<f64> = (0..9).map(|at| 1e-3 + 0.5e-3 * f64::from(at)).collect();
-    let slot = || Stadium::new(Point3::origin(), &Vector3::z(), &Vector3::x(), [6e-3, 20e-3], Ends::Round, true);
+    let slot = || {
+        Stadium::new(
+            Point3::origin(),
+            &Vector3::z(),
+            &Vector3::x(),
+            [6e-3, 20e-3],
+            Ends::Round,
+            true,
+        )
+    };
     let of_slot = |name, asked, error| Case {
         name,
         truth: slot(),
@@ -328,18 +461,27 @@ fn planned_touches_beat_a_uniform_grid() {
         places: over(&outline(120), &fine),
         grid: over(&outline(12), &depths),
     };
-    let length = planned_over_grid(&of_slot("length of a slot", vec![(Freedom::Second, 1.0, 1e-6)], |fit, truth| {
-        fit.length - truth.length
-    }));
-    let width = planned_over_grid(&of_slot("width of a slot", vec![(Freedom::Size, 1.0, 1e-6)], |fit, truth| {
-        fit.width - truth.width
-    }));
-    let direction =
-        planned_over_grid(&of_slot("direction of a slot, 1/1000", vec![(Freedom::Turn, 1e-3, 1e-7)], |fit, _| {
-            1e-3 * fit.direction().y
-        }));
+    let length = planned_over_grid(&of_slot(
+        "length of a slot",
+        vec![(Freedom::Second, 1.0, 1e-6)],
+        |fit, truth| fit.length - truth.length,
+    ));
+    let width = planned_over_grid(&of_slot(
+        "width of a slot",
+        vec![(Freedom::Size, 1.0, 1e-6)],
+        |fit, truth| fit.width - truth.width,
+    ));
+    let direction = planned_over_grid(&of_slot(
+        "direction of a slot, 1/1000",
+        vec![(Freedom::Turn, 1e-3, 1e-7)],
+        |fit, _| 1e-3 * fit.direction().y,
+    ));
     // with the axes of its frame those of O
-    let hole = || Cylinder { pose_of: nalgebra::Isometry3::identity(), radius: 4e-3, concave: true };
+    let hole = || Cylinder {
+        pose_of: nalgebra::Isometry3::identity(),
+        radius: 4e-3,
+        concave: true,
+    };
     let of_hole = |name, asked, error| Case {
         name,
         truth: hole(),
@@ -354,16 +496,21 @@ fn planned_touches_beat_a_uniform_grid() {
         vec![(Freedom::TiltX, 1e-3, 1e-7)],
         |fit, _| 1e-3 * fit.axis().x / fit.axis().z,
     ));
-    let x =
-        planned_over_grid(&of_hole("place of a hole along x", vec![(Freedom::X, 1.0, 1e-6)], |fit, _| opening(fit).x));
+    let x = planned_over_grid(&of_hole(
+        "place of a hole along x",
+        vec![(Freedom::X, 1.0, 1e-6)],
+        |fit, _| opening(fit).x,
+    ));
     let place = planned_over_grid(&of_hole(
         "place of a hole",
         vec![(Freedom::X, 1.0, 1e-6), (Freedom::Y, 1.0, 1e-6)],
         |fit, _| opening(fit).coords.norm(),
     ));
-    let diameter = planned_over_grid(&of_hole("diameter of a hole", vec![(Freedom::Size, 2.0, 1e-6)], |fit, truth| {
-        2.0 * (fit.radius - truth.radius)
-    }));
+    let diameter = planned_over_grid(&of_hole(
+        "diameter of a hole",
+        vec![(Freedom::Size, 2.0, 1e-6)],
+        |fit, truth| 2.0 * (fit.radius - truth.radius),
+    ));
     // by the information 0.52, 0.43, 0.42, 0.54, 0.75, 0.92 and 1.0, and a fifth of it for chance
     for (what, ratio, most) in [
         ("length", length, 0.62),
@@ -380,7 +527,12 @@ fn planned_touches_beat_a_uniform_grid() {
 
 /// Contact of a ball that is let down and then moved in a straight line until it meets the material, exactly, with noise along
 /// its path; a path that is blocked before measures nothing.
-pub(super) fn probe(distance: &dyn Fn(&Point3<f64>) -> f64, planned: &TouchPlan, ball: f64, noise: f64) -> TouchResult {
+pub(super) fn probe(
+    distance: &dyn Fn(&Point3<f64>) -> f64,
+    planned: &TouchPlan,
+    ball: f64,
+    noise: f64,
+) -> TouchResult {
     // the distance changes no faster than the place
     let free = |from: &Point3<f64>, direction: &Vector3<f64>, length: f64| {
         let mut gone = 0.0;
@@ -397,9 +549,11 @@ pub(super) fn probe(distance: &dyn Fn(&Point3<f64>) -> f64, planned: &TouchPlan,
     if down.norm() > 0.0 && free(&planned.entry, &down.normalize(), down.norm()).is_some() {
         return TouchResult::Unclear;
     }
-    free(&planned.from, &planned.direction, planned.search).map_or(TouchResult::Nothing, |gone| TouchResult::At {
-        centre: planned.from + planned.direction.into_inner() * (gone + noise),
-        sigma: SIGMA,
+    free(&planned.from, &planned.direction, planned.search).map_or(TouchResult::Nothing, |gone| {
+        TouchResult::At {
+            centre: planned.from + planned.direction.into_inner() * (gone + noise),
+            sigma: SIGMA,
+        }
     })
 }
 
@@ -411,13 +565,22 @@ fn explored(
     distance: &dyn Fn(&Point3<f64>) -> f64,
     rng: &mut Pcg64,
 ) -> Result<Found, ExploreError> {
-    let params = PatternParams { sigma: 10e-6, touch_sigma: 5e-6, ..PatternParams::default() };
+    let params = PatternParams {
+        sigma: 10e-6,
+        touch_sigma: 5e-6,
+        ..PatternParams::default()
+    };
     let mut lean = || rng.random_range(-0.05..0.05);
     let normal = Unit::new_normalize(Vector3::new(lean(), lean(), 1.0));
     let mut explorer = Explorer::new(Some(kind), &flag, &normal, params, scan).unwrap();
     while let Some(planned) = explorer.next_touch() {
         let noise: f64 = StandardNormal.sample(rng);
-        explorer.take(&probe(distance, &planned, params.ball_radius, noise * SIGMA));
+        explorer.take(&probe(
+            distance,
+            &planned,
+            params.ball_radius,
+            noise * SIGMA,
+        ));
     }
     explorer.found()
 }
@@ -433,8 +596,19 @@ fn a_slot_that_is_claimed_is_the_one_of_the_drawing() {
     let (plate, mut rng) = (Plate::default(), Pcg64::seed_from_u64(21));
     let (mut claimed, mut worst, count) = (0, 0.0f64, 100);
     for _ in 0..count {
-        let flag = SLOT + Vector3::new(rng.random_range(-9e-3..9e-3), rng.random_range(-3e-3..3e-3), 0.0);
-        let Ok(found) = explored(Kind::Slot, flag, &plate_scan(1), &|p| plate.signed_distance(p), &mut rng) else {
+        let flag = SLOT
+            + Vector3::new(
+                rng.random_range(-9e-3..9e-3),
+                rng.random_range(-3e-3..3e-3),
+                0.0,
+            );
+        let Ok(found) = explored(
+            Kind::Slot,
+            flag,
+            &plate_scan(1),
+            &|p| plate.signed_distance(p),
+            &mut rng,
+        ) else {
             continue;
         };
         if !found.is_as_asked {
@@ -449,7 +623,11 @@ fn a_slot_that_is_claimed_is_the_one_of_the_drawing() {
             (number(&slot.length) - 20e-3).abs(),
         ];
         worst = errors.into_iter().fold(worst, f64::max);
-        assert!(worst < 50e-6, "flag {flag}, {} touches: {errors:?}", found.touches);
+        assert!(
+            worst < 50e-6,
+            "flag {flag}, {} touches: {errors:?}",
+            found.touches
+        );
         assert!(found.touches < 40, "flag {flag}: {}", found.touches);
     }
     println!("{claimed} of {count} claimed, worst {:.1} um", worst * 1e6);
@@ -466,10 +644,17 @@ fn an_obstacle_in_a_slot_is_not_its_end() {
             14e-3 + rng.random_range(-0.5e-3..0.5e-3),
             rng.random_range(0.5e-3..1.2e-3),
         );
-        let distance = |p: &Point3<f64>| plate.signed_distance(p).min((p.x - x).hypot(p.y - y) - radius);
+        let distance = |p: &Point3<f64>| {
+            plate
+                .signed_distance(p)
+                .min((p.x - x).hypot(p.y - y) - radius)
+        };
         let flag = Point3::new(rng.random_range(20e-3..23e-3), 14e-3, TOP);
         let found = explored(Kind::Slot, flag, &plate_scan(1), &distance, &mut rng);
-        assert!(!found.as_ref().is_ok_and(|found| found.is_as_asked), "pin at {x} {y}, {radius}: {found:?}");
+        assert!(
+            !found.as_ref().is_ok_and(|found| found.is_as_asked),
+            "pin at {x} {y}, {radius}: {found:?}"
+        );
     }
 }
 
@@ -480,13 +665,26 @@ fn a_slot_without_ends_is_reported_as_such() {
     // two blocks 6 mm apart on a floor 5 mm below their top
     let distance = |p: &Point3<f64>| {
         let (beside, above) = (3e-3 - p.y.abs(), p.z - TOP);
-        let wall = if beside > 0.0 && above > 0.0 { beside.hypot(above) } else { beside.max(above) };
+        let wall = if beside > 0.0 && above > 0.0 {
+            beside.hypot(above)
+        } else {
+            beside.max(above)
+        };
         wall.min(p.z - TOP + 5e-3)
     };
     for _ in 0..10 {
         let flag = Point3::new(0.0, rng.random_range(-2e-3..2e-3), TOP);
-        let found = explored(Kind::Slot, flag, &flat([-100.0, 100.0], [-100.0, 100.0]), &distance, &mut rng);
-        assert!(matches!(found, Err(ExploreError::NoEnd { .. })), "{found:?}");
+        let found = explored(
+            Kind::Slot,
+            flag,
+            &flat([-100.0, 100.0], [-100.0, 100.0]),
+            &distance,
+            &mut rng,
+        );
+        assert!(
+            matches!(found, Err(ExploreError::NoEnd { .. })),
+            "{found:?}"
+        );
     }
 }
 
@@ -494,30 +692,62 @@ fn a_slot_without_ends_is_reported_as_such() {
 #[test]
 fn a_hole_is_not_claimed_from_touches_of_something_else() {
     let (plate, mut rng) = (Plate::default(), Pcg64::seed_from_u64(24));
-    let params = PatternParams { sigma: 10e-6, touch_sigma: 5e-6, ..PatternParams::default() };
+    let params = PatternParams {
+        sigma: 10e-6,
+        touch_sigma: 5e-6,
+        ..PatternParams::default()
+    };
     let mut claimed = 0;
     for _ in 0..50 {
-        let flag = Point3::new(16e-3 + rng.random_range(-2e-3..2e-3), 36e-3 + rng.random_range(-2e-3..2e-3), TOP);
-        let mut explorer = Explorer::new(Some(Kind::Hole), &flag, &Vector3::z_axis(), params, &plate_scan(1)).unwrap();
+        let flag = Point3::new(
+            16e-3 + rng.random_range(-2e-3..2e-3),
+            36e-3 + rng.random_range(-2e-3..2e-3),
+            TOP,
+        );
+        let mut explorer = Explorer::new(
+            Some(Kind::Hole),
+            &flag,
+            &Vector3::z_axis(),
+            params,
+            &plate_scan(1),
+        )
+        .unwrap();
         let mut walls = 0;
         while let Some(planned) = explorer.next_touch() {
             walls += usize::from(planned.direction.z.abs() < 0.5);
             let noise: f64 = StandardNormal.sample(&mut rng);
             let is_wrong = walls % 6 == 5 && planned.direction.z.abs() < 0.5;
-            let off = if is_wrong { rng.random_range(-1e-3..-0.3e-3) } else { noise * SIGMA };
-            explorer.take(&probe(&|p| plate.signed_distance(p), &planned, params.ball_radius, off));
+            let off = if is_wrong {
+                rng.random_range(-1e-3..-0.3e-3)
+            } else {
+                noise * SIGMA
+            };
+            explorer.take(&probe(
+                &|p| plate.signed_distance(p),
+                &planned,
+                params.ball_radius,
+                off,
+            ));
         }
-        let Ok(found) = explorer.found() else { continue };
+        let Ok(found) = explorer.found() else {
+            continue;
+        };
         let hole = found.feature.unwrap();
         let off = hole.centre.value - Point3::new(16e-3, 36e-3, TOP);
         let diameter = hole.diameter.unwrap().value - 8e-3;
         if found.is_as_asked {
             claimed += 1;
-            assert!(off.xy().norm() < 50e-6 && diameter.abs() < 50e-6, "{off} {diameter}");
+            assert!(
+                off.xy().norm() < 50e-6 && diameter.abs() < 50e-6,
+                "{off} {diameter}"
+            );
         }
     }
     println!("{claimed} of 50 claimed");
-    assert!(claimed > 0, "with one in six of them wrong the others still determine it");
+    assert!(
+        claimed > 0,
+        "with one in six of them wrong the others still determine it"
+    );
 }
 
 /// A boss of which one of the first three directions met nothing is touched in more of them, or not measured at all.
@@ -527,21 +757,48 @@ fn a_boss_is_measured_from_three_walls_at_the_least() {
     let truth = Point3::new(47e-3, 25e-3, TOP);
     for missed in 0..3 {
         let flag = truth + Vector3::new(1e-3, -0.5e-3, 4e-3);
-        let params = PatternParams { sigma: 10e-6, touch_sigma: 5e-6, ..PatternParams::default() };
-        let mut explorer = Explorer::new(Some(Kind::Boss), &flag, &Vector3::z_axis(), params, &plate_scan(1)).unwrap();
+        let params = PatternParams {
+            sigma: 10e-6,
+            touch_sigma: 5e-6,
+            ..PatternParams::default()
+        };
+        let mut explorer = Explorer::new(
+            Some(Kind::Boss),
+            &flag,
+            &Vector3::z_axis(),
+            params,
+            &plate_scan(1),
+        )
+        .unwrap();
         let mut walls = 0;
         while let Some(planned) = explorer.next_touch() {
             let is_wall = planned.direction.z.abs() < 0.5;
             walls += usize::from(is_wall);
             let noise: f64 = StandardNormal.sample(&mut rng);
-            let result = probe(&|p| plate.signed_distance(p), &planned, params.ball_radius, noise * SIGMA);
-            explorer.take(if is_wall && walls == missed + 1 { &TouchResult::Nothing } else { &result });
+            let result = probe(
+                &|p| plate.signed_distance(p),
+                &planned,
+                params.ball_radius,
+                noise * SIGMA,
+            );
+            explorer.take(if is_wall && walls == missed + 1 {
+                &TouchResult::Nothing
+            } else {
+                &result
+            });
         }
         let found = explorer.found().unwrap();
         assert!(found.is_as_asked, "{found:?}");
         let boss = found.feature.unwrap();
-        assert!((boss.centre.value - truth).xy().norm() < 50e-6, "{missed}: {}", boss.centre.value);
-        assert!((boss.diameter.unwrap().value - 10e-3).abs() < 50e-6, "{missed}");
+        assert!(
+            (boss.centre.value - truth).xy().norm() < 50e-6,
+            "{missed}: {}",
+            boss.centre.value
+        );
+        assert!(
+            (boss.diameter.unwrap().value - 10e-3).abs() < 50e-6,
+            "{missed}"
+        );
     }
 }
 
@@ -554,7 +811,10 @@ pub(super) fn flat(x: [f64; 2], y: [f64; 2]) -> TriMesh {
 
 /// A block of 40 × 30 × 12 mm, from O on, with one feature near its edges: how far a place is from it, m.
 fn near_edges(kind: Option<Kind>, p: &Point3<f64>) -> f64 {
-    let (half, middle) = (Vector3::new(20e-3, 15e-3, 6e-3), Vector3::new(20e-3, 15e-3, 6e-3));
+    let (half, middle) = (
+        Vector3::new(20e-3, 15e-3, 6e-3),
+        Vector3::new(20e-3, 15e-3, 6e-3),
+    );
     let off = (p.coords - middle).abs() - half;
     let block = off.sup(&Vector3::zeros()).norm() + off.max().min(0.0);
     let about = |half: f64| ((p.x - 13e-3).abs() - half).max(0.0).hypot(p.y - 6e-3);
@@ -566,7 +826,11 @@ fn near_edges(kind: Option<Kind>, p: &Point3<f64>) -> f64 {
         // Ø 8, 5 mm high, 2 mm from the edge
         Some(Kind::Boss) => {
             let (beside, above) = (about(0.0) - 4e-3, (p.z - 17e-3).max(10e-3 - p.z));
-            block.min(if beside > 0.0 && above > 0.0 { beside.hypot(above) } else { beside.max(above) })
+            block.min(if beside > 0.0 && above > 0.0 {
+                beside.hypot(above)
+            } else {
+                beside.max(above)
+            })
         }
         _ => block,
     }
@@ -592,20 +856,33 @@ fn no_touch_is_planned_beside_the_part() {
             for (which, scan) in [&scan, &endless].into_iter().enumerate() {
                 let mut rng = Pcg64::seed_from_u64(seed);
                 let (turn, off) = (rng.random_range(0.0..TAU), rng.random_range(0.0..2e-3));
-                let flag = Point3::from(flagged.map(|mm| mm * 1e-3)) + Vector3::new(turn.cos(), turn.sin(), 0.0) * off;
-                let params = PatternParams { sigma: 10e-6, touch_sigma: 5e-6, ..PatternParams::default() };
-                let mut explorer = Explorer::new(kind, &flag, &Vector3::z_axis(), params, scan).unwrap();
+                let flag = Point3::from(flagged.map(|mm| mm * 1e-3))
+                    + Vector3::new(turn.cos(), turn.sin(), 0.0) * off;
+                let params = PatternParams {
+                    sigma: 10e-6,
+                    touch_sigma: 5e-6,
+                    ..PatternParams::default()
+                };
+                let mut explorer =
+                    Explorer::new(kind, &flag, &Vector3::z_axis(), params, scan).unwrap();
                 while let Some(planned) = explorer.next_touch() {
                     let from = planned.from;
                     // within a cell of the outline, 0.2 mm
-                    let is_over = (-0.5e-3..40.5e-3).contains(&from.x) && (-0.5e-3..30.5e-3).contains(&from.y);
+                    let is_over = (-0.5e-3..40.5e-3).contains(&from.x)
+                        && (-0.5e-3..30.5e-3).contains(&from.y);
                     // a wall that is touched from outside ends where the part does
                     let is_wall = kind == Some(Kind::Edge) && planned.direction.z.abs() < 0.5;
                     if planned.direction.z < -0.9 && !is_over || is_wall && from.y < -0.5e-3 {
-                        beside[which].push(format!("{kind:?} seed {seed}, flag {flag}: {planned:?}"));
+                        beside[which]
+                            .push(format!("{kind:?} seed {seed}, flag {flag}: {planned:?}"));
                     }
                     let noise: f64 = StandardNormal.sample(&mut rng);
-                    explorer.take(&probe(&|p| near_edges(kind, p), &planned, params.ball_radius, noise * SIGMA));
+                    explorer.take(&probe(
+                        &|p| near_edges(kind, p),
+                        &planned,
+                        params.ball_radius,
+                        noise * SIGMA,
+                    ));
                 }
                 if which == 1 {
                     continue;
@@ -618,8 +895,15 @@ fn no_touch_is_planned_beside_the_part() {
                 };
                 let is_found = match (&found, kind) {
                     (Ok(found), None) => found.touches > 20,
-                    (Ok(Found { feature: Some(feature), .. }), _) => {
-                        let off = (feature.centre.value.coords - truth).map(|off| if off.is_nan() { 0.0 } else { off });
+                    (
+                        Ok(Found {
+                            feature: Some(feature),
+                            ..
+                        }),
+                        _,
+                    ) => {
+                        let off = (feature.centre.value.coords - truth)
+                            .map(|off| if off.is_nan() { 0.0 } else { off });
                         off.norm() < 40e-6
                     }
                     _ => false,

@@ -29,30 +29,53 @@ impl Pocket {
         let outside = off.sup(&Vector2::zeros()).norm() + off.max().min(0.0) - self.corner;
         let above = p.z - TOP;
         // in the pocket its walls and floor, above it the top and the rim
-        let walls = if above > 0.0 && outside < 0.0 { outside.hypot(above) } else { (-outside).max(above) };
+        let walls = if above > 0.0 && outside < 0.0 {
+            outside.hypot(above)
+        } else {
+            (-outside).max(above)
+        };
         walls.min(above + 6e-3)
     }
 }
 
 /// Probes a pocket; what it is off, in place, direction over half its length, width and length, m, or why not.
-fn measured(pocket: &Pocket, kind: Kind, scan: &TriMesh, seed: u64) -> Result<([f64; 4], usize), String> {
+fn measured(
+    pocket: &Pocket,
+    kind: Kind,
+    scan: &TriMesh,
+    seed: u64,
+) -> Result<([f64; 4], usize), String> {
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut some = |most: f64| rng.random_range(-most..most);
     let middle = Point3::new(pocket.middle[0], pocket.middle[1], TOP);
     let flag = middle + Vector3::new(some(2e-3), some(2e-3), some(0.2e-3));
     let normal = Unit::new_normalize(Vector3::new(some(0.03), some(0.03), 1.0));
-    let params = PatternParams { sigma: 10e-6, touch_sigma: 5e-6, ..PatternParams::default() };
+    let params = PatternParams {
+        sigma: 10e-6,
+        touch_sigma: 5e-6,
+        ..PatternParams::default()
+    };
     let mut search = Explorer::new(Some(kind), &flag, &normal, params, scan).unwrap();
     while let Some(planned) = search.next_touch() {
         let noise: f64 = StandardNormal.sample(&mut rng);
-        search.take(&probe(&|p| pocket.distance(p), &planned, params.ball_radius, noise * SIGMA));
+        search.take(&probe(
+            &|p| pocket.distance(p),
+            &planned,
+            params.ball_radius,
+            noise * SIGMA,
+        ));
     }
     let found = search.found().map_err(|error| error.to_string())?;
     if !found.is_as_asked {
-        return Err(format!("not within its tolerance after {} touches, {:?}", found.touches, found.uncertainty));
+        return Err(format!(
+            "not within its tolerance after {} touches, {:?}",
+            found.touches, found.uncertainty
+        ));
     }
     let feature = found.feature.unwrap();
-    let Some(Walls::Slot(walls)) = feature.walls else { return Err("no walls".to_owned()) };
+    let Some(Walls::Slot(walls)) = feature.walls else {
+        return Err("no walls".to_owned());
+    };
     if walls.ends != Ends::Straight {
         return Err(format!("its ends are {:?}", walls.ends));
     }
@@ -60,8 +83,14 @@ fn measured(pocket: &Pocket, kind: Kind, scan: &TriMesh, seed: u64) -> Result<([
     let along = Rotation2::new(pocket.angle) * Vector2::x();
     let turned = feature.direction.unwrap().xy().perp(&along).abs();
     let off = (feature.centre.value - middle).xy().norm();
-    let (width, length) = (number(&feature.width) - pocket.width, number(&feature.length) - pocket.length);
-    Ok(([off, turned * pocket.length / 2.0, width.abs(), length.abs()], found.touches))
+    let (width, length) = (
+        number(&feature.width) - pocket.width,
+        number(&feature.length) - pocket.length,
+    );
+    Ok((
+        [off, turned * pocket.length / 2.0, width.abs(), length.abs()],
+        found.touches,
+    ))
 }
 
 /// Every 15°, with `--full` every 5°, with sharp corners and with corners up to half of half the width: within 25 µm of the drawing with touches of 5 µm and a
@@ -71,13 +100,28 @@ fn pockets_with_straight_ends_are_found_at_every_angle() {
     let scan = flat([-100.0, 100.0], [-100.0, 100.0]);
     let step = if crate::full::is_full() { 5 } else { 15 };
     let (mut missed, mut worst, mut count) = (Vec::new(), [0.0f64; 4], 0);
-    for (length, width, corner) in
-        [(20e-3, 8e-3, 0.0), (20e-3, 8e-3, 2e-3), (16e-3, 12e-3, 0.5e-3), (20e-3, 15e-3, 3e-3), (14e-3, 6e-3, 1e-3)]
-    {
+    for (length, width, corner) in [
+        (20e-3, 8e-3, 0.0),
+        (20e-3, 8e-3, 2e-3),
+        (16e-3, 12e-3, 0.5e-3),
+        (20e-3, 15e-3, 3e-3),
+        (14e-3, 6e-3, 1e-3),
+    ] {
         for degrees in (0..180u32).step_by(step) {
             let angle = f64::from(degrees).to_radians();
-            let pocket = Pocket { middle: [3e-3, -2e-3], length, width, corner, angle };
-            let what = format!("{} x {} mm, corners {} mm, {degrees}°", length * 1e3, width * 1e3, corner * 1e3);
+            let pocket = Pocket {
+                middle: [3e-3, -2e-3],
+                length,
+                width,
+                corner,
+                angle,
+            };
+            let what = format!(
+                "{} x {} mm, corners {} mm, {degrees}°",
+                length * 1e3,
+                width * 1e3,
+                corner * 1e3
+            );
             count += 1;
             match measured(&pocket, Kind::Pocket, &scan, u64::from(degrees)) {
                 Ok((off, touches)) => {
@@ -90,8 +134,16 @@ fn pockets_with_straight_ends_are_found_at_every_angle() {
             }
         }
     }
-    println!("{count} pockets, worst: place, direction, width, length {:.1?} µm", worst.map(|off| off * 1e6));
-    assert!(missed.is_empty(), "{} of {count}\n{}", missed.len(), missed.join("\n"));
+    println!(
+        "{count} pockets, worst: place, direction, width, length {:.1?} µm",
+        worst.map(|off| off * 1e6)
+    );
+    assert!(
+        missed.is_empty(),
+        "{} of {count}\n{}",
+        missed.len(),
+        missed.join("\n")
+    );
 }
 
 /// 2 mm from the corner of a part, whose scan is 0.3 mm too large and knows of no opening.
@@ -99,8 +151,15 @@ fn pockets_with_straight_ends_are_found_at_every_angle() {
 fn a_straight_ended_slot_near_edges_is_measured() {
     let scan = flat([-0.3, 40.3], [-0.3, 30.3]);
     for seed in 0..10 {
-        let pocket = Pocket { middle: [12e-3, 5e-3], length: 20e-3, width: 6e-3, corner: 0.8e-3, angle: 0.0 };
-        let (off, _) = measured(&pocket, Kind::Slot, &scan, seed).unwrap_or_else(|why| panic!("seed {seed}: {why}"));
+        let pocket = Pocket {
+            middle: [12e-3, 5e-3],
+            length: 20e-3,
+            width: 6e-3,
+            corner: 0.8e-3,
+            angle: 0.0,
+        };
+        let (off, _) = measured(&pocket, Kind::Slot, &scan, seed)
+            .unwrap_or_else(|why| panic!("seed {seed}: {why}"));
         assert!(off.iter().all(|off| *off < 25e-6), "seed {seed}: {off:?}");
     }
 }

@@ -5,7 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Isometry3, Point3, Vector3};
 use touchup::mesh::{FaceId, FaceTree, TriMesh, VertexId};
 use touchup::reconstruct::{Patched, Patcher, PatcherParams, Support};
-use touchup::sim::{Moment, Plate, StylusParams, Surface, TruthFeature, TruthShape, measure_quality};
+use touchup::sim::{
+    Moment, Plate, StylusParams, Surface, TruthFeature, TruthShape, measure_quality,
+};
 use touchup::stylus::{Sample, TipShape, Wrench};
 
 use crate::full::either;
@@ -19,8 +21,14 @@ struct Case {
     patched: Patched,
 }
 
-const FLAT: TipShape = TipShape::Flat { edge_radius: 0.2e-3, length: 6e-3 };
-const CONE: TipShape = TipShape::Cone { half_angle: 0.35, length: 6e-3 };
+const FLAT: TipShape = TipShape::Flat {
+    edge_radius: 0.2e-3,
+    length: 6e-3,
+};
+const CONE: TipShape = TipShape::Cone {
+    half_angle: 0.35,
+    length: 6e-3,
+};
 
 fn case(stylus: &StylusParams, seed: u64) -> Case {
     case_with(stylus, seed, |_| {})
@@ -28,16 +36,41 @@ fn case(stylus: &StylusParams, seed: u64) -> Case {
 
 /// … with other settings than those that hold for the tip.
 fn case_with(stylus: &StylusParams, seed: u64, change: impl Fn(&mut PatcherParams)) -> Case {
-    let (PlateStream { scan, noise, samples }, touch) = plate_stream(stylus, seed);
-    let mut params = PatcherParams::for_tip(stylus.shape, stylus.radius, Some(stylus.stiffness), noise).unwrap();
+    let (
+        PlateStream {
+            scan,
+            noise,
+            samples,
+        },
+        touch,
+    ) = plate_stream(stylus, seed);
+    let mut params =
+        PatcherParams::for_tip(stylus.shape, stylus.radius, Some(stylus.stiffness), noise).unwrap();
     change(&mut params);
     let mut patcher = Patcher::new(params).unwrap();
-    contacts_of(stylus.radius, Some(stylus.stiffness), &samples).iter().for_each(|contact| patcher.push(contact));
+    contacts_of(stylus.radius, Some(stylus.stiffness), &samples)
+        .iter()
+        .for_each(|contact| patcher.push(contact));
     patcher.flush();
     let patched = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap();
-    let contact_points = |moment: &Moment| moment.contacts.iter().map(|contact| contact.point).collect::<Vec<_>>();
-    let contacts = touch.moments.iter().step_by(7).flat_map(contact_points).collect();
-    Case { scan, contacts, patched }
+    let contact_points = |moment: &Moment| {
+        moment
+            .contacts
+            .iter()
+            .map(|contact| contact.point)
+            .collect::<Vec<_>>()
+    };
+    let contacts = touch
+        .moments
+        .iter()
+        .step_by(7)
+        .flat_map(contact_points)
+        .collect();
+    Case {
+        scan,
+        contacts,
+        patched,
+    }
 }
 
 impl Case {
@@ -45,7 +78,12 @@ impl Case {
     fn errors(&self, mesh: &TriMesh) -> [f64; 2] {
         let plate = Plate::default();
         let tree = FaceTree::new(mesh);
-        let to_mesh = |p: &Point3<f64>| tree.closest(mesh, p, f64::INFINITY).unwrap().distance_squared.sqrt();
+        let to_mesh = |p: &Point3<f64>| {
+            tree.closest(mesh, p, f64::INFINITY)
+                .unwrap()
+                .distance_squared
+                .sqrt()
+        };
         let forth = self.contacts.iter().map(to_mesh).sum::<f64>() / self.contacts.len() as f64;
         let cell = |p: &Point3<f64>| [p.x, p.y, p.z].map(|x| (x / 1e-3).floor() as i64);
         let touched: BTreeSet<[i64; 3]> = self.contacts.iter().map(cell).collect();
@@ -60,7 +98,9 @@ impl Case {
         let below = centre - Vector3::z() * 1e-3;
         mesh.faces().any(|(face, _)| {
             let [a, b, c] = mesh.triangle(face);
-            let side = |p: Point3<f64>, q: Point3<f64>| (q.x - p.x) * (below.y - p.y) - (q.y - p.y) * (below.x - p.x);
+            let side = |p: Point3<f64>, q: Point3<f64>| {
+                (q.x - p.x) * (below.y - p.y) - (q.y - p.y) * (below.x - p.x)
+            };
             let [u, v, w] = [side(b, c), side(c, a), side(a, b)];
             let sum = u + v + w;
             let is_inside = (u > 0.0) == (v > 0.0) && (v > 0.0) == (w > 0.0) && sum != 0.0;
@@ -95,8 +135,10 @@ impl Rims {
         for [a, b] in soundness(mesh).rims.difference(&was) {
             let (a, b) = (mesh.position(VertexId(*a)), mesh.position(VertexId(*b)));
             let length = (b - a).norm();
-            let opening =
-                Plate::default().features().iter().find_map(|truth| opening_at(truth, &nalgebra::center(&a, &b)));
+            let opening = Plate::default()
+                .features()
+                .iter()
+                .find_map(|truth| opening_at(truth, &nalgebra::center(&a, &b)));
             match opening {
                 Some((name, most)) => rims.openings.entry(name).or_insert([0.0, most])[0] += length,
                 None => rims.elsewhere += length,
@@ -113,32 +155,58 @@ fn opening_at(truth: &TruthFeature, p: &Point3<f64>) -> Option<(&'static str, f6
     const BESIDE: f64 = 0.25e-3;
     let off = p - truth.centre;
     let (far, perimeter) = match truth.shape {
-        TruthShape::Hole { diameter, .. } => (off.xy().norm() - diameter / 2.0, std::f64::consts::PI * diameter),
-        TruthShape::Slot { width, length, direction, .. } => {
+        TruthShape::Hole { diameter, .. } => (
+            off.xy().norm() - diameter / 2.0,
+            std::f64::consts::PI * diameter,
+        ),
+        TruthShape::Slot {
+            width,
+            length,
+            direction,
+            ..
+        } => {
             let straight = (length - width) / 2.0;
             let along = off.dot(&direction);
             let nearest = direction * along.clamp(-straight, straight);
-            ((off - nearest).xy().norm() - width / 2.0, 4.0 * straight + std::f64::consts::PI * width)
+            (
+                (off - nearest).xy().norm() - width / 2.0,
+                4.0 * straight + std::f64::consts::PI * width,
+            )
         }
         _ => return None,
     };
-    (far < NEAR).then_some((truth.name, ZIGZAG * (perimeter + 2.0 * std::f64::consts::PI * BESIDE)))
+    (far < NEAR).then_some((
+        truth.name,
+        ZIGZAG * (perimeter + 2.0 * std::f64::consts::PI * BESIDE),
+    ))
 }
 
 #[test]
 fn the_touched_part_is_right_and_one_closed_skin() {
     let case = case(&StylusParams::default(), 1);
-    let ([before, before_back], [after, after_back]) = (case.errors(&case.scan), case.errors(&case.patched.mesh));
-    println!("part to mesh {before:.3} -> {after:.3} mm, mesh to part {before_back:.3} -> {after_back:.3} mm");
+    let ([before, before_back], [after, after_back]) =
+        (case.errors(&case.scan), case.errors(&case.patched.mesh));
+    println!(
+        "part to mesh {before:.3} -> {after:.3} mm, mesh to part {before_back:.3} -> {after_back:.3} mm"
+    );
     assert!(after < before / 20.0 && after_back < before_back / 10.0);
 
     let (was, is) = (soundness(&case.scan), soundness(&case.patched.mesh));
     let rims = Rims::of(&case);
     println!("{rims:?}");
-    assert!(rims.openings.keys().eq(&["through-hole"]), "a rim of what is closed: {rims:?}");
-    assert!(rims.openings.values().all(|[is, most]| is <= most) && rims.elsewhere < CELL_RIM, "{rims:?}");
+    assert!(
+        rims.openings.keys().eq(&["through-hole"]),
+        "a rim of what is closed: {rims:?}"
+    );
+    assert!(
+        rims.openings.values().all(|[is, most]| is <= most) && rims.elsewhere < CELL_RIM,
+        "{rims:?}"
+    );
     assert!(is.bad_edges <= was.bad_edges, "{is:?}");
-    assert_eq!(intersections(&case.patched.mesh, 1e-3, |face| case.is_new(face)), Vec::<[FaceId; 2]>::new());
+    assert_eq!(
+        intersections(&case.patched.mesh, 1e-3, |face| case.is_new(face)),
+        Vec::<[FaceId; 2]>::new()
+    );
 }
 
 #[test]
@@ -146,8 +214,15 @@ fn closed_holes_open() {
     let case = case(&StylusParams::default(), 2);
     let plate = Plate::default();
     for feature in plate.features() {
-        if matches!(feature.shape, TruthShape::Hole { .. } | TruthShape::Slot { .. }) {
-            assert!(!case.is_covered(&feature.centre), "{} is still closed", feature.name);
+        if matches!(
+            feature.shape,
+            TruthShape::Hole { .. } | TruthShape::Slot { .. }
+        ) {
+            assert!(
+                !case.is_covered(&feature.centre),
+                "{} is still closed",
+                feature.name
+            );
         }
     }
 }
@@ -163,8 +238,15 @@ pub fn sheet() -> TriMesh {
 /// The `at`-th sample of a tip with its centre at `p_mm`, pressed upwards with `newtons`.
 pub fn sample(at: usize, p_mm: [f64; 3], newtons: f64) -> Sample {
     let [x, y, z] = p_mm.map(|x| x * 1e-3);
-    let wrench = Wrench { force: Vector3::z() * newtons, torque: Vector3::zeros() };
-    Sample { stamp_ns: at as i64 * 1_000_000, pose_ot: Isometry3::translation(x, y, z), wrench }
+    let wrench = Wrench {
+        force: Vector3::z() * newtons,
+        torque: Vector3::zeros(),
+    };
+    Sample {
+        stamp_ns: at as i64 * 1_000_000,
+        pose_ot: Isometry3::translation(x, y, z),
+        wrench,
+    }
 }
 
 /// A ball goes round and round in a moat of 12 mm across, down to its floor at z = -9.5 mm, which it touches from
@@ -178,7 +260,11 @@ fn what_the_ball_went_all_around_is_no_part() {
         let mut samples = Vec::new();
         let mut add = |radius: f64, turns: f64, z: f64, newtons: f64| {
             let (sin, cos) = (turns * std::f64::consts::TAU).sin_cos();
-            samples.push(sample(samples.len(), [20.0 + radius * cos, 20.0 + radius * sin, z], newtons));
+            samples.push(sample(
+                samples.len(),
+                [20.0 + radius * cos, 20.0 + radius * sin, z],
+                newtons,
+            ));
         };
         for level in 0..=10 {
             let (z, newtons) = (2.0 - f64::from(level), if level == 10 { 2.0 } else { 0.0 });
@@ -187,17 +273,29 @@ fn what_the_ball_went_all_around_is_no_part() {
         // a spiral on the floor
         for i in 0..10_000 {
             let turns = f64::from(i) / 1000.0;
-            add(MOAT_MM - (MOAT_MM - inner_mm) * turns / 10.0, turns, -8.0, 2.0);
+            add(
+                MOAT_MM - (MOAT_MM - inner_mm) * turns / 10.0,
+                turns,
+                -8.0,
+                2.0,
+            );
         }
         let mut patcher = Patcher::new(PatcherParams::new(1.5e-3, None, 0.1e-3)).unwrap();
-        contacts_of(1.5e-3, None, &samples).iter().for_each(|contact| patcher.push(contact));
+        contacts_of(1.5e-3, None, &samples)
+            .iter()
+            .for_each(|contact| patcher.push(contact));
         patcher.flush();
         let mesh = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap().mesh;
-        let heights = mesh.faces().filter_map(|(face, _)| height_over(&mesh.triangle(face), 20.01e-3, 19.99e-3));
+        let heights = mesh
+            .faces()
+            .filter_map(|(face, _)| height_over(&mesh.triangle(face), 20.01e-3, 19.99e-3));
         heights.map(|z| z * 1e3).fold(f64::NEG_INFINITY, f64::max)
     };
     let [post, floor] = [MOAT_MM, 0.0].map(top_mm);
-    assert!(post.abs() < 1e-9 && (floor + 9.5).abs() < 0.05, "{post} {floor} mm");
+    assert!(
+        post.abs() < 1e-9 && (floor + 9.5).abs() < 0.05,
+        "{post} {floor} mm"
+    );
 }
 
 /// Where a vertical line meets a triangle: z, m.
@@ -217,19 +315,42 @@ fn where_free_space_is_no_evidence_lids_stay() {
     let mut add = |x, y, z, newtons| samples.push(sample(samples.len(), [x, y, z], newtons));
     for i in 0..4000 {
         let (line, along) = (f64::from(i / 400), f64::from(i % 400) / 40.0);
-        add(if i / 400 % 2 == 0 { along } else { 10.0 - along }, 15.0 + line, 1.5, 2.0);
+        add(
+            if i / 400 % 2 == 0 {
+                along
+            } else {
+                10.0 - along
+            },
+            15.0 + line,
+            1.5,
+            2.0,
+        );
     }
     for i in 0..4000 {
-        add(20.0 + f64::from(i) / 400.0, 20.0, 4.0 * (f64::from(i) / 40.0).sin(), 0.0);
+        add(
+            20.0 + f64::from(i) / 400.0,
+            20.0,
+            4.0 * (f64::from(i) / 40.0).sin(),
+            0.0,
+        );
     }
     let distance = |free_space: bool| {
-        let params = PatcherParams { free_space, ..PatcherParams::new(1.5e-3, None, 0.1e-3) };
+        let params = PatcherParams {
+            free_space,
+            ..PatcherParams::new(1.5e-3, None, 0.1e-3)
+        };
         let mut patcher = Patcher::new(params).unwrap();
-        contacts_of(1.5e-3, None, &samples).iter().for_each(|contact| patcher.push(contact));
+        contacts_of(1.5e-3, None, &samples)
+            .iter()
+            .for_each(|contact| patcher.push(contact));
         patcher.flush();
         let mesh = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap().mesh;
         let lid = Point3::new(25e-3, 20e-3, 0.0);
-        FaceTree::new(&mesh).closest(&mesh, &lid, f64::INFINITY).unwrap().distance_squared.sqrt()
+        FaceTree::new(&mesh)
+            .closest(&mesh, &lid, f64::INFINITY)
+            .unwrap()
+            .distance_squared
+            .sqrt()
     };
     let [with, without] = [true, false].map(distance);
     assert!(with > 1e-3 && without < 1e-9, "{with:e} {without:e} m");
@@ -238,27 +359,47 @@ fn where_free_space_is_no_evidence_lids_stay() {
 /// Friction of 0.35 tilts the force by 19°, to and fro.
 #[test]
 fn where_friction_is_no_part_the_patch_is_worse_for_it() {
-    let stylus = StylusParams { friction: 0.35, ..StylusParams::default() };
+    let stylus = StylusParams {
+        friction: 0.35,
+        ..StylusParams::default()
+    };
     let [with, without] = [Some(0.9135), None].map(|cone_cosine| {
-        let case = case_with(&stylus, 1, |params| params.touches.cone_cosine = cone_cosine);
+        let case = case_with(&stylus, 1, |params| {
+            params.touches.cone_cosine = cone_cosine
+        });
         case.errors(&case.patched.mesh)
     });
     println!("with {with:.3?}, without {without:.3?} mm");
     // 1.5 mm (1 − cos 19°) is 0.08 mm
-    assert!(without[0] > with[0] + 0.04 && without[1] > with[1] + 0.04, "{with:?} {without:?}");
+    assert!(
+        without[0] > with[0] + 0.04 && without[1] > with[1] + 0.04,
+        "{with:?} {without:?}"
+    );
 }
 
 #[test]
 fn what_was_not_touched_keeps_its_ids_and_bits() {
     let case = case(&StylusParams::default(), 3);
     let mesh = &case.patched.mesh;
-    let far = |p: &Point3<f64>| case.contacts.iter().all(|contact| (contact - p).norm() > 8e-3);
+    let far = |p: &Point3<f64>| {
+        case.contacts
+            .iter()
+            .all(|contact| (contact - p).norm() > 8e-3)
+    };
     let mut kept = 0;
     for (face, corners) in case.scan.faces() {
         if corners.iter().all(|&v| far(&case.scan.position(v))) {
             assert_eq!(mesh.corners(face), corners);
-            assert!(corners.iter().all(|&v| mesh.position(v) == case.scan.position(v)));
-            assert!(corners.iter().all(|&v| case.patched.support[v.0 as usize] == Support::Scan));
+            assert!(
+                corners
+                    .iter()
+                    .all(|&v| mesh.position(v) == case.scan.position(v))
+            );
+            assert!(
+                corners
+                    .iter()
+                    .all(|&v| case.patched.support[v.0 as usize] == Support::Scan)
+            );
             kept += 1;
         }
     }
@@ -283,7 +424,11 @@ struct Expected {
     back_mm: f64,
 }
 
-const OF_A_BALL: Expected = Expected { opened: "through-hole", rim: 1.0, back_mm: 0.05 };
+const OF_A_BALL: Expected = Expected {
+    opened: "through-hole",
+    rim: 1.0,
+    back_mm: 0.05,
+};
 
 /// The first stylus, and with the slow proofs the others too: all of them are measured before one of them fails.
 fn are_right(styli: &[(&str, StylusParams, Expected)]) {
@@ -291,9 +436,15 @@ fn are_right(styli: &[(&str, StylusParams, Expected)]) {
     let mut wrong = Vec::new();
     for (name, stylus, expected) in &styli[..either(1, styli.len())] {
         for (seed, errors, rims) in measured(stylus, either(1, 20)) {
-            println!("{name:14} {seed:2} {:6.3} {:6.3} {rims:?}", errors[0], errors[1]);
+            println!(
+                "{name:14} {seed:2} {:6.3} {:6.3} {rims:?}",
+                errors[0], errors[1]
+            );
             let is_right = rims.openings.keys().eq(&[expected.opened])
-                && rims.openings.values().all(|[is, most]| *is <= expected.rim * most)
+                && rims
+                    .openings
+                    .values()
+                    .all(|[is, most]| *is <= expected.rim * most)
                 && rims.elsewhere < CELL_RIM
                 && errors[0] < 0.04
                 && errors[1] < expected.back_mm;
@@ -302,7 +453,12 @@ fn are_right(styli: &[(&str, StylusParams, Expected)]) {
             }
         }
     }
-    assert!(wrong.is_empty(), "{} recordings:\n{}", wrong.len(), wrong.join("\n"));
+    assert!(
+        wrong.is_empty(),
+        "{} recordings:\n{}",
+        wrong.len(),
+        wrong.join("\n")
+    );
 }
 
 #[test]
@@ -310,24 +466,87 @@ fn other_tips_balls_hands_and_friction() {
     let usual = StylusParams::default;
     are_right(&[
         // the lines of the hand are as far apart as this ball is wide: its rim has teeth, and is half longer than it may be
-        ("1 mm", StylusParams { radius: 1e-3, ..usual() }, Expected { rim: 1.5, back_mm: 0.1, ..OF_A_BALL }),
+        (
+            "1 mm",
+            StylusParams {
+                radius: 1e-3,
+                ..usual()
+            },
+            Expected {
+                rim: 1.5,
+                back_mm: 0.1,
+                ..OF_A_BALL
+            },
+        ),
         // of this one the tests above measure a recording
         ("1.5 mm", usual(), OF_A_BALL),
-        ("2.5 mm", StylusParams { radius: 2.5e-3, ..usual() }, OF_A_BALL),
-        ("friction 0.05", StylusParams { friction: 0.05, ..usual() }, OF_A_BALL),
-        ("friction 0.35", StylusParams { friction: 0.35, ..usual() }, OF_A_BALL),
-        ("tilt 15°", StylusParams { tilt: 15f64.to_radians(), ..usual() }, OF_A_BALL),
-        ("soft, 5 N/mm", StylusParams { stiffness: 5e3, ..usual() }, OF_A_BALL),
+        (
+            "2.5 mm",
+            StylusParams {
+                radius: 2.5e-3,
+                ..usual()
+            },
+            OF_A_BALL,
+        ),
+        (
+            "friction 0.05",
+            StylusParams {
+                friction: 0.05,
+                ..usual()
+            },
+            OF_A_BALL,
+        ),
+        (
+            "friction 0.35",
+            StylusParams {
+                friction: 0.35,
+                ..usual()
+            },
+            OF_A_BALL,
+        ),
+        (
+            "tilt 15°",
+            StylusParams {
+                tilt: 15f64.to_radians(),
+                ..usual()
+            },
+            OF_A_BALL,
+        ),
+        (
+            "soft, 5 N/mm",
+            StylusParams {
+                stiffness: 5e3,
+                ..usual()
+            },
+            OF_A_BALL,
+        ),
     ]);
 }
 
 #[test]
 fn other_tips_flat_ends() {
-    let flat = || StylusParams { shape: FLAT, ..StylusParams::default() };
+    let flat = || StylusParams {
+        shape: FLAT,
+        ..StylusParams::default()
+    };
     are_right(&[
         ("flat, 1.5 mm", flat(), OF_A_BALL),
-        ("flat, upright", StylusParams { tilt: 0.0, ..flat() }, OF_A_BALL),
-        ("flat, tilt 15°", StylusParams { tilt: 15f64.to_radians(), ..flat() }, OF_A_BALL),
+        (
+            "flat, upright",
+            StylusParams {
+                tilt: 0.0,
+                ..flat()
+            },
+            OF_A_BALL,
+        ),
+        (
+            "flat, tilt 15°",
+            StylusParams {
+                tilt: 15f64.to_radians(),
+                ..flat()
+            },
+            OF_A_BALL,
+        ),
     ]);
 }
 
@@ -335,8 +554,20 @@ fn other_tips_flat_ends() {
 #[test]
 #[ignore = "full"]
 fn other_tips_a_cone() {
-    let stylus = StylusParams { shape: CONE, radius: 0.5e-3, ..StylusParams::default() };
-    are_right(&[("cone, 20°", stylus, Expected { opened: "slot", rim: 1.5, ..OF_A_BALL })]);
+    let stylus = StylusParams {
+        shape: CONE,
+        radius: 0.5e-3,
+        ..StylusParams::default()
+    };
+    are_right(&[(
+        "cone, 20°",
+        stylus,
+        Expected {
+            opened: "slot",
+            rim: 1.5,
+            ..OF_A_BALL
+        },
+    )]);
 }
 
 /// Errors and rims of the recordings with seeds 1 to `seeds`, two at a time.
@@ -349,8 +580,14 @@ fn measured(stylus: &StylusParams, seeds: u64) -> Vec<(u64, [f64; 2], Rims)> {
     let all: Vec<u64> = (1..=seeds).collect();
     let pair = |pair: &[u64]| {
         std::thread::scope(|scope| {
-            let threads: Vec<_> = pair.iter().map(|&seed| scope.spawn(move || of_seed(seed))).collect();
-            threads.into_iter().map(|thread| thread.join().unwrap()).collect::<Vec<_>>()
+            let threads: Vec<_> = pair
+                .iter()
+                .map(|&seed| scope.spawn(move || of_seed(seed)))
+                .collect();
+            threads
+                .into_iter()
+                .map(|thread| thread.join().unwrap())
+                .collect::<Vec<_>>()
         })
     };
     all.chunks(2).flat_map(pair).collect()

@@ -10,7 +10,8 @@ use touchup::io::mesh_file::{MeshUnit, read_mesh};
 use touchup::mesh::triangle::shape_quality;
 use touchup::mesh::{FaceId, FaceTree, TriMesh, VertexId, signed_distance};
 use touchup::reconstruct::{
-    Crossing, Cut, Edge, Lattice, LatticeNode, LatticeRegion, NodeValues, OpenSquare, Owner, Patch, contour,
+    Crossing, Cut, Edge, Lattice, LatticeNode, LatticeRegion, NodeValues, OpenSquare, Owner, Patch,
+    contour,
 };
 
 use crate::common::{grid, within};
@@ -22,13 +23,18 @@ type Field<'a> = &'a dyn Fn(&Point3<f64>) -> f64;
 const PITCH: f64 = 0.75e-3;
 
 fn lattice(pitch: f64) -> Lattice {
-    Lattice { origin: Point3::new(0.137, -0.0931, 0.2713) * pitch, pitch }
+    Lattice {
+        origin: Point3::new(0.137, -0.0931, 0.2713) * pitch,
+        pitch,
+    }
 }
 
 /// All cells from `-n` to `n` on each axis.
 fn cube(n: i32) -> LatticeRegion {
     let side = || -n..=n;
-    side().flat_map(|x| side().flat_map(move |y| side().map(move |z| [x, y, z]))).collect()
+    side()
+        .flat_map(|x| side().flat_map(move |y| side().map(move |z| [x, y, z])))
+        .collect()
 }
 
 fn node_values(lattice: &Lattice, region: &LatticeRegion, field: Field) -> NodeValues {
@@ -48,18 +54,33 @@ fn crossing(lattice: &Lattice, field: Field, edge: &Edge) -> Crossing {
     let is_inside = field(&a) < 0.0;
     for _ in 0..50 {
         let middle = nalgebra::center(&a, &b);
-        if (field(&middle) < 0.0) == is_inside { a = middle } else { b = middle }
+        if (field(&middle) < 0.0) == is_inside {
+            a = middle
+        } else {
+            b = middle
+        }
     }
     let h = 1e-4 * lattice.pitch;
     let slope = |i: usize| field(&(a + Vector3::ith(i, h))) - field(&(a - Vector3::ith(i, h)));
-    Crossing { point: a, normal: vector![slope(0), slope(1), slope(2)].normalize() }
+    Crossing {
+        point: a,
+        normal: vector![slope(0), slope(1), slope(2)].normalize(),
+    }
 }
 
-fn patch_of(lattice: &Lattice, region: &LatticeRegion, scan: &TriMesh, tree: &FaceTree, field: Field) -> Patch {
+fn patch_of(
+    lattice: &Lattice,
+    region: &LatticeRegion,
+    scan: &TriMesh,
+    tree: &FaceTree,
+    field: Field,
+) -> Patch {
     let values = node_values(lattice, region, field);
     let cut = Cut::new(lattice, region, scan, tree);
     assert!(cut.lost.is_empty());
-    contour(lattice, region, &values, &cut, |edge| crossing(lattice, field, edge))
+    contour(lattice, region, &values, &cut, |edge| {
+        crossing(lattice, field, edge)
+    })
 }
 
 fn nothing() -> TriMesh {
@@ -69,18 +90,30 @@ fn nothing() -> TriMesh {
 /// The zero set of a field in a region, without a scan.
 fn surface(lattice: &Lattice, region: &LatticeRegion, field: Field) -> TriMesh {
     let scan = nothing();
-    patch_of(lattice, region, &scan, &FaceTree::new(&scan), field).applied_to(scan.clone()).unwrap().0
+    patch_of(lattice, region, &scan, &FaceTree::new(&scan), field)
+        .applied_to(scan.clone())
+        .unwrap()
+        .0
 }
 
 /// Closed, two-sided, without intersections, and of the given Euler characteristic.
 fn assert_skin(mesh: &TriMesh, pitch: f64, euler: i64) {
     let sound = soundness(mesh);
-    assert_eq!(sound, Soundness { euler, ..Default::default() });
+    assert_eq!(
+        sound,
+        Soundness {
+            euler,
+            ..Default::default()
+        }
+    );
     assert!(intersections(mesh, pitch, |_| true).is_empty());
 }
 
 fn largest_distance(mesh: &TriMesh, field: Field) -> f64 {
-    mesh.faces().flat_map(|(face, _)| mesh.triangle(face)).map(|p| field(&p).abs()).fold(0.0, f64::max)
+    mesh.faces()
+        .flat_map(|(face, _)| mesh.triangle(face))
+        .map(|p| field(&p).abs())
+        .fold(0.0, f64::max)
 }
 
 fn turn() -> UnitQuaternion<f64> {
@@ -99,7 +132,12 @@ fn a_sphere_is_a_sphere() {
     let bound = 0.75 * PITCH * PITCH / (2.0 * radius);
     assert!(largest_distance(&mesh, &field) < bound);
     for (face, _) in mesh.faces() {
-        assert!(mesh.normal(face).dot(&mesh.barycentre(face).coords.normalize()) > 0.9, "normals point out");
+        assert!(
+            mesh.normal(face)
+                .dot(&mesh.barycentre(face).coords.normalize())
+                > 0.9,
+            "normals point out"
+        );
     }
 }
 
@@ -107,7 +145,12 @@ fn a_sphere_is_a_sphere() {
 fn a_box_keeps_its_edges_and_corners() {
     let half = vector![5.21, 4.03, 3.37] * PITCH;
     let turn = turn();
-    let field = |p: &Point3<f64>| (turn.inverse() * p.coords).abs().zip_map(&half, |x, h| x - h).max();
+    let field = |p: &Point3<f64>| {
+        (turn.inverse() * p.coords)
+            .abs()
+            .zip_map(&half, |x, h| x - h)
+            .max()
+    };
     let mesh = surface(&lattice(PITCH), &cube(8), &field);
     assert_skin(&mesh, PITCH, 2);
     let tree = FaceTree::new(&mesh);
@@ -117,13 +160,22 @@ fn a_box_keeps_its_edges_and_corners() {
             let mut at = half;
             at[axis] *= f64::from(i - 20) / 20.0;
             let p = Point3::from(turn * at);
-            let distance = tree.closest(&mesh, &p, 1.0).unwrap().distance_squared.sqrt();
+            let distance = tree
+                .closest(&mesh, &p, 1.0)
+                .unwrap()
+                .distance_squared
+                .sqrt();
             worst = worst.max(distance);
             sum += distance / 123.0;
         }
     }
     // a cell that the edge passes without a crossing on either side of it cannot know of it: there a corner is cut off
-    assert!(worst < 0.3 * PITCH && sum < 0.05 * PITCH, "worst {}, mean {} pitches", worst / PITCH, sum / PITCH);
+    assert!(
+        worst < 0.3 * PITCH && sum < 0.05 * PITCH,
+        "worst {}, mean {} pitches",
+        worst / PITCH,
+        sum / PITCH
+    );
     assert!(largest_distance(&mesh, &field) < 0.25 * PITCH);
 }
 
@@ -134,12 +186,18 @@ fn two_thin_sheets_stay_apart() {
         // two plates, each a little over a cell thick, with a gap of about a cell, within a rounded rim
         let field = |p: &Point3<f64>| {
             let x = turn.inverse() * p.coords / PITCH;
-            let plate = |middle: f64| ((x.z - middle).abs() - 0.6).max((x.x * x.x + x.y * x.y).sqrt() - 5.0);
+            let plate = |middle: f64| {
+                ((x.z - middle).abs() - 0.6).max((x.x * x.x + x.y * x.y).sqrt() - 5.0)
+            };
             plate(0.6 + gap / 2.0).min(plate(-0.6 - gap / 2.0)) * PITCH
         };
         let mesh = surface(&lattice(PITCH), &cube(8), &field);
         let sound = soundness(&mesh);
-        assert_eq!((sound.rims.len(), sound.bad_edges, sound.bad_vertices), (0, 0, 0), "gap {gap}");
+        assert_eq!(
+            (sound.rims.len(), sound.bad_edges, sound.bad_vertices),
+            (0, 0, 0),
+            "gap {gap}"
+        );
         assert!(intersections(&mesh, PITCH, |_| true).is_empty());
     }
 }
@@ -159,11 +217,18 @@ fn waves(seed: u64, shortest: f64) -> impl Fn(&Point3<f64>) -> f64 {
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut direction = || Vector3::from_fn(|_, _| within(&mut rng, -1.0, 1.0));
     let list: Vec<_> = (0..12)
-        .map(|_| (direction().normalize() * (std::f64::consts::TAU / (shortest * PITCH)), direction() * 3.0))
+        .map(|_| {
+            (
+                direction().normalize() * (std::f64::consts::TAU / (shortest * PITCH)),
+                direction() * 3.0,
+            )
+        })
         .collect();
     move |p| {
         list.iter()
-            .map(|(k, phase)| (k.dot(&p.coords) + phase.x).cos() + 0.3 * (0.5 * k.dot(&p.coords) + phase.y).sin())
+            .map(|(k, phase)| {
+                (k.dot(&p.coords) + phase.x).cos() + 0.3 * (0.5 * k.dot(&p.coords) + phase.y).sin()
+            })
             .sum::<f64>()
             * PITCH
     }
@@ -181,16 +246,34 @@ fn random_waves_give_closed_skins_without_intersections() {
         let field = enclosed(waves(seed, shortest), 6.0 * PITCH);
         let mesh = surface(&lattice(PITCH), &cube(8), &field);
         let sound = soundness(&mesh);
-        assert_eq!((sound.rims.len(), sound.bad_edges, sound.bad_vertices), (0, 0, 0), "seed {seed}");
-        assert!(intersections(&mesh, PITCH, |_| true).is_empty(), "seed {seed}");
+        assert_eq!(
+            (sound.rims.len(), sound.bad_edges, sound.bad_vertices),
+            (0, 0, 0),
+            "seed {seed}"
+        );
+        assert!(
+            intersections(&mesh, PITCH, |_| true).is_empty(),
+            "seed {seed}"
+        );
     }
 }
 
 // ---- in a scan --------------------------------------------------------------------------------------------------
 
 /// Cells that come within `radius` of one of `points`, none within `margin` of a rim of the scan.
-fn region_around(lattice: &Lattice, scan: &TriMesh, points: &[Point3<f64>], radius: f64, margin: f64) -> LatticeRegion {
-    let rims: Vec<Point3<f64>> = soundness(scan).rims.iter().flatten().map(|&v| scan.positions()[v as usize]).collect();
+fn region_around(
+    lattice: &Lattice,
+    scan: &TriMesh,
+    points: &[Point3<f64>],
+    radius: f64,
+    margin: f64,
+) -> LatticeRegion {
+    let rims: Vec<Point3<f64>> = soundness(scan)
+        .rims
+        .iter()
+        .flatten()
+        .map(|&v| scan.positions()[v as usize])
+        .collect();
     let steps = (radius / lattice.pitch).ceil() as i32 + 1;
     let mut region = LatticeRegion::default();
     for p in points {
@@ -208,12 +291,28 @@ fn region_around(lattice: &Lattice, scan: &TriMesh, points: &[Point3<f64>], radi
 }
 
 /// Adds what is beyond open squares that the scan crosses, until there are none: no region grows by more rounds than this.
-fn close_region(lattice: &Lattice, region: &mut LatticeRegion, scan: &TriMesh, tree: &FaceTree, field: Field) {
+fn close_region(
+    lattice: &Lattice,
+    region: &mut LatticeRegion,
+    scan: &TriMesh,
+    tree: &FaceTree,
+    field: Field,
+) {
     for _ in 0..60 {
-        let (cut, values) = (Cut::new(lattice, region, scan, tree), node_values(lattice, region, field));
-        let crossing = |edge: &Edge| Crossing { point: lattice.position(edge.node), normal: Vector3::z() };
+        let (cut, values) = (
+            Cut::new(lattice, region, scan, tree),
+            node_values(lattice, region, field),
+        );
+        let crossing = |edge: &Edge| Crossing {
+            point: lattice.position(edge.node),
+            normal: Vector3::z(),
+        };
         let open = contour(lattice, region, &values, &cut, crossing).open;
-        let beyond: Vec<LatticeNode> = open.iter().filter(|open| open.is_scanned).map(|open| open.beyond).collect();
+        let beyond: Vec<LatticeNode> = open
+            .iter()
+            .filter(|open| open.is_scanned)
+            .map(|open| open.beyond)
+            .collect();
         if beyond.is_empty() {
             return;
         }
@@ -222,11 +321,16 @@ fn close_region(lattice: &Lattice, region: &mut LatticeRegion, scan: &TriMesh, t
 }
 
 fn new_faces(scan: &TriMesh, mesh: &TriMesh) -> Vec<FaceId> {
-    mesh.faces().filter(|(f, c)| !scan.has_face(*f) || scan.corners(*f) != *c).map(|(face, _)| face).collect()
+    mesh.faces()
+        .filter(|(f, c)| !scan.has_face(*f) || scan.corners(*f) != *c)
+        .map(|(face, _)| face)
+        .collect()
 }
 
 fn area(mesh: &TriMesh) -> f64 {
-    mesh.faces().map(|(face, _)| mesh.double_area_normal(face).norm() / 2.0).sum()
+    mesh.faces()
+        .map(|(face, _)| mesh.double_area_normal(face).norm() / 2.0)
+        .sum()
 }
 
 /// The spliced mesh against the scan: one skin with the same rims, nothing else touched. Where squares stayed open, rims are
@@ -237,7 +341,10 @@ fn spliced(scan: &TriMesh, patch: &Patch, pitch: f64) -> TriMesh {
     let new = new_faces(scan, &mesh);
     assert_eq!(after.bad_edges, before.bad_edges);
     assert!(intersections(&mesh, pitch, |face| new.contains(&face)).is_empty());
-    for (face, corners) in scan.faces().filter(|(face, _)| !patch.removed.contains(face)) {
+    for (face, corners) in scan
+        .faces()
+        .filter(|(face, _)| !patch.removed.contains(face))
+    {
         assert_eq!(mesh.corners(face), corners);
     }
     assert_eq!(&mesh.positions()[..scan.vertex_count()], scan.positions());
@@ -248,13 +355,21 @@ fn spliced(scan: &TriMesh, patch: &Patch, pitch: f64) -> TriMesh {
         assert!(change.abs() < 1e-9, "rims are longer by {change} m");
     }
     let corner = |square: &OpenSquare| lattice(pitch).position(square.square.node);
-    for rim in after.rims.difference(&before.rims).map(|rim| rim.map(|v| positions[v as usize])) {
+    for rim in after
+        .rims
+        .difference(&before.rims)
+        .map(|rim| rim.map(|v| positions[v as usize]))
+    {
         // a rim of the scan that was cut in two is no new one
         let is_on_old = before.rims.iter().any(|old| {
             let [a, b] = old.map(|v| positions[v as usize]);
-            rim.iter().all(|p| (p - a).norm() + (p - b).norm() < (b - a).norm() * (1.0 + 1e-12))
+            rim.iter()
+                .all(|p| (p - a).norm() + (p - b).norm() < (b - a).norm() * (1.0 + 1e-12))
         });
-        let is_announced = patch.open.iter().any(|open| (rim[0] - corner(open)).norm() < 3.0 * pitch);
+        let is_announced = patch
+            .open
+            .iter()
+            .any(|open| (rim[0] - corner(open)).norm() < 3.0 * pitch);
         assert!(is_on_old || is_announced, "a rim at {}", rim[0]);
     }
     mesh
@@ -264,7 +379,11 @@ fn spliced(scan: &TriMesh, patch: &Patch, pitch: f64) -> TriMesh {
 fn distances(mesh: &TriMesh, scan: &TriMesh, tree: &FaceTree) -> (f64, f64) {
     let (mut sum, mut worst, mut count): (f64, f64, f64) = (0.0, 0.0, 0.0);
     for face in new_faces(scan, mesh) {
-        for p in mesh.triangle(face).into_iter().chain([mesh.barycentre(face)]) {
+        for p in mesh
+            .triangle(face)
+            .into_iter()
+            .chain([mesh.barycentre(face)])
+        {
             let distance = tree.closest(scan, &p, 1.0).unwrap().distance_squared.sqrt();
             (sum, worst, count) = (sum + distance, worst.max(distance), count + 1.0);
         }
@@ -279,7 +398,13 @@ fn shared_scan(name: &str) -> Option<TriMesh> {
 
 fn some_points(scan: &TriMesh, count: usize, seed: u64) -> Vec<Point3<f64>> {
     let mut rng = Pcg64::seed_from_u64(seed);
-    (0..count).map(|_| scan.barycentre(FaceId(within(&mut rng, 0.0, scan.face_count() as f64) as u32))).collect()
+    (0..count)
+        .map(|_| {
+            scan.barycentre(FaceId(
+                within(&mut rng, 0.0, scan.face_count() as f64) as u32
+            ))
+        })
+        .collect()
 }
 
 /// Closes and splices a region; the field is the scan's own distance.
@@ -297,18 +422,24 @@ const SCANS: [&str; 3] = ["plate", "flange", "featuretype"];
 #[test]
 fn a_scan_remeshed_by_its_own_distance_is_the_same_surface() {
     for (name, seed) in SCANS.into_iter().flat_map(|name| [(name, 0), (name, 1)]) {
-        let Some(scan) = shared_scan(name) else { return };
+        let Some(scan) = shared_scan(name) else {
+            return;
+        };
         let lattice = lattice(PITCH);
-        let mut region = region_around(&lattice, &scan, &some_points(&scan, 12, seed), 3e-3, 2.5e-3);
+        let mut region =
+            region_around(&lattice, &scan, &some_points(&scan, 12, seed), 3e-3, 2.5e-3);
         let (patch, mesh) = splice_own(&lattice, &mut region, &scan);
         assert!(patch.open.is_empty() && patch.removed.len() > 100);
         assert_eq!(soundness(&mesh).euler, soundness(&scan).euler);
         let (mean, worst) = distances(&mesh, &scan, &FaceTree::new(&scan));
-        assert!(mean < 0.02 * PITCH && worst < 0.5 * PITCH, "{name}: {mean}, {worst}");
+        assert!(
+            mean < 0.02 * PITCH && worst < 0.5 * PITCH,
+            "{name}: {mean}, {worst}"
+        );
         assert!((area(&mesh) / area(&scan) - 1.0).abs() < 1e-3);
-        let slivers = new_faces(&scan, &mesh)
-            .into_iter()
-            .filter(|&face| shape_quality(&mesh.triangle(face), mesh.double_area_normal(face).norm()) < 0.02);
+        let slivers = new_faces(&scan, &mesh).into_iter().filter(|&face| {
+            shape_quality(&mesh.triangle(face), mesh.double_area_normal(face).norm()) < 0.02
+        });
         println!(
             "{name} {seed}: {} cells, {} faces gone, {} new, {} of them thin; off the scan by {:.4} pitch, at most {:.3}",
             region.len(),
@@ -324,18 +455,27 @@ fn a_scan_remeshed_by_its_own_distance_is_the_same_surface() {
 #[test]
 fn a_dent_is_pressed_into_a_scan() {
     let depth = 0.5e-3;
-    for (name, seed) in SCANS.into_iter().flat_map(|name| [(name, 3), (name, 4), (name, 5)]) {
-        let Some(scan) = shared_scan(name) else { return };
+    for (name, seed) in SCANS
+        .into_iter()
+        .flat_map(|name| [(name, 3), (name, 4), (name, 5)])
+    {
+        let Some(scan) = shared_scan(name) else {
+            return;
+        };
         let tree = FaceTree::new(&scan);
         let lattice = lattice(PITCH);
         let mut middle = some_points(&scan, 50, seed);
         let rims = soundness(&scan).rims;
-        let is_far = |p: &Point3<f64>| rims.iter().all(|rim| (p - scan.positions()[rim[0] as usize]).norm() > 8e-3);
+        let is_far = |p: &Point3<f64>| {
+            rims.iter()
+                .all(|rim| (p - scan.positions()[rim[0] as usize]).norm() > 8e-3)
+        };
         middle.retain(is_far);
         middle.truncate(1);
         let field = |p: &Point3<f64>| {
             let share = ((3.5e-3 - (p - middle[0]).norm()) / 1.5e-3).clamp(0.0, 1.0);
-            signed_distance(&scan, &tree, p, 1.0).unwrap() + depth * share * share * (3.0 - 2.0 * share)
+            signed_distance(&scan, &tree, p, 1.0).unwrap()
+                + depth * share * share * (3.0 - 2.0 * share)
         };
         let mut region = region_around(&lattice, &scan, &middle, 5e-3, 0.0);
         close_region(&lattice, &mut region, &scan, &tree, &field);
@@ -366,8 +506,13 @@ fn crumbs(lattice: &Lattice, scan: &TriMesh, seed: u64, count: usize) -> Lattice
 
 #[test]
 fn crumbs_of_any_size_leave_a_scan_whole() {
-    for (name, seed) in SCANS.into_iter().flat_map(|name| [(name, 0), (name, 1), (name, 2)]) {
-        let Some(scan) = shared_scan(name) else { return };
+    for (name, seed) in SCANS
+        .into_iter()
+        .flat_map(|name| [(name, 0), (name, 1), (name, 2)])
+    {
+        let Some(scan) = shared_scan(name) else {
+            return;
+        };
         let lattice = lattice(PITCH * [0.3, 1.0, 2.5][seed as usize]);
         splice_own(&lattice, &mut crumbs(&lattice, &scan, seed, 60), &scan);
     }
@@ -375,13 +520,19 @@ fn crumbs_of_any_size_leave_a_scan_whole() {
 
 #[test]
 fn what_is_done_far_away_changes_no_face_here() {
-    let Some(scan) = shared_scan("flange") else { return };
+    let Some(scan) = shared_scan("flange") else {
+        return;
+    };
     let tree = FaceTree::new(&scan);
     let field = |p: &Point3<f64>| signed_distance(&scan, &tree, p, 1.0).unwrap();
     let lattice = lattice(PITCH);
     let points = some_points(&scan, 30, 1);
     let here = region_around(&lattice, &scan, &points[..1], 3e-3, 0.0);
-    let far: Vec<_> = points.iter().copied().filter(|p| (p - points[0]).norm() > 12e-3).collect();
+    let far: Vec<_> = points
+        .iter()
+        .copied()
+        .filter(|p| (p - points[0]).norm() > 12e-3)
+        .collect();
     let mut both = region_around(&lattice, &scan, &far, 3e-3, 0.0);
     here.iter().for_each(|(cell, ())| both.insert(cell, ()));
     // owner, names and places of the corners
@@ -399,7 +550,11 @@ fn what_is_done_far_away_changes_no_face_here() {
     };
     let (alone, together) = (faces(&here), faces(&both));
     assert!(alone.len() > 20 && together.len() > 10 * alone.len());
-    assert!(alone.iter().all(|(owner, faces)| together.get(owner) == Some(faces)));
+    assert!(
+        alone
+            .iter()
+            .all(|(owner, faces)| together.get(owner) == Some(faces))
+    );
     assert!(far.len() > 10);
 }
 
@@ -412,14 +567,26 @@ fn a_field_that_contradicts_the_scan_is_not_joined_to_it() {
     let own = |p: &Point3<f64>| signed_distance(&scan, &tree, p, 1.0).unwrap();
     let joined = patch_of(&lattice, &region, &scan, &tree, &own);
     assert!(joined.open.is_empty());
-    let shared: BTreeSet<_> =
-        joined.faces.iter().filter(|face| matches!(face.owner, Owner::Square(_))).map(|face| face.owner).collect();
+    let shared: BTreeSet<_> = joined
+        .faces
+        .iter()
+        .filter(|face| matches!(face.owner, Owner::Square(_)))
+        .map(|face| face.owner)
+        .collect();
     // material above instead of below; and a plane that misses the scan
     let (turned, apart) = (|p: &Point3<f64>| -own(p), |p: &Point3<f64>| p.z + 1.4e-3);
     for field in [&turned as Field, &apart] {
         let patch = patch_of(&lattice, &region, &scan, &tree, field);
-        assert!(patch.faces.iter().all(|face| !matches!(face.owner, Owner::Square(_))));
-        assert_eq!(patch.open.iter().filter(|open| open.is_scanned).count(), shared.len());
+        assert!(
+            patch
+                .faces
+                .iter()
+                .all(|face| !matches!(face.owner, Owner::Square(_)))
+        );
+        assert_eq!(
+            patch.open.iter().filter(|open| open.is_scanned).count(),
+            shared.len()
+        );
         spliced(&scan, &patch, PITCH);
     }
 }
@@ -436,7 +603,10 @@ fn rough_plate(edge: f64, noise: f64, seed: u64) -> TriMesh {
 fn thin_sheet(edge: f64, noise: f64, thickness: f64, seed: u64) -> TriMesh {
     let plate = rough_plate(edge, noise, seed);
     let count = plate.vertex_count() as u32;
-    let below = plate.positions().iter().map(|p| p - vector![0.0, 0.0, thickness]);
+    let below = plate
+        .positions()
+        .iter()
+        .map(|p| p - vector![0.0, 0.0, thickness]);
     let positions = plate.positions().iter().copied().chain(below).collect();
     let mut faces: Vec<[u32; 3]> = plate.faces().map(|(_, c)| c.map(|v| v.0)).collect();
     for [a, b, c] in faces.clone() {
@@ -495,7 +665,11 @@ fn random_crossings_give_a_closed_skin_without_intersections() {
         let (region, waves) = (cube(4), waves(seed, 5.0));
         let mut values = node_values(&lattice, &region, &|_| 1.0);
         for (node, ()) in cube(3).iter() {
-            let value = if seed % 2 == 0 { within(&mut rng, -1.0, 1.0) } else { waves(&lattice.position(node)) };
+            let value = if seed % 2 == 0 {
+                within(&mut rng, -1.0, 1.0)
+            } else {
+                waves(&lattice.position(node))
+            };
             values.insert(node, value);
         }
         let scan = nothing();
@@ -503,11 +677,21 @@ fn random_crossings_give_a_closed_skin_without_intersections() {
         let patch = contour(&lattice, &region, &values, &cut, |edge| {
             let mut point = lattice.position(edge.node);
             point[edge.axis as usize] += within(&mut rng, 0.0, PITCH);
-            Crossing { point, normal: Vector3::from_fn(|_, _| within(&mut rng, -1.0, 1.0)).normalize() }
+            Crossing {
+                point,
+                normal: Vector3::from_fn(|_, _| within(&mut rng, -1.0, 1.0)).normalize(),
+            }
         });
         let mesh = patch.applied_to(scan.clone()).unwrap().0;
         let sound = soundness(&mesh);
-        assert_eq!((sound.rims.len(), sound.bad_edges, sound.bad_vertices), (0, 0, 0), "seed {seed}");
-        assert!(intersections(&mesh, PITCH, |_| true).is_empty(), "seed {seed}");
+        assert_eq!(
+            (sound.rims.len(), sound.bad_edges, sound.bad_vertices),
+            (0, 0, 0),
+            "seed {seed}"
+        );
+        assert!(
+            intersections(&mesh, PITCH, |_| true).is_empty(),
+            "seed {seed}"
+        );
     }
 }

@@ -10,7 +10,10 @@ const RADIUS: f64 = 1.5e-3;
 
 /// Settings by which the lattice has this pitch (m): p = √(16 · radius · tolerance).
 fn with_pitch(radius: f64, pitch: f64) -> PatcherParams {
-    PatcherParams { tolerance: pitch * pitch / (16.0 * radius), ..PatcherParams::new(radius, None, 0.05e-3) }
+    PatcherParams {
+        tolerance: pitch * pitch / (16.0 * radius),
+        ..PatcherParams::new(radius, None, 0.05e-3)
+    }
 }
 
 fn refused(radius: f64, pitch: f64) -> Option<String> {
@@ -38,24 +41,44 @@ fn a_lattice_that_one_contact_would_fill_the_memory_with_is_refused_with_the_fig
 fn a_lattice_around_all_that_was_touched_is_refused_with_the_figure_before_it_is_made() {
     const SIDE: f64 = 30e-3;
     let reach: f64 = 2.8 * RADIUS;
-    let volume = SIDE * SIDE * 2.0 * reach + 2.0 * SIDE * PI * reach.powi(2) + 4.0 / 3.0 * PI * reach.powi(3);
+    let volume = SIDE * SIDE * 2.0 * reach
+        + 2.0 * SIDE * PI * reach.powi(2)
+        + 4.0 / 3.0 * PI * reach.powi(3);
     assert!((volume * 1e9 - 11_196.0).abs() < 1.0, "{}", volume * 1e9);
     let checked = |pitch: f64| {
         let mut patcher = Patcher::new(with_pitch(RADIUS, pitch)).unwrap();
-        let tip = TipParams { radius: RADIUS, stiffness: None };
+        let tip = TipParams {
+            radius: RADIUS,
+            stiffness: None,
+        };
         let mut estimator = ContactEstimator::new(ContactEstimatorParams::new(tip)).unwrap();
         for i in 0..600 * 31 {
             let (line, step) = (i / 600, i % 600);
             let along = f64::from(if line % 2 == 0 { step } else { 599 - step }) * 0.05e-3;
             let pose_ot = Isometry3::translation(along, f64::from(line) * 1e-3, RADIUS);
-            let wrench = Wrench { force: Vector3::z() * 2.0, torque: Vector3::zeros() };
-            patcher.push(estimator.observe(&Sample { stamp_ns: i64::from(i) * 1_000_000, pose_ot, wrench }).unwrap());
+            let wrench = Wrench {
+                force: Vector3::z() * 2.0,
+                torque: Vector3::zeros(),
+            };
+            patcher.push(
+                estimator
+                    .observe(&Sample {
+                        stamp_ns: i64::from(i) * 1_000_000,
+                        pose_ot,
+                        wrench,
+                    })
+                    .unwrap(),
+            );
         }
         patcher.flush();
         patcher.check_extent().map_err(|error| error.to_string())
     };
     let why = checked(0.1e-3).unwrap_err();
-    let figure = why.split("would have ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
+    let figure = why
+        .split("would have ")
+        .nth(1)
+        .and_then(|rest| rest.split(' ').next())
+        .unwrap();
     let ratio = figure.parse::<f64>().unwrap() * 1e-12 / volume;
     assert!((0.75..1.33).contains(&ratio), "{ratio}: {why}");
     for part in ["patch.tolerance_mm is 0.0004", "all that was touched", "GB"] {
@@ -68,7 +91,10 @@ fn a_lattice_around_all_that_was_touched_is_refused_with_the_figure_before_it_is
 fn a_tip_smaller_than_any_is_refused() {
     for radius in [1e-9, 9e-6, 0.0, f64::NAN] {
         let why = refused(radius, 0.75e-3).expect("it is refused");
-        assert!(why.contains("tip.radius_mm") && why.contains("0.01 or more"), "{why}");
+        assert!(
+            why.contains("tip.radius_mm") && why.contains("0.01 or more"),
+            "{why}"
+        );
     }
     assert_eq!(refused(1e-5, 0.5e-5), None);
 }

@@ -4,7 +4,9 @@ use nalgebra::{Point3, UnitVector3, Vector3};
 use touchup::mesh::{FaceTree, TriMesh};
 use touchup::reconstruct::{Patched, Patcher, PatcherParams, Support};
 use touchup::sim::{Bounds, Stroke, StylusParams, Surface, SurfacePoint, touch};
-use touchup::stylus::{ContactEstimator, ContactEstimatorParams, SyncParams, Synchroniser, TipParams};
+use touchup::stylus::{
+    ContactEstimator, ContactEstimatorParams, SyncParams, Synchroniser, TipParams,
+};
 
 const RADIUS: f64 = 1.5e-3;
 
@@ -17,14 +19,24 @@ struct Profile {
 impl Profile {
     /// The floor z = 0 and the wall x = 0.
     fn corner() -> Self {
-        Self { corners: vec![[0.0, 60e-3], [0.0, 0.0], [60e-3, 0.0]], is_inside: |x, z| x < 0.0 || z < 0.0 }
+        Self {
+            corners: vec![[0.0, 60e-3], [0.0, 0.0], [60e-3, 0.0]],
+            is_inside: |x, z| x < 0.0 || z < 0.0,
+        }
     }
 
     /// A slot 3.2 mm wide and 5 mm deep.
     fn slot() -> Self {
         let [wide, top] = [1.6e-3, 5e-3];
         Self {
-            corners: vec![[-60e-3, top], [-wide, top], [-wide, 0.0], [wide, 0.0], [wide, top], [60e-3, top]],
+            corners: vec![
+                [-60e-3, top],
+                [-wide, top],
+                [-wide, 0.0],
+                [wide, 0.0],
+                [wide, top],
+                [60e-3, top],
+            ],
             is_inside: |x, z| z < 0.0 || (z < 5e-3 && x.abs() > 1.6e-3),
         }
     }
@@ -34,16 +46,22 @@ impl Profile {
         self.corners.windows(2).map(move |ends| {
             let [a, b] = [0, 1].map(|i| Vector3::new(ends[i][0], 0.0, ends[i][1]));
             let along = b - a;
-            let share = ((Vector3::new(p.x, 0.0, p.z) - a).dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
+            let share = ((Vector3::new(p.x, 0.0, p.z) - a).dot(&along) / along.norm_squared())
+                .clamp(0.0, 1.0);
             let point = a + along * share + Vector3::y() * p.y;
-            SurfacePoint { point: point.into(), normal: Vector3::new(-along.z, 0.0, along.x).normalize() }
+            SurfacePoint {
+                point: point.into(),
+                normal: Vector3::new(-along.z, 0.0, along.x).normalize(),
+            }
         })
     }
 
     /// Angle from a normal to the nearest one of the pieces, degrees.
     fn error(&self, normal: &Vector3<f64>) -> f64 {
         let origin = Point3::origin();
-        let angles = self.pieces(&origin).map(|piece| piece.normal.angle(normal).to_degrees());
+        let angles = self
+            .pieces(&origin)
+            .map(|piece| piece.normal.angle(normal).to_degrees());
         angles.fold(f64::INFINITY, f64::min)
     }
 }
@@ -51,12 +69,18 @@ impl Profile {
 impl Surface for Profile {
     fn signed_distance(&self, p: &Point3<f64>) -> f64 {
         let distance = (p - self.closest(p).point).norm();
-        if (self.is_inside)(p.x, p.z) { -distance } else { distance }
+        if (self.is_inside)(p.x, p.z) {
+            -distance
+        } else {
+            distance
+        }
     }
 
     fn closest(&self, p: &Point3<f64>) -> SurfacePoint {
         let distance = |s: &SurfacePoint| (p - s.point).norm();
-        self.pieces(p).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap()
+        self.pieces(p)
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .unwrap()
     }
 
     fn bounds(&self) -> Bounds {
@@ -70,8 +94,15 @@ impl Surface for Profile {
 
 /// A stroke through points in mm, pressed along an axis or not at all.
 fn stroke(points: &[[f64; 3]], press: Option<Vector3<f64>>, speed: f64) -> Stroke {
-    let points = points.iter().map(|p| Point3::from(Vector3::from(*p) * 1e-3)).collect();
-    Stroke { points, press: press.map(UnitVector3::new_unchecked), speed }
+    let points = points
+        .iter()
+        .map(|p| Point3::from(Vector3::from(*p) * 1e-3))
+        .collect();
+    Stroke {
+        points,
+        press: press.map(UnitVector3::new_unchecked),
+        speed,
+    }
 }
 
 /// Over the floor up to the wall and along it, over the wall, and along the corner in both.
@@ -81,14 +112,34 @@ fn over_the_corner() -> Vec<Stroke> {
         let y = f64::from(line) - 6.0;
         let down = Some(-Vector3::z());
         strokes.push(stroke(&[[8.0, y, 6.0]], None, 0.06));
-        strokes.push(stroke(&[[8.0, y, 1.0], [1.2, y, 1.0], [8.0, y, 1.0]], down, 0.03));
+        strokes.push(stroke(
+            &[[8.0, y, 1.0], [1.2, y, 1.0], [8.0, y, 1.0]],
+            down,
+            0.03,
+        ));
     }
     for line in 0..6 {
         let (x, z) = (1.3 + f64::from(line), 1.3 + f64::from(line));
-        strokes.push(stroke(&[[8.0, -6.0, 8.0], [x.max(1.6), -6.0, 8.0]], None, 0.06));
-        strokes.push(stroke(&[[x, -6.0, 1.0], [x, 6.0, 1.0], [x, -6.0, 1.0]], Some(-Vector3::z()), 0.03));
-        strokes.push(stroke(&[[8.0, -6.0, 8.0], [8.0, -6.0, z.max(1.6)]], None, 0.06));
-        strokes.push(stroke(&[[1.0, -6.0, z], [1.0, 6.0, z], [1.0, -6.0, z]], Some(-Vector3::x()), 0.03));
+        strokes.push(stroke(
+            &[[8.0, -6.0, 8.0], [x.max(1.6), -6.0, 8.0]],
+            None,
+            0.06,
+        ));
+        strokes.push(stroke(
+            &[[x, -6.0, 1.0], [x, 6.0, 1.0], [x, -6.0, 1.0]],
+            Some(-Vector3::z()),
+            0.03,
+        ));
+        strokes.push(stroke(
+            &[[8.0, -6.0, 8.0], [8.0, -6.0, z.max(1.6)]],
+            None,
+            0.06,
+        ));
+        strokes.push(stroke(
+            &[[1.0, -6.0, z], [1.0, 6.0, z], [1.0, -6.0, z]],
+            Some(-Vector3::x()),
+            0.03,
+        ));
     }
     strokes
 }
@@ -98,9 +149,17 @@ fn along_the_slot() -> Vec<Stroke> {
     let mut strokes = vec![stroke(&[[0.0, -6.0, 9.0], [0.0, -6.0, 1.6]], None, 0.05)];
     for line in 0..4 {
         let z = 1.3 + 0.8 * f64::from(line);
-        strokes.push(stroke(&[[0.0, -6.0, 1.0], [0.0, 6.0, 1.0]], Some(-Vector3::z()), 0.03));
+        strokes.push(stroke(
+            &[[0.0, -6.0, 1.0], [0.0, 6.0, 1.0]],
+            Some(-Vector3::z()),
+            0.03,
+        ));
         for side in [-0.5, 0.5] {
-            strokes.push(stroke(&[[side, 6.0, z], [side, -6.0, z], [side, 6.0, z]], None, 0.03));
+            strokes.push(stroke(
+                &[[side, 6.0, z], [side, -6.0, z], [side, 6.0, z]],
+                None,
+                0.03,
+            ));
         }
         strokes.push(stroke(&[[0.0, 6.0, 1.3], [0.0, -6.0, 1.3]], None, 0.03));
     }
@@ -120,26 +179,48 @@ fn strips(profile: &Profile) -> TriMesh {
     across.push(profile.corners[profile.corners.len() - 1].map(|x| x.clamp(-12e-3, 12e-3)));
     let (rows, count) = (25u32, across.len() as u32);
     let vertices = (0..rows)
-        .flat_map(|row| across.iter().map(move |[x, z]| Point3::new(*x, f64::from(row) * 1e-3 - 12e-3, *z + 0.2e-3)))
+        .flat_map(|row| {
+            across
+                .iter()
+                .map(move |[x, z]| Point3::new(*x, f64::from(row) * 1e-3 - 12e-3, *z + 0.2e-3))
+        })
         .collect();
     let faces = (0..rows - 1)
         .flat_map(|row| (0..count - 1).map(move |at| row * count + at))
-        .flat_map(|at| [[at, at + 1, at + count + 1], [at, at + count + 1, at + count]])
+        .flat_map(|at| {
+            [
+                [at, at + 1, at + count + 1],
+                [at, at + count + 1, at + count],
+            ]
+        })
         .collect();
     TriMesh::new(vertices, faces).unwrap()
 }
 
 /// Kept contacts and reconstruction of a touch.
-fn reconstructed(profile: &Profile, path: &[Stroke], friction: f64, seed: u64) -> (Patcher, Patched) {
-    let stylus = StylusParams { friction, ..StylusParams::default() };
+fn reconstructed(
+    profile: &Profile,
+    path: &[Stroke],
+    friction: f64,
+    seed: u64,
+) -> (Patcher, Patched) {
+    let stylus = StylusParams {
+        friction,
+        ..StylusParams::default()
+    };
     let recording = touch(profile, path, &stylus, seed).unwrap();
-    let mut patcher = Patcher::new(PatcherParams::new(RADIUS, Some(stylus.stiffness), 0.3e-3)).unwrap();
+    let mut patcher =
+        Patcher::new(PatcherParams::new(RADIUS, Some(stylus.stiffness), 0.3e-3)).unwrap();
     let mut sync = Synchroniser::new(SyncParams::default()).unwrap();
-    let tip = TipParams { radius: RADIUS, stiffness: Some(stylus.stiffness) };
+    let tip = TipParams {
+        radius: RADIUS,
+        stiffness: Some(stylus.stiffness),
+    };
     let mut contacts = ContactEstimator::new(ContactEstimatorParams::new(tip)).unwrap();
     for message in &recording.messages {
         sync.push(*message);
-        std::iter::from_fn(|| sync.next_sample()).for_each(|sample| patcher.push(contacts.observe(&sample).unwrap()));
+        std::iter::from_fn(|| sync.next_sample())
+            .for_each(|sample| patcher.push(contacts.observe(&sample).unwrap()));
     }
     let scan = strips(profile);
     let patched = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap();
@@ -150,7 +231,11 @@ fn reconstructed(profile: &Profile, path: &[Stroke], friction: f64, seed: u64) -
 fn invented(profile: &Profile, patcher: &Patcher) -> f64 {
     let means = patcher.contacts().means();
     let total: f64 = means.iter().map(|mean| mean.weight).sum();
-    let wrong: f64 = means.iter().filter(|mean| profile.error(&mean.normal) > 5.0).map(|mean| mean.weight).sum();
+    let wrong: f64 = means
+        .iter()
+        .filter(|mean| profile.error(&mean.normal) > 5.0)
+        .map(|mean| mean.weight)
+        .sum();
     wrong / total
 }
 
@@ -162,7 +247,10 @@ fn no_normal_is_invented_between_two_walls() {
         for friction in [0.05, 0.15, 0.4] {
             let (patcher, _) = reconstructed(&profile, &path, friction, 1);
             let share = invented(&profile, &patcher);
-            println!("{name}, friction {friction}: {:.1} % farther than 5 degrees", share * 1e2);
+            println!(
+                "{name}, friction {friction}: {:.1} % farther than 5 degrees",
+                share * 1e2
+            );
             // what stays is from before both walls were known, and from where the ball changes from one to the other
             assert!(share < most, "{name}, friction {friction}: {share}");
         }
@@ -205,12 +293,18 @@ fn an_inner_corner_is_a_crease() {
         let in_corner = |p: &Point3<f64>| p.y.abs() < 4e-3 && p.x.max(p.z) < 0.8 * RADIUS;
         let vertices = patched.mesh.positions().iter().zip(&patched.support);
         let (mut off, mut guessed) = (Vec::new(), 0);
-        for (p, support) in vertices.filter(|(p, support)| **support != Support::Scan && in_corner(p)) {
+        for (p, support) in
+            vertices.filter(|(p, support)| **support != Support::Scan && in_corner(p))
+        {
             off.push(profile.signed_distance(p).abs());
             guessed += usize::from(*support != Support::Touched);
         }
         let mean = off.iter().sum::<f64>() / off.len() as f64;
-        println!("friction {friction}: {:.4} mm off in the corner, {guessed} of {} guessed", mean * 1e3, off.len());
+        println!(
+            "friction {friction}: {:.4} mm off in the corner, {guessed} of {} guessed",
+            mean * 1e3,
+            off.len()
+        );
         assert!(off.len() > 25 && guessed == off.len());
         // a ball that fills the corner is off by 0.2 mm on average over this stretch, and by 0.44 mm in the middle
         assert!(mean < 0.1e-3, "{mean}");

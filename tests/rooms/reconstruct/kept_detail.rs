@@ -28,29 +28,60 @@ fn scan(noise: f64) -> TriMesh {
     // an own small generator
     let state = std::cell::Cell::new(1u64);
     let next = || {
-        state.set(state.get().wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407));
+        state.set(
+            state
+                .get()
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407),
+        );
         (state.get() >> 11) as f64 / (1u64 << 53) as f64 - 0.5
     };
-    grid(160, 0.125e-3, |x, _| ABOVE + engraved(x) + noise * 12f64.sqrt() * next())
+    grid(160, 0.125e-3, |x, _| {
+        ABOVE + engraved(x) + noise * 12f64.sqrt() * next()
+    })
 }
 
 /// A ball slides over z = 0 in lines 0.8 mm apart, over a hole in the middle it goes down by `sinks` (m) and up again.
 fn patched(scan: &TriMesh, sinks: f64) -> Patched {
-    let mut contacts =
-        ContactEstimator::new(ContactEstimatorParams::new(TipParams { radius: RADIUS, stiffness: None })).unwrap();
+    let mut contacts = ContactEstimator::new(ContactEstimatorParams::new(TipParams {
+        radius: RADIUS,
+        stiffness: None,
+    }))
+    .unwrap();
     let mut patcher = Patcher::new(PatcherParams::new(RADIUS, None, 0.1e-3)).unwrap();
     let (lines, steps) = (13, 400);
     for i in 0..lines * steps {
-        let (line, along) = (i / steps, f64::from(i % steps) / f64::from(steps) * 2.0 * TOUCHED - TOUCHED);
-        let (x, y) = (if line % 2 == 0 { along } else { -along }, f64::from(line) * 0.8e-3 - 4.8e-3);
+        let (line, along) = (
+            i / steps,
+            f64::from(i % steps) / f64::from(steps) * 2.0 * TOUCHED - TOUCHED,
+        );
+        let (x, y) = (
+            if line % 2 == 0 { along } else { -along },
+            f64::from(line) * 0.8e-3 - 4.8e-3,
+        );
         // where the ball touches neither floor nor walls
         let inside = HOLE - 1.1 * RADIUS - x.abs().max(y.abs());
         let is_over = sinks > 0.0 && x.abs().max(y.abs()) < HOLE;
-        let down = if is_over { (4.0 * inside).clamp(0.0, sinks) } else { 0.0 };
+        let down = if is_over {
+            (4.0 * inside).clamp(0.0, sinks)
+        } else {
+            0.0
+        };
         let force = if is_over { 0.0 } else { 2.0 };
         let pose_ot = Isometry3::translation(x, y, RADIUS - down);
-        let wrench = Wrench { force: Vector3::z() * force, torque: Vector3::zeros() };
-        patcher.push(contacts.observe(&Sample { stamp_ns: i64::from(i) * 1_000_000, pose_ot, wrench }).unwrap());
+        let wrench = Wrench {
+            force: Vector3::z() * force,
+            torque: Vector3::zeros(),
+        };
+        patcher.push(
+            contacts
+                .observe(&Sample {
+                    stamp_ns: i64::from(i) * 1_000_000,
+                    pose_ot,
+                    wrench,
+                })
+                .unwrap(),
+        );
     }
     patcher.flush();
     patcher.patched(scan, &FaceTree::new(scan)).unwrap()
@@ -64,8 +95,12 @@ fn is_well_inside(p: &Point3<f64>) -> bool {
 
 /// Off the part as it was touched, m: the ball rests on the plane between the lines.
 fn p95(mesh: &TriMesh, part: impl Fn(f64) -> f64) -> f64 {
-    let used = (0..mesh.vertex_slots() as u32).map(VertexId).filter(|&v| !mesh.star(v).is_empty());
-    let inside = used.map(|v| mesh.position(v)).filter(|p| is_well_inside(p) && p.z.abs() < 1e-3);
+    let used = (0..mesh.vertex_slots() as u32)
+        .map(VertexId)
+        .filter(|&v| !mesh.star(v).is_empty());
+    let inside = used
+        .map(|v| mesh.position(v))
+        .filter(|p| is_well_inside(p) && p.z.abs() < 1e-3);
     let mut off: Vec<f64> = inside.map(|p| (p.z - part(p.x)).abs()).collect();
     off.sort_unstable_by(f64::total_cmp);
     off[off.len() * 95 / 100]
@@ -75,12 +110,25 @@ fn p95(mesh: &TriMesh, part: impl Fn(f64) -> f64) -> f64 {
 fn what_is_engraved_stays_where_the_scan_agrees_with_touch() {
     let scan = scan(0.0);
     let patched = patched(&scan, 0.0);
-    assert_eq!((patched.removed_faces, patched.added_faces), (0, 0), "nothing is to be replaced");
+    assert_eq!(
+        (patched.removed_faces, patched.added_faces),
+        (0, 0),
+        "nothing is to be replaced"
+    );
     let (before, after) = (p95(&scan, engraved), p95(&patched.mesh, engraved));
-    println!("p95 {:.4} mm before, {:.4} mm after", before * 1e3, after * 1e3);
+    println!(
+        "p95 {:.4} mm before, {:.4} mm after",
+        before * 1e3,
+        after * 1e3
+    );
     assert!(after < 0.004e-3 && before > 0.19e-3, "{before} {after}");
     let mut moved = 0;
-    for (vertex, (was, is)) in scan.positions().iter().zip(patched.mesh.positions()).enumerate() {
+    for (vertex, (was, is)) in scan
+        .positions()
+        .iter()
+        .zip(patched.mesh.positions())
+        .enumerate()
+    {
         let from_middle = was.x.abs().max(was.y.abs());
         if from_middle > TOUCHED + 2.0 * RADIUS {
             assert!(was == is && patched.support[vertex] == Support::Scan);
@@ -98,10 +146,20 @@ fn a_hole_opens_in_a_scan_whose_detail_stays() {
     let scan = scan(0.0);
     let patched = patched(&scan, 2.5e-3);
     let after = p95(&patched.mesh, engraved);
-    println!("p95 {:.4} mm, {} removed, {} added", after * 1e3, patched.removed_faces, patched.added_faces);
+    println!(
+        "p95 {:.4} mm, {} removed, {} added",
+        after * 1e3,
+        patched.removed_faces,
+        patched.added_faces
+    );
     assert!(patched.removed_faces > 200 && after < 0.02e-3, "{after}");
-    let lid = patched.mesh.faces().map(|(face, _)| patched.mesh.barycentre(face));
-    let lid = lid.filter(|p| p.x.abs().max(p.y.abs()) < 0.6e-3 && p.z > -1e-3).count();
+    let lid = patched
+        .mesh
+        .faces()
+        .map(|(face, _)| patched.mesh.barycentre(face));
+    let lid = lid
+        .filter(|p| p.x.abs().max(p.y.abs()) < 0.6e-3 && p.z > -1e-3)
+        .count();
     assert_eq!(lid, 0, "faces across the hole");
     let (was, is) = (soundness(&scan), soundness(&patched.mesh));
     assert_eq!((was.bad_edges, is.bad_edges), (0, 0));

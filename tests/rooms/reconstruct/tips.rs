@@ -6,14 +6,23 @@ use std::sync::LazyLock;
 use nalgebra::{Isometry3, Point3, Vector3};
 use touchup::reconstruct::{TipTouch, TouchFinder, TouchFinderParams};
 use touchup::sim::{
-    Lines, Moment, PathParams, Plate, RasterRegion, Stroke, StylusParams, Surface, plan_demo, raster, touch,
+    Lines, Moment, PathParams, Plate, RasterRegion, Stroke, StylusParams, Surface, plan_demo,
+    raster, touch,
 };
-use touchup::stylus::{ContactEstimator, ContactEstimatorParams, SyncParams, Synchroniser, TipParams, TipShape};
+use touchup::stylus::{
+    ContactEstimator, ContactEstimatorParams, SyncParams, Synchroniser, TipParams, TipShape,
+};
 
 use crate::full::either;
 
-const FLAT: TipShape = TipShape::Flat { edge_radius: 0.2e-3, length: 6e-3 };
-const CONE: TipShape = TipShape::Cone { half_angle: 0.35, length: 6e-3 };
+const FLAT: TipShape = TipShape::Flat {
+    edge_radius: 0.2e-3,
+    length: 6e-3,
+};
+const CONE: TipShape = TipShape::Cone {
+    half_angle: 0.35,
+    length: 6e-3,
+};
 
 /// A ball or a flat end goes over the plate as in the demo; a cone only so deep into holes that it does not get stuck.
 fn path(stylus: &StylusParams, hand: &PathParams) -> Vec<Stroke> {
@@ -34,24 +43,38 @@ fn path(stylus: &StylusParams, hand: &PathParams) -> Vec<Stroke> {
 /// Contacts, with the truth at that time.
 fn contacts(stylus: &StylusParams, seed: u64) -> Vec<(TipTouch, Moment)> {
     let plate = Plate::default();
-    let hand = PathParams { radius: stylus.radius, ..PathParams::default() };
+    let hand = PathParams {
+        radius: stylus.radius,
+        ..PathParams::default()
+    };
     let recording = touch(&plate, &path(stylus, &hand), stylus, seed).unwrap();
-    let params =
-        TouchFinderParams { shape: stylus.shape, ..TouchFinderParams::new(stylus.radius, Some(stylus.stiffness)) };
+    let params = TouchFinderParams {
+        shape: stylus.shape,
+        ..TouchFinderParams::new(stylus.radius, Some(stylus.stiffness))
+    };
     let mut finder = TouchFinder::new(params).unwrap();
-    let tip = TipParams { radius: stylus.radius, stiffness: Some(stylus.stiffness) };
+    let tip = TipParams {
+        radius: stylus.radius,
+        stiffness: Some(stylus.stiffness),
+    };
     let mut contacts = ContactEstimator::new(ContactEstimatorParams::new(tip)).unwrap();
     let mut sync = Synchroniser::new(SyncParams::default()).unwrap();
     let mut touches = Vec::new();
     for message in &recording.messages {
         sync.push(*message);
-        std::iter::from_fn(|| sync.next_sample())
-            .for_each(|sample| finder.push(contacts.observe(&sample).unwrap(), |touch| touches.push(touch)));
+        std::iter::from_fn(|| sync.next_sample()).for_each(|sample| {
+            finder.push(contacts.observe(&sample).unwrap(), |touch| {
+                touches.push(touch)
+            })
+        });
     }
     finder.flush(|touch| touches.push(touch));
     let truth = |touch: TipTouch| {
         let tick = (touch.stamp_ns - stylus.sensor.start_ns + 500_000) / 1_000_000;
-        Some((touch, recording.moments.get(usize::try_from(tick).ok()?)?.clone()))
+        Some((
+            touch,
+            recording.moments.get(usize::try_from(tick).ok()?)?.clone(),
+        ))
     };
     touches.into_iter().filter_map(truth).collect()
 }
@@ -63,8 +86,12 @@ static OF_FLAT_AND_CONE: LazyLock<[Vec<(TipTouch, Moment)>; 2]> = LazyLock::new(
 });
 
 fn tips() -> [(&'static str, StylusParams); 6] {
-    let with =
-        |shape, radius, tilt: f64| StylusParams { shape, radius, tilt: tilt.to_radians(), ..StylusParams::default() };
+    let with = |shape, radius, tilt: f64| StylusParams {
+        shape,
+        radius,
+        tilt: tilt.to_radians(),
+        ..StylusParams::default()
+    };
     [
         ("flat of 1.5 mm", with(FLAT, 1.5e-3, 5.0)),
         ("cone of 20°", with(CONE, 0.5e-3, 5.0)),
@@ -81,15 +108,25 @@ fn quality(contacts: &[(TipTouch, Moment)]) -> [f64; 5] {
     let plate = Plate::default();
     let (mut distances, mut angles, mut touching) = (Vec::new(), Vec::new(), 0);
     for (touch, moment) in contacts {
-        let [truth] = &moment.contacts[..] else { continue };
+        let [truth] = &moment.contacts[..] else {
+            continue;
+        };
         touching += 1;
-        let Some(contact) = touch.contact else { continue };
+        let Some(contact) = touch.contact else {
+            continue;
+        };
         distances.push(plate.signed_distance(&contact.point).abs() * 1e3);
         angles.push(angle(&contact.normal, &truth.normal));
     }
     let [median, p90] = quantiles(&mut distances);
     let [angle_median, angle_p90] = quantiles(&mut angles);
-    [distances.len() as f64 / f64::from(touching), median, p90, angle_median, angle_p90]
+    [
+        distances.len() as f64 / f64::from(touching),
+        median,
+        p90,
+        angle_median,
+        angle_p90,
+    ]
 }
 
 fn angle(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
@@ -105,7 +142,9 @@ fn quantiles(values: &mut [f64]) -> [f64; 2] {
 fn the_simulated_tip_does_not_enter_the_part() {
     use touchup::stylus::{TipBody, TipPlace};
     let plate = Plate::default();
-    for ((_, StylusParams { shape, radius, .. }), contacts) in tips().into_iter().zip(&*OF_FLAT_AND_CONE) {
+    for ((_, StylusParams { shape, radius, .. }), contacts) in
+        tips().into_iter().zip(&*OF_FLAT_AND_CONE)
+    {
         let body = TipBody::new(shape, radius).unwrap();
         let (mut deepest, mut touching) = (0.0f64, 0);
         for (_, moment) in contacts.iter().step_by(50) {
@@ -115,26 +154,39 @@ fn the_simulated_tip_does_not_enter_the_part() {
             for i in 0..600 {
                 let turn = f64::from(i) * 2.399_963;
                 let lean = f64::from(i) / 600.0 * 1.9;
-                let out = Vector3::new(turn.cos() * lean.sin(), turn.sin() * lean.sin(), -lean.cos());
+                let out = Vector3::new(
+                    turn.cos() * lean.sin(),
+                    turn.sin() * lean.sin(),
+                    -lean.cos(),
+                );
                 let point = body.support(&place, &(moment.pose_ot.rotation * out));
                 deepest = deepest.max(-plate.signed_distance(&point));
             }
             // the tip is known up to 6 mm; the simulated one goes on
             let on_tip = |p: &Point3<f64>| {
-                (p - place.centre).dot(&place.axis) > 6e-3 || body.signed_distance(&place, p).abs() < 20e-6
+                (p - place.centre).dot(&place.axis) > 6e-3
+                    || body.signed_distance(&place, p).abs() < 20e-6
             };
             assert!(moment.contacts.iter().all(|contact| on_tip(&contact.point)));
         }
-        println!("{shape:?}: {:.1} um deep at most, {touching} touching", deepest * 1e6);
+        println!(
+            "{shape:?}: {:.1} um deep at most, {touching} touching",
+            deepest * 1e6
+        );
         assert!(deepest < 8e-6 && touching > 100, "{deepest}");
     }
 }
 
 #[test]
 fn contacts_of_a_tip_are_located() {
-    println!("{:24} {:>6} {:>14} {:>14}", "", "share", "distance, mm", "normal, °");
+    println!(
+        "{:24} {:>6} {:>14} {:>14}",
+        "", "share", "distance, mm", "normal, °"
+    );
     let (tips, shared) = (tips(), &*OF_FLAT_AND_CONE);
-    let others = tips[2..either(2, tips.len())].iter().map(|(_, stylus)| Cow::Owned(contacts(stylus, 1)));
+    let others = tips[2..either(2, tips.len())]
+        .iter()
+        .map(|(_, stylus)| Cow::Owned(contacts(stylus, 1)));
     let all = shared.iter().map(Cow::Borrowed).chain(others);
     for ((name, _), contacts) in tips.iter().zip(all) {
         let [share, median, p90, angle_median, angle_p90] = quality(&contacts);
@@ -142,7 +194,11 @@ fn contacts_of_a_tip_are_located() {
         // noise of 0.05 mm at 500 Hz, averaged over 16 ms and more, and a tenth of the samples at edges and turns
         assert!(share > 0.8 && median < 0.03 && angle_median < 3.0, "{name}");
         // the side of a leaning cylinder on the edge of a hole is taken for its end
-        let worst = if *name == "flat, tilt 15°" { 2.0 } else { 0.15 };
+        let worst = if *name == "flat, tilt 15°" {
+            2.0
+        } else {
+            0.15
+        };
         assert!(p90 < worst && angle_p90 < 10.0, "{name}");
     }
 }

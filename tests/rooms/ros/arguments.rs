@@ -42,7 +42,9 @@ fn nothing_given_is_the_default() {
 
 #[test]
 fn names_are_relative_to_the_namespace_wherever_that_stands() {
-    let config = config("-r stylus/wrench:=ft/wrench -r mesh:=/view -r __ns:=/bench -r __node:=left").unwrap();
+    let config =
+        config("-r stylus/wrench:=ft/wrench -r mesh:=/view -r __ns:=/bench -r __node:=left")
+            .unwrap();
     assert_eq!(config.place.full_name(), "/bench/left");
     assert_eq!(config.resolve("stylus/wrench").unwrap(), "/bench/ft/wrench");
     assert_eq!(config.resolve("mesh").unwrap(), "/view");
@@ -100,23 +102,44 @@ fn the_file_of_this_repository_is_read() {
 #[test]
 fn what_is_wrong_is_named_with_a_way_out() {
     let cases = [
-        ("--remaps a:=b", "--ros-args does not know \"--remaps\": did you mean --remap?"),
+        (
+            "--remaps a:=b",
+            "--ros-args does not know \"--remaps\": did you mean --remap?",
+        ),
         ("--scene x", "--ros-args does not know \"--scene\""),
         ("-p", "-p needs NAME:=VALUE behind it"),
-        ("-p scan=part.ply", "-p scan=part.ply: it must be NAME:=VALUE, as in scan:=part.ply"),
-        ("-p scna:=part.ply", "-p scna:=part.ply: there is no parameter \"scna\": did you mean \"scan\"?"),
+        (
+            "-p scan=part.ply",
+            "-p scan=part.ply: it must be NAME:=VALUE, as in scan:=part.ply",
+        ),
+        (
+            "-p scna:=part.ply",
+            "-p scna:=part.ply: there is no parameter \"scna\": did you mean \"scan\"?",
+        ),
         (
             "-p view_rat_hz:=1",
             "-p view_rat_hz:=1: there is no parameter \"view_rat_hz\": did you mean \"view_rate_hz\"?",
         ),
-        ("-p view_rate_hz:=0", "-p view_rate_hz:=0: view_rate_hz is 0.0: it may be 0.1 to 100"),
-        ("-r mesh", "--remap mesh: it must be FROM:=TO, as in stylus/wrench:=/ft_sensor/wrench"),
-        ("-r mesh:=a//b", "--remap mesh:=a//b: \"/a//b\" has an empty part: a name is words between single slashes"),
+        (
+            "-p view_rate_hz:=0",
+            "-p view_rate_hz:=0: view_rate_hz is 0.0: it may be 0.1 to 100",
+        ),
+        (
+            "-r mesh",
+            "--remap mesh: it must be FROM:=TO, as in stylus/wrench:=/ft_sensor/wrench",
+        ),
+        (
+            "-r mesh:=a//b",
+            "--remap mesh:=a//b: \"/a//b\" has an empty part: a name is words between single slashes",
+        ),
         (
             "-r __ns:=/1a",
             "--remap __ns:=/1a: \"/1a\" has the part \"1a\": letters, digits and single _ are allowed, no digit at the beginning",
         ),
-        ("--log-level loud", "--log-level loud: it must be debug, info, warn, error or fatal"),
+        (
+            "--log-level loud",
+            "--log-level loud: it must be debug, info, warn, error or fatal",
+        ),
         (
             "--params-file /nowhere.yaml",
             "cannot read the parameter file /nowhere.yaml: No such file or directory (os error 2)",
@@ -127,7 +150,10 @@ fn what_is_wrong_is_named_with_a_way_out() {
     }
     let not_nodes = file("view_rate_hz: 3.0\n");
     let line = format!("--params-file {}", not_nodes.path().display());
-    assert!(refusal_of(&line).ends_with("\"view_rate_hz\" is no node: below it must be ros__parameters, or a node"));
+    assert!(
+        refusal_of(&line)
+            .ends_with("\"view_rate_hz\" is no node: below it must be ros__parameters, or a node")
+    );
 }
 
 #[test]
@@ -137,10 +163,17 @@ fn the_environment_says_who_is_seen() {
     };
     assert_eq!(with("ROS_DOMAIN_ID", "42").unwrap().domain_id, 42);
     assert_eq!(with("ROS_DOMAIN_ID", "").unwrap().domain_id, 0);
-    assert_eq!(with("ROS_DOMAIN_ID", "233").unwrap_err().to_string(), "ROS_DOMAIN_ID=233: it must be 0 to 232");
+    assert_eq!(
+        with("ROS_DOMAIN_ID", "233").unwrap_err().to_string(),
+        "ROS_DOMAIN_ID=233: it must be 0 to 232"
+    );
     assert!(with("ROS_DOMAIN_ID", "-1").is_err());
     assert!(with("ROS_LOCALHOST_ONLY", "1").unwrap().localhost_only);
     assert!(!with("ROS_LOCALHOST_ONLY", "0").unwrap().localhost_only);
-    assert!(with("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST").unwrap().localhost_only);
+    assert!(
+        with("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+            .unwrap()
+            .localhost_only
+    );
     assert!(with("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF").is_err());
 }

@@ -94,9 +94,17 @@ fn constants_defaults_bounds_and_comments_come_along() {
 
 #[test]
 fn parts_of_a_service_are_named_for_it_and_an_empty_one_has_a_byte() {
-    let messages = parse("touchup_msgs", "srv/Look.srv", "# Looks.\n\n---\n# how many\nuint32 count\n").unwrap();
+    let messages = parse(
+        "touchup_msgs",
+        "srv/Look.srv",
+        "# Looks.\n\n---\n# how many\nuint32 count\n",
+    )
+    .unwrap();
     let text = rust::structs(&messages).unwrap();
-    assert!(text.starts_with("/// Request of the service `Look`.\n///\n/// Looks.\n#[derive("), "{text}");
+    assert!(
+        text.starts_with("/// Request of the service `Look`.\n///\n/// Looks.\n#[derive("),
+        "{text}"
+    );
     for part in [
         "pub struct LookRequest {\n    /// 0, means nothing\n    pub structure_needs_at_least_one_member: u8,\n}",
         "\"touchup_msgs/srv/Look_Request\"",
@@ -112,18 +120,36 @@ fn parts_of_a_service_are_named_for_it_and_an_empty_one_has_a_byte() {
         "service!(Look = super::touchup_msgs::srv::Look::Service);",
         "message!(LookResponse = super::touchup_msgs::srv::Look::Response { count: count, });",
     ];
-    assert_eq!(rust::conversions(&messages).lines().collect::<Vec<_>>(), conversions);
-    assert_eq!(rust::carried(&messages), "carried!(LookRequest, LookResponse);\n");
+    assert_eq!(
+        rust::conversions(&messages).lines().collect::<Vec<_>>(),
+        conversions
+    );
+    assert_eq!(
+        rust::carried(&messages),
+        "carried!(LookRequest, LookResponse);\n"
+    );
     assert!(rust::stand_ins(&messages).contains("\nservice!(Look { } { count: u32, });\n"));
 }
 
 #[test]
 fn what_is_no_definition_is_refused_by_name() {
     for (path, text, reason) in [
-        ("msg/A.msg", "uint8\n", "msg/A.msg: \"uint8\" has a type and no name"),
-        ("msg/A.msg", "uint8[x] a\n", "msg/A.msg: a has a length that is no number: x"),
+        (
+            "msg/A.msg",
+            "uint8\n",
+            "msg/A.msg: \"uint8\" has a type and no name",
+        ),
+        (
+            "msg/A.msg",
+            "uint8[x] a\n",
+            "msg/A.msg: a has a length that is no number: x",
+        ),
         ("srv/A.srv", "uint8 a\n", "srv/A.srv: 1 parts, a .srv has 2"),
-        ("msg/A.idl", "", "msg/A.idl: it ends in .idl, definitions end in .msg, .srv or .action"),
+        (
+            "msg/A.idl",
+            "",
+            "msg/A.idl: it ends in .idl, definitions end in .msg, .srv or .action",
+        ),
     ] {
         assert_eq!(parse("own", path, text).unwrap_err(), reason);
     }

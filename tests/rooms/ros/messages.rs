@@ -14,7 +14,9 @@ fn golden() -> Map<String, Value> {
 
 fn bytes(hexadecimal: &str) -> Vec<u8> {
     let digits = hexadecimal.as_bytes().chunks(2);
-    digits.map(|pair| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap()).collect()
+    digits
+        .map(|pair| u8::from_str_radix(std::str::from_utf8(pair).unwrap(), 16).unwrap())
+        .collect()
 }
 
 /// Bytes, fields, and the message are the same thing three times; cut off anywhere, the bytes are refused.
@@ -23,12 +25,26 @@ fn check<M: RosMessage>(golden: &Map<String, Value>) -> &'static str {
     let (wire, fields) = (bytes(entry["cdr"].as_str().unwrap()), &entry["fields"]);
     let (read, length) = cdr_encoding::from_bytes::<M, LittleEndian>(&wire).unwrap();
     assert_eq!(length, wire.len(), "{}", M::TYPE_NAME);
-    assert_eq!(serde_json::to_value(&read).unwrap(), *fields, "{}", M::TYPE_NAME);
+    assert_eq!(
+        serde_json::to_value(&read).unwrap(),
+        *fields,
+        "{}",
+        M::TYPE_NAME
+    );
     let written: M = serde_json::from_value(fields.clone()).unwrap();
     assert_eq!(written, read, "{}", M::TYPE_NAME);
-    assert_eq!(cdr_encoding::to_vec::<M, LittleEndian>(&written).unwrap(), wire, "{}", M::TYPE_NAME);
+    assert_eq!(
+        cdr_encoding::to_vec::<M, LittleEndian>(&written).unwrap(),
+        wire,
+        "{}",
+        M::TYPE_NAME
+    );
     for end in 0..wire.len() {
-        assert!(cdr_encoding::from_bytes::<M, LittleEndian>(&wire[..end]).is_err(), "{} to {end}", M::TYPE_NAME);
+        assert!(
+            cdr_encoding::from_bytes::<M, LittleEndian>(&wire[..end]).is_err(),
+            "{} to {end}",
+            M::TYPE_NAME
+        );
     }
     M::TYPE_NAME
 }

@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use touchup::ros::parameters::{Allowed, PARAMETERS, ParameterDescriptor, ParameterValue, Settable};
+use touchup::ros::parameters::{
+    Allowed, PARAMETERS, ParameterDescriptor, ParameterValue, Settable,
+};
 
 /// In every node, so in neither of the two files.
 const EVERYWHERE: &str = "use_sim_time";
@@ -28,15 +30,29 @@ fn row(declared: &ParameterDescriptor) -> [String; 6] {
         Settable::OnlyToFalse => "to false",
     };
     let type_name = default.type_name().to_owned();
-    [declared.name.into(), type_name, default.to_string(), range, live.into(), declared.description.into()]
+    [
+        declared.name.into(),
+        type_name,
+        default.to_string(),
+        range,
+        live.into(),
+        declared.description.into(),
+    ]
 }
 
 fn documented() -> Vec<[String; 6]> {
     let text = read("docs/ros.md");
     let (_, table) = text.split_once("| name | type | default |").unwrap();
-    let rows = table.lines().skip(2).take_while(|line| line.starts_with('|'));
+    let rows = table
+        .lines()
+        .skip(2)
+        .take_while(|line| line.starts_with('|'));
     rows.map(|line| {
-        let cells: Vec<_> = line.trim_matches('|').split('|').map(|cell| cell.replace('`', "").trim().into()).collect();
+        let cells: Vec<_> = line
+            .trim_matches('|')
+            .split('|')
+            .map(|cell| cell.replace('`', "").trim().into())
+            .collect();
         cells.try_into().unwrap()
     })
     .collect()
@@ -44,13 +60,21 @@ fn documented() -> Vec<[String; 6]> {
 
 #[test]
 fn the_table_is_that_of_the_documentation() {
-    let declared = PARAMETERS.iter().filter(|declared| declared.name != EVERYWHERE);
+    let declared = PARAMETERS
+        .iter()
+        .filter(|declared| declared.name != EVERYWHERE);
     // "a file", "a folder" and "a type" say what a word means, not what it may be
     let documented = documented().into_iter().map(|mut row| {
-        row[3] = row[3].replace("a file", "").replace("a folder", "").replace("a type", "");
+        row[3] = row[3]
+            .replace("a file", "")
+            .replace("a folder", "")
+            .replace("a type", "");
         row
     });
-    assert_eq!(declared.map(row).collect::<Vec<_>>(), documented.collect::<Vec<_>>());
+    assert_eq!(
+        declared.map(row).collect::<Vec<_>>(),
+        documented.collect::<Vec<_>>()
+    );
 }
 
 #[test]
@@ -58,15 +82,25 @@ fn the_file_has_every_parameter_with_its_default() {
     type File = BTreeMap<String, BTreeMap<String, BTreeMap<String, String>>>;
     let file: File = serde_saphyr::from_str(&read("config/node.yaml")).unwrap();
     let in_file = &file["/**"]["ros__parameters"];
-    let declared = PARAMETERS.iter().filter(|declared| declared.name != EVERYWHERE);
-    let defaults: BTreeMap<_, _> = declared.map(|one| (one.name.to_owned(), one.default_value().to_string())).collect();
+    let declared = PARAMETERS
+        .iter()
+        .filter(|declared| declared.name != EVERYWHERE);
+    let defaults: BTreeMap<_, _> = declared
+        .map(|one| (one.name.to_owned(), one.default_value().to_string()))
+        .collect();
     assert_eq!(*in_file, defaults);
 }
 
 #[test]
 fn every_default_is_allowed() {
     for declared in PARAMETERS {
-        assert_eq!(declared.check(&declared.default_value()), Ok(declared.default_value()));
+        assert_eq!(
+            declared.check(&declared.default_value()),
+            Ok(declared.default_value())
+        );
     }
-    assert_eq!(PARAMETERS[0].default_value(), ParameterValue::String(String::new()));
+    assert_eq!(
+        PARAMETERS[0].default_value(),
+        ParameterValue::String(String::new())
+    );
 }

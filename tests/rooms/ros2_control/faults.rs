@@ -46,7 +46,10 @@ fn stays_until_recovered(mut bench: Bench, reason: &ArmError) {
 #[test]
 fn joints_that_fall_silent_are_named_and_the_arm_stands() {
     let (bench, stood_ms, reason) = after(Fault::JointsSilent);
-    assert!(matches!(&reason, ArmError::TopicSilent { topic, .. } if topic == "/joint_states"), "{reason}");
+    assert!(
+        matches!(&reason, ArmError::TopicSilent { topic, .. } if topic == "/joint_states"),
+        "{reason}"
+    );
     assert!(stood_ms < ENDS_BY_ITSELF_MS + 10.0, "{stood_ms} ms");
     stays_until_recovered(bench, &reason);
 }
@@ -54,7 +57,10 @@ fn joints_that_fall_silent_are_named_and_the_arm_stands() {
 #[test]
 fn a_sensor_that_falls_silent_is_named_and_the_arm_stands() {
     let (bench, stood_ms, reason) = after(Fault::WrenchSilent);
-    assert!(matches!(&reason, ArmError::TopicSilent { topic, .. } if topic == "/ft_sensor/wrench"), "{reason}");
+    assert!(
+        matches!(&reason, ArmError::TopicSilent { topic, .. } if topic == "/ft_sensor/wrench"),
+        "{reason}"
+    );
     assert!(stood_ms < SILENT_MS + BRAKED_MS, "{stood_ms} ms");
     stays_until_recovered(bench, &reason);
 }
@@ -62,7 +68,10 @@ fn a_sensor_that_falls_silent_is_named_and_the_arm_stands() {
 #[test]
 fn states_that_come_late_are_named_and_the_arm_stands() {
     let (bench, stood_ms, reason) = after(Fault::Late(Duration::from_millis(90)));
-    assert!(matches!(reason, ArmError::Late { .. } | ArmError::TopicSilent { .. }), "{reason}");
+    assert!(
+        matches!(reason, ArmError::Late { .. } | ArmError::TopicSilent { .. }),
+        "{reason}"
+    );
     assert!(stood_ms < 90.0 + BRAKED_MS, "{stood_ms} ms");
     stays_until_recovered(bench, &reason);
 }
@@ -70,11 +79,17 @@ fn states_that_come_late_are_named_and_the_arm_stands() {
 #[test]
 fn stamps_that_jump_are_named_by_their_direction_and_the_arm_stands() {
     let (bench, stood_ms, reason) = after(Fault::StampsJump(400));
-    assert!(matches!(reason, ArmError::JumpedAhead { ahead_ms, .. } if (ahead_ms - 400.0).abs() < 5.0), "{reason}");
+    assert!(
+        matches!(reason, ArmError::JumpedAhead { ahead_ms, .. } if (ahead_ms - 400.0).abs() < 5.0),
+        "{reason}"
+    );
     assert!(stood_ms < BRAKED_MS, "{stood_ms} ms");
     stays_until_recovered(bench, &reason);
     let (bench, stood_ms, reason) = after(Fault::StampsJump(-400));
-    assert!(matches!(reason, ArmError::WentBack { back_ms } if (back_ms - 398.0).abs() < 5.0), "{reason}");
+    assert!(
+        matches!(reason, ArmError::WentBack { back_ms } if (back_ms - 398.0).abs() < 5.0),
+        "{reason}"
+    );
     assert!(stood_ms < BRAKED_MS, "{stood_ms} ms");
     stays_until_recovered(bench, &reason);
 }
@@ -111,8 +126,14 @@ fn an_arm_that_goes_on_after_a_stop_is_said_so() {
     bench.order_for(500, &sideways(36e-3)).unwrap();
     bench.world().fail_in(1, Fault::RunsOn);
     let reason = bench.order_for(1000, &STOP).unwrap_err();
-    assert!(matches!(&reason, ArmError::GoesOn { first, .. } if first.contains("36 mm/s")), "{reason}");
-    assert!(reason.to_string().contains("press its emergency stop"), "{reason}");
+    assert!(
+        matches!(&reason, ArmError::GoesOn { first, .. } if first.contains("36 mm/s")),
+        "{reason}"
+    );
+    assert!(
+        reason.to_string().contains("press its emergency stop"),
+        "{reason}"
+    );
     assert!(matches!(bench.arm.recover(), Err(ArmError::GoesOn { .. })));
 }
 
@@ -133,7 +154,10 @@ fn an_arm_whose_client_has_died_stands_by_itself() {
             "died after {ms} ms: stood {stood_ms:.0} ms later, {:.1} mm on",
             (world.arm.ball() - place).norm() * 1e3
         );
-        assert!(stood_ms <= ENDS_BY_ITSELF_MS + 36.0 / 500.0 * 1e3, "{stood_ms} ms");
+        assert!(
+            stood_ms <= ENDS_BY_ITSELF_MS + 36.0 / 500.0 * 1e3,
+            "{stood_ms} ms"
+        );
         assert_eq!(world.refused, 0);
     }
 }

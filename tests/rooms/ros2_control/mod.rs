@@ -24,7 +24,11 @@ struct Bench {
 /// The arm with seven joints, and a plate before it.
 fn seven() -> ArmParams {
     let pose_bo = Isometry3::translation(0.45, -0.03, 0.15);
-    ArmParams { geometry: ArmGeometry::from(seven_joints()), pose_bo, ..ArmParams::default() }
+    ArmParams {
+        geometry: ArmGeometry::from(seven_joints()),
+        pose_bo,
+        ..ArmParams::default()
+    }
 }
 
 /// Its tip over a place of the plate.
@@ -42,7 +46,9 @@ fn told(simulated: &ArmParams, clock: touchup::clock::Clock) -> Ros2ControlParam
             trajectory: "/arm_controller/joint_trajectory".to_owned(),
         },
         geometry: simulated.geometry.clone(),
-        joint_names: (1..=joint_count).map(|number| format!("joint{number}").into()).collect(),
+        joint_names: (1..=joint_count)
+            .map(|number| format!("joint{number}").into())
+            .collect(),
         pose_ft: simulated.pose_ft,
         wrench_frame: "ft_sensor".to_owned(),
         pose_fs: mounted(),
@@ -59,15 +65,23 @@ fn told(simulated: &ArmParams, clock: touchup::clock::Clock) -> Ros2ControlParam
 }
 
 /// - `change`: of what is told of the arm.
-fn bench_with(simulated: ArmParams, change: impl FnOnce(&mut Ros2ControlParams)) -> Result<Bench, ArmError> {
+fn bench_with(
+    simulated: ArmParams,
+    change: impl FnOnce(&mut Ros2ControlParams),
+) -> Result<Bench, ArmError> {
     let plate: &'static Plate = Box::leak(Box::new(Plate::default()));
     let start_bt = over(&simulated, [40e-3, 25e-3, 50e-3]);
     let arm = SimArm::new(plate, simulated.clone(), &start_bt).unwrap();
-    let names = (1..=simulated.geometry.joint_count()).map(|number| format!("joint{number}")).collect();
+    let names = (1..=simulated.geometry.joint_count())
+        .map(|number| format!("joint{number}"))
+        .collect();
     let (world, port, clock) = start(arm, names, mounted());
     let mut params = told(&simulated, clock);
     change(&mut params);
-    Ok(Bench { arm: Ros2ControlArm::connect(&params, Box::new(port))?, world })
+    Ok(Bench {
+        arm: Ros2ControlArm::connect(&params, Box::new(port))?,
+        world,
+    })
 }
 
 fn bench(simulated: ArmParams) -> Bench {
@@ -94,7 +108,10 @@ impl Bench {
 
 /// Sideways, free of the plate.
 fn sideways(speed: f64) -> Command {
-    Command::Velocity { linear: Vector3::new(0.0, speed, 0.0), acceleration: 0.5 }
+    Command::Velocity {
+        linear: Vector3::new(0.0, speed, 0.0),
+        acceleration: 0.5,
+    }
 }
 
 const STOP: Command = Command::Stop { deceleration: 0.5 };

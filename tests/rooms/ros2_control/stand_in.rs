@@ -90,7 +90,11 @@ pub struct StandIn(Arc<Mutex<World>>);
 pub type SharedWorld = Arc<Mutex<World>>;
 
 /// A controller of an arm at rest, its port, and its clock.
-pub fn start(arm: SimArm<'static>, names: Vec<String>, pose_fs: Isometry3<f64>) -> (SharedWorld, StandIn, Clock) {
+pub fn start(
+    arm: SimArm<'static>,
+    names: Vec<String>,
+    pose_fs: Isometry3<f64>,
+) -> (SharedWorld, StandIn, Clock) {
     let (clock, hand) = Clock::manual();
     let joints = arm.joints();
     let still = joints.mapped(|_, _| 0.0);
@@ -144,7 +148,11 @@ impl World {
         self.now_ns += STEP_NS;
         self.hand.advance(Duration::from_nanos(STEP_NS as u64));
         let now_ns = self.now_ns;
-        let due: Vec<_> = self.faults.extract_if(.., |(at_ns, _)| *at_ns <= now_ns).map(|(_, fault)| fault).collect();
+        let due: Vec<_> = self
+            .faults
+            .extract_if(.., |(at_ns, _)| *at_ns <= now_ns)
+            .map(|(_, fault)| fault)
+            .collect();
         for fault in due {
             match fault {
                 Fault::Late(by) => self.late_ns = by.as_nanos() as i64,
@@ -167,7 +175,10 @@ impl World {
         let holds = self.has(Fault::Dead) || self.has(Fault::Frozen);
         if self.has(Fault::RunsOn) {
             let rates = self.set_point.1;
-            self.set_point.0 = self.set_point.0.mapped(|joint, angle| angle + rates[joint] * 2e-3);
+            self.set_point.0 = self
+                .set_point
+                .0
+                .mapped(|joint, angle| angle + rates[joint] * 2e-3);
         } else if holds {
             self.active = None;
             self.set_point.1 = self.set_point.1.mapped(|_, _| 0.0);
@@ -187,7 +198,10 @@ impl World {
         }
         let state = match self.last {
             Some(last) if self.has(Fault::Frozen) => last,
-            _ => ArmState { stamp_ns: EPOCH_NS + now_ns + self.jump_ns, ..state },
+            _ => ArmState {
+                stamp_ns: EPOCH_NS + now_ns + self.jump_ns,
+                ..state
+            },
         };
         self.last = Some(state);
         let due_ns = now_ns + ON_THE_WAY_NS + self.late_ns;
@@ -204,11 +218,18 @@ impl World {
     /// In the reverse order of the arm's own, with a gripper among them.
     fn joint_state(&mut self, state: &ArmState, before: &Joints) -> JointState {
         let [place, rate] = NOISE.map(|noise| Normal::new(0.0, noise).unwrap());
-        let mut message = JointState { header: header(state.stamp_ns, ""), ..JointState::default() };
+        let mut message = JointState {
+            header: header(state.stamp_ns, ""),
+            ..JointState::default()
+        };
         for joint in (0..self.names.len()).rev() {
             message.name.push(self.names[joint].clone());
-            message.position.push(state.joints[joint] + place.sample(&mut self.rng));
-            message.velocity.push((state.joints[joint] - before[joint]) / 2e-3 + rate.sample(&mut self.rng));
+            message
+                .position
+                .push(state.joints[joint] + place.sample(&mut self.rng));
+            message
+                .velocity
+                .push((state.joints[joint] - before[joint]) / 2e-3 + rate.sample(&mut self.rng));
             if joint == 3 {
                 message.name.push("finger".to_owned());
                 message.position.push(0.02);
@@ -219,40 +240,80 @@ impl World {
     }
 
     fn wrench(&self, state: &ArmState) -> WrenchStamped {
-        let added =
-            self.has.iter().map(|fault| if let Fault::Force(force) = fault { *force } else { 0.0 }).sum::<f64>();
+        let added = self
+            .has
+            .iter()
+            .map(|fault| {
+                if let Fault::Force(force) = fault {
+                    *force
+                } else {
+                    0.0
+                }
+            })
+            .sum::<f64>();
         let force_f = state.raw_wrench_f.force + Vector3::z() * added;
         let torque_f = state.raw_wrench_f.torque - self.pose_fs.translation.vector.cross(&force_f);
         let turned = |v: Vector3<f64>| self.pose_fs.rotation.inverse() * v;
         let (force, torque) = (turned(force_f), turned(torque_f));
-        let mut message = WrenchStamped { header: header(state.stamp_ns, "ft_sensor"), ..WrenchStamped::default() };
-        (message.wrench.force.x, message.wrench.force.y, message.wrench.force.z) = (force.x, force.y, force.z);
-        (message.wrench.torque.x, message.wrench.torque.y, message.wrench.torque.z) = (torque.x, torque.y, torque.z);
+        let mut message = WrenchStamped {
+            header: header(state.stamp_ns, "ft_sensor"),
+            ..WrenchStamped::default()
+        };
+        (
+            message.wrench.force.x,
+            message.wrench.force.y,
+            message.wrench.force.z,
+        ) = (force.x, force.y, force.z);
+        (
+            message.wrench.torque.x,
+            message.wrench.torque.y,
+            message.wrench.torque.z,
+        ) = (torque.x, torque.y, torque.z);
         message
     }
 
     fn take(&mut self, order: &JointTrajectory) {
         let place = |name: &String| order.joint_names.iter().position(|other| other == name);
         let places: Option<Vec<_>> = self.names.iter().map(place).collect();
-        let times: Vec<_> = order.points.iter().map(|point| length_ns(&point.time_from_start)).collect();
-        let ends_at_rest =
-            order.points.last().is_some_and(|point| point.velocities.iter().all(|velocity| *velocity == 0.0));
+        let times: Vec<_> = order
+            .points
+            .iter()
+            .map(|point| length_ns(&point.time_from_start))
+            .collect();
+        let ends_at_rest = order
+            .points
+            .last()
+            .is_some_and(|point| point.velocities.iter().all(|velocity| *velocity == 0.0));
         let is_whole = order.points.iter().all(|point| {
             point.velocities.len() == self.names.len()
                 && point.positions.is_empty()
                 && point.velocities.iter().all(|velocity| velocity.is_finite())
         });
         let begins_now = order.header.stamp.sec == 0 && order.header.stamp.nanosec == 0;
-        let rises = times.first().is_some_and(|first| *first > 0) && times.windows(2).all(|pair| pair[0] < pair[1]);
-        let Some(places) = places.filter(|_| ends_at_rest && is_whole && begins_now && rises) else {
+        let rises = times.first().is_some_and(|first| *first > 0)
+            && times.windows(2).all(|pair| pair[0] < pair[1]);
+        let Some(places) = places.filter(|_| ends_at_rest && is_whole && begins_now && rises)
+        else {
             self.refused += 1;
             return;
         };
         self.taken += 1;
-        let velocity = |at: usize| self.set_point.1.mapped(|joint, _| order.points[at].velocities[places[joint]]);
+        let velocity = |at: usize| {
+            self.set_point
+                .1
+                .mapped(|joint, _| order.points[at].velocities[places[joint]])
+        };
         let before_ns = if self.repeats { 0 } else { PERIOD_NS };
-        let points = times.iter().enumerate().map(|(at, time_ns)| (before_ns + time_ns, velocity(at))).collect();
-        self.active = Some(Active { begin_ns: self.now_ns - before_ns, from: self.set_point, points });
+        let points = times
+            .iter()
+            .enumerate()
+            .map(|(at, time_ns)| (before_ns + time_ns, velocity(at)))
+            .collect();
+        self.active = Some(Active {
+            begin_ns: self.now_ns - before_ns,
+            from: self.set_point,
+            points,
+        });
     }
 }
 
@@ -265,7 +326,8 @@ impl Active {
             let share = (after_ns.min(*to_ns) - from_ns) as f64 / (to_ns - from_ns) as f64;
             let seconds = (after_ns.min(*to_ns) - from_ns) as f64 * 1e-9;
             let reached = rates.mapped(|joint, rate| rate + (end[joint] - rate) * share);
-            angles = angles.mapped(|joint, angle| angle + 0.5 * (rates[joint] + reached[joint]) * seconds);
+            angles = angles
+                .mapped(|joint, angle| angle + 0.5 * (rates[joint] + reached[joint]) * seconds);
             rates = reached;
             if after_ns <= *to_ns {
                 break;
@@ -317,8 +379,14 @@ fn due<T>(queue: &mut VecDeque<(i64, T)>, now_ns: i64) -> Option<T> {
 }
 
 fn header(stamp_ns: i64, frame: &str) -> Header {
-    let stamp = Time { sec: (stamp_ns / 1_000_000_000) as i32, nanosec: (stamp_ns % 1_000_000_000) as u32 };
-    Header { stamp, frame_id: frame.to_owned() }
+    let stamp = Time {
+        sec: (stamp_ns / 1_000_000_000) as i32,
+        nanosec: (stamp_ns % 1_000_000_000) as u32,
+    };
+    Header {
+        stamp,
+        frame_id: frame.to_owned(),
+    }
 }
 
 fn length_ns(length: &touchup::ros::messages::Duration) -> i64 {

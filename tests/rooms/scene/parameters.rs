@@ -180,19 +180,31 @@ struct Row {
 
 fn rows() -> impl Iterator<Item = Row> {
     NUMBERS.trim().lines().map(|line| {
-        let [key, unit, default, low, high] = line.split(' ').collect::<Vec<_>>().try_into().unwrap();
+        let [key, unit, default, low, high] =
+            line.split(' ').collect::<Vec<_>>().try_into().unwrap();
         let default = (default != "-").then_some(default);
-        Row { key, unit, default, low: low.parse().unwrap(), high: high.parse().unwrap() }
+        Row {
+            key,
+            unit,
+            default,
+            low: low.parse().unwrap(),
+            high: high.parse().unwrap(),
+        }
     })
 }
 
 fn declared() -> Vec<Parameter> {
     fn below(parameter: Parameter, all: &mut Vec<Parameter>) {
         all.push(parameter.clone());
-        parameter.inner.into_iter().for_each(|inner| below(inner, all));
+        parameter
+            .inner
+            .into_iter()
+            .for_each(|inner| below(inner, all));
     }
     let mut all = vec![];
-    Scene::parameters().into_iter().for_each(|section| below(section, &mut all));
+    Scene::parameters()
+        .into_iter()
+        .for_each(|section| below(section, &mut all));
     all
 }
 
@@ -205,32 +217,65 @@ fn sorted(mut lines: Vec<String>) -> Vec<String> {
 #[test]
 fn each_parameter_is_declared_as_in_the_table_by_hand() {
     let (mut by_hand, mut of_code) = (vec![], vec![]);
-    for Row { key, unit, default, low, high } in rows() {
+    for Row {
+        key,
+        unit,
+        default,
+        low,
+        high,
+    } in rows()
+    {
         by_hand.push(format!("{key} {unit} {default:?} {low} {high}"));
     }
     for one in declared().iter().filter(|one| one.range.is_some()) {
         let [low, high] = one.range.unwrap();
         // a word of what the unit is called in full
-        let known = ["length", "edges", "deviations", "scan"].into_iter().find(|word| one.unit.symbol.contains(word));
-        let unit = if one.unit.symbol.is_empty() { "-" } else { known.unwrap_or(one.unit.symbol) };
-        let default = one.default.as_ref().map(|default| default.replace(", ", ","));
+        let known = ["length", "edges", "deviations", "scan"]
+            .into_iter()
+            .find(|word| one.unit.symbol.contains(word));
+        let unit = if one.unit.symbol.is_empty() {
+            "-"
+        } else {
+            known.unwrap_or(one.unit.symbol)
+        };
+        let default = one
+            .default
+            .as_ref()
+            .map(|default| default.replace(", ", ","));
         of_code.push(format!("{} {unit} {default:?} {low} {high}", one.name()));
     }
     assert_eq!(sorted(of_code), sorted(by_hand));
 
-    let or_none = |text: &str| if text.is_empty() { "-".to_owned() } else { text.to_owned() };
-    let words = declared().into_iter().filter(|one| one.range.is_none() && !one.is_section).map(|one| {
-        format!(
-            "{} {} {}",
-            one.name(),
-            one.default.clone().unwrap_or_else(|| "-".into()),
-            or_none(&one.words.join(","))
-        )
-    });
-    assert_eq!(sorted(words.collect()), sorted(WORDS.trim().lines().map(str::to_owned).collect()));
+    let or_none = |text: &str| {
+        if text.is_empty() {
+            "-".to_owned()
+        } else {
+            text.to_owned()
+        }
+    };
+    let words = declared()
+        .into_iter()
+        .filter(|one| one.range.is_none() && !one.is_section)
+        .map(|one| {
+            format!(
+                "{} {} {}",
+                one.name(),
+                one.default.clone().unwrap_or_else(|| "-".into()),
+                or_none(&one.words.join(","))
+            )
+        });
+    assert_eq!(
+        sorted(words.collect()),
+        sorted(WORDS.trim().lines().map(str::to_owned).collect())
+    );
     let sections = declared().into_iter().filter(|one| one.is_section);
-    let sections: Vec<_> = sections.map(|one| (one.name(), one.default.is_some())).collect();
-    assert_eq!(sections, SECTIONS.map(|(name, is_built)| (name.to_owned(), is_built)));
+    let sections: Vec<_> = sections
+        .map(|one| (one.name(), one.default.is_some()))
+        .collect();
+    assert_eq!(
+        sections,
+        SECTIONS.map(|(name, is_built)| (name.to_owned(), is_built))
+    );
 }
 
 #[test]
@@ -258,18 +303,30 @@ fn each_parameter_is_explained_and_has_its_unit_in_its_key() {
     ];
     for one in declared() {
         let summary = one.summary();
-        assert!(summary.len() > 8 && summary.ends_with('.'), "{}: {summary}", one.name());
-        if let Some((_, suffix)) = suffixes.iter().find(|(symbol, _)| *symbol == one.unit.symbol) {
+        assert!(
+            summary.len() > 8 && summary.ends_with('.'),
+            "{}: {summary}",
+            one.name()
+        );
+        if let Some((_, suffix)) = suffixes
+            .iter()
+            .find(|(symbol, _)| *symbol == one.unit.symbol)
+        {
             assert!(one.key.ends_with(suffix), "{} has no {suffix}", one.name());
         }
-        assert!(one.default.is_some() || one.is_section || !one.example.is_empty(), "{}: no example", one.name());
+        assert!(
+            one.default.is_some() || one.is_section || !one.example.is_empty(),
+            "{}: no example",
+            one.name()
+        );
     }
 }
 
 /// `key: value` as one scene, with what else that key asks for.
 fn scene(key: &str, value: &str) -> String {
     let (section, name) = key.rsplit_once('.').unwrap();
-    let speeds = "link_mm_per_s: 0.1, search_mm_per_s: 0.1, measure_mm_per_s: 0.1, slide_mm_per_s: 0.1, ";
+    let speeds =
+        "link_mm_per_s: 0.1, search_mm_per_s: 0.1, measure_mm_per_s: 0.1, slide_mm_per_s: 0.1, ";
     let with = match key {
         "contact.on_n" => "off_n: 0, ",
         "contact.off_n" => "on_n: 1000, ",
@@ -285,10 +342,15 @@ fn scene(key: &str, value: &str) -> String {
         "markers.gate_mm" => "positions_mm: [[0, 0, 5000], [0, 5000, 0], [5000, 0, 0]], ",
         _ => "",
     };
-    let inner =
-        section.rsplit('.').fold(format!("{with}{name}: {value}"), |inner, name| format!("{name}: {{ {inner} }}"));
+    let inner = section
+        .rsplit('.')
+        .fold(format!("{with}{name}: {value}"), |inner, name| {
+            format!("{name}: {{ {inner} }}")
+        });
     // a ball of radius 0 has no patch
-    let others = [("tip", ""), ("contact", ""), ("patch", "off")].into_iter().filter(|(other, _)| *other != section);
+    let others = [("tip", ""), ("contact", ""), ("patch", "off")]
+        .into_iter()
+        .filter(|(other, _)| *other != section);
     let others = others.map(|(other, value)| format!(", {other}: {value}"));
     format!("{{ {inner}{} }}", others.collect::<String>())
 }
@@ -333,22 +395,33 @@ fn a_number_is_taken_up_to_its_limits_and_refused_beyond_them() {
         };
         for x in [low, high] {
             // a corner of the scan's box at the other one is no box
-            let is_empty_box = key.starts_with("scan.region") && (x > 0.0) == key.ends_with("low_mm");
-            if is_empty_box || key == "markers.positions_mm" || (key == "markers.gate_mm" && x > 0.0) {
+            let is_empty_box =
+                key.starts_with("scan.region") && (x > 0.0) == key.ends_with("low_mm");
+            if is_empty_box
+                || key == "markers.positions_mm"
+                || (key == "markers.gate_mm" && x > 0.0)
+            {
                 continue;
             }
             if let Err(error) = Scene::from_yaml(&scene(key, &written(&row, x))) {
                 wrong.push(format!("{key} {x} is refused: {error}"));
             }
         }
-        let beyond: &[f64] = if is_whole { &[] } else { &[f64::NAN, f64::INFINITY, f64::NEG_INFINITY] };
+        let beyond: &[f64] = if is_whole {
+            &[]
+        } else {
+            &[f64::NAN, f64::INFINITY, f64::NEG_INFINITY]
+        };
         for x in [low - by(low), high + by(high)].iter().chain(beyond) {
-            let yaml = written(&row, *x).replace("NaN", ".nan").replace("inf", ".inf");
+            let yaml = written(&row, *x)
+                .replace("NaN", ".nan")
+                .replace("inf", ".inf");
             match Scene::from_yaml(&scene(key, &yaml)) {
                 Ok(_) => wrong.push(format!("{key} {x} is taken")),
                 Err(error) => {
                     let error = error.to_string();
-                    let names_range = error.contains(&format!("{key} is ")) && error.contains("; it must be ");
+                    let names_range =
+                        error.contains(&format!("{key} is ")) && error.contains("; it must be ");
                     if !names_range {
                         wrong.push(format!("{key} {x}: {error}"));
                     }
@@ -362,12 +435,18 @@ fn a_number_is_taken_up_to_its_limits_and_refused_beyond_them() {
 /// `TOUCHUP_WRITE=1 cargo test --test rooms written_from_the_definition` writes them.
 #[test]
 fn the_shipped_scene_and_the_page_of_parameters_are_written_from_the_definition() {
-    for (file, text) in [("config/default.yaml", Scene::template()), ("docs/scene.md", Scene::table())] {
+    for (file, text) in [
+        ("config/default.yaml", Scene::template()),
+        ("docs/scene.md", Scene::table()),
+    ] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
         if std::env::var_os("TOUCHUP_WRITE").is_some() {
             fs::write(&path, &text).unwrap();
         }
         let is_same = fs::read_to_string(&path).is_ok_and(|shipped| shipped == text);
-        assert!(is_same, "{file} is not as the parameters are declared: run this test with TOUCHUP_WRITE=1");
+        assert!(
+            is_same,
+            "{file} is not as the parameters are declared: run this test with TOUCHUP_WRITE=1"
+        );
     }
 }

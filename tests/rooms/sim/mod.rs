@@ -22,7 +22,10 @@ fn triangles(mesh: &TriMesh) -> Vec<[Point3<f64>; 3]> {
 fn distance_to_triangle(p: &Point3<f64>, t: &[Point3<f64>; 3]) -> f64 {
     let normal = (t[1] - t[0]).cross(&(t[2] - t[0])).normalize();
     let sides = [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
-    if sides.iter().all(|(a, b)| normal.dot(&(b - a).cross(&(p - a))) >= 0.0) {
+    if sides
+        .iter()
+        .all(|(a, b)| normal.dot(&(b - a).cross(&(p - a))) >= 0.0)
+    {
         return normal.dot(&(p - t[0])).abs();
     }
     let to_side = |(a, b): &(Point3<f64>, Point3<f64>)| {
@@ -45,5 +48,6 @@ fn winding_number(p: &Point3<f64>, mesh: &[[Point3<f64>; 3]]) -> f64 {
 
 fn around(surface: &dyn Surface, margin: f64) -> impl Strategy<Value = Point3<f64>> {
     let b = surface.bounds().grown(margin);
-    (b.min.x..b.max.x, b.min.y..b.max.y, b.min.z..b.max.z).prop_map(|(x, y, z)| Point3::new(x, y, z))
+    (b.min.x..b.max.x, b.min.y..b.max.y, b.min.z..b.max.z)
+        .prop_map(|(x, y, z)| Point3::new(x, y, z))
 }

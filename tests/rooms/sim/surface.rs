@@ -7,7 +7,10 @@ use touchup::sim::add_vertex_noise;
 
 /// Volume by the divergence theorem.
 fn volume(mesh: &TriMesh) -> f64 {
-    triangles(mesh).iter().map(|[a, b, c]| a.coords.dot(&b.coords.cross(&c.coords)) / 6.0).sum()
+    triangles(mesh)
+        .iter()
+        .map(|[a, b, c]| a.coords.dot(&b.coords.cross(&c.coords)) / 6.0)
+        .sum()
 }
 
 #[test]
@@ -18,12 +21,24 @@ fn plate_mesh_is_closed_outward_and_has_one_tunnel() {
     for (_, c) in mesh.faces() {
         (0..3).for_each(|i| *edges.entry((c[i].0, c[(i + 1) % 3].0)).or_default() += 1);
     }
-    assert!(edges.iter().all(|((a, b), n)| *n == 1 && edges.get(&(*b, *a)) == Some(&1)));
+    assert!(
+        edges
+            .iter()
+            .all(|((a, b), n)| *n == 1 && edges.get(&(*b, *a)) == Some(&1))
+    );
     let euler = mesh.vertex_count() as i64 - edges.len() as i64 / 2 + mesh.face_count() as i64;
     // V − E + F = 2 − 2 · tunnels
     assert_eq!(euler, 0);
-    assert!(mesh.positions().iter().all(|p| plate.signed_distance(p).abs() < 1e-15));
-    assert!(mesh.faces().all(|(f, _)| mesh.double_area_normal(f).norm() > 1e-12), "no face without area");
+    assert!(
+        mesh.positions()
+            .iter()
+            .all(|p| plate.signed_distance(p).abs() < 1e-15)
+    );
+    assert!(
+        mesh.faces()
+            .all(|(f, _)| mesh.double_area_normal(f).norm() > 1e-12),
+        "no face without area"
+    );
 }
 
 #[test]
@@ -34,7 +49,12 @@ fn plate_volume_converges_to_the_closed_form() {
     let error = |chord: f64| (volume(&plate.mesh(chord).unwrap()) - by_hand).abs();
     // curved walls of 2π (3·8 + 4·12 + 5·4 + 3·5) mm²; the area between chord and arc is less than chord error · arc
     let walls = 2.0 * PI * 107e-6;
-    assert!(error(40e-6) < walls * 40e-6 && error(10e-6) < error(40e-6) / 3.0, "{} {}", error(40e-6), error(10e-6));
+    assert!(
+        error(40e-6) < walls * 40e-6 && error(10e-6) < error(40e-6) / 3.0,
+        "{} {}",
+        error(40e-6),
+        error(10e-6)
+    );
 }
 
 #[test]
@@ -61,7 +81,10 @@ fn plate_distances_worked_by_hand() {
         (mm(59., 25., 8.), -(1f64 + 1f64).sqrt()), // below the inner corner of the step
     ];
     for (i, (found, expected)) in cases.iter().enumerate() {
-        assert!((found - expected).abs() < 1e-9, "case {i}: {found} instead of {expected}");
+        assert!(
+            (found - expected).abs() < 1e-9,
+            "case {i}: {found} instead of {expected}"
+        );
     }
 }
 
@@ -70,23 +93,46 @@ fn plate_features_are_those_of_the_drawing() {
     let plate = Plate::default();
     for feature in plate.features() {
         match feature.shape {
-            TruthShape::Hole { diameter, depth, through } => {
+            TruthShape::Hole {
+                diameter,
+                depth,
+                through,
+            } => {
                 let floor = feature.centre - feature.axis * depth;
-                assert_eq!(plate.signed_distance(&floor) > 1e-4, through, "{}", feature.name);
-                let side = feature.centre + Vector3::x() * (diameter / 2.0) - feature.axis * (depth / 2.0);
+                assert_eq!(
+                    plate.signed_distance(&floor) > 1e-4,
+                    through,
+                    "{}",
+                    feature.name
+                );
+                let side =
+                    feature.centre + Vector3::x() * (diameter / 2.0) - feature.axis * (depth / 2.0);
                 assert!(plate.signed_distance(&side).abs() < 1e-15);
             }
-            TruthShape::Slot { width, length, depth, direction } => {
+            TruthShape::Slot {
+                width,
+                length,
+                depth,
+                direction,
+            } => {
                 let middle = feature.centre - feature.axis * (depth / 2.0);
                 let end = middle + direction * (length / 2.0);
                 let side = middle + direction.cross(&feature.axis) * (width / 2.0);
-                assert!([end, side].iter().all(|p| plate.signed_distance(p).abs() < 1e-15));
+                assert!(
+                    [end, side]
+                        .iter()
+                        .all(|p| plate.signed_distance(p).abs() < 1e-15)
+                );
             }
             TruthShape::Boss { diameter, height } => {
                 let rim = feature.centre + feature.axis * height + Vector3::y() * (diameter / 2.0);
                 assert!(plate.signed_distance(&rim).abs() < 1e-15);
             }
-            TruthShape::Step { height, length, direction } => {
+            TruthShape::Step {
+                height,
+                length,
+                direction,
+            } => {
                 let end = feature.centre + direction * (length / 2.0) - feature.axis * height;
                 assert!(plate.signed_distance(&end).abs() < 1e-15);
             }
@@ -97,10 +143,20 @@ fn plate_features_are_those_of_the_drawing() {
 /// Largest distance of the fine plate mesh below from the plate, m.
 const CHORD: f64 = 1e-6;
 
-fn check_against_mesh(plate: &Plate, mesh: &[[Point3<f64>; 3]], p: Point3<f64>) -> Result<(), TestCaseError> {
+fn check_against_mesh(
+    plate: &Plate,
+    mesh: &[[Point3<f64>; 3]],
+    p: Point3<f64>,
+) -> Result<(), TestCaseError> {
     let signed = plate.signed_distance(&p);
-    let brute = mesh.iter().map(|t| distance_to_triangle(&p, t)).fold(f64::MAX, f64::min);
-    prop_assert!((signed.abs() - brute).abs() <= CHORD, "{signed} against {brute}");
+    let brute = mesh
+        .iter()
+        .map(|t| distance_to_triangle(&p, t))
+        .fold(f64::MAX, f64::min);
+    prop_assert!(
+        (signed.abs() - brute).abs() <= CHORD,
+        "{signed} against {brute}"
+    );
     if brute > 2.0 * CHORD {
         prop_assert_eq!(signed < 0.0, winding_number(&p, mesh) > 0.5);
     }
@@ -131,7 +187,10 @@ fn brute_peaks(peaks: &Peaks, p: &Point3<f64>) -> f64 {
     let best = |cx: f64, cy: f64, half: f64, n: i32| {
         let at = |c: f64, i: i32| c + half * f64::from(i) / f64::from(n);
         let nodes = (-n..=n).flat_map(|i| (-n..=n).map(move |j| (i, j)));
-        nodes.map(|(i, j)| (at(cx, i), at(cy, j))).min_by(|a, b| far(a.0, a.1).total_cmp(&far(b.0, b.1))).unwrap()
+        nodes
+            .map(|(i, j)| (at(cx, i), at(cy, j)))
+            .min_by(|a, b| far(a.0, a.1).total_cmp(&far(b.0, b.1)))
+            .unwrap()
     };
     let (mut x, mut y) = best(0.0, 0.0, 0.030, 150);
     let mut half = 0.4e-3;
@@ -169,25 +228,38 @@ fn peaks_has_the_size_of_the_paper() {
     assert!((high - low - 0.020).abs() < 1e-5, "{low} {high}");
     // MATLAB: peaks at the origin of the formula is 3/e − 1/(3e) = 0.981 of a range of 14.657
     let middle = (8.106_213_589 - 6.551_133_333) / 2.0;
-    let origin = (3.0 / std::f64::consts::E - 1.0 / (3.0 * std::f64::consts::E) - middle) * 0.020 / 14.657_346_922;
+    let origin = (3.0 / std::f64::consts::E - 1.0 / (3.0 * std::f64::consts::E) - middle) * 0.020
+        / 14.657_346_922;
     assert!((peaks.height(0.0, 0.0) - origin).abs() < 1e-11);
 }
 
 #[test]
 fn noisy_peaks_keep_their_faces_and_have_the_stated_noise() {
     let truth = Peaks::default().mesh(1e-3).unwrap();
-    assert_eq!((truth.vertex_count(), truth.face_count()), (51 * 51, 2 * 50 * 50));
+    assert_eq!(
+        (truth.vertex_count(), truth.face_count()),
+        (51 * 51, 2 * 50 * 50)
+    );
     assert!(truth.faces().all(|(f, _)| truth.normal(f).z > 0.0));
     let mut noisy = truth.clone();
     add_vertex_noise(&mut noisy, 3e-3, &Vector3::new(0.0, 0.0, 2e-3), 1);
     assert!(truth.faces().eq(noisy.faces()));
-    let moved: Vec<_> = truth.positions().iter().zip(noisy.positions()).map(|(a, b)| b - a).collect();
+    let moved: Vec<_> = truth
+        .positions()
+        .iter()
+        .zip(noisy.positions())
+        .map(|(a, b)| b - a)
+        .collect();
     let n = moved.len() as f64;
     let mean = moved.iter().sum::<Vector3<f64>>() / n;
     // five standard errors
     let bound = 5.0 * 3e-3 / n.sqrt();
     assert!((mean - Vector3::new(0.0, 0.0, 2e-3)).amax() < bound);
-    let variance = moved.iter().map(|v| (v - mean).component_mul(&(v - mean))).sum::<Vector3<f64>>() / n;
+    let variance = moved
+        .iter()
+        .map(|v| (v - mean).component_mul(&(v - mean)))
+        .sum::<Vector3<f64>>()
+        / n;
     assert!((variance.map(f64::sqrt) - Vector3::repeat(3e-3)).amax() < bound);
     let mut other = truth.clone();
     add_vertex_noise(&mut other, 3e-3, &Vector3::new(0.0, 0.0, 2e-3), 2);
@@ -207,7 +279,13 @@ fn points_and_edges_that_are_no_numbers_end_in_no_panic() {
         assert!(near.is_empty());
     }
     for edge in [f64::NAN, f64::INFINITY, 0.0, -1e-3, 1e-300, 0.8e-6, 24.9e-6] {
-        assert!(matches!(Peaks::default().mesh(edge), Err(SimError::BadParameter { .. })), "{edge}");
+        assert!(
+            matches!(
+                Peaks::default().mesh(edge),
+                Err(SimError::BadParameter { .. })
+            ),
+            "{edge}"
+        );
     }
 }
 

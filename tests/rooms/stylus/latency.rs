@@ -3,20 +3,37 @@
 use nalgebra::{Isometry3, Vector3};
 use touchup::sim::{PathParams, Plate, SensorParams, StylusParams, plan_demo, touch};
 use touchup::stylus::{
-    ClockEstimator, ClockEvidence, ClockOffset, ContactEstimator, ContactEstimatorParams, Message, Sample, SyncParams,
-    Synchroniser, TipParams, Wrench,
+    ClockEstimator, ClockEvidence, ClockOffset, ContactEstimator, ContactEstimatorParams, Message,
+    Sample, SyncParams, Synchroniser, TipParams, Wrench,
 };
 
 fn contacts() -> ContactEstimator {
-    let tip = TipParams { radius: 0.0, stiffness: None };
-    ContactEstimator::new(ContactEstimatorParams { bias: None, sliding: None, ..ContactEstimatorParams::new(tip) })
-        .unwrap()
+    let tip = TipParams {
+        radius: 0.0,
+        stiffness: None,
+    };
+    ContactEstimator::new(ContactEstimatorParams {
+        bias: None,
+        sliding: None,
+        ..ContactEstimatorParams::new(tip)
+    })
+    .unwrap()
 }
 
 fn touched(sensor: SensorParams, seed: u64) -> Vec<Message> {
     let plate = Plate::default();
     let path = plan_demo(&plate, &PathParams::default()).unwrap();
-    touch(&plate, &path, &StylusParams { sensor, ..StylusParams::default() }, seed).unwrap().messages
+    touch(
+        &plate,
+        &path,
+        &StylusParams {
+            sensor,
+            ..StylusParams::default()
+        },
+        seed,
+    )
+    .unwrap()
+    .messages
 }
 
 fn estimated(sensor: SensorParams, seed: u64) -> Option<ClockOffset> {
@@ -42,34 +59,73 @@ fn the_delay_is_right_within_its_uncertainty_over_twenty_seeds() {
     for seed in 1..=20 {
         // every seed its own delay, from -4 to 5.5 ms
         let truth = (seed as f64 - 9.0) * 0.5e-3;
-        let found = estimated(SensorParams { wrench_clock: truth, ..SensorParams::default() }, seed);
-        let ClockOffset { offset, sigma, drift, evidence } =
-            found.unwrap_or_else(|| panic!("seed {seed}: nothing found"));
-        println!("{seed}: {:.2} ms, found {:.2} ± {:.2} ms, {evidence}", truth * 1e3, offset * 1e3, sigma * 1e3);
+        let found = estimated(
+            SensorParams {
+                wrench_clock: truth,
+                ..SensorParams::default()
+            },
+            seed,
+        );
+        let ClockOffset {
+            offset,
+            sigma,
+            drift,
+            evidence,
+        } = found.unwrap_or_else(|| panic!("seed {seed}: nothing found"));
+        println!(
+            "{seed}: {:.2} ms, found {:.2} ± {:.2} ms, {evidence}",
+            truth * 1e3,
+            offset * 1e3,
+            sigma * 1e3
+        );
         worst = worst.max((offset - truth).abs() / sigma);
-        assert!(sigma < 1e-3 && drift.is_none(), "seed {seed}: {sigma} s, {drift:?}");
+        assert!(
+            sigma < 1e-3 && drift.is_none(),
+            "seed {seed}: {sigma} s, {drift:?}"
+        );
     }
     assert!(worst <= 2.0, "{worst} standard uncertainties");
 }
 
 #[test]
 fn delays_up_to_a_tenth_of_a_second_are_right_within_their_uncertainty() {
-    for (seed, truth) in (1..).zip([-0.1, -0.08, -0.04, -0.02, -0.01, 0.01, 0.02, 0.04, 0.08, 0.1]) {
-        let found = estimated(SensorParams { wrench_clock: truth, ..SensorParams::default() }, seed);
-        let ClockOffset { offset, sigma, .. } = found.unwrap_or_else(|| panic!("{truth} s: nothing found"));
-        assert!((offset - truth).abs() <= 3.0 * sigma && sigma < 1e-3, "{truth} s: {offset} ± {sigma} s");
+    for (seed, truth) in (1..).zip([
+        -0.1, -0.08, -0.04, -0.02, -0.01, 0.01, 0.02, 0.04, 0.08, 0.1,
+    ]) {
+        let found = estimated(
+            SensorParams {
+                wrench_clock: truth,
+                ..SensorParams::default()
+            },
+            seed,
+        );
+        let ClockOffset { offset, sigma, .. } =
+            found.unwrap_or_else(|| panic!("{truth} s: nothing found"));
+        assert!(
+            (offset - truth).abs() <= 3.0 * sigma && sigma < 1e-3,
+            "{truth} s: {offset} ± {sigma} s"
+        );
     }
 }
 
 fn sample(ms: i64, height: f64, force: f64) -> Sample {
     let pose_ot = Isometry3::translation(0.0, 0.0, height);
-    let wrench = Wrench { force: Vector3::z() * force, torque: Vector3::zeros() };
-    Sample { stamp_ns: ms * 1_000_000, pose_ot, wrench }
+    let wrench = Wrench {
+        force: Vector3::z() * force,
+        torque: Vector3::zeros(),
+    };
+    Sample {
+        stamp_ns: ms * 1_000_000,
+        pose_ot,
+        wrench,
+    }
 }
 
 fn offset_of(samples: impl IntoIterator<Item = Sample>) -> Option<ClockOffset> {
     let (mut clock, mut contacts) = (ClockEstimator::new(None).unwrap(), contacts());
-    samples.into_iter().for_each(|sample| clock.push(contacts.observe(&sample).unwrap()));
+    samples
+        .into_iter()
+        .for_each(|sample| clock.push(contacts.observe(&sample).unwrap()));
     clock.offset()
 }
 
@@ -80,12 +136,23 @@ fn a_clean_stop_gives_the_delay_that_was_put_in() {
         let at = |ms: i64| {
             let since_pose = (ms % 600 - 300) as f64;
             let since_force = (ms as f64 - late_ms).rem_euclid(600.0) - 300.0;
-            let height = if since_pose < 0.0 { -since_pose * 50e-6 } else { 0.0 };
-            let force = if since_force < 300.0 { 2.0 * (1.0 - (-since_force.max(0.0) / 10.0).exp()) } else { 0.0 };
+            let height = if since_pose < 0.0 {
+                -since_pose * 50e-6
+            } else {
+                0.0
+            };
+            let force = if since_force < 300.0 {
+                2.0 * (1.0 - (-since_force.max(0.0) / 10.0).exp())
+            } else {
+                0.0
+            };
             sample(ms, height, force)
         };
         let found = offset_of((0..12_000).map(at)).unwrap();
-        assert!((found.offset * 1e3 - late_ms).abs() < 0.15, "{late_ms} ms: {found:?}");
+        assert!(
+            (found.offset * 1e3 - late_ms).abs() < 0.15,
+            "{late_ms} ms: {found:?}"
+        );
         assert_eq!(found.evidence, ClockEvidence::Onsets(20));
     }
 }
@@ -94,9 +161,21 @@ fn a_clean_stop_gives_the_delay_that_was_put_in() {
 fn where_there_is_nothing_to_see_nothing_is_found() {
     // never in contact; always in contact; the ball comes to rest long before it is pressed; two onsets alone
     assert_eq!(offset_of((0..5000).map(|ms| sample(ms, 0.01, 0.05))), None);
-    assert_eq!(offset_of((0..5000).map(|ms| sample(ms, 0.01 * (ms as f64 * 0.01).sin(), 2.0))), None);
-    assert_eq!(offset_of((0..5000).map(|ms| sample(ms, 0.0, if ms % 200 < 100 { 0.0 } else { 2.0 }))), None);
-    let stop = |ms: i64| sample(ms, (100 - ms % 200).max(0) as f64 * 50e-6, if ms % 200 < 100 { 0.0 } else { 2.0 });
+    assert_eq!(
+        offset_of((0..5000).map(|ms| sample(ms, 0.01 * (ms as f64 * 0.01).sin(), 2.0))),
+        None
+    );
+    assert_eq!(
+        offset_of((0..5000).map(|ms| sample(ms, 0.0, if ms % 200 < 100 { 0.0 } else { 2.0 }))),
+        None
+    );
+    let stop = |ms: i64| {
+        sample(
+            ms,
+            (100 - ms % 200).max(0) as f64 * 50e-6,
+            if ms % 200 < 100 { 0.0 } else { 2.0 },
+        )
+    };
     assert_eq!(offset_of((0..400).map(stop)), None);
 }
 
@@ -110,11 +189,24 @@ fn friction_that_turns_with_the_motion_gives_the_delay_where_contact_never_ends(
             let x: f64 = (0..ms).map(|ms| forth(ms) * 40e-6).sum();
             let pose_ot = Isometry3::translation(x, 0.0, 0.0);
             let force = Vector3::new(-0.4 * forth(ms - late_ms), 0.0, 2.0);
-            Sample { stamp_ns: ms * 1_000_000, pose_ot, wrench: Wrench { force, torque: Vector3::zeros() } }
+            Sample {
+                stamp_ns: ms * 1_000_000,
+                pose_ot,
+                wrench: Wrench {
+                    force,
+                    torque: Vector3::zeros(),
+                },
+            }
         };
         let found = offset_of((0..8_000).map(at)).unwrap();
-        assert!((found.offset * 1e3 - late_ms as f64).abs() < 2.5, "{late_ms} ms: {found:?}");
-        assert!(matches!(found.evidence, ClockEvidence::Course(_)) && found.sigma < 3e-3, "{found:?}");
+        assert!(
+            (found.offset * 1e3 - late_ms as f64).abs() < 2.5,
+            "{late_ms} ms: {found:?}"
+        );
+        assert!(
+            matches!(found.evidence, ClockEvidence::Course(_)) && found.sigma < 3e-3,
+            "{found:?}"
+        );
     }
 }
 
@@ -124,25 +216,50 @@ fn friction_that_turns_with_the_motion_gives_the_delay_where_contact_never_ends(
 fn a_clock_that_drifts_is_told_by_its_rate_and_its_offset_at_first() {
     const LASTS_MS: i64 = 600_000;
     for (late_ms, ppm) in [(0.0, 80.0), (12.0, -80.0), (-5.0, 40.0), (20.0, 0.0)] {
-        let forth = |ms: f64| if ms.rem_euclid(700.0) < 400.0 { 1.0 } else { -1.0 };
+        let forth = |ms: f64| {
+            if ms.rem_euclid(700.0) < 400.0 {
+                1.0
+            } else {
+                -1.0
+            }
+        };
         let mut x = 0.0;
         let at = |ms: i64| {
             let late = late_ms + ms as f64 * ppm * 1e-6;
             let force = Vector3::new(-0.4 * forth(ms as f64 - late), 0.0, 2.0);
             let pose_ot = Isometry3::translation(x, 0.0, 0.0);
             x += forth(ms as f64) * 160e-6;
-            Sample { stamp_ns: ms * 1_000_000, pose_ot, wrench: Wrench { force, torque: Vector3::zeros() } }
+            Sample {
+                stamp_ns: ms * 1_000_000,
+                pose_ot,
+                wrench: Wrench {
+                    force,
+                    torque: Vector3::zeros(),
+                },
+            }
         };
         let found = offset_of((0..LASTS_MS).step_by(4).map(at)).unwrap();
         println!("{late_ms} ms, {ppm} ppm: {found:?}");
         let Some(drift) = found.drift else {
-            assert!(ppm == 0.0 && (found.offset * 1e3 - late_ms).abs() < 2.5, "{late_ms} ms, {ppm} ppm: {found:?}");
+            assert!(
+                ppm == 0.0 && (found.offset * 1e3 - late_ms).abs() < 2.5,
+                "{late_ms} ms, {ppm} ppm: {found:?}"
+            );
             continue;
         };
-        assert!((drift.rate * 1e6 - ppm).abs() < 4.0 * (drift.rate_sigma * 1e6).max(0.5), "{ppm} ppm: {drift:?}");
-        assert!((drift.offset_at_first * 1e3 - late_ms).abs() < 2.5, "{late_ms} ms: {drift:?}");
+        assert!(
+            (drift.rate * 1e6 - ppm).abs() < 4.0 * (drift.rate_sigma * 1e6).max(0.5),
+            "{ppm} ppm: {drift:?}"
+        );
+        assert!(
+            (drift.offset_at_first * 1e3 - late_ms).abs() < 2.5,
+            "{late_ms} ms: {drift:?}"
+        );
         let late_at_last = late_ms + LASTS_MS as f64 * ppm * 1e-6;
-        assert!((drift.offset_at_last * 1e3 - late_at_last).abs() < 2.5, "{late_at_last} ms: {drift:?}");
+        assert!(
+            (drift.offset_at_last * 1e3 - late_at_last).abs() < 2.5,
+            "{late_at_last} ms: {drift:?}"
+        );
     }
 }
 
@@ -155,9 +272,15 @@ fn a_recording_with_a_hole_in_it_shows_no_drift_where_there_is_none() {
         for from_s in 4..=11 {
             for rest_s in [4, 6, 9, 14] {
                 let hole = ends[0] + from_s * 1_000_000_000..ends[1] - rest_s * 1_000_000_000;
-                let kept = messages.iter().filter(|message| !hole.contains(&message.stamp_ns())).cloned();
+                let kept = messages
+                    .iter()
+                    .filter(|message| !hole.contains(&message.stamp_ns()))
+                    .cloned();
                 let drift = estimated_from(kept).and_then(|found| found.drift);
-                assert!(drift.is_none(), "seed {seed}, {from_s} s and {rest_s} s: {drift:?}");
+                assert!(
+                    drift.is_none(),
+                    "seed {seed}, {from_s} s and {rest_s} s: {drift:?}"
+                );
             }
         }
     }
@@ -169,8 +292,15 @@ fn a_recording_with_a_hole_in_it_shows_no_drift_where_there_is_none() {
 fn taps(period_ms: i64, late_ms: i64) -> Option<ClockOffset> {
     let phase = |ms: i64| ms.rem_euclid(period_ms) - 60;
     let at = |ms: i64| {
-        let up = phase(ms).max(0).min(period_ms - 60 - phase(ms).max(0)).min(70);
-        sample(ms, up as f64 * 50e-6, if phase(ms - late_ms) < 0 { 2.0 } else { 0.0 })
+        let up = phase(ms)
+            .max(0)
+            .min(period_ms - 60 - phase(ms).max(0))
+            .min(70);
+        sample(
+            ms,
+            up as f64 * 50e-6,
+            if phase(ms - late_ms) < 0 { 2.0 } else { 0.0 },
+        )
     };
     offset_of((0..24_000).step_by(8).map(at))
 }
@@ -179,8 +309,14 @@ fn taps(period_ms: i64, late_ms: i64) -> Option<ClockOffset> {
 fn where_a_slow_sensor_taps_the_gap_without_force_gives_the_delay() {
     for late_ms in [-90, -40, 0, 40, 90] {
         let found = taps(500, late_ms).unwrap();
-        assert!((found.offset * 1e3 - late_ms as f64).abs() < 4.0, "{late_ms} ms: {found:?}");
-        assert!(matches!(found.evidence, ClockEvidence::Course(_)) && found.sigma < 6e-3, "{found:?}");
+        assert!(
+            (found.offset * 1e3 - late_ms as f64).abs() < 4.0,
+            "{late_ms} ms: {found:?}"
+        );
+        assert!(
+            matches!(found.evidence, ClockEvidence::Course(_)) && found.sigma < 6e-3,
+            "{found:?}"
+        );
     }
 }
 

@@ -2,21 +2,31 @@
 
 use nalgebra::{Isometry3, Vector3};
 use proptest::prelude::*;
-use touchup::stylus::{Message, Sample, StampedPose, StampedWrench, SyncParams, Synchroniser, Wrench};
+use touchup::stylus::{
+    Message, Sample, StampedPose, StampedWrench, SyncParams, Synchroniser, Wrench,
+};
 
 fn pose(stamp_ns: i64) -> Message {
-    Message::Pose(StampedPose { stamp_ns, pose_ot: Isometry3::translation(stamp_ns as f64 * 1e-9, 0.1, 0.2) })
+    Message::Pose(StampedPose {
+        stamp_ns,
+        pose_ot: Isometry3::translation(stamp_ns as f64 * 1e-9, 0.1, 0.2),
+    })
 }
 
 fn wrench(stamp_ns: i64) -> Message {
     let force = Vector3::new(0.0, 0.0, stamp_ns as f64 * 1e-9);
-    Message::Wrench(StampedWrench { stamp_ns, wrench: Wrench { force, torque: Vector3::zeros() } })
+    Message::Wrench(StampedWrench {
+        stamp_ns,
+        wrench: Wrench {
+            force,
+            torque: Vector3::zeros(),
+        },
+    })
 }
 
 /// Stamps with steps of 0 (twice the same) to 60 ms (a gap), now and then 15 s (a leap).
 fn stamps() -> impl Strategy<Value = Vec<i64>> {
-    let step =
-        prop_oneof![8 => 1i64..4_000_000, 1 => Just(0i64), 1 => 20_000_000i64..60_000_000, 1 => Just(15_000_000_000)];
+    let step = prop_oneof![8 => 1i64..4_000_000, 1 => Just(0i64), 1 => 20_000_000i64..60_000_000, 1 => Just(15_000_000_000)];
     proptest::collection::vec(step, 0..120).prop_map(|steps| {
         steps
             .into_iter()
@@ -73,7 +83,9 @@ fn a_sample_goes_out_with_the_later_of_its_wrench_and_the_pose_after_it() {
         assert!(sync.push(message));
     }
     let stamps = |sync: &mut Synchroniser| -> Vec<i64> {
-        std::iter::from_fn(|| sync.next_sample()).map(|sample| sample.stamp_ns).collect()
+        std::iter::from_fn(|| sync.next_sample())
+            .map(|sample| sample.stamp_ns)
+            .collect()
     };
     assert_eq!(stamps(&mut sync), [0, 1]);
     sync.push(wrench(3));
@@ -83,7 +95,18 @@ fn a_sample_goes_out_with_the_later_of_its_wrench_and_the_pose_after_it() {
     sync.push(pose(10));
     assert_eq!(stamps(&mut sync), [7], "the wrench was there");
     sync.push(wrench(10));
-    assert_eq!(stamps(&mut sync), [10], "at the stamp of a pose nothing is waited for");
+    assert_eq!(
+        stamps(&mut sync),
+        [10],
+        "at the stamp of a pose nothing is waited for"
+    );
     assert!(!sync.push(wrench(10)) && !sync.push(wrench(9)) && !sync.push(pose(4)));
-    assert_eq!((sync.counts().duplicate, sync.counts().late, sync.pose_counts().late), (1, 1, 1));
+    assert_eq!(
+        (
+            sync.counts().duplicate,
+            sync.counts().late,
+            sync.pose_counts().late
+        ),
+        (1, 1, 1)
+    );
 }

@@ -10,8 +10,8 @@ use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 
 use crate::mesh::{FaceTree, TriMesh, Workers, coherent_order, map_by};
 use crate::numeric::{
-    NormalEquations, SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, centroid_and_spread, median, moved_by_twist,
-    order_statistic, point_to_plane_row,
+    NormalEquations, SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, centroid_and_spread, median,
+    moved_by_twist, order_statistic, point_to_plane_row,
 };
 
 /// Settings of [`icp`].
@@ -25,7 +25,10 @@ pub struct IcpParams {
 
 impl Default for IcpParams {
     fn default() -> Self {
-        Self { reach: f64::INFINITY, most_rounds: 100 }
+        Self {
+            reach: f64::INFINITY,
+            most_rounds: 100,
+        }
     }
 }
 
@@ -162,12 +165,22 @@ pub fn icp(
     params: &IcpParams,
     workers: &dyn Workers,
 ) -> Result<IcpFit, IcpError> {
-    if let Some(point) = points.iter().position(|p| !p.coords.iter().all(|x| x.is_finite())) {
+    if let Some(point) = points
+        .iter()
+        .position(|p| !p.coords.iter().all(|x| x.is_finite()))
+    {
         return Err(IcpError::NotFinite { point });
     }
-    let ordered: Vec<_> = coherent_order(points).into_iter().map(|at| points[at as usize]).collect();
+    let ordered: Vec<_> = coherent_order(points)
+        .into_iter()
+        .map(|at| points[at as usize])
+        .collect();
     let mut search = Search::new(&ordered, target, tree, start, params, workers)?;
-    for count in LEVELS.into_iter().filter(|&count| count < points.len()).chain([points.len()]) {
+    for count in LEVELS
+        .into_iter()
+        .filter(|&count| count < points.len())
+        .chain([points.len()])
+    {
         let stride = points.len() / count;
         loop {
             let round = search.round(stride)?;
@@ -231,11 +244,17 @@ impl<'a> Search<'a> {
         workers: &'a dyn Workers,
     ) -> Result<Self, IcpError> {
         let stride = (points.len() / LEVELS[0]).max(1);
-        let distance =
-            |p: &Point3<f64>| tree.closest(target, &(start * p), params.reach).map(|hit| hit.distance_squared);
+        let distance = |p: &Point3<f64>| {
+            tree.closest(target, &(start * p), params.reach)
+                .map(|hit| hit.distance_squared)
+        };
         let mut squares: Vec<f64> = points.iter().step_by(stride).filter_map(distance).collect();
         if squares.len() < LEAST_POINTS {
-            return Err(IcpError::TooFew { found: squares.len(), needed: LEAST_POINTS, reach: params.reach });
+            return Err(IcpError::TooFew {
+                found: squares.len(),
+                needed: LEAST_POINTS,
+                reach: params.reach,
+            });
         }
         let far = order_statistic(&mut squares, 0.9).unwrap_or(0.0).sqrt();
         let (middle, lever) = centroid_and_spread(points.iter());
@@ -249,7 +268,9 @@ impl<'a> Search<'a> {
             pose: *start,
             middle,
             lever: lever.max(f64::MIN_POSITIVE),
-            width: (FIRST_WIDTH * far).min(params.reach).max(TUKEY_WIDTH * rounding),
+            width: (FIRST_WIDTH * far)
+                .min(params.reach)
+                .max(TUKEY_WIDTH * rounding),
             scatter: far,
             rounding,
             rounds: 0,
@@ -275,7 +296,10 @@ impl<'a> Search<'a> {
             }
         }
         self.rounds += 1;
-        let (shift, turn) = (step.fixed_rows::<3>(0).into_owned(), step.fixed_rows::<3>(3) / self.lever);
+        let (shift, turn) = (
+            step.fixed_rows::<3>(0).into_owned(),
+            step.fixed_rows::<3>(3) / self.lever,
+        );
         round.step = shift.norm() + turn.norm() * self.lever;
         if self.rounds > self.most_rounds || !round.step.is_finite() {
             return Err(self.unsettled(round.step));
@@ -292,7 +316,10 @@ impl<'a> Search<'a> {
             let x = self.pose * self.points[at * stride];
             let hit = self.tree.closest(self.target, &x, self.width)?;
             let normal = self.target.normal(hit.face);
-            Some((point_to_plane_row(&(x - centre), &normal, self.lever), -normal.dot(&(x - hit.point))))
+            Some((
+                point_to_plane_row(&(x - centre), &normal, self.lever),
+                -normal.dot(&(x - hit.point)),
+            ))
         };
         let found = map_by(self.workers, self.points.len().div_ceil(stride), partner);
         self.partners.clear();
@@ -311,21 +338,40 @@ impl<'a> Search<'a> {
             weight
         });
         if inliers < LEAST_POINTS {
-            return Err(IcpError::TooFew { found: inliers, needed: LEAST_POINTS, reach: self.width });
+            return Err(IcpError::TooFew {
+                found: inliers,
+                needed: LEAST_POINTS,
+                reach: self.width,
+            });
         }
         let (information, right) = (equations.information / weights, equations.right / weights);
-        Ok(Round { information, right, inliers, square, step: 0.0, is_narrow: false })
+        Ok(Round {
+            information,
+            right,
+            inliers,
+            square,
+            step: 0.0,
+            is_narrow: false,
+        })
     }
 
     /// Brings the width of the weights towards the scatter that is left: at once where the pose has converged, else in
     /// steps.
     fn narrow(&mut self, round: &mut Round, step: &Vector6<f64>) {
         self.sizes.clear();
-        self.sizes.extend(self.partners.iter().map(|(row, value)| (value - row.dot(step)).abs()));
+        self.sizes.extend(
+            self.partners
+                .iter()
+                .map(|(row, value)| (value - row.dot(step)).abs()),
+        );
         self.scatter = SIGMA_OF_MEDIAN * median(&mut self.sizes).unwrap_or(0.0);
         let wanted = TUKEY_WIDTH * self.scatter.max(self.rounding);
         round.is_narrow = wanted >= self.width * SHRINK;
-        let least = if round.step <= self.least_step() { wanted } else { self.width * SHRINK };
+        let least = if round.step <= self.least_step() {
+            wanted
+        } else {
+            self.width * SHRINK
+        };
         self.width = wanted.max(least).min(self.width);
     }
 
@@ -339,7 +385,11 @@ impl<'a> Search<'a> {
     }
 
     fn unsettled(&self, step: f64) -> IcpError {
-        IcpError::Unsettled { rounds: self.rounds, step, scatter: self.scatter }
+        IcpError::Unsettled {
+            rounds: self.rounds,
+            step,
+            scatter: self.scatter,
+        }
     }
 
     fn fit(&self, round: &Round) -> IcpFit {
@@ -347,7 +397,11 @@ impl<'a> Search<'a> {
         let mut motions: [Motion; 6] = std::array::from_fn(|i| {
             let v = eigen.eigenvectors.column(i);
             let [shift, turn] = [0, 3].map(|at| v.fixed_rows::<3>(at).into_owned());
-            Motion { shift, turn, share: eigen.eigenvalues[i].max(0.0) }
+            Motion {
+                shift,
+                turn,
+                share: eigen.eigenvalues[i].max(0.0),
+            }
         });
         motions.sort_by(|a, b| a.share.total_cmp(&b.share));
         IcpFit {
@@ -369,7 +423,11 @@ fn solve(round: &Round) -> Vector6<f64> {
     let along = |i: usize| {
         let v = eigen.eigenvectors.column(i).into_owned();
         let share = eigen.eigenvalues[i];
-        if share < LEAST_SHARE { Vector6::zeros() } else { v * (v.dot(&round.right) / share) }
+        if share < LEAST_SHARE {
+            Vector6::zeros()
+        } else {
+            v * (v.dot(&round.right) / share)
+        }
     };
     (0..6).map(along).sum()
 }

@@ -6,7 +6,8 @@ mod icp;
 mod pairs;
 
 pub use by_features::{
-    Alternative, FeaturesError, FeaturesParams, FeaturesSide, FreeTurn, OrientedSample, Surfaces, align_features,
+    Alternative, FeaturesError, FeaturesParams, FeaturesSide, FreeTurn, OrientedSample, Surfaces,
+    align_features,
 };
 pub use datum_fit::{DatumFit, DatumFitError, DatumPair, fit_datums};
 pub use icp::{IcpError, IcpFit, IcpParams, Motion, icp};

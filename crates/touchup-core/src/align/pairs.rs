@@ -48,8 +48,13 @@ const SAME_SHARE: f64 = 1e-6;
 /// # Ok::<(), touchup_core::align::PairsError>(())
 /// ```
 pub fn fit_pairs(pairs: &[PointPair], params: &PairsParams) -> Result<PairsFit, PairsError> {
-    if let Some(sigma) = params.sigma.filter(|sigma| !BELIEVABLE_SIGMA.contains(sigma)) {
-        return Err(PairsError::BadGivenSigma { sigma_mm: sigma * 1e3 });
+    if let Some(sigma) = params
+        .sigma
+        .filter(|sigma| !BELIEVABLE_SIGMA.contains(sigma))
+    {
+        return Err(PairsError::BadGivenSigma {
+            sigma_mm: sigma * 1e3,
+        });
     }
     check(pairs)?;
     check_extent(pairs, params)?;
@@ -69,7 +74,13 @@ pub(crate) fn closest_motion(pairs: &[PointPair]) -> Option<Isometry3<f64>> {
 
 /// σ of a pair of unit weight, where it is known beforehand.
 fn given_sigma(pairs: &[PointPair], params: &PairsParams) -> Option<f64> {
-    params.sigma.or_else(|| pairs.iter().all(|pair| pair.sigma.is_some()).then(|| pairs[0].sigma).flatten())
+    params.sigma.or_else(|| {
+        pairs
+            .iter()
+            .all(|pair| pair.sigma.is_some())
+            .then(|| pairs[0].sigma)
+            .flatten()
+    })
 }
 
 /// (σ₀ / σᵢ)², so that a pair of σ₀ has weight 1. A pair without a sigma has the median weight of those that have one.
@@ -77,7 +88,10 @@ fn weights(pairs: &[PointPair], params: &PairsParams) -> Vec<f64> {
     let mut named: Vec<f64> = pairs.iter().filter_map(|pair| pair.sigma).collect();
     let usual = params.sigma.or(median(&mut named)).unwrap_or(1.0);
     let unit = given_sigma(pairs, params).unwrap_or(usual);
-    pairs.iter().map(|pair| (unit / pair.sigma.unwrap_or(usual)).powi(2)).collect()
+    pairs
+        .iter()
+        .map(|pair| (unit / pair.sigma.unwrap_or(usual)).powi(2))
+        .collect()
 }
 
 fn check(pairs: &[PointPair]) -> Result<(), PairsError> {
@@ -91,7 +105,10 @@ fn check(pairs: &[PointPair]) -> Result<(), PairsError> {
             }
         }
         if let Some(sigma) = pair.sigma.filter(|sigma| !BELIEVABLE_SIGMA.contains(sigma)) {
-            return Err(PairsError::BadSigma { pair: i + 1, sigma_mm: sigma * 1e3 });
+            return Err(PairsError::BadSigma {
+                pair: i + 1,
+                sigma_mm: sigma * 1e3,
+            });
         }
     }
     Ok(())
@@ -106,7 +123,10 @@ fn check_extent(pairs: &[PointPair], params: &PairsParams) -> Result<(), PairsEr
         let mut distinct: Vec<usize> = Vec::new();
         let mut same = None;
         for (i, point) in points.iter().enumerate() {
-            match distinct.iter().find(|&&j| (points[j] - point).norm() <= apart) {
+            match distinct
+                .iter()
+                .find(|&&j| (points[j] - point).norm() <= apart)
+            {
                 Some(&j) => same = same.or(Some((j, i, (points[j] - point).norm()))),
                 None if distinct.len() < 3 => distinct.push(i),
                 None => {}
@@ -114,7 +134,12 @@ fn check_extent(pairs: &[PointPair], params: &PairsParams) -> Result<(), PairsEr
         }
         if let (Some((first, second, distance)), 0..3) = (same, distinct.len()) {
             let (first, second) = (first + 1, second + 1);
-            return Err(PairsError::Coincident { first, second, side, distance_mm: distance * 1e3 });
+            return Err(PairsError::Coincident {
+                first,
+                second,
+                side,
+                distance_mm: distance * 1e3,
+            });
         }
     }
     check_lines(pairs, params.sigma.unwrap_or(0.0))
@@ -125,7 +150,11 @@ fn check_lines(pairs: &[PointPair], sigma: f64) -> Result<(), PairsError> {
     for side in [PairSide::From, PairSide::To] {
         let [_, across, along] = spreads(pairs.iter().map(|pair| pair.on(side).coords));
         if across <= (LINE_SHARE * along).max(LINE_SIGMAS * sigma) {
-            return Err(PairsError::Collinear { side, along_mm: along * 1e3, across_mm: across * 1e3 });
+            return Err(PairsError::Collinear {
+                side,
+                along_mm: along * 1e3,
+                across_mm: across * 1e3,
+            });
         }
     }
     Ok(())

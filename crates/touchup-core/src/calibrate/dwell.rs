@@ -22,7 +22,11 @@ pub struct DwellParams {
 impl Default for DwellParams {
     /// A point.
     fn default() -> Self {
-        Self { dwell_ns: 500_000_000, largest_drift: 0.5e-3, radius: 0.0 }
+        Self {
+            dwell_ns: 500_000_000,
+            largest_drift: 0.5e-3,
+            radius: 0.0,
+        }
     }
 }
 
@@ -61,7 +65,11 @@ pub struct DwellFinder {
 impl DwellFinder {
     /// Nothing seen yet.
     pub fn new(params: DwellParams) -> Self {
-        Self { params, stretch: None, found: Vec::new() }
+        Self {
+            params,
+            stretch: None,
+            found: Vec::new(),
+        }
     }
 
     /// Takes the next sample, in order of time; O is the frame of the poses.
@@ -70,11 +78,21 @@ impl DwellFinder {
             return self.close();
         }
         let (tip, centre) = (&sample.tip, sample.centre.coords);
-        if self.stretch.is_some_and(|stretch| (centre - stretch.anchor).norm() > self.params.largest_drift) {
+        if self
+            .stretch
+            .is_some_and(|stretch| (centre - stretch.anchor).norm() > self.params.largest_drift)
+        {
             self.close();
         }
         let (begin_ns, zero) = (tip.stamp_ns, Vector3::zeros());
-        let new = Stretch { anchor: centre, begin_ns, end_ns: begin_ns, centre: zero, force: zero, count: 0.0 };
+        let new = Stretch {
+            anchor: centre,
+            begin_ns,
+            end_ns: begin_ns,
+            centre: zero,
+            force: zero,
+            count: 0.0,
+        };
         let stretch = self.stretch.get_or_insert(new);
         stretch.end_ns = tip.stamp_ns;
         stretch.centre += centre;
@@ -89,12 +107,28 @@ impl DwellFinder {
     }
 
     fn close(&mut self) {
-        let Some(Stretch { begin_ns, end_ns, centre, force, count, .. }) = self.stretch.take() else { return };
+        let Some(Stretch {
+            begin_ns,
+            end_ns,
+            centre,
+            force,
+            count,
+            ..
+        }) = self.stretch.take()
+        else {
+            return;
+        };
         let lasted_ns = end_ns.saturating_sub(begin_ns);
         let (centre, force) = (centre / count, force / count);
-        if let (true, Some(normal)) = (lasted_ns >= self.params.dwell_ns, force.try_normalize(0.0)) {
+        if let (true, Some(normal)) = (lasted_ns >= self.params.dwell_ns, force.try_normalize(0.0))
+        {
             let point = Point3::from(centre - normal * self.params.radius);
-            self.found.push(Dwell { point, begin_ns, seconds: lasted_ns as f64 * 1e-9, force });
+            self.found.push(Dwell {
+                point,
+                begin_ns,
+                seconds: lasted_ns as f64 * 1e-9,
+                force,
+            });
         }
     }
 }

@@ -77,24 +77,40 @@ pub(super) fn least_determined(equations: &[Equation], kept: &[bool]) -> Undeter
     let (n, mean, _) = means(equations, &weights);
     let eigen = SymmetricEigen::new(normal(equations, &weights, &mean) / n);
     let i = eigen.eigenvalues.imin();
-    Undetermined { spread: eigen.eigenvalues[i], axis: eigen.eigenvectors.column(i).into_owned() }
+    Undetermined {
+        spread: eigen.eigenvalues[i],
+        axis: eigen.eigenvectors.column(i).into_owned(),
+    }
 }
 
 /// The fit, or the direction that it does not determine.
 ///
 /// - `equations`: at least three.
 /// - `smallest_spread`: a direction with less [`spread`] than this is not determined.
-pub(super) fn fit(equations: &[Equation], smallest_spread: f64) -> Result<CalibrationFit, Undetermined> {
+pub(super) fn fit(
+    equations: &[Equation],
+    smallest_spread: f64,
+) -> Result<CalibrationFit, Undetermined> {
     let fitted = |kept: Vec<bool>| {
         let least = least_determined(equations, &kept);
-        if least.spread < smallest_spread { None } else { least_squares(equations, kept) }.ok_or(least)
+        if least.spread < smallest_spread {
+            None
+        } else {
+            least_squares(equations, kept)
+        }
+        .ok_or(least)
     };
     let mut found = fitted(vec![true; equations.len()])?;
     if equations.len() < FEWEST_TO_REJECT {
         return Ok(found);
     }
-    let Some(mut norms) = robust_norms(equations) else { return Ok(found) };
-    let largest = equations.iter().map(|equation| equation.z.amax()).fold(0.0, f64::max);
+    let Some(mut norms) = robust_norms(equations) else {
+        return Ok(found);
+    };
+    let largest = equations
+        .iter()
+        .map(|equation| equation.z.amax())
+        .fold(0.0, f64::max);
     let mut sigma = median(&mut norms.clone()).unwrap_or(0.0) / MEDIAN_NORM;
     for _ in 0..CHOICE_ROUNDS {
         let gate = GATE_SIGMAS * sigma.max(ROUNDING * largest);
@@ -104,7 +120,10 @@ pub(super) fn fit(equations: &[Equation], smallest_spread: f64) -> Result<Calibr
         }
         found = fitted(kept)?;
         sigma = found.sigma;
-        norms = equations.iter().map(|equation| found.residual(equation).norm()).collect();
+        norms = equations
+            .iter()
+            .map(|equation| found.residual(equation).norm())
+            .collect();
     }
     Ok(found)
 }
@@ -115,13 +134,19 @@ fn robust_norms(equations: &[Equation]) -> Option<Vec<f64>> {
     let mut norms = Vec::new();
     for _ in 0..ROBUST_ROUNDS {
         let (x, y) = solve(equations, &weights)?;
-        norms = equations.iter().map(|e| (e.z - e.a * x - y).norm()).collect();
+        norms = equations
+            .iter()
+            .map(|e| (e.z - e.a * x - y).norm())
+            .collect();
         let mean = norms.iter().sum::<f64>() / norms.len() as f64;
         if mean <= 0.0 {
             break;
         }
         // a residual of 0 would have infinite weight
-        weights = norms.iter().map(|norm| 1.0 / norm.max(1e-3 * mean)).collect();
+        weights = norms
+            .iter()
+            .map(|norm| 1.0 / norm.max(1e-3 * mean))
+            .collect();
     }
     Some(norms)
 }
@@ -131,9 +156,19 @@ fn least_squares(equations: &[Equation], kept: Vec<bool>) -> Option<CalibrationF
     let (x, y) = solve(equations, &weights)?;
     let (n, mean, _) = means(equations, &weights);
     let inverse = normal(equations, &weights, &mean).try_inverse()?;
-    let mut found = CalibrationFit { x, y, covariance_x: inverse, covariance_y: inverse, sigma: 0.0, rms: 0.0, kept };
+    let mut found = CalibrationFit {
+        x,
+        y,
+        covariance_x: inverse,
+        covariance_y: inverse,
+        sigma: 0.0,
+        rms: 0.0,
+        kept,
+    };
     let kept = equations.iter().zip(&found.kept).filter(|(_, kept)| **kept);
-    let squares: f64 = kept.map(|(equation, _)| found.residual(equation).norm_squared()).sum();
+    let squares: f64 = kept
+        .map(|(equation, _)| found.residual(equation).norm_squared())
+        .sum();
     found.rms = (squares / n).sqrt();
     found.sigma = (squares / (3.0 * n - 6.0).max(1.0)).sqrt();
     let variance = found.sigma * found.sigma;
@@ -144,7 +179,11 @@ fn least_squares(equations: &[Equation], kept: Vec<bool>) -> Option<CalibrationF
 
 fn solve(equations: &[Equation], weights: &[f64]) -> Option<(Vector3<f64>, Vector3<f64>)> {
     let (_, a, z) = means(equations, weights);
-    let right: Vector3<f64> = equations.iter().zip(weights).map(|(e, w)| (e.a - a).transpose() * (e.z - z) * *w).sum();
+    let right: Vector3<f64> = equations
+        .iter()
+        .zip(weights)
+        .map(|(e, w)| (e.a - a).transpose() * (e.z - z) * *w)
+        .sum();
     let x = normal(equations, weights, &a).cholesky()?.solve(&right);
     Some((x, z - a * x))
 }
@@ -159,5 +198,9 @@ fn means(equations: &[Equation], weights: &[f64]) -> (f64, Matrix3<f64>, Vector3
 
 /// Σ w (A − Ā)ᵀ (A − Ā)
 fn normal(equations: &[Equation], weights: &[f64], mean: &Matrix3<f64>) -> Matrix3<f64> {
-    equations.iter().zip(weights).map(|(e, w)| (e.a - mean).transpose() * (e.a - mean) * *w).sum()
+    equations
+        .iter()
+        .zip(weights)
+        .map(|(e, w)| (e.a - mean).transpose() * (e.a - mean) * *w)
+        .sum()
 }

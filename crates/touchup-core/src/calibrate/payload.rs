@@ -23,7 +23,11 @@ pub struct PayloadParams {
 
 impl Default for PayloadParams {
     fn default() -> Self {
-        Self { wrench_frame: WrenchFrame::Sensor, r_ts: UnitQuaternion::identity(), gravity: 9.81 }
+        Self {
+            wrench_frame: WrenchFrame::Sensor,
+            r_ts: UnitQuaternion::identity(),
+            gravity: 9.81,
+        }
     }
 }
 
@@ -38,7 +42,12 @@ pub struct VectorEstimate {
 
 impl VectorEstimate {
     pub(super) fn new(value: Vector3<f64>, covariance: &Matrix3<f64>) -> Self {
-        Self { value, sigma: covariance.diagonal().map(|variance| variance.max(0.0).sqrt()) }
+        Self {
+            value,
+            sigma: covariance
+                .diagonal()
+                .map(|variance| variance.max(0.0).sqrt()),
+        }
     }
 }
 
@@ -75,12 +84,19 @@ impl PayloadFit {
     /// As the compensator takes it off, with gravity in the frame of the poses.
     pub fn payload(&self) -> Payload {
         let gravity_w = self.weight_w.value * (self.gravity / self.weight[0]);
-        Payload { mass: self.weight[0] / self.gravity, p_sc: self.p_sc.value, gravity_o: gravity_w }
+        Payload {
+            mass: self.weight[0] / self.gravity,
+            p_sc: self.p_sc.value,
+            gravity_o: gravity_w,
+        }
     }
 
     /// As the compensator takes it off.
     pub fn bias_s(&self) -> Wrench {
-        Wrench { force: self.bias_force.value, torque: self.bias_torque.value }
+        Wrench {
+            force: self.bias_force.value,
+            torque: self.bias_torque.value,
+        }
     }
 }
 
@@ -176,27 +192,44 @@ const LARGEST_REJECTED: f64 = 0.4;
 /// # Errors
 /// [`PayloadError`]: too few poses or too alike (which direction is not determined), no weight, wrong axes, too many
 /// poses that do not fit.
-pub fn fit_payload(poses: &[StaticPose], params: &PayloadParams) -> Result<PayloadFit, PayloadError> {
+pub fn fit_payload(
+    poses: &[StaticPose],
+    params: &PayloadParams,
+) -> Result<PayloadFit, PayloadError> {
     if poses.len() < FEWEST_POSES {
         return Err(PayloadError::TooFew { count: poses.len() });
     }
     let forces = equations(poses, params);
-    let too_alike =
-        |least: Undetermined| PayloadError::TooAlike { tilt_deg: least.angle().to_degrees(), axis: least.axis.into() };
+    let too_alike = |least: Undetermined| PayloadError::TooAlike {
+        tilt_deg: least.angle().to_degrees(),
+        axis: least.axis.into(),
+    };
     let force = fit(&forces, SMALLEST_SPREAD).map_err(too_alike)?;
     check_axes(poses, params, &force)?;
     if force.rejected() as f64 > LARGEST_REJECTED * poses.len() as f64 {
-        return Err(PayloadError::Inconsistent { rejected: force.rejected(), poses: poses.len() });
+        return Err(PayloadError::Inconsistent {
+            rejected: force.rejected(),
+            poses: poses.len(),
+        });
     }
     let weight = force.x.norm();
     let direction = force.x / weight.max(f64::MIN_POSITIVE);
-    let sigma = direction.dot(&(force.covariance_x * direction)).max(0.0).sqrt();
+    let sigma = direction
+        .dot(&(force.covariance_x * direction))
+        .max(0.0)
+        .sqrt();
     // NaN is no weight either
     if !(weight > 3.0 * sigma && weight > f64::MIN_POSITIVE) {
-        return Err(PayloadError::NoWeight { weight_n: weight, sigma_n: sigma });
+        return Err(PayloadError::NoWeight {
+            weight_n: weight,
+            sigma_n: sigma,
+        });
     }
     let torque = fit_torque(poses, params, &force)?;
-    let variance = |pose: &StaticPose| pose.noise.map(|noise| 3.0 * noise * noise / pose.samples as f64);
+    let variance = |pose: &StaticPose| {
+        pose.noise
+            .map(|noise| 3.0 * noise * noise / pose.samples as f64)
+    };
     let expected: Option<f64> = poses.iter().map(variance).sum();
     Ok(PayloadFit {
         weight: [weight, sigma],
@@ -218,12 +251,19 @@ pub fn fit_payload(poses: &[StaticPose], params: &PayloadParams) -> Result<Paylo
 fn equations(poses: &[StaticPose], params: &PayloadParams) -> Vec<Equation> {
     let equation = |pose: &StaticPose| {
         let turn = (pose.r_wt * params.r_ts).inverse();
-        Equation { a: turn.to_rotation_matrix().into_inner(), z: in_sensor(params, &turn, pose.wrench.force) }
+        Equation {
+            a: turn.to_rotation_matrix().into_inner(),
+            z: in_sensor(params, &turn, pose.wrench.force),
+        }
     };
     poses.iter().map(equation).collect()
 }
 
-fn in_sensor(params: &PayloadParams, turn: &UnitQuaternion<f64>, vector: Vector3<f64>) -> Vector3<f64> {
+fn in_sensor(
+    params: &PayloadParams,
+    turn: &UnitQuaternion<f64>,
+    vector: Vector3<f64>,
+) -> Vector3<f64> {
     match params.wrench_frame {
         WrenchFrame::Sensor => vector,
         WrenchFrame::Object => turn * vector,
@@ -236,17 +276,28 @@ fn fit_torque(
     params: &PayloadParams,
     force: &CalibrationFit,
 ) -> Result<CalibrationFit, PayloadError> {
-    let kept = || poses.iter().zip(&force.kept).filter(|(_, kept)| **kept).map(|(pose, _)| pose);
+    let kept = || {
+        poses
+            .iter()
+            .zip(&force.kept)
+            .filter(|(_, kept)| **kept)
+            .map(|(pose, _)| pose)
+    };
     let torques = |weight: &Vector3<f64>| -> Vec<Equation> {
         let equation = |pose: &StaticPose| {
             let turn = (pose.r_wt * params.r_ts).inverse();
-            Equation { a: -(turn * weight).cross_matrix(), z: in_sensor(params, &turn, pose.wrench.torque) }
+            Equation {
+                a: -(turn * weight).cross_matrix(),
+                z: in_sensor(params, &turn, pose.wrench.torque),
+            }
         };
         kept().map(equation).collect()
     };
     let smallest = SMALLEST_CENTRE_SPREAD * force.x.norm_squared();
     let equations = torques(&force.x);
-    let undetermined = |least: Undetermined| PayloadError::CentreUndetermined { axis: least.axis.into() };
+    let undetermined = |least: Undetermined| PayloadError::CentreUndetermined {
+        axis: least.axis.into(),
+    };
     let mut found = fit(&equations, smallest).map_err(undetermined)?;
     // a step as large as the uncertainty of w: the change is nearly linear over it
     let step = force.covariance_x.trace().sqrt().max(1e-6 * force.x.norm());
@@ -265,7 +316,11 @@ fn fit_torque(
 }
 
 /// Refuses axes when the other ones fit far better.
-fn check_axes(poses: &[StaticPose], params: &PayloadParams, given: &CalibrationFit) -> Result<(), PayloadError> {
+fn check_axes(
+    poses: &[StaticPose],
+    params: &PayloadParams,
+    given: &CalibrationFit,
+) -> Result<(), PayloadError> {
     let (name, other, other_name) = match params.wrench_frame {
         WrenchFrame::Sensor => ("sensor", WrenchFrame::Object, "pose"),
         WrenchFrame::Object => ("pose", WrenchFrame::Sensor, "sensor"),
@@ -273,11 +328,25 @@ fn check_axes(poses: &[StaticPose], params: &PayloadParams, given: &CalibrationF
     if poses.len() < FEWEST_FOR_AXES {
         return Ok(());
     }
-    let other = equations(poses, &PayloadParams { wrench_frame: other, ..*params });
+    let other = equations(
+        poses,
+        &PayloadParams {
+            wrench_frame: other,
+            ..*params
+        },
+    );
     let few = poses.len() / 5;
     match fit(&other, SMALLEST_SPREAD) {
-        Ok(better) if better.rejected() <= few.max(given.rejected()) && AXES_RATIO * better.rms < given.rms => {
-            Err(PayloadError::WrongAxes { given: name, other: other_name, rms_n: given.rms, other_rms_n: better.rms })
+        Ok(better)
+            if better.rejected() <= few.max(given.rejected())
+                && AXES_RATIO * better.rms < given.rms =>
+        {
+            Err(PayloadError::WrongAxes {
+                given: name,
+                other: other_name,
+                rms_n: given.rms,
+                other_rms_n: better.rms,
+            })
         }
         _ => Ok(()),
     }

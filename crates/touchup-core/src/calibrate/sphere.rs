@@ -66,7 +66,13 @@ pub fn fit_sphere(points: &[Point3<f64>]) -> Option<SphereFit> {
     let here = equations(points, &centre, radius);
     let cofactors = here.information.cholesky()?.inverse();
     let is_sphere = centre.iter().all(|x| x.is_finite()) && radius > 0.0;
-    is_sphere.then_some(SphereFit { centre, radius, cofactors, residual_square: here.square, degrees_of_freedom })
+    is_sphere.then_some(SphereFit {
+        centre,
+        radius,
+        cofactors,
+        residual_square: here.square,
+        degrees_of_freedom,
+    })
 }
 
 /// Of a step of the centre and the radius.
@@ -81,11 +87,15 @@ fn equations(points: &[Point3<f64>], centre: &Point3<f64>, radius: f64) -> Norma
 
 /// Of |p|² = 2 p·c + (ρ² − |c|²), which is linear in c and ρ² − |c|²; p from the mean of the points, in units of their extent.
 fn linear_centre(points: &[Point3<f64>]) -> Option<Point3<f64>> {
-    let mean = Point3::from(points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / points.len() as f64);
+    let mean =
+        Point3::from(points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / points.len() as f64);
     let extent = points.iter().map(|p| (p - mean).norm()).fold(0.0, f64::max);
     let rows = points.iter().map(|p| {
         let off = (p - mean) / extent;
-        (Vector4::new(2.0 * off.x, 2.0 * off.y, 2.0 * off.z, 1.0), off.norm_squared())
+        (
+            Vector4::new(2.0 * off.x, 2.0 * off.y, 2.0 * off.z, 1.0),
+            off.norm_squared(),
+        )
     });
     let solution = NormalEquations::of(rows).solution()?;
     Some(mean + solution.xyz() * extent)
@@ -100,13 +110,22 @@ impl ReferenceSphere {
         let rings = SEGMENTS / 2;
         let on_ring = |ring: u32| {
             (0..SEGMENTS).map(move |at| {
-                let (polar, azimuth) =
-                    (PI * f64::from(ring) / f64::from(rings), TAU * f64::from(at) / f64::from(SEGMENTS));
-                Vector3::new(polar.sin() * azimuth.cos(), polar.sin() * azimuth.sin(), polar.cos())
+                let (polar, azimuth) = (
+                    PI * f64::from(ring) / f64::from(rings),
+                    TAU * f64::from(at) / f64::from(SEGMENTS),
+                );
+                Vector3::new(
+                    polar.sin() * azimuth.cos(),
+                    polar.sin() * azimuth.sin(),
+                    polar.cos(),
+                )
             })
         };
         let between = (1..rings).flat_map(on_ring);
-        let corners = [Vector3::z()].into_iter().chain(between).chain([-Vector3::z()]);
+        let corners = [Vector3::z()]
+            .into_iter()
+            .chain(between)
+            .chain([-Vector3::z()]);
         let positions = corners.map(|out| self.centre + out * self.radius).collect();
         let corner = |ring: u32, at: u32| 1 + (ring - 1) * SEGMENTS + at % SEGMENTS;
         let last = 1 + (rings - 1) * SEGMENTS;
@@ -115,8 +134,12 @@ impl ReferenceSphere {
             faces.push([0, corner(1, at), corner(1, at + 1)]);
             faces.push([last, corner(rings - 1, at + 1), corner(rings - 1, at)]);
             for ring in 1..rings - 1 {
-                let [a, b, c, d] =
-                    [corner(ring, at), corner(ring + 1, at), corner(ring + 1, at + 1), corner(ring, at + 1)];
+                let [a, b, c, d] = [
+                    corner(ring, at),
+                    corner(ring + 1, at),
+                    corner(ring + 1, at + 1),
+                    corner(ring, at + 1),
+                ];
                 faces.extend([[a, b, c], [a, c, d]]);
             }
         }
@@ -130,11 +153,17 @@ impl ReferenceSphere {
 /// [`MeshError`] where the centre or radius of a sphere is no number, or there is too much of it.
 pub fn beside_spheres(part: &TriMesh, spheres: &[ReferenceSphere]) -> Result<TriMesh, MeshError> {
     let mut positions = part.positions().to_vec();
-    let mut faces: Vec<_> = part.faces().map(|(_, corners)| corners.map(|corner| corner.0)).collect();
+    let mut faces: Vec<_> = part
+        .faces()
+        .map(|(_, corners)| corners.map(|corner| corner.0))
+        .collect();
     for sphere in spheres {
         let (mesh, first) = (sphere.mesh()?, positions.len() as u32);
         positions.extend(mesh.positions());
-        faces.extend(mesh.faces().map(|(_, corners)| corners.map(|corner| first + corner.0)));
+        faces.extend(
+            mesh.faces()
+                .map(|(_, corners)| corners.map(|corner| first + corner.0)),
+        );
     }
     TriMesh::new(positions, faces)
 }
@@ -147,21 +176,38 @@ mod tests {
     /// so an error of the pole is one of the centre; an error of one of the equator has the residuals of a hand count.
     #[test]
     fn a_fit_has_the_residuals_of_a_hand_count() {
-        let out = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]];
+        let out = [
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [-1.0, 0.0, 0.0],
+            [0.0, -1.0, 0.0],
+            [0.0, 0.0, 1.0],
+        ];
         let mut points = out.map(|out| Point3::from(Vector3::from(out) * 0.015));
         points[0].x += 20e-6;
         let fit = fit_sphere(&points).unwrap();
         // the radii of the x pair grow by 10 µm on average, which the common radius takes half of: residuals ±5 µm on four touches
-        assert!((fit.residual_square - 4.0 * 5e-6f64.powi(2)).abs() < 1e-13, "{}", fit.residual_square);
+        assert!(
+            (fit.residual_square - 4.0 * 5e-6f64.powi(2)).abs() < 1e-13,
+            "{}",
+            fit.residual_square
+        );
         assert!((fit.radius - 0.015 - 5e-6).abs() < 1e-8 && (fit.centre.x - 10e-6).abs() < 1e-8);
         assert_eq!(fit.degrees_of_freedom, 1);
         // of x: two touches with ±1
-        assert!((fit.cofactors[(0, 0)] - 0.5).abs() < 1e-3, "{}", fit.cofactors);
+        assert!(
+            (fit.cofactors[(0, 0)] - 0.5).abs() < 1e-3,
+            "{}",
+            fit.cofactors
+        );
     }
 
     #[test]
     fn too_few_touches_and_touches_in_a_plane_are_no_sphere() {
-        let ring: Vec<_> = (0..6).map(f64::from).map(|a| Point3::new(a.cos(), a.sin(), 0.0)).collect();
+        let ring: Vec<_> = (0..6)
+            .map(f64::from)
+            .map(|a| Point3::new(a.cos(), a.sin(), 0.0))
+            .collect();
         assert_eq!(fit_sphere(&ring), None);
         assert_eq!(fit_sphere(&ring[..4]), None);
         assert_eq!(fit_sphere(&[Point3::origin(); 7]), None);
@@ -170,7 +216,10 @@ mod tests {
 
     #[test]
     fn the_mesh_of_a_sphere_is_closed_and_looks_outward() {
-        let sphere = ReferenceSphere { centre: Point3::new(0.03, 0.0, -0.01), radius: 12.5e-3 };
+        let sphere = ReferenceSphere {
+            centre: Point3::new(0.03, 0.0, -0.01),
+            radius: 12.5e-3,
+        };
         let mesh = sphere.mesh().unwrap();
         let volume: f64 = mesh
             .faces()
@@ -180,6 +229,10 @@ mod tests {
             })
             .sum();
         let whole = 4.0 / 3.0 * PI * sphere.radius.powi(3);
-        assert!(volume < whole && volume > 0.99 * whole, "{}", volume / whole);
+        assert!(
+            volume < whole && volume > 0.99 * whole,
+            "{}",
+            volume / whole
+        );
     }
 }

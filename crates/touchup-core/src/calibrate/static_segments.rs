@@ -70,7 +70,11 @@ pub(crate) struct SampleBlock {
 
 impl SampleBlock {
     pub fn of(sample: &Sample) -> Self {
-        let Sample { stamp_ns, pose_ot, wrench } = sample;
+        let Sample {
+            stamp_ns,
+            pose_ot,
+            wrench,
+        } = sample;
         let orientation = *pose_ot.rotation.quaternion();
         Self {
             begin_ns: *stamp_ns,
@@ -93,7 +97,11 @@ impl SampleBlock {
     }
 
     fn join(&mut self, other: &Self) {
-        let half = if self.orientation.dot(&other.orientation) < 0.0 { -1.0 } else { 1.0 };
+        let half = if self.orientation.dot(&other.orientation) < 0.0 {
+            -1.0
+        } else {
+            1.0
+        };
         self.orientation += other.orientation * half;
         self.end_ns = other.end_ns;
         self.count += other.count;
@@ -111,9 +119,18 @@ impl SampleBlock {
     pub fn static_pose(&self) -> StaticPose {
         let n = self.count as f64;
         // a difference of two readings has twice the variance of one, on three axes
-        let noise = (self.differences > 0).then(|| (self.squares / (6 * self.differences) as f64).sqrt());
-        let wrench = Wrench { force: self.force / n, torque: self.torque / n };
-        StaticPose { r_wt: self.rotation(), wrench, noise, samples: self.count }
+        let noise =
+            (self.differences > 0).then(|| (self.squares / (6 * self.differences) as f64).sqrt());
+        let wrench = Wrench {
+            force: self.force / n,
+            torque: self.torque / n,
+        };
+        StaticPose {
+            r_wt: self.rotation(),
+            wrench,
+            noise,
+            samples: self.count,
+        }
     }
 }
 
@@ -144,16 +161,30 @@ pub struct StaticSegmentFinder {
 impl StaticSegmentFinder {
     /// Nothing seen yet.
     pub fn new(params: StaticSegmentParams) -> Self {
-        Self { params, block: None, last: None, phase: None, found: Vec::new() }
+        Self {
+            params,
+            block: None,
+            last: None,
+            phase: None,
+            found: Vec::new(),
+        }
     }
 
     /// Takes one sample; those that cannot be a measurement, or are not after the one before, are left out.
     pub fn push(&mut self, sample: &Sample) {
-        if sample.check().is_err() || self.block.is_some_and(|block| sample.stamp_ns <= block.end_ns) {
+        if sample.check().is_err()
+            || self
+                .block
+                .is_some_and(|block| sample.stamp_ns <= block.end_ns)
+        {
             return;
         }
         match &mut self.block {
-            Some(block) if sample.stamp_ns.saturating_sub(block.begin_ns) < self.params.block_ns => block.add(sample),
+            Some(block)
+                if sample.stamp_ns.saturating_sub(block.begin_ns) < self.params.block_ns =>
+            {
+                block.add(sample)
+            }
             block => {
                 let whole = block.replace(SampleBlock::of(sample));
                 whole.into_iter().for_each(|whole| self.take(whole));
@@ -163,7 +194,10 @@ impl StaticSegmentFinder {
 
     /// The static segments, in order of time.
     pub fn finish(mut self) -> Vec<StaticPose> {
-        self.block.take().into_iter().for_each(|block| self.take(block));
+        self.block
+            .take()
+            .into_iter()
+            .for_each(|block| self.take(block));
         self.close();
         self.found
     }
@@ -171,7 +205,11 @@ impl StaticSegmentFinder {
     fn take(&mut self, block: SampleBlock) {
         let is_static = self.last.is_some_and(|last| self.is_static(&last, &block));
         match &mut self.phase {
-            Some((phase, first)) if is_static && is_near(first, &block, self.params.largest_turn) => phase.join(&block),
+            Some((phase, first))
+                if is_static && is_near(first, &block, self.params.largest_turn) =>
+            {
+                phase.join(&block)
+            }
             _ => {
                 self.close();
                 self.phase = Some((block, block));
@@ -181,7 +219,9 @@ impl StaticSegmentFinder {
     }
 
     fn close(&mut self) {
-        let Some((phase, _)) = self.phase.take() else { return };
+        let Some((phase, _)) = self.phase.take() else {
+            return;
+        };
         if phase.end_ns.saturating_sub(phase.begin_ns) >= self.params.least_ns {
             self.found.push(phase.static_pose());
         }
@@ -193,7 +233,13 @@ impl StaticSegmentFinder {
         let change = |of: fn(&SampleBlock) -> Vector3<f64>| {
             (of(after) / after.count as f64 - of(before) / before.count as f64).norm() / seconds
         };
-        let StaticSegmentParams { block_ns, turning, force_rate, torque_rate, .. } = self.params;
+        let StaticSegmentParams {
+            block_ns,
+            turning,
+            force_rate,
+            torque_rate,
+            ..
+        } = self.params;
         // a pause ends a segment
         apart_ns < block_ns.saturating_mul(3)
             && before.rotation().angle_to(&after.rotation()) < turning * seconds

@@ -24,7 +24,10 @@ pub struct TipFitParams {
 
 impl Default for TipFitParams {
     fn default() -> Self {
-        Self { largest_rms: 1e-3, smallest_swing: 8f64.to_radians() }
+        Self {
+            largest_rms: 1e-3,
+            smallest_swing: 8f64.to_radians(),
+        }
     }
 }
 
@@ -51,7 +54,9 @@ pub struct TipFit {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TipError {
     /// Too few poses.
-    #[error("{count} poses do not determine the tip: swing the stylus about its resting ball for at least ten seconds")]
+    #[error(
+        "{count} poses do not determine the tip: swing the stylus about its resting ball for at least ten seconds"
+    )]
     TooFew {
         /// how many there are
         count: usize,
@@ -100,14 +105,22 @@ const LARGEST_REJECTED: f64 = 0.4;
 /// [`TipError`]: too few poses, too small a swing (and across which axis), a ball that did not rest.
 pub fn fit_tip(poses: &[SwingPose], params: &TipFitParams) -> Result<TipFit, TipError> {
     let is_number = |pose: &&SwingPose| {
-        pose.translation.vector.iter().chain(&pose.rotation.coords).all(|x| x.is_finite() && x.abs() < 1e6)
+        pose.translation
+            .vector
+            .iter()
+            .chain(&pose.rotation.coords)
+            .all(|x| x.is_finite() && x.abs() < 1e6)
     };
     // R d − c = −p
-    let equation =
-        |pose: &SwingPose| Equation { a: pose.rotation.to_rotation_matrix().into_inner(), z: -pose.translation.vector };
+    let equation = |pose: &SwingPose| Equation {
+        a: pose.rotation.to_rotation_matrix().into_inner(),
+        z: -pose.translation.vector,
+    };
     let equations: Vec<_> = poses.iter().filter(is_number).map(equation).collect();
     if equations.len() < FEWEST_POSES {
-        return Err(TipError::TooFew { count: equations.len() });
+        return Err(TipError::TooFew {
+            count: equations.len(),
+        });
     }
     let too_small = |least: Undetermined| TipError::TooSmall {
         swing_deg: least.angle().to_degrees(),
@@ -117,7 +130,11 @@ pub fn fit_tip(poses: &[SwingPose], params: &TipFitParams) -> Result<TipFit, Tip
     let found = fit(&equations, params.smallest_swing.sin().powi(2)).map_err(too_small)?;
     let (rejected, poses) = (found.rejected(), equations.len());
     if found.rms > params.largest_rms || rejected as f64 > LARGEST_REJECTED * poses as f64 {
-        return Err(TipError::NotAtRest { rms_mm: found.rms * 1e3, rejected, poses });
+        return Err(TipError::NotAtRest {
+            rms_mm: found.rms * 1e3,
+            rejected,
+            poses,
+        });
     }
     let correlation = correlation(&found, &equations);
     Ok(TipFit {
@@ -134,8 +151,12 @@ pub fn fit_tip(poses: &[SwingPose], params: &TipFitParams) -> Result<TipFit, Tip
 /// (1 + ρ) / (1 − ρ) with ρ the correlation of neighbouring residuals: a tracker's noise is not independent from pose to
 /// pose.
 fn correlation(found: &CalibrationFit, equations: &[Equation]) -> f64 {
-    let residuals: Vec<Vector3<f64>> =
-        equations.iter().zip(&found.kept).filter(|(_, kept)| **kept).map(|(e, _)| found.residual(e)).collect();
+    let residuals: Vec<Vector3<f64>> = equations
+        .iter()
+        .zip(&found.kept)
+        .filter(|(_, kept)| **kept)
+        .map(|(e, _)| found.residual(e))
+        .collect();
     let squares: f64 = residuals.iter().map(Vector3::norm_squared).sum();
     let products: f64 = residuals.windows(2).map(|pair| pair[0].dot(&pair[1])).sum();
     if squares <= 0.0 {

@@ -25,7 +25,9 @@ pub struct PlaneTipFit {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlaneTipError {
     /// Too few touches.
-    #[error("{count} touches do not determine the tip: {FEWEST} are needed, upright and leaning to all sides")]
+    #[error(
+        "{count} touches do not determine the tip: {FEWEST} are needed, upright and leaning to all sides"
+    )]
     TooFew {
         /// how many there are
         count: usize,
@@ -45,7 +47,9 @@ pub enum PlaneTipError {
     )]
     OnOneLine,
     /// The heights do not fit a plane.
-    #[error("the touches are {rms_mm:.3} mm rms off one plane: touch a flat spot of a stiff part that does not move")]
+    #[error(
+        "the touches are {rms_mm:.3} mm rms off one plane: touch a flat spot of a stiff part that does not move"
+    )]
     NotFlat {
         /// mm
         rms_mm: f64,
@@ -70,7 +74,10 @@ type Six = SVector<f64, 6>;
 ///
 /// # Errors
 /// [`PlaneTipError`]
-pub fn fit_tip_by_plane(poses: &[Isometry3<f64>], normal: &Unit<Vector3<f64>>) -> Result<PlaneTipFit, PlaneTipError> {
+pub fn fit_tip_by_plane(
+    poses: &[Isometry3<f64>],
+    normal: &Unit<Vector3<f64>>,
+) -> Result<PlaneTipFit, PlaneTipError> {
     let count = poses.len();
     if count < FEWEST {
         return Err(PlaneTipError::TooFew { count });
@@ -82,11 +89,21 @@ pub fn fit_tip_by_plane(poses: &[Isometry3<f64>], normal: &Unit<Vector3<f64>>) -
     // d, two slopes of the plane, h
     let mut x = Six::zeros();
     let equations = |x: &Six| {
-        let (offset, out) = (x.fixed_rows::<3>(0).into_owned(), normal.into_inner() + u * x[3] + v * x[4]);
+        let (offset, out) = (
+            x.fixed_rows::<3>(0).into_owned(),
+            normal.into_inner() + u * x[3] + v * x[4],
+        );
         let row = |pose: &Isometry3<f64>| {
             let centre = pose.translation.vector - middle + pose.rotation * offset;
             let by_offset = pose.rotation.inverse() * out;
-            let by = Six::new(by_offset.x, by_offset.y, by_offset.z, u.dot(&centre), v.dot(&centre), -1.0);
+            let by = Six::new(
+                by_offset.x,
+                by_offset.y,
+                by_offset.z,
+                u.dot(&centre),
+                v.dot(&centre),
+                -1.0,
+            );
             // as a height: the normal with slopes is longer than one
             (by / out.norm(), (out.dot(&centre) - x[5]) / out.norm())
         };
@@ -95,7 +112,11 @@ pub fn fit_tip_by_plane(poses: &[Isometry3<f64>], normal: &Unit<Vector3<f64>>) -
     for _ in 0..ROUNDS {
         x -= equations(&x).solution().ok_or(PlaneTipError::OnOneLine)?;
     }
-    let NormalEquations { information, square, .. } = equations(&x);
+    let NormalEquations {
+        information,
+        square,
+        ..
+    } = equations(&x);
     let rms = (square / n).sqrt();
     // NaN is no plane either
     if rms.is_nan() || rms > FLAT {
@@ -103,19 +124,31 @@ pub fn fit_tip_by_plane(poses: &[Isometry3<f64>], normal: &Unit<Vector3<f64>>) -
     }
     // the residuals of few touches know their own scale badly: the error is Student's t of n − 6, whose variance is larger by
     // (n − 6)/(n − 8) (JCGM 101:2008, 6.4.9.4)
-    let covariance = information.try_inverse().ok_or(PlaneTipError::OnOneLine)? * (square / (n - 8.0));
+    let covariance =
+        information.try_inverse().ok_or(PlaneTipError::OnOneLine)? * (square / (n - 8.0));
     let covariance: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into_owned();
     let offset = VectorEstimate::new(x.fixed_rows::<3>(0).into_owned(), &covariance);
-    Ok(PlaneTipFit { offset, rms, touches: count })
+    Ok(PlaneTipFit {
+        offset,
+        rms,
+        touches: count,
+    })
 }
 
-fn check_spread(poses: &[Isometry3<f64>], normal: &Unit<Vector3<f64>>) -> Result<(), PlaneTipError> {
-    let seen = poses.iter().map(|pose| pose.rotation.inverse() * normal.into_inner());
+fn check_spread(
+    poses: &[Isometry3<f64>],
+    normal: &Unit<Vector3<f64>>,
+) -> Result<(), PlaneTipError> {
+    let seen = poses
+        .iter()
+        .map(|pose| pose.rotation.inverse() * normal.into_inner());
     let scatter = scatter(seen);
     let eigen = SymmetricEigen::new(scatter / poses.len() as f64);
     let least = eigen.eigenvalues.imin();
     match eigen.eigenvalues[least] < LEAST_SPREAD * LEAST_SPREAD {
-        true => Err(PlaneTipError::TooAlike { axis: eigen.eigenvectors.column(least).into_owned().into() }),
+        true => Err(PlaneTipError::TooAlike {
+            axis: eigen.eigenvectors.column(least).into_owned().into(),
+        }),
         false => Ok(()),
     }
 }
@@ -128,12 +161,24 @@ mod tests {
 
     /// Touches of the plane n · p = 1.5 mm with a ball that is off by `offset` in the axes of a flange that leans by these angles, °, and
     /// towards these; on a square, m.
-    fn poses(leans: &[(f64, f64)], offset: Vector3<f64>, normal: &Unit<Vector3<f64>>) -> Vec<Isometry3<f64>> {
+    fn poses(
+        leans: &[(f64, f64)],
+        offset: Vector3<f64>,
+        normal: &Unit<Vector3<f64>>,
+    ) -> Vec<Isometry3<f64>> {
         let pose = |(at, (lean, towards)): (usize, &(f64, f64))| {
-            let axis = Unit::new_normalize(Vector3::new(-towards.to_radians().sin(), towards.to_radians().cos(), 0.0));
-            let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_axis_angle(&axis, lean.to_radians()));
+            let axis = Unit::new_normalize(Vector3::new(
+                -towards.to_radians().sin(),
+                towards.to_radians().cos(),
+                0.0,
+            ));
+            let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_axis_angle(
+                &axis,
+                lean.to_radians(),
+            ));
             let aside = normal.cross(&Vector3::new((at % 4) as f64, (at / 4) as f64, 2.0)) * 1e-3;
-            let centre = aside - normal.into_inner() * aside.dot(normal) + normal.into_inner() * 1.5e-3;
+            let centre =
+                aside - normal.into_inner() * aside.dot(normal) + normal.into_inner() * 1.5e-3;
             Isometry3::from_parts((centre - rotation * offset).into(), rotation)
         };
         leans.iter().enumerate().map(pose).collect()
@@ -141,7 +186,11 @@ mod tests {
 
     fn all_sides() -> Vec<(f64, f64)> {
         let ring = |lean: f64| (0..6).map(move |at| (lean, 60.0 * f64::from(at)));
-        ring(0.0).take(4).chain(ring(20.0)).chain(ring(40.0)).collect()
+        ring(0.0)
+            .take(4)
+            .chain(ring(20.0))
+            .chain(ring(40.0))
+            .collect()
     }
 
     #[test]
@@ -151,7 +200,10 @@ mod tests {
         // the normal that it begins with is 2° off
         let about = Unit::new_normalize(normal.into_inner() + Vector3::new(0.03, 0.0, 0.0));
         let fit = fit_tip_by_plane(&poses(&all_sides(), offset, &normal), &about).unwrap();
-        assert!((fit.offset.value - offset).norm() < 1e-12 && fit.rms < 1e-12, "{fit:?}");
+        assert!(
+            (fit.offset.value - offset).norm() < 1e-12 && fit.rms < 1e-12,
+            "{fit:?}"
+        );
     }
 
     #[test]
@@ -161,14 +213,28 @@ mod tests {
         let to_one_side: Vec<_> = (0..12).map(|at| (4.0 * f64::from(at), 0.0)).collect();
         let error = fit_tip_by_plane(&poses(&to_one_side, offset, &normal), &normal).unwrap_err();
         // it leans about y alone: along y nothing is determined
-        assert!(matches!(error, PlaneTipError::TooAlike { axis } if axis[1].abs() > 0.99), "{error}");
+        assert!(
+            matches!(error, PlaneTipError::TooAlike { axis } if axis[1].abs() > 0.99),
+            "{error}"
+        );
         let few = poses(&all_sides()[..8], offset, &normal);
-        assert_eq!(fit_tip_by_plane(&few, &normal), Err(PlaneTipError::TooFew { count: 8 }));
+        assert_eq!(
+            fit_tip_by_plane(&few, &normal),
+            Err(PlaneTipError::TooFew { count: 8 })
+        );
         let mut bent = poses(&all_sides(), offset, &normal);
-        bent.iter_mut().step_by(2).for_each(|pose| pose.translation.z += 1e-3);
-        assert!(matches!(fit_tip_by_plane(&bent, &normal), Err(PlaneTipError::NotFlat { .. })));
+        bent.iter_mut()
+            .step_by(2)
+            .for_each(|pose| pose.translation.z += 1e-3);
+        assert!(matches!(
+            fit_tip_by_plane(&bent, &normal),
+            Err(PlaneTipError::NotFlat { .. })
+        ));
         let mut in_line = poses(&all_sides(), Vector3::zeros(), &normal);
         in_line.iter_mut().for_each(|pose| pose.translation.y = 0.0);
-        assert_eq!(fit_tip_by_plane(&in_line, &normal), Err(PlaneTipError::OnOneLine));
+        assert_eq!(
+            fit_tip_by_plane(&in_line, &normal),
+            Err(PlaneTipError::OnOneLine)
+        );
     }
 }

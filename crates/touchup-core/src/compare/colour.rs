@@ -27,7 +27,9 @@ pub fn colour_of(deviation: f64, range: f64) -> Rgb {
     // NaN becomes 0
     let below = (at as usize).min(last - 1);
     let part = at - below as f64;
-    std::array::from_fn(|i| (STOPS[below][i] + (STOPS[below + 1][i] - STOPS[below][i]) * part).round() as u8)
+    std::array::from_fn(|i| {
+        (STOPS[below][i] + (STOPS[below + 1][i] - STOPS[below][i]) * part).round() as u8
+    })
 }
 
 /// Colours of deviations, with one colour for all that is within tolerance.
@@ -41,7 +43,9 @@ pub(super) struct ColourScale {
 
 impl ColourScale {
     pub fn colour(&self, deviation: f64) -> Rgb {
-        let is_within = self.tolerance.is_some_and(|tolerance| deviation.abs() <= tolerance);
+        let is_within = self
+            .tolerance
+            .is_some_and(|tolerance| deviation.abs() <= tolerance);
         colour_of(if is_within { 0.0 } else { deviation }, self.range)
     }
 }
@@ -73,13 +77,27 @@ mod tests {
         // ten times what is just seen
         assert!(least_difference(&Class::ALL.map(colour_of_class)) > 23.0);
         let former_pair = [[204, 56, 40], [20, 130, 60]];
-        assert!(least_difference(&former_pair) < 15.0, "red and green of one brightness are not");
+        assert!(
+            least_difference(&former_pair) < 15.0,
+            "red and green of one brightness are not"
+        );
     }
 
     #[test]
     fn ends_and_middle_are_as_listed_and_what_is_beyond_is_clipped() {
-        for (deviation, stop) in [(-2.0, 0), (-9.0, 0), (0.0, 4), (1.0, 6), (2.0, 8), (f64::INFINITY, 8)] {
-            assert_eq!(colour_of(deviation, 2.0).map(f64::from), STOPS[stop], "{deviation}");
+        for (deviation, stop) in [
+            (-2.0, 0),
+            (-9.0, 0),
+            (0.0, 4),
+            (1.0, 6),
+            (2.0, 8),
+            (f64::INFINITY, 8),
+        ] {
+            assert_eq!(
+                colour_of(deviation, 2.0).map(f64::from),
+                STOPS[stop],
+                "{deviation}"
+            );
         }
         assert_eq!(colour_of(-0.25, 2.0), [208, 225, 237]);
     }

@@ -59,7 +59,13 @@ pub struct CompareParams {
 
 impl Default for CompareParams {
     fn default() -> Self {
-        Self { samples: 200_000, seed: 1, range: None, reach: 2e-3, tolerance: None }
+        Self {
+            samples: 200_000,
+            seed: 1,
+            range: None,
+            reach: 2e-3,
+            tolerance: None,
+        }
     }
 }
 
@@ -117,7 +123,9 @@ struct Sorted {
 impl Sorted {
     fn within(&self, region: Option<SupportRegion>) -> Vec<f64> {
         let both = self.values.iter().zip(&self.regions);
-        both.filter(|(_, at)| region.is_none() || region == **at).map(|(value, _)| *value).collect()
+        both.filter(|(_, at)| region.is_none() || region == **at)
+            .map(|(value, _)| *value)
+            .collect()
     }
 
     fn summary(&self, region: Option<SupportRegion>) -> Option<Summary> {
@@ -166,21 +174,44 @@ pub fn compare(
     }
     // a mesh that is the truth must not meet its own points
     let [seed, other] = [params.seed, params.seed.wrapping_add(1)];
-    let samples = [sample_surface(mesh.mesh, density, seed), sample_surface(truth.mesh, density, other)];
+    let samples = [
+        sample_surface(mesh.mesh, density, seed),
+        sample_surface(truth.mesh, density, other),
+    ];
     let measured = measure(mesh, truth, regions, &samples, params.reach, workers)?;
-    let range = params.range.unwrap_or_else(|| fitting_range(&measured.to_truth.values));
+    let range = params
+        .range
+        .unwrap_or_else(|| fitting_range(&measured.to_truth.values));
     let parts = match regions {
         Regions::Unknown => Vec::new(),
-        _ => [SupportRegion::Touched, SupportRegion::Guessed, SupportRegion::Untouched]
-            .map(|region| measured.comparison(Some(region), range, params.tolerance))
-            .into(),
+        _ => [
+            SupportRegion::Touched,
+            SupportRegion::Guessed,
+            SupportRegion::Untouched,
+        ]
+        .map(|region| measured.comparison(Some(region), range, params.tolerance))
+        .into(),
     };
-    let is_there = |part: &RegionComparison| part.mesh_to_truth.is_some() || part.truth_to_mesh.is_some();
+    let is_there =
+        |part: &RegionComparison| part.mesh_to_truth.is_some() || part.truth_to_mesh.is_some();
     let whole = measured.comparison(None, range, params.tolerance);
-    let regions = std::iter::once(whole).chain(parts.into_iter().filter(is_there)).collect();
-    let unseen = measured.to_mesh.regions.iter().filter(|region| region.is_none()).count() as f64;
+    let regions = std::iter::once(whole)
+        .chain(parts.into_iter().filter(is_there))
+        .collect();
+    let unseen = measured
+        .to_mesh
+        .regions
+        .iter()
+        .filter(|region| region.is_none())
+        .count() as f64;
     let unseen = unseen / measured.to_mesh.regions.len().max(1) as f64;
-    Ok(Comparison { density, range, unseen, regions, vertex_deviations: measured.vertex_deviations })
+    Ok(Comparison {
+        density,
+        range,
+        unseen,
+        regions,
+        vertex_deviations: measured.vertex_deviations,
+    })
 }
 
 /// - `samples`: of the mesh and of the truth.
@@ -195,21 +226,39 @@ fn measure(
     let [on_mesh, on_truth] = samples;
     let [mesh_points, truth_points] =
         [on_mesh, on_truth].map(|samples| samples.iter().map(|s| s.point).collect::<Vec<_>>());
-    let there: Vec<VertexId> =
-        (0..mesh.mesh.vertex_slots() as u32).map(VertexId).filter(|&vertex| mesh.mesh.has_vertex(vertex)).collect();
-    let vertex_points: Vec<_> = there.iter().map(|&vertex| mesh.mesh.position(vertex)).collect();
+    let there: Vec<VertexId> = (0..mesh.mesh.vertex_slots() as u32)
+        .map(VertexId)
+        .filter(|&vertex| mesh.mesh.has_vertex(vertex))
+        .collect();
+    let vertex_points: Vec<_> = there
+        .iter()
+        .map(|&vertex| mesh.mesh.position(vertex))
+        .collect();
 
-    let (mesh_feet, vertex_feet) = (feet(&mesh_points, truth, workers)?, feet(&vertex_points, truth, workers)?);
+    let (mesh_feet, vertex_feet) = (
+        feet(&mesh_points, truth, workers)?,
+        feet(&vertex_points, truth, workers)?,
+    );
     let truth_feet = feet(&truth_points, mesh, workers)?;
     let deviations = |feet: &[Foot]| feet.iter().map(|foot| foot.deviation).collect::<Vec<f64>>();
     let on_true_part = |feet: &[Foot]| feet.iter().map(|foot| foot.point).collect::<Vec<_>>();
     let to_truth = Sorted {
         values: deviations(&mesh_feet),
-        regions: regions_of(regions, on_mesh.iter().map(|sample| sample.corner), &on_true_part(&mesh_feet), workers)?,
+        regions: regions_of(
+            regions,
+            on_mesh.iter().map(|sample| sample.corner),
+            &on_true_part(&mesh_feet),
+            workers,
+        )?,
     };
     let vertices = Sorted {
         values: deviations(&vertex_feet),
-        regions: regions_of(regions, there.iter().copied(), &on_true_part(&vertex_feet), workers)?,
+        regions: regions_of(
+            regions,
+            there.iter().copied(),
+            &on_true_part(&vertex_feet),
+            workers,
+        )?,
     };
     let to_mesh = Sorted {
         // a true point outside of the mesh is material that the mesh lacks
@@ -217,32 +266,57 @@ fn measure(
         regions: regions_of_truth(regions, truth, on_truth, &truth_feet, mesh, reach, workers)?,
     };
     let cloud = |points: &[_], cloud: &[_], like: &Sorted| -> Result<Sorted, CompareError> {
-        Ok(Sorted { values: cloud_distances(points, cloud, workers)?, regions: like.regions.clone() })
+        Ok(Sorted {
+            values: cloud_distances(points, cloud, workers)?,
+            regions: like.regions.clone(),
+        })
     };
     let cloud_to_truth = cloud(&mesh_points, &truth_points, &to_truth)?;
     let truth_to_cloud = cloud(&truth_points, &mesh_points, &to_mesh)?;
-    let (mut of_slot, mut vertex_deviations) =
-        (vec![SupportRegion::Untouched; mesh.mesh.vertex_slots()], vec![0.0; mesh.mesh.vertex_slots()]);
+    let (mut of_slot, mut vertex_deviations) = (
+        vec![SupportRegion::Untouched; mesh.mesh.vertex_slots()],
+        vec![0.0; mesh.mesh.vertex_slots()],
+    );
     for ((vertex, region), deviation) in there.iter().zip(&vertices.regions).zip(&vertices.values) {
         of_slot[vertex.0 as usize] = region.unwrap_or(SupportRegion::Untouched);
         vertex_deviations[vertex.0 as usize] = *deviation;
     }
     let tilts = tilts(mesh.mesh, truth.mesh, truth.tree)?;
-    let tilts = tilts.into_iter().map(|tilt| (tilt, most_common(mesh.mesh.corners(tilt.face), &of_slot))).collect();
-    Ok(MeasuredDeviations { to_truth, to_mesh, vertices, cloud_to_truth, truth_to_cloud, tilts, vertex_deviations })
+    let tilts = tilts
+        .into_iter()
+        .map(|tilt| (tilt, most_common(mesh.mesh.corners(tilt.face), &of_slot)))
+        .collect();
+    Ok(MeasuredDeviations {
+        to_truth,
+        to_mesh,
+        vertices,
+        cloud_to_truth,
+        truth_to_cloud,
+        tilts,
+        vertex_deviations,
+    })
 }
 
 impl MeasuredDeviations {
-    fn comparison(&self, region: Option<SupportRegion>, range: f64, tolerance: Option<f64>) -> RegionComparison {
+    fn comparison(
+        &self,
+        region: Option<SupportRegion>,
+        range: f64,
+        tolerance: Option<f64>,
+    ) -> RegionComparison {
         let to_truth = self.to_truth.within(region);
-        let tilts =
-            self.tilts.iter().filter(|(_, at)| region.is_none_or(|region| region == *at)).map(|(tilt, _)| *tilt);
+        let tilts = self
+            .tilts
+            .iter()
+            .filter(|(_, at)| region.is_none_or(|region| region == *at))
+            .map(|(tilt, _)| *tilt);
         RegionComparison {
             region,
             mesh_to_truth: Summary::of(&to_truth),
             histogram: Histogram::of(&to_truth, range),
             within_tolerance: tolerance.filter(|_| !to_truth.is_empty()).map(|tolerance| {
-                to_truth.iter().filter(|d| d.abs() <= tolerance).count() as f64 / to_truth.len() as f64
+                to_truth.iter().filter(|d| d.abs() <= tolerance).count() as f64
+                    / to_truth.len() as f64
             }),
             truth_to_mesh: self.to_mesh.summary(region),
             vertices_to_truth: self.vertices.summary(region),
@@ -254,10 +328,19 @@ impl MeasuredDeviations {
 }
 
 /// The feet of `points` on a shape, in their order.
-fn feet(points: &[Point3<f64>], shape: IndexedMesh<'_>, workers: &dyn Workers) -> Result<Vec<Foot>, CompareError> {
+fn feet(
+    points: &[Point3<f64>],
+    shape: IndexedMesh<'_>,
+    workers: &dyn Workers,
+) -> Result<Vec<Foot>, CompareError> {
     at_closest_places(points, shape.mesh, shape.tree, workers, |p, hit| {
         let corner = nearest_corner(shape.mesh.corners(hit.face), &hit.barycentric);
-        Foot { deviation: signed(p, shape.mesh, hit), point: hit.point, face: hit.face, corner }
+        Foot {
+            deviation: signed(p, shape.mesh, hit),
+            point: hit.point,
+            face: hit.face,
+            corner,
+        }
     })
 }
 
@@ -273,10 +356,13 @@ fn regions_of(
 ) -> Result<Vec<Option<SupportRegion>>, CompareError> {
     Ok(match regions {
         Regions::Unknown => vec![Some(SupportRegion::Untouched); places.len()],
-        Regions::Own(of_vertex) => own.map(|vertex| Some(of_vertex[vertex.0 as usize])).collect(),
-        Regions::Of(other, of_vertex) => {
-            feet(places, other, workers)?.iter().map(|foot| Some(of_vertex[foot.corner.0 as usize])).collect()
-        }
+        Regions::Own(of_vertex) => own
+            .map(|vertex| Some(of_vertex[vertex.0 as usize]))
+            .collect(),
+        Regions::Of(other, of_vertex) => feet(places, other, workers)?
+            .iter()
+            .map(|foot| Some(of_vertex[foot.corner.0 as usize]))
+            .collect(),
     })
 }
 
@@ -294,9 +380,14 @@ fn regions_of_truth(
     workers: &dyn Workers,
 ) -> Result<Vec<Option<SupportRegion>>, CompareError> {
     let (shape, looked_up) = match regions {
-        Regions::Of(other, _) => {
-            (other, feet(&points.iter().map(|sample| sample.point).collect::<Vec<_>>(), other, workers)?)
-        }
+        Regions::Of(other, _) => (
+            other,
+            feet(
+                &points.iter().map(|sample| sample.point).collect::<Vec<_>>(),
+                other,
+                workers,
+            )?,
+        ),
         _ => (mesh, feet_on_mesh.to_vec()),
     };
     let region_at = |corner: VertexId| match regions {
@@ -304,7 +395,10 @@ fn regions_of_truth(
         Regions::Own(of_vertex) | Regions::Of(_, of_vertex) => of_vertex[corner.0 as usize],
     };
     let region = |(sample, foot): (&SampledPoint, &Foot)| {
-        let faces = truth.mesh.double_area_normal(sample.face).dot(&shape.mesh.double_area_normal(foot.face));
+        let faces = truth
+            .mesh
+            .double_area_normal(sample.face)
+            .dot(&shape.mesh.double_area_normal(foot.face));
         (foot.deviation.abs() <= reach && faces > 0.0).then(|| region_at(foot.corner))
     };
     Ok(points.iter().zip(&looked_up).map(region).collect())
@@ -329,5 +423,8 @@ fn fitting_range(deviations: &[f64]) -> f64 {
 pub(super) fn round_up(x: f64) -> f64 {
     let power = 10.0_f64.powi(x.log10().floor() as i32);
     let fits = |step: &&f64| **step * power >= x * (1.0 - 1e-9);
-    [1.0, 1.5, 2.0, 3.0, 5.0, 7.0].iter().find(fits).map_or(10.0 * power, |step| step * power)
+    [1.0, 1.5, 2.0, 3.0, 5.0, 7.0]
+        .iter()
+        .find(fits)
+        .map_or(10.0 * power, |step| step * power)
 }

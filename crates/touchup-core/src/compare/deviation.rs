@@ -20,7 +20,12 @@ pub fn closest_places(
 ) -> Result<(), CompareError> {
     let (order, ordered) = in_order(points)?;
     for (at, p) in order.into_iter().zip(&ordered) {
-        take(at as usize, &tree.closest(mesh, p, f64::INFINITY).ok_or(CompareError::NoFaces)?);
+        take(
+            at as usize,
+            &tree
+                .closest(mesh, p, f64::INFINITY)
+                .ok_or(CompareError::NoFaces)?,
+        );
     }
     Ok(())
 }
@@ -38,11 +43,18 @@ pub(super) fn at_closest_places<T: Send>(
 ) -> Result<Vec<T>, CompareError> {
     let (order, ordered) = in_order(points)?;
     let values = map_by(workers, ordered.len(), |at| {
-        tree.closest(mesh, &ordered[at], f64::INFINITY).map(|hit| evaluate(&ordered[at], &hit))
+        tree.closest(mesh, &ordered[at], f64::INFINITY)
+            .map(|hit| evaluate(&ordered[at], &hit))
     });
     let mut in_place: Vec<Option<T>> = points.iter().map(|_| None).collect();
-    order.into_iter().zip(values).for_each(|(at, value)| in_place[at as usize] = value);
-    in_place.into_iter().map(|value| value.ok_or(CompareError::NoFaces)).collect()
+    order
+        .into_iter()
+        .zip(values)
+        .for_each(|(at, value)| in_place[at as usize] = value);
+    in_place
+        .into_iter()
+        .map(|value| value.ok_or(CompareError::NoFaces))
+        .collect()
 }
 
 /// Numbers of the points so that neighbours follow each other, and the points in this order: read one by one they would
@@ -86,12 +98,20 @@ pub fn deviations(
 #[inline]
 pub(super) fn signed(p: &Point3<f64>, mesh: &TriMesh, hit: &FaceHit) -> f64 {
     let is_inside = hit.barycentric.iter().all(|&share| share > 0.0);
-    let normal = if is_inside { mesh.double_area_normal(hit.face) } else { pseudo_normal(mesh, hit) };
-    hit.distance_squared.sqrt().copysign((p - hit.point).dot(&normal))
+    let normal = if is_inside {
+        mesh.double_area_normal(hit.face)
+    } else {
+        pseudo_normal(mesh, hit)
+    };
+    hit.distance_squared
+        .sqrt()
+        .copysign((p - hit.point).dot(&normal))
 }
 
 /// Refuses what is no place.
 pub(super) fn check_finite(points: &[Point3<f64>]) -> Result<(), CompareError> {
-    let bad = points.iter().position(|p| !p.coords.iter().all(|x| x.is_finite()));
+    let bad = points
+        .iter()
+        .position(|p| !p.coords.iter().all(|x| x.is_finite()));
     bad.map_or(Ok(()), |point| Err(CompareError::NotFinite { point }))
 }

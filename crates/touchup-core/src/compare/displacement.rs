@@ -53,13 +53,25 @@ pub fn displacements_by_vertex(
     let mut normals = vec![Vector3::zeros(); before.vertex_slots()];
     for (face, corners) in before.faces() {
         let normal = before.double_area_normal(face);
-        corners.into_iter().for_each(|corner| normals[corner.0 as usize] += normal);
+        corners
+            .into_iter()
+            .for_each(|corner| normals[corner.0 as usize] += normal);
     }
-    let places = before.positions().iter().zip(after.positions()).zip(&normals).enumerate();
+    let places = before
+        .positions()
+        .iter()
+        .zip(after.positions())
+        .zip(&normals)
+        .enumerate();
     let displaced = places.map(|(at, ((p, q), normal))| {
-        let distance = normal.try_normalize(0.0).map_or(0.0, |normal| (q - p).dot(&normal));
+        let distance = normal
+            .try_normalize(0.0)
+            .map_or(0.0, |normal| (q - p).dot(&normal));
         let of = |sigma: &[f64]| sigma.get(at).copied();
-        Displacement { distance, sigma: larger(sigmas.map(|sigma| sigma.and_then(of))) }
+        Displacement {
+            distance,
+            sigma: larger(sigmas.map(|sigma| sigma.and_then(of))),
+        }
     });
     Some(displaced.collect())
 }
@@ -82,17 +94,28 @@ pub fn displacements_to_surface(
     let there = |hit: &FaceHit, sigma: &[f64]| {
         let corners = other.mesh.corners(hit.face);
         let shares = corners.iter().zip(&hit.barycentric);
-        shares.map(|(corner, share)| sigma.get(corner.0 as usize).map(|sigma| sigma * share)).sum::<Option<f64>>()
+        shares
+            .map(|(corner, share)| sigma.get(corner.0 as usize).map(|sigma| sigma * share))
+            .sum::<Option<f64>>()
     };
     let places: Vec<Point3<f64>> = shape.positions().to_vec();
     let found = at_closest_places(&places, other.mesh, other.tree, workers, |p, hit| {
         let off = signed(p, other.mesh, hit);
-        let distance = if from == DisplacedFrom::Before { -off } else { off };
+        let distance = if from == DisplacedFrom::Before {
+            -off
+        } else {
+            off
+        };
         (distance, other_sigma.and_then(|sigma| there(hit, sigma)))
     })?;
     let own = |at: usize| sigma.and_then(|sigma| sigma.get(at).copied());
     let displaced = found.into_iter().enumerate();
-    Ok(displaced.map(|(at, (distance, sigma))| Displacement { distance, sigma: larger([own(at), sigma]) }).collect())
+    Ok(displaced
+        .map(|(at, (distance, sigma))| Displacement {
+            distance,
+            sigma: larger([own(at), sigma]),
+        })
+        .collect())
 }
 
 /// `None` where neither is known.
@@ -102,7 +125,9 @@ fn larger(sigmas: [Option<f64>; 2]) -> Option<f64> {
 
 /// How many of the vertices that a mesh has are moved.
 pub fn moved_count(mesh: &TriMesh, displacements: &[Displacement], k: f64) -> usize {
-    let is_moved = |(at, one): &(usize, &Displacement)| mesh.has_vertex(VertexId(*at as u32)) && one.is_moved(k);
+    let is_moved = |(at, one): &(usize, &Displacement)| {
+        mesh.has_vertex(VertexId(*at as u32)) && one.is_moved(k)
+    };
     displacements.iter().enumerate().filter(is_moved).count()
 }
 
@@ -117,7 +142,11 @@ mod tests {
         let vertices = (0..25).map(|n| at(n % 5, n / 5)).collect();
         let faces = (0..16).flat_map(|n| {
             let v = (n / 4 * 5 + n % 4) as u32;
-            if is_turned { [[v, v + 1, v + 5], [v + 1, v + 6, v + 5]] } else { [[v, v + 1, v + 6], [v, v + 6, v + 5]] }
+            if is_turned {
+                [[v, v + 1, v + 5], [v + 1, v + 6, v + 5]]
+            } else {
+                [[v, v + 1, v + 6], [v, v + 6, v + 5]]
+            }
         });
         TriMesh::new(vertices, faces.collect()).unwrap()
     }
@@ -131,11 +160,21 @@ mod tests {
         let sigmas = [Some(&fine[..]), Some(&coarse[..])];
         let moved = displacements_by_vertex(&flat, &raised, sigmas).unwrap();
         assert_eq!(moved_count(&flat, &moved, 2.0), 10);
-        assert_eq!(moved.iter().map(|one| one.sigma.unwrap()).fold(0.0, f64::max), 1e-5, "the larger of both");
+        assert_eq!(
+            moved
+                .iter()
+                .map(|one| one.sigma.unwrap())
+                .fold(0.0, f64::max),
+            1e-5,
+            "the larger of both"
+        );
         assert!((moved[4].distance - 4e-5).abs() < 1e-15);
         let sunk = displacements_by_vertex(&raised, &flat, sigmas).unwrap();
         assert!(sunk[4].distance < 0.0, "back again there is less material");
-        assert!(displacements_by_vertex(&flat, &sheet(|_, _| 0.0, true), sigmas).is_none(), "other faces");
+        assert!(
+            displacements_by_vertex(&flat, &sheet(|_, _| 0.0, true), sigmas).is_none(),
+            "other faces"
+        );
     }
 
     /// The same by the nearest place of a sheet with other faces: parallel to it all rise by as much.
@@ -146,16 +185,43 @@ mod tests {
         let [low_shape, high_shape] =
             [(&low, &trees[0]), (&high, &trees[1])].map(|(mesh, tree)| IndexedMesh { mesh, tree });
         // known to ± 0.02 mm in the two columns on the left, to ± 0.04 mm on the right
-        let sigma: Vec<f64> = (0..25).map(|n| if n % 5 < 2 { 1e-5 } else { 2e-5 }).collect();
-        let from_low =
-            displacements_to_surface(&low, Some(&sigma), DisplacedFrom::Before, high_shape, None, &Alone).unwrap();
-        let from_high =
-            displacements_to_surface(&high, None, DisplacedFrom::After, low_shape, Some(&sigma), &Alone).unwrap();
+        let sigma: Vec<f64> = (0..25)
+            .map(|n| if n % 5 < 2 { 1e-5 } else { 2e-5 })
+            .collect();
+        let from_low = displacements_to_surface(
+            &low,
+            Some(&sigma),
+            DisplacedFrom::Before,
+            high_shape,
+            None,
+            &Alone,
+        )
+        .unwrap();
+        let from_high = displacements_to_surface(
+            &high,
+            None,
+            DisplacedFrom::After,
+            low_shape,
+            Some(&sigma),
+            &Alone,
+        )
+        .unwrap();
         for displaced in [from_low, from_high] {
-            assert!(displaced.iter().all(|one| (one.distance - 3e-5).abs() < 1e-15), "{displaced:?}");
+            assert!(
+                displaced
+                    .iter()
+                    .all(|one| (one.distance - 3e-5).abs() < 1e-15),
+                "{displaced:?}"
+            );
             assert_eq!(moved_count(&low, &displaced, 2.0), 10);
         }
-        let unknown = displacements_to_surface(&low, None, DisplacedFrom::Before, high_shape, None, &Alone).unwrap();
-        assert_eq!(moved_count(&low, &unknown, 2.0), 25, "where nothing is known all that lies elsewhere is moved");
+        let unknown =
+            displacements_to_surface(&low, None, DisplacedFrom::Before, high_shape, None, &Alone)
+                .unwrap();
+        assert_eq!(
+            moved_count(&low, &unknown, 2.0),
+            25,
+            "where nothing is known all that lies elsewhere is moved"
+        );
     }
 }

@@ -28,7 +28,10 @@ impl UnlikeExtents {
         if !PLAUSIBLE.contains(&ratio) {
             return Some(Self::Size(ratio));
         }
-        let gap = (true_low - high).sup(&(low - true_high)).sup(&nalgebra::Vector3::zeros()).norm();
+        let gap = (true_low - high)
+            .sup(&(low - true_high))
+            .sup(&nalgebra::Vector3::zeros())
+            .norm();
         (gap > BESIDE * true_diagonal).then_some(Self::Apart(gap))
     }
 }
@@ -37,8 +40,14 @@ impl UnlikeExtents {
 impl fmt::Display for UnlikeExtents {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Self::Size(ratio) if ratio > 1.0 => write!(f, "the mesh is {ratio:.1} times larger than the truth"),
-            Self::Size(ratio) => write!(f, "the mesh is {:.1} times smaller than the truth", 1.0 / ratio),
+            Self::Size(ratio) if ratio > 1.0 => {
+                write!(f, "the mesh is {ratio:.1} times larger than the truth")
+            }
+            Self::Size(ratio) => write!(
+                f,
+                "the mesh is {:.1} times smaller than the truth",
+                1.0 / ratio
+            ),
             Self::Apart(gap) => write!(f, "the mesh lies {:.1} mm beside the truth", gap * 1e3),
         }
     }
@@ -60,10 +69,26 @@ mod tests {
         let truth = triangle(0.0, 1.0);
         assert_eq!(UnlikeExtents::of(&triangle(0.5, 0.25), &truth), None);
         assert_eq!(UnlikeExtents::of(&triangle(1.1, 1.0), &truth), None);
-        assert_eq!(UnlikeExtents::of(&triangle(0.0, 1e3), &truth), Some(UnlikeExtents::Size(1e3)));
-        assert_eq!(UnlikeExtents::of(&triangle(3.0, 1.0), &truth), Some(UnlikeExtents::Apart(2.0)));
-        assert_eq!(UnlikeExtents::of(&triangle(-3.0, 1.0), &truth), Some(UnlikeExtents::Apart(2.0)));
-        let words = [UnlikeExtents::Size(0.001), UnlikeExtents::Apart(0.002)].map(|unlike| unlike.to_string());
-        assert_eq!(words, ["the mesh is 1000.0 times smaller than the truth", "the mesh lies 2.0 mm beside the truth"]);
+        assert_eq!(
+            UnlikeExtents::of(&triangle(0.0, 1e3), &truth),
+            Some(UnlikeExtents::Size(1e3))
+        );
+        assert_eq!(
+            UnlikeExtents::of(&triangle(3.0, 1.0), &truth),
+            Some(UnlikeExtents::Apart(2.0))
+        );
+        assert_eq!(
+            UnlikeExtents::of(&triangle(-3.0, 1.0), &truth),
+            Some(UnlikeExtents::Apart(2.0))
+        );
+        let words = [UnlikeExtents::Size(0.001), UnlikeExtents::Apart(0.002)]
+            .map(|unlike| unlike.to_string());
+        assert_eq!(
+            words,
+            [
+                "the mesh is 1000.0 times smaller than the truth",
+                "the mesh lies 2.0 mm beside the truth"
+            ]
+        );
     }
 }

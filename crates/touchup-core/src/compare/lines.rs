@@ -23,26 +23,39 @@ impl DrawnMesh {
     pub fn of(mesh: &TriMesh, colour: Rgb) -> Self {
         let positions = mesh.positions().to_vec();
         let paint = vec![colour; positions.len()];
-        let faces = mesh.faces().map(|(_, corners)| corners.map(|corner| corner.0)).collect();
-        Self { positions, faces, paint }
+        let faces = mesh
+            .faces()
+            .map(|(_, corners)| corners.map(|corner| corner.0))
+            .collect();
+        Self {
+            positions,
+            faces,
+            paint,
+        }
     }
 
     fn add(&mut self, points: &[Point3<f64>], faces: &[[u32; 3]], colour: Rgb) {
         let first = self.positions.len() as u32;
         self.positions.extend_from_slice(points);
         self.paint.extend(points.iter().map(|_| colour));
-        self.faces.extend(faces.iter().map(|face| face.map(|corner| first + corner)));
+        self.faces
+            .extend(faces.iter().map(|face| face.map(|corner| first + corner)));
     }
 
     /// A line of a radius (m) from one place to another; nothing where both are one.
     pub fn line(&mut self, from: &Point3<f64>, to: &Point3<f64>, radius: f64, colour: Rgb) {
-        let Some(along) = (to - from).try_normalize(0.0) else { return };
+        let Some(along) = (to - from).try_normalize(0.0) else {
+            return;
+        };
         let [x, y] = tangent_basis(&along);
         let around = |end: &Point3<f64>, at: usize| {
             let angle = at as f64 / SIDES as f64 * std::f64::consts::TAU;
             end + (x * angle.cos() + y * angle.sin()) * radius
         };
-        let points: Vec<_> = [from, to].iter().flat_map(|end| (0..SIDES).map(|at| around(end, at))).collect();
+        let points: Vec<_> = [from, to]
+            .iter()
+            .flat_map(|end| (0..SIDES).map(|at| around(end, at)))
+            .collect();
         let sides = SIDES as u32;
         let faces: Vec<[u32; 3]> = (0..sides)
             .flat_map(|at| {
@@ -56,8 +69,20 @@ impl DrawnMesh {
     /// A place, as an octahedron of a radius (m).
     pub fn place(&mut self, at: &Point3<f64>, radius: f64, colour: Rgb) {
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
-        let points: Vec<_> = axes.iter().flat_map(|axis| [at + axis * radius, at - axis * radius]).collect();
-        let faces = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+        let points: Vec<_> = axes
+            .iter()
+            .flat_map(|axis| [at + axis * radius, at - axis * radius])
+            .collect();
+        let faces = [
+            [0, 2, 4],
+            [2, 1, 4],
+            [1, 3, 4],
+            [3, 0, 4],
+            [2, 0, 5],
+            [1, 2, 5],
+            [3, 1, 5],
+            [0, 3, 5],
+        ];
         self.add(&points, &faces, colour);
     }
 

@@ -43,7 +43,14 @@ pub fn angle_between(n: &Vector3<f64>, m: &Vector3<f64>) -> f64 {
 pub fn tilts(mesh: &TriMesh, truth: &TriMesh, tree: &FaceTree) -> Result<Vec<Tilt>, CompareError> {
     let faces: Vec<FaceId> = mesh.faces().map(|(face, _)| face).collect();
     let middles: Vec<Point3<f64>> = faces.iter().map(|&face| mesh.barycentre(face)).collect();
-    let mut tilts: Vec<Tilt> = faces.into_iter().map(|face| Tilt { face, angle: 0.0, area: 0.0 }).collect();
+    let mut tilts: Vec<Tilt> = faces
+        .into_iter()
+        .map(|face| Tilt {
+            face,
+            angle: 0.0,
+            area: 0.0,
+        })
+        .collect();
     closest_places(&middles, truth, tree, |at, hit| {
         let normal = mesh.double_area_normal(tilts[at].face);
         tilts[at].angle = angle_between(&normal, &truth.double_area_normal(hit.face));
@@ -56,10 +63,20 @@ impl TiltSummary {
     /// `None` where there is no area.
     pub fn of(tilts: &[Tilt]) -> Option<Self> {
         let mut angles: Vec<_> = tilts.iter().map(|tilt| (tilt.angle, tilt.area)).collect();
-        let (median, p95) = (weighted_quantile(&mut angles, 0.5)?, weighted_quantile(&mut angles, 0.95)?);
+        let (median, p95) = (
+            weighted_quantile(&mut angles, 0.5)?,
+            weighted_quantile(&mut angles, 0.95)?,
+        );
         let total: f64 = angles.iter().map(|(_, area)| area).sum();
-        let flipped = angles.iter().filter(|(angle, _)| *angle > FRAC_PI_2).fold(0.0, |sum, (_, area)| sum + area);
-        (total > 0.0).then(|| Self { median, p95, flipped: flipped / total })
+        let flipped = angles
+            .iter()
+            .filter(|(angle, _)| *angle > FRAC_PI_2)
+            .fold(0.0, |sum, (_, area)| sum + area);
+        (total > 0.0).then(|| Self {
+            median,
+            p95,
+            flipped: flipped / total,
+        })
     }
 }
 
@@ -72,16 +89,31 @@ mod tests {
         let x = Vector3::x();
         for angle in [1e-9, 0.3, 3.1] {
             let turned = Vector3::new(f64::cos(angle), f64::sin(angle), 0.0);
-            assert!((angle_between(&x, &(turned * 7.0)) - angle).abs() < 1e-15, "{angle}");
+            assert!(
+                (angle_between(&x, &(turned * 7.0)) - angle).abs() < 1e-15,
+                "{angle}"
+            );
         }
         assert_eq!(angle_between(&x, &-x), std::f64::consts::PI);
     }
 
     #[test]
     fn faces_count_by_area() {
-        let tilt = |face, angle, area| Tilt { face: FaceId(face), angle, area };
-        let found = TiltSummary::of(&[tilt(0, 0.1, 6.0), tilt(1, 2.0, 1.0), tilt(2, 0.2, 3.0)]).unwrap();
-        assert_eq!(found, TiltSummary { median: 0.1, p95: 2.0, flipped: 0.1 });
+        let tilt = |face, angle, area| Tilt {
+            face: FaceId(face),
+            angle,
+            area,
+        };
+        let found =
+            TiltSummary::of(&[tilt(0, 0.1, 6.0), tilt(1, 2.0, 1.0), tilt(2, 0.2, 3.0)]).unwrap();
+        assert_eq!(
+            found,
+            TiltSummary {
+                median: 0.1,
+                p95: 2.0,
+                flipped: 0.1
+            }
+        );
         assert_eq!(TiltSummary::of(&[]), None);
     }
 }

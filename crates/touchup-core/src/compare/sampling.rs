@@ -23,7 +23,9 @@ pub struct SampledPoint {
 
 /// Area of all faces, m².
 pub fn surface_area(mesh: &TriMesh) -> f64 {
-    mesh.faces().map(|(face, _)| mesh.double_area_normal(face).norm() / 2.0).sum()
+    mesh.faces()
+        .map(|(face, _)| mesh.double_area_normal(face).norm() / 2.0)
+        .sum()
 }
 
 /// Points spread over a surface by area: one at random in each piece of 1/`density` that the faces, laid end to end in
@@ -56,7 +58,11 @@ fn on_face(mesh: &TriMesh, face: FaceId, corners: [VertexId; 3], u: f64, v: f64)
     let shares = [1.0 - u, u * (1.0 - v), u * v];
     let [a, b, c] = mesh.triangle(face).map(|p| p.coords);
     let point = Point3::from(a * shares[0] + b * shares[1] + c * shares[2]);
-    SampledPoint { point, face, corner: nearest_corner(corners, &shares) }
+    SampledPoint {
+        point,
+        face,
+        corner: nearest_corner(corners, &shares),
+    }
 }
 
 /// The corner with the largest barycentric coordinate, the first among equals.

@@ -65,7 +65,13 @@ impl Histogram {
     /// Of deviations in m, in 40 bins from −`range` to `range` (m, more than 0); a bin has its lower end in it.
     pub fn of(deviations: &[f64], range: f64) -> Self {
         let width = 2.0 * range / BINS as f64;
-        let mut histogram = Self { from: -range, width, counts: vec![0; BINS], below: 0, above: 0 };
+        let mut histogram = Self {
+            from: -range,
+            width,
+            counts: vec![0; BINS],
+            below: 0,
+            above: 0,
+        };
         for &deviation in deviations {
             let bin = ((deviation + range) / width).floor();
             match histogram.counts.get_mut(bin.max(0.0) as usize) {
@@ -85,7 +91,10 @@ mod tests {
     #[test]
     fn five_numbers_by_hand() {
         let summary = Summary::of(&[1.0, -2.0, 3.0, -4.0, 0.0]).unwrap();
-        assert_eq!((summary.points, summary.mean, summary.median, summary.max), (5, 2.0, 2.0, 4.0));
+        assert_eq!(
+            (summary.points, summary.mean, summary.median, summary.max),
+            (5, 2.0, 2.0, 4.0)
+        );
         assert_eq!((summary.rms, summary.bias), (6.0_f64.sqrt(), -0.4));
         // sizes 0 1 2 3 4: the 95 % quantile is 3.8
         assert!((summary.p95 - 3.8).abs() < 1e-15 && (summary.p99 - 3.96).abs() < 1e-15);
@@ -96,9 +105,17 @@ mod tests {
     fn every_deviation_is_counted_once() {
         let deviations = [-5.0, -2.0, -1.95, -0.01, 0.0, 0.05, 1.99, 2.0, 9.0];
         let histogram = Histogram::of(&deviations, 2.0);
-        assert_eq!((histogram.below, histogram.above, histogram.width), (1, 2, 0.1));
-        let filled: Vec<_> =
-            histogram.counts.iter().enumerate().filter(|(_, n)| **n > 0).map(|(at, n)| (at, *n)).collect();
+        assert_eq!(
+            (histogram.below, histogram.above, histogram.width),
+            (1, 2, 0.1)
+        );
+        let filled: Vec<_> = histogram
+            .counts
+            .iter()
+            .enumerate()
+            .filter(|(_, n)| **n > 0)
+            .map(|(at, n)| (at, *n))
+            .collect();
         assert_eq!(filled, [(0, 2), (19, 1), (20, 2), (39, 1)]);
     }
 }

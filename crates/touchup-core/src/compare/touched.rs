@@ -23,8 +23,14 @@ impl TouchedRegion {
     /// The region around points of the part, m, that were touched; what is not finite is left out.
     pub fn of(contacts: impl IntoIterator<Item = Point3<f64>>) -> Self {
         let mut kept = HashSet::new();
-        let mut region = Self { contacts: Vec::new(), grid: PointGrid::new(REACH) };
-        for contact in contacts.into_iter().filter(|contact| contact.coords.iter().all(|x| x.is_finite())) {
+        let mut region = Self {
+            contacts: Vec::new(),
+            grid: PointGrid::new(REACH),
+        };
+        for contact in contacts
+            .into_iter()
+            .filter(|contact| contact.coords.iter().all(|x| x.is_finite()))
+        {
             if kept.insert(voxel_of(&contact, SPACING)) {
                 region.grid.insert(region.contacts.len() as u32, &contact);
                 region.contacts.push(contact);

@@ -67,7 +67,10 @@ pub struct DecisionParams {
 
 impl Default for DecisionParams {
     fn default() -> Self {
-        Self { rule: DecisionRule::GuardBands, confidence: 0.95 }
+        Self {
+            rule: DecisionRule::GuardBands,
+            confidence: 0.95,
+        }
     }
 }
 
@@ -112,16 +115,24 @@ pub fn assess(
     distribution: Distribution,
     params: &DecisionParams,
 ) -> Assessment {
-    let open = |reason| Assessment { reason: Some(reason), ..Assessment::default() };
+    let open = |reason| Assessment {
+        reason: Some(reason),
+        ..Assessment::default()
+    };
     let z = match params.rule {
         DecisionRule::GuardBands => normal_quantile(params.confidence),
         DecisionRule::Simple => 0.0,
     };
     if measured.is_at_least {
         let decision = decision_on_bound(measured, limits, z);
-        return Assessment { decision, ..open_unless_decided(decision, OpenReason::LowerBound) };
+        return Assessment {
+            decision,
+            ..open_unless_decided(decision, OpenReason::LowerBound)
+        };
     }
-    let Some(std) = measured.std else { return open(OpenReason::NoUncertainty) };
+    let Some(std) = measured.std else {
+        return open(OpenReason::NoUncertainty);
+    };
     let probability = |value: f64| conformance_probability(value, std, limits, distribution);
     let conforms = probability(measured.value);
     let rejection = ToleranceLimits {
@@ -130,7 +141,9 @@ pub fn assess(
     };
     let acceptance = match params.rule {
         DecisionRule::Simple => Some(limits),
-        DecisionRule::GuardBands => acceptance_zone(limits, distribution, params.confidence, &probability),
+        DecisionRule::GuardBands => {
+            acceptance_zone(limits, distribution, params.confidence, &probability)
+        }
     };
     let passes = match params.rule {
         DecisionRule::Simple => limits.hold(measured.value),
@@ -146,11 +159,20 @@ pub fn assess(
         (Decision::Undecided, Some(OpenReason::GuardBand))
     };
     let acceptance = acceptance.unwrap_or_default();
-    Assessment { decision, reason, conformance_probability: Some(conforms), acceptance, rejection }
+    Assessment {
+        decision,
+        reason,
+        conformance_probability: Some(conforms),
+        acceptance,
+        rejection,
+    }
 }
 
 fn open_unless_decided(decision: Decision, reason: OpenReason) -> Assessment {
-    Assessment { reason: (decision == Decision::Undecided).then_some(reason), ..Assessment::default() }
+    Assessment {
+        reason: (decision == Decision::Undecided).then_some(reason),
+        ..Assessment::default()
+    }
 }
 
 /// - `z`: guard band over the standard uncertainty.
@@ -158,7 +180,9 @@ fn decision_on_bound(bound: &MeasuredNumber, limits: ToleranceLimits, z: f64) ->
     let guard = z * bound.std.unwrap_or(0.0);
     match (limits.lower, limits.upper) {
         (_, Some(upper)) if bound.value > upper + guard => Decision::Fail,
-        (Some(lower), None) if bound.std.is_some() && bound.value >= lower + guard => Decision::Pass,
+        (Some(lower), None) if bound.std.is_some() && bound.value >= lower + guard => {
+            Decision::Pass
+        }
         _ => Decision::Undecided,
     }
 }
@@ -170,7 +194,11 @@ fn acceptance_zone(
     confidence: f64,
     probability: &impl Fn(f64) -> f64,
 ) -> Option<ToleranceLimits> {
-    let floor = if distribution == Distribution::Normal { None } else { Some(0.0) };
+    let floor = if distribution == Distribution::Normal {
+        None
+    } else {
+        Some(0.0)
+    };
     // where it is most probable: in the middle, on 0, or far from a single limit
     let best = match (limits.lower.or(floor), limits.upper) {
         (Some(_), Some(_)) if limits.lower.is_none() => 0.0,
@@ -180,12 +208,20 @@ fn acceptance_zone(
     if probability(best) < confidence {
         return None;
     }
-    let end = |limit: Option<f64>| limit.map(|limit| crossing(best, limit, confidence, probability));
-    Some(ToleranceLimits { lower: end(limits.lower), upper: end(limits.upper) })
+    let end =
+        |limit: Option<f64>| limit.map(|limit| crossing(best, limit, confidence, probability));
+    Some(ToleranceLimits {
+        lower: end(limits.lower),
+        upper: end(limits.upper),
+    })
 }
 
 /// The zone within a single limit: it has no end on the other side, so it always exists.
-fn one_sided(limits: ToleranceLimits, confidence: f64, probability: &impl Fn(f64) -> f64) -> ToleranceLimits {
+fn one_sided(
+    limits: ToleranceLimits,
+    confidence: f64,
+    probability: &impl Fn(f64) -> f64,
+) -> ToleranceLimits {
     let end = |limit: f64, inward: f64| {
         // doubled until the far end surely passes
         let mut reach = limit.abs().max(1.0) * 1e-9;
@@ -208,7 +244,11 @@ fn crossing(inside: f64, outside: f64, confidence: f64, probability: &impl Fn(f6
     }
     for _ in 0..60 {
         let middle = f64::midpoint(inside, outside);
-        if probability(middle) >= confidence { inside = middle } else { outside = middle }
+        if probability(middle) >= confidence {
+            inside = middle
+        } else {
+            outside = middle
+        }
     }
     inside
 }
@@ -220,28 +260,48 @@ mod tests {
     const Z: f64 = 1.644_853_626_951_472_2;
 
     fn limits(lower: impl Into<Option<f64>>, upper: impl Into<Option<f64>>) -> ToleranceLimits {
-        ToleranceLimits { lower: lower.into(), upper: upper.into() }
+        ToleranceLimits {
+            lower: lower.into(),
+            upper: upper.into(),
+        }
     }
 
     fn with_std(value: f64, std: f64) -> MeasuredNumber {
-        MeasuredNumber { value, std: Some(std), is_at_least: false }
+        MeasuredNumber {
+            value,
+            std: Some(std),
+            is_at_least: false,
+        }
     }
 
     fn decided(measured: &MeasuredNumber, limits: ToleranceLimits) -> Decision {
-        assess(measured, limits, Distribution::Normal, &DecisionParams::default()).decision
+        assess(
+            measured,
+            limits,
+            Distribution::Normal,
+            &DecisionParams::default(),
+        )
+        .decision
     }
 
     /// u small against the tolerance: guard bands of 1.645 u on either side of both limits.
     #[test]
     fn guard_bands_are_1_645_u_where_u_is_small() {
-        let found = assess(&with_std(10.0, 0.01), limits(9.0, 11.0), Distribution::Normal, &DecisionParams::default());
+        let found = assess(
+            &with_std(10.0, 0.01),
+            limits(9.0, 11.0),
+            Distribution::Normal,
+            &DecisionParams::default(),
+        );
         let near = |found: Option<f64>, expected: f64| (found.unwrap() - expected).abs() < 1e-9;
         assert!(
-            near(found.acceptance.lower, 9.0 + 0.01 * Z) && near(found.acceptance.upper, 11.0 - 0.01 * Z),
+            near(found.acceptance.lower, 9.0 + 0.01 * Z)
+                && near(found.acceptance.upper, 11.0 - 0.01 * Z),
             "{found:?}"
         );
         assert!(
-            near(found.rejection.lower, 9.0 - 0.01 * Z) && near(found.rejection.upper, 11.0 + 0.01 * Z),
+            near(found.rejection.lower, 9.0 - 0.01 * Z)
+                && near(found.rejection.upper, 11.0 + 0.01 * Z),
             "{found:?}"
         );
     }
@@ -249,10 +309,20 @@ mod tests {
     #[test]
     fn zones_of_pass_undecided_and_fail_follow_one_another() {
         use Decision::{Fail, Pass, Undecided};
-        let zones =
-            [(8.983, Fail), (8.984, Undecided), (9.016, Undecided), (9.017, Pass), (10.983, Pass), (11.016, Undecided)];
+        let zones = [
+            (8.983, Fail),
+            (8.984, Undecided),
+            (9.016, Undecided),
+            (9.017, Pass),
+            (10.983, Pass),
+            (11.016, Undecided),
+        ];
         for (value, expected) in zones {
-            assert_eq!(decided(&with_std(value, 0.01), limits(9.0, 11.0)), expected, "{value}");
+            assert_eq!(
+                decided(&with_std(value, 0.01), limits(9.0, 11.0)),
+                expected,
+                "{value}"
+            );
         }
         assert_eq!(decided(&with_std(11.017, 0.01), limits(9.0, 11.0)), Fail);
     }
@@ -261,45 +331,105 @@ mod tests {
     #[test]
     fn a_narrow_tolerance_widens_the_guard_bands() {
         let (u, zone) = (0.25, limits(-0.6, 0.6));
-        let found = assess(&with_std(0.0, u), zone, Distribution::Normal, &DecisionParams::default());
+        let found = assess(
+            &with_std(0.0, u),
+            zone,
+            Distribution::Normal,
+            &DecisionParams::default(),
+        );
         let upper = found.acceptance.upper.unwrap();
         assert!(0.6 - upper > Z * u, "{found:?}");
-        assert!((conformance_probability(upper, u, zone, Distribution::Normal) - 0.95).abs() < 1e-12, "{found:?}");
-        assert!((found.acceptance.lower.unwrap() + upper).abs() < 1e-15, "{found:?}");
+        assert!(
+            (conformance_probability(upper, u, zone, Distribution::Normal) - 0.95).abs() < 1e-12,
+            "{found:?}"
+        );
+        assert!(
+            (found.acceptance.lower.unwrap() + upper).abs() < 1e-15,
+            "{found:?}"
+        );
     }
 
     #[test]
     fn a_tolerance_below_the_uncertainty_has_no_acceptance_zone() {
-        let found = assess(&with_std(0.0, 1.0), limits(-1.0, 1.0), Distribution::Normal, &DecisionParams::default());
-        assert_eq!((found.decision, found.reason), (Decision::Undecided, Some(OpenReason::NoAcceptanceZone)));
+        let found = assess(
+            &with_std(0.0, 1.0),
+            limits(-1.0, 1.0),
+            Distribution::Normal,
+            &DecisionParams::default(),
+        );
+        assert_eq!(
+            (found.decision, found.reason),
+            (Decision::Undecided, Some(OpenReason::NoAcceptanceZone))
+        );
         assert_eq!(found.acceptance, ToleranceLimits::default());
-        assert_eq!(decided(&with_std(2.7, 1.0), limits(-1.0, 1.0)), Decision::Fail);
+        assert_eq!(
+            decided(&with_std(2.7, 1.0), limits(-1.0, 1.0)),
+            Decision::Fail
+        );
     }
 
     #[test]
     fn a_single_limit_has_a_single_guard_band() {
-        let found = assess(&with_std(5.0, 0.1), limits(None, 6.0), Distribution::Normal, &DecisionParams::default());
-        assert!((found.acceptance.upper.unwrap() - (6.0 - 0.1 * Z)).abs() < 1e-9, "{found:?}");
-        assert_eq!((found.decision, found.acceptance.lower), (Decision::Pass, None));
-        assert_eq!(decided(&with_std(-5.47, 0.05), limits(None, -5.40)), Decision::Undecided, "92 % are not enough");
+        let found = assess(
+            &with_std(5.0, 0.1),
+            limits(None, 6.0),
+            Distribution::Normal,
+            &DecisionParams::default(),
+        );
+        assert!(
+            (found.acceptance.upper.unwrap() - (6.0 - 0.1 * Z)).abs() < 1e-9,
+            "{found:?}"
+        );
+        assert_eq!(
+            (found.decision, found.acceptance.lower),
+            (Decision::Pass, None)
+        );
+        assert_eq!(
+            decided(&with_std(-5.47, 0.05), limits(None, -5.40)),
+            Decision::Undecided,
+            "92 % are not enough"
+        );
     }
 
     #[test]
     fn the_simple_rule_decides_by_the_value_and_shows_the_risk() {
-        let params = DecisionParams { rule: DecisionRule::Simple, ..DecisionParams::default() };
-        let found = assess(&with_std(11.0, 0.01), limits(9.0, 11.0), Distribution::Normal, &params);
-        assert_eq!((found.decision, found.acceptance), (Decision::Pass, limits(9.0, 11.0)));
+        let params = DecisionParams {
+            rule: DecisionRule::Simple,
+            ..DecisionParams::default()
+        };
+        let found = assess(
+            &with_std(11.0, 0.01),
+            limits(9.0, 11.0),
+            Distribution::Normal,
+            &params,
+        );
+        assert_eq!(
+            (found.decision, found.acceptance),
+            (Decision::Pass, limits(9.0, 11.0))
+        );
         assert!((found.risk().unwrap() - 0.5).abs() < 1e-15);
-        let found = assess(&with_std(11.01, 0.01), limits(9.0, 11.0), Distribution::Normal, &params);
+        let found = assess(
+            &with_std(11.01, 0.01),
+            limits(9.0, 11.0),
+            Distribution::Normal,
+            &params,
+        );
         assert_eq!(found.decision, Decision::Fail);
         assert!((found.risk().unwrap() - 0.158_655_253_931_457_05).abs() < 1e-12);
     }
 
     #[test]
     fn nothing_is_decided_without_an_uncertainty() {
-        let untouched = MeasuredNumber { value: 10.0, std: None, is_at_least: false };
+        let untouched = MeasuredNumber {
+            value: 10.0,
+            std: None,
+            is_at_least: false,
+        };
         for rule in DecisionRule::ALL {
-            let params = DecisionParams { rule, ..DecisionParams::default() };
+            let params = DecisionParams {
+                rule,
+                ..DecisionParams::default()
+            };
             let found = assess(&untouched, limits(9.0, 11.0), Distribution::Normal, &params);
             assert_eq!(
                 (found.decision, found.reason),
@@ -311,12 +441,29 @@ mod tests {
 
     #[test]
     fn a_lower_bound_decides_only_beyond_the_limits() {
-        let bound = |value, std| MeasuredNumber { value, std, is_at_least: true };
-        assert_eq!(decided(&bound(6.0, None), limits(7.9, 8.1)), Decision::Undecided);
-        assert_eq!(decided(&bound(8.0, None), limits(7.9, 8.1)), Decision::Undecided);
+        let bound = |value, std| MeasuredNumber {
+            value,
+            std,
+            is_at_least: true,
+        };
+        assert_eq!(
+            decided(&bound(6.0, None), limits(7.9, 8.1)),
+            Decision::Undecided
+        );
+        assert_eq!(
+            decided(&bound(8.0, None), limits(7.9, 8.1)),
+            Decision::Undecided
+        );
         assert_eq!(decided(&bound(8.2, None), limits(7.9, 8.1)), Decision::Fail);
-        assert_eq!(decided(&bound(8.11, Some(0.01)), limits(7.9, 8.1)), Decision::Undecided, "in the guard band");
-        assert_eq!(decided(&bound(8.2, Some(0.01)), limits(7.9, None)), Decision::Pass);
+        assert_eq!(
+            decided(&bound(8.11, Some(0.01)), limits(7.9, 8.1)),
+            Decision::Undecided,
+            "in the guard band"
+        );
+        assert_eq!(
+            decided(&bound(8.2, Some(0.01)), limits(7.9, None)),
+            Decision::Pass
+        );
         assert_eq!(
             decided(&bound(8.2, None), limits(7.9, None)),
             Decision::Undecided,
@@ -327,7 +474,12 @@ mod tests {
     #[test]
     fn a_form_passes_by_its_upper_limit_alone() {
         let of_form = |value, std| {
-            assess(&with_std(value, std), limits(None, 0.03), Distribution::NonNegative, &DecisionParams::default())
+            assess(
+                &with_std(value, std),
+                limits(None, 0.03),
+                Distribution::NonNegative,
+                &DecisionParams::default(),
+            )
         };
         assert_eq!(of_form(0.0, 0.01).decision, Decision::Pass);
         assert_eq!(of_form(0.02, 0.01).decision, Decision::Undecided);

@@ -35,8 +35,13 @@ impl GeneralTolerance {
     /// Permissible deviation ± of a linear dimension, mm; `None` where the class has none for that size.
     pub fn linear_mm(self, nominal_mm: f64) -> Option<f64> {
         let class = Self::ALL.iter().position(|class| *class == self)?;
-        let range = LINEAR_MM.iter().find(|(end, _)| nominal_mm <= *end).filter(|_| nominal_mm >= LEAST_MM);
-        range.map(|(_, deviations)| deviations[class]).filter(|deviation| deviation.is_finite())
+        let range = LINEAR_MM
+            .iter()
+            .find(|(end, _)| nominal_mm <= *end)
+            .filter(|_| nominal_mm >= LEAST_MM);
+        range
+            .map(|(_, deviations)| deviations[class])
+            .filter(|deviation| deviation.is_finite())
     }
 }
 
@@ -65,7 +70,11 @@ mod tests {
             (Coarse, 4000.1, None),
         ];
         for (class, nominal_mm, expected) in table {
-            assert_eq!(class.linear_mm(nominal_mm), expected, "{class} of {nominal_mm} mm");
+            assert_eq!(
+                class.linear_mm(nominal_mm),
+                expected,
+                "{class} of {nominal_mm} mm"
+            );
         }
     }
 }

@@ -50,8 +50,15 @@ pub enum FeatureMatch {
 ///
 /// - `reach`: how far off a centre may be across its axis, of a plane along its normal, m. Two that are less than that apart in place and
 ///   size are not told apart.
-pub fn match_features(sought: &[SoughtFeature], found: &[FeaturePlace], reach: f64) -> Vec<FeatureMatch> {
-    let mut matches: Vec<_> = sought.iter().map(|one| match_one(one, found, reach)).collect();
+pub fn match_features(
+    sought: &[SoughtFeature],
+    found: &[FeaturePlace],
+    reach: f64,
+) -> Vec<FeatureMatch> {
+    let mut matches: Vec<_> = sought
+        .iter()
+        .map(|one| match_one(one, found, reach))
+        .collect();
     let is_shared = |at: usize| {
         matches!(&matches[at], FeatureMatch::Found(id)
         if sought[at].id.is_none() && (0..matches.len()).any(|other| other != at && matches[other] == FeatureMatch::Found(*id)))
@@ -74,13 +81,27 @@ fn match_one(sought: &SoughtFeature, found: &[FeaturePlace], reach: f64) -> Feat
             .map_or(FeatureMatch::Missing, FeatureMatch::Found);
     }
     let mut candidates: Vec<(f64, u32)> = of_kind
-        .filter(|place| sought.place.is_none_or(|nominal| off(place, &nominal) <= reach))
+        .filter(|place| {
+            sought
+                .place
+                .is_none_or(|nominal| off(place, &nominal) <= reach)
+        })
         .map(|place| (unlikeness(sought, place), place.id))
         .collect();
     candidates.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let Some(&(best, id)) = candidates.first() else { return FeatureMatch::Missing };
-    let alike: Vec<_> = candidates.iter().filter(|(other, _)| other - best < reach).map(|&(_, id)| id).collect();
-    if alike.len() == 1 { FeatureMatch::Found(id) } else { FeatureMatch::Ambiguous(alike) }
+    let Some(&(best, id)) = candidates.first() else {
+        return FeatureMatch::Missing;
+    };
+    let alike: Vec<_> = candidates
+        .iter()
+        .filter(|(other, _)| other - best < reach)
+        .map(|&(_, id)| id)
+        .collect();
+    if alike.len() == 1 {
+        FeatureMatch::Found(id)
+    } else {
+        FeatureMatch::Ambiguous(alike)
+    }
 }
 
 /// Distance across the axis, of a plane along its normal, m.
@@ -95,8 +116,13 @@ fn off(place: &FeaturePlace, nominal: &Point3<f64>) -> f64 {
 
 /// Distance in space and difference of size, m.
 fn unlikeness(sought: &SoughtFeature, place: &FeaturePlace) -> f64 {
-    let apart = sought.place.map_or(0.0, |nominal| (place.centre - nominal).norm());
-    let size = sought.size.zip(place.size).map_or(0.0, |(nominal, size)| (nominal - size).abs());
+    let apart = sought
+        .place
+        .map_or(0.0, |nominal| (place.centre - nominal).norm());
+    let size = sought
+        .size
+        .zip(place.size)
+        .map_or(0.0, |(nominal, size)| (nominal - size).abs());
     apart + size
 }
 
@@ -108,51 +134,106 @@ mod tests {
 
     fn hole(id: u32, x_mm: f64, z_mm: f64, diameter_mm: f64) -> FeaturePlace {
         let centre = Point3::new(x_mm, 0.0, z_mm) * 1e-3;
-        FeaturePlace { id, kind: Kind::Hole, centre, axis: Some(Vector3::z()), size: Some(diameter_mm * 1e-3) }
+        FeaturePlace {
+            id,
+            kind: Kind::Hole,
+            centre,
+            axis: Some(Vector3::z()),
+            size: Some(diameter_mm * 1e-3),
+        }
     }
 
     fn sought(x_mm: f64, z_mm: f64, diameter_mm: f64) -> SoughtFeature {
         let place = Some(Point3::new(x_mm, 0.0, z_mm) * 1e-3);
-        SoughtFeature { kind: Kind::Hole, id: None, place, size: Some(diameter_mm * 1e-3) }
+        SoughtFeature {
+            kind: Kind::Hole,
+            id: None,
+            place,
+            size: Some(diameter_mm * 1e-3),
+        }
     }
 
     #[test]
     fn the_nearest_of_its_kind_is_found_also_from_the_other_side() {
         let found = [hole(4, 0.1, 12.0, 8.0), hole(7, 20.0, 12.0, 8.0)];
-        let boss = SoughtFeature { kind: Kind::Boss, ..sought(0.0, 12.0, 8.0) };
-        let matches = match_features(&[sought(20.0, 0.0, 8.0), sought(0.0, 12.0, 8.0), boss], &found, REACH);
-        assert_eq!(matches, [FeatureMatch::Found(7), FeatureMatch::Found(4), FeatureMatch::Missing]);
+        let boss = SoughtFeature {
+            kind: Kind::Boss,
+            ..sought(0.0, 12.0, 8.0)
+        };
+        let matches = match_features(
+            &[sought(20.0, 0.0, 8.0), sought(0.0, 12.0, 8.0), boss],
+            &found,
+            REACH,
+        );
+        assert_eq!(
+            matches,
+            [
+                FeatureMatch::Found(7),
+                FeatureMatch::Found(4),
+                FeatureMatch::Missing
+            ]
+        );
     }
 
     #[test]
     fn steps_on_one_axis_are_told_apart_by_place_and_size() {
         let found = [hole(0, 0.0, 10.0, 12.0), hole(1, 0.0, 6.0, 6.0)];
-        let matches = match_features(&[sought(0.0, 6.0, 6.0), sought(0.0, 10.0, 12.0)], &found, REACH);
+        let matches = match_features(
+            &[sought(0.0, 6.0, 6.0), sought(0.0, 10.0, 12.0)],
+            &found,
+            REACH,
+        );
         assert_eq!(matches, [FeatureMatch::Found(1), FeatureMatch::Found(0)]);
     }
 
     #[test]
     fn what_could_be_two_is_ambiguous() {
         let found = [hole(0, 0.0, 10.0, 6.0), hole(1, 1.0, 10.0, 6.0)];
-        assert_eq!(match_features(&[sought(0.4, 10.0, 6.0)], &found, REACH), [FeatureMatch::Ambiguous(vec![0, 1])]);
-        let anywhere = SoughtFeature { place: None, size: None, ..sought(0.0, 0.0, 0.0) };
-        assert_eq!(match_features(&[anywhere], &found, REACH), [FeatureMatch::Ambiguous(vec![0, 1])]);
-        assert_eq!(match_features(&[anywhere], &found[..1], REACH), [FeatureMatch::Found(0)]);
+        assert_eq!(
+            match_features(&[sought(0.4, 10.0, 6.0)], &found, REACH),
+            [FeatureMatch::Ambiguous(vec![0, 1])]
+        );
+        let anywhere = SoughtFeature {
+            place: None,
+            size: None,
+            ..sought(0.0, 0.0, 0.0)
+        };
+        assert_eq!(
+            match_features(&[anywhere], &found, REACH),
+            [FeatureMatch::Ambiguous(vec![0, 1])]
+        );
+        assert_eq!(
+            match_features(&[anywhere], &found[..1], REACH),
+            [FeatureMatch::Found(0)]
+        );
     }
 
     #[test]
     fn what_two_of_the_drawing_would_share_neither_gets() {
         let found = [hole(3, 0.0, 10.0, 6.0)];
-        let matches = match_features(&[sought(-0.8, 10.0, 6.0), sought(0.8, 10.0, 6.0)], &found, REACH);
+        let matches = match_features(
+            &[sought(-0.8, 10.0, 6.0), sought(0.8, 10.0, 6.0)],
+            &found,
+            REACH,
+        );
         assert_eq!(matches, [FeatureMatch::Shared(3), FeatureMatch::Shared(3)]);
     }
 
     #[test]
     fn a_number_is_taken_as_it_is_named() {
         let found = [hole(3, 0.0, 10.0, 6.0), hole(5, 50.0, 10.0, 6.0)];
-        let named = SoughtFeature { id: Some(5), ..sought(0.0, 10.0, 6.0) };
-        let wrong = SoughtFeature { id: Some(9), ..named };
-        assert_eq!(match_features(&[named, wrong], &found, REACH), [FeatureMatch::Found(5), FeatureMatch::Missing]);
+        let named = SoughtFeature {
+            id: Some(5),
+            ..sought(0.0, 10.0, 6.0)
+        };
+        let wrong = SoughtFeature {
+            id: Some(9),
+            ..named
+        };
+        assert_eq!(
+            match_features(&[named, wrong], &found, REACH),
+            [FeatureMatch::Found(5), FeatureMatch::Missing]
+        );
     }
 
     /// A plane is matched along its normal; of two in one plane the nearer one in space.
@@ -165,8 +246,19 @@ mod tests {
             axis: Some(Vector3::z()),
             size: None,
         };
-        let found = [plane(0, 0.0, 12.0), plane(1, 40.0, 12.0), plane(2, 0.0, 0.0)];
-        let top = SoughtFeature { kind: Kind::Plane, size: None, ..sought(5.0, 12.1, 0.0) };
-        assert_eq!(match_features(&[top], &found, REACH), [FeatureMatch::Found(0)]);
+        let found = [
+            plane(0, 0.0, 12.0),
+            plane(1, 40.0, 12.0),
+            plane(2, 0.0, 0.0),
+        ];
+        let top = SoughtFeature {
+            kind: Kind::Plane,
+            size: None,
+            ..sought(5.0, 12.1, 0.0)
+        };
+        assert_eq!(
+            match_features(&[top], &found, REACH),
+            [FeatureMatch::Found(0)]
+        );
     }
 }

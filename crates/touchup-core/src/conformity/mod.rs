@@ -18,7 +18,9 @@ mod probability;
 mod quantity;
 mod repeated;
 
-pub use assess::{Assessment, Decision, DecisionParams, DecisionRule, MeasuredNumber, OpenReason, assess};
+pub use assess::{
+    Assessment, Decision, DecisionParams, DecisionRule, MeasuredNumber, OpenReason, assess,
+};
 pub use general::GeneralTolerance;
 pub use matching::{FeatureMatch, FeaturePlace, SoughtFeature, match_features};
 pub use of_feature::measured_number;

@@ -18,7 +18,11 @@ pub fn measured_number(
 ) -> Option<MeasuredNumber> {
     let size = |size: &Option<Measured<f64>>| {
         let size = size.as_ref()?;
-        Some(MeasuredNumber { value: size.value, std: size.std, is_at_least: size.is_at_least })
+        Some(MeasuredNumber {
+            value: size.value,
+            std: size.std,
+            is_at_least: size.is_at_least,
+        })
     };
     let axis = feature.axis.as_ref().map(|axis| axis.value);
     let (centre, std) = (&feature.centre.value, feature.centre.std);
@@ -29,8 +33,13 @@ pub fn measured_number(
         InspectedQuantity::Depth => size(&feature.depth),
         InspectedQuantity::X | InspectedQuantity::Y | InspectedQuantity::Z => {
             let at = quantity as usize - InspectedQuantity::X as usize;
-            let std = std.and_then(|std| coordinate_std(feature.kind, axis, std, &Vector3::ith(at, 1.0)));
-            Some(MeasuredNumber { value: centre[at], std, is_at_least: false })
+            let std =
+                std.and_then(|std| coordinate_std(feature.kind, axis, std, &Vector3::ith(at, 1.0)));
+            Some(MeasuredNumber {
+                value: centre[at],
+                std,
+                is_at_least: false,
+            })
         }
         InspectedQuantity::Position => position(feature.kind, centre, axis, std, nominal?),
         _ => None,
@@ -44,20 +53,47 @@ mod tests {
 
     #[test]
     fn sizes_and_coordinates_are_those_of_the_feature() {
-        let number = |value, std| Measured { value, std: Some(std), ..Measured::default() };
+        let number = |value, std| Measured {
+            value,
+            std: Some(std),
+            ..Measured::default()
+        };
         let hole = Feature {
             kind: Kind::Hole,
-            centre: Measured { value: Point3::new(3.0, 4.0, 9.0), std: Some(0.2), ..Measured::default() },
-            axis: Some(Measured { value: Vector3::z(), std: Some(1e-3), ..Measured::default() }),
+            centre: Measured {
+                value: Point3::new(3.0, 4.0, 9.0),
+                std: Some(0.2),
+                ..Measured::default()
+            },
+            axis: Some(Measured {
+                value: Vector3::z(),
+                std: Some(1e-3),
+                ..Measured::default()
+            }),
             diameter: Some(number(8.0, 0.1)),
             ..Feature::default()
         };
         let of = |quantity| measured_number(&hole, quantity, Some(&Point3::origin()));
-        let with = |value, std| Some(MeasuredNumber { value, std, is_at_least: false });
+        let with = |value, std| {
+            Some(MeasuredNumber {
+                value,
+                std,
+                is_at_least: false,
+            })
+        };
         assert_eq!(of(InspectedQuantity::Diameter), with(8.0, Some(0.1)));
         assert_eq!(of(InspectedQuantity::Y), with(4.0, Some(0.2 / 2f64.sqrt())));
         assert_eq!(of(InspectedQuantity::Z), with(9.0, None));
-        assert_eq!(of(InspectedQuantity::Position), with(10.0, Some(0.4 / 2f64.sqrt())));
-        assert_eq!((of(InspectedQuantity::Width), of(InspectedQuantity::Roundness)), (None, None));
+        assert_eq!(
+            of(InspectedQuantity::Position),
+            with(10.0, Some(0.4 / 2f64.sqrt()))
+        );
+        assert_eq!(
+            (
+                of(InspectedQuantity::Width),
+                of(InspectedQuantity::Roundness)
+            ),
+            (None, None)
+        );
     }
 }

@@ -18,7 +18,12 @@ const SQUARE: f64 = 0.087_155_742_747_658_17;
 /// - `std`: of the centre.
 /// - `direction`: unit vector.
 /// - returns: `None` where the uncertainty of the centre says nothing of that direction.
-pub fn coordinate_std(kind: Kind, axis: Option<Vector3<f64>>, std: f64, direction: &Vector3<f64>) -> Option<f64> {
+pub fn coordinate_std(
+    kind: Kind,
+    axis: Option<Vector3<f64>>,
+    std: f64,
+    direction: &Vector3<f64>,
+) -> Option<f64> {
     let along = axis.map(|axis| axis.dot(direction).abs());
     match (kind, along) {
         (Kind::Corner, _) => Some(std / 3f64.sqrt()),
@@ -46,7 +51,11 @@ pub fn position(
     }
     let distance = off.cross(&axis?).norm();
     let std = std.map(|std| 2.0 * std / 2f64.sqrt());
-    Some(MeasuredNumber { value: 2.0 * distance, std, is_at_least: false })
+    Some(MeasuredNumber {
+        value: 2.0 * distance,
+        std,
+        is_at_least: false,
+    })
 }
 
 #[cfg(test)]
@@ -56,11 +65,24 @@ mod tests {
     #[test]
     fn two_coordinates_share_what_is_known_of_an_axis() {
         let z = Some(Vector3::z());
-        assert_eq!(coordinate_std(Kind::Hole, z, 0.02, &Vector3::x()), Some(0.02 / 2f64.sqrt()));
-        assert_eq!(coordinate_std(Kind::Hole, z, 0.02, &Vector3::z()), None, "along the axis nothing is known");
-        assert_eq!(coordinate_std(Kind::Plane, z, 0.02, &Vector3::z()), Some(0.02));
+        assert_eq!(
+            coordinate_std(Kind::Hole, z, 0.02, &Vector3::x()),
+            Some(0.02 / 2f64.sqrt())
+        );
+        assert_eq!(
+            coordinate_std(Kind::Hole, z, 0.02, &Vector3::z()),
+            None,
+            "along the axis nothing is known"
+        );
+        assert_eq!(
+            coordinate_std(Kind::Plane, z, 0.02, &Vector3::z()),
+            Some(0.02)
+        );
         assert_eq!(coordinate_std(Kind::Plane, z, 0.02, &Vector3::x()), None);
-        assert_eq!(coordinate_std(Kind::Corner, None, 0.03, &Vector3::x()), Some(0.03 / 3f64.sqrt()));
+        assert_eq!(
+            coordinate_std(Kind::Corner, None, 0.03, &Vector3::x()),
+            Some(0.03 / 3f64.sqrt())
+        );
     }
 
     /// 3-4-5 across the axis; along the axis nothing counts.
@@ -70,6 +92,9 @@ mod tests {
         let found = position(Kind::Hole, &centre, Some(Vector3::z()), Some(0.1), &nominal).unwrap();
         assert_eq!(found.value, 10.0);
         assert!((found.std.unwrap() - 0.2 / 2f64.sqrt()).abs() < 1e-15);
-        assert_eq!(position(Kind::Hole, &centre, None, Some(0.1), &nominal), None);
+        assert_eq!(
+            position(Kind::Hole, &centre, None, Some(0.1), &nominal),
+            None
+        );
     }
 }

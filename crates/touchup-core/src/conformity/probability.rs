@@ -14,7 +14,8 @@ pub struct ToleranceLimits {
 impl ToleranceLimits {
     /// Whether a value is within them.
     pub fn hold(&self, value: f64) -> bool {
-        self.lower.is_none_or(|lower| value >= lower) && self.upper.is_none_or(|upper| value <= upper)
+        self.lower.is_none_or(|lower| value >= lower)
+            && self.upper.is_none_or(|upper| value <= upper)
     }
 }
 
@@ -34,7 +35,12 @@ pub enum Distribution {
 /// Probability p_c that the measurand is within the limits.
 ///
 /// - `std`: standard uncertainty, 0 or more. 0: the measurand is the value.
-pub fn conformance_probability(value: f64, std: f64, limits: ToleranceLimits, distribution: Distribution) -> f64 {
+pub fn conformance_probability(
+    value: f64,
+    std: f64,
+    limits: ToleranceLimits,
+    distribution: Distribution,
+) -> f64 {
     if std <= 0.0 {
         return if limits.hold(value) { 1.0 } else { 0.0 };
     }
@@ -42,16 +48,26 @@ pub fn conformance_probability(value: f64, std: f64, limits: ToleranceLimits, di
     let between = |from: f64, to: f64| {
         let [from, to] = [from, to].map(|limit| (limit - value) / std);
         // of two upper tails, lower ones have the digits
-        if from > 0.0 { normal_cdf(-from) - normal_cdf(-to) } else { normal_cdf(to) - normal_cdf(from) }
+        if from > 0.0 {
+            normal_cdf(-from) - normal_cdf(-to)
+        } else {
+            normal_cdf(to) - normal_cdf(from)
+        }
     };
     let lower = limits.lower.unwrap_or(f64::NEG_INFINITY);
     let upper = limits.upper.unwrap_or(f64::INFINITY);
     let probability = match distribution {
         Distribution::Normal => between(lower, upper),
-        Distribution::NonNegative => between(lower.max(0.0), upper.max(0.0)) / between(0.0, f64::INFINITY),
+        Distribution::NonNegative => {
+            between(lower.max(0.0), upper.max(0.0)) / between(0.0, f64::INFINITY)
+        }
         Distribution::Position => {
             let inside = |limit: f64| {
-                if limit == f64::INFINITY { 1.0 } else { circle_probability(value / 2.0, std / 2.0, limit / 2.0) }
+                if limit == f64::INFINITY {
+                    1.0
+                } else {
+                    circle_probability(value / 2.0, std / 2.0, limit / 2.0)
+                }
             };
             inside(upper) - inside(lower.max(0.0))
         }
@@ -64,7 +80,10 @@ mod tests {
     use super::*;
 
     fn limits(lower: impl Into<Option<f64>>, upper: impl Into<Option<f64>>) -> ToleranceLimits {
-        ToleranceLimits { lower: lower.into(), upper: upper.into() }
+        ToleranceLimits {
+            lower: lower.into(),
+            upper: upper.into(),
+        }
     }
 
     fn normal(value: f64, std: f64, limits: ToleranceLimits) -> f64 {
@@ -95,8 +114,9 @@ mod tests {
     /// Of a form of 0 nothing but its uncertainty is known: half a normal distribution is left.
     #[test]
     fn a_form_of_nothing_conforms_as_half_a_normal_distribution() {
-        let of_form =
-            |value, upper| conformance_probability(value, 0.01, limits(None, upper), Distribution::NonNegative);
+        let of_form = |value, upper| {
+            conformance_probability(value, 0.01, limits(None, upper), Distribution::NonNegative)
+        };
         assert!((of_form(0.0, 0.02) - 0.954_499_736_103_641_6).abs() < 1e-14);
         assert!(
             (of_form(0.2, 0.21) - normal(0.2, 0.01, limits(None, 0.21))).abs() < 1e-15,
@@ -108,6 +128,9 @@ mod tests {
     #[test]
     fn a_position_on_its_nominal_place_conforms_as_rayleigh_says() {
         let found = conformance_probability(0.0, 0.02, limits(None, 0.05), Distribution::Position);
-        assert!((found - (1.0 - (-0.5f64 * 2.5 * 2.5).exp())).abs() < 1e-10, "{found}");
+        assert!(
+            (found - (1.0 - (-0.5f64 * 2.5 * 2.5).exp())).abs() < 1e-10,
+            "{found}"
+        );
     }
 }

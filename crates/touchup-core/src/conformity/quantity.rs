@@ -101,7 +101,10 @@ impl InspectedQuantity {
 
     /// Whether a general tolerance for linear dimensions applies.
     pub fn is_linear_size(self) -> bool {
-        matches!(self, Self::Diameter | Self::Width | Self::Length | Self::Depth | Self::Distance)
+        matches!(
+            self,
+            Self::Diameter | Self::Width | Self::Length | Self::Depth | Self::Distance
+        )
     }
 
     /// How the measurand is distributed about a measured value.
@@ -137,16 +140,26 @@ mod tests {
     #[test]
     fn every_quantity_is_of_some_kind_and_every_kind_has_a_place() {
         for quantity in InspectedQuantity::ALL {
-            assert!(Kind::ALL.into_iter().any(|kind| quantity.is_of(kind)), "{quantity}");
+            assert!(
+                Kind::ALL.into_iter().any(|kind| quantity.is_of(kind)),
+                "{quantity}"
+            );
         }
         for kind in Kind::ALL {
             assert!(
-                [InspectedQuantity::X, InspectedQuantity::Y, InspectedQuantity::Z]
-                    .into_iter()
-                    .all(|quantity| quantity.is_of(kind)),
+                [
+                    InspectedQuantity::X,
+                    InspectedQuantity::Y,
+                    InspectedQuantity::Z
+                ]
+                .into_iter()
+                .all(|quantity| quantity.is_of(kind)),
                 "{kind}"
             );
         }
-        assert!(!InspectedQuantity::Position.is_of(Kind::Plane) && !InspectedQuantity::Width.is_of(Kind::Hole));
+        assert!(
+            !InspectedQuantity::Position.is_of(Kind::Plane)
+                && !InspectedQuantity::Width.is_of(Kind::Hole)
+        );
     }
 }

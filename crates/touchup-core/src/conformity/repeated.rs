@@ -33,10 +33,17 @@ pub fn repeated_confidence(confidence: f64, first: usize, last: usize) -> f64 {
     }
     // no more than all looks apart would need
     let looks = (last - first + 1) as f64;
-    let (mut low, mut high) = (normal_quantile(confidence), normal_quantile(1.0 - (1.0 - confidence) / looks));
+    let (mut low, mut high) = (
+        normal_quantile(confidence),
+        normal_quantile(1.0 - (1.0 - confidence) / looks),
+    );
     for _ in 0..BISECTIONS {
         let middle = f64::midpoint(low, high);
-        if crossing(middle, first, last) > 1.0 - confidence { low = middle } else { high = middle }
+        if crossing(middle, first, last) > 1.0 - confidence {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     normal_cdf(high)
 }
@@ -56,7 +63,11 @@ fn crossing(bound: f64, first: usize, last: usize) -> f64 {
         let kept = touches as f64 / next as f64;
         let (shrink, sigma) = (kept.sqrt(), (1.0 - kept).sqrt());
         let mut after = vec![0.0; count];
-        for (at, share) in density.iter().enumerate().map(|(at, density)| (at, density * weight(at))) {
+        for (at, share) in density
+            .iter()
+            .enumerate()
+            .map(|(at, density)| (at, density * weight(at)))
+        {
             let middle = shrink * z(at);
             crossed += share * normal_cdf(-(bound - middle) / sigma);
             let near = |z: f64| ((bound - z) / STEP).max(0.0);
@@ -78,9 +89,19 @@ mod tests {
     /// Table 1 of Pocock 1977, of both sides at 5 %: that of one side at 2.5 % is less than 0.005 below.
     #[test]
     fn looks_at_equal_groups_need_the_constants_of_pocock() {
-        for (looks, expected) in [(1, 1.960), (2, 2.178), (3, 2.289), (4, 2.361), (5, 2.413), (10, 2.555)] {
+        for (looks, expected) in [
+            (1, 1.960),
+            (2, 2.178),
+            (3, 2.289),
+            (4, 2.361),
+            (5, 2.413),
+            (10, 2.555),
+        ] {
             let found = normal_quantile(repeated_confidence(0.975, 1, looks));
-            assert!((found - expected).abs() < 0.006, "{looks} looks: {found}, not {expected}");
+            assert!(
+                (found - expected).abs() < 0.006,
+                "{looks} looks: {found}, not {expected}"
+            );
         }
     }
 
@@ -94,7 +115,12 @@ mod tests {
 
     #[test]
     fn more_looks_ask_for_more_and_one_look_for_what_is_stated() {
-        let asked: Vec<f64> = [6, 12, 39, 200].map(|last| repeated_confidence(0.95, 6, last)).to_vec();
-        assert!(asked.is_sorted() && asked[0] == 0.95 && asked[3] < 0.999, "{asked:?}");
+        let asked: Vec<f64> = [6, 12, 39, 200]
+            .map(|last| repeated_confidence(0.95, 6, last))
+            .to_vec();
+        assert!(
+            asked.is_sorted() && asked[0] == 0.95 && asked[3] < 0.999,
+            "{asked:?}"
+        );
     }
 }

@@ -22,8 +22,7 @@ const SURE_ERRORS: f64 = 6.0;
 const STRETCHES: usize = 16;
 /// Fewer slides say nothing.
 const FEWEST_SLIDES: usize = 2 * STRETCHES;
-pub(super) const WRENCH_FRAME_REMEDY: &str =
-    "the frame_id of the wrench names its axes: that of the pose the scan's, any other the stylus' own";
+pub(super) const WRENCH_FRAME_REMEDY: &str = "the frame_id of the wrench names its axes: that of the pose the scan's, any other the stylus' own";
 
 /// A ball that slides, in the axes in which the wrench was read; unit vectors.
 struct Slide {
@@ -55,7 +54,8 @@ impl OtherAxes {
         normals: impl FnOnce(&[&InputRecord]) -> Vec<Vector3<f64>>,
         axes: impl Fn(&InputRecord) -> UnitQuaternion<f64>,
     ) -> Option<Self> {
-        let (sliding, courses): (Vec<&InputRecord>, Vec<Vector3<f64>>) = courses(records, levels).unzip();
+        let (sliding, courses): (Vec<&InputRecord>, Vec<Vector3<f64>>) =
+            courses(records, levels).unzip();
         let under = normals(&sliding);
         let slides: Vec<Slide> = sliding
             .iter()
@@ -65,7 +65,11 @@ impl OtherAxes {
             .map(|((record, course), normal)| {
                 let turn = axes(record);
                 let force = (record.rotation * (record.force_t() - levels.rest_t)).normalize();
-                Slide { force: turn * force, normal: turn * normal, course: turn * course }
+                Slide {
+                    force: turn * force,
+                    normal: turn * normal,
+                    course: turn * course,
+                }
             })
             .collect();
         if slides.len() < FEWEST_SLIDES {
@@ -79,21 +83,37 @@ impl OtherAxes {
         let (_, axes) = signed_permutations()
             .skip(1)
             .filter(|axes| mean_of(&|slide| lean(axes, slide)) > lean_as_read + LEAST_GAIN)
-            .map(|axes| (mean_of(&|slide| lean(&axes, slide) + drag(&axes, slide)), axes))
+            .map(|axes| {
+                (
+                    mean_of(&|slide| lean(&axes, slide) + drag(&axes, slide)),
+                    axes,
+                )
+            })
             .max_by(|a, b| a.0.total_cmp(&b.0))?;
         let gains = |of: &dyn Fn(&Matrix3<f64>, &Slide) -> f64| {
-            let gains: Vec<f64> = slides.iter().map(|slide| of(&axes, slide) - of(&as_read, slide)).collect();
+            let gains: Vec<f64> = slides
+                .iter()
+                .map(|slide| of(&axes, slide) - of(&as_read, slide))
+                .collect();
             errors_of_mean(&gains)
         };
         let errors = gains(&drag).max(gains(&|axes, slide| lean(axes, slide) + drag(axes, slide)));
-        let both =
-            |of: &dyn Fn(&Matrix3<f64>, &Slide) -> f64| [as_read, axes].map(|axes| mean_of(&|slide| of(&axes, slide)));
-        Some(Self { axes, leans: both(&lean), drags: both(&drag), errors })
+        let both = |of: &dyn Fn(&Matrix3<f64>, &Slide) -> f64| {
+            [as_read, axes].map(|axes| mean_of(&|slide| of(&axes, slide)))
+        };
+        Some(Self {
+            axes,
+            leans: both(&lean),
+            drags: both(&drag),
+            errors,
+        })
     }
 
     /// What is to be said of it.
     pub fn finding(&self) -> Option<InputFinding> {
-        let degrees = self.leans.map(|cosine| cosine.clamp(-1.0, 1.0).acos().to_degrees());
+        let degrees = self
+            .leans
+            .map(|cosine| cosine.clamp(-1.0, 1.0).acos().to_degrees());
         let measured = format!(
             "where the ball slides, the force leans {:.0}° from the scan's normal and {:.2} of it is against the motion; with its axes taken \
              as {} {:.0}° and {:.2}, which is better by {:.0} standard errors",
@@ -105,7 +125,12 @@ impl OtherAxes {
             self.errors
         );
         (self.errors > DOUBTED_ERRORS).then(|| {
-            InputFinding::new(InputCause::WrenchFrame, self.errors > SURE_ERRORS, measured, WRENCH_FRAME_REMEDY)
+            InputFinding::new(
+                InputCause::WrenchFrame,
+                self.errors > SURE_ERRORS,
+                measured,
+                WRENCH_FRAME_REMEDY,
+            )
         })
     }
 }
@@ -115,24 +140,39 @@ fn courses<'a>(
     records: &'a [InputRecord],
     levels: &'a ForceLevels,
 ) -> impl Iterator<Item = (&'a InputRecord, Vector3<f64>)> {
-    records.iter().enumerate().filter(|(_, record)| levels.is_pressing(record)).filter_map(|(at, record)| {
-        let before = records[at.saturating_sub(MOST_BACK)..at].iter().rev();
-        let ways = before.take_while(|other| levels.is_pressing(other)).map(|other| record.centre - other.centre);
-        let way = ways.into_iter().find(|way| way.norm() >= *COURSE.start())?;
-        COURSE.contains(&way.norm()).then(|| (record, way.normalize()))
-    })
+    records
+        .iter()
+        .enumerate()
+        .filter(|(_, record)| levels.is_pressing(record))
+        .filter_map(|(at, record)| {
+            let before = records[at.saturating_sub(MOST_BACK)..at].iter().rev();
+            let ways = before
+                .take_while(|other| levels.is_pressing(other))
+                .map(|other| record.centre - other.centre);
+            let way = ways.into_iter().find(|way| way.norm() >= *COURSE.start())?;
+            COURSE
+                .contains(&way.norm())
+                .then(|| (record, way.normalize()))
+        })
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = values.fold((0.0, 0usize), |(sum, count), value| (sum + value, count + 1));
+    let (sum, count) = values.fold((0.0, 0usize), |(sum, count), value| {
+        (sum + value, count + 1)
+    });
     sum / count.max(1) as f64
 }
 
 /// A mean in standard errors, by the jackknife over stretches that follow each other.
 fn errors_of_mean(values: &[f64]) -> f64 {
-    let stretches: Vec<&[f64]> = values.chunks(values.len().div_ceil(STRETCHES).max(1)).collect();
+    let stretches: Vec<&[f64]> = values
+        .chunks(values.len().div_ceil(STRETCHES).max(1))
+        .collect();
     let without = |left_out: usize| {
-        let others = stretches.iter().enumerate().filter(move |(at, _)| *at != left_out);
+        let others = stretches
+            .iter()
+            .enumerate()
+            .filter(move |(at, _)| *at != left_out);
         mean(others.flat_map(|(_, stretch)| stretch.iter().copied()))
     };
     let without: Vec<f64> = (0..stretches.len()).map(without).collect();

@@ -96,8 +96,18 @@ pub struct InputFinding {
 }
 
 impl InputFinding {
-    pub(super) fn new(cause: InputCause, is_sure: bool, measured: String, remedy: &'static str) -> Self {
-        Self { cause, is_sure, measured, remedy }
+    pub(super) fn new(
+        cause: InputCause,
+        is_sure: bool,
+        measured: String,
+        remedy: &'static str,
+    ) -> Self {
+        Self {
+            cause,
+            is_sure,
+            measured,
+            remedy,
+        }
     }
 }
 

@@ -31,24 +31,41 @@ impl ForceLevels {
         let forces: Vec<Vector3<f64>> = records.iter().map(InputRecord::force_t).collect();
         let step = (forces.len() / REST_CANDIDATES).max(1);
         let distances = |from: &Vector3<f64>| {
-            let mut distances: Vec<f64> = forces.iter().map(|force| (force - from).norm()).collect();
+            let mut distances: Vec<f64> =
+                forces.iter().map(|force| (force - from).norm()).collect();
             distances.sort_unstable_by(f64::total_cmp);
             distances
         };
         let width = |from: &Vector3<f64>| quantile(&distances(from), REST_SHARE);
-        let candidates = forces.iter().step_by(step).map(|force| (width(force), *force));
-        let peak = candidates.min_by(|a, b| a.0.total_cmp(&b.0)).map_or_else(Vector3::zeros, |(_, force)| force);
+        let candidates = forces
+            .iter()
+            .step_by(step)
+            .map(|force| (width(force), *force));
+        let peak = candidates
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map_or_else(Vector3::zeros, |(_, force)| force);
         let reach = (4.0 * noise).max(1.5 * width(&peak));
-        let around: Vec<&Vector3<f64>> = forces.iter().filter(|force| (*force - peak).norm() <= reach).collect();
+        let around: Vec<&Vector3<f64>> = forces
+            .iter()
+            .filter(|force| (*force - peak).norm() <= reach)
+            .collect();
         let rest_t = around.iter().copied().sum::<Vector3<f64>>() / around.len().max(1) as f64;
-        Self { largest: quantile(&distances(&rest_t), 0.95), rest_t, noise }
+        Self {
+            largest: quantile(&distances(&rest_t), 0.95),
+            rest_t,
+            noise,
+        }
     }
 
     /// The same with a rest of zero.
     pub fn without_rest(self, records: &[InputRecord]) -> Self {
         let mut sizes: Vec<f64> = records.iter().map(|record| record.force_o.norm()).collect();
         sizes.sort_unstable_by(f64::total_cmp);
-        Self { rest_t: Vector3::zeros(), largest: quantile(&sizes, 0.95), ..self }
+        Self {
+            rest_t: Vector3::zeros(),
+            largest: quantile(&sizes, 0.95),
+            ..self
+        }
     }
 
     /// |F − rest|, N.
@@ -67,7 +84,14 @@ impl ForceLevels {
 
 /// The 47 axes that a right one can be taken for, and itself first: permutations of the three with signs.
 pub(super) fn signed_permutations() -> impl Iterator<Item = nalgebra::Matrix3<f64>> {
-    const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [1, 0, 2], [0, 2, 1], [2, 1, 0]];
+    const ORDERS: [[usize; 3]; 6] = [
+        [0, 1, 2],
+        [1, 2, 0],
+        [2, 0, 1],
+        [1, 0, 2],
+        [0, 2, 1],
+        [2, 1, 0],
+    ];
     ORDERS.into_iter().flat_map(|order| {
         (0..8u8).map(move |signs| {
             nalgebra::Matrix3::from_fn(|row, column| {
@@ -81,8 +105,14 @@ pub(super) fn signed_permutations() -> impl Iterator<Item = nalgebra::Matrix3<f6
 /// Axes as a wrench or a position is taken in: (x, −z, y).
 pub(super) fn axes_in_words(axes: &nalgebra::Matrix3<f64>) -> String {
     let name = |row: usize| {
-        let column = (0..3).find(|&column| axes[(row, column)] != 0.0).unwrap_or(0);
-        format!("{}{}", if axes[(row, column)] < 0.0 { "−" } else { "" }, ["x", "y", "z"][column])
+        let column = (0..3)
+            .find(|&column| axes[(row, column)] != 0.0)
+            .unwrap_or(0);
+        format!(
+            "{}{}",
+            if axes[(row, column)] < 0.0 { "−" } else { "" },
+            ["x", "y", "z"][column]
+        )
     };
     format!("({}, {}, {})", name(0), name(1), name(2))
 }

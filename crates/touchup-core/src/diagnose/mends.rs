@@ -25,7 +25,11 @@ pub(super) struct PlaceMend {
 impl PlaceMend {
     /// Where the ball is then, in the scan as it was read.
     pub fn centre(&self, placement: &Placement, record: &InputRecord) -> Point3<f64> {
-        self.pose(placement, record).translation.vector.scale(self.scan_unit).into()
+        self.pose(placement, record)
+            .translation
+            .vector
+            .scale(self.scan_unit)
+            .into()
     }
 
     /// How the ball is turned then.
@@ -34,8 +38,15 @@ impl PlaceMend {
     }
 
     fn pose(&self, placement: &Placement, record: &InputRecord) -> Isometry3<f64> {
-        let recorded = placement.unplaced(&Isometry3::from_parts(record.centre.into(), record.rotation));
-        let rotation = if self.is_w_first { w_first(&recorded.rotation) } else { recorded.rotation };
+        let recorded = placement.unplaced(&Isometry3::from_parts(
+            record.centre.into(),
+            record.rotation,
+        ));
+        let rotation = if self.is_w_first {
+            w_first(&recorded.rotation)
+        } else {
+            recorded.rotation
+        };
         let position = self.poses * recorded.translation.vector;
         placement.placed(&Isometry3::from_parts(position.into(), rotation))
     }
@@ -56,14 +67,26 @@ impl PlaceMend {
         const UNITS: [(f64, f64, &str); 10] = [
             (1e-3, 1.0, "the poses look like mm, and are read as m"),
             (1e3, 1.0, "the poses look like km, and are read as m"),
-            (25.4e-3, 1.0, "the poses look like inches, and are read as m"),
+            (
+                25.4e-3,
+                1.0,
+                "the poses look like inches, and are read as m",
+            ),
             (1e-2, 1.0, "the poses look like cm, and are read as m"),
             (1.0, 25.4, "the scan looks like mm, and is read as inches"),
             (1.0, 1e3, "the scan looks like mm, and is read as m"),
             (1.0, 1e-3, "the scan looks like m, and is read as mm"),
-            (1.0, 1.0 / 25.4, "the scan looks like inches, and is read as mm"),
+            (
+                1.0,
+                1.0 / 25.4,
+                "the scan looks like inches, and is read as mm",
+            ),
             (1.0, 25.4e-3, "the scan looks like m, and is read as inches"),
-            (1.0, 1e3 / 25.4, "the scan looks like inches, and is read as m"),
+            (
+                1.0,
+                1e3 / 25.4,
+                "the scan looks like inches, and is read as m",
+            ),
         ];
         UNITS.into_iter().map(|(poses, scan_unit, says)| Self {
             cause: InputCause::LengthUnit,
@@ -78,7 +101,10 @@ impl PlaceMend {
     pub fn axes() -> impl Iterator<Item = Self> {
         signed_permutations().skip(1).map(|poses| Self {
             cause: InputCause::PositionAxes,
-            says: format!("the positions fit with their axes taken as {}", axes_in_words(&poses)),
+            says: format!(
+                "the positions fit with their axes taken as {}",
+                axes_in_words(&poses)
+            ),
             poses,
             is_w_first: false,
             scan_unit: 1.0,

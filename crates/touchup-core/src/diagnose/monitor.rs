@@ -10,7 +10,8 @@ use super::stamps::InputStamps;
 use crate::mesh::{FaceTree, TriMesh};
 use crate::numeric::median;
 use crate::stylus::{
-    ClockEstimator, ClockEvidence, ClockOffset, Compensator, ContactSample, Message, Sample, SettingError,
+    ClockEstimator, ClockEvidence, ClockOffset, Compensator, ContactSample, Message, Sample,
+    SettingError,
 };
 
 /// Samples that are kept: 60 s at 1 kHz are one in sixteen.
@@ -119,23 +120,37 @@ impl InputMonitor {
             ClockEvidence::Onsets(_) => self.stamps.pose_period() / 2.0,
             ClockEvidence::Course(_) => 0.0,
         };
-        Some(ClockOffset { sigma: found.sigma.hypot(unseen), ..found })
+        Some(ClockOffset {
+            sigma: found.sigma.hypot(unseen),
+            ..found
+        })
     }
 
     /// All doubts so far, the surest and most basic first; empty: none.
     pub fn findings(&self, scan: &TriMesh, tree: &FaceTree) -> Vec<InputFinding> {
-        let mut findings = self.stamps.findings(self.params.sync.largest_gap_ns, self.samples);
+        let mut findings = self
+            .stamps
+            .findings(self.params.sync.largest_gap_ns, self.samples);
         if findings.iter().any(|finding| finding.is_sure) {
             return findings;
         }
         if self.records.len() < FEWEST_PRESSES {
             let [poses, wrenches] = self.stamps.counts();
-            let measured = format!("{} of {wrenches} wrenches and {poses} poses became a sample", self.samples);
+            let measured = format!(
+                "{} of {wrenches} wrenches and {poses} poses became a sample",
+                self.samples
+            );
             let remedy = "each needs a pose shortly before and after it by the same clock: are the topics right?";
-            findings.push(InputFinding::new(InputCause::NoSample, true, measured, remedy));
+            findings.push(InputFinding::new(
+                InputCause::NoSample,
+                true,
+                measured,
+                remedy,
+            ));
             return findings;
         }
-        let noise = median(&mut self.steps.clone()).unwrap_or(0.0) / (MEDIAN_OF_THREE * 2f64.sqrt());
+        let noise =
+            median(&mut self.steps.clone()).unwrap_or(0.0) / (MEDIAN_OF_THREE * 2f64.sqrt());
         let judge = InputJudge {
             params: &self.params,
             scan,

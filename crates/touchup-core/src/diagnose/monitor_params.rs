@@ -1,6 +1,8 @@
 //! What an input is taken for.
 
-use crate::stylus::{CompensatorParams, ContactGateParams, Placement, SyncParams, TipParams, TipShape};
+use crate::stylus::{
+    CompensatorParams, ContactGateParams, Placement, SyncParams, TipParams, TipShape,
+};
 
 /// What the input is taken for.
 #[derive(Clone, Copy, Debug)]

@@ -28,7 +28,10 @@ impl ScanScale {
     pub fn of(scan: &TriMesh) -> Self {
         let step = (scan.vertex_slots() / NOISE_VERTICES).max(1);
         let (mut off, mut edges) = (Vec::new(), Vec::new());
-        for vertex in (0..scan.vertex_slots()).step_by(step).map(|at| crate::mesh::VertexId(at as u32)) {
+        for vertex in (0..scan.vertex_slots())
+            .step_by(step)
+            .map(|at| crate::mesh::VertexId(at as u32))
+        {
             if !scan.has_vertex(vertex) {
                 continue;
             }
@@ -36,7 +39,11 @@ impl ScanScale {
             let at = scan.position(vertex);
             for &face in scan.star(vertex) {
                 normal += scan.double_area_normal(face);
-                for corner in scan.corners(face).into_iter().filter(|&corner| corner != vertex) {
+                for corner in scan
+                    .corners(face)
+                    .into_iter()
+                    .filter(|&corner| corner != vertex)
+                {
                     let edge = scan.position(corner) - at;
                     edges.push(edge.norm());
                     (sum, count) = (sum + edge, count + 1.0);
@@ -60,7 +67,8 @@ impl ScanScale {
     /// - `unit`: how many m the scan as it was read takes for one.
     pub fn tolerance(&self, told_noise: f64, radius: f64, unit: f64) -> f64 {
         let noise = self.noise.max(told_noise);
-        (3.0 * noise + 0.2 * self.edge + 0.1 * radius).clamp(LEAST_TOLERANCE * unit, LARGEST_TOLERANCE * unit)
+        (3.0 * noise + 0.2 * self.edge + 0.1 * radius)
+            .clamp(LEAST_TOLERANCE * unit, LARGEST_TOLERANCE * unit)
     }
 }
 
@@ -114,32 +122,53 @@ impl BallFit {
     ) -> Self {
         let (mut distances, mut normals, mut is_beyond) = (Vec::new(), Vec::new(), Vec::new());
         for centre in centres {
-            let Some(hit) = tree.closest(scan, &centre, f64::INFINITY) else { continue };
+            let Some(hit) = tree.closest(scan, &centre, f64::INFINITY) else {
+                continue;
+            };
             let off = centre - hit.point;
             let normal = scan.normal(hit.face);
             distances.push(off.norm().copysign(off.dot(&normal)));
             normals.push(normal);
             is_beyond.push(is_on_rim(scan, &hit));
         }
-        let within = distances.iter().filter(|&&distance| (distance - radius).abs() <= tolerance).count();
-        let below = distances.iter().filter(|&&distance| distance < -tolerance).count();
+        let within = distances
+            .iter()
+            .filter(|&&distance| (distance - radius).abs() <= tolerance)
+            .count();
+        let below = distances
+            .iter()
+            .filter(|&&distance| distance < -tolerance)
+            .count();
         let is_lid = below as f64 <= MOST_UNDER_LIDS * distances.len() as f64;
         let count = distances.len() - if is_lid { below } else { 0 };
         let share = within as f64 / count.max(1) as f64;
         // beyond a rim there is no side
-        let is_rim = is_beyond.iter().filter(|is| **is).count() as f64 <= MOST_BEYOND_RIMS * distances.len() as f64;
-        let has_side = |distance: f64, is_beyond: bool| !(is_lid && distance < -tolerance || is_rim && is_beyond);
-        let sided = distances.iter().zip(&is_beyond).filter(|&(&distance, &is_beyond)| has_side(distance, is_beyond));
+        let is_rim = is_beyond.iter().filter(|is| **is).count() as f64
+            <= MOST_BEYOND_RIMS * distances.len() as f64;
+        let has_side = |distance: f64, is_beyond: bool| {
+            !(is_lid && distance < -tolerance || is_rim && is_beyond)
+        };
+        let sided = distances
+            .iter()
+            .zip(&is_beyond)
+            .filter(|&(&distance, &is_beyond)| has_side(distance, is_beyond));
         let mut sided: Vec<f64> = sided.map(|(&distance, _)| distance).collect();
         let distance = median(&mut sided).unwrap_or(f64::INFINITY);
         sided.iter_mut().for_each(|x| *x = (*x - distance).abs());
         let scatter = median(&mut sided).unwrap_or(f64::INFINITY);
-        Self { distance, scatter, share, distances, normals }
+        Self {
+            distance,
+            scatter,
+            share,
+            distances,
+            normals,
+        }
     }
 
     /// Share of the centres that are farther off the surface than `distance`, m, on whichever side: beside the part, and where the
     /// scan has holes, the side is not known.
     pub fn share_beyond(&self, distance: f64) -> f64 {
-        self.distances.iter().filter(|x| x.abs() > distance).count() as f64 / self.distances.len().max(1) as f64
+        self.distances.iter().filter(|x| x.abs() > distance).count() as f64
+            / self.distances.len().max(1) as f64
     }
 }

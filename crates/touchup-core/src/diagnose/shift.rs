@@ -36,17 +36,33 @@ pub(super) fn best_shift(
     let some = |most: usize| centres.iter().step_by(centres.len().div_ceil(most).max(1));
     let judges: Vec<Point3<f64>> = some(JUDGES).copied().collect();
     let share = |of: &[Point3<f64>], shift: Vector3<f64>| {
-        BallFit::of(scan, tree, of.iter().map(|centre| centre + shift), radius, tolerance).share
+        BallFit::of(
+            scan,
+            tree,
+            of.iter().map(|centre| centre + shift),
+            radius,
+            tolerance,
+        )
+        .share
     };
     let vertices = (0..scan.vertex_slots()).step_by((scan.vertex_slots() / VERTICES).max(1));
-    let vertices = vertices.map(|at| VertexId(at as u32)).filter(|&vertex| scan.has_vertex(vertex));
+    let vertices = vertices
+        .map(|at| VertexId(at as u32))
+        .filter(|&vertex| scan.has_vertex(vertex));
     let mut shifts: Vec<ContactShift> = vertices
         .filter_map(|vertex| {
-            let normals = scan.star(vertex).iter().map(|&face| scan.double_area_normal(face)).sum::<Vector3<f64>>();
+            let normals = scan
+                .star(vertex)
+                .iter()
+                .map(|&face| scan.double_area_normal(face))
+                .sum::<Vector3<f64>>();
             Some(scan.position(vertex) + normals.try_normalize(0.0)? * radius)
         })
         .flat_map(|place| some(CONTACTS).map(move |centre| place - centre))
-        .map(|shift| ContactShift { shift, share: share(&judges, shift) })
+        .map(|shift| ContactShift {
+            shift,
+            share: share(&judges, shift),
+        })
         .collect();
     shifts.sort_by(|a, b| b.share.total_cmp(&a.share));
     let refined = shifts.into_iter().take(REFINED).map(|mut best| {

@@ -32,7 +32,8 @@ impl StreamStamps {
         if let Some([first_ns, newest_ns]) = &mut self.span_ns {
             self.backs += u64::from(self.last_ns.saturating_sub(stamp_ns) > GOES_BACK_NS);
             if self.periods.len() < MOST_PERIODS {
-                self.periods.push(stamp_ns.saturating_sub(self.last_ns) as f64 * 1e-9);
+                self.periods
+                    .push(stamp_ns.saturating_sub(self.last_ns) as f64 * 1e-9);
             }
             (*first_ns, *newest_ns) = ((*first_ns).min(stamp_ns), (*newest_ns).max(stamp_ns));
         } else {
@@ -44,7 +45,8 @@ impl StreamStamps {
     /// s
     fn mean_period(&self) -> f64 {
         let [first_ns, newest_ns] = self.span_ns.unwrap_or_default();
-        newest_ns.saturating_sub(first_ns) as f64 * 1e-9 / self.count.max(2).saturating_sub(1) as f64
+        newest_ns.saturating_sub(first_ns) as f64 * 1e-9
+            / self.count.max(2).saturating_sub(1) as f64
     }
 }
 
@@ -64,7 +66,11 @@ impl InputStamps {
     }
 
     pub fn push(&mut self, message: &Message) {
-        let stream = if matches!(message, Message::Pose(_)) { &mut self.poses } else { &mut self.wrenches };
+        let stream = if matches!(message, Message::Pose(_)) {
+            &mut self.poses
+        } else {
+            &mut self.wrenches
+        };
         stream.push(message.stamp_ns());
     }
 
@@ -112,7 +118,8 @@ impl InputStamps {
             return findings;
         }
         if let (Some(poses), Some(wrenches)) = (self.poses.span_ns, self.wrenches.span_ns) {
-            let apart = (wrenches[0].saturating_sub(poses[1])).max(poses[0].saturating_sub(wrenches[1]));
+            let apart =
+                (wrenches[0].saturating_sub(poses[1])).max(poses[0].saturating_sub(wrenches[1]));
             if apart > 0 {
                 let later = wrenches[0].saturating_sub(poses[0]) as f64 * 1e-9;
                 findings.push(InputFinding::new(

@@ -42,11 +42,20 @@ impl Bodies {
             return Self::default();
         }
         let body = |faces: Vec<u32>| {
-            let is_closed = faces.iter().all(|&face| !facets.beside[face as usize].contains(&NONE));
+            let is_closed = faces
+                .iter()
+                .all(|&face| !facets.beside[face as usize].contains(&NONE));
             let mesh = is_closed.then(|| part(facets.mesh, &faces)).flatten()?;
-            Some(ClosedBody { tree: FaceTree::new(&mesh), mesh, faces })
+            Some(ClosedBody {
+                tree: FaceTree::new(&mesh),
+                mesh,
+                faces,
+            })
         };
-        Self { piece_of, bodies: pieces.into_iter().map(body).collect() }
+        Self {
+            piece_of,
+            bodies: pieces.into_iter().map(body).collect(),
+        }
     }
 
     /// Number of the piece that a face belongs to.
@@ -55,10 +64,23 @@ impl Bodies {
     }
 
     /// What a face sees.
-    pub fn around<'a>(&'a self, face: Option<u32>, mesh: &'a TriMesh, tree: &'a FaceTree) -> Surroundings<'a> {
+    pub fn around<'a>(
+        &'a self,
+        face: Option<u32>,
+        mesh: &'a TriMesh,
+        tree: &'a FaceTree,
+    ) -> Surroundings<'a> {
         match face.and_then(|face| self.bodies.get(self.piece_of(face) as usize)?.as_ref()) {
-            Some(ClosedBody { mesh, tree, faces }) => Surroundings { mesh, tree, faces: Some(faces) },
-            None => Surroundings { mesh, tree, faces: None },
+            Some(ClosedBody { mesh, tree, faces }) => Surroundings {
+                mesh,
+                tree,
+                faces: Some(faces),
+            },
+            None => Surroundings {
+                mesh,
+                tree,
+                faces: None,
+            },
         }
     }
 }
@@ -80,7 +102,9 @@ impl<'a> Surroundings<'a> {
 fn pieces(facets: &Facets) -> (Vec<u32>, Vec<Vec<u32>>) {
     let mut sets = DisjointSets::of(facets.slots());
     for (FaceId(face), _) in facets.mesh.faces() {
-        let beside = facets.beside[face as usize].iter().filter(|&&other| other != NONE);
+        let beside = facets.beside[face as usize]
+            .iter()
+            .filter(|&&other| other != NONE);
         beside.for_each(|&other| sets.join(face, other));
     }
     let (mut piece_of, mut faces) = (vec![NONE; facets.slots()], Vec::new());
@@ -106,6 +130,9 @@ fn part(mesh: &TriMesh, faces: &[u32]) -> Option<TriMesh> {
         let [a, b, c] = mesh.corners(FaceId(face)).map(number);
         Some([a?, b?, c?])
     });
-    let positions = vertices.iter().map(|&vertex| mesh.position(vertex)).collect();
+    let positions = vertices
+        .iter()
+        .map(|&vertex| mesh.position(vertex))
+        .collect();
     TriMesh::new(positions, renumbered.collect::<Option<_>>()?).ok()
 }

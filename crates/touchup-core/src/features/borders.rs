@@ -41,11 +41,21 @@ const SHORTEST: f64 = 0.02;
 
 /// The segment of each face, those of the seams too.
 pub(super) fn without_seams(parted: &Parted) -> Vec<u32> {
-    let is_strong: Vec<bool> = (0..parted.segmentation.segments.len()).map(|number| parted.is_strong(number)).collect();
-    let label = |&number: &u32| if number != NONE && is_strong[number as usize] { number } else { NONE };
+    let is_strong: Vec<bool> = (0..parted.segmentation.segments.len())
+        .map(|number| parted.is_strong(number))
+        .collect();
+    let label = |&number: &u32| {
+        if number != NONE && is_strong[number as usize] {
+            number
+        } else {
+            NONE
+        }
+    };
     let mut of_face: Vec<u32> = parted.segmentation.of_face.iter().map(label).collect();
     let without = (0..of_face.len() as u32).filter(|&face| of_face[face as usize] == NONE);
-    let beside = without.flat_map(|face| parted.facets.beside(face)).map(|(_, other)| other);
+    let beside = without
+        .flat_map(|face| parted.facets.beside(face))
+        .map(|(_, other)| other);
     let mut front = distinct(beside.filter(|&face| of_face[face as usize] != NONE));
     for _ in 0..SEAM {
         let mut next = Vec::new();
@@ -81,7 +91,10 @@ pub(super) fn borders(parted: &Parted, of_face: &[u32]) -> Borders {
         for (edge, other) in parted.facets.beside(face) {
             let beside = of_face[other as usize];
             if beside != NONE && label < beside {
-                let border = Border { ends: parted.facets.edge(face, edge), faces: [face, other] };
+                let border = Border {
+                    ends: parted.facets.edge(face, edge),
+                    faces: [face, other],
+                };
                 borders.entry([label, beside]).or_default().push(border);
             }
         }
@@ -91,16 +104,24 @@ pub(super) fn borders(parted: &Parted, of_face: &[u32]) -> Borders {
 
 /// All straight edges, in order of their planes.
 pub(super) fn straight_edges(parted: &Parted, borders: &Borders) -> Vec<StraightEdge> {
-    borders.iter().flat_map(|(&[i, j], border)| edges_between(parted, [i as usize, j as usize], border)).collect()
+    borders
+        .iter()
+        .flat_map(|(&[i, j], border)| edges_between(parted, [i as usize, j as usize], border))
+        .collect()
 }
 
 fn edges_between(parted: &Parted, planes: [usize; 2], border: &[Border]) -> Vec<StraightEdge> {
     let segments = planes.map(|number| parted.segment(number));
-    let Some((one, other)) = parted.plane(planes[0]).zip(parted.plane(planes[1])) else { return Vec::new() };
-    let Some(direction) = one.normal().cross(&other.normal()).try_normalize(SHARP) else { return Vec::new() };
+    let Some((one, other)) = parted.plane(planes[0]).zip(parted.plane(planes[1])) else {
+        return Vec::new();
+    };
+    let Some(direction) = one.normal().cross(&other.normal()).try_normalize(SHARP) else {
+        return Vec::new();
+    };
     let origin = on_both([one, other], &border[0].ends[0]);
     let tolerance = segments[0].tolerance.max(segments[1].tolerance);
-    let near = (NEAR_TOLERANCES * tolerance).max(NEAR_EDGES * parted.edge.min(GAP * parted.diagonal));
+    let near =
+        (NEAR_TOLERANCES * tolerance).max(NEAR_EDGES * parted.edge.min(GAP * parted.diagonal));
     let is_near = |x: &Point3<f64>| {
         let v = x - origin;
         (v - direction * v.dot(&direction)).norm() < near
@@ -112,7 +133,9 @@ fn edges_between(parted: &Parted, planes: [usize; 2], border: &[Border]) -> Vec<
         .map(|[a, b]| [a.min(b), a.max(b)])
         .collect();
     pieces.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let gap = (GAP_EDGES * parted.edge).min(GAP * parted.diagonal).max(near);
+    let gap = (GAP_EDGES * parted.edge)
+        .min(GAP * parted.diagonal)
+        .max(near);
     let mut joint: Vec<[f64; 2]> = Vec::new();
     for piece in pieces {
         match joint.last_mut() {
@@ -124,17 +147,28 @@ fn edges_between(parted: &Parted, planes: [usize; 2], border: &[Border]) -> Vec<
     joint
         .into_iter()
         .filter(|[a, b]| b - a > SHORTEST * parted.diagonal)
-        .map(|ends| StraightEdge { planes, ends: ends.map(|t| origin + direction * t), is_convex })
+        .map(|ends| StraightEdge {
+            planes,
+            ends: ends.map(|t| origin + direction * t),
+            is_convex,
+        })
         .collect()
 }
 
 /// Whether each of two segments falls away from the other where they meet.
 pub(super) fn is_convex(parted: &Parted, border: &[Border], numbers: [usize; 2]) -> bool {
     let surfaces = numbers.map(|number| &parted.segment(number).primitive);
-    let height =
-        |face: u32, surface: &Primitive| parted.facets.triangle(face).map(|x| surface.distance(&x)).iter().sum::<f64>();
+    let height = |face: u32, surface: &Primitive| {
+        parted
+            .facets
+            .triangle(face)
+            .map(|x| surface.distance(&x))
+            .iter()
+            .sum::<f64>()
+    };
     let along = |border: &Border| (border.ends[1] - border.ends[0]).norm();
-    let above = |b: &Border| (height(b.faces[1], surfaces[0]) + height(b.faces[0], surfaces[1])) * along(b);
+    let above =
+        |b: &Border| (height(b.faces[1], surfaces[0]) + height(b.faces[0], surfaces[1])) * along(b);
     border.iter().map(above).sum::<f64>() < 0.0
 }
 

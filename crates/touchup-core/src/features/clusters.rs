@@ -38,7 +38,11 @@ impl Default for PaperParams {
     /// the area that a defect is divided by, whether depressions with K < 0 count (here they do: |K|), and the start of
     /// k-means.
     fn default() -> Self {
-        Self { threshold: 0.3e6, k: 5, seed: 0 }
+        Self {
+            threshold: 0.3e6,
+            k: 5,
+            seed: 0,
+        }
     }
 }
 
@@ -46,14 +50,30 @@ impl Default for PaperParams {
 /// mesh, since at an edge or corner the curvature grows as the faces shrink.
 ///
 /// - `curvature`: of `mesh`, from [`super::curvature::curvature`]
-pub fn paper_clusters(mesh: &TriMesh, curvature: &[VertexCurvature], params: &PaperParams) -> Vec<Cluster> {
+pub fn paper_clusters(
+    mesh: &TriMesh,
+    curvature: &[VertexCurvature],
+    params: &PaperParams,
+) -> Vec<Cluster> {
     let is_marked = |(_, c): &(usize, &VertexCurvature)| c.gaussian().abs() > params.threshold;
-    let marked: Vec<_> = curvature.iter().enumerate().filter(is_marked).map(|(v, _)| VertexId(v as u32)).collect();
+    let marked: Vec<_> = curvature
+        .iter()
+        .enumerate()
+        .filter(is_marked)
+        .map(|(v, _)| VertexId(v as u32))
+        .collect();
     let points: Vec<_> = marked.iter().map(|&v| mesh.position(v)).collect();
     let found = k_means(&points, params.k, params.seed);
-    let cluster = |center: &Point3<f64>| Cluster { center: *center, vertices: Vec::new(), bend: None };
+    let cluster = |center: &Point3<f64>| Cluster {
+        center: *center,
+        vertices: Vec::new(),
+        bend: None,
+    };
     let mut clusters: Vec<_> = found.centers.iter().map(cluster).collect();
-    marked.iter().zip(&found.labels).for_each(|(v, label)| clusters[*label as usize].vertices.push(*v));
+    marked
+        .iter()
+        .zip(&found.labels)
+        .for_each(|(v, label)| clusters[*label as usize].vertices.push(*v));
     clusters.retain(|cluster| !cluster.vertices.is_empty());
     clusters.sort_by_key(|cluster| std::cmp::Reverse(cluster.vertices.len()));
     clusters
@@ -75,7 +95,11 @@ pub struct ClusterParams {
 
 impl Default for ClusterParams {
     fn default() -> Self {
-        Self { sharp_angle: 35f64.to_radians(), sharp_defect: 0.6, merge_share: 1e-3 }
+        Self {
+            sharp_angle: 35f64.to_radians(),
+            sharp_defect: 0.6,
+            merge_share: 1e-3,
+        }
     }
 }
 
@@ -86,22 +110,35 @@ impl Default for ClusterParams {
 /// edges of its wall, which carry no information. Rims of an open mesh are left out.
 ///
 /// - `curvature`: of `mesh`, from [`super::curvature::curvature`]
-pub fn clusters(mesh: &TriMesh, curvature: &[VertexCurvature], params: &ClusterParams) -> Vec<Cluster> {
+pub fn clusters(
+    mesh: &TriMesh,
+    curvature: &[VertexCurvature],
+    params: &ClusterParams,
+) -> Vec<Cluster> {
     let creases = Creases::find(mesh, curvature, params.sharp_angle, params.sharp_defect);
     let [low, high] = mesh.bounds();
     let near = params.merge_share * (high - low).norm();
     let mut regions = creases.connected();
     creases.merge(&mut regions, mesh, near);
-    let mut parts: Vec<(u32, usize)> = (0..creases.list.len()).map(|i| (regions.root(i as u32), i)).collect();
+    let mut parts: Vec<(u32, usize)> = (0..creases.list.len())
+        .map(|i| (regions.root(i as u32), i))
+        .collect();
     parts.sort_unstable();
-    let mut clusters: Vec<_> =
-        parts.chunk_by(|a, b| a.0 == b.0).filter_map(|part| cluster_of(mesh, &creases, part, near)).collect();
+    let mut clusters: Vec<_> = parts
+        .chunk_by(|a, b| a.0 == b.0)
+        .filter_map(|part| cluster_of(mesh, &creases, part, near))
+        .collect();
     clusters.sort_by(|a, b| a.vertices.cmp(&b.vertices));
     clusters
 }
 
 /// The cluster of some creases; `None` if they are no longer than `least`. A single sharp vertex always counts.
-fn cluster_of(mesh: &TriMesh, creases: &Creases, part: &[(u32, usize)], least: f64) -> Option<Cluster> {
+fn cluster_of(
+    mesh: &TriMesh,
+    creases: &Creases,
+    part: &[(u32, usize)],
+    least: f64,
+) -> Option<Cluster> {
     let list = || part.iter().map(|&(_, i)| &creases.list[i]);
     let (mut sum, mut length) = (Vector3::zeros(), 0.0);
     for ends in list().map(|crease| crease.ends.map(|v| mesh.position(v))) {
@@ -114,6 +151,14 @@ fn cluster_of(mesh: &TriMesh, creases: &Creases, part: &[(u32, usize)], least: f
     if length <= least && !has_point {
         return None;
     }
-    let center = if length > 0.0 { (sum / length).into() } else { mesh.position(vertices[0]) };
-    Some(Cluster { center, vertices, bend: list().next().map(|crease| crease.bend) })
+    let center = if length > 0.0 {
+        (sum / length).into()
+    } else {
+        mesh.position(vertices[0])
+    };
+    Some(Cluster {
+        center,
+        vertices,
+        bend: list().next().map(|crease| crease.bend),
+    })
 }

@@ -39,15 +39,28 @@ const COVERAGE: f64 = 0.6;
 /// Adds the cones at both ends of each hole's wall to the segmentation and to the walls.
 pub(super) fn add_cones(parted: &mut Parted, walls: &mut Vec<Wall>) {
     walls.retain(|wall| !wall.is_cone());
-    let holes: Vec<Wall> = walls.iter().filter(|wall| wall.is_concave && wall.coverage > COVERAGE).cloned().collect();
+    let holes: Vec<Wall> = walls
+        .iter()
+        .filter(|wall| wall.is_concave && wall.coverage > COVERAGE)
+        .cloned()
+        .collect();
     for wall in holes {
         for (end, out) in wall.ends.into_iter().zip([-1.0, 1.0]) {
-            let Some(segment) = cone_beyond(parted, &wall, end, out) else { continue };
+            let Some(segment) = cone_beyond(parted, &wall, end, out) else {
+                continue;
+            };
             let number = parted.segmentation.segments.len();
-            let cone = Wall::of_faces(&parted.facets, &segment.primitive, &segment.faces, vec![number]);
+            let cone = Wall::of_faces(
+                &parted.facets,
+                &segment.primitive,
+                &segment.faces,
+                vec![number],
+            );
             let is_sound = |cone: &Wall| {
                 let width = (cone.radius_at(cone.ends[1]) - cone.radius_at(cone.ends[0])).abs();
-                cone.coverage > COVERAGE && cone.filled > FILLED && width > LEAST_WIDTH * wall.radius()
+                cone.coverage > COVERAGE
+                    && cone.filled > FILLED
+                    && width > LEAST_WIDTH * wall.radius()
             };
             if let Some(cone) = cone.filter(is_sound) {
                 walls.push(cone);
@@ -70,12 +83,21 @@ fn cone_beyond(parted: &Parted, wall: &Wall, end: f64, out: f64) -> Option<Segme
         let corners = || faces.iter().flat_map(|&face| parted.facets.triangle(face));
         let misfit = |cone: &Primitive| corners().map(|p| cone.distance(&p).powi(2)).sum::<f64>();
         // those of a measured mesh are no better than its facets
-        let drawn = parted.rounding.and_then(|_| through_corners(parted, wall, &faces, &start));
+        let drawn = parted
+            .rounding
+            .and_then(|_| through_corners(parted, wall, &faces, &start));
         let better = [moved, drawn, Some(start)].into_iter().flatten();
         let better = better.min_by(|a, b| misfit(a).total_cmp(&misfit(b)))?;
         let faces = faces_on(parted, faces, &better, tolerance);
         let area = parted.facets.area_of(&faces);
-        (!faces.is_empty()).then_some(Segment { primitive: better, faces, area, tolerance, is_exact, felt_turn: 0.0 })
+        (!faces.is_empty()).then_some(Segment {
+            primitive: better,
+            faces,
+            area,
+            tolerance,
+            is_exact,
+            felt_turn: 0.0,
+        })
     })
 }
 
@@ -97,7 +119,11 @@ fn cone_of(parted: &Parted, wall: &Wall, faces: &[u32], out: f64) -> Option<Prim
     let along = |face: u32| parted.facets.normal(face).dot(&wall.axis) * out;
     let sine = median(&mut faces.iter().map(|&face| along(face)).collect::<Vec<_>>())?;
     let is_alike = |face: u32| (along(face) - sine).abs() < ALIKE;
-    let alike: Vec<u32> = faces.iter().copied().filter(|&face| is_alike(face)).collect();
+    let alike: Vec<u32> = faces
+        .iter()
+        .copied()
+        .filter(|&face| is_alike(face))
+        .collect();
     let is_steep = sine.abs() > SINES[0] && sine.abs() < SINES[1];
     if !is_steep || alike.len() as f64 <= LEAST_SHARE * faces.len() as f64 {
         return None;
@@ -108,21 +134,40 @@ fn cone_of(parted: &Parted, wall: &Wall, faces: &[u32], out: f64) -> Option<Prim
         let t = v.dot(&axis);
         t - (v - axis * t).norm() / half_angle.tan()
     };
-    let apex: Point3<f64> = wall.origin + axis * median(&mut alike.iter().map(apex_of).collect::<Vec<_>>())?;
+    let apex: Point3<f64> =
+        wall.origin + axis * median(&mut alike.iter().map(apex_of).collect::<Vec<_>>())?;
     Some(cone_from(apex, &axis, half_angle, wall))
 }
 
 /// A hollow cone, by its circle as wide as the wall.
 fn cone_from(apex: Point3<f64>, axis: &Vector3<f64>, half_angle: f64, wall: &Wall) -> Primitive {
     let radius = wall.radius();
-    Primitive::Cone(Cone::new(apex + axis * (radius / half_angle.tan()), axis, radius, half_angle, true))
+    Primitive::Cone(Cone::new(
+        apex + axis * (radius / half_angle.tan()),
+        axis,
+        radius,
+        half_angle,
+        true,
+    ))
 }
 
 /// The cone about the axis of the wall through the corners of faces: those of a coarse one lie on it, its facets do not.
-fn through_corners(parted: &Parted, wall: &Wall, faces: &[u32], start: &Primitive) -> Option<Primitive> {
-    let Primitive::Cone(start) = start else { return None };
+fn through_corners(
+    parted: &Parted,
+    wall: &Wall,
+    faces: &[u32],
+    start: &Primitive,
+) -> Option<Primitive> {
+    let Primitive::Cone(start) = start else {
+        return None;
+    };
     let axis = start.axis();
-    let corners = || faces.iter().flat_map(|&face| parted.facets.triangle(face)).map(|p| p - wall.origin);
+    let corners = || {
+        faces
+            .iter()
+            .flat_map(|&face| parted.facets.triangle(face))
+            .map(|p| p - wall.origin)
+    };
     // radius over height, a straight line
     let place = |v: Vector3<f64>| Vector2::new(v.dot(&axis), (v - axis * v.dot(&axis)).norm());
     let mean = corners().map(place).sum::<Vector2<f64>>() / (3 * faces.len()).max(1) as f64;
@@ -138,9 +183,14 @@ fn through_corners(parted: &Parted, wall: &Wall, faces: &[u32], start: &Primitiv
 
 /// Whether a cone has the axis of its hole.
 fn is_along(cone: &Primitive, wall: &Wall) -> bool {
-    let Primitive::Cone(cone) = cone else { return false };
+    let Primitive::Cone(cone) = cone else {
+        return false;
+    };
     let off = |apex: Point3<f64>| (apex - wall.origin).cross(&wall.axis).norm();
-    cone.axis().dot(&wall.axis).abs() > SINES[1] && cone.apex().is_some_and(|apex| off(apex) < NEAR * wall.radius())
+    cone.axis().dot(&wall.axis).abs() > SINES[1]
+        && cone
+            .apex()
+            .is_some_and(|apex| off(apex) < NEAR * wall.radius())
 }
 
 /// Faces that lie on the cone, from those of `seeds` on, planes and round walls left alone.

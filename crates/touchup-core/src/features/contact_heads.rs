@@ -61,33 +61,53 @@ struct Seen {
 /// The head around a bore that was felt, above its floor; `None` where contacts show none.
 pub(super) fn head_of(measure: &Measure, bore: &Feature) -> Option<Head> {
     let observed = measure.observed;
-    let (axis, narrow) = (bore.axis.as_ref()?.value, bore.diameter.as_ref()?.value / 2.0);
+    let (axis, narrow) = (
+        bore.axis.as_ref()?.value,
+        bore.diameter.as_ref()?.value / 2.0,
+    );
     if bore.kind != Kind::Hole || bore.fitted_to != FittedTo::Touches {
         return None;
     }
-    [axis, -axis].into_iter().find_map(|out| head_towards(observed, &bore.centre.value, &out, narrow))
+    [axis, -axis]
+        .into_iter()
+        .find_map(|out| head_towards(observed, &bore.centre.value, &out, narrow))
 }
 
-fn head_towards(observed: &Observed, on_axis: &Point3<f64>, out: &Vector3<f64>, narrow: f64) -> Option<Head> {
+fn head_towards(
+    observed: &Observed,
+    on_axis: &Point3<f64>,
+    out: &Vector3<f64>,
+    narrow: f64,
+) -> Option<Head> {
     let radius = observed.reach();
     let seen = seen_from(observed, on_axis, out, narrow * HEADS.end);
     let parted = observed.parted;
     let is_land = |&number: &usize| {
-        parted.is_strong(number) && parted.plane(number).is_some_and(|plane| plane.normal().dot(out) > SQUARE)
+        parted.is_strong(number)
+            && parted
+                .plane(number)
+                .is_some_and(|plane| plane.normal().dot(out) > SQUARE)
     };
-    (0..parted.segmentation.segments.len()).filter(is_land).find_map(|land| {
-        let level = parted.plane(land)?.along(on_axis, out)?;
-        let head = head_under(observed, &seen, on_axis, out, (narrow, level, land))?;
-        let around = parted.around(land);
-        let ring = [head.wall.surface.radius + 0.5 * radius];
-        let top = head.wall.surface.nearest_on_axis(&(on_axis + out * level));
-        let (number, share) = parted.plane_around(&around, &top, out, &ring, 0.3 * radius)?;
-        (number == land && share > FLOOR_TURN).then_some(head)
-    })
+    (0..parted.segmentation.segments.len())
+        .filter(is_land)
+        .find_map(|land| {
+            let level = parted.plane(land)?.along(on_axis, out)?;
+            let head = head_under(observed, &seen, on_axis, out, (narrow, level, land))?;
+            let around = parted.around(land);
+            let ring = [head.wall.surface.radius + 0.5 * radius];
+            let top = head.wall.surface.nearest_on_axis(&(on_axis + out * level));
+            let (number, share) = parted.plane_around(&around, &top, out, &ring, 0.3 * radius)?;
+            (number == land && share > FLOOR_TURN).then_some(head)
+        })
 }
 
 /// Contacts around an axis.
-fn seen_from(observed: &Observed, on_axis: &Point3<f64>, out: &Vector3<f64>, widest: f64) -> Vec<Seen> {
+fn seen_from(
+    observed: &Observed,
+    on_axis: &Point3<f64>,
+    out: &Vector3<f64>,
+    widest: f64,
+) -> Vec<Seen> {
     let [e, g] = tangent_basis(out);
     let seen = observed.sound().filter_map(|(touch, contact)| {
         let v = contact.centre - on_axis;
@@ -96,8 +116,19 @@ fn seen_from(observed: &Observed, on_axis: &Point3<f64>, out: &Vector3<f64>, wid
         let rho = aside.norm();
         let turn = aside.dot(&g).atan2(aside.dot(&e)) / std::f64::consts::TAU;
         let part = ((turn * PARTS as f64).floor() as i64).rem_euclid(PARTS as i64) as usize;
-        let inward = if rho > 0.0 { -contact.normal.dot(&aside) / rho } else { 0.0 };
-        (rho < widest).then_some(Seen { touch, z, rho, part, up: contact.normal.dot(out), inward })
+        let inward = if rho > 0.0 {
+            -contact.normal.dot(&aside) / rho
+        } else {
+            0.0
+        };
+        (rho < widest).then_some(Seen {
+            touch,
+            z,
+            rho,
+            part,
+            up: contact.normal.dot(out),
+            inward,
+        })
     });
     seen.collect()
 }
@@ -133,35 +164,90 @@ fn head_under(
         .filter(|(wide, ..)| HEADS.contains(&(wide / narrow)))
         .collect();
     let near = SEARCHED * radius;
-    let on = |wide: f64| walls.iter().filter(move |(other, ..)| (other - wide).abs() < near);
-    let candidates = walls.iter().step_by(walls.len().div_ceil(200).max(1)).map(|(wide, ..)| *wide);
-    let counted = candidates.map(|wide| (turn_of(on(wide).map(|(.., one)| *one)), on(wide).count(), wide));
+    let on = |wide: f64| {
+        walls
+            .iter()
+            .filter(move |(other, ..)| (other - wide).abs() < near)
+    };
+    let candidates = walls
+        .iter()
+        .step_by(walls.len().div_ceil(200).max(1))
+        .map(|(wide, ..)| *wide);
+    let counted = candidates.map(|wide| {
+        (
+            turn_of(on(wide).map(|(.., one)| *one)),
+            on(wide).count(),
+            wide,
+        )
+    });
     let best = counted.filter(|&(turn, count, _)| turn >= TURN && count >= LEAST);
-    let (.., wide) = best.max_by(|a, b| (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal))?;
+    let (.., wide) = best.max_by(|a, b| {
+        (a.0, a.1)
+            .partial_cmp(&(b.0, b.1))
+            .unwrap_or(std::cmp::Ordering::Equal)
+    })?;
     let wide = median(&mut on(wide).map(|(other, ..)| *other).collect::<Vec<_>>())?;
     // the floor between both
-    let is_floor = |one: &&Seen| one.up > LEVEL && one.rho < wide && one.z < level + radius * (1.0 - DEPTHS.start);
-    let of_floor: Vec<&Seen> = seen.iter().filter(is_floor).filter(|one| one.rho > narrow - 0.5 * radius).collect();
+    let is_floor = |one: &&Seen| {
+        one.up > LEVEL && one.rho < wide && one.z < level + radius * (1.0 - DEPTHS.start)
+    };
+    let of_floor: Vec<&Seen> = seen
+        .iter()
+        .filter(is_floor)
+        .filter(|one| one.rho > narrow - 0.5 * radius)
+        .collect();
     let height = median(&mut of_floor.iter().map(|one| one.z).collect::<Vec<_>>())?;
-    let floor: Vec<&Seen> = of_floor.into_iter().filter(|one| (one.z - height).abs() < near).collect();
+    let floor: Vec<&Seen> = of_floor
+        .into_iter()
+        .filter(|one| (one.z - height).abs() < near)
+        .collect();
     let depth = level - (height - radius);
-    if !DEPTHS.contains(&(depth / radius)) || turn_of(floor.iter().copied()) < FLOOR_TURN || floor.len() < LEAST / 2 {
+    if !DEPTHS.contains(&(depth / radius))
+        || turn_of(floor.iter().copied()) < FLOOR_TURN
+        || floor.len() < LEAST / 2
+    {
         return None;
     }
-    let of_wall: Vec<&(f64, f64, &Seen)> = on(wide).filter(|(.., one)| one.z > height - near).collect();
+    let of_wall: Vec<&(f64, f64, &Seen)> =
+        on(wide).filter(|(.., one)| one.z > height - near).collect();
     let numbers: Vec<u32> = of_wall.iter().map(|(.., one)| one.touch).collect();
     let observations: Vec<Observation> = observed
         .of_touches(&numbers)
         .into_iter()
         .zip(&of_wall)
-        .map(|(observation, (_, away, _))| Observation { offset: *away, ..observation })
+        .map(|(observation, (_, away, _))| Observation {
+            offset: *away,
+            ..observation
+        })
         .collect();
     let [common_sigma, shift_sigma] = observed.systematic(&numbers);
-    let params = FitParams { common_sigma, shift_sigma, axis_sigma: Some(1e-3), ..FitParams::default() };
+    let params = FitParams {
+        common_sigma,
+        shift_sigma,
+        axis_sigma: Some(1e-3),
+        ..FitParams::default()
+    };
     let guess = Cylinder::new(on_axis + out * (level - depth / 2.0), out, wide, true);
     let found = fit(&guess, &observations, &params).ok()?;
-    let touches = numbers.into_iter().zip(&found.used).filter(|&(_, used)| *used).map(|(touch, _)| touch).collect();
+    let touches = numbers
+        .into_iter()
+        .zip(&found.used)
+        .filter(|&(_, used)| *used)
+        .map(|(touch, _)| touch)
+        .collect();
     let surface = found.surface;
-    let wall = Fitted { surface, fit: Some(found), touches, to: FittedTo::Touches, is_confirmed: true };
-    Some(Head { wall, floor: floor.into_iter().map(|one| one.touch).collect(), land, out: *out, depth })
+    let wall = Fitted {
+        surface,
+        fit: Some(found),
+        touches,
+        to: FittedTo::Touches,
+        is_confirmed: true,
+    };
+    Some(Head {
+        wall,
+        floor: floor.into_iter().map(|one| one.touch).collect(),
+        land,
+        out: *out,
+        depth,
+    })
 }

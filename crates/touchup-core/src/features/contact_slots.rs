@@ -7,7 +7,9 @@ use nalgebra::{Point2, Point3, Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-use super::contacts::{ALIKE, Projected, SQUARE, TOGETHER, axes, large_planes, projected, thinned, together_along};
+use super::contacts::{
+    ALIKE, Projected, SQUARE, TOGETHER, axes, large_planes, projected, thinned, together_along,
+};
 use super::fit::Ends;
 use super::scene::Parted;
 use super::slots::{LONG, LONG_BOX, SHALLOW, SQUARISH, Slot, WIDE};
@@ -80,18 +82,37 @@ struct Line {
 /// All slots and pockets that contacts show.
 ///
 /// - `is_round`: by contact, whether it is on a wall that is round all around
-pub(super) fn contact_slots(parted: &Parted, touches: &[ProbedPoint], is_round: &[bool]) -> Vec<Slot> {
+pub(super) fn contact_slots(
+    parted: &Parted,
+    touches: &[ProbedPoint],
+    is_round: &[bool],
+) -> Vec<Slot> {
     let kept = thinned(touches);
-    let Some(radius) = kept.first().map(|&at| touches[at].radius) else { return Vec::new() };
+    let Some(radius) = kept.first().map(|&at| touches[at].radius) else {
+        return Vec::new();
+    };
     let kept: Vec<usize> = kept.into_iter().filter(|&at| !is_round[at]).collect();
     let planes = large_planes(parted);
     let mut found: Vec<(usize, Slot)> = Vec::new();
     for axis in axes(parted, &planes, touches, &kept, radius) {
-        let upright: Vec<usize> =
-            kept.iter().copied().filter(|&at| touches[at].normal.dot(&axis).abs() < SQUARE).collect();
-        let view = AxisView { parted, touches, kept: &kept, axis, plane: tangent_basis(&axis), radius };
+        let upright: Vec<usize> = kept
+            .iter()
+            .copied()
+            .filter(|&at| touches[at].normal.dot(&axis).abs() < SQUARE)
+            .collect();
+        let view = AxisView {
+            parted,
+            touches,
+            kept: &kept,
+            axis,
+            plane: tangent_basis(&axis),
+            radius,
+        };
         let groups = together_along(touches, &upright, &axis, TOGETHER * radius);
-        let lines: Vec<Line> = groups.iter().flat_map(|members| view.lines(members)).collect();
+        let lines: Vec<Line> = groups
+            .iter()
+            .flat_map(|members| view.lines(members))
+            .collect();
         for (at, one) in lines.iter().enumerate() {
             for other in &lines[..at] {
                 let count = one.touches.len() + other.touches.len();
@@ -101,7 +122,9 @@ pub(super) fn contact_slots(parted: &Parted, touches: &[ProbedPoint], is_round: 
     }
     // of walls in pieces, and seen along several axes, those count that most contacts are on
     found.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
-    without_repeats(found.into_iter().map(|(_, slot)| slot), |one, other| one.holds(other) || other.holds(one))
+    without_repeats(found.into_iter().map(|(_, slot)| slot), |one, other| {
+        one.holds(other) || other.holds(one)
+    })
 }
 
 /// Contacts seen along an axis.
@@ -151,14 +174,23 @@ impl AxisView<'_> {
             for start in (0..left.len()).step_by(left.len().div_ceil(STARTS)) {
                 for _ in 0..PARTNERS {
                     let [p, q] = [&left[start], &left[rng.random_range(0..left.len())]];
-                    let Some(normal) = self.through(p, q) else { continue };
-                    let count = left.iter().step_by(step).filter(|one| self.is_on_line(one, &p.at, &normal)).count();
+                    let Some(normal) = self.through(p, q) else {
+                        continue;
+                    };
+                    let count = left
+                        .iter()
+                        .step_by(step)
+                        .filter(|one| self.is_on_line(one, &p.at, &normal))
+                        .count();
                     if best.as_ref().is_none_or(|&(most, ..)| count > most) {
                         best = Some((count, p.at, normal));
                     }
                 }
             }
-            let Some(line) = best.and_then(|(_, at, normal)| self.fitted_line(&left, at, normal)) else { break };
+            let Some(line) = best.and_then(|(_, at, normal)| self.fitted_line(&left, at, normal))
+            else {
+                break;
+            };
             let taken = distinct(line.touches.iter().copied());
             left.retain(|one| taken.binary_search(&one.touch).is_err());
             found.push(line);
@@ -183,7 +215,12 @@ impl AxisView<'_> {
     }
 
     /// The line through contacts near one: those that hang together along it; `None` where they are too few.
-    fn fitted_line(&self, all: &[Projected], mut at: Point2<f64>, mut normal: Vector2<f64>) -> Option<Line> {
+    fn fitted_line(
+        &self,
+        all: &[Projected],
+        mut at: Point2<f64>,
+        mut normal: Vector2<f64>,
+    ) -> Option<Line> {
         let mut line = None;
         for _ in 0..3 {
             let along = Vector2::new(normal.y, -normal.x);
@@ -193,13 +230,19 @@ impl AxisView<'_> {
                 .map(|one| ((one.at - at).dot(&along), one))
                 .collect();
             on.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let run = on.chunk_by(|a, b| b.0 - a.0 < GAP_RADII * self.radius).max_by_key(|run| run.len())?;
+            let run = on
+                .chunk_by(|a, b| b.0 - a.0 < GAP_RADII * self.radius)
+                .max_by_key(|run| run.len())?;
             let is_long = run.last()?.0 - run.first()?.0 > LEAST_RADII * self.radius;
             if run.len() < LEAST || !is_long {
                 return None;
             }
             let count = run.len() as f64;
-            let middle = run.iter().map(|(_, one)| one.at.coords).sum::<Vector2<f64>>() / count;
+            let middle = run
+                .iter()
+                .map(|(_, one)| one.at.coords)
+                .sum::<Vector2<f64>>()
+                / count;
             let [mut xx, mut xy] = [0.0; 2];
             for (_, one) in run {
                 let v = one.at.coords - middle;
@@ -209,7 +252,12 @@ impl AxisView<'_> {
             let turned = normal - along * (xy / xx);
             (at, normal) = (Point2::from(middle), turned.normalize());
             let centres = run.iter().map(|(_, one)| one.at).collect();
-            line = Some(Line { centres, touches: run.iter().map(|(_, one)| one.touch).collect(), at, normal });
+            line = Some(Line {
+                centres,
+                touches: run.iter().map(|(_, one)| one.touch).collect(),
+                at,
+                normal,
+            });
         }
         line
     }
@@ -224,7 +272,9 @@ impl AxisView<'_> {
         let along = Vector2::new(across.y, -across.x);
         let span = |line: &Line| {
             let x = line.centres.iter().map(|p| (p - one.at).dot(&along));
-            x.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+            x.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
+                [low.min(x), high.max(x)]
+            })
         };
         let [a, b] = [span(one), span(other)];
         let (low, high) = (a[0].max(b[0]), a[1].min(b[1]));
@@ -240,11 +290,18 @@ impl AxisView<'_> {
             let mut z: Vec<f64> = line.touches.iter().map(height).collect();
             z.sort_by(f64::total_cmp);
             // a wall beyond may lie on the same line
-            let run = z.chunk_by(|a, b| b - a < LAYER_RADII * self.radius).max_by_key(|run| run.len());
+            let run = z
+                .chunk_by(|a, b| b - a < LAYER_RADII * self.radius)
+                .max_by_key(|run| run.len());
             let mut run = run.unwrap_or_default().to_vec();
-            [0.0, 1.0].map(|end| order_statistic(&mut run, OUTER + end * (1.0 - 2.0 * OUTER)).unwrap_or_default())
+            [0.0, 1.0].map(|end| {
+                order_statistic(&mut run, OUTER + end * (1.0 - 2.0 * OUTER)).unwrap_or_default()
+            })
         });
-        let (bottom, top) = (heights[0][0].min(heights[1][0]), heights[0][1].max(heights[1][1]));
+        let (bottom, top) = (
+            heights[0][0].min(heights[1][0]),
+            heights[0][1].max(heights[1][1]),
+        );
         if heights[0][0].max(heights[1][0]) > heights[0][1].min(heights[1][1]) + self.radius {
             return None;
         }
@@ -291,11 +348,27 @@ impl Void<'_> {
         let local = |touch: usize| {
             let contact = &self.view.touches[touch];
             let (v, p) = (contact.centre - self.origin, contact.point - self.origin);
-            let to = |v: &Vector3<f64>| [v.dot(&self.along), v.dot(&self.across), v.dot(&self.view.axis)];
+            let to = |v: &Vector3<f64>| {
+                [
+                    v.dot(&self.along),
+                    v.dot(&self.across),
+                    v.dot(&self.view.axis),
+                ]
+            };
             let ([x, y, _], [contact_x, contact_y, z]) = (to(&v), to(&p));
             let normal = Vector3::from(to(&contact.normal));
-            let is_beside = x > self.reach[0] - w && x < self.reach[1] + w && y.abs() < self.gap / 2.0 + 0.3 * r;
-            (is_beside && !contact.is_rejected).then_some(Local { touch, x, y, contact_x, contact_y, z, normal })
+            let is_beside = x > self.reach[0] - w
+                && x < self.reach[1] + w
+                && y.abs() < self.gap / 2.0 + 0.3 * r;
+            (is_beside && !contact.is_rejected).then_some(Local {
+                touch,
+                x,
+                y,
+                contact_x,
+                contact_y,
+                z,
+                normal,
+            })
         };
         among.filter_map(local).collect()
     }
@@ -309,24 +382,40 @@ impl Void<'_> {
         };
         let of_end: Vec<&Local> = contacts.iter().filter(is_of).collect();
         // another slot may end beyond: what is nearest counts
-        let nearest = of_end.iter().map(|one| one.x * sign).fold(f64::INFINITY, f64::min);
-        let of_end: Vec<&Local> = of_end.into_iter().filter(|one| one.x * sign < nearest + half.max(0.5 * r)).collect();
+        let nearest = of_end
+            .iter()
+            .map(|one| one.x * sign)
+            .fold(f64::INFINITY, f64::min);
+        let of_end: Vec<&Local> = of_end
+            .into_iter()
+            .filter(|one| one.x * sign < nearest + half.max(0.5 * r))
+            .collect();
         if of_end.len() < END_CONTACTS {
             return None;
         }
         let half_width = self.width() / 2.0;
         // contacts and not centres: a ball that fills the end hardly moves in it
-        let from_axis = |one: &Local| (half_width * half_width - one.contact_y.powi(2)).max(0.0).sqrt();
+        let from_axis = |one: &Local| {
+            (half_width * half_width - one.contact_y.powi(2))
+                .max(0.0)
+                .sqrt()
+        };
         let axis_at = |one: &Local| one.contact_x * sign - from_axis(one);
-        let middle_of =
-            |place: &dyn Fn(&Local) -> f64| median(&mut of_end.iter().map(|one| place(one)).collect::<Vec<_>>());
-        let (round, flat) = (middle_of(&axis_at)?, middle_of(&|one| one.contact_x * sign)?);
+        let middle_of = |place: &dyn Fn(&Local) -> f64| {
+            median(&mut of_end.iter().map(|one| place(one)).collect::<Vec<_>>())
+        };
+        let (round, flat) = (
+            middle_of(&axis_at)?,
+            middle_of(&|one| one.contact_x * sign)?,
+        );
         let end_at = [
-            middle_of(&|one| one.x * sign - (half * half - one.y * one.y).max(0.0).sqrt())? + half_width,
+            middle_of(&|one| one.x * sign - (half * half - one.y * one.y).max(0.0).sqrt())?
+                + half_width,
             middle_of(&|one| one.x * sign)? + r,
         ];
         let misfit = |off: f64, normal: &Vector2<f64>, expected: &Vector2<f64>| {
-            let misfit = (off / (END_OFF * r)).powi(2) + (normal - expected).norm_squared() / END_TURNED.powi(2);
+            let misfit = (off / (END_OFF * r)).powi(2)
+                + (normal - expected).norm_squared() / END_TURNED.powi(2);
             misfit.min(MOST_MISFIT)
         };
         let mut costs = [0.0; 2];
@@ -336,7 +425,10 @@ impl Void<'_> {
             costs[0] += misfit(axis_at(one) - round, &normal, &of_circle);
             costs[1] += misfit(one.contact_x * sign - flat, &normal, &-Vector2::x());
         }
-        Some(SlotEnd { at: end_at.map(|at| at * sign), costs })
+        Some(SlotEnd {
+            at: end_at.map(|at| at * sign),
+            costs,
+        })
     }
 
     /// The slot or pocket; `None` where it is none.
@@ -349,13 +441,20 @@ impl Void<'_> {
         // what is open at an end is left to the mesh
         let ends = [self.end(&contacts, 1.0)?, self.end(&contacts, -1.0)?];
         let total = |shape: usize| ends[0].costs[shape] + ends[1].costs[shape];
-        let shape = if total(0) <= total(1) { Ends::Round } else { Ends::Straight };
+        let shape = if total(0) <= total(1) {
+            Ends::Round
+        } else {
+            Ends::Straight
+        };
         let [high, low] = ends.map(|end| end.at[usize::from(shape == Ends::Straight)]);
         let length = high - low;
         if length < SQUARISH * width {
             return None;
         }
-        let (axis, middle) = (self.view.axis, self.origin + self.along * ((high + low) / 2.0));
+        let (axis, middle) = (
+            self.view.axis,
+            self.origin + self.along * ((high + low) / 2.0),
+        );
         let openings = [axis, -axis].map(|out| self.land(&middle, &out));
         let out_at = match openings {
             [Some(up), Some(down)] => usize::from(down.distance < up.distance),
@@ -364,13 +463,22 @@ impl Void<'_> {
             [None, None] => return None,
         };
         let (land, out) = (openings[out_at]?, if out_at == 0 { axis } else { -axis });
-        let floor = self.floor(&self.contacts(0..self.view.touches.len()), &out, [low, high]);
-        let is_reached = |end: &Land| floor.is_none() && end.distance < self.half_height + self.view.radius;
+        let floor = self.floor(
+            &self.contacts(0..self.view.touches.len()),
+            &out,
+            [low, high],
+        );
+        let is_reached =
+            |end: &Land| floor.is_none() && end.distance < self.half_height + self.view.radius;
         let opposite = openings[1 - out_at].filter(is_reached);
         let lowest = opposite.map_or(self.half_height, |end| end.distance);
         let down = floor.as_ref().map_or(lowest, |(_, distance)| *distance);
         let depth = land.distance + down;
-        let is_through = if floor.is_some() { Some(false) } else { opposite.map(|_| true) };
+        let is_through = if floor.is_some() {
+            Some(false)
+        } else {
+            opposite.map(|_| true)
+        };
         let (is_shut, is_boxed) = (floor.is_some(), shape == Ends::Straight);
         let is_long = length > width * if is_boxed { LONG_BOX } else { LONG };
         let is_pocket = !is_long && is_boxed && is_shut;
@@ -413,43 +521,66 @@ impl Void<'_> {
         let farthest = self.half_height + (2.0 * r).max(0.5 * self.width());
         let mut best: Option<Land> = None;
         for number in 0..parted.segmentation.segments.len() {
-            let is_plane = parted.plane(number).is_some_and(|plane| plane.normal().dot(out) > LAND);
+            let is_plane = parted
+                .plane(number)
+                .is_some_and(|plane| plane.normal().dot(out) > LAND);
             if !parted.is_strong(number) || !(is_plane || parted.is_shaft(number)) {
                 continue;
             }
-            let Some(distance) = parted.exit(number, middle, out) else { continue };
+            let Some(distance) = parted.exit(number, middle, out) else {
+                continue;
+            };
             if distance < self.half_height - r || distance > farthest {
                 continue;
             }
             let around = parted.around(number);
             let primitive = &parted.segment(number).primitive;
             let is_there = |beside: Point3<f64>| {
-                let Some(up) = parted.exit(number, &beside, out) else { return false };
+                let Some(up) = parted.exit(number, &beside, out) else {
+                    return false;
+                };
                 let place = beside + out * up;
                 let normal = primitive.distance_and_normal(&place).1;
-                around.closest(&place, LAND_OFF * r).is_some_and(|face| parted.facets.normal(face).dot(&normal) > ALIKE)
+                around
+                    .closest(&place, LAND_OFF * r)
+                    .is_some_and(|face| parted.facets.normal(face).dot(&normal) > ALIKE)
             };
             let mut count = 0;
-            for (side, at) in [1.0, -1.0].into_iter().flat_map(|side| (0..PLACES).map(move |at| (side, at))) {
+            for (side, at) in [1.0, -1.0]
+                .into_iter()
+                .flat_map(|side| (0..PLACES).map(move |at| (side, at)))
+            {
                 let x = self.felt * (2.0 * at as f64 / (PLACES - 1) as f64 - 1.0);
-                let beside = |off: f64| middle + self.along * x + self.across * (side * (self.width() / 2.0 + off));
+                let beside = |off: f64| {
+                    middle + self.along * x + self.across * (side * (self.width() / 2.0 + off))
+                };
                 count += usize::from(LAND_RADII.iter().any(|radii| is_there(beside(radii * r))));
             }
             let share = count as f64 / (2 * PLACES) as f64;
             if share > LAND_SHARE && best.is_none_or(|best| share > best.share) {
-                best = Some(Land { number, distance, share });
+                best = Some(Land {
+                    number,
+                    distance,
+                    share,
+                });
             }
         }
         best
     }
 
     /// The contacts on the floor, with its distance below the middle, m.
-    fn floor(&self, contacts: &[Local], out: &Vector3<f64>, [low, high]: [f64; 2]) -> Option<(Vec<u32>, f64)> {
+    fn floor(
+        &self,
+        contacts: &[Local],
+        out: &Vector3<f64>,
+        [low, high]: [f64; 2],
+    ) -> Option<(Vec<u32>, f64)> {
         let r = self.view.radius;
         let side = -self.view.axis.dot(out).signum();
         let deepest = self.half_height + FLOOR_RADII * r;
         let is_of = |one: &&Local| {
-            let is_inside = one.x > low && one.x < high && one.y.abs() < self.gap / 2.0 + SEARCHED * r;
+            let is_inside =
+                one.x > low && one.x < high && one.y.abs() < self.gap / 2.0 + SEARCHED * r;
             is_inside
                 && one.normal.z * side < -FLOOR_LEAN
                 && one.z * side > self.half_height - 0.5 * r
@@ -457,7 +588,9 @@ impl Void<'_> {
         };
         let of_floor: Vec<&Local> = contacts.iter().filter(is_of).collect();
         let level = median(&mut of_floor.iter().map(|one| one.z * side).collect::<Vec<_>>())?;
-        let on = of_floor.iter().filter(|one| (one.z * side - level).abs() < FLOOR_OFF * r);
+        let on = of_floor
+            .iter()
+            .filter(|one| (one.z * side - level).abs() < FLOOR_OFF * r);
         let on: Vec<u32> = on.map(|one| one.touch as u32).collect();
         (on.len() >= FLOOR_CONTACTS).then_some((on, level))
     }

@@ -11,7 +11,8 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::contacts::{
-    ALIKE, LEAST, Projected, SQUARE, TOGETHER, axes, is_on, large_planes, projected, thinned, together,
+    ALIKE, LEAST, Projected, SQUARE, TOGETHER, axes, is_on, large_planes, projected, thinned,
+    together,
 };
 use super::facets::NONE;
 use super::fit::{Cylinder, FitParams, Plane, Surface, fit};
@@ -99,17 +100,38 @@ struct ContactWalls {
 pub(super) fn add_contact_walls(parted: &mut Parted, touches: &[ProbedPoint]) -> Vec<bool> {
     let radius = touches.iter().map(|touch| touch.radius).fold(0.0, f64::max);
     let ContactWalls { cylinders, planes } = contact_walls(parted, touches);
-    let of_planes = planes.iter().map(|found| (Primitive::Plane(found.surface), faces_by(parted, found, touches), 0.0));
+    let of_planes = planes.iter().map(|found| {
+        (
+            Primitive::Plane(found.surface),
+            faces_by(parted, found, touches),
+            0.0,
+        )
+    });
     let of_cylinders = cylinders.iter().map(|found| {
-        let faces = [faces_on(parted, found, radius), faces_of_same(parted, found, radius)].concat();
-        (Primitive::Cylinder(found.surface), distinct(faces), found.turn)
+        let faces = [
+            faces_on(parted, found, radius),
+            faces_of_same(parted, found, radius),
+        ]
+        .concat();
+        (
+            Primitive::Cylinder(found.surface),
+            distinct(faces),
+            found.turn,
+        )
     });
     let found: Vec<_> = of_planes.chain(of_cylinders).collect();
     for (primitive, faces, felt_turn) in found {
         let area = parted.facets.area_of(&faces);
         if area > 0.0 {
             let tolerance = TOLERANCE * radius;
-            let segment = Segment { primitive, faces, area, tolerance, is_exact: false, felt_turn };
+            let segment = Segment {
+                primitive,
+                faces,
+                area,
+                tolerance,
+                is_exact: false,
+                felt_turn,
+            };
             parted.segmentation.add(&parted.facets, segment);
         }
     }
@@ -122,15 +144,24 @@ pub(super) fn add_contact_walls(parted: &mut Parted, touches: &[ProbedPoint]) ->
 
 /// Faces of the round pieces of the mesh that are the same wall, or the rest of it that nobody touched: one wall is one feature.
 fn faces_of_same(parted: &Parted, found: &ContactCylinder, of_ball: f64) -> Vec<u32> {
-    let Cylinder { radius, concave, .. } = found.surface;
+    let Cylinder {
+        radius, concave, ..
+    } = found.surface;
     let near = (SAME_WALL * radius).min(SAME_WALL_OF_BALL * of_ball);
     let (axis, centre) = (found.surface.axis(), found.surface.center());
     let is_same = |segment: &&Segment| {
-        let Primitive::Cylinder(other) = segment.primitive else { return false };
+        let Primitive::Cylinder(other) = segment.primitive else {
+            return false;
+        };
         let aside = (other.center() - centre).cross(&axis).norm();
-        let along =
-            segment.faces.iter().flat_map(|&face| parted.facets.triangle(face)).map(|p| (p - centre).dot(&axis));
-        let [low, high] = along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| [low.min(t), high.max(t)]);
+        let along = segment
+            .faces
+            .iter()
+            .flat_map(|&face| parted.facets.triangle(face))
+            .map(|p| (p - centre).dot(&axis));
+        let [low, high] = along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| {
+            [low.min(t), high.max(t)]
+        });
         other.concave == concave
             && (other.radius - radius).abs() < near
             && aside < near
@@ -138,7 +169,13 @@ fn faces_of_same(parted: &Parted, found: &ContactCylinder, of_ball: f64) -> Vec<
             && low < found.ends[1] + radius
             && high > found.ends[0] - radius
     };
-    parted.segmentation.segments.iter().filter(is_same).flat_map(|segment| segment.faces.iter().copied()).collect()
+    parted
+        .segmentation
+        .segments
+        .iter()
+        .filter(is_same)
+        .flat_map(|segment| segment.faces.iter().copied())
+        .collect()
 }
 
 /// Faces of the mesh on a plane beside the contacts on it.
@@ -148,7 +185,9 @@ fn faces_by(parted: &Parted, found: &ContactPlane, touches: &[ProbedPoint]) -> V
     let mut faces = Vec::new();
     for touch in found.touches.iter().map(|&at| &touches[at]) {
         let reach = Vector3::repeat(TOGETHER * touch.radius);
-        parted.tree.faces_in_box(&(touch.point - reach), &(touch.point + reach), &mut query);
+        parted
+            .tree
+            .faces_in_box(&(touch.point - reach), &(touch.point + reach), &mut query);
         faces.extend(query.faces.iter().map(|face| face.0));
     }
     let mut faces = distinct(faces);
@@ -157,27 +196,54 @@ fn faces_by(parted: &Parted, found: &ContactPlane, touches: &[ProbedPoint]) -> V
     // a few contacts of a round wall lie on a plane too
     let is_round = |face: &u32| {
         let number = parted.segmentation.of_face[*face as usize];
-        number != NONE && matches!(parted.segment(number as usize).primitive, Primitive::Cylinder(_))
+        number != NONE
+            && matches!(
+                parted.segment(number as usize).primitive,
+                Primitive::Cylinder(_)
+            )
     };
-    let round: f64 = faces.iter().filter(|face| is_round(face)).map(|&face| parted.facets.area(face)).sum();
-    if round > MOST_ROUND * parted.facets.area_of(&faces) { Vec::new() } else { faces }
+    let round: f64 = faces
+        .iter()
+        .filter(|face| is_round(face))
+        .map(|&face| parted.facets.area(face))
+        .sum();
+    if round > MOST_ROUND * parted.facets.area_of(&faces) {
+        Vec::new()
+    } else {
+        faces
+    }
 }
 
 /// Faces of the mesh on a cylinder, as far as it was touched.
 fn faces_on(parted: &Parted, found: &ContactCylinder, radius: f64) -> Vec<u32> {
-    let Cylinder { radius: of_wall, .. } = found.surface;
+    let Cylinder {
+        radius: of_wall, ..
+    } = found.surface;
     let (axis, centre) = (found.surface.axis(), found.surface.center());
     let ends = found.ends.map(|t| centre + axis * t);
     let reach = Vector3::repeat(of_wall + radius);
     let mut query = BoxQuery::default();
-    parted.tree.faces_in_box(&(ends[0].inf(&ends[1]) - reach), &(ends[0].sup(&ends[1]) + reach), &mut query);
+    parted.tree.faces_in_box(
+        &(ends[0].inf(&ends[1]) - reach),
+        &(ends[0].sup(&ends[1]) + reach),
+        &mut query,
+    );
     let primitive = Primitive::Cylinder(found.surface);
-    let [low, high] = [found.ends[0] - MESH_BEYOND * radius, found.ends[1] + MESH_BEYOND * radius];
+    let [low, high] = [
+        found.ends[0] - MESH_BEYOND * radius,
+        found.ends[1] + MESH_BEYOND * radius,
+    ];
     let is_of = |face: u32| {
         let along = (parted.facets.mesh.barycentre(FaceId(face)) - centre).dot(&axis);
-        (low..=high).contains(&along) && belongs(&parted.facets, face, &primitive, MESH_OFF * radius)
+        (low..=high).contains(&along)
+            && belongs(&parted.facets, face, &primitive, MESH_OFF * radius)
     };
-    let mut faces: Vec<u32> = query.faces.iter().map(|face| face.0).filter(|&face| is_of(face)).collect();
+    let mut faces: Vec<u32> = query
+        .faces
+        .iter()
+        .map(|face| face.0)
+        .filter(|&face| is_of(face))
+        .collect();
     faces.sort_unstable();
     faces
 }
@@ -200,18 +266,43 @@ impl ContactWalls {
             };
             let other = self.cylinders.remove(piece);
             let one = &self.cylinders[at];
-            let ends = |wall: &ContactCylinder| wall.ends.map(|t| wall.surface.center() + wall.surface.axis() * t);
+            let ends = |wall: &ContactCylinder| {
+                wall.ends
+                    .map(|t| wall.surface.center() + wall.surface.axis() * t)
+            };
             let [a, b] = [ends(one), ends(&other)];
-            let along = a.into_iter().flat_map(|p| b.map(|q| q - p)).max_by(|v, w| v.norm().total_cmp(&w.norm()));
+            let along = a
+                .into_iter()
+                .flat_map(|p| b.map(|q| q - p))
+                .max_by(|v, w| v.norm().total_cmp(&w.norm()));
             let along = along.unwrap_or_default();
             let axis = (along * along.dot(&one.surface.axis()).signum()).normalize();
             let [e, g] = tangent_basis(&axis);
             let middle = nalgebra::center(&one.surface.center(), &other.surface.center());
-            let Cylinder { radius: of_wall, concave, .. } = one.surface;
-            let rho = if concave { of_wall - radius } else { -of_wall - radius };
-            let circle = (Point2::new(middle.coords.dot(&e), middle.coords.dot(&g)), rho, one.turn.max(other.turn));
-            let numbers: Vec<u32> = one.touches.iter().chain(&other.touches).map(|&touch| touch as u32).collect();
-            if let Some(joint) = cylinder_of(touches, &numbers, &axis, circle, [e, g], radius, group_of) {
+            let Cylinder {
+                radius: of_wall,
+                concave,
+                ..
+            } = one.surface;
+            let rho = if concave {
+                of_wall - radius
+            } else {
+                -of_wall - radius
+            };
+            let circle = (
+                Point2::new(middle.coords.dot(&e), middle.coords.dot(&g)),
+                rho,
+                one.turn.max(other.turn),
+            );
+            let numbers: Vec<u32> = one
+                .touches
+                .iter()
+                .chain(&other.touches)
+                .map(|&touch| touch as u32)
+                .collect();
+            if let Some(joint) =
+                cylinder_of(touches, &numbers, &axis, circle, [e, g], radius, group_of)
+            {
                 self.cylinders[at] = joint;
             }
         }
@@ -221,10 +312,17 @@ impl ContactWalls {
 /// All walls that contacts show, those with the most contacts first.
 fn contact_walls(parted: &Parted, touches: &[ProbedPoint]) -> ContactWalls {
     let kept = thinned(touches);
-    let Some(radius) = kept.first().map(|&at| touches[at].radius) else { return ContactWalls::default() };
+    let Some(radius) = kept.first().map(|&at| touches[at].radius) else {
+        return ContactWalls::default();
+    };
     let planes = large_planes(parted);
-    let is_on_plane = |touch: &ProbedPoint| planes.iter().any(|&number| is_on(parted, number, touch));
-    let free: Vec<usize> = kept.iter().copied().filter(|&at| !is_on_plane(&touches[at])).collect();
+    let is_on_plane =
+        |touch: &ProbedPoint| planes.iter().any(|&number| is_on(parted, number, touch));
+    let free: Vec<usize> = kept
+        .iter()
+        .copied()
+        .filter(|&at| !is_on_plane(&touches[at]))
+        .collect();
     let group_of = groups(touches);
     let mut found = ContactWalls::default();
     let mut left = vec![true; touches.len()];
@@ -239,9 +337,17 @@ fn contact_walls(parted: &Parted, touches: &[ProbedPoint]) -> ContactWalls {
         }
         // a shaft is touched in strips that are far apart
         let walls: Vec<usize> = walls.into_iter().filter(|&at| left[at]).collect();
-        let some: Vec<usize> = walls.iter().copied().step_by(walls.len().div_ceil(MOST_ON_SHAFT).max(1)).collect();
+        let some: Vec<usize> = walls
+            .iter()
+            .copied()
+            .step_by(walls.len().div_ceil(MOST_ON_SHAFT).max(1))
+            .collect();
         for (one, on) in circles(touches, &some, &axis, radius, &group_of) {
-            let Cylinder { radius: of_wall, concave, .. } = one.surface;
+            let Cylinder {
+                radius: of_wall,
+                concave,
+                ..
+            } = one.surface;
             if !concave && of_wall > LARGE * radius && one.turn > SHAFT_TURN {
                 on.iter().for_each(|&at| left[at] = false);
                 found.add(one);
@@ -253,8 +359,12 @@ fn contact_walls(parted: &Parted, touches: &[ProbedPoint]) -> ContactWalls {
     for members in together(touches, &rest, TOGETHER * radius) {
         found.planes.extend(flat_walls(touches, members));
     }
-    found.planes.sort_by_key(|one| std::cmp::Reverse(one.touches.len()));
-    found.cylinders.sort_by_key(|one| std::cmp::Reverse(one.touches.len()));
+    found
+        .planes
+        .sort_by_key(|one| std::cmp::Reverse(one.touches.len()));
+    found
+        .cylinders
+        .sort_by_key(|one| std::cmp::Reverse(one.touches.len()));
     found
 }
 
@@ -270,18 +380,29 @@ fn flat_walls(touches: &[ProbedPoint], mut left: Vec<usize>) -> Vec<ContactPlane
             };
             left.iter().copied().filter(is_on).collect()
         };
-        let starts = left.iter().step_by(left.len().div_ceil(STARTS)).map(|&at| &touches[at]);
+        let starts = left
+            .iter()
+            .step_by(left.len().div_ceil(STARTS))
+            .map(|&at| &touches[at]);
         let planes = starts.map(|touch| on(&Plane::new(touch.point, &touch.normal)));
-        let Some(members) = planes.max_by_key(Vec::len) else { break };
-        let Some(plane) = plane_through(touches, &members) else { break };
+        let Some(members) = planes.max_by_key(Vec::len) else {
+            break;
+        };
+        let Some(plane) = plane_through(touches, &members) else {
+            break;
+        };
         let members = on(&plane);
-        let is_wide = members.len() >= LEAST && extent(touches, &members) > FLAT_RADII * touches[members[0]].radius;
+        let is_wide = members.len() >= LEAST
+            && extent(touches, &members) > FLAT_RADII * touches[members[0]].radius;
         if !is_wide {
             break;
         }
         left.retain(|at| members.binary_search(at).is_err());
         if !is_edge(touches, &members, &plane) {
-            found.push(ContactPlane { surface: plane, touches: members });
+            found.push(ContactPlane {
+                surface: plane,
+                touches: members,
+            });
         }
     }
     found
@@ -296,15 +417,23 @@ fn is_edge(touches: &[ProbedPoint], members: &[usize], plane: &Plane) -> bool {
         let seen = |&at: &usize| basis.map(|axis| of(&touches[at]).dot(&axis));
         let all: Vec<Vector2<f64>> = members.iter().map(seen).map(Vector2::from).collect();
         let mean = all.iter().sum::<Vector2<f64>>() / all.len() as f64;
-        all.iter().map(|v| (v - mean) * (v - mean).transpose()).sum::<Matrix2<f64>>() / all.len() as f64
+        all.iter()
+            .map(|v| (v - mean) * (v - mean).transpose())
+            .sum::<Matrix2<f64>>()
+            / all.len() as f64
     };
     let centres = spread(|touch| touch.centre.coords);
     let eigen = centres.symmetric_eigen();
-    let across = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+    let across = eigen
+        .eigenvectors
+        .column(eigen.eigenvalues.imin())
+        .into_owned();
     let wide = |spread: &Matrix2<f64>| across.dot(&(spread * across)).max(0.0).sqrt();
     let moved = wide(&centres);
-    let is_rolled = moved > ROLLED * radius && wide(&spread(|touch| touch.point.coords)) < ROLLED_SHARE * moved;
-    let is_corner = moved < CORNER * radius && spread(|touch| touch.normal).trace() > CORNER_TURN.powi(2);
+    let is_rolled =
+        moved > ROLLED * radius && wide(&spread(|touch| touch.point.coords)) < ROLLED_SHARE * moved;
+    let is_corner =
+        moved < CORNER * radius && spread(|touch| touch.normal).trace() > CORNER_TURN.powi(2);
     is_rolled || is_corner
 }
 
@@ -320,16 +449,29 @@ fn plane_through(touches: &[ProbedPoint], members: &[usize]) -> Option<Plane> {
     let normal: Vector3<f64> = members.iter().map(|&at| touches[at].normal).sum();
     let normal = normal.try_normalize(0.0)?;
     let middle = mean(members.iter().map(|&at| touches[at].centre.coords));
-    let spread: nalgebra::Matrix3<f64> =
-        members.iter().map(|&at| touches[at].centre.coords - middle).map(|v| v * v.transpose()).sum();
+    let spread: nalgebra::Matrix3<f64> = members
+        .iter()
+        .map(|&at| touches[at].centre.coords - middle)
+        .map(|v| v * v.transpose())
+        .sum();
     let eigen = (spread / members.len() as f64).symmetric_eigen();
     let widths = [0, 1, 2].map(|i| eigen.eigenvalues[i].max(0.0).sqrt());
-    let longest = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
+    let longest = eigen
+        .eigenvectors
+        .column(eigen.eigenvalues.imax())
+        .into_owned();
     let radius = touches[members[0]].radius;
     let mut rising = widths;
     rising.sort_by(f64::total_cmp);
-    let thinnest = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
-    let fitted = if rising[1] > WIDE_RADII * radius { thinnest } else { normal - longest * normal.dot(&longest) };
+    let thinnest = eigen
+        .eigenvectors
+        .column(eigen.eigenvalues.imin())
+        .into_owned();
+    let fitted = if rising[1] > WIDE_RADII * radius {
+        thinnest
+    } else {
+        normal - longest * normal.dot(&longest)
+    };
     let fitted = fitted.try_normalize(0.0)? * fitted.dot(&normal).signum();
     Some(Plane::new(Point3::from(middle) - fitted * radius, &fitted))
 }
@@ -355,10 +497,22 @@ fn circles(
     let mut left = projected(touches, members, [e, g]);
     let mut found = Vec::new();
     while found.len() < MOST_IN_GROUP && left.len() >= LEAST {
-        let Some((centre, rho, turn)) = best_circle(&left, radius) else { break };
-        let on: Vec<usize> = (0..left.len()).filter(|&at| is_on_circle(&left[at], &centre, rho, radius)).collect();
+        let Some((centre, rho, turn)) = best_circle(&left, radius) else {
+            break;
+        };
+        let on: Vec<usize> = (0..left.len())
+            .filter(|&at| is_on_circle(&left[at], &centre, rho, radius))
+            .collect();
         let numbers: Vec<u32> = on.iter().map(|&at| left[at].touch as u32).collect();
-        if let Some(one) = cylinder_of(touches, &numbers, axis, (centre, rho, turn), [e, g], radius, group_of) {
+        if let Some(one) = cylinder_of(
+            touches,
+            &numbers,
+            axis,
+            (centre, rho, turn),
+            [e, g],
+            radius,
+            group_of,
+        ) {
             found.push((one, numbers.iter().map(|&number| number as usize).collect()));
         }
         let is_on = |projected: &Projected| is_on_circle(projected, &centre, rho, radius);
@@ -370,7 +524,8 @@ fn circles(
 fn is_on_circle(one: &Projected, centre: &Point2<f64>, rho: f64, radius: f64) -> bool {
     let v = centre - one.at;
     let distance = v.norm();
-    (distance - rho.abs()).abs() < SEARCHED * radius && v.dot(&one.normal) * rho.signum() > RADIAL * distance
+    (distance - rho.abs()).abs() < SEARCHED * radius
+        && v.dot(&one.normal) * rho.signum() > RADIAL * distance
 }
 
 /// The circle of ball centres on which most of a turn was touched: its centre and ρ, m, and the share of the turn; `None` where none was
@@ -381,13 +536,25 @@ fn best_circle(all: &[Projected], radius: f64) -> Option<(Point2<f64>, f64, f64)
     let mut rng = Pcg64::seed_from_u64(SEED);
     for _ in 0..PAIRS.min(all.len() * all.len()) {
         let [one, other, third] = [(); 3].map(|()| &all[rng.random_range(0..all.len())]);
-        for (centre, rho) in [circle_of_two(one, other), circle_of_three([one, other, third])].into_iter().flatten() {
+        for (centre, rho) in [
+            circle_of_two(one, other),
+            circle_of_three([one, other, third]),
+        ]
+        .into_iter()
+        .flatten()
+        {
             let of_wall = rho.abs() + radius * rho.signum();
-            if of_wall < RADII[0] * radius * f64::from(rho > 0.0) || of_wall > RADII[1] * radius || of_wall <= 0.0 {
+            if of_wall < RADII[0] * radius * f64::from(rho > 0.0)
+                || of_wall > RADII[1] * radius
+                || of_wall <= 0.0
+            {
                 continue;
             }
             let (count, turn) = support(all, &centre, rho, radius);
-            if best.as_ref().is_none_or(|&(most, number, ..)| (turn, count) > (most, number)) {
+            if best
+                .as_ref()
+                .is_none_or(|&(most, number, ..)| (turn, count) > (most, number))
+            {
                 best = Some((turn, count, centre, rho));
             }
         }
@@ -408,7 +575,13 @@ fn circle_of_two(one: &Projected, other: &Projected) -> Option<(Point2<f64>, f64
         return None;
     }
     let rho = -apart.dot(&turned) / turned.norm_squared();
-    Some((nalgebra::center(&(one.at + one.normal * rho), &(other.at + other.normal * rho)), rho))
+    Some((
+        nalgebra::center(
+            &(one.at + one.normal * rho),
+            &(other.at + other.normal * rho),
+        ),
+        rho,
+    ))
 }
 
 /// The circle through three centres; its sign is that of the first normal.
@@ -418,16 +591,23 @@ fn circle_of_three([one, other, third]: [&Projected; 3]) -> Option<(Point2<f64>,
     if twice_area.abs() < BENT * a.norm() * b.norm() {
         return None;
     }
-    let to_centre =
-        Vector2::new(b.y * a.norm_squared() - a.y * b.norm_squared(), a.x * b.norm_squared() - b.x * a.norm_squared())
-            / (2.0 * twice_area);
-    Some((one.at + to_centre, to_centre.norm().copysign(to_centre.dot(&one.normal))))
+    let to_centre = Vector2::new(
+        b.y * a.norm_squared() - a.y * b.norm_squared(),
+        a.x * b.norm_squared() - b.x * a.norm_squared(),
+    ) / (2.0 * twice_area);
+    Some((
+        one.at + to_centre,
+        to_centre.norm().copysign(to_centre.dot(&one.normal)),
+    ))
 }
 
 /// How many contacts are on a circle, and over how many parts of a turn.
 fn support(all: &[Projected], centre: &Point2<f64>, rho: f64, radius: f64) -> (usize, usize) {
     let (mut parts, mut count) = ([false; PARTS], 0);
-    for one in all.iter().filter(|one| is_on_circle(one, centre, rho, radius)) {
+    for one in all
+        .iter()
+        .filter(|one| is_on_circle(one, centre, rho, radius))
+    {
         let v = one.at - centre;
         let turn = v.y.atan2(v.x) / std::f64::consts::TAU;
         parts[((turn * PARTS as f64).floor() as i64).rem_euclid(PARTS as i64) as usize] = true;
@@ -437,11 +617,22 @@ fn support(all: &[Projected], centre: &Point2<f64>, rho: f64, radius: f64) -> (u
 }
 
 /// The circle of least squares through the contacts on one: x² + y² = 2 a x + 2 b y + c.
-fn fitted_circle(all: &[Projected], centre: Point2<f64>, rho: f64, radius: f64) -> Option<(Point2<f64>, f64)> {
-    let rows = all.iter().filter(|one| is_on_circle(one, &centre, rho, radius)).map(|one| {
-        let v = one.at - centre;
-        (nalgebra::SVector::<f64, 3>::new(2.0 * v.x, 2.0 * v.y, 1.0), v.norm_squared())
-    });
+fn fitted_circle(
+    all: &[Projected],
+    centre: Point2<f64>,
+    rho: f64,
+    radius: f64,
+) -> Option<(Point2<f64>, f64)> {
+    let rows = all
+        .iter()
+        .filter(|one| is_on_circle(one, &centre, rho, radius))
+        .map(|one| {
+            let v = one.at - centre;
+            (
+                nalgebra::SVector::<f64, 3>::new(2.0 * v.x, 2.0 * v.y, 1.0),
+                v.norm_squared(),
+            )
+        });
     let solution = crate::numeric::NormalEquations::of(rows).solution()?;
     let moved = Vector2::new(solution.x, solution.y);
     let square = solution.z + moved.norm_squared();
@@ -459,22 +650,40 @@ fn cylinder_of(
     group_of: &[u32],
 ) -> Option<ContactCylinder> {
     let along = |axis: &Vector3<f64>, from: &Point3<f64>| -> Vec<f64> {
-        numbers.iter().map(|&number| (touches[number as usize].point - from).dot(axis)).collect()
+        numbers
+            .iter()
+            .map(|&number| (touches[number as usize].point - from).dot(axis))
+            .collect()
     };
     let height = median(&mut along(axis, &Point3::origin()))?;
     let middle = Point3::from(e * centre.x + g * centre.y + axis * height);
     let of_wall = rho.abs() + radius * rho.signum();
     let guess = Cylinder::new(middle, axis, of_wall, rho > 0.0);
-    let observations: Vec<_> =
-        numbers.iter().map(|&number| observation(&touches[number as usize], group_of[number as usize])).collect();
-    let params = FitParams { axis_sigma: Some(AXIS_SIGMA), ..FitParams::default() };
+    let observations: Vec<_> = numbers
+        .iter()
+        .map(|&number| observation(&touches[number as usize], group_of[number as usize]))
+        .collect();
+    let params = FitParams {
+        axis_sigma: Some(AXIS_SIGMA),
+        ..FitParams::default()
+    };
     let surface = fit(&guess, &observations, &params).map_or(guess, |fit| fit.surface);
-    let is_near = (surface.radius - of_wall).abs() < SAME * of_wall && surface.axis_towards(axis).dot(axis) > ALIKE;
+    let is_near = (surface.radius - of_wall).abs() < SAME * of_wall
+        && surface.axis_towards(axis).dot(axis) > ALIKE;
     let surface = if is_near { surface } else { guess };
     let of_axis = along(&surface.axis(), &surface.center());
-    let ends = of_axis.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &t| [low.min(t), high.max(t)]);
+    let ends = of_axis
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &t| {
+            [low.min(t), high.max(t)]
+        });
     let touches = numbers.iter().map(|&number| number as usize).collect();
-    Some(ContactCylinder { surface, ends, turn, touches })
+    Some(ContactCylinder {
+        surface,
+        ends,
+        turn,
+        touches,
+    })
 }
 
 /// How well the direction of an axis is known before its contacts are, rad: 3°.

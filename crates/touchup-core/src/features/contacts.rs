@@ -39,11 +39,19 @@ pub(super) struct Projected {
 /// Contacts seen along an axis.
 ///
 /// - `plane`: two directions square to the axis
-pub(super) fn projected(touches: &[ProbedPoint], members: &[usize], [e, g]: [Vector3<f64>; 2]) -> Vec<Projected> {
+pub(super) fn projected(
+    touches: &[ProbedPoint],
+    members: &[usize],
+    [e, g]: [Vector3<f64>; 2],
+) -> Vec<Projected> {
     let project = |&touch: &usize| {
         let (p, n) = (touches[touch].centre.coords, touches[touch].normal);
         let normal = Vector2::new(n.dot(&e), n.dot(&g)).try_normalize(0.0)?;
-        Some(Projected { touch, at: Point2::new(p.dot(&e), p.dot(&g)), normal })
+        Some(Projected {
+            touch,
+            at: Point2::new(p.dot(&e), p.dot(&g)),
+            normal,
+        })
     };
     members.iter().filter_map(project).collect()
 }
@@ -53,22 +61,30 @@ pub(super) fn thinned(touches: &[ProbedPoint]) -> Vec<usize> {
     let mut seen = BTreeSet::<VoxelKey>::new();
     let mut is_new = |touch: &ProbedPoint| seen.insert(voxel_of(&touch.point, THIN * touch.radius));
     let is_sound = |touch: &ProbedPoint| !touch.is_rejected && touch.radius > 0.0;
-    (0..touches.len()).filter(|&at| is_sound(&touches[at]) && is_new(&touches[at])).collect()
+    (0..touches.len())
+        .filter(|&at| is_sound(&touches[at]) && is_new(&touches[at]))
+        .collect()
 }
 
 /// Numbers of the planes that holes may stand on, the largest first.
 pub(super) fn large_planes(parted: &Parted) -> Vec<usize> {
-    let mut numbers: Vec<usize> =
-        parted.planes().map(|(number, ..)| number).filter(|&number| parted.is_strong(number)).collect();
+    let mut numbers: Vec<usize> = parted
+        .planes()
+        .map(|(number, ..)| number)
+        .filter(|&number| parted.is_strong(number))
+        .collect();
     numbers.sort_by(|&a, &b| parted.segment(b).area.total_cmp(&parted.segment(a).area));
     numbers
 }
 
 /// Whether a contact is on the plane of a segment.
 pub(super) fn is_on(parted: &Parted, number: usize, touch: &ProbedPoint) -> bool {
-    let Some(plane) = parted.plane(number) else { return false };
+    let Some(plane) = parted.plane(number) else {
+        return false;
+    };
     let near = (ON_PLANE_SIGMAS * touch.sigma_along_normal()).max(ON_PLANE * touch.radius);
-    (plane.distance(&touch.centre) - touch.radius).abs() < near && plane.normal().dot(&touch.normal) > ALIKE
+    (plane.distance(&touch.centre) - touch.radius).abs() < near
+        && plane.normal().dot(&touch.normal) > ALIKE
 }
 
 /// Directions that axes may have.
@@ -81,11 +97,18 @@ pub(super) fn axes(
 ) -> Vec<Vector3<f64>> {
     let mut axes: Vec<Vector3<f64>> = Vec::new();
     let mut add = |axis: Vector3<f64>| {
-        if axes.len() < MOST_AXES && axes.iter().all(|other: &Vector3<f64>| other.dot(&axis).abs() < SAME_AXIS) {
+        if axes.len() < MOST_AXES
+            && axes
+                .iter()
+                .all(|other: &Vector3<f64>| other.dot(&axis).abs() < SAME_AXIS)
+        {
             axes.push(axis);
         }
     };
-    planes.iter().filter_map(|&number| parted.plane(number)).for_each(|plane| add(plane.normal()));
+    planes
+        .iter()
+        .filter_map(|&number| parted.plane(number))
+        .for_each(|plane| add(plane.normal()));
     // the normals of a round wall are square to its axis
     for members in together(touches, free, TOGETHER * radius) {
         let normals = members.iter().map(|&at| touches[at].normal);
@@ -93,7 +116,10 @@ pub(super) fn axes(
         if members.len() >= LEAST && least < 0.5 * second {
             let second_moment: Matrix3<f64> = normals.map(|n| n * n.transpose()).sum();
             let eigen = second_moment.symmetric_eigen();
-            add(eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned());
+            add(eigen
+                .eigenvectors
+                .column(eigen.eigenvalues.imin())
+                .into_owned());
         }
     }
     axes
@@ -113,7 +139,9 @@ pub(super) fn together_along(
     reach: f64,
 ) -> Vec<Vec<usize>> {
     let seen = |at: usize| touches[at].point - axis * touches[at].point.coords.dot(axis);
-    hanging(numbers, seen, reach, |one, other| touches[one].normal.dot(&touches[other].normal) > ALIKE)
+    hanging(numbers, seen, reach, |one, other| {
+        touches[one].normal.dot(&touches[other].normal) > ALIKE
+    })
 }
 
 fn hanging(
@@ -126,13 +154,19 @@ fn hanging(
     let grid = PointGrid::of(&points, 0..points.len(), reach);
     let mut sets = DisjointSets::of(points.len());
     for (at, point) in points.iter().enumerate() {
-        for other in grid.near(point, reach).filter(|&other| other < at && may_hang(numbers[at], numbers[other])) {
+        for other in grid
+            .near(point, reach)
+            .filter(|&other| other < at && may_hang(numbers[at], numbers[other]))
+        {
             sets.join(at as u32, other as u32);
         }
     }
     let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for (at, &number) in numbers.iter().enumerate() {
-        members.entry(sets.root(at as u32)).or_default().push(number);
+        members
+            .entry(sets.root(at as u32))
+            .or_default()
+            .push(number);
     }
     members.into_values().collect()
 }

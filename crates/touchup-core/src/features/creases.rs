@@ -34,7 +34,12 @@ pub(super) struct Creases {
 
 impl Creases {
     /// - `sharp_angle`, `sharp_defect`: as in [`super::clusters::ClusterParams`], rad.
-    pub fn find(mesh: &TriMesh, curvature: &[VertexCurvature], sharp_angle: f64, sharp_defect: f64) -> Self {
+    pub fn find(
+        mesh: &TriMesh,
+        curvature: &[VertexCurvature],
+        sharp_angle: f64,
+        sharp_defect: f64,
+    ) -> Self {
         let facets = Facets::of(mesh);
         let (mut list, mut has_crease) = (Vec::new(), vec![false; mesh.vertex_slots()]);
         let cos_sharp = sharp_angle.cos();
@@ -43,18 +48,38 @@ impl Creases {
                 let ends = [corners[edge], corners[(edge + 1) % 3]];
                 let (n, m) = (facets.normal(face.0), facets.normal(other));
                 // once for each edge: the other face runs along it in the opposite direction
-                if ends[0] < ends[1] && n.dot(&m) < cos_sharp && n != Vector3::zeros() && m != Vector3::zeros() {
+                if ends[0] < ends[1]
+                    && n.dot(&m) < cos_sharp
+                    && n != Vector3::zeros()
+                    && m != Vector3::zeros()
+                {
                     let along = mesh.position(ends[1]) - mesh.position(ends[0]);
-                    let bend = if n.cross(&m).dot(&along) > 0.0 { Bend::Convex } else { Bend::Concave };
+                    let bend = if n.cross(&m).dot(&along) > 0.0 {
+                        Bend::Convex
+                    } else {
+                        Bend::Concave
+                    };
                     ends.iter().for_each(|v| has_crease[v.0 as usize] = true);
                     list.push(Crease { ends, bend });
                 }
             }
         }
-        let is_sharp = |c: &VertexCurvature| c.kind == VertexKind::Inner && c.defect.abs() > sharp_defect;
-        for (v, c) in curvature.iter().enumerate().filter(|(v, c)| is_sharp(c) && !has_crease[*v]) {
-            let bend = if c.integrated_mean >= 0.0 { Bend::Convex } else { Bend::Concave };
-            list.push(Crease { ends: [VertexId(v as u32); 2], bend });
+        let is_sharp =
+            |c: &VertexCurvature| c.kind == VertexKind::Inner && c.defect.abs() > sharp_defect;
+        for (v, c) in curvature
+            .iter()
+            .enumerate()
+            .filter(|(v, c)| is_sharp(c) && !has_crease[*v])
+        {
+            let bend = if c.integrated_mean >= 0.0 {
+                Bend::Convex
+            } else {
+                Bend::Concave
+            };
+            list.push(Crease {
+                ends: [VertexId(v as u32); 2],
+                bend,
+            });
         }
         Self { list }
     }
@@ -62,7 +87,8 @@ impl Creases {
     /// Creases of one kind that share a vertex, as sets.
     pub fn connected(&self) -> DisjointSets {
         let mut regions = DisjointSets::of(self.list.len());
-        let ends = |(i, crease): (usize, &Crease)| crease.ends.map(|v| ((crease.bend, v), i as u32));
+        let ends =
+            |(i, crease): (usize, &Crease)| crease.ends.map(|v| ((crease.bend, v), i as u32));
         let mut at_vertex: Vec<_> = self.list.iter().enumerate().flat_map(ends).collect();
         join_equal(&mut regions, &mut at_vertex);
         regions
@@ -71,7 +97,9 @@ impl Creases {
     /// Joins creases of one kind of which points are in one cell of a grid of size `near`, or in cells that touch: all that are
     /// closer than `near`, none that are farther than 2√3 times that.
     pub fn merge(&self, regions: &mut DisjointSets, mesh: &TriMesh, near: f64) {
-        let lengths = |crease: &Crease| (mesh.position(crease.ends[1]) - mesh.position(crease.ends[0])).norm();
+        let lengths = |crease: &Crease| {
+            (mesh.position(crease.ends[1]) - mesh.position(crease.ends[0])).norm()
+        };
         let spacing = (near / 2.0).max(self.list.iter().map(lengths).sum::<f64>() / MOST_POINTS);
         if !(spacing > 0.0 && spacing.is_finite()) {
             return;

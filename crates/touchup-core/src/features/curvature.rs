@@ -44,19 +44,29 @@ pub struct VertexCurvature {
 impl VertexCurvature {
     /// Gaussian curvature κ₁κ₂, 1/m²; 0 on the rim and where the area is 0.
     pub fn gaussian(&self) -> f64 {
-        if self.kind == VertexKind::Inner && self.area > 0.0 { self.defect / self.area } else { 0.0 }
+        if self.kind == VertexKind::Inner && self.area > 0.0 {
+            self.defect / self.area
+        } else {
+            0.0
+        }
     }
 
     /// Mean curvature (κ₁ + κ₂)/2, 1/m; positive on bumps; 0 on the rim and where the area is 0.
     pub fn mean(&self) -> f64 {
-        if self.kind == VertexKind::Inner && self.area > 0.0 { self.integrated_mean / self.area } else { 0.0 }
+        if self.kind == VertexKind::Inner && self.area > 0.0 {
+            self.integrated_mean / self.area
+        } else {
+            0.0
+        }
     }
 }
 
 /// Curvature at all vertices, indexed by [`VertexId`].
 pub fn curvature(mesh: &TriMesh) -> Vec<VertexCurvature> {
     let mut fan = Fan::default();
-    (0..mesh.vertex_slots() as u32).map(|vertex| fan.curvature(mesh, VertexId(vertex))).collect()
+    (0..mesh.vertex_slots() as u32)
+        .map(|vertex| fan.curvature(mesh, VertexId(vertex)))
+        .collect()
 }
 
 /// The faces around a vertex, as pairs of its neighbours; kept only for its memory.
@@ -83,11 +93,19 @@ impl Fan {
         }
         let sums = CornerSums::around(mesh, &mesh.position(vertex), &self.links);
         let (defect, integrated_mean) = match kind {
-            VertexKind::Inner => (sums.angle_short_of_full_turn(), 0.5 * sums.gradient_along_normal()),
+            VertexKind::Inner => (
+                sums.angle_short_of_full_turn(),
+                0.5 * sums.gradient_along_normal(),
+            ),
             VertexKind::Rim => (sums.angle_short_of_full_turn() - PI, 0.0),
             _ => (0.0, 0.0),
         };
-        VertexCurvature { kind, defect, integrated_mean, area: sums.area }
+        VertexCurvature {
+            kind,
+            defect,
+            integrated_mean,
+            area: sums.area,
+        }
     }
 
     /// The neighbours after and after that in each face.
@@ -117,7 +135,11 @@ impl Fan {
         while at != 0 && steps < count {
             (at, steps) = (self.next[at as usize], steps + 1);
         }
-        if at == 0 && steps == count { VertexKind::Inner } else { VertexKind::Irregular }
+        if at == 0 && steps == count {
+            VertexKind::Inner
+        } else {
+            VertexKind::Irregular
+        }
     }
 
     /// Fills `next`; whether each face has exactly one.
@@ -135,7 +157,8 @@ impl Fan {
         let mut sound = true;
         self.next.extend(self.links.iter().map(|&[_, end]| {
             // how many were found, and the sum of their places, in one number
-            let found = |(i, &start): (usize, &u32)| if start == end { COUNTED + i as u32 } else { 0 };
+            let found =
+                |(i, &start): (usize, &u32)| if start == end { COUNTED + i as u32 } else { 0 };
             let places: u32 = starts.iter().enumerate().map(found).sum();
             sound &= places / COUNTED == 1;
             places % COUNTED
@@ -146,11 +169,19 @@ impl Fan {
     #[cold]
     fn link_up_large(&mut self) -> bool {
         let first = |end: u32| self.links.partition_point(|link| link[0] < end);
-        self.next.extend(self.links.iter().map(|link| first(link[1]) as u32));
+        self.next
+            .extend(self.links.iter().map(|link| first(link[1]) as u32));
         let count = |(link, &at): (&[u32; 2], &u32)| {
-            self.links[at as usize..].iter().take(2).filter(|other| other[0] == link[1]).count()
+            self.links[at as usize..]
+                .iter()
+                .take(2)
+                .filter(|other| other[0] == link[1])
+                .count()
         };
-        self.links.iter().zip(&self.next).all(|pair| count(pair) == 1)
+        self.links
+            .iter()
+            .zip(&self.next)
+            .all(|pair| count(pair) == 1)
     }
 
     /// On the rim one face begins where none ends; from there the walk must come past all.
@@ -160,14 +191,29 @@ impl Fan {
         starts.sort_unstable_by_key(|link| link[0]);
         ends.sort_unstable_by_key(|link| link[1]);
         let is_twice = |pair: &[[u32; 2]], side: usize| pair[0][side] == pair[1][side];
-        if starts.windows(2).any(|pair| is_twice(pair, 0)) || ends.windows(2).any(|pair| is_twice(pair, 1)) {
+        if starts.windows(2).any(|pair| is_twice(pair, 0))
+            || ends.windows(2).any(|pair| is_twice(pair, 1))
+        {
             return VertexKind::Irregular;
         }
-        let mut firsts = starts.iter().filter(|link| ends.binary_search_by_key(&link[0], |end| end[1]).is_err());
-        let (Some(first), None) = (firsts.next(), firsts.next()) else { return VertexKind::Irregular };
-        let after = |link: &[u32; 2]| starts.binary_search_by_key(&link[1], |start| start[0]).ok().map(|i| starts[i]);
+        let mut firsts = starts
+            .iter()
+            .filter(|link| ends.binary_search_by_key(&link[0], |end| end[1]).is_err());
+        let (Some(first), None) = (firsts.next(), firsts.next()) else {
+            return VertexKind::Irregular;
+        };
+        let after = |link: &[u32; 2]| {
+            starts
+                .binary_search_by_key(&link[1], |start| start[0])
+                .ok()
+                .map(|i| starts[i])
+        };
         let steps = std::iter::successors(Some(*first), after).count();
-        if steps == self.links.len() { VertexKind::Rim } else { VertexKind::Irregular }
+        if steps == self.links.len() {
+            VertexKind::Rim
+        } else {
+            VertexKind::Irregular
+        }
     }
 }
 
@@ -196,10 +242,26 @@ impl CornerSums {
         let positions = mesh.positions();
         let zero = Vector3::zeros();
         let first = (positions[links[0][0] as usize] - vertex).norm_squared();
-        let scale = if first > f64::MIN_POSITIVE { first.recip() } else { 1.0 };
-        let mut sums =
-            Self { re: 1.0, im: 0.0, turns: 0, scale, area: 0.0, double_area_normal: zero, area_gradient: zero };
-        let corner = |&[p, q]: &[u32; 2]| [positions[p as usize] - vertex, positions[q as usize] - vertex];
+        let scale = if first > f64::MIN_POSITIVE {
+            first.recip()
+        } else {
+            1.0
+        };
+        let mut sums = Self {
+            re: 1.0,
+            im: 0.0,
+            turns: 0,
+            scale,
+            area: 0.0,
+            double_area_normal: zero,
+            area_gradient: zero,
+        };
+        let corner = |&[p, q]: &[u32; 2]| {
+            [
+                positions[p as usize] - vertex,
+                positions[q as usize] - vertex,
+            ]
+        };
         let (pairs, last) = links.as_chunks::<2>();
         for pair in pairs {
             let corners = Corners::between([corner(&pair[0]), corner(&pair[1])]);
@@ -254,7 +316,11 @@ impl CornerSums {
     #[inline]
     fn gradient_along_normal(&self) -> f64 {
         let length = self.double_area_normal.norm();
-        if length > 0.0 { self.area_gradient.dot(&self.double_area_normal) / length } else { 0.0 }
+        if length > 0.0 {
+            self.area_gradient.dot(&self.double_area_normal) / length
+        } else {
+            0.0
+        }
     }
 }
 
@@ -267,7 +333,9 @@ fn argument(re: f64, im: f64) -> f64 {
     }
     let t = im / re;
     let tt = t * t;
-    let series = [17.0, -15.0, 13.0, -11.0, 9.0, -7.0, 5.0, -3.0].iter().fold(0.0, |sum, n| sum * tt + 1.0 / n);
+    let series = [17.0, -15.0, 13.0, -11.0, 9.0, -7.0, 5.0, -3.0]
+        .iter()
+        .fold(0.0, |sum, n| sum * tt + 1.0 / n);
     t + t * tt * series
 }
 
@@ -294,8 +362,11 @@ impl Corners {
     fn between(edges: [[Vector3<f64>; 2]; 2]) -> Self {
         let e = [0, 1, 2].map(|axis| two(|i| edges[i][0][axis]));
         let f = [0, 1, 2].map(|axis| two(|i| edges[i][1][axis]));
-        let dot = |a: &[Two; 3], b: &[Two; 3]| two(|i| a[0][i] * b[0][i] + a[1][i] * b[1][i] + a[2][i] * b[2][i]);
-        let normal = [(1, 2), (2, 0), (0, 1)].map(|(j, k)| two(|i| e[j][i] * f[k][i] - e[k][i] * f[j][i]));
+        let dot = |a: &[Two; 3], b: &[Two; 3]| {
+            two(|i| a[0][i] * b[0][i] + a[1][i] * b[1][i] + a[2][i] * b[2][i])
+        };
+        let normal =
+            [(1, 2), (2, 0), (0, 1)].map(|(j, k)| two(|i| e[j][i] * f[k][i] - e[k][i] * f[j][i]));
         let (cos, square) = (dot(&e, &f), dot(&normal, &normal));
         let sin = two(|i| square[i].sqrt());
         // without area nothing is added
@@ -305,9 +376,16 @@ impl Corners {
         let (at_e, at_f) = (two(|i| ee[i] - cos[i]), two(|i| ff[i] - cos[i]));
         let nearest = two(|i| (ee[i] * at_f[i] + ff[i] * at_e[i]) * per_sin[i] / 8.0);
         let area = two(|i| mixed_area(nearest[i], sin[i], [cos[i], at_e[i], at_f[i]]));
-        let gradient =
-            [0, 1, 2].map(|axis| two(|i| (f[axis][i] * at_e[i] + e[axis][i] * at_f[i]) * (0.5 * per_sin[i])));
-        Self { cos, sin, area, normal, gradient }
+        let gradient = [0, 1, 2].map(|axis| {
+            two(|i| (f[axis][i] * at_e[i] + e[axis][i] * at_f[i]) * (0.5 * per_sin[i]))
+        });
+        Self {
+            cos,
+            sin,
+            area,
+            normal,
+            gradient,
+        }
     }
 }
 
@@ -316,5 +394,9 @@ impl Corners {
 #[inline]
 fn mixed_area(nearest: f64, sin: f64, [cos, at_e, at_f]: [f64; 3]) -> f64 {
     let of_obtuse = if cos < 0.0 { sin / 4.0 } else { sin / 8.0 };
-    if cos.min(at_e).min(at_f) < 0.0 { of_obtuse } else { nearest }
+    if cos.min(at_e).min(at_f) < 0.0 {
+        of_obtuse
+    } else {
+        nearest
+    }
 }

@@ -51,30 +51,65 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     let of_face = without_seams(&parted);
     let borders = borders(&parted, &of_face);
     let holes = holes(&parted, &walls);
-    let (mut slots, pockets) =
-        with_felt(contact_slots(&parted, touches, &is_round), slots(&parted, &walls, &of_face, &borders));
+    let (mut slots, pockets) = with_felt(
+        contact_slots(&parted, touches, &is_round),
+        slots(&parted, &walls, &of_face, &borders),
+    );
     // what was felt all around is no end of a slot
-    let felt_bores: Vec<&Wall> =
-        holes.iter().map(|hole| &walls[hole.wall]).filter(|wall| wall.felt_turn >= ALL_AROUND).collect();
-    slots.retain(|slot| felt_bores.iter().all(|wall| !is_slot_end(wall, std::slice::from_ref(slot))));
-    let is_sure = |edge: &StraightEdge| edge.planes.iter().all(|&number| is_sure_plane(&parted, number));
-    let edges: Vec<_> = straight_edges(&parted, &borders).into_iter().filter(is_sure).collect();
-    let holes: Vec<_> = holes.into_iter().filter(|hole| !is_slot_end(&walls[hole.wall], &slots)).collect();
+    let felt_bores: Vec<&Wall> = holes
+        .iter()
+        .map(|hole| &walls[hole.wall])
+        .filter(|wall| wall.felt_turn >= ALL_AROUND)
+        .collect();
+    slots.retain(|slot| {
+        felt_bores
+            .iter()
+            .all(|wall| !is_slot_end(wall, std::slice::from_ref(slot)))
+    });
+    let is_sure = |edge: &StraightEdge| {
+        edge.planes
+            .iter()
+            .all(|&number| is_sure_plane(&parted, number))
+    };
+    let edges: Vec<_> = straight_edges(&parted, &borders)
+        .into_iter()
+        .filter(is_sure)
+        .collect();
+    let holes: Vec<_> = holes
+        .into_iter()
+        .filter(|hole| !is_slot_end(&walls[hole.wall], &slots))
+        .collect();
     let observed = Observed::of(&parted, &of_face, touches);
     let measure = Measure::new(&observed);
 
     // a wall of the ball's own width that nothing touched is the way that it took through what was not scanned
-    let of_ball = touches.iter().map(|touch| 2.0 * touch.radius).fold(0.0, f64::max);
+    let of_ball = touches
+        .iter()
+        .map(|touch| 2.0 * touch.radius)
+        .fold(0.0, f64::max);
     let is_way_of_ball = |feature: &Feature| {
-        let width = feature.diameter.as_ref().map_or(0.0, |diameter| diameter.value);
-        feature.fitted_to == FittedTo::Mesh && feature.touched == 0.0 && OF_BALL.contains(&(width / of_ball))
+        let width = feature
+            .diameter
+            .as_ref()
+            .map_or(0.0, |diameter| diameter.value);
+        feature.fitted_to == FittedTo::Mesh
+            && feature.touched == 0.0
+            && OF_BALL.contains(&(width / of_ball))
     };
     let mut features = Vec::new();
     for (hole, group) in holes.iter().zip(groups(&walls, &holes)) {
-        features.push(Feature { group, ..hole_feature(&measure, &walls, hole) });
+        features.push(Feature {
+            group,
+            ..hole_feature(&measure, &walls, hole)
+        });
     }
     let is_new = |rim: &RoundOpening| holes.iter().all(|hole| !is_rim_of(&walls[hole.wall], rim));
-    features.extend(rims(&parted).iter().filter(|rim| is_new(rim)).map(|rim| rim_feature(&measure, rim)));
+    features.extend(
+        rims(&parted)
+            .iter()
+            .filter(|rim| is_new(rim))
+            .map(|rim| rim_feature(&measure, rim)),
+    );
     features.retain(|feature| !is_way_of_ball(feature));
     let mut features = with_heads(&measure, without_second_walls(features));
     let is_reported = |slot: &Slot, feature: &Feature| {
@@ -82,29 +117,70 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
         let is_shut = slot.floor.is_some() || slot.is_closed;
         is_shut || parted.rounding.is_some() || feature.fitted_to == FittedTo::Touches
     };
-    let measured = slots.iter().map(|slot| (slot, slot_feature(&measure, slot, Kind::Slot)));
-    features.extend(measured.filter(|(slot, feature)| is_reported(slot, feature)).map(|(_, feature)| feature));
-    features.extend(pockets.iter().map(|pocket| slot_feature(&measure, pocket, Kind::Pocket)));
+    let measured = slots
+        .iter()
+        .map(|slot| (slot, slot_feature(&measure, slot, Kind::Slot)));
+    features.extend(
+        measured
+            .filter(|(slot, feature)| is_reported(slot, feature))
+            .map(|(_, feature)| feature),
+    );
+    features.extend(
+        pockets
+            .iter()
+            .map(|pocket| slot_feature(&measure, pocket, Kind::Pocket)),
+    );
     let bosses = bosses(&parted, &walls);
-    let raised = bosses.iter().map(|boss| boss_feature(&measure, &walls, boss)).collect();
+    let raised = bosses
+        .iter()
+        .map(|boss| boss_feature(&measure, &walls, boss))
+        .collect();
     features.extend(without_second_walls(raised));
-    let is_shaft = |at: &usize| is_shaft(&parted, &walls[*at]) && bosses.iter().all(|boss| boss.wall != *at);
-    features.extend((0..walls.len()).filter(is_shaft).map(|at| cylinder_feature(&measure, &walls[at])));
+    let is_shaft =
+        |at: &usize| is_shaft(&parted, &walls[*at]) && bosses.iter().all(|boss| boss.wall != *at);
+    features.extend(
+        (0..walls.len())
+            .filter(is_shaft)
+            .map(|at| cylinder_feature(&measure, &walls[at])),
+    );
     features.extend(edges.iter().filter_map(|edge| edge_feature(&measure, edge)));
     features.extend(corners(&parted, &measure, &edges));
-    let is_large = |number: usize| parted.segment(number).area > LEAST_PLANE * parted.diagonal * parted.diagonal;
-    let planes = parted.planes().filter(|&(number, ..)| is_sure_plane(&parted, number) && is_large(number));
+    let is_large = |number: usize| {
+        parted.segment(number).area > LEAST_PLANE * parted.diagonal * parted.diagonal
+    };
+    let planes = parted
+        .planes()
+        .filter(|&(number, ..)| is_sure_plane(&parted, number) && is_large(number));
     features.extend(planes.filter_map(|(number, ..)| plane_feature(&measure, number)));
-    features.iter_mut().enumerate().for_each(|(id, feature)| feature.id = id as u32);
+    features
+        .iter_mut()
+        .enumerate()
+        .for_each(|(id, feature)| feature.id = id as u32);
     let all: f64 = parted.facets.areas.iter().sum();
-    let explained: f64 = parted.segmentation.segments.iter().map(|segment| segment.area).sum();
-    Detection { features, unexplained: if all > 0.0 { (1.0 - explained / all).max(0.0) } else { 0.0 } }
+    let explained: f64 = parted
+        .segmentation
+        .segments
+        .iter()
+        .map(|segment| segment.area)
+        .sum();
+    Detection {
+        features,
+        unexplained: if all > 0.0 {
+            (1.0 - explained / all).max(0.0)
+        } else {
+            0.0
+        },
+    }
 }
 
 /// Joins planes that meet and are one.
 fn join_planes(parted: &mut Parted) {
-    let beside: Vec<_> = borders(parted, &without_seams(parted)).into_keys().collect();
-    parted.segmentation.join_planes(&parted.facets, beside.into_iter());
+    let beside: Vec<_> = borders(parted, &without_seams(parted))
+        .into_keys()
+        .collect();
+    parted
+        .segmentation
+        .join_planes(&parted.facets, beside.into_iter());
 }
 
 /// A cylinder is reported when it covers more than this share of a turn: less is the rounding of an edge, which looks wider in a measured mesh …
@@ -115,9 +191,17 @@ const SHAFT_FILLED: f64 = 0.8;
 
 /// Whether a wall has the material inside and is large enough to be reported.
 fn is_shaft(parted: &Parted, wall: &Wall) -> bool {
-    let area: f64 = wall.segments.iter().map(|&number| parted.segment(number).area).sum();
+    let area: f64 = wall
+        .segments
+        .iter()
+        .map(|&number| parted.segment(number).area)
+        .sum();
     let is_large = area > LEAST_PLANE * parted.diagonal * parted.diagonal;
-    let least = if parted.rounding.is_some() { ROUNDED_EDGE } else { ROUNDED_EDGE_MEASURED };
+    let least = if parted.rounding.is_some() {
+        ROUNDED_EDGE
+    } else {
+        ROUNDED_EDGE_MEASURED
+    };
     let is_whole = wall.coverage > least && wall.filled > SHAFT_FILLED;
     is_large && !wall.is_concave && !wall.is_cone() && is_whole
 }
@@ -125,21 +209,31 @@ fn is_shaft(parted: &Parted, wall: &Wall) -> bool {
 /// Holes, and the heads around them that contacts alone show; both are steps of one.
 fn with_heads(measure: &Measure, mut features: Vec<Feature>) -> Vec<Feature> {
     for at in 0..features.len() {
-        let Some(head) = head_of(measure, &features[at]) else { continue };
+        let Some(head) = head_of(measure, &features[at]) else {
+            continue;
+        };
         let head = head_feature(measure, &head);
         if features.iter().any(|known| is_same_head(known, &head)) {
             continue;
         }
         let group = features[at].group.unwrap_or(features.len() as u32);
         features[at].group = Some(group);
-        features.push(Feature { group: Some(group), ..head });
+        features.push(Feature {
+            group: Some(group),
+            ..head
+        });
     }
     features
 }
 
 /// Whether a hole is a head that was found already.
 fn is_same_head(known: &Feature, head: &Feature) -> bool {
-    let wide = |feature: &Feature| feature.diameter.as_ref().map_or(0.0, |diameter| diameter.value);
+    let wide = |feature: &Feature| {
+        feature
+            .diameter
+            .as_ref()
+            .map_or(0.0, |diameter| diameter.value)
+    };
     let near = 0.5 * wide(head);
     let is_near = (known.centre.value - head.centre.value).norm() < near;
     known.kind == Kind::Hole && is_near && (wide(known) - wide(head)).abs() < ONE_WALL * wide(head)
@@ -151,11 +245,16 @@ fn head_feature(measure: &Measure, head: &Head) -> Feature {
     let opening = AxisEnd::on(measure, Some(head.land), &on_axis, &axis.value);
     let bottom = opening.place.value - axis.value * head.depth;
     let floor = measure.felt_plane(&head.floor, &bottom, &axis.value);
-    let floor =
-        floor.map_or_else(|| AxisEnd::unknown(&bottom), |floor| AxisEnd::met(measure, &floor, &bottom, &axis.value));
+    let floor = floor.map_or_else(
+        || AxisEnd::unknown(&bottom),
+        |floor| AxisEnd::met(measure, &floor, &bottom, &axis.value),
+    );
     let centre = opening.centre(&head.wall, |fit| fit.lateral_std(&opening.place.value));
     Feature {
-        diameter: Some(head.wall.number(2.0 * head.wall.surface.radius, &[(Freedom::Size, 2.0)])),
+        diameter: Some(
+            head.wall
+                .number(2.0 * head.wall.surface.radius, &[(Freedom::Size, 2.0)]),
+        ),
         depth: Some(between(&opening, &floor, &axis.value)),
         axis: Some(axis),
         walls: Some(Walls::Round(head.wall.surface)),
@@ -172,16 +271,25 @@ const ONE_WALL: f64 = 0.15;
 /// felt of it. Of two that with the most touches is kept, and the deeper one where both have none.
 fn without_second_walls(mut features: Vec<Feature>) -> Vec<Feature> {
     let depth = |feature: &Feature| feature.depth.as_ref().map_or(0.0, |depth| depth.value);
-    let touches = |feature: &Feature| feature.diameter.as_ref().map_or(0, |diameter| diameter.touches.len());
+    let touches = |feature: &Feature| {
+        feature
+            .diameter
+            .as_ref()
+            .map_or(0, |diameter| diameter.touches.len())
+    };
     let is_second = |at: usize, of: usize| {
         let (one, other) = (&features[at], &features[of]);
         let rank = |feature: &Feature| (touches(feature), depth(feature));
         let is_less = rank(one) < rank(other) || (rank(one) == rank(other) && at > of);
         at != of && is_less && is_one_wall(one, other)
     };
-    let first: Vec<usize> =
-        (0..features.len()).filter(|&at| !(0..features.len()).any(|of| is_second(at, of))).collect();
-    first.into_iter().map(|at| std::mem::take(&mut features[at])).collect()
+    let first: Vec<usize> = (0..features.len())
+        .filter(|&at| !(0..features.len()).any(|of| is_second(at, of)))
+        .collect();
+    first
+        .into_iter()
+        .map(|at| std::mem::take(&mut features[at]))
+        .collect()
 }
 
 /// Whether two holes, or two bosses, overlap along one axis over more than half of the shorter one, and are as wide.
@@ -193,7 +301,9 @@ fn is_one_wall(one: &Feature, other: &Feature) -> bool {
         let bottom = feature.centre.value - axis * if is_hole { depth } else { 0.0 };
         (depth > 0.0).then_some((bottom, axis, depth, feature.diameter.as_ref()?.value))
     };
-    let (Some((bottom, axis, depth, wide)), Some(other)) = (wall(one), wall(other)) else { return false };
+    let (Some((bottom, axis, depth, wide)), Some(other)) = (wall(one), wall(other)) else {
+        return false;
+    };
     let (other_bottom, other_axis, other_depth, other_wide) = other;
     let from = (other_bottom - bottom).dot(&axis);
     let to = from + other_depth * other_axis.dot(&axis);
@@ -202,15 +312,23 @@ fn is_one_wall(one: &Feature, other: &Feature) -> bool {
     let aside = (middle - axis * middle.dot(&axis)).norm();
     let near = ONE_WALL * wide.min(other_wide);
     let is_along = axis.dot(&other_axis).abs() > ONE_AXIS;
-    is_along && overlap > 0.5 * depth.min(other_depth) && (wide - other_wide).abs() < near && aside < near
+    is_along
+        && overlap > 0.5 * depth.min(other_depth)
+        && (wide - other_wide).abs() < near
+        && aside < near
 }
 
 /// Slots and pockets by contacts, and those of the mesh that are none of them.
 fn with_felt(felt: Vec<Slot>, (slots, pockets): (Vec<Slot>, Vec<Slot>)) -> (Vec<Slot>, Vec<Slot>) {
     let is_new = |slot: &Slot| felt.iter().all(|one| !one.holds(slot));
-    let [slots, pockets] = [slots, pockets].map(|found| found.into_iter().filter(is_new).collect::<Vec<_>>());
-    let (felt_pockets, felt_slots): (Vec<Slot>, Vec<Slot>) = felt.into_iter().partition(|one| one.is_boxed);
-    ([felt_slots, slots].concat(), [felt_pockets, pockets].concat())
+    let [slots, pockets] =
+        [slots, pockets].map(|found| found.into_iter().filter(is_new).collect::<Vec<_>>());
+    let (felt_pockets, felt_slots): (Vec<Slot>, Vec<Slot>) =
+        felt.into_iter().partition(|one| one.is_boxed);
+    (
+        [felt_slots, slots].concat(),
+        [felt_pockets, pockets].concat(),
+    )
 }
 
 /// Whether a wall is the half-round end of a slot: with its corners it may look like more than half a turn.
@@ -219,7 +337,8 @@ fn is_slot_end(wall: &Wall, slots: &[Slot]) -> bool {
         let is_wide = (2.0 * wall.radius() - slot.width).abs() < ALIKE * slot.width;
         let v = wall.at(wall.middle()) - slot.centre;
         let across = slot.out.cross(&slot.direction);
-        let is_inside = v.dot(&across).abs() < ALIKE * slot.width && v.dot(&slot.direction).abs() < slot.length / 2.0;
+        let is_inside = v.dot(&across).abs() < ALIKE * slot.width
+            && v.dot(&slot.direction).abs() < slot.length / 2.0;
         is_wide && is_inside
     })
 }
@@ -247,9 +366,17 @@ struct AxisEnd {
 fn between(from: &AxisEnd, to: &AxisEnd, direction: &Vector3<f64>) -> Measured<f64> {
     // touched from one side, both are off alike by most of what touches have in common
     let common = NOT_ALIKE * from.systematic.hypot(to.systematic);
-    let std = from.own_std.zip(to.own_std).map(|(a, b)| a.hypot(b).hypot(common));
+    let std = from
+        .own_std
+        .zip(to.own_std)
+        .map(|(a, b)| a.hypot(b).hypot(common));
     let touches = distinct(from.place.touches.iter().chain(&to.place.touches).copied());
-    Measured { value: (from.place.value - to.place.value).dot(direction).abs(), std, touches, ..Measured::default() }
+    Measured {
+        value: (from.place.value - to.place.value).dot(direction).abs(),
+        std,
+        touches,
+        ..Measured::default()
+    }
 }
 
 /// A lower bound leaves out so many standard deviations of the leans of the touches on its wall, in radii of the ball.
@@ -257,7 +384,13 @@ const LEAN_SIGMAS: f64 = 3.0;
 
 /// From one end of a wall to the other. Where the wall was felt and an end was not, that may be a guess: then it is as far as the
 /// wall was felt, and a lower bound.
-fn extent<S>(measure: &Measure, fitted: &Fitted<S>, from: &AxisEnd, to: &AxisEnd, out: &Vector3<f64>) -> Measured<f64> {
+fn extent<S>(
+    measure: &Measure,
+    fitted: &Fitted<S>,
+    from: &AxisEnd,
+    to: &AxisEnd,
+    out: &Vector3<f64>,
+) -> Measured<f64> {
     let is_felt = [from, to].map(|end| !end.place.touches.is_empty());
     if fitted.to == FittedTo::Mesh || is_felt == [true; 2] {
         return between(from, to, out);
@@ -265,16 +398,26 @@ fn extent<S>(measure: &Measure, fitted: &Fitted<S>, from: &AxisEnd, to: &AxisEnd
     let side = (to.place.value - from.place.value).dot(out).signum();
     let along = |point: &Point3<f64>| (point - from.place.value).dot(out) * side;
     // the ball is as high as its contact, or as its measured normal leans: whatever is less far
-    let of_wall = || fitted.touches.iter().map(|&number| measure.observed.touch(number));
+    let of_wall = || {
+        fitted
+            .touches
+            .iter()
+            .map(|&number| measure.observed.touch(number))
+    };
     let heights = of_wall().map(|touch| [along(&touch.centre), along(&touch.point)]);
-    let (lowest, highest) =
-        heights.fold((f64::MAX, f64::MIN), |(low, high), [a, b]| (low.min(a.max(b)), high.max(a.min(b))));
+    let (lowest, highest) = heights.fold((f64::MAX, f64::MIN), |(low, high), [a, b]| {
+        (low.min(a.max(b)), high.max(a.min(b)))
+    });
     // what rolled over the edge leans as others lean by friction and noise, and is farther than it seems
     let leans: f64 = of_wall().map(|touch| touch.normal.dot(out).powi(2)).sum();
     let radius = of_wall().map(|touch| touch.radius).fold(0.0, f64::max);
     let beyond = LEAN_SIGMAS * (leans / fitted.touches.len().max(1) as f64).sqrt() * radius;
     let begin = if is_felt[0] { 0.0 } else { lowest + beyond };
-    let end = if is_felt[1] { along(&to.place.value) } else { highest - beyond };
+    let end = if is_felt[1] {
+        along(&to.place.value)
+    } else {
+        highest - beyond
+    };
     Measured {
         value: (end - begin).max(0.0),
         touches: fitted.touches.clone(),
@@ -285,7 +428,12 @@ fn extent<S>(measure: &Measure, fitted: &Fitted<S>, from: &AxisEnd, to: &AxisEnd
 
 impl AxisEnd {
     /// Where the axis leaves plane or cylinder number `land`; else `point`.
-    fn on(measure: &Measure, land: Option<usize>, point: &Point3<f64>, axis: &Vector3<f64>) -> Self {
+    fn on(
+        measure: &Measure,
+        land: Option<usize>,
+        point: &Point3<f64>,
+        axis: &Vector3<f64>,
+    ) -> Self {
         let on_plane = |number: usize| {
             let fitted = measure.plane(number)?;
             let place = fitted.met(point, axis)?;
@@ -297,11 +445,19 @@ impl AxisEnd {
             Some((fitted.own_std_at(&place.value), place))
         };
         let met = land.and_then(|number| on_plane(number).or_else(|| on_shaft(number)));
-        met.map_or_else(|| Self::unknown(point), |(own_std, place)| Self::at(measure, place, own_std))
+        met.map_or_else(
+            || Self::unknown(point),
+            |(own_std, place)| Self::at(measure, place, own_std),
+        )
     }
 
     /// Where the axis meets a plane that was felt; else `point`.
-    fn met(measure: &Measure, plane: &Fitted<Plane>, point: &Point3<f64>, axis: &Vector3<f64>) -> Self {
+    fn met(
+        measure: &Measure,
+        plane: &Fitted<Plane>,
+        point: &Point3<f64>,
+        axis: &Vector3<f64>,
+    ) -> Self {
         let place = plane.met(point, axis);
         place.map_or_else(
             || Self::unknown(point),
@@ -311,19 +467,38 @@ impl AxisEnd {
 
     fn at(measure: &Measure, place: Measured<Point3<f64>>, own_std: Option<f64>) -> Self {
         let [common, shift] = measure.observed.systematic(&place.touches);
-        Self { place, own_std, systematic: common.hypot(shift) }
+        Self {
+            place,
+            own_std,
+            systematic: common.hypot(shift),
+        }
     }
 
     fn unknown(point: &Point3<f64>) -> Self {
-        Self { place: Measured { value: *point, ..Measured::default() }, ..Self::default() }
+        Self {
+            place: Measured {
+                value: *point,
+                ..Measured::default()
+            },
+            ..Self::default()
+        }
     }
 
     /// As the place of a feature with a fitted surface.
     ///
     /// - `std`: of the place, from the fit, m.
-    fn centre<S: Surface>(&self, fitted: &Fitted<S>, std: impl Fn(&Fit<S>) -> Option<f64>) -> Measured<Point3<f64>> {
+    fn centre<S: Surface>(
+        &self,
+        fitted: &Fitted<S>,
+        std: impl Fn(&Fit<S>) -> Option<f64>,
+    ) -> Measured<Point3<f64>> {
         let touches = distinct(fitted.touches.iter().chain(&self.place.touches).copied());
-        Measured { value: self.place.value, std: fitted.confirmed().and_then(std), touches, ..Measured::default() }
+        Measured {
+            value: self.place.value,
+            std: fitted.confirmed().and_then(std),
+            touches,
+            ..Measured::default()
+        }
     }
 }
 
@@ -334,15 +509,24 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
     let wall = &walls[hole.wall];
     let fitted = measure.cylinder(wall, hole.rim);
     let axis = fitted.axis(&hole.out);
-    let opening = AxisEnd::on(measure, hole.rim, &fitted.surface.nearest_on_axis(&hole.opening), &axis.value);
-    let bottom = fitted.surface.nearest_on_axis(&(hole.opening - hole.out * hole.depth));
+    let opening = AxisEnd::on(
+        measure,
+        hole.rim,
+        &fitted.surface.nearest_on_axis(&hole.opening),
+        &axis.value,
+    );
+    let bottom = fitted
+        .surface
+        .nearest_on_axis(&(hole.opening - hole.out * hole.depth));
     let floor = AxisEnd::on(measure, hole.floor, &bottom, &axis.value);
     // beside a wall that was touched, a floor that was not may be a guess
-    let is_known = hole.floor.is_none() || fitted.to == FittedTo::Mesh || !floor.place.touches.is_empty();
+    let is_known =
+        hole.floor.is_none() || fitted.to == FittedTo::Mesh || !floor.place.touches.is_empty();
     let centre = opening.centre(&fitted, |fit| fit.lateral_std(&opening.place.value));
     let touched = measure.observed.touched_share(&wall.segments);
     // where the mesh has a gap the touches may go all around
-    let is_notch = hole.is_notch && measure.turn(&fitted.touches, wall).max(wall.felt_turn) < WHOLE_TURN;
+    let is_notch =
+        hole.is_notch && measure.turn(&fitted.touches, wall).max(wall.felt_turn) < WHOLE_TURN;
     let cone = hole.countersink.and_then(|cone| measure.cone(&walls[cone]));
     Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
@@ -352,8 +536,18 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
         walls: Some(Walls::Round(fitted.surface)),
         form: measure.round_form(&fitted).map(Form::Round),
         element: measure.axis_element(&fitted),
-        cone_angle: cone.map(|cone| cone.number(2.0 * cone.surface.half_angle.abs(), &[(Freedom::Second, 2.0)])),
-        ..Feature::new(if is_notch { Kind::Notch } else { Kind::Hole }, centre, touched, fitted.to)
+        cone_angle: cone.map(|cone| {
+            cone.number(
+                2.0 * cone.surface.half_angle.abs(),
+                &[(Freedom::Second, 2.0)],
+            )
+        }),
+        ..Feature::new(
+            if is_notch { Kind::Notch } else { Kind::Hole },
+            centre,
+            touched,
+            fitted.to,
+        )
     }
 }
 
@@ -370,14 +564,36 @@ fn is_rim_of(wall: &Wall, rim: &RoundOpening) -> bool {
 
 /// A hole of which there is no wall: how deep it is and whether it goes through is not known.
 fn rim_feature(measure: &Measure, rim: &RoundOpening) -> Feature {
-    let (surface, fit, is_confirmed) = (rim.fit.surface, Some(rim.fit.clone()), !measure.observed.has_touches());
-    let fitted = Fitted { surface, fit, touches: Vec::new(), to: FittedTo::Mesh, is_confirmed };
-    let std = fitted.confirmed().and_then(|fit| fit.lateral_std(&rim.centre));
-    let centre = Measured { value: rim.centre, std, touches: Vec::new(), ..Measured::default() };
+    let (surface, fit, is_confirmed) = (
+        rim.fit.surface,
+        Some(rim.fit.clone()),
+        !measure.observed.has_touches(),
+    );
+    let fitted = Fitted {
+        surface,
+        fit,
+        touches: Vec::new(),
+        to: FittedTo::Mesh,
+        is_confirmed,
+    };
+    let std = fitted
+        .confirmed()
+        .and_then(|fit| fit.lateral_std(&rim.centre));
+    let centre = Measured {
+        value: rim.centre,
+        std,
+        touches: Vec::new(),
+        ..Measured::default()
+    };
     Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
         axis: Some(fitted.axis(&rim.out)),
-        ..Feature::new(Kind::Hole, centre, measure.observed.touched_at(&rim.corners), FittedTo::Mesh)
+        ..Feature::new(
+            Kind::Hole,
+            centre,
+            measure.observed.touched_at(&rim.corners),
+            FittedTo::Mesh,
+        )
     }
 }
 
@@ -387,7 +603,9 @@ fn boss_feature(measure: &Measure, walls: &[Wall], boss: &Boss) -> Feature {
     let axis = fitted.axis(&boss.out);
     let foot = fitted.surface.nearest_on_axis(&boss.foot);
     let foot = AxisEnd::on(measure, Some(boss.base), &foot, &axis.value);
-    let top = fitted.surface.nearest_on_axis(&(boss.foot + boss.out * boss.height));
+    let top = fitted
+        .surface
+        .nearest_on_axis(&(boss.foot + boss.out * boss.height));
     let top = AxisEnd::on(measure, boss.top, &top, &axis.value);
     let centre = foot.centre(&fitted, |fit| fit.lateral_std(&foot.place.value));
     Feature {
@@ -398,7 +616,11 @@ fn boss_feature(measure: &Measure, walls: &[Wall], boss: &Boss) -> Feature {
         form: measure.round_form(&fitted).map(Form::Round),
         element: measure.axis_element(&fitted),
         ..Feature::new(
-            if boss.is_turned { Kind::Cylinder } else { Kind::Boss },
+            if boss.is_turned {
+                Kind::Cylinder
+            } else {
+                Kind::Boss
+            },
             centre,
             measure.observed.touched_share(&wall.segments),
             fitted.to,
@@ -410,15 +632,28 @@ fn cylinder_feature(measure: &Measure, wall: &Wall) -> Feature {
     let fitted = measure.cylinder(wall, None);
     let middle = fitted.surface.nearest_on_axis(&wall.at(wall.middle()));
     let std = fitted.confirmed().and_then(|fit| fit.lateral_std(&middle));
-    let centre = Measured { value: middle, std, touches: fitted.touches.clone(), ..Measured::default() };
+    let centre = Measured {
+        value: middle,
+        std,
+        touches: fitted.touches.clone(),
+        ..Measured::default()
+    };
     Feature {
         diameter: Some(fitted.number(2.0 * fitted.surface.radius, &[(Freedom::Size, 2.0)])),
-        length: Some(Measured { value: wall.height(), ..Measured::default() }),
+        length: Some(Measured {
+            value: wall.height(),
+            ..Measured::default()
+        }),
         axis: Some(fitted.axis(&wall.axis)),
         walls: Some(Walls::Round(fitted.surface)),
         form: measure.round_form(&fitted).map(Form::Round),
         element: measure.axis_element(&fitted),
-        ..Feature::new(Kind::Cylinder, centre, measure.observed.touched_share(&wall.segments), fitted.to)
+        ..Feature::new(
+            Kind::Cylinder,
+            centre,
+            measure.observed.touched_share(&wall.segments),
+            fitted.to,
+        )
     }
 }
 
@@ -426,11 +661,21 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
     let fitted = measure.stadium(slot);
     let axis = fitted.axis(&slot.out);
     let Stadium { width, length, .. } = fitted.surface;
-    let is_fixed = |freedom: Freedom| fitted.fit.as_ref().is_some_and(|fit| fit.std(freedom).is_some());
-    let direction = fitted.surface.direction() * fitted.surface.direction().dot(&slot.direction).signum();
+    let is_fixed = |freedom: Freedom| {
+        fitted
+            .fit
+            .as_ref()
+            .is_some_and(|fit| fit.std(freedom).is_some())
+    };
+    let direction =
+        fitted.surface.direction() * fitted.surface.direction().dot(&slot.direction).signum();
     // along the slot only its ends determine its position
     let start = fitted.surface.center();
-    let along = if is_fixed(Freedom::X) { 0.0 } else { (slot.centre - start).dot(&direction) };
+    let along = if is_fixed(Freedom::X) {
+        0.0
+    } else {
+        (slot.centre - start).dot(&direction)
+    };
     let near = start + direction * along + axis.value * (slot.centre - start).dot(&axis.value);
     let opening = AxisEnd::on(measure, Some(slot.land), &near, &axis.value);
     let bottom = near - axis.value * slot.depth;
@@ -439,18 +684,31 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
         None => AxisEnd::on(measure, slot.floor, &bottom, &axis.value),
     };
     let centre = opening.centre(&fitted, Fit::middle_std);
-    let length = if is_fixed(Freedom::Second) { length } else { slot.length };
+    let length = if is_fixed(Freedom::Second) {
+        length
+    } else {
+        slot.length
+    };
     let half = direction * (length / 2.0);
     let touched = if slot.walls.is_empty() {
-        let (middle, across) =
-            (near - axis.value * (slot.depth / 2.0), axis.value.cross(&direction) * (slot.width / 2.0));
+        let (middle, across) = (
+            near - axis.value * (slot.depth / 2.0),
+            axis.value.cross(&direction) * (slot.width / 2.0),
+        );
         let side = |sign: f64| [-half, half].map(|end| middle + across * sign + end);
-        [1.0, -1.0].iter().map(|&sign| measure.observed.touched_along(&side(sign))).sum::<f64>() / 2.0
+        [1.0, -1.0]
+            .iter()
+            .map(|&sign| measure.observed.touched_along(&side(sign)))
+            .sum::<f64>()
+            / 2.0
     } else {
         measure.observed.touched_share(&slot.walls)
     };
     let depth = if slot.through == Some(true) && fitted.to == FittedTo::Mesh {
-        Measured { value: slot.depth, ..Measured::default() }
+        Measured {
+            value: slot.depth,
+            ..Measured::default()
+        }
     } else {
         extent(measure, &fitted, &opening, &floor, &axis.value)
     };
@@ -470,7 +728,11 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
 /// Whether both planes were measured by touch.
 fn fitted_to(planes: &[&Fitted<Plane>]) -> FittedTo {
     let is_touched = planes.iter().all(|plane| plane.to == FittedTo::Touches);
-    if is_touched { FittedTo::Touches } else { FittedTo::Mesh }
+    if is_touched {
+        FittedTo::Touches
+    } else {
+        FittedTo::Mesh
+    }
 }
 
 /// A place of a concave edge is touched when a touch is within a radius of where this share of it stands off both its walls.
@@ -481,12 +743,29 @@ fn edge_feature(measure: &Measure, edge: &StraightEdge) -> Option<Feature> {
     let (a, b) = (a?, b?);
     let std_at = |side: usize, point: &Point3<f64>| [&a, &b][side].confirmed()?.std_at(point);
     let touches = distinct(a.touches.iter().chain(&b.touches).copied());
-    let (axis, _, found) = Feature::crossing([&a.surface, &b.surface], std_at, &edge.ends, edge.is_convex, touches)?;
+    let (axis, _, found) = Feature::crossing(
+        [&a.surface, &b.surface],
+        std_at,
+        &edge.ends,
+        edge.is_convex,
+        touches,
+    )?;
     // a ball that rests in a corner touches its walls one radius off the edge
-    let reached = if edge.is_convex { 0.0 } else { IN_CORNER * measure.observed.reach() };
+    let reached = if edge.is_convex {
+        0.0
+    } else {
+        IN_CORNER * measure.observed.reach()
+    };
     let off = (a.surface.normal() + b.surface.normal()) * reached;
-    let touched = measure.observed.touched_along(&[found.points[0] + off, found.points[1] + off]);
-    Some(Feature { axis: Some(axis), touched, fitted_to: fitted_to(&[&a, &b]), ..found })
+    let touched = measure
+        .observed
+        .touched_along(&[found.points[0] + off, found.points[1] + off]);
+    Some(Feature {
+        axis: Some(axis),
+        touched,
+        fitted_to: fitted_to(&[&a, &b]),
+        ..found
+    })
 }
 
 /// Ends of edges closer together than this are one corner, in diagonals; of exact planes: what is farther off is round.
@@ -498,11 +777,23 @@ fn corners(parted: &Parted, measure: &Measure, edges: &[StraightEdge]) -> Vec<Fe
     for (at, first) in edges.iter().enumerate() {
         for second in &edges[..at] {
             let planes = distinct([first.planes, second.planes].concat());
-            let &[i, j, k] = planes.as_slice() else { continue };
-            let Some(corner) = corner_of(measure, [i, j, k]) else { continue };
+            let &[i, j, k] = planes.as_slice() else {
+                continue;
+            };
+            let Some(corner) = corner_of(measure, [i, j, k]) else {
+                continue;
+            };
             let is_exact = planes.iter().all(|&number| parted.segment(number).is_exact);
-            let near = if is_exact { SAME_EXACT_CORNER } else { SAME_CORNER } * parted.diagonal;
-            let ends = |edge: &StraightEdge| edge.ends.iter().any(|end| (end - corner.centre.value).norm() < near);
+            let near = if is_exact {
+                SAME_EXACT_CORNER
+            } else {
+                SAME_CORNER
+            } * parted.diagonal;
+            let ends = |edge: &StraightEdge| {
+                edge.ends
+                    .iter()
+                    .any(|end| (end - corner.centre.value).norm() < near)
+            };
             let is_new = found.iter().all(|(planes, _)| *planes != [i, j, k]);
             if is_new && ends(first) && ends(second) {
                 found.push(([i, j, k], corner));
@@ -523,7 +814,12 @@ fn corner_of(measure: &Measure, planes: [usize; 3]) -> Option<Feature> {
         return None;
     }
     let inverse = normals.try_inverse()?;
-    let heights = Vector3::from_fn(|i, _| planes[i].surface.normal().dot(&planes[i].surface.point().coords));
+    let heights = Vector3::from_fn(|i, _| {
+        planes[i]
+            .surface
+            .normal()
+            .dot(&planes[i].surface.point().coords)
+    });
     let point = Point3::from(inverse * heights);
     let stds = [0, 1, 2].map(|i| planes[i].confirmed().and_then(|fit| fit.std_at(&point)));
     let std = if let [Some(s), Some(t), Some(u)] = stds {
@@ -532,17 +828,40 @@ fn corner_of(measure: &Measure, planes: [usize; 3]) -> Option<Feature> {
     } else {
         None
     };
-    let touches = distinct(planes.iter().flat_map(|plane| plane.touches.iter().copied()));
+    let touches = distinct(
+        planes
+            .iter()
+            .flat_map(|plane| plane.touches.iter().copied()),
+    );
     let touched = measure.observed.touched_along(&[point, point]);
     let to = fitted_to(&[&planes[0], &planes[1], &planes[2]]);
-    Some(Feature::new(Kind::Corner, Measured { value: point, std, touches, ..Measured::default() }, touched, to))
+    Some(Feature::new(
+        Kind::Corner,
+        Measured {
+            value: point,
+            std,
+            touches,
+            ..Measured::default()
+        },
+        touched,
+        to,
+    ))
 }
 
 fn plane_feature(measure: &Measure, number: usize) -> Option<Feature> {
     let fitted = measure.plane(number)?;
-    let (point, normal) = measure.observed.parted.plane(number).map(|plane| (plane.point(), plane.normal()))?;
+    let (point, normal) = measure
+        .observed
+        .parted
+        .plane(number)
+        .map(|plane| (plane.point(), plane.normal()))?;
     let touched = measure.observed.touched_share(&[number]);
-    let feature = Feature::new(Kind::Plane, fitted.met(&point, &normal)?, touched, fitted.to);
+    let feature = Feature::new(
+        Kind::Plane,
+        fitted.met(&point, &normal)?,
+        touched,
+        fitted.to,
+    );
     Some(Feature {
         axis: Some(fitted.axis(&normal)),
         form: measure.flat_form(&fitted).map(Form::Flat),

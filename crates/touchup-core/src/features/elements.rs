@@ -17,8 +17,12 @@ fn own_covariance<S: Surface>(fit: &Fit<S>) -> Matrix6<f64> {
     let rotation = fit.surface.pose_of().rotation.to_rotation_matrix();
     // the freedoms in their order: shifts along x, y, z of F, z leans towards x and y
     let mut by_freedoms = SMatrix::<f64, 6, 8>::zeros();
-    by_freedoms.fixed_view_mut::<3, 3>(0, 0).copy_from(rotation.matrix());
-    by_freedoms.fixed_view_mut::<3, 2>(3, 3).copy_from(&rotation.matrix().fixed_columns::<2>(0));
+    by_freedoms
+        .fixed_view_mut::<3, 3>(0, 0)
+        .copy_from(rotation.matrix());
+    by_freedoms
+        .fixed_view_mut::<3, 2>(3, 3)
+        .copy_from(&rotation.matrix().fixed_columns::<2>(0));
     by_freedoms * fit.own_covariance * by_freedoms.transpose()
 }
 
@@ -27,9 +31,17 @@ impl Measure<'_> {
     fn form_points<S: Surface>(&self, fitted: &Fitted<S>) -> Vec<FormPoint> {
         let on_surface = |o: super::fit::Observation| {
             let (_, normal) = fitted.surface.distance_and_normal(&o.point);
-            FormPoint { point: o.point - normal * o.offset, sigma: o.sigma, group: o.group }
+            FormPoint {
+                point: o.point - normal * o.offset,
+                sigma: o.sigma,
+                group: o.group,
+            }
         };
-        self.observed.of_touches(&fitted.touches).into_iter().map(on_surface).collect()
+        self.observed
+            .of_touches(&fitted.touches)
+            .into_iter()
+            .map(on_surface)
+            .collect()
     }
 
     /// Roundness, cylindricity and straightness of a wall that was fitted to touches.
@@ -37,22 +49,38 @@ impl Measure<'_> {
         let cylinder = &fitted.surface;
         let is_touched = fitted.to == FittedTo::Touches;
         let points = self.form_points(fitted);
-        round_form(&points, &cylinder.center(), &cylinder.axis(), cylinder.radius).filter(|_| is_touched)
+        round_form(
+            &points,
+            &cylinder.center(),
+            &cylinder.axis(),
+            cylinder.radius,
+        )
+        .filter(|_| is_touched)
     }
 
     /// Flatness of a plane that was fitted to touches.
     pub fn flat_form(&self, fitted: &Fitted<Plane>) -> Option<FlatForm> {
         let points = self.form_points(fitted);
-        flat_form(&points, &fitted.surface.point(), &fitted.surface.normal()).filter(|_| fitted.to == FittedTo::Touches)
+        flat_form(&points, &fitted.surface.point(), &fitted.surface.normal())
+            .filter(|_| fitted.to == FittedTo::Touches)
     }
 
     /// The axis of a wall that was fitted to touches, over the heights of these.
     pub fn axis_element(&self, fitted: &Fitted<Cylinder>) -> Option<Element> {
         let direction = fitted.surface.axis();
         let places = self.touched_places(fitted)?;
-        let heights = || places.iter().map(|p| (p - fitted.surface.center()).dot(&direction));
-        let ends = [heights().fold(f64::MAX, f64::min), heights().fold(f64::MIN, f64::max)];
-        let extent = ends.map(|height| fitted.surface.center() + direction * height).to_vec();
+        let heights = || {
+            places
+                .iter()
+                .map(|p| (p - fitted.surface.center()).dot(&direction))
+        };
+        let ends = [
+            heights().fold(f64::MAX, f64::min),
+            heights().fold(f64::MIN, f64::max),
+        ];
+        let extent = ends
+            .map(|height| fitted.surface.center() + direction * height)
+            .to_vec();
         self.element(fitted, Shape::Axis, extent)
     }
 
@@ -67,16 +95,27 @@ impl Measure<'_> {
             (0..places.len()).max_by(|&a, &b| along(a).total_cmp(&along(b)))
         };
         let corners = distinct((0..CORNERS).filter_map(outermost));
-        let on = |at: usize| places[at] - normal * (places[at] - fitted.surface.point()).dot(&normal);
+        let on =
+            |at: usize| places[at] - normal * (places[at] - fitted.surface.point()).dot(&normal);
         self.element(fitted, Shape::Plane, corners.into_iter().map(on).collect())
     }
 
     fn touched_places<S: Surface>(&self, fitted: &Fitted<S>) -> Option<Vec<Point3<f64>>> {
         let is_touched = fitted.to == FittedTo::Touches && !fitted.touches.is_empty();
-        is_touched.then(|| self.form_points(fitted).into_iter().map(|p| p.point).collect())
+        is_touched.then(|| {
+            self.form_points(fitted)
+                .into_iter()
+                .map(|p| p.point)
+                .collect()
+        })
     }
 
-    fn element<S: Surface>(&self, fitted: &Fitted<S>, shape: Shape, extent: Vec<Point3<f64>>) -> Option<Element> {
+    fn element<S: Surface>(
+        &self,
+        fitted: &Fitted<S>,
+        shape: Shape,
+        extent: Vec<Point3<f64>>,
+    ) -> Option<Element> {
         let fit = fitted.confirmed()?;
         let direction = fit.surface.axis();
         let [calibration, shift] = self.observed.systematic(&fitted.touches);
@@ -91,6 +130,13 @@ impl Measure<'_> {
             let mut block = covariance.fixed_view_mut::<3, 1>(0, i);
             block += column * (alone * alone);
         }
-        Some(Element { shape, point: fit.surface.center(), direction, covariance, calibration, extent })
+        Some(Element {
+            shape,
+            point: fit.surface.center(),
+            direction,
+            covariance,
+            calibration,
+            extent,
+        })
     }
 }

@@ -24,18 +24,34 @@ impl<'a> Facets<'a> {
         let slots = mesh.face_slots();
         let (mut normals, mut areas) = (Vec::with_capacity(slots), Vec::with_capacity(slots));
         for face in (0..slots as u32).map(FaceId) {
-            let double = if mesh.has_face(face) { mesh.double_area_normal(face) } else { Vector3::zeros() };
+            let double = if mesh.has_face(face) {
+                mesh.double_area_normal(face)
+            } else {
+                Vector3::zeros()
+            };
             let length = double.norm();
             areas.push(length / 2.0);
-            normals.push(if length > 0.0 { double / length } else { Vector3::zeros() });
+            normals.push(if length > 0.0 {
+                double / length
+            } else {
+                Vector3::zeros()
+            });
         }
         let mut beside = vec![[NONE; 3]; slots];
         let mut fan = VertexFan::default();
-        for vertex in (0..mesh.vertex_slots() as u32).map(VertexId).filter(|&vertex| mesh.has_vertex(vertex)) {
+        for vertex in (0..mesh.vertex_slots() as u32)
+            .map(VertexId)
+            .filter(|&vertex| mesh.has_vertex(vertex))
+        {
             fan.gather(mesh, vertex);
             fan.join(vertex, &mut beside);
         }
-        Self { mesh, normals, areas, beside }
+        Self {
+            mesh,
+            normals,
+            areas,
+            beside,
+        }
     }
 
     /// Number of faces, removed ones counted.
@@ -60,7 +76,10 @@ impl<'a> Facets<'a> {
 
     /// The faces beside, each with the number of its edge.
     pub fn beside(&self, face: u32) -> impl Iterator<Item = (usize, u32)> + use<> {
-        self.beside[face as usize].into_iter().enumerate().filter(|&(_, other)| other != NONE)
+        self.beside[face as usize]
+            .into_iter()
+            .enumerate()
+            .filter(|&(_, other)| other != NONE)
     }
 
     /// Numbers of the edges of a face that have no other face at all.
@@ -106,36 +125,53 @@ impl VertexFan {
             numbers.resize(size, NONE);
         }
         let places = self.before.iter_mut().zip(&mut self.after);
-        self.faces.extend(star.iter().zip(places).map(|(&face, place)| {
-            let [a, b, c] = mesh.corners(face).map(|corner| corner.0);
-            let (before, after, edge) = match vertex.0 {
-                v if v == a => (c, b, 0),
-                v if v == b => (a, c, 1),
-                _ => (b, a, 2),
-            };
-            (*place.0, *place.1) = (before, after);
-            (face.0, edge)
-        }));
+        self.faces
+            .extend(star.iter().zip(places).map(|(&face, place)| {
+                let [a, b, c] = mesh.corners(face).map(|corner| corner.0);
+                let (before, after, edge) = match vertex.0 {
+                    v if v == a => (c, b, 0),
+                    v if v == b => (a, c, 1),
+                    _ => (b, a, 2),
+                };
+                (*place.0, *place.1) = (before, after);
+                (face.0, edge)
+            }));
     }
 
     /// The place of the face across the edge to vertex `next`, when there is that one and no third, and it runs along it
     /// in the opposite direction.
     fn across(&self, next: u32) -> Option<usize> {
         let (mut faces, mut place) = (0, 0);
-        let (before, after) = (self.before.as_chunks::<AT_ONCE>().0, self.after.as_chunks::<AT_ONCE>().0);
+        let (before, after) = (
+            self.before.as_chunks::<AT_ONCE>().0,
+            self.after.as_chunks::<AT_ONCE>().0,
+        );
         for (chunk, (before, after)) in before.iter().zip(after).enumerate() {
             for at in 0..AT_ONCE {
                 let is_across = before[at] == next;
                 faces += u32::from(is_across) + u32::from(after[at] == next);
-                place += if is_across { (chunk * AT_ONCE + at + 1) as u32 } else { 0 };
+                place += if is_across {
+                    (chunk * AT_ONCE + at + 1) as u32
+                } else {
+                    0
+                };
             }
         }
-        if faces == 2 { (place as usize).checked_sub(1) } else { None }
+        if faces == 2 {
+            (place as usize).checked_sub(1)
+        } else {
+            None
+        }
     }
 
     /// Sets what is across each edge between the vertex and a later one.
     fn join(&self, vertex: VertexId, beside: &mut [[u32; 3]]) {
-        for (&(face, edge), &next) in self.faces.iter().zip(&self.after).filter(|&(_, &next)| next > vertex.0) {
+        for (&(face, edge), &next) in self
+            .faces
+            .iter()
+            .zip(&self.after)
+            .filter(|&(_, &next)| next > vertex.0)
+        {
             if let Some(place) = self.across(next) {
                 // its edge to this vertex ends where the one from here begins
                 let (other, its_edge) = self.faces[place];

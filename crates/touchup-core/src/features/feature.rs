@@ -123,12 +123,25 @@ pub enum Walls {
 impl Feature {
     /// Numbers of the touches that its sizes come from; one may come again.
     pub(crate) fn touch_numbers(&self) -> impl Iterator<Item = u32> {
-        let sizes = [&self.diameter, &self.width, &self.length].into_iter().flatten();
+        let sizes = [&self.diameter, &self.width, &self.length]
+            .into_iter()
+            .flatten();
         sizes.flat_map(|size| size.touches.iter().copied())
     }
 
     /// A feature without numbers but its place.
-    pub(super) fn new(kind: Kind, centre: Measured<Point3<f64>>, touched: f64, fitted_to: FittedTo) -> Self {
-        Self { kind, centre, touched, fitted_to, ..Self::default() }
+    pub(super) fn new(
+        kind: Kind,
+        centre: Measured<Point3<f64>>,
+        touched: f64,
+        fitted_to: FittedTo,
+    ) -> Self {
+        Self {
+            kind,
+            centre,
+            touched,
+            fitted_to,
+            ..Self::default()
+        }
     }
 }

@@ -29,13 +29,20 @@ pub(super) struct FlatPiece {
 impl Flats {
     /// `None` for a mesh that is no drawing.
     pub fn of(facets: &Facets) -> Option<Self> {
-        is_drawn(facets).then(|| Self { of_face: vec![NONE; facets.slots()], flats: Vec::new() })
+        is_drawn(facets).then(|| Self {
+            of_face: vec![NONE; facets.slots()],
+            flats: Vec::new(),
+        })
     }
 
     /// That of a face.
     pub fn at(&mut self, facets: &Facets, face: u32) -> &FlatPiece {
         let known = self.of_face[face as usize];
-        let number = if known == NONE { self.add(facets, face) } else { known };
+        let number = if known == NONE {
+            self.add(facets, face)
+        } else {
+            known
+        };
         &self.flats[number as usize]
     }
 
@@ -51,7 +58,10 @@ impl Flats {
             }
             is_new
         });
-        self.flats.push(FlatPiece { area: facets.area_of(&faces), faces });
+        self.flats.push(FlatPiece {
+            area: facets.area_of(&faces),
+            faces,
+        });
         number
     }
 }
@@ -60,8 +70,14 @@ impl FlatPiece {
     /// The faces in which it continues without an edge.
     pub fn beside<'a>(&'a self, facets: &'a Facets) -> impl Iterator<Item = u32> + 'a {
         let normal = facets.normal(self.faces[0]);
-        let beside = self.faces.iter().flat_map(|&face| facets.beside(face)).map(|(_, other)| other);
-        beside.filter(move |&other| (COPLANAR..1.0 - SMOOTH).contains(&(1.0 - normal.dot(&facets.normal(other)))))
+        let beside = self
+            .faces
+            .iter()
+            .flat_map(|&face| facets.beside(face))
+            .map(|(_, other)| other);
+        beside.filter(move |&other| {
+            (COPLANAR..1.0 - SMOOTH).contains(&(1.0 - normal.dot(&facets.normal(other))))
+        })
     }
 }
 
@@ -74,5 +90,9 @@ fn is_drawn(facets: &Facets) -> bool {
     };
     // no more are looked at than it takes
     let enough = (DRAWN_SHARE * all as f64) as usize + 1;
-    (0..facets.slots() as u32).filter(is_coplanar).take(enough).count() == enough
+    (0..facets.slots() as u32)
+        .filter(is_coplanar)
+        .take(enough)
+        .count()
+        == enough
 }

@@ -23,13 +23,27 @@ impl Feature {
     ///
     /// - `top`: around the opening, or the foot of the boss; `end`: of the floor, or the boss' top, where it was touched.
     /// - `touches`: those used.
-    pub fn round(wall: &Fit<Cylinder>, top: &Fit<Plane>, end: Option<&End>, touches: Touches) -> Self {
+    pub fn round(
+        wall: &Fit<Cylinder>,
+        top: &Fit<Plane>,
+        end: Option<&End>,
+        touches: Touches,
+    ) -> Self {
         let out = top.surface.normal();
         let centre = met(&top.surface, &wall.surface.center(), &wall.surface.axis());
-        let kind = if wall.surface.concave { Kind::Hole } else { Kind::Boss };
+        let kind = if wall.surface.concave {
+            Kind::Hole
+        } else {
+            Kind::Boss
+        };
         Self {
             axis: Some(axis_of(wall, &out, &touches)),
-            diameter: Some(number(wall, 2.0 * wall.surface.radius, &[(Freedom::Size, 2.0)], &touches)),
+            diameter: Some(number(
+                wall,
+                2.0 * wall.surface.radius,
+                &[(Freedom::Size, 2.0)],
+                &touches,
+            )),
             depth: end.map(|end| apart(top, end, &touches)),
             through: end.filter(|_| kind == Kind::Hole).map(|_| false),
             walls: Some(Walls::Round(wall.surface)),
@@ -38,15 +52,30 @@ impl Feature {
     }
 
     /// A slot: its walls, the surface around its opening, and its floor where it was touched.
-    pub fn slot(wall: &Fit<Stadium>, top: &Fit<Plane>, floor: Option<&End>, touches: Touches) -> Self {
+    pub fn slot(
+        wall: &Fit<Stadium>,
+        top: &Fit<Plane>,
+        floor: Option<&End>,
+        touches: Touches,
+    ) -> Self {
         let centre = met(&top.surface, &wall.surface.center(), &wall.surface.axis());
         let direction = wall.surface.direction();
         let half = direction * (wall.surface.length / 2.0);
         Self {
             axis: Some(axis_of(wall, &top.surface.normal(), &touches)),
             direction: Some(direction),
-            width: Some(number(wall, wall.surface.width, &[(Freedom::Size, 1.0)], &touches)),
-            length: Some(number(wall, wall.surface.length, &[(Freedom::Second, 1.0)], &touches)),
+            width: Some(number(
+                wall,
+                wall.surface.width,
+                &[(Freedom::Size, 1.0)],
+                &touches,
+            )),
+            length: Some(number(
+                wall,
+                wall.surface.length,
+                &[(Freedom::Second, 1.0)],
+                &touches,
+            )),
             depth: floor.map(|floor| apart(top, floor, &touches)),
             through: floor.map(|_| false),
             points: vec![centre - half, centre + half],
@@ -58,7 +87,12 @@ impl Feature {
     /// The edge between two planes, as far as from one place on it to another; `None` when they are parallel.
     ///
     /// - `ends`: near the edge, m in O.
-    pub fn edge(sides: [&Fit<Plane>; 2], ends: &[Point3<f64>; 2], is_convex: bool, touches: Touches) -> Option<Self> {
+    pub fn edge(
+        sides: [&Fit<Plane>; 2],
+        ends: &[Point3<f64>; 2],
+        is_convex: bool,
+        touches: Touches,
+    ) -> Option<Self> {
         let planes = sides.map(|side| &side.surface);
         let std_at = |side: usize, point: &Point3<f64>| sides[side].std_at(point);
         let (mut axis, sine, edge) = Self::crossing(planes, std_at, ends, is_convex, touches)?;
@@ -68,7 +102,10 @@ impl Feature {
             side.std_by(&[(Freedom::TiltX, along.x), (Freedom::TiltY, along.y)])
         });
         axis.std = leans[0].zip(leans[1]).map(|(a, b)| a.hypot(b) / sine);
-        Some(Self { axis: Some(axis), ..edge })
+        Some(Self {
+            axis: Some(axis),
+            ..edge
+        })
     }
 
     /// The edge in which two planes meet, as far as from one place near it to another: its axis, the sine between the planes, and the rest;
@@ -88,10 +125,20 @@ impl Feature {
         let ends = ends.map(|end| on_both(planes, &end));
         let middle = nalgebra::center(&ends[0], &ends[1]);
         // two planes that may be shifted by s and t displace their line of intersection by √(s² + t²) / sin of the angle between them
-        let std = std_at(0, &middle).zip(std_at(1, &middle)).map(|(s, t)| s.hypot(t) / sine);
-        let axis = Measured { value, std: None, touches: touches.clone(), ..Measured::default() };
+        let std = std_at(0, &middle)
+            .zip(std_at(1, &middle))
+            .map(|(s, t)| s.hypot(t) / sine);
+        let axis = Measured {
+            value,
+            std: None,
+            touches: touches.clone(),
+            ..Measured::default()
+        };
         let edge = Self {
-            length: Some(Measured { value: (ends[1] - ends[0]).norm(), ..Measured::default() }),
+            length: Some(Measured {
+                value: (ends[1] - ends[0]).norm(),
+                ..Measured::default()
+            }),
             points: ends.to_vec(),
             is_convex: Some(is_convex),
             ..Self::touched(Kind::Edge, middle, std, touches)
@@ -110,7 +157,17 @@ impl Feature {
     }
 
     fn touched(kind: Kind, centre: Point3<f64>, std: Option<f64>, touches: Touches) -> Self {
-        Self::new(kind, Measured { value: centre, std, touches, ..Measured::default() }, 1.0, FittedTo::Touches)
+        Self::new(
+            kind,
+            Measured {
+                value: centre,
+                std,
+                touches,
+                ..Measured::default()
+            },
+            1.0,
+            FittedTo::Touches,
+        )
     }
 }
 
@@ -121,7 +178,11 @@ fn met(plane: &Plane, from: &Point3<f64>, direction: &Vector3<f64>) -> Point3<f6
 }
 
 /// Its direction, with the sign of `out`.
-pub(super) fn axis_of<S: Surface>(fit: &Fit<S>, out: &Vector3<f64>, touches: &Touches) -> Measured<Vector3<f64>> {
+pub(super) fn axis_of<S: Surface>(
+    fit: &Fit<S>,
+    out: &Vector3<f64>,
+    touches: &Touches,
+) -> Measured<Vector3<f64>> {
     Measured {
         value: fit.surface.axis_towards(out),
         std: fit.axis_std(),
@@ -131,13 +192,30 @@ pub(super) fn axis_of<S: Surface>(fit: &Fit<S>, out: &Vector3<f64>, touches: &To
 }
 
 /// A number with its derivatives by the freedoms.
-pub(super) fn number<S: Surface>(fit: &Fit<S>, value: f64, by: &[(Freedom, f64)], touches: &Touches) -> Measured<f64> {
-    Measured { value, std: fit.std_by(by), touches: touches.clone(), ..Measured::default() }
+pub(super) fn number<S: Surface>(
+    fit: &Fit<S>,
+    value: f64,
+    by: &[(Freedom, f64)],
+    touches: &Touches,
+) -> Measured<f64> {
+    Measured {
+        value,
+        std: fit.std_by(by),
+        touches: touches.clone(),
+        ..Measured::default()
+    }
 }
 
 /// Distance of a place from a plane, m.
 fn apart(plane: &Fit<Plane>, end: &End, touches: &Touches) -> Measured<f64> {
-    let value = (end.point - plane.surface.point()).dot(&plane.surface.normal()).abs();
+    let value = (end.point - plane.surface.point())
+        .dot(&plane.surface.normal())
+        .abs();
     let std = plane.std_at(&end.point).map(|std| std.hypot(end.sigma));
-    Measured { value, std, touches: touches.clone(), ..Measured::default() }
+    Measured {
+        value,
+        std,
+        touches: touches.clone(),
+        ..Measured::default()
+    }
 }

@@ -125,7 +125,10 @@ impl<'a> Growing<'a> {
     fn seeds(&self) -> Vec<u32> {
         let mut buckets: [Vec<u32>; 16] = Default::default();
         for (face, normal) in self.facets.normals.iter().enumerate() {
-            let turns = self.facets.beside(face as u32).map(|(_, other)| 1.0 - normal.dot(&self.facets.normal(other)));
+            let turns = self
+                .facets
+                .beside(face as u32)
+                .map(|(_, other)| 1.0 - normal.dot(&self.facets.normal(other)));
             let sharpest = turns.fold(0.0, f64::max);
             // 1 − cos: a bucket for each power of two above a thousandth of a degree
             let at = power_of_two((sharpest / 1.5e-10).max(1.0)) / 2;
@@ -162,7 +165,9 @@ impl<'a> Growing<'a> {
 
     fn grow_from(&mut self, seed: u32, flats: Option<&mut Flats>) {
         let near = self.near(seed, NEAR);
-        let Some(bend) = NormalSpread::of(self.facets, &near) else { return };
+        let Some(bend) = NormalSpread::of(self.facets, &near) else {
+            return;
+        };
         let mut needs = f64::INFINITY;
         let mut best = None;
         if bend.spread < FLAT {
@@ -171,7 +176,9 @@ impl<'a> Growing<'a> {
         if let Some(flats) = flats.filter(|_| best.is_none() && self.is_exact()) {
             best = self.flat_from(flats.at(self.facets, seed));
         }
-        let is_bounded = best.as_ref().is_some_and(|plane| self.smooth_share(plane) < BOUNDED);
+        let is_bounded = best
+            .as_ref()
+            .is_some_and(|plane| self.smooth_share(plane) < BOUNDED);
         if !is_bounded {
             let enough = best.as_ref().map_or(0.0, |plane| MORE * plane.area);
             let faces = best.as_ref().map_or(0, |plane| plane.faces.len());
@@ -191,19 +198,27 @@ impl<'a> Growing<'a> {
             // what was tried in vain is tried again with more tolerance
             None => {
                 let needs = needs.max(self.closeness * (1.0 + f64::EPSILON));
-                near.iter().for_each(|&face| self.needs[face as usize] = needs);
+                near.iter()
+                    .for_each(|&face| self.needs[face as usize] = needs);
             }
         }
     }
 
     fn accept(&mut self, mut region: Segment) {
         sort(&mut region.faces, self.of_face.len());
-        region.faces.iter().for_each(|&face| self.of_face[face as usize] = self.segments.len() as u32);
+        region
+            .faces
+            .iter()
+            .for_each(|&face| self.of_face[face as usize] = self.segments.len() as u32);
         self.segments.push(region);
     }
 
     fn plane_from(&mut self, seed: u32, near: &[u32], needs: &mut f64) -> Option<Segment> {
-        let start = plane_of(self.facets, self.facets.triangle(seed)[0], near.iter().copied())?;
+        let start = plane_of(
+            self.facets,
+            self.facets.triangle(seed)[0],
+            near.iter().copied(),
+        )?;
         self.is_close(&start, near, needs).then_some(())?;
         self.grown(seed, start, near.len())
     }
@@ -216,7 +231,10 @@ impl<'a> Growing<'a> {
     /// A flat piece of a drawing, where it continues in round ones, of facets much smaller than it is.
     fn flat_from(&mut self, flat: &FlatPiece) -> Option<Segment> {
         let (facets, seed) = (self.facets, flat.faces[0]);
-        let largest = flat.beside(facets).map(|face| facets.area(face)).fold(0.0, f64::max);
+        let largest = flat
+            .beside(facets)
+            .map(|face| facets.area(face))
+            .fold(0.0, f64::max);
         if flat.area <= FLAT_AMONG_ROUND * largest {
             return None;
         }
@@ -238,7 +256,8 @@ impl<'a> Growing<'a> {
             }
             let flat = flat.clone();
             // of something round that was divided further, what is beside is as large
-            let is_large = |face: u32| FLAT_BESIDE_FLAT * flats.at(self.facets, face).area > flat.area;
+            let is_large =
+                |face: u32| FLAT_BESIDE_FLAT * flats.at(self.facets, face).area > flat.area;
             if flat.beside(self.facets).any(is_large) {
                 continue;
             }
@@ -258,7 +277,10 @@ impl<'a> Growing<'a> {
     fn cylinder_from(&mut self, seed: u32, plane: usize, needs: &mut f64) -> Option<Segment> {
         let mut best: Option<Segment> = None;
         let (mut before, mut is_all) = (0, false);
-        for most in CURVED_NEAR.into_iter().chain([(3 * plane + 24).min(MOST_NEAR)]) {
+        for most in CURVED_NEAR
+            .into_iter()
+            .chain([(3 * plane + 24).min(MOST_NEAR)])
+        {
             if is_all || most <= before {
                 continue;
             }
@@ -268,15 +290,24 @@ impl<'a> Growing<'a> {
                 continue;
             }
             before = near.len();
-            let near: Vec<u32> = near.into_iter().step_by(before.div_ceil(MOST_FITTED)).collect();
+            let near: Vec<u32> = near
+                .into_iter()
+                .step_by(before.div_ceil(MOST_FITTED))
+                .collect();
             let bend = NormalSpread::of(self.facets, &near).filter(|bend| bend.spread > BENT);
-            let Some(axis) = bend.and_then(|bend| bend.cylinder_axis()) else { continue };
+            let Some(axis) = bend.and_then(|bend| bend.cylinder_axis()) else {
+                continue;
+            };
             let start = cylinder_of(self.facets, &near, &axis);
-            let Some(start) = start.and_then(|start| refined(&start, self.facets, &near)) else { continue };
+            let Some(start) = start.and_then(|start| refined(&start, self.facets, &near)) else {
+                continue;
+            };
             if !self.is_close(&start, &near, needs) {
                 continue;
             }
-            let Some(region) = self.grown(seed, start, before) else { continue };
+            let Some(region) = self.grown(seed, start, before) else {
+                continue;
+            };
             // any facet lies on some cylinder
             if NormalSpread::of(self.facets, &region.faces).is_none_or(|bend| bend.spread < BENT) {
                 continue;
@@ -290,7 +321,10 @@ impl<'a> Growing<'a> {
 
     /// Whether corners of `near` are as near as the tolerance wants them; else returns what they need.
     fn is_close(&self, primitive: &Primitive, near: &[u32], needs: &mut f64) -> bool {
-        let squares = near.iter().flat_map(|&face| self.facets.triangle(face)).map(|p| primitive.distance(&p).powi(2));
+        let squares = near
+            .iter()
+            .flat_map(|&face| self.facets.triangle(face))
+            .map(|p| primitive.distance(&p).powi(2));
         let needed = SPREAD * (squares.sum::<f64>() / (3 * near.len()) as f64).sqrt();
         *needs = needs.min(needed);
         needed <= self.closeness
@@ -313,12 +347,20 @@ impl<'a> Growing<'a> {
                 break;
             }
         }
-        if matches!(primitive, Primitive::Cylinder(wall) if self.closeness > SHARPNESS * wall.radius) {
+        if matches!(primitive, Primitive::Cylinder(wall) if self.closeness > SHARPNESS * wall.radius)
+        {
             return None;
         }
         let area = self.facets.area_of(&faces);
         let (tolerance, is_exact) = (self.tolerance, self.is_exact());
-        Some(Segment { primitive, faces, area, tolerance, is_exact, felt_turn: 0.0 })
+        Some(Segment {
+            primitive,
+            faces,
+            area,
+            tolerance,
+            is_exact,
+            felt_turn: 0.0,
+        })
     }
 
     /// Goes from the faces of `found` over all that belong to the primitive, which follows them each time their number has
@@ -327,7 +369,9 @@ impl<'a> Growing<'a> {
     /// - `fitted`: how many faces already determine the primitive; fewer of them may be flat by themselves.
     fn flood(&mut self, mut found: Vec<u32>, primitive: &mut Primitive, fitted: usize) -> Vec<u32> {
         self.round += 1;
-        found.iter().for_each(|&face| self.seen[face as usize] = self.round);
+        found
+            .iter()
+            .for_each(|&face| self.seen[face as usize] = self.round);
         let (mut at, mut refit_at) = (0, 2 * found.len().max(fitted));
         while at < found.len() {
             let face = found[at];
@@ -353,22 +397,34 @@ impl<'a> Growing<'a> {
 
     /// Whether two primitives are the same on a sample of faces, within the tolerance.
     fn is_settled(&self, one: &Primitive, other: &Primitive, faces: &[u32]) -> bool {
-        faces.iter().step_by(faces.len().div_ceil(SAMPLE)).all(|&face| {
-            let p = self.facets.triangle(face)[0];
-            (one.distance(&p) - other.distance(&p)).abs() < SETTLED * self.tolerance
-        })
+        faces
+            .iter()
+            .step_by(faces.len().div_ceil(SAMPLE))
+            .all(|&face| {
+                let p = self.facets.triangle(face)[0];
+                (one.distance(&p) - other.distance(&p)).abs() < SETTLED * self.tolerance
+            })
     }
 
     fn fitted(&self, primitive: &Primitive, faces: &[u32]) -> Option<Primitive> {
-        let Some(plane) = primitive.plane() else { return refined(primitive, self.facets, faces) };
+        let Some(plane) = primitive.plane() else {
+            return refined(primitive, self.facets, faces);
+        };
         let step = faces.len().div_ceil(MOST_OF_PLANE);
-        plane_of(self.facets, plane.point(), faces.iter().copied().step_by(step))
+        plane_of(
+            self.facets,
+            plane.point(),
+            faces.iter().copied().step_by(step),
+        )
     }
 
     /// Share of a region's border without an edge.
     fn smooth_share(&mut self, region: &Segment) -> f64 {
         self.round += 1;
-        region.faces.iter().for_each(|&face| self.seen[face as usize] = self.round);
+        region
+            .faces
+            .iter()
+            .for_each(|&face| self.seen[face as usize] = self.round);
         let (mut smooth, mut all) = (0.0, f64::MIN_POSITIVE);
         for &face in &region.faces {
             for edge in 0..3 {
@@ -379,7 +435,8 @@ impl<'a> Growing<'a> {
                 let [a, b] = self.facets.edge(face, edge);
                 let length = (a - b).norm();
                 all += length;
-                let goes_on = |other: u32| self.facets.normal(face).dot(&self.facets.normal(other)) > SMOOTH;
+                let goes_on =
+                    |other: u32| self.facets.normal(face).dot(&self.facets.normal(other)) > SMOOTH;
                 if other != NONE && goes_on(other) {
                     smooth += length;
                 }
@@ -391,17 +448,32 @@ impl<'a> Growing<'a> {
     /// Parts the mesh once more: tight and large segments take what they explain of loose and small ones.
     fn claim(&mut self) {
         let mut order = std::mem::take(&mut self.segments);
-        order.sort_by(|a, b| a.tolerance.total_cmp(&b.tolerance).then(b.area.total_cmp(&a.area)));
+        order.sort_by(|a, b| {
+            a.tolerance
+                .total_cmp(&b.tolerance)
+                .then(b.area.total_cmp(&a.area))
+        });
         self.of_face.fill(NONE);
         for segment in order {
             self.tolerance = segment.tolerance;
-            let mut left: Vec<u32> = segment.faces.iter().copied().filter(|&face| self.is_free(face)).collect();
+            let mut left: Vec<u32> = segment
+                .faces
+                .iter()
+                .copied()
+                .filter(|&face| self.is_free(face))
+                .collect();
             if left.is_empty() {
                 continue;
             }
             let is_whole = left.len() == segment.faces.len();
-            let primitive = if is_whole { Some(segment.primitive) } else { self.fitted(&segment.primitive, &left) };
-            let Some(mut primitive) = primitive else { continue };
+            let primitive = if is_whole {
+                Some(segment.primitive)
+            } else {
+                self.fitted(&segment.primitive, &left)
+            };
+            let Some(mut primitive) = primitive else {
+                continue;
+            };
             left.retain(|&face| belongs(self.facets, face, &primitive, self.tolerance));
             let fitted = left.len();
             let faces = self.flood(left, &mut primitive, fitted);
@@ -410,16 +482,28 @@ impl<'a> Growing<'a> {
                 continue;
             }
             let primitive = self.fitted(&primitive, &faces).unwrap_or(primitive);
-            self.accept(Segment { primitive, faces, area, ..segment });
+            self.accept(Segment {
+                primitive,
+                faces,
+                area,
+                ..segment
+            });
         }
     }
 
     fn finish(mut self) -> Segmentation {
         self.claim();
-        let Self { mut segments, mut of_face, .. } = self;
+        let Self {
+            mut segments,
+            mut of_face,
+            ..
+        } = self;
         segments.sort_by(|a, b| b.area.total_cmp(&a.area));
         for (number, segment) in segments.iter().enumerate() {
-            segment.faces.iter().for_each(|&face| of_face[face as usize] = number as u32);
+            segment
+                .faces
+                .iter()
+                .for_each(|&face| of_face[face as usize] = number as u32);
         }
         Segmentation { segments, of_face }
     }
@@ -435,10 +519,15 @@ impl MeshScale {
     pub(super) fn of(facets: &Facets) -> Self {
         let [lo, hi] = facets.mesh.bounds();
         let count = facets.slots();
-        let sample = (0..count).step_by((count / 10_000).max(1)).filter(|&face| facets.areas[face] > 0.0);
+        let sample = (0..count)
+            .step_by((count / 10_000).max(1))
+            .filter(|&face| facets.areas[face] > 0.0);
         let edges = sample.map(|face| facets.edge(face as u32, 0));
         let mut lengths: Vec<f64> = edges.map(|[a, b]| (b - a).norm()).collect();
-        Self { diagonal: (hi - lo).norm(), edge: median(&mut lengths).unwrap_or(0.0) }
+        Self {
+            diagonal: (hi - lo).norm(),
+            edge: median(&mut lengths).unwrap_or(0.0),
+        }
     }
 
     /// How near the faces around a seed have to be, and how near the others. Tight ones first: what they explain is not left
@@ -449,7 +538,11 @@ impl MeshScale {
         let (exact, (closeness, tolerance)) = (self.exact(), self.waves());
         let wider = |rung| f64::powi(WIDER, rung);
         let loose = (0..RUNGS).map(|rung| (closeness * wider(rung), tolerance * wider(rung)));
-        is_drawn.then_some((exact, exact)).into_iter().chain(loose).collect()
+        is_drawn
+            .then_some((exact, exact))
+            .into_iter()
+            .chain(loose)
+            .collect()
     }
 
     /// What a drawing needs, m.
@@ -469,7 +562,9 @@ impl MeshScale {
 
     /// What surfaces that are good but no drawing need.
     fn waves(&self) -> (f64, f64) {
-        let closeness = (WAVES * self.edge).min(WAVES_OF_ALL * self.diagonal).max(self.exact());
+        let closeness = (WAVES * self.edge)
+            .min(WAVES_OF_ALL * self.diagonal)
+            .max(self.exact());
         (closeness, WIDER * closeness)
     }
 }

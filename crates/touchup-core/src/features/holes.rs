@@ -128,13 +128,21 @@ pub(super) fn holes(parted: &Parted, walls: &[Wall]) -> Vec<Hole> {
     let is_hole = |wall: &Wall| wall.is_concave && !wall.is_cone();
     let numbers = (0..walls.len()).filter(|&at| is_hole(&walls[at]));
     let found: Vec<Hole> = numbers.filter_map(|at| hole(parted, walls, at)).collect();
-    let is_of = |hole: &Hole, other: &Hole| is_fragment_of(parted, &walls[hole.wall], &walls[other.wall]);
-    found.iter().filter(|hole| !found.iter().any(|other| is_of(hole, other))).cloned().collect()
+    let is_of =
+        |hole: &Hole, other: &Hole| is_fragment_of(parted, &walls[hole.wall], &walls[other.wall]);
+    found
+        .iter()
+        .filter(|hole| !found.iter().any(|other| is_of(hole, other)))
+        .cloned()
+        .collect()
 }
 
 /// Whether a wall is a fragment of the same hole as a better one: with few touches it is crooked.
 fn is_fragment_of(parted: &Parted, wall: &Wall, better: &Wall) -> bool {
-    let (part, whole) = (parted.segment(wall.segments[0]), parted.segment(better.segments[0]));
+    let (part, whole) = (
+        parted.segment(wall.segments[0]),
+        parted.segment(better.segments[0]),
+    );
     let v = wall.at(wall.middle()) - better.origin;
     let along = v.dot(&better.axis);
     let aside = (v - better.axis * along).norm();
@@ -161,7 +169,9 @@ fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
     let ends = [end(parted, wall, 0), end(parted, wall, 1)];
     let open = match ends.map(|end| end.closed_at.is_none()) {
         // a plug
-        [false, false] if is_felt => usize::from(openness(walls, at, &ends[1]) > openness(walls, at, &ends[0])),
+        [false, false] if is_felt => {
+            usize::from(openness(walls, at, &ends[1]) > openness(walls, at, &ends[0]))
+        }
         [false, false] => return None,
         [true, false] => 0,
         [false, true] => 1,
@@ -180,7 +190,8 @@ fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
         return None;
     }
     let top = rim.map_or(open.t, |(_, t)| t);
-    let tip = cone_beside(walls, at, &other).filter(|&cone| walls[cone].axis.dot(&wall.axis) * other.out < 0.0);
+    let tip = cone_beside(walls, at, &other)
+        .filter(|&cone| walls[cone].axis.dot(&wall.axis) * other.out < 0.0);
     // at the tip of a drill the depth is that of the cylinder
     let closed_at = other.closed_at.filter(|_| tip.is_none());
     let floor = match shoulder(parted, walls, at, &other) {
@@ -189,7 +200,10 @@ fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
     };
     let bottom = match other.closed_at {
         Some(_) => floor.map_or(other.t, |(_, t)| t),
-        None => floor.map(|(_, t)| t).or_else(|| Some(on_land(&other)?.1)).unwrap_or(other.t),
+        None => floor
+            .map(|(_, t)| t)
+            .or_else(|| Some(on_land(&other)?.1))
+            .unwrap_or(other.t),
     };
     Some(Hole {
         wall: at,
@@ -203,7 +217,8 @@ fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
         rim: rim.map(|(number, _)| number),
         floor: floor.map(|(number, _)| number),
         is_notch,
-        countersink: cone_beside(walls, at, &open).filter(|&cone| is_countersink(&walls[cone], wall, open.out)),
+        countersink: cone_beside(walls, at, &open)
+            .filter(|&cone| is_countersink(&walls[cone], wall, open.out)),
     })
 }
 
@@ -212,13 +227,21 @@ fn shoulder(parted: &Parted, walls: &[Wall], at: usize, end: &WallEnd) -> Option
     let wall = &walls[at];
     let is_next = |next: &&Wall| {
         let is_near = next.gap(wall).abs() < SAME_HOLE * wall.radius();
-        !next.is_cone() && next.coverage >= HOLE_COVERAGE && next.radius() < wall.radius() && is_near
+        !next.is_cone()
+            && next.coverage >= HOLE_COVERAGE
+            && next.radius() < wall.radius()
+            && is_near
     };
-    let next = walls.iter().filter(|next| end.goes_on_in(wall, next)).find(is_next)?;
+    let next = walls
+        .iter()
+        .filter(|next| end.goes_on_in(wall, next))
+        .find(is_next)?;
     let ring = [(wall.radius() + next.radius()) / 2.0];
     let (middle, opening) = (wall.at(end.t), wall.axis * -end.out);
     let around = parted.around(wall.segments[0]);
-    parted.plane_around(&around, &middle, &opening, &ring, NEAR_END * wall.radius()).map(|(number, _)| number)
+    parted
+        .plane_around(&around, &middle, &opening, &ring, NEAR_END * wall.radius())
+        .map(|(number, _)| number)
 }
 
 /// Whether a wall is a cut at the rim of the part: beside where it is open neither a wall nor what is around the opening goes on.
@@ -229,12 +252,25 @@ fn is_notch(parted: &Parted, wall: &Wall, end: &WallEnd) -> bool {
     let mut is_open = |i: usize| {
         let (sine, cosine) = (std::f64::consts::TAU * (i as f64 + 0.3) / AROUND as f64).sin_cos();
         let along = e * cosine + g * sine;
-        let is_beside = around.closest(&(wall.at(end.t) + along * (RINGS[1] * radius)), NEAR_END * radius).is_some();
-        [!is_beside, rays.first(&wall.at(wall.middle()), &along, OPEN * radius).is_none()]
+        let is_beside = around
+            .closest(
+                &(wall.at(end.t) + along * (RINGS[1] * radius)),
+                NEAR_END * radius,
+            )
+            .is_some();
+        [
+            !is_beside,
+            rays.first(&wall.at(wall.middle()), &along, OPEN * radius)
+                .is_none(),
+        ]
     };
     let open: Vec<[bool; 2]> = (0..AROUND).map(&mut is_open).collect();
     let widest = |which: usize| {
-        let run = |start: usize| (0..AROUND).take_while(|i| open[(start + i) % AROUND][which]).count();
+        let run = |start: usize| {
+            (0..AROUND)
+                .take_while(|i| open[(start + i) % AROUND][which])
+                .count()
+        };
         (0..AROUND).map(run).max().unwrap_or(0)
     };
     widest(0) > 0 && widest(1) >= NOTCH
@@ -249,12 +285,14 @@ fn is_free(parted: &Parted, wall: &Wall) -> bool {
     for i in 0..PROBES {
         let start = wall.at(wall.ends[0] + wall.height() * (i as f64 + 0.5) / PROBES as f64);
         for k in 0..PROBE_RAYS {
-            let (sine, cosine) = (std::f64::consts::TAU * (k as f64 + 0.3) / PROBE_RAYS as f64).sin_cos();
+            let (sine, cosine) =
+                (std::f64::consts::TAU * (k as f64 + 0.3) / PROBE_RAYS as f64).sin_cos();
             let along = e * cosine + g * sine;
             let met = rays.first(&start, &along, (1.0 + FREE) * radius);
             // what is met from behind is material around the axis
-            let is_free =
-                |met: RayHit| met.distance > FREE * radius && parted.facets.normal(met.face.0).dot(&along) < 0.0;
+            let is_free = |met: RayHit| {
+                met.distance > FREE * radius && parted.facets.normal(met.face.0).dot(&along) < 0.0
+            };
             free += usize::from(met.is_none_or(is_free));
         }
     }
@@ -268,7 +306,13 @@ fn end(parted: &Parted, wall: &Wall, which: usize) -> WallEnd {
     let middle = wall.middle();
     let around = parted.around(wall.segments[0]);
     let rings = RINGS.map(|ring| ring * radius);
-    let rim = parted.land_around(&around, &wall.at(t), &(wall.axis * out), &rings, NEAR_END * radius);
+    let rim = parted.land_around(
+        &around,
+        &wall.at(t),
+        &(wall.axis * out),
+        &rings,
+        NEAR_END * radius,
+    );
     let rim = rim.filter(|&(_, share)| share > RIM);
     let reach = [CLOSED, MAYBE_CLOSED].map(|radii| wall.height() / 2.0 + radii * radius);
     // beside the axis: on it lie the tips of cones and the edges of floors, which a line may slip through
@@ -276,12 +320,19 @@ fn end(parted: &Parted, wall: &Wall, which: usize) -> WallEnd {
     let mut rays = around.rays(radius);
     let mut met = [0.4f64, 2.5, 4.6].map(|turn| {
         let aside = (e * turn.cos() + g * turn.sin()) * (ASIDE * radius);
-        rays.first(&(wall.at(middle) + aside), &(wall.axis * out), reach[1]).map_or(f64::INFINITY, |met| met.distance)
+        rays.first(&(wall.at(middle) + aside), &(wall.axis * out), reach[1])
+            .map_or(f64::INFINITY, |met| met.distance)
     });
     met.sort_by(f64::total_cmp);
     let closed_at = (met[1] <= reach[0]).then(|| middle + out * met[1]);
     let is_open = closed_at.is_none() && (rim.is_some() || met[1].is_infinite());
-    WallEnd { t, out, closed_at, is_open, rim }
+    WallEnd {
+        t,
+        out,
+        closed_at,
+        is_open,
+        rim,
+    }
 }
 
 /// Whether the mesh ends there: the continuation of the wall was neither scanned nor touched. Where a plane is around the end, the
@@ -292,10 +343,16 @@ fn is_torn(parted: &Parted, wall: &Wall, end: &WallEnd) -> bool {
     // of a box that holds all of them, however the axis lies
     let reach = Vector3::repeat(near[1] * f64::sqrt(2.0));
     let mut found = BoxQuery::default();
-    parted.tree.faces_in_box(&(middle - reach), &(middle + reach), &mut found);
+    parted
+        .tree
+        .faces_in_box(&(middle - reach), &(middle + reach), &mut found);
     let mut torn = [false; AROUND];
     for &FaceId(face) in &found.faces {
-        for [from, to] in parted.facets.open_edges(face).map(|edge| parted.facets.edge(face, edge)) {
+        for [from, to] in parted
+            .facets
+            .open_edges(face)
+            .map(|edge| parted.facets.edge(face, edge))
+        {
             let v = from + (to - from) / 2.0 - middle;
             let (along, aside) = (v.dot(&wall.axis) * end.out, v.cross(&wall.axis).norm());
             if along > -near[0] && along < near[1] && aside < near[1] {
@@ -312,7 +369,9 @@ fn is_torn(parted: &Parted, wall: &Wall, end: &WallEnd) -> bool {
 fn openness(walls: &[Wall], at: usize, end: &WallEnd) -> f64 {
     let wall = &walls[at];
     let is_near = |other: &Wall| other.gap(wall) < SAME_HOLE * wall.radius();
-    let is_next = |other: &&Wall| end.goes_on_in(wall, other) && other.coverage >= HOLE_COVERAGE && is_near(other);
+    let is_next = |other: &&Wall| {
+        end.goes_on_in(wall, other) && other.coverage >= HOLE_COVERAGE && is_near(other)
+    };
     let (before, after) = (&walls[..at], &walls[at + 1..]);
     let next = before.iter().chain(after).find(is_next);
     let stepped = next.map_or(0.0, |next| 2.0 * (next.radius() - wall.radius()).signum());
@@ -323,7 +382,8 @@ fn openness(walls: &[Wall], at: usize, end: &WallEnd) -> f64 {
 fn cone_beside(walls: &[Wall], at: usize, end: &WallEnd) -> Option<usize> {
     let wall = &walls[at];
     let is_near = |cone: &Wall| cone.gap(wall).abs() < SAME_HOLE * wall.radius();
-    let is_next = |cone: &Wall| cone.is_cone() && cone.coverage > HOLE_COVERAGE && end.goes_on_in(wall, cone);
+    let is_next =
+        |cone: &Wall| cone.is_cone() && cone.coverage > HOLE_COVERAGE && end.goes_on_in(wall, cone);
     walls.iter().position(|cone| is_next(cone) && is_near(cone))
 }
 
@@ -334,7 +394,11 @@ fn is_countersink(cone: &Wall, wall: &Wall, out: f64) -> bool {
 
 /// The plane square to the axis that closes a wall at `t`.
 fn floor_at(parted: &Parted, wall: &Wall, t: f64) -> Option<usize> {
-    let number = parted.segment_at(&parted.around(wall.segments[0]), &wall.at(t), NEAR_END * wall.radius())?;
+    let number = parted.segment_at(
+        &parted.around(wall.segments[0]),
+        &wall.at(t),
+        NEAR_END * wall.radius(),
+    )?;
     (parted.plane(number)?.normal().dot(&wall.axis).abs() > SQUARE).then_some(number)
 }
 
@@ -355,8 +419,12 @@ pub(super) fn groups(walls: &[Wall], holes: &[Hole]) -> Vec<Option<u32>> {
 
 /// All round bosses, and steps of shafts: walls with material inside whose foot is a plane.
 pub(super) fn bosses(parted: &Parted, walls: &[Wall]) -> Vec<Boss> {
-    let is_boss = |wall: &Wall| !wall.is_concave && !wall.is_cone() && wall.coverage >= BOSS_COVERAGE;
-    (0..walls.len()).filter(|&at| is_boss(&walls[at])).filter_map(|at| boss(parted, walls, at)).collect()
+    let is_boss =
+        |wall: &Wall| !wall.is_concave && !wall.is_cone() && wall.coverage >= BOSS_COVERAGE;
+    (0..walls.len())
+        .filter(|&at| is_boss(&walls[at]))
+        .filter_map(|at| boss(parted, walls, at))
+        .collect()
 }
 
 /// Whether a wall is what carries the shoulder on which another stands at `foot`, `out` being ±1 times its axis.
@@ -364,7 +432,10 @@ fn is_shaft_below(wider: &Wall, wall: &Wall, foot: f64, out: f64) -> bool {
     let is_round = !wider.is_concave && wider.coverage >= SHAFT_COVERAGE * wall.coverage;
     let is_round = is_round && wider.radius() > wall.radius();
     let beyond = (wider.at(wider.middle()) - wall.at(foot)).dot(&wall.axis) * out;
-    is_round && wider.is_coaxial(wall, SAME_AXIS) && beyond < 0.0 && wider.gap(wall) < SAME_HOLE * wall.radius()
+    is_round
+        && wider.is_coaxial(wall, SAME_AXIS)
+        && beyond < 0.0
+        && wider.gap(wall) < SAME_HOLE * wall.radius()
 }
 
 /// Whether the part is round about the axis of a wall below the shoulder at `foot` that it stands on, whatever of that was segmented: a shaft that
@@ -373,7 +444,9 @@ fn is_round_below(parted: &Parted, wall: &Wall, foot: f64, out: f64) -> bool {
     let (radius, axis, middle) = (wall.radius(), wall.axis, wall.at(foot));
     let reach = Vector3::repeat(BELOW_RADII[1] * radius);
     let mut query = BoxQuery::default();
-    parted.tree.faces_in_box(&(middle - reach), &(middle + reach), &mut query);
+    parted
+        .tree
+        .faces_in_box(&(middle - reach), &(middle + reach), &mut query);
     let mut far: [Vec<f64>; BELOW_PARTS] = Default::default();
     let [e, g] = tangent_basis(&axis);
     for face in query.faces.iter().map(|face| face.0) {
@@ -381,15 +454,19 @@ fn is_round_below(parted: &Parted, wall: &Wall, foot: f64, out: f64) -> bool {
         let below = -v.dot(&axis) * out;
         let across = v - axis * v.dot(&axis);
         let distance = across.norm();
-        let is_there =
-            BELOW.contains(&(below / radius)) && (BELOW_RADII[0]..BELOW_RADII[1]).contains(&(distance / radius));
+        let is_there = BELOW.contains(&(below / radius))
+            && (BELOW_RADII[0]..BELOW_RADII[1]).contains(&(distance / radius));
         if is_there && parted.facets.normal(face).dot(&across) > BELOW_RADIAL * distance {
             let turn = across.dot(&g).atan2(across.dot(&e)) / std::f64::consts::TAU;
-            far[((turn * BELOW_PARTS as f64).floor() as i64).rem_euclid(BELOW_PARTS as i64) as usize].push(distance);
+            far[((turn * BELOW_PARTS as f64).floor() as i64).rem_euclid(BELOW_PARTS as i64)
+                as usize]
+                .push(distance);
         }
     }
     let mut of_parts: Vec<f64> = far.iter_mut().filter_map(|of| median(of)).collect();
-    let Some(usual) = median(&mut of_parts.clone()) else { return false };
+    let Some(usual) = median(&mut of_parts.clone()) else {
+        return false;
+    };
     of_parts.retain(|of| (of - usual).abs() < BELOW_ALIKE * usual);
     of_parts.len() as f64 >= BELOW_SHARE * BELOW_PARTS as f64
 }
@@ -406,29 +483,60 @@ const BELOW_ALIKE: f64 = 0.1;
 fn boss(parted: &Parted, walls: &[Wall], at: usize) -> Option<Boss> {
     let wall = &walls[at];
     let (radius, around) = (wall.radius(), parted.around(wall.segments[0]));
-    let rings = if parted.rounding.is_some() { &RINGS[..] } else { &FOOT_RINGS[..] };
+    let rings = if parted.rounding.is_some() {
+        &RINGS[..]
+    } else {
+        &FOOT_RINGS[..]
+    };
     let rings: Vec<f64> = rings.iter().map(|ring| ring * radius).collect();
     [(0, 1.0), (1, -1.0)].into_iter().find_map(|(which, out)| {
         let (foot, top) = (wall.ends[which], wall.ends[1 - which]);
         let direction = wall.axis * out;
-        let base = |rings: &[f64]| parted.plane_around(&around, &wall.at(foot), &direction, rings, NEAR_END * radius);
+        let base = |rings: &[f64]| {
+            parted.plane_around(
+                &around,
+                &wall.at(foot),
+                &direction,
+                rings,
+                NEAR_END * radius,
+            )
+        };
         let (base, share) = match parted.rounding {
             Some(_) => base(&rings)?,
             // the corner at the foot may be as wide as the ball
-            None => rings.iter().filter_map(|&ring| base(&[ring])).max_by(|a, b| a.1.total_cmp(&b.1))?,
+            None => rings
+                .iter()
+                .filter_map(|&ring| base(&[ring]))
+                .max_by(|a, b| a.1.total_cmp(&b.1))?,
         };
         if share < 2.0 * RIM || wall.height() < LEAST_HEIGHT * radius {
             return None;
         }
         let to_plane = |number: usize| parted.plane(number)?.along(&wall.origin, &wall.axis);
         let foot = to_plane(base)?;
-        let lid = parted.plane_around(&around, &wall.at(top), &direction, &[FREE * radius], NEAR_END * radius);
+        let lid = parted.plane_around(
+            &around,
+            &wall.at(top),
+            &direction,
+            &[FREE * radius],
+            NEAR_END * radius,
+        );
         let lid = lid.map(|(number, _)| number);
         let top = lid.and_then(to_plane).unwrap_or(top);
         let height = (top - foot) * out;
-        let is_turned = walls.iter().any(|wider| is_shaft_below(wider, wall, foot, out))
+        let is_turned = walls
+            .iter()
+            .any(|wider| is_shaft_below(wider, wall, foot, out))
             || parted.rounding.is_none() && is_round_below(parted, wall, foot, out);
         let foot = wall.at(foot);
-        (height > 0.0).then_some(Boss { wall: at, foot, out: direction, height, base, top: lid, is_turned })
+        (height > 0.0).then_some(Boss {
+            wall: at,
+            foot,
+            out: direction,
+            height,
+            base,
+            top: lid,
+            is_turned,
+        })
     })
 }

@@ -39,7 +39,11 @@ pub fn k_means(points: &[Point3<f64>], k: usize, seed: u64) -> KMeans {
         if !changed {
             break;
         }
-        for (center, (sum, count)) in centers.iter_mut().zip(&sums).filter(|(_, (_, count))| *count > 0.0) {
+        for (center, (sum, count)) in centers
+            .iter_mut()
+            .zip(&sums)
+            .filter(|(_, (_, count))| *count > 0.0)
+        {
             *center = (sum / *count).into();
         }
     }
@@ -65,17 +69,34 @@ fn seeds(points: &[Point3<f64>], k: usize, seed: u64) -> Vec<Point3<f64>> {
     }
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut centers = vec![points[rng.random_range(0..points.len())]];
-    let mut squares: Vec<f64> = points.iter().map(|p| (p - centers[0]).norm_squared()).collect();
+    let mut squares: Vec<f64> = points
+        .iter()
+        .map(|p| (p - centers[0]).norm_squared())
+        .collect();
     while centers.len() < k {
         let total: f64 = squares.iter().sum();
-        let draws: Vec<f64> = (0..DRAWS).map(|_| rng.random_range(0.0..1.0) * total).collect();
-        let drawn = draws.into_iter().filter_map(|rest| drawn(&squares, rest)).map(|i| points[i]);
+        let draws: Vec<f64> = (0..DRAWS)
+            .map(|_| rng.random_range(0.0..1.0) * total)
+            .collect();
+        let drawn = draws
+            .into_iter()
+            .filter_map(|rest| drawn(&squares, rest))
+            .map(|i| points[i]);
         let left = |c: &Point3<f64>| -> f64 {
-            points.iter().zip(&squares).map(|(p, square)| square.min((p - c).norm_squared())).sum()
+            points
+                .iter()
+                .zip(&squares)
+                .map(|(p, square)| square.min((p - c).norm_squared()))
+                .sum()
         };
-        let best = drawn.map(|c| (left(&c), c)).min_by(|a, b| a.0.total_cmp(&b.0));
+        let best = drawn
+            .map(|c| (left(&c), c))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
         let Some((_, center)) = best else { break };
-        points.iter().zip(&mut squares).for_each(|(p, square)| *square = square.min((p - center).norm_squared()));
+        points
+            .iter()
+            .zip(&mut squares)
+            .for_each(|(p, square)| *square = square.min((p - center).norm_squared()));
         centers.push(center);
     }
     centers
@@ -87,5 +108,8 @@ fn drawn(squares: &[f64], mut rest: f64) -> Option<usize> {
         rest -= square;
         rest < 0.0 && *square > 0.0
     };
-    squares.iter().position(passes).or_else(|| squares.iter().rposition(|square| *square > 0.0))
+    squares
+        .iter()
+        .position(passes)
+        .or_else(|| squares.iter().rposition(|square| *square > 0.0))
 }

@@ -6,7 +6,9 @@ use std::collections::BTreeMap;
 use nalgebra::{Point3, Vector3};
 
 use super::feature::{FittedTo, Measured};
-use super::fit::{Cone, Cylinder, Ends, Fit, FitParams, Freedom, Observation, Plane, Stadium, Surface, fit};
+use super::fit::{
+    Cone, Cylinder, Ends, Fit, FitParams, Freedom, Observation, Plane, Stadium, Surface, fit,
+};
 use super::observe::Observed;
 use super::primitive::Primitive;
 use super::slots::Slot;
@@ -61,13 +63,20 @@ const DRILLED: f64 = 0.0087;
 fn is_over_end(touch: &ProbedPoint, wall: &Wall) -> bool {
     let along = (touch.point - wall.origin).dot(&wall.axis);
     let lean = touch.normal.dot(&wall.axis);
-    let to_end = if lean > 0.0 { wall.ends[1] - along } else { along - wall.ends[0] };
+    let to_end = if lean > 0.0 {
+        wall.ends[1] - along
+    } else {
+        along - wall.ends[0]
+    };
     lean.abs() > OVER_END_LEAN && to_end < OVER_END * touch.radius
 }
 
 impl<'a> Measure<'a> {
     pub fn new(observed: &'a Observed<'a>) -> Self {
-        Self { observed, planes: RefCell::new(BTreeMap::new()) }
+        Self {
+            observed,
+            planes: RefCell::new(BTreeMap::new()),
+        }
     }
 
     /// The plane of a segment.
@@ -77,7 +86,9 @@ impl<'a> Measure<'a> {
         }
         let guess = self.observed.parted.plane(number)?;
         // two lines far apart are as good as a field
-        let fitted = self.plane_by(number, guess, |[_, second, first]| second > LEAST_SPREAD * first);
+        let fitted = self.plane_by(number, guess, |[_, second, first]| {
+            second > LEAST_SPREAD * first
+        });
         self.planes.borrow_mut().insert(number, fitted.clone());
         Some(fitted)
     }
@@ -90,35 +101,77 @@ impl<'a> Measure<'a> {
             return Some(plane);
         }
         let guess = self.observed.parted.plane(number)?;
-        let [_, of_mesh, _] = spreads(self.observed.of_mesh(&[number]).iter().map(|one| one.point - guess.point()));
+        let [_, of_mesh, _] = spreads(
+            self.observed
+                .of_mesh(&[number])
+                .iter()
+                .map(|one| one.point - guess.point()),
+        );
         let is_wide = |[_, second, _]: [f64; 3]| second > LEAST_STRIP * of_mesh;
         let first = self.plane_by(number, guess, is_wide);
         // a mesh rounds the corner between two walls and leans there: touches by the first plane are others than by the mesh
         let is_felt = first.to == FittedTo::Touches;
-        Some(if is_felt { self.plane_by(number, &first.surface, is_wide) } else { first })
+        Some(if is_felt {
+            self.plane_by(number, &first.surface, is_wide)
+        } else {
+            first
+        })
     }
 
     /// - `is_wide`: whether touches that spread so far in three directions, m, the least first, are enough.
-    fn plane_by(&self, number: usize, guess: &Plane, is_wide: impl Fn([f64; 3]) -> bool) -> Fitted<Plane> {
-        let spread =
-            |touches: &[u32]| spreads(touches.iter().map(|&number| self.observed.touch(number).point - guess.point()));
-        let is_enough = |touches: &[u32]| touches.len() >= LEAST_TOUCHES && is_wide(spread(touches));
-        let lean = |touch: &ProbedPoint| (1.0 - touch.normal.dot(&guess.normal()).powi(2)).max(0.0).sqrt();
+    fn plane_by(
+        &self,
+        number: usize,
+        guess: &Plane,
+        is_wide: impl Fn([f64; 3]) -> bool,
+    ) -> Fitted<Plane> {
+        let spread = |touches: &[u32]| {
+            spreads(
+                touches
+                    .iter()
+                    .map(|&number| self.observed.touch(number).point - guess.point()),
+            )
+        };
+        let is_enough =
+            |touches: &[u32]| touches.len() >= LEAST_TOUCHES && is_wide(spread(touches));
+        let lean = |touch: &ProbedPoint| {
+            (1.0 - touch.normal.dot(&guess.normal()).powi(2))
+                .max(0.0)
+                .sqrt()
+        };
         let touches = self.squarest(self.observed.touches_of(&[number]), lean, is_enough);
         self.fitted(guess, touches, &self.observed.of_mesh(&[number]), None)
     }
 
     /// The plane through touches, about square to `normal`; `None` where there are none.
-    pub fn felt_plane(&self, touches: &[u32], point: &Point3<f64>, normal: &Vector3<f64>) -> Option<Fitted<Plane>> {
+    pub fn felt_plane(
+        &self,
+        touches: &[u32],
+        point: &Point3<f64>,
+        normal: &Vector3<f64>,
+    ) -> Option<Fitted<Plane>> {
         let is_felt = !touches.is_empty();
-        is_felt.then(|| self.fitted(&Plane::new(*point, normal), touches.to_vec(), &[], Some(DRILLED)))
+        is_felt.then(|| {
+            self.fitted(
+                &Plane::new(*point, normal),
+                touches.to_vec(),
+                &[],
+                Some(DRILLED),
+            )
+        })
     }
 
     /// The cylinder of a segment; `None` where it is none.
     pub fn shaft(&self, number: usize) -> Option<Fitted<Cylinder>> {
-        let Primitive::Cylinder(guess) = self.observed.parted.segment(number).primitive else { return None };
+        let Primitive::Cylinder(guess) = self.observed.parted.segment(number).primitive else {
+            return None;
+        };
         let touches = self.observed.touches_of(&[number]);
-        let touches = if touches.len() < LEAST_TOUCHES { Vec::new() } else { touches };
+        let touches = if touches.len() < LEAST_TOUCHES {
+            Vec::new()
+        } else {
+            touches
+        };
         Some(self.fitted(&guess, touches, &self.observed.of_mesh(&[number]), None))
     }
 
@@ -128,31 +181,66 @@ impl<'a> Measure<'a> {
     pub fn cylinder(&self, wall: &Wall, rim: Option<usize>) -> Fitted<Cylinder> {
         let touches = self.touches_around(wall);
         let (mut axis, mut axis_sigma) = (wall.axis, None);
-        let height = if touches.is_empty() { wall.height() } else { self.height(&touches, wall) };
+        let height = if touches.is_empty() {
+            wall.height()
+        } else {
+            self.height(&touches, wall)
+        };
         if height < SHORT * 2.0 * wall.radius()
             && let Some(plane) = rim.and_then(|rim| self.plane(rim))
         {
             (axis, axis_sigma) = (plane.surface.normal(), Some(DRILLED));
         }
-        let guess = Cylinder::new(wall.at(wall.middle()), &axis, wall.radius(), wall.is_concave);
-        self.fitted(&guess, touches, &self.observed.of_mesh(&wall.segments), axis_sigma)
+        let guess = Cylinder::new(
+            wall.at(wall.middle()),
+            &axis,
+            wall.radius(),
+            wall.is_concave,
+        );
+        self.fitted(
+            &guess,
+            touches,
+            &self.observed.of_mesh(&wall.segments),
+            axis_sigma,
+        )
     }
 
     /// The cone of a wall; `None` for a cylinder.
     pub fn cone(&self, wall: &Wall) -> Option<Fitted<Cone>> {
-        let guess = Cone::new(wall.at(wall.middle()), &wall.axis, wall.radius(), wall.half_angle?, wall.is_concave);
-        Some(self.fitted(&guess, self.touches_around(wall), &self.observed.of_mesh(&wall.segments), None))
+        let guess = Cone::new(
+            wall.at(wall.middle()),
+            &wall.axis,
+            wall.radius(),
+            wall.half_angle?,
+            wall.is_concave,
+        );
+        Some(self.fitted(
+            &guess,
+            self.touches_around(wall),
+            &self.observed.of_mesh(&wall.segments),
+            None,
+        ))
     }
 
     /// The touches of a wall, where they are enough around it; else none.
     fn touches_around(&self, wall: &Wall) -> Vec<u32> {
         let mut touches = self.observed.touches_of(&wall.segments);
         touches.retain(|&number| !is_over_end(self.observed.touch(number), wall));
-        let is_enough = |touches: &[u32]| touches.len() >= LEAST_TOUCHES && self.turn(touches, wall) >= LEAST_TURN;
+        let is_enough = |touches: &[u32]| {
+            touches.len() >= LEAST_TOUCHES && self.turn(touches, wall) >= LEAST_TURN
+        };
         if wall.is_cone() {
-            return if is_enough(&touches) { touches } else { Vec::new() };
+            return if is_enough(&touches) {
+                touches
+            } else {
+                Vec::new()
+            };
         }
-        self.squarest(touches, |touch| touch.normal.dot(&wall.axis).abs(), is_enough)
+        self.squarest(
+            touches,
+            |touch| touch.normal.dot(&wall.axis).abs(),
+            is_enough,
+        )
     }
 
     /// The touches whose normals lean least off that of their surface, where they are enough; none where all are not. A ball that rolls over
@@ -172,42 +260,72 @@ impl<'a> Measure<'a> {
                 return square;
             }
         }
-        if is_enough(&touches) { touches } else { Vec::new() }
+        if is_enough(&touches) {
+            touches
+        } else {
+            Vec::new()
+        }
     }
 
     /// The walls of a slot or pocket.
     pub fn stadium(&self, slot: &Slot) -> Fitted<Stadium> {
         let ends = slot.shape;
-        let land = self.plane(slot.land).map_or(slot.out, |land| land.surface.normal());
+        let land = self
+            .plane(slot.land)
+            .map_or(slot.out, |land| land.surface.normal());
         let centre = slot.centre - slot.out * (slot.depth / 2.0);
-        let guess = Stadium::new(centre, &land, &slot.direction, [slot.width, slot.length], ends, true);
+        let guess = Stadium::new(
+            centre,
+            &land,
+            &slot.direction,
+            [slot.width, slot.length],
+            ends,
+            true,
+        );
         // its walls and ends may go on beyond it, and its corners may be round
         let is_of = |p: &Point3<f64>, is_wall: bool| {
             let q = guess.pose_of.inverse_transform_point(p);
             let room = BESIDE * slot.width * if ends == Ends::Round { 1.0 } else { -1.0 };
             let (half_length, half_width) = (slot.length / 2.0, slot.width / 2.0);
-            if is_wall { q.x.abs() < half_length + room.min(0.0) } else { q.y.abs() < half_width + room }
+            if is_wall {
+                q.x.abs() < half_length + room.min(0.0)
+            } else {
+                q.y.abs() < half_width + room
+            }
         };
         let of_part = |segments: &[usize], is_wall: bool| {
-            let mut of_mesh: Vec<Observation> =
-                segments.iter().flat_map(|&number| self.observed.of_mesh_surface(number)).collect();
+            let mut of_mesh: Vec<Observation> = segments
+                .iter()
+                .flat_map(|&number| self.observed.of_mesh_surface(number))
+                .collect();
             of_mesh.retain(|observation| is_of(&observation.point, is_wall));
             of_mesh
         };
         let ends_of: Vec<usize> = slot.ends.into_iter().flatten().collect();
         let of_mesh = [of_part(&slot.walls, true), of_part(&ends_of, false)].concat();
-        let is_deep =
-            |p: &Point3<f64>| (0.0..slot.depth + BESIDE * slot.width).contains(&(slot.centre - p).dot(&slot.out));
+        let is_deep = |p: &Point3<f64>| {
+            (0.0..slot.depth + BESIDE * slot.width).contains(&(slot.centre - p).dot(&slot.out))
+        };
         let touches = self.observed.touches_on(&guess, is_deep);
         let on_wall = |touches: &[u32], side: f64| {
             let is_there = |number: &&u32| {
-                let q = guess.pose_of.inverse_transform_point(&self.observed.touch(**number).point);
+                let q = guess
+                    .pose_of
+                    .inverse_transform_point(&self.observed.touch(**number).point);
                 q.y * side > 0.25 * slot.width && is_of(&self.observed.touch(**number).point, true)
             };
             touches.iter().filter(is_there).count()
         };
-        let is_enough = |touches: &[u32]| [1.0, -1.0].iter().all(|&side| on_wall(touches, side) >= LEAST_TOUCHES / 2);
-        let touches = self.squarest(touches, |touch| touch.normal.dot(&slot.out).abs(), is_enough);
+        let is_enough = |touches: &[u32]| {
+            [1.0, -1.0]
+                .iter()
+                .all(|&side| on_wall(touches, side) >= LEAST_TOUCHES / 2)
+        };
+        let touches = self.squarest(
+            touches,
+            |touch| touch.normal.dot(&slot.out).abs(),
+            is_enough,
+        );
         self.fitted(&guess, touches, &of_mesh, Some(DRILLED))
     }
 
@@ -220,20 +338,46 @@ impl<'a> Measure<'a> {
         axis_sigma: Option<f64>,
     ) -> Fitted<S> {
         let [common_sigma, shift_sigma] = self.observed.systematic(&touches);
-        let params = FitParams { common_sigma, shift_sigma, axis_sigma, ..FitParams::default() };
+        let params = FitParams {
+            common_sigma,
+            shift_sigma,
+            axis_sigma,
+            ..FitParams::default()
+        };
         if !touches.is_empty()
             && let Ok(found) = fit(guess, &self.observed.of_touches(&touches), &params)
         {
-            let touches = touches.into_iter().zip(&found.used).filter(|&(_, used)| *used).map(|(touch, _)| touch);
+            let touches = touches
+                .into_iter()
+                .zip(&found.used)
+                .filter(|&(_, used)| *used)
+                .map(|(touch, _)| touch);
             let touches = touches.collect();
             let (surface, to) = (found.surface.clone(), FittedTo::Touches);
-            return Fitted { surface, fit: Some(found), touches, to, is_confirmed: true };
+            return Fitted {
+                surface,
+                fit: Some(found),
+                touches,
+                to,
+                is_confirmed: true,
+            };
         }
-        let params = FitParams { axis_sigma, ..FitParams::default() };
+        let params = FitParams {
+            axis_sigma,
+            ..FitParams::default()
+        };
         let found = fit(guess, of_mesh, &params).ok();
-        let surface = found.as_ref().map_or_else(|| guess.clone(), |found| found.surface.clone());
+        let surface = found
+            .as_ref()
+            .map_or_else(|| guess.clone(), |found| found.surface.clone());
         let is_confirmed = !self.observed.has_touches();
-        Fitted { surface, fit: found, touches: Vec::new(), to: FittedTo::Mesh, is_confirmed }
+        Fitted {
+            surface,
+            fit: found,
+            touches: Vec::new(),
+            to: FittedTo::Mesh,
+            is_confirmed,
+        }
     }
 
     /// Share of a turn around a wall that touches cover.
@@ -250,23 +394,33 @@ impl<'a> Measure<'a> {
 
     /// Between the lowest and the highest tenth of the touches along the axis of a wall, m.
     fn height(&self, touches: &[u32], wall: &Wall) -> f64 {
-        let along = |&number: &u32| (self.observed.touch(number).point - wall.origin).dot(&wall.axis);
+        let along =
+            |&number: &u32| (self.observed.touch(number).point - wall.origin).dot(&wall.axis);
         let mut along: Vec<f64> = touches.iter().map(along).collect();
-        let [lowest, highest] = [0.1, 0.9].map(|share| order_statistic(&mut along, share).unwrap_or(0.0));
+        let [lowest, highest] =
+            [0.1, 0.9].map(|share| order_statistic(&mut along, share).unwrap_or(0.0));
         highest - lowest
     }
 }
 
 impl Fitted<Plane> {
     /// Where a line meets the plane, m; its uncertainty is along the normal.
-    pub fn met(&self, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<Measured<Point3<f64>>> {
+    pub fn met(
+        &self,
+        from: &Point3<f64>,
+        direction: &Vector3<f64>,
+    ) -> Option<Measured<Point3<f64>>> {
         Some(self.place(from + direction * self.surface.along(from, direction)?))
     }
 }
 
 impl Fitted<Cylinder> {
     /// Where a line leaves the cylinder, m; its uncertainty is along the normal there.
-    pub fn met(&self, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<Measured<Point3<f64>>> {
+    pub fn met(
+        &self,
+        from: &Point3<f64>,
+        direction: &Vector3<f64>,
+    ) -> Option<Measured<Point3<f64>>> {
         Some(self.place(from + direction * self.surface.exit(from, direction)?))
     }
 }
@@ -275,7 +429,12 @@ impl<S: Surface> Fitted<S> {
     /// A place on the surface, m; its uncertainty is along the normal.
     fn place(&self, value: Point3<f64>) -> Measured<Point3<f64>> {
         let std = self.confirmed().and_then(|fit| fit.std_at(&value));
-        Measured { value, std, touches: self.touches.clone(), ..Measured::default() }
+        Measured {
+            value,
+            std,
+            touches: self.touches.clone(),
+            ..Measured::default()
+        }
     }
 
     /// The standard deviation at a place without what all touches have in common, m.

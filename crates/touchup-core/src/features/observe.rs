@@ -70,7 +70,11 @@ impl<'a> Observed<'a> {
             grid: PointGrid::new(reach),
             reach,
         };
-        for (number, touch) in touches.iter().enumerate().filter(|(_, touch)| !touch.is_rejected) {
+        for (number, touch) in touches
+            .iter()
+            .enumerate()
+            .filter(|(_, touch)| !touch.is_rejected)
+        {
             if let Some(segment) = observed.segment_of(of_face, touch) {
                 observed.of_segment[segment].push(number as u32);
                 observed.grid.insert(number as u32, &touch.point);
@@ -80,7 +84,10 @@ impl<'a> Observed<'a> {
     }
 
     fn segment_of(&self, of_face: &[u32], touch: &ProbedPoint) -> Option<usize> {
-        let hit = self.parted.tree.closest(self.parted.facets.mesh, &touch.point, self.reach)?;
+        let hit = self
+            .parted
+            .tree
+            .closest(self.parted.facets.mesh, &touch.point, self.reach)?;
         let number = of_face[hit.face.0 as usize];
         if number == NONE {
             return None;
@@ -94,7 +101,11 @@ impl<'a> Observed<'a> {
 
     /// Numbers of the touches of some segments, in ascending order.
     pub fn touches_of(&self, segments: &[usize]) -> Vec<u32> {
-        let mut touches: Vec<u32> = segments.iter().flat_map(|&number| &self.of_segment[number]).copied().collect();
+        let mut touches: Vec<u32> = segments
+            .iter()
+            .flat_map(|&number| &self.of_segment[number])
+            .copied()
+            .collect();
         touches.sort_unstable();
         touches
     }
@@ -102,19 +113,27 @@ impl<'a> Observed<'a> {
     /// Numbers of the touches on a surface, in ascending order.
     ///
     /// - `is_of`: whether a point of the surface is of the part that is meant.
-    pub fn touches_on(&self, surface: &impl Surface, is_of: impl Fn(&Point3<f64>) -> bool) -> Vec<u32> {
+    pub fn touches_on(
+        &self,
+        surface: &impl Surface,
+        is_of: impl Fn(&Point3<f64>) -> bool,
+    ) -> Vec<u32> {
         let is_on = |touch: &ProbedPoint| {
             let (distance, normal) = surface.distance_and_normal(&touch.centre);
             let is_near = (distance - touch.radius).abs() < NEAR_RADII * self.reach;
             is_near && normal.dot(&touch.normal) > ALIKE && is_of(&touch.point)
         };
-        let numbers = (0..).zip(self.touches).filter(|(_, touch)| !touch.is_rejected && is_on(touch));
+        let numbers = (0..)
+            .zip(self.touches)
+            .filter(|(_, touch)| !touch.is_rejected && is_on(touch));
         numbers.map(|(number, _)| number).collect()
     }
 
     /// Observations of touches for a fit.
     pub fn of_touches(&self, numbers: &[u32]) -> Vec<Observation> {
-        let observation = |&number: &u32| observation(&self.touches[number as usize], self.group[number as usize]);
+        let observation = |&number: &u32| {
+            observation(&self.touches[number as usize], self.group[number as usize])
+        };
         numbers.iter().map(observation).collect()
     }
 
@@ -131,7 +150,9 @@ impl<'a> Observed<'a> {
 
     /// The touches that are no outliers, with their numbers.
     pub fn sound(&self) -> impl Iterator<Item = (u32, &ProbedPoint)> {
-        (0..).zip(self.touches).filter(|(_, touch)| !touch.is_rejected)
+        (0..)
+            .zip(self.touches)
+            .filter(|(_, touch)| !touch.is_rejected)
     }
 
     /// A place is touched when a touch is within this, m: the radius of the ball.
@@ -159,18 +180,35 @@ impl<'a> Observed<'a> {
                 Some(_) => own,
                 None => *cells.entry(voxel_of(&point, cell)).or_insert(own),
             };
-            Observation { point, offset: 0.0, sigma, group }
+            Observation {
+                point,
+                offset: 0.0,
+                sigma,
+                group,
+            }
         };
-        (0..).zip(vertices.into_iter().step_by(step)).map(observation).collect()
+        (0..)
+            .zip(vertices.into_iter().step_by(step))
+            .map(observation)
+            .collect()
     }
 
     /// Observations of a segment for a fit: its vertices, or points all over it where it is flat in a drawing, whose few corners may all lie at its
     /// ends.
     pub fn of_mesh_surface(&self, number: usize) -> Vec<Observation> {
-        match self.parted.rounding.filter(|_| self.parted.plane(number).is_some()) {
+        match self
+            .parted
+            .rounding
+            .filter(|_| self.parted.plane(number).is_some())
+        {
             None => self.of_mesh(&[number]),
             Some(rounding) => {
-                let point = |(group, point)| Observation { point, offset: 0.0, sigma: rounding / 6.0, group };
+                let point = |(group, point)| Observation {
+                    point,
+                    offset: 0.0,
+                    sigma: rounding / 6.0,
+                    group,
+                };
                 (0..).zip(samples(self.parted, number)).map(point).collect()
             }
         }
@@ -179,16 +217,29 @@ impl<'a> Observed<'a> {
     /// The vertices of some segments, in ascending order; of round ones in a drawing without those on chords: a tessellation
     /// has them where a neighbour needed a corner, and they are not on the surface.
     fn vertices_of(&self, segments: &[usize]) -> Vec<VertexId> {
-        let Parted { facets, segmentation, rounding, .. } = self.parted;
+        let Parted {
+            facets,
+            segmentation,
+            rounding,
+            ..
+        } = self.parted;
         let mesh = facets.mesh;
         let mut vertices = NumberSet::below(mesh.vertex_slots());
-        for &face in segments.iter().flat_map(|&number| &self.parted.segment(number).faces) {
-            mesh.corners(FaceId(face)).iter().for_each(|vertex| vertices.add(vertex.0));
+        for &face in segments
+            .iter()
+            .flat_map(|&number| &self.parted.segment(number).faces)
+        {
+            mesh.corners(FaceId(face))
+                .iter()
+                .for_each(|vertex| vertices.add(vertex.0));
         }
         let vertices: Vec<VertexId> = vertices.iter().map(VertexId).collect();
         let primitive = self.parted.segment(segments[0]).primitive;
-        let Some(rounding) = rounding.filter(|_| primitive.plane().is_none()) else { return vertices };
-        let is_of = |face: &FaceId| segments.contains(&(segmentation.of_face[face.0 as usize] as usize));
+        let Some(rounding) = rounding.filter(|_| primitive.plane().is_none()) else {
+            return vertices;
+        };
+        let is_of =
+            |face: &FaceId| segments.contains(&(segmentation.of_face[face.0 as usize] as usize));
         let is_on = |&vertex: &VertexId| {
             let faces: Vec<FaceId> = mesh.star(vertex).iter().copied().filter(is_of).collect();
             !is_on_chord(mesh, vertex, &faces, &primitive, rounding)
@@ -205,7 +256,10 @@ impl<'a> Observed<'a> {
         let (mut touched, mut all) = (0.0, f64::MIN_POSITIVE);
         for &number in segments {
             let faces = &self.parted.segment(number).faces;
-            for &face in faces.iter().step_by(faces.len().div_ceil(MOST_FACES).max(1)) {
+            for &face in faces
+                .iter()
+                .step_by(faces.len().div_ceil(MOST_FACES).max(1))
+            {
                 let area = self.parted.facets.area(face);
                 let middle = self.parted.facets.mesh.barycentre(FaceId(face));
                 all += area;
@@ -236,21 +290,41 @@ impl<'a> Observed<'a> {
 
 /// Observation of a touch for a fit.
 pub(super) fn observation(touch: &ProbedPoint, group: u32) -> Observation {
-    let ProbedPoint { centre, radius, sigma, weight, .. } = *touch;
+    let ProbedPoint {
+        centre,
+        radius,
+        sigma,
+        weight,
+        ..
+    } = *touch;
     let sigma = (sigma / weight.max(LEAST_WEIGHT).sqrt()).max(LEAST_SIGMA);
-    Observation { point: centre, offset: radius, sigma, group }
+    Observation {
+        point: centre,
+        offset: radius,
+        sigma,
+        group,
+    }
 }
 
 /// As [`Observed::systematic`].
 pub(super) fn systematic<'a>(touches: impl Iterator<Item = &'a ProbedPoint>) -> [f64; 2] {
     let (sum, count) = touches.fold(([0.0; 2], 0.0f64), |([common, shift], count), touch| {
-        ([common + touch.calibration, shift + touch.place], count + 1.0)
+        (
+            [common + touch.calibration, shift + touch.place],
+            count + 1.0,
+        )
     });
     sum.map(|sum| sum / count.max(1.0))
 }
 
 /// Whether a vertex is between two others of its faces on a line that is not one of the straight lines of the surface.
-fn is_on_chord(mesh: &TriMesh, vertex: VertexId, faces: &[FaceId], primitive: &Primitive, rounding: f64) -> bool {
+fn is_on_chord(
+    mesh: &TriMesh,
+    vertex: VertexId,
+    faces: &[FaceId],
+    primitive: &Primitive,
+    rounding: f64,
+) -> bool {
     if faces.len() > MOST_AROUND {
         return false;
     }
@@ -258,20 +332,31 @@ fn is_on_chord(mesh: &TriMesh, vertex: VertexId, faces: &[FaceId], primitive: &P
     let straight = match primitive {
         Primitive::Plane(_) => return false,
         Primitive::Cylinder(cylinder) => cylinder.axis(),
-        Primitive::Cone(cone) => cone.apex().and_then(|apex| (p - apex).try_normalize(0.0)).unwrap_or_default(),
+        Primitive::Cone(cone) => cone
+            .apex()
+            .and_then(|apex| (p - apex).try_normalize(0.0))
+            .unwrap_or_default(),
     };
     let around = distinct(faces.iter().flat_map(|&face| mesh.corners(face)));
-    let around: Vec<Point3<f64>> = around.into_iter().map(|other| mesh.position(other)).filter(|q| *q != p).collect();
+    let around: Vec<Point3<f64>> = around
+        .into_iter()
+        .map(|other| mesh.position(other))
+        .filter(|q| *q != p)
+        .collect();
     let is_between = |a: &Point3<f64>, b: &Point3<f64>| {
         if (p - a).dot(&(p - b)) >= 0.0 {
             return false;
         }
-        let Some(direction) = (b - a).try_normalize(0.0) else { return false };
+        let Some(direction) = (b - a).try_normalize(0.0) else {
+            return false;
+        };
         let v = p - a;
         let off = (v - direction * v.dot(&direction)).norm();
         off < rounding && direction.dot(&straight).abs() < STRAIGHT
     };
-    around.iter().any(|a| around.iter().any(|b| is_between(a, b)))
+    around
+        .iter()
+        .any(|a| around.iter().any(|b| is_between(a, b)))
 }
 
 /// Numbers of the groups of touches that share their error.
@@ -279,8 +364,9 @@ pub(super) fn groups(touches: &[ProbedPoint]) -> Vec<u32> {
     let mut last: Option<(u32, i64)> = None;
     let mut group = 0;
     let mut number = |touch: &ProbedPoint| {
-        let is_same = last
-            .is_some_and(|(stroke, begun)| touch.stroke == stroke && touch.stamp_ns.saturating_sub(begun) < SHARED_NS);
+        let is_same = last.is_some_and(|(stroke, begun)| {
+            touch.stroke == stroke && touch.stamp_ns.saturating_sub(begun) < SHARED_NS
+        });
         if !is_same {
             group += u32::from(last.is_some());
             last = Some((touch.stroke, touch.stamp_ns));

@@ -43,7 +43,11 @@ impl Primitive {
     /// The plane, if it is one.
     #[inline]
     pub fn plane(&self) -> Option<&Plane> {
-        if let Self::Plane(plane) = self { Some(plane) } else { None }
+        if let Self::Plane(plane) = self {
+            Some(plane)
+        } else {
+            None
+        }
     }
 }
 
@@ -57,7 +61,12 @@ pub(super) fn belongs(facets: &Facets, face: u32, primitive: &Primitive, toleran
         Primitive::Plane(plane) => {
             let (point, normal) = (plane.point(), plane.normal());
             let off = |vertex: VertexId| (facets.mesh.position(vertex) - point).dot(&normal).abs();
-            facets.mesh.corners(FaceId(face)).into_iter().all(|vertex| off(vertex) <= tolerance).then_some(normal)
+            facets
+                .mesh
+                .corners(FaceId(face))
+                .into_iter()
+                .all(|vertex| off(vertex) <= tolerance)
+                .then_some(normal)
         }
         Primitive::Cylinder(cylinder) => normal_beneath(facets, face, cylinder, tolerance),
         Primitive::Cone(cone) => normal_beneath(facets, face, cone, tolerance),
@@ -66,18 +75,33 @@ pub(super) fn belongs(facets: &Facets, face: u32, primitive: &Primitive, toleran
         facets.normal(face).dot(&normal) > ALIKE || {
             // the normal of a sliver says nothing
             let corners = facets.triangle(face);
-            let longest = (0..3).map(|i| (corners[i] - corners[(i + 1) % 3]).norm()).fold(0.0, f64::max);
+            let longest = (0..3)
+                .map(|i| (corners[i] - corners[(i + 1) % 3]).norm())
+                .fold(0.0, f64::max);
             2.0 * facets.area(face) < tolerance * longest
         }
     })
 }
 
 /// The normal of a surface beneath the middle of a face, in O; `None` where a corner is farther from it than `tolerance`, m.
-fn normal_beneath(facets: &Facets, face: u32, surface: &impl Surface, tolerance: f64) -> Option<Vector3<f64>> {
+fn normal_beneath(
+    facets: &Facets,
+    face: u32,
+    surface: &impl Surface,
+    tolerance: f64,
+) -> Option<Vector3<f64>> {
     let own = surface.to_own();
     let is_near = |p: &Point3<f64>| surface.distance_at(&own(p)).value.abs() <= tolerance;
-    let middle = || surface.distance_at(&own(&facets.mesh.barycentre(FaceId(face)))).normal;
-    facets.triangle(face).iter().all(is_near).then(|| surface.pose_of().rotation * middle())
+    let middle = || {
+        surface
+            .distance_at(&own(&facets.mesh.barycentre(FaceId(face))))
+            .normal
+    };
+    facets
+        .triangle(face)
+        .iter()
+        .all(is_near)
+        .then(|| surface.pose_of().rotation * middle())
 }
 
 /// Rows and columns of the lower triangle of a symmetric matrix.
@@ -87,17 +111,27 @@ const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 
 /// area.
 ///
 /// - `origin`: near the faces, so that squares stay small.
-pub(super) fn plane_of(facets: &Facets, origin: Point3<f64>, faces: impl Iterator<Item = u32>) -> Option<Primitive> {
-    let (mut all, mut first, mut second, mut normals) = (0.0, Vector3::zeros(), Matrix3::zeros(), Vector3::zeros());
+pub(super) fn plane_of(
+    facets: &Facets,
+    origin: Point3<f64>,
+    faces: impl Iterator<Item = u32>,
+) -> Option<Primitive> {
+    let (mut all, mut first, mut second, mut normals) =
+        (0.0, Vector3::zeros(), Matrix3::zeros(), Vector3::zeros());
     for face in faces {
         let area = facets.area(face);
-        let corners = facets.mesh.corners(FaceId(face)).map(|vertex| facets.mesh.position(vertex) - origin);
+        let corners = facets
+            .mesh
+            .corners(FaceId(face))
+            .map(|vertex| facets.mesh.position(vertex) - origin);
         let sum = corners[0] + corners[1] + corners[2];
         all += area;
         first += sum * (area / 3.0);
         // ∫ x xᵀ over a triangle: A/12 (Σ vᵢ vᵢᵀ + (Σ vᵢ)(Σ vᵢ)ᵀ)
         for (i, j) in LOWER {
-            let square = corners.iter().fold(sum[i] * sum[j], |sum, v| sum + v[i] * v[j]);
+            let square = corners
+                .iter()
+                .fold(sum[i] * sum[j], |sum, v| sum + v[i] * v[j]);
             second[(i, j)] += square * (area / 12.0);
         }
         normals += facets.normal(face) * area;
@@ -110,10 +144,17 @@ pub(super) fn plane_of(facets: &Facets, origin: Point3<f64>, faces: impl Iterato
         return None;
     }
     let eigen = spread.symmetric_eigen();
-    let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+    let normal = eigen
+        .eigenvectors
+        .column(eigen.eigenvalues.imin())
+        .into_owned();
     // faces on a line have no thinnest direction of their own
     let cosine = normal.dot(&towards);
-    let normal = if cosine.abs() > 0.9 { normal * cosine.signum() } else { towards };
+    let normal = if cosine.abs() > 0.9 {
+        normal * cosine.signum()
+    } else {
+        towards
+    };
     Some(Primitive::Plane(Plane::new(origin + mean, &normal)))
 }
 
@@ -133,21 +174,32 @@ impl NormalSpread {
             let (a, n) = (facets.area(face), facets.normal(face));
             area += a;
             first += n * a;
-            LOWER.iter().for_each(|&(i, j)| second[(i, j)] += n[i] * n[j] * a);
+            LOWER
+                .iter()
+                .for_each(|&(i, j)| second[(i, j)] += n[i] * n[j] * a);
         }
         if area <= 0.0 {
             return None;
         }
         second.fill_upper_triangle_with_lower_triangle();
         let (mean, second) = (first / area, second / area);
-        let spread = root((second - mean * mean.transpose()).symmetric_eigenvalues().max());
+        let spread = root(
+            (second - mean * mean.transpose())
+                .symmetric_eigenvalues()
+                .max(),
+        );
         Some(Self { spread, second })
     }
 
     /// Axis of the cylinder whose normals these could be: the direction along which there is least of them.
     pub fn cylinder_axis(&self) -> Option<Vector3<f64>> {
         let eigen = self.second.symmetric_eigen();
-        let mut pairs = [0, 1, 2].map(|i| (eigen.eigenvalues[i], eigen.eigenvectors.column(i).into_owned()));
+        let mut pairs = [0, 1, 2].map(|i| {
+            (
+                eigen.eigenvalues[i],
+                eigen.eigenvectors.column(i).into_owned(),
+            )
+        });
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
         (root(pairs[0].0) < CLEAR * root(pairs[1].0)).then_some(pairs[0].1)
     }
@@ -162,7 +214,11 @@ fn root(x: f64) -> f64 {
 const CLEAR: f64 = 0.5;
 
 /// The cylinder with this axis whose normals these are: the lines along them meet at its axis.
-pub(super) fn cylinder_of(facets: &Facets, faces: &[u32], axis: &Vector3<f64>) -> Option<Primitive> {
+pub(super) fn cylinder_of(
+    facets: &Facets,
+    faces: &[u32],
+    axis: &Vector3<f64>,
+) -> Option<Primitive> {
     let [e, g] = tangent_basis(axis);
     let flat = |v: &Vector3<f64>| Vector2::new(v.dot(&e), v.dot(&g));
     let origin = facets.triangle(faces[0])[0];
@@ -171,7 +227,8 @@ pub(super) fn cylinder_of(facets: &Facets, faces: &[u32], axis: &Vector3<f64>) -
         let corners = facets.triangle(face);
         let middle = (corners[0] - origin + (corners[1] - origin) + (corners[2] - origin)) / 3.0;
         let n = flat(&facets.normal(face));
-        let across = (Matrix2::identity() * n.norm_squared() - n * n.transpose()) * facets.area(face);
+        let across =
+            (Matrix2::identity() * n.norm_squared() - n * n.transpose()) * facets.area(face);
         m += across;
         right += across * flat(&middle);
     }
@@ -187,7 +244,12 @@ pub(super) fn cylinder_of(facets: &Facets, faces: &[u32], axis: &Vector3<f64>) -
             inward -= v.dot(&facets.normal(face)) * facets.area(face);
         }
     }
-    Some(Primitive::Cylinder(Cylinder::new(centre, axis, reach / count, inward > 0.0)))
+    Some(Primitive::Cylinder(Cylinder::new(
+        centre,
+        axis,
+        reach / count,
+        inward > 0.0,
+    )))
 }
 
 /// Rounds of least squares.
@@ -208,11 +270,13 @@ pub(super) fn refined(primitive: &Primitive, facets: &Facets, faces: &[u32]) -> 
         _ if faces.is_empty() => None,
         Primitive::Plane(_) => Some(*primitive),
         Primitive::Cylinder(cylinder) => {
-            moved_to::<_, 5>(cylinder, facets, faces, |cylinder| cylinder.radius, true).map(Primitive::Cylinder)
+            moved_to::<_, 5>(cylinder, facets, faces, |cylinder| cylinder.radius, true)
+                .map(Primitive::Cylinder)
         }
         Primitive::Cone(cone) => {
             let cone = moved_to::<_, 6>(cone, facets, faces, |cone| cone.radius, false);
-            cone.filter(|cone| cone.half_angle > 0.0).map(Primitive::Cone)
+            cone.filter(|cone| cone.half_angle > 0.0)
+                .map(Primitive::Cone)
         }
     }
 }
@@ -230,22 +294,34 @@ fn moved_to<S: Surface, const N: usize>(
     let free = const { numbers_of_free::<N>(S::FREE) };
     // it turns about the middle of the faces
     let own = start.to_own();
-    let places: Vec<_> = faces.iter().map(|&face| own(&facets.triangle(face)[0])).collect();
+    let places: Vec<_> = faces
+        .iter()
+        .map(|&face| own(&facets.triangle(face)[0]))
+        .collect();
     let mut surface = start.described_from(&places);
     for _ in 0..ROUNDS {
         let mut equations = NormalEquations::<N>::default();
         let (own, turn) = (surface.to_own(), surface.pose_of().rotation);
-        for (at, &face) in faces.iter().step_by(faces.len().div_ceil(MOST_ROWS)).enumerate() {
+        for (at, &face) in faces
+            .iter()
+            .step_by(faces.len().div_ceil(MOST_ROWS))
+            .enumerate()
+        {
             let corners = facets.triangle(face);
             let is_one = are_square && faces.len() >= FEW;
-            for corner in if is_one { &corners[at % 3..=at % 3] } else { &corners[..] } {
+            for corner in if is_one {
+                &corners[at % 3..=at % 3]
+            } else {
+                &corners[..]
+            } {
                 let (distance, by) = surface.derivatives_at(&own(corner));
                 equations.add(&SVector::from_fn(|i, _| by[free[i]]), -distance, 1.0);
             }
             if are_square {
                 let normal = turn.inverse_transform_vector(&facets.normal(face));
                 let [x, y, z] = (normal * (NORMAL_ARM * radius(&surface))).into();
-                let by = Steps::ith(Freedom::TiltX as usize, x) + Steps::ith(Freedom::TiltY as usize, y);
+                let by =
+                    Steps::ith(Freedom::TiltX as usize, x) + Steps::ith(Freedom::TiltY as usize, y);
                 equations.add(&SVector::from_fn(|i, _| by[free[i]]), -z, 1.0);
             }
         }

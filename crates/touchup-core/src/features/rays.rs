@@ -30,25 +30,50 @@ pub(super) struct RayHit {
 }
 
 impl<'a> Rays<'a> {
-    pub fn new(mesh: &'a TriMesh, tree: &'a FaceTree, piece: f64, names: Option<&'a [u32]>) -> Self {
-        Self { mesh, tree, piece, names, query: BoxQuery::default() }
+    pub fn new(
+        mesh: &'a TriMesh,
+        tree: &'a FaceTree,
+        piece: f64,
+        names: Option<&'a [u32]>,
+    ) -> Self {
+        Self {
+            mesh,
+            tree,
+            piece,
+            names,
+            query: BoxQuery::default(),
+        }
     }
 
     /// The first face between `from` and the point `reach` (m) away along the unit vector `direction`.
-    pub fn first(&mut self, from: &Point3<f64>, direction: &Vector3<f64>, reach: f64) -> Option<RayHit> {
+    pub fn first(
+        &mut self,
+        from: &Point3<f64>,
+        direction: &Vector3<f64>,
+        reach: f64,
+    ) -> Option<RayHit> {
         let count = (reach / self.piece).ceil().clamp(1.0, MOST_PIECES);
         let piece = reach / count;
         for i in 0..count as usize {
-            let (a, b) = (from + direction * (piece * i as f64), from + direction * (piece * (i + 1) as f64));
-            self.tree.faces_in_box(&a.inf(&b), &a.sup(&b), &mut self.query);
+            let (a, b) = (
+                from + direction * (piece * i as f64),
+                from + direction * (piece * (i + 1) as f64),
+            );
+            self.tree
+                .faces_in_box(&a.inf(&b), &a.sup(&b), &mut self.query);
             let found = self.query.faces.iter().filter_map(|&face| {
                 let distance = crossing(&self.mesh.triangle(face), from, direction)?;
                 (distance >= 0.0 && distance <= reach).then_some(RayHit { distance, face })
             });
             // a face of this box may be crossed in a later one, behind a nearer face that is not here
-            let nearest = found.min_by(|a, b| a.distance.total_cmp(&b.distance).then(a.face.cmp(&b.face)));
-            if let Some(nearest) = nearest.filter(|nearest| nearest.distance <= piece * (i + 1) as f64) {
-                let face = self.names.map_or(nearest.face, |names| FaceId(names[nearest.face.0 as usize]));
+            let nearest =
+                found.min_by(|a, b| a.distance.total_cmp(&b.distance).then(a.face.cmp(&b.face)));
+            if let Some(nearest) =
+                nearest.filter(|nearest| nearest.distance <= piece * (i + 1) as f64)
+            {
+                let face = self
+                    .names
+                    .map_or(nearest.face, |names| FaceId(names[nearest.face.0 as usize]));
                 return Some(RayHit { face, ..nearest });
             }
         }
@@ -57,12 +82,17 @@ impl<'a> Rays<'a> {
 
     /// How far the line is free, at most `reach`, m.
     pub fn free(&mut self, from: &Point3<f64>, direction: &Vector3<f64>, reach: f64) -> f64 {
-        self.first(from, direction, reach).map_or(reach, |crossing| crossing.distance)
+        self.first(from, direction, reach)
+            .map_or(reach, |crossing| crossing.distance)
     }
 }
 
 /// Where a line meets the plane of a triangle, if inside of it; edges belong to it.
-fn crossing([a, b, c]: &[Point3<f64>; 3], from: &Point3<f64>, direction: &Vector3<f64>) -> Option<f64> {
+fn crossing(
+    [a, b, c]: &[Point3<f64>; 3],
+    from: &Point3<f64>,
+    direction: &Vector3<f64>,
+) -> Option<f64> {
     let (ab, ac) = (b - a, c - a);
     let across = direction.cross(&ac);
     let volume = ab.dot(&across);
@@ -85,11 +115,25 @@ mod tests {
         let mesh = TriMesh::new(positions, vec![[0, 1, 2], [3, 4, 5]]).unwrap();
         let tree = FaceTree::new(&mesh);
         let mut rays = Rays::new(&mesh, &tree, 0.7, None);
-        let met = rays.first(&Point3::new(1.0, 1.0, 5.0), &-Vector3::z(), 10.0).unwrap();
+        let met = rays
+            .first(&Point3::new(1.0, 1.0, 5.0), &-Vector3::z(), 10.0)
+            .unwrap();
         assert_eq!((met.face, met.distance), (FaceId(1), 2.5));
-        assert_eq!(rays.free(&Point3::new(1.0, 1.0, 5.0), &-Vector3::z(), 2.0), 2.0, "too short");
-        assert_eq!(rays.free(&Point3::new(3.0, 3.0, 5.0), &-Vector3::z(), 9.0), 9.0, "beside both");
+        assert_eq!(
+            rays.free(&Point3::new(1.0, 1.0, 5.0), &-Vector3::z(), 2.0),
+            2.0,
+            "too short"
+        );
+        assert_eq!(
+            rays.free(&Point3::new(3.0, 3.0, 5.0), &-Vector3::z(), 9.0),
+            9.0,
+            "beside both"
+        );
         let mut rays = Rays::new(&mesh, &tree, 1e-300, None);
-        assert_eq!(rays.free(&Point3::new(1.0, 1.0, 5.0), &-Vector3::z(), 10.0), 2.5, "however small the pieces are");
+        assert_eq!(
+            rays.free(&Point3::new(1.0, 1.0, 5.0), &-Vector3::z(), 10.0),
+            2.5,
+            "however small the pieces are"
+        );
     }
 }

@@ -1,7 +1,9 @@
 //! The relations between touched features that a drawing would ask for.
 
 use super::feature::{Feature, Kind};
-use crate::form::{Element, Estimate, Shape, angle, coaxiality, concentricity, distance, orientation};
+use crate::form::{
+    Element, Estimate, Shape, angle, coaxiality, concentricity, distance, orientation,
+};
 use crate::names;
 
 names! {
@@ -52,24 +54,42 @@ const MOST_RELATED: usize = 24;
 /// - Of two parallel axes, each to the longer: coaxiality, or their distance.
 pub fn relations(features: &[Feature]) -> Vec<Relation> {
     let of_shape = |shape: Shape| -> Vec<(&Feature, &Element)> {
-        let known = features.iter().filter_map(|f| Some((f, f.element.as_ref().filter(|e| e.shape == shape)?)));
+        let known = features
+            .iter()
+            .filter_map(|f| Some((f, f.element.as_ref().filter(|e| e.shape == shape)?)));
         known.take(MOST_RELATED).collect()
     };
     let (axes, planes) = (of_shape(Shape::Axis), of_shape(Shape::Plane));
     let mut found = Vec::new();
     for (at, one) in planes.iter().enumerate() {
-        found.extend(planes[..at].iter().filter_map(|other| Relation::of_alike(one, other)));
+        found.extend(
+            planes[..at]
+                .iter()
+                .filter_map(|other| Relation::of_alike(one, other)),
+        );
     }
     for axis in &axes {
-        let squares = planes.iter().filter(|plane| cosine(axis.1, plane.1) > MEANT.cos());
-        let off = |plane: &Element| (axis.0.centre.value - plane.point).dot(&plane.direction).abs();
+        let squares = planes
+            .iter()
+            .filter(|plane| cosine(axis.1, plane.1) > MEANT.cos());
+        let off = |plane: &Element| {
+            (axis.0.centre.value - plane.point)
+                .dot(&plane.direction)
+                .abs()
+        };
         let land = squares.min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
         found.extend(land.and_then(|land| Relation::oriented(axis, land)));
-        let beside = planes.iter().filter(|plane| cosine(axis.1, plane.1) < MEANT.sin());
+        let beside = planes
+            .iter()
+            .filter(|plane| cosine(axis.1, plane.1) < MEANT.sin());
         found.extend(beside.filter_map(|plane| Relation::oriented(axis, plane)));
     }
     for (at, one) in axes.iter().enumerate() {
-        found.extend(axes[..at].iter().filter_map(|other| Relation::of_alike(one, other)));
+        found.extend(
+            axes[..at]
+                .iter()
+                .filter_map(|other| Relation::of_alike(one, other)),
+        );
     }
     found
 }
@@ -90,7 +110,11 @@ type Related<'a> = (&'a Feature, &'a Element);
 impl Relation {
     /// Of two planes or two axes; `None` where they are neither parallel nor square, and of axes that are not parallel.
     fn of_alike<'a>(one: &Related<'a>, other: &Related<'a>) -> Option<Self> {
-        let (toleranced, datum) = if reach(one.1) > reach(other.1) { (other, one) } else { (one, other) };
+        let (toleranced, datum) = if reach(one.1) > reach(other.1) {
+            (other, one)
+        } else {
+            (one, other)
+        };
         let cos = cosine(one.1, other.1);
         let is_parallel = cos > MEANT.cos();
         match one.1.shape {
@@ -102,7 +126,15 @@ impl Relation {
 
     fn new(kind: RelationKind, of: &Related, to: &Related) -> Self {
         let (zone, angle, distance, concentricity) = (None, None, None, None);
-        Self { kind, of: of.0.id, to: to.0.id, zone, angle, distance, concentricity }
+        Self {
+            kind,
+            of: of.0.id,
+            to: to.0.id,
+            zone,
+            angle,
+            distance,
+            concentricity,
+        }
     }
 
     fn oriented(of: &Related, to: &Related) -> Option<Self> {
@@ -111,8 +143,16 @@ impl Relation {
         // an axis is square to a plane along its normal
         let is_off_zero = is_along == (of.1.shape == to.1.shape);
         let off = found.off;
-        let value = if is_off_zero { off.value } else { std::f64::consts::FRAC_PI_2 - off.value };
-        let kind = if found.is_parallel { RelationKind::Parallelism } else { RelationKind::Perpendicularity };
+        let value = if is_off_zero {
+            off.value
+        } else {
+            std::f64::consts::FRAC_PI_2 - off.value
+        };
+        let kind = if found.is_parallel {
+            RelationKind::Parallelism
+        } else {
+            RelationKind::Perpendicularity
+        };
         Some(Self {
             zone: Some(found.zone),
             angle: Some(Estimate { value, ..off }),
@@ -125,12 +165,29 @@ impl Relation {
         let apart = distance(of.1, to.1)?;
         let angle = angle(of.1, to.1);
         let diameter = |f: &Feature| f.diameter.as_ref().map_or(0.0, |diameter| diameter.value);
-        let is_round = |f: &Feature| matches!(f.kind, Kind::Hole | Kind::Boss | Kind::Cylinder | Kind::Notch);
-        if apart.value < ONE_AXIS * diameter(of.0).min(diameter(to.0)) && is_round(of.0) && is_round(to.0) {
+        let is_round = |f: &Feature| {
+            matches!(
+                f.kind,
+                Kind::Hole | Kind::Boss | Kind::Cylinder | Kind::Notch
+            )
+        };
+        if apart.value < ONE_AXIS * diameter(of.0).min(diameter(to.0))
+            && is_round(of.0)
+            && is_round(to.0)
+        {
             let zone = coaxiality(of.1, to.1);
             let concentricity = concentricity(of.1, to.1);
-            return Some(Self { zone, angle, concentricity, ..Self::new(RelationKind::Coaxiality, of, to) });
+            return Some(Self {
+                zone,
+                angle,
+                concentricity,
+                ..Self::new(RelationKind::Coaxiality, of, to)
+            });
         }
-        Some(Self { angle, distance: Some(apart), ..Self::new(RelationKind::Distance, of, to) })
+        Some(Self {
+            angle,
+            distance: Some(apart),
+            ..Self::new(RelationKind::Distance, of, to)
+        })
     }
 }

@@ -54,13 +54,18 @@ pub(super) fn rims(parted: &Parted) -> Vec<RoundOpening> {
     let loops = loops(&parted.facets);
     let mut longest: BTreeMap<u32, (f64, usize)> = BTreeMap::new();
     for (at, border) in loops.iter().enumerate() {
-        let of_piece = longest.entry(parted.bodies.piece_of(border.faces[0])).or_insert((0.0, at));
+        let of_piece = longest
+            .entry(parted.bodies.piece_of(border.faces[0]))
+            .or_insert((0.0, at));
         if border.length() > of_piece.0 {
             *of_piece = (border.length(), at);
         }
     }
     let is_inner = |at: usize| longest.values().all(|&(_, outer)| outer != at);
-    (0..loops.len()).filter(|&at| is_inner(at)).filter_map(|at| loops[at].rim(parted)).collect()
+    (0..loops.len())
+        .filter(|&at| is_inner(at))
+        .filter_map(|at| loops[at].rim(parted))
+        .collect()
 }
 
 /// Closed chains of edges of one face, those through a vertex where several meet left out.
@@ -75,11 +80,21 @@ fn loops(facets: &Facets) -> Vec<Loop> {
             }
         }
     }
-    let mut starts: Vec<(u32, VertexId)> = next.iter().map(|(&from, &(_, face))| (face, from)).collect();
+    let mut starts: Vec<(u32, VertexId)> = next
+        .iter()
+        .map(|(&from, &(_, face))| (face, from))
+        .collect();
     starts.sort_unstable();
     let mut loops = Vec::new();
     for (_, start) in starts {
-        let (mut at, mut border, mut is_simple) = (start, Loop { corners: Vec::new(), faces: Vec::new() }, true);
+        let (mut at, mut border, mut is_simple) = (
+            start,
+            Loop {
+                corners: Vec::new(),
+                faces: Vec::new(),
+            },
+            true,
+        );
         while let Some((to, face)) = next.remove(&at) {
             is_simple &= forked.binary_search(&at).is_err();
             border.corners.push(facets.mesh.position(at));
@@ -95,7 +110,8 @@ fn loops(facets: &Facets) -> Vec<Loop> {
 
 impl Loop {
     fn edges(&self) -> impl Iterator<Item = (Point3<f64>, Point3<f64>)> + '_ {
-        (0..self.corners.len()).map(|i| (self.corners[i], self.corners[(i + 1) % self.corners.len()]))
+        (0..self.corners.len())
+            .map(|i| (self.corners[i], self.corners[(i + 1) % self.corners.len()]))
     }
 
     fn length(&self) -> f64 {
@@ -108,7 +124,10 @@ impl Loop {
         }
         let middle = Point3::from(mean(self.corners.iter().map(|p| p.coords)));
         // the part is on the left: around an opening it is gone around clockwise
-        let area = self.edges().map(|(a, b)| (a - middle).cross(&(b - middle))).sum::<Vector3<f64>>();
+        let area = self
+            .edges()
+            .map(|(a, b)| (a - middle).cross(&(b - middle)))
+            .sum::<Vector3<f64>>();
         let out = -area.try_normalize(0.0)?;
         if !self.faces_out(parted, &out) {
             return None;
@@ -118,7 +137,12 @@ impl Loop {
         let out = cylinder.axis_towards(&out);
         let centre = cylinder.nearest_on_axis(&middle);
         let is_round = self.is_round(&centre, &out, cylinder.radius);
-        is_round.then(|| RoundOpening { fit, centre, out, corners: self.corners.clone() })
+        is_round.then(|| RoundOpening {
+            fit,
+            centre,
+            out,
+            corners: self.corners.clone(),
+        })
     }
 
     fn faces_out(&self, parted: &Parted, out: &Vector3<f64>) -> bool {
@@ -129,25 +153,57 @@ impl Loop {
         facing.sum::<f64>() > FACING_SHARE * self.length()
     }
 
-    fn circle(&self, parted: &Parted, middle: &Point3<f64>, out: &Vector3<f64>) -> Option<Fit<Cylinder>> {
+    fn circle(
+        &self,
+        parted: &Parted,
+        middle: &Point3<f64>,
+        out: &Vector3<f64>,
+    ) -> Option<Fit<Cylinder>> {
         let away = |p: &Point3<f64>| (p - middle) - out * (p - middle).dot(out);
-        let radius = self.corners.iter().map(|p| away(p).norm()).sum::<f64>() / self.corners.len() as f64;
-        let height = self.corners.iter().map(|p| (p - middle).dot(out).abs()).fold(0.0, f64::max);
+        let radius =
+            self.corners.iter().map(|p| away(p).norm()).sum::<f64>() / self.corners.len() as f64;
+        let height = self
+            .corners
+            .iter()
+            .map(|p| (p - middle).dot(out).abs())
+            .fold(0.0, f64::max);
         let sigma = parted.rounding.unwrap_or(ROUNDING * parted.diagonal);
         // triangles of a scan end before its rim does: all by as much as they please, up to an edge
-        let common_sigma = if parted.rounding.is_some() { 0.0 } else { parted.edge / 12f64.sqrt() };
+        let common_sigma = if parted.rounding.is_some() {
+            0.0
+        } else {
+            parted.edge / 12f64.sqrt()
+        };
         let axis_sigma = (height < FLAT * radius).then_some(AXIS);
-        let params = FitParams { axis_sigma, common_sigma, ..FitParams::default() };
-        let observation =
-            |(group, &point): (usize, &Point3<f64>)| Observation { point, offset: 0.0, sigma, group: group as u32 };
+        let params = FitParams {
+            axis_sigma,
+            common_sigma,
+            ..FitParams::default()
+        };
+        let observation = |(group, &point): (usize, &Point3<f64>)| Observation {
+            point,
+            offset: 0.0,
+            sigma,
+            group: group as u32,
+        };
         let observations: Vec<_> = self.corners.iter().enumerate().map(observation).collect();
-        fit(&Cylinder::new(*middle, out, radius, true), &observations, &params).ok()
+        fit(
+            &Cylinder::new(*middle, out, radius, true),
+            &observations,
+            &params,
+        )
+        .ok()
     }
 
     fn is_round(&self, centre: &Point3<f64>, out: &Vector3<f64>, radius: f64) -> bool {
         let [e, g] = tangent_basis(out);
         let place = |p: &Point3<f64>| [(p - centre).dot(&e), (p - centre).dot(&g)];
-        let off: Vec<f64> = self.corners.iter().map(place).map(|[x, y]| (x.hypot(y) / radius - 1.0).abs()).collect();
+        let off: Vec<f64> = self
+            .corners
+            .iter()
+            .map(place)
+            .map(|[x, y]| (x.hypot(y) / radius - 1.0).abs())
+            .collect();
         let mean_square = off.iter().map(|off| off * off).sum::<f64>() / off.len() as f64;
         let turns = self.edges().map(|(a, b)| {
             let ([x, y], [u, v]) = (place(&a), place(&b));

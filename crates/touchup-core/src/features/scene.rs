@@ -41,9 +41,21 @@ impl<'a> Parted<'a> {
         let mut segmentation = Segmentation::of(&facets, scale);
         segmentation.join_chords(&facets, scale.chords());
         let bodies = Bodies::of(&facets);
-        let exact = segmentation.segments.iter().filter(|segment| segment.is_exact).map(|segment| segment.tolerance);
+        let exact = segmentation
+            .segments
+            .iter()
+            .filter(|segment| segment.is_exact)
+            .map(|segment| segment.tolerance);
         let rounding = exact.min_by(f64::total_cmp);
-        Self { rounding, facets, bodies, tree, segmentation, diagonal: scale.diagonal, edge: scale.edge }
+        Self {
+            rounding,
+            facets,
+            bodies,
+            tree,
+            segmentation,
+            diagonal: scale.diagonal,
+            edge: scale.edge,
+        }
     }
 
     pub fn segment(&self, number: usize) -> &Segment {
@@ -62,13 +74,20 @@ impl<'a> Parted<'a> {
 
     /// Numbers of the flat segments, each with a point and the normal.
     pub fn planes(&self) -> impl Iterator<Item = (usize, Point3<f64>, Vector3<f64>)> + '_ {
-        let plane = |number| self.plane(number).map(|plane| (number, plane.point(), plane.normal()));
+        let plane = |number| {
+            self.plane(number)
+                .map(|plane| (number, plane.point(), plane.normal()))
+        };
         (0..self.segmentation.segments.len()).filter_map(plane)
     }
 
     /// What is around a segment.
     pub fn around(&self, number: usize) -> Surroundings<'_> {
-        self.bodies.around(self.segment(number).faces.first().copied(), self.facets.mesh, self.tree)
+        self.bodies.around(
+            self.segment(number).faces.first().copied(),
+            self.facets.mesh,
+            self.tree,
+        )
     }
 
     /// The segment of the face closest to `p`, when one is within `reach`, m.
@@ -123,7 +142,10 @@ impl<'a> Parted<'a> {
         radii: &[f64],
         reach: f64,
     ) -> Option<(usize, f64)> {
-        let is_along = |number: usize| self.plane(number).is_some_and(|plane| plane.normal().dot(direction) >= SQUARE);
+        let is_along = |number: usize| {
+            self.plane(number)
+                .is_some_and(|plane| plane.normal().dot(direction) >= SQUARE)
+        };
         self.surface_around(around, middle, direction, radii, reach, is_along)
     }
 
@@ -141,13 +163,17 @@ impl<'a> Parted<'a> {
         for (i, radius) in (0..AROUND).flat_map(|i| radii.iter().map(move |radius| (i, radius))) {
             let (sine, cosine) = (std::f64::consts::TAU * i as f64 / AROUND as f64).sin_cos();
             let p = middle + (e * cosine + g * sine) * *radius;
-            let Some(number) = self.segment_at(around, &p, reach) else { continue };
+            let Some(number) = self.segment_at(around, &p, reach) else {
+                continue;
+            };
             if !is_land(number) {
                 continue;
             }
             *votes.entry(number).or_default() += 1;
         }
-        let (number, count) = votes.into_iter().max_by_key(|&(number, count)| (count, usize::MAX - number))?;
+        let (number, count) = votes
+            .into_iter()
+            .max_by_key(|&(number, count)| (count, usize::MAX - number))?;
         Some((number, count as f64 / (AROUND * radii.len()) as f64))
     }
 }

@@ -48,7 +48,9 @@ impl Segmentation {
             }
         }
         for before in distinct(poorer) {
-            self.segments[before as usize].faces.retain(|&face| self.of_face[face as usize] == before);
+            self.segments[before as usize]
+                .faces
+                .retain(|&face| self.of_face[face as usize] == before);
         }
         self.segments.push(segment);
         number as usize
@@ -60,7 +62,14 @@ impl Segmentation {
     /// - `tolerance`: how far chords are off the surface, m.
     pub(super) fn join_chords(&mut self, facets: &Facets, tolerance: f64) {
         for number in 0..self.segments.len() {
-            let Segment { primitive, is_exact: true, .. } = self.segments[number] else { continue };
+            let Segment {
+                primitive,
+                is_exact: true,
+                ..
+            } = self.segments[number]
+            else {
+                continue;
+            };
             if primitive.plane().is_some() {
                 continue;
             }
@@ -69,7 +78,11 @@ impl Segmentation {
             let mut examined = BTreeSet::from([number as u32]);
             while !front.is_empty() {
                 let mut taken = Vec::new();
-                for other in front.iter().flat_map(|&face| facets.beside(face)).map(|(_, other)| other) {
+                for other in front
+                    .iter()
+                    .flat_map(|&face| facets.beside(face))
+                    .map(|(_, other)| other)
+                {
                     let label = self.of_face[other as usize];
                     if label == NONE {
                         if is_on(&other) {
@@ -78,8 +91,12 @@ impl Segmentation {
                         }
                         continue;
                     }
-                    let is_smaller = self.segments[label as usize].area < self.segments[number].area;
-                    if is_smaller && examined.insert(label) && self.segments[label as usize].faces.iter().all(is_on) {
+                    let is_smaller =
+                        self.segments[label as usize].area < self.segments[number].area;
+                    if is_smaller
+                        && examined.insert(label)
+                        && self.segments[label as usize].faces.iter().all(is_on)
+                    {
                         let piece = &mut self.segments[label as usize];
                         piece.area = 0.0;
                         for face in std::mem::take(&mut piece.faces) {
@@ -103,7 +120,10 @@ impl Segmentation {
         self.segments.retain(|segment| !segment.faces.is_empty());
         self.segments.sort_by(|a, b| b.area.total_cmp(&a.area));
         for (number, segment) in self.segments.iter().enumerate() {
-            segment.faces.iter().for_each(|&face| self.of_face[face as usize] = number as u32);
+            segment
+                .faces
+                .iter()
+                .for_each(|&face| self.of_face[face as usize] = number as u32);
         }
     }
 
@@ -139,10 +159,14 @@ impl Segmentation {
             let whole = &mut self.segments[number];
             sort(&mut whole.faces, facets.slots());
             let origin = facets.triangle(whole.faces[0])[0];
-            whole.primitive = plane_of(facets, origin, whole.faces.iter().copied()).unwrap_or(whole.primitive);
+            whole.primitive =
+                plane_of(facets, origin, whole.faces.iter().copied()).unwrap_or(whole.primitive);
         }
         for (number, segment) in self.segments.iter().enumerate() {
-            segment.faces.iter().for_each(|&face| self.of_face[face as usize] = number as u32);
+            segment
+                .faces
+                .iter()
+                .for_each(|&face| self.of_face[face as usize] = number as u32);
         }
     }
 }
@@ -154,8 +178,14 @@ const SAME_PLANE: f64 = 1.5;
 
 /// Whether the smaller of two segments lies on the larger.
 fn is_one_plane(one: &Segment, other: &Segment) -> bool {
-    let (large, small) = if one.area < other.area { (other, one) } else { (one, other) };
-    let Some((plane, other)) = large.primitive.plane().zip(small.primitive.plane()) else { return false };
+    let (large, small) = if one.area < other.area {
+        (other, one)
+    } else {
+        (one, other)
+    };
+    let Some((plane, other)) = large.primitive.plane().zip(small.primitive.plane()) else {
+        return false;
+    };
     let near = SAME_PLANE * large.tolerance.max(small.tolerance);
     plane.normal().dot(&other.normal()) > SAME_NORMAL && plane.distance(&other.point()).abs() < near
 }

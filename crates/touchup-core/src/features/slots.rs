@@ -57,7 +57,8 @@ impl Slot {
     pub fn holds(&self, other: &Self) -> bool {
         let v = other.centre - other.out * (other.depth / 2.0) - self.centre;
         let across = self.out.cross(&self.direction);
-        let is_beside = v.dot(&across).abs() < self.width / 2.0 && v.dot(&self.direction).abs() < self.length / 2.0;
+        let is_beside = v.dot(&across).abs() < self.width / 2.0
+            && v.dot(&self.direction).abs() < self.length / 2.0;
         is_beside && (-self.depth..0.0).contains(&v.dot(&self.out))
     }
 }
@@ -112,8 +113,16 @@ const MOST_MET: usize = 8;
 /// All slots, and all pockets.
 ///
 /// - `of_face`: the segment of each face, seams included.
-pub(super) fn slots(parted: &Parted, walls: &[Wall], of_face: &[u32], borders: &Borders) -> (Vec<Slot>, Vec<Slot>) {
-    let planes: Vec<_> = parted.planes().filter(|&(number, ..)| parted.is_strong(number)).collect();
+pub(super) fn slots(
+    parted: &Parted,
+    walls: &[Wall],
+    of_face: &[u32],
+    borders: &Borders,
+) -> (Vec<Slot>, Vec<Slot>) {
+    let planes: Vec<_> = parted
+        .planes()
+        .filter(|&(number, ..)| parted.is_strong(number))
+        .collect();
     let (mut slots, mut pockets): (Vec<Slot>, Vec<Slot>) = (Vec::new(), Vec::new());
     let mut views = BTreeMap::new();
     for (at, &(i, p, n)) in planes.iter().enumerate() {
@@ -122,7 +131,9 @@ pub(super) fn slots(parted: &Parted, walls: &[Wall], of_face: &[u32], borders: &
             if !is_facing {
                 continue;
             }
-            let Some((slot, share)) = between(parted, of_face, borders, &mut views, [i, j]) else { continue };
+            let Some((slot, share)) = between(parted, of_face, borders, &mut views, [i, j]) else {
+                continue;
+            };
             let is_slot = slot.length > if slot.is_boxed { LONG_BOX } else { LONG } * slot.width;
             let is_shut = slot.floor.is_some() && slot.is_closed;
             let widest = if is_shut { SHALLOW } else { WIDE };
@@ -134,12 +145,16 @@ pub(super) fn slots(parted: &Parted, walls: &[Wall], of_face: &[u32], borders: &
         }
     }
     slots.extend(between_round_ends(parted, of_face, walls));
-    (distinct(slots, is_same_slot), distinct(pockets, is_same_pocket))
+    (
+        distinct(slots, is_same_slot),
+        distinct(pockets, is_same_pocket),
+    )
 }
 
 /// Slots of which both half-round ends are there: what is between them may be in pieces, or hardly there.
 fn between_round_ends(parted: &Parted, of_face: &[u32], walls: &[Wall]) -> Vec<Slot> {
-    let is_end = |wall: &&Wall| wall.is_concave && !wall.is_cone() && END_TURN.contains(&wall.coverage);
+    let is_end =
+        |wall: &&Wall| wall.is_concave && !wall.is_cone() && END_TURN.contains(&wall.coverage);
     let ends: Vec<&Wall> = walls.iter().filter(is_end).collect();
     let mut slots = Vec::new();
     for (at, one) in ends.iter().enumerate() {
@@ -155,7 +170,8 @@ fn slot_of_ends(parted: &Parted, of_face: &[u32], ends: [&Wall; 2]) -> Option<Sl
     let [one, other] = ends;
     let width = one.radius() + other.radius();
     let axis = one.axis;
-    let is_alike = (one.radius() - other.radius()).abs() < ABOUT * width && axis.dot(&other.axis).abs() > ENDS_PARALLEL;
+    let is_alike = (one.radius() - other.radius()).abs() < ABOUT * width
+        && axis.dot(&other.axis).abs() > ENDS_PARALLEL;
     let v = other.at(other.middle()) - one.at(one.middle());
     let apart = v - axis * v.dot(&axis);
     let is_beside = v.dot(&axis).abs() < (one.height() + other.height()) / 2.0;
@@ -174,7 +190,10 @@ fn slot_of_ends(parted: &Parted, of_face: &[u32], ends: [&Wall; 2]) -> Option<Sl
     let around = parted.around(one.segments[0]);
     let mut rays = around.rays(width);
     // nothing stands between them
-    if [direction, -direction].iter().any(|along| rays.free(&middle, along, distance) < distance / 2.0) {
+    if [direction, -direction]
+        .iter()
+        .any(|along| rays.free(&middle, along, distance) < distance / 2.0)
+    {
         return None;
     }
     let segment_of = |met: Option<RayHit>| {
@@ -194,8 +213,9 @@ fn slot_of_ends(parted: &Parted, of_face: &[u32], ends: [&Wall; 2]) -> Option<Sl
         let out = axis * sign;
         ends.into_iter().find_map(|end| {
             let t = end.ends[usize::from(end.axis.dot(&out) > 0.0)];
-            let (land, _) =
-                parted.land_around(&around, &end.at(t), &out, &rings, 0.2 * width).filter(|&(_, share)| share > 0.2)?;
+            let (land, _) = parted
+                .land_around(&around, &end.at(t), &out, &rings, 0.2 * width)
+                .filter(|&(_, share)| share > 0.2)?;
             let up = parted.exit(land, &middle, &out).filter(|&up| up > 0.0)?;
             Some((out, land, up))
         })
@@ -204,12 +224,19 @@ fn slot_of_ends(parted: &Parted, of_face: &[u32], ends: [&Wall; 2]) -> Option<Sl
     if rays.free(&middle, &out, up + width) < up + width / 2.0 {
         return None;
     }
-    let lowest = |wall: &Wall| wall.ends.map(|t| (wall.at(t) - middle).dot(&-out)).into_iter().fold(0.0, f64::max);
+    let lowest = |wall: &Wall| {
+        wall.ends
+            .map(|t| (wall.at(t) - middle).dot(&-out))
+            .into_iter()
+            .fold(0.0, f64::max)
+    };
     let deepest = lowest(one).max(lowest(other));
     let met = rays.first(&middle, &-out, deepest + width);
     let floor = segment_of(met).filter(|&number| is_square(parted, number, &out));
-    let down =
-        floor.and_then(|number| parted.exit(number, &middle, &-out)).or(met.map(|met| met.distance)).unwrap_or(deepest);
+    let down = floor
+        .and_then(|number| parted.exit(number, &middle, &-out))
+        .or(met.map(|met| met.distance))
+        .unwrap_or(deepest);
     let [from, to] = ends.map(|wall| wall.segments[0]);
     Some(Slot {
         walls: vec![sides[0].unwrap_or(from), sides[1].unwrap_or(to)],
@@ -272,7 +299,10 @@ struct View {
 impl View {
     /// The segment that is first met across a void of `width`.
     fn across(&self, width: f64) -> Option<u32> {
-        let &(distance, segment) = self.met.iter().find(|(distance, _)| *distance >= OFF * width)?;
+        let &(distance, segment) = self
+            .met
+            .iter()
+            .find(|(distance, _)| *distance >= OFF * width)?;
         (distance <= (1.1 + OFF) * width).then_some(segment)
     }
 }
@@ -283,8 +313,14 @@ fn views(parted: &Parted, of_face: &[u32], wall: usize, normal: &Vector3<f64>) -
     let farthest = FARTHEST * parted.diagonal;
     let mut view = |from: Point3<f64>| {
         let (mut met, mut at) = (Vec::new(), APART * parted.diagonal);
-        while met.len() < MOST_MET && met.last().is_none_or(|&(distance, _)| distance < OFF * farthest) {
-            let Some(hit) = rays.first(&(from + normal * at), normal, farthest - at) else { break };
+        while met.len() < MOST_MET
+            && met
+                .last()
+                .is_none_or(|&(distance, _)| distance < OFF * farthest)
+        {
+            let Some(hit) = rays.first(&(from + normal * at), normal, farthest - at) else {
+                break;
+            };
             met.push((at + hit.distance, of_face[hit.face.0 as usize]));
             at += hit.distance + APART * parted.diagonal;
         }
@@ -306,10 +342,15 @@ fn between(
     let planes = [parted.plane(walls[0])?, parted.plane(walls[1])?];
     let n = planes[0].normal();
     // across from the smaller wall: the larger one may go on far beyond
-    let [from, to] =
-        if parted.segment(walls[0]).area < parted.segment(walls[1]).area { walls } else { [walls[1], walls[0]] };
+    let [from, to] = if parted.segment(walls[0]).area < parted.segment(walls[1]).area {
+        walls
+    } else {
+        [walls[1], walls[0]]
+    };
     let (normal, opposite) = (parted.plane(from)?.normal(), parted.plane(to)?);
-    let starts = seen.entry(from).or_insert_with(|| views(parted, of_face, from, &normal));
+    let starts = seen
+        .entry(from)
+        .or_insert_with(|| views(parted, of_face, from, &normal));
     let mut middles = Vec::new();
     for view in &*starts {
         let width = opposite.along(&view.from, &normal)?;
@@ -328,12 +369,26 @@ fn between(
     let area = share * parted.segment(from).area;
     let lands = lands(parted, borders, walls, &middle, &n);
     let seen = lands.into_iter().filter_map(|(land, out)| {
-        opened(parted, of_face, &Opened { walls, middle, across: n, width, land, out, area })
+        opened(
+            parted,
+            of_face,
+            &Opened {
+                walls,
+                middle,
+                across: n,
+                width,
+                land,
+                out,
+                area,
+            },
+        )
     });
     let seen: Vec<Slot> = seen.collect();
     let longest = seen.iter().map(|slot| slot.length).fold(0.0, f64::max);
     // as long from both of its sides, as the neck of a T-slot is: from where it is deeper
-    let deepest = seen.into_iter().filter(|slot| slot.length > AS_LONG * longest);
+    let deepest = seen
+        .into_iter()
+        .filter(|slot| slot.length > AS_LONG * longest);
     let deepest = deepest.max_by(|a, b| a.depth.total_cmp(&b.depth))?;
     Some((deepest, share))
 }
@@ -351,7 +406,11 @@ pub(super) fn samples(parted: &Parted, number: usize) -> Vec<Point3<f64>> {
             // a lattice of the unit square, folded onto the triangle
             let (u, v) = ((k % rows) as f64 + 0.4, (k / rows) as f64 + 0.4);
             let (u, v) = (u / rows as f64, v / rows as f64);
-            let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+            let (u, v) = if u + v > 1.0 {
+                (1.0 - u, 1.0 - v)
+            } else {
+                (u, v)
+            };
             points.push(a + (b - a) * u + (c - a) * v);
         }
     }
@@ -399,7 +458,15 @@ struct Opened {
 }
 
 fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
-    let Opened { walls, middle, across, width, land, out, area } = *seen;
+    let Opened {
+        walls,
+        middle,
+        across,
+        width,
+        land,
+        out,
+        area,
+    } = *seen;
     let mut rays = parted.around(walls[0]).rays(width);
     let reach = parted.diagonal;
     let up = parted.exit(land, &middle, &out)?;
@@ -407,12 +474,18 @@ fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
         return None;
     }
     let segment_of = |met: Option<RayHit>| {
-        met.map(|met| of_face[met.face.0 as usize]).filter(|&number| number != NONE).map(|number| number as usize)
+        met.map(|met| of_face[met.face.0 as usize])
+            .filter(|&number| number != NONE)
+            .map(|number| number as usize)
     };
     let below = rays.first(&middle, &-out, reach);
     let walls_end = |along: &Vector3<f64>| {
         let of_wall = |number: usize| {
-            let corners = parted.segment(number).faces.iter().flat_map(|&face| parted.facets.triangle(face));
+            let corners = parted
+                .segment(number)
+                .faces
+                .iter()
+                .flat_map(|&face| parted.facets.triangle(face));
             corners.map(|p| (p - middle).dot(along)).fold(0.0, f64::max)
         };
         // one of them may go on beyond the slot
@@ -430,7 +503,9 @@ fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
     let direction = out.cross(&across).normalize();
     let (mut ends, mut lengths, mut flat, mut is_aslant) = ([None; 2], [0.0; 2], 0, false);
     for (at, along) in [direction, -direction].into_iter().enumerate() {
-        let met = rays.first(&middle, &along, reach).filter(|met| met.distance < walls_end(&along) + 1.5 * width);
+        let met = rays
+            .first(&middle, &along, reach)
+            .filter(|met| met.distance < walls_end(&along) + 1.5 * width);
         lengths[at] = met.map_or_else(|| walls_end(&along), |met| met.distance);
         let number = segment_of(met);
         let is_flat = number.is_some_and(|number| is_square(parted, number, &along));
@@ -438,12 +513,23 @@ fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
         is_aslant |= number.is_some_and(|number| is_wall_aslant(parted, number, &along, &out));
         // what only reaches there over a seam, as a floor does, is no end
         let met = number.filter(|&number| is_flat || is_round_end(parted, number, &out, width));
-        ends[at] =
-            met.or_else(|| round_end_about(parted, &(middle + along * (lengths[at] - width / 2.0)), &out, width));
+        ends[at] = met.or_else(|| {
+            round_end_about(
+                parted,
+                &(middle + along * (lengths[at] - width / 2.0)),
+                &out,
+                width,
+            )
+        });
     }
     let centre = middle + out * up + direction * ((lengths[0] - lengths[1]) / 2.0);
-    let is_round = |&number: &usize| matches!(parted.segment(number).primitive, Primitive::Cylinder(_));
-    let shape = if ends.iter().flatten().any(is_round) { Ends::Round } else { Ends::Straight };
+    let is_round =
+        |&number: &usize| matches!(parted.segment(number).primitive, Primitive::Cylinder(_));
+    let shape = if ends.iter().flatten().any(is_round) {
+        Ends::Round
+    } else {
+        Ends::Straight
+    };
     Some(Slot {
         walls: walls.to_vec(),
         ends,
@@ -467,27 +553,48 @@ fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
 
 /// Whether a segment is a plane square to `along`.
 fn is_square(parted: &Parted, number: usize, along: &Vector3<f64>) -> bool {
-    parted.plane(number).is_some_and(|plane| plane.normal().dot(along).abs() > PARALLEL.powi(4))
+    parted
+        .plane(number)
+        .is_some_and(|plane| plane.normal().dot(along).abs() > PARALLEL.powi(4))
 }
 
 /// Whether a segment is an upright wall that `along` meets aslant.
-fn is_wall_aslant(parted: &Parted, number: usize, along: &Vector3<f64>, out: &Vector3<f64>) -> bool {
-    let Some(normal) = parted.plane(number).map(Plane::normal) else { return false };
+fn is_wall_aslant(
+    parted: &Parted,
+    number: usize,
+    along: &Vector3<f64>,
+    out: &Vector3<f64>,
+) -> bool {
+    let Some(normal) = parted.plane(number).map(Plane::normal) else {
+        return false;
+    };
     ASLANT.contains(&-normal.dot(along)) && normal.dot(out).abs() < SQUARE
 }
 
 /// The half-round end about a point: where the wall has few touches it may be in pieces, and the line meet another.
-fn round_end_about(parted: &Parted, middle: &Point3<f64>, out: &Vector3<f64>, width: f64) -> Option<usize> {
+fn round_end_about(
+    parted: &Parted,
+    middle: &Point3<f64>,
+    out: &Vector3<f64>,
+    width: f64,
+) -> Option<usize> {
     let is_there = |number: usize| match parted.segment(number).primitive {
-        Primitive::Cylinder(end) => (middle - end.center()).cross(&end.axis()).norm() < ABOUT * width,
+        Primitive::Cylinder(end) => {
+            (middle - end.center()).cross(&end.axis()).norm() < ABOUT * width
+        }
         _ => false,
     };
     // the largest first
-    (0..parted.segmentation.segments.len()).find(|&at| is_there(at) && is_round_end(parted, at, out, width))
+    (0..parted.segmentation.segments.len())
+        .find(|&at| is_there(at) && is_round_end(parted, at, out, width))
 }
 
 /// Whether a segment is a half-round end of a slot.
 fn is_round_end(parted: &Parted, number: usize, out: &Vector3<f64>, width: f64) -> bool {
-    let Primitive::Cylinder(end) = parted.segment(number).primitive else { return false };
-    end.concave && end.axis().dot(out).abs() > PARALLEL && (2.0 * end.radius - width).abs() < 0.2 * width
+    let Primitive::Cylinder(end) = parted.segment(number).primitive else {
+        return false;
+    };
+    end.concave
+        && end.axis().dot(out).abs() > PARALLEL
+        && (2.0 * end.radius - width).abs() < 0.2 * width
 }

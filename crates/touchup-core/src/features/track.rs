@@ -52,14 +52,27 @@ impl Tracker {
     }
 
     /// Detects features in the whole mesh again; features that were known keep their ids.
-    pub fn renew(&mut self, mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> &[Feature] {
-        let Detection { mut features, unexplained } = detect(mesh, tree, touches);
+    pub fn renew(
+        &mut self,
+        mesh: &TriMesh,
+        tree: &FaceTree,
+        touches: &[ProbedPoint],
+    ) -> &[Feature] {
+        let Detection {
+            mut features,
+            unexplained,
+        } = detect(mesh, tree, touches);
         self.unexplained = Some(unexplained);
         let mut known = std::mem::take(&mut self.features);
         for feature in &mut features {
             let off = |before: &Feature| (before.centre.value - feature.centre.value).norm();
-            let alike = known.iter().enumerate().filter(|(_, before)| is_same(before, feature));
-            let same = alike.min_by(|(_, a), (_, b)| off(a).total_cmp(&off(b))).map(|(at, _)| at);
+            let alike = known
+                .iter()
+                .enumerate()
+                .filter(|(_, before)| is_same(before, feature));
+            let same = alike
+                .min_by(|(_, a), (_, b)| off(a).total_cmp(&off(b)))
+                .map(|(at, _)| at);
             feature.id = same.map_or_else(|| self.fresh_id(), |at| known.swap_remove(at).id);
         }
         features.sort_by_key(|feature| feature.id);
@@ -90,7 +103,10 @@ impl Tracker {
     /// - `touches`: all of them, as for [`Self::renew`]. When some that were there are gone, as after an undone stroke,
     ///   nothing changes until the next detection in the whole mesh: features name touches by number.
     pub fn update(&mut self, touches: &[ProbedPoint]) -> Vec<u32> {
-        let last = self.seen.checked_sub(1).map(|last| touches.get(last).map(|touch| touch.stamp_ns));
+        let last = self
+            .seen
+            .checked_sub(1)
+            .map(|last| touches.get(last).map(|touch| touch.stamp_ns));
         if last.unwrap_or_default() != self.until_ns {
             return Vec::new();
         }
@@ -99,7 +115,11 @@ impl Tracker {
         let mut changed = Vec::new();
         for feature in &mut self.features {
             let is_on = |&number: &usize| is_on(feature, &touches[number]);
-            let new: Vec<u32> = added.clone().filter(is_on).map(|number| number as u32).collect();
+            let new: Vec<u32> = added
+                .clone()
+                .filter(is_on)
+                .map(|number| number as u32)
+                .collect();
             if !new.is_empty() && feature.take(&new, touches) {
                 changed.push(feature.id);
             }
@@ -110,7 +130,9 @@ impl Tracker {
 
 /// The size that a feature's place is compared with, m.
 fn size(feature: &Feature) -> f64 {
-    let mut sizes = [&feature.diameter, &feature.width, &feature.length].into_iter().flatten();
+    let mut sizes = [&feature.diameter, &feature.width, &feature.length]
+        .into_iter()
+        .flatten();
     sizes.next().map_or(2.0 * RADIUS, |size| size.value)
 }
 
@@ -120,7 +142,9 @@ fn is_same(one: &Feature, other: &Feature) -> bool {
     let off = one.centre.value - other.centre.value;
     // a hole is the same however deep it has become
     let off = match (one.kind, &one.axis) {
-        (Kind::Hole | Kind::Boss | Kind::Cylinder, Some(axis)) => off - axis.value * off.dot(&axis.value),
+        (Kind::Hole | Kind::Boss | Kind::Cylinder, Some(axis)) => {
+            off - axis.value * off.dot(&axis.value)
+        }
         _ => off,
     };
     let (a, b) = (size(one), size(other));
@@ -130,10 +154,19 @@ fn is_same(one: &Feature, other: &Feature) -> bool {
 
 /// Whether a touch is on the surface of a feature.
 fn is_on(feature: &Feature, touch: &ProbedPoint) -> bool {
-    let reach = if touch.radius > 0.0 { touch.radius } else { RADIUS };
-    let Some(axis) = feature.axis.as_ref().filter(|_| !touch.is_rejected) else { return false };
+    let reach = if touch.radius > 0.0 {
+        touch.radius
+    } else {
+        RADIUS
+    };
+    let Some(axis) = feature.axis.as_ref().filter(|_| !touch.is_rejected) else {
+        return false;
+    };
     let height = feature.depth.as_ref().map_or(0.0, |depth| depth.value);
-    let half_length = feature.length.as_ref().map_or(0.0, |length| length.value / 2.0);
+    let half_length = feature
+        .length
+        .as_ref()
+        .map_or(0.0, |length| length.value / 2.0);
     let along = (touch.point - feature.centre.value).dot(&axis.value);
     // a hole lies below its opening, a boss rises from its foot
     let is_between = match feature.kind {
@@ -142,7 +175,8 @@ fn is_on(feature: &Feature, touch: &ProbedPoint) -> bool {
         Kind::Cylinder => along > 0.0 && along < height,
         _ => along < 0.0 && along > -height - reach,
     };
-    let far = size(feature) + feature.length.as_ref().map_or(0.0, |length| length.value) + height + reach;
+    let far =
+        size(feature) + feature.length.as_ref().map_or(0.0, |length| length.value) + height + reach;
     if !is_between || (touch.point - feature.centre.value).norm() > far {
         return false;
     }
@@ -162,19 +196,31 @@ impl Feature {
         let all = distinct(known.chain(new).copied());
         let step = all.len().div_ceil(MOST_FITTED).max(1);
         let fitted: Vec<u32> = all.iter().copied().rev().step_by(step).collect();
-        let chosen: Vec<ProbedPoint> = fitted.iter().rev().map(|&number| touches[number as usize]).collect();
-        let observations: Vec<_> =
-            chosen.iter().zip(groups(&chosen)).map(|(touch, group)| observation(touch, group)).collect();
+        let chosen: Vec<ProbedPoint> = fitted
+            .iter()
+            .rev()
+            .map(|&number| touches[number as usize])
+            .collect();
+        let observations: Vec<_> = chosen
+            .iter()
+            .zip(groups(&chosen))
+            .map(|(touch, group)| observation(touch, group))
+            .collect();
         let [common_sigma, shift_sigma] = systematic(chosen.iter());
         let axis_sigma = Some(AXIS_KNOWN);
-        let params = FitParams { common_sigma, shift_sigma, axis_sigma, ..FitParams::default() };
+        let params = FitParams {
+            common_sigma,
+            shift_sigma,
+            axis_sigma,
+            ..FitParams::default()
+        };
         let is_held = match &self.walls {
-            Some(Walls::Round(cylinder)) => {
-                fit(cylinder, &observations, &params).map(|found| self.is_round(&found, &all)).is_ok()
-            }
-            Some(Walls::Slot(stadium)) => {
-                fit(stadium, &observations, &params).map(|found| self.is_slot(&found, &all)).is_ok()
-            }
+            Some(Walls::Round(cylinder)) => fit(cylinder, &observations, &params)
+                .map(|found| self.is_round(&found, &all))
+                .is_ok(),
+            Some(Walls::Slot(stadium)) => fit(stadium, &observations, &params)
+                .map(|found| self.is_slot(&found, &all))
+                .is_ok(),
             None => false,
         };
         if is_held {
@@ -192,28 +238,63 @@ impl Feature {
             ..Measured::default()
         };
         self.axis = Some(self.turned(found, touches));
-        self.diameter = Some(number(found, 2.0 * found.surface.radius, &[(Freedom::Size, 2.0)], touches));
+        self.diameter = Some(number(
+            found,
+            2.0 * found.surface.radius,
+            &[(Freedom::Size, 2.0)],
+            touches,
+        ));
         self.walls = Some(Walls::Round(found.surface));
     }
 
     fn is_slot(&mut self, found: &Fit<Stadium>, touches: &Touches) {
-        self.width = Some(number(found, found.surface.width, &[(Freedom::Size, 1.0)], touches));
+        self.width = Some(number(
+            found,
+            found.surface.width,
+            &[(Freedom::Size, 1.0)],
+            touches,
+        ));
         if found.std(Freedom::Second).is_some() {
-            self.length = Some(number(found, found.surface.length, &[(Freedom::Second, 1.0)], touches));
+            self.length = Some(number(
+                found,
+                found.surface.length,
+                &[(Freedom::Second, 1.0)],
+                touches,
+            ));
         }
-        let (axis, start, direction) = (found.surface.axis(), found.surface.center(), found.surface.direction());
+        let (axis, start, direction) = (
+            found.surface.axis(),
+            found.surface.center(),
+            found.surface.direction(),
+        );
         let off = self.centre.value - start;
         // along the slot only its ends determine its position
-        let along = if found.std(Freedom::X).is_some() { 0.0 } else { off.dot(&direction) };
+        let along = if found.std(Freedom::X).is_some() {
+            0.0
+        } else {
+            off.dot(&direction)
+        };
         let value = start + axis * off.dot(&axis) + direction * along;
-        self.centre = Measured { value, std: found.middle_std(), touches: touches.clone(), ..Measured::default() };
+        self.centre = Measured {
+            value,
+            std: found.middle_std(),
+            touches: touches.clone(),
+            ..Measured::default()
+        };
         self.axis = Some(self.turned(found, touches));
         self.walls = Some(Walls::Slot(found.surface));
     }
 
     /// The direction of a fit with the sign of the axis.
     fn turned<S: Surface>(&self, found: &Fit<S>, touches: &Touches) -> Measured<Vector3<f64>> {
-        axis_of(found, &self.axis.as_ref().map_or_else(|| found.surface.axis(), |axis| axis.value), touches)
+        axis_of(
+            found,
+            &self
+                .axis
+                .as_ref()
+                .map_or_else(|| found.surface.axis(), |axis| axis.value),
+            touches,
+        )
     }
 }
 

@@ -53,7 +53,9 @@ impl Wall {
     pub fn all(facets: &Facets, segmentation: &Segmentation) -> Vec<Self> {
         let mut walls: Vec<Self> = Vec::new();
         for number in 0..segmentation.segments.len() {
-            let Some(wall) = Self::of(facets, segmentation, vec![number]) else { continue };
+            let Some(wall) = Self::of(facets, segmentation, vec![number]) else {
+                continue;
+            };
             let same = walls.iter_mut().find(|other| other.goes_on_as(&wall));
             match same {
                 Some(other) => {
@@ -72,18 +74,44 @@ impl Wall {
     fn of(facets: &Facets, segmentation: &Segmentation, segments: Vec<usize>) -> Option<Self> {
         let of_wall = |&number: &usize| segmentation.segments[number].faces.iter().copied();
         let faces: Vec<u32> = segments.iter().flat_map(of_wall).collect();
-        let felt_turns = segments.iter().map(|&number| segmentation.segments[number].felt_turn);
-        let felt_turn = felt_turns.filter(|&turn| turn >= ALL_AROUND).fold(0.0, f64::max);
-        let wall = Self::of_faces(facets, &segmentation.segments[segments[0]].primitive, &faces, segments)?;
-        Some(Self { coverage: wall.coverage.max(felt_turn), felt_turn, ..wall })
+        let felt_turns = segments
+            .iter()
+            .map(|&number| segmentation.segments[number].felt_turn);
+        let felt_turn = felt_turns
+            .filter(|&turn| turn >= ALL_AROUND)
+            .fold(0.0, f64::max);
+        let wall = Self::of_faces(
+            facets,
+            &segmentation.segments[segments[0]].primitive,
+            &faces,
+            segments,
+        )?;
+        Some(Self {
+            coverage: wall.coverage.max(felt_turn),
+            felt_turn,
+            ..wall
+        })
     }
 
     /// The wall that these faces are; `None` for a plane.
-    pub fn of_faces(facets: &Facets, primitive: &Primitive, faces: &[u32], segments: Vec<usize>) -> Option<Self> {
+    pub fn of_faces(
+        facets: &Facets,
+        primitive: &Primitive,
+        faces: &[u32],
+        segments: Vec<usize>,
+    ) -> Option<Self> {
         let (origin, axis, radius_at_origin, half_angle, is_concave) = match primitive {
             Primitive::Plane(_) => return None,
-            Primitive::Cylinder(wall) => (wall.center(), wall.axis(), wall.radius, None, wall.concave),
-            Primitive::Cone(cone) => (cone.apex()?, cone.axis(), 0.0, Some(cone.half_angle), cone.concave),
+            Primitive::Cylinder(wall) => {
+                (wall.center(), wall.axis(), wall.radius, None, wall.concave)
+            }
+            Primitive::Cone(cone) => (
+                cone.apex()?,
+                cone.axis(),
+                0.0,
+                Some(cone.half_angle),
+                cone.concave,
+            ),
         };
         let [e, g] = tangent_basis(&axis);
         let mut parts = [[f64::INFINITY, f64::NEG_INFINITY]; PARTS];
@@ -94,22 +122,32 @@ impl Wall {
             let span = span_of(corners.map(|v| v.dot(&g).atan2(v.dot(&e))));
             spans.push(span);
             for part in parts_between(span) {
-                along.iter().for_each(|t| parts[part] = [parts[part][0].min(*t), parts[part][1].max(*t)]);
+                along
+                    .iter()
+                    .for_each(|t| parts[part] = [parts[part][0].min(*t), parts[part][1].max(*t)]);
             }
         }
         let covered: Vec<_> = parts.iter().filter(|part| part[0] <= part[1]).collect();
         let coverage = covered_share(spans);
         // the usual end, not the farthest: walls have ears
-        let ends = [0, 1].map(|end| median(&mut covered.iter().map(|part| part[end]).collect::<Vec<_>>()));
-        let [Some(low), Some(high)] = ends else { return None };
+        let ends =
+            [0, 1].map(|end| median(&mut covered.iter().map(|part| part[end]).collect::<Vec<_>>()));
+        let [Some(low), Some(high)] = ends else {
+            return None;
+        };
         let ends = [low, high];
         let away = |part: usize| {
             let (sine, cosine) = (TAU * (part as f64 + 0.5) / PARTS as f64).sin_cos();
             e * cosine + g * sine
         };
         let is_covered = |&part: &usize| parts[part][0] <= parts[part][1];
-        let towards = (0..PARTS).filter(is_covered).map(away).sum::<Vector3<f64>>();
-        let towards = towards.try_normalize(f64::EPSILON * PARTS as f64).unwrap_or_default();
+        let towards = (0..PARTS)
+            .filter(is_covered)
+            .map(away)
+            .sum::<Vector3<f64>>();
+        let towards = towards
+            .try_normalize(f64::EPSILON * PARTS as f64)
+            .unwrap_or_default();
         let filled = 0.0;
         let mut wall = Self {
             radius_at_origin,
@@ -126,7 +164,11 @@ impl Wall {
         };
         let slant = wall.radius() / half_angle.unwrap_or(0.0).cos();
         let whole = TAU * slant * wall.height() * coverage;
-        wall.filled = if whole > 0.0 { facets.area_of(faces) / whole } else { 0.0 };
+        wall.filled = if whole > 0.0 {
+            facets.area_of(faces) / whole
+        } else {
+            0.0
+        };
         Some(wall)
     }
 
@@ -134,7 +176,9 @@ impl Wall {
     fn goes_on_as(&self, other: &Self) -> bool {
         let is_same = match (self.half_angle, other.half_angle) {
             (None, None) => (self.radius() - other.radius()).abs() < SAME_RADIUS * self.radius(),
-            (Some(a), Some(b)) => (a - b).abs() < SAME_RADIUS && (self.origin - other.origin).norm() < self.radius(),
+            (Some(a), Some(b)) => {
+                (a - b).abs() < SAME_RADIUS && (self.origin - other.origin).norm() < self.radius()
+            }
             _ => false,
         };
         is_same
@@ -148,12 +192,15 @@ impl Wall {
         let middle = other.at(other.middle());
         let v = middle - self.origin;
         let off = (v - self.axis * v.dot(&self.axis)).norm();
-        self.axis.dot(&other.axis).abs() > SAME_AXIS && off < share * self.radius().max(other.radius())
+        self.axis.dot(&other.axis).abs() > SAME_AXIS
+            && off < share * self.radius().max(other.radius())
     }
 
     /// Distance between the walls along the axis, m; negative where they overlap.
     pub fn gap(&self, other: &Self) -> f64 {
-        let along = other.ends.map(|t| (other.at(t) - self.origin).dot(&self.axis));
+        let along = other
+            .ends
+            .map(|t| (other.at(t) - self.origin).dot(&self.axis));
         let (low, high) = (along[0].min(along[1]), along[0].max(along[1]));
         (low - self.ends[1]).max(self.ends[0] - high)
     }
@@ -190,12 +237,17 @@ impl Wall {
 fn span_of(angles: [f64; 3]) -> [f64; 2] {
     let from = angles[0];
     let turned = angles.map(|angle| (angle - from + PI).rem_euclid(TAU) - PI);
-    [turned.iter().copied().fold(0.0, f64::min) + from, turned.iter().copied().fold(0.0, f64::max) + from]
+    [
+        turned.iter().copied().fold(0.0, f64::min) + from,
+        turned.iter().copied().fold(0.0, f64::max) + from,
+    ]
 }
 
 /// The share of a turn that spans cover together, but for gaps of less than a part: the same however the turn is counted.
 fn covered_share(spans: Vec<[f64; 2]>) -> f64 {
-    let begun = spans.into_iter().map(|[low, high]| (low.rem_euclid(TAU), high - low));
+    let begun = spans
+        .into_iter()
+        .map(|[low, high]| (low.rem_euclid(TAU), high - low));
     // what goes beyond the turn begins it
     let mut spans: Vec<[f64; 2]> = begun
         .flat_map(|(low, length)| {
@@ -228,10 +280,14 @@ mod tests {
 
     #[test]
     fn spans_that_overlap_or_go_beyond_a_turn_count_once() {
-        let degrees =
-            |spans: &[[f64; 2]]| covered_share(spans.iter().map(|span| span.map(f64::to_radians)).collect()) * 360.0;
+        let degrees = |spans: &[[f64; 2]]| {
+            covered_share(spans.iter().map(|span| span.map(f64::to_radians)).collect()) * 360.0
+        };
         assert!((degrees(&[[10.0, 40.0], [30.0, 70.0], [100.0, 120.0]]) - 80.0).abs() < 1e-9);
-        assert!((degrees(&[[10.0, 40.0], [44.0, 70.0], [76.0, 80.0]]) - 64.0).abs() < 1e-9, "a gap of 4°, one of 6°");
+        assert!(
+            (degrees(&[[10.0, 40.0], [44.0, 70.0], [76.0, 80.0]]) - 64.0).abs() < 1e-9,
+            "a gap of 4°, one of 6°"
+        );
         // 350° to 20°, 10° to 15° within it, −20° to −5° half within it
         assert!((degrees(&[[350.0, 380.0], [10.0, 15.0], [-20.0, -5.0]]) - 40.0).abs() < 1e-9);
         assert!((degrees(&[[-180.0, 0.0], [0.0, 180.0]]) - 360.0).abs() < 1e-9);

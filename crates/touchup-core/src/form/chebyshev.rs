@@ -29,57 +29,105 @@ struct Bounded<const N: usize> {
 /// The x of the least largest |value − row·x|, and that residual; `None` where the exchange does not end.
 ///
 /// - `rows`: each with a last entry that is not looked at, in the place of the residual itself; x has 0 there.
-pub(super) fn chebyshev<const N: usize>(rows: &[SVector<f64, N>], values: &[f64]) -> Option<(SVector<f64, N>, f64)> {
+pub(super) fn chebyshev<const N: usize>(
+    rows: &[SVector<f64, N>],
+    values: &[f64],
+) -> Option<(SVector<f64, N>, f64)> {
     let last = N - 1;
-    let largest = values.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
-    let is_finite = values.iter().all(|x| x.is_finite()) && rows.iter().all(|row| row.iter().all(|x| x.is_finite()));
+    let largest = values
+        .iter()
+        .fold(0.0, |most: f64, value| most.max(value.abs()));
+    let is_finite = values.iter().all(|x| x.is_finite())
+        && rows.iter().all(|row| row.iter().all(|x| x.is_finite()));
     if !is_finite || rows.is_empty() || rows.len() != values.len() {
         return None;
     }
     if largest == 0.0 {
         return Some((SVector::zeros(), 0.0));
     }
-    let column = |j: usize| rows.iter().fold(0.0, |most: f64, row| most.max(row[j].abs()));
-    let scale = SVector::<f64, N>::from_fn(|j, _| if j == last { 1.0 } else { column(j).max(f64::MIN_POSITIVE) });
+    let column = |j: usize| {
+        rows.iter()
+            .fold(0.0, |most: f64, row| most.max(row[j].abs()))
+    };
+    let scale = SVector::<f64, N>::from_fn(|j, _| {
+        if j == last {
+            1.0
+        } else {
+            column(j).max(f64::MIN_POSITIVE)
+        }
+    });
     let upper = |i: usize| Bounded {
-        row: SVector::from_fn(|j, _| if j == last { 1.0 } else { rows[i][j] / scale[j] }),
+        row: SVector::from_fn(|j, _| {
+            if j == last {
+                1.0
+            } else {
+                rows[i][j] / scale[j]
+            }
+        }),
         least: values[i] / largest,
     };
     let lower = |i: usize| {
         let Bounded { row, least } = upper(i);
-        Bounded { row: SVector::from_fn(|j, _| if j == last { 1.0 } else { -row[j] }), least: -least }
+        Bounded {
+            row: SVector::from_fn(|j, _| if j == last { 1.0 } else { -row[j] }),
+            least: -least,
+        }
     };
     // each its own, so that ties are broken
-    let aim = SVector::<f64, N>::from_fn(|j, _| if j == last { 1.0 } else { TURN * (1.0 + (j as f64 + 2.0).sqrt()) });
+    let aim = SVector::<f64, N>::from_fn(|j, _| {
+        if j == last {
+            1.0
+        } else {
+            TURN * (1.0 + (j as f64 + 2.0).sqrt())
+        }
+    });
     let first = upper(0);
     let mut basis: [Bounded<N>; N] = std::array::from_fn(|j| {
         if j == last {
             return first;
         }
         let side = (aim[j] - first.row[j]).signum();
-        Bounded { row: SVector::from_fn(|k, _| if k == j { side } else { 0.0 }), least: -BOUND }
+        Bounded {
+            row: SVector::from_fn(|k, _| if k == j { side } else { 0.0 }),
+            least: -BOUND,
+        }
     });
     // the residual of any x is no less than that of the best, and t of a basis no more
     let (mut best, mut most, mut least) = (SVector::zeros(), f64::MAX, 0.0);
     for _ in 0..MOST_EXCHANGES * N {
         let matrix = SMatrix::<f64, N, N>::from_fn(|i, j| basis[i].row[j]);
-        let Some(inverse) = matrix.try_inverse() else { break };
+        let Some(inverse) = matrix.try_inverse() else {
+            break;
+        };
         let y = inverse * SVector::<f64, N>::from_fn(|i, _| basis[i].least);
         let x_of = |i: usize| (0..last).map(|j| rows[i][j] / scale[j] * y[j]).sum::<f64>();
         let residual = |i: usize| values[i] / largest - x_of(i);
-        let worst = (0..rows.len()).map(|i| (i, residual(i))).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+        let worst = (0..rows.len())
+            .map(|i| (i, residual(i)))
+            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
         least = y[last].max(least);
         if worst.1.abs() < most {
             most = worst.1.abs();
-            best = SVector::from_fn(|j, _| if j == last { 0.0 } else { y[j] * largest / scale[j] });
+            best = SVector::from_fn(|j, _| {
+                if j == last {
+                    0.0
+                } else {
+                    y[j] * largest / scale[j]
+                }
+            });
         }
         if worst.1.abs() <= y[last] + ABOVE {
             break;
         }
-        let entering = if worst.1 > 0.0 { upper(worst.0) } else { lower(worst.0) };
+        let entering = if worst.1 > 0.0 {
+            upper(worst.0)
+        } else {
+            lower(worst.0)
+        };
         let (shares, moves) = (inverse.tr_mul(&aim), inverse.tr_mul(&entering.row));
         let can_leave = (0..N).filter(|&i| moves[i] > LEAST_PIVOT);
-        let leaving = can_leave.min_by(|&i, &j| (shares[i] / moves[i]).total_cmp(&(shares[j] / moves[j])));
+        let leaving =
+            can_leave.min_by(|&i, &j| (shares[i] / moves[i]).total_cmp(&(shares[j] / moves[j])));
         let Some(leaving) = leaving else { break };
         basis[leaving] = entering;
     }
@@ -100,7 +148,10 @@ mod tests {
         let rows: Vec<_> = at.iter().map(|x| Vector3::new(1.0, *x, 0.0)).collect();
         let values: Vec<f64> = at.iter().map(|x| x * x).collect();
         let (line, off) = chebyshev(&rows, &values).unwrap();
-        assert!((line - Vector3::new(-0.125, 1.0, 0.0)).norm() < 1e-8 && (off - 0.125).abs() < 1e-9, "{line} {off}");
+        assert!(
+            (line - Vector3::new(-0.125, 1.0, 0.0)).norm() < 1e-8 && (off - 0.125).abs() < 1e-9,
+            "{line} {off}"
+        );
     }
 
     /// The middle of the smallest and largest value, among many of the same.
@@ -108,10 +159,16 @@ mod tests {
     fn the_best_constant_is_between_the_ends() {
         let values = [3.0, -1.0, 3.0, 2.0, -1.0, -1.0, 3.0];
         let (x, off) = chebyshev(&[Vector2::new(2.0, 0.0); 7], &values).unwrap();
-        assert!((x[0] - 0.5).abs() < 1e-12 && (off - 2.0).abs() < 1e-12, "{x} {off}");
+        assert!(
+            (x[0] - 0.5).abs() < 1e-12 && (off - 2.0).abs() < 1e-12,
+            "{x} {off}"
+        );
         assert_eq!(chebyshev::<2>(&[], &[]), None);
         assert_eq!(chebyshev(&[Vector2::new(1.0, 0.0)], &[f64::NAN]), None);
-        assert_eq!(chebyshev(&[Vector2::new(1.0, 0.0)], &[0.0]), Some((Vector2::zeros(), 0.0)));
+        assert_eq!(
+            chebyshev(&[Vector2::new(1.0, 0.0)], &[0.0]),
+            Some((Vector2::zeros(), 0.0))
+        );
     }
 
     /// No small step in any direction makes the largest residual less: the problem is convex, so it is the least.
@@ -121,16 +178,35 @@ mod tests {
         for _ in 0..20 {
             let mut random = || rng.random_range(-1.0..1.0);
             let rows: Vec<SVector<f64, 6>> = (0..200)
-                .map(|_| SVector::from([random(), 1e-3 * random(), random(), 1.0, 50.0 * random(), 0.0]))
+                .map(|_| {
+                    SVector::from([
+                        random(),
+                        1e-3 * random(),
+                        random(),
+                        1.0,
+                        50.0 * random(),
+                        0.0,
+                    ])
+                })
                 .collect();
             let values: Vec<f64> = rows.iter().map(|_| 1e-5 * random()).collect();
             let (x, off) = chebyshev(&rows, &values).unwrap();
             let worst = |x: &SVector<f64, 6>| {
-                rows.iter().zip(&values).map(|(row, value)| (value - row.dot(x)).abs()).fold(0.0, f64::max)
+                rows.iter()
+                    .zip(&values)
+                    .map(|(row, value)| (value - row.dot(x)).abs())
+                    .fold(0.0, f64::max)
             };
             assert!((worst(&x) - off).abs() < 1e-15);
             for _ in 0..300 {
-                let step = SVector::from([random(), 1e3 * random(), random(), random(), 0.02 * random(), 0.0]) * 1e-8;
+                let step = SVector::from([
+                    random(),
+                    1e3 * random(),
+                    random(),
+                    random(),
+                    0.02 * random(),
+                    0.0,
+                ]) * 1e-8;
                 assert!(worst(&(x + step)) > off * (1.0 - 1e-9));
             }
         }

@@ -18,7 +18,11 @@ pub fn datum_frame([a, b, c]: [&Element; 3]) -> Option<Isometry3<f64>> {
     let is_along = |e: &Element| e.direction.cross(&z).norm() < APART;
     let on_a = |e: &Element| {
         let to_a = (a.point - e.point).dot(&z) / e.direction.dot(&z);
-        if a.shape == Shape::Plane && is_along(e) { e.point + e.direction * to_a } else { e.point }
+        if a.shape == Shape::Plane && is_along(e) {
+            e.point + e.direction * to_a
+        } else {
+            e.point
+        }
     };
     let mut axis = Some(a).filter(|a| a.shape == Shape::Axis);
     let mut x = None;
@@ -41,10 +45,15 @@ pub fn datum_frame([a, b, c]: [&Element; 3]) -> Option<Isometry3<f64>> {
             }
         }
     }
-    let [Some(x0), Some(y0), Some(z0)] = origin else { return None };
+    let [Some(x0), Some(y0), Some(z0)] = origin else {
+        return None;
+    };
     let place = Point3::from(basis[0] * x0 + basis[1] * y0 + basis[2] * z0);
     let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&basis));
-    Some(Isometry3::from_parts(place.into(), UnitQuaternion::from_rotation_matrix(&rotation)))
+    Some(Isometry3::from_parts(
+        place.into(),
+        UnitQuaternion::from_rotation_matrix(&rotation),
+    ))
 }
 
 #[cfg(test)]
@@ -55,7 +64,14 @@ mod tests {
 
     fn element(shape: Shape, point: [f64; 3], direction: [f64; 3]) -> Element {
         let (point, direction) = (Point3::from(point), Vector3::from(direction).normalize());
-        Element { shape, point, direction, covariance: Matrix6::zeros(), calibration: 0.0, extent: vec![point] }
+        Element {
+            shape,
+            point,
+            direction,
+            covariance: Matrix6::zeros(),
+            calibration: 0.0,
+            extent: vec![point],
+        }
     }
 
     #[test]

@@ -31,19 +31,31 @@ pub struct Element {
 impl Element {
     /// Point and direction changed by so much; what was touched goes with them.
     pub(super) fn moved(&self, by: &Vector6<f64>) -> Self {
-        let [shift, turn] = [by.fixed_rows::<3>(0).into_owned(), by.fixed_rows::<3>(3).into_owned()];
+        let [shift, turn] = [
+            by.fixed_rows::<3>(0).into_owned(),
+            by.fixed_rows::<3>(3).into_owned(),
+        ];
         let (point, direction) = (self.point + shift, (self.direction + turn).normalize());
         let on = |p: &Point3<f64>| match self.shape {
             Shape::Axis => point + direction * (p - self.point).dot(&self.direction),
             Shape::Plane => p - direction * (p - point).dot(&direction),
         };
         let extent = self.extent.iter().map(on).collect();
-        Self { point, direction, extent, ..self.clone() }
+        Self {
+            point,
+            direction,
+            extent,
+            ..self.clone()
+        }
     }
 
     /// Moved as a larger ball would have it: planes along their normals, axes not at all.
     pub(super) fn lifted(&self, by: f64) -> Self {
-        let along = if self.shape == Shape::Plane { self.direction * by } else { Vector3::zeros() };
+        let along = if self.shape == Shape::Plane {
+            self.direction * by
+        } else {
+            Vector3::zeros()
+        };
         self.moved(&Vector6::new(along.x, along.y, along.z, 0.0, 0.0, 0.0))
     }
 
@@ -52,7 +64,9 @@ impl Element {
         // lengths and angles in units of their own, so that neither is lost beside the other
         let unit = |i: usize| {
             let start = if i < 3 { 0 } else { 3 };
-            let largest = (start..start + 3).map(|j| self.covariance[(j, j)]).fold(0.0, f64::max);
+            let largest = (start..start + 3)
+                .map(|j| self.covariance[(j, j)])
+                .fold(0.0, f64::max);
             if largest > 0.0 { largest.sqrt() } else { 1.0 }
         };
         let units = Vector6::from_fn(|i, _| unit(i));
@@ -61,8 +75,14 @@ impl Element {
             return Vec::new();
         }
         let eigen = SymmetricEigen::new(scaled);
-        let directions = eigen.eigenvectors.column_iter().zip(eigen.eigenvalues.iter());
-        directions.filter(|(_, x)| **x > NOTHING).map(|(v, x)| v.component_mul(&units) * x.sqrt()).collect()
+        let directions = eigen
+            .eigenvectors
+            .column_iter()
+            .zip(eigen.eigenvalues.iter());
+        directions
+            .filter(|(_, x)| **x > NOTHING)
+            .map(|(v, x)| v.component_mul(&units) * x.sqrt())
+            .collect()
     }
 
     /// Length of an axis as far as it was touched, m.
@@ -73,7 +93,9 @@ impl Element {
     /// How far what was touched reaches along a direction, m.
     pub(super) fn span(&self, along: &Vector3<f64>) -> f64 {
         let heights = self.extent.iter().map(|p| (p - self.point).dot(along));
-        let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(x), high.max(x)));
+        let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), x| {
+            (low.min(x), high.max(x))
+        });
         (high - low).max(0.0)
     }
 }

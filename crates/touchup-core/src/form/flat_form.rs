@@ -37,12 +37,16 @@ fn legendre(x: f64) -> [f64; MOST_DEGREE + 1] {
 /// Products of polynomials by their degree: the first three are the plane.
 fn terms([x, y]: [f64; 2]) -> Vec<f64> {
     let (p, q) = (legendre(x), legendre(y));
-    (0..=MOST_DEGREE).flat_map(|degree| (0..=degree).map(move |i| p[degree - i] * q[i])).collect()
+    (0..=MOST_DEGREE)
+        .flat_map(|degree| (0..=degree).map(move |i| p[degree - i] * q[i]))
+        .collect()
 }
 
 /// Degree of a term.
 fn degree_of(term: usize) -> usize {
-    (0..=MOST_DEGREE).find(|degree| term < (degree + 1) * (degree + 2) / 2).unwrap_or(MOST_DEGREE)
+    (0..=MOST_DEGREE)
+        .find(|degree| term < (degree + 1) * (degree + 2) / 2)
+        .unwrap_or(MOST_DEGREE)
 }
 
 /// Number of terms of the plane.
@@ -51,16 +55,28 @@ const REFERENCE: usize = 3;
 /// Flatness of a wall; `None` where the points do not determine it.
 ///
 /// - `on_plane`, `normal`: of the fitted plane, m and a unit vector, in O.
-pub fn flat_form(points: &[FormPoint], on_plane: &Point3<f64>, normal: &Vector3<f64>) -> Option<FlatForm> {
+pub fn flat_form(
+    points: &[FormPoint],
+    on_plane: &Point3<f64>,
+    normal: &Vector3<f64>,
+) -> Option<FlatForm> {
     let [u, v] = long_sides(points, on_plane, normal)?;
-    let local: Vec<[f64; 2]> =
-        points.iter().map(|p| [u.dot(&(p.point - on_plane)), v.dot(&(p.point - on_plane))]).collect();
+    let local: Vec<[f64; 2]> = points
+        .iter()
+        .map(|p| [u.dot(&(p.point - on_plane)), v.dot(&(p.point - on_plane))])
+        .collect();
     let range = |i: usize| {
-        let (low, high) = local.iter().fold((f64::MAX, f64::MIN), |(low, high), q| (low.min(q[i]), high.max(q[i])));
-        [(low + high) / 2.0, ((high - low) / 2.0).max(f64::MIN_POSITIVE)]
+        let (low, high) = local.iter().fold((f64::MAX, f64::MIN), |(low, high), q| {
+            (low.min(q[i]), high.max(q[i]))
+        });
+        [
+            (low + high) / 2.0,
+            ((high - low) / 2.0).max(f64::MIN_POSITIVE),
+        ]
     };
     let ranges = [range(0), range(1)];
-    let unit = |q: &[f64; 2]| [0, 1].map(|i| ((q[i] - ranges[i][0]) / ranges[i][1]).clamp(-1.0, 1.0));
+    let unit =
+        |q: &[f64; 2]| [0, 1].map(|i| ((q[i] - ranges[i][0]) / ranges[i][1]).clamp(-1.0, 1.0));
     let places: Vec<[f64; 2]> = local.iter().map(unit).collect();
     let row = |(p, place): (&FormPoint, &[f64; 2])| Row {
         terms: terms(*place),
@@ -74,30 +90,49 @@ pub fn flat_form(points: &[FormPoint], on_plane: &Point3<f64>, normal: &Vector3<
     let profile = Profile::of(&rows, REFERENCE, blocks)?;
 
     // within a quarter of the shortest undulation of a touch: a polynomial of degree n has n/2 of them over a length of 2
-    let shortest = profile.sought.iter().map(|&number| degree_of(REFERENCE + number)).max()?;
+    let shortest = profile
+        .sought
+        .iter()
+        .map(|&number| degree_of(REFERENCE + number))
+        .max()?;
     let near = 1.0 / shortest as f64;
     let at = |i: usize| 2.0 * i as f64 / (PLACES - 1) as f64 - 1.0;
     let mut is_touched = [[false; PLACES]; PLACES];
     for place in &places {
-        let [rows, columns] = place.map(|x| (0..PLACES).filter(move |&i| (at(i) - x).abs() <= near));
+        let [rows, columns] =
+            place.map(|x| (0..PLACES).filter(move |&i| (at(i) - x).abs() <= near));
         rows.for_each(|i| columns.clone().for_each(|j| is_touched[i][j] = true));
     }
     let all = (0..PLACES).flat_map(|i| (0..PLACES).map(move |j| (i, j)));
-    let wall: Vec<Vec<f64>> = all.filter(|&(i, j)| is_touched[i][j]).map(|(i, j)| terms([at(i), at(j)])).collect();
-    let plane: Vec<SVector<f64, 4>> =
-        wall.iter().map(|place| SVector::from([place[0], place[1], place[2], 0.0])).collect();
+    let wall: Vec<Vec<f64>> = all
+        .filter(|&(i, j)| is_touched[i][j])
+        .map(|(i, j)| terms([at(i), at(j)]))
+        .collect();
+    let plane: Vec<SVector<f64, 4>> = wall
+        .iter()
+        .map(|place| SVector::from([place[0], place[1], place[2], 0.0]))
+        .collect();
     let flatness = profile.sizes(
         |_| true,
         &wall,
         |values| linear_zone(&plane, values).map(|zone| [zone.minimum_zone, zone.least_squares]),
     )?;
-    Some(FlatForm { flatness: Deviation::of(flatness), coverage: wall.len() as f64 / (PLACES * PLACES) as f64 })
+    Some(FlatForm {
+        flatness: Deviation::of(flatness),
+        coverage: wall.len() as f64 / (PLACES * PLACES) as f64,
+    })
 }
 
 /// Unit vectors in a plane along the sides of the rectangle that its points fill: along their principal axes.
-fn long_sides(points: &[FormPoint], on_plane: &Point3<f64>, normal: &Vector3<f64>) -> Option<[Vector3<f64>; 2]> {
+fn long_sides(
+    points: &[FormPoint],
+    on_plane: &Point3<f64>,
+    normal: &Vector3<f64>,
+) -> Option<[Vector3<f64>; 2]> {
     let [u, v] = tangent_basis(normal);
-    let local = points.iter().map(|p| Vector2::new(u.dot(&(p.point - on_plane)), v.dot(&(p.point - on_plane))));
+    let local = points
+        .iter()
+        .map(|p| Vector2::new(u.dot(&(p.point - on_plane)), v.dot(&(p.point - on_plane))));
     let count = points.len().max(1) as f64;
     let middle = local.clone().sum::<Vector2<f64>>() / count;
     let scatter: Matrix2<f64> = local.map(|q| (q - middle) * (q - middle).transpose()).sum();

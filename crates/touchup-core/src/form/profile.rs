@@ -92,28 +92,52 @@ impl<'a> Weighted<'a> {
     /// - returns: `None` where something is not finite, or a standard deviation is not positive.
     fn of(rows: &'a [Row], count: usize) -> Option<Self> {
         let names = distinct(rows.iter().map(|row| row.group));
-        let group: Vec<usize> = rows.iter().map(|row| names.partition_point(|&name| name < row.group)).collect();
+        let group: Vec<usize> = rows
+            .iter()
+            .map(|row| names.partition_point(|&name| name < row.group))
+            .collect();
         let mut in_group = vec![0.0; names.len()];
         group.iter().for_each(|&g| in_group[g] += 1.0);
         let weight = |(row, &g): (&Row, &usize)| 1.0 / (row.sigma * row.sigma * in_group[g]);
         let weights: Vec<f64> = rows.iter().zip(&group).map(weight).collect();
-        let is_finite = |row: &Row| row.value.is_finite() && row.terms.iter().all(|x| x.is_finite());
-        let is_sound = rows.iter().all(|row| row.terms.len() == count && is_finite(row))
+        let is_finite =
+            |row: &Row| row.value.is_finite() && row.terms.iter().all(|x| x.is_finite());
+        let is_sound = rows
+            .iter()
+            .all(|row| row.terms.len() == count && is_finite(row))
             && weights.iter().all(|w| w.is_finite() && *w > 0.0);
-        is_sound.then_some(Self { rows, weights, group, groups: names.len() })
+        is_sound.then_some(Self {
+            rows,
+            weights,
+            group,
+            groups: names.len(),
+        })
     }
 
     /// Variance of the errors over the stated one, by what a solution leaves of the groups.
     fn excess(&self, choice: &Choice, solution: &DVector<f64>) -> f64 {
         let (mut of_group, mut weight_of_group) = (vec![0.0; self.groups], vec![0.0; self.groups]);
         for ((row, &w), &g) in self.rows.iter().zip(&self.weights).zip(&self.group) {
-            let fitted: f64 = choice.terms.iter().zip(solution.iter()).map(|(&term, x)| row.terms[term] * x).sum();
+            let fitted: f64 = choice
+                .terms
+                .iter()
+                .zip(solution.iter())
+                .map(|(&term, x)| row.terms[term] * x)
+                .sum();
             of_group[g] += w * (row.value - fitted);
             weight_of_group[g] += w;
         }
         let spare = self.groups.saturating_sub(choice.terms.len()).max(1);
-        let square: f64 = of_group.iter().zip(&weight_of_group).map(|(sum, w)| sum * sum / w).sum();
-        let least = if spare < SPARE_GROUPS { 1.0 } else { f64::MIN_POSITIVE };
+        let square: f64 = of_group
+            .iter()
+            .zip(&weight_of_group)
+            .map(|(sum, w)| sum * sum / w)
+            .sum();
+        let least = if spare < SPARE_GROUPS {
+            1.0
+        } else {
+            f64::MIN_POSITIVE
+        };
         (square / spare as f64).max(least)
     }
 }
@@ -136,7 +160,10 @@ struct Own {
 impl Own {
     /// How much the squares of the residuals lose by the block.
     fn gain(&self) -> f64 {
-        self.information.clone().cholesky().map_or(0.0, |cholesky| self.right.dot(&cholesky.solve(&self.right)))
+        self.information
+            .clone()
+            .cholesky()
+            .map_or(0.0, |cholesky| self.right.dot(&cholesky.solve(&self.right)))
     }
 }
 
@@ -150,7 +177,11 @@ struct Sums {
 impl Sums {
     fn of(weighted: &Weighted, count: usize) -> Self {
         let (information, right) = (DMatrix::zeros(count, count), DVector::zeros(count));
-        let mut sums = Self { information, right, weight: weighted.weights.iter().sum() };
+        let mut sums = Self {
+            information,
+            right,
+            weight: weighted.weights.iter().sum(),
+        };
         for (row, &w) in weighted.rows.iter().zip(&weighted.weights) {
             let terms = DVector::from_column_slice(&row.terms);
             sums.information.ger(w, &terms, &terms, 1.0);
@@ -162,10 +193,15 @@ impl Sums {
     fn choice(&self, terms: Vec<usize>) -> Option<Choice> {
         let count = terms.len();
         let entry = |i: usize, j: usize| self.information[(terms[i], terms[j])];
-        let scale = DVector::from_fn(count, |i, _| entry(i, i).max(f64::MIN_POSITIVE).sqrt().recip());
+        let scale = DVector::from_fn(count, |i, _| {
+            entry(i, i).max(f64::MIN_POSITIVE).sqrt().recip()
+        });
         let scaled = DMatrix::from_fn(count, count, |i, j| entry(i, j) * scale[i] * scale[j]);
         let inverse = scaled.cholesky()?.inverse();
-        Some(Choice { terms, inverse: DMatrix::from_fn(count, count, |i, j| inverse[(i, j)] * scale[i] * scale[j]) })
+        Some(Choice {
+            terms,
+            inverse: DMatrix::from_fn(count, count, |i, j| inverse[(i, j)] * scale[i] * scale[j]),
+        })
     }
 
     /// A choice and a block.
@@ -179,23 +215,41 @@ impl Sums {
 
     /// By how much the squares of the values are more than those of the residuals.
     fn explained(&self, choice: &Choice) -> f64 {
-        choice.terms.iter().zip(self.solution(choice).iter()).map(|(&term, x)| self.right[term] * x).sum()
+        choice
+            .terms
+            .iter()
+            .zip(self.solution(choice).iter())
+            .map(|(&term, x)| self.right[term] * x)
+            .sum()
     }
 
     fn own(&self, block: &Range<usize>, choice: &Choice) -> Own {
         let Choice { terms, inverse } = choice;
-        let between = DMatrix::from_fn(terms.len(), block.len(), |i, j| self.information[(terms[i], block.start + j)]);
-        let inside = self.information.view((block.start, block.start), (block.len(), block.len())).into_owned();
+        let between = DMatrix::from_fn(terms.len(), block.len(), |i, j| {
+            self.information[(terms[i], block.start + j)]
+        });
+        let inside = self
+            .information
+            .view((block.start, block.start), (block.len(), block.len()))
+            .into_owned();
         let information = &inside - between.tr_mul(&(inverse * &between));
-        let right = self.right.rows(block.start, block.len()) - between.tr_mul(&self.solution(choice));
+        let right =
+            self.right.rows(block.start, block.len()) - between.tr_mul(&self.solution(choice));
         let share = |j: usize| information[(j, j)] / inside[(j, j)].max(f64::MIN_POSITIVE);
         let share = (0..block.len()).map(share).fold(1.0, f64::min);
-        Own { information, right, share }
+        Own {
+            information,
+            right,
+            share,
+        }
     }
 
     /// The terms of the reference that the points determine.
     fn reference(&self, count: usize) -> Option<Choice> {
-        let mut choice = Choice { terms: Vec::new(), inverse: DMatrix::zeros(0, 0) };
+        let mut choice = Choice {
+            terms: Vec::new(),
+            inverse: DMatrix::zeros(0, 0),
+        };
         for term in 0..count {
             let is_there = self.information[(term, term)] > 0.0;
             if is_there && self.own(&(term..term + 1), &choice).share > LEAST_REFERENCE {
@@ -206,11 +260,21 @@ impl Sums {
     }
 
     /// Numbers of the blocks that are no reference and that so many groups carry, and all terms that the points can tell apart.
-    fn sought(&self, blocks: &[Range<usize>], reference: &Choice, groups: usize) -> Option<(Vec<usize>, Choice)> {
+    fn sought(
+        &self,
+        blocks: &[Range<usize>],
+        reference: &Choice,
+        groups: usize,
+    ) -> Option<(Vec<usize>, Choice)> {
         let first = blocks.first().map_or(0, |block| block.start);
-        let is_carried = |block: &Range<usize>| groups >= first + GROUPS_PER_TERM * (block.end - first);
+        let is_carried =
+            |block: &Range<usize>| groups >= first + GROUPS_PER_TERM * (block.end - first);
         let (mut all, mut sought) = (reference.clone(), Vec::new());
-        for (number, block) in blocks.iter().enumerate().take_while(|(_, block)| is_carried(block)) {
+        for (number, block) in blocks
+            .iter()
+            .enumerate()
+            .take_while(|(_, block)| is_carried(block))
+        {
             if self.own(block, reference).share > LEAST_SHARE {
                 sought.push(number);
             }
@@ -237,8 +301,17 @@ impl Sums {
                 let own = self.own(&blocks[number], &choice);
                 (own.share > LEAST_SHARE).then(|| (number, own.gain()))
             });
-            let limit = limit(sought.len(), if found.is_empty() { BY_CHANCE } else { MORE_BY_CHANCE }) * excess;
-            let best = gains.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, gain)| *gain > limit);
+            let limit = limit(
+                sought.len(),
+                if found.is_empty() {
+                    BY_CHANCE
+                } else {
+                    MORE_BY_CHANCE
+                },
+            ) * excess;
+            let best = gains
+                .max_by(|a, b| a.1.total_cmp(&b.1))
+                .filter(|(_, gain)| *gain > limit);
             let Some((best, _)) = best else { break };
             found.push(best);
             choice = self.with(&choice, &blocks[best])?;
@@ -259,7 +332,8 @@ impl Profile {
     /// - returns: `None` where the points do not determine the reference.
     pub fn of(rows: &[Row], reference: usize, blocks: Vec<Range<usize>>) -> Option<Self> {
         let count = blocks.last().map_or(reference, |last| last.end);
-        let weighted = Weighted::of(rows, count).filter(|weighted| weighted.groups >= reference + 2)?;
+        let weighted =
+            Weighted::of(rows, count).filter(|weighted| weighted.groups >= reference + 2)?;
         let sums = Sums::of(&weighted, count);
         let reference = sums.reference(reference)?;
         let (sought, all) = sums.sought(&blocks, &reference, weighted.groups)?;
@@ -283,7 +357,15 @@ impl Profile {
             root.row_mut(term).copy_from(&lower.row(i));
         }
         let hidden = (beyond * excess / sums.weight).sqrt();
-        Some(Self { sought, found, blocks, coefficients, root, least_found, hidden })
+        Some(Self {
+            sought,
+            found,
+            blocks,
+            coefficients,
+            root,
+            least_found,
+            hidden,
+        })
     }
 
     /// Sizes of the deviation that some blocks make, each without the bias of noise.
@@ -302,10 +384,17 @@ impl Profile {
         sizes: impl Fn(&[f64]) -> Option<[f64; S]>,
     ) -> Option<[Estimate; S]> {
         let of = |numbers: &[usize]| -> Vec<usize> {
-            numbers.iter().filter(|number| blocks(**number)).flat_map(|&number| self.blocks[number].clone()).collect()
+            numbers
+                .iter()
+                .filter(|number| blocks(**number))
+                .flat_map(|&number| self.blocks[number].clone())
+                .collect()
         };
         let field = |terms: &[usize], x: &DVector<f64>| -> Vec<f64> {
-            places.iter().map(|place| terms.iter().map(|&term| place[term] * x[term]).sum()).collect()
+            places
+                .iter()
+                .map(|place| terms.iter().map(|&term| place[term] * x[term]).sum())
+                .collect()
         };
         let terms = of(&self.found);
         if terms.is_empty() {
@@ -315,7 +404,8 @@ impl Profile {
         let mut rng = rand_pcg::Pcg64::seed_from_u64(SEED);
         let mut sums = [[0.0; 2]; S];
         for _ in 0..PAIRS {
-            let normal = DVector::from_fn(self.root.ncols(), |_, _| StandardNormal.sample(&mut rng));
+            let normal =
+                DVector::from_fn(self.root.ncols(), |_, _| StandardNormal.sample(&mut rng));
             let error = &self.root * normal;
             for moved in [&self.coefficients + &error, &self.coefficients - &error] {
                 let drawn = sizes(&field(&terms, &moved))?;
@@ -329,7 +419,10 @@ impl Profile {
             let bias = sums[i][0] / draws;
             let variance = (sums[i][1] / draws - bias * bias).max(0.0) * draws / (draws - 1.0);
             // a hidden part may raise the highest place and lower the lowest
-            Estimate { value: (here[i] - bias).max(0.0), std: (variance + 2.0 * self.hidden * self.hidden).sqrt() }
+            Estimate {
+                value: (here[i] - bias).max(0.0),
+                std: (variance + 2.0 * self.hidden * self.hidden).sqrt(),
+            }
         }))
     }
 
@@ -342,13 +435,28 @@ impl Profile {
     ) -> Option<[Estimate; S]> {
         let of_block = |&number: &usize| {
             let (term, length) = (self.blocks[number].start, self.least_found[number]);
-            sizes(&places.iter().map(|place| place[term] * length).collect::<Vec<f64>>())
+            sizes(
+                &places
+                    .iter()
+                    .map(|place| place[term] * length)
+                    .collect::<Vec<f64>>(),
+            )
         };
-        let each: Option<Vec<[f64; S]>> = self.sought.iter().filter(|number| blocks(**number)).map(of_block).collect();
+        let each: Option<Vec<[f64; S]>> = self
+            .sought
+            .iter()
+            .filter(|number| blocks(**number))
+            .map(of_block)
+            .collect();
         let each = each.filter(|each| !each.is_empty())?;
-        let mean_square = |i: usize| each.iter().map(|sizes| sizes[i] * sizes[i]).sum::<f64>() / each.len() as f64;
+        let mean_square = |i: usize| {
+            each.iter().map(|sizes| sizes[i] * sizes[i]).sum::<f64>() / each.len() as f64
+        };
         // of what is equally likely between 0 and a the mean square is a²/3
-        Some(std::array::from_fn(|i| Estimate { value: 0.0, std: (mean_square(i) / 3.0).sqrt() }))
+        Some(std::array::from_fn(|i| Estimate {
+            value: 0.0,
+            std: (mean_square(i) / 3.0).sqrt(),
+        }))
     }
 
     /// Whether something of a block was looked for.

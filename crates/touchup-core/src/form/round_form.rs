@@ -20,7 +20,10 @@ pub struct Deviation {
 
 impl Deviation {
     pub(super) fn of([minimum_zone, least_squares]: [Estimate; 2]) -> Self {
-        Self { minimum_zone, least_squares }
+        Self {
+            minimum_zone,
+            least_squares,
+        }
     }
 }
 
@@ -70,13 +73,33 @@ enum Term {
 impl Term {
     /// All, the longest undulations first.
     fn all() -> Vec<Self> {
-        let first = [Self::Lobes(2), Self::Lobes(3), Self::Radius(1), Self::Axis(2), Self::Radius(2)];
-        let then = [Self::Lobes(4), Self::Lobes(5), Self::Twisted(2), Self::Twisted(3), Self::Axis(3)];
-        first.into_iter().chain(then).chain((6..=MOST_UNDULATIONS).map(Self::Lobes)).collect()
+        let first = [
+            Self::Lobes(2),
+            Self::Lobes(3),
+            Self::Radius(1),
+            Self::Axis(2),
+            Self::Radius(2),
+        ];
+        let then = [
+            Self::Lobes(4),
+            Self::Lobes(5),
+            Self::Twisted(2),
+            Self::Twisted(3),
+            Self::Axis(3),
+        ];
+        first
+            .into_iter()
+            .chain(then)
+            .chain((6..=MOST_UNDULATIONS).map(Self::Lobes))
+            .collect()
     }
 
     fn width(self) -> usize {
-        if matches!(self, Self::Radius(_)) { 1 } else { 2 }
+        if matches!(self, Self::Radius(_)) {
+            1
+        } else {
+            2
+        }
     }
 
     /// Of a place at an angle and a height, −1 to 1 over what was touched.
@@ -98,7 +121,8 @@ const REFERENCE: usize = 5;
 fn terms(all: &[Term], angle: f64, height: f64) -> Vec<f64> {
     let (sin, cos) = angle.sin_cos();
     let mut terms = vec![1.0, cos, sin, height * cos, height * sin];
-    all.iter().for_each(|term| term.push(angle, height, &mut terms));
+    all.iter()
+        .for_each(|term| term.push(angle, height, &mut terms));
     terms
 }
 
@@ -122,14 +146,31 @@ fn rows_of(
 ) -> (Vec<Row>, Vec<[f64; 2]>, bool) {
     let [u, v] = tangent_basis(axis);
     let along = |p: &FormPoint| axis.dot(&(p.point - on_axis));
-    let (low, high) = points.iter().map(along).fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
+    let (low, high) = points
+        .iter()
+        .map(along)
+        .fold((f64::MAX, f64::MIN), |(low, high), z| {
+            (low.min(z), high.max(z))
+        });
     let is_high = high - low > SEVERAL_HEIGHTS * radius;
     let row = |p: &FormPoint| {
         let (x, y) = (u.dot(&(p.point - on_axis)), v.dot(&(p.point - on_axis)));
-        let height = if is_high { (2.0 * along(p) - low - high) / (high - low) } else { 0.0 };
+        let height = if is_high {
+            (2.0 * along(p) - low - high) / (high - low)
+        } else {
+            0.0
+        };
         let angle = y.atan2(x);
         let value = x.hypot(y) - radius;
-        (Row { terms: terms(all, angle, height), value, sigma: p.sigma, group: p.group }, [angle, height])
+        (
+            Row {
+                terms: terms(all, angle, height),
+                value,
+                sigma: p.sigma,
+                group: p.group,
+            },
+            [angle, height],
+        )
     };
     let (rows, places) = points.iter().map(row).unzip();
     (rows, places, is_high)
@@ -137,36 +178,68 @@ fn rows_of(
 
 /// Angles all around that are no farther from a touch than touches are from one another, and within a quarter of the shortest undulation.
 fn touched_angles(places: &[[f64; 2]], undulations: u32) -> Option<Vec<f64>> {
-    let mut angles: Vec<f64> = places.iter().map(|[angle, _]| angle.rem_euclid(TAU)).collect();
+    let mut angles: Vec<f64> = places
+        .iter()
+        .map(|[angle, _]| angle.rem_euclid(TAU))
+        .collect();
     angles.sort_by(f64::total_cmp);
     let mut gaps: Vec<f64> = angles.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let between = order_statistic(&mut gaps, TYPICAL_GAP)?;
-    let near = between.max(TAU / (2 * PLACES) as f64).min(TAU / (4.0 * f64::from(undulations)));
+    let near = between
+        .max(TAU / (2 * PLACES) as f64)
+        .min(TAU / (4.0 * f64::from(undulations)));
     let is_touched = |angle: &f64| {
         let at = angles.partition_point(|other| other < angle);
-        let around = [at.checked_sub(1).unwrap_or(angles.len() - 1), at % angles.len()];
+        let around = [
+            at.checked_sub(1).unwrap_or(angles.len() - 1),
+            at % angles.len(),
+        ];
         around.iter().any(|&i| {
             let off = (angles[i] - angle).abs();
             off.min(TAU - off) <= near
         })
     };
-    Some((0..PLACES).map(|i| TAU * i as f64 / PLACES as f64).filter(is_touched).collect())
+    Some(
+        (0..PLACES)
+            .map(|i| TAU * i as f64 / PLACES as f64)
+            .filter(is_touched)
+            .collect(),
+    )
 }
 
 /// Form of a round wall; `None` where the points do not determine it.
 ///
 /// - `on_axis`, `axis`: of the fitted cylinder, m and a unit vector, in O; `radius`: its, m.
-pub fn round_form(points: &[FormPoint], on_axis: &Point3<f64>, axis: &Vector3<f64>, radius: f64) -> Option<RoundForm> {
+pub fn round_form(
+    points: &[FormPoint],
+    on_axis: &Point3<f64>,
+    axis: &Vector3<f64>,
+    radius: f64,
+) -> Option<RoundForm> {
     let all = Term::all();
     let (rows, places, is_high) = rows_of(points, &all, on_axis, axis, radius);
     let profile = Profile::of(&rows, REFERENCE, blocks(&all))?;
-    let lobes = |&number: &usize| if let Term::Lobes(lobes) = all[number] { Some(lobes) } else { None };
+    let lobes = |&number: &usize| {
+        if let Term::Lobes(lobes) = all[number] {
+            Some(lobes)
+        } else {
+            None
+        }
+    };
     let undulations = profile.sought.iter().filter_map(lobes).max()?;
     let around = touched_angles(&places, undulations)?;
     Some(RoundForm {
         roundness: roundness(&profile, &all, &around)?,
-        cylindricity: if is_high { cylindricity(&profile, &all, &places) } else { None },
-        straightness: if is_high { straightness(&profile, &all, &places) } else { None },
+        cylindricity: if is_high {
+            cylindricity(&profile, &all, &places)
+        } else {
+            None
+        },
+        straightness: if is_high {
+            straightness(&profile, &all, &places)
+        } else {
+            None
+        },
         coverage: around.len() as f64 / PLACES as f64,
         undulations,
         lobes: profile.found.iter().filter_map(lobes).collect(),
@@ -176,8 +249,10 @@ pub fn round_form(points: &[FormPoint], on_axis: &Point3<f64>, axis: &Vector3<f6
 /// Of the terms that are alike at all heights, at the angles that were touched.
 fn roundness(profile: &Profile, all: &[Term], around: &[f64]) -> Option<Deviation> {
     let section: Vec<Vec<f64>> = around.iter().map(|&angle| terms(all, angle, 0.0)).collect();
-    let circle: Vec<SVector<f64, 4>> =
-        section.iter().map(|place| SVector::from([place[0], place[1], place[2], 0.0])).collect();
+    let circle: Vec<SVector<f64, 4>> = section
+        .iter()
+        .map(|place| SVector::from([place[0], place[1], place[2], 0.0]))
+        .collect();
     let sizes = profile.sizes(
         |number| matches!(all[number], Term::Lobes(_)),
         &section,
@@ -203,9 +278,15 @@ fn cylindricity(profile: &Profile, all: &[Term], places: &[[f64; 2]]) -> Option<
             *known = Some([TAU * (turn as f64 + 0.5) / PARTS[0] as f64, place[1]]);
         }
     }
-    let wall: Vec<Vec<f64>> = of_part.iter().flatten().map(|[angle, height]| terms(all, *angle, *height)).collect();
-    let cylinder: Vec<SVector<f64, 6>> =
-        wall.iter().map(|place| SVector::from([place[0], place[1], place[2], place[3], place[4], 0.0])).collect();
+    let wall: Vec<Vec<f64>> = of_part
+        .iter()
+        .flatten()
+        .map(|[angle, height]| terms(all, *angle, *height))
+        .collect();
+    let cylinder: Vec<SVector<f64, 6>> = wall
+        .iter()
+        .map(|place| SVector::from([place[0], place[1], place[2], place[3], place[4], 0.0]))
+        .collect();
     let sizes = profile.sizes(
         |_| true,
         &wall,
@@ -222,11 +303,18 @@ fn straightness(profile: &Profile, all: &[Term], places: &[[f64; 2]]) -> Option<
     }
     let heights: Vec<f64> = (0..PARTS[1])
         .filter_map(|part| {
-            let here: Vec<&[f64; 2]> = places.iter().filter(|place| part_of(place)[1] == part).collect();
+            let here: Vec<&[f64; 2]> = places
+                .iter()
+                .filter(|place| part_of(place)[1] == part)
+                .collect();
             let mut turn = [false; PARTS[0]];
             here.iter().for_each(|place| turn[part_of(place)[0]] = true);
-            let is_section = turn.iter().filter(|is| **is).count() as f64 > SECTION * PARTS[0] as f64;
-            let outermost = here.iter().map(|place| place[1]).max_by(|a, b| a.abs().total_cmp(&b.abs()));
+            let is_section =
+                turn.iter().filter(|is| **is).count() as f64 > SECTION * PARTS[0] as f64;
+            let outermost = here
+                .iter()
+                .map(|place| place[1])
+                .max_by(|a, b| a.abs().total_cmp(&b.abs()));
             outermost.filter(|_| is_section)
         })
         .collect();
@@ -234,8 +322,12 @@ fn straightness(profile: &Profile, all: &[Term], places: &[[f64; 2]]) -> Option<
         return None;
     }
     // towards angle 0 a shifted section is farther out by its x, a quarter of a turn on by its y
-    let both = heights.iter().flat_map(|&height| [(0.0, height), (TAU / 4.0, height)]);
-    let middles: Vec<Vec<f64>> = both.map(|(angle, height)| terms(all, angle, height)).collect();
+    let both = heights
+        .iter()
+        .flat_map(|&height| [(0.0, height), (TAU / 4.0, height)]);
+    let middles: Vec<Vec<f64>> = both
+        .map(|(angle, height)| terms(all, angle, height))
+        .collect();
     let sizes = profile.sizes(is_axis, &middles, |values| {
         // the height in units of its own: only its proportions matter
         let middle = |(xy, height): (&[f64], &f64)| Point3::new(xy[0], xy[1], *height);

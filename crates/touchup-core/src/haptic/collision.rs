@@ -65,7 +65,11 @@ impl Pairs {
             let common = shared.next();
             let is_in_fan = common.is_some_and(|[at, _]| is_smooth(corners[at as usize]));
             if shared.next().is_none() && !is_in_fan {
-                self.list.push(FacePair { faces: [face, other], common, safe_until: 0.0 });
+                self.list.push(FacePair {
+                    faces: [face, other],
+                    common,
+                    safe_until: 0.0,
+                });
             }
         }
     }
@@ -124,13 +128,19 @@ impl Pairs {
 /// How far every vertex may move before two faces can meet, m; 0 when there is no simple bound.
 fn margin(t: &TrianglePoints, u: &TrianglePoints, common: Option<[u8; 2]>, gap: f64) -> f64 {
     match common.map(|pair| pair.map(usize::from)) {
-        Some([i, j]) => {
-            margin_at_corner(t, i, u, j).max(margin_at_corner(u, j, t, i)).max(margin_between_arms(t, i, u, j))
-        }
+        Some([i, j]) => margin_at_corner(t, i, u, j)
+            .max(margin_at_corner(u, j, t, i))
+            .max(margin_between_arms(t, i, u, j)),
         None => {
             let (a, b) = (extent(t), extent(u));
-            let boxes = (0..3).map(|i| (a.0[i] - b.1[i]).max(b.0[i] - a.1[i])).fold(f64::NEG_INFINITY, f64::max);
-            let widest = boxes.max(height_above(t, u)).max(height_above(u, t)).max(beside(t, u)).max(beside(u, t));
+            let boxes = (0..3)
+                .map(|i| (a.0[i] - b.1[i]).max(b.0[i] - a.1[i]))
+                .fold(f64::NEG_INFINITY, f64::max);
+            let widest = boxes
+                .max(height_above(t, u))
+                .max(height_above(u, t))
+                .max(beside(t, u))
+                .max(beside(u, t));
             // both faces may come closer
             (0.5 * (widest - gap)).max(0.0)
         }
@@ -143,7 +153,11 @@ fn beside(t: &TrianglePoints, u: &TrianglePoints) -> f64 {
     let beyond = |i: usize| {
         let (start, end) = (t[i], t[(i + 1) % 3]);
         let across = direction(&(end - start).cross(&normal))?;
-        Some(u.iter().map(|p| across.dot(&(p - start))).fold(f64::INFINITY, f64::min))
+        Some(
+            u.iter()
+                .map(|p| across.dot(&(p - start)))
+                .fold(f64::INFINITY, f64::min),
+        )
     };
     (0..3).filter_map(beyond).fold(f64::NEG_INFINITY, f64::max)
 }
@@ -153,25 +167,41 @@ fn beside(t: &TrianglePoints, u: &TrianglePoints) -> f64 {
 ///
 /// The height of a point above a plane through the corner, of a direction that stays, changes by no more than 2 m when both move by m.
 fn margin_between_arms(t: &TrianglePoints, i: usize, u: &TrianglePoints, j: usize) -> f64 {
-    let arms_of = |triangle: &TrianglePoints, at: usize| [1, 2].map(|next| triangle[(at + next) % 3] - triangle[at]);
+    let arms_of = |triangle: &TrianglePoints, at: usize| {
+        [1, 2].map(|next| triangle[(at + next) % 3] - triangle[at])
+    };
     let (here, there) = (arms_of(t, i), arms_of(u, j));
-    let [Some(a), Some(b), Some(c), Some(d)] = [here[0], here[1], there[0], there[1]].map(|arm| direction(&arm)) else {
+    let [Some(a), Some(b), Some(c), Some(d)] =
+        [here[0], here[1], there[0], there[1]].map(|arm| direction(&arm))
+    else {
         return 0.0;
     };
     let height = |across: Vector3<f64>| {
         let across = direction(&across)?;
-        let heights = here.iter().map(|arm| across.dot(arm)).chain(there.iter().map(|arm| -across.dot(arm)));
+        let heights = here
+            .iter()
+            .map(|arm| across.dot(arm))
+            .chain(there.iter().map(|arm| -across.dot(arm)));
         Some(heights.fold(f64::INFINITY, f64::min))
     };
-    let widest = [a - c, a - d, b - c, b - d].into_iter().filter_map(height).fold(0.0, f64::max);
+    let widest = [a - c, a - d, b - c, b - d]
+        .into_iter()
+        .filter_map(height)
+        .fold(0.0, f64::max);
     0.5 * widest
 }
 
 /// How far all of `u` lies on one side of the plane of `t`, m; negative when it does not.
 fn height_above(t: &TrianglePoints, u: &TrianglePoints) -> f64 {
-    let Some(normal) = direction(&(t[1] - t[0]).cross(&(t[2] - t[0]))) else { return f64::NEG_INFINITY };
+    let Some(normal) = direction(&(t[1] - t[0]).cross(&(t[2] - t[0]))) else {
+        return f64::NEG_INFINITY;
+    };
     let heights = u.map(|p| normal.dot(&(p - t[0])));
-    let (low, high) = heights.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &h| (a.min(h), b.max(h)));
+    let (low, high) = heights
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &h| {
+            (a.min(h), b.max(h))
+        });
     low.max(-high)
 }
 
@@ -221,7 +251,9 @@ mod tests {
     fn random() -> impl FnMut() -> f64 {
         let mut state = 1u64;
         move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
         }
     }
@@ -248,14 +280,25 @@ mod tests {
     #[test]
     fn faces_beside_each_other_in_a_plane_can_move_by_a_share_of_what_is_between_them() {
         let corner = at(0.0, 0.0, 0.0);
-        let [x, up, y, left] = [at(1.0, 0.0, 0.0), at(1.0, 1.0, 0.0), at(0.0, 1.0, 0.0), at(-1.0, 1.0, 0.0)];
+        let [x, up, y, left] = [
+            at(1.0, 0.0, 0.0),
+            at(1.0, 1.0, 0.0),
+            at(0.0, 1.0, 0.0),
+            at(-1.0, 1.0, 0.0),
+        ];
         // 45° between the nearest edges of a fan, and a plane halfway
         let between = margin(&[corner, x, up], &[corner, y, left], Some([0, 0]), 0.0);
-        assert!((between - 0.5 * std::f64::consts::FRAC_PI_8.sin()).abs() < 1e-15, "{between}");
+        assert!(
+            (between - 0.5 * std::f64::consts::FRAC_PI_8.sin()).abs() < 1e-15,
+            "{between}"
+        );
         // across the diagonal, where boxes and planes of the faces overlap
         let beyond = [at(1.0, 0.2, 0.0), at(1.0, 1.0, 0.0), at(0.2, 1.0, 0.0)];
         let across = margin(&[corner, x, y], &beyond, None, 0.0);
-        assert!((across - 0.5 * 0.2 * std::f64::consts::FRAC_1_SQRT_2).abs() < 1e-15, "{across}");
+        assert!(
+            (across - 0.5 * 0.2 * std::f64::consts::FRAC_1_SQRT_2).abs() < 1e-15,
+            "{across}"
+        );
     }
 
     /// 2,000 pairs with a common corner, moved by the margin in random directions.
@@ -273,7 +316,10 @@ mod tests {
             tried += 1;
             let mut step = || Vector3::new(next(), next(), next()).normalize() * margin;
             let moved = corner + step();
-            let (t, u) = ([moved, t[1] + step(), t[2] + step()], [u[0] + step(), moved, u[2] + step()]);
+            let (t, u) = (
+                [moved, t[1] + step(), t[2] + step()],
+                [u[0] + step(), moved, u[2] + step()],
+            );
             assert!(!meet(&t, &u, Some([0, 1]), 0.0), "{t:?} {u:?}");
         }
     }

@@ -7,7 +7,9 @@ use super::guard::{GuardEvidence, GuardParams, GuardVerdict};
 use super::params::ScanRegion;
 use super::roi::{Roi, RoiSize};
 use super::stroke_undo::StrokeUndo;
-use crate::mesh::{FaceHit, FaceId, FaceTree, MeshError, Nearby, RefitPlan, Region, TriMesh, VertexId, is_place};
+use crate::mesh::{
+    FaceHit, FaceId, FaceTree, MeshError, Nearby, RefitPlan, Region, TriMesh, VertexId, is_place,
+};
 use crate::reconstruct::{PatchDelta, Support};
 
 /// An update that would break the mesh is tried again at this share of its length …
@@ -115,7 +117,13 @@ impl DeformableMesh {
     }
 
     /// The closest face nearer than `reach` (m), sooner if it is near `hint`, and `p` near what was asked for last with `nearby`.
-    pub fn closest(&self, p: &Point3<f64>, hint: Option<FaceId>, reach: f64, nearby: &mut Nearby) -> Option<FaceHit> {
+    pub fn closest(
+        &self,
+        p: &Point3<f64>,
+        hint: Option<FaceId>,
+        reach: f64,
+        nearby: &mut Nearby,
+    ) -> Option<FaceHit> {
         match hint {
             Some(hint) => self.tree.closest_nearby(&self.mesh, p, hint, reach, nearby),
             None => self.tree.closest(&self.mesh, p, reach),
@@ -147,14 +155,20 @@ impl DeformableMesh {
     /// Makes the region that of `handle`, and looks at it again where the mesh was changed elsewhere.
     pub fn prepare(&mut self, region: &mut HandleRegion, handle: FaceId) {
         if region.roi.handle != Some(handle) {
-            region.roi.rebuild(&self.mesh, handle, region.size, self.guard.is_some());
-            self.tree.plan(region.roi.neighbourhood.ring.moving(), &mut region.refit);
+            region
+                .roi
+                .rebuild(&self.mesh, handle, region.size, self.guard.is_some());
+            self.tree
+                .plan(region.roi.neighbourhood.ring.moving(), &mut region.refit);
             region.seen = None;
         }
         if region.seen != Some(self.edits) {
             if let Some(guard) = &self.guard {
                 let (margin, gap) = (MARGIN_EDGES * self.mean_edge, self.evidence(guard).gap);
-                region.roi.neighbourhood.refresh(&self.mesh, &self.tree, margin, gap);
+                region
+                    .roi
+                    .neighbourhood
+                    .refresh(&self.mesh, &self.tree, margin, gap);
             }
             region.refit.spend();
             (region.seen, region.is_bounded) = (Some(self.edits), false);
@@ -167,7 +181,12 @@ impl DeformableMesh {
     }
 
     /// Moves the corners of `handle` by `steps` (m) and the region around it after them.
-    pub fn deform(&mut self, region: &mut HandleRegion, handle: FaceId, steps: &[Vector3<f64>; 3]) -> RegionFit {
+    pub fn deform(
+        &mut self,
+        region: &mut HandleRegion,
+        handle: FaceId,
+        steps: &[Vector3<f64>; 3],
+    ) -> RegionFit {
         self.prepare(region, handle);
         if let Some(strokes) = &mut self.strokes {
             strokes.note_positions(&region.roi.vertices, &self.mesh);
@@ -180,7 +199,12 @@ impl DeformableMesh {
                 RegionFit::Whole
             }
         };
-        self.tree.refit_planned(&self.mesh, &mut region.refit, longest, BOX_MARGIN_EDGES * self.mean_edge);
+        self.tree.refit_planned(
+            &self.mesh,
+            &mut region.refit,
+            longest,
+            BOX_MARGIN_EDGES * self.mean_edge,
+        );
         self.edits += 1;
         region.seen = Some(self.edits);
         if let Some(patch) = &mut self.patch {
@@ -203,11 +227,24 @@ impl DeformableMesh {
 
     /// Takes the last stroke back, or does again what was undone last; returns whether there was any.
     pub fn change_strokes(&mut self, is_undo: bool) -> bool {
-        let Self { strokes, mesh, tree, evidence, .. } = self;
-        let Some(moved) = strokes.as_mut().and_then(|strokes| strokes.change(is_undo, mesh, evidence)) else {
+        let Self {
+            strokes,
+            mesh,
+            tree,
+            evidence,
+            ..
+        } = self;
+        let Some(moved) = strokes
+            .as_mut()
+            .and_then(|strokes| strokes.change(is_undo, mesh, evidence))
+        else {
             return false;
         };
-        let faces: Vec<FaceId> = moved.iter().flat_map(|&vertex| mesh.star(vertex)).copied().collect();
+        let faces: Vec<FaceId> = moved
+            .iter()
+            .flat_map(|&vertex| mesh.star(vertex))
+            .copied()
+            .collect();
         tree.refit(mesh, &faces);
         self.edits += 1;
         true
@@ -227,15 +264,34 @@ impl DeformableMesh {
     /// Whether all corners of a face were touched: the patch alone moves it then.
     #[inline]
     pub fn is_stiff(&self, face: FaceId) -> bool {
-        self.patch.as_ref().is_some_and(|patch| self.mesh.corners(face).into_iter().all(|v| patch.is_touched(v)))
+        self.patch.as_ref().is_some_and(|patch| {
+            self.mesh
+                .corners(face)
+                .into_iter()
+                .all(|v| patch.is_touched(v))
+        })
     }
 
     /// Begins to take up what changed in the patch: puts vertices that moved last before that back to where they were scanned,
     /// or are in the patch; returns whether there was any.
     pub fn begin_delta(&mut self, delta: &PatchDelta) -> bool {
-        let Self { patch: Some(patch), mesh, tree, scanned, .. } = self else { return false };
+        let Self {
+            patch: Some(patch),
+            mesh,
+            tree,
+            scanned,
+            ..
+        } = self
+        else {
+            return false;
+        };
         patch.splice.begin();
-        let FollowedPatch { moved, moved_ns, refit, .. } = patch;
+        let FollowedPatch {
+            moved,
+            moved_ns,
+            refit,
+            ..
+        } = patch;
         refit.clear();
         moved.retain(|&vertex| {
             let at = vertex.0 as usize;
@@ -256,13 +312,29 @@ impl DeformableMesh {
 
     /// Takes up to `most` parts more of it, as [`crate::reconstruct::Splice::go_on`]; whether that was all.
     pub fn go_on(&mut self, delta: &PatchDelta, most: usize) -> Result<bool, MeshError> {
-        let Self { patch: Some(patch), mesh, tree, scanned, evidence, .. } = self else { return Ok(true) };
+        let Self {
+            patch: Some(patch),
+            mesh,
+            tree,
+            scanned,
+            evidence,
+            ..
+        } = self
+        else {
+            return Ok(true);
+        };
         let before = patch.splice.placed().len();
         let is_done = patch.splice.go_on(delta, most, mesh, tree)?;
         patch.support.resize(mesh.vertex_slots(), Support::Scan);
         patch.moved_ns.resize(mesh.vertex_slots(), NEVER);
         scanned.resize(mesh.vertex_slots(), Point3::origin());
-        for (vertex, placed) in patch.splice.placed().iter().zip(&delta.vertices).skip(before) {
+        for (vertex, placed) in patch
+            .splice
+            .placed()
+            .iter()
+            .zip(&delta.vertices)
+            .skip(before)
+        {
             patch.support[vertex.0 as usize] = placed.support;
             scanned[vertex.0 as usize] = placed.position;
         }
@@ -276,16 +348,32 @@ impl DeformableMesh {
 
     fn evidence<'a>(&'a self, params: &'a GuardParams) -> GuardEvidence<'a> {
         let gap = params.gap_share * self.mean_edge;
-        GuardEvidence { params, gap, scanned: &self.scanned, normals: &self.evidence }
+        GuardEvidence {
+            params,
+            gap,
+            scanned: &self.scanned,
+            normals: &self.evidence,
+        }
     }
 
     /// Puts the region at the largest share of its displacement that leaves the mesh sound.
-    fn place_soundly(&mut self, region: &mut HandleRegion, longest: f64, guard: &GuardParams) -> RegionFit {
+    fn place_soundly(
+        &mut self,
+        region: &mut HandleRegion,
+        longest: f64,
+        guard: &GuardParams,
+    ) -> RegionFit {
         let margin = MARGIN_EDGES * self.mean_edge;
         if !std::mem::replace(&mut region.is_bounded, true) {
-            region.roi.neighbourhood.bound_unseen(&self.mesh, &self.evidence(guard));
+            region
+                .roi
+                .neighbourhood
+                .bound_unseen(&self.mesh, &self.evidence(guard));
         } else if region.roi.neighbourhood.is_outdated(longest) {
-            region.roi.neighbourhood.collect(&self.mesh, &self.tree, margin);
+            region
+                .roi
+                .neighbourhood
+                .collect(&self.mesh, &self.tree, margin);
         }
         if region.roi.neighbourhood.pass_unseen(longest) {
             self.place(&region.roi, 1.0);
@@ -296,12 +384,19 @@ impl DeformableMesh {
             let mut verdict = self.judge_at(region, share, longest, guard);
             if verdict == GuardVerdict::Rough {
                 self.place(&region.roi, 0.0);
-                region.roi.neighbourhood.roughen(&self.mesh, &self.tree, margin);
+                region
+                    .roi
+                    .neighbourhood
+                    .roughen(&self.mesh, &self.tree, margin);
                 verdict = self.judge_at(region, share, longest, guard);
             }
             if verdict == GuardVerdict::Sound {
                 region.roi.neighbourhood.accept(share * longest);
-                return if share == 1.0 { RegionFit::Whole } else { RegionFit::CutBack };
+                return if share == 1.0 {
+                    RegionFit::Whole
+                } else {
+                    RegionFit::CutBack
+                };
             }
             share *= CUT;
         }
@@ -309,12 +404,21 @@ impl DeformableMesh {
         RegionFit::CutBack
     }
 
-    fn judge_at(&mut self, region: &mut HandleRegion, share: f64, longest: f64, guard: &GuardParams) -> GuardVerdict {
+    fn judge_at(
+        &mut self,
+        region: &mut HandleRegion,
+        share: f64,
+        longest: f64,
+        guard: &GuardParams,
+    ) -> GuardVerdict {
         self.place(&region.roi, share);
         let (mesh, before, numbers) = (&self.mesh, &self.before, &region.roi.numbers);
         let moved = |v: VertexId| numbers.of(v.0).and_then(|i| before.get(i as usize));
         let was = |v: VertexId| moved(v).copied().unwrap_or_else(|| mesh.position(v));
-        region.roi.neighbourhood.judge(mesh, &self.evidence(guard), share * longest, was)
+        region
+            .roi
+            .neighbourhood
+            .judge(mesh, &self.evidence(guard), share * longest, was)
     }
 
     /// The displacement of each vertex of the region; returns the longest, m.
@@ -324,11 +428,18 @@ impl DeformableMesh {
         let mut longest = 0.0f64;
         for (&vertex, weights) in roi.vertices.iter().zip(&roi.weights) {
             let (here, scanned) = (self.mesh.position(vertex), self.scanned[vertex.0 as usize]);
-            let is_outside = self.movable.is_some_and(|movable| !movable.contains(&scanned));
-            let is_stiff = is_outside || self.patch.as_ref().is_some_and(|patch| patch.is_touched(vertex));
+            let is_outside = self
+                .movable
+                .is_some_and(|movable| !movable.contains(&scanned));
+            let is_stiff = is_outside
+                || self
+                    .patch
+                    .as_ref()
+                    .is_some_and(|patch| patch.is_touched(vertex));
             let mut step = steps[0] * weights[0] + steps[1] * weights[1] + steps[2] * weights[2];
             let (moved, next) = (here - scanned, here + step - scanned);
-            let is_far = next.norm_squared() > self.largest_move * self.largest_move && next.norm() > moved.norm();
+            let is_far = next.norm_squared() > self.largest_move * self.largest_move
+                && next.norm() > moved.norm();
             // the last look at what all formulas before came to: a vertex never goes where there is no place
             if is_stiff || is_far || !is_place(&(here + step)) {
                 step = Vector3::zeros();
@@ -342,8 +453,14 @@ impl DeformableMesh {
 
     /// Puts the region at a share of its displacement.
     fn place(&mut self, roi: &Roi, share: f64) {
-        for ((&vertex, before), displacement) in roi.vertices.iter().zip(&self.before).zip(&self.displacements) {
-            self.mesh.set_position(vertex, before + displacement * share);
+        for ((&vertex, before), displacement) in roi
+            .vertices
+            .iter()
+            .zip(&self.before)
+            .zip(&self.displacements)
+        {
+            self.mesh
+                .set_position(vertex, before + displacement * share);
         }
     }
 }

@@ -48,7 +48,13 @@ impl Fans {
     /// Finds the fans whose normals are within `smallest_cosine` of their mean.
     ///
     /// - `normal`: of a face of the ring by its number, unit.
-    pub fn find(&mut self, mesh: &TriMesh, ring: &Ring, smallest_cosine: f64, normal: impl Fn(u32) -> Vector3<f64>) {
+    pub fn find(
+        &mut self,
+        mesh: &TriMesh,
+        ring: &Ring,
+        smallest_cosine: f64,
+        normal: impl Fn(u32) -> Vector3<f64>,
+    ) {
         self.list.clear();
         self.moving.clear();
         self.corners.clear();
@@ -61,9 +67,17 @@ impl Fans {
             let mean = self.smooth_mean(mesh, ring, corner, smallest_cosine, &normal);
             self.are_smooth.push(mean.is_some());
             if let Some(mean) = mean {
-                let numbers = mesh.star(corner).iter().filter_map(|&face| ring.number_of(face));
-                self.moving.extend(numbers.filter(|&number| (number as usize) < ring.moving));
-                self.list.push(CornerFan { corner, mean, end: self.moving.len() as u32 });
+                let numbers = mesh
+                    .star(corner)
+                    .iter()
+                    .filter_map(|&face| ring.number_of(face));
+                self.moving
+                    .extend(numbers.filter(|&number| (number as usize) < ring.moving));
+                self.list.push(CornerFan {
+                    corner,
+                    mean,
+                    end: self.moving.len() as u32,
+                });
             }
         }
     }
@@ -71,7 +85,9 @@ impl Fans {
     /// Whether the faces around this corner of a moving face need no look, pair by pair.
     #[inline]
     pub fn is_smooth(&self, corner: VertexId) -> bool {
-        self.corners.of(corner.0).is_some_and(|number| self.are_smooth[number as usize])
+        self.corners
+            .of(corner.0)
+            .is_some_and(|number| self.are_smooth[number as usize])
     }
 
     /// Whether no two faces of a fan have come to meet.
@@ -90,7 +106,9 @@ impl Fans {
         self.list.iter().all(|fan| {
             let faces = &self.moving[start..fan.end as usize];
             start = fan.end as usize;
-            let stays_smooth = faces.iter().all(|&face| normal(face).dot(&fan.mean) > smallest_cosine);
+            let stays_smooth = faces
+                .iter()
+                .all(|&face| normal(face).dot(&fan.mean) > smallest_cosine);
             stays_smooth || is_fan_clear(mesh, fan.corner, gap, &before)
         })
     }
@@ -104,7 +122,9 @@ impl Fans {
         smallest_cosine: f64,
         normal: &impl Fn(u32) -> Vector3<f64>,
     ) -> Option<Vector3<f64>> {
-        let Self { spokes, normals, .. } = self;
+        let Self {
+            spokes, normals, ..
+        } = self;
         let (star, centre) = (mesh.star(corner), mesh.position(corner));
         normals.clear();
         for &face in star {
@@ -114,7 +134,10 @@ impl Fans {
             });
         }
         let mean = direction(&normals.iter().sum())?;
-        if normals.iter().any(|normal| normal.dot(&mean) <= smallest_cosine) {
+        if normals
+            .iter()
+            .any(|normal| normal.dot(&mean) <= smallest_cosine)
+        {
             return None;
         }
         spokes.clear();
@@ -135,11 +158,15 @@ impl Fans {
 
 /// Whether faces between spokes follow each other all around, once as seen along `mean`, on whose side all of them are.
 fn goes_around_once(spokes: &[[Spoke; 2]], mean: &Vector3<f64>) -> bool {
-    let Some([(first, from), (second, to)]) = spokes.first() else { return false };
+    let Some([(first, from), (second, to)]) = spokes.first() else {
+        return false;
+    };
     let (mut at, mut steps) = (*second, 1);
     while at != *first {
         let mut next = spokes.iter().filter(|[(start, _), _]| *start == at);
-        let (Some([_, (end, _)]), None) = (next.next(), next.next()) else { return false };
+        let (Some([_, (end, _)]), None) = (next.next(), next.next()) else {
+            return false;
+        };
         (at, steps) = (*end, steps + 1);
         if steps > spokes.len() {
             return false;
@@ -150,19 +177,34 @@ fn goes_around_once(spokes: &[[Spoke; 2]], mean: &Vector3<f64>) -> bool {
     let (left, right) = (mean.cross(&ray), ray.cross(mean));
     let others = spokes.iter().skip(1);
     steps == spokes.len()
-        && others.clone().all(|[(_, start), (_, end)]| !(right.dot(start) >= 0.0 && left.dot(end) >= 0.0))
+        && others
+            .clone()
+            .all(|[(_, start), (_, end)]| !(right.dot(start) >= 0.0 && left.dot(end) >= 0.0))
 }
 
 /// Whether no two faces around a vertex meet that did not before, but for those that share an edge.
-fn is_fan_clear(mesh: &TriMesh, corner: VertexId, gap: f64, before: impl Fn(VertexId) -> Point3<f64>) -> bool {
+fn is_fan_clear(
+    mesh: &TriMesh,
+    corner: VertexId,
+    gap: f64,
+    before: impl Fn(VertexId) -> Point3<f64>,
+) -> bool {
     let star = mesh.star(corner);
-    let pairs = star.iter().enumerate().flat_map(|(at, &face)| star[..at].iter().map(move |&other| [face, other]));
+    let pairs = star
+        .iter()
+        .enumerate()
+        .flat_map(|(at, &face)| star[..at].iter().map(move |&other| [face, other]));
     pairs.into_iter().all(|faces| {
         let [a, b] = faces.map(|face: FaceId| mesh.corners(face));
         if a.iter().filter(|corner| b.contains(corner)).count() > 1 {
             return true;
         }
-        let at = |corners: &[VertexId; 3]| corners.iter().position(|&other| other == corner).unwrap_or(0) as u8;
+        let at = |corners: &[VertexId; 3]| {
+            corners
+                .iter()
+                .position(|&other| other == corner)
+                .unwrap_or(0) as u8
+        };
         let common = [at(&a), at(&b)];
         let meet = |[t, u]: [[Point3<f64>; 3]; 2]| triangle::meet(&t, &u, Some(common), gap);
         !meet([a, b].map(|corners| corners.map(|vertex| mesh.position(vertex))))
@@ -178,10 +220,22 @@ mod tests {
     fn fan(around: u32, turns: f64, height: impl Fn(f64) -> f64) -> TriMesh {
         let rim = |k: u32| {
             let turn = turns * f64::from(k) / f64::from(around);
-            Point3::new((std::f64::consts::TAU * turn).cos(), (std::f64::consts::TAU * turn).sin(), height(turn))
+            Point3::new(
+                (std::f64::consts::TAU * turn).cos(),
+                (std::f64::consts::TAU * turn).sin(),
+                height(turn),
+            )
         };
-        let positions = std::iter::once(Point3::origin()).chain((0..around).map(rim)).collect();
-        TriMesh::new(positions, (0..around).map(|k| [0, 1 + k, 1 + (k + 1) % around]).collect()).unwrap()
+        let positions = std::iter::once(Point3::origin())
+            .chain((0..around).map(rim))
+            .collect();
+        TriMesh::new(
+            positions,
+            (0..around)
+                .map(|k| [0, 1 + k, 1 + (k + 1) % around])
+                .collect(),
+        )
+        .unwrap()
     }
 
     /// The fans around the corners of the faces at vertex 0.
@@ -189,7 +243,9 @@ mod tests {
         let mut ring = Ring::default();
         ring.gather(mesh, &[VertexId(0)]);
         let mut fans = Fans::default();
-        fans.find(mesh, &ring, 0.35, |number| mesh.normal(ring.faces[number as usize]));
+        fans.find(mesh, &ring, 0.35, |number| {
+            mesh.normal(ring.faces[number as usize])
+        });
         fans
     }
 
@@ -197,12 +253,24 @@ mod tests {
     fn a_fan_is_smooth_that_is_closed_and_goes_around_once() {
         assert!(fans_of(&fan(6, 1.0, |_| 0.5)).is_smooth(VertexId(0)));
         assert!(fans_of(&fan(3, 1.0, |turn| 0.4 * turn)).is_smooth(VertexId(0)));
-        assert!(!fans_of(&fan(6, 1.0, |_| 3.0)).is_smooth(VertexId(0)), "its normals are 76 degrees from their mean");
-        assert!(!fans_of(&fan(12, 2.0, |turn| 0.3 * (1.0 - turn).abs())).is_smooth(VertexId(0)), "goes around twice");
-        let open =
-            TriMesh::new(fan(6, 1.0, |_| 0.0).positions().to_vec(), vec![[0, 1, 2], [0, 2, 3], [0, 3, 4]]).unwrap();
+        assert!(
+            !fans_of(&fan(6, 1.0, |_| 3.0)).is_smooth(VertexId(0)),
+            "its normals are 76 degrees from their mean"
+        );
+        assert!(
+            !fans_of(&fan(12, 2.0, |turn| 0.3 * (1.0 - turn).abs())).is_smooth(VertexId(0)),
+            "goes around twice"
+        );
+        let open = TriMesh::new(
+            fan(6, 1.0, |_| 0.0).positions().to_vec(),
+            vec![[0, 1, 2], [0, 2, 3], [0, 3, 4]],
+        )
+        .unwrap();
         assert!(!fans_of(&open).is_smooth(VertexId(0)));
-        assert!(!fans_of(&fan(6, 1.0, |_| 0.0)).is_smooth(VertexId(1)), "the rim has two faces");
+        assert!(
+            !fans_of(&fan(6, 1.0, |_| 0.0)).is_smooth(VertexId(1)),
+            "the rim has two faces"
+        );
     }
 
     #[test]
@@ -210,7 +278,9 @@ mod tests {
         // an own small generator
         let mut state = 1u64;
         let mut next = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1u64 << 53) as f64
         };
         let (mut smooth, mut met) = (0, 0);
@@ -223,13 +293,18 @@ mod tests {
                 mesh.set_position(VertexId(vertex), here + step);
             }
             // before the motion nothing met
-            let is_clear = is_fan_clear(&mesh, VertexId(0), 0.0, |vertex| fan(around, 1.0, |_| 0.0).position(vertex));
+            let is_clear = is_fan_clear(&mesh, VertexId(0), 0.0, |vertex| {
+                fan(around, 1.0, |_| 0.0).position(vertex)
+            });
             let is_smooth = fans_of(&mesh).is_smooth(VertexId(0));
             assert!(!is_smooth || is_clear, "{:?}", mesh.positions());
             smooth += usize::from(is_smooth);
             met += usize::from(!is_clear);
         }
-        assert!(smooth > 400 && met > 400, "{smooth} smooth, {met} that meet themselves");
+        assert!(
+            smooth > 400 && met > 400,
+            "{smooth} smooth, {met} that meet themselves"
+        );
     }
 
     #[test]
@@ -239,7 +314,13 @@ mod tests {
         let mut ring = Ring::default();
         ring.gather(&flat, &[VertexId(0)]);
         let clear = |mesh: &TriMesh| {
-            fans.are_clear(mesh, 0.25, |n| mesh.normal(ring.faces[n as usize]), 0.0, |v| flat.position(v))
+            fans.are_clear(
+                mesh,
+                0.25,
+                |n| mesh.normal(ring.faces[n as usize]),
+                0.0,
+                |v| flat.position(v),
+            )
         };
         let mut mesh = flat.clone();
         assert!(clear(&mesh));

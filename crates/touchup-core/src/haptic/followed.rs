@@ -27,10 +27,19 @@ impl FollowedPatch {
     /// For a scan without a patch, with room for so many new vertices.
     pub fn new(scan: &TriMesh, vertices: usize) -> Self {
         let slots = scan.vertex_slots();
-        let (mut support, mut moved_ns) = (Vec::with_capacity(slots + vertices), Vec::with_capacity(slots + vertices));
+        let (mut support, mut moved_ns) = (
+            Vec::with_capacity(slots + vertices),
+            Vec::with_capacity(slots + vertices),
+        );
         support.resize(slots, Support::Scan);
         moved_ns.resize(slots, NEVER);
-        Self { splice: Splice::default(), support, moved: Vec::new(), moved_ns, refit: Vec::new() }
+        Self {
+            splice: Splice::default(),
+            support,
+            moved: Vec::new(),
+            moved_ns,
+            refit: Vec::new(),
+        }
     }
 
     /// Memory of what is kept for each vertex, bytes.

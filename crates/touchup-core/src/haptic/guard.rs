@@ -77,9 +77,15 @@ pub(super) struct GuardEvidence<'a> {
 impl GuardEvidence<'_> {
     /// Twice the area over the longest edge squared that a face may not fall below.
     fn smallest_quality(&self, mesh: &TriMesh, face: FaceId) -> f64 {
-        let corners = mesh.corners(face).map(|vertex| self.scanned[vertex.0 as usize]);
-        let double_area = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).norm();
-        self.params.smallest_quality.min(GuardParams::SCANNED_SHARE * triangle::shape_quality(&corners, double_area))
+        let corners = mesh
+            .corners(face)
+            .map(|vertex| self.scanned[vertex.0 as usize]);
+        let double_area = (corners[1] - corners[0])
+            .cross(&(corners[2] - corners[0]))
+            .norm();
+        self.params
+            .smallest_quality
+            .min(GuardParams::SCANNED_SHARE * triangle::shape_quality(&corners, double_area))
     }
 }
 
@@ -134,7 +140,11 @@ fn shape_of(mesh: &TriMesh, face: FaceId) -> FaceShape {
     let (double_area, normal) = length_and_direction(&double);
     let quality = triangle::shape_quality(&corners, double_area);
     // 2A / L from 2A / L² and 2A
-    FaceShape { normal, quality, altitude: (quality * double_area).sqrt() }
+    FaceShape {
+        normal,
+        quality,
+        altitude: (quality * double_area).sqrt(),
+    }
 }
 
 impl Neighbourhood {
@@ -156,7 +166,8 @@ impl Neighbourhood {
     /// - `gap`: as in [`GuardEvidence`].
     pub fn refresh(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64, gap: f64) {
         self.before.clear();
-        self.before.extend(self.ring.faces.iter().map(|&face| shape_of(mesh, face)));
+        self.before
+            .extend(self.ring.faces.iter().map(|&face| shape_of(mesh, face)));
         self.collect(mesh, tree, margin);
         if self.smooth.is_none() {
             self.suspects.measure(mesh, gap);
@@ -168,7 +179,8 @@ impl Neighbourhood {
     pub fn bound_unseen(&mut self, mesh: &TriMesh, evidence: &GuardEvidence) {
         if let Some(mean) = self.smooth {
             self.after.clear();
-            self.after.extend_from_slice(&self.before[..self.ring.moving]);
+            self.after
+                .extend_from_slice(&self.before[..self.ring.moving]);
             let is_safe = self.is_safe(mesh, evidence) == Some(true);
             self.stays_smooth(&mean, is_safe);
         }
@@ -191,33 +203,59 @@ impl Neighbourhood {
         self.find_near(mesh, tree, margin);
         self.suspects.clear();
         self.boxes.clear();
-        self.boxes.extend(self.near.faces.iter().map(|&face| (face, extent(&mesh.triangle(face)))));
+        self.boxes.extend(
+            self.near
+                .faces
+                .iter()
+                .map(|&face| (face, extent(&mesh.triangle(face)))),
+        );
         let before = &self.before;
-        self.fans.find(mesh, &self.ring, SMOOTH_COSINE, |number| before[number as usize].normal);
+        self.fans.find(mesh, &self.ring, SMOOTH_COSINE, |number| {
+            before[number as usize].normal
+        });
         for (moving, &face) in self.ring.moving().iter().enumerate() {
             // two moving faces are one pair
-            let is_wanted = |other| self.ring.number_of(other).is_none_or(|index| index as usize > moving);
+            let is_wanted = |other| {
+                self.ring
+                    .number_of(other)
+                    .is_none_or(|index| index as usize > moving)
+            };
             let is_smooth = |corner| self.fans.is_smooth(corner);
-            self.suspects.add_near(mesh, face, &self.boxes, margin, is_wanted, is_smooth);
+            self.suspects
+                .add_near(mesh, face, &self.boxes, margin, is_wanted, is_smooth);
         }
     }
 
     fn find_near(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64) {
-        let (mut lo, mut hi) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+        let (mut lo, mut hi) = (
+            Vector3::repeat(f64::INFINITY),
+            Vector3::repeat(f64::NEG_INFINITY),
+        );
         for &face in self.ring.moving() {
             for p in mesh.triangle(face) {
                 (lo, hi) = (lo.inf(&p.coords), hi.sup(&p.coords));
             }
         }
         let margin_box = Vector3::repeat(margin);
-        tree.faces_in_box(&Point3::from(lo - margin_box), &Point3::from(hi + margin_box), &mut self.near);
+        tree.faces_in_box(
+            &Point3::from(lo - margin_box),
+            &Point3::from(hi + margin_box),
+            &mut self.near,
+        );
     }
 
     /// The mean normal, if all faces nearby are within [`SMOOTH_COSINE`] of it and hang together.
     fn smooth_normal(&mut self, mesh: &TriMesh) -> Option<Vector3<f64>> {
-        let sum: Vector3<f64> = self.before[..self.ring.moving].iter().map(|shape| shape.normal).sum();
+        let sum: Vector3<f64> = self.before[..self.ring.moving]
+            .iter()
+            .map(|shape| shape.normal)
+            .sum();
         let mean = direction(&sum)?;
-        if self.before.iter().any(|shape| shape.normal.dot(&mean) <= SMOOTH_COSINE) {
+        if self
+            .before
+            .iter()
+            .any(|shape| shape.normal.dot(&mean) <= SMOOTH_COSINE)
+        {
             return None;
         }
         let ring = &self.ring;
@@ -234,7 +272,8 @@ impl Neighbourhood {
         let (moving, rim) = self.ring.faces.split_at(self.ring.moving);
         for faces in [rim, moving] {
             for &face in faces {
-                self.reached.number(mesh.corners(face).map(|corner| corner.0));
+                self.reached
+                    .number(mesh.corners(face).map(|corner| corner.0));
             }
             if reach_all(mesh, &mut self.near.faces, &mut self.reached) {
                 return Some(mean);
@@ -266,9 +305,15 @@ impl Neighbourhood {
         before: impl Fn(VertexId) -> Point3<f64>,
     ) -> GuardVerdict {
         self.after.clear();
-        self.after.extend(self.ring.faces[..self.ring.moving].iter().map(|&face| shape_of(mesh, face)));
+        self.after.extend(
+            self.ring.faces[..self.ring.moving]
+                .iter()
+                .map(|&face| shape_of(mesh, face)),
+        );
         self.unseen = 0.0;
-        let Some(is_safe) = self.is_safe(mesh, evidence) else { return GuardVerdict::Broken };
+        let Some(is_safe) = self.is_safe(mesh, evidence) else {
+            return GuardVerdict::Broken;
+        };
         match self.smooth.map(|mean| self.stays_smooth(&mean, is_safe)) {
             Some(true) => GuardVerdict::Sound,
             Some(false) => GuardVerdict::Rough,
@@ -287,15 +332,24 @@ impl Neighbourhood {
     ) -> bool {
         let after = &self.after;
         let normal = |number: u32| after[number as usize].normal;
-        self.fans.are_clear(mesh, STILL_SMOOTH_COSINE, normal, gap, &before)
+        self.fans
+            .are_clear(mesh, STILL_SMOOTH_COSINE, normal, gap, &before)
             && self.suspects.are_clear(mesh, gap, displacement, &before)
     }
 
     /// Whether a region that was smooth is still; sets how far its vertices may move without a look, where all of it `is_safe`.
     fn stays_smooth(&mut self, mean: &Vector3<f64>, is_safe: bool) -> bool {
-        let lowest = self.after.iter().map(|shape| shape.normal.dot(mean)).fold(1.0, f64::min);
+        let lowest = self
+            .after
+            .iter()
+            .map(|shape| shape.normal.dot(mean))
+            .fold(1.0, f64::min);
         if is_safe && lowest > STILL_SMOOTH_COSINE + COSINE_MARGIN {
-            let altitude = self.after.iter().map(|shape| shape.altitude).fold(f64::INFINITY, f64::min);
+            let altitude = self
+                .after
+                .iter()
+                .map(|shape| shape.altitude)
+                .fold(f64::INFINITY, f64::min);
             self.unseen = UNSEEN_SHARE * altitude;
         }
         lowest > STILL_SMOOTH_COSINE
@@ -316,9 +370,17 @@ impl Neighbourhood {
             let worse = |new: f64, old: f64, limit: f64| new < limit && new < old;
             let cosine = new.normal.dot(&seen);
             let is_thin = new.quality < params.smallest_quality * QUALITY_MARGIN;
-            let smallest_quality = if is_thin { evidence.smallest_quality(mesh, face) } else { 0.0 };
+            let smallest_quality = if is_thin {
+                evidence.smallest_quality(mesh, face)
+            } else {
+                0.0
+            };
             if worse(new.quality, old.quality, smallest_quality)
-                || worse(cosine, old.normal.dot(&seen), params.smallest_evidence_cosine)
+                || worse(
+                    cosine,
+                    old.normal.dot(&seen),
+                    params.smallest_evidence_cosine,
+                )
                 || new.normal.dot(&old.normal) < params.smallest_turn_cosine
             {
                 return None;
@@ -331,7 +393,8 @@ impl Neighbourhood {
 
     fn are_edges_safe(&self, evidence: &GuardEvidence) -> Option<bool> {
         let (limit, mut is_safe) = (evidence.params.smallest_fold_cosine, true);
-        let has_side = |index: u32| evidence.normals[self.ring.faces[index as usize].0 as usize] != [0.0; 3];
+        let has_side =
+            |index: u32| evidence.normals[self.ring.faces[index as usize].0 as usize] != [0.0; 3];
         for &(a, b) in &self.ring.edges {
             let (old_a, old_b) = (&self.before[a as usize], &self.before[b as usize]);
             let new_b = self.after.get(b as usize).unwrap_or(old_b);

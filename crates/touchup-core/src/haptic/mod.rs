@@ -22,7 +22,8 @@ use serde::Serialize;
 
 pub use deform::{Footprint, RegionFit};
 pub use dynamics::{
-    Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, SigmoidParams, StepRule,
+    Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, SigmoidParams,
+    StepRule,
 };
 pub use guard::GuardParams;
 pub use params::{CarveParams, RefineParams, ScanParams, ScanRegion, TouchPoint, relaxing_alpha};
@@ -35,8 +36,8 @@ pub use crate::stylus::{SlidingParams, TipParams};
 use crate::mesh::{BoxQuery, Changes, FaceHit, FaceId, MeshError, Nearby, TriMesh, VertexId};
 use crate::reconstruct::{PatchDelta, Support};
 use crate::stylus::{
-    Ball, ContactEstimator, ContactSample, FrictionCoefficient, LONGEST_HOLD, NormalEstimate, Sample, SampleError,
-    SettingError, TipBody, TipPlace, TouchState,
+    Ball, ContactEstimator, ContactSample, FrictionCoefficient, LONGEST_HOLD, NormalEstimate,
+    Sample, SampleError, SettingError, TipBody, TipPlace, TouchState,
 };
 use deform::{DeformableMesh, HandleRegion};
 use dynamics::turn;
@@ -110,9 +111,17 @@ pub struct Update {
 }
 
 impl Update {
-    const FREE: Self = Self { case: Case::Free, mismatch: None, fit: None };
+    const FREE: Self = Self {
+        case: Case::Free,
+        mismatch: None,
+        fit: None,
+    };
     /// Contact with nothing that may be moved.
-    const BESIDE: Self = Self { case: Case::SurfaceOnly, mismatch: None, fit: None };
+    const BESIDE: Self = Self {
+        case: Case::SurfaceOnly,
+        mismatch: None,
+        fit: None,
+    };
 }
 
 /// What became of the samples so far.
@@ -217,8 +226,8 @@ impl Refiner {
         }
         params.check()?;
         let mut deformable = DeformableMesh::new(mesh, params.guard, params.region.as_ref());
-        deformable.largest_move =
-            (params.largest_move_edges * deformable.mean_edge).max(params.largest_move_noises * params.scan_noise);
+        deformable.largest_move = (params.largest_move_edges * deformable.mean_edge)
+            .max(params.largest_move_noises * params.scan_noise);
         Ok(Self {
             contacts: ContactEstimator::new(params.contact())?,
             dynamics: FaceDynamics::new(params.dynamics)?,
@@ -263,7 +272,16 @@ impl Refiner {
 
     fn take(&mut self, sample: &Sample, handle: Option<FaceId>) -> Result<Update, RefineError> {
         let observed = self.contacts.observe(sample)?;
-        let (state, &ContactSample { ball, dt, ball_contact, surface, .. }) = (observed.ball_state(), observed);
+        let (
+            state,
+            &ContactSample {
+                ball,
+                dt,
+                ball_contact,
+                surface,
+                ..
+            },
+        ) = (observed.ball_state(), observed);
         let dt = dt.min(LONGEST_HOLD);
         self.deformable.now_ns = sample.stamp_ns;
         if !self.body.is_ball() {
@@ -271,7 +289,10 @@ impl Refiner {
         }
         self.counts.contacts = self.contacts.contacts();
         // a sample outside the region that may be touched moves nothing
-        let is_outside = self.params.region.is_some_and(|touched| !touched.region.contains(&ball.centre));
+        let is_outside = self
+            .params
+            .region
+            .is_some_and(|touched| !touched.region.contains(&ball.centre));
         let track = self.track.take();
         let update = match ball_contact {
             None => {
@@ -295,41 +316,67 @@ impl Refiner {
             }
         };
         self.counts.accepted += 1;
-        Ok(if is_outside { update } else { self.carve(&ball, state, dt, update) })
+        Ok(if is_outside {
+            update
+        } else {
+            self.carve(&ball, state, dt, update)
+        })
     }
 
     /// Cases 3 and 4, and without a gate also 1 and 2: moves the face that the ball touches.
     fn press(&mut self, pressing: &Pressing, dt: f64) -> Result<Update, RefineError> {
         let mismatch = self.mismatch(pressing);
         // without a gate the surface is felt by more than what is expected at the face itself
-        let is_felt =
-            self.params.gate.is_some() || pressing.force_o.norm() > self.params.dynamics.model.force(0.0).max(0.0);
+        let is_felt = self.params.gate.is_some()
+            || pressing.force_o.norm() > self.params.dynamics.model.force(0.0).max(0.0);
         let case = match (mismatch.distance < 0.0, is_felt) {
             (true, true) => Case::Both,
             (false, true) => Case::SurfaceOnly,
             (true, false) => Case::MeshOnly,
             (false, false) => Case::Free,
         };
-        let untouched = Ok(Update { case, mismatch: Some(mismatch), fit: None });
+        let untouched = Ok(Update {
+            case,
+            mismatch: Some(mismatch),
+            fit: None,
+        });
         let face = &pressing.face;
         // without area a face has no normal; turned away from the measured normal it is another surface
-        let is_apart = face.n == Vector3::zeros() || face.n.dot(&pressing.normal) < self.params.smallest_contact_cosine;
+        let is_apart = face.n == Vector3::zeros()
+            || face.n.dot(&pressing.normal) < self.params.smallest_contact_cosine;
         if is_apart || self.deformable.is_stiff(pressing.handle) {
             return untouched;
         }
-        self.counts.clamped += u64::from(self.params.dynamics.model.clamps(pressing.force_o.dot(&face.n)));
-        let initial = self.begun.filter(|(handle, _)| *handle == pressing.handle).map_or(face.n, |(_, n)| n);
+        self.counts.clamped += u64::from(
+            self.params
+                .dynamics
+                .model
+                .clamps(pressing.force_o.dot(&face.n)),
+        );
+        let initial = self
+            .begun
+            .filter(|(handle, _)| *handle == pressing.handle)
+            .map_or(face.n, |(_, n)| n);
         self.begun = Some((pressing.handle, initial));
-        let mut next = self.dynamics.step_from(&initial, face, &pressing.point, &pressing.force_o, dt)?;
+        let mut next =
+            self.dynamics
+                .step_from(&initial, face, &pressing.point, &pressing.force_o, dt)?;
         if let Some(turning) = self.params.turning {
             next.n = turn(&face.n, &pressing.normal, turning * dt);
         }
-        self.deformable.note_normal(pressing.handle, &pressing.normal);
+        self.deformable
+            .note_normal(pressing.handle, &pressing.normal);
         let steps = self.rigid_steps(pressing, &next);
         self.take_region(pressing.handle);
-        let fit = self.deformable.deform(&mut self.contact_region, pressing.handle, &steps);
+        let fit = self
+            .deformable
+            .deform(&mut self.contact_region, pressing.handle, &steps);
         self.count(fit);
-        Ok(Update { case, mismatch: Some(mismatch), fit: Some(fit) })
+        Ok(Update {
+            case,
+            mismatch: Some(mismatch),
+            fit: Some(fit),
+        })
     }
 
     /// The ball against `handle`, else against the face that it touches; `None` beyond the reach.
@@ -340,9 +387,16 @@ impl Refiner {
         handle: Option<FaceId>,
         track: Option<TouchTrack>,
     ) -> Option<Pressing> {
-        let (normal, reach) = (surface.map(|known| known.normal).unwrap_or_default(), self.reach());
+        let (normal, reach) = (
+            surface.map(|known| known.normal).unwrap_or_default(),
+            self.reach(),
+        );
         // the spring expects the deflection F/k of the tip, a rigid contact does not
-        let centre = if self.params.dynamics.take_out_rigid_offset { ball.centre } else { ball.reported };
+        let centre = if self.params.dynamics.take_out_rigid_offset {
+            ball.centre
+        } else {
+            ball.reported
+        };
         let seek = match self.params.touch_point {
             TouchPoint::MeasuredNormal => self.touching_point(centre, &normal),
             TouchPoint::FaceNormal => centre,
@@ -351,21 +405,41 @@ impl Refiner {
             _ if handle.is_some() => None,
             TouchPoint::MeasuredNormal => {
                 let step = track.map_or_else(Vector3::zeros, |track| seek - track.last);
-                self.track = Some(TouchTrack { last: seek, next: seek + step });
+                self.track = Some(TouchTrack {
+                    last: seek,
+                    next: seek + step,
+                });
                 self.touched_face(&seek)
             }
-            TouchPoint::FaceNormal => self.deformable.tree.closest_barycentre(&self.deformable.mesh, &seek, reach),
+            TouchPoint::FaceNormal => {
+                self.deformable
+                    .tree
+                    .closest_barycentre(&self.deformable.mesh, &seek, reach)
+            }
         };
         let handle = handle.or(hit.map(|hit| hit.face))?;
         let mesh = &self.deformable.mesh;
-        let face = FaceState { b: mesh.barycentre(handle), n: mesh.normal(handle) };
+        let face = FaceState {
+            b: mesh.barycentre(handle),
+            n: mesh.normal(handle),
+        };
         Some(match self.params.touch_point {
-            TouchPoint::MeasuredNormal => {
-                Pressing { handle, face, normal, point: seek, force_o: normal * ball.force_o.dot(&normal) }
-            }
+            TouchPoint::MeasuredNormal => Pressing {
+                handle,
+                face,
+                normal,
+                point: seek,
+                force_o: normal * ball.force_o.dot(&normal),
+            },
             TouchPoint::FaceNormal => {
                 let point = self.touching_point(centre, &face.n);
-                Pressing { handle, face, normal: face.n, point, force_o: ball.force_o }
+                Pressing {
+                    handle,
+                    face,
+                    normal: face.n,
+                    point,
+                    force_o: ball.force_o,
+                }
             }
         })
     }
@@ -377,14 +451,18 @@ impl Refiner {
 
     /// The face closest to the point that touches.
     fn touched_face(&mut self, point: &Point3<f64>) -> Option<FaceHit> {
-        let hit = self.deformable.closest(point, self.nearest, self.reach(), &mut self.near_contact);
+        let hit =
+            self.deformable
+                .closest(point, self.nearest, self.reach(), &mut self.near_contact);
         self.nearest = hit.map(|hit| hit.face).or(self.nearest);
         hit
     }
 
     /// The region of the contact becomes the one that was made ready for this handle, if there is one.
     fn take_region(&mut self, handle: FaceId) {
-        if self.contact_region.roi.handle != Some(handle) && self.deformable.is_prepared(&self.next_region, handle) {
+        if self.contact_region.roi.handle != Some(handle)
+            && self.deformable.is_prepared(&self.next_region, handle)
+        {
             std::mem::swap(&mut self.contact_region, &mut self.next_region);
             self.next_region.roi.handle = None;
         }
@@ -393,8 +471,12 @@ impl Refiner {
     /// Makes ready what the next sample needs if the tip goes on as it did, so that this does not wait for it: the closest face, and
     /// the region around it. To be called between samples; it changes no result.
     pub fn look_ahead(&mut self) {
-        let Some(TouchTrack { next, .. }) = self.track else { return };
-        let Some(FaceHit { face, .. }) = self.touched_face(&next) else { return };
+        let Some(TouchTrack { next, .. }) = self.track else {
+            return;
+        };
+        let Some(FaceHit { face, .. }) = self.touched_face(&next) else {
+            return;
+        };
         if self.deformable.is_stiff(face) {
             return;
         }
@@ -409,7 +491,10 @@ impl Refiner {
 
     /// The point of the tip that touches a surface of this outward normal, m, in O.
     fn touching_point(&self, centre: Point3<f64>, normal: &Vector3<f64>) -> Point3<f64> {
-        let place = TipPlace { centre, axis: self.axis };
+        let place = TipPlace {
+            centre,
+            axis: self.axis,
+        };
         match self.body.touched(&place, normal, FLUSH) {
             Some(touched) => touched.point,
             None => self.body.support(&place, &-normal),
@@ -417,7 +502,13 @@ impl Refiner {
     }
 
     fn mismatch(&self, pressing: &Pressing) -> Mismatch {
-        let Pressing { handle, face: FaceState { b, n }, point, force_o, .. } = pressing;
+        let Pressing {
+            handle,
+            face: FaceState { b, n },
+            point,
+            force_o,
+            ..
+        } = pressing;
         let distance = (point - b).dot(n);
         let expected = n * self.params.dynamics.model.force(distance).max(0.0);
         Mismatch {
@@ -432,15 +523,33 @@ impl Refiner {
     /// Case 1 or 2 at a face that the tip is at or in, without contact.
     fn mismatch_in_free_motion(&self, ball: &Ball, handle: FaceId) -> Mismatch {
         let mesh = &self.deformable.mesh;
-        let face = FaceState { b: mesh.barycentre(handle), n: mesh.normal(handle) };
+        let face = FaceState {
+            b: mesh.barycentre(handle),
+            n: mesh.normal(handle),
+        };
         let point = self.touching_point(ball.centre, &face.n);
-        self.mismatch(&Pressing { handle, face, normal: face.n, point, force_o: ball.force_o })
+        self.mismatch(&Pressing {
+            handle,
+            face,
+            normal: face.n,
+            point,
+            force_o: ball.force_o,
+        })
     }
 
     /// The rigid motion of the handle to its next state, as steps of its corners, m.
     ///
     /// Along the force a corner only goes along it: the turn's sideways part would make the triangles creep.
-    fn rigid_steps(&self, Pressing { handle, face, normal, .. }: &Pressing, next: &FaceState) -> [Vector3<f64>; 3] {
+    fn rigid_steps(
+        &self,
+        Pressing {
+            handle,
+            face,
+            normal,
+            ..
+        }: &Pressing,
+        next: &FaceState,
+    ) -> [Vector3<f64>; 3] {
         // the smallest rotation from n to n′: x + v × x + v × (v × x) / (1 + n·n′), v = n × n′
         let axis = face.n.cross(&next.n);
         let bend = 1.0 / (1.0 + face.n.dot(&next.n)).max(f64::EPSILON);
@@ -450,11 +559,19 @@ impl Refiner {
             let arm = corner - face.b;
             let across = axis.cross(&arm);
             let step = across + axis.cross(&across) * bend + (next.b - face.b);
-            if along { normal * step.dot(normal) } else { step }
+            if along {
+                normal * step.dot(normal)
+            } else {
+                step
+            }
         });
         // by one share: corners shortened each by itself would turn the face
         let farthest = steps.iter().map(Vector3::norm).fold(0.0, f64::max);
-        if farthest > longest { steps.map(|step| step * (longest / farthest)) } else { steps }
+        if farthest > longest {
+            steps.map(|step| step * (longest / farthest))
+        } else {
+            steps
+        }
     }
 
     /// Keeps what it takes to undo strokes from here on; with a patch that is followed, it is the patch's strokes that are
@@ -506,7 +623,11 @@ impl Refiner {
     ///
     /// # Errors
     /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`]; the mesh is inconsistent then.
-    pub fn go_on_following(&mut self, delta: &PatchDelta, most: usize) -> Result<bool, RefineError> {
+    pub fn go_on_following(
+        &mut self,
+        delta: &PatchDelta,
+        most: usize,
+    ) -> Result<bool, RefineError> {
         if !delta.is_empty() {
             self.forget_regions();
         }
@@ -515,7 +636,11 @@ impl Refiner {
 
     /// Faces were added, removed or moved.
     fn forget_regions(&mut self) {
-        for region in [&mut self.contact_region, &mut self.next_region, &mut self.carve_region] {
+        for region in [
+            &mut self.contact_region,
+            &mut self.next_region,
+            &mut self.carve_region,
+        ] {
             region.roi.handle = None;
         }
         self.nearest = None;
@@ -544,7 +669,10 @@ impl Refiner {
 
     /// The support of a vertex in the patch that is followed; `None` without a patch.
     pub fn support(&self, vertex: VertexId) -> Option<Support> {
-        self.deformable.patch.as_ref().map(|patch| patch.support(vertex))
+        self.deformable
+            .patch
+            .as_ref()
+            .map(|patch| patch.support(vertex))
     }
 
     /// Gives the mesh back.
@@ -559,7 +687,9 @@ impl Refiner {
 
     /// The closest face of the current mesh, by true surface distance, nearer than `reach` (m).
     pub fn closest_face(&self, p: &Point3<f64>, reach: f64) -> Option<FaceHit> {
-        self.deformable.tree.closest(&self.deformable.mesh, p, reach)
+        self.deformable
+            .tree
+            .closest(&self.deformable.mesh, p, reach)
     }
 
     /// What became of the samples so far.

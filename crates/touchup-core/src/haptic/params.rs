@@ -5,8 +5,8 @@ use super::{Along, ContactModel, DynamicsParams, RoiSize, StepRule};
 use crate::mesh::Region;
 use crate::parameters;
 use crate::stylus::{
-    BiasParams, CompensatorParams, ContactEstimatorParams, ContactGateParams, SettingError, SlidingParams, TipBody,
-    TipParams, TipShape,
+    BiasParams, CompensatorParams, ContactEstimatorParams, ContactGateParams, SettingError,
+    SlidingParams, TipBody, TipParams, TipShape,
 };
 
 parameters! {
@@ -124,7 +124,9 @@ pub fn relaxing_alpha(model: &ContactModel) -> f64 {
     let slope = match *model {
         ContactModel::Spring { stiffness_n_per_m } => stiffness_n_per_m,
         // f (1 − f/f_max) / h_min; at more than half of f_max the slope falls again
-        ContactModel::Sigmoid { f_max_n, h_min_m, .. } => {
+        ContactModel::Sigmoid {
+            f_max_n, h_min_m, ..
+        } => {
             let share = (USUAL_FORCE / f_max_n).min(0.5);
             f_max_n * share * (1.0 - share) / h_min_m
         }
@@ -210,13 +212,27 @@ impl RefineParams {
 
     /// The edges to which a scan of this mean edge (m) is to be simplified for the haptic update; `None`: it is coarse enough.
     pub fn simplified_edge(&self, mean_edge: f64) -> Option<f64> {
-        self.working_edge.filter(|edge| mean_edge < COARSE_ENOUGH * edge)
+        self.working_edge
+            .filter(|edge| mean_edge < COARSE_ENOUGH * edge)
     }
 
     /// How contact is decided.
     pub fn contact(&self) -> ContactEstimatorParams {
-        let &Self { compensator, bias, gate, tip, sliding, .. } = self;
-        ContactEstimatorParams { compensator, bias, gate, tip, sliding }
+        let &Self {
+            compensator,
+            bias,
+            gate,
+            tip,
+            sliding,
+            ..
+        } = self;
+        ContactEstimatorParams {
+            compensator,
+            bias,
+            gate,
+            tip,
+            sliding,
+        }
     }
 
     /// # Errors
@@ -224,13 +240,25 @@ impl RefineParams {
     pub fn check(&self) -> Result<(), SettingError> {
         TipBody::new(self.shape, self.tip.radius)?;
         self.tip.check()?;
-        ScanParams { noise: self.scan_noise }.check()?;
+        ScanParams {
+            noise: self.scan_noise,
+        }
+        .check()?;
         self.carve.iter().try_for_each(CarveParams::check)?;
         self.sliding.iter().try_for_each(SlidingParams::check)?;
         self.guard.iter().try_for_each(GuardParams::check)?;
-        let roi = if let RoiSize::Radius(radius) = self.roi { radius } else { 0.0 };
+        let roi = if let RoiSize::Radius(radius) = self.roi {
+            radius
+        } else {
+            0.0
+        };
         let cosine = self.smallest_contact_cosine;
-        SettingError::check("smallest contact cosine", cosine, cosine.abs() <= 1.0, "-1 to 1")?;
+        SettingError::check(
+            "smallest contact cosine",
+            cosine,
+            cosine.abs() <= 1.0,
+            "-1 to 1",
+        )?;
         let not_negative = |name, x| SettingError::check(name, x, x >= 0.0, "finite and 0 or more");
         not_negative("turning (1/s)", self.turning.unwrap_or(0.0))?;
         not_negative("region of interest (m)", roi)?;

@@ -13,8 +13,8 @@ use super::ScanParams;
 use crate::mesh::{FaceTree, TriMesh};
 use crate::numeric::mean;
 use crate::numeric::{
-    NormalEquations, VoxelKey, cauchy_weight, direction, moved_by_twist, point_to_plane_row, voxel_neighbourhood,
-    voxel_of,
+    NormalEquations, VoxelKey, cauchy_weight, direction, moved_by_twist, point_to_plane_row,
+    voxel_neighbourhood, voxel_of,
 };
 use crate::stylus::SettingError;
 
@@ -34,7 +34,12 @@ pub struct RegistrationParams {
 
 impl Default for RegistrationParams {
     fn default() -> Self {
-        Self { scan_noise: ScanParams::default().noise, correlation: 9e-3, surface_offset: 0.3e-3, spacing: 1e-3 }
+        Self {
+            scan_noise: ScanParams::default().noise,
+            correlation: 9e-3,
+            surface_offset: 0.3e-3,
+            spacing: 1e-3,
+        }
     }
 }
 
@@ -59,7 +64,9 @@ pub struct Registration {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RegistrationError {
     /// Too little was touched.
-    #[error("{cells} separate places of the scan were touched, {needed} are needed: touch more of it")]
+    #[error(
+        "{cells} separate places of the scan were touched, {needed} are needed: touch more of it"
+    )]
     TooFew {
         /// cells of the correlation length
         cells: usize,
@@ -67,7 +74,10 @@ pub enum RegistrationError {
         needed: usize,
     },
     /// The touched surfaces let the scan slide.
-    #[error("the touched surfaces let the scan move along {}: touch faces of other orientations", list(directions))]
+    #[error(
+        "the touched surfaces let the scan move along {}: touch faces of other orientations",
+        list(directions)
+    )]
     Undetermined {
         /// shift and turn about the middle of the contacts; unit, a turn counting as the shift that it gives on average
         directions: Vec<Vector6<f64>>,
@@ -80,7 +90,11 @@ pub enum RegistrationError {
 fn list(directions: &[Vector6<f64>]) -> String {
     let name = |d: &Vector6<f64>| {
         let part = |what, v: [f64; 3]| format!("{what} ({:.2}, {:.2}, {:.2})", v[0], v[1], v[2]);
-        format!("{} with {}", part("shift", [d[0], d[1], d[2]]), part("turn", [d[3], d[4], d[5]]))
+        format!(
+            "{} with {}",
+            part("shift", [d[0], d[1], d[2]]),
+            part("turn", [d[3], d[4], d[5]])
+        )
     };
     directions.iter().map(name).collect::<Vec<_>>().join("; ")
 }
@@ -129,7 +143,12 @@ impl Registrar {
     /// # Errors
     /// [`SettingError`] unless all settings are more than 0.
     pub fn new(params: RegistrationParams) -> Result<Self, SettingError> {
-        let RegistrationParams { scan_noise, correlation, surface_offset, spacing } = params;
+        let RegistrationParams {
+            scan_noise,
+            correlation,
+            surface_offset,
+            spacing,
+        } = params;
         for (name, value) in [
             ("scan noise (m)", scan_noise),
             ("correlation length of the scan (m)", correlation),
@@ -138,7 +157,10 @@ impl Registrar {
         ] {
             SettingError::check(name, value, value > 0.0, "more than 0")?;
         }
-        Ok(Self { params, means: BTreeMap::new() })
+        Ok(Self {
+            params,
+            means: BTreeMap::new(),
+        })
     }
 
     /// Takes a point of the part, m, with its outward unit normal, in O.
@@ -161,7 +183,11 @@ impl Registrar {
     ///
     /// # Errors
     /// [`RegistrationError`].
-    pub fn estimate(&self, scan: &TriMesh, tree: &FaceTree) -> Result<Registration, RegistrationError> {
+    pub fn estimate(
+        &self,
+        scan: &TriMesh,
+        tree: &FaceTree,
+    ) -> Result<Registration, RegistrationError> {
         let contacts: Vec<_> = self.means.values().filter_map(contact_of).collect();
         let centre = Point3::from(mean(contacts.iter().map(|(p, _)| p.coords)));
         let mut pose = Isometry3::identity();
@@ -170,7 +196,9 @@ impl Registrar {
             let [shift, turn] = [0, 3].map(|at| fit.step.fixed_rows::<3>(at).into_owned());
             pose = moved_by_twist(&pose, &centre, &shift, &turn);
             let largest = pose.translation.vector.norm() + (pose * centre - centre).norm();
-            if !largest.is_finite() || (pose * centre - centre).norm() > REACH * self.params.scan_noise {
+            if !largest.is_finite()
+                || (pose * centre - centre).norm() > REACH * self.params.scan_noise
+            {
                 break;
             }
             let moved = shift.norm() + turn.norm() * fit.lever;
@@ -184,7 +212,10 @@ impl Registrar {
 }
 
 fn contact_of(mean: &Mean) -> Option<(Point3<f64>, Vector3<f64>)> {
-    Some((Point3::from(mean.point / mean.count), direction(&mean.normal)?))
+    Some((
+        Point3::from(mean.point / mean.count),
+        direction(&mean.normal)?,
+    ))
 }
 
 /// One round of least squares.
@@ -201,7 +232,9 @@ impl RegistrationRound {
     fn step_in_sigmas(&self) -> f64 {
         let twist = self.step.fixed_rows::<6>(0).into_owned();
         let covariance = self.covariance.fixed_view::<6, 6>(0, 0).into_owned();
-        covariance.cholesky().map_or(f64::INFINITY, |c| twist.dot(&c.solve(&twist)).sqrt())
+        covariance
+            .cholesky()
+            .map_or(f64::INFINITY, |c| twist.dot(&c.solve(&twist)).sqrt())
     }
 
     fn of(
@@ -212,7 +245,12 @@ impl RegistrationRound {
         centre: &Point3<f64>,
         pose: &Isometry3<f64>,
     ) -> Result<Self, RegistrationError> {
-        let RegistrationParams { scan_noise, correlation, surface_offset, .. } = registrar.params;
+        let RegistrationParams {
+            scan_noise,
+            correlation,
+            surface_offset,
+            ..
+        } = registrar.params;
         // the scan stays where it is: the contacts are moved back
         let rows: Vec<_> = contacts
             .iter()
@@ -221,45 +259,81 @@ impl RegistrationRound {
                 let is_same = scan.normal(hit.face).dot(&(pose.inverse() * n)) >= SMALLEST_COSINE;
                 let arm = p - centre;
                 let row = point_to_plane_row(&arm, n, 1.0).insert_row(6, -1.0);
-                is_same.then(|| (voxel_of(p, correlation), row, n.dot(&(p - pose * hit.point)), arm.norm_squared(), *p))
+                is_same.then(|| {
+                    (
+                        voxel_of(p, correlation),
+                        row,
+                        n.dot(&(p - pose * hit.point)),
+                        arm.norm_squared(),
+                        *p,
+                    )
+                })
             })
             .collect();
         let cells: std::collections::BTreeSet<_> = rows.iter().map(|(cell, ..)| *cell).collect();
         if cells.len() < LEAST_CELLS {
-            return Err(RegistrationError::TooFew { cells: cells.len(), needed: LEAST_CELLS });
+            return Err(RegistrationError::TooFew {
+                cells: cells.len(),
+                needed: LEAST_CELLS,
+            });
         }
         let count = rows.len() as f64;
         let lever = (rows.iter().map(|(_, _, _, square, _)| square).sum::<f64>() / count).sqrt();
-        check_directions(&rows.iter().map(|(_, row, ..)| *row).collect::<Vec<_>>(), lever)?;
+        check_directions(
+            &rows.iter().map(|(_, row, ..)| *row).collect::<Vec<_>>(),
+            lever,
+        )?;
 
         let prior = 1.0 / (surface_offset * surface_offset);
-        let unit = independent(rows.iter().map(|(_, _, _, _, p)| p), correlation) / count / (scan_noise * scan_noise);
+        let unit = independent(rows.iter().map(|(_, _, _, _, p)| p), correlation)
+            / count
+            / (scan_noise * scan_noise);
         let (mut step, mut half_weight) = (Unknowns::zeros(), f64::INFINITY);
         for _ in 0..5 {
             let mut equations = NormalEquations::default();
             equations.information[(6, 6)] = prior;
             let values = rows.iter().map(|(_, row, error, ..)| (*row, *error));
-            equations.add_reweighted(values, &step, |_, left| cauchy_weight((left / half_weight).powi(2)) * unit);
-            step = equations.solution().ok_or(RegistrationError::NotConverged)?;
+            equations.add_reweighted(values, &step, |_, left| {
+                cauchy_weight((left / half_weight).powi(2)) * unit
+            });
+            step = equations
+                .solution()
+                .ok_or(RegistrationError::NotConverged)?;
             half_weight = HALF_WEIGHT * scan_noise;
         }
-        let weight = |error: f64, row: &Unknowns| cauchy_weight(((error - row.dot(&step)) / half_weight).powi(2));
-        let weights: Vec<f64> = rows.iter().map(|(_, row, error, ..)| weight(*error, row)).collect();
+        let weight = |error: f64, row: &Unknowns| {
+            cauchy_weight(((error - row.dot(&step)) / half_weight).powi(2))
+        };
+        let weights: Vec<f64> = rows
+            .iter()
+            .map(|(_, row, error, ..)| weight(*error, row))
+            .collect();
         // how far the estimate yields: not by the weights but by how fast the weighted errors grow
         let mut slopes = Information::zeros();
         slopes[(6, 6)] = prior;
         for ((_, row, ..), weight) in rows.iter().zip(&weights) {
             slopes += row * row.transpose() * (weight * (2.0 * weight - 1.0) * unit);
         }
-        let inverse = slopes.try_inverse().ok_or(RegistrationError::NotConverged)?;
+        let inverse = slopes
+            .try_inverse()
+            .ok_or(RegistrationError::NotConverged)?;
         // no better than the stated noise of the scan: few places can agree by chance
-        let square: f64 =
-            rows.iter().zip(&weights).map(|((_, row, error, ..), w)| w * (error - row.dot(&step)).powi(2)).sum();
-        let scale = (square / weights.iter().sum::<f64>() / (scan_noise * scan_noise)).max(LEAST_SCALE);
+        let square: f64 = rows
+            .iter()
+            .zip(&weights)
+            .map(|((_, row, error, ..), w)| w * (error - row.dot(&step)).powi(2))
+            .sum();
+        let scale =
+            (square / weights.iter().sum::<f64>() / (scan_noise * scan_noise)).max(LEAST_SCALE);
         let mut covariance = inverse * scale;
         // what is known of the surface offset beforehand does not depend on the errors
         covariance += inverse.column(6) * inverse.column(6).transpose() * (prior * (1.0 - scale));
-        Ok(Self { step, covariance, lever, contacts: rows.len() })
+        Ok(Self {
+            step,
+            covariance,
+            lever,
+            contacts: rows.len(),
+        })
     }
 
     fn registration(&self, pose: &Isometry3<f64>, centre: &Point3<f64>) -> Registration {
@@ -295,11 +369,23 @@ fn independent<'a>(points: impl Iterator<Item = &'a Point3<f64>>, correlation: f
 fn check_directions(rows: &[Unknowns], lever: f64) -> Result<(), RegistrationError> {
     let mut information = Matrix6::zeros();
     for row in rows {
-        let row = Vector6::from_fn(|i, _| if i < 3 { row[i] } else { row[i] / lever.max(f64::MIN_POSITIVE) });
+        let row = Vector6::from_fn(|i, _| {
+            if i < 3 {
+                row[i]
+            } else {
+                row[i] / lever.max(f64::MIN_POSITIVE)
+            }
+        });
         information += row * row.transpose() / rows.len() as f64;
     }
     let eigen = information.symmetric_eigen();
     let loose = (0..6).filter(|&i| eigen.eigenvalues[i] < LEAST_SHARE);
-    let directions: Vec<_> = loose.map(|i| eigen.eigenvectors.column(i).into_owned()).collect();
-    if directions.is_empty() { Ok(()) } else { Err(RegistrationError::Undetermined { directions }) }
+    let directions: Vec<_> = loose
+        .map(|i| eigen.eigenvectors.column(i).into_owned())
+        .collect();
+    if directions.is_empty() {
+        Ok(())
+    } else {
+        Err(RegistrationError::Undetermined { directions })
+    }
 }

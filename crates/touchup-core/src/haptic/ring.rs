@@ -94,8 +94,11 @@ impl Ring {
     /// next.
     pub fn link(&mut self, mesh: &TriMesh, vertices: &[VertexId], scratch_map: &mut ScratchMap) {
         self.corners.clear();
-        self.corners
-            .extend(self.faces.iter().map(|&face| scratch_map.number(mesh.corners(face).map(|corner| corner.0))));
+        self.corners.extend(
+            self.faces
+                .iter()
+                .map(|&face| scratch_map.number(mesh.corners(face).map(|corner| corner.0))),
+        );
         self.met.clear();
         self.met.resize(scratch_map.len(), (NONE, NONE, 0));
         self.edges.clear();
@@ -119,10 +122,17 @@ impl Ring {
 
     /// Finds the neighbours of a vertex, and the edges from it to later ones.
     fn go_around(&mut self, vertex: u32, star: Range<usize>, mut found: RingCount) -> RingCount {
-        let (met, edges, neighbours) = (&mut self.met[..], &mut self.edges[..], &mut self.neighbours[..]);
+        let (met, edges, neighbours) = (
+            &mut self.met[..],
+            &mut self.edges[..],
+            &mut self.neighbours[..],
+        );
         for &face in &self.stars[star] {
             let [a, b, c] = self.corners[face as usize];
-            for corner in [select_unpredictable(a == vertex, b, a), select_unpredictable(c == vertex, b, c)] {
+            for corner in [
+                select_unpredictable(a == vertex, b, a),
+                select_unpredictable(c == vertex, b, c),
+            ] {
                 // no branches: which corner was met before cannot be predicted
                 let (around, other, times) = met[corner as usize];
                 let is_met = around == vertex;
@@ -145,10 +155,15 @@ impl Ring {
             let (star, others) = rest.split_at(mesh.star(*id).len());
             rest = others;
             for (at, &face) in star.iter().enumerate() {
-                let later = self.corners[face as usize].map(|corner| (corner > vertex).then_some(corner));
+                let later =
+                    self.corners[face as usize].map(|corner| (corner > vertex).then_some(corner));
                 for &other in &star[..at] {
                     let corners = &self.corners[other as usize];
-                    if later.iter().flatten().any(|corner| corners.contains(corner)) {
+                    if later
+                        .iter()
+                        .flatten()
+                        .any(|corner| corners.contains(corner))
+                    {
                         self.edges.push((other, face));
                     }
                 }
@@ -160,7 +175,9 @@ impl Ring {
     fn link_outside(&mut self, mesh: &TriMesh, moving_vertices: u32) {
         for index in 0..self.moving {
             let fixed = self.corners[index].map(|corner| corner >= moving_vertices);
-            let Some(side) = (0..3).find(|&side| fixed[side] & fixed[(side + 1) % 3]) else { continue };
+            let Some(side) = (0..3).find(|&side| fixed[side] & fixed[(side + 1) % 3]) else {
+                continue;
+            };
             let corners = mesh.corners(self.faces[index]);
             let end = corners[(side + 1) % 3];
             for &face in mesh.star(corners[side]) {

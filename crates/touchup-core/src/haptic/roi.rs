@@ -75,14 +75,20 @@ impl Roi {
         self.handle = Some(handle);
         self.numbers.clear();
         self.vertices.clear();
-        mesh.corners(handle).into_iter().for_each(|vertex| self.add(vertex));
+        mesh.corners(handle)
+            .into_iter()
+            .for_each(|vertex| self.add(vertex));
         self.spread(mesh, mesh.barycentre(handle), size);
         let ring = &mut self.neighbourhood.ring;
         ring.gather(mesh, &self.vertices);
         if is_guarded || self.vertices.len() > 3 {
             ring.link(mesh, &self.vertices, &mut self.numbers);
         }
-        self.solver.solve(&self.neighbourhood.ring, self.vertices.len(), &mut self.weights);
+        self.solver.solve(
+            &self.neighbourhood.ring,
+            self.vertices.len(),
+            &mut self.weights,
+        );
     }
 
     fn add(&mut self, vertex: VertexId) {
@@ -143,7 +149,10 @@ impl Solver {
         self.starts.clear();
         for (row, right) in right.iter_mut().enumerate() {
             let neighbours = ring.neighbours(row + 3);
-            let earlier = neighbours.iter().map(|&other| other as usize).filter(|&other| other >= 3);
+            let earlier = neighbours
+                .iter()
+                .map(|&other| other as usize)
+                .filter(|&other| other >= 3);
             let first = earlier.map(|other| other - 3).min().unwrap_or(row).min(row);
             let start = self.rows.len();
             self.starts.push(start);
@@ -193,7 +202,12 @@ impl Solver {
 
     fn substitute(&self, x: &mut [[f64; 3]]) {
         let rows = self.starts.len() - 1;
-        let below = |row: usize| (self.first(row), &self.rows[self.starts[row]..self.starts[row + 1] - 1]);
+        let below = |row: usize| {
+            (
+                self.first(row),
+                &self.rows[self.starts[row]..self.starts[row + 1] - 1],
+            )
+        };
         for row in 0..rows {
             let (first, factors) = below(row);
             for (column, factor) in (first..).zip(factors) {
@@ -231,7 +245,11 @@ mod tests {
             Point3::new(radius * turn.cos(), radius * turn.sin(), 0.0)
         };
         let mut positions = vec![Point3::origin()];
-        positions.extend((0..6).map(|k| ring(k, 1.0)).chain((0..6).map(|k| ring(k, 2.0))));
+        positions.extend(
+            (0..6)
+                .map(|k| ring(k, 1.0))
+                .chain((0..6).map(|k| ring(k, 2.0))),
+        );
         let mut faces = Vec::new();
         for k in 0..6 {
             let (a, b, c, d) = (1 + k, 1 + (k + 1) % 6, 7 + k, 7 + (k + 1) % 6);
@@ -240,13 +258,26 @@ mod tests {
         let mesh = TriMesh::new(positions, faces).unwrap();
         let mut roi = Roi::with_room(16);
         roi.rebuild(&mesh, FaceId(0), RoiSize::OneRing, false);
-        assert_eq!(roi.vertices.len(), 10, "the handle, four more of the inner ring, three of the outer");
+        assert_eq!(
+            roi.vertices.len(),
+            10,
+            "the handle, four more of the inner ring, three of the outer"
+        );
         for (vertex, weights) in roi.vertices.iter().zip(&roi.weights).skip(3) {
-            let mut around: Vec<_> = mesh.star(*vertex).iter().flat_map(|&face| mesh.corners(face)).collect();
+            let mut around: Vec<_> = mesh
+                .star(*vertex)
+                .iter()
+                .flat_map(|&face| mesh.corners(face))
+                .collect();
             around.sort_unstable();
             around.dedup();
             around.retain(|other| other != vertex);
-            let of = |v: &VertexId| roi.vertices.iter().position(|w| w == v).map_or([0.0; 3], |i| roi.weights[i]);
+            let of = |v: &VertexId| {
+                roi.vertices
+                    .iter()
+                    .position(|w| w == v)
+                    .map_or([0.0; 3], |i| roi.weights[i])
+            };
             for (i, weight) in weights.iter().enumerate() {
                 let mean = around.iter().map(|v| of(v)[i]).sum::<f64>() / around.len() as f64;
                 assert!((weight - mean).abs() < 1e-15);

@@ -104,7 +104,10 @@ impl ScratchMap {
     fn grow(&mut self) {
         let room = (2 * self.entries.len()).max(FIRST_ROOM);
         let old = std::mem::replace(&mut self.entries, vec![Entry::default(); room]);
-        for entry in old.into_iter().filter(|entry| entry.tag >> 32 == u64::from(self.stamp)) {
+        for entry in old
+            .into_iter()
+            .filter(|entry| entry.tag >> 32 == u64::from(self.stamp))
+        {
             let at = self.slot(entry.tag as u32);
             self.entries[at] = entry;
         }
@@ -127,7 +130,10 @@ mod tests {
             assert_eq!(scratch_map.len(), 1000);
             scratch_map.number([3, 4]);
             scratch_map.take_back([3, 4]);
-            assert_eq!((scratch_map.of(3), scratch_map.of(4), scratch_map.len()), (None, None, 1000));
+            assert_eq!(
+                (scratch_map.of(3), scratch_map.of(4), scratch_map.len()),
+                (None, None, 1000)
+            );
             for key in 0..1000u32 {
                 assert_eq!(scratch_map.of(key * 4096 + round), Some(key));
                 assert_eq!(scratch_map.of(key * 4096 + round + 1), None);

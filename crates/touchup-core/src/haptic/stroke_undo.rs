@@ -19,14 +19,21 @@ pub(super) struct StrokeUndo {
 
 impl Default for StrokeUndo {
     fn default() -> Self {
-        Self { positions: History::new(MOST_KEPT), evidence: History::new(MOST_KEPT), last_contact_ns: None }
+        Self {
+            positions: History::new(MOST_KEPT),
+            evidence: History::new(MOST_KEPT),
+            last_contact_ns: None,
+        }
     }
 }
 
 impl StrokeUndo {
     /// Begins a stroke when the contact at `stamp_ns` follows none for a while.
     pub fn touch(&mut self, stamp_ns: i64) {
-        if self.last_contact_ns.is_none_or(|last| stamp_ns.saturating_sub(last) > STROKE_PAUSE_NS) {
+        if self
+            .last_contact_ns
+            .is_none_or(|last| stamp_ns.saturating_sub(last) > STROKE_PAUSE_NS)
+        {
             self.positions.begin();
             self.evidence.begin();
         }
@@ -47,7 +54,12 @@ impl StrokeUndo {
 
     /// Exchanges what the last stroke changed with what was there before it, or what was so undone last with what is there;
     /// returns the vertices that moved, `None` where there was no stroke.
-    pub fn change(&mut self, is_undo: bool, mesh: &mut TriMesh, evidence: &mut [[f32; 3]]) -> Option<Vec<VertexId>> {
+    pub fn change(
+        &mut self,
+        is_undo: bool,
+        mesh: &mut TriMesh,
+        evidence: &mut [[f32; 3]],
+    ) -> Option<Vec<VertexId>> {
         self.last_contact_ns = None;
         let mut moved = Vec::new();
         let move_vertex = |vertex, position: &mut Point3<f64>| {
@@ -56,9 +68,12 @@ impl StrokeUndo {
             mesh.set_position(vertex, std::mem::replace(position, here));
             moved.push(vertex);
         };
-        let turn_face = |face: u32, normal: &mut [f32; 3]| std::mem::swap(&mut evidence[face as usize], normal);
+        let turn_face =
+            |face: u32, normal: &mut [f32; 3]| std::mem::swap(&mut evidence[face as usize], normal);
         let has_changed = if is_undo {
-            !self.evidence.is_empty() && self.positions.undo(move_vertex) && self.evidence.undo(turn_face)
+            !self.evidence.is_empty()
+                && self.positions.undo(move_vertex)
+                && self.evidence.undo(turn_face)
         } else {
             self.positions.redo(move_vertex) && self.evidence.redo(turn_face)
         };

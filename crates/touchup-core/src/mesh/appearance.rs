@@ -43,15 +43,31 @@ impl Appearance {
     /// - `colours`, `texture`: as many as it has vertices, and faces.
     pub fn new(mesh: TriMesh, colours: Option<VertexColours>, texture: Option<Texture>) -> Self {
         let tree = FaceTree::new(&mesh);
-        Self { mesh, tree, colours, texture }
+        Self {
+            mesh,
+            tree,
+            colours,
+            texture,
+        }
     }
 
     /// The colours of vertices at `places` (m, in O): those of the nearest vertex of the nearest face.
-    pub fn colours_at(&self, places: &[Point3<f64>], workers: &dyn Workers) -> Option<VertexColours> {
-        let nearest = |at: usize| self.hit(&places[at]).map_or(0, |hit| nearest_corner(&self.mesh, &hit, &places[at]));
+    pub fn colours_at(
+        &self,
+        places: &[Point3<f64>],
+        workers: &dyn Workers,
+    ) -> Option<VertexColours> {
+        let nearest = |at: usize| {
+            self.hit(&places[at])
+                .map_or(0, |hit| nearest_corner(&self.mesh, &hit, &places[at]))
+        };
         Some(match self.colours.as_ref()? {
-            VertexColours::Rgb(of) => VertexColours::Rgb(map_by(workers, places.len(), |at| of[nearest(at)])),
-            VertexColours::Rgba(of) => VertexColours::Rgba(map_by(workers, places.len(), |at| of[nearest(at)])),
+            VertexColours::Rgb(of) => {
+                VertexColours::Rgb(map_by(workers, places.len(), |at| of[nearest(at)]))
+            }
+            VertexColours::Rgba(of) => {
+                VertexColours::Rgba(map_by(workers, places.len(), |at| of[nearest(at)]))
+            }
         })
     }
 
@@ -59,35 +75,59 @@ impl Appearance {
     /// lie on faces beside it, without a seam between them.
     ///
     /// - `places`: for each vertex where it is on this mesh, m in O.
-    pub fn texture_on(&self, mesh: &TriMesh, places: &[Point3<f64>], workers: &dyn Workers) -> Option<Texture> {
+    pub fn texture_on(
+        &self,
+        mesh: &TriMesh,
+        places: &[Point3<f64>],
+        workers: &dyn Workers,
+    ) -> Option<Texture> {
         let texture = self.texture.as_ref()?;
         let of_face = |slot: usize| {
             let face = FaceId(slot as u32);
             if !mesh.has_face(face) {
                 return ([[0.0; 2]; 3], 0);
             }
-            self.corners_at(texture, mesh.corners(face).map(|v: VertexId| places[v.0 as usize]))
+            self.corners_at(
+                texture,
+                mesh.corners(face).map(|v: VertexId| places[v.0 as usize]),
+            )
         };
-        let (corners, shown) = map_by(workers, mesh.face_slots(), of_face).into_iter().unzip();
-        Some(Texture { corners, shown, images: texture.images.clone() })
+        let (corners, shown) = map_by(workers, mesh.face_slots(), of_face)
+            .into_iter()
+            .unzip();
+        Some(Texture {
+            corners,
+            shown,
+            images: texture.images.clone(),
+        })
     }
 
     /// Texture coordinates of a triangle, and which image it shows.
     fn corners_at(&self, texture: &Texture, triangle: [Point3<f64>; 3]) -> ([[f32; 2]; 3], u32) {
         let [a, b, c] = &triangle;
         let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
-        let Some(hit) = self.hit(&middle) else { return ([[0.0; 2]; 3], 0) };
+        let Some(hit) = self.hit(&middle) else {
+            return ([[0.0; 2]; 3], 0);
+        };
         let shown = texture.shown[hit.face.0 as usize];
         let centre = at_point(&self.mesh, texture, hit.face, &hit.point);
         let corners = triangle.map(|corner| {
-            let own = self.mesh.triangle(hit.face).iter().position(|p| *p == corner);
+            let own = self
+                .mesh
+                .triangle(hit.face)
+                .iter()
+                .position(|p| *p == corner);
             if let Some(own) = own {
                 return texture.corners[hit.face.0 as usize][own];
             }
             let onward = at_point(&self.mesh, texture, hit.face, &corner);
-            let there = self.hit(&corner).filter(|there| texture.shown[there.face.0 as usize] == shown);
+            let there = self
+                .hit(&corner)
+                .filter(|there| texture.shown[there.face.0 as usize] == shown);
             let found = there.map(|there| at_point(&self.mesh, texture, there.face, &there.point));
-            let is_beside = |found: &Vector2<f32>| (found - onward).norm() <= ON_ONE_CHART * (onward - centre).norm();
+            let is_beside = |found: &Vector2<f32>| {
+                (found - onward).norm() <= ON_ONE_CHART * (onward - centre).norm()
+            };
             found.filter(is_beside).unwrap_or(onward).into()
         });
         (corners, shown)
@@ -101,7 +141,10 @@ impl Appearance {
 /// The vertex of the face that was hit which is nearest.
 fn nearest_corner(mesh: &TriMesh, hit: &FaceHit, place: &Point3<f64>) -> usize {
     let off = |v: &VertexId| (mesh.position(*v) - place).norm_squared();
-    let nearest = mesh.corners(hit.face).into_iter().min_by(|v, w| off(v).total_cmp(&off(w)));
+    let nearest = mesh
+        .corners(hit.face)
+        .into_iter()
+        .min_by(|v, w| off(v).total_cmp(&off(w)));
     nearest.map_or(0, |v| v.0 as usize)
 }
 
@@ -109,10 +152,16 @@ fn nearest_corner(mesh: &TriMesh, hit: &FaceHit, place: &Point3<f64>) -> usize {
 fn at_point(mesh: &TriMesh, texture: &Texture, face: FaceId, point: &Point3<f64>) -> Vector2<f32> {
     let [a, b, c] = mesh.triangle(face);
     let normal = (b - a).cross(&(c - a));
-    let of = |p: &Point3<f64>, q: &Point3<f64>| (q - p).cross(&(point - p)).dot(&normal) / normal.norm_squared();
+    let of = |p: &Point3<f64>, q: &Point3<f64>| {
+        (q - p).cross(&(point - p)).dot(&normal) / normal.norm_squared()
+    };
     let shares = [of(&b, &c), of(&c, &a), of(&a, &b)];
     let corners = texture.corners[face.0 as usize];
-    corners.iter().zip(shares).map(|(corner, share)| Vector2::from(*corner) * share as f32).sum()
+    corners
+        .iter()
+        .zip(shares)
+        .map(|(corner, share)| Vector2::from(*corner) * share as f32)
+        .sum()
 }
 
 #[cfg(test)]
@@ -123,24 +172,51 @@ mod tests {
     /// A roof over x = 0 … 4 with its ridge at x = 2, two triangles a side; the second side is in another corner of the image.
     fn roof() -> (Vec<Point3<f64>>, Vec<[u32; 3]>, Texture) {
         let heights = [(0.0, 0.0), (2.0, 1.0), (4.0, 0.0)];
-        let positions = heights.iter().flat_map(|&(x, z)| [0.0, 2.0].map(|y| Point3::new(x, y, z))).collect();
+        let positions = heights
+            .iter()
+            .flat_map(|&(x, z)| [0.0, 2.0].map(|y| Point3::new(x, y, z)))
+            .collect();
         let faces: Vec<[u32; 3]> = vec![[0, 2, 1], [1, 2, 3], [2, 4, 3], [3, 4, 5]];
-        let uv = |v: u32, side: usize| [(v / 2) as f32 / 8.0 + 0.5 * side as f32, (v % 2) as f32 / 8.0];
-        let corners = faces.iter().enumerate().map(|(at, face)| face.map(|v| uv(v, at / 2))).collect();
-        (positions, faces, Texture { corners, shown: vec![7, 7, 9, 9], images: Vec::new() })
+        let uv = |v: u32, side: usize| {
+            [
+                (v / 2) as f32 / 8.0 + 0.5 * side as f32,
+                (v % 2) as f32 / 8.0,
+            ]
+        };
+        let corners = faces
+            .iter()
+            .enumerate()
+            .map(|(at, face)| face.map(|v| uv(v, at / 2)))
+            .collect();
+        (
+            positions,
+            faces,
+            Texture {
+                corners,
+                shown: vec![7, 7, 9, 9],
+                images: Vec::new(),
+            },
+        )
     }
 
     fn appearance() -> Appearance {
         let (positions, faces, texture) = roof();
         let colours = VertexColours::Rgb((0..6).map(|v| [v, 10 * v, 100]).collect());
-        Appearance::new(TriMesh::new(positions, faces).unwrap(), Some(colours), Some(texture))
+        Appearance::new(
+            TriMesh::new(positions, faces).unwrap(),
+            Some(colours),
+            Some(texture),
+        )
     }
 
     #[test]
     fn a_new_vertex_has_the_colour_of_the_nearest_one() {
         let places = [[0.1, 0.2, 0.5], [2.0, 1.9, 3.0], [4.0, 2.0, 0.0]].map(Point3::from);
         let colours = appearance().colours_at(&places, &Alone).unwrap();
-        assert_eq!(colours, VertexColours::Rgb(vec![[0, 0, 100], [3, 30, 100], [5, 50, 100]]));
+        assert_eq!(
+            colours,
+            VertexColours::Rgb(vec![[0, 0, 100], [3, 30, 100], [5, 50, 100]])
+        );
     }
 
     #[test]
@@ -151,32 +227,59 @@ mod tests {
         let mesh = TriMesh::new(positions.clone(), faces).unwrap();
         let mut expected = texture.clone();
         expected.corners[1].rotate_left(1);
-        assert_eq!(appearance().texture_on(&mesh, &positions, &Alone), Some(expected));
+        assert_eq!(
+            appearance().texture_on(&mesh, &positions, &Alone),
+            Some(expected)
+        );
     }
 
     /// By hand: u = x / 16 on the first side, and half more on the second; v = y / 16.
     #[test]
     fn a_new_face_is_on_one_side_of_a_seam_and_reaches_over_faces_of_its_own() {
-        let places = [[0.5, 0.5, 0.25], [1.8, 0.5, 0.9], [1.8, 1.9, 0.9], [2.3, 1.0, 0.85]].map(Point3::from);
+        let places = [
+            [0.5, 0.5, 0.25],
+            [1.8, 0.5, 0.9],
+            [1.8, 1.9, 0.9],
+            [2.3, 1.0, 0.85],
+        ]
+        .map(Point3::from);
         let mesh = TriMesh::new(places.to_vec(), vec![[0, 1, 2], [1, 3, 2]]).unwrap();
         let texture = appearance().texture_on(&mesh, &places, &Alone).unwrap();
         assert_eq!(texture.shown, [7, 7]);
-        let by_hand = [[0.5, 0.5], [1.8, 0.5], [1.8, 1.9]].map(|place: [f32; 2]| place.map(|x| x / 16.0));
+        let by_hand =
+            [[0.5, 0.5], [1.8, 0.5], [1.8, 1.9]].map(|place: [f32; 2]| place.map(|x| x / 16.0));
         for (found, expected) in texture.corners[0].iter().zip(by_hand) {
-            assert!((Vector2::from(*found) - Vector2::from(expected)).norm() < 1e-6, "{found:?} {expected:?}");
+            assert!(
+                (Vector2::from(*found) - Vector2::from(expected)).norm() < 1e-6,
+                "{found:?} {expected:?}"
+            );
         }
         // the middle of the second face is on the first side, its second corner on the other: it goes straight on there, 0.3 along x and
         // 0.15 down on a slope of 1 in 2
         let along = 2.0 + (2.0 * 0.3 - 0.15) / 5.0 * 2.0;
         let [u, v] = texture.corners[1][1];
-        assert!((u - along / 16.0).abs() < 1e-6 && (v - 1.0 / 16.0).abs() < 1e-6, "{u} {v} {along}");
+        assert!(
+            (u - along / 16.0).abs() < 1e-6 && (v - 1.0 / 16.0).abs() < 1e-6,
+            "{u} {v} {along}"
+        );
     }
 
     #[test]
     fn a_mesh_that_has_no_colour_gives_none() {
         let (positions, faces, _) = roof();
-        let plain = Appearance::new(TriMesh::new(positions.clone(), faces.clone()).unwrap(), None, None);
+        let plain = Appearance::new(
+            TriMesh::new(positions.clone(), faces.clone()).unwrap(),
+            None,
+            None,
+        );
         assert_eq!(plain.colours_at(&positions, &Alone), None);
-        assert_eq!(plain.texture_on(&TriMesh::new(positions.clone(), faces).unwrap(), &positions, &Alone), None);
+        assert_eq!(
+            plain.texture_on(
+                &TriMesh::new(positions.clone(), faces).unwrap(),
+                &positions,
+                &Alone
+            ),
+            None
+        );
     }
 }

@@ -10,11 +10,16 @@ const BITS: u32 = 10;
 /// - `points`: finite, fewer than 2³².
 pub(crate) fn coherent_order(points: &[Point3<f64>]) -> Vec<u32> {
     let empty = [f64::INFINITY, f64::NEG_INFINITY].map(|x| Point3::new(x, x, x));
-    let [lo, hi] = points.iter().fold(empty, |[lo, hi], p| [lo.inf(p), hi.sup(p)]);
+    let [lo, hi] = points
+        .iter()
+        .fold(empty, |[lo, hi], p| [lo.inf(p), hi.sup(p)]);
     // cubes: a flat part is ordered as a flat one
     let cells = f64::from(1 << BITS) / (hi - lo).amax().max(f64::MIN_POSITIVE);
-    let mut keys: Vec<u64> =
-        points.iter().zip(0u64..).map(|(p, at)| code(&((p - lo) * cells).into()) << 32 | at).collect();
+    let mut keys: Vec<u64> = points
+        .iter()
+        .zip(0u64..)
+        .map(|(p, at)| code(&((p - lo) * cells).into()) << 32 | at)
+        .collect();
     keys.sort_unstable();
     keys.into_iter().map(|key| key as u32).collect()
 }
@@ -39,16 +44,25 @@ mod tests {
 
     #[test]
     fn the_corners_of_a_cube_come_in_z_order_and_each_once() {
-        let corner = |i: u32| Point3::new(f64::from(i >> 2), f64::from(i >> 1 & 1), f64::from(i & 1));
+        let corner =
+            |i: u32| Point3::new(f64::from(i >> 2), f64::from(i >> 1 & 1), f64::from(i & 1));
         let shuffled = [3, 7, 0, 5, 1, 6, 2, 4];
         let order = coherent_order(&shuffled.map(corner));
-        assert_eq!(order.iter().map(|&at| shuffled[at as usize]).collect::<Vec<_>>(), [0, 1, 2, 3, 4, 5, 6, 7]);
+        assert_eq!(
+            order
+                .iter()
+                .map(|&at| shuffled[at as usize])
+                .collect::<Vec<_>>(),
+            [0, 1, 2, 3, 4, 5, 6, 7]
+        );
     }
 
     #[test]
     fn bits_are_spread_one_by_one() {
         for x in [0, 1, 2, 0b10_1101_0110, 1023] {
-            let by_hand: u64 = (0..10).map(|bit| u64::from(x >> bit & 1) << (3 * bit)).sum();
+            let by_hand: u64 = (0..10)
+                .map(|bit| u64::from(x >> bit & 1) << (3 * bit))
+                .sum();
             assert_eq!(spread(x), by_hand);
         }
     }

@@ -31,7 +31,11 @@ pub(super) struct Journal {
 impl Journal {
     /// Nothing noted yet, room for so many slots.
     pub fn new(vertices: usize, faces: usize) -> Self {
-        Self { vertices: IdSet::with_slots(vertices), faces: IdSet::with_slots(faces), edits: 0 }
+        Self {
+            vertices: IdSet::with_slots(vertices),
+            faces: IdSet::with_slots(faces),
+            edits: 0,
+        }
     }
 
     /// Never inlined: most meshes are not watched.
@@ -49,7 +53,8 @@ impl Journal {
 
     /// Moves up to `most` vertices and as many faces over; returns whether that was all.
     pub fn take(&mut self, most: usize, into: &mut Changes) -> bool {
-        self.vertices.take(most, |vertex| into.vertices.push(VertexId(vertex)));
+        self.vertices
+            .take(most, |vertex| into.vertices.push(VertexId(vertex)));
         self.faces.take(most, |face| into.faces.push(FaceId(face)));
         self.vertices.is_empty() && self.faces.is_empty()
     }
@@ -77,7 +82,10 @@ pub struct IdSet {
 impl IdSet {
     /// An empty one with room for ids below `slots`; others are taken too.
     pub(crate) fn with_slots(slots: usize) -> Self {
-        Self { is_in: vec![0; slots.div_ceil(64)], ids: Vec::new() }
+        Self {
+            is_in: vec![0; slots.div_ceil(64)],
+            ids: Vec::new(),
+        }
     }
 
     /// Puts an id in.

@@ -27,6 +27,10 @@ pub struct ScanStation {
 impl ScanStation {
     /// Points from a place that is not known.
     pub fn unknown(points: usize) -> Self {
-        Self { points, eye: None, is_sure: false }
+        Self {
+            points,
+            eye: None,
+            is_sure: false,
+        }
     }
 }

@@ -42,11 +42,21 @@ impl PointTree {
     /// # Panics
     /// Without a point, or with more.
     pub fn new(points: &[Point3<f64>]) -> Self {
-        assert!((1..=Self::MOST_POINTS).contains(&points.len()), "{} points", points.len());
-        let [low, high] = points.iter().fold([points[0]; 2], |[low, high], p| [low.inf(p), high.sup(p)]);
+        assert!(
+            (1..=Self::MOST_POINTS).contains(&points.len()),
+            "{} points",
+            points.len()
+        );
+        let [low, high] = points
+            .iter()
+            .fold([points[0]; 2], |[low, high], p| [low.inf(p), high.sup(p)]);
         let steps = STEPS / (high - low).amax().max(f64::MIN_POSITIVE * STEPS);
         let cloud: Vec<GridPoint> = points.iter().map(|p| place(p, &low, steps)).collect();
-        Self { tree: KDTree::new(&cloud), low, steps }
+        Self {
+            tree: KDTree::new(&cloud),
+            low,
+            steps,
+        }
     }
 
     /// By how much the distance of a point may be off in the tree, m: each of both points by a step along each axis.
@@ -57,13 +67,34 @@ impl PointTree {
     /// The nearest `count` points within `radius` of `p`, nearest first: the index of each and its distance, m.
     ///
     /// - `p`: finite; `radius`: m, may be infinite.
-    pub fn nearest(&self, p: &Point3<f64>, count: u32, radius: f64) -> impl Iterator<Item = (usize, f64)> + use<> {
-        let parameters =
-            Parameters { epsilon: 0.0, max_radius: radius * self.steps, allow_self_match: true, sort_results: true };
-        let container = if count <= 16 { CandidateContainer::Linear } else { CandidateContainer::BinaryHeap };
-        let found = self.tree.knn_advanced(count, &place(p, &self.low, self.steps), container, &parameters, None);
+    pub fn nearest(
+        &self,
+        p: &Point3<f64>,
+        count: u32,
+        radius: f64,
+    ) -> impl Iterator<Item = (usize, f64)> + use<> {
+        let parameters = Parameters {
+            epsilon: 0.0,
+            max_radius: radius * self.steps,
+            allow_self_match: true,
+            sort_results: true,
+        };
+        let container = if count <= 16 {
+            CandidateContainer::Linear
+        } else {
+            CandidateContainer::BinaryHeap
+        };
+        let found = self.tree.knn_advanced(
+            count,
+            &place(p, &self.low, self.steps),
+            container,
+            &parameters,
+            None,
+        );
         let steps = self.steps;
-        found.into_iter().map(move |near| (near.index as usize, near.dist2.into_inner().sqrt() / steps))
+        found
+            .into_iter()
+            .map(move |near| (near.index as usize, near.dist2.into_inner().sqrt() / steps))
     }
 }
 
@@ -78,14 +109,25 @@ mod tests {
 
     #[test]
     fn the_nearest_of_a_row_come_in_order_up_to_the_radius() {
-        let row: Vec<_> = (0..100).map(|i| Point3::new(f64::from(i), 0.0, 0.0)).collect();
+        let row: Vec<_> = (0..100)
+            .map(|i| Point3::new(f64::from(i), 0.0, 0.0))
+            .collect();
         let tree = PointTree::new(&row);
-        let found = |count, radius| tree.nearest(&Point3::new(7.25, 0.0, 0.0), count, radius).collect::<Vec<_>>();
+        let found = |count, radius| {
+            tree.nearest(&Point3::new(7.25, 0.0, 0.0), count, radius)
+                .collect::<Vec<_>>()
+        };
         let close = |found: &[(usize, f64)], by_hand: &[(usize, f64)]| {
             found.len() == by_hand.len()
-                && found.iter().zip(by_hand).all(|(a, b)| a.0 == b.0 && (a.1 - b.1).abs() < 1e-9)
+                && found
+                    .iter()
+                    .zip(by_hand)
+                    .all(|(a, b)| a.0 == b.0 && (a.1 - b.1).abs() < 1e-9)
         };
-        assert!(close(&found(3, f64::INFINITY), &[(7, 0.25), (8, 0.75), (6, 1.25)]));
+        assert!(close(
+            &found(3, f64::INFINITY),
+            &[(7, 0.25), (8, 0.75), (6, 1.25)]
+        ));
         assert!(close(&found(40, 1.0), &[(7, 0.25), (8, 0.75)]));
     }
 }

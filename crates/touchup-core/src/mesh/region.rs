@@ -19,7 +19,10 @@ impl Region {
     /// Larger by `margin` (m) on all sides.
     #[must_use]
     pub fn grown(&self, margin: f64) -> Self {
-        Self { low: self.low - Vector3::repeat(margin), high: self.high + Vector3::repeat(margin) }
+        Self {
+            low: self.low - Vector3::repeat(margin),
+            high: self.high + Vector3::repeat(margin),
+        }
     }
 
     /// Whether a point is in it.
@@ -105,12 +108,25 @@ impl TriMesh {
                 of_part.push(*p);
             }
         }
-        inside.iter_mut().flatten().for_each(|vertex| *vertex = ids[*vertex as usize]);
+        inside
+            .iter_mut()
+            .flatten()
+            .for_each(|vertex| *vertex = ids[*vertex as usize]);
         let mut valences = Valences::new(of_part.len());
         inside.iter().for_each(|corners| valences.add(corners));
         let part = TriMesh::of_sound(of_part, inside, valences);
         let (rim, rim_edges) = rim_of(&part, &faces, &ids);
-        (part, Outside { positions, vertices, faces, places, rim, rim_edges })
+        (
+            part,
+            Outside {
+                positions,
+                vertices,
+                faces,
+                places,
+                rim,
+                rim_edges,
+            },
+        )
     }
 }
 
@@ -122,16 +138,25 @@ fn rim_of(part: &TriMesh, faces: &[[u32; 3]], ids: &[u32]) -> (Vec<RimVertex>, V
     let mut edges = Vec::new();
     let mut vertices = Vec::new();
     for corners in faces {
-        let corners = corners.map(|vertex| Some(ids[vertex as usize]).filter(|&id| id != NOT_IN).map(VertexId));
+        let corners = corners.map(|vertex| {
+            Some(ids[vertex as usize])
+                .filter(|&id| id != NOT_IN)
+                .map(VertexId)
+        });
         vertices.extend(corners.into_iter().flatten());
         for (a, b) in [(0, 1), (1, 2), (2, 0)] {
-            let Some((a, b)) = corners[a].zip(corners[b]) else { continue };
+            let Some((a, b)) = corners[a].zip(corners[b]) else {
+                continue;
+            };
             if part.faces_at_edge(a, b).next().is_some() {
                 edges.push([a.min(b), a.max(b)]);
             }
         }
     }
-    let vertices = distinct(vertices).into_iter().map(|vertex| (vertex, part.position(vertex))).collect();
+    let vertices = distinct(vertices)
+        .into_iter()
+        .map(|vertex| (vertex, part.position(vertex)))
+        .collect();
     (vertices, distinct(edges))
 }
 
@@ -155,8 +180,9 @@ impl Outside {
     /// # Errors
     /// [`MeshError::TornRim`] where that reached the rim, [`MeshError::TooMany`].
     pub fn sew_to(&self, part: &TriMesh) -> Result<Sewn, MeshError> {
-        let is_as_it_was =
-            |&(vertex, p): &(VertexId, Point3<f64>)| part.has_vertex(vertex) && part.position(vertex) == p;
+        let is_as_it_was = |&(vertex, p): &(VertexId, Point3<f64>)| {
+            part.has_vertex(vertex) && part.position(vertex) == p
+        };
         let is_joined = |&[a, b]: &[VertexId; 2]| part.faces_at_edge(a, b).next().is_some();
         if !self.rim.iter().all(is_as_it_was) || !self.rim_edges.iter().all(is_joined) {
             return Err(MeshError::TornRim);
@@ -164,7 +190,13 @@ impl Outside {
         let old = self.vertices.len();
         let slots = self.positions.len() + old;
         let added = (0..part.vertex_slots().saturating_sub(old)).map(|new| (slots + new) as u32);
-        let vertices: Vec<_> = self.vertices.iter().copied().chain(added).map(VertexId).collect();
+        let vertices: Vec<_> = self
+            .vertices
+            .iter()
+            .copied()
+            .chain(added)
+            .map(VertexId)
+            .collect();
 
         let mut positions = vec![Point3::origin(); slots + part.vertex_slots().saturating_sub(old)];
         let mut others = self.positions.iter();
@@ -178,7 +210,10 @@ impl Outside {
             positions[vertex.0 as usize] = *p;
         }
         let faces = self.all_faces(part, |vertex| vertices[vertex.0 as usize].0);
-        Ok(Sewn { mesh: TriMesh::new(positions, faces)?, vertices })
+        Ok(Sewn {
+            mesh: TriMesh::new(positions, faces)?,
+            vertices,
+        })
     }
 
     /// Faces in the order of the whole; those that were added to the part last.
@@ -190,7 +225,11 @@ impl Outside {
         let mut faces = Vec::with_capacity(self.faces.len() + part.face_count());
         let (mut outside, mut known) = (self.faces.iter(), 0);
         for place in 0..self.faces.len() + self.places.len() {
-            if self.places.get(known).is_some_and(|&at| at as usize == place) {
+            if self
+                .places
+                .get(known)
+                .is_some_and(|&at| at as usize == place)
+            {
                 faces.extend(corners(known));
                 known += 1;
             } else {

@@ -11,7 +11,12 @@ use super::{FaceHit, FaceTree, TriMesh, VertexId};
 
 /// Signed distance from `p` to the mesh, m: positive outside, negative in the material; `None` when no face is nearer than
 /// `reach` (m).
-pub fn signed_distance(mesh: &TriMesh, tree: &FaceTree, p: &Point3<f64>, reach: f64) -> Option<f64> {
+pub fn signed_distance(
+    mesh: &TriMesh,
+    tree: &FaceTree,
+    p: &Point3<f64>,
+    reach: f64,
+) -> Option<f64> {
     let hit = tree.closest(mesh, p, reach)?;
     let is_behind = (p - hit.point).dot(&pseudo_normal(mesh, &hit)) < 0.0;
     Some(hit.distance_squared.sqrt() * if is_behind { -1.0 } else { 1.0 })
@@ -22,20 +27,25 @@ pub fn signed_distance(mesh: &TriMesh, tree: &FaceTree, p: &Point3<f64>, reach: 
 /// - `hit`: from [`FaceTree::closest`], whose barycentric coordinates are exactly 0 on edges and corners.
 pub fn pseudo_normal(mesh: &TriMesh, hit: &FaceHit) -> Vector3<f64> {
     let corners = mesh.corners(hit.face);
-    let mut on = (0..3).filter(|&i| hit.barycentric[i] != 0.0).map(|i| corners[i]);
+    let mut on = (0..3)
+        .filter(|&i| hit.barycentric[i] != 0.0)
+        .map(|i| corners[i]);
     let sum = match (on.next(), on.next(), on.next()) {
         (Some(corner), None, None) => corner_normal(mesh, corner),
         (Some(a), Some(b), None) => mesh.faces_at_edge(a, b).map(|face| mesh.normal(face)).sum(),
         _ => mesh.normal(hit.face),
     };
-    sum.try_normalize(f64::EPSILON).unwrap_or_else(|| mesh.normal(hit.face))
+    sum.try_normalize(f64::EPSILON)
+        .unwrap_or_else(|| mesh.normal(hit.face))
 }
 
 /// Sum of the normals of the faces around a vertex, each times its angle there (rad).
 pub(crate) fn corner_normal(mesh: &TriMesh, vertex: VertexId) -> Vector3<f64> {
     let apex = mesh.position(vertex);
     let weighted = mesh.star(vertex).iter().map(|&face| {
-        let [u, v] = mesh.other_corners(face, vertex).map(|corner| mesh.position(corner) - apex);
+        let [u, v] = mesh
+            .other_corners(face, vertex)
+            .map(|corner| mesh.position(corner) - apex);
         mesh.normal(face) * u.angle(&v)
     });
     weighted.sum()
@@ -45,10 +55,15 @@ pub(crate) fn corner_normal(mesh: &TriMesh, vertex: VertexId) -> Vector3<f64> {
 pub fn is_on_rim(mesh: &TriMesh, hit: &FaceHit) -> bool {
     let corners = mesh.corners(hit.face);
     let is_open = |a: VertexId, b: VertexId| mesh.faces_at_edge(a, b).nth(1).is_none();
-    let mut on = (0..3).filter(|&i| hit.barycentric[i] != 0.0).map(|i| corners[i]);
+    let mut on = (0..3)
+        .filter(|&i| hit.barycentric[i] != 0.0)
+        .map(|i| corners[i]);
     match (on.next(), on.next(), on.next()) {
         (Some(corner), None, None) => {
-            let mut around = mesh.star(corner).iter().flat_map(|&face| mesh.corners(face));
+            let mut around = mesh
+                .star(corner)
+                .iter()
+                .flat_map(|&face| mesh.corners(face));
             around.any(|other| other != corner && is_open(corner, other))
         }
         (Some(a), Some(b), None) => is_open(a, b),
@@ -72,21 +87,41 @@ mod tests {
         let mesh = needle();
         let tree = FaceTree::new(&mesh);
         // seen from the apex, each point lies behind some of the three faces
-        for (y, z) in [(0.0, 0.0), (0.3, 0.0), (-0.3, 0.3), (-0.3, -0.3), (0.1, 0.4)] {
+        for (y, z) in [
+            (0.0, 0.0),
+            (0.3, 0.0),
+            (-0.3, 0.3),
+            (-0.3, -0.3),
+            (0.1, 0.4),
+        ] {
             let p = Point3::new(-1.0, y, z);
             let d = signed_distance(&mesh, &tree, &p, f64::INFINITY).unwrap();
             assert!((d - p.coords.norm()).abs() < 1e-15, "{d} at {p}");
         }
         assert!(signed_distance(&mesh, &tree, &Point3::new(0.9, 0.0, 0.0), 1.0).unwrap() < 0.0);
-        assert_eq!(signed_distance(&mesh, &tree, &Point3::new(-1.0, 0.0, 0.0), 0.9), None);
+        assert_eq!(
+            signed_distance(&mesh, &tree, &Point3::new(-1.0, 0.0, 0.0), 0.9),
+            None
+        );
     }
 
     #[test]
     fn a_corner_weights_its_faces_by_angle() {
         // the corner of a cube at the origin, its faces cut into one, one and two triangles: x, y and z have the same weight
-        let p = [[0., 0., 0.], [-1., 0., 0.], [0., -1., 0.], [0., 0., -1.], [-1., -1., 0.]].map(Point3::from);
-        let mesh = TriMesh::new(p.into(), vec![[0, 2, 3], [0, 3, 1], [0, 1, 4], [0, 4, 2]]).unwrap();
+        let p = [
+            [0., 0., 0.],
+            [-1., 0., 0.],
+            [0., -1., 0.],
+            [0., 0., -1.],
+            [-1., -1., 0.],
+        ]
+        .map(Point3::from);
+        let mesh =
+            TriMesh::new(p.into(), vec![[0, 2, 3], [0, 3, 1], [0, 1, 4], [0, 4, 2]]).unwrap();
         let normal = corner_normal(&mesh, VertexId(0)).normalize();
-        assert!((normal - Vector3::repeat(1.0 / 3.0_f64.sqrt())).norm() < 1e-15, "{normal}");
+        assert!(
+            (normal - Vector3::repeat(1.0 / 3.0_f64.sqrt())).norm() < 1e-15,
+            "{normal}"
+        );
     }
 }

@@ -79,8 +79,15 @@ impl Simplified {
                 }
             }
         }
-        let positions = seeds.iter().zip(&made).map(|(seed, cell)| seed + cell.place(spacing)).collect();
-        Ok(Self { mesh: TriMesh::new(positions, faces)?, cells })
+        let positions = seeds
+            .iter()
+            .zip(&made)
+            .map(|(seed, cell)| seed + cell.place(spacing))
+            .collect();
+        Ok(Self {
+            mesh: TriMesh::new(positions, faces)?,
+            cells,
+        })
     }
 
     /// Memory, bytes.
@@ -90,7 +97,10 @@ impl Simplified {
 
     /// The vertex that stands for a vertex of the original; `None`: no face uses it.
     pub fn cell_of(&self, vertex: VertexId) -> Option<VertexId> {
-        self.cells.get(vertex.0 as usize).filter(|cell| **cell != NONE).map(|&cell| VertexId(cell))
+        self.cells
+            .get(vertex.0 as usize)
+            .filter(|cell| **cell != NONE)
+            .map(|&cell| VertexId(cell))
     }
 
     /// The original, moved as the simplified mesh was: a vertex keeps its place beside the face that it is nearest to, turned as the
@@ -100,11 +110,22 @@ impl Simplified {
     /// - `moved`: the simplified mesh, with other positions.
     pub fn carry(&self, original: &TriMesh, moved: &TriMesh) -> TriMesh {
         let mut detailed = original.clone();
-        let turns: Vec<_> = (0..self.mesh.vertex_slots() as u32).map(|at| self.turn(VertexId(at), moved)).collect();
-        for (vertex, &cell) in self.cells.iter().enumerate().filter(|(_, cell)| **cell != NONE) {
+        let turns: Vec<_> = (0..self.mesh.vertex_slots() as u32)
+            .map(|at| self.turn(VertexId(at), moved))
+            .collect();
+        for (vertex, &cell) in self
+            .cells
+            .iter()
+            .enumerate()
+            .filter(|(_, cell)| **cell != NONE)
+        {
             let (vertex, here) = (VertexId(vertex as u32), original.positions()[vertex]);
-            let place = self.carried(&here, VertexId(cell), moved, |corner| turns[corner.0 as usize]);
-            place.into_iter().for_each(|place| detailed.set_position(vertex, place));
+            let place = self.carried(&here, VertexId(cell), moved, |corner| {
+                turns[corner.0 as usize]
+            });
+            place
+                .into_iter()
+                .for_each(|place| detailed.set_position(vertex, place));
         }
         detailed
     }
@@ -121,15 +142,28 @@ impl Simplified {
         mut put: impl FnMut(VertexId, Point3<f64>),
     ) {
         let mut turns: Vec<(VertexId, Option<UnitQuaternion<f64>>)> = Vec::new();
-        for corner in self.mesh.star(cell).iter().flat_map(|&face| self.mesh.corners(face)) {
+        for corner in self
+            .mesh
+            .star(cell)
+            .iter()
+            .flat_map(|&face| self.mesh.corners(face))
+        {
             if !turns.iter().any(|(known, _)| *known == corner) {
                 turns.push((corner, self.turn(corner, moved)));
             }
         }
-        let turn = |corner| turns.iter().find(|(known, _)| *known == corner).and_then(|(_, turn)| *turn);
+        let turn = |corner| {
+            turns
+                .iter()
+                .find(|(known, _)| *known == corner)
+                .and_then(|(_, turn)| *turn)
+        };
         for vertex in members {
             let here = original.position(vertex);
-            put(vertex, self.carried(&here, cell, moved, turn).unwrap_or(here));
+            put(
+                vertex,
+                self.carried(&here, cell, moved, turn).unwrap_or(here),
+            );
         }
     }
 
@@ -138,7 +172,8 @@ impl Simplified {
         if self.mesh.position(vertex) == moved.position(vertex) {
             return None;
         }
-        let [before, after] = [&self.mesh, moved].map(|mesh| self.star_normal(vertex, mesh.positions()));
+        let [before, after] =
+            [&self.mesh, moved].map(|mesh| self.star_normal(vertex, mesh.positions()));
         Some(UnitQuaternion::rotation_between(&before, &after).unwrap_or_default())
     }
 
@@ -147,7 +182,10 @@ impl Simplified {
     /// - `positions`: of the simplified mesh or of one that was moved, m.
     fn star_normal(&self, vertex: VertexId, positions: &[Point3<f64>]) -> Vector3<f64> {
         let doubled = self.mesh.star(vertex).iter().map(|&face| {
-            let [a, b, c] = self.mesh.corners(face).map(|corner| positions[corner.0 as usize]);
+            let [a, b, c] = self
+                .mesh
+                .corners(face)
+                .map(|corner| positions[corner.0 as usize]);
             (b - a).cross(&(c - a))
         });
         doubled.sum::<Vector3<f64>>() * 0.5
@@ -163,14 +201,19 @@ impl Simplified {
     ) -> Option<Point3<f64>> {
         let star = self.mesh.star(cell);
         let is_moved = |corner: &VertexId| self.mesh.position(*corner) != moved.position(*corner);
-        if !star.iter().flat_map(|&face| self.mesh.corners(face)).any(|corner| is_moved(&corner)) {
+        if !star
+            .iter()
+            .flat_map(|&face| self.mesh.corners(face))
+            .any(|corner| is_moved(&corner))
+        {
             return None;
         }
         let nearest = star.iter().map(|&face| {
             let (point, barycentric) = triangle::closest_point(here, &self.mesh.triangle(face));
             ((here - point).norm_squared(), face, barycentric)
         });
-        let (_, face, barycentric) = nearest.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))?;
+        let (_, face, barycentric) =
+            nearest.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))?;
         let corners = self.mesh.corners(face);
         if !corners.iter().any(is_moved) {
             return None;
@@ -178,7 +221,8 @@ impl Simplified {
         let mut place = Vector3::zeros();
         for (corner, share) in corners.into_iter().zip(barycentric) {
             let arm = here - self.mesh.position(corner);
-            place += (moved.position(corner).coords + turn(corner).unwrap_or_default() * arm) * share;
+            place +=
+                (moved.position(corner).coords + turn(corner).unwrap_or_default() * arm) * share;
         }
         Some(Point3::from(place))
     }
@@ -195,12 +239,20 @@ impl Cell {
         let eigen = self.planes.symmetric_eigen();
         let (largest, missing) = (eigen.eigenvalues.max(), self.offsets - self.planes * mean);
         let mut step = Vector3::zeros();
-        for (curvature, axis) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+        for (curvature, axis) in eigen
+            .eigenvalues
+            .iter()
+            .zip(eigen.eigenvectors.column_iter())
+        {
             if *curvature > FLAT * largest {
                 step += axis * (axis.dot(&missing) / curvature);
             }
         }
-        if step.norm() <= spacing { mean + step } else { mean }
+        if step.norm() <= spacing {
+            mean + step
+        } else {
+            mean
+        }
     }
 }
 
@@ -220,10 +272,18 @@ fn cells_of(mesh: &TriMesh, spacing: f64) -> (Vec<u32>, Vec<Point3<f64>>) {
         // takes what is nearer to it than to any seed before, as far as it is connected within the spacing
         let (seed, number) = (mesh.position(VertexId(vertex)), seeds.len() as u32);
         seeds.push(seed);
-        (cells[vertex as usize], nearest[vertex as usize], seen[vertex as usize]) = (number, 0.0, number);
+        (
+            cells[vertex as usize],
+            nearest[vertex as usize],
+            seen[vertex as usize],
+        ) = (number, 0.0, number);
         queue.push(vertex);
         while let Some(vertex) = queue.pop() {
-            for other in mesh.star(VertexId(vertex)).iter().flat_map(|&face| mesh.corners(face)) {
+            for other in mesh
+                .star(VertexId(vertex))
+                .iter()
+                .flat_map(|&face| mesh.corners(face))
+            {
                 let at = other.0 as usize;
                 if std::mem::replace(&mut seen[at], number) == number {
                     continue;
@@ -243,5 +303,9 @@ fn cells_of(mesh: &TriMesh, spacing: f64) -> (Vec<u32>, Vec<Point3<f64>>) {
 
 /// Whether a vertex is at the rim: around others each neighbour is met twice.
 fn is_at_rim(mesh: &TriMesh, vertex: VertexId) -> bool {
-    mesh.star(vertex).iter().flat_map(|&face| mesh.other_corners(face, vertex)).fold(0, |odd, other| odd ^ other.0) != 0
+    mesh.star(vertex)
+        .iter()
+        .flat_map(|&face| mesh.other_corners(face, vertex))
+        .fold(0, |odd, other| odd ^ other.0)
+        != 0
 }

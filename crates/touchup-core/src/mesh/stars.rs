@@ -28,7 +28,11 @@ struct StarSlot {
 }
 
 /// The star of a vertex that was removed.
-const REMOVED: StarSlot = StarSlot { start: 0, len: 0, capacity: NONE };
+const REMOVED: StarSlot = StarSlot {
+    start: 0,
+    len: 0,
+    capacity: NONE,
+};
 
 /// The faces around each vertex of one mesh.
 #[derive(Clone, Debug)]
@@ -58,7 +62,9 @@ impl Stars {
     /// Whether a vertex is there.
     #[inline]
     pub fn has(&self, vertex: u32) -> bool {
-        self.slots.get(vertex as usize).is_some_and(|slot| slot.capacity != NONE)
+        self.slots
+            .get(vertex as usize)
+            .is_some_and(|slot| slot.capacity != NONE)
     }
 
     /// Removes a vertex that no face uses.
@@ -77,7 +83,10 @@ impl Stars {
     /// Entries that a face more at each of three vertices may add.
     #[inline]
     fn growth(&self, corners: &[u32; 3]) -> usize {
-        let full = corners.iter().map(|&v| self.slots[v as usize]).filter(|slot| slot.len == slot.capacity);
+        let full = corners
+            .iter()
+            .map(|&v| self.slots[v as usize])
+            .filter(|slot| slot.len == slot.capacity);
         full.map(|slot| block_for(slot.len + 1) as usize).sum()
     }
 
@@ -115,8 +124,15 @@ impl Stars {
     fn move_star(&mut self, vertex: u32, capacity: u32) {
         let old = self.slots[vertex as usize];
         let start = self.take_block(capacity);
-        self.entries.copy_within(old.start as usize..(old.start + old.len) as usize, start as usize);
-        self.slots[vertex as usize] = StarSlot { start, len: old.len, capacity };
+        self.entries.copy_within(
+            old.start as usize..(old.start + old.len) as usize,
+            start as usize,
+        );
+        self.slots[vertex as usize] = StarSlot {
+            start,
+            len: old.len,
+            capacity,
+        };
         self.give_back(old);
     }
 
@@ -151,7 +167,8 @@ impl Stars {
 
     /// Memory, bytes.
     pub fn bytes(&self) -> usize {
-        self.slots.capacity() * size_of::<StarSlot>() + self.entries.capacity() * size_of::<FaceId>()
+        self.slots.capacity() * size_of::<StarSlot>()
+            + self.entries.capacity() * size_of::<FaceId>()
     }
 }
 
@@ -173,7 +190,9 @@ impl Valences {
     /// Counts a face.
     #[inline]
     pub fn add(&mut self, corners: &[u32; 3]) {
-        corners.iter().for_each(|&v| self.0[v as usize].capacity += 1);
+        corners
+            .iter()
+            .for_each(|&v| self.0[v as usize].capacity += 1);
     }
 
     /// Whether each vertex has a face.
@@ -202,7 +221,11 @@ impl Valences {
                 slot.len += 1;
             }
         }
-        Stars { slots, entries, free: [NONE; 32] }
+        Stars {
+            slots,
+            entries,
+            free: [NONE; 32],
+        }
     }
 }
 
@@ -225,13 +248,25 @@ mod tests {
         for face in 0..7 {
             stars.push(0, FaceId(face));
         }
-        assert_eq!((stars.entries.len(), stars.slots[0].start), (6 + 8, 6), "the seventh does not fit in six");
+        assert_eq!(
+            (stars.entries.len(), stars.slots[0].start),
+            (6 + 8, 6),
+            "the seventh does not fit in six"
+        );
         stars.push(1, FaceId(7));
-        assert_eq!((stars.entries.len(), stars.slots[1].start), (6 + 8, 0), "four of the six are used again");
+        assert_eq!(
+            (stars.entries.len(), stars.slots[1].start),
+            (6 + 8, 0),
+            "four of the six are used again"
+        );
         (0..7).for_each(|face| stars.remove(0, FaceId(face)));
         stars.remove_vertex(0);
         (8..12).for_each(|face| stars.push(1, FaceId(face)));
-        assert_eq!((stars.entries.len(), stars.of(1).len()), (6 + 8, 5), "the eight are used again");
+        assert_eq!(
+            (stars.entries.len(), stars.of(1).len()),
+            (6 + 8, 5),
+            "the eight are used again"
+        );
     }
 
     #[test]
@@ -253,7 +288,11 @@ mod tests {
         let mut stars = stars(&[0, 4, 4]);
         (0..4).for_each(|face| stars.push(1, FaceId(face)));
         stars.push(2, FaceId(0));
-        assert_eq!(stars.growth(&[0, 1, 2]), 4 + 8, "one block of four, one of eight, and a place that is there");
+        assert_eq!(
+            stars.growth(&[0, 1, 2]),
+            4 + 8,
+            "one block of four, one of eight, and a place that is there"
+        );
         assert!(stars.have_room(&[0, 1, 2]));
     }
 }

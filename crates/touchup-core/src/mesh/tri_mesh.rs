@@ -61,7 +61,9 @@ pub enum MeshError {
         vertex: usize,
     },
     /// More faces or vertices than 32-bit ids can name, or than there is memory for.
-    #[error("{count} {what} are more than 32-bit numbers can count or memory can hold: reduce the mesh first")]
+    #[error(
+        "{count} {what} are more than 32-bit numbers can count or memory can hold: reduce the mesh first"
+    )]
     TooMany {
         /// "faces" or "vertices"
         what: &'static str,
@@ -94,7 +96,10 @@ impl TriMesh {
     /// # Errors
     /// Every breach of the invariants above; nothing is repaired here.
     pub fn new(positions: Vec<Point3<f64>>, faces: Vec<[u32; 3]>) -> Result<Self, MeshError> {
-        for (what, count, limit) in [("vertices", positions.len(), MOST_VERTICES), ("faces", faces.len(), MOST_FACES)] {
+        for (what, count, limit) in [
+            ("vertices", positions.len(), MOST_VERTICES),
+            ("faces", faces.len(), MOST_FACES),
+        ] {
             if count > limit {
                 return Err(MeshError::TooMany { what, count });
             }
@@ -111,10 +116,25 @@ impl TriMesh {
     }
 
     /// Builds the adjacency of arrays that keep the invariants above, and whose faces have been counted.
-    pub(super) fn of_sound(positions: Vec<Point3<f64>>, faces: Vec<[u32; 3]>, valences: Valences) -> Self {
-        debug_assert!(faces.iter().all(|corners| check_corners(corners, 0, positions.len()).is_ok()));
+    pub(super) fn of_sound(
+        positions: Vec<Point3<f64>>,
+        faces: Vec<[u32; 3]>,
+        valences: Valences,
+    ) -> Self {
+        debug_assert!(
+            faces
+                .iter()
+                .all(|corners| check_corners(corners, 0, positions.len()).is_ok())
+        );
         let stars = valences.stars_of(&faces);
-        Self { positions, faces, stars, free_faces: Vec::new(), free_vertices: Vec::new(), journal: None }
+        Self {
+            positions,
+            faces,
+            stars,
+            free_faces: Vec::new(),
+            free_vertices: Vec::new(),
+            journal: None,
+        }
     }
 
     /// Number of vertices, removed ones not counted.
@@ -145,12 +165,18 @@ impl TriMesh {
     /// The lowest and the highest corner of the box around all vertices, m, in O; inverted where there is none.
     pub fn bounds(&self) -> [Point3<f64>; 2] {
         let empty = [f64::INFINITY, f64::NEG_INFINITY].map(|x| Point3::new(x, x, x));
-        self.positions.iter().fold(empty, |[lo, hi], p| [lo.inf(p), hi.sup(p)])
+        self.positions
+            .iter()
+            .fold(empty, |[lo, hi], p| [lo.inf(p), hi.sup(p)])
     }
 
     /// All faces with their ids, in order of id, removed ones left out.
     pub fn faces(&self) -> impl Iterator<Item = (FaceId, [VertexId; 3])> + '_ {
-        let there = self.faces.iter().enumerate().filter(|(_, corners)| corners[0] != REMOVED);
+        let there = self
+            .faces
+            .iter()
+            .enumerate()
+            .filter(|(_, corners)| corners[0] != REMOVED);
         there.map(|(face, corners)| (FaceId(face as u32), corners.map(VertexId)))
     }
 
@@ -161,7 +187,9 @@ impl TriMesh {
 
     /// Whether `face` names a face that is there.
     pub fn has_face(&self, face: FaceId) -> bool {
-        self.faces.get(face.0 as usize).is_some_and(|corners| corners[0] != REMOVED)
+        self.faces
+            .get(face.0 as usize)
+            .is_some_and(|corners| corners[0] != REMOVED)
     }
 
     /// The corners of a face, counter-clockwise seen from outside.
@@ -233,13 +261,17 @@ impl TriMesh {
 
     /// The faces that share the edge from `a` to `b` (either direction), in no particular order.
     pub fn faces_at_edge(&self, a: VertexId, b: VertexId) -> impl Iterator<Item = FaceId> + '_ {
-        self.star(a).iter().copied().filter(move |&f| self.corners(f).contains(&b))
+        self.star(a)
+            .iter()
+            .copied()
+            .filter(move |&f| self.corners(f).contains(&b))
     }
 
     /// Whether no edge is that of one face alone. O(F).
     pub fn is_closed(&self) -> bool {
         let is_rim = |a, b| self.faces_at_edge(a, b).nth(1).is_none();
-        self.faces().all(|(_, [a, b, c])| !is_rim(a, b) && !is_rim(b, c) && !is_rim(c, a))
+        self.faces()
+            .all(|(_, [a, b, c])| !is_rim(a, b) && !is_rim(b, c) && !is_rim(c, a))
     }
 
     /// Moves one vertex; an index over the faces must be refitted ([`crate::mesh::FaceTree::refit`]).
@@ -252,13 +284,18 @@ impl TriMesh {
 
     /// From here on notes what changes, for [`Self::take_changes`].
     pub fn watch(&mut self) {
-        self.journal = Some(Box::new(Journal::new(self.vertex_slots(), self.face_slots())));
+        self.journal = Some(Box::new(Journal::new(
+            self.vertex_slots(),
+            self.face_slots(),
+        )));
     }
 
     /// Lists what changed since the last call, up to `most` vertices and as many faces, and adds it to `into`; returns
     /// whether that was all. Nothing before [`Self::watch`].
     pub fn take_changes(&mut self, most: usize, into: &mut Changes) -> bool {
-        self.journal.as_mut().is_none_or(|journal| journal.take(most, into))
+        self.journal
+            .as_mut()
+            .is_none_or(|journal| journal.take(most, into))
     }
 
     /// Mean edge length, m, of up to 20,000 faces spread over the mesh; 0 without faces.
@@ -298,9 +335,15 @@ impl TriMesh {
     /// [`MeshError::TooMany`] where memory is short.
     pub fn reserve(&mut self, vertices: usize, faces: usize) -> Result<(), MeshError> {
         let short = |what, count| MeshError::TooMany { what, count };
-        self.positions.try_reserve(vertices).map_err(|_| short("vertices", vertices))?;
-        self.faces.try_reserve(faces).map_err(|_| short("faces", faces))?;
-        self.stars.reserve(vertices, faces).ok_or(short("faces", faces))
+        self.positions
+            .try_reserve(vertices)
+            .map_err(|_| short("vertices", vertices))?;
+        self.faces
+            .try_reserve(faces)
+            .map_err(|_| short("faces", faces))?;
+        self.stars
+            .reserve(vertices, faces)
+            .ok_or(short("faces", faces))
     }
 
     /// Memory, bytes.
@@ -319,12 +362,18 @@ impl TriMesh {
     /// [`MeshError::NotFinite`], [`MeshError::TooMany`].
     pub fn add_vertex(&mut self, position: Point3<f64>) -> Result<VertexId, MeshError> {
         let next = self.positions.len();
-        let vertex = self.free_vertices.last().map_or(next, |vertex| vertex.0 as usize);
+        let vertex = self
+            .free_vertices
+            .last()
+            .map_or(next, |vertex| vertex.0 as usize);
         if !is_place(&position) {
             return Err(MeshError::NotFinite { vertex });
         }
         if vertex >= MOST_VERTICES {
-            return Err(MeshError::TooMany { what: "vertices", count: vertex + 1 });
+            return Err(MeshError::TooMany {
+                what: "vertices",
+                count: vertex + 1,
+            });
         }
         match self.free_vertices.pop() {
             Some(_) => self.positions[vertex] = position,
@@ -360,14 +409,19 @@ impl TriMesh {
             return Err(MeshError::RemovedVertex { face, vertex });
         }
         if face >= MOST_FACES || !self.stars.have_room(&corners) {
-            return Err(MeshError::TooMany { what: "faces", count: self.face_count() + 1 });
+            return Err(MeshError::TooMany {
+                what: "faces",
+                count: self.face_count() + 1,
+            });
         }
         match self.free_faces.pop() {
             Some(_) => self.faces[face] = corners,
             None => self.faces.push(corners),
         }
         let face = FaceId(face as u32);
-        corners.into_iter().for_each(|vertex| self.stars.push(vertex, face));
+        corners
+            .into_iter()
+            .for_each(|vertex| self.stars.push(vertex, face));
         self.note_face(face);
         Ok(face)
     }
@@ -380,7 +434,9 @@ impl TriMesh {
             return false;
         }
         let corners = std::mem::replace(&mut self.faces[face.0 as usize], [REMOVED; 3]);
-        corners.into_iter().for_each(|vertex| self.stars.remove(vertex, face));
+        corners
+            .into_iter()
+            .for_each(|vertex| self.stars.remove(vertex, face));
         self.free_faces.push(face);
         self.note_face(face);
         true
@@ -401,11 +457,18 @@ pub fn is_place(p: &Point3<f64>) -> bool {
 
 fn check_corners(corners: &[u32; 3], face: usize, vertices: usize) -> Result<(), MeshError> {
     if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= vertices) {
-        return Err(MeshError::VertexOutOfRange { face, vertex, vertices });
+        return Err(MeshError::VertexOutOfRange {
+            face,
+            vertex,
+            vertices,
+        });
     }
     let [a, b, c] = *corners;
     if a == b || b == c || c == a {
-        return Err(MeshError::RepeatedVertex { face, vertex: if b == c { b } else { a } });
+        return Err(MeshError::RepeatedVertex {
+            face,
+            vertex: if b == c { b } else { a },
+        });
     }
     Ok(())
 }
@@ -416,8 +479,12 @@ mod tests {
 
     /// Two triangles that share the edge 1–2.
     fn quad() -> TriMesh {
-        let positions =
-            vec![Point3::origin(), Point3::new(1.0, 0.0, 0.0), Point3::new(0.0, 1.0, 0.0), Point3::new(1.0, 1.0, 0.0)];
+        let positions = vec![
+            Point3::origin(),
+            Point3::new(1.0, 0.0, 0.0),
+            Point3::new(0.0, 1.0, 0.0),
+            Point3::new(1.0, 1.0, 0.0),
+        ];
         TriMesh::new(positions, vec![[0, 1, 2], [1, 3, 2]]).unwrap()
     }
 
@@ -427,11 +494,23 @@ mod tests {
         assert_eq!(mesh.star(VertexId(1)), [FaceId(0), FaceId(1)]);
         assert!(mesh.remove_face(FaceId(0)));
         assert!(!mesh.remove_face(FaceId(0)));
-        assert_eq!((mesh.face_count(), mesh.star(VertexId(0)).len(), mesh.star(VertexId(1)).len()), (1, 0, 1));
+        assert_eq!(
+            (
+                mesh.face_count(),
+                mesh.star(VertexId(0)).len(),
+                mesh.star(VertexId(1)).len()
+            ),
+            (1, 0, 1)
+        );
         let centre = mesh.add_vertex(Point3::new(0.2, 0.2, 0.0)).unwrap();
-        let added: Vec<_> =
-            [[0, 1], [1, 2], [2, 0]].map(|[a, b]| mesh.add_face([VertexId(a), VertexId(b), centre]).unwrap()).into();
-        assert_eq!(added, [FaceId(0), FaceId(2), FaceId(3)], "a freed slot is used first");
+        let added: Vec<_> = [[0, 1], [1, 2], [2, 0]]
+            .map(|[a, b]| mesh.add_face([VertexId(a), VertexId(b), centre]).unwrap())
+            .into();
+        assert_eq!(
+            added,
+            [FaceId(0), FaceId(2), FaceId(3)],
+            "a freed slot is used first"
+        );
         assert_eq!(mesh.star(centre).len(), 3);
         assert_eq!(mesh.faces_at_edge(VertexId(2), VertexId(1)).count(), 2);
         assert_eq!(mesh.faces().count(), 4);
@@ -439,10 +518,18 @@ mod tests {
 
     #[test]
     fn breaches_of_the_invariants_are_refused() {
-        let p = vec![Point3::origin(), Point3::new(1.0, 0.0, 0.0), Point3::new(0.0, 1.0, 0.0)];
+        let p = vec![
+            Point3::origin(),
+            Point3::new(1.0, 0.0, 0.0),
+            Point3::new(0.0, 1.0, 0.0),
+        ];
         assert_eq!(
             TriMesh::new(p.clone(), vec![[0, 1, 3]]).unwrap_err(),
-            MeshError::VertexOutOfRange { face: 0, vertex: 3, vertices: 3 }
+            MeshError::VertexOutOfRange {
+                face: 0,
+                vertex: 3,
+                vertices: 3
+            }
         );
         assert_eq!(
             TriMesh::new(p.clone(), vec![[0, 1, 1]]).unwrap_err(),
@@ -450,7 +537,10 @@ mod tests {
         );
         let mut bad = p;
         bad[2].y = f64::NAN;
-        assert_eq!(TriMesh::new(bad, vec![[0, 1, 2]]).unwrap_err(), MeshError::NotFinite { vertex: 2 });
+        assert_eq!(
+            TriMesh::new(bad, vec![[0, 1, 2]]).unwrap_err(),
+            MeshError::NotFinite { vertex: 2 }
+        );
     }
 
     #[test]
@@ -459,13 +549,33 @@ mod tests {
         assert!(!mesh.remove_vertex(VertexId(3)), "in use");
         assert!(mesh.remove_face(FaceId(1)));
         assert!(mesh.remove_vertex(VertexId(3)));
-        assert!(!mesh.remove_vertex(VertexId(3)) && !mesh.has_vertex(VertexId(3)), "gone");
+        assert!(
+            !mesh.remove_vertex(VertexId(3)) && !mesh.has_vertex(VertexId(3)),
+            "gone"
+        );
         assert!(!mesh.remove_vertex(VertexId(4)), "never there");
-        assert_eq!((mesh.vertex_count(), mesh.vertex_slots(), mesh.star(VertexId(3)).len()), (3, 4, 0));
+        assert_eq!(
+            (
+                mesh.vertex_count(),
+                mesh.vertex_slots(),
+                mesh.star(VertexId(3)).len()
+            ),
+            (3, 4, 0)
+        );
         let corners = [1, 3, 2].map(VertexId);
-        assert_eq!(mesh.add_face(corners), Err(MeshError::RemovedVertex { face: 1, vertex: 3 }));
-        assert_eq!(mesh.add_vertex(Point3::new(2.0, 2.0, 0.0)), Ok(VertexId(3)), "a freed slot is used first");
+        assert_eq!(
+            mesh.add_face(corners),
+            Err(MeshError::RemovedVertex { face: 1, vertex: 3 })
+        );
+        assert_eq!(
+            mesh.add_vertex(Point3::new(2.0, 2.0, 0.0)),
+            Ok(VertexId(3)),
+            "a freed slot is used first"
+        );
         assert_eq!(mesh.add_face(corners), Ok(FaceId(1)));
-        assert_eq!((mesh.position(VertexId(3)).x, mesh.star(VertexId(3))), (2.0, &[FaceId(1)][..]));
+        assert_eq!(
+            (mesh.position(VertexId(3)).x, mesh.star(VertexId(3))),
+            (2.0, &[FaceId(1)][..])
+        );
     }
 }

@@ -71,7 +71,11 @@ fn closest_point_of_thin(p: &Point3<f64>, corners: [&Point3<f64>; 3]) -> (Point3
         let (s, e) = (corners[i], corners[(i + 1) % 3]);
         let side = e - s;
         let length = side.norm_squared();
-        let t = if length > 0.0 { ((p - s).dot(&side) / length).clamp(0.0, 1.0) } else { 0.0 };
+        let t = if length > 0.0 {
+            ((p - s).dot(&side) / length).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
         let mut barycentric = [0.0; 3];
         (barycentric[i], barycentric[(i + 1) % 3]) = (1.0 - t, t);
         take(s + side * t, barycentric);
@@ -80,7 +84,9 @@ fn closest_point_of_thin(p: &Point3<f64>, corners: [&Point3<f64>; 3]) -> (Point3
     let (double_area, normal) = length_and_direction(&double);
     if double_area > 0.0 {
         let foot = p - normal * normal.dot(&(p - corners[0]));
-        let share = |s: &Point3<f64>, e: &Point3<f64>| normal.dot(&(s - foot).cross(&(e - foot))) / double_area;
+        let share = |s: &Point3<f64>, e: &Point3<f64>| {
+            normal.dot(&(s - foot).cross(&(e - foot))) / double_area
+        };
         let (u, v) = (share(corners[1], corners[2]), share(corners[2], corners[0]));
         if u >= 0.0 && v >= 0.0 && u + v <= 1.0 {
             take(foot, [u, v, 1.0 - u - v]);
@@ -93,9 +99,16 @@ fn closest_point_of_thin(p: &Point3<f64>, corners: [&Point3<f64>; 3]) -> (Point3
 ///
 /// `gap` widens the triangle in its plane and lengthens the segment; pass a small share of the edge length.
 #[inline]
-pub fn segment_crosses(p: &Point3<f64>, q: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3], gap: f64) -> bool {
+pub fn segment_crosses(
+    p: &Point3<f64>,
+    q: &Point3<f64>,
+    [a, b, c]: &[Point3<f64>; 3],
+    gap: f64,
+) -> bool {
     let normal = (b - a).cross(&(c - a));
-    let Some(unit) = direction(&normal) else { return false };
+    let Some(unit) = direction(&normal) else {
+        return false;
+    };
     let (hp, hq) = (unit.dot(&(p - a)), unit.dot(&(q - a)));
     if hp.min(hq) > gap || hp.max(hq) < -gap {
         return false;
@@ -141,7 +154,10 @@ fn coplanar_overlap(
 
 /// Whether two triangles without a common corner meet, or come within `gap` (m) as in [`segment_crosses`].
 pub fn intersect(t: &[Point3<f64>; 3], u: &[Point3<f64>; 3], gap: f64) -> bool {
-    (0..3).any(|i| segment_crosses(&t[i], &t[(i + 1) % 3], u, gap) || segment_crosses(&u[i], &u[(i + 1) % 3], t, gap))
+    (0..3).any(|i| {
+        segment_crosses(&t[i], &t[(i + 1) % 3], u, gap)
+            || segment_crosses(&u[i], &u[(i + 1) % 3], t, gap)
+    })
 }
 
 /// Lowest and highest coordinates, m.
@@ -150,7 +166,10 @@ pub(crate) type Extent = (Vector3<f64>, Vector3<f64>);
 /// The extent of a triangle.
 #[inline]
 pub(crate) fn extent([a, b, c]: &[Point3<f64>; 3]) -> Extent {
-    (a.coords.inf(&b.coords).inf(&c.coords), a.coords.sup(&b.coords).sup(&c.coords))
+    (
+        a.coords.inf(&b.coords).inf(&c.coords),
+        a.coords.sup(&b.coords).sup(&c.coords),
+    )
 }
 
 /// Whether two extents are farther than `gap` (m) from each other along some axis.
@@ -162,11 +181,18 @@ pub(crate) fn are_apart(a: &Extent, b: &Extent, gap: f64) -> bool {
 /// Whether two triangles that share no edge meet, other than in their common corner, or come within `gap` (m) as in [`intersect`].
 ///
 /// - `common`: index of the common corner in either.
-pub(crate) fn meet(t: &[Point3<f64>; 3], u: &[Point3<f64>; 3], common: Option<[u8; 2]>, gap: f64) -> bool {
+pub(crate) fn meet(
+    t: &[Point3<f64>; 3],
+    u: &[Point3<f64>; 3],
+    common: Option<[u8; 2]>,
+    gap: f64,
+) -> bool {
     if are_apart(&extent(t), &extent(u), gap) {
         return false;
     }
-    let Some([i, j]) = common.map(|pair| pair.map(usize::from)) else { return intersect(t, u, gap) };
+    let Some([i, j]) = common.map(|pair| pair.map(usize::from)) else {
+        return intersect(t, u, gap);
+    };
     segment_crosses(&t[(i + 1) % 3], &t[(i + 2) % 3], u, 0.0)
         || segment_crosses(&u[(j + 1) % 3], &u[(j + 2) % 3], t, 0.0)
 }
@@ -174,12 +200,19 @@ pub(crate) fn meet(t: &[Point3<f64>; 3], u: &[Point3<f64>; 3], common: Option<[u
 /// The square of the longest edge, m².
 #[inline]
 pub(crate) fn longest_edge_squared(t: &[Point3<f64>; 3]) -> f64 {
-    (t[1] - t[0]).norm_squared().max((t[2] - t[1]).norm_squared()).max((t[0] - t[2]).norm_squared())
+    (t[1] - t[0])
+        .norm_squared()
+        .max((t[2] - t[1]).norm_squared())
+        .max((t[0] - t[2]).norm_squared())
 }
 
 /// Twice the area over the square of the longest edge: 0.87 for an equilateral triangle, 0 for one without area.
 #[inline]
 pub fn shape_quality(t: &[Point3<f64>; 3], double_area: f64) -> f64 {
     let longest = longest_edge_squared(t);
-    if longest > 0.0 { double_area / longest } else { 0.0 }
+    if longest > 0.0 {
+        double_area / longest
+    } else {
+        0.0
+    }
 }

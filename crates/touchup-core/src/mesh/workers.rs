@@ -31,7 +31,11 @@ impl Workers for Alone {
 const LEAST_PIECE: usize = 4_000;
 
 /// What `each` makes of 0 to `count` − 1, in this order, for any workers.
-pub(crate) fn map_by<T: Send>(workers: &dyn Workers, count: usize, each: impl Fn(usize) -> T + Sync) -> Vec<T> {
+pub(crate) fn map_by<T: Send>(
+    workers: &dyn Workers,
+    count: usize,
+    each: impl Fn(usize) -> T + Sync,
+) -> Vec<T> {
     map_pieces_by(workers, count, LEAST_PIECE, each)
 }
 
@@ -81,7 +85,11 @@ mod tests {
         for count in [0, 1, LEAST_PIECE - 1, 2 * LEAST_PIECE, 3 * LEAST_PIECE + 1] {
             let by_hand: Vec<usize> = (0..count).map(|i| i * i).collect();
             for workers in 1..6 {
-                assert_eq!(map_by(&Backwards(workers), count, |i| i * i), by_hand, "{count} by {workers}");
+                assert_eq!(
+                    map_by(&Backwards(workers), count, |i| i * i),
+                    by_hand,
+                    "{count} by {workers}"
+                );
             }
             assert_eq!(map_by(&Alone, count, |i| i * i), by_hand);
         }

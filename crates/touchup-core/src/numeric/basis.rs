@@ -8,15 +8,20 @@ const FAR_FROM_X: f64 = 0.6;
 /// Two unit vectors u and v across `axis`, a unit vector: (u, v, axis) is right-handed. No continuous choice exists: where
 /// they are discontinuous as the axis turns is not defined.
 pub(crate) fn tangent_basis(axis: &Vector3<f64>) -> [Vector3<f64>; 2] {
-    let aside = if axis.x.abs() < FAR_FROM_X { Vector3::x() } else { Vector3::y() };
+    let aside = if axis.x.abs() < FAR_FROM_X {
+        Vector3::x()
+    } else {
+        Vector3::y()
+    };
     let u = axis.cross(&aside).normalize();
     [u, axis.cross(&u)]
 }
 
 /// The smallest turn that takes z to a direction; half a turn about x to the opposite one.
 pub fn turned_to(direction: &Vector3<f64>) -> UnitQuaternion<f64> {
-    UnitQuaternion::rotation_between(&Vector3::z(), direction)
-        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI))
+    UnitQuaternion::rotation_between(&Vector3::z(), direction).unwrap_or_else(|| {
+        UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
+    })
 }
 
 #[cfg(test)]
@@ -35,7 +40,10 @@ mod tests {
         for x in [0.0, 0.599, 0.601, -0.7, 1.0f64] {
             let axis = Vector3::new(x, (1.0 - x * x).sqrt() * 0.8, (1.0 - x * x).sqrt() * 0.6);
             let [u, v] = tangent_basis(&axis);
-            assert!((u.cross(&v) - axis).norm() < 1e-15 && (u.norm() - 1.0).abs() < 1e-15, "{x}");
+            assert!(
+                (u.cross(&v) - axis).norm() < 1e-15 && (u.norm() - 1.0).abs() < 1e-15,
+                "{x}"
+            );
         }
     }
 }

@@ -31,7 +31,10 @@ fn scaled(v: &Vector3<f64>) -> (f64, Vector3<f64>) {
     let largest = v.amax();
     if largest == 0.0 || !v.iter().all(|x| x.is_finite()) {
         // NaN is a length that no comparison holds for
-        return (if largest == 0.0 { 0.0 } else { f64::NAN }, Vector3::zeros());
+        return (
+            if largest == 0.0 { 0.0 } else { f64::NAN },
+            Vector3::zeros(),
+        );
     }
     let scaled = v / largest;
     let length = scaled.norm();
@@ -49,16 +52,32 @@ mod tests {
         for exponent in -1000..1000 {
             let size = 2.0f64.powi(exponent);
             let (length, found) = length_and_direction(&(Vector3::new(2.0, -3.0, 6.0) * size));
-            assert!((length / size - 7.0).abs() < 1e-14, "2^{exponent}: {length:e}");
-            assert!((found - Vector3::new(wanted.x, -wanted.y, wanted.z)).amax() < 1e-15, "2^{exponent}: {found}");
+            assert!(
+                (length / size - 7.0).abs() < 1e-14,
+                "2^{exponent}: {length:e}"
+            );
+            assert!(
+                (found - Vector3::new(wanted.x, -wanted.y, wanted.z)).amax() < 1e-15,
+                "2^{exponent}: {found}"
+            );
         }
     }
 
     #[test]
     fn denormal_and_zero_and_infinite_vectors_are_told_apart() {
-        assert_eq!(direction(&Vector3::new(0.0, -5e-324, 0.0)), Some(-Vector3::y()));
-        assert_eq!(direction(&Vector3::new(f64::MAX, 0.0, 0.0)), Some(Vector3::x()));
-        for v in [Vector3::zeros(), Vector3::new(f64::INFINITY, 0.0, 0.0), Vector3::new(f64::NAN, 1.0, 0.0)] {
+        assert_eq!(
+            direction(&Vector3::new(0.0, -5e-324, 0.0)),
+            Some(-Vector3::y())
+        );
+        assert_eq!(
+            direction(&Vector3::new(f64::MAX, 0.0, 0.0)),
+            Some(Vector3::x())
+        );
+        for v in [
+            Vector3::zeros(),
+            Vector3::new(f64::INFINITY, 0.0, 0.0),
+            Vector3::new(f64::NAN, 1.0, 0.0),
+        ] {
             assert_eq!(direction(&v), None);
         }
     }

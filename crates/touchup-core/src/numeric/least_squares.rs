@@ -17,7 +17,11 @@ pub(crate) struct NormalEquations<const N: usize> {
 
 impl<const N: usize> Default for NormalEquations<N> {
     fn default() -> Self {
-        Self { information: SMatrix::zeros(), right: SVector::zeros(), square: 0.0 }
+        Self {
+            information: SMatrix::zeros(),
+            right: SVector::zeros(),
+            square: 0.0,
+        }
     }
 }
 
@@ -25,7 +29,8 @@ impl<const N: usize> NormalEquations<N> {
     /// Of rows and values of weight 1.
     pub fn of(rows: impl IntoIterator<Item = (SVector<f64, N>, f64)>) -> Self {
         let mut sums = Self::default();
-        rows.into_iter().for_each(|(row, value)| sums.add(&row, value, 1.0));
+        rows.into_iter()
+            .for_each(|(row, value)| sums.add(&row, value, 1.0));
         sums
     }
 
@@ -114,7 +119,9 @@ impl DampedSearch {
     ) -> (T, f64, SearchEnd) {
         let (mut damping, mut here) = (self.first, equations(&place));
         for _ in 0..self.tries {
-            let Some(step) = damped(here, damping).solution() else { return (place, cost, SearchEnd::Singular) };
+            let Some(step) = damped(here, damping).solution() else {
+                return (place, cost, SearchEnd::Singular);
+            };
             let factor = if let Some(next) = better(&place, &step, cost) {
                 (place, cost) = next;
                 if is_last(&step, &here) {
@@ -146,7 +153,10 @@ mod tests {
         let points = [(0.0, 1.0), (1.0, 2.0), (2.0, 5.0)];
         let sums = NormalEquations::of(points.map(|(x, y)| (Vector2::new(1.0, x), y)));
         let line = sums.solution().unwrap();
-        assert!((line - Vector2::new(2.0 / 3.0, 2.0)).norm() < 1e-14, "{line}");
+        assert!(
+            (line - Vector2::new(2.0 / 3.0, 2.0)).norm() < 1e-14,
+            "{line}"
+        );
         assert!((sums.residual_square(&line) - 2.0 / 3.0).abs() < 1e-13);
     }
 
@@ -155,12 +165,18 @@ mod tests {
         let (row, other) = (Vector2::new(1.0, -2.0), Vector2::new(0.5, 1.0));
         let mut weighted = NormalEquations::of([(other, 3.0)]);
         weighted.add(&row, 4.0, 2.0);
-        assert_eq!(weighted, NormalEquations::of([(other, 3.0), (row, 4.0), (row, 4.0)]));
+        assert_eq!(
+            weighted,
+            NormalEquations::of([(other, 3.0), (row, 4.0), (row, 4.0)])
+        );
     }
 
     #[test]
     fn parallel_rows_determine_nothing() {
-        assert_eq!(NormalEquations::of([(Vector2::new(1.0, 0.0), 1.0)]).solution(), None);
+        assert_eq!(
+            NormalEquations::of([(Vector2::new(1.0, 0.0), 1.0)]).solution(),
+            None
+        );
     }
 
     /// The bent valley of Rosenbrock, as two residuals 1 − x and 10 (y − x²): its least is 0 at (1, 1).
@@ -169,16 +185,27 @@ mod tests {
         let residuals = |p: &Vector2<f64>| [1.0 - p.x, 10.0 * (p.y - p.x * p.x)];
         let cost = |p: &Vector2<f64>| residuals(p).map(|r| r * r).iter().sum::<f64>();
         let rows = |p: &Vector2<f64>| [Vector2::new(-1.0, 0.0), Vector2::new(-20.0 * p.x, 10.0)];
-        let search = DampedSearch { first: 1e-3, factors: [0.1, 10.0], least: 1e-12, most: 1e9, tries: 200 };
+        let search = DampedSearch {
+            first: 1e-3,
+            factors: [0.1, 10.0],
+            least: 1e-12,
+            most: 1e9,
+            tries: 200,
+        };
         let start = Vector2::new(-1.2, 1.0);
         let (end, left, why) = search.run(
             (start, cost(&start)),
             |p| NormalEquations::of(rows(p).into_iter().zip(residuals(p).map(|r| -r))),
             NormalEquations::damped,
-            |p, step, before| Some((p + step, cost(&(p + step)))).filter(|(_, after)| *after <= before),
+            |p, step, before| {
+                Some((p + step, cost(&(p + step)))).filter(|(_, after)| *after <= before)
+            },
             |step, _| step.norm() < 1e-12,
         );
-        assert!((end - Vector2::new(1.0, 1.0)).norm() < 1e-9 && left < 1e-18, "{end} {left}");
+        assert!(
+            (end - Vector2::new(1.0, 1.0)).norm() < 1e-9 && left < 1e-18,
+            "{end} {left}"
+        );
         assert_eq!(why, SearchEnd::Converged);
     }
 }

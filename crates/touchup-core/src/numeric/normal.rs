@@ -53,7 +53,11 @@ pub fn normal_quantile(share: f64) -> f64 {
     let (mut low, mut high) = (-40.0, 40.0);
     for _ in 0..80 {
         let middle = f64::midpoint(low, high);
-        if normal_cdf(middle) < share { low = middle } else { high = middle }
+        if normal_cdf(middle) < share {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     f64::midpoint(low, high)
 }
@@ -106,9 +110,16 @@ mod tests {
             (-6.0, 9.865_876_450_376_98e-10),
         ];
         for (z, expected) in table {
-            assert!((normal_cdf(z) - expected).abs() < 4e-16 + 1e-12 * expected, "{z}: {}", normal_cdf(z));
+            assert!(
+                (normal_cdf(z) - expected).abs() < 4e-16 + 1e-12 * expected,
+                "{z}: {}",
+                normal_cdf(z)
+            );
         }
-        assert_eq!((normal_cdf(f64::INFINITY), normal_cdf(f64::NEG_INFINITY)), (1.0, 0.0));
+        assert_eq!(
+            (normal_cdf(f64::INFINITY), normal_cdf(f64::NEG_INFINITY)),
+            (1.0, 0.0)
+        );
     }
 
     #[test]
@@ -122,9 +133,15 @@ mod tests {
         assert!((normal_quantile(0.95) - 1.644_853_626_951_472_2).abs() < 1e-12);
         assert!((normal_quantile(0.5)).abs() < 1e-15);
         for share in [1e-12, 0.01, 0.3, 0.77, 0.999] {
-            assert!((normal_cdf(normal_quantile(share)) / share - 1.0).abs() < 1e-9, "{share}");
+            assert!(
+                (normal_cdf(normal_quantile(share)) / share - 1.0).abs() < 1e-9,
+                "{share}"
+            );
         }
-        assert_eq!((normal_quantile(0.0), normal_quantile(1.0)), (f64::NEG_INFINITY, f64::INFINITY));
+        assert_eq!(
+            (normal_quantile(0.0), normal_quantile(1.0)),
+            (f64::NEG_INFINITY, f64::INFINITY)
+        );
     }
 
     /// About the middle it is Rayleigh's distribution, and of a circle much larger than the spread a half-plane.
@@ -132,7 +149,10 @@ mod tests {
     fn a_circle_holds_what_closed_forms_say() {
         for ratio in [0.01, 0.5, 1.0, 3.0, 7.0] {
             let rayleigh = 1.0 - (-0.5f64 * ratio * ratio).exp();
-            assert!((circle_probability(0.0, 2.0, 2.0 * ratio) - rayleigh).abs() < 1e-10, "{ratio}");
+            assert!(
+                (circle_probability(0.0, 2.0, 2.0 * ratio) - rayleigh).abs() < 1e-10,
+                "{ratio}"
+            );
         }
         let half_plane = normal_cdf(1.0);
         assert!((circle_probability(1e4 - 1.0, 1.0, 1e4) - half_plane).abs() < 1e-4);

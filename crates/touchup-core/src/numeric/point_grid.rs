@@ -19,7 +19,10 @@ impl PointGrid {
     ///
     /// - `size`: of a voxel, m, more than 0: the largest distance of a query.
     pub fn new(size: f64) -> Self {
-        Self { size: size.max(f64::MIN_POSITIVE), voxels: HashMap::new() }
+        Self {
+            size: size.max(f64::MIN_POSITIVE),
+            voxels: HashMap::new(),
+        }
     }
 
     /// Of those of `points` that `numbers` name.
@@ -30,14 +33,21 @@ impl PointGrid {
     }
 
     pub fn insert(&mut self, number: u32, point: &Point3<f64>) {
-        self.voxels.entry(voxel_of(point, self.size)).or_default().push((number, *point));
+        self.voxels
+            .entry(voxel_of(point, self.size))
+            .or_default()
+            .push((number, *point));
     }
 
     /// Numbers of the points within `reach` (m, at most the size) of `p`.
     pub fn near(&self, p: &Point3<f64>, reach: f64) -> impl Iterator<Item = usize> + '_ {
         let p = *p;
-        let voxels = voxel_neighbourhood(voxel_of(&p, self.size)).filter_map(|voxel| self.voxels.get(&voxel));
-        voxels.flatten().filter(move |(_, point)| (point - p).norm() <= reach).map(|(number, _)| *number as usize)
+        let voxels = voxel_neighbourhood(voxel_of(&p, self.size))
+            .filter_map(|voxel| self.voxels.get(&voxel));
+        voxels
+            .flatten()
+            .filter(move |(_, point)| (point - p).norm() <= reach)
+            .map(|(number, _)| *number as usize)
     }
 }
 
@@ -47,9 +57,14 @@ mod tests {
 
     #[test]
     fn points_of_a_line_are_found_on_both_sides_of_a_voxel() {
-        let line: Vec<_> = (-4..5).map(|i| Point3::new(f64::from(i) * 0.25, 0.0, 0.0)).collect();
+        let line: Vec<_> = (-4..5)
+            .map(|i| Point3::new(f64::from(i) * 0.25, 0.0, 0.0))
+            .collect();
         let grid = PointGrid::of(&line, 0..line.len(), 0.5);
-        let near = |x: f64| grid.near(&Point3::new(x, 0.0, 0.0), 0.3).collect::<Vec<_>>();
+        let near = |x: f64| {
+            grid.near(&Point3::new(x, 0.0, 0.0), 0.3)
+                .collect::<Vec<_>>()
+        };
         assert_eq!(near(0.0), [3, 4, 5]);
         assert_eq!(near(-1.0), [0, 1]);
         assert_eq!(near(1.31), Vec::<usize>::new());

@@ -23,7 +23,9 @@ pub fn median(values: &mut [f64]) -> Option<f64> {
 ///
 /// - `share`: from the first (0) to the last (1).
 pub fn quantile(rising: &[f64], share: f64) -> f64 {
-    let Some(last) = rising.len().checked_sub(1) else { return 0.0 };
+    let Some(last) = rising.len().checked_sub(1) else {
+        return 0.0;
+    };
     let at = share.clamp(0.0, 1.0) * last as f64;
     let (low, high) = (rising[at.floor() as usize], rising[at.ceil() as usize]);
     low + (high - low) * at.fract()
@@ -41,7 +43,11 @@ pub fn weighted_quantile(values: &mut [(f64, f64)], share: f64) -> Option<f64> {
         below += weight;
         below >= share * total
     };
-    values.iter().find(reached).or(values.last()).map(|(value, _)| *value)
+    values
+        .iter()
+        .find(reached)
+        .or(values.last())
+        .map(|(value, _)| *value)
 }
 
 #[cfg(test)]
@@ -64,8 +70,19 @@ mod tests {
     #[test]
     fn of_a_hundred_numbers_a_share_has_as_many_before_it() {
         let mut numbers: Vec<f64> = (0..100).rev().map(f64::from).collect();
-        for (share, expected) in [(0.0, 0.0), (0.1, 10.0), (0.25, 25.0), (0.9, 90.0), (0.95, 95.0), (1.0, 99.0)] {
-            assert_eq!(order_statistic(&mut numbers, share), Some(expected), "{share}");
+        for (share, expected) in [
+            (0.0, 0.0),
+            (0.1, 10.0),
+            (0.25, 25.0),
+            (0.9, 90.0),
+            (0.95, 95.0),
+            (1.0, 99.0),
+        ] {
+            assert_eq!(
+                order_statistic(&mut numbers, share),
+                Some(expected),
+                "{share}"
+            );
         }
     }
 
@@ -73,7 +90,10 @@ mod tests {
     fn between_two_numbers_it_goes_by_proportion() {
         let five = [0.0, 1.0, 2.0, 3.0, 4.0];
         assert!((quantile(&five, 0.95) - 3.8).abs() < 1e-15);
-        assert_eq!([0.0, 0.5, 1.0].map(|share| quantile(&five, share)), [0.0, 2.0, 4.0]);
+        assert_eq!(
+            [0.0, 0.5, 1.0].map(|share| quantile(&five, share)),
+            [0.0, 2.0, 4.0]
+        );
         assert_eq!(quantile(&[], 0.5), 0.0);
     }
 

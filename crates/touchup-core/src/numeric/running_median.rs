@@ -13,6 +13,7 @@ const STEP: f64 = 0.01;
 impl RunningMedian {
     /// Takes in a length that is larger than the median, or smaller.
     pub(crate) fn note(&mut self, is_larger: bool) {
-        self.length = (self.length * if is_larger { 1.0 + STEP } else { 1.0 - STEP }).max(self.least);
+        self.length =
+            (self.length * if is_larger { 1.0 + STEP } else { 1.0 - STEP }).max(self.least);
     }
 }

@@ -9,7 +9,10 @@ pub(crate) fn distinct<T: Ord>(things: impl IntoIterator<Item = T>) -> Vec<T> {
 }
 
 /// Things in their order, without those that are the same as one before.
-pub(crate) fn without_repeats<T>(things: impl IntoIterator<Item = T>, is_same: impl Fn(&T, &T) -> bool) -> Vec<T> {
+pub(crate) fn without_repeats<T>(
+    things: impl IntoIterator<Item = T>,
+    is_same: impl Fn(&T, &T) -> bool,
+) -> Vec<T> {
     let mut kept: Vec<T> = Vec::new();
     for thing in things {
         if !kept.iter().any(|before| is_same(before, &thing)) {
@@ -67,16 +70,25 @@ mod tests {
     #[test]
     fn a_flood_of_a_line_ends_where_it_is_cut_and_comes_to_each_number_once() {
         let mut seen = [3].into_iter().collect::<std::collections::HashSet<i32>>();
-        let found = flood(vec![3], |at| [at - 1, at + 1], |other| (1..6).contains(&other) && seen.insert(other));
+        let found = flood(
+            vec![3],
+            |at| [at - 1, at + 1],
+            |other| (1..6).contains(&other) && seen.insert(other),
+        );
         assert_eq!(found, [3, 2, 4, 1, 5]);
         assert_eq!(distinct([3, 1, 3, 2, 1]), [1, 2, 3]);
-        assert_eq!(without_repeats([3, 1, -3, 2, -1], |a: &i32, b| a.abs() == b.abs()), [3, 1, 2]);
+        assert_eq!(
+            without_repeats([3, 1, -3, 2, -1], |a: &i32, b| a.abs() == b.abs()),
+            [3, 1, 2]
+        );
     }
 
     #[test]
     fn numbers_that_leave_the_same_rest_end_in_one_set_named_by_the_rest() {
         let mut sets = DisjointSets::of(30);
-        (0..27).rev().for_each(|number| sets.join(number + 3, number));
+        (0..27)
+            .rev()
+            .for_each(|number| sets.join(number + 3, number));
         assert!((0..30).all(|number| sets.root(number) == number % 3));
     }
 }

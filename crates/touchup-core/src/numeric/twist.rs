@@ -17,7 +17,11 @@ pub(crate) fn moved_by_twist(
 /// and by turn, a turn counted by the shift that it gives at the lever.
 ///
 /// - `arm`: of the point from the centre of the turn, m; `normal`: unit, of the plane; `lever`: m, 1 where turns are counted in rad.
-pub(crate) fn point_to_plane_row(arm: &Vector3<f64>, normal: &Vector3<f64>, lever: f64) -> Vector6<f64> {
+pub(crate) fn point_to_plane_row(
+    arm: &Vector3<f64>,
+    normal: &Vector3<f64>,
+    lever: f64,
+) -> Vector6<f64> {
     let turn = arm.cross(normal) / lever;
     Vector6::new(normal.x, normal.y, normal.z, turn.x, turn.y, turn.z)
 }
@@ -32,20 +36,37 @@ mod tests {
     fn a_quarter_turn_about_a_centre_leaves_the_centre_and_moves_the_origin() {
         let centre = Point3::new(1.0, 0.0, 0.0);
         let up = Vector3::new(0.0, 0.0, 3.0);
-        let moved = moved_by_twist(&Isometry3::identity(), &centre, &up, &(Vector3::z() * FRAC_PI_2));
+        let moved = moved_by_twist(
+            &Isometry3::identity(),
+            &centre,
+            &up,
+            &(Vector3::z() * FRAC_PI_2),
+        );
         assert!((moved * centre - Point3::new(1.0, 0.0, 3.0)).norm() < 1e-15);
         assert!((moved * Point3::origin() - Point3::new(1.0, -1.0, 3.0)).norm() < 1e-15);
     }
 
     #[test]
     fn a_row_is_the_derivative_of_the_distance() {
-        let (arm, normal, lever) = (Vector3::new(0.3, -0.2, 0.5), Vector3::new(0.48, 0.6, 0.64), 0.25);
+        let (arm, normal, lever) = (
+            Vector3::new(0.3, -0.2, 0.5),
+            Vector3::new(0.48, 0.6, 0.64),
+            0.25,
+        );
         let row = point_to_plane_row(&arm, &normal, lever);
         let small = 1e-6;
         for i in 0..3 {
             let turn = Vector3::ith(i, small / lever);
-            let moved = moved_by_twist(&Isometry3::identity(), &Point3::origin(), &Vector3::zeros(), &turn) * arm;
-            assert!((normal.dot(&(moved - arm)) / small - row[3 + i]).abs() < 1e-5, "{i}");
+            let moved = moved_by_twist(
+                &Isometry3::identity(),
+                &Point3::origin(),
+                &Vector3::zeros(),
+                &turn,
+            ) * arm;
+            assert!(
+                (normal.dot(&(moved - arm)) / small - row[3 + i]).abs() < 1e-5,
+                "{i}"
+            );
             assert_eq!(row[i], normal[i]);
         }
     }

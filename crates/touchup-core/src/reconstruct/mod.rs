@@ -34,7 +34,9 @@ pub use evidence::outliers::{Outlier, Outliers};
 pub use evidence::point_evidence::{EvidenceParams, Source};
 pub use evidence::stroke_log::StrokeSpan;
 pub use evidence::touches::{SurfaceContact, TipTouch, TouchFinder, TouchFinderParams};
-pub use field::lattice::{Edge, Lattice, LatticeNode, LatticeRegion, NodeValues, Owner, PatchFace, Square, VertexKey};
+pub use field::lattice::{
+    Edge, Lattice, LatticeNode, LatticeRegion, NodeValues, Owner, PatchFace, Square, VertexKey,
+};
 pub use field::piecewise::{FieldParams, FieldScratch, FieldValue};
 pub use field::uncertainty::FitSigma;
 pub use incremental::delta::{PatchDelta, PatchVertex};

@@ -29,7 +29,10 @@ const FIRST_ROOM: usize = 16;
 
 impl<K, V> Default for CellTable<K, V> {
     fn default() -> Self {
-        Self { entries: Vec::new(), slots: vec![EMPTY; FIRST_ROOM] }
+        Self {
+            entries: Vec::new(),
+            slots: vec![EMPTY; FIRST_ROOM],
+        }
     }
 }
 
@@ -101,7 +104,8 @@ impl<K: Key, V> CellTable<K, V> {
     /// The value of `key`, to be changed.
     #[inline]
     pub fn get_mut(&mut self, key: &K) -> Option<&mut V> {
-        self.index_of(key).map(|at| &mut self.entries[at as usize].1)
+        self.index_of(key)
+            .map(|at| &mut self.entries[at as usize].1)
     }
 
     /// The value of the `at`-th key inserted, to be changed.
@@ -215,10 +219,19 @@ mod tests {
         for round in 0..2 {
             table.clear();
             for i in 0..1000i32 {
-                assert_eq!(table.insert_with([i % 7 - 3, -i, 1000 * i], || i), (i as u32, true));
-                assert_eq!(table.insert_with([i % 7 - 3, -i, 1000 * i], || -1), (i as u32, false));
+                assert_eq!(
+                    table.insert_with([i % 7 - 3, -i, 1000 * i], || i),
+                    (i as u32, true)
+                );
+                assert_eq!(
+                    table.insert_with([i % 7 - 3, -i, 1000 * i], || -1),
+                    (i as u32, false)
+                );
             }
-            assert!(table.iter().map(|(_, &value)| value).eq(0..1000), "round {round}");
+            assert!(
+                table.iter().map(|(_, &value)| value).eq(0..1000),
+                "round {round}"
+            );
             assert_eq!(table.get(&[-3, -7, 7000]), Some(&7));
             assert_eq!(table.get(&[-3, -7, 7001]), None);
             table.insert([-3, -7, 7000], 8);
@@ -233,7 +246,9 @@ mod tests {
         let mut map = std::collections::BTreeMap::new();
         let mut state = 7u64;
         for step in 0..20_000u32 {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
             let key = [(state >> 40) as i32 % 12, (state >> 50) as i32 % 9, 0];
             if state >> 63 == 0 {
                 assert_eq!(table.remove(&key), map.remove(&key), "step {step}");
@@ -246,6 +261,8 @@ mod tests {
         let mut rest: Vec<_> = table.iter().map(|(key, value)| (key, *value)).collect();
         rest.sort_unstable();
         assert!(rest.into_iter().eq(map));
-        assert!((0..12).all(|x| (0..9).all(|y| table.get(&[x, y, 0]).is_some() == table.contains(&[x, y, 0]))));
+        assert!((0..12).all(|x| {
+            (0..9).all(|y| table.get(&[x, y, 0]).is_some() == table.contains(&[x, y, 0]))
+        }));
     }
 }

@@ -60,7 +60,14 @@ impl BiasTracker {
     pub fn new(params: BiasParams) -> Result<Self, SettingError> {
         params.check()?;
         let zero = Vector3::zeros();
-        Ok(Self { params, bias_t: zero, began_t: [zero; 2], span_ns: 0, free_since_ns: None, last_ns: 0 })
+        Ok(Self {
+            params,
+            bias_t: zero,
+            began_t: [zero; 2],
+            span_ns: 0,
+            free_since_ns: None,
+            last_ns: 0,
+        })
     }
 
     /// The force of the next tip without the bias, N, in O.
@@ -68,7 +75,11 @@ impl BiasTracker {
     /// - `tip`: later than the one before.
     /// - `is_free`: whether a force without the bias, N, is one of free motion.
     #[inline]
-    pub fn compensate(&mut self, tip: &Tip, is_free: impl FnOnce(&Vector3<f64>) -> bool) -> Vector3<f64> {
+    pub fn compensate(
+        &mut self,
+        tip: &Tip,
+        is_free: impl FnOnce(&Vector3<f64>) -> bool,
+    ) -> Vector3<f64> {
         let rotation = &tip.pose_ot.rotation;
         let rest_t = rotation.inverse_transform_vector(&tip.force_o) - self.bias_t;
         let since_last_ns = tip.stamp_ns.saturating_sub(self.last_ns);
@@ -120,7 +131,12 @@ mod tests {
 
     fn tip(ms: i64, rotation: UnitQuaternion<f64>, force_o: Vector3<f64>) -> Tip {
         let pose_ot = Isometry3::from_parts(Vector3::new(0.1, 0.2, 0.3).into(), rotation);
-        Tip { stamp_ns: ms * MS, pose_ot, force_o, torque_o: Vector3::zeros() }
+        Tip {
+            stamp_ns: ms * MS,
+            pose_ot,
+            force_o,
+            torque_o: Vector3::zeros(),
+        }
     }
 
     fn is_below(rest: &Vector3<f64>) -> bool {
@@ -138,7 +154,11 @@ mod tests {
         let mut tracker = tracker();
         for ms in 0..=1000 {
             let rest = tracker.compensate(&tip(ms, UnitQuaternion::identity(), drift), is_below);
-            let share = if ms < 60 { 0.0 } else { 1.0 - (-((ms - 59) as f64) * 1e-3 / 0.3).exp() };
+            let share = if ms < 60 {
+                0.0
+            } else {
+                1.0 - (-((ms - 59) as f64) * 1e-3 / 0.3).exp()
+            };
             assert!((tracker.bias_t() - drift * share).norm() < 1e-12, "{ms} ms");
             assert_eq!(rest, drift - tracker.bias_t());
         }
@@ -154,7 +174,10 @@ mod tests {
             let rotation = UnitQuaternion::from_euler_angles(0.7 * t, -0.4 * t, 1.1 * t);
             let rest_o = tracker.compensate(&tip(ms, rotation, rotation * (slope * t)), is_below);
             if ms > 4000 {
-                assert!((rest_o - rotation * (slope * time)).norm() < 1e-4, "{rest_o}");
+                assert!(
+                    (rest_o - rotation * (slope * time)).norm() < 1e-4,
+                    "{rest_o}"
+                );
             }
         }
     }
@@ -168,9 +191,20 @@ mod tests {
             let (turn, within) = (ms / 1000, ms % 1000);
             let ramp = 10 + turn * 30 / 20;
             let level = ((within - 600).min(1000 - within).clamp(0, ramp)) as f64 / ramp as f64;
-            tracker.compensate(&tip(ms, UnitQuaternion::identity(), drift + Vector3::z() * (2.0 * level)), is_below);
+            tracker.compensate(
+                &tip(
+                    ms,
+                    UnitQuaternion::identity(),
+                    drift + Vector3::z() * (2.0 * level),
+                ),
+                is_below,
+            );
             if ms > 14_000 && level > 0.5 {
-                assert!((tracker.bias_t() - drift).norm() < 1e-6, "{ms} ms: {}", tracker.bias_t());
+                assert!(
+                    (tracker.bias_t() - drift).norm() < 1e-6,
+                    "{ms} ms: {}",
+                    tracker.bias_t()
+                );
             }
         }
     }
@@ -180,7 +214,10 @@ mod tests {
         for force in [2.0, 0.3] {
             let mut tracker = tracker();
             for ms in 0..5000 {
-                tracker.compensate(&tip(ms, UnitQuaternion::identity(), Vector3::z() * force), is_below);
+                tracker.compensate(
+                    &tip(ms, UnitQuaternion::identity(), Vector3::z() * force),
+                    is_below,
+                );
             }
             assert_eq!(tracker.bias_t(), Vector3::zeros());
         }
@@ -190,10 +227,16 @@ mod tests {
     fn one_sample_after_a_pause_does_not_count_for_all_of_it() {
         let mut tracker = tracker();
         for ms in 0..2000 {
-            tracker.compensate(&tip(ms, UnitQuaternion::identity(), Vector3::x() * 0.1), is_below);
+            tracker.compensate(
+                &tip(ms, UnitQuaternion::identity(), Vector3::x() * 0.1),
+                is_below,
+            );
         }
         let before = tracker.bias_t();
-        tracker.compensate(&tip(60_000, UnitQuaternion::identity(), Vector3::x() * -0.15), is_below);
+        tracker.compensate(
+            &tip(60_000, UnitQuaternion::identity(), Vector3::x() * -0.15),
+            is_below,
+        );
         assert_eq!(tracker.bias_t(), before);
     }
 
@@ -201,9 +244,18 @@ mod tests {
     fn settings_without_a_meaning_are_refused() {
         let good = BiasParams::default();
         for bad in [
-            BiasParams { settle_ns: -1, ..good },
-            BiasParams { time: f64::NAN, ..good },
-            BiasParams { settle_ns: 0, ..good },
+            BiasParams {
+                settle_ns: -1,
+                ..good
+            },
+            BiasParams {
+                time: f64::NAN,
+                ..good
+            },
+            BiasParams {
+                settle_ns: 0,
+                ..good
+            },
             BiasParams { time: -1.0, ..good },
         ] {
             assert!(BiasTracker::new(bad).is_err(), "{bad:?}");

@@ -99,7 +99,16 @@ impl ClockEstimator {
         let held = VecDeque::with_capacity(MOST_SAMPLES);
         let onsets = VecDeque::new();
         let course = CourseClock::default();
-        Ok(Self { stiffness, is_in_contact: false, held, turned_ns: None, onset_ns: None, period: 0.0, onsets, course })
+        Ok(Self {
+            stiffness,
+            is_in_contact: false,
+            held,
+            turned_ns: None,
+            onset_ns: None,
+            period: 0.0,
+            onsets,
+            course,
+        })
     }
 
     /// Takes the next sample, which is later than the one before.
@@ -111,8 +120,14 @@ impl ClockEstimator {
             self.held.pop_front();
         }
         let position = tip.pose_ot.translation.vector;
-        self.held.push_back(OnsetEntry { stamp_ns: tip.stamp_ns, position, force_o: tip.force_o });
-        if self.onset_ns.is_some_and(|onset_ns| tip.stamp_ns.saturating_sub(onset_ns) >= AFTER_NS)
+        self.held.push_back(OnsetEntry {
+            stamp_ns: tip.stamp_ns,
+            position,
+            force_o: tip.force_o,
+        });
+        if self
+            .onset_ns
+            .is_some_and(|onset_ns| tip.stamp_ns.saturating_sub(onset_ns) >= AFTER_NS)
             && let Some(onset_ns) = self.onset_ns.take()
             && let Some(onset) = self.onset(onset_ns)
         {
@@ -123,7 +138,9 @@ impl ClockEstimator {
             self.period = mean_period(self.held.iter().map(|x| x.stamp_ns));
         }
         if was_in_contact != is_in_contact {
-            let was_calm = self.turned_ns.is_none_or(|turned_ns| tip.stamp_ns.saturating_sub(turned_ns) >= CALM_NS);
+            let was_calm = self
+                .turned_ns
+                .is_none_or(|turned_ns| tip.stamp_ns.saturating_sub(turned_ns) >= CALM_NS);
             if is_in_contact && was_calm && self.onset_ns.is_none() {
                 self.onset_ns = Some(tip.stamp_ns);
             }
@@ -137,7 +154,9 @@ impl ClockEstimator {
         let (onsets, course) = (self.by_onsets(), self.course.offset());
         match (onsets, course) {
             // onsets tell the mean of a clock that drifts
-            (Some(onsets), Some(course)) if course.drift.is_some() || !onsets.agrees(&course) => Some(course),
+            (Some(onsets), Some(course)) if course.drift.is_some() || !onsets.agrees(&course) => {
+                Some(course)
+            }
             (onsets, course) => onsets.or(course),
         }
     }
@@ -148,11 +167,16 @@ impl ClockEstimator {
         }
         let coarse = self.searched()?;
         let bend = 1.0 / self.stiffness.unwrap_or(f64::INFINITY);
-        let profiles: Vec<Profile> = self.onsets.iter().filter_map(|onset| onset.profile(coarse, bend)).collect();
+        let profiles: Vec<Profile> = self
+            .onsets
+            .iter()
+            .filter_map(|onset| onset.profile(coarse, bend))
+            .collect();
         if profiles.len() < LEAST_ONSETS {
             return None;
         }
-        let sum: Profile = std::array::from_fn(|at| profiles.iter().map(|profile| profile[at]).sum());
+        let sum: Profile =
+            std::array::from_fn(|at| profiles.iter().map(|profile| profile[at]).sum());
         let best = (0..DELAYS).min_by(|&a, &b| sum[a].total_cmp(&sum[b]))?;
         // slopes over ±3 steps: the rounding of single samples is smoother than that
         const SPAN: usize = 3;
@@ -167,7 +191,10 @@ impl ClockEstimator {
         }
         let shift = -slope(&sum) / bend;
         let mean_slope = slope(&sum) / profiles.len() as f64;
-        let scatter: f64 = profiles.iter().map(|x| (slope(x) - mean_slope).powi(2)).sum();
+        let scatter: f64 = profiles
+            .iter()
+            .map(|x| (slope(x) - mean_slope).powi(2))
+            .sum();
         let sigma = (scatter / (bend * bend) + SHAPE * SHAPE + (self.period / 2.0).powi(2)).sqrt();
         let offset = coarse + (best as f64 - REACH as f64) * STEP + shift.clamp(-width, width);
         (sigma <= LARGEST_SIGMA).then_some(ClockOffset {
@@ -183,29 +210,47 @@ impl ClockEstimator {
         let at_step = |step: usize| (step as f64 - (SEARCHED_STEPS / 2) as f64) * SEARCH_STEP;
         let stops: Vec<f64> = (0..SEARCHED_STEPS)
             .map(|step| {
-                let mut stops: Vec<f64> = self.onsets.iter().filter_map(|onset| onset.stop(at_step(step))).collect();
+                let mut stops: Vec<f64> = self
+                    .onsets
+                    .iter()
+                    .filter_map(|onset| onset.stop(at_step(step)))
+                    .collect();
                 let is_seen = stops.len() >= LEAST_ONSETS.max(self.onsets.len() / 2);
                 // the median: what one onset does, as the ball leaving an edge, is not the clock's
-                if is_seen { median(&mut stops).unwrap_or(0.0) } else { 0.0 }
+                if is_seen {
+                    median(&mut stops).unwrap_or(0.0)
+                } else {
+                    0.0
+                }
             })
             .collect();
         let best = (0..SEARCHED_STEPS).max_by(|&a, &b| stops[a].total_cmp(&stops[b]))?;
         let apart = (APART / SEARCH_STEP) as usize;
-        let second = (0..SEARCHED_STEPS).filter(|step| step.abs_diff(best) > apart).map(|step| stops[step]);
+        let second = (0..SEARCHED_STEPS)
+            .filter(|step| step.abs_diff(best) > apart)
+            .map(|step| stops[step]);
         let is_alone = second.fold(0.0, f64::max) <= SECOND_STOP * stops[best];
         (is_alone && stops[best] >= LEAST_STOP).then(|| at_step(best))
     }
 
     /// `None` when the samples around the onset do not show one.
     fn onset(&self, onset_ns: i64) -> Option<Onset> {
-        let around =
-            self.held.iter().filter(|x| (-BEFORE_NS..=AFTER_NS).contains(&x.stamp_ns.saturating_sub(onset_ns)));
-        let of_press = |x: &&OnsetEntry| (0.0..=AFTER).contains(&(x.stamp_ns.saturating_sub(onset_ns) as f64 * 1e-9));
+        let around = self
+            .held
+            .iter()
+            .filter(|x| (-BEFORE_NS..=AFTER_NS).contains(&x.stamp_ns.saturating_sub(onset_ns)));
+        let of_press = |x: &&OnsetEntry| {
+            (0.0..=AFTER).contains(&(x.stamp_ns.saturating_sub(onset_ns) as f64 * 1e-9))
+        };
         let pressed: Vector3<f64> = around.clone().filter(of_press).map(|x| x.force_o).sum();
         let along = direction(&pressed)?;
         let of_entry = |x: &OnsetEntry| {
             let t = x.stamp_ns.saturating_sub(onset_ns) as f64 * 1e-9;
-            OnsetSample { t, centre: x.position.dot(&along), force: x.force_o.dot(&along) }
+            OnsetSample {
+                t,
+                centre: x.position.dot(&along),
+                force: x.force_o.dot(&along),
+            }
         };
         let mut samples: Vec<OnsetSample> = around.map(of_entry).collect();
         if samples.len() < LEAST_SAMPLES || samples[0].t > -0.6 * BEFORE {
@@ -273,14 +318,25 @@ struct OnsetSample {
 
 /// When the force leaves zero: least squares of offset and A (1 − e^(−(t − t₁)/T)) over t₁ and T.
 fn force_begins(samples: &[OnsetSample]) -> Option<f64> {
-    let rise = || samples.iter().filter(|x| (-2.0 * RISE_BEFORE..=RISE_AFTER).contains(&x.t));
+    let rise = || {
+        samples
+            .iter()
+            .filter(|x| (-2.0 * RISE_BEFORE..=RISE_AFTER).contains(&x.t))
+    };
     let mut best: Option<(f64, f64)> = None;
     for time in [2e-3, 4e-3, 7e-3, 10e-3, 15e-3, 30e-3] {
         for step in 0..=90 {
             let begun = 1e-3 - f64::from(step) * 1e-4;
-            let row = |x: &OnsetSample| (Vector2::new(1.0, -(-(x.t - begun).max(0.0) / time).exp_m1()), x.force);
+            let row = |x: &OnsetSample| {
+                (
+                    Vector2::new(1.0, -(-(x.t - begun).max(0.0) / time).exp_m1()),
+                    x.force,
+                )
+            };
             let equations = NormalEquations::of(rise().map(row));
-            let Some(solved) = equations.solution() else { continue };
+            let Some(solved) = equations.solution() else {
+                continue;
+            };
             let left = equations.residual_square(&solved);
             if best.is_none_or(|(least, _)| left < least) {
                 best = Some((left, begun));
@@ -293,10 +349,19 @@ fn force_begins(samples: &[OnsetSample]) -> Option<f64> {
 /// The residual of the centre's path after a bent line is subtracted, and the speeds before and after the bend.
 ///
 /// - `around`: those of the stop, out of `samples`.
-fn kink(around: &[OnsetSample], samples: &[OnsetSample], begun: f64, delay: f64, bend: f64) -> Option<(f64, [f64; 2])> {
+fn kink(
+    around: &[OnsetSample],
+    samples: &[OnsetSample],
+    begun: f64,
+    delay: f64,
+    bend: f64,
+) -> Option<(f64, [f64; 2])> {
     let row = |x: &OnsetSample| {
         let t = x.t - (begun - delay);
-        (Vector3::new(1.0, t.min(0.0), t.max(0.0)), x.centre + force_at(samples, x.t + delay) * bend)
+        (
+            Vector3::new(1.0, t.min(0.0), t.max(0.0)),
+            x.centre + force_at(samples, x.t + delay) * bend,
+        )
     };
     let equations = NormalEquations::of(around.iter().map(row));
     let solved = equations.solution()?;
@@ -306,7 +371,10 @@ fn kink(around: &[OnsetSample], samples: &[OnsetSample], begun: f64, delay: f64,
 /// Between samples straight, beyond them as the nearest.
 fn force_at(samples: &[OnsetSample], t: f64) -> f64 {
     let after = samples.partition_point(|x| x.t <= t);
-    match (after.checked_sub(1).and_then(|i| samples.get(i)), samples.get(after)) {
+    match (
+        after.checked_sub(1).and_then(|i| samples.get(i)),
+        samples.get(after),
+    ) {
         (Some(a), Some(b)) => a.force + (b.force - a.force) * (t - a.t) / (b.t - a.t),
         (Some(only), None) | (None, Some(only)) => only.force,
         (None, None) => 0.0,

@@ -80,8 +80,12 @@ impl ClockOffset {
 }
 
 /// Mean time between samples of these stamps, in order, s; 0 for fewer than two.
-pub(super) fn mean_period(mut stamps_ns: impl DoubleEndedIterator<Item = i64> + ExactSizeIterator) -> f64 {
+pub(super) fn mean_period(
+    mut stamps_ns: impl DoubleEndedIterator<Item = i64> + ExactSizeIterator,
+) -> f64 {
     let steps = stamps_ns.len().max(2) - 1;
     let ends = stamps_ns.next().zip(stamps_ns.next_back());
-    ends.map_or(0.0, |(first, last)| last.saturating_sub(first) as f64 * 1e-9) / steps as f64
+    ends.map_or(0.0, |(first, last)| {
+        last.saturating_sub(first) as f64 * 1e-9
+    }) / steps as f64
 }

@@ -78,7 +78,10 @@ impl Payload {
     /// - returns: wrench about So, expressed in O; N and N·m.
     pub fn weight_o(&self, r_os: &UnitQuaternion<f64>) -> Wrench {
         let force = self.gravity_o * self.mass;
-        Wrench { force, torque: (r_os * self.p_sc).cross(&force) }
+        Wrench {
+            force,
+            torque: (r_os * self.p_sc).cross(&force),
+        }
     }
 }
 
@@ -123,9 +126,15 @@ impl Compensator {
         for c in &params.pose_ts.rotation.coords {
             SettingError::check("compensation.sensor_orientation_xyzw", *c, true, "finite")?;
         }
-        SensorMount { position: params.pose_ts.translation.vector, orientation_xyzw: None }.check()?;
+        SensorMount {
+            position: params.pose_ts.translation.vector,
+            orientation_xyzw: None,
+        }
+        .check()?;
         params.payload.iter().try_for_each(Payload::check)?;
-        let bias = params.bias_s.map(|Wrench { force, torque }| SensorBias { force, torque });
+        let bias = params
+            .bias_s
+            .map(|Wrench { force, torque }| SensorBias { force, torque });
         bias.iter().try_for_each(SensorBias::check)?;
         Ok(Self { params })
     }
@@ -133,19 +142,35 @@ impl Compensator {
     /// What the object does to the tip.
     #[inline]
     pub fn compensate(&self, sample: &Sample) -> Tip {
-        let CompensatorParams { wrench_frame, pose_ts, payload, bias_s } = &self.params;
+        let CompensatorParams {
+            wrench_frame,
+            pose_ts,
+            payload,
+            bias_s,
+        } = &self.params;
         let r_ot = &sample.pose_ot.rotation;
         let r_os = r_ot * pose_ts.rotation;
         let mut measured = match wrench_frame {
             WrenchFrame::Sensor => sample.wrench.turned(&r_os),
             WrenchFrame::Object => sample.wrench,
         };
-        for part in [bias_s.map(|bias| bias.turned(&r_os)), payload.map(|p| p.weight_o(&r_os))].into_iter().flatten() {
+        for part in [
+            bias_s.map(|bias| bias.turned(&r_os)),
+            payload.map(|p| p.weight_o(&r_os)),
+        ]
+        .into_iter()
+        .flatten()
+        {
             measured.force -= part.force;
             measured.torque -= part.torque;
         }
         let p_ts_o = r_ot * pose_ts.translation.vector;
         let torque_o = measured.torque + p_ts_o.cross(&measured.force);
-        Tip { stamp_ns: sample.stamp_ns, pose_ot: sample.pose_ot, force_o: measured.force, torque_o }
+        Tip {
+            stamp_ns: sample.stamp_ns,
+            pose_ot: sample.pose_ot,
+            force_o: measured.force,
+            torque_o,
+        }
     }
 }

@@ -74,7 +74,11 @@ impl ContactGate {
     /// [`SettingError`] unless 0 ≤ `off` ≤ `on` ≤ 1000.
     pub fn new(params: ContactGateParams) -> Result<Self, SettingError> {
         params.check()?;
-        Ok(Self { params, contact: None, contacts: 0 })
+        Ok(Self {
+            params,
+            contact: None,
+            contacts: 0,
+        })
     }
 
     /// Takes the next force, N, in any frame; returns the contact that it begins or continues, if any.

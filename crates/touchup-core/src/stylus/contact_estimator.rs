@@ -14,9 +14,9 @@ use nalgebra::{Point3, Vector3};
 
 use super::free_motion::FreeMotion;
 use super::{
-    Ball, BiasParams, BiasTracker, Compensator, CompensatorParams, Contact, ContactGate, ContactGateParams,
-    FrictionCoefficient, LONGEST_HOLD, NormalEstimate, Sample, SampleError, SettingError, SlidingParams, Tip,
-    TipMotion, TipParams, TouchState,
+    Ball, BiasParams, BiasTracker, Compensator, CompensatorParams, Contact, ContactGate,
+    ContactGateParams, FrictionCoefficient, LONGEST_HOLD, NormalEstimate, Sample, SampleError,
+    SettingError, SlidingParams, Tip, TipMotion, TipParams, TouchState,
 };
 
 /// Settings of a [`ContactEstimator`]. What is `None` is not built.
@@ -51,8 +51,15 @@ impl ContactEstimatorParams {
     /// own contacts do.
     pub fn completed(self) -> Option<Self> {
         let is_complete = self.gate.is_some() && self.sliding.is_some();
-        let (gate, sliding) = (Some(self.gate.unwrap_or_default()), Some(self.sliding.unwrap_or_default()));
-        (!is_complete).then_some(Self { gate, sliding, ..self })
+        let (gate, sliding) = (
+            Some(self.gate.unwrap_or_default()),
+            Some(self.sliding.unwrap_or_default()),
+        );
+        (!is_complete).then_some(Self {
+            gate,
+            sliding,
+            ..self
+        })
     }
 }
 
@@ -189,7 +196,9 @@ impl ContactEstimator {
             Some(_) => self.motion.update(&tip, dt, LONGEST_HOLD),
             None => self.motion.unfiltered(&tip),
         };
-        let always = Contact { onset_ns: *self.first_ns.get_or_insert(tip.stamp_ns) };
+        let always = Contact {
+            onset_ns: *self.first_ns.get_or_insert(tip.stamp_ns),
+        };
         let decide = |gate: &mut Option<ContactGate>, force_o: &Vector3<f64>| match gate {
             Some(gate) => gate.update(tip.stamp_ns, force_o),
             None => Some(always),
@@ -207,7 +216,17 @@ impl ContactEstimator {
         let reported = tip.pose_ot.translation.vector.into();
         let centre = self.params.tip.centre(&reported, &tip.force_o);
         let is_free = is_free && contact.is_none();
-        self.latest.insert(ContactSample { tip, dt, bias_t, centre, contact, is_free, ball, ball_contact, surface })
+        self.latest.insert(ContactSample {
+            tip,
+            dt,
+            bias_t,
+            centre,
+            contact,
+            is_free,
+            ball,
+            ball_contact,
+            surface,
+        })
     }
 
     /// The last sample that was taken; `None` before the first.

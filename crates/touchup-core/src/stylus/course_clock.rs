@@ -71,7 +71,12 @@ struct DelayBlock {
 }
 
 impl DelayBlock {
-    const EMPTY: Self = Self { count: 0, time: 0.0, sums: [0.0; DELAYS], squares: [0.0; DELAYS] };
+    const EMPTY: Self = Self {
+        count: 0,
+        time: 0.0,
+        sums: [0.0; DELAYS],
+        squares: [0.0; DELAYS],
+    };
 
     fn joined(mut self, other: &Self) -> Self {
         self.count += other.count;
@@ -85,7 +90,9 @@ impl DelayBlock {
 
     /// Sum of squares about the mean, at each delay.
     fn scatter(&self) -> OfDelays {
-        std::array::from_fn(|at| self.squares[at] - self.sums[at] * self.sums[at] / self.count.max(1) as f64)
+        std::array::from_fn(|at| {
+            self.squares[at] - self.sums[at] * self.sums[at] / self.count.max(1) as f64
+        })
     }
 }
 
@@ -108,9 +115,14 @@ impl DelayBlocks {
         }
         self.block.count += 1;
         if self.block.count == self.size {
-            self.blocks.push(std::mem::replace(&mut self.block, DelayBlock::EMPTY));
+            self.blocks
+                .push(std::mem::replace(&mut self.block, DelayBlock::EMPTY));
             if self.blocks.len() == MOST_BLOCKS {
-                self.blocks = self.blocks.chunks_exact(2).map(|two| two[0].joined(&two[1])).collect();
+                self.blocks = self
+                    .blocks
+                    .chunks_exact(2)
+                    .map(|two| two[0].joined(&two[1]))
+                    .collect();
                 self.size *= 2;
             }
         }
@@ -121,7 +133,12 @@ impl DelayBlocks {
     ///
     /// - `period`: between two samples, s.
     /// - `ends`: first and last sample, s.
-    fn offset(&self, period: f64, ends: [f64; 2], of_block: impl Fn(&DelayBlock) -> OfDelays) -> Option<ClockOffset> {
+    fn offset(
+        &self,
+        period: f64,
+        ends: [f64; 2],
+        of_block: impl Fn(&DelayBlock) -> OfDelays,
+    ) -> Option<ClockOffset> {
         if self.blocks.len() < LEAST_BLOCKS {
             return None;
         }
@@ -132,15 +149,21 @@ impl DelayBlocks {
         let offset = least(&total)?;
         let mean = total.iter().sum::<f64>() / DELAYS as f64;
         let lowest = lowest(&total);
-        if lowest > LEAST_SHARE * mean || has_another(&total, lowest + OTHER_DEPTH * (mean - lowest)) {
+        if lowest > LEAST_SHARE * mean
+            || has_another(&total, lowest + OTHER_DEPTH * (mean - lowest))
+        {
             return None;
         }
-        let without = (0..parts.curves.len()).map(|at| least(&sum_of(&total, &parts.shifted(at, rate), -1.0)));
+        let without = (0..parts.curves.len())
+            .map(|at| least(&sum_of(&total, &parts.shifted(at, rate), -1.0)));
         let without: Vec<f64> = without.collect::<Option<_>>()?;
         let [step, every] = [STEP_NS, EVERY_NS].map(|ns| ns as f64 * 1e-9);
         let instants: usize = self.blocks.iter().map(|block| block.count).sum();
         // of the steps, and of the mean that a sensor takes over a period
-        let sigma = jackknife_variance(&without).sqrt().hypot(step / 2.0).hypot(period / 2.0);
+        let sigma = jackknife_variance(&without)
+            .sqrt()
+            .hypot(step / 2.0)
+            .hypot(period / 2.0);
         let at = |t: f64| offset + rate * (t - parts.middle);
         let drift = drift.map(|[rate, rate_sigma]| ClockDrift {
             rate,
@@ -167,21 +190,28 @@ struct Parts {
 
 impl Parts {
     fn of(blocks: &[DelayBlock], of_block: impl Fn(&DelayBlock) -> OfDelays) -> Self {
-        let curves: Vec<_> =
-            blocks.iter().map(|block| (block.time / block.count.max(1) as f64, of_block(block))).collect();
+        let curves: Vec<_> = blocks
+            .iter()
+            .map(|block| (block.time / block.count.max(1) as f64, of_block(block)))
+            .collect();
         let middle = curves.iter().map(|(time, _)| time).sum::<f64>() / curves.len().max(1) as f64;
         Self { curves, middle }
     }
 
     /// From the first block to the last, s.
     fn span(&self) -> f64 {
-        self.curves.first().zip(self.curves.last()).map_or(0.0, |(first, last)| last.0 - first.0)
+        self.curves
+            .first()
+            .zip(self.curves.last())
+            .map_or(0.0, |(first, last)| last.0 - first.0)
     }
 
     /// Sum of all at each delay in the middle, where the delay grows by `rate`.
     fn total(&self, rate: f64) -> OfDelays {
         let all = 0..self.curves.len();
-        all.fold([0.0; DELAYS], |total, at| sum_of(&total, &self.shifted(at, rate), 1.0))
+        all.fold([0.0; DELAYS], |total, at| {
+            sum_of(&total, &self.shifted(at, rate), 1.0)
+        })
     }
 
     /// A block's values at each delay in the middle, where the delay grows by `rate`.
@@ -190,7 +220,13 @@ impl Parts {
         let shift = rate * (time - self.middle) / (STEP_NS as f64 * 1e-9);
         let mean = curve.iter().sum::<f64>() / DELAYS as f64;
         // beyond what was tried nothing is known
-        let value = |at: i64| usize::try_from(at).ok().and_then(|at| curve.get(at)).copied().unwrap_or(mean);
+        let value = |at: i64| {
+            usize::try_from(at)
+                .ok()
+                .and_then(|at| curve.get(at))
+                .copied()
+                .unwrap_or(mean)
+        };
         let (whole, share) = (shift.floor(), shift - shift.floor());
         std::array::from_fn(|at| {
             let before = at as i64 + whole as i64;
@@ -213,7 +249,9 @@ impl Parts {
         };
         let rate = best(&totals.iter().map(lowest).collect::<Vec<_>>())?;
         let without = |left_out: usize| {
-            let less = |(rate, total): (&f64, &OfDelays)| lowest(&sum_of(total, &self.shifted(left_out, *rate), -1.0));
+            let less = |(rate, total): (&f64, &OfDelays)| {
+                lowest(&sum_of(total, &self.shifted(left_out, *rate), -1.0))
+            };
             best(&rates.iter().zip(&totals).map(less).collect::<Vec<_>>())
         };
         let without: Vec<f64> = (0..self.curves.len()).map(without).collect::<Option<_>>()?;
@@ -234,7 +272,11 @@ fn lowest(sums: &OfDelays) -> f64 {
 
 impl Default for DelayBlocks {
     fn default() -> Self {
-        Self { size: BLOCK, block: DelayBlock::EMPTY, blocks: Vec::new() }
+        Self {
+            size: BLOCK,
+            block: DelayBlock::EMPTY,
+            blocks: Vec::new(),
+        }
     }
 }
 
@@ -274,7 +316,8 @@ impl CourseClock {
     /// Takes the next sample, which is later than the one before.
     pub fn push(&mut self, sample: &ContactSample) {
         let (tip, is_in_contact) = (&sample.tip, sample.is_in_contact());
-        let is_next = |last: &CourseSample| tip.stamp_ns.saturating_sub(last.stamp_ns) <= LONGEST_GAP_NS;
+        let is_next =
+            |last: &CourseSample| tip.stamp_ns.saturating_sub(last.stamp_ns) <= LONGEST_GAP_NS;
         if !self.held.back().is_none_or(is_next) {
             self.held.clear();
         }
@@ -283,13 +326,26 @@ impl CourseClock {
         }
         let (stamp_ns, position) = (tip.stamp_ns, tip.pose_ot.translation.vector);
         self.ends_ns.get_or_insert([stamp_ns; 2])[1] = stamp_ns;
-        self.held.push_back(CourseSample { stamp_ns, position, force_o: tip.force_o, is_in_contact });
+        self.held.push_back(CourseSample {
+            stamp_ns,
+            position,
+            force_o: tip.force_o,
+            is_in_contact,
+        });
         let oldest_ns = stamp_ns.saturating_sub(2 * SPAN_NS);
         // one before that stays: it shows that the course is as long
-        while self.held.get(1).is_some_and(|second| second.stamp_ns <= oldest_ns) {
+        while self
+            .held
+            .get(1)
+            .is_some_and(|second| second.stamp_ns <= oldest_ns)
+        {
             self.held.pop_front();
         }
-        let is_covered = self.held.len() > 1 && self.held.front().is_some_and(|first| first.stamp_ns <= oldest_ns);
+        let is_covered = self.held.len() > 1
+            && self
+                .held
+                .front()
+                .is_some_and(|first| first.stamp_ns <= oldest_ns);
         if is_covered && stamp_ns >= self.next_ns {
             self.next_ns = stamp_ns.saturating_add(EVERY_NS);
             self.add(stamp_ns.saturating_sub(SPAN_NS));
@@ -318,23 +374,45 @@ impl CourseClock {
         let way = self.mean_position(middle_ns, middle_ns.saturating_add(MEAN_NS))? - before;
         let length = way.norm();
         (length >= LEAST_SPEED * MEAN_NS as f64 * 1e-9).then(|| {
-            self.at_delays(middle_ns, |force_o| force_o.dot(&way) / (force_o.norm() * length).max(f64::MIN_POSITIVE))
+            self.at_delays(middle_ns, |force_o| {
+                force_o.dot(&way) / (force_o.norm() * length).max(f64::MIN_POSITIVE)
+            })
         })
     }
 
     /// F(t + δ) g(t), N m.
     fn forces_at_gap(&self, middle_ns: i64) -> Option<OfDelays> {
-        let along = self.held.iter().map(|x| x.force_o).sum::<Vector3<f64>>().try_normalize(0.0)?;
-        let middle = self.mean_position(middle_ns.saturating_sub(EVERY_NS), middle_ns.saturating_add(EVERY_NS))?;
-        let lowest = self.held.iter().map(|x| (x.position - middle).dot(&along)).fold(0.0, f64::min);
+        let along = self
+            .held
+            .iter()
+            .map(|x| x.force_o)
+            .sum::<Vector3<f64>>()
+            .try_normalize(0.0)?;
+        let middle = self.mean_position(
+            middle_ns.saturating_sub(EVERY_NS),
+            middle_ns.saturating_add(EVERY_NS),
+        )?;
+        let lowest = self
+            .held
+            .iter()
+            .map(|x| (x.position - middle).dot(&along))
+            .fold(0.0, f64::min);
         Some(self.at_delays(middle_ns, |force_o| -lowest * force_o.dot(&along)))
     }
 
     fn mean_position(&self, from_ns: i64, to_ns: i64) -> Option<Vector3<f64>> {
         let first = self.held.partition_point(|x| x.stamp_ns < from_ns);
-        let end = self.held.partition_point(|x| x.stamp_ns <= to_ns).max(first + 1);
-        (end <= self.held.len())
-            .then(|| self.held.range(first..end).map(|x| x.position).sum::<Vector3<f64>>() / (end - first) as f64)
+        let end = self
+            .held
+            .partition_point(|x| x.stamp_ns <= to_ns)
+            .max(first + 1);
+        (end <= self.held.len()).then(|| {
+            self.held
+                .range(first..end)
+                .map(|x| x.position)
+                .sum::<Vector3<f64>>()
+                / (end - first) as f64
+        })
     }
 
     /// `value` of the force at each delay: between two samples it goes straight.
@@ -355,11 +433,20 @@ impl CourseClock {
     /// The delay; `None` where neither sliding nor lifting determines it, or the two differ.
     pub fn offset(&self) -> Option<ClockOffset> {
         let period = mean_period(self.held.iter().map(|x| x.stamp_ns));
-        let ends = self.ends_ns.map(|[first, last]| [0.0, last.saturating_sub(first) as f64 * 1e-9])?;
+        let ends = self
+            .ends_ns
+            .map(|[first, last]| [0.0, last.saturating_sub(first) as f64 * 1e-9])?;
         let lifting = self.lifting.offset(period, ends, |block| block.sums);
-        match (self.sliding.offset(period, ends, DelayBlock::scatter), lifting) {
+        match (
+            self.sliding.offset(period, ends, DelayBlock::scatter),
+            lifting,
+        ) {
             (Some(sliding), Some(lifting)) => {
-                let surer = if sliding.sigma <= lifting.sigma { sliding } else { lifting };
+                let surer = if sliding.sigma <= lifting.sigma {
+                    sliding
+                } else {
+                    lifting
+                };
                 sliding.agrees(&lifting).then_some(surer)
             }
             (sliding, lifting) => sliding.or(lifting),
@@ -376,9 +463,12 @@ fn is_sure([rate, sigma]: &[f64; 2], span: f64) -> bool {
 
 /// Whether a sum is least at two delays apart, both below `limit`.
 fn has_another(sums: &OfDelays, limit: f64) -> bool {
-    let is_low = |at: &usize| sums[*at] < limit && sums[*at] <= sums[at - 1] && sums[*at] <= sums[at + 1];
+    let is_low =
+        |at: &usize| sums[*at] < limit && sums[*at] <= sums[at - 1] && sums[*at] <= sums[at + 1];
     let mut low = (1..DELAYS - 1).filter(is_low);
-    low.next().zip(low.next_back()).is_some_and(|(first, last)| last - first > OTHER_STEPS)
+    low.next()
+        .zip(low.next_back())
+        .is_some_and(|(first, last)| last - first > OTHER_STEPS)
 }
 
 /// Where a sum is least, by the parabola through the three points around it, s; `None` at an end.
@@ -392,5 +482,9 @@ fn least(sums: &OfDelays) -> Option<f64> {
 /// Where the parabola through three values is least, in steps from the middle one.
 fn parabola([before, middle, after]: [f64; 3]) -> f64 {
     let bend = before - 2.0 * middle + after;
-    if bend > 0.0 { 0.5 * (before - after) / bend } else { 0.0 }
+    if bend > 0.0 {
+        0.5 * (before - after) / bend
+    } else {
+        0.0
+    }
 }

@@ -20,12 +20,18 @@ pub(crate) struct ForceNoise {
 impl ForceNoise {
     /// That of a usual sensor.
     pub(crate) fn new() -> Self {
-        Self { step: RunningMedian { length: USUAL_STEP, least: LEAST_STEP } }
+        Self {
+            step: RunningMedian {
+                length: USUAL_STEP,
+                least: LEAST_STEP,
+            },
+        }
     }
 
     /// Takes two readings that follow one another, N.
     pub(crate) fn note(&mut self, before: &Vector3<f64>, now: &Vector3<f64>) {
-        self.step.note((now - before).norm_squared() > self.step.length * self.step.length);
+        self.step
+            .note((now - before).norm_squared() > self.step.length * self.step.length);
     }
 
     /// Standard deviation per axis, N.

@@ -35,10 +35,14 @@ pub enum FrameError {
     #[error("frame \"{0}\" is not known: is its transform published?")]
     Unknown(String),
     /// Both are known, and nothing joins them.
-    #[error("frames \"{0}\" and \"{1}\" are not connected: a transform between their trees is missing")]
+    #[error(
+        "frames \"{0}\" and \"{1}\" are not connected: a transform between their trees is missing"
+    )]
     NotConnected(String, String),
     /// Its parents lead back to it.
-    #[error("frame \"{0}\" is its own ancestor: two nodes publish transforms that contradict each other")]
+    #[error(
+        "frame \"{0}\" is its own ancestor: two nodes publish transforms that contradict each other"
+    )]
     Cycle(String),
     /// The moment is before what is kept.
     #[error("frame \"{0}\" is known from {1} ns on, {2} ns was asked for")]
@@ -87,14 +91,19 @@ impl FrameBuffer {
         if !is_finite || !is_name(parent) || !is_name(child) || parent == child || !is_room {
             return false;
         }
-        let fresh = || FrameLink { parent: parent.to_owned(), motion: FrameMotion::Moving(VecDeque::new()) };
+        let fresh = || FrameLink {
+            parent: parent.to_owned(),
+            motion: FrameMotion::Moving(VecDeque::new()),
+        };
         let link = self.links.entry(child.to_owned()).or_insert_with(fresh);
         if link.parent != parent {
             *link = fresh();
         }
         match &mut link.motion {
             motion if is_static => *motion = FrameMotion::Static(pose),
-            FrameMotion::Static(_) => link.motion = FrameMotion::Moving(VecDeque::from([(stamp_ns, pose)])),
+            FrameMotion::Static(_) => {
+                link.motion = FrameMotion::Moving(VecDeque::from([(stamp_ns, pose)]))
+            }
             FrameMotion::Moving(poses) => keep(poses, stamp_ns, pose),
         }
         true
@@ -102,14 +111,20 @@ impl FrameBuffer {
 
     /// Forgets all that moves, as after a jump of the clock.
     pub fn forget_moving(&mut self) {
-        self.links.retain(|_, link| matches!(link.motion, FrameMotion::Static(_)));
+        self.links
+            .retain(|_, link| matches!(link.motion, FrameMotion::Static(_)));
     }
 
     /// The pose of `of` in `in_frame` at a moment: maps points of `of` to `in_frame`.
     ///
     /// # Errors
     /// [`FrameError`]
-    pub fn pose(&self, in_frame: &str, of: &str, stamp_ns: i64) -> Result<Isometry3<f64>, FrameError> {
+    pub fn pose(
+        &self,
+        in_frame: &str,
+        of: &str,
+        stamp_ns: i64,
+    ) -> Result<Isometry3<f64>, FrameError> {
         Ok(self.bridged_pose(in_frame, of, stamp_ns, i64::MAX)?.0)
     }
 
@@ -128,7 +143,11 @@ impl FrameBuffer {
     }
 
     /// The frames from `in_frame`, and those from `of`, to below the first that both hang on.
-    pub(super) fn links_between<'a>(&'a self, in_frame: &'a str, of: &'a str) -> Result<[Vec<&'a str>; 2], FrameError> {
+    pub(super) fn links_between<'a>(
+        &'a self,
+        in_frame: &'a str,
+        of: &'a str,
+    ) -> Result<[Vec<&'a str>; 2], FrameError> {
         let (mut target, mut source) = (self.ancestors(in_frame)?, self.ancestors(of)?);
         let Some(up) = source.iter().position(|name| target.contains(name)) else {
             // of two that are not known the one that a header names
@@ -138,14 +157,21 @@ impl FrameBuffer {
                 None => FrameError::NotConnected(in_frame.to_owned(), of.to_owned()),
             });
         };
-        target.truncate(target.iter().position(|name| *name == source[up]).unwrap_or(0));
+        target.truncate(
+            target
+                .iter()
+                .position(|name| *name == source[up])
+                .unwrap_or(0),
+        );
         source.truncate(up);
         Ok([target, source])
     }
 
     /// Whether a frame moves in its parent.
     pub(super) fn moves(&self, name: &str) -> bool {
-        self.links.get(name).is_some_and(|link| matches!(link.motion, FrameMotion::Moving(_)))
+        self.links
+            .get(name)
+            .is_some_and(|link| matches!(link.motion, FrameMotion::Moving(_)))
     }
 
     /// A frame of which a transform has come, as a child or as a parent.
@@ -174,11 +200,16 @@ impl FrameBuffer {
         stamp_ns: i64,
         longest_gap_ns: i64,
     ) -> Result<(Isometry3<f64>, bool), FrameError> {
-        names.iter().try_fold((Isometry3::identity(), false), |(below, is_between), name| {
-            let Some(link) = self.links.get(*name) else { return Ok((below, is_between)) };
-            let (pose, is_also) = link.motion.at(name, stamp_ns, longest_gap_ns)?;
-            Ok((pose * below, is_between || is_also))
-        })
+        names.iter().try_fold(
+            (Isometry3::identity(), false),
+            |(below, is_between), name| {
+                let Some(link) = self.links.get(*name) else {
+                    return Ok((below, is_between));
+                };
+                let (pose, is_also) = link.motion.at(name, stamp_ns, longest_gap_ns)?;
+                Ok((pose * below, is_between || is_also))
+            },
+        )
     }
 }
 
@@ -189,21 +220,36 @@ fn keep(poses: &mut VecDeque<(i64, Isometry3<f64>)>, stamp: i64, pose: Isometry3
         _ => poses.insert(at, (stamp, pose)),
     }
     let newest = poses.back().map_or(stamp, |last| last.0);
-    while poses.len() > MOST_POSES || poses.front().is_some_and(|first| newest.saturating_sub(first.0) > KEPT_NS) {
+    while poses.len() > MOST_POSES
+        || poses
+            .front()
+            .is_some_and(|first| newest.saturating_sub(first.0) > KEPT_NS)
+    {
         poses.pop_front();
     }
 }
 
 impl FrameMotion {
     /// Straight between two poses, at constant angular velocity the shorter way; and whether it is between two.
-    fn at(&self, name: &str, stamp_ns: i64, longest_gap_ns: i64) -> Result<(Isometry3<f64>, bool), FrameError> {
+    fn at(
+        &self,
+        name: &str,
+        stamp_ns: i64,
+        longest_gap_ns: i64,
+    ) -> Result<(Isometry3<f64>, bool), FrameError> {
         let poses = match self {
             Self::Static(pose) => return Ok((*pose, false)),
             Self::Moving(poses) => poses,
         };
         let next = poses.partition_point(|(stamp, _)| *stamp < stamp_ns);
-        let (first, last) = (poses.front().map_or(i64::MAX, |p| p.0), poses.back().map_or(i64::MIN, |p| p.0));
-        match (poses.get(next), next.checked_sub(1).and_then(|before| poses.get(before))) {
+        let (first, last) = (
+            poses.front().map_or(i64::MAX, |p| p.0),
+            poses.back().map_or(i64::MIN, |p| p.0),
+        );
+        match (
+            poses.get(next),
+            next.checked_sub(1).and_then(|before| poses.get(before)),
+        ) {
             (Some((stamp, pose)), _) if *stamp == stamp_ns => Ok((*pose, false)),
             (Some((end, after)), Some((start, before))) => {
                 let gap_ns = end.saturating_sub(*start);
@@ -226,9 +272,17 @@ mod tests {
     use super::*;
 
     fn stamped(parent: &str, child: &str, sec: i64, x: f64, quarter_turns: f64) -> FrameTransform {
-        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), quarter_turns * std::f64::consts::FRAC_PI_2);
+        let turn = UnitQuaternion::from_axis_angle(
+            &Vector3::z_axis(),
+            quarter_turns * std::f64::consts::FRAC_PI_2,
+        );
         let pose = Isometry3::from_parts(Translation3::new(x, 0.0, 0.0), turn);
-        FrameTransform { stamp_ns: sec * 1_000_000_000, parent: parent.to_owned(), child: child.to_owned(), pose }
+        FrameTransform {
+            stamp_ns: sec * 1_000_000_000,
+            parent: parent.to_owned(),
+            child: child.to_owned(),
+            pose,
+        }
     }
 
     /// Worked by hand: the arm goes from 0 to 2 m in two seconds and turns by 90° about z; the tool is 1 m along its x.
@@ -241,7 +295,10 @@ mod tests {
         assert!(frames.insert(&stamped("cell", "object", 0, 5.0, 0.0), true));
         let pose = frames.pose("object", "tool", 11_000_000_000).unwrap();
         let diagonal = std::f64::consts::FRAC_1_SQRT_2;
-        assert!((pose.translation.vector - Vector3::new(1.0 + diagonal - 5.0, diagonal, 0.0)).norm() < 1e-12);
+        assert!(
+            (pose.translation.vector - Vector3::new(1.0 + diagonal - 5.0, diagonal, 0.0)).norm()
+                < 1e-12
+        );
         let back = frames.pose("tool", "object", 11_000_000_000).unwrap();
         assert!((back * pose).translation.vector.norm() < 1e-12);
         assert!(
@@ -250,7 +307,10 @@ mod tests {
         assert!(
             matches!(frames.pose("object", "tool", 9_000_000_000), Err(FrameError::TooEarly(name, ..)) if name == "arm")
         );
-        assert_eq!(frames.pose("cell", "cell", 0).unwrap(), Isometry3::identity());
+        assert_eq!(
+            frames.pose("cell", "cell", 0).unwrap(),
+            Isometry3::identity()
+        );
     }
 
     #[test]
@@ -258,11 +318,23 @@ mod tests {
         let mut frames = FrameBuffer::default();
         frames.insert(&stamped("a", "b", 0, 0.0, 0.0), true);
         frames.insert(&stamped("c", "d", 0, 0.0, 0.0), true);
-        assert_eq!(frames.pose("a", "x", 0), Err(FrameError::Unknown("x".into())));
-        assert_eq!(frames.pose("b", "d", 0), Err(FrameError::NotConnected("b".into(), "d".into())));
+        assert_eq!(
+            frames.pose("a", "x", 0),
+            Err(FrameError::Unknown("x".into()))
+        );
+        assert_eq!(
+            frames.pose("b", "d", 0),
+            Err(FrameError::NotConnected("b".into(), "d".into()))
+        );
         frames.insert(&stamped("b", "a", 0, 0.0, 0.0), true);
-        assert!(matches!(frames.pose("c", "a", 0), Err(FrameError::Cycle(_))));
-        for bad in [stamped("a", "a", 0, 0.0, 0.0), stamped("", "a", 0, 0.0, 0.0)] {
+        assert!(matches!(
+            frames.pose("c", "a", 0),
+            Err(FrameError::Cycle(_))
+        ));
+        for bad in [
+            stamped("a", "a", 0, 0.0, 0.0),
+            stamped("", "a", 0, 0.0, 0.0),
+        ] {
             assert!(!frames.insert(&bad, false));
         }
         assert!(!frames.insert(&stamped("a", "b", 0, f64::NAN, 0.0), false));
@@ -274,7 +346,10 @@ mod tests {
         for sec in 0..100 {
             frames.insert(&stamped("a", "b", sec, sec as f64, 0.0), false);
         }
-        assert!(matches!(frames.pose("a", "b", 88_000_000_000), Err(FrameError::TooEarly(_, 89_000_000_000, _))));
+        assert!(matches!(
+            frames.pose("a", "b", 88_000_000_000),
+            Err(FrameError::TooEarly(_, 89_000_000_000, _))
+        ));
         for number in 0..5000 {
             frames.insert(&stamped("a", &format!("f{number}"), 0, 0.0, 0.0), true);
         }

@@ -30,7 +30,13 @@ pub(super) struct FreeMotion {
 
 impl FreeMotion {
     pub(super) fn new(zero: f64) -> Self {
-        Self { zero, noise: ForceNoise::new(), smoothed: Vector3::zeros(), variance: 1.0, last: None }
+        Self {
+            zero,
+            noise: ForceNoise::new(),
+            smoothed: Vector3::zeros(),
+            variance: 1.0,
+            last: None,
+        }
     }
 
     /// Takes the next force without weight and bias, N, `dt` (s) after the one before; returns whether nothing is touched.
@@ -51,7 +57,9 @@ impl FreeMotion {
         // cut off there, so that a firm contact is soon forgotten
         self.smoothed += (force.cap_magnitude(largest) - self.smoothed) * gain;
         let is_settled = gain < 1.0 && self.variance <= SETTLED * last_variance;
-        is_settled && force.norm() <= largest && self.smoothed.norm() <= self.zero.hypot(noise * self.variance.sqrt())
+        is_settled
+            && force.norm() <= largest
+            && self.smoothed.norm() <= self.zero.hypot(noise * self.variance.sqrt())
     }
 }
 
@@ -65,7 +73,9 @@ mod tests {
     fn free_of(force: Vector3<f64>, sigma: f64) -> usize {
         let (mut rng, mut free) = (rand_pcg::Pcg64::seed_from_u64(3), FreeMotion::new(0.15));
         let mut noise = || Vector3::from_fn(|_, _| StandardNormal.sample(&mut rng)) * sigma;
-        (0..5000).filter(|&ms| free.update(&(force + noise()), 1e-3) && ms >= 1000).count()
+        (0..5000)
+            .filter(|&ms| free.update(&(force + noise()), 1e-3) && ms >= 1000)
+            .count()
     }
 
     #[test]
@@ -73,7 +83,10 @@ mod tests {
         for sigma in [0.0, 0.005, 0.05, 0.1] {
             for zero in [0.0, 0.1] {
                 let free = free_of(Vector3::new(0.0, zero, 0.0), sigma);
-                assert!(free >= 3920, "{free} of 4000 at a noise of {sigma} N and a zero of {zero} N");
+                assert!(
+                    free >= 3920,
+                    "{free} of 4000 at a noise of {sigma} N and a zero of {zero} N"
+                );
             }
         }
     }
@@ -89,8 +102,13 @@ mod tests {
     #[test]
     fn a_light_touch_is_told_at_its_first_sample_by_a_quiet_sensor() {
         let mut free = FreeMotion::new(0.15);
-        let starts = (0..2000).filter(|_| !free.update(&Vector3::zeros(), 1e-3)).count();
-        assert!((40..50).contains(&starts), "{starts} ms until anything is free");
+        let starts = (0..2000)
+            .filter(|_| !free.update(&Vector3::zeros(), 1e-3))
+            .count();
+        assert!(
+            (40..50).contains(&starts),
+            "{starts} ms until anything is free"
+        );
         assert!(!free.update(&Vector3::new(0.0, 0.0, 0.2), 1e-3));
     }
 }

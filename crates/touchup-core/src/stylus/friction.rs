@@ -42,7 +42,10 @@ impl NormalEstimate {
     ///
     /// - `force_o`: force of the object on the stylus, N, in O.
     pub(crate) fn of_force(force_o: &Vector3<f64>) -> Option<Self> {
-        direction(force_o).map(|normal| Self { normal, sigma: LEAST_SIGMA })
+        direction(force_o).map(|normal| Self {
+            normal,
+            sigma: LEAST_SIGMA,
+        })
     }
 }
 
@@ -145,26 +148,45 @@ impl Friction {
     /// - `widest`: angle of the widest friction cone accepted, rad.
     pub fn new(widest: f64) -> Self {
         let (stretch, early) = (SlidingStretch::default(), SlidingStretch::default());
-        Self { widest, stretch, early, bins: [0; BINS], known: None, angle: USUAL_ANGLE }
+        Self {
+            widest,
+            stretch,
+            early,
+            bins: [0; BINS],
+            known: None,
+            angle: USUAL_ANGLE,
+        }
     }
 
     /// Takes in what the ball did in contact during `dt` (s).
     pub fn observe(&mut self, sliding: &Sliding, dt: f64) {
-        let Sliding { force_o, velocity, velocity_sigma } = sliding;
+        let Sliding {
+            force_o,
+            velocity,
+            velocity_sigma,
+        } = sliding;
         // two of the three components are along the surface, where noise makes the path longer
-        let speed = (velocity.norm_squared() - 2.0 * velocity_sigma * velocity_sigma).max(0.0).sqrt();
+        let speed = (velocity.norm_squared() - 2.0 * velocity_sigma * velocity_sigma)
+            .max(0.0)
+            .sqrt();
         if speed < CREEP.max(CLEAR * velocity_sigma) {
             return;
         }
         let (length, work) = (speed * dt, -force_o.dot(velocity) * dt);
-        let piece = SlidingStretch { length, work, most_work: force_o.norm() * length };
+        let piece = SlidingStretch {
+            length,
+            work,
+            most_work: force_o.norm() * length,
+        };
         self.stretch.extend(&piece);
         if self.known.is_none() {
             self.early.extend(&piece);
             self.guess();
         }
         if self.stretch.length >= STRETCH {
-            let SlidingStretch { work, most_work, .. } = std::mem::take(&mut self.stretch);
+            let SlidingStretch {
+                work, most_work, ..
+            } = std::mem::take(&mut self.stretch);
             if most_work > 0.0 {
                 self.note(work / most_work);
             }
@@ -189,16 +211,22 @@ impl Friction {
         let across_force = sliding.velocity - along_force * sliding.velocity.dot(&along_force);
         let across_speed = across_force.norm();
         if across_speed <= 0.0 {
-            return Some(NormalEstimate { normal: along_force, sigma: usual.hypot(usual_sigma) });
+            return Some(NormalEstimate {
+                normal: along_force,
+                sigma: usual.hypot(usual_sigma),
+            });
         }
         // error of the direction of sliding, rad
         let astray = (noise / speed).min(1.0).hypot(LEAST_SIGMA);
-        let measured = (-sliding.velocity.dot(&along_force) / speed).clamp(-1.0, 1.0).asin();
+        let measured = (-sliding.velocity.dot(&along_force) / speed)
+            .clamp(-1.0, 1.0)
+            .asin();
         let contradiction = (measured - usual).powi(2);
         let bound = CONTRADICTION * CONTRADICTION * (astray * astray + usual_sigma * usual_sigma);
         let [measured_weight, usual_weight] = [astray.powi(-2), usual_sigma.powi(-2)];
         let mut variance = 1.0 / (measured_weight + usual_weight);
-        let angle = ((measured * measured_weight + usual * usual_weight) * variance).clamp(0.0, self.widest);
+        let angle = ((measured * measured_weight + usual * usual_weight) * variance)
+            .clamp(0.0, self.widest);
         if contradiction > bound {
             // another friction, two surfaces at once, or no sliding at all
             variance += contradiction;
@@ -207,8 +235,12 @@ impl Friction {
         let squared = across_speed * across_speed;
         let clear = squared / (squared + 2.0 * noise * noise + CREEP * CREEP);
         variance += angle * angle * (astray * astray + 1.0 - clear * clear).min(1.0);
-        let normal = (along_force + across_force * (angle.tan() * clear / across_speed)).normalize();
-        Some(NormalEstimate { normal, sigma: variance.sqrt() })
+        let normal =
+            (along_force + across_force * (angle.tan() * clear / across_speed)).normalize();
+        Some(NormalEstimate {
+            normal,
+            sigma: variance.sqrt(),
+        })
     }
 
     /// Counts a stretch of this sin φ.
@@ -216,24 +248,42 @@ impl Friction {
         let sine = sine.clamp(0.0, std::f64::consts::FRAC_1_SQRT_2);
         let mu = sine / (1.0 - sine * sine).sqrt();
         self.bins[((mu / BIN) as usize).min(BINS - 1)] += 1;
-        let stretches = self.bins.iter().fold(0u32, |sum, &count| sum.saturating_add(count));
+        let stretches = self
+            .bins
+            .iter()
+            .fold(0u32, |sum, &count| sum.saturating_add(count));
         if stretches >= FEWEST {
-            let [low, mu, high] = [0.25, 0.5, 0.75].map(|share| self.quantile(share * f64::from(stretches)));
+            let [low, mu, high] =
+                [0.25, 0.5, 0.75].map(|share| self.quantile(share * f64::from(stretches)));
             // of a normal distribution: the quartiles are 1.349 standard deviations apart, and the median varies by
             // √(π/2) times as much as the mean
             let spread = (high - low) / 1.349;
             let sigma = 1.2533 * spread / f64::from(stretches).sqrt();
-            self.known = Some(FrictionCoefficient { mu, sigma, spread, stretches });
+            self.known = Some(FrictionCoefficient {
+                mu,
+                sigma,
+                spread,
+                stretches,
+            });
             let per_angle = 1.0 / (1.0 + mu * mu);
-            self.angle = [mu.atan(), (spread.hypot(sigma) * per_angle).hypot(LEAST_SIGMA)];
+            self.angle = [
+                mu.atan(),
+                (spread.hypot(sigma) * per_angle).hypot(LEAST_SIGMA),
+            ];
         }
     }
 
     /// φ while there are too few stretches.
     fn guess(&mut self) {
-        let SlidingStretch { length, work, most_work } = self.early;
-        let sine = (work / most_work.max(f64::MIN_POSITIVE)).clamp(0.0, std::f64::consts::FRAC_1_SQRT_2);
-        let ([usual, usual_sigma], measured_sigma) = (USUAL_ANGLE, EARLY_SIGMA.hypot(EARLY_PATH / length));
+        let SlidingStretch {
+            length,
+            work,
+            most_work,
+        } = self.early;
+        let sine =
+            (work / most_work.max(f64::MIN_POSITIVE)).clamp(0.0, std::f64::consts::FRAC_1_SQRT_2);
+        let ([usual, usual_sigma], measured_sigma) =
+            (USUAL_ANGLE, EARLY_SIGMA.hypot(EARLY_PATH / length));
         let [measured, before] = [measured_sigma, usual_sigma].map(|sigma| sigma.powi(-2));
         let mean = (sine.asin() * measured + usual * before) / (measured + before);
         self.angle = [mean, (measured + before).powf(-0.5).hypot(EARLY_SIGMA)];

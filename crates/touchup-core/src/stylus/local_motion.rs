@@ -40,7 +40,13 @@ impl LocalMotion {
     /// - `middle`: the position at the instant, m, in O.
     /// - `scale`: a time about as long as half the longest window, s; more than 0.
     pub fn new(middle: Point3<f64>, scale: f64) -> Self {
-        Self { scale, middle, powers: [0.0; 5], moments: [Vector3::zeros(); 3], squares: 0.0 }
+        Self {
+            scale,
+            middle,
+            powers: [0.0; 5],
+            moments: [Vector3::zeros(); 3],
+            squares: 0.0,
+        }
     }
 
     /// Adds the position `after` (s) the instant.
@@ -62,15 +68,24 @@ impl LocalMotion {
     /// The parabola at the instant; the mean, at rest and with no bound on its error, of too few positions.
     pub fn motion(&self) -> SmoothedMotion {
         let [n, u, u2, u3, u4] = self.powers;
-        let parabola = (n > 3.0).then(|| Matrix3::new(n, u, u2, u, u2, u3, u2, u3, u4).try_inverse()).flatten();
+        let parabola = (n > 3.0)
+            .then(|| Matrix3::new(n, u, u2, u, u2, u3, u2, u3, u4).try_inverse())
+            .flatten();
         let Some(inverse) = parabola else {
             let centre = self.middle + self.moments[0] / n.max(1.0);
             let velocity = Vector3::zeros();
             let (centre_gain, residual) = (1.0 / n.max(1.0), f64::INFINITY);
-            return SmoothedMotion { centre, velocity, centre_gain, velocity_gain: f64::INFINITY, residual };
+            return SmoothedMotion {
+                centre,
+                velocity,
+                centre_gain,
+                velocity_gain: f64::INFINITY,
+                residual,
+            };
         };
         let [m0, m1, m2] = &self.moments;
-        let [a, b, c] = [0, 1, 2].map(|row| m0 * inverse[(row, 0)] + m1 * inverse[(row, 1)] + m2 * inverse[(row, 2)]);
+        let [a, b, c] = [0, 1, 2]
+            .map(|row| m0 * inverse[(row, 0)] + m1 * inverse[(row, 1)] + m2 * inverse[(row, 2)]);
         let explained = a.dot(m0) + b.dot(m1) + c.dot(m2);
         SmoothedMotion {
             centre: self.middle + a,

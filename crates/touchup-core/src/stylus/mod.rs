@@ -33,7 +33,9 @@ mod tip_shape;
 pub use bias::{BiasParams, BiasTracker};
 pub use clock::ClockEstimator;
 pub use clock_offset::{ClockDrift, ClockEvidence, ClockOffset};
-pub use compensate::{Compensator, CompensatorParams, Payload, SensorBias, SensorMount, Tip, WrenchFrame};
+pub use compensate::{
+    Compensator, CompensatorParams, Payload, SensorBias, SensorMount, Tip, WrenchFrame,
+};
 pub use contact::{Contact, ContactGate, ContactGateParams, TouchState};
 pub(crate) use contact::{LONGEST_HOLD, STROKE_PAUSE_NS};
 pub use contact_estimator::{ContactEstimator, ContactEstimatorParams, ContactSample};
@@ -42,8 +44,8 @@ pub use frame_buffer::{FrameBuffer, FrameError, FrameTransform, plain_name};
 pub use friction::{Friction, FrictionCoefficient, NormalEstimate, Sliding, WIDEST_CONE_COSINE};
 pub use local_motion::{LocalMotion, SmoothedMotion};
 pub use markers::{
-    MOST_MARKERS, MarkerBody, MarkerCounts, MarkerFilter, MarkerFrame, MarkerObservation, MarkerParams, SpringParams,
-    Tracking,
+    MOST_MARKERS, MarkerBody, MarkerCounts, MarkerFilter, MarkerFrame, MarkerObservation,
+    MarkerParams, SpringParams, Tracking,
 };
 pub use moving_frame::MovingFrame;
 pub use placement::Placement;
@@ -83,7 +85,9 @@ pub enum SampleError {
         stamp_ns: i64,
     },
     /// A magnitude that no stylus reaches.
-    #[error("the {what} of {magnitude:e} {unit} at {stamp_ns} ns is beyond {limit:e} {unit}; is the unit right?")]
+    #[error(
+        "the {what} of {magnitude:e} {unit} at {stamp_ns} ns is beyond {limit:e} {unit}; is the unit right?"
+    )]
     Absurd {
         /// "position", "force" or "torque"
         what: &'static str,
@@ -97,7 +101,9 @@ pub enum SampleError {
         stamp_ns: i64,
     },
     /// An orientation that is no rotation.
-    #[error("the orientation at {stamp_ns} ns is a quaternion of length {norm}, not 1; normalise it at its source")]
+    #[error(
+        "the orientation at {stamp_ns} ns is a quaternion of length {norm}, not 1; normalise it at its source"
+    )]
     NotARotation {
         /// length of the quaternion
         norm: f64,
@@ -105,7 +111,9 @@ pub enum SampleError {
         stamp_ns: i64,
     },
     /// Repeated or backward in time.
-    #[error("the sample at {stamp_ns} ns is not after the one at {last_ns} ns; give samples in order of time")]
+    #[error(
+        "the sample at {stamp_ns} ns is not after the one at {last_ns} ns; give samples in order of time"
+    )]
     NotAfter {
         /// its time, ns
         stamp_ns: i64,
@@ -141,7 +149,10 @@ pub struct Wrench {
 impl Wrench {
     /// In other axes.
     pub(crate) fn turned(&self, rotation: &UnitQuaternion<f64>) -> Self {
-        Self { force: rotation * self.force, torque: rotation * self.torque }
+        Self {
+            force: rotation * self.force,
+            torque: rotation * self.torque,
+        }
     }
 }
 
@@ -161,10 +172,19 @@ impl StampedPose {
     /// [`SampleError::NotFinite`], [`SampleError::Absurd`], [`SampleError::NotARotation`].
     pub fn check(&self) -> Result<(), SampleError> {
         let stamp_ns = self.stamp_ns;
-        check_vector("position", &self.pose_ot.translation.vector, LARGEST_POSITION, "m", stamp_ns)?;
+        check_vector(
+            "position",
+            &self.pose_ot.translation.vector,
+            LARGEST_POSITION,
+            "m",
+            stamp_ns,
+        )?;
         let norm = self.pose_ot.rotation.coords.norm();
         if !norm.is_finite() {
-            return Err(SampleError::NotFinite { what: "orientation", stamp_ns });
+            return Err(SampleError::NotFinite {
+                what: "orientation",
+                stamp_ns,
+            });
         }
         if (norm - 1.0).abs() > UNIT_TOLERANCE {
             return Err(SampleError::NotARotation { norm, stamp_ns });
@@ -188,8 +208,20 @@ impl StampedWrench {
     /// # Errors
     /// [`SampleError::NotFinite`], [`SampleError::Absurd`].
     pub fn check(&self) -> Result<(), SampleError> {
-        check_vector("force", &self.wrench.force, LARGEST_FORCE, "N", self.stamp_ns)?;
-        check_vector("torque", &self.wrench.torque, LARGEST_TORQUE, "N·m", self.stamp_ns)
+        check_vector(
+            "force",
+            &self.wrench.force,
+            LARGEST_FORCE,
+            "N",
+            self.stamp_ns,
+        )?;
+        check_vector(
+            "torque",
+            &self.wrench.torque,
+            LARGEST_TORQUE,
+            "N·m",
+            self.stamp_ns,
+        )
     }
 }
 
@@ -229,8 +261,16 @@ impl Sample {
     /// # Errors
     /// As [`StampedPose::check`] and [`StampedWrench::check`].
     pub fn check(&self) -> Result<(), SampleError> {
-        StampedPose { stamp_ns: self.stamp_ns, pose_ot: self.pose_ot }.check()?;
-        StampedWrench { stamp_ns: self.stamp_ns, wrench: self.wrench }.check()
+        StampedPose {
+            stamp_ns: self.stamp_ns,
+            pose_ot: self.pose_ot,
+        }
+        .check()?;
+        StampedWrench {
+            stamp_ns: self.stamp_ns,
+            wrench: self.wrench,
+        }
+        .check()
     }
 
     /// Time since the sample before this one, s; 0 for the first.
@@ -239,9 +279,10 @@ impl Sample {
     /// [`SampleError::NotAfter`] when this one is repeated or older.
     pub fn seconds_since(&self, last_ns: Option<i64>) -> Result<f64, SampleError> {
         match last_ns {
-            Some(last_ns) if self.stamp_ns <= last_ns => {
-                Err(SampleError::NotAfter { stamp_ns: self.stamp_ns, last_ns })
-            }
+            Some(last_ns) if self.stamp_ns <= last_ns => Err(SampleError::NotAfter {
+                stamp_ns: self.stamp_ns,
+                last_ns,
+            }),
             Some(last_ns) => Ok(self.stamp_ns.abs_diff(last_ns) as f64 * 1e-9),
             None => Ok(0.0),
         }
@@ -260,7 +301,13 @@ fn check_vector(
     }
     let magnitude = vector.amax();
     if magnitude > limit {
-        return Err(SampleError::Absurd { what, magnitude, limit, unit, stamp_ns });
+        return Err(SampleError::Absurd {
+            what,
+            magnitude,
+            limit,
+            unit,
+            stamp_ns,
+        });
     }
     Ok(())
 }

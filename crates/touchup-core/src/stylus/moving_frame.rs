@@ -46,7 +46,15 @@ impl MovingFrame {
     /// - `moving`: the frame whose pose is wanted; `base`: in which.
     pub fn new(moving: &str, base: &str) -> Self {
         let [moving, base] = [moving, base].map(|name| plain_name(name).to_owned());
-        Self { moving, base, pending: BTreeSet::new(), given_ns: None, interpolated: 0, outside: 0, apart: 0 }
+        Self {
+            moving,
+            base,
+            pending: BTreeSet::new(),
+            given_ns: None,
+            interpolated: 0,
+            outside: 0,
+            apart: 0,
+        }
     }
 
     /// The frame in which the poses are.
@@ -56,7 +64,12 @@ impl MovingFrame {
 
     /// Puts the transforms of one message into the buffer, and notes the stamps of those that move between the two frames; how many the buffer
     /// refused.
-    pub fn push(&mut self, frames: &mut FrameBuffer, transforms: &[FrameTransform], are_static: bool) -> u64 {
+    pub fn push(
+        &mut self,
+        frames: &mut FrameBuffer,
+        transforms: &[FrameTransform],
+        are_static: bool,
+    ) -> u64 {
         let has_jumped = !are_static && self.has_jumped(frames, transforms);
         if has_jumped {
             // the clock was set back: what was before belongs to nothing that comes
@@ -65,13 +78,20 @@ impl MovingFrame {
             self.pending.clear();
             self.given_ns = None;
         }
-        let refused = transforms.iter().filter(|transform| !frames.insert(transform, are_static)).count();
+        let refused = transforms
+            .iter()
+            .filter(|transform| !frames.insert(transform, are_static))
+            .count();
         if !are_static {
             // until the two are connected, as far up as links are known
             let links = frames.links_between(&self.base, &self.moving);
-            let known = links.or_else(|_| Ok::<_, FrameError>([Vec::new(), frames.ancestors(&self.moving)?]));
+            let known = links
+                .or_else(|_| Ok::<_, FrameError>([Vec::new(), frames.ancestors(&self.moving)?]));
             let [down, up] = known.unwrap_or_default();
-            for FrameTransform { stamp_ns, child, .. } in transforms {
+            for FrameTransform {
+                stamp_ns, child, ..
+            } in transforms
+            {
                 let child = plain_name(child);
                 if !(down.contains(&child) || up.contains(&child)) || !frames.moves(child) {
                     continue;
@@ -88,12 +108,21 @@ impl MovingFrame {
 
     /// A link between the two frames is farther back in time than anything is kept.
     fn has_jumped(&self, frames: &FrameBuffer, transforms: &[FrameTransform]) -> bool {
-        let Some(given_ns) = self.given_ns else { return false };
-        let Ok([down, up]) = frames.links_between(&self.base, &self.moving) else { return false };
-        transforms.iter().any(|FrameTransform { stamp_ns, child, .. }| {
-            let child = plain_name(child);
-            given_ns.saturating_sub(*stamp_ns) > KEPT_NS && (down.contains(&child) || up.contains(&child))
-        })
+        let Some(given_ns) = self.given_ns else {
+            return false;
+        };
+        let Ok([down, up]) = frames.links_between(&self.base, &self.moving) else {
+            return false;
+        };
+        transforms.iter().any(
+            |FrameTransform {
+                 stamp_ns, child, ..
+             }| {
+                let child = plain_name(child);
+                given_ns.saturating_sub(*stamp_ns) > KEPT_NS
+                    && (down.contains(&child) || up.contains(&child))
+            },
+        )
     }
 
     /// The next pose, in order of their stamps; `None` as long as a link may still come to the stamp.
@@ -106,15 +135,20 @@ impl MovingFrame {
                     self.interpolated += u64::from(is_interpolated);
                     return Some(StampedPose { stamp_ns, pose_ot });
                 }
-                Err(FrameError::NotYet(..) | FrameError::Unknown(_) | FrameError::NotConnected(..))
-                    if self.pending.len() <= MOST_PENDING =>
-                {
+                Err(
+                    FrameError::NotYet(..) | FrameError::Unknown(_) | FrameError::NotConnected(..),
+                ) if self.pending.len() <= MOST_PENDING => {
                     return None;
                 }
                 Err(error) => {
                     self.pending.pop_first();
-                    let is_before = self.given_ns.is_none() && !matches!(error, FrameError::Gap(..));
-                    *(if is_before { &mut self.outside } else { &mut self.apart }) += 1;
+                    let is_before =
+                        self.given_ns.is_none() && !matches!(error, FrameError::Gap(..));
+                    *(if is_before {
+                        &mut self.outside
+                    } else {
+                        &mut self.apart
+                    }) += 1;
                 }
             }
         }
@@ -126,7 +160,10 @@ impl MovingFrame {
         match frames.links_between(&self.base, &self.moving) {
             Err(error) => Some(error.to_string()),
             Ok(links) if links.iter().flatten().any(|link| frames.moves(link)) => None,
-            Ok(_) => Some(format!("frame \"{}\" does not move in \"{}\"", self.moving, self.base)),
+            Ok(_) => Some(format!(
+                "frame \"{}\" does not move in \"{}\"",
+                self.moving, self.base
+            )),
         }
     }
 
@@ -153,7 +190,12 @@ mod tests {
     fn link(stamp_ms: i64, parent: &str, child: &str, x: f64, turn: f64) -> FrameTransform {
         let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn);
         let pose = Isometry3::from_parts(Translation3::new(x, 0.0, 0.0), rotation);
-        FrameTransform { stamp_ns: stamp_ms * MS, parent: parent.into(), child: child.into(), pose }
+        FrameTransform {
+            stamp_ns: stamp_ms * MS,
+            parent: parent.into(),
+            child: child.into(),
+            pose,
+        }
     }
 
     fn poses(
@@ -162,7 +204,9 @@ mod tests {
         transforms: &[FrameTransform],
     ) -> Vec<(i64, Isometry3<f64>)> {
         assert_eq!(tool.push(frames, transforms, false), 0);
-        std::iter::from_fn(|| tool.next_pose(frames)).map(|pose| (pose.stamp_ns / MS, pose.pose_ot)).collect()
+        std::iter::from_fn(|| tool.next_pose(frames))
+            .map(|pose| (pose.stamp_ns / MS, pose.pose_ot))
+            .collect()
     }
 
     /// base → arm turns by a quarter in 100 ms at 10 Hz, arm → tool goes along x by 1 m in that time at 50 Hz.
@@ -171,17 +215,39 @@ mod tests {
         let (mut frames, mut tool) = (FrameBuffer::default(), MovingFrame::new("tool0", "/base"));
         let quarter = std::f64::consts::FRAC_PI_2;
         assert!(poses(&mut tool, &mut frames, &[link(0, "base", "arm", 0.0, 0.0)]).is_empty());
-        assert!(tool.missing(&frames).unwrap().contains("\"tool0\" is not known"));
+        assert!(
+            tool.missing(&frames)
+                .unwrap()
+                .contains("\"tool0\" is not known")
+        );
         for at in 0..=5 {
-            let found = poses(&mut tool, &mut frames, &[link(20 * at, "arm", "tool0", 1.0 + 0.2 * at as f64, 0.0)]);
-            assert_eq!(found.len(), usize::from(at == 0), "the arm is known at 0 alone");
+            let found = poses(
+                &mut tool,
+                &mut frames,
+                &[link(20 * at, "arm", "tool0", 1.0 + 0.2 * at as f64, 0.0)],
+            );
+            assert_eq!(
+                found.len(),
+                usize::from(at == 0),
+                "the arm is known at 0 alone"
+            );
         }
-        let found = poses(&mut tool, &mut frames, &[link(100, "base", "arm", 0.0, quarter)]);
-        assert_eq!(found.iter().map(|(stamp, _)| *stamp).collect::<Vec<_>>(), [20, 40, 60, 80, 100]);
+        let found = poses(
+            &mut tool,
+            &mut frames,
+            &[link(100, "base", "arm", 0.0, quarter)],
+        );
+        assert_eq!(
+            found.iter().map(|(stamp, _)| *stamp).collect::<Vec<_>>(),
+            [20, 40, 60, 80, 100]
+        );
         for (stamp, pose) in found {
             let (part, turned) = (stamp as f64 / 100.0, stamp as f64 / 100.0 * quarter);
             let expected = (1.0 + part) * Vector3::new(turned.cos(), turned.sin(), 0.0);
-            assert!((pose.translation.vector - expected).norm() < 1e-12, "{stamp}");
+            assert!(
+                (pose.translation.vector - expected).norm() < 1e-12,
+                "{stamp}"
+            );
             assert!((pose.rotation.angle() - turned).abs() < 1e-12);
         }
         assert_eq!(tool.missing(&frames), None);
@@ -192,12 +258,22 @@ mod tests {
     #[test]
     fn at_equal_stamps_nothing_is_interpolated_and_what_repeats_gives_nothing() {
         let (mut frames, mut tool) = (FrameBuffer::default(), MovingFrame::new("tool0", "base"));
-        let both = [link(5, "base", "arm", 1.0, 0.0), link(5, "arm", "tool0", 1.0, 0.0)];
+        let both = [
+            link(5, "base", "arm", 1.0, 0.0),
+            link(5, "arm", "tool0", 1.0, 0.0),
+        ];
         assert!(poses(&mut tool, &mut frames, &both[..1]).is_empty());
         let found = poses(&mut tool, &mut frames, &both[1..]);
         assert_eq!(found, [(5, both[0].pose * both[1].pose)]);
         assert!(poses(&mut tool, &mut frames, &both).is_empty());
-        assert!(poses(&mut tool, &mut frames, &[link(7, "arm", "camera", 1.0, 0.0)]).is_empty());
+        assert!(
+            poses(
+                &mut tool,
+                &mut frames,
+                &[link(7, "arm", "camera", 1.0, 0.0)]
+            )
+            .is_empty()
+        );
         assert_eq!((tool.interpolated, tool.take_apart()), (0, 0));
     }
 
@@ -210,8 +286,18 @@ mod tests {
         // before the first of the arm there is nothing
         assert!(poses(&mut tool, &mut frames, &hand(0)).is_empty());
         assert!(poses(&mut tool, &mut frames, &arm(60)).is_empty());
-        for (ms, expected) in [(50, vec![]), (100, vec![60]), (150, vec![]), (200, vec![]), (250, vec![])] {
-            assert_eq!(at(poses(&mut tool, &mut frames, &hand(ms))), expected, "{ms}");
+        for (ms, expected) in [
+            (50, vec![]),
+            (100, vec![60]),
+            (150, vec![]),
+            (200, vec![]),
+            (250, vec![]),
+        ] {
+            assert_eq!(
+                at(poses(&mut tool, &mut frames, &hand(ms))),
+                expected,
+                "{ms}"
+            );
         }
         assert_eq!((tool.outside, tool.take_apart()), (2, 0));
         // from 60 to 190 is more than is bridged, and 100 and 150 are in between
@@ -226,16 +312,47 @@ mod tests {
     #[test]
     fn a_clock_that_was_set_back_begins_anew_and_what_never_comes_takes_no_memory() {
         let (mut frames, mut tool) = (FrameBuffer::default(), MovingFrame::new("tool0", "base"));
-        assert_eq!(poses(&mut tool, &mut frames, &[link(60_000, "base", "tool0", 1.0, 0.0)]).len(), 1);
-        assert_eq!(poses(&mut tool, &mut frames, &[link(10, "base", "tool0", 2.0, 0.0)])[0].0, 10);
-        assert_eq!(poses(&mut tool, &mut frames, &[link(5, "base", "tool0", 2.0, 0.0)]).len(), 0);
+        assert_eq!(
+            poses(
+                &mut tool,
+                &mut frames,
+                &[link(60_000, "base", "tool0", 1.0, 0.0)]
+            )
+            .len(),
+            1
+        );
+        assert_eq!(
+            poses(
+                &mut tool,
+                &mut frames,
+                &[link(10, "base", "tool0", 2.0, 0.0)]
+            )[0]
+            .0,
+            10
+        );
+        assert_eq!(
+            poses(
+                &mut tool,
+                &mut frames,
+                &[link(5, "base", "tool0", 2.0, 0.0)]
+            )
+            .len(),
+            0
+        );
         assert_eq!(tool.take_apart(), 1, "it is older than the last");
         let mut tool = MovingFrame::new("tool0", "base");
         let mut frames = FrameBuffer::default();
         poses(&mut tool, &mut frames, &[link(0, "base", "arm", 1.0, 0.0)]);
         for ms in 1..=MOST_PENDING as i64 + 5 {
-            poses(&mut tool, &mut frames, &[link(ms, "arm", "tool0", 1.0, 0.0)]);
+            poses(
+                &mut tool,
+                &mut frames,
+                &[link(ms, "arm", "tool0", 1.0, 0.0)],
+            );
         }
-        assert_eq!((tool.pending.len(), tool.outside, tool.take_apart()), (MOST_PENDING, 5, 0));
+        assert_eq!(
+            (tool.pending.len(), tool.outside, tool.take_apart()),
+            (MOST_PENDING, 5, 0)
+        );
     }
 }

@@ -46,7 +46,10 @@ impl<T: Stamped + Copy> Stream<T> {
     pub fn push(&mut self, message: T, params: &SyncParams) -> bool {
         let stamp = message.stamp_ns();
         let leap_ns = params.largest_jump_ns.max(params.reorder_ns);
-        if self.newest.is_some_and(|newest| stamp <= newest.saturating_add(leap_ns)) {
+        if self
+            .newest
+            .is_some_and(|newest| stamp <= newest.saturating_add(leap_ns))
+        {
             let is_kept = self.insert(message, params);
             if is_kept {
                 self.refuse_leapt();
@@ -61,7 +64,13 @@ impl<T: Stamped + Copy> Stream<T> {
             self.refuse_leapt();
         }
         self.leapt.push(message);
-        if self.leapt.len() == if self.newest.is_some() { AGREEING } else { AGREEING_AT_FIRST } {
+        if self.leapt.len()
+            == if self.newest.is_some() {
+                AGREEING
+            } else {
+                AGREEING_AT_FIRST
+            }
+        {
             self.insert_leapt(params);
         }
         true
@@ -69,9 +78,13 @@ impl<T: Stamped + Copy> Stream<T> {
 
     /// Messages that no other contradicted are kept.
     pub fn finish(&mut self, params: &SyncParams) {
-        let reached = self.newest.map(|newest| newest.saturating_add(LONGEST_PAUSE_NS));
+        let reached = self
+            .newest
+            .map(|newest| newest.saturating_add(LONGEST_PAUSE_NS));
         match &self.leapt[..] {
-            [only] if reached.is_some_and(|reached| only.stamp_ns() > reached) => self.refuse_leapt(),
+            [only] if reached.is_some_and(|reached| only.stamp_ns() > reached) => {
+                self.refuse_leapt()
+            }
             _ => self.insert_leapt(params),
         }
     }
@@ -103,7 +116,11 @@ impl<T: Stamped + Copy> Stream<T> {
             return false;
         }
         let at = self.held.partition_point(|held| held.stamp_ns() < stamp);
-        if self.held.get(at).is_some_and(|held| held.stamp_ns() == stamp) {
+        if self
+            .held
+            .get(at)
+            .is_some_and(|held| held.stamp_ns() == stamp)
+        {
             self.counts.duplicate += 1;
             return false;
         }
@@ -121,7 +138,11 @@ impl<T: Stamped + Copy> Stream<T> {
 
     /// Drops what lies before the last message at or before `stamp_ns`.
     pub fn forget_before(&mut self, stamp_ns: i64) {
-        while self.held.get(1).is_some_and(|second| second.stamp_ns() <= stamp_ns) {
+        while self
+            .held
+            .get(1)
+            .is_some_and(|second| second.stamp_ns() <= stamp_ns)
+        {
             self.pop();
         }
     }

@@ -63,8 +63,18 @@ impl Synchroniser {
 
     fn waiting(params: SyncParams, wait_ns: i64) -> Result<Self, SettingError> {
         params.check()?;
-        let (poses, wrenches) = (Stream::new(params.capacity, wait_ns), Stream::new(params.capacity, wait_ns));
-        Ok(Self { params, poses, wrenches, drifts_from_ns: None, last_wrench_ns: None, finished: false })
+        let (poses, wrenches) = (
+            Stream::new(params.capacity, wait_ns),
+            Stream::new(params.capacity, wait_ns),
+        );
+        Ok(Self {
+            params,
+            poses,
+            wrenches,
+            drifts_from_ns: None,
+            last_wrench_ns: None,
+            finished: false,
+        })
     }
 
     /// Takes one message; draw samples with [`Self::next_sample`] before the next one. What comes after
@@ -78,7 +88,9 @@ impl Synchroniser {
             _ if self.finished => counts.late += 1,
             Ok(()) => return self.take(message),
             Err(SampleError::NotFinite { .. }) => counts.not_finite += 1,
-            Err(SampleError::Absurd { .. } | SampleError::NotARotation { .. }) => counts.absurd += 1,
+            Err(SampleError::Absurd { .. } | SampleError::NotARotation { .. }) => {
+                counts.absurd += 1
+            }
             Err(SampleError::NotAfter { .. }) => counts.late += 1,
         }
         false
@@ -89,7 +101,8 @@ impl Synchroniser {
             Message::Pose(pose) => self.poses.push(pose, &self.params),
             Message::Wrench(wrench) => {
                 let stamp_ns = self.on_clock_of_pose(wrench.stamp_ns);
-                self.wrenches.push(StampedWrench { stamp_ns, ..wrench }, &self.params)
+                self.wrenches
+                    .push(StampedWrench { stamp_ns, ..wrench }, &self.params)
             }
         }
     }
@@ -100,7 +113,9 @@ impl Synchroniser {
         // a first stamp that is wild would shift all others
         let last = self.last_wrench_ns.replace(stamp_ns).filter(is_near);
         self.drifts_from_ns = self.drifts_from_ns.or(last);
-        let since_ns = self.drifts_from_ns.map_or(0, |from_ns| stamp_ns.saturating_sub(from_ns));
+        let since_ns = self
+            .drifts_from_ns
+            .map_or(0, |from_ns| stamp_ns.saturating_sub(from_ns));
         let gained_ns = (since_ns as f64 * self.params.wrench_drift).round() as i64;
         stamp_ns.saturating_sub(self.params.wrench_offset_ns.saturating_add(gained_ns))
     }
@@ -124,7 +139,13 @@ impl Synchroniser {
             let pose = self.pose_at(wrench.stamp_ns, watermark)?;
             self.wrenches.pop();
             match pose {
-                Ok(pose_ot) => return Some(Sample { stamp_ns: wrench.stamp_ns, pose_ot, wrench: wrench.wrench }),
+                Ok(pose_ot) => {
+                    return Some(Sample {
+                        stamp_ns: wrench.stamp_ns,
+                        pose_ot,
+                        wrench: wrench.wrench,
+                    });
+                }
                 Err(count) => *count(&mut self.wrenches.counts) += 1,
             }
         }
@@ -147,22 +168,35 @@ impl Synchroniser {
 
     /// Up to this stamp nothing of `stream` can arrive any more.
     fn watermark<T>(&self, stream: &Stream<T>) -> i64 {
-        if self.finished { i64::MAX } else { stream.watermark }
+        if self.finished {
+            i64::MAX
+        } else {
+            stream.watermark
+        }
     }
 
     /// The pose at `stamp_ns`, or the counter to raise when there is none; `None` while that is still open.
     fn pose_at(&self, stamp_ns: i64, watermark: i64) -> Option<Result<Isometry3<f64>, Counter>> {
         let mut held = self.poses.held.iter();
-        let missing: Counter =
-            if self.poses.overflown { |counts| &mut counts.overflow } else { |counts| &mut counts.no_pose_before };
-        let Some(before) = held.next() else { return self.finished.then_some(Err(missing)) };
+        let missing: Counter = if self.poses.overflown {
+            |counts| &mut counts.overflow
+        } else {
+            |counts| &mut counts.no_pose_before
+        };
+        let Some(before) = held.next() else {
+            return self.finished.then_some(Err(missing));
+        };
         if before.stamp_ns == stamp_ns {
             return Some(Ok(before.pose_ot));
         }
         if before.stamp_ns > stamp_ns {
             return (stamp_ns <= watermark).then_some(Err(missing));
         }
-        let Some(after) = held.next() else { return self.finished.then_some(Err(|counts| &mut counts.no_pose_after)) };
+        let Some(after) = held.next() else {
+            return self
+                .finished
+                .then_some(Err(|counts| &mut counts.no_pose_after));
+        };
         if after.stamp_ns > watermark {
             return None;
         }
@@ -179,7 +213,11 @@ impl Synchroniser {
 type Counter = fn(&mut SyncCounts) -> &mut u64;
 
 /// Between two poses: straight for the position, at constant angular velocity along the shorter arc for the orientation.
-pub(super) fn interpolated(before: &Isometry3<f64>, after: &Isometry3<f64>, t: f64) -> Isometry3<f64> {
+pub(super) fn interpolated(
+    before: &Isometry3<f64>,
+    after: &Isometry3<f64>,
+    t: f64,
+) -> Isometry3<f64> {
     let position = before.translation.vector.lerp(&after.translation.vector, t);
     // the power of the relative rotation keeps its digits at angles where a slerp by sines loses them
     let mut rotation = before.rotation * (before.rotation.inverse() * after.rotation).powf(t);

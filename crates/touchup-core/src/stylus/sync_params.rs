@@ -59,7 +59,17 @@ pub struct SyncCounts {
 impl SyncCounts {
     /// Each reason by its name, in the order of the fields.
     pub fn reasons(&self) -> [(&'static str, u64); 9] {
-        let Self { gap, no_pose_before, no_pose_after, late, duplicate, not_finite, absurd, jump, overflow } = *self;
+        let Self {
+            gap,
+            no_pose_before,
+            no_pose_after,
+            late,
+            duplicate,
+            not_finite,
+            absurd,
+            jump,
+            overflow,
+        } = *self;
         [
             ("gap", gap),
             ("no_pose_before", no_pose_before),

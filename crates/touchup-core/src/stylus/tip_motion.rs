@@ -24,7 +24,8 @@ parameters! {
 impl TipParams {
     /// Where the ball really is, m: the pose is that of a rigid stylus, and the force F bends it back by F/k.
     pub fn centre(&self, reported: &Point3<f64>, force_o: &Vector3<f64>) -> Point3<f64> {
-        self.stiffness.map_or(*reported, |stiffness| reported + force_o / stiffness)
+        self.stiffness
+            .map_or(*reported, |stiffness| reported + force_o / stiffness)
     }
 }
 
@@ -89,7 +90,13 @@ impl TipMotion {
     /// A filter without samples yet.
     pub fn new(params: SlidingParams, tip: TipParams) -> Self {
         let friction = Friction::new(params.cone_cosine.clamp(-1.0, 1.0).acos());
-        Self { params, tip, last: None, friction, touched_for: 0.0 }
+        Self {
+            params,
+            tip,
+            last: None,
+            friction,
+            touched_for: 0.0,
+        }
     }
 
     /// Takes the next tip, `dt` (s) after the one before; a longer pause than `largest_gap` (s) restarts the filter.
@@ -104,8 +111,15 @@ impl TipMotion {
                 let velocity_now = (centre - last.centre) / dt;
                 let slow_gain = follow(dt, self.params.velocity_smoothing);
                 let velocity = last.velocity + (velocity_now - last.velocity) * slow_gain;
-                let force_with_velocity = last.force_with_velocity + (force_o - last.force_with_velocity) * slow_gain;
-                Ball { reported, centre, force_o, force_with_velocity, velocity }
+                let force_with_velocity =
+                    last.force_with_velocity + (force_o - last.force_with_velocity) * slow_gain;
+                Ball {
+                    reported,
+                    centre,
+                    force_o,
+                    force_with_velocity,
+                    velocity,
+                }
             }
             _ => self.unfiltered(tip),
         };
@@ -117,16 +131,32 @@ impl TipMotion {
     pub fn unfiltered(&self, tip: &Tip) -> Ball {
         let (reported, force_o) = (Point3::from(tip.pose_ot.translation.vector), tip.force_o);
         let centre = self.tip.centre(&reported, &force_o);
-        Ball { reported, centre, force_o, force_with_velocity: force_o, velocity: Vector3::zeros() }
+        Ball {
+            reported,
+            centre,
+            force_o,
+            force_with_velocity: force_o,
+            velocity: Vector3::zeros(),
+        }
     }
 
     /// Outward normal of the surface under the ball, which has been in contact for the last `dt` (s); `None` without a force.
     pub fn surface_normal(&mut self, ball: &Ball, dt: f64) -> Option<NormalEstimate> {
         let velocity_sigma = VELOCITY_NOISE * self.params.slowest;
-        let sliding = Sliding { force_o: ball.force_o, velocity: ball.velocity, velocity_sigma };
+        let sliding = Sliding {
+            force_o: ball.force_o,
+            velocity: ball.velocity,
+            velocity_sigma,
+        };
         self.touched_for += dt;
         if self.touched_for > TRANSIENT * (self.params.smoothing + self.params.velocity_smoothing) {
-            self.friction.observe(&Sliding { force_o: ball.force_with_velocity, ..sliding }, dt);
+            self.friction.observe(
+                &Sliding {
+                    force_o: ball.force_with_velocity,
+                    ..sliding
+                },
+                dt,
+            );
         }
         self.friction.normal(&sliding)
     }
@@ -145,7 +175,11 @@ impl TipMotion {
 
 /// Share of a step that a first-order filter makes in `dt`.
 fn follow(dt: f64, time_constant: f64) -> f64 {
-    if time_constant > 0.0 { -(-dt / time_constant).exp_m1() } else { 1.0 }
+    if time_constant > 0.0 {
+        -(-dt / time_constant).exp_m1()
+    } else {
+        1.0
+    }
 }
 
 #[cfg(test)]
@@ -153,7 +187,10 @@ mod tests {
     use super::*;
     use nalgebra::Isometry3;
 
-    const RIGID: TipParams = TipParams { radius: 1.5e-3, stiffness: None };
+    const RIGID: TipParams = TipParams {
+        radius: 1.5e-3,
+        stiffness: None,
+    };
 
     fn tip(x: f64) -> Tip {
         Tip {
@@ -179,24 +216,44 @@ mod tests {
         }
         assert!((ball.velocity - Vector3::new(0.02, 0.0, 0.0)).norm() < 1e-6);
         let first = motion.surface_normal(&ball, 1e-3).unwrap().normal;
-        assert!(first.angle(&Vector3::z()).to_degrees() < 2.0, "before the friction is known: {first}");
+        assert!(
+            first.angle(&Vector3::z()).to_degrees() < 2.0,
+            "before the friction is known: {first}"
+        );
         // 40 mm: eight stretches
         for _ in 0..2000 {
             motion.surface_normal(&ball, 1e-3);
         }
         // noise of 3.2 mm/s is reckoned with: 2 · 3.2² / 20² = 5 % of atan 0.15 stay
-        assert!(motion.surface_normal(&ball, 1e-3).unwrap().normal.angle(&Vector3::z()).to_degrees() < 0.6);
+        assert!(
+            motion
+                .surface_normal(&ball, 1e-3)
+                .unwrap()
+                .normal
+                .angle(&Vector3::z())
+                .to_degrees()
+                < 0.6
+        );
         assert!((motion.friction().unwrap().mu - 0.15).abs() < 5e-3);
     }
 
     #[test]
     fn a_changing_force_on_an_elastic_tip_is_no_motion() {
-        let mut motion = TipMotion::new(SlidingParams::default(), TipParams { stiffness: Some(1e4), ..RIGID });
+        let mut motion = TipMotion::new(
+            SlidingParams::default(),
+            TipParams {
+                stiffness: Some(1e4),
+                ..RIGID
+            },
+        );
         let mut ball = None;
         for i in 0..100 {
             // the real centre stays at x = 0 while the force rises by 2 N
             let force_o = Vector3::x() * (1.0 + 0.02 * f64::from(i));
-            let pressed = Tip { force_o, ..tip(-force_o.x / 1e4) };
+            let pressed = Tip {
+                force_o,
+                ..tip(-force_o.x / 1e4)
+            };
             ball = Some(motion.update(&pressed, 1e-3, 0.03));
         }
         assert!(ball.unwrap().velocity.norm() < 1e-12);

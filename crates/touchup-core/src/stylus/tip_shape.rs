@@ -44,7 +44,10 @@ pub struct TipPlace {
 
 impl From<&Isometry3<f64>> for TipPlace {
     fn from(pose_ot: &Isometry3<f64>) -> Self {
-        Self { centre: pose_ot.translation.vector.into(), axis: pose_ot.rotation * Vector3::z() }
+        Self {
+            centre: pose_ot.translation.vector.into(),
+            axis: pose_ot.rotation * Vector3::z(),
+        }
     }
 }
 
@@ -104,7 +107,14 @@ impl TipBody {
     /// A ball of `radius` (m).
     pub fn ball(radius: f64) -> Self {
         let core = Vector2::zeros();
-        Self { shape: TipShape::Ball, radius, round: radius, low: core, high: core, flank: Vector2::x() }
+        Self {
+            shape: TipShape::Ball,
+            radius,
+            round: radius,
+            low: core,
+            high: core,
+            flank: Vector2::x(),
+        }
     }
 
     /// A tip of `shape` with `radius` (m): of the ball, of the flat end, or of the nose of the cone.
@@ -116,23 +126,61 @@ impl TipBody {
         let sizes = TipSizes::default();
         let (round, low, high) = match shape {
             TipShape::Ball => return Ok(Self::ball(radius)),
-            TipShape::Flat { edge_radius, length } => {
-                SettingError::check("tip.radius_mm", radius * 1e3, radius > 0.0, "more than 0 mm for a flat tip")?;
-                TipSizes { edge_radius: Some(edge_radius), length: Some(length), ..sizes }.check()?;
+            TipShape::Flat {
+                edge_radius,
+                length,
+            } => {
+                SettingError::check(
+                    "tip.radius_mm",
+                    radius * 1e3,
+                    radius > 0.0,
+                    "more than 0 mm for a flat tip",
+                )?;
+                TipSizes {
+                    edge_radius: Some(edge_radius),
+                    length: Some(length),
+                    ..sizes
+                }
+                .check()?;
                 let (is_edge, is_length) = (edge_radius <= radius, length > edge_radius);
-                SettingError::check("tip.edge_radius_mm", edge_radius * 1e3, is_edge, "0 mm to tip.radius_mm")?;
+                SettingError::check(
+                    "tip.edge_radius_mm",
+                    edge_radius * 1e3,
+                    is_edge,
+                    "0 mm to tip.radius_mm",
+                )?;
                 let allowed = "more than tip.edge_radius_mm, to 1000 mm";
                 SettingError::check("tip.length_mm", length * 1e3, is_length, allowed)?;
-                (edge_radius, vector![radius - edge_radius, edge_radius], vector![radius - edge_radius, length])
+                (
+                    edge_radius,
+                    vector![radius - edge_radius, edge_radius],
+                    vector![radius - edge_radius, length],
+                )
             }
             TipShape::Cone { half_angle, length } => {
-                TipSizes { half_angle: Some(half_angle), length: Some(length), ..sizes }.check()?;
-                (radius, Vector2::zeros(), vector![length * half_angle.tan(), length])
+                TipSizes {
+                    half_angle: Some(half_angle),
+                    length: Some(length),
+                    ..sizes
+                }
+                .check()?;
+                (
+                    radius,
+                    Vector2::zeros(),
+                    vector![length * half_angle.tan(), length],
+                )
             }
         };
         let side = high - low;
         let flank = vector![side.y, -side.x] / side.x.hypot(side.y);
-        Ok(Self { shape, radius, round, low, high, flank })
+        Ok(Self {
+            shape,
+            radius,
+            round,
+            low,
+            high,
+            flank,
+        })
     }
 
     /// Which tip it is.
@@ -166,14 +214,22 @@ impl TipBody {
         }
         let (along, across, outward) = split(&place.axis, direction);
         let height = |corner: &Vector2<f64>| corner.x * across + corner.y * along;
-        let corner = if height(&self.high) > height(&self.low) { self.high } else { self.low };
+        let corner = if height(&self.high) > height(&self.low) {
+            self.high
+        } else {
+            self.low
+        };
         place.centre + outward * corner.x + place.axis * corner.y + direction * self.round
     }
 
     /// Signed distance of `x` (m, in O) from the tip, m: negative inside.
     #[inline]
     pub fn signed_distance(&self, place: &TipPlace, x: &Point3<f64>) -> f64 {
-        if self.is_ball() { (x - place.centre).norm() - self.round } else { self.shortest_exit(place, x).0 }
+        if self.is_ball() {
+            (x - place.centre).norm() - self.round
+        } else {
+            self.shortest_exit(place, x).0
+        }
     }
 
     /// Signed distance of `x` (m, in O), and the direction in which it grows, unit, in O; zero where there is none.
@@ -183,25 +239,49 @@ impl TipBody {
         let across = arm - place.axis * height;
         let from_axis = across.norm();
         let (distance, out) = self.core_distance(&vector![from_axis, height]);
-        let outward = across.try_normalize(ON_AXIS * self.radius).unwrap_or_else(|| tangent_basis(&place.axis)[0]);
+        let outward = across
+            .try_normalize(ON_AXIS * self.radius)
+            .unwrap_or_else(|| tangent_basis(&place.axis)[0]);
         (distance - self.round, outward * out.x + place.axis * out.y)
     }
 
     /// Signed distance of a point of the half plane from the core, m, and its gradient there.
     fn core_distance(&self, p: &Vector2<f64>) -> (f64, Vector2<f64>) {
-        let &Self { low, high, flank, .. } = self;
-        let sides = [(low.y - p.y, vector![0.0, -1.0]), ((p - low).dot(&flank), flank), (p.y - high.y, Vector2::y())];
-        let deepest = if sides[1].0 > sides[0].0 { sides[1] } else { sides[0] };
-        let deepest = if sides[2].0 > deepest.0 { sides[2] } else { deepest };
+        let &Self {
+            low, high, flank, ..
+        } = self;
+        let sides = [
+            (low.y - p.y, vector![0.0, -1.0]),
+            ((p - low).dot(&flank), flank),
+            (p.y - high.y, Vector2::y()),
+        ];
+        let deepest = if sides[1].0 > sides[0].0 {
+            sides[1]
+        } else {
+            sides[0]
+        };
+        let deepest = if sides[2].0 > deepest.0 {
+            sides[2]
+        } else {
+            deepest
+        };
         if deepest.0 <= 0.0 {
             return deepest;
         }
-        let closest = [(vector![0.0, low.y], low), (low, high), (high, vector![0.0, high.y])].map(|(a, b)| {
+        let closest = [
+            (vector![0.0, low.y], low),
+            (low, high),
+            (high, vector![0.0, high.y]),
+        ]
+        .map(|(a, b)| {
             let (along, arm) = (b - a, p - a);
             let share = along.dot(&arm) / along.dot(&along).max(f64::MIN_POSITIVE);
             arm - along * share.clamp(0.0, 1.0)
         });
-        let arm = closest.into_iter().min_by(|a, b| a.x.hypot(a.y).total_cmp(&b.x.hypot(b.y))).unwrap_or_default();
+        let arm = closest
+            .into_iter()
+            .min_by(|a, b| a.x.hypot(a.y).total_cmp(&b.x.hypot(b.y)))
+            .unwrap_or_default();
         let distance = arm.x.hypot(arm.y).max(f64::MIN_POSITIVE);
         (distance, arm / distance)
     }
@@ -211,8 +291,19 @@ impl TipBody {
     /// A flat end touches with its whole face where its axis may be the normal, else with the point of its rim; the side
     /// of a cylinder may lie on a wall or lean on an edge. `None` where the flank of a cone or what is behind it touches:
     /// the force does not determine where along it.
-    pub fn touched(&self, place: &TipPlace, normal: &Vector3<f64>, sigma: f64) -> Option<TipContact> {
-        let sharp = |point| Some(TipContact { point, normal: *normal, is_vague: false });
+    pub fn touched(
+        &self,
+        place: &TipPlace,
+        normal: &Vector3<f64>,
+        sigma: f64,
+    ) -> Option<TipContact> {
+        let sharp = |point| {
+            Some(TipContact {
+                point,
+                normal: *normal,
+                is_vague: false,
+            })
+        };
         if self.is_ball() {
             return sharp(place.centre - normal * self.round);
         }
@@ -221,15 +312,24 @@ impl TipBody {
         let lean = across.atan2(-along);
         if lean < flush && self.low.x > 0.0 {
             let point = place.centre + place.axis * (self.low.y - self.round);
-            return Some(TipContact { point, normal: place.axis, is_vague: false });
+            return Some(TipContact {
+                point,
+                normal: place.axis,
+                is_vague: false,
+            });
         }
         let is_vague = lean > self.flank.x.atan2(-self.flank.y) - flush;
         let is_beyond = lean > self.flank.x.atan2(-self.flank.y) + flush;
         if is_beyond || (is_vague && self.low.x != self.high.x) {
             return None;
         }
-        let point = place.centre + outward * self.low.x + place.axis * self.low.y - normal * self.round;
-        Some(TipContact { point, normal: *normal, is_vague })
+        let point =
+            place.centre + outward * self.low.x + place.axis * self.low.y - normal * self.round;
+        Some(TipContact {
+            point,
+            normal: *normal,
+            is_vague,
+        })
     }
 
     /// Heights on the axis of balls of one radius that together cover the tip, and that radius, m.
@@ -242,7 +342,9 @@ impl TipBody {
         let widest = self.low.x.max(self.high.x);
         let count = (length / (widest + self.round)).ceil().clamp(1.0, 64.0);
         let half = 0.5 * length / count;
-        let heights = (0..count as usize).map(|i| self.low.y + half * (2.0 * i as f64 + 1.0)).collect();
+        let heights = (0..count as usize)
+            .map(|i| self.low.y + half * (2.0 * i as f64 + 1.0))
+            .collect();
         (heights, widest.hypot(half) + self.round)
     }
 
@@ -259,7 +361,15 @@ fn split(axis: &Vector3<f64>, direction: &Vector3<f64>) -> (f64, f64, Vector3<f6
     let along = direction.dot(axis);
     let across = direction - axis * along;
     let size = across.norm();
-    (along, size, if size > ON_AXIS { across / size } else { tangent_basis(axis)[0] })
+    (
+        along,
+        size,
+        if size > ON_AXIS {
+            across / size
+        } else {
+            tangent_basis(axis)[0]
+        },
+    )
 }
 
 #[cfg(test)]
@@ -267,26 +377,43 @@ mod tests {
     use super::*;
     use nalgebra::UnitQuaternion;
 
-    const FLAT: TipShape = TipShape::Flat { edge_radius: 0.2e-3, length: 5e-3 };
-    const CONE: TipShape = TipShape::Cone { half_angle: 0.5, length: 4e-3 };
+    const FLAT: TipShape = TipShape::Flat {
+        edge_radius: 0.2e-3,
+        length: 5e-3,
+    };
+    const CONE: TipShape = TipShape::Cone {
+        half_angle: 0.5,
+        length: 4e-3,
+    };
 
     fn bodies() -> [TipBody; 4] {
         [
             TipBody::ball(1.5e-3),
             TipBody::new(FLAT, 2e-3).unwrap(),
-            TipBody::new(TipShape::Flat { edge_radius: 0.0, length: 3e-3 }, 2e-3).unwrap(),
+            TipBody::new(
+                TipShape::Flat {
+                    edge_radius: 0.0,
+                    length: 3e-3,
+                },
+                2e-3,
+            )
+            .unwrap(),
             TipBody::new(CONE, 0.4e-3).unwrap(),
         ]
     }
 
     /// Directions all around, and places of a tip in them.
     fn directions() -> Vec<Vector3<f64>> {
-        let turn = |i: i32| UnitQuaternion::from_euler_angles(f64::from(i), 1.7 * f64::from(i), 0.3);
+        let turn =
+            |i: i32| UnitQuaternion::from_euler_angles(f64::from(i), 1.7 * f64::from(i), 0.3);
         (0..40).map(|i| turn(i) * Vector3::z()).collect()
     }
 
     fn place(axis: Vector3<f64>) -> TipPlace {
-        TipPlace { centre: Point3::new(1e-3, -2e-3, 3e-3), axis }
+        TipPlace {
+            centre: Point3::new(1e-3, -2e-3, 3e-3),
+            axis,
+        }
     }
 
     #[test]
@@ -296,7 +423,10 @@ mod tests {
                 let place = place(axis);
                 for direction in directions() {
                     let farthest = body.support(&place, &direction);
-                    assert!(body.signed_distance(&place, &farthest).abs() < 1e-12, "{body:?}");
+                    assert!(
+                        body.signed_distance(&place, &farthest).abs() < 1e-12,
+                        "{body:?}"
+                    );
                     // all of the tip is behind the plane there: a point in front of it is at least so far away
                     let beyond = farthest + direction * 1e-3;
                     assert!((body.signed_distance(&place, &beyond) - 1e-3).abs() < 1e-12);
@@ -318,7 +448,10 @@ mod tests {
                     let x = place.centre + direction * (((7 * i + j) % 13) as f64 * 0.4e-3);
                     let (distance, out) = body.shortest_exit(&place, &x);
                     let there = x - out * distance;
-                    assert!(body.signed_distance(&place, &there).abs() < 1e-9, "{body:?} {distance}");
+                    assert!(
+                        body.signed_distance(&place, &there).abs() < 1e-9,
+                        "{body:?} {distance}"
+                    );
                 }
             }
         }
@@ -326,26 +459,61 @@ mod tests {
 
     #[test]
     fn sizes_by_hand() {
-        let up = TipPlace { centre: Point3::origin(), axis: Vector3::z() };
+        let up = TipPlace {
+            centre: Point3::origin(),
+            axis: Vector3::z(),
+        };
         let [ball, flat, sharp, cone] = bodies();
-        assert_eq!(ball.support(&up, &-Vector3::z()), Point3::new(0.0, 0.0, -1.5e-3));
+        assert_eq!(
+            ball.support(&up, &-Vector3::z()),
+            Point3::new(0.0, 0.0, -1.5e-3)
+        );
         // the face is at z = 0, the side at 2 mm
-        assert!(flat.signed_distance(&up, &Point3::new(1e-3, 0.0, 0.0)).abs() < 1e-15);
-        assert!(flat.signed_distance(&up, &Point3::new(0.0, 2e-3, 3e-3)).abs() < 1e-15);
+        assert!(
+            flat.signed_distance(&up, &Point3::new(1e-3, 0.0, 0.0))
+                .abs()
+                < 1e-15
+        );
+        assert!(
+            flat.signed_distance(&up, &Point3::new(0.0, 2e-3, 3e-3))
+                .abs()
+                < 1e-15
+        );
         assert!((flat.signed_distance(&up, &Point3::new(0.0, 0.0, 1.5e-3)) + 1.5e-3).abs() < 1e-15);
-        assert!((sharp.signed_distance(&up, &Point3::new(2.3e-3, 0.0, -0.4e-3)) - 0.5e-3).abs() < 1e-15);
+        assert!(
+            (sharp.signed_distance(&up, &Point3::new(2.3e-3, 0.0, -0.4e-3)) - 0.5e-3).abs() < 1e-15
+        );
         // 3 mm up, the flank is 0.4 mm away from a cone of 0.5 rad: tan 0.5 · 3 mm + 0.4 mm / cos 0.5
         let flank = Point3::new(0.5f64.tan() * 3e-3 + 0.4e-3 / 0.5f64.cos(), 0.0, 3e-3);
         assert!(cone.signed_distance(&up, &flank).abs() < 1e-15);
-        assert!(cone.signed_distance(&up, &Point3::new(0.0, 0.0, -0.4e-3)).abs() < 1e-15);
+        assert!(
+            cone.signed_distance(&up, &Point3::new(0.0, 0.0, -0.4e-3))
+                .abs()
+                < 1e-15
+        );
     }
 
     #[test]
     fn a_flat_end_touches_with_its_face_or_with_its_rim() {
-        let flat = TipBody::new(TipShape::Flat { edge_radius: 0.0, length: 5e-3 }, 2e-3).unwrap();
+        let flat = TipBody::new(
+            TipShape::Flat {
+                edge_radius: 0.0,
+                length: 5e-3,
+            },
+            2e-3,
+        )
+        .unwrap();
         let tilted = |degrees: f64| {
-            let axis = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), degrees.to_radians()) * Vector3::z();
-            flat.touched(&TipPlace { centre: Point3::origin(), axis }, &Vector3::z(), 2f64.to_radians())
+            let axis = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), degrees.to_radians())
+                * Vector3::z();
+            flat.touched(
+                &TipPlace {
+                    centre: Point3::origin(),
+                    axis,
+                },
+                &Vector3::z(),
+                2f64.to_radians(),
+            )
         };
         let face = tilted(2.5).unwrap();
         assert_eq!(face.point, Point3::origin());
@@ -362,7 +530,10 @@ mod tests {
     #[test]
     fn a_cone_says_nothing_of_where_its_flank_touches() {
         let cone = TipBody::new(CONE, 0.4e-3).unwrap();
-        let up = TipPlace { centre: Point3::origin(), axis: Vector3::z() };
+        let up = TipPlace {
+            centre: Point3::origin(),
+            axis: Vector3::z(),
+        };
         let facing = |angle: f64| Vector3::new(-angle.sin(), 0.0, angle.cos());
         let nose = cone.touched(&up, &facing(0.8), 0.03).unwrap();
         assert!((nose.point - Point3::from(facing(0.8) * -0.4e-3)).norm() < 1e-15);
@@ -380,7 +551,9 @@ mod tests {
                 let place = place(axis);
                 for direction in directions() {
                     let point = body.support(&place, &direction);
-                    let near = |height: &f64| (point - (place.centre + axis * *height)).norm() <= radius + 1e-12;
+                    let near = |height: &f64| {
+                        (point - (place.centre + axis * *height)).norm() <= radius + 1e-12
+                    };
                     assert!(heights.iter().any(near), "{body:?}");
                     assert!((point - (place.centre + axis * middle)).norm() <= bound + 1e-12);
                 }
@@ -391,12 +564,39 @@ mod tests {
     #[test]
     fn impossible_tips_are_refused_by_name_value_and_remedy() {
         let refused = |shape, radius| TipBody::new(shape, radius).unwrap_err().to_string();
-        let wide = TipShape::Flat { edge_radius: 3e-3, length: 5e-3 };
-        assert_eq!(refused(wide, 2e-3), "tip.edge_radius_mm is 3; it must be 0 mm to tip.radius_mm");
-        let blunt = TipShape::Cone { half_angle: 1.5, length: 5e-3 };
+        let wide = TipShape::Flat {
+            edge_radius: 3e-3,
+            length: 5e-3,
+        };
+        assert_eq!(
+            refused(wide, 2e-3),
+            "tip.edge_radius_mm is 3; it must be 0 mm to tip.radius_mm"
+        );
+        let blunt = TipShape::Cone {
+            half_angle: 1.5,
+            length: 5e-3,
+        };
         assert!(refused(blunt, 1e-3).starts_with("tip.half_angle_deg is 85.9"));
-        assert!(refused(TipShape::Cone { half_angle: 0.3, length: 0.0 }, 1e-3).contains("length"));
-        assert!(refused(TipShape::Flat { edge_radius: 0.0, length: f64::NAN }, 1e-3).contains("length"));
+        assert!(
+            refused(
+                TipShape::Cone {
+                    half_angle: 0.3,
+                    length: 0.0
+                },
+                1e-3
+            )
+            .contains("length")
+        );
+        assert!(
+            refused(
+                TipShape::Flat {
+                    edge_radius: 0.0,
+                    length: f64::NAN
+                },
+                1e-3
+            )
+            .contains("length")
+        );
         assert!(refused(FLAT, 0.0).contains("radius"));
         assert!(refused(TipShape::Ball, -1.0).contains("radius"));
     }

@@ -30,18 +30,29 @@ impl PaintedSoup {
     /// Of a file in `folder`. Faces without a place or an area, and vertices that no other face uses, show nothing.
     pub fn appearance(self, folder: &Path) -> Result<Appearance, MeshError> {
         let soup = self;
-        let corners = |face: &[u32; 3]| Some(face.map(|v| soup.positions.get(v as usize).copied().filter(is_place)));
+        let corners = |face: &[u32; 3]| {
+            Some(face.map(|v| soup.positions.get(v as usize).copied().filter(is_place)))
+        };
         let is_shown = |face: &[u32; 3]| match corners(face) {
             Some([Some(a), Some(b), Some(c)]) => (b - a).cross(&(c - a)).norm_squared() > 0.0,
             _ => false,
         };
-        let kept: Vec<usize> = (0..soup.faces.len()).filter(|&at| is_shown(&soup.faces[at])).collect();
+        let kept: Vec<usize> = (0..soup.faces.len())
+            .filter(|&at| is_shown(&soup.faces[at]))
+            .collect();
         let mut renamed = vec![u32::MAX; soup.positions.len()];
-        kept.iter().flat_map(|&at| soup.faces[at]).for_each(|v| renamed[v as usize] = 0);
+        kept.iter()
+            .flat_map(|&at| soup.faces[at])
+            .for_each(|v| renamed[v as usize] = 0);
         let used: Vec<usize> = (0..renamed.len()).filter(|&v| renamed[v] == 0).collect();
-        used.iter().zip(0..).for_each(|(&v, name)| renamed[v] = name);
+        used.iter()
+            .zip(0..)
+            .for_each(|(&v, name)| renamed[v] = name);
         let positions = used.iter().map(|&v| soup.positions[v]).collect();
-        let faces = kept.iter().map(|&at| soup.faces[at].map(|v| renamed[v as usize])).collect();
+        let faces = kept
+            .iter()
+            .map(|&at| soup.faces[at].map(|v| renamed[v as usize]))
+            .collect();
         let colours = soup.colours.map(|colours| match colours {
             VertexColours::Rgb(of) => VertexColours::Rgb(used.iter().map(|&v| of[v]).collect()),
             VertexColours::Rgba(of) => VertexColours::Rgba(used.iter().map(|&v| of[v]).collect()),
@@ -49,9 +60,17 @@ impl PaintedSoup {
         let texture = soup.texture.map(|texture| Texture {
             corners: kept.iter().map(|&at| texture.corners[at]).collect(),
             shown: kept.iter().map(|&at| texture.shown[at]).collect(),
-            images: texture.images.iter().map(|name| folder.join(name)).collect(),
+            images: texture
+                .images
+                .iter()
+                .map(|name| folder.join(name))
+                .collect(),
         });
-        Ok(Appearance::new(TriMesh::new(positions, faces)?, colours, texture))
+        Ok(Appearance::new(
+            TriMesh::new(positions, faces)?,
+            colours,
+            texture,
+        ))
     }
 }
 
@@ -63,7 +82,11 @@ impl SoupTexture {
         let folder = absolute(folder);
         let name = |image: &PathBuf| {
             let image = absolute(image);
-            image.strip_prefix(&folder).unwrap_or(&image).display().to_string()
+            image
+                .strip_prefix(&folder)
+                .unwrap_or(&image)
+                .display()
+                .to_string()
         };
         let slots = || mesh.faces().map(|(face, _)| face.0 as usize);
         Self {

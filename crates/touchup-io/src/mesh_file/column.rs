@@ -15,9 +15,14 @@ impl VertexColumn {
     /// A column for each colour, named as most programs name them.
     pub fn of_colours(colours: VertexColours) -> Vec<Self> {
         fn columns<const N: usize>(of: &[[u8; N]]) -> Vec<VertexColumn> {
-            let column =
-                |(at, name)| VertexColumn { name, values: of.iter().map(|c| c[at]).collect::<Vec<_>>().into() };
-            (0..N).zip(["red", "green", "blue", "alpha"]).map(column).collect()
+            let column = |(at, name)| VertexColumn {
+                name,
+                values: of.iter().map(|c| c[at]).collect::<Vec<_>>().into(),
+            };
+            (0..N)
+                .zip(["red", "green", "blue", "alpha"])
+                .map(column)
+                .collect()
         }
         match colours {
             VertexColours::Rgb(of) => columns(&of),

@@ -62,13 +62,33 @@ impl Syntax {
         /// Enough to find it again.
         const SHOWN: usize = 40;
         let found = found.to_string();
-        let shown: String = found.chars().take(SHOWN).flat_map(char::escape_debug).collect();
-        let more = if found.chars().count() > SHOWN { "…" } else { "" };
-        Self { place, defect: Defect::Unexpected { expected, found: format!("'{shown}{more}'") } }
+        let shown: String = found
+            .chars()
+            .take(SHOWN)
+            .flat_map(char::escape_debug)
+            .collect();
+        let more = if found.chars().count() > SHOWN {
+            "…"
+        } else {
+            ""
+        };
+        Self {
+            place,
+            defect: Defect::Unexpected {
+                expected,
+                found: format!("'{shown}{more}'"),
+            },
+        }
     }
 
     /// The file ends here.
     pub fn ends(place: FilePlace, expected: &'static str) -> Self {
-        Self { place, defect: Defect::Unexpected { expected, found: "the end of the file".into() } }
+        Self {
+            place,
+            defect: Defect::Unexpected {
+                expected,
+                found: "the end of the file".into(),
+            },
+        }
     }
 }

@@ -153,9 +153,10 @@ pub enum MeshOrPoints {
 pub fn read_mesh(path: &Path, unit: MeshUnit) -> Result<MeshFile, MeshFileError> {
     match read_mesh_or_points(path, unit)? {
         MeshOrPoints::Mesh(file) => Ok(*file),
-        MeshOrPoints::Points(cloud) => {
-            Err(MeshFileError::NoFaces { path: path.into(), vertices: cloud.positions.len() })
-        }
+        MeshOrPoints::Points(cloud) => Err(MeshFileError::NoFaces {
+            path: path.into(),
+            vertices: cloud.positions.len(),
+        }),
     }
 }
 
@@ -167,15 +168,26 @@ pub fn read_mesh(path: &Path, unit: MeshUnit) -> Result<MeshFile, MeshFileError>
 /// As [`read_mesh`].
 pub fn read_mesh_or_points(path: &Path, unit: MeshUnit) -> Result<MeshOrPoints, MeshFileError> {
     let bytes = read_file(path)?;
-    let syntax = |Syntax { place, defect }| MeshFileError::Syntax { path: path.into(), place, defect };
+    let syntax = |Syntax { place, defect }| MeshFileError::Syntax {
+        path: path.into(),
+        place,
+        defect,
+    };
     if bytes.is_empty() {
         return Err(syntax(Syntax::ends(FilePlace::Byte(0), "a mesh")));
     }
     match cloud_format(&bytes, path) {
         Some(CloudFormat::E57) if unit != MeshUnit::Metre => {
-            return Err(MeshFileError::UnitOfE57 { path: path.into(), unit });
+            return Err(MeshFileError::UnitOfE57 {
+                path: path.into(),
+                unit,
+            });
         }
-        Some(format) => return Ok(MeshOrPoints::Points(format.read(&bytes, unit).map_err(syntax)?)),
+        Some(format) => {
+            return Ok(MeshOrPoints::Points(
+                format.read(&bytes, unit).map_err(syntax)?,
+            ));
+        }
         None => {}
     }
     let scale = unit.metres();
@@ -186,14 +198,23 @@ pub fn read_mesh_or_points(path: &Path, unit: MeshUnit) -> Result<MeshOrPoints, 
             Ok(soup) if soup.faces.is_empty() && !soup.positions.is_empty() => {
                 let columns = ply::read_columns(&bytes, scale, ["nx", "ny", "nz"]);
                 let (positions, normals) = columns.map_err(syntax)?;
-                return Ok(MeshOrPoints::Points(point_cloud::of_ply(positions, normals)));
+                return Ok(MeshOrPoints::Points(point_cloud::of_ply(
+                    positions, normals,
+                )));
             }
             soup => soup,
         },
     };
-    let Soup { positions, faces, unused } = soup.map_err(syntax)?;
+    let Soup {
+        positions,
+        faces,
+        unused,
+    } = soup.map_err(syntax)?;
     if faces.is_empty() {
-        return Err(MeshFileError::NoFaces { path: path.into(), vertices: positions.len() + unused });
+        return Err(MeshFileError::NoFaces {
+            path: path.into(),
+            vertices: positions.len() + unused,
+        });
     }
     let mut file = repaired(path, unit, positions, faces)?;
     file.repair.unused_vertices += unused;
@@ -218,11 +239,20 @@ pub fn read_appearance(path: &Path, unit: MeshUnit) -> Result<Option<Appearance>
         Ok(Format::Obj) => obj::read_painted(&bytes, unit.metres(), folder),
         Ok(Format::Stl) | Err(_) => return Ok(None),
     };
-    let soup = soup.map_err(|Syntax { place, defect }| MeshFileError::Syntax { path: path.into(), place, defect })?;
+    let soup = soup.map_err(|Syntax { place, defect }| MeshFileError::Syntax {
+        path: path.into(),
+        place,
+        defect,
+    })?;
     if soup.faces.is_empty() || (soup.colours.is_none() && soup.texture.is_none()) {
         return Ok(None);
     }
-    soup.appearance(folder).map(Some).map_err(|source| MeshFileError::Mesh { path: path.into(), source })
+    soup.appearance(folder)
+        .map(Some)
+        .map_err(|source| MeshFileError::Mesh {
+            path: path.into(),
+            source,
+        })
 }
 
 /// The mesh of what `path` holds, repaired ([`repair`]).
@@ -237,10 +267,15 @@ pub fn repaired(
     positions: Vec<Point3<f64>>,
     faces: Vec<[u32; 3]>,
 ) -> Result<MeshFile, MeshFileError> {
-    let (mesh, repair) =
-        repair(positions, faces).map_err(|source| MeshFileError::Mesh { path: path.into(), source })?;
+    let (mesh, repair) = repair(positions, faces).map_err(|source| MeshFileError::Mesh {
+        path: path.into(),
+        source,
+    })?;
     let [low, high] = mesh.bounds();
-    Implausible::check(high - low, unit).map_err(|size| MeshFileError::Implausible { path: path.into(), size })?;
+    Implausible::check(high - low, unit).map_err(|size| MeshFileError::Implausible {
+        path: path.into(),
+        size,
+    })?;
     Ok(MeshFile { mesh, repair })
 }
 
@@ -271,7 +306,11 @@ pub fn read_vertex_columns<const N: usize>(
     if !matches!(Format::of_content(&bytes), Some(Format::Ply)) {
         return Ok([const { None }; N]);
     }
-    let syntax = |Syntax { place, defect }| MeshFileError::Syntax { path: path.into(), place, defect };
+    let syntax = |Syntax { place, defect }| MeshFileError::Syntax {
+        path: path.into(),
+        place,
+        defect,
+    };
     let (positions, columns) = ply::read_columns(&bytes, unit.metres(), names).map_err(syntax)?;
     let rows = rows_of(mesh, &positions);
     // of a surface made through points no vertex is in the file
@@ -284,7 +323,10 @@ pub fn read_vertex_columns<const N: usize>(
 /// For each vertex the row of the file that it comes from: repair keeps the order, and of equal positions the first.
 fn rows_of(mesh: &TriMesh, positions: &[Point3<f64>]) -> Vec<usize> {
     let mut rows = positions.iter().enumerate();
-    let mut row_of = |wanted: &Point3<f64>| rows.find(|(_, p)| p.coords == wanted.coords).map(|(row, _)| row);
+    let mut row_of = |wanted: &Point3<f64>| {
+        rows.find(|(_, p)| p.coords == wanted.coords)
+            .map(|(row, _)| row)
+    };
     mesh.positions().iter().map_while(&mut row_of).collect()
 }
 
@@ -294,7 +336,12 @@ fn rows_of(mesh: &TriMesh, positions: &[Point3<f64>]) -> Vec<usize> {
 /// As [`write_mesh`].
 pub fn check_target(path: &Path) -> Result<(), MeshFileError> {
     Format::of_name(path)?;
-    Ok(AtomicFile::create(path).map(drop).map_err(|source| FileError::Write { path: path.into(), source })?)
+    Ok(AtomicFile::create(path)
+        .map(drop)
+        .map_err(|source| FileError::Write {
+            path: path.into(),
+            source,
+        })?)
 }
 
 /// Writes a mesh as PLY (binary, double), STL (binary, which is single) or OBJ, by the extension of `path`.
@@ -324,10 +371,14 @@ pub fn write_mesh_with(
 ) -> Result<(), MeshFileError> {
     let format = Format::of_name(path)?;
     if let Some(vertex) = mesh.positions().iter().position(|p| !is_place(p)) {
-        return Err(MeshFileError::NoPlace { path: path.into(), vertex: vertex as u32 });
+        return Err(MeshFileError::NoPlace {
+            path: path.into(),
+            vertex: vertex as u32,
+        });
     }
     let ((soup, ids), unit) = (Soup::used_part(mesh, unit.metres()), unit.to_string());
-    let texture = texture.map(|texture| SoupTexture::of(texture, mesh, path.parent().unwrap_or(Path::new(""))));
+    let texture = texture
+        .map(|texture| SoupTexture::of(texture, mesh, path.parent().unwrap_or(Path::new(""))));
     let (texture, materials) = (texture.as_ref(), path.with_extension("mtl"));
     let images = texture.map_or(&[][..], |texture| &texture.images);
     if matches!(format, Format::Obj) && !images.is_empty() {

@@ -26,7 +26,9 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     let no_materials = |_: &Path| Err(LoadError::OpenFileFailed);
     let (models, _) = load(&bytes, &mut lines, no_materials)?;
     let mut soup = Soup::default();
-    models.iter().for_each(|model| take(model, scale, &mut soup.positions, &mut soup.faces));
+    models
+        .iter()
+        .for_each(|model| take(model, scale, &mut soup.positions, &mut soup.faces));
     soup.unused = lines.vertices - soup.positions.len().min(lines.vertices);
     Ok(soup)
 }
@@ -48,15 +50,22 @@ pub(super) fn read_painted(bytes: &[u8], scale: f64, folder: &Path) -> Result<Pa
         tobj::load_mtl_buf(&mut BufReader::new(file))
     };
     let (models, materials) = load(&bytes, &mut lines, materials)?;
-    let (mut soup, mut texture, mut colours) = (PaintedSoup::default(), SoupTexture::default(), Vec::new());
+    let (mut soup, mut texture, mut colours) =
+        (PaintedSoup::default(), SoupTexture::default(), Vec::new());
     let mut image_of = vec![None; materials.len()];
     for model in &models {
         let mesh = &model.mesh;
         let of = |&corner: &u32| {
-            mesh.texcoords.as_chunks().0.get(corner as usize).map_or([0.0; 2], |uv| uv.map(|x| x as f32))
+            mesh.texcoords
+                .as_chunks()
+                .0
+                .get(corner as usize)
+                .map_or([0.0; 2], |uv| uv.map(|x| x as f32))
         };
         let triangles = mesh.texcoord_indices.as_chunks::<3>().0;
-        texture.corners.extend(triangles.iter().map(|[a, b, c]| [of(a), of(b), of(c)]));
+        texture
+            .corners
+            .extend(triangles.iter().map(|[a, b, c]| [of(a), of(b), of(c)]));
         take(model, scale, &mut soup.positions, &mut soup.faces);
         // a model without texture coordinates between others that have them
         texture.corners.resize(soup.faces.len(), [[0.0; 2]; 3]);
@@ -68,19 +77,36 @@ pub(super) fn read_painted(bytes: &[u8], scale: f64, folder: &Path) -> Result<Pa
             }))
         });
         texture.shown.resize(soup.faces.len(), shown.unwrap_or(0));
-        colours.extend(mesh.vertex_color.as_chunks().0.iter().map(|of| of.map(|x| (x * 255.0).round() as u8)));
+        colours.extend(
+            mesh.vertex_color
+                .as_chunks()
+                .0
+                .iter()
+                .map(|of| of.map(|x| (x * 255.0).round() as u8)),
+        );
     }
-    let has_texture = models.iter().any(|model| !model.mesh.texcoord_indices.is_empty());
+    let has_texture = models
+        .iter()
+        .any(|model| !model.mesh.texcoord_indices.is_empty());
     soup.texture = has_texture.then_some(texture);
-    soup.colours =
-        (!colours.is_empty() && colours.len() == soup.positions.len()).then_some(VertexColours::Rgb(colours));
+    soup.colours = (!colours.is_empty() && colours.len() == soup.positions.len())
+        .then_some(VertexColours::Rgb(colours));
     Ok(soup)
 }
 
 type Loaded = (Vec<Model>, Vec<Material>);
 
-fn load(bytes: &[u8], lines: &mut Lines, materials: impl Fn(&Path) -> tobj::MTLLoadResult) -> Result<Loaded, Syntax> {
-    let options = LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
+fn load(
+    bytes: &[u8],
+    lines: &mut Lines,
+    materials: impl Fn(&Path) -> tobj::MTLLoadResult,
+) -> Result<Loaded, Syntax> {
+    let options = LoadOptions {
+        triangulate: true,
+        ignore_points: true,
+        ignore_lines: true,
+        ..Default::default()
+    };
     let loaded = tobj::load_obj_buf(&mut *lines, &options, materials);
     let (models, materials) = loaded.map_err(|error| place_of(error, bytes, lines.number))?;
     Ok((models, materials.unwrap_or_default()))
@@ -89,8 +115,24 @@ fn load(bytes: &[u8], lines: &mut Lines, materials: impl Fn(&Path) -> tobj::MTLL
 /// Adds the triangles of a model.
 fn take(model: &Model, scale: f64, positions: &mut Vec<Point3<f64>>, faces: &mut Vec<[u32; 3]>) {
     let first = positions.len() as u32;
-    positions.extend(model.mesh.positions.as_chunks().0.iter().map(|&p| Point3::from(p) * scale));
-    faces.extend(model.mesh.indices.as_chunks().0.iter().map(|f| f.map(|v| v + first)));
+    positions.extend(
+        model
+            .mesh
+            .positions
+            .as_chunks()
+            .0
+            .iter()
+            .map(|&p| Point3::from(p) * scale),
+    );
+    faces.extend(
+        model
+            .mesh
+            .indices
+            .as_chunks()
+            .0
+            .iter()
+            .map(|f| f.map(|v| v + first)),
+    );
 }
 
 /// The text as UTF-8: UTF-16 with a byte order mark is turned into it. Comments may be in any encoding.
@@ -98,11 +140,21 @@ fn as_utf8(bytes: &[u8]) -> Result<Cow<'_, [u8]>, Syntax> {
     let pair: fn([u8; 2]) -> u16 = match bytes {
         [0xfe, 0xff, ..] => u16::from_be_bytes,
         [0xff, 0xfe, ..] => u16::from_le_bytes,
-        _ => return Ok(Cow::Borrowed(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes))),
+        _ => {
+            return Ok(Cow::Borrowed(
+                bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes),
+            ));
+        }
     };
     let units = bytes[2..].as_chunks().0.iter().map(|&b| pair(b));
     let text: Result<String, _> = char::decode_utf16(units).collect();
-    let broken = |_| Syntax::unexpected(FilePlace::Byte(0), "UTF-8 or UTF-16 text", "a broken UTF-16 character");
+    let broken = |_| {
+        Syntax::unexpected(
+            FilePlace::Byte(0),
+            "UTF-8 or UTF-16 text",
+            "a broken UTF-16 character",
+        )
+    };
     Ok(Cow::Owned(text.map_err(broken)?.into_bytes()))
 }
 
@@ -123,12 +175,24 @@ struct Lines<'a> {
 
 impl<'a> Lines<'a> {
     fn new(rest: &'a [u8], is_painted: bool) -> Self {
-        Self { rest, is_painted, has_colours: false, line: &[], shortened: false, number: 0, vertices: 0 }
+        Self {
+            rest,
+            is_painted,
+            has_colours: false,
+            line: &[],
+            shortened: false,
+            number: 0,
+            vertices: 0,
+        }
     }
 
     fn is_passed_on(&self, line: &[u8]) -> bool {
-        let word = line.split(u8::is_ascii_whitespace).next().unwrap_or_default();
-        matches!(word, b"v" | b"f") || (self.is_painted && matches!(word, b"vt" | b"mtllib" | b"usemtl"))
+        let word = line
+            .split(u8::is_ascii_whitespace)
+            .next()
+            .unwrap_or_default();
+        matches!(word, b"v" | b"f")
+            || (self.is_painted && matches!(word, b"vt" | b"mtllib" | b"usemtl"))
     }
 }
 
@@ -138,14 +202,22 @@ impl BufRead for Lines<'_> {
             self.line = b"\n";
         }
         while self.line.is_empty() && !self.rest.is_empty() {
-            let len = self.rest.iter().position(|&b| b == b'\n').map_or(self.rest.len(), |at| at + 1);
+            let len = self
+                .rest
+                .iter()
+                .position(|&b| b == b'\n')
+                .map_or(self.rest.len(), |at| at + 1);
             let (line, rest) = self.rest.split_at(len);
             (self.rest, self.number) = (rest, self.number + 1);
             let kind = line.trim_ascii_start();
             if self.is_passed_on(kind) {
                 let is_vertex = matches!(kind, [b'v', b' ' | b'\t', ..]);
                 self.vertices += usize::from(is_vertex);
-                self.line = if is_vertex && !self.has_colours { without_colour(line) } else { line };
+                self.line = if is_vertex && !self.has_colours {
+                    without_colour(line)
+                } else {
+                    line
+                };
                 self.shortened = self.line.len() < line.len();
             }
         }
@@ -168,11 +240,18 @@ impl Read for Lines<'_> {
 fn every_vertex_has_a_colour(bytes: &[u8]) -> bool {
     let lines = bytes.split(|&b| b == b'\n').map(<[u8]>::trim_ascii_start);
     let mut vertices = lines.filter(|line| matches!(line, [b'v', b' ' | b'\t', ..]));
-    vertices.all(|line| line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).count() == 7)
+    vertices.all(|line| {
+        line.split(u8::is_ascii_whitespace)
+            .filter(|word| !word.is_empty())
+            .count()
+            == 7
+    })
 }
 
 fn has_texture_coordinates(bytes: &[u8]) -> bool {
-    bytes.split(|&b| b == b'\n').any(|line| matches!(line.trim_ascii_start(), [b'v', b't', b' ' | b'\t', ..]))
+    bytes
+        .split(|&b| b == b'\n')
+        .any(|line| matches!(line.trim_ascii_start(), [b'v', b't', b' ' | b'\t', ..]))
 }
 
 /// The line up to the third coordinate when more than a weight follows: files in which only some vertices have a colour
@@ -192,7 +271,10 @@ fn without_colour(line: &[u8]) -> &[u8] {
 
 /// Where and what: errors in the use of vertices are found only at the end, when `tobj` has lost the line.
 fn place_of(error: LoadError, bytes: &[u8], number: usize) -> Syntax {
-    let of_faces = matches!(error, LoadError::FaceVertexOutOfBounds | LoadError::InvalidPolygon);
+    let of_faces = matches!(
+        error,
+        LoadError::FaceVertexOutOfBounds | LoadError::InvalidPolygon
+    );
     let found = || first_bad_face(bytes).filter(|_| of_faces);
     found().unwrap_or_else(|| {
         let expected = match error {
@@ -201,26 +283,44 @@ fn place_of(error: LoadError, bytes: &[u8], number: usize) -> Syntax {
             LoadError::ScalingByZeroError => "a weight other than zero",
             _ => "three coordinates with a decimal point",
         };
-        let line = bytes.split(|&b| b == b'\n').nth(number.saturating_sub(1)).unwrap_or_default();
-        Syntax::unexpected(FilePlace::Line(number), expected, String::from_utf8_lossy(line.trim_ascii()))
+        let line = bytes
+            .split(|&b| b == b'\n')
+            .nth(number.saturating_sub(1))
+            .unwrap_or_default();
+        Syntax::unexpected(
+            FilePlace::Line(number),
+            expected,
+            String::from_utf8_lossy(line.trim_ascii()),
+        )
     })
 }
 
 /// The first face without corners or with a corner that names no vertex.
 fn first_bad_face(bytes: &[u8]) -> Option<Syntax> {
-    let total = bytes.split(|&b| b == b'\n').filter(|line| matches!(line, [b'v', b' ' | b'\t', ..])).count();
+    let total = bytes
+        .split(|&b| b == b'\n')
+        .filter(|line| matches!(line, [b'v', b' ' | b'\t', ..]))
+        .count();
     let (mut lines, mut before) = (NumberedLines::new(bytes, b'\n'), 0);
     while let Some(line) = lines.next() {
         let place = FilePlace::Line(lines.number());
         let mut words = line.split_ascii_whitespace();
         match words.next() {
             Some("v") => before += 1,
-            Some("f") if line.len() == 1 => return Some(Syntax::unexpected(place, "numbers of vertices", &line)),
+            Some("f") if line.len() == 1 => {
+                return Some(Syntax::unexpected(place, "numbers of vertices", &line));
+            }
             Some("f") => {
                 let exists = |v: &i64| (1..=total as i64).contains(v) || (-before..0).contains(v);
                 let named = words.filter_map(|w| w.split('/').next()?.parse::<i64>().ok());
                 if let Some(vertex) = named.into_iter().find(|v| !exists(v)) {
-                    return Some(Syntax { place, defect: Defect::NoSuchVertex { vertex, vertices: total } });
+                    return Some(Syntax {
+                        place,
+                        defect: Defect::NoSuchVertex {
+                            vertex,
+                            vertices: total,
+                        },
+                    });
                 }
             }
             _ => {}
@@ -245,7 +345,11 @@ pub(super) fn write(
     if has_images {
         writeln!(out, "mtllib {materials}")?;
     }
-    let bytes = |name| match columns.iter().find(|column| column.name == name).map(|column| &column.values) {
+    let bytes = |name| match columns
+        .iter()
+        .find(|column| column.name == name)
+        .map(|column| &column.values)
+    {
         Some(ColumnValues::Byte(values)) => Some(values),
         _ => None,
     };
@@ -254,15 +358,16 @@ pub(super) fn write(
         write!(out, "v {:?} {:?} {:?}", p.x, p.y, p.z)?;
         if let Some(((r, g), b)) = colours {
             // four digits give back the byte
-            [r, g, b].iter().try_for_each(|values| write!(out, " {:.4}", f64::from(values[id]) / 255.0))?;
+            [r, g, b]
+                .iter()
+                .try_for_each(|values| write!(out, " {:.4}", f64::from(values[id]) / 255.0))?;
         }
         writeln!(out)?;
     }
     let Some(texture) = texture else {
-        return soup
-            .faces
-            .iter()
-            .try_for_each(|[a, b, c]| writeln!(out, "f {} {} {}", named(*a), named(*b), named(*c)));
+        return soup.faces.iter().try_for_each(|[a, b, c]| {
+            writeln!(out, "f {} {} {}", named(*a), named(*b), named(*c))
+        });
     };
     let mut numbers = HashMap::new();
     for uv in texture.corners.as_flattened() {
@@ -273,7 +378,9 @@ pub(super) fn write(
         }
     }
     let mut used = None;
-    for ((corners, shown), coordinates) in soup.faces.iter().zip(&texture.shown).zip(&texture.corners) {
+    for ((corners, shown), coordinates) in
+        soup.faces.iter().zip(&texture.shown).zip(&texture.corners)
+    {
         if has_images && used != Some(shown) {
             writeln!(out, "usemtl {}", material(*shown))?;
             used = Some(shown);
@@ -289,10 +396,9 @@ pub(super) fn write(
 
 /// The materials that [`write`] names: an image each.
 pub(super) fn write_materials(images: &[String], out: &mut impl Write) -> io::Result<()> {
-    images
-        .iter()
-        .zip(0..)
-        .try_for_each(|(image, at)| writeln!(out, "newmtl {}\nKd 1 1 1\nmap_Kd {image}", material(at)))
+    images.iter().zip(0..).try_for_each(|(image, at)| {
+        writeln!(out, "newmtl {}\nKd 1 1 1\nmap_Kd {image}", material(at))
+    })
 }
 
 fn material(shown: u32) -> String {
@@ -310,10 +416,18 @@ mod tests {
     #[test]
     fn a_file_that_does_not_say_how_it_looks_is_not_parsed_for_that() {
         let read = |text: String| read_painted(text.as_bytes(), 1.0, Path::new(""));
-        let plain = |colour: &str| format!("v 0 0 0\nv 1 0 0 1 0 0\nv 0 1 0{colour}\nusemtl x\nf 1 2 nothing\n");
+        let plain = |colour: &str| {
+            format!("v 0 0 0\nv 1 0 0 1 0 0\nv 0 1 0{colour}\nusemtl x\nf 1 2 nothing\n")
+        };
         let soup = read(plain("")).expect("its faces are not looked at");
         assert!(soup.faces.is_empty() && soup.colours.is_none() && soup.texture.is_none());
-        assert!(read(format!("  vt 0 0\n{}", plain(""))).is_err(), "its faces may have texture coordinates");
-        assert!(read(plain(" 0 0 1").replacen("v 0 0 0", "v 0 0 0 0 0 0", 1)).is_err(), "its vertices have colours");
+        assert!(
+            read(format!("  vt 0 0\n{}", plain(""))).is_err(),
+            "its faces may have texture coordinates"
+        );
+        assert!(
+            read(plain(" 0 0 1").replacen("v 0 0 0", "v 0 0 0 0 0 0", 1)).is_err(),
+            "its vertices have colours"
+        );
     }
 }

@@ -16,7 +16,8 @@ const RECORD: usize = 50;
 
 /// Whether the count in a binary header agrees with the length of the file.
 pub(super) fn is_binary(bytes: &[u8]) -> bool {
-    announced(bytes).is_some_and(|count| bytes.len() as u64 == HEADER as u64 + RECORD as u64 * u64::from(count))
+    announced(bytes)
+        .is_some_and(|count| bytes.len() as u64 == HEADER as u64 + RECORD as u64 * u64::from(count))
 }
 
 /// Whether the text begins as ASCII STL does; the headers of some binary files do so as well.
@@ -37,24 +38,41 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
 }
 
 fn announced(bytes: &[u8]) -> Option<u32> {
-    bytes.get(80..HEADER)?.try_into().ok().map(u32::from_le_bytes)
+    bytes
+        .get(80..HEADER)?
+        .try_into()
+        .ok()
+        .map(u32::from_le_bytes)
 }
 
 fn read_binary(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     let Some(count) = announced(bytes) else {
-        return Err(Syntax::ends(FilePlace::Byte(bytes.len() as u64), "84 bytes of STL header"));
+        return Err(Syntax::ends(
+            FilePlace::Byte(bytes.len() as u64),
+            "84 bytes of STL header",
+        ));
     };
     let (count, left) = (u64::from(count), bytes.len() - HEADER);
     let needed = u128::from(count) * RECORD as u128;
     if needed != left as u128 {
         let place = FilePlace::Byte(HEADER as u64 + needed.min(left as u128) as u64);
-        return Err(Syntax { place, defect: Defect::Length { what: "triangles".into(), count, needed, left } });
+        return Err(Syntax {
+            place,
+            defect: Defect::Length {
+                what: "triangles".into(),
+                count,
+                needed,
+                left,
+            },
+        });
     }
     let mut positions = Vec::with_capacity(3 * count as usize);
     for record in bytes[HEADER..].chunks_exact(RECORD) {
         for corner in record[12..48].as_chunks::<12>().0 {
             let numbers = corner.as_chunks::<4>().0;
-            positions.push(Point3::from([0, 1, 2].map(|i| scale * f64::from(f32::from_le_bytes(numbers[i])))));
+            positions.push(Point3::from(
+                [0, 1, 2].map(|i| scale * f64::from(f32::from_le_bytes(numbers[i]))),
+            ));
         }
     }
     Ok(Soup::of_triangles(positions))
@@ -68,7 +86,12 @@ fn read_ascii(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     while let Some(line) = lines.next() {
         let place = FilePlace::Line(lines.number());
         let mut words = line.split_ascii_whitespace();
-        match words.next().unwrap_or_default().to_ascii_lowercase().as_str() {
+        match words
+            .next()
+            .unwrap_or_default()
+            .to_ascii_lowercase()
+            .as_str()
+        {
             "" | "solid" | "endsolid" | "outer" | "endloop" => {}
             "facet" => corners.clear(),
             "vertex" => {
@@ -76,13 +99,27 @@ fn read_ascii(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
                 corners.push(Point3::new(coordinate()?, coordinate()?, coordinate()?));
             }
             "endfacet" if corners.len() < 3 => {
-                return Err(Syntax::unexpected(place, "three 'vertex' lines before it", "endfacet"));
+                return Err(Syntax::unexpected(
+                    place,
+                    "three 'vertex' lines before it",
+                    "endfacet",
+                ));
             }
             "endfacet" => {
-                positions.extend(corners[1..].windows(2).flat_map(|pair| [corners[0], pair[0], pair[1]]));
+                positions.extend(
+                    corners[1..]
+                        .windows(2)
+                        .flat_map(|pair| [corners[0], pair[0], pair[1]]),
+                );
                 corners.clear();
             }
-            other => return Err(Syntax::unexpected(place, "a word of an ASCII STL file such as 'facet'", other)),
+            other => {
+                return Err(Syntax::unexpected(
+                    place,
+                    "a word of an ASCII STL file such as 'facet'",
+                    other,
+                ));
+            }
         }
     }
     match corners.is_empty() {
@@ -102,10 +139,16 @@ pub(super) fn write(soup: &Soup, unit: &str, out: &mut impl Write) -> io::Result
     out.write_all(&count.to_le_bytes())?;
     for corners in &soup.faces {
         let [a, b, c] = corners.map(|v| soup.positions[v as usize]);
-        let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
+        let normal = (b - a)
+            .cross(&(c - a))
+            .try_normalize(0.0)
+            .unwrap_or_default();
         let mut record = [0; RECORD];
         let values = [normal, a.coords, b.coords, c.coords];
-        for (slot, x) in record.chunks_exact_mut(4).zip(values.iter().flat_map(|v| v.iter())) {
+        for (slot, x) in record
+            .chunks_exact_mut(4)
+            .zip(values.iter().flat_map(|v| v.iter()))
+        {
             slot.copy_from_slice(&(*x as f32).to_le_bytes());
         }
         out.write_all(&record)?;

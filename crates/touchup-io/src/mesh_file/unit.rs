@@ -66,29 +66,52 @@ impl Implausible {
             return Ok(());
         }
         let sides = sides_m / unit.metres();
-        let suggestion = MeshUnit::ALL.into_iter().find(|u| plausible(sides.norm() * u.metres()));
-        Err(Self { sides, unit, suggestion })
+        let suggestion = MeshUnit::ALL
+            .into_iter()
+            .find(|u| plausible(sides.norm() * u.metres()));
+        Err(Self {
+            sides,
+            unit,
+            suggestion,
+        })
     }
 }
 
 impl fmt::Display for Implausible {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { sides, unit, suggestion } = self;
+        let Self {
+            sides,
+            unit,
+            suggestion,
+        } = self;
         let small = sides.norm() * unit.metres() < SMALLEST_M;
         let [x, y, z] = [sides.x, sides.y, sides.z].map(three_digits);
-        write!(f, "{x} x {y} x {z} {unit} is too {} for a work-piece: ", if small { "small" } else { "large" })?;
+        write!(
+            f,
+            "{x} x {y} x {z} {unit} is too {} for a work-piece: ",
+            if small { "small" } else { "large" }
+        )?;
         match suggestion {
             Some(other) => {
-                write!(f, "the file is probably in {}, try --mesh-unit {other}", other.metres_and_plural().1)
+                write!(
+                    f,
+                    "the file is probably in {}, try --mesh-unit {other}",
+                    other.metres_and_plural().1
+                )
             }
-            None => write!(f, "it fits in no unit (diagonal from {SMALLEST_M} to {LARGEST_M} m): scale the file"),
+            None => write!(
+                f,
+                "it fits in no unit (diagonal from {SMALLEST_M} to {LARGEST_M} m): scale the file"
+            ),
         }
     }
 }
 
 /// The number with three significant digits, in its shortest form.
 fn three_digits(x: f64) -> String {
-    format!("{x:.2e}").parse::<f64>().map_or_else(|_| x.to_string(), |rounded| format!("{rounded:?}"))
+    format!("{x:.2e}")
+        .parse::<f64>()
+        .map_or_else(|_| x.to_string(), |rounded| format!("{rounded:?}"))
 }
 
 #[cfg(test)]
@@ -103,7 +126,11 @@ mod tests {
             Implausible::check(sides * unit.metres(), unit).map_err(|e| e.to_string())
         };
         assert_eq!(refusal(block, MeshUnit::Inch), Ok(()));
-        assert_eq!(refusal(block, MeshUnit::Millimetre), Ok(()), "small, but not beyond belief");
+        assert_eq!(
+            refusal(block, MeshUnit::Millimetre),
+            Ok(()),
+            "small, but not beyond belief"
+        );
         assert_eq!(
             refusal(block * 0.0254, MeshUnit::Millimetre).unwrap_err(),
             "0.127 x 0.0635 x 0.0349 mm is too small for a work-piece: the file is probably in metres, try --mesh-unit m"

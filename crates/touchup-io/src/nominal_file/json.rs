@@ -18,13 +18,21 @@ struct NominalFile {
 pub(super) fn read(path: &Path) -> Result<Vec<(String, NominalRecord)>, NominalFileError> {
     let text = read_file(path)?;
     let file: NominalFile =
-        serde_json::from_slice(&text).map_err(|source| NominalFileError::Json { path: path.to_owned(), source })?;
-    let placed = (1..).zip(file.characteristics).map(|(number, record)| (format!("characteristic {number}"), record));
+        serde_json::from_slice(&text).map_err(|source| NominalFileError::Json {
+            path: path.to_owned(),
+            source,
+        })?;
+    let placed = (1..)
+        .zip(file.characteristics)
+        .map(|(number, record)| (format!("characteristic {number}"), record));
     Ok(placed.collect())
 }
 
 pub(super) fn write(path: &Path, records: &[NominalRecord]) -> Result<(), FileError> {
-    let file = NominalFile { characteristics: records.to_vec() };
-    let text = serde_json::to_string_pretty(&file).expect("finite numbers and names alone cannot fail");
+    let file = NominalFile {
+        characteristics: records.to_vec(),
+    };
+    let text =
+        serde_json::to_string_pretty(&file).expect("finite numbers and names alone cannot fail");
     write_file(path, |out| writeln!(out, "{text}"))
 }

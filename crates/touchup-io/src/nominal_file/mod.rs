@@ -22,22 +22,42 @@ pub fn is_nominal_file(path: &Path) -> bool {
 /// # Errors
 /// [`NominalFileError`]: the first that is wrong, with its line.
 pub fn read_nominal(path: &Path) -> Result<Vec<NominalRecord>, NominalFileError> {
-    let is_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
-    let placed = if is_json { json::read(path)? } else { rows::read(path)? };
-    let wrong =
-        |place: &str, why| NominalFileError::Characteristic { path: path.to_owned(), place: place.to_owned(), why };
+    let is_json = path
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
+    let placed = if is_json {
+        json::read(path)?
+    } else {
+        rows::read(path)?
+    };
+    let wrong = |place: &str, why| NominalFileError::Characteristic {
+        path: path.to_owned(),
+        place: place.to_owned(),
+        why,
+    };
     let mut names: BTreeMap<&str, &str> = BTreeMap::new();
     let mut characteristics: Vec<(&NominalRecord, &str)> = Vec::new();
     for (place, record) in &placed {
         record.check().map_err(|why| wrong(place, why))?;
         if let Some(first) = names.insert(&record.name, place) {
-            return Err(wrong(place, format!("the name {:?} is that of {first}: give each its own", record.name)));
+            return Err(wrong(
+                place,
+                format!(
+                    "the name {:?} is that of {first}: give each its own",
+                    record.name
+                ),
+            ));
         }
-        if let Some((_, first)) = characteristics.iter().find(|(other, _)| other.is_the_same_as(record)) {
+        if let Some((_, first)) = characteristics
+            .iter()
+            .find(|(other, _)| other.is_the_same_as(record))
+        {
             let quantity = &record.quantity;
             return Err(wrong(
                 place,
-                format!("{quantity} of this feature has its tolerance in {first}: remove one of the two"),
+                format!(
+                    "{quantity} of this feature has its tolerance in {first}: remove one of the two"
+                ),
             ));
         }
         characteristics.push((record, place));
@@ -54,9 +74,19 @@ pub fn read_nominal(path: &Path) -> Result<Vec<NominalRecord>, NominalFileError>
 ///
 /// # Errors
 /// [`NominalFileError::File`].
-pub fn write_nominal(path: &Path, records: &[NominalRecord], comment: &[&str]) -> Result<(), NominalFileError> {
-    let is_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
-    let written = if is_json { json::write(path, records) } else { rows::write(path, records, comment) };
+pub fn write_nominal(
+    path: &Path,
+    records: &[NominalRecord],
+    comment: &[&str],
+) -> Result<(), NominalFileError> {
+    let is_json = path
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
+    let written = if is_json {
+        json::write(path, records)
+    } else {
+        rows::write(path, records, comment)
+    };
     Ok(written?)
 }
 

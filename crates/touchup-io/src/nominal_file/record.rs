@@ -99,12 +99,14 @@ impl NominalRecord {
         let lower = self.lower_deviation_mm.or(self.lower_deviation_deg);
         let upper = self.upper_deviation_mm.or(self.upper_deviation_deg);
         match (self.tolerance_mm.or(self.tolerance_deg), lower, upper) {
-            (Some(width), ..) if is_zone => {
-                NominalTolerance::Limits(ToleranceLimits { lower: None, upper: Some(width) })
-            }
-            (Some(half), ..) => {
-                NominalTolerance::Limits(ToleranceLimits { lower: Some(nominal - half), upper: Some(nominal + half) })
-            }
+            (Some(width), ..) if is_zone => NominalTolerance::Limits(ToleranceLimits {
+                lower: None,
+                upper: Some(width),
+            }),
+            (Some(half), ..) => NominalTolerance::Limits(ToleranceLimits {
+                lower: Some(nominal - half),
+                upper: Some(nominal + half),
+            }),
             (None, None, None) => NominalTolerance::General,
             (None, lower, upper) => NominalTolerance::Limits(ToleranceLimits {
                 lower: lower.map(|deviation| nominal + deviation),
@@ -115,17 +117,26 @@ impl NominalRecord {
 
     /// Whether both are of the same feature: its kind, and its place or number.
     pub fn is_of_the_same_feature(&self, other: &Self) -> bool {
-        self.kind == other.kind && self.feature == other.feature && self.center_mm == other.center_mm
+        self.kind == other.kind
+            && self.feature == other.feature
+            && self.center_mm == other.center_mm
     }
 
     /// Whether both are the same characteristic of the same feature.
     pub(super) fn is_the_same_as(&self, other: &Self) -> bool {
-        self.is_of_the_same_feature(other) && self.quantity == other.quantity && self.datum == other.datum
+        self.is_of_the_same_feature(other)
+            && self.quantity == other.quantity
+            && self.datum == other.datum
     }
 
     /// What is wrong with it, and what to do.
     pub(super) fn check(&self) -> Result<(), String> {
-        let Self { name, kind, quantity, .. } = self;
+        let Self {
+            name,
+            kind,
+            quantity,
+            ..
+        } = self;
         if name.trim().is_empty() {
             return Err("it has no name: give one in the column name".to_owned());
         }
@@ -133,14 +144,22 @@ impl NominalRecord {
         let Some(quantity) = InspectedQuantity::of_name(quantity) else {
             return Err(format!(
                 "{name}: there is no quantity {quantity:?}: take one of {}",
-                InspectedQuantity::ALL.map(InspectedQuantity::name).join(", ")
+                InspectedQuantity::ALL
+                    .map(InspectedQuantity::name)
+                    .join(", ")
             ));
         };
         if !self.kind().is_some_and(|kind| quantity.is_of(kind)) {
-            let others =
-                InspectedQuantity::ALL.into_iter().filter(|other| self.kind().is_some_and(|kind| other.is_of(kind)));
-            let others = others.map(InspectedQuantity::name).collect::<Vec<_>>().join(", ");
-            return Err(format!("{name}: a {kind} has no {quantity}: take one of {others}"));
+            let others = InspectedQuantity::ALL
+                .into_iter()
+                .filter(|other| self.kind().is_some_and(|kind| other.is_of(kind)));
+            let others = others
+                .map(InspectedQuantity::name)
+                .collect::<Vec<_>>()
+                .join(", ");
+            return Err(format!(
+                "{name}: a {kind} has no {quantity}: take one of {others}"
+            ));
         }
         self.check_units(quantity)?;
         self.check_limits(quantity)?;
@@ -150,13 +169,13 @@ impl NominalRecord {
             ));
         }
         match &self.datum {
-            Some(_) if !quantity.needs_datum() => {
-                Err(format!("{name}: {quantity} has no datum: leave the columns of the datum empty"))
-            }
+            Some(_) if !quantity.needs_datum() => Err(format!(
+                "{name}: {quantity} has no datum: leave the columns of the datum empty"
+            )),
             Some(datum) => check_kind(name, &datum.kind),
-            None if quantity.needs_datum() => {
-                Err(format!("{name}: {quantity} needs a datum: fill in datum_kind, and its centre or its number"))
-            }
+            None if quantity.needs_datum() => Err(format!(
+                "{name}: {quantity} needs a datum: fill in datum_kind, and its centre or its number"
+            )),
             None => Ok(()),
         }
     }
@@ -175,20 +194,34 @@ impl NominalRecord {
             ("upper_deviation", self.upper_deviation_deg),
         ];
         let name = &self.name;
-        let (other, wrong) = if quantity.unit() == "mm" { (of_deg, "deg") } else { (of_mm, "mm") };
+        let (other, wrong) = if quantity.unit() == "mm" {
+            (of_deg, "deg")
+        } else {
+            (of_mm, "mm")
+        };
         if let Some((column, _)) = other.iter().find(|(_, number)| number.is_some()) {
             let unit = quantity.unit();
             return Err(format!(
                 "{name}: {quantity} is in {unit}: put the number into {column}_{unit} and leave {column}_{wrong} empty"
             ));
         }
-        let numbers = of_mm.iter().chain(&of_deg).filter_map(|(_, number)| *number);
-        let places = [self.center_mm, self.axis, self.datum.as_ref().and_then(|datum| datum.center_mm)];
-        match numbers.chain(places.into_iter().flatten().flatten()).find(|number| !number.is_finite()) {
+        let numbers = of_mm
+            .iter()
+            .chain(&of_deg)
+            .filter_map(|(_, number)| *number);
+        let places = [
+            self.center_mm,
+            self.axis,
+            self.datum.as_ref().and_then(|datum| datum.center_mm),
+        ];
+        match numbers
+            .chain(places.into_iter().flatten().flatten())
+            .find(|number| !number.is_finite())
+        {
             Some(number) => Err(format!("{name}: {number} is no finite number")),
-            None if self.axis == Some([0.0; 3]) => {
-                Err(format!("{name}: axis_x, axis_y, axis_z are 0: leave them empty"))
-            }
+            None if self.axis == Some([0.0; 3]) => Err(format!(
+                "{name}: axis_x, axis_y, axis_z are 0: leave them empty"
+            )),
             None => Ok(()),
         }
     }
@@ -197,10 +230,14 @@ impl NominalRecord {
         let (name, unit) = (&self.name, quantity.unit());
         let nominal = self.nominal_mm.or(self.nominal_deg);
         if !quantity.is_zone() && nominal.is_none() {
-            return Err(format!("{name}: {quantity} needs a nominal value: fill in nominal_{unit}"));
+            return Err(format!(
+                "{name}: {quantity} needs a nominal value: fill in nominal_{unit}"
+            ));
         }
         if quantity.is_zone() && nominal.is_some_and(|nominal| nominal != 0.0) {
-            return Err(format!("{name}: the nominal value of {quantity} is 0: leave nominal_{unit} empty"));
+            return Err(format!(
+                "{name}: the nominal value of {quantity} is 0: leave nominal_{unit} empty"
+            ));
         }
         let tolerance = self.tolerance_mm.or(self.tolerance_deg);
         let lower = self.lower_deviation_mm.or(self.lower_deviation_deg);
@@ -209,15 +246,17 @@ impl NominalRecord {
             return Err(format!("{name}: tolerance_{unit} must be above 0"));
         }
         if tolerance.is_some() && (lower.is_some() || upper.is_some()) {
-            return Err(format!("{name}: give tolerance_{unit}, or limit deviations, not both"));
+            return Err(format!(
+                "{name}: give tolerance_{unit}, or limit deviations, not both"
+            ));
         }
         match (lower, upper) {
-            (Some(_), _) if quantity.is_zone() => {
-                Err(format!("{name}: {quantity} cannot be below 0: leave lower_deviation_{unit} empty"))
-            }
-            (_, Some(upper)) if quantity.is_zone() && upper <= 0.0 => {
-                Err(format!("{name}: upper_deviation_{unit} must be above 0, it is the width of the zone"))
-            }
+            (Some(_), _) if quantity.is_zone() => Err(format!(
+                "{name}: {quantity} cannot be below 0: leave lower_deviation_{unit} empty"
+            )),
+            (_, Some(upper)) if quantity.is_zone() && upper <= 0.0 => Err(format!(
+                "{name}: upper_deviation_{unit} must be above 0, it is the width of the zone"
+            )),
             (Some(lower), Some(upper)) if lower >= upper => Err(format!(
                 "{name}: lower_deviation_{unit} {lower} is not below upper_deviation_{unit} {upper}: exchange them"
             )),
@@ -235,5 +274,7 @@ impl DatumRecord {
 
 fn check_kind(name: &str, kind: &str) -> Result<(), String> {
     let kinds = || Kind::ALL.map(Kind::name).join(", ");
-    Kind::of_name(kind).map(drop).ok_or_else(|| format!("{name}: there is no kind {kind:?}: take one of {}", kinds()))
+    Kind::of_name(kind)
+        .map(drop)
+        .ok_or_else(|| format!("{name}: there is no kind {kind:?}: take one of {}", kinds()))
 }

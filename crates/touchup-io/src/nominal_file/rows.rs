@@ -43,20 +43,33 @@ pub(super) fn read(path: &Path) -> Result<Vec<(String, NominalRecord)>, NominalF
     let rows = read_table(path, &[], &COLUMNS)?;
     let record = |row: &Row| match record_of(row) {
         Ok(record) => Ok((format!("line {}", row.line), record)),
-        Err(why) => Err(TableError::Line { path: path.to_owned(), line: row.line, why }.into()),
+        Err(why) => Err(TableError::Line {
+            path: path.to_owned(),
+            line: row.line,
+            why,
+        }
+        .into()),
     };
     rows.iter().map(record).collect()
 }
 
 fn record_of(row: &Row) -> Result<NominalRecord, String> {
-    let at = |column: &str| COLUMNS.iter().position(|known| *known == column).unwrap_or_default();
+    let at = |column: &str| {
+        COLUMNS
+            .iter()
+            .position(|known| *known == column)
+            .unwrap_or_default()
+    };
     let text = |column: &str| row.more[at(column)].clone();
     let number = |column: &str| row.number(at(column), column);
-    let needed =
-        |column: &str| text(column).ok_or_else(|| format!("{column} is empty or the column {column} is missing"));
+    let needed = |column: &str| {
+        text(column).ok_or_else(|| format!("{column} is empty or the column {column} is missing"))
+    };
     let whole = |column: &str| {
-        let wrong =
-            |text: String| text.parse().map_err(|_| format!("{column} is {text:?} and must be the id of a feature"));
+        let wrong = |text: String| {
+            text.parse()
+                .map_err(|_| format!("{column} is {text:?} and must be the id of a feature"))
+        };
         text(column).map(wrong).transpose()
     };
     let place = |columns: [&str; 3]| {
@@ -64,14 +77,26 @@ fn record_of(row: &Row) -> Result<NominalRecord, String> {
         match (x?, y?, z?) {
             (Some(x), Some(y), Some(z)) => Ok(Some([x, y, z])),
             (None, None, None) => Ok(None),
-            _ => Err(format!("{} go together: fill in all three or none", columns.join(", "))),
+            _ => Err(format!(
+                "{} go together: fill in all three or none",
+                columns.join(", ")
+            )),
         }
     };
-    let of_datum = (place(["datum_x_mm", "datum_y_mm", "datum_z_mm"])?, whole("datum_feature")?);
+    let of_datum = (
+        place(["datum_x_mm", "datum_y_mm", "datum_z_mm"])?,
+        whole("datum_feature")?,
+    );
     let datum = match (text("datum_kind"), of_datum) {
-        (Some(kind), (center_mm, feature)) => Some(DatumRecord { kind, center_mm, feature }),
+        (Some(kind), (center_mm, feature)) => Some(DatumRecord {
+            kind,
+            center_mm,
+            feature,
+        }),
         (None, (None, None)) => None,
-        (None, _) => return Err("datum_kind is empty: say which kind of feature the datum is".to_owned()),
+        (None, _) => {
+            return Err("datum_kind is empty: say which kind of feature the datum is".to_owned());
+        }
     };
     Ok(NominalRecord {
         name: needed(COLUMNS[0])?,
@@ -92,20 +117,40 @@ fn record_of(row: &Row) -> Result<NominalRecord, String> {
     })
 }
 
-pub(super) fn write(path: &Path, records: &[NominalRecord], comment: &[&str]) -> Result<(), FileError> {
+pub(super) fn write(
+    path: &Path,
+    records: &[NominalRecord],
+    comment: &[&str],
+) -> Result<(), FileError> {
     let rows: Vec<_> = records.iter().map(fields_of).collect();
     let is_used = |column: usize| column < NEEDED || rows.iter().any(|row| !row[column].is_empty());
-    let used: Vec<_> = (0..COLUMNS.len()).filter(|&column| is_used(column)).collect();
+    let used: Vec<_> = (0..COLUMNS.len())
+        .filter(|&column| is_used(column))
+        .collect();
     write_file(path, |out| {
-        comment.iter().try_for_each(|line| writeln!(out, "# {line}"))?;
-        writeln!(out, "{}", csv_line(used.iter().map(|&column| COLUMNS[column])))?;
-        rows.iter().try_for_each(|row| writeln!(out, "{}", csv_line(used.iter().map(|&column| row[column].as_str()))))
+        comment
+            .iter()
+            .try_for_each(|line| writeln!(out, "# {line}"))?;
+        writeln!(
+            out,
+            "{}",
+            csv_line(used.iter().map(|&column| COLUMNS[column]))
+        )?;
+        rows.iter().try_for_each(|row| {
+            writeln!(
+                out,
+                "{}",
+                csv_line(used.iter().map(|&column| row[column].as_str()))
+            )
+        })
     })
 }
 
 fn fields_of(record: &NominalRecord) -> [String; 23] {
     let shown = |number: Option<f64>| number.map_or(String::new(), |number| number.to_string());
-    let place = |center: Option<[f64; 3]>| center.map_or_else(Default::default, |center| center.map(|x| x.to_string()));
+    let place = |center: Option<[f64; 3]>| {
+        center.map_or_else(Default::default, |center| center.map(|x| x.to_string()))
+    };
     let whole = |id: Option<u32>| id.map_or(String::new(), |id| id.to_string());
     let datum = record.datum.clone().unwrap_or_default();
     let [x, y, z] = place(record.center_mm);

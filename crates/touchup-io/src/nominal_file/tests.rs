@@ -7,7 +7,8 @@ fn read(name: &str, text: &str) -> Result<Vec<NominalRecord>, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     fs::write(&path, text).unwrap();
-    read_nominal(&path).map_err(|error| error.to_string().replace(&path.display().to_string(), name))
+    read_nominal(&path)
+        .map_err(|error| error.to_string().replace(&path.display().to_string(), name))
 }
 
 const HEADER: &str = "name,kind,quantity,nominal_mm,tolerance_mm,lower_deviation_mm,upper_deviation_mm,center_x_mm,center_y_mm,center_z_mm";
@@ -39,49 +40,112 @@ fn a_table_says_tolerances_in_three_ways() {
 #[test]
 fn each_mistake_in_a_row_is_said_with_its_line_and_what_to_do() {
     let mistakes = [
-        ("a,hole,diameter_mm,NaN,0.1,,,,,", "n.csv, line 3: nominal_mm is \"NaN\" and must be a number"),
+        (
+            "a,hole,diameter_mm,NaN,0.1,,,,,",
+            "n.csv, line 3: nominal_mm is \"NaN\" and must be a number",
+        ),
         (
             "a,hole,diameter_mm,8,,0.1,-0.1,,,",
             "a: lower_deviation_mm 0.1 is not below upper_deviation_mm -0.1: exchange them",
         ),
-        ("a,bore,diameter_mm,8,0.1,,,,,", "there is no kind \"bore\": take one of hole, slot"),
-        ("a,hole,diameter,8,0.1,,,,,", "there is no quantity \"diameter\": take one of diameter_mm"),
-        ("a,hole,diameter_mm,,0.1,,,,,", "needs a nominal value: fill in nominal_mm"),
-        ("a,hole,diameter_mm,8,-0.1,,,,,", "tolerance_mm must be above 0"),
-        ("a,hole,diameter_mm,8,0.1,-0.1,,,,", "give tolerance_mm, or limit deviations, not both"),
-        ("a,hole,diameter_mm,8,0.1,,,16,,12", "go together: fill in all three or none"),
-        ("a,hole,cone_angle_deg,90,1,,,,,", "cone_angle_deg is in deg: put the number into nominal_deg"),
-        ("a,hole,position_mm,,0.1,,,,,", "position_mm needs the nominal centre"),
-        ("a,hole,roundness_mm,,,-0.1,0.1,,,", "roundness_mm cannot be below 0"),
-        ("a,hole,roundness_mm,1,0.1,,,,,", "the nominal value of roundness_mm is 0"),
-        ("a,hole,distance_mm,10,0.1,,,,,", "distance_mm needs a datum"),
-        ("a,hole,width_mm,10,0.1,,,,,", "a: a hole has no width_mm: take one of diameter_mm, depth_mm"),
+        (
+            "a,bore,diameter_mm,8,0.1,,,,,",
+            "there is no kind \"bore\": take one of hole, slot",
+        ),
+        (
+            "a,hole,diameter,8,0.1,,,,,",
+            "there is no quantity \"diameter\": take one of diameter_mm",
+        ),
+        (
+            "a,hole,diameter_mm,,0.1,,,,,",
+            "needs a nominal value: fill in nominal_mm",
+        ),
+        (
+            "a,hole,diameter_mm,8,-0.1,,,,,",
+            "tolerance_mm must be above 0",
+        ),
+        (
+            "a,hole,diameter_mm,8,0.1,-0.1,,,,",
+            "give tolerance_mm, or limit deviations, not both",
+        ),
+        (
+            "a,hole,diameter_mm,8,0.1,,,16,,12",
+            "go together: fill in all three or none",
+        ),
+        (
+            "a,hole,cone_angle_deg,90,1,,,,,",
+            "cone_angle_deg is in deg: put the number into nominal_deg",
+        ),
+        (
+            "a,hole,position_mm,,0.1,,,,,",
+            "position_mm needs the nominal centre",
+        ),
+        (
+            "a,hole,roundness_mm,,,-0.1,0.1,,,",
+            "roundness_mm cannot be below 0",
+        ),
+        (
+            "a,hole,roundness_mm,1,0.1,,,,,",
+            "the nominal value of roundness_mm is 0",
+        ),
+        (
+            "a,hole,distance_mm,10,0.1,,,,,",
+            "distance_mm needs a datum",
+        ),
+        (
+            "a,hole,width_mm,10,0.1,,,,,",
+            "a: a hole has no width_mm: take one of diameter_mm, depth_mm",
+        ),
         (",hole,diameter_mm,8,0.1,,,,,", "name is empty"),
         ("a,hole,diameter_mm,8,0,1,,,,,", "11 values for 10 columns"),
     ];
     for (row, expected) in mistakes {
         let found = refused(row);
-        assert!(found.contains(expected) && found.contains("line 3"), "{row}: {found}");
+        assert!(
+            found.contains(expected) && found.contains("line 3"),
+            "{row}: {found}"
+        );
     }
 }
 
 #[test]
 fn what_is_there_twice_is_refused() {
     let names = refused("a,hole,diameter_mm,8,0.1,,,,,\na,slot,width_mm,8,0.1,,,,,");
-    assert_eq!(names, "n.csv, line 4: the name \"a\" is that of line 3: give each its own");
+    assert_eq!(
+        names,
+        "n.csv, line 4: the name \"a\" is that of line 3: give each its own"
+    );
     let quantities = refused("a,hole,diameter_mm,8,0.1,,,1,2,3\nb,hole,diameter_mm,9,0.1,,,1,2,3");
-    assert!(quantities.contains("line 4: diameter_mm of this feature has its tolerance in line 3"), "{quantities}");
+    assert!(
+        quantities.contains("line 4: diameter_mm of this feature has its tolerance in line 3"),
+        "{quantities}"
+    );
 }
 
 #[test]
 fn a_file_that_is_no_table_of_nominal_values_is_named() {
     assert!(read("n.csv", "").unwrap_err().starts_with("n.csv"));
-    assert!(read("n.csv", "name,kind,quantity\n").unwrap_err().contains("it has no characteristic"));
+    assert!(
+        read("n.csv", "name,kind,quantity\n")
+            .unwrap_err()
+            .contains("it has no characteristic")
+    );
     let unknown = read("n.csv", "name,kind,quantity,nominal_inch\n").unwrap_err();
-    assert!(unknown.contains("no column is called \"nominal_inch\""), "{unknown}");
-    let missing = read("n.csv", "name,quantity,nominal_mm,tolerance_mm\na,diameter_mm,8,1\n").unwrap_err();
+    assert!(
+        unknown.contains("no column is called \"nominal_inch\""),
+        "{unknown}"
+    );
+    let missing = read(
+        "n.csv",
+        "name,quantity,nominal_mm,tolerance_mm\na,diameter_mm,8,1\n",
+    )
+    .unwrap_err();
     assert!(missing.contains("column kind is missing"), "{missing}");
-    let json = read("n.json", "{\"characteristics\": [{\"name\": \"a\", \"kind\": \"hole\"}]}").unwrap_err();
+    let json = read(
+        "n.json",
+        "{\"characteristics\": [{\"name\": \"a\", \"kind\": \"hole\"}]}",
+    )
+    .unwrap_err();
     assert!(json.contains("missing field `quantity`"), "{json}");
     let json = read(
         "n.json",
@@ -92,24 +156,44 @@ fn a_file_that_is_no_table_of_nominal_values_is_named() {
 
 #[test]
 fn what_is_written_is_read_again_as_table_and_as_json() {
-    let datum = DatumRecord { kind: "plane".to_owned(), center_mm: Some([1.0, 2.0, 12.0]), feature: None };
-    let base =
-        NominalRecord { kind: "hole".to_owned(), center_mm: Some([0.1, -2.0, 1e-3]), ..NominalRecord::default() };
+    let datum = DatumRecord {
+        kind: "plane".to_owned(),
+        center_mm: Some([1.0, 2.0, 12.0]),
+        feature: None,
+    };
+    let base = NominalRecord {
+        kind: "hole".to_owned(),
+        center_mm: Some([0.1, -2.0, 1e-3]),
+        ..NominalRecord::default()
+    };
     let record = |name: &str, quantity: &str| NominalRecord {
         name: name.to_owned(),
         quantity: quantity.to_owned(),
         ..base.clone()
     };
     let records = [
-        NominalRecord { nominal_mm: Some(8.0), tolerance_mm: Some(0.1), ..record("bore < 9 & \"fit\"", "diameter_mm") },
+        NominalRecord {
+            nominal_mm: Some(8.0),
+            tolerance_mm: Some(0.1),
+            ..record("bore < 9 & \"fit\"", "diameter_mm")
+        },
         NominalRecord {
             nominal_deg: Some(90.0),
             lower_deviation_deg: Some(-1.0),
             axis: Some([0.0, -0.6, 0.8]),
             ..record("cone", "cone_angle_deg")
         },
-        NominalRecord { upper_deviation_mm: Some(0.05), datum: Some(datum), ..record("square", "perpendicularity_mm") },
-        NominalRecord { center_mm: None, feature: Some(3), nominal_mm: Some(1.0), ..record("by number", "depth_mm") },
+        NominalRecord {
+            upper_deviation_mm: Some(0.05),
+            datum: Some(datum),
+            ..record("square", "perpendicularity_mm")
+        },
+        NominalRecord {
+            center_mm: None,
+            feature: Some(3),
+            nominal_mm: Some(1.0),
+            ..record("by number", "depth_mm")
+        },
     ];
     let folder = tempfile::tempdir().unwrap();
     for name in ["n.csv", "n.json"] {

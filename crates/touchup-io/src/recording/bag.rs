@@ -13,7 +13,8 @@ use super::bag_index::{Connections, Head, Index, LENGTH_BYTES, MAGIC, op};
 use super::framing::{ByteStream, Fields, check_length};
 use super::topics::check_topic;
 use super::{
-    Damage, FilePlace, MessageFormat, RawMessage, RecordingError, RecordingFile, RecordingLayout, TopicInfo, TopicKind,
+    Damage, FilePlace, MessageFormat, RawMessage, RecordingError, RecordingFile, RecordingLayout,
+    TopicInfo, TopicKind,
 };
 
 /// Topic and how it is read, place of the payload in the records, log time, ns.
@@ -42,7 +43,10 @@ pub(super) struct BagReader {
 impl BagReader {
     /// Opens a bag and learns which of the topics it has: from its index, or, where it has none, by reading until all of them are
     /// described. Damage met on that search is returned beside the reader.
-    pub fn open(path: &Path, layout: &RecordingLayout) -> Result<(Self, Option<RecordingError>), RecordingError> {
+    pub fn open(
+        path: &Path,
+        layout: &RecordingLayout,
+    ) -> Result<(Self, Option<RecordingError>), RecordingError> {
         let mut reader = Self::start(path, layout)?;
         let index = Index::read(path);
         reader.truncated = index.is_none();
@@ -58,7 +62,10 @@ impl BagReader {
     }
 
     fn start(path: &Path, layout: &RecordingLayout) -> Result<Self, RecordingError> {
-        let io = |source| RecordingError::Io { path: path.to_owned(), source };
+        let io = |source| RecordingError::Io {
+            path: path.to_owned(),
+            source,
+        };
         let mut reader = Self {
             path: path.to_owned(),
             layout: layout.clone(),
@@ -82,7 +89,9 @@ impl BagReader {
     /// Takes over what is described elsewhere; a topic of a wrong type is an error of those who ask for the topics.
     fn knows(&mut self, connections: Connections) {
         let read = connections.topics.iter();
-        let read = read.filter_map(|(id, info)| Some((*id, check_topic(&self.path, &self.layout, info).ok()??)));
+        let read = read.filter_map(|(id, info)| {
+            Some((*id, check_topic(&self.path, &self.layout, info).ok()??))
+        });
         self.read = read.collect();
         self.connections = connections;
     }
@@ -93,7 +102,11 @@ impl BagReader {
     }
 
     fn damaged(&self, damage: Damage) -> RecordingError {
-        RecordingError::Damaged { path: self.path.clone(), place: FilePlace::Byte(self.at), damage }
+        RecordingError::Damaged {
+            path: self.path.clone(),
+            place: FilePlace::Byte(self.at),
+            damage,
+        }
     }
 
     fn advance(&mut self) -> Result<Option<FoundMessage>, RecordingError> {
@@ -111,10 +124,18 @@ impl BagReader {
 
     /// Takes one record of the current chunk; a message of the topics of a touch gives its payload's place in `records`.
     fn next_record(&mut self) -> Result<Option<FoundMessage>, RecordingError> {
-        let damaged =
-            |damage| RecordingError::Damaged { path: self.path.clone(), place: FilePlace::Byte(self.at), damage };
+        let damaged = |damage| RecordingError::Damaged {
+            path: self.path.clone(),
+            place: FilePlace::Byte(self.at),
+            damage,
+        };
         let mut rest = Fields(&self.records[self.next..]);
-        let mut split = || Ok::<_, Damage>((rest.sized("header of a record")?, rest.sized("data of a record")?));
+        let mut split = || {
+            Ok::<_, Damage>((
+                rest.sized("header of a record")?,
+                rest.sized("data of a record")?,
+            ))
+        };
         let (header, data) = split().map_err(damaged)?;
         let head = Head::of(header).map_err(damaged)?;
         self.next = self.records.len() - rest.0.len();
@@ -161,7 +182,8 @@ impl BagReader {
                     return Ok(true);
                 }
                 op::CONNECTION | op::MESSAGE => {
-                    self.records.extend((self.header.len() as u32).to_le_bytes());
+                    self.records
+                        .extend((self.header.len() as u32).to_le_bytes());
                     self.records.extend(&self.header);
                     self.records.extend(length.to_le_bytes());
                     self.stream.load(length.into(), &mut self.records)?;
@@ -190,14 +212,26 @@ impl RecordingFile for BagReader {
         let Some((kind, format, payload, logged_ns)) = self.advance()? else {
             return match self.promised {
                 Some(promised) if promised != self.found => {
-                    Err(self.damaged(Damage::MessageCount { promised, found: self.found }))
+                    Err(self.damaged(Damage::MessageCount {
+                        promised,
+                        found: self.found,
+                    }))
                 }
                 _ => Ok(None),
             };
         };
         self.found += 1;
-        let (payload, place) = (Cow::Borrowed(&self.records[payload]), FilePlace::Byte(self.at));
-        Ok(Some(RawMessage { kind, format, payload, logged_ns, place }))
+        let (payload, place) = (
+            Cow::Borrowed(&self.records[payload]),
+            FilePlace::Byte(self.at),
+        );
+        Ok(Some(RawMessage {
+            kind,
+            format,
+            payload,
+            logged_ns,
+            place,
+        }))
     }
 }
 
@@ -209,10 +243,18 @@ fn unpack_chunk(head: &Head, packed: &[u8], records: &mut Vec<u8>) -> Result<(),
     let limit = announced + 1;
     match head.compression {
         b"none" => packed.take(limit).read_to_end(records)?,
-        b"bz2" => bzip2::read::BzDecoder::new(packed).take(limit).read_to_end(records)?,
-        b"lz4" => lz4::Decoder::new(packed)?.take(limit).read_to_end(records)?,
+        b"bz2" => bzip2::read::BzDecoder::new(packed)
+            .take(limit)
+            .read_to_end(records)?,
+        b"lz4" => lz4::Decoder::new(packed)?
+            .take(limit)
+            .read_to_end(records)?,
         other => return Err(Damage::Compression(other.escape_ascii().to_string())),
     };
     let found = records.len() as u64;
-    if found == announced { Ok(()) } else { Err(Damage::ChunkSize { announced, found }) }
+    if found == announced {
+        Ok(())
+    } else {
+        Err(Damage::ChunkSize { announced, found })
+    }
 }

@@ -72,7 +72,10 @@ fn named_fields(bytes: &[u8]) -> Result<Vec<NamedField<'_>>, Damage> {
     let (mut rest, mut fields) = (Fields(bytes), Vec::new());
     while !rest.0.is_empty() {
         let field = rest.sized("field of a header")?;
-        let sign = field.iter().position(|byte| *byte == b'=').ok_or(Damage::Field("name of a field"))?;
+        let sign = field
+            .iter()
+            .position(|byte| *byte == b'=')
+            .ok_or(Damage::Field("name of a field"))?;
         fields.push((&field[..sign], &field[sign + 1..]));
     }
     Ok(fields)
@@ -91,12 +94,24 @@ const CONNECTION_BYTES: usize = 128;
 impl Connections {
     pub fn add(&mut self, head: &Head, data: &[u8]) -> Result<&TopicInfo, Damage> {
         let fields = named_fields(data)?;
-        let named = |wanted: &[u8]| fields.iter().find(|(name, _)| *name == wanted).map(|(_, value)| *value);
+        let named = |wanted: &[u8]| {
+            fields
+                .iter()
+                .find(|(name, _)| *name == wanted)
+                .map(|(_, value)| *value)
+        };
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
         let type_name = named(b"type").map_or_else(|| "without a type".to_owned(), text);
-        let info = TopicInfo { name: text(head.topic), type_name, encoding: "ros1".to_owned() };
+        let info = TopicInfo {
+            name: text(head.topic),
+            type_name,
+            encoding: "ros1".to_owned(),
+        };
         let bytes = |info: &TopicInfo| info.name_bytes() + CONNECTION_BYTES;
-        self.name_bytes.take(bytes(&info), self.topics.get(&head.connection).map_or(0, bytes))?;
+        self.name_bytes.take(
+            bytes(&info),
+            self.topics.get(&head.connection).map_or(0, bytes),
+        )?;
         Ok(match self.topics.entry(head.connection) {
             Entry::Vacant(place) => place.insert(info),
             Entry::Occupied(mut known) => {
@@ -107,7 +122,11 @@ impl Connections {
     }
 
     pub fn has(&self, layout: &RecordingLayout) -> bool {
-        layout.needed().all(|kind| self.topics.values().any(|info| layout.is_topic(kind, &info.name)))
+        layout.needed().all(|kind| {
+            self.topics
+                .values()
+                .any(|info| layout.is_topic(kind, &info.name))
+        })
     }
 }
 
@@ -136,7 +155,10 @@ impl Index {
         file.seek(SeekFrom::Start(start)).ok()?;
         let mut records = Vec::new();
         file.take(length).read_to_end(&mut records).ok()?;
-        let mut index = Self { connections: Connections::default(), counts: BTreeMap::new() };
+        let mut index = Self {
+            connections: Connections::default(),
+            counts: BTreeMap::new(),
+        };
         index.add_records(&records).ok()?;
         Some(index)
     }
@@ -144,7 +166,10 @@ impl Index {
     fn add_records(&mut self, records: &[u8]) -> Result<(), Damage> {
         let mut rest = Fields(records);
         while !rest.0.is_empty() {
-            let (header, data) = (rest.sized("header of a record")?, rest.sized("data of a record")?);
+            let (header, data) = (
+                rest.sized("header of a record")?,
+                rest.sized("data of a record")?,
+            );
             let head = Head::of(header)?;
             match head.op {
                 op::CONNECTION => drop(self.connections.add(&head, data)?),
@@ -167,7 +192,14 @@ impl Index {
     /// Messages on the topics of a touch.
     pub fn promised(&self, layout: &RecordingLayout) -> u64 {
         let topics = &self.connections.topics;
-        let wanted = |id: &u32| topics.get(id).is_some_and(|info| layout.kind_of(&info.name).is_some());
-        self.counts.iter().filter(|(id, _)| wanted(id)).fold(0, |sum: u64, (_, count)| sum.saturating_add(*count))
+        let wanted = |id: &u32| {
+            topics
+                .get(id)
+                .is_some_and(|info| layout.kind_of(&info.name).is_some())
+        };
+        self.counts
+            .iter()
+            .filter(|(id, _)| wanted(id))
+            .fold(0, |sum: u64, (_, count)| sum.saturating_add(*count))
     }
 }

@@ -45,14 +45,21 @@ impl<'a> HeaderMsg<'a> {
     pub(super) fn new(stamp_ns: i64, frame: &'a str) -> Result<Self, RecordingError> {
         let (sec, nanosec) = (stamp_ns.div_euclid(NS_PER_S), stamp_ns.rem_euclid(NS_PER_S));
         match (i32::try_from(sec), u32::try_from(nanosec)) {
-            (Ok(sec @ 0..), Ok(nanosec)) => Ok(Self { stamp: TimeMsg { sec, nanosec }, frame_id: frame.into() }),
+            (Ok(sec @ 0..), Ok(nanosec)) => Ok(Self {
+                stamp: TimeMsg { sec, nanosec },
+                frame_id: frame.into(),
+            }),
             _ => Err(RecordingError::Stamp { stamp_ns }),
         }
     }
 
     pub(super) fn stamp_ns(&self) -> Result<i64, BadMessage> {
         let nanosec = i64::from(self.stamp.nanosec);
-        if nanosec < NS_PER_S { Ok(i64::from(self.stamp.sec) * NS_PER_S + nanosec) } else { Err(BadMessage::Stamp) }
+        if nanosec < NS_PER_S {
+            Ok(i64::from(self.stamp.sec) * NS_PER_S + nanosec)
+        } else {
+            Err(BadMessage::Stamp)
+        }
     }
 }
 
@@ -95,7 +102,10 @@ pub(super) fn encode_pose(pose: &StampedPose, frame: &str) -> Result<Vec<u8>, Re
 }
 
 /// Writes a `WrenchStamped` in little-endian CDR.
-pub(super) fn encode_wrench(wrench: &StampedWrench, frame: &str) -> Result<Vec<u8>, RecordingError> {
+pub(super) fn encode_wrench(
+    wrench: &StampedWrench,
+    frame: &str,
+) -> Result<Vec<u8>, RecordingError> {
     encode(&WrenchStampedMsg {
         header: HeaderMsg::new(wrench.stamp_ns, frame)?,
         force: wrench.wrench.force.into(),

@@ -85,15 +85,31 @@ const POSITION: UsualNames = UsualNames {
     of_rtde: "actual_TCP_pose_",
     rtde_unit: "m",
     first: 0,
-    groups: &[&["x", "y", "z"], &["px", "py", "pz"], &["position_x", "position_y", "position_z"]],
+    groups: &[
+        &["x", "y", "z"],
+        &["px", "py", "pz"],
+        &["position_x", "position_y", "position_z"],
+    ],
 };
-const TURN: UsualNames =
-    UsualNames { of_rtde: "actual_TCP_pose_", rtde_unit: "rad", first: 3, groups: &[&["rx", "ry", "rz"]] };
+const TURN: UsualNames = UsualNames {
+    of_rtde: "actual_TCP_pose_",
+    rtde_unit: "rad",
+    first: 3,
+    groups: &[&["rx", "ry", "rz"]],
+};
 const QUATERNION: UsualNames = UsualNames {
     of_rtde: "",
     rtde_unit: "",
     first: 0,
-    groups: &[&["qx", "qy", "qz", "qw"], &["orientation_x", "orientation_y", "orientation_z", "orientation_w"]],
+    groups: &[
+        &["qx", "qy", "qz", "qw"],
+        &[
+            "orientation_x",
+            "orientation_y",
+            "orientation_z",
+            "orientation_w",
+        ],
+    ],
 };
 const FORCE: UsualNames = UsualNames {
     of_rtde: "actual_TCP_force_",
@@ -105,7 +121,11 @@ const TORQUE: UsualNames = UsualNames {
     of_rtde: "actual_TCP_force_",
     rtde_unit: "Nm",
     first: 3,
-    groups: &[&["tx", "ty", "tz"], &["mx", "my", "mz"], &["torque_x", "torque_y", "torque_z"]],
+    groups: &[
+        &["tx", "ty", "tz"],
+        &["mx", "my", "mz"],
+        &["torque_x", "torque_y", "torque_z"],
+    ],
 };
 
 impl TableColumns {
@@ -118,27 +138,48 @@ impl TableColumns {
         let three = |key, named: &Option<Vec<String>>, quantity, usual| {
             header.find::<3>(key, named.as_deref(), quantity, usual)
         };
-        let needed = |key: &'static str, found: Option<[Column; 3]>| found.ok_or_else(|| header.missing(key));
+        let needed = |key: &'static str, found: Option<[Column; 3]>| {
+            found.ok_or_else(|| header.missing(key))
+        };
         let orientation = match &self.orientation {
             Some(names) if names.len() != 4 => {
                 let turn = three("orientation", &self.orientation, Quantity::Angle, &TURN)?;
                 OrientationColumns::RotationVector(needed("orientation", turn)?)
             }
-            named => match header.find::<4>("orientation", named.as_deref(), Quantity::None, &QUATERNION)? {
+            named => match header.find::<4>(
+                "orientation",
+                named.as_deref(),
+                Quantity::None,
+                &QUATERNION,
+            )? {
                 Some(quaternion) => OrientationColumns::Quaternion(quaternion),
                 None => three("orientation", &None, Quantity::Angle, &TURN)?
                     .map_or(OrientationColumns::None, OrientationColumns::RotationVector),
             },
         };
         if orientation == OrientationColumns::None && self.wrench_axes == WrenchAxes::Tip {
-            return Err(format!("wrench_axes: tip needs an orientation; {}", header.missing("orientation")));
+            return Err(format!(
+                "wrench_axes: tip needs an orientation; {}",
+                header.missing("orientation")
+            ));
         }
-        let time = header.find::<1>("time", self.time.as_ref().map(std::slice::from_ref), Quantity::Time, &TIME)?;
+        let time = header.find::<1>(
+            "time",
+            self.time.as_ref().map(std::slice::from_ref),
+            Quantity::Time,
+            &TIME,
+        )?;
         Ok(FoundColumns {
             time: time.ok_or_else(|| header.missing("time"))?[0],
-            position: needed("position", three("position", &self.position, Quantity::Length, &POSITION)?)?,
+            position: needed(
+                "position",
+                three("position", &self.position, Quantity::Length, &POSITION)?,
+            )?,
             orientation,
-            force: needed("force", three("force", &self.force, Quantity::Force, &FORCE)?)?,
+            force: needed(
+                "force",
+                three("force", &self.force, Quantity::Force, &FORCE)?,
+            )?,
             torque: three("torque", &self.torque, Quantity::Torque, &TORQUE)?,
             wrench_axes: self.wrench_axes,
         })
@@ -169,8 +210,9 @@ impl Header<'_> {
         usual: &UsualNames,
     ) -> Result<Option<[Column; N]>, String> {
         if let Some(names) = named {
-            let names: &[String; N] =
-                names.try_into().map_err(|_| format!("columns.{key} names {} columns, it takes {N}", names.len()))?;
+            let names: &[String; N] = names.try_into().map_err(|_| {
+                format!("columns.{key} names {} columns, it takes {N}", names.len())
+            })?;
             let mut columns = [Column { at: 0, factor: 1.0 }; N];
             for (column, name) in columns.iter_mut().zip(names) {
                 *column = self.named(key, name, quantity)?;
@@ -181,12 +223,23 @@ impl Header<'_> {
             return Ok(Some(columns));
         }
         for group in usual.groups {
-            let at = |name: &&str| self.only(key, |there| split_unit(there, quantity).0.eq_ignore_ascii_case(name));
-            let Some(places) = group.iter().map(at).collect::<Result<Option<Vec<_>>, _>>()? else { continue };
+            let at = |name: &&str| {
+                self.only(key, |there| {
+                    split_unit(there, quantity).0.eq_ignore_ascii_case(name)
+                })
+            };
+            let Some(places) = group
+                .iter()
+                .map(at)
+                .collect::<Result<Option<Vec<_>>, _>>()?
+            else {
+                continue;
+            };
             let mut columns = [Column { at: 0, factor: 1.0 }; N];
             for (column, at) in columns.iter_mut().zip(places) {
-                let factor =
-                    split_unit(&self.0[at], quantity).1.map_or_else(|| self.no_unit(&self.0[at], quantity), Ok)?;
+                let factor = split_unit(&self.0[at], quantity)
+                    .1
+                    .map_or_else(|| self.no_unit(&self.0[at], quantity), Ok)?;
                 *column = Column { at, factor };
             }
             return Ok(Some(columns));
@@ -194,14 +247,24 @@ impl Header<'_> {
         Ok(None)
     }
 
-    fn of_rtde<const N: usize>(&self, quantity: Quantity, usual: &UsualNames) -> Option<[Column; N]> {
+    fn of_rtde<const N: usize>(
+        &self,
+        quantity: Quantity,
+        usual: &UsualNames,
+    ) -> Option<[Column; N]> {
         if !self.0.iter().any(|name| name == "actual_TCP_pose_0") || usual.of_rtde.is_empty() {
             return None;
         }
-        let mut columns = [Column { at: 0, factor: quantity.factor(usual.rtde_unit)? }; N];
+        let mut columns = [Column {
+            at: 0,
+            factor: quantity.factor(usual.rtde_unit)?,
+        }; N];
         for (number, column) in columns.iter_mut().enumerate() {
-            let name =
-                if N == 1 { usual.of_rtde.to_owned() } else { format!("{}{}", usual.of_rtde, usual.first + number) };
+            let name = if N == 1 {
+                usual.of_rtde.to_owned()
+            } else {
+                format!("{}{}", usual.of_rtde, usual.first + number)
+            };
             column.at = self.0.iter().position(|there| *there == name)?;
         }
         Some(columns)
@@ -227,7 +290,10 @@ impl Header<'_> {
         let exact = self.only(key, |there| there == name)?;
         let at = exact.map_or_else(|| self.only(key, is_meant), |at| Ok(Some(at)))?;
         let at = at.ok_or_else(|| {
-            format!("no column {name:?}, which columns.{key} of the scene names. It has: {}", self.list())
+            format!(
+                "no column {name:?}, which columns.{key} of the scene names. It has: {}",
+                self.list()
+            )
         })?;
         match (split_unit(&self.0[at], quantity).1, told) {
             (Some(there), Some(told)) if there != told => Err(format!(
@@ -235,7 +301,9 @@ impl Header<'_> {
                 self.0[at]
             )),
             (there, told) => {
-                let factor = there.or(told).map_or_else(|| self.no_unit(&self.0[at], quantity), Ok)?;
+                let factor = there
+                    .or(told)
+                    .map_or_else(|| self.no_unit(&self.0[at], quantity), Ok)?;
                 Ok(Column { at, factor })
             }
         }

@@ -38,7 +38,10 @@ pub fn copy_recording(
     topics: &Topics,
     at_each: &mut dyn FnMut(),
 ) -> Result<CopiedRecording, RecordingError> {
-    let io = |source| RecordingError::Io { path: path.to_owned(), source };
+    let io = |source| RecordingError::Io {
+        path: path.to_owned(),
+        source,
+    };
     let mut file = AtomicFile::create(path).map_err(io)?;
     let mut writer = RecordingWriter::new(&mut file, topics)?;
     let mut copied = CopiedRecording::default();
@@ -56,7 +59,10 @@ pub fn copy_recording(
             false => (&mut copied.poses, reader.pose_frame()),
         };
         *count += 1;
-        writer.write(record, frame.filter(|frame| !frame.is_empty()).unwrap_or(UNNAMED))?;
+        writer.write(
+            record,
+            frame.filter(|frame| !frame.is_empty()).unwrap_or(UNNAMED),
+        )?;
         at_each();
     }
     writer.finish()?;
@@ -66,17 +72,28 @@ pub fn copy_recording(
     }
     file.commit().map_err(io)?;
     let own = |frame: Option<&str>| frame.unwrap_or_default().to_owned();
-    (copied.pose_frame, copied.wrench_frame) = (own(reader.pose_frame()), own(reader.wrench_frame()));
+    (copied.pose_frame, copied.wrench_frame) =
+        (own(reader.pose_frame()), own(reader.wrench_frame()));
     Ok(copied)
 }
 
 impl RecordingReader {
     /// It has been read, and there was none.
     fn without(&self, what: &str) -> RecordingError {
-        let left_out = self.bad_messages().iter().map(|(reason, bad)| format!("{} {reason}", bad.poses + bad.wrenches));
+        let left_out = self
+            .bad_messages()
+            .iter()
+            .map(|(reason, bad)| format!("{} {reason}", bad.poses + bad.wrenches));
         let left_out: Vec<_> = left_out.collect();
-        let left_out = if left_out.is_empty() { String::new() } else { format!("; left out: {}", left_out.join(", ")) };
+        let left_out = if left_out.is_empty() {
+            String::new()
+        } else {
+            format!("; left out: {}", left_out.join(", "))
+        };
         let reason = format!("no {what} in it can be used{left_out}");
-        RecordingError::NotARecording { path: self.source_path().to_owned(), reason }
+        RecordingError::NotARecording {
+            path: self.source_path().to_owned(),
+            reason,
+        }
     }
 }

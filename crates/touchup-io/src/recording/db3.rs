@@ -17,7 +17,8 @@ use super::framing::NameBytes;
 use super::topics::check_topic;
 use super::wire::MAX_MESSAGE_BYTES;
 use super::{
-    Damage, FilePlace, MessageFormat, RawMessage, RecordingError, RecordingFile, RecordingLayout, TopicInfo, TopicKind,
+    Damage, FilePlace, MessageFormat, RawMessage, RecordingError, RecordingFile, RecordingLayout,
+    TopicInfo, TopicKind,
 };
 
 pub(super) const MAGIC: [u8; 16] = *b"SQLite format 3\0";
@@ -56,20 +57,35 @@ pub(super) struct Db3Reader {
 
 impl Db3Reader {
     /// Opens a file (`packed`: compressed as a whole by zstd) and reads its table of topics.
-    pub fn open(path: &Path, layout: &RecordingLayout, packed: bool) -> Result<Self, RecordingError> {
+    pub fn open(
+        path: &Path,
+        layout: &RecordingLayout,
+        packed: bool,
+    ) -> Result<Self, RecordingError> {
         let unpacked = if packed { Some(unpack(path)?) } else { None };
         let db_path = unpacked.as_ref().map_or(path, |file| file.path());
-        let damaged = |damage| RecordingError::Damaged { path: path.to_owned(), place: FilePlace::Row(0), damage };
+        let damaged = |damage| RecordingError::Damaged {
+            path: path.to_owned(),
+            place: FilePlace::Row(0),
+            damage,
+        };
         let db = connect(db_path).map_err(|error| damaged(error.into()))?;
         if !has_tables(&db).map_err(|error| damaged(error.into()))? {
-            let reason = "a SQLite file without rosbag2's tables `topics` and `messages`".to_owned();
-            return Err(RecordingError::NotARecording { path: path.to_owned(), reason });
+            let reason =
+                "a SQLite file without rosbag2's tables `topics` and `messages`".to_owned();
+            return Err(RecordingError::NotARecording {
+                path: path.to_owned(),
+                reason,
+            });
         }
         let rows = read_topics(&db).map_err(damaged)?;
         let failed = find_cut(&db, db_path).err();
         // a topic of a wrong type is an error of those who ask for the topics
         let reads = |(id, info): &(i64, TopicInfo)| {
-            check_topic(path, layout, info).ok().flatten().map(|(kind, format)| (*id, kind, format))
+            check_topic(path, layout, info)
+                .ok()
+                .flatten()
+                .map(|(kind, format)| (*id, kind, format))
         };
         let mut read: Vec<_> = rows.iter().filter_map(reads).collect();
         // the first row of each, as many as the layout names
@@ -90,8 +106,16 @@ impl Db3Reader {
     }
 
     fn damaged(&self, damage: Damage) -> RecordingError {
-        let row = if self.last.1 == i64::MIN { 0 } else { self.last.1 };
-        RecordingError::Damaged { path: self.path.clone(), place: FilePlace::Row(row), damage }
+        let row = if self.last.1 == i64::MIN {
+            0
+        } else {
+            self.last.1
+        };
+        RecordingError::Damaged {
+            path: self.path.clone(),
+            place: FilePlace::Row(row),
+            damage,
+        }
     }
 
     /// Fetches the next rows; those before an error stay.
@@ -99,10 +123,20 @@ impl Db3Reader {
         let mut statement = self.db.prepare_cached(FETCH)?;
         let ([first, second, third], (time, id)) = (ids(&self.read), self.last);
         let longest = MAX_MESSAGE_BYTES as i64;
-        let mut rows = statement.query(params![longest, first, second, third, time, id, BATCH_ROWS as i64])?;
+        let mut rows = statement.query(params![
+            longest,
+            first,
+            second,
+            third,
+            time,
+            id,
+            BATCH_ROWS as i64
+        ])?;
         while let Some(row) = rows.next()? {
             let topic: i64 = row.get(2)?;
-            let Some(&(_, kind, format)) = self.read.iter().find(|(id, ..)| *id == topic) else { continue };
+            let Some(&(_, kind, format)) = self.read.iter().find(|(id, ..)| *id == topic) else {
+                continue;
+            };
             // text, a number or NULL in place of the blob: an empty payload, which counts as malformed
             let payload = row.get_ref(3)?.as_blob().unwrap_or_default().to_vec();
             let (id, time) = (row.get(0)?, row.get(1)?);
@@ -131,7 +165,9 @@ impl RecordingFile for Db3Reader {
     /// Reads through the table once.
     fn promised(&self) -> Option<u64> {
         let count = "SELECT count(*) FROM messages WHERE topic_id IN (?1, ?2, ?3)";
-        let found = self.db.query_row(count, ids(&self.read), |row| row.get::<_, i64>(0));
+        let found = self
+            .db
+            .query_row(count, ids(&self.read), |row| row.get::<_, i64>(0));
         found.ok().and_then(|n| u64::try_from(n).ok())
     }
 
@@ -149,7 +185,10 @@ impl RecordingFile for Db3Reader {
             self.done = true;
         }
         match self.rows.pop_front() {
-            None => self.failed.take().map_or(Ok(None), |damage| Err(self.damaged(damage))),
+            None => self
+                .failed
+                .take()
+                .map_or(Ok(None), |damage| Err(self.damaged(damage))),
             message => Ok(message),
         }
     }
@@ -161,7 +200,9 @@ fn ids(read: &[(i64, TopicKind, MessageFormat)]) -> [Option<i64>; 3] {
 }
 
 fn connect(path: &Path) -> rusqlite::Result<Connection> {
-    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY
+        | OpenFlags::SQLITE_OPEN_URI
+        | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let db = Connection::open_with_flags(immutable_uri(path), flags)?;
     // the file is not trusted: no functions from its schema, no cells that leave their page, no value without end
     db.set_limit(Limit::SQLITE_LIMIT_LENGTH, MAX_VALUE_BYTES)?;
@@ -175,7 +216,9 @@ fn immutable_uri(path: &Path) -> String {
     let mut uri = String::from("file:");
     for byte in path.as_os_str().as_encoded_bytes() {
         match byte {
-            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'.' | b'_' | b'-' => uri.push(char::from(*byte)),
+            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'.' | b'_' | b'-' => {
+                uri.push(char::from(*byte))
+            }
             _ => uri.push_str(&format!("%{byte:02X}")),
         }
     }
@@ -185,17 +228,22 @@ fn immutable_uri(path: &Path) -> String {
 
 fn has_tables(db: &Connection) -> rusqlite::Result<bool> {
     // a virtual table has no root page
-    let count =
-        "SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND rootpage > 0 AND name IN ('topics', 'messages')";
-    db.query_row(count, [], |row| row.get::<_, i64>(0)).map(|tables| tables == 2)
+    let count = "SELECT count(*) FROM sqlite_schema WHERE type = 'table' AND rootpage > 0 AND name IN ('topics', 'messages')";
+    db.query_row(count, [], |row| row.get::<_, i64>(0))
+        .map(|tables| tables == 2)
 }
 
 fn read_topics(db: &Connection) -> Result<Vec<(i64, TopicInfo)>, Damage> {
-    let mut statement = db.prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY id LIMIT ?1")?;
+    let mut statement =
+        db.prepare("SELECT id, name, type, serialization_format FROM topics ORDER BY id LIMIT ?1")?;
     let mut rows = statement.query([MAX_TOPICS as i64])?;
     let (mut topics, mut name_bytes) = (Vec::new(), NameBytes::default());
     while let Some(row) = rows.next()? {
-        let info = TopicInfo { name: row.get(1)?, type_name: row.get(2)?, encoding: row.get(3)? };
+        let info = TopicInfo {
+            name: row.get(1)?,
+            type_name: row.get(2)?,
+            encoding: row.get(3)?,
+        };
         name_bytes.take(info.name_bytes(), 0)?;
         topics.push((row.get(0)?, info));
     }
@@ -207,7 +255,10 @@ fn find_cut(db: &Connection, path: &Path) -> Result<(), Damage> {
     let page_bytes = db.pragma_query_value(None, "page_size", |row| row.get::<_, u32>(0))?;
     match fs::metadata(path)?.len() % u64::from(page_bytes) {
         0 => Ok(()),
-        left => Err(Damage::Cut { wanted: page_bytes.into(), left }),
+        left => Err(Damage::Cut {
+            wanted: page_bytes.into(),
+            left,
+        }),
     }
 }
 
@@ -226,10 +277,21 @@ fn unpack(path: &Path) -> Result<NamedTempFile, RecordingError> {
         let mut packed = zstd::Decoder::new(fs::File::open(path)?)?.take(MAX_UNPACKED_BYTES + 1);
         Ok((io::copy(&mut packed, &mut plain)?, plain))
     };
-    let (bytes, plain) = unpack().map_err(|source| RecordingError::Io { path: path.to_owned(), source })?;
+    let (bytes, plain) = unpack().map_err(|source| RecordingError::Io {
+        path: path.to_owned(),
+        source,
+    })?;
     if bytes > MAX_UNPACKED_BYTES {
-        let damage = Damage::TooLong { what: "unpacked file", bytes, limit: MAX_UNPACKED_BYTES };
-        return Err(RecordingError::Damaged { path: path.to_owned(), place: FilePlace::Row(0), damage });
+        let damage = Damage::TooLong {
+            what: "unpacked file",
+            bytes,
+            limit: MAX_UNPACKED_BYTES,
+        };
+        return Err(RecordingError::Damaged {
+            path: path.to_owned(),
+            place: FilePlace::Row(0),
+            damage,
+        });
     }
     Ok(plain)
 }

@@ -24,11 +24,18 @@ const TRANSFORM_BYTES: usize = 8 + 4 + 4 + 56;
 /// Reads a message. The position may be anything, the rotation is a unit quaternion.
 ///
 /// - `logged_ns`: counts where the type has no stamp of its own.
-pub(super) fn decode(format: MessageFormat, payload: &[u8], logged_ns: i64) -> Result<Decoded, BadMessage> {
+pub(super) fn decode(
+    format: MessageFormat,
+    payload: &[u8],
+    logged_ns: i64,
+) -> Result<Decoded, BadMessage> {
     let MessageFormat { message_type, wire } = format;
     if message_type == MessageType::PointCloud {
         let (frame, seen) = point_cloud::decode_markers(payload)?;
-        return Ok(Decoded::Record(frame.into_owned(), Record::Markers(Box::new(seen))));
+        return Ok(Decoded::Record(
+            frame.into_owned(),
+            Record::Markers(Box::new(seen)),
+        ));
     }
     decode_fields(format, &mut WireReader::new(wire, payload)?, logged_ns)
 }
@@ -40,16 +47,23 @@ pub(super) fn decode_fields(
     logged_ns: i64,
 ) -> Result<Decoded, BadMessage> {
     let MessageFormat { message_type, wire } = format;
-    let unnamed = || Header { stamp_ns: logged_ns, ..Header::default() };
+    let unnamed = || Header {
+        stamp_ns: logged_ns,
+        ..Header::default()
+    };
     let decoded = match message_type {
         MessageType::Transforms => transforms(fields)?,
-        MessageType::FrankaState => return franka_state(wire, fields).map(|state| Decoded::State(Box::new(state))),
+        MessageType::FrankaState => {
+            return franka_state(wire, fields).map(|state| Decoded::State(Box::new(state)));
+        }
         MessageType::FrankaRobotState => {
             return franka_robot_state(fields).map(|state| Decoded::State(Box::new(state)));
         }
         MessageType::Pose => pose_in(unnamed(), fields)?,
         MessageType::Wrench => wrench_in(unnamed(), fields)?,
-        MessageType::WrenchStamped | MessageType::IiwaWrench => wrench_in(fields.header()?, fields)?,
+        MessageType::WrenchStamped | MessageType::IiwaWrench => {
+            wrench_in(fields.header()?, fields)?
+        }
         MessageType::TransformStamped => {
             let header = fields.header()?;
             fields.name()?;
@@ -84,24 +98,44 @@ pub(super) fn decode_fields(
 }
 
 fn pose_in(header: Header, fields: &mut impl MessageFields) -> Result<Decoded, BadMessage> {
-    let pose = StampedPose { stamp_ns: header.stamp_ns, pose_ot: fields.pose()? };
+    let pose = StampedPose {
+        stamp_ns: header.stamp_ns,
+        pose_ot: fields.pose()?,
+    };
     Ok(Decoded::Record(header.frame, Message::Pose(pose).into()))
 }
 
 fn wrench_in(header: Header, fields: &mut impl MessageFields) -> Result<Decoded, BadMessage> {
-    let wrench = StampedWrench { stamp_ns: header.stamp_ns, wrench: fields.wrench()? };
-    Ok(Decoded::Record(header.frame, Message::Wrench(wrench).into()))
+    let wrench = StampedWrench {
+        stamp_ns: header.stamp_ns,
+        wrench: fields.wrench()?,
+    };
+    Ok(Decoded::Record(
+        header.frame,
+        Message::Wrench(wrench).into(),
+    ))
 }
 
 fn transforms(fields: &mut impl MessageFields) -> Result<Decoded, BadMessage> {
     let count = fields.count(TRANSFORM_BYTES)?;
     let mut transform = || {
-        let Header { stamp_ns, frame: parent } = fields.header()?;
+        let Header {
+            stamp_ns,
+            frame: parent,
+        } = fields.header()?;
         let child = fields.name()?;
         let child = child.strip_prefix('/').unwrap_or(&child).to_owned();
-        Ok(FrameTransform { stamp_ns, parent, child, pose: fields.pose()? })
+        Ok(FrameTransform {
+            stamp_ns,
+            parent,
+            child,
+            pose: fields.pose()?,
+        })
     };
-    (0..count).map(|_| transform()).collect::<Result<_, _>>().map(Decoded::Transforms)
+    (0..count)
+        .map(|_| transform())
+        .collect::<Result<_, _>>()
+        .map(Decoded::Transforms)
 }
 
 #[cfg(test)]

@@ -155,7 +155,9 @@ pub enum Damage {
         id: u16,
     },
     /// The index at the end of the file promises another number of messages on the topics that are read.
-    #[error("the file's index promises {promised} messages on the topics of the touch, {found} were found")]
+    #[error(
+        "the file's index promises {promised} messages on the topics of the touch, {found} were found"
+    )]
     MessageCount {
         /// by the index
         promised: u64,

@@ -15,7 +15,10 @@ const MAX_METADATA_BYTES: u64 = 16 << 20;
 
 /// Whether a file of this name makes a folder look like a recording of rosbag2.
 pub(crate) fn is_of_recording(name: &str) -> bool {
-    name == METADATA || Path::new(name).extension().is_some_and(|ending| ending == "mcap")
+    name == METADATA
+        || Path::new(name)
+            .extension()
+            .is_some_and(|ending| ending == "mcap")
 }
 
 /// The files of a folder of rosbag2, each in the folder itself and none a link; `None`: it is no recording, or leads out of itself.
@@ -49,26 +52,41 @@ pub(super) fn files_of(path: &Path) -> Result<VecDeque<PathBuf>, RecordingError>
     let metadata_path = path.join(METADATA);
     if !metadata_path.exists() {
         // a recorder that was killed wrote none
-        let segments = segments_of(path).map_err(|source| RecordingError::Io { path: path.to_owned(), source })?;
+        let segments = segments_of(path).map_err(|source| RecordingError::Io {
+            path: path.to_owned(),
+            source,
+        })?;
         if !segments.is_empty() {
             return Ok(segments.into());
         }
         let reason = "the folder has no metadata.yaml and no .mcap file with anything in it: nothing was recorded, or it is elsewhere";
-        return Err(RecordingError::NotARecording { path: path.to_owned(), reason: reason.to_owned() });
+        return Err(RecordingError::NotARecording {
+            path: path.to_owned(),
+            reason: reason.to_owned(),
+        });
     }
-    let bad = |reason: String| RecordingError::Metadata { path: metadata_path.clone(), reason };
+    let bad = |reason: String| RecordingError::Metadata {
+        path: metadata_path.clone(),
+        reason,
+    };
     let text = read_metadata(&metadata_path).map_err(|error| bad(error.to_string()))?;
-    let metadata: Metadata = serde_saphyr::from_str(&text).map_err(|error| bad(error.to_string()))?;
+    let metadata: Metadata =
+        serde_saphyr::from_str(&text).map_err(|error| bad(error.to_string()))?;
     let names = metadata.rosbag2_bagfile_information.relative_file_paths;
     if names.is_empty() {
         return Err(bad("it names no files".to_owned()));
     }
-    names.iter().map(|name| find_file(path, name).ok_or_else(|| bad(format!("{name:?} is not there")))).collect()
+    names
+        .iter()
+        .map(|name| find_file(path, name).ok_or_else(|| bad(format!("{name:?} is not there"))))
+        .collect()
 }
 
 fn read_metadata(path: &Path) -> io::Result<String> {
     let mut text = String::new();
-    File::open(path)?.take(MAX_METADATA_BYTES).read_to_string(&mut text)?;
+    File::open(path)?
+        .take(MAX_METADATA_BYTES)
+        .read_to_string(&mut text)?;
     Ok(text)
 }
 
@@ -76,5 +94,7 @@ fn read_metadata(path: &Path) -> io::Result<String> {
 fn find_file(folder: &Path, name: &str) -> Option<PathBuf> {
     let in_folder = folder.join(name);
     let by_last_part = folder.join(Path::new(name).file_name()?);
-    [in_folder, by_last_part].into_iter().find(|path| fs::metadata(path).is_ok_and(|file| file.is_file()))
+    [in_folder, by_last_part]
+        .into_iter()
+        .find(|path| fs::metadata(path).is_ok_and(|file| file.is_file()))
 }

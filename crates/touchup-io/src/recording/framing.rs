@@ -30,11 +30,27 @@ pub(super) mod op {
 
 /// A stored checksum of 0 means that none was computed.
 pub(super) fn check_crc(what: &'static str, stored: u32, computed: u32) -> Result<(), Damage> {
-    if stored == 0 || stored == computed { Ok(()) } else { Err(Damage::Checksum { what, stored, computed }) }
+    if stored == 0 || stored == computed {
+        Ok(())
+    } else {
+        Err(Damage::Checksum {
+            what,
+            stored,
+            computed,
+        })
+    }
 }
 
 pub(super) fn check_length(what: &'static str, bytes: u64) -> Result<(), Damage> {
-    if bytes <= MAX_RECORD_BYTES { Ok(()) } else { Err(Damage::TooLong { what, bytes, limit: MAX_RECORD_BYTES }) }
+    if bytes <= MAX_RECORD_BYTES {
+        Ok(())
+    } else {
+        Err(Damage::TooLong {
+            what,
+            bytes,
+            limit: MAX_RECORD_BYTES,
+        })
+    }
 }
 
 /// Counts the bytes of the names that are kept, and refuses more than [`MAX_NAMES_BYTES`].
@@ -48,7 +64,11 @@ impl NameBytes {
         if self.0 <= MAX_NAMES_BYTES {
             return Ok(());
         }
-        Err(Damage::TooLong { what: "names of topics and types", bytes: self.0, limit: MAX_NAMES_BYTES })
+        Err(Damage::TooLong {
+            what: "names of topics and types",
+            bytes: self.0,
+            limit: MAX_NAMES_BYTES,
+        })
     }
 }
 
@@ -65,22 +85,44 @@ pub(super) struct ByteStream {
 impl ByteStream {
     pub fn open(path: &Path, packed: bool) -> std::io::Result<Self> {
         let file = File::open(path)?;
-        let size = if packed { None } else { Some(file.metadata()?.len()) };
-        let input: Box<dyn Read + Send> =
-            if packed { Box::new(BufReader::new(zstd::Decoder::new(file)?)) } else { Box::new(BufReader::new(file)) };
-        Ok(Self { input, at: 0, size, crc: crc32fast::Hasher::new() })
+        let size = if packed {
+            None
+        } else {
+            Some(file.metadata()?.len())
+        };
+        let input: Box<dyn Read + Send> = if packed {
+            Box::new(BufReader::new(zstd::Decoder::new(file)?))
+        } else {
+            Box::new(BufReader::new(file))
+        };
+        Ok(Self {
+            input,
+            at: 0,
+            size,
+            crc: crc32fast::Hasher::new(),
+        })
     }
 
     /// Opcode and length of the next record; `None` where the file ends between two records.
     pub fn head(&mut self) -> Result<Option<(u8, u64)>, Damage> {
         let mut head = Vec::with_capacity(HEAD_BYTES);
-        let left = self.input.by_ref().take(HEAD_BYTES as u64).read_to_end(&mut head)? as u64;
+        let left = self
+            .input
+            .by_ref()
+            .take(HEAD_BYTES as u64)
+            .read_to_end(&mut head)? as u64;
         if left == 0 {
             return Ok(None);
         }
         let mut fields = Fields(&head);
-        let cut = |_| Damage::Cut { wanted: HEAD_BYTES as u64, left };
-        let (opcode, len) = (fields.u8("opcode").map_err(cut)?, fields.u64("length").map_err(cut)?);
+        let cut = |_| Damage::Cut {
+            wanted: HEAD_BYTES as u64,
+            left,
+        };
+        let (opcode, len) = (
+            fields.u8("opcode").map_err(cut)?,
+            fields.u64("length").map_err(cut)?,
+        );
         self.at += left;
         if opcode != op::DATA_END {
             self.crc.update(&head);
@@ -146,7 +188,9 @@ pub(super) struct Fields<'a>(pub &'a [u8]);
 
 impl<'a> Fields<'a> {
     pub fn bytes(&mut self, len: u64, what: &'static str) -> Result<&'a [u8], Damage> {
-        let split = usize::try_from(len).ok().and_then(|len| self.0.split_at_checked(len));
+        let split = usize::try_from(len)
+            .ok()
+            .and_then(|len| self.0.split_at_checked(len));
         let (front, rest) = split.ok_or(Damage::Field(what))?;
         self.0 = rest;
         Ok(front)
@@ -184,7 +228,11 @@ impl<'a> Fields<'a> {
     pub fn text(&mut self, what: &'static str) -> Result<String, Damage> {
         let bytes = u64::from(self.u32(what)?);
         if bytes > MAX_TEXT_BYTES {
-            return Err(Damage::TooLong { what, bytes, limit: MAX_TEXT_BYTES });
+            return Err(Damage::TooLong {
+                what,
+                bytes,
+                limit: MAX_TEXT_BYTES,
+            });
         }
         Ok(String::from_utf8_lossy(self.bytes(bytes, what)?).into_owned())
     }

@@ -19,7 +19,11 @@ pub(super) struct ArmState {
 const fn franka_numbers(wire: Wire) -> [usize; 3] {
     match wire {
         Wire::Ros1 => [2 * 6 + 9 * 7 + 6 + 2 * 2 + 2 * 7, 7 + 3 * 13, 3 * 16 + 2],
-        Wire::Cdr => [2 * 6 + 10 * 7 + 6 + 5 * 2 + 2 * 7, 3 * 6 + 7 + 3 * 13, 4 * 16 + 2],
+        Wire::Cdr => [
+            2 * 6 + 10 * 7 + 6 + 5 * 2 + 2 * 7,
+            3 * 6 + 7 + 3 * 13,
+            4 * 16 + 2,
+        ],
     }
 }
 
@@ -27,7 +31,10 @@ const fn franka_numbers(wire: Wire) -> [usize; 3] {
 const FRANKA_FLAGS: std::ops::RangeInclusive<usize> = 1 + 2 * 30..=1 + 2 * 64;
 
 /// `O_T_EE` and `O_F_ext_hat_K`, both in the axes of the base.
-pub(super) fn franka_state(wire: Wire, fields: &mut impl MessageFields) -> Result<ArmState, BadMessage> {
+pub(super) fn franka_state(
+    wire: Wire,
+    fields: &mut impl MessageFields,
+) -> Result<ArmState, BadMessage> {
     let header = fields.header()?;
     let [before, between, behind] = franka_numbers(wire);
     fields.skip_f64s(before)?;
@@ -38,12 +45,24 @@ pub(super) fn franka_state(wire: Wire, fields: &mut impl MessageFields) -> Resul
     flags(fields)?;
     let pose_ot = from_columns(&matrix).ok_or(BadMessage::Quaternion)?;
     let Header { stamp_ns, frame } = header;
-    let (pose, wrench) = (StampedPose { stamp_ns, pose_ot }, StampedWrench { stamp_ns, wrench });
-    Ok(ArmState { pose_frame: frame.clone(), pose, wrench_frame: frame, wrench })
+    let (pose, wrench) = (
+        StampedPose { stamp_ns, pose_ot },
+        StampedWrench { stamp_ns, wrench },
+    );
+    Ok(ArmState {
+        pose_frame: frame.clone(),
+        pose,
+        wrench_frame: frame,
+        wrench,
+    })
 }
 
 fn flags(fields: &mut impl MessageFields) -> Result<(), BadMessage> {
-    if FRANKA_FLAGS.contains(&fields.rest()) { Ok(()) } else { Err(BadMessage::Malformed) }
+    if FRANKA_FLAGS.contains(&fields.rest()) {
+        Ok(())
+    } else {
+        Err(BadMessage::Malformed)
+    }
 }
 
 /// `o_t_ee` and `o_f_ext_hat_k` of a `franka_msgs/FrankaRobotState`, as franka_ros2 has it up to 1.0: stamped as the whole, in the frames
@@ -74,7 +93,13 @@ pub(super) fn franka_robot_state(fields: &mut impl MessageFields) -> Result<ArmS
     fields.skip_f64s(2)?;
     flags(fields)?;
     let stamp_ns = whole.stamp_ns;
-    let frame = |own: Header| if own.frame.is_empty() { whole.frame.clone() } else { own.frame };
+    let frame = |own: Header| {
+        if own.frame.is_empty() {
+            whole.frame.clone()
+        } else {
+            own.frame
+        }
+    };
     Ok(ArmState {
         pose_frame: frame(pose_header),
         pose: StampedPose { stamp_ns, pose_ot },
@@ -106,11 +131,15 @@ const ROTATION_SLACK: f64 = 0.02;
 
 /// The motion of a homogeneous 4 × 4 matrix, column by column; `None` when it is none.
 fn from_columns(matrix: &[f64; 16]) -> Option<Isometry3<f64>> {
-    let [x, y, z, p] = [0, 4, 8, 12].map(|at| nalgebra::Vector3::new(matrix[at], matrix[at + 1], matrix[at + 2]));
+    let [x, y, z, p] =
+        [0, 4, 8, 12].map(|at| nalgebra::Vector3::new(matrix[at], matrix[at + 1], matrix[at + 2]));
     let rotation = Matrix3::from_columns(&[x, y, z]);
-    let is_rotation = (rotation.transpose() * rotation - Matrix3::identity()).norm() <= ROTATION_SLACK
+    let is_rotation = (rotation.transpose() * rotation - Matrix3::identity()).norm()
+        <= ROTATION_SLACK
         && rotation.determinant() > 0.0
         && [matrix[3], matrix[7], matrix[11], matrix[15]] == [0.0, 0.0, 0.0, 1.0];
     let turn = || UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
-    is_rotation.then(|| Isometry3::from_parts(p.into(), UnitQuaternion::new_normalize(turn().into_inner())))
+    is_rotation.then(|| {
+        Isometry3::from_parts(p.into(), UnitQuaternion::new_normalize(turn().into_inner()))
+    })
 }

@@ -27,7 +27,11 @@ pub(super) struct Intake {
 impl Intake {
     /// Of a recording whose messages name no frames.
     pub fn in_frames(pose: &str, wrench: &str) -> Self {
-        Self { pose_frame: Some(pose.to_owned()), wrench_frame: Some(wrench.to_owned()), ..Self::default() }
+        Self {
+            pose_frame: Some(pose.to_owned()),
+            wrench_frame: Some(wrench.to_owned()),
+            ..Self::default()
+        }
     }
 
     pub fn take_chain(&mut self, chain: TransformChain) {
@@ -38,7 +42,10 @@ impl Intake {
     pub fn accept(&mut self, raw: &RawMessage, path: &Path, stamps: StampSource) -> Option<Record> {
         let decoded = self.decode(raw, stamps);
         if let Err(reason) = decoded {
-            let holds = [raw.kind != TopicKind::Wrench, matches!(raw.kind, TopicKind::Wrench | TopicKind::State)];
+            let holds = [
+                raw.kind != TopicKind::Wrench,
+                matches!(raw.kind, TopicKind::Wrench | TopicKind::State),
+            ];
             self.leave_out(reason, holds, path, raw.place);
         }
         if raw.kind == TopicKind::Transforms {
@@ -54,17 +61,28 @@ impl Intake {
 
     /// Poses for which transforms were interpolated, and stamps outside of what the transforms cover.
     pub fn transform_counts(&self) -> Option<[u64; 2]> {
-        self.chain.as_ref().map(|chain| [chain.poses.interpolated, chain.poses.outside])
+        self.chain
+            .as_ref()
+            .map(|chain| [chain.poses.interpolated, chain.poses.outside])
     }
 
     /// Counts the stamps of which the transforms give no pose.
     fn count_apart(&mut self, path: &Path, place: FilePlace) {
-        let apart = self.chain.as_mut().map_or(0, |chain| chain.poses.take_apart());
-        (0..apart).for_each(|_| self.leave_out(BadMessage::TransformsApart, [true, false], path, place));
+        let apart = self
+            .chain
+            .as_mut()
+            .map_or(0, |chain| chain.poses.take_apart());
+        (0..apart)
+            .for_each(|_| self.leave_out(BadMessage::TransformsApart, [true, false], path, place));
     }
 
     /// Pose and wrench of a row of a table.
-    pub fn accept_row(&mut self, row: Result<TableRow, BadMessage>, place: FilePlace, path: &Path) -> Option<Record> {
+    pub fn accept_row(
+        &mut self,
+        row: Result<TableRow, BadMessage>,
+        place: FilePlace,
+        path: &Path,
+    ) -> Option<Record> {
         match row {
             Ok(TableRow { pose, wrench }) => {
                 let wrench = wrench.map(|wrench| Record::from(Message::Wrench(wrench)));
@@ -81,22 +99,37 @@ impl Intake {
 
     /// - `holds`: whether it holds a pose, and a wrench.
     fn leave_out(&mut self, reason: BadMessage, holds: [bool; 2], path: &Path, place: FilePlace) {
-        let first = BadCount { poses: 0, wrenches: 0, path: path.to_owned(), place };
+        let first = BadCount {
+            poses: 0,
+            wrenches: 0,
+            path: path.to_owned(),
+            place,
+        };
         let bad = self.bad.entry(reason).or_insert(first);
         bad.poses += u64::from(holds[0]);
         bad.wrenches += u64::from(holds[1]);
     }
 
-    fn decode(&mut self, raw: &RawMessage, stamps: StampSource) -> Result<Option<Record>, BadMessage> {
+    fn decode(
+        &mut self,
+        raw: &RawMessage,
+        stamps: StampSource,
+    ) -> Result<Option<Record>, BadMessage> {
         let logged_ns = (stamps == StampSource::Log).then_some(raw.logged_ns);
         let stamped = |mut record: Record| {
-            logged_ns.into_iter().for_each(|logged_ns| record.set_stamp(logged_ns));
+            logged_ns
+                .into_iter()
+                .for_each(|logged_ns| record.set_stamp(logged_ns));
             record
         };
         match decode_raw(raw)? {
             Decoded::Record(frame, record) => {
                 let is_wrench = raw.kind == TopicKind::Wrench;
-                let first = if is_wrench { &mut self.wrench_frame } else { &mut self.pose_frame };
+                let first = if is_wrench {
+                    &mut self.wrench_frame
+                } else {
+                    &mut self.pose_frame
+                };
                 in_one_frame(first, &frame)?;
                 Ok(Some(stamped(record)))
             }
@@ -115,9 +148,15 @@ impl Intake {
                 Ok(Some(stamped(Message::Pose(pose).into())))
             }
             Decoded::Transforms(links) => {
-                let Some(chain) = &mut self.chain else { return Ok(None) };
+                let Some(chain) = &mut self.chain else {
+                    return Ok(None);
+                };
                 // of several stamps the newest is the one that was recorded now
-                let newest_ns = links.iter().map(|link| link.stamp_ns).max().unwrap_or_default();
+                let newest_ns = links
+                    .iter()
+                    .map(|link| link.stamp_ns)
+                    .max()
+                    .unwrap_or_default();
                 let shift_ns = logged_ns.map_or(0, |logged_ns| logged_ns.saturating_sub(newest_ns));
                 chain.push(links, raw.kind == TopicKind::StaticTransforms)?;
                 while let Some(mut pose) = chain.next_pose() {
@@ -133,7 +172,11 @@ impl Intake {
 /// All messages of a topic name the frame that the first one named.
 fn in_one_frame(first: &mut Option<String>, frame: &str) -> Result<(), BadMessage> {
     let is_first = first.get_or_insert_with(|| frame.to_owned()) == frame;
-    if is_first { Ok(()) } else { Err(BadMessage::FrameChanged) }
+    if is_first {
+        Ok(())
+    } else {
+        Err(BadMessage::FrameChanged)
+    }
 }
 
 /// Reads a message as the file has it.

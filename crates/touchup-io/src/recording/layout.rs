@@ -17,7 +17,11 @@ pub struct Topics {
 impl Default for Topics {
     /// `/stylus/pose` and `/stylus/wrench`, no markers.
     fn default() -> Self {
-        Self { pose: "/stylus/pose".into(), wrench: "/stylus/wrench".into(), markers: None }
+        Self {
+            pose: "/stylus/pose".into(),
+            wrench: "/stylus/wrench".into(),
+            markers: None,
+        }
     }
 }
 
@@ -44,7 +48,10 @@ pub struct RecordingLayout {
 
 impl From<&Topics> for RecordingLayout {
     fn from(topics: &Topics) -> Self {
-        Self { topics: topics.clone(), ..Self::default() }
+        Self {
+            topics: topics.clone(),
+            ..Self::default()
+        }
     }
 }
 
@@ -66,7 +73,11 @@ impl RecordingLayout {
     pub(super) fn kinds(&self) -> &'static [TopicKind] {
         match (&self.topics.markers, &self.frames) {
             (Some(_), _) => &[TopicKind::Markers, TopicKind::Wrench],
-            (None, Some(_)) => &[TopicKind::Transforms, TopicKind::StaticTransforms, TopicKind::Wrench],
+            (None, Some(_)) => &[
+                TopicKind::Transforms,
+                TopicKind::StaticTransforms,
+                TopicKind::Wrench,
+            ],
             (None, None) if self.topics.pose == self.topics.wrench => &[TopicKind::State],
             (None, None) => &[TopicKind::Pose, TopicKind::Wrench],
         }
@@ -74,11 +85,17 @@ impl RecordingLayout {
 
     /// Those that must be there.
     pub(super) fn needed(&self) -> impl Iterator<Item = TopicKind> + use<> {
-        self.kinds().iter().copied().filter(|kind| *kind != TopicKind::StaticTransforms)
+        self.kinds()
+            .iter()
+            .copied()
+            .filter(|kind| *kind != TopicKind::StaticTransforms)
     }
 
     pub(super) fn kind_of(&self, topic: &str) -> Option<TopicKind> {
-        self.kinds().iter().copied().find(|kind| self.is_topic(*kind, topic))
+        self.kinds()
+            .iter()
+            .copied()
+            .find(|kind| self.is_topic(*kind, topic))
     }
 
     /// Whether a topic is the one that gives `kind`.
@@ -124,7 +141,10 @@ impl Topics {
         match kind {
             TopicKind::Wrench => &self.wrench,
             TopicKind::Markers => self.markers.as_deref().unwrap_or_default(),
-            TopicKind::Pose | TopicKind::State | TopicKind::Transforms | TopicKind::StaticTransforms => &self.pose,
+            TopicKind::Pose
+            | TopicKind::State
+            | TopicKind::Transforms
+            | TopicKind::StaticTransforms => &self.pose,
         }
     }
 }
@@ -152,7 +172,9 @@ impl TopicKind {
                 "geometry_msgs/msg/WrenchStamped or another wrench (Wrench, FrankaState, FrankaRobotState, iiwa_msgs' \
                  CartesianWrench)"
             }
-            Self::State => "franka_msgs' FrankaState or FrankaRobotState, the only ones that hold both pose and wrench",
+            Self::State => {
+                "franka_msgs' FrankaState or FrankaRobotState, the only ones that hold both pose and wrench"
+            }
             Self::Markers | Self::Transforms | Self::StaticTransforms => self.type_name(),
         }
     }

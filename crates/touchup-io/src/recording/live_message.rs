@@ -52,12 +52,21 @@ impl LiveType {
     /// In words, what it is instead and what can be read.
     pub fn of(kind: SampleKind, type_name: &str) -> Result<Self, String> {
         let usual = kind.topic_kind().type_name();
-        let type_name = if type_name.is_empty() { usual } else { type_name };
+        let type_name = if type_name.is_empty() {
+            usual
+        } else {
+            type_name
+        };
         let topic = match kind {
             SampleKind::Pose => "another pose, or remap its topic (-r)",
             SampleKind::Wrench => "another wrench, or remap its topic (-r)",
         };
-        let message_type = MessageType::giving(kind.topic_kind(), type_name, "the parameter pose_frame", topic)?;
+        let message_type = MessageType::giving(
+            kind.topic_kind(),
+            type_name,
+            "the parameter pose_frame",
+            topic,
+        )?;
         Ok(Self { kind, message_type })
     }
 
@@ -83,22 +92,32 @@ impl LiveType {
 
     /// The same for a library that unpacks the numbers itself.
     pub fn seed(self, received_ns: i64) -> LiveSeed {
-        LiveSeed { of: self, received_ns }
+        LiveSeed {
+            of: self,
+            received_ns,
+        }
     }
 
     fn format(self) -> MessageFormat {
-        MessageFormat { message_type: self.message_type, wire: Wire::Cdr }
+        MessageFormat {
+            message_type: self.message_type,
+            wire: Wire::Cdr,
+        }
     }
 
     fn sample(self, decoded: Decoded) -> Result<LiveMessage, BadMessage> {
         match (decoded, self.kind) {
-            (Decoded::Record(frame, Record::Message(message)), _) => Ok(LiveMessage { frame, message }),
-            (Decoded::State(state), SampleKind::Pose) => {
-                Ok(LiveMessage { frame: state.pose_frame, message: Message::Pose(state.pose) })
+            (Decoded::Record(frame, Record::Message(message)), _) => {
+                Ok(LiveMessage { frame, message })
             }
-            (Decoded::State(state), SampleKind::Wrench) => {
-                Ok(LiveMessage { frame: state.wrench_frame, message: Message::Wrench(state.wrench) })
-            }
+            (Decoded::State(state), SampleKind::Pose) => Ok(LiveMessage {
+                frame: state.pose_frame,
+                message: Message::Pose(state.pose),
+            }),
+            (Decoded::State(state), SampleKind::Wrench) => Ok(LiveMessage {
+                frame: state.wrench_frame,
+                message: Message::Wrench(state.wrench),
+            }),
             (Decoded::Record(..) | Decoded::Transforms(_), _) => Err(BadMessage::Malformed),
         }
     }
@@ -128,7 +147,11 @@ impl<'de> Visitor<'de> for LiveSeed {
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, fields: A) -> Result<Self::Value, A::Error> {
-        let decoded = decode_fields(self.of.format(), &mut SequenceFields(fields), self.received_ns);
+        let decoded = decode_fields(
+            self.of.format(),
+            &mut SequenceFields(fields),
+            self.received_ns,
+        );
         Ok(decoded.and_then(|decoded| self.of.sample(decoded)))
     }
 }

@@ -12,10 +12,13 @@ use std::io::{Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use super::framing::{ByteStream, Fields, HEAD_BYTES, NameBytes, check_crc, check_length, op, split_record};
+use super::framing::{
+    ByteStream, Fields, HEAD_BYTES, NameBytes, check_crc, check_length, op, split_record,
+};
 use super::topics::check_topic;
 use super::{
-    Damage, FilePlace, MessageFormat, RawMessage, RecordingError, RecordingFile, RecordingLayout, TopicInfo, TopicKind,
+    Damage, FilePlace, MessageFormat, RawMessage, RecordingError, RecordingFile, RecordingLayout,
+    TopicInfo, TopicKind,
 };
 
 pub(super) const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
@@ -74,7 +77,10 @@ impl McapReader {
     }
 
     fn start(path: &Path, layout: &RecordingLayout, packed: bool) -> Result<Self, RecordingError> {
-        let io = |source| RecordingError::Io { path: path.to_owned(), source };
+        let io = |source| RecordingError::Io {
+            path: path.to_owned(),
+            source,
+        };
         let stream = ByteStream::open(path, packed).map_err(io)?;
         let mut reader = Self {
             path: path.to_owned(),
@@ -98,7 +104,9 @@ impl McapReader {
     /// Takes over what is described elsewhere; a topic of a wrong type is an error of those who ask for the topics.
     fn knows(&mut self, described: Described) {
         let read = described.channels.iter();
-        let read = read.filter_map(|(id, info)| Some((*id, check_topic(&self.path, &self.layout, info).ok()??)));
+        let read = read.filter_map(|(id, info)| {
+            Some((*id, check_topic(&self.path, &self.layout, info).ok()??))
+        });
         self.read = read.collect();
         self.described = described;
     }
@@ -110,7 +118,11 @@ impl McapReader {
     }
 
     fn damaged(&self, damage: Damage) -> RecordingError {
-        RecordingError::Damaged { path: self.path.clone(), place: FilePlace::Byte(self.at), damage }
+        RecordingError::Damaged {
+            path: self.path.clone(),
+            place: FilePlace::Byte(self.at),
+            damage,
+        }
     }
 
     fn advance(&mut self) -> Result<Option<FoundMessage>, RecordingError> {
@@ -128,13 +140,20 @@ impl McapReader {
 
     /// Takes one record of the current chunk; a message of the topics of a touch gives its payload's place in `records`.
     fn next_record(&mut self) -> Result<Option<FoundMessage>, RecordingError> {
-        let (opcode, body) = split_record(&self.records[self.next..]).map_err(|damage| self.damaged(damage))?;
+        let (opcode, body) =
+            split_record(&self.records[self.next..]).map_err(|damage| self.damaged(damage))?;
         let start = self.next + HEAD_BYTES;
         self.next = start + body.len();
         match opcode {
-            op::SCHEMA => self.described.add_schema(body).map_err(|damage| self.damaged(damage))?,
+            op::SCHEMA => self
+                .described
+                .add_schema(body)
+                .map_err(|damage| self.damaged(damage))?,
             op::CHANNEL => {
-                let id = self.described.add_channel(body).map_err(|damage| self.damaged(damage))?;
+                let id = self
+                    .described
+                    .add_channel(body)
+                    .map_err(|damage| self.damaged(damage))?;
                 let info = &self.described.channels[&id];
                 match check_topic(&self.path, &self.layout, info)? {
                     Some(read) => self.read.insert(id, read),
@@ -143,18 +162,29 @@ impl McapReader {
             }
             op::MESSAGE => {
                 let mut head = Fields(body);
-                let channel = head.u16("channel of a message").map_err(|damage| self.damaged(damage))?;
+                let channel = head
+                    .u16("channel of a message")
+                    .map_err(|damage| self.damaged(damage))?;
                 if !self.described.channels.contains_key(&channel) {
-                    return Err(self.damaged(Damage::Undescribed { what: "channel", id: channel }));
+                    return Err(self.damaged(Damage::Undescribed {
+                        what: "channel",
+                        id: channel,
+                    }));
                 }
                 if body.len() < MESSAGE_HEAD_BYTES {
                     return Err(self.damaged(Damage::Field("head of a message")));
                 }
-                let mut logged = || head.u32("sequence of a message").and_then(|_| head.u64("log time of a message"));
+                let mut logged = || {
+                    head.u32("sequence of a message")
+                        .and_then(|_| head.u64("log time of a message"))
+                };
                 let logged = logged().map_err(|damage| self.damaged(damage))?;
                 let logged_ns = i64::try_from(logged).unwrap_or(i64::MAX);
                 let payload = start + MESSAGE_HEAD_BYTES..self.next;
-                return Ok(self.read.get(&channel).map(|&(kind, format)| (kind, format, payload, logged_ns)));
+                return Ok(self
+                    .read
+                    .get(&channel)
+                    .map(|&(kind, format)| (kind, format, payload, logged_ns)));
             }
             _ => {}
         }
@@ -187,7 +217,11 @@ impl McapReader {
                 op::DATA_END => {
                     let computed = self.stream.crc.clone().finalize();
                     self.stream.load(len, &mut self.packed)?;
-                    check_crc("the data section", Fields(&self.packed).u32("data end")?, computed)?;
+                    check_crc(
+                        "the data section",
+                        Fields(&self.packed).u32("data end")?,
+                        computed,
+                    )?;
                     return Ok(false);
                 }
                 op::FOOTER => return Ok(false),
@@ -214,14 +248,26 @@ impl RecordingFile for McapReader {
         let Some((kind, format, payload, logged_ns)) = self.advance()? else {
             return match self.promised {
                 Some(promised) if promised != self.found => {
-                    Err(self.damaged(Damage::MessageCount { promised, found: self.found }))
+                    Err(self.damaged(Damage::MessageCount {
+                        promised,
+                        found: self.found,
+                    }))
                 }
                 _ => Ok(None),
             };
         };
         self.found += 1;
-        let (payload, place) = (Cow::Borrowed(&self.records[payload]), FilePlace::Byte(self.at));
-        Ok(Some(RawMessage { kind, format, payload, logged_ns, place }))
+        let (payload, place) = (
+            Cow::Borrowed(&self.records[payload]),
+            FilePlace::Byte(self.at),
+        );
+        Ok(Some(RawMessage {
+            kind,
+            format,
+            payload,
+            logged_ns,
+            place,
+        }))
     }
 }
 
@@ -239,8 +285,12 @@ fn unpack_chunk(chunk: &[u8], records: &mut Vec<u8>) -> Result<(), Damage> {
     let limit = announced + 1;
     match compression.as_str() {
         "" => packed.take(limit).read_to_end(records)?,
-        "zstd" => zstd::Decoder::with_buffer(packed)?.take(limit).read_to_end(records)?,
-        "lz4" => lz4::Decoder::new(packed)?.take(limit).read_to_end(records)?,
+        "zstd" => zstd::Decoder::with_buffer(packed)?
+            .take(limit)
+            .read_to_end(records)?,
+        "lz4" => lz4::Decoder::new(packed)?
+            .take(limit)
+            .read_to_end(records)?,
         _ => return Err(Damage::Compression(compression)),
     };
     let found = records.len() as u64;
@@ -263,7 +313,8 @@ impl Described {
         let mut fields = Fields(body);
         let id = fields.u16("number of a schema")?;
         let name = fields.text("name of a schema")?;
-        self.name_bytes.take(name.len(), self.schemas.get(&id).map_or(0, String::len))?;
+        self.name_bytes
+            .take(name.len(), self.schemas.get(&id).map_or(0, String::len))?;
         self.schemas.insert(id, name);
         Ok(())
     }
@@ -272,20 +323,39 @@ impl Described {
         let mut fields = Fields(body);
         let id = fields.u16("number of a channel")?;
         let schema = fields.u16("schema of a channel")?;
-        let (name, encoding) = (fields.text("topic of a channel")?, fields.text("encoding of a channel")?);
+        let (name, encoding) = (
+            fields.text("topic of a channel")?,
+            fields.text("encoding of a channel")?,
+        );
         let type_name = match self.schemas.get(&schema) {
             Some(type_name) => type_name.clone(),
             None if schema == 0 => "without a type".to_owned(),
-            None => return Err(Damage::Undescribed { what: "schema", id: schema }),
+            None => {
+                return Err(Damage::Undescribed {
+                    what: "schema",
+                    id: schema,
+                });
+            }
         };
-        let info = TopicInfo { name, type_name, encoding };
-        self.name_bytes.take(info.name_bytes(), self.channels.get(&id).map_or(0, TopicInfo::name_bytes))?;
+        let info = TopicInfo {
+            name,
+            type_name,
+            encoding,
+        };
+        self.name_bytes.take(
+            info.name_bytes(),
+            self.channels.get(&id).map_or(0, TopicInfo::name_bytes),
+        )?;
         self.channels.insert(id, info);
         Ok(id)
     }
 
     fn has(&self, layout: &RecordingLayout) -> bool {
-        layout.needed().all(|kind| self.channels.values().any(|info| layout.is_topic(kind, &info.name)))
+        layout.needed().all(|kind| {
+            self.channels
+                .values()
+                .any(|info| layout.is_topic(kind, &info.name))
+        })
     }
 }
 
@@ -312,8 +382,14 @@ impl Index {
             return None;
         }
         let start = Fields(body).u64("start of the summary").ok()?;
-        let crc = Fields(body.get(16..)?).u32("checksum of the summary").ok()?;
-        let mut index = Self { described: Described::default(), counts: None, checked: false };
+        let crc = Fields(body.get(16..)?)
+            .u32("checksum of the summary")
+            .ok()?;
+        let mut index = Self {
+            described: Described::default(),
+            counts: None,
+            checked: false,
+        };
         if start == 0 {
             return Some(index);
         }
@@ -321,10 +397,14 @@ impl Index {
         check_length("summary", len).ok()?;
         file.seek(SeekFrom::Start(start)).ok()?;
         let mut summary = Vec::new();
-        file.take(len + (HEAD_BYTES + 16) as u64).read_to_end(&mut summary).ok()?;
+        file.take(len + (HEAD_BYTES + 16) as u64)
+            .read_to_end(&mut summary)
+            .ok()?;
         check_crc("the summary", crc, crc32fast::hash(&summary)).ok()?;
         index.checked = crc != 0;
-        index.add_records(summary.get(..usize::try_from(len).ok()?)?).ok()?;
+        index
+            .add_records(summary.get(..usize::try_from(len).ok()?)?)
+            .ok()?;
         Some(index)
     }
 
@@ -345,8 +425,18 @@ impl Index {
     /// Messages on the topics of a touch.
     fn promised(&self, layout: &RecordingLayout) -> Option<u64> {
         let counts = self.counts.as_ref()?;
-        let wanted = |id: &u16| self.described.channels.get(id).is_some_and(|c| layout.kind_of(&c.name).is_some());
-        Some(counts.iter().filter(|(id, _)| wanted(id)).fold(0, |sum: u64, (_, n)| sum.saturating_add(*n)))
+        let wanted = |id: &u16| {
+            self.described
+                .channels
+                .get(id)
+                .is_some_and(|c| layout.kind_of(&c.name).is_some())
+        };
+        Some(
+            counts
+                .iter()
+                .filter(|(id, _)| wanted(id))
+                .fold(0, |sum: u64, (_, n)| sum.saturating_add(*n)),
+        )
     }
 }
 

@@ -25,14 +25,26 @@ pub(super) enum MessageType {
 const NAMES: [(&str, MessageType); 13] = [
     ("geometry_msgs/msg/PoseStamped", MessageType::PoseStamped),
     ("geometry_msgs/msg/Pose", MessageType::Pose),
-    ("geometry_msgs/msg/PoseWithCovarianceStamped", MessageType::PoseWithCovarianceStamped),
+    (
+        "geometry_msgs/msg/PoseWithCovarianceStamped",
+        MessageType::PoseWithCovarianceStamped,
+    ),
     ("nav_msgs/msg/Odometry", MessageType::Odometry),
-    ("geometry_msgs/msg/TransformStamped", MessageType::TransformStamped),
+    (
+        "geometry_msgs/msg/TransformStamped",
+        MessageType::TransformStamped,
+    ),
     ("tf2_msgs/msg/TFMessage", MessageType::Transforms),
-    ("geometry_msgs/msg/WrenchStamped", MessageType::WrenchStamped),
+    (
+        "geometry_msgs/msg/WrenchStamped",
+        MessageType::WrenchStamped,
+    ),
     ("geometry_msgs/msg/Wrench", MessageType::Wrench),
     ("franka_msgs/msg/FrankaState", MessageType::FrankaState),
-    ("franka_msgs/msg/FrankaRobotState", MessageType::FrankaRobotState),
+    (
+        "franka_msgs/msg/FrankaRobotState",
+        MessageType::FrankaRobotState,
+    ),
     ("iiwa_msgs/msg/CartesianPose", MessageType::IiwaPose),
     ("iiwa_msgs/msg/CartesianWrench", MessageType::IiwaWrench),
     ("sensor_msgs/msg/PointCloud2", MessageType::PointCloud),
@@ -46,12 +58,18 @@ impl MessageType {
             Some((package, name)) if !name.contains('/') => format!("{package}/msg/{name}"),
             _ => type_name.to_owned(),
         };
-        NAMES.iter().find(|(name, _)| *name == ros2).map(|(_, message_type)| *message_type)
+        NAMES
+            .iter()
+            .find(|(name, _)| *name == ros2)
+            .map(|(_, message_type)| *message_type)
     }
 
     /// As ROS 2 has it.
     pub fn name(self) -> &'static str {
-        NAMES.iter().find(|(_, known)| *known == self).map_or("", |(name, _)| name)
+        NAMES
+            .iter()
+            .find(|(_, known)| *known == self)
+            .map_or("", |(name, _)| name)
     }
 
     /// Whether stamp and frame are those of its header.
@@ -61,13 +79,18 @@ impl MessageType {
 
     fn gives(self, kind: TopicKind) -> bool {
         match (kind, self) {
-            (TopicKind::Pose | TopicKind::Wrench | TopicKind::State, Self::FrankaState | Self::FrankaRobotState) => {
-                true
-            }
+            (
+                TopicKind::Pose | TopicKind::Wrench | TopicKind::State,
+                Self::FrankaState | Self::FrankaRobotState,
+            ) => true,
             (TopicKind::State, _) => false,
-            (TopicKind::Transforms | TopicKind::StaticTransforms, given) => given == Self::Transforms,
+            (TopicKind::Transforms | TopicKind::StaticTransforms, given) => {
+                given == Self::Transforms
+            }
             (TopicKind::Markers, given) => given == Self::PointCloud,
-            (TopicKind::Wrench, given) => matches!(given, Self::Wrench | Self::WrenchStamped | Self::IiwaWrench),
+            (TopicKind::Wrench, given) => {
+                matches!(given, Self::Wrench | Self::WrenchStamped | Self::IiwaWrench)
+            }
             (TopicKind::Pose, given) => matches!(
                 given,
                 Self::Pose
@@ -83,13 +106,21 @@ impl MessageType {
     /// The type of a topic that is to give what `kind` says; the error is what the topic is instead, and what to do.
     ///
     /// - `frame`, `topic`: what names the frame of the stylus, and what chooses another topic.
-    pub fn giving(kind: TopicKind, type_name: &str, frame: &str, topic: &str) -> Result<Self, String> {
+    pub fn giving(
+        kind: TopicKind,
+        type_name: &str,
+        frame: &str,
+        topic: &str,
+    ) -> Result<Self, String> {
         match Self::named(type_name) {
             Some(given) if given.gives(kind) => Ok(given),
-            Some(Self::Transforms) if kind == TopicKind::Pose => {
-                Err(format!("{type_name}, which holds many frames; name that of the stylus with {frame}"))
-            }
-            _ => Err(format!("{type_name}, not {}; choose another with {topic}", kind.types())),
+            Some(Self::Transforms) if kind == TopicKind::Pose => Err(format!(
+                "{type_name}, which holds many frames; name that of the stylus with {frame}"
+            )),
+            _ => Err(format!(
+                "{type_name}, not {}; choose another with {topic}",
+                kind.types()
+            )),
         }
     }
 }
@@ -107,11 +138,14 @@ impl MessageFormat {
         let type_name = &info.type_name;
         let message_type = MessageType::giving(kind, type_name, "--pose-frame", kind.flag())?;
         match (message_type, Wire::of(&info.encoding)) {
-            (MessageType::PointCloud, Some(Wire::Ros1)) => {
-                Err(format!("{type_name} of ROS 1; convert the recording with `rosbags-convert` to read markers"))
-            }
+            (MessageType::PointCloud, Some(Wire::Ros1)) => Err(format!(
+                "{type_name} of ROS 1; convert the recording with `rosbags-convert` to read markers"
+            )),
             (_, Some(wire)) => Ok(Self { message_type, wire }),
-            (_, None) => Err(format!("encoded as {:?}; only ROS 2's \"cdr\" can be read", info.encoding)),
+            (_, None) => Err(format!(
+                "encoded as {:?}; only ROS 2's \"cdr\" can be read",
+                info.encoding
+            )),
         }
     }
 }

@@ -54,22 +54,38 @@ struct TableLines {
 
 impl TableLines {
     fn open(path: &Path) -> Result<Self, RecordingError> {
-        let file = File::open(path).map_err(|source| RecordingError::Io { path: path.to_owned(), source })?;
-        Ok(Self { path: path.to_owned(), input: BufReader::new(file), line: Vec::new(), at: 0 })
+        let file = File::open(path).map_err(|source| RecordingError::Io {
+            path: path.to_owned(),
+            source,
+        })?;
+        Ok(Self {
+            path: path.to_owned(),
+            input: BufReader::new(file),
+            line: Vec::new(),
+            at: 0,
+        })
     }
 
     /// Reads the next line; `false` at the end.
     fn advance(&mut self) -> Result<bool, RecordingError> {
         loop {
             self.line.clear();
-            let read = self.input.by_ref().take(MAX_LINE_BYTES + 1).read_until(b'\n', &mut self.line);
+            let read = self
+                .input
+                .by_ref()
+                .take(MAX_LINE_BYTES + 1)
+                .read_until(b'\n', &mut self.line);
             self.at += 1;
             let bytes = read.map_err(|error| self.damaged(error.into()))? as u64;
             if bytes == 0 {
                 return Ok(false);
             }
             if bytes > MAX_LINE_BYTES {
-                return Err(self.damaged(Damage::TooLong { what: "line", bytes, limit: MAX_LINE_BYTES }));
+                return Err(self.damaged(Damage::TooLong {
+                    what: "line",
+                    bytes,
+                    limit: MAX_LINE_BYTES,
+                }));
             }
             let text = self.line.trim_ascii();
             if !text.is_empty() && !text.starts_with(b"#") {
@@ -79,7 +95,11 @@ impl TableLines {
     }
 
     fn damaged(&self, damage: Damage) -> RecordingError {
-        RecordingError::Damaged { path: self.path.clone(), place: FilePlace::Line(self.at), damage }
+        RecordingError::Damaged {
+            path: self.path.clone(),
+            place: FilePlace::Line(self.at),
+            damage,
+        }
     }
 }
 
@@ -90,20 +110,36 @@ impl NumberTable {
     /// [`RecordingError::Io`]; [`RecordingError::Columns`] with the columns that are there, when they do not say what is what.
     pub fn open(path: &Path, columns: &TableColumns) -> Result<Self, RecordingError> {
         let mut lines = TableLines::open(path)?;
-        let bad = |what: &str| RecordingError::Columns { path: path.to_owned(), what: what.to_owned() };
+        let bad = |what: &str| RecordingError::Columns {
+            path: path.to_owned(),
+            what: what.to_owned(),
+        };
         if !lines.advance()? {
             return Err(bad("the table is empty; its first line names the columns"));
         }
-        let text = str::from_utf8(&lines.line).map_err(|_| bad("its first line is no UTF-8 text"))?;
+        let text =
+            str::from_utf8(&lines.line).map_err(|_| bad("its first line is no UTF-8 text"))?;
         let text = text.strip_prefix('\u{feff}').unwrap_or(text).trim();
-        let separator = [',', ';', '\t'].into_iter().find(|separator| text.contains(*separator)).unwrap_or(' ');
-        let names: Vec<String> = split(text, separator).into_iter().map(str::to_owned).collect();
+        let separator = [',', ';', '\t']
+            .into_iter()
+            .find(|separator| text.contains(*separator))
+            .unwrap_or(' ');
+        let names: Vec<String> = split(text, separator)
+            .into_iter()
+            .map(str::to_owned)
+            .collect();
         if names.iter().all(|name| name.parse::<f64>().is_ok()) {
-            return Err(bad("its first line has numbers alone; it must name the columns"));
+            return Err(bad(
+                "its first line has numbers alone; it must name the columns",
+            ));
         }
         let columns = columns.find(&names).map_err(|what| bad(&what))?;
-        let mut ahead =
-            Self { lines: TableLines::open(path)?, separator, columns: columns.clone(), width: names.len() };
+        let mut ahead = Self {
+            lines: TableLines::open(path)?,
+            separator,
+            columns: columns.clone(),
+            width: names.len(),
+        };
         match ahead.why_unusable()? {
             Some(why) => Err(bad(&why)),
             None => Ok(Self { lines, ..ahead }),
@@ -127,12 +163,15 @@ impl NumberTable {
     /// What is wrong with the last line.
     fn in_words(&self, bad: BadMessage) -> String {
         let (line, width) = (self.lines.at, self.width);
-        let count = str::from_utf8(&self.lines.line).map_or(0, |text| split(text.trim(), self.separator).len());
+        let count = str::from_utf8(&self.lines.line)
+            .map_or(0, |text| split(text.trim(), self.separator).len());
         match bad {
             BadMessage::Quaternion => format!(
                 "the orientation in line {line} has not the length 1: a quaternion is x, y, z, w, a rotation vector has finite numbers"
             ),
-            BadMessage::Stamp => format!("the time in line {line} is no number, or too large: decimals have a point"),
+            BadMessage::Stamp => {
+                format!("the time in line {line} is no number, or too large: decimals have a point")
+            }
             _ if count != width => {
                 format!(
                     "line {line} has {count} values for {width} columns: decimals have a point, and each line has all columns"
@@ -165,18 +204,32 @@ impl NumberTable {
         if values.len() != self.width {
             return Err(BadMessage::Malformed);
         }
-        let FoundColumns { time, position, orientation, force, torque, .. } = &self.columns;
+        let FoundColumns {
+            time,
+            position,
+            orientation,
+            force,
+            torque,
+            ..
+        } = &self.columns;
         let stamp_ns = nanoseconds(values[time.at], time.factor).ok_or(BadMessage::Stamp)?;
         let pose = match vector(&values, position)? {
             Some(position) => {
-                let pose_ot = Isometry3::from_parts(position.into(), rotation(&values, orientation)?);
+                let pose_ot =
+                    Isometry3::from_parts(position.into(), rotation(&values, orientation)?);
                 Some(StampedPose { stamp_ns, pose_ot })
             }
             None => None,
         };
         let force = vector(&values, force)?;
-        let torque = torque.as_ref().map_or(Ok(None), |torque| vector(&values, torque))?.unwrap_or_default();
-        let wrench = force.map(|force| StampedWrench { stamp_ns, wrench: Wrench { force, torque } });
+        let torque = torque
+            .as_ref()
+            .map_or(Ok(None), |torque| vector(&values, torque))?
+            .unwrap_or_default();
+        let wrench = force.map(|force| StampedWrench {
+            stamp_ns,
+            wrench: Wrench { force, torque },
+        });
         Ok(TableRow { pose, wrench })
     }
 }
@@ -212,12 +265,16 @@ fn vector(values: &[&str], columns: &[Column; 3]) -> Result<Option<Vector3<f64>>
     }
 }
 
-fn rotation(values: &[&str], columns: &OrientationColumns) -> Result<UnitQuaternion<f64>, BadMessage> {
+fn rotation(
+    values: &[&str],
+    columns: &OrientationColumns,
+) -> Result<UnitQuaternion<f64>, BadMessage> {
     match columns {
         OrientationColumns::None => Ok(UnitQuaternion::identity()),
         OrientationColumns::RotationVector(turn) => {
             let turn = vector(values, turn)?.filter(|turn| turn.iter().all(|x| x.is_finite()));
-            turn.map(UnitQuaternion::from_scaled_axis).ok_or(BadMessage::Quaternion)
+            turn.map(UnitQuaternion::from_scaled_axis)
+                .ok_or(BadMessage::Quaternion)
         }
         OrientationColumns::Quaternion(quaternion) => {
             let mut numbers = [0.0; 4];
@@ -234,13 +291,21 @@ const NS_PER_S: f64 = 1e9;
 /// A time in ns, rounded; whole units and their fraction apart, as a time since 1970 in s has more digits than a float.
 fn nanoseconds(value: &str, factor: f64) -> Option<i64> {
     let unit_ns = (factor * NS_PER_S).round();
-    let (sign, digits) = value.strip_prefix('-').map_or((1.0, value), |digits| (-1.0, digits));
+    let (sign, digits) = value
+        .strip_prefix('-')
+        .map_or((1.0, value), |digits| (-1.0, digits));
     let apart = digits.split_once('.').unwrap_or((digits, ""));
-    let is_plain = [apart.0, apart.1].iter().all(|part| part.bytes().all(|byte| byte.is_ascii_digit()));
+    let is_plain = [apart.0, apart.1]
+        .iter()
+        .all(|part| part.bytes().all(|byte| byte.is_ascii_digit()));
     let ns = match apart.0.parse::<i64>() {
         Ok(whole) if is_plain => {
-            let fraction = format!("0.{}", if apart.1.is_empty() { "0" } else { apart.1 }).parse::<f64>().ok()?;
-            whole.checked_mul(unit_ns as i64)?.checked_add((fraction * unit_ns).round() as i64)?
+            let fraction = format!("0.{}", if apart.1.is_empty() { "0" } else { apart.1 })
+                .parse::<f64>()
+                .ok()?;
+            whole
+                .checked_mul(unit_ns as i64)?
+                .checked_add((fraction * unit_ns).round() as i64)?
         }
         _ => {
             let ns = digits.parse::<f64>().ok()? * unit_ns;

@@ -17,7 +17,10 @@ pub(super) fn open_file(
     path: &Path,
     layout: &RecordingLayout,
 ) -> Result<(Box<dyn RecordingFile>, Option<RecordingError>), RecordingError> {
-    let io = |source| RecordingError::Io { path: path.to_owned(), source };
+    let io = |source| RecordingError::Io {
+        path: path.to_owned(),
+        source,
+    };
     let mut front = read_front(File::open(path).map_err(io)?).map_err(io)?;
     let packed = front.starts_with(&ZSTD_MAGIC);
     if packed {
@@ -33,13 +36,18 @@ pub(super) fn open_file(
         let (reader, damage) = BagReader::open(path, layout)?;
         Ok((Box::new(reader), damage))
     } else {
-        Err(RecordingError::NotARecording { path: path.to_owned(), reason: describe_front(&front) })
+        Err(RecordingError::NotARecording {
+            path: path.to_owned(),
+            reason: describe_front(&front),
+        })
     }
 }
 
 fn read_front(input: impl Read) -> io::Result<Vec<u8>> {
     let mut front = Vec::new();
-    input.take(db3::MAGIC.len() as u64).read_to_end(&mut front)?;
+    input
+        .take(db3::MAGIC.len() as u64)
+        .read_to_end(&mut front)?;
     Ok(front)
 }
 

@@ -64,11 +64,16 @@ impl CloudField {
         let scalar = *Scalar::ALL.get(usize::from(field.datatype).checked_sub(1)?)?;
         let offset = usize::try_from(field.offset).ok()?;
         let is_inside = offset.checked_add(scalar.size())? <= msg.point_step as usize;
-        is_inside.then_some(Self { offset, scalar, is_bigendian: msg.is_bigendian })
+        is_inside.then_some(Self {
+            offset,
+            scalar,
+            is_bigendian: msg.is_bigendian,
+        })
     }
 
     fn value(&self, point: &[u8]) -> Option<f64> {
-        self.scalar.value(point.get(self.offset..)?, self.is_bigendian)
+        self.scalar
+            .value(point.get(self.offset..)?, self.is_bigendian)
     }
 }
 
@@ -90,7 +95,8 @@ fn read_points(msg: &PointCloud2Msg, frame: &mut MarkerFrame) -> Option<()> {
     }
     let (step, width) = (msg.point_step as usize, msg.width as usize);
     let row = usize::try_from(msg.row_step).ok()?;
-    let is_whole = step.checked_mul(width)? <= row && row.checked_mul(msg.height as usize)? <= msg.data.len();
+    let is_whole =
+        step.checked_mul(width)? <= row && row.checked_mul(msg.height as usize)? <= msg.data.len();
     if !is_whole || (row == 0 && msg.height > 0 && width > 0) {
         return None;
     }
@@ -101,13 +107,19 @@ fn read_points(msg: &PointCloud2Msg, frame: &mut MarkerFrame) -> Option<()> {
         let position = Point3::new(x.value(point)?, y.value(point)?, z.value(point)?);
         let label = id.map_or(Some(at as f64), |id| id.value(point))?;
         // a number that is no label becomes one that no marker has
-        frame.see(MarkerObservation { label: if label >= 0.0 { label as u32 } else { u32::MAX }, position });
+        frame.see(MarkerObservation {
+            label: if label >= 0.0 { label as u32 } else { u32::MAX },
+            position,
+        });
     }
     Some(())
 }
 
 /// Writes a cloud in little-endian CDR; x, y and z as 32 bits, as viewers expect.
-pub(super) fn encode_markers(frame: &MarkerFrame, frame_id: &str) -> Result<Vec<u8>, RecordingError> {
+pub(super) fn encode_markers(
+    frame: &MarkerFrame,
+    frame_id: &str,
+) -> Result<Vec<u8>, RecordingError> {
     let field = |(name, at, datatype): (&'static str, u32, u8)| PointFieldMsg {
         name: name.into(),
         offset: at * 4,
@@ -116,14 +128,24 @@ pub(super) fn encode_markers(frame: &MarkerFrame, frame_id: &str) -> Result<Vec<
     };
     let mut data = Vec::with_capacity(frame.seen().len() * POINT_BYTES);
     for marker in frame.seen() {
-        marker.position.iter().for_each(|&x| data.extend((x as f32).to_le_bytes()));
+        marker
+            .position
+            .iter()
+            .for_each(|&x| data.extend((x as f32).to_le_bytes()));
         data.extend(marker.label.to_le_bytes());
     }
     encode(&PointCloud2Msg {
         header: HeaderMsg::new(frame.stamp_ns, frame_id)?,
         height: 1,
         width: frame.seen().len() as u32,
-        fields: [("x", 0, FLOAT32), ("y", 1, FLOAT32), ("z", 2, FLOAT32), ("id", 3, UINT32)].map(field).into(),
+        fields: [
+            ("x", 0, FLOAT32),
+            ("y", 1, FLOAT32),
+            ("z", 2, FLOAT32),
+            ("id", 3, UINT32),
+        ]
+        .map(field)
+        .into(),
         is_bigendian: false,
         point_step: POINT_BYTES as u32,
         // at most MOST_MARKERS points
@@ -153,7 +175,11 @@ mod tests {
         fn of(points: &[([f32; 3], u32)]) -> Self {
             let data: Vec<u8> = points
                 .iter()
-                .flat_map(|(p, id)| p.iter().flat_map(|x| x.to_le_bytes()).chain(id.to_le_bytes()))
+                .flat_map(|(p, id)| {
+                    p.iter()
+                        .flat_map(|x| x.to_le_bytes())
+                        .chain(id.to_le_bytes())
+                })
                 .collect();
             let bytes = data.len() as u32;
             Self {
@@ -174,7 +200,9 @@ mod tests {
             [7, 9, 2].into_iter().for_each(|x| number(&mut body, x));
             body.extend(b"O\0");
             align(&mut body);
-            [self.height, self.width, self.names.len() as u32].into_iter().for_each(|x| number(&mut body, x));
+            [self.height, self.width, self.names.len() as u32]
+                .into_iter()
+                .for_each(|x| number(&mut body, x));
             for (name, offset, datatype) in &self.names {
                 number(&mut body, name.len() as u32 + 1);
                 body.extend(name.bytes().chain([0]));
@@ -186,7 +214,9 @@ mod tests {
             }
             body.push(0);
             align(&mut body);
-            [self.point_step, self.row_step, self.data_len].into_iter().for_each(|x| number(&mut body, x));
+            [self.point_step, self.row_step, self.data_len]
+                .into_iter()
+                .for_each(|x| number(&mut body, x));
             body.extend(&self.data);
             body.push(1);
             [&[0, 1, 0, 0], &body[..]].concat()
@@ -200,7 +230,10 @@ mod tests {
     const POINTS: [([f32; 3], u32); 2] = [([1.0, -2.0, 0.5], 3), ([0.25, 0.125, 4.0], 0)];
 
     fn seen(label: u32, p: [f64; 3]) -> MarkerObservation {
-        MarkerObservation { label, position: p.into() }
+        MarkerObservation {
+            label,
+            position: p.into(),
+        }
     }
 
     #[test]
@@ -208,30 +241,58 @@ mod tests {
         let bytes = Cloud::of(&POINTS).bytes();
         let (frame_id, frame) = decode_markers(&bytes).unwrap();
         assert_eq!((frame_id.as_ref(), frame.stamp_ns), ("O", 7_000_000_009));
-        assert_eq!(frame.seen(), [seen(3, [1.0, -2.0, 0.5]), seen(0, [0.25, 0.125, 4.0])]);
+        assert_eq!(
+            frame.seen(),
+            [seen(3, [1.0, -2.0, 0.5]), seen(0, [0.25, 0.125, 4.0])]
+        );
         assert_eq!(encode_markers(&frame, "O").unwrap(), bytes);
     }
 
     #[test]
     fn without_an_id_the_place_in_the_cloud_is_the_label_and_nan_is_not_seen() {
-        let mut cloud = Cloud::of(&[([1.0; 3], 9), ([f32::NAN, 0.0, 0.0], 9), ([1e30, 0.0, 0.0], 9), ([2.0; 3], 9)]);
+        let mut cloud = Cloud::of(&[
+            ([1.0; 3], 9),
+            ([f32::NAN, 0.0, 0.0], 9),
+            ([1e30, 0.0, 0.0], 9),
+            ([2.0; 3], 9),
+        ]);
         cloud.names.pop();
-        assert_eq!(cloud.read().unwrap().seen(), [seen(0, [1.0; 3]), seen(3, [2.0; 3])]);
+        assert_eq!(
+            cloud.read().unwrap().seen(),
+            [seen(0, [1.0; 3]), seen(3, [2.0; 3])]
+        );
     }
 
     #[test]
     fn other_number_types_and_their_order_are_read() {
         let mut cloud = Cloud::of(&[]);
-        cloud.names = vec![("id", 0, 3), ("z", 8, 8), ("y", 16, 8), ("x", 24, 8), ("rgb", 4, 7)];
+        cloud.names = vec![
+            ("id", 0, 3),
+            ("z", 8, 8),
+            ("y", 16, 8),
+            ("x", 24, 8),
+            ("rgb", 4, 7),
+        ];
         for (id, z) in [(5_i16, 3.0_f64), (-1, 6.0)] {
             cloud.data.extend([&id.to_le_bytes()[..], &[0; 6]].concat());
-            [z, 2.0, 1.0].iter().for_each(|x| cloud.data.extend(x.to_le_bytes()));
+            [z, 2.0, 1.0]
+                .iter()
+                .for_each(|x| cloud.data.extend(x.to_le_bytes()));
         }
         // two rows of one point, each with 4 bytes of padding behind it
         cloud.data.splice(32..32, [0; 4]);
         cloud.data.extend([0; 4]);
-        (cloud.width, cloud.height, cloud.point_step, cloud.row_step, cloud.data_len) = (1, 2, 32, 36, 72);
-        assert_eq!(cloud.read().unwrap().seen(), [seen(5, [1.0, 2.0, 3.0]), seen(u32::MAX, [1.0, 2.0, 6.0])]);
+        (
+            cloud.width,
+            cloud.height,
+            cloud.point_step,
+            cloud.row_step,
+            cloud.data_len,
+        ) = (1, 2, 32, 36, 72);
+        assert_eq!(
+            cloud.read().unwrap().seen(),
+            [seen(5, [1.0, 2.0, 3.0]), seen(u32::MAX, [1.0, 2.0, 6.0])]
+        );
     }
 
     #[test]
@@ -258,7 +319,11 @@ mod tests {
         for len in [33, 1 << 20, u32::MAX] {
             let mut cloud = Cloud::of(&POINTS);
             cloud.data_len = len;
-            assert_eq!(cloud.read().unwrap_err(), BadMessage::Malformed, "{len} bytes of data");
+            assert_eq!(
+                cloud.read().unwrap_err(),
+                BadMessage::Malformed,
+                "{len} bytes of data"
+            );
         }
     }
 
@@ -266,7 +331,11 @@ mod tests {
     fn every_shortened_payload_is_malformed() {
         let bytes = Cloud::of(&POINTS).bytes();
         for len in 0..bytes.len() {
-            assert_eq!(decode_markers(&bytes[..len]).unwrap_err(), BadMessage::Malformed, "{len} bytes");
+            assert_eq!(
+                decode_markers(&bytes[..len]).unwrap_err(),
+                BadMessage::Malformed,
+                "{len} bytes"
+            );
         }
     }
 

@@ -95,7 +95,11 @@ impl RecordingReader {
     fn of_table(path: &Path, layout: &RecordingLayout) -> Result<Self, RecordingError> {
         let table = NumberTable::open(path, &layout.columns)?;
         let [object, stylus] = TABLE_FRAMES;
-        let wrench_frame = if table.wrench_axes() == WrenchAxes::Pose { object } else { stylus };
+        let wrench_frame = if table.wrench_axes() == WrenchAxes::Pose {
+            object
+        } else {
+            stylus
+        };
         let intake = Intake::in_frames(object, wrench_frame);
         Ok(Self {
             layout: layout.clone(),
@@ -182,13 +186,17 @@ impl RecordingReader {
                 return Ok(Some(other));
             }
             if let Some(table) = &mut self.table {
-                let Some(row) = table.next_row()? else { return Ok(None) };
+                let Some(row) = table.next_row()? else {
+                    return Ok(None);
+                };
                 if let Some(record) = self.intake.accept_row(row, table.place(), &self.path) {
                     return Ok(Some(record));
                 }
                 continue;
             }
-            let Some(source) = &mut self.source else { return Ok(None) };
+            let Some(source) = &mut self.source else {
+                return Ok(None);
+            };
             if let Some(raw) = source.next_message()? {
                 if let Some(record) = self.intake.accept(&raw, &self.path, self.stamps) {
                     return Ok(Some(record));

@@ -14,7 +14,10 @@ impl SegmentedWriter {
     /// # Errors
     /// [`RecordingError::Io`].
     pub fn replace(folder: &Path, topics: &Topics) -> Result<Self, RecordingError> {
-        let io = |source| RecordingError::Io { path: folder.to_owned(), source };
+        let io = |source| RecordingError::Io {
+            path: folder.to_owned(),
+            source,
+        };
         create_dir_all(folder).map_err(io)?;
         remove(&folder.join(METADATA)).map_err(io)?;
         for path in segment_paths(folder) {
@@ -39,7 +42,10 @@ impl SegmentedWriter {
         frames: [&str; 2],
         each: &mut dyn FnMut(&Message),
     ) -> Result<Self, RecordingError> {
-        let io = |source| RecordingError::Io { path: folder.to_owned(), source };
+        let io = |source| RecordingError::Io {
+            path: folder.to_owned(),
+            source,
+        };
         create_dir_all(folder).map_err(io)?;
         remove(&folder.join(METADATA)).map_err(io)?;
         let mut writer = Self::new(folder, topics);
@@ -50,7 +56,10 @@ impl SegmentedWriter {
                 if writer.segments.len() + 1 < paths.len() {
                     let reason =
                         "nothing of it can be read, and other segments follow: go on in another folder".to_owned();
-                    return Err(RecordingError::NotARecording { path: path.clone(), reason });
+                    return Err(RecordingError::NotARecording {
+                        path: path.clone(),
+                        reason,
+                    });
                 }
                 remove(path).map_err(io)?;
                 break;
@@ -72,7 +81,10 @@ impl SegmentedWriter {
 
 /// The files of the segments, whose numbers have no gap.
 fn segment_paths(folder: &Path) -> Vec<PathBuf> {
-    (0..).map(|number| folder.join(FileSegment::name_of(number))).take_while(|path| path.exists()).collect()
+    (0..)
+        .map(|number| folder.join(FileSegment::name_of(number)))
+        .take_while(|path| path.exists())
+        .collect()
 }
 
 /// The messages of a segment up to where it is damaged, and whether it has its end.
@@ -81,7 +93,9 @@ fn read_segment(path: &Path, topics: &Topics) -> Result<(Vec<Message>, bool), Re
         Ok(reader) => reader,
         // it ends before its first message
         Err(
-            RecordingError::Damaged { .. } | RecordingError::MissingTopic { .. } | RecordingError::NotARecording { .. },
+            RecordingError::Damaged { .. }
+            | RecordingError::MissingTopic { .. }
+            | RecordingError::NotARecording { .. },
         ) => {
             return Ok((Vec::new(), false));
         }

@@ -50,7 +50,13 @@ impl FileSegment {
     /// - `stamp_ns`: of the first message.
     pub fn begin(number: usize, stamp_ns: i64) -> Self {
         let (first_ns, last_ns) = (stamp_ns, stamp_ns);
-        Self { name: Self::name_of(number), counts: [0; 2], first_ns, last_ns, is_whole: false }
+        Self {
+            name: Self::name_of(number),
+            counts: [0; 2],
+            first_ns,
+            last_ns,
+            is_whole: false,
+        }
     }
 
     pub fn count(&mut self, message: &Message) {
@@ -66,7 +72,14 @@ impl SegmentedWriter {
     /// - `folder`: is there and holds no segments.
     pub fn new(folder: &Path, topics: &Topics) -> Self {
         let (folder, topics) = (folder.to_owned(), topics.clone());
-        Self { folder, topics, current: None, segments: Vec::new(), unflushed: 0, flushed_length: 0 }
+        Self {
+            folder,
+            topics,
+            current: None,
+            segments: Vec::new(),
+            unflushed: 0,
+            flushed_length: 0,
+        }
     }
 
     /// Appends a message whose header names `frame`.
@@ -74,11 +87,14 @@ impl SegmentedWriter {
     /// # Errors
     /// As [`RecordingWriter::write`].
     pub fn write(&mut self, message: &Message, frame: &str) -> Result<(), RecordingError> {
-        let is_full = |segment: &FileSegment| segment.counts.iter().sum::<u64>() >= MOST_IN_A_SEGMENT;
+        let is_full =
+            |segment: &FileSegment| segment.counts.iter().sum::<u64>() >= MOST_IN_A_SEGMENT;
         if self.current.is_none() || self.segments.last().is_none_or(is_full) {
             self.begin_segment(message.stamp_ns())?;
         }
-        let (Some(writer), Some(segment)) = (&mut self.current, self.segments.last_mut()) else { return Ok(()) };
+        let (Some(writer), Some(segment)) = (&mut self.current, self.segments.last_mut()) else {
+            return Ok(());
+        };
         writer.write(*message, frame)?;
         self.unflushed += 1;
         segment.count(message);
@@ -89,7 +105,10 @@ impl SegmentedWriter {
         self.end_segment()?;
         let segment = FileSegment::begin(self.segments.len(), stamp_ns);
         let path = self.folder.join(&segment.name);
-        let file = File::create_new(&path).map_err(|source| RecordingError::Io { path: path.clone(), source })?;
+        let file = File::create_new(&path).map_err(|source| RecordingError::Io {
+            path: path.clone(),
+            source,
+        })?;
         let begun = RecordingWriter::new(BufWriter::new(file), &self.topics);
         // a full disk takes a file and not its first bytes: an empty one would be in the way of the next for ever
         self.current = Some(begun.inspect_err(|_| drop(std::fs::remove_file(&path)))?);
@@ -99,10 +118,18 @@ impl SegmentedWriter {
 
     fn end_segment(&mut self) -> Result<(), RecordingError> {
         self.flush()?;
-        let (Some(writer), Some(segment)) = (self.current.take(), self.segments.last_mut()) else { return Ok(()) };
+        let (Some(writer), Some(segment)) = (self.current.take(), self.segments.last_mut()) else {
+            return Ok(());
+        };
         self.flushed_length = 0;
-        let io = |source| RecordingError::Io { path: self.folder.clone(), source };
-        let file = writer.finish()?.into_inner().map_err(|error| io(error.into_error()))?;
+        let io = |source| RecordingError::Io {
+            path: self.folder.clone(),
+            source,
+        };
+        let file = writer
+            .finish()?
+            .into_inner()
+            .map_err(|error| io(error.into_error()))?;
         file.sync_all().map_err(io)?;
         segment.is_whole = true;
         Ok(())
@@ -113,13 +140,18 @@ impl SegmentedWriter {
     /// # Errors
     /// [`RecordingError::Write`], [`RecordingError::Io`].
     pub fn flush(&mut self) -> Result<u64, RecordingError> {
-        let (Some(writer), Some(segment)) = (&mut self.current, self.segments.last()) else { return Ok(0) };
+        let (Some(writer), Some(segment)) = (&mut self.current, self.segments.last()) else {
+            return Ok(0);
+        };
         if self.unflushed == 0 {
             return Ok(0);
         }
         writer.flush()?;
         let path = self.folder.join(&segment.name);
-        self.flushed_length = path.metadata().map_err(|source| RecordingError::Io { path, source })?.len();
+        self.flushed_length = path
+            .metadata()
+            .map_err(|source| RecordingError::Io { path, source })?
+            .len();
         Ok(std::mem::take(&mut self.unflushed))
     }
 
@@ -131,9 +163,14 @@ impl SegmentedWriter {
         if self.flush()? == 0 {
             return Ok(());
         }
-        let Some(segment) = self.segments.last() else { return Ok(()) };
+        let Some(segment) = self.segments.last() else {
+            return Ok(());
+        };
         let path = self.folder.join(&segment.name);
-        let synced = File::options().append(true).open(&path).and_then(|file| file.sync_data());
+        let synced = File::options()
+            .append(true)
+            .open(&path)
+            .and_then(|file| file.sync_data());
         synced.map_err(|source| RecordingError::Io { path, source })
     }
 
@@ -141,16 +178,23 @@ impl SegmentedWriter {
     /// another. Returns how many messages are lost.
     pub fn give_up_segment(&mut self) -> u64 {
         // where none was begun, those before it stay
-        let Some(writer) = self.current.take() else { return 0 };
+        let Some(writer) = self.current.take() else {
+            return 0;
+        };
         // tries once more to write what it holds
         drop(writer);
-        let Some(segment) = self.segments.pop() else { return 0 };
+        let Some(segment) = self.segments.pop() else {
+            return 0;
+        };
         let path = self.folder.join(&segment.name);
         let flushed = std::mem::take(&mut self.flushed_length);
         // where even that is refused, the file's end is one that a reader passes over
         let _ = match flushed {
             0 => std::fs::remove_file(path),
-            _ => File::options().write(true).open(path).and_then(|file| file.set_len(flushed)),
+            _ => File::options()
+                .write(true)
+                .open(path)
+                .and_then(|file| file.set_len(flushed)),
         };
         if flushed > 0 {
             self.segments.push(segment);
@@ -176,8 +220,13 @@ impl SegmentedWriter {
     /// As rosbag2 writes it, version 5: every release reads that.
     fn metadata(&self) -> String {
         let all = &self.segments;
-        let [poses, wrenches] = [0, 1].map(|at| all.iter().map(|segment| segment.counts[at]).sum::<u64>());
-        let first_ns = all.iter().map(|segment| segment.first_ns).min().unwrap_or(0);
+        let [poses, wrenches] =
+            [0, 1].map(|at| all.iter().map(|segment| segment.counts[at]).sum::<u64>());
+        let first_ns = all
+            .iter()
+            .map(|segment| segment.first_ns)
+            .min()
+            .unwrap_or(0);
         let last_ns = all.iter().map(|segment| segment.last_ns).max().unwrap_or(0);
         let mut text = format!(
             "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: mcap\n  duration:\n    nanoseconds: {}\n  \
@@ -194,12 +243,21 @@ impl SegmentedWriter {
                  cdr\n        offered_qos_profiles: \"\"\n      message_count: {count}\n"
             );
         }
-        text.push_str("  compression_format: \"\"\n  compression_mode: \"\"\n  relative_file_paths:\n");
+        text.push_str(
+            "  compression_format: \"\"\n  compression_mode: \"\"\n  relative_file_paths:\n",
+        );
         for segment in all {
             let _ = writeln!(text, "    - {}", segment.name);
         }
         text.push_str("  files:\n");
-        for FileSegment { name, counts: [poses, wrenches], first_ns, last_ns, .. } in all {
+        for FileSegment {
+            name,
+            counts: [poses, wrenches],
+            first_ns,
+            last_ns,
+            ..
+        } in all
+        {
             let _ = write!(
                 text,
                 "    - path: {name}\n      starting_time:\n        nanoseconds_since_epoch: {first_ns}\n      duration:\n        \

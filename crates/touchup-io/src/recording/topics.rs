@@ -7,16 +7,34 @@ use super::layout::{RecordingLayout, TopicInfo, TopicKind};
 use super::message_type::MessageFormat;
 
 /// The topics that are needed exist, and those that are read have types that give what is wanted.
-pub(super) fn check_topics(path: &Path, layout: &RecordingLayout, found: &[TopicInfo]) -> Result<(), RecordingError> {
+pub(super) fn check_topics(
+    path: &Path,
+    layout: &RecordingLayout,
+    found: &[TopicInfo],
+) -> Result<(), RecordingError> {
     for kind in layout.needed() {
         if !found.iter().any(|info| layout.is_topic(kind, &info.name)) {
-            let shown: Vec<_> = found.iter().map(|info| format!("{} ({})", info.name, info.type_name)).collect();
-            let found = if shown.is_empty() { "no topics".to_owned() } else { shown.join(", ") };
+            let shown: Vec<_> = found
+                .iter()
+                .map(|info| format!("{} ({})", info.name, info.type_name))
+                .collect();
+            let found = if shown.is_empty() {
+                "no topics".to_owned()
+            } else {
+                shown.join(", ")
+            };
             let (path, topic) = (path.to_owned(), layout.topics.name(kind).to_owned());
-            return Err(RecordingError::MissingTopic { path, topic, flag: kind.flag(), found });
+            return Err(RecordingError::MissingTopic {
+                path,
+                topic,
+                flag: kind.flag(),
+                found,
+            });
         }
     }
-    found.iter().try_for_each(|info| check_topic(path, layout, info).map(drop))
+    found
+        .iter()
+        .try_for_each(|info| check_topic(path, layout, info).map(drop))
 }
 
 /// What a topic gives and how it is read; `None` when it is none of those that are.
@@ -25,7 +43,15 @@ pub(super) fn check_topic(
     layout: &RecordingLayout,
     info: &TopicInfo,
 ) -> Result<Option<(TopicKind, MessageFormat)>, RecordingError> {
-    let Some(kind) = layout.kind_of(&info.name) else { return Ok(None) };
-    let wrong = |why| RecordingError::WrongTopic { path: path.to_owned(), topic: info.name.clone(), why };
-    MessageFormat::of(info, kind).map(|format| Some((kind, format))).map_err(wrong)
+    let Some(kind) = layout.kind_of(&info.name) else {
+        return Ok(None);
+    };
+    let wrong = |why| RecordingError::WrongTopic {
+        path: path.to_owned(),
+        topic: info.name.clone(),
+        why,
+    };
+    MessageFormat::of(info, kind)
+        .map(|format| Some((kind, format)))
+        .map_err(wrong)
 }

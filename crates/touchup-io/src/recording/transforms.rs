@@ -36,9 +36,21 @@ impl TransformTree {
     /// Takes in the links of one message.
     pub fn add(&mut self, transforms: Vec<FrameTransform>, are_static: bool) {
         self.messages += u64::from(!are_static);
-        for FrameTransform { parent, child, pose, .. } in transforms {
+        for FrameTransform {
+            parent,
+            child,
+            pose,
+            ..
+        } in transforms
+        {
             if self.links.len() < MOST_FRAMES || self.links.contains_key(&child) {
-                self.links.insert(child, TreeLink { parent, fixed: are_static.then_some(pose) });
+                self.links.insert(
+                    child,
+                    TreeLink {
+                        parent,
+                        fixed: are_static.then_some(pose),
+                    },
+                );
             }
         }
     }
@@ -56,7 +68,11 @@ impl TransformTree {
         while frames.base.as_ref() != Some(&at) && links.len() <= self.links.len() {
             match self.links.get(&at) {
                 Some(TreeLink { parent, fixed }) => {
-                    links.push(ChainLink { child: at, parent: parent.clone(), fixed: *fixed });
+                    links.push(ChainLink {
+                        child: at,
+                        parent: parent.clone(),
+                        fixed: *fixed,
+                    });
                     at = parent.clone();
                 }
                 None if frames.base.is_none() => break,
@@ -70,26 +86,51 @@ impl TransformTree {
     ///
     /// # Errors
     /// [`RecordingError::Frames`] when the tree does not have it, or when it does not move.
-    pub fn into_chain(self, frames: &TransformFrames, path: &Path) -> Result<TransformChain, RecordingError> {
-        let bad = |what: String| RecordingError::Frames { path: path.to_owned(), what, found: self.found() };
+    pub fn into_chain(
+        self,
+        frames: &TransformFrames,
+        path: &Path,
+    ) -> Result<TransformChain, RecordingError> {
+        let bad = |what: String| RecordingError::Frames {
+            path: path.to_owned(),
+            what,
+            found: self.found(),
+        };
         let TransformFrames { moving, base } = frames;
         if !self.links.contains_key(moving) {
-            return Err(bad(format!("no frame {moving:?} in the transforms; choose one with --pose-frame")));
+            return Err(bad(format!(
+                "no frame {moving:?} in the transforms; choose one with --pose-frame"
+            )));
         }
         let Some((links, root)) = self.chain(frames) else {
             let base = base.as_deref().unwrap_or_default();
-            return Err(bad(format!("{moving:?} does not hang on {base:?}; choose another frame with --base-frame")));
+            return Err(bad(format!(
+                "{moving:?} does not hang on {base:?}; choose another frame with --base-frame"
+            )));
         };
         if links.iter().all(|link| link.fixed.is_some()) {
             return Err(bad(format!(
                 "{moving:?} does not move in {root:?}; choose others with --pose-frame and --base-frame"
             )));
         }
-        let mut chain =
-            TransformChain { poses: MovingFrame::new(moving, &root), links, frames: FrameBuffer::default() };
-        for ChainLink { child, parent, fixed } in &chain.links {
+        let mut chain = TransformChain {
+            poses: MovingFrame::new(moving, &root),
+            links,
+            frames: FrameBuffer::default(),
+        };
+        for ChainLink {
+            child,
+            parent,
+            fixed,
+        } in &chain.links
+        {
             if let Some(pose) = *fixed {
-                let link = FrameTransform { stamp_ns: 0, parent: parent.clone(), child: child.clone(), pose };
+                let link = FrameTransform {
+                    stamp_ns: 0,
+                    parent: parent.clone(),
+                    child: child.clone(),
+                    pose,
+                };
                 chain.poses.push(&mut chain.frames, &[link], true);
             }
         }
@@ -103,7 +144,11 @@ impl TransformTree {
         if self.links.len() > MOST_NAMED {
             named.push(format!("and {} more", self.links.len() - MOST_NAMED));
         }
-        if named.is_empty() { "no frames".to_owned() } else { named.join(", ") }
+        if named.is_empty() {
+            "no frames".to_owned()
+        } else {
+            named.join(", ")
+        }
     }
 }
 
@@ -127,9 +172,15 @@ impl TransformChain {
     ///
     /// # Errors
     /// [`BadMessage::FrameChanged`] for a frame that hangs on another one now.
-    pub fn push(&mut self, transforms: Vec<FrameTransform>, are_static: bool) -> Result<(), BadMessage> {
+    pub fn push(
+        &mut self,
+        transforms: Vec<FrameTransform>,
+        are_static: bool,
+    ) -> Result<(), BadMessage> {
         for transform in transforms {
-            let Some(link) = self.links.iter().find(|link| link.child == transform.child) else { continue };
+            let Some(link) = self.links.iter().find(|link| link.child == transform.child) else {
+                continue;
+            };
             if link.parent != transform.parent {
                 return Err(BadMessage::FrameChanged);
             }
@@ -157,7 +208,12 @@ mod tests {
     fn link(stamp_ns: i64, parent: &str, child: &str, x: f64, turn: f64) -> FrameTransform {
         let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn);
         let pose = Isometry3::from_parts(Translation3::new(x, 0.0, 0.0), rotation);
-        FrameTransform { stamp_ns, parent: parent.into(), child: child.into(), pose }
+        FrameTransform {
+            stamp_ns,
+            parent: parent.into(),
+            child: child.into(),
+            pose,
+        }
     }
 
     /// What a message gives.
@@ -167,23 +223,43 @@ mod tests {
     }
 
     fn frames(moving: &str, base: Option<&str>) -> TransformFrames {
-        TransformFrames { moving: moving.into(), base: base.map(Into::into) }
+        TransformFrames {
+            moving: moving.into(),
+            base: base.map(Into::into),
+        }
     }
 
     /// world → base stays, base → arm and arm → hand move, hand → tool0 stays.
     fn tree() -> TransformTree {
         let mut tree = TransformTree::default();
-        tree.add(vec![link(0, "world", "base", 10.0, 0.0), link(0, "hand", "tool0", 0.1, 0.0)], true);
-        tree.add(vec![link(1, "base", "arm", 1.0, 0.0), link(1, "arm", "hand", 1.0, 0.0)], false);
+        tree.add(
+            vec![
+                link(0, "world", "base", 10.0, 0.0),
+                link(0, "hand", "tool0", 0.1, 0.0),
+            ],
+            true,
+        );
+        tree.add(
+            vec![
+                link(1, "base", "arm", 1.0, 0.0),
+                link(1, "arm", "hand", 1.0, 0.0),
+            ],
+            false,
+        );
         tree
     }
 
     #[test]
     fn two_turned_links_and_a_fixed_one_give_the_place_worked_out_by_hand() {
-        let mut chain = tree().into_chain(&frames("tool0", Some("base")), Path::new("bag")).unwrap();
+        let mut chain = tree()
+            .into_chain(&frames("tool0", Some("base")), Path::new("bag"))
+            .unwrap();
         let quarter = std::f64::consts::FRAC_PI_2;
         // along x by 1, a quarter turn: along y by 1, another quarter turn: along -x by 0.1
-        let links = vec![link(5, "base", "arm", 1.0, quarter), link(5, "arm", "hand", 1.0, quarter)];
+        let links = vec![
+            link(5, "base", "arm", 1.0, quarter),
+            link(5, "arm", "hand", 1.0, quarter),
+        ];
         let pose = pushed(&mut chain, links).unwrap();
         assert_eq!((pose.stamp_ns, chain.poses.base()), (5, "base"));
         assert!((pose.pose_ot.translation.vector - Vector3::new(0.9, 1.0, 0.0)).norm() < 1e-12);
@@ -192,30 +268,70 @@ mod tests {
 
     #[test]
     fn without_a_base_the_root_of_the_tree_is_it() {
-        let mut chain = tree().into_chain(&frames("tool0", None), Path::new("bag")).unwrap();
-        let pose = pushed(&mut chain, vec![link(5, "base", "arm", 1.0, 0.0), link(5, "arm", "hand", 1.0, 0.0)]);
+        let mut chain = tree()
+            .into_chain(&frames("tool0", None), Path::new("bag"))
+            .unwrap();
+        let pose = pushed(
+            &mut chain,
+            vec![
+                link(5, "base", "arm", 1.0, 0.0),
+                link(5, "arm", "hand", 1.0, 0.0),
+            ],
+        );
         assert_eq!(chain.poses.base(), "world");
         assert!((pose.unwrap().pose_ot.translation.vector.x - 12.1).abs() < 1e-12);
     }
 
     #[test]
     fn links_that_come_apart_wait_for_one_another_and_keep_their_parents() {
-        let mut chain = tree().into_chain(&frames("tool0", Some("base")), Path::new("bag")).unwrap();
-        assert_eq!(pushed(&mut chain, vec![link(5, "base", "arm", 1.0, 0.0)]), None);
+        let mut chain = tree()
+            .into_chain(&frames("tool0", Some("base")), Path::new("bag"))
+            .unwrap();
+        assert_eq!(
+            pushed(&mut chain, vec![link(5, "base", "arm", 1.0, 0.0)]),
+            None
+        );
         assert!(pushed(&mut chain, vec![link(5, "arm", "hand", 1.0, 0.0)]).is_some());
         // what concerns other frames gives nothing, and what stays may be repeated among what moves
-        assert_eq!(pushed(&mut chain, vec![link(8, "base", "camera", 1.0, 0.0)]), None);
-        assert_eq!(pushed(&mut chain, vec![link(9, "hand", "tool0", 0.1, 0.0)]), None);
-        assert_eq!(chain.push(vec![link(9, "camera", "hand", 1.0, 0.0)], false), Err(BadMessage::FrameChanged));
-        assert!(pushed(&mut chain, vec![link(9, "base", "arm", 1.0, 0.0), link(9, "arm", "hand", 1.0, 0.0)]).is_some());
+        assert_eq!(
+            pushed(&mut chain, vec![link(8, "base", "camera", 1.0, 0.0)]),
+            None
+        );
+        assert_eq!(
+            pushed(&mut chain, vec![link(9, "hand", "tool0", 0.1, 0.0)]),
+            None
+        );
+        assert_eq!(
+            chain.push(vec![link(9, "camera", "hand", 1.0, 0.0)], false),
+            Err(BadMessage::FrameChanged)
+        );
+        assert!(
+            pushed(
+                &mut chain,
+                vec![
+                    link(9, "base", "arm", 1.0, 0.0),
+                    link(9, "arm", "hand", 1.0, 0.0)
+                ]
+            )
+            .is_some()
+        );
         assert_eq!((chain.poses.take_apart(), chain.poses.interpolated), (0, 0));
     }
 
     #[test]
     fn a_frame_that_is_not_there_is_answered_by_those_that_are() {
-        let why = |moving, base| tree().into_chain(&frames(moving, base), Path::new("bag")).err().unwrap().to_string();
+        let why = |moving, base| {
+            tree()
+                .into_chain(&frames(moving, base), Path::new("bag"))
+                .err()
+                .unwrap()
+                .to_string()
+        };
         let text = why("tool1", None);
-        assert!(text.contains("--pose-frame") && text.contains("tool0 (in hand)"), "{text}");
+        assert!(
+            text.contains("--pose-frame") && text.contains("tool0 (in hand)"),
+            "{text}"
+        );
         assert!(why("tool0", Some("floor")).contains("--base-frame"));
         assert!(why("base", None).contains("does not move"));
         // a circle ends

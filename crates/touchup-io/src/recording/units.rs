@@ -16,8 +16,22 @@ impl Quantity {
     /// Units by the names that a header gives them in lower case, and how many of SI they are; the first is the usual one.
     fn known(self) -> &'static [(&'static str, f64)] {
         match self {
-            Self::Time => &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("µs", 1e-6), ("ns", 1e-9), ("sec", 1.0)],
-            Self::Length => &[("mm", 1e-3), ("m", 1.0), ("um", 1e-6), ("µm", 1e-6), ("inch", 0.0254), ("in", 0.0254)],
+            Self::Time => &[
+                ("s", 1.0),
+                ("ms", 1e-3),
+                ("us", 1e-6),
+                ("µs", 1e-6),
+                ("ns", 1e-9),
+                ("sec", 1.0),
+            ],
+            Self::Length => &[
+                ("mm", 1e-3),
+                ("m", 1.0),
+                ("um", 1e-6),
+                ("µm", 1e-6),
+                ("inch", 0.0254),
+                ("in", 0.0254),
+            ],
             Self::Angle => &[("rad", 1.0), ("deg", std::f64::consts::PI / 180.0)],
             Self::Force => &[("n", 1.0), ("kn", 1e3)],
             Self::Torque => &[("nm", 1.0), ("n·m", 1.0), ("n*m", 1.0), ("nmm", 1e-3)],
@@ -28,7 +42,10 @@ impl Quantity {
     /// How many of SI a unit is.
     pub fn factor(self, unit: &str) -> Option<f64> {
         let unit = unit.trim().to_lowercase();
-        self.known().iter().find(|(name, _)| *name == unit).map(|(_, factor)| *factor)
+        self.known()
+            .iter()
+            .find(|(name, _)| *name == unit)
+            .map(|(_, factor)| *factor)
     }
 
     /// The known ones, in words.
@@ -55,10 +72,12 @@ pub(super) fn split_unit(name: &str, quantity: Quantity) -> (&str, Option<f64>) 
     if quantity == Quantity::None {
         return (name, Some(1.0));
     }
-    let in_brackets = [('[', ']'), ('(', ')')].into_iter().find_map(|(open, close)| {
-        let (plain, unit) = name.strip_suffix(close)?.rsplit_once(open)?;
-        Some((plain.trim_end(), quantity.factor(unit)))
-    });
+    let in_brackets = [('[', ']'), ('(', ')')]
+        .into_iter()
+        .find_map(|(open, close)| {
+            let (plain, unit) = name.strip_suffix(close)?.rsplit_once(open)?;
+            Some((plain.trim_end(), quantity.factor(unit)))
+        });
     let behind_a_line = || {
         let (plain, unit) = name.rsplit_once('_')?;
         quantity.factor(unit).map(|factor| (plain, Some(factor)))
@@ -78,7 +97,12 @@ mod tests {
             ("Fx (N)", Quantity::Force, "Fx", Some(1.0)),
             ("tx_Nm", Quantity::Torque, "tx", Some(1.0)),
             ("t_ns", Quantity::Time, "t", Some(1e-9)),
-            ("actual_TCP_pose_0", Quantity::Length, "actual_TCP_pose_0", None),
+            (
+                "actual_TCP_pose_0",
+                Quantity::Length,
+                "actual_TCP_pose_0",
+                None,
+            ),
             ("px [furlong]", Quantity::Length, "px", None),
             ("x", Quantity::Length, "x", None),
             ("qx", Quantity::None, "qx", Some(1.0)),

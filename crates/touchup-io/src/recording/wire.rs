@@ -71,7 +71,11 @@ pub(super) trait MessageFields {
 
     /// The message ends here.
     fn end(&mut self) -> Result<(), BadMessage> {
-        if self.rest() <= MAX_PADDING_BYTES { Ok(()) } else { Err(BadMessage::Malformed) }
+        if self.rest() <= MAX_PADDING_BYTES {
+            Ok(())
+        } else {
+            Err(BadMessage::Malformed)
+        }
     }
 
     fn f64s<const N: usize>(&mut self) -> Result<[f64; N], BadMessage> {
@@ -85,12 +89,16 @@ pub(super) trait MessageFields {
     /// Position and quaternion (x, y, z, w), which a pose and a transform have in the same order.
     fn pose(&mut self) -> Result<Isometry3<f64>, BadMessage> {
         let position = self.f64s::<3>()?;
-        let rotation = measured_rotation(Quaternion::from(self.f64s::<4>()?)).ok_or(BadMessage::Quaternion)?;
+        let rotation =
+            measured_rotation(Quaternion::from(self.f64s::<4>()?)).ok_or(BadMessage::Quaternion)?;
         Ok(Isometry3::from_parts(position.into(), rotation))
     }
 
     fn wrench(&mut self) -> Result<Wrench, BadMessage> {
-        Ok(Wrench { force: self.f64s::<3>()?.into(), torque: self.f64s::<3>()?.into() })
+        Ok(Wrench {
+            force: self.f64s::<3>()?.into(),
+            torque: self.f64s::<3>()?.into(),
+        })
     }
 
     /// Passes over numbers.
@@ -106,7 +114,10 @@ fn header_of(sec: i64, nanosec: u32, frame: &str) -> Result<Header, BadMessage> 
     }
     // a slash in front says nothing
     let frame = frame.strip_prefix('/').unwrap_or(frame).to_owned();
-    Ok(Header { stamp_ns: sec * NS_PER_S + nanosec, frame })
+    Ok(Header {
+        stamp_ns: sec * NS_PER_S + nanosec,
+        frame,
+    })
 }
 
 /// What is left of a payload.
@@ -127,7 +138,16 @@ impl<'a> WireReader<'a> {
             (Wire::Cdr, _) => return Err(BadMessage::Malformed),
         };
         let is_short = body.len() <= MAX_MESSAGE_BYTES;
-        if is_short { Ok(Self { wire, is_big, body, at: 0 }) } else { Err(BadMessage::Malformed) }
+        if is_short {
+            Ok(Self {
+                wire,
+                is_big,
+                body,
+                at: 0,
+            })
+        } else {
+            Err(BadMessage::Malformed)
+        }
     }
 
     fn bytes(&mut self, count: usize) -> Result<&'a [u8], BadMessage> {
@@ -141,7 +161,10 @@ impl<'a> WireReader<'a> {
         if self.wire == Wire::Cdr {
             self.at = self.at.next_multiple_of(N);
         }
-        let mut number: [u8; N] = self.bytes(N)?.try_into().map_err(|_| BadMessage::Malformed)?;
+        let mut number: [u8; N] = self
+            .bytes(N)?
+            .try_into()
+            .map_err(|_| BadMessage::Malformed)?;
         if self.is_big {
             number.reverse();
         }
@@ -164,8 +187,14 @@ impl MessageFields for WireReader<'_> {
 
     fn count(&mut self, least_bytes: usize) -> Result<usize, BadMessage> {
         let count = usize::try_from(self.u32()?).map_err(|_| BadMessage::Malformed)?;
-        let is_there = count.checked_mul(least_bytes).is_some_and(|bytes| bytes <= self.left());
-        if is_there { Ok(count) } else { Err(BadMessage::Malformed) }
+        let is_there = count
+            .checked_mul(least_bytes)
+            .is_some_and(|bytes| bytes <= self.left());
+        if is_there {
+            Ok(count)
+        } else {
+            Err(BadMessage::Malformed)
+        }
     }
 
     fn name(&mut self) -> Result<String, BadMessage> {
@@ -178,7 +207,11 @@ impl MessageFields for WireReader<'_> {
             (Wire::Cdr, _) => return Err(BadMessage::Malformed),
         };
         let text = str::from_utf8(text).map_err(|_| BadMessage::Malformed)?;
-        if text.len() <= MAX_FRAME_NAME_BYTES { Ok(text.to_owned()) } else { Err(BadMessage::Malformed) }
+        if text.len() <= MAX_FRAME_NAME_BYTES {
+            Ok(text.to_owned())
+        } else {
+            Err(BadMessage::Malformed)
+        }
     }
 
     fn header(&mut self) -> Result<Header, BadMessage> {
@@ -186,7 +219,11 @@ impl MessageFields for WireReader<'_> {
             self.u32()?;
         }
         let [sec, nanosec] = [self.u32()?, self.u32()?];
-        let sec = if self.wire == Wire::Ros1 { i64::from(sec) } else { i64::from(sec.cast_signed()) };
+        let sec = if self.wire == Wire::Ros1 {
+            i64::from(sec)
+        } else {
+            i64::from(sec.cast_signed())
+        };
         header_of(sec, nanosec, &self.name()?)
     }
 
@@ -197,8 +234,16 @@ impl MessageFields for WireReader<'_> {
     }
 
     fn end(&mut self) -> Result<(), BadMessage> {
-        let padding = if self.wire == Wire::Cdr { MAX_PADDING_BYTES } else { 0 };
-        if self.left() <= padding { Ok(()) } else { Err(BadMessage::Malformed) }
+        let padding = if self.wire == Wire::Cdr {
+            MAX_PADDING_BYTES
+        } else {
+            0
+        };
+        if self.left() <= padding {
+            Ok(())
+        } else {
+            Err(BadMessage::Malformed)
+        }
     }
 }
 
@@ -207,7 +252,11 @@ pub(super) struct SequenceFields<A>(pub A);
 
 impl<'de, A: SeqAccess<'de>> SequenceFields<A> {
     fn next<T: Deserialize<'de>>(&mut self) -> Result<T, BadMessage> {
-        self.0.next_element().ok().flatten().ok_or(BadMessage::Malformed)
+        self.0
+            .next_element()
+            .ok()
+            .flatten()
+            .ok_or(BadMessage::Malformed)
     }
 }
 
@@ -221,14 +270,18 @@ impl<'de, A: SeqAccess<'de>> MessageFields for SequenceFields<A> {
     }
 
     fn name(&mut self) -> Result<String, BadMessage> {
-        self.next().and_then(
-            |text: String| {
-                if text.len() <= MAX_FRAME_NAME_BYTES { Ok(text) } else { Err(BadMessage::Malformed) }
-            },
-        )
+        self.next().and_then(|text: String| {
+            if text.len() <= MAX_FRAME_NAME_BYTES {
+                Ok(text)
+            } else {
+                Err(BadMessage::Malformed)
+            }
+        })
     }
 
     fn rest(&mut self) -> usize {
-        (0..MAX_MESSAGE_BYTES).take_while(|_| self.next::<u8>().is_ok()).count()
+        (0..MAX_MESSAGE_BYTES)
+            .take_while(|_| self.next::<u8>().is_ok())
+            .count()
     }
 }

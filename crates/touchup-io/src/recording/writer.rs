@@ -15,16 +15,28 @@ use crate::atomic::AtomicFile;
 use touchup_core::stylus::Message;
 
 /// Message definitions in the form rosbag2 stores: the type, then each type it uses behind a line of 80 equals signs.
-const RULE: &str = "================================================================================";
+const RULE: &str =
+    "================================================================================";
 const POSE_STAMPED: &str = "std_msgs/Header header\ngeometry_msgs/Pose pose\n";
 const WRENCH_STAMPED: &str = "std_msgs/Header header\ngeometry_msgs/Wrench wrench\n";
-const HEADER: (&str, &str) = ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n");
+const HEADER: (&str, &str) = (
+    "std_msgs/Header",
+    "builtin_interfaces/Time stamp\nstring frame_id\n",
+);
 const TIME: (&str, &str) = ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n");
-const POSE: (&str, &str) =
-    ("geometry_msgs/Pose", "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n");
+const POSE: (&str, &str) = (
+    "geometry_msgs/Pose",
+    "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n",
+);
 const POINT: (&str, &str) = ("geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z\n");
-const QUATERNION: (&str, &str) = ("geometry_msgs/Quaternion", "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n");
-const WRENCH: (&str, &str) = ("geometry_msgs/Wrench", "geometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque\n");
+const QUATERNION: (&str, &str) = (
+    "geometry_msgs/Quaternion",
+    "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n",
+);
+const WRENCH: (&str, &str) = (
+    "geometry_msgs/Wrench",
+    "geometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque\n",
+);
 const VECTOR3: (&str, &str) = ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n");
 
 /// rosbag2 keeps the publishers' quality of service as YAML whose words changed between releases; the empty list
@@ -33,10 +45,19 @@ const NO_QOS_PROFILES: &str = "[]";
 
 fn definition(kind: TopicKind) -> String {
     let (mut text, parts) = match kind {
-        TopicKind::Wrench => (WRENCH_STAMPED.to_owned(), [HEADER, TIME, WRENCH, VECTOR3].as_slice()),
-        TopicKind::Markers => (POINT_CLOUD.to_owned(), [HEADER, TIME, POINT_FIELD].as_slice()),
+        TopicKind::Wrench => (
+            WRENCH_STAMPED.to_owned(),
+            [HEADER, TIME, WRENCH, VECTOR3].as_slice(),
+        ),
+        TopicKind::Markers => (
+            POINT_CLOUD.to_owned(),
+            [HEADER, TIME, POINT_FIELD].as_slice(),
+        ),
         // what is written of a pose, however it was read
-        _ => (POSE_STAMPED.to_owned(), [HEADER, TIME, POSE, POINT, QUATERNION].as_slice()),
+        _ => (
+            POSE_STAMPED.to_owned(),
+            [HEADER, TIME, POSE, POINT, QUATERNION].as_slice(),
+        ),
     };
     for (name, fields) in parts {
         text.push_str(&format!("{RULE}\nMSG: {name}\n{fields}"));
@@ -76,8 +97,15 @@ impl<W: Write + Seek> RecordingWriter<W> {
         let pose = add_channel(&mut mcap, topics, TopicKind::Pose)?;
         let wrench = add_channel(&mut mcap, topics, TopicKind::Wrench)?;
         let wanted = topics.markers.as_ref();
-        let markers = wanted.map(|_| add_channel(&mut mcap, topics, TopicKind::Markers)).transpose()?;
-        Ok(Self { mcap, pose, wrench, markers })
+        let markers = wanted
+            .map(|_| add_channel(&mut mcap, topics, TopicKind::Markers))
+            .transpose()?;
+        Ok(Self {
+            mcap,
+            pose,
+            wrench,
+            markers,
+        })
     }
 
     /// Appends one message or frame of markers; markers without a topic are left out.
@@ -90,9 +118,13 @@ impl<W: Write + Seek> RecordingWriter<W> {
         let record = record.into();
         let (payload, channel) = match &record {
             Record::Message(Message::Pose(pose)) => (encode_pose(pose, frame)?, &mut self.pose),
-            Record::Message(Message::Wrench(wrench)) => (encode_wrench(wrench, frame)?, &mut self.wrench),
+            Record::Message(Message::Wrench(wrench)) => {
+                (encode_wrench(wrench, frame)?, &mut self.wrench)
+            }
             Record::Markers(markers) => {
-                let Some(channel) = &mut self.markers else { return Ok(()) };
+                let Some(channel) = &mut self.markers else {
+                    return Ok(());
+                };
                 (encode_markers(markers, frame)?, channel)
             }
         };
@@ -100,7 +132,12 @@ impl<W: Write + Seek> RecordingWriter<W> {
         let time = u64::try_from(stamp_ns).map_err(|_| RecordingError::Stamp { stamp_ns })?;
         let sequence = channel.sequence;
         channel.sequence = sequence.wrapping_add(1);
-        let header = MessageHeader { channel_id: channel.id, sequence, log_time: time, publish_time: time };
+        let header = MessageHeader {
+            channel_id: channel.id,
+            sequence,
+            log_time: time,
+            publish_time: time,
+        };
         Ok(self.mcap.write_to_known_channel(&header, &payload)?)
     }
 
@@ -128,7 +165,10 @@ fn add_channel<W: Write + Seek>(
     kind: TopicKind,
 ) -> Result<Channel, RecordingError> {
     let schema = mcap.add_schema(kind.type_name(), "ros2msg", definition(kind).as_bytes())?;
-    let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), NO_QOS_PROFILES.to_owned())]);
+    let metadata = BTreeMap::from([(
+        "offered_qos_profiles".to_owned(),
+        NO_QOS_PROFILES.to_owned(),
+    )]);
     let id = mcap.add_channel(schema, topics.name(kind), "cdr", &metadata)?;
     Ok(Channel { id, sequence: 0 })
 }
@@ -146,7 +186,10 @@ pub fn write_recording(
     wrench_frame: &str,
     records: impl IntoIterator<Item = impl Into<Record>>,
 ) -> Result<(), RecordingError> {
-    let io = |source| RecordingError::Io { path: path.to_owned(), source };
+    let io = |source| RecordingError::Io {
+        path: path.to_owned(),
+        source,
+    };
     let mut file = AtomicFile::create(path).map_err(io)?;
     let write = || {
         let mut writer = RecordingWriter::new(&mut file, topics)?;

@@ -22,11 +22,26 @@ impl ResultTable {
                 Kind::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
             };
             let field = Type::primitive_type_builder(name, physical).with_logical_type(logical);
-            field.with_repetition(Repetition::OPTIONAL).build().map(Arc::new)
+            field
+                .with_repetition(Repetition::OPTIONAL)
+                .build()
+                .map(Arc::new)
         };
-        let fields = self.columns.iter().map(field).collect::<Result<Vec<_>, _>>()?;
-        let schema = Arc::new(Type::group_type_builder("touchup").with_fields(fields).build()?);
-        let mut writer = SerializedFileWriter::new(Vec::new(), schema, Arc::new(WriterProperties::builder().build()))?;
+        let fields = self
+            .columns
+            .iter()
+            .map(field)
+            .collect::<Result<Vec<_>, _>>()?;
+        let schema = Arc::new(
+            Type::group_type_builder("touchup")
+                .with_fields(fields)
+                .build()?,
+        );
+        let mut writer = SerializedFileWriter::new(
+            Vec::new(),
+            schema,
+            Arc::new(WriterProperties::builder().build()),
+        )?;
         let mut group = writer.next_row_group()?;
         for (_, column) in &self.columns {
             write_column(&mut group, column)?;
@@ -70,13 +85,19 @@ fn write_column(
             Cell::Count(count) => *count as f64,
             Cell::Flag(_) | Cell::Text(_) => f64::NAN,
         }),
-        Kind::Count => {
-            write_values::<Int64Type>(group, column, |cell| if let Cell::Count(count) = cell { *count } else { 0 })
+        Kind::Count => write_values::<Int64Type>(group, column, |cell| {
+            if let Cell::Count(count) = cell {
+                *count
+            } else {
+                0
+            }
+        }),
+        Kind::Flag => {
+            write_values::<BoolType>(group, column, |cell| matches!(cell, Cell::Flag(true)))
         }
-        Kind::Flag => write_values::<BoolType>(group, column, |cell| matches!(cell, Cell::Flag(true))),
-        Kind::Text => {
-            write_values::<ByteArrayType>(group, column, |cell| ByteArray::from(text_of(Some(cell)).into_bytes()))
-        }
+        Kind::Text => write_values::<ByteArrayType>(group, column, |cell| {
+            ByteArray::from(text_of(Some(cell)).into_bytes())
+        }),
     }
 }
 
@@ -87,9 +108,14 @@ fn write_values<T: DataType>(
 ) -> Result<(), ParquetError> {
     let values: Vec<T::T> = column.iter().flatten().map(value).collect();
     // an optional value is there at level 1
-    let levels: Vec<i16> = column.iter().map(|cell| i16::from(cell.is_some())).collect();
+    let levels: Vec<i16> = column
+        .iter()
+        .map(|cell| i16::from(cell.is_some()))
+        .collect();
     if let Some(mut writer) = group.next_column()? {
-        writer.typed::<T>().write_batch(&values, Some(&levels), None)?;
+        writer
+            .typed::<T>()
+            .write_batch(&values, Some(&levels), None)?;
         writer.close()?;
     }
     Ok(())

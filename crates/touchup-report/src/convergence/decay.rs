@@ -16,13 +16,25 @@ pub struct Line {
 /// The line through (x, y); `None` for less than two points, all at one x, or what is not finite.
 pub fn straight_line(points: &[(f64, f64)]) -> Option<Line> {
     let n = points.len() as f64;
-    let (x, y) = points.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / n, sum.1 + p.1 / n));
-    let (xy, xx) = points.iter().fold((0.0, 0.0), |s, p| (s.0 + (p.0 - x) * (p.1 - y), s.1 + (p.0 - x).powi(2)));
+    let (x, y) = points
+        .iter()
+        .fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / n, sum.1 + p.1 / n));
+    let (xy, xx) = points.iter().fold((0.0, 0.0), |s, p| {
+        (s.0 + (p.0 - x) * (p.1 - y), s.1 + (p.0 - x).powi(2))
+    });
     let slope = Some(xy / xx).filter(|slope| points.len() > 1 && slope.is_finite())?;
-    let left: f64 = points.iter().map(|p| (p.1 - y - slope * (p.0 - x)).powi(2)).sum();
+    let left: f64 = points
+        .iter()
+        .map(|p| (p.1 - y - slope * (p.0 - x)).powi(2))
+        .sum();
     let there: f64 = points.iter().map(|p| (p.1 - y).powi(2)).sum();
     let r_squared = (there > 0.0).then(|| 1.0 - left / there);
-    Some(Line { offset: y - slope * x, slope, left: (left / n).sqrt(), r_squared })
+    Some(Line {
+        offset: y - slope * x,
+        slope,
+        left: (left / n).sqrt(),
+        r_squared,
+    })
 }
 
 /// Both laws of the same errors, each as a line through their logarithms.
@@ -37,16 +49,25 @@ pub struct Decay {
 /// Fits both laws to the errors after sweep 1, 2, 3, …; `None` for less than two, and for one that is not above 0.
 pub fn fit_decay(errors: &[f64]) -> Option<Decay> {
     let fit = |x: fn(f64) -> f64| {
-        let points = errors.iter().enumerate().map(|(i, e)| (x(i as f64 + 1.0), e.ln()));
+        let points = errors
+            .iter()
+            .enumerate()
+            .map(|(i, e)| (x(i as f64 + 1.0), e.ln()));
         straight_line(&points.collect::<Vec<_>>())
     };
-    Some(Decay { exponential: fit(|sweep| sweep)?, power: fit(f64::ln)? })
+    Some(Decay {
+        exponential: fit(|sweep| sweep)?,
+        power: fit(f64::ln)?,
+    })
 }
 
 impl Decay {
     /// The error after `sweep` (1 or later) by the exponential and by the power law.
     pub fn at(&self, sweep: f64) -> [f64; 2] {
         let Self { exponential, power } = self;
-        [exponential.offset.exp() * (exponential.slope * sweep).exp(), power.offset.exp() * sweep.powf(power.slope)]
+        [
+            exponential.offset.exp() * (exponential.slope * sweep).exp(),
+            power.offset.exp() * sweep.powf(power.slope),
+        ]
     }
 }

@@ -98,14 +98,29 @@ impl SweepRun {
         }
         let distances: Vec<f64> = errors[1..].iter().map(|error| error.distance_mm).collect();
         let is_whole = ended.is_none() && distances.len() >= FEWEST_SWEEPS;
-        let decay = if is_whole { fit_decay(&distances) } else { None };
-        Self { rule, seed, edge_mm: edge * 1e3, errors, has_blown_up, ended, decay }
+        let decay = if is_whole {
+            fit_decay(&distances)
+        } else {
+            None
+        };
+        Self {
+            rule,
+            seed,
+            edge_mm: edge * 1e3,
+            errors,
+            has_blown_up,
+            ended,
+            decay,
+        }
     }
 
     /// Whether all sweeps were made and the last left less error than there was.
     pub fn has_converged(&self) -> bool {
         let (first, last) = (self.errors.first(), self.errors.last());
-        self.ended.is_none() && first.zip(last).is_some_and(|(first, last)| last.distance_mm < first.distance_mm)
+        self.ended.is_none()
+            && first
+                .zip(last)
+                .is_some_and(|(first, last)| last.distance_mm < first.distance_mm)
     }
 }
 
@@ -130,20 +145,38 @@ pub fn convergence(effort: Effort, progress: &mut dyn FnMut(&str)) -> Convergenc
     progress("convergence: one face");
     let one_face = one_face::one_face_runs(ONE_FACE_S);
     let why = |error: &MeasureError| error.to_string();
-    let failed = runs.iter().filter_map(|run| run.as_ref().err().map(why)).chain(one_face.as_ref().err().map(why));
+    let failed = runs
+        .iter()
+        .filter_map(|run| run.as_ref().err().map(why))
+        .chain(one_face.as_ref().err().map(why));
     let failed = failed.collect();
-    Convergence { sweeps, runs: runs.into_iter().flatten().collect(), one_face: one_face.unwrap_or_default(), failed }
+    Convergence {
+        sweeps,
+        runs: runs.into_iter().flatten().collect(),
+        one_face: one_face.unwrap_or_default(),
+        failed,
+    }
 }
 
 fn paper_run(seed: u64, sweeps: usize) -> Measured<SweepRun> {
     let mut run = PaperSweeps::new(PAPER_EDGE, None, seed)?;
     let start = run.errors();
-    Ok(SweepRun::of((Rule::Paper, seed, PAPER_EDGE), start, sweeps, || run.sweep(start.distance_mm)))
+    Ok(SweepRun::of(
+        (Rule::Paper, seed, PAPER_EDGE),
+        start,
+        sweeps,
+        || run.sweep(start.distance_mm),
+    ))
 }
 
 fn robust_run(peaks: &Peaks, samples: &[Sample], seed: u64, sweeps: usize) -> Measured<SweepRun> {
     let mut run = RobustSweeps::new(peaks, noisy(&peaks.mesh(ROBUST_EDGE)?, seed), samples)?;
-    Ok(SweepRun::of((Rule::Robust, seed, ROBUST_EDGE), run.errors(), sweeps, || run.sweep()))
+    Ok(SweepRun::of(
+        (Rule::Robust, seed, ROBUST_EDGE),
+        run.errors(),
+        sweeps,
+        || run.sweep(),
+    ))
 }
 
 impl Convergence {
@@ -156,6 +189,11 @@ impl Convergence {
     /// there are.
     pub fn power_wins(&self, rule: Rule) -> (usize, usize) {
         let fits: Vec<&Decay> = self.of(rule).filter_map(|run| run.decay.as_ref()).collect();
-        (fits.iter().filter(|fit| fit.power.left < fit.exponential.left).count(), fits.len())
+        (
+            fits.iter()
+                .filter(|fit| fit.power.left < fit.exponential.left)
+                .count(),
+            fits.len(),
+        )
     }
 }

@@ -4,7 +4,9 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::error::Measured;
-use touchup_core::haptic::{DynamicsParams, FaceDynamics, FaceState, RefineError, RefineParams, TipParams};
+use touchup_core::haptic::{
+    DynamicsParams, FaceDynamics, FaceState, RefineError, RefineParams, TipParams,
+};
 use touchup_sim::coupled::GuidedStylus;
 
 /// Time between two samples, s.
@@ -37,25 +39,46 @@ pub struct OneFaceRun {
 }
 
 /// Starts of the faces: b*, mm, tilt and azimuth of n*, degrees.
-const STARTS: [([f64; 3], f64, f64); 3] =
-    [([3.0, -2.0, 2.5], 20.0, 17.0), ([-1.0, 4.0, -3.0], 10.0, 115.0), ([0.5, 0.5, 4.0], 40.0, 230.0)];
+const STARTS: [([f64; 3], f64, f64); 3] = [
+    ([3.0, -2.0, 2.5], 20.0, 17.0),
+    ([-1.0, 4.0, -3.0], 10.0, 115.0),
+    ([0.5, 0.5, 4.0], 40.0, 230.0),
+];
 
 /// Each start for `seconds` (s), noted each 10 ms.
 ///
 /// # Errors
 /// [`MeasureError`](crate::error::MeasureError) for a step that was refused.
 pub(super) fn one_face_runs(seconds: usize) -> Measured<Vec<OneFaceRun>> {
-    STARTS.iter().map(|&(b_mm, tilt_deg, azimuth_deg)| one_face(b_mm, tilt_deg, azimuth_deg, seconds)).collect()
+    STARTS
+        .iter()
+        .map(|&(b_mm, tilt_deg, azimuth_deg)| one_face(b_mm, tilt_deg, azimuth_deg, seconds))
+        .collect()
 }
 
-fn one_face(b_mm: [f64; 3], tilt_deg: f64, azimuth_deg: f64, seconds: usize) -> Measured<OneFaceRun> {
-    let params: DynamicsParams = RefineParams::paper(TipParams { radius: 0.0, stiffness: None }).dynamics;
+fn one_face(
+    b_mm: [f64; 3],
+    tilt_deg: f64,
+    azimuth_deg: f64,
+    seconds: usize,
+) -> Measured<OneFaceRun> {
+    let params: DynamicsParams = RefineParams::paper(TipParams {
+        radius: 0.0,
+        stiffness: None,
+    })
+    .dynamics;
     let dynamics = FaceDynamics::new(params).map_err(RefineError::from)?;
     let stylus = GuidedStylus::default();
     let surface = |p: &Point3<f64>| params.model.force(p.z) * Vector3::z();
-    let ([sine, cosine], azimuth) = (<[f64; 2]>::from(tilt_deg.to_radians().sin_cos()), azimuth_deg.to_radians());
+    let ([sine, cosine], azimuth) = (
+        <[f64; 2]>::from(tilt_deg.to_radians().sin_cos()),
+        azimuth_deg.to_radians(),
+    );
     let initial_normal = Vector3::new(sine * azimuth.cos(), sine * azimuth.sin(), cosine);
-    let mut face = FaceState { b: Point3::from(b_mm.map(|x| 1e-3 * x)), n: initial_normal };
+    let mut face = FaceState {
+        b: Point3::from(b_mm.map(|x| 1e-3 * x)),
+        n: initial_normal,
+    };
     let mut p = face.b + START_ABOVE * Vector3::z();
     let mut samples = Vec::with_capacity(100 * seconds + 1);
     for tick in 0..=(1000 * seconds) {
@@ -65,7 +88,12 @@ fn one_face(b_mm: [f64; 3], tilt_deg: f64, azimuth_deg: f64, seconds: usize) -> 
                 barycentre_mm: (face.b.coords * 1e3).into(),
                 tip_mm: (p.coords * 1e3).into(),
                 distance_mm: 1e3 * face.b.z.abs(),
-                normal_deg: face.n.cross(&Vector3::z()).norm().atan2(face.n.z).to_degrees(),
+                normal_deg: face
+                    .n
+                    .cross(&Vector3::z())
+                    .norm()
+                    .atan2(face.n.z)
+                    .to_degrees(),
             });
         }
         let moved = dynamics.step_from(&initial_normal, &face, &p, &surface(&p), PERIOD_S);
@@ -79,7 +107,10 @@ impl OneFaceRun {
     /// From when on an error stays below a share of its start, s; `None` where it does not.
     pub fn time_to_share(&self, share: f64, error: impl Fn(&OneFaceSample) -> f64) -> Option<f64> {
         let first = self.samples.first().map(&error)?;
-        let above = self.samples.iter().rposition(|sample| error(sample) > share * first)?;
+        let above = self
+            .samples
+            .iter()
+            .rposition(|sample| error(sample) > share * first)?;
         self.samples.get(above + 1).map(|sample| sample.time_s)
     }
 }

@@ -9,8 +9,8 @@ use touchup_core::mesh::TriMesh;
 use touchup_core::stylus::{Sample, Wrench};
 use touchup_sim::coupled::GuidedStylus;
 use touchup_sim::{
-    Lines, Moment, PathParams, Peaks, RasterRegion, SensorParams, StylusParams, Surface, add_vertex_noise, raster,
-    touch,
+    Lines, Moment, PathParams, Peaks, RasterRegion, SensorParams, StylusParams, Surface,
+    add_vertex_noise, raster, touch,
 };
 
 /// Time between two samples of the paper, ns and s.
@@ -21,7 +21,10 @@ const SAMPLES_PER_FACE: usize = 4000;
 /// A mean error beyond this multiple of its start counts as diverged.
 pub const BLOWN_UP: f64 = 2.0;
 /// The raster's ball, m, and its stiffness, N/m.
-const TIP: TipParams = TipParams { radius: 1.5e-3, stiffness: Some(20e3) };
+const TIP: TipParams = TipParams {
+    radius: 1.5e-3,
+    stiffness: Some(20e3),
+};
 
 /// The true mesh with 3 mm of noise on each coordinate, 2 mm too high \[paper\].
 pub fn noisy(truth: &TriMesh, seed: u64) -> TriMesh {
@@ -48,10 +51,21 @@ impl PaperSweeps {
     pub fn new(edge: f64, guard: Option<GuardParams>, seed: u64) -> Measured<Self> {
         let truth = Peaks::default().mesh(edge)?;
         // ten million samples: solved together they take twenty times as long
-        let mut params = RefineParams { guard, ..RefineParams::paper(TipParams { radius: 0.0, stiffness: None }) };
+        let mut params = RefineParams {
+            guard,
+            ..RefineParams::paper(TipParams {
+                radius: 0.0,
+                stiffness: None,
+            })
+        };
         params.dynamics.rule = StepRule::DriftCorrected;
         let refiner = Refiner::new(noisy(&truth, seed), params)?;
-        Ok(Self { truth, refiner, params, stamp_ns: 0 })
+        Ok(Self {
+            truth,
+            refiner,
+            params,
+            stamp_ns: 0,
+        })
     }
 
     /// Sets the stylus to each face in turn and lets both go where Eq 8–11 and Eq 6–7 take them. The true face acts as
@@ -71,10 +85,20 @@ impl PaperSweeps {
             for _ in 0..SAMPLES_PER_FACE {
                 let mesh = self.refiner.mesh();
                 let (b, n) = (mesh.barycentre(face), mesh.normal(face));
-                let wrench = Wrench { force: force(&p), torque: Vector3::zeros() };
+                let wrench = Wrench {
+                    force: force(&p),
+                    torque: Vector3::zeros(),
+                };
                 self.stamp_ns += PERIOD_NS;
                 let pose_ot = Isometry3::translation(p.x, p.y, p.z);
-                self.refiner.push_on(face, &Sample { stamp_ns: self.stamp_ns, pose_ot, wrench })?;
+                self.refiner.push_on(
+                    face,
+                    &Sample {
+                        stamp_ns: self.stamp_ns,
+                        pose_ot,
+                        wrench,
+                    },
+                )?;
                 p = stylus.step(&p, &b, &n, force, PERIOD);
             }
             if self.errors().distance_mm > BLOWN_UP * start_mm {
@@ -110,7 +134,14 @@ pub fn raster_samples(peaks: &Peaks, friction: f64) -> Measured<Vec<Sample>> {
     let TipParams { radius, stiffness } = TIP;
     let stiffness = stiffness.unwrap_or(f64::INFINITY);
     let region = region_over(peaks, 0.5 * 50e-3, radius);
-    let path = raster(&region, Lines::AlongX, &PathParams { radius, ..PathParams::default() })?;
+    let path = raster(
+        &region,
+        Lines::AlongX,
+        &PathParams {
+            radius,
+            ..PathParams::default()
+        },
+    )?;
     let stylus = StylusParams {
         radius,
         stiffness,
@@ -126,7 +157,14 @@ pub fn raster_samples(peaks: &Peaks, friction: f64) -> Measured<Vec<Sample>> {
         let mut pose_ot = moment.pose_ot;
         pose_ot.translation.vector -= moment.force_o / stiffness;
         let force = moment.pose_ot.rotation.inverse() * moment.force_o;
-        Sample { stamp_ns: (i as i64 + 1) * 1_000_000, pose_ot, wrench: Wrench { force, torque: Vector3::zeros() } }
+        Sample {
+            stamp_ns: (i as i64 + 1) * 1_000_000,
+            pose_ot,
+            wrench: Wrench {
+                force,
+                torque: Vector3::zeros(),
+            },
+        }
     };
     Ok(moments.iter().enumerate().map(sample).collect())
 }
@@ -147,8 +185,16 @@ impl<'a> RobustSweeps<'a> {
     /// # Errors
     /// [`MeasureError::Refine`](crate::error::MeasureError::Refine) for a scan without faces.
     pub fn new(peaks: &'a Peaks, scan: TriMesh, samples: &'a [Sample]) -> Measured<Self> {
-        let params = RefineParams { scan_noise: 3e-3, ..RefineParams::robust(TIP) };
-        Ok(Self { peaks, samples, refiner: Refiner::new(scan, params)?, last_ns: 0 })
+        let params = RefineParams {
+            scan_noise: 3e-3,
+            ..RefineParams::robust(TIP)
+        };
+        Ok(Self {
+            peaks,
+            samples,
+            refiner: Refiner::new(scan, params)?,
+            last_ns: 0,
+        })
     }
 
     /// Goes over the square once.
@@ -159,7 +205,10 @@ impl<'a> RobustSweeps<'a> {
         let start_ns = self.last_ns;
         for sample in self.samples {
             self.last_ns = start_ns + sample.stamp_ns;
-            self.refiner.push(&Sample { stamp_ns: self.last_ns, ..*sample })?;
+            self.refiner.push(&Sample {
+                stamp_ns: self.last_ns,
+                ..*sample
+            })?;
         }
         Ok(self.errors())
     }

@@ -14,13 +14,26 @@ impl Convergence {
     pub fn chapter(&self) -> Chapter {
         let mut text = vec![self.introduction()];
         text.extend(Rule::ALL.into_iter().map(|rule| self.verdict(rule)));
-        text.extend(self.failed.iter().map(|reason| format!("Not run: {reason}.")));
+        text.extend(
+            self.failed
+                .iter()
+                .map(|reason| format!("Not run: {reason}.")),
+        );
         text.extend(self.one_face.iter().map(one_face_text));
         let mut figures: Vec<Figure> = Rule::ALL.map(|rule| self.figure(rule)).into();
         if !self.one_face.is_empty() {
-            figures.extend([self.one_face_paths(), self.one_face_distances(), self.one_face_normals()]);
+            figures.extend([
+                self.one_face_paths(),
+                self.one_face_distances(),
+                self.one_face_normals(),
+            ]);
         }
-        Chapter::of("Convergence from sweep to sweep, and of one face", text, figures, vec![self.table()])
+        Chapter::of(
+            "Convergence from sweep to sweep, and of one face",
+            text,
+            figures,
+            vec![self.table()],
+        )
     }
 
     fn introduction(&self) -> String {
@@ -37,14 +50,19 @@ impl Convergence {
     /// Result of the runs of one rule.
     fn verdict(&self, rule: Rule) -> String {
         let runs: Vec<&SweepRun> = self.of(rule).collect();
-        let converged: Vec<&SweepRun> = runs.iter().copied().filter(|run| run.has_converged()).collect();
+        let converged: Vec<&SweepRun> = runs
+            .iter()
+            .copied()
+            .filter(|run| run.has_converged())
+            .collect();
         let blown_up = runs.iter().filter(|run| run.has_blown_up).count();
         let (name, fewer, all) = (capitalised(rule.name()), converged.len(), runs.len());
-        let mut text =
-            format!("{name}: {fewer} of {all} scans ended with less error than they began with, {blown_up} blew up.");
-        if let Some((least, most)) = range(
-            converged.iter().filter_map(|run| Some(run.errors.last()?.distance_mm / run.errors.first()?.distance_mm)),
-        ) {
+        let mut text = format!(
+            "{name}: {fewer} of {all} scans ended with less error than they began with, {blown_up} blew up."
+        );
+        if let Some((least, most)) = range(converged.iter().filter_map(|run| {
+            Some(run.errors.last()?.distance_mm / run.errors.first()?.distance_mm)
+        })) {
             let (least, most, sweeps) = (least * 100.0, most * 100.0, self.sweeps);
             text += &format!(
                 " Where it converged, {least:.1} to {most:.1} % of the mean error is left after {sweeps} sweeps."
@@ -52,12 +70,16 @@ impl Convergence {
         }
         let (wins, fits) = self.power_wins(rule);
         let mean = |r_squared: fn(&Decay) -> Option<f64>| {
-            let all: Vec<f64> = runs.iter().filter_map(|run| r_squared(run.decay.as_ref()?)).collect();
+            let all: Vec<f64> = runs
+                .iter()
+                .filter_map(|run| r_squared(run.decay.as_ref()?))
+                .collect();
             (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
         };
-        if let (Some(power), Some(exponential)) =
-            (mean(|decay| decay.power.r_squared), mean(|decay| decay.exponential.r_squared))
-        {
+        if let (Some(power), Some(exponential)) = (
+            mean(|decay| decay.power.r_squared),
+            mean(|decay| decay.exponential.r_squared),
+        ) {
             let exponents = runs.iter().filter_map(|run| Some(-run.decay?.power.slope));
             let (least, most) = range(exponents).unwrap_or_default();
             text += &format!(
@@ -71,14 +93,28 @@ impl Convergence {
     fn figure(&self, rule: Rule) -> Figure {
         let series = self.of(rule).flat_map(|run| {
             let name = format!("scan {}", run.seed);
-            let marks = run.errors.iter().enumerate().map(|(sweep, error)| Mark::at(sweep as f64, error.distance_mm));
+            let marks = run
+                .errors
+                .iter()
+                .enumerate()
+                .map(|(sweep, error)| Mark::at(sweep as f64, error.distance_mm));
             let measured = Series::new(&name, LineStroke::Marks, marks);
-            let laws = run.decay.iter().flat_map(|decay| drawn(decay, &name, run.errors.len() - 1)).collect::<Vec<_>>();
+            let laws = run
+                .decay
+                .iter()
+                .flat_map(|decay| drawn(decay, &name, run.errors.len() - 1))
+                .collect::<Vec<_>>();
             [measured].into_iter().chain(laws)
         });
         let (id, measure) = match rule {
-            Rule::Paper => ("convergence_published", "face by face, as the paper measures"),
-            Rule::Robust => ("convergence_robust", "from the faces' middles to the surface"),
+            Rule::Paper => (
+                "convergence_published",
+                "face by face, as the paper measures",
+            ),
+            Rule::Robust => (
+                "convergence_robust",
+                "from the faces' middles to the surface",
+            ),
         };
         Figure::of(id, Drawing::Curves(series.collect()))
             .title(format!("Mean distance error from sweep to sweep, {}", rule.name()))
@@ -94,7 +130,9 @@ impl Convergence {
     fn one_face_paths(&self) -> Figure {
         let series = self.one_face.iter().flat_map(|run| {
             let path = |of: fn(&OneFaceSample) -> [f64; 3]| {
-                run.samples.iter().map(move |sample| Mark::at(of(sample)[0], of(sample)[2]))
+                run.samples
+                    .iter()
+                    .map(move |sample| Mark::at(of(sample)[0], of(sample)[2]))
             };
             [
                 Series::new(
@@ -102,7 +140,11 @@ impl Convergence {
                     LineStroke::Joined,
                     path(|sample| sample.barycentre_mm),
                 ),
-                Series::new(format!("{}, tip", one_face_name(run)), LineStroke::Dashed, path(|sample| sample.tip_mm)),
+                Series::new(
+                    format!("{}, tip", one_face_name(run)),
+                    LineStroke::Dashed,
+                    path(|sample| sample.tip_mm),
+                ),
             ]
         });
         Figure::of("one_face_path", Drawing::Curves(series.collect()))
@@ -131,9 +173,18 @@ impl Convergence {
             .caption("The paper's Fig 7, as an angle: |n* x n| would be zero for a face that is turned over. It waits for the distance.")
     }
 
-    fn one_face_errors(&self, id: &str, label: &str, column: &str, error: fn(&OneFaceSample) -> f64) -> Figure {
+    fn one_face_errors(
+        &self,
+        id: &str,
+        label: &str,
+        column: &str,
+        error: fn(&OneFaceSample) -> f64,
+    ) -> Figure {
         let series = self.one_face.iter().map(|run| {
-            let marks = run.samples.iter().map(|sample| Mark::at(sample.time_s, error(sample).max(DRAWN_FROM)));
+            let marks = run
+                .samples
+                .iter()
+                .map(|sample| Mark::at(sample.time_s, error(sample).max(DRAWN_FROM)));
             Series::new(one_face_name(run), LineStroke::Dashed, marks)
         });
         Figure::of(id, Drawing::Curves(series.collect()))
@@ -141,7 +192,8 @@ impl Convergence {
     }
 
     fn table(&self) -> Table {
-        let error_at = |sweep: usize| move |run: &SweepRun| Some(run.errors.get(sweep)?.distance_mm);
+        let error_at =
+            |sweep: usize| move |run: &SweepRun| Some(run.errors.get(sweep)?.distance_mm);
         let last = |of: fn(&MeshErrors) -> f64| move |run: &SweepRun| run.errors.last().map(of);
         Table::of("convergence", "Sweeps and fits", &self.runs)
             .column("rule", |run| run.rule.name())
@@ -173,11 +225,20 @@ fn one_face_name(run: &OneFaceRun) -> String {
 /// When which error is down to a tenth, and what is left at the end.
 fn one_face_text(run: &OneFaceRun) -> String {
     let tenth = |error: fn(&OneFaceSample) -> f64| {
-        run.time_to_share(0.1, error).map_or("not within the run".to_owned(), |time_s| format!("after {time_s:.2} s"))
+        run.time_to_share(0.1, error)
+            .map_or("not within the run".to_owned(), |time_s| {
+                format!("after {time_s:.2} s")
+            })
     };
-    let (distance, normal) = (tenth(|sample| sample.distance_mm), tenth(|sample| sample.normal_deg));
+    let (distance, normal) = (
+        tenth(|sample| sample.distance_mm),
+        tenth(|sample| sample.normal_deg),
+    );
     let left = run.samples.last().map_or(String::new(), |last| {
-        format!("; after {:.0} s {:.1e} mm and {:.1e} degrees are left", last.time_s, last.distance_mm, last.normal_deg)
+        format!(
+            "; after {:.0} s {:.1e} mm and {:.1e} degrees are left",
+            last.time_s, last.distance_mm, last.normal_deg
+        )
     });
     format!(
         "One face, {}: the distance is down to a tenth for good {distance}, the angle {normal}{left}.",
@@ -189,12 +250,16 @@ fn one_face_text(run: &OneFaceRun) -> String {
 fn drawn(decay: &Decay, name: &str, sweeps: usize) -> [Series; 2] {
     let at = |step: usize| 1.0 + step as f64 / STEPS as f64;
     [("exponential", 0), ("power law", 1)].map(|(law, which)| {
-        let marks = (0..=STEPS * (sweeps - 1)).map(at).map(|sweep| Mark::at(sweep, decay.at(sweep)[which]));
+        let marks = (0..=STEPS * (sweeps - 1))
+            .map(at)
+            .map(|sweep| Mark::at(sweep, decay.at(sweep)[which]));
         Series::new(format!("{name}, {law}"), LineStroke::Dashed, marks)
     })
 }
 
 fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+    letters.next().map_or_else(String::new, |first| {
+        first.to_uppercase().chain(letters).collect()
+    })
 }

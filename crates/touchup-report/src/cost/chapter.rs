@@ -1,7 +1,8 @@
 //! The chapter of the report.
 
 use super::{
-    Cost, LARGEST_RATIO, LAW_UP_TO, LEAST_REPLAY_PER_S, PartCost, READING, RecordingCost, ReplaySpeed, SizeCost,
+    Cost, LARGEST_RATIO, LAW_UP_TO, LEAST_REPLAY_PER_S, PartCost, READING, RecordingCost,
+    ReplaySpeed, SizeCost,
 };
 use crate::number::three_digits;
 use crate::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Series, Spread, Table};
@@ -20,9 +21,23 @@ const HOW: &str = "The default scene over a recording at 1 kHz: quantiles of the
 impl Cost {
     /// As it is printed.
     pub fn chapter(&self) -> Chapter {
-        let texts = [self.recording_text(), self.size_text(), self.ratio_text(), self.part_text(), self.replay_text()];
-        let text = texts.into_iter().flatten().chain([self.count_text()]).collect();
-        let figures = vec![self.edge_figure(), self.faces_figure(), self.cheapest_figure()];
+        let texts = [
+            self.recording_text(),
+            self.size_text(),
+            self.ratio_text(),
+            self.part_text(),
+            self.replay_text(),
+        ];
+        let text = texts
+            .into_iter()
+            .flatten()
+            .chain([self.count_text()])
+            .collect();
+        let figures = vec![
+            self.edge_figure(),
+            self.faces_figure(),
+            self.cheapest_figure(),
+        ];
         Chapter::of("Cost of each stage", text, figures, self.tables())
     }
 
@@ -31,17 +46,31 @@ impl Cost {
         let curves = recording_curves(&self.by_edge, "", |recording| recording.edge * 1e3);
         let faces = self.by_edge.first().map_or(0, |recording| recording.faces);
         recording_figure("push_time_by_edge", axis, curves)
-            .title(format!("A recording refined, against the edge length of the scan; {faces} faces"))
-            .caption(format!("Edges of a thirtieth to two radii of the tip, {:.1} mm. {HOW}", RADIUS * 1e3))
+            .title(format!(
+                "A recording refined, against the edge length of the scan; {faces} faces"
+            ))
+            .caption(format!(
+                "Edges of a thirtieth to two radii of the tip, {:.1} mm. {HOW}",
+                RADIUS * 1e3
+            ))
     }
 
     fn faces_figure(&self) -> Figure {
         let axis = Axis::log("faces of the scan", "faces");
         let of_edge = |recordings: &[RecordingCost]| {
-            let edge = format!(", {:.2} mm", recordings.first().map_or(0.0, |recording| recording.edge * 1e3));
+            let edge = format!(
+                ", {:.2} mm",
+                recordings
+                    .first()
+                    .map_or(0.0, |recording| recording.edge * 1e3)
+            );
             recording_curves(recordings, &edge, |recording| recording.faces as f64)
         };
-        let curves = self.by_faces.chunk_by(|a, b| a.edge == b.edge).flat_map(of_edge).collect();
+        let curves = self
+            .by_faces
+            .chunk_by(|a, b| a.edge == b.edge)
+            .flat_map(of_edge)
+            .collect();
         recording_figure("push_time_by_faces", axis, curves)
             .title("A recording refined, against the faces of the scan, on edges of two lengths")
             .caption(HOW)
@@ -49,16 +78,29 @@ impl Cost {
 
     fn cheapest_figure(&self) -> Figure {
         let curve = |name: &str, stroke: LineStroke, time: &dyn Fn(&SizeCost) -> Spread| {
-            let marks = self.sizes.iter().map(|size| Mark::at(size.faces as f64, time(size).times(1e-3)));
+            let marks = self
+                .sizes
+                .iter()
+                .map(|size| Mark::at(size.faces as f64, time(size).times(1e-3)));
             Series::new(name, stroke, marks)
         };
         let mut curves = vec![
-            curve("hand-written loop", LineStroke::Joined, &|size| size.minimal.time_ns),
-            curve("the loop, keeping", LineStroke::Joined, &|size| size.keeping.time_ns),
-            curve("cheapest scene", LineStroke::Joined, &|size| size.barest.time_ns),
+            curve("hand-written loop", LineStroke::Joined, &|size| {
+                size.minimal.time_ns
+            }),
+            curve("the loop, keeping", LineStroke::Joined, &|size| {
+                size.keeping.time_ns
+            }),
+            curve("cheapest scene", LineStroke::Joined, &|size| {
+                size.barest.time_ns
+            }),
         ];
         if let Some(law) = self.barest_law {
-            curves.push(curve("law of the cheapest scene", LineStroke::Dashed, &|size| law.at(size.faces).into()));
+            curves.push(curve(
+                "law of the cheapest scene",
+                LineStroke::Dashed,
+                &|size| law.at(size.faces).into(),
+            ));
         }
         Figure::of("cheapest_push_by_faces", Drawing::Curves(curves))
             .title("The cheapest push against the size of the scan")
@@ -75,11 +117,22 @@ impl Cost {
             let order = |a: &&RecordingCost, b: &&RecordingCost| of(a).total_cmp(&of(b));
             let said = |recording: &RecordingCost| {
                 let value = three_digits(of(recording));
-                (value, format!("{} faces, edges of {:.2} mm", recording.faces, recording.edge * 1e3))
+                (
+                    value,
+                    format!(
+                        "{} faces, edges of {:.2} mm",
+                        recording.faces,
+                        recording.edge * 1e3
+                    ),
+                )
             };
-            all().min_by(order).map(said).zip(all().max_by(order).map(said))
+            all()
+                .min_by(order)
+                .map(said)
+                .zip(all().max_by(order).map(said))
         };
-        let ((least, fastest), (most, slowest)) = ends(|recording| recording.push.median as f64 * 1e-3)?;
+        let ((least, fastest), (most, slowest)) =
+            ends(|recording| recording.push.median as f64 * 1e-3)?;
         let (_, (p999, longest)) = ends(|recording| recording.push.p999 as f64 * 1e-3)?;
         let ((share, coarse), (times, fine)) =
             ends(|recording| recording.peer.median as f64 / recording.push.median.max(1) as f64)?;
@@ -115,26 +168,46 @@ impl Cost {
     }
 
     fn ratio_text(&self) -> Option<String> {
-        let largest =
-            |ratio: fn(&SizeCost) -> Spread| self.sizes.iter().map(|size| ratio(size).median).max_by(f64::total_cmp);
-        let (worst, keeping) = (largest(|size| size.barest_to_minimal)?, largest(|size| size.barest_to_keeping)?);
+        let largest = |ratio: fn(&SizeCost) -> Spread| {
+            self.sizes
+                .iter()
+                .map(|size| ratio(size).median)
+                .max_by(f64::total_cmp)
+        };
+        let (worst, keeping) = (
+            largest(|size| size.barest_to_minimal)?,
+            largest(|size| size.barest_to_keeping)?,
+        );
         Some(format!(
             "A part that a scene says is off costs nothing: the cheapest scene takes at most {worst:.3} times as long as the loop \
              that is written by hand, on the same samples in turns; {} the {LARGEST_RATIO} that is allowed. Against the same \
              loop made to keep what it looked up, as the refiner does (which boxes to bring up to date, with a margin, and what \
              is near), it is {keeping:.3} times.",
-            if worst <= LARGEST_RATIO { "within" } else { "this misses" }
+            if worst <= LARGEST_RATIO {
+                "within"
+            } else {
+                "this misses"
+            }
         ))
     }
 
     fn part_text(&self) -> Option<String> {
         let faces = self.parts.iter().map(|part| part.faces).max()?;
-        let parts = self.parts.iter().filter(|part| part.faces == faces).map(|part| {
-            let PartCost { part: name, cost_ns, without, .. } = part;
-            let is_lost = cost_ns.median.abs() < DISCERNIBLE * without.time_ns.median;
-            let noise = if is_lost { " (within the noise)" } else { "" };
-            format!("{name} {:+.0} ns{noise}", cost_ns.median)
-        });
+        let parts = self
+            .parts
+            .iter()
+            .filter(|part| part.faces == faces)
+            .map(|part| {
+                let PartCost {
+                    part: name,
+                    cost_ns,
+                    without,
+                    ..
+                } = part;
+                let is_lost = cost_ns.median.abs() < DISCERNIBLE * without.time_ns.median;
+                let noise = if is_lost { " (within the noise)" } else { "" };
+                format!("{name} {:+.0} ns{noise}", cost_ns.median)
+            });
         Some(format!(
             "What the parts cost, as the difference of whole pushes with and without them on {faces} faces: {}.",
             parts.collect::<Vec<_>>().join(", ")
@@ -149,14 +222,24 @@ impl Cost {
     }
 
     fn replay_text(&self) -> Option<String> {
-        let replays = self.replays.iter().map(|ReplaySpeed { scene, edge_mm, samples_per_s, .. }| {
-            let verdict = match samples_per_s.median >= LEAST_REPLAY_PER_S {
-                _ if scene == READING => String::new(),
-                true => format!(" (holds {LEAST_REPLAY_PER_S:.0})"),
-                false => format!(" (misses {LEAST_REPLAY_PER_S:.0})"),
-            };
-            format!("{:.0} samples per second, scene {scene}, edges of {edge_mm:.2} mm{verdict}", samples_per_s.median)
-        });
+        let replays = self.replays.iter().map(
+            |ReplaySpeed {
+                 scene,
+                 edge_mm,
+                 samples_per_s,
+                 ..
+             }| {
+                let verdict = match samples_per_s.median >= LEAST_REPLAY_PER_S {
+                    _ if scene == READING => String::new(),
+                    true => format!(" (holds {LEAST_REPLAY_PER_S:.0})"),
+                    false => format!(" (misses {LEAST_REPLAY_PER_S:.0})"),
+                };
+                format!(
+                    "{:.0} samples per second, scene {scene}, edges of {edge_mm:.2} mm{verdict}",
+                    samples_per_s.median
+                )
+            },
+        );
         let faces = self.replays.first()?.faces;
         Some(format!(
             "A recording is replayed by one thread, from the file to the moved mesh of {faces} faces: {}.",
@@ -165,13 +248,27 @@ impl Cost {
     }
 
     fn count_text(&self) -> String {
-        let default = self.parts.iter().filter(|part| part.is_default).map(|part| &part.with);
+        let default = self
+            .parts
+            .iter()
+            .filter(|part| part.is_default)
+            .map(|part| &part.with);
         let pushes = self.sizes.iter().map(|size| &size.barest).chain(default);
-        let Some(most) = pushes.filter_map(|push| push.allocations).max_by(f64::total_cmp) else {
-            return "This program does not count allocations, so their columns are empty.".to_owned();
+        let Some(most) = pushes
+            .filter_map(|push| push.allocations)
+            .max_by(f64::total_cmp)
+        else {
+            return "This program does not count allocations, so their columns are empty."
+                .to_owned();
         };
-        let bound = if most == 0.0 { "never asks".to_owned() } else { format!("asks {most:.2e} times") };
-        format!("A push that is warm {bound} for memory, counted by the allocator itself over every timed push.")
+        let bound = if most == 0.0 {
+            "never asks".to_owned()
+        } else {
+            format!("asks {most:.2e} times")
+        };
+        format!(
+            "A push that is warm {bound} for memory, counted by the allocator itself over every timed push."
+        )
     }
 
     fn tables(&self) -> Vec<Table> {
@@ -234,18 +331,34 @@ impl Cost {
 /// Pushes, the whole, and the peer, against `x`.
 ///
 /// - `more`: behind each name.
-fn recording_curves(recordings: &[RecordingCost], more: &str, x: impl Fn(&RecordingCost) -> f64) -> Vec<Series> {
+fn recording_curves(
+    recordings: &[RecordingCost],
+    more: &str,
+    x: impl Fn(&RecordingCost) -> f64,
+) -> Vec<Series> {
     let curve = |name: &str, stroke, time_us: &dyn Fn(&RecordingCost) -> f64| {
-        let marks = recordings.iter().map(|recording| Mark::at(x(recording), time_us(recording)));
+        let marks = recordings
+            .iter()
+            .map(|recording| Mark::at(x(recording), time_us(recording)));
         Series::new(format!("{name}{more}"), stroke, marks)
     };
     let us = |ns: u64| ns as f64 * 1e-3;
     vec![
-        curve("push, median", LineStroke::Joined, &|recording| us(recording.push.median)),
-        curve("push, p99", LineStroke::Joined, &|recording| us(recording.push.p99)),
-        curve("push, p99.9", LineStroke::Joined, &|recording| us(recording.push.p999)),
-        curve("end to end", LineStroke::Joined, &|recording| recording.whole_us),
-        curve("index of parry3d", LineStroke::Joined, &|recording| us(recording.peer.median)),
+        curve("push, median", LineStroke::Joined, &|recording| {
+            us(recording.push.median)
+        }),
+        curve("push, p99", LineStroke::Joined, &|recording| {
+            us(recording.push.p99)
+        }),
+        curve("push, p99.9", LineStroke::Joined, &|recording| {
+            us(recording.push.p999)
+        }),
+        curve("end to end", LineStroke::Joined, &|recording| {
+            recording.whole_us
+        }),
+        curve("index of parry3d", LineStroke::Joined, &|recording| {
+            us(recording.peer.median)
+        }),
     ]
 }
 
@@ -265,9 +378,13 @@ fn recording_table(id: &str, title: &str, recordings: &[RecordingCost]) -> Table
         .column("until the first push, ms", |recording| recording.begin_ms)
         .column("patch at the end, ms", |recording| recording.patch_ms)
         .column("end to end, µs per sample", |recording| recording.whole_us)
-        .column("parry3d, median, µs", |recording| us(recording.peer.median))
+        .column("parry3d, median, µs", |recording| {
+            us(recording.peer.median)
+        })
         .column("parry3d, p99, µs", |recording| us(recording.peer.p99))
         .column("parry3d, p99.9, µs", |recording| us(recording.peer.p999))
-        .column("vertices moved for parry3d", |recording| recording.peer_moves)
+        .column("vertices moved for parry3d", |recording| {
+            recording.peer_moves
+        })
         .caption(HOW)
 }

@@ -43,31 +43,57 @@ impl MinimalLoop {
     /// Builds the tree.
     pub fn new(mesh: TriMesh) -> Self {
         let tree = FaceTree::new(&mesh);
-        Self { mesh, tree, gain: gain(), faces: Vec::new(), plan: None }
+        Self {
+            mesh,
+            tree,
+            gain: gain(),
+            faces: Vec::new(),
+            plan: None,
+        }
     }
 
     /// As [`Self::new`], and keeps what it looked up, as the refiner does: which boxes to bring up to date, and what is near.
     pub fn keeping(mesh: TriMesh) -> Self {
-        Self { plan: Some(StaleBoxes::default()), ..Self::new(mesh) }
+        Self {
+            plan: Some(StaleBoxes::default()),
+            ..Self::new(mesh)
+        }
     }
 
     /// Takes one sample of known force; returns whether it moved anything.
     pub fn push(&mut self, sample: &Sample) -> bool {
-        let Self { mesh, tree, gain, faces, plan } = self;
+        let Self {
+            mesh,
+            tree,
+            gain,
+            faces,
+            plan,
+        } = self;
         let normal = sample.wrench.force / FORCE;
-        let p = Point3::from(sample.pose_ot.translation.vector) + sample.wrench.force / STIFFNESS - normal * RADIUS;
+        let p = Point3::from(sample.pose_ot.translation.vector) + sample.wrench.force / STIFFNESS
+            - normal * RADIUS;
         let hit = match plan {
-            Some(StaleBoxes { face: Some(last), nearby, .. }) => tree.closest_nearby(mesh, &p, *last, REACH, nearby),
+            Some(StaleBoxes {
+                face: Some(last),
+                nearby,
+                ..
+            }) => tree.closest_nearby(mesh, &p, *last, REACH, nearby),
             _ => tree.closest(mesh, &p, REACH),
         };
         let Some(hit) = hit else { return false };
         let step = normal * (*gain * (p - hit.point).dot(&normal));
         let corners = mesh.corners(hit.face);
-        corners.into_iter().for_each(|vertex: VertexId| mesh.set_position(vertex, mesh.position(vertex) + step));
-        let is_known = plan.as_ref().is_some_and(|kept| kept.face == Some(hit.face));
+        corners
+            .into_iter()
+            .for_each(|vertex: VertexId| mesh.set_position(vertex, mesh.position(vertex) + step));
+        let is_known = plan
+            .as_ref()
+            .is_some_and(|kept| kept.face == Some(hit.face));
         if !is_known {
             faces.clear();
-            corners.into_iter().for_each(|vertex| faces.extend_from_slice(mesh.star(vertex)));
+            corners
+                .into_iter()
+                .for_each(|vertex| faces.extend_from_slice(mesh.star(vertex)));
         }
         match plan {
             None => tree.refit(mesh, faces),

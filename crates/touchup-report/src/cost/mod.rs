@@ -61,17 +61,32 @@ pub fn cost(effort: Effort, progress: &mut dyn FnMut(&str)) -> Measured<Cost> {
     let by_faces = recordings::by_faces(effort, progress)?;
     let sizes: &[usize] = effort.choose(
         &[10_000, 30_000, 100_000],
-        &[10_000, 20_000, 50_000, 100_000, 200_000, 500_000, 1_000_000, 2_000_000, 5_000_000],
+        &[
+            10_000, 20_000, 50_000, 100_000, 200_000, 500_000, 1_000_000, 2_000_000, 5_000_000,
+        ],
     );
-    let timing = effort
-        .choose(Timing { warm: 3_000, blocks: 15, block: 400 }, Timing { warm: 20_000, blocks: 40, block: 1_000 });
+    let timing = effort.choose(
+        Timing {
+            warm: 3_000,
+            blocks: 15,
+            block: 400,
+        },
+        Timing {
+            warm: 20_000,
+            blocks: 40,
+            block: 1_000,
+        },
+    );
     let at_size = |&faces: &usize| {
         progress(&format!("cost: the cheapest push on {faces} faces"));
         pushes::size_cost(faces, timing)
     };
     let sizes = sizes.iter().map(at_size).collect::<Result<Vec<_>, _>>()?;
     let (mut parts, mut stages, mut seldom) = (Vec::new(), Vec::new(), Vec::new());
-    for &faces in effort.choose(&[10_000, 100_000][..], &[10_000, 100_000, 1_000_000, 5_000_000]) {
+    for &faces in effort.choose(
+        &[10_000, 100_000][..],
+        &[10_000, 100_000, 1_000_000, 5_000_000],
+    ) {
         progress(&format!("cost: parts and stages on {faces} faces"));
         // eight refiners at once: on the largest scans they would take 5 GB
         if faces <= 1_000_000 {
@@ -85,9 +100,25 @@ pub fn cost(effort: Effort, progress: &mut dyn FnMut(&str)) -> Measured<Cost> {
     }
     let (count, repeats) = effort.choose((30_000, 3), (300_000, 7));
     progress("cost: replay on 1,000,000 faces");
-    let mut replays = replay::replay_speeds((1_000_000, pushes::side_of(1_000_000)), count, repeats)?;
-    replays.extend(replay::replay_speeds((1_000_000, touchup_sim::wavy::SIDE), count, repeats)?);
+    let mut replays =
+        replay::replay_speeds((1_000_000, pushes::side_of(1_000_000)), count, repeats)?;
+    replays.extend(replay::replay_speeds(
+        (1_000_000, touchup_sim::wavy::SIDE),
+        count,
+        repeats,
+    )?);
     let known = sizes.iter().filter(|size| size.faces <= LAW_UP_TO);
-    let known: Vec<_> = known.map(|size| (size.faces, size.barest.time_ns.median)).collect();
-    Ok(Cost { by_edge, by_faces, barest_law: LogLaw::fit(&known), sizes, parts, stages, seldom, replays })
+    let known: Vec<_> = known
+        .map(|size| (size.faces, size.barest.time_ns.median))
+        .collect();
+    Ok(Cost {
+        by_edge,
+        by_faces,
+        barest_law: LogLaw::fit(&known),
+        sizes,
+        parts,
+        stages,
+        seldom,
+        replays,
+    })
 }

@@ -34,12 +34,20 @@ struct TouchedRegion {
 
 impl TouchedRegion {
     fn of(mesh: &TriMesh) -> Self {
-        Self { taken: [vec![0; mesh.vertex_slots()], vec![0; mesh.face_slots()]], ..Self::default() }
+        Self {
+            taken: [vec![0; mesh.vertex_slots()], vec![0; mesh.face_slots()]],
+            ..Self::default()
+        }
     }
 
     /// The corners of a face, all that is joined to them within one radius of the tip, and the faces around.
     fn find(&mut self, mesh: &TriMesh, (face, touched): (FaceId, Point3<f64>)) {
-        let Self { vertices, faces, taken: [by_vertex, by_face], touches } = self;
+        let Self {
+            vertices,
+            faces,
+            taken: [by_vertex, by_face],
+            touches,
+        } = self;
         *touches += 1;
         vertices.clear();
         faces.clear();
@@ -50,7 +58,9 @@ impl TouchedRegion {
                 vertices.push(vertex);
             }
         };
-        mesh.corners(face).into_iter().for_each(|vertex| take(vertex, vertices));
+        mesh.corners(face)
+            .into_iter()
+            .for_each(|vertex| take(vertex, vertices));
         let mut next = 0;
         while let Some(&vertex) = vertices.get(next) {
             next += 1;
@@ -83,9 +93,15 @@ fn aabb(mesh: &TriMesh, face: FaceId) -> Aabb {
 impl ParryLoop {
     /// Builds the tree.
     pub fn new(mesh: TriMesh) -> Self {
-        let leaves = mesh.faces().map(|(face, _)| (face.0 as usize, aabb(&mesh, face)));
+        let leaves = mesh
+            .faces()
+            .map(|(face, _)| (face.0 as usize, aabb(&mesh, face)));
         let tree = Bvh::from_iter(BvhBuildStrategy::Binned, leaves);
-        Self { tree, region: TouchedRegion::of(&mesh), mesh }
+        Self {
+            tree,
+            region: TouchedRegion::of(&mesh),
+            mesh,
+        }
     }
 
     /// The closest face, and its point that is closest.
@@ -95,7 +111,8 @@ impl ParryLoop {
             let (point, _) = triangle::closest_point(p, &mesh.triangle(FaceId(face)));
             Some(PointProjection::new(false, vector(&point)))
         };
-        let (face, (_, PointProjection { point, .. })) = tree.project_point(vector(p), REACH, project)?;
+        let (face, (_, PointProjection { point, .. })) =
+            tree.project_point(vector(p), REACH, project)?;
         Some((FaceId(face), Point3::new(point.x, point.y, point.z)))
     }
 
@@ -109,7 +126,10 @@ impl ParryLoop {
         let Self { mesh, tree, region } = self;
         region.find(mesh, hit);
         let step = normal * (gain() * (p - hit.1).dot(&normal));
-        region.vertices.iter().for_each(|&vertex| mesh.set_position(vertex, mesh.position(vertex) + step));
+        region
+            .vertices
+            .iter()
+            .for_each(|&vertex| mesh.set_position(vertex, mesh.position(vertex) + step));
         let started = Instant::now();
         for &face in &region.faces {
             // grows the boxes above as far as they do not hold it yet

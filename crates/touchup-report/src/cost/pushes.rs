@@ -56,14 +56,23 @@ pub(super) fn side_of(faces: usize) -> f64 {
 }
 
 /// A plate of `side` (m), and the samples of a raster on it.
-pub(super) fn touched_plate(faces: usize, side: f64, count: usize) -> Measured<(TriMesh, Vec<Sample>)> {
-    Ok((plate(faces, side)?, (0..count).map(|i| slide_on(side, i, 0.8 * side)).collect()))
+pub(super) fn touched_plate(
+    faces: usize,
+    side: f64,
+    count: usize,
+) -> Measured<(TriMesh, Vec<Sample>)> {
+    Ok((
+        plate(faces, side)?,
+        (0..count).map(|i| slide_on(side, i, 0.8 * side)).collect(),
+    ))
 }
 
 /// A refiner as a scene names it.
 pub(super) fn refiner_of(scene: &Scene, mesh: TriMesh) -> Measured<Refiner> {
     // the force of the slide is in the axes of the scan
-    let params = scene.refine_params(WrenchFrame::Object).ok_or(MeasureError::NothingMoves)?;
+    let params = scene
+        .refine_params(WrenchFrame::Object)
+        .ok_or(MeasureError::NothingMoves)?;
     Ok(Refiner::new(mesh, params)?)
 }
 
@@ -72,17 +81,29 @@ pub(super) fn size_cost(faces: usize, timing: Timing) -> Measured<SizeCost> {
     let (mesh, samples) = touched_plate(faces, SIDE, timing.samples())?;
     let faces = mesh.face_count();
     let (tree_build_s, tree) = timed(|| FaceTree::new(&mesh));
-    let last = samples.last().ok_or(MeasureError::NothingTimed)?.pose_ot.translation.vector;
-    tree.closest(&mesh, &last.into(), 0.01).ok_or(MeasureError::NothingTimed)?;
+    let last = samples
+        .last()
+        .ok_or(MeasureError::NothingTimed)?
+        .pose_ot
+        .translation
+        .vector;
+    tree.closest(&mesh, &last.into(), 0.01)
+        .ok_or(MeasureError::NothingTimed)?;
     drop(tree);
     let mut barest = refiner_of(&Scene::from_yaml(BAREST)?, mesh.clone())?;
     let footprint = barest.footprint();
     let mut keeping = MinimalLoop::keeping(mesh.clone());
     let mut minimal = MinimalLoop::new(mesh);
     let mut cases = [
-        TimedCase::each("hand-written loop", &samples, |sample| Ok(minimal.push(sample))),
-        TimedCase::each("the loop, keeping", &samples, |sample| Ok(keeping.push(sample))),
-        TimedCase::each("cheapest scene", &samples, |sample| Ok(barest.push(sample).map(drop)?)),
+        TimedCase::each("hand-written loop", &samples, |sample| {
+            Ok(minimal.push(sample))
+        }),
+        TimedCase::each("the loop, keeping", &samples, |sample| {
+            Ok(keeping.push(sample))
+        }),
+        TimedCase::each("cheapest scene", &samples, |sample| {
+            Ok(barest.push(sample).map(drop)?)
+        }),
     ];
     let timed = in_turns(&mut cases, timing)?;
     let per_face = |bytes: usize| bytes as f64 / faces.max(1) as f64;
@@ -126,12 +147,55 @@ fn scenes() -> Measured<Vec<(&'static str, bool, Scene)>> {
     let extra = Scene::from_yaml(&format!("{COMPENSATION}\nbias_tracking:"))?;
     Ok(vec![
         ("default", true, default()),
-        ("contact", true, Scene { contact: None, patch: None, ..default() }),
-        ("sliding", true, Scene { sliding: None, ..default() }),
-        ("carve", true, Scene { carve: None, ..default() }),
-        ("guard", true, Scene { guard: None, ..default() }),
-        ("compensation", false, Scene { compensation: extra.compensation, ..default() }),
-        ("bias_tracking", false, Scene { bias_tracking: extra.bias_tracking, ..default() }),
+        (
+            "contact",
+            true,
+            Scene {
+                contact: None,
+                patch: None,
+                ..default()
+            },
+        ),
+        (
+            "sliding",
+            true,
+            Scene {
+                sliding: None,
+                ..default()
+            },
+        ),
+        (
+            "carve",
+            true,
+            Scene {
+                carve: None,
+                ..default()
+            },
+        ),
+        (
+            "guard",
+            true,
+            Scene {
+                guard: None,
+                ..default()
+            },
+        ),
+        (
+            "compensation",
+            false,
+            Scene {
+                compensation: extra.compensation,
+                ..default()
+            },
+        ),
+        (
+            "bias_tracking",
+            false,
+            Scene {
+                bias_tracking: extra.bias_tracking,
+                ..default()
+            },
+        ),
         ("undo of strokes", false, default()),
     ])
 }
@@ -141,7 +205,9 @@ pub(super) fn part_costs(faces: usize, timing: Timing) -> Measured<Vec<PartCost>
     let (mesh, samples) = touched_plate(faces, side_of(faces), timing.samples())?;
     let faces = mesh.face_count();
     let scenes = scenes()?;
-    let refiners = scenes.iter().map(|(.., scene)| refiner_of(scene, mesh.clone()));
+    let refiners = scenes
+        .iter()
+        .map(|(.., scene)| refiner_of(scene, mesh.clone()));
     let mut refiners = refiners.collect::<Result<Vec<_>, _>>()?;
     // what can be undone is kept by the refiner alone where there is no patch
     if let Some(last) = refiners.last_mut() {
@@ -150,19 +216,29 @@ pub(super) fn part_costs(faces: usize, timing: Timing) -> Measured<Vec<PartCost>
     let each = scenes.iter().zip(&mut refiners);
     let mut cases = Vec::new();
     for ((name, ..), refiner) in each {
-        cases.push(TimedCase::each(name, &samples, |sample| Ok(refiner.push(sample).map(drop)?)));
+        cases.push(TimedCase::each(name, &samples, |sample| {
+            Ok(refiner.push(sample).map(drop)?)
+        }));
     }
     let timed = in_turns(&mut cases, timing)?;
-    let costs = scenes.iter().zip(&timed).skip(1).map(|(&(name, is_default, _), other)| {
-        let (with, without) = if is_default { (&timed[0], other) } else { (other, &timed[0]) };
-        Ok(PartCost {
-            part: name.to_owned(),
-            faces,
-            is_default,
-            with: with.per_sample()?,
-            without: without.per_sample()?,
-            cost_ns: by_block(with, without, f64::sub)?,
-        })
-    });
+    let costs = scenes
+        .iter()
+        .zip(&timed)
+        .skip(1)
+        .map(|(&(name, is_default, _), other)| {
+            let (with, without) = if is_default {
+                (&timed[0], other)
+            } else {
+                (other, &timed[0])
+            };
+            Ok(PartCost {
+                part: name.to_owned(),
+                faces,
+                is_default,
+                with: with.per_sample()?,
+                without: without.per_sample()?,
+                cost_ns: by_block(with, without, f64::sub)?,
+            })
+        });
     costs.collect()
 }

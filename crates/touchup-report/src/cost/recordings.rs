@@ -42,28 +42,58 @@ pub struct RecordingCost {
 }
 
 /// Measures scans of one size and different edges.
-pub(super) fn by_edge(effort: Effort, progress: &mut dyn FnMut(&str)) -> Measured<Vec<RecordingCost>> {
-    let edges = effort.choose(&EDGES[1..], &EDGES).iter().map(|radii| radii * RADIUS);
+pub(super) fn by_edge(
+    effort: Effort,
+    progress: &mut dyn FnMut(&str),
+) -> Measured<Vec<RecordingCost>> {
+    let edges = effort
+        .choose(&EDGES[1..], &EDGES)
+        .iter()
+        .map(|radii| radii * RADIUS);
     let faces = effort.choose(20_000, 1_000_000);
-    edges.map(|edge| recording_cost(faces, edge, effort, progress)).collect()
+    edges
+        .map(|edge| recording_cost(faces, edge, effort, progress))
+        .collect()
 }
 
 /// Measures scans of equal edges and different size.
-pub(super) fn by_faces(effort: Effort, progress: &mut dyn FnMut(&str)) -> Measured<Vec<RecordingCost>> {
-    let sizes: &[usize] = effort.choose(&[10_000, 100_000], &[10_000, 100_000, 1_000_000, 5_000_000, 10_000_000]);
-    let cases = EDGES_BY_FACES.iter().flat_map(|edge| sizes.iter().map(move |faces| (*faces, *edge)));
-    cases.map(|(faces, edge)| recording_cost(faces, edge, effort, progress)).collect()
+pub(super) fn by_faces(
+    effort: Effort,
+    progress: &mut dyn FnMut(&str),
+) -> Measured<Vec<RecordingCost>> {
+    let sizes: &[usize] = effort.choose(
+        &[10_000, 100_000],
+        &[10_000, 100_000, 1_000_000, 5_000_000, 10_000_000],
+    );
+    let cases = EDGES_BY_FACES
+        .iter()
+        .flat_map(|edge| sizes.iter().map(move |faces| (*faces, *edge)));
+    cases
+        .map(|(faces, edge)| recording_cost(faces, edge, effort, progress))
+        .collect()
 }
 
-fn recording_cost(faces: usize, edge: f64, effort: Effort, progress: &mut dyn FnMut(&str)) -> Measured<RecordingCost> {
-    progress(&format!("cost: a recording on {faces} faces, edges of {:.2} mm", edge * 1e3));
+fn recording_cost(
+    faces: usize,
+    edge: f64,
+    effort: Effort,
+    progress: &mut dyn FnMut(&str),
+) -> Measured<RecordingCost> {
+    progress(&format!(
+        "cost: a recording on {faces} faces, edges of {:.2} mm",
+        edge * 1e3
+    ));
     let side = edge * (faces as f64 / 2.0).sqrt();
     let (warm, count) = effort.choose((500, 3_000), (1_000, 20_000));
-    let samples: Vec<_> = (0..count).map(|i| noisy_slide_on(side, i, 0.8 * side)).collect();
+    let samples: Vec<_> = (0..count)
+        .map(|i| noisy_slide_on(side, i, 0.8 * side))
+        .collect();
     let scan = plate(faces, side)?;
     let faces = scan.face_count();
     let scene = Scene::default();
-    let refine = scene.refine_params(WrenchFrame::Object).ok_or(MeasureError::NothingMoves)?;
+    let refine = scene
+        .refine_params(WrenchFrame::Object)
+        .ok_or(MeasureError::NothingMoves)?;
     let copy = scan.clone();
 
     let started = Instant::now();

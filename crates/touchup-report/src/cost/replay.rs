@@ -30,27 +30,49 @@ pub struct ReplaySpeed {
 }
 
 /// Writes the recording of a slide and replays it, reading alone and through each scene.
-pub(super) fn replay_speeds((faces, side): (usize, f64), count: usize, repeats: usize) -> Measured<Vec<ReplaySpeed>> {
+pub(super) fn replay_speeds(
+    (faces, side): (usize, f64),
+    count: usize,
+    repeats: usize,
+) -> Measured<Vec<ReplaySpeed>> {
     let folder = tempfile::tempdir().map_err(MeasureError::Folder)?;
     let path = folder.path().join("slide.mcap");
     let (mesh, samples) = touched_plate(faces, side, count)?;
     let topics = Topics::default();
-    let written = write_recording(&path, &topics, "object", "stylus", samples.iter().flat_map(messages));
+    let written = write_recording(
+        &path,
+        &topics,
+        "object",
+        "stylus",
+        samples.iter().flat_map(messages),
+    );
     written.map_err(ReplayError::from)?;
     let edge_mm = side / (mesh.face_count() as f64 / 2.0).sqrt() * 1e3;
     // one after the other: each refiner of a million faces takes its part of the cache
-    let of = |scene: &Scene| refiner_of(scene, mesh.clone()).map(|refiner| (scene.sync_params(), refiner));
-    let scenes = [("cheapest", Scene::from_yaml(BAREST)?), ("default, without patch", Scene::default())];
-    let built = scenes.iter().map(|(_, scene)| of(scene)).collect::<Result<Vec<_>, _>>()?;
+    let of = |scene: &Scene| {
+        refiner_of(scene, mesh.clone()).map(|refiner| (scene.sync_params(), refiner))
+    };
+    let scenes = [
+        ("cheapest", Scene::from_yaml(BAREST)?),
+        ("default, without patch", Scene::default()),
+    ];
+    let built = scenes
+        .iter()
+        .map(|(_, scene)| of(scene))
+        .collect::<Result<Vec<_>, _>>()?;
     let mut rates = vec![Vec::new(); built.len() + 1];
     for _ in 0..repeats {
         rates[0].push(replay(&path, &topics, SyncParams::default(), |_| Ok(()))?);
         for ((sync, refiner), rates) in built.iter().zip(&mut rates[1..]) {
             let mut refiner = refiner.clone();
-            rates.push(replay(&path, &topics, *sync, |sample| Ok(refiner.push(sample).map(drop)?))?);
+            rates.push(replay(&path, &topics, *sync, |sample| {
+                Ok(refiner.push(sample).map(drop)?)
+            })?);
         }
     }
-    let names = [READING].into_iter().chain(scenes.iter().map(|(name, _)| *name));
+    let names = [READING]
+        .into_iter()
+        .chain(scenes.iter().map(|(name, _)| *name));
     let speed = |(name, rates): (&str, Vec<f64>)| {
         Ok(ReplaySpeed {
             scene: name.to_owned(),
@@ -65,8 +87,15 @@ pub(super) fn replay_speeds((faces, side): (usize, f64), count: usize, repeats: 
 
 /// The two messages of a sample.
 pub(super) fn messages(sample: &Sample) -> [Message; 2] {
-    let &Sample { stamp_ns, pose_ot, wrench } = sample;
-    [Message::Pose(StampedPose { stamp_ns, pose_ot }), Message::Wrench(StampedWrench { stamp_ns, wrench })]
+    let &Sample {
+        stamp_ns,
+        pose_ot,
+        wrench,
+    } = sample;
+    [
+        Message::Pose(StampedPose { stamp_ns, pose_ot }),
+        Message::Wrench(StampedWrench { stamp_ns, wrench }),
+    ]
 }
 
 /// Reads and pairs all, and gives each sample to `push`; returns how many there were in a second.

@@ -15,8 +15,8 @@ use touchup_core::haptic::{FaceDynamics, FaceState, RefineError};
 use touchup_core::mesh::{FaceId, FaceTree, Nearby, RefitPlan, TriMesh};
 use touchup_core::reconstruct::Patcher;
 use touchup_core::stylus::{
-    BiasTracker, Compensator, ContactEstimator, ContactEstimatorParams, ContactGate, ContactSample, Sample,
-    Synchroniser, Tip, TipMotion, TipParams, WrenchFrame,
+    BiasTracker, Compensator, ContactEstimator, ContactEstimatorParams, ContactGate, ContactSample,
+    Sample, Synchroniser, Tip, TipMotion, TipParams, WrenchFrame,
 };
 use touchup_io::recording::{RecordingWriter, Topics};
 use touchup_session::replay::ReplayError;
@@ -66,10 +66,15 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Measured<Vec<StageCos
     let (mesh, samples) = touched_plate(faces, side_of(faces), timing.samples())?;
     let tree = FaceTree::new(&mesh);
     let scene = Scene::default();
-    let params = scene.refine_params(WrenchFrame::Sensor).ok_or(MeasureError::NothingMoves)?;
+    let params = scene
+        .refine_params(WrenchFrame::Sensor)
+        .ok_or(MeasureError::NothingMoves)?;
 
     let plain = Compensator::new(params.compensator)?;
-    let tips: Vec<Tip> = samples.iter().map(|sample| plain.compensate(sample)).collect();
+    let tips: Vec<Tip> = samples
+        .iter()
+        .map(|sample| plain.compensate(sample))
+        .collect();
     let contacts = contacts_of(&samples, params.tip)?;
     let points: Vec<_> = samples.iter().map(touching).collect();
     let mut sync = Synchroniser::new(scene.sync_params())?;
@@ -81,8 +86,16 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Measured<Vec<StageCos
     let mut writer = writer.map_err(ReplayError::from)?;
     let mut patcher = Patcher::new(scene.patcher_params().ok_or(MeasureError::NothingMoves)?)?;
     let (mut last, mut nearby) = (None, Nearby::default());
-    let mut moving = Moving { mesh: mesh.clone(), tree: tree.clone(), plan: RefitPlan::default(), at: None };
-    let face = FaceState { b: Point3::origin(), n: Vector3::z() };
+    let mut moving = Moving {
+        mesh: mesh.clone(),
+        tree: tree.clone(),
+        plan: RefitPlan::default(),
+        at: None,
+    };
+    let face = FaceState {
+        b: Point3::origin(),
+        n: Vector3::z(),
+    };
 
     let mut cases = [
         TimedCase::each("sync", &samples, |sample| {
@@ -95,14 +108,20 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Measured<Vec<StageCos
             Ok(plain.compensate(black_box(sample)))
         }),
         TimedCase::each("bias tracking", &tips, |tip| {
-            Ok(bias.compensate(tip, |rest| rest.norm() < scene.contact.unwrap_or_default().free))
+            Ok(bias.compensate(tip, |rest| {
+                rest.norm() < scene.contact.unwrap_or_default().free
+            }))
         }),
-        TimedCase::each("contact gate", &tips, |tip| Ok(gate.update(tip.stamp_ns, &tip.force_o))),
+        TimedCase::each("contact gate", &tips, |tip| {
+            Ok(gate.update(tip.stamp_ns, &tip.force_o))
+        }),
         TimedCase::each("sliding and friction", &tips, |tip| {
             let ball = motion.update(tip, 1e-3, 0.03);
             Ok(motion.surface_normal(&ball, 1e-3))
         }),
-        TimedCase::each("closest face, from the root", &points, |p| Ok(tree.closest(&mesh, p, RADIUS))),
+        TimedCase::each("closest face, from the root", &points, |p| {
+            Ok(tree.closest(&mesh, p, RADIUS))
+        }),
         TimedCase::each("closest face, from the last one", &points, |p| {
             let hit = match last {
                 Some(hint) => tree.closest_nearby(&mesh, p, hint, RADIUS, &mut nearby),
@@ -113,11 +132,17 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Measured<Vec<StageCos
         }),
         TimedCase::each("face dynamics", &samples, |sample| {
             let p = Point3::new(0.0, 0.0, -0.05e-3);
-            Ok(dynamics.step(black_box(&face), &p, &sample.wrench.force, 1e-3).map_err(RefineError::from)?)
+            Ok(dynamics
+                .step(black_box(&face), &p, &sample.wrench.force, 1e-3)
+                .map_err(RefineError::from)?)
         }),
-        TimedCase::each("tree update around one face", &points, |p| Ok(moving.follow(p))),
+        TimedCase::each("tree update around one face", &points, |p| {
+            Ok(moving.follow(p))
+        }),
         TimedCase::each("recording (on a thread of its own)", &samples, |sample| {
-            let mut written = messages(sample).into_iter().map(|message| writer.write(message, "object"));
+            let mut written = messages(sample)
+                .into_iter()
+                .map(|message| writer.write(message, "object"));
             Ok(written.try_for_each(|one| one).map_err(ReplayError::from)?)
         }),
         TimedCase::each("patch: touches found and kept", &contacts, |contact| {
@@ -130,7 +155,13 @@ pub(super) fn stage_costs(faces: usize, timing: Timing) -> Measured<Vec<StageCos
     cases
         .iter()
         .zip(&timed)
-        .map(|(case, timed)| Ok(StageCost { stage: case.name.to_owned(), faces, per_sample: timed.per_sample()? }))
+        .map(|(case, timed)| {
+            Ok(StageCost {
+                stage: case.name.to_owned(),
+                faces,
+                per_sample: timed.per_sample()?,
+            })
+        })
         .collect()
 }
 
@@ -146,12 +177,20 @@ impl Moving {
     /// Brings the boxes around the face under the tip up to date, and returns that. Which face that is, and which boxes, is looked up
     /// once for a millimetre of travel, as the refiner does it once for each face.
     fn follow(&mut self, p: &Point3<f64>) -> Option<FaceId> {
-        let Self { mesh, tree, plan, at } = self;
+        let Self {
+            mesh,
+            tree,
+            plan,
+            at,
+        } = self;
         let is_far = at.is_none_or(|face| (mesh.barycentre(face) - p).norm_squared() > 1e-6);
         if is_far {
             *at = tree.closest(mesh, p, RADIUS).map(|hit| hit.face);
             let corners = at.iter().flat_map(|&face| mesh.corners(face));
-            let faces: Vec<FaceId> = corners.flat_map(|vertex| mesh.star(vertex)).copied().collect();
+            let faces: Vec<FaceId> = corners
+                .flat_map(|vertex| mesh.star(vertex))
+                .copied()
+                .collect();
             tree.plan(&faces, plan);
         }
         tree.refit_planned(mesh, plan, f64::INFINITY, 0.0);
@@ -174,10 +213,18 @@ pub(super) fn seldom_costs(faces: usize, repeats: usize) -> Measured<Vec<SeldomC
     // the first renewal takes in all that came before
     renew(&contacts[..1000]);
     let renewals = spread(contacts[1000..].chunks_exact(RENEWAL).map(renew))?;
-    let looks = spread((0..repeats.clamp(1, 3)).map(|_| timed(|| detect(&mesh, &tree, &[])).0 * 1e3))?;
-    let cost = |work: &str, time_ms| SeldomCost { work: work.to_owned(), faces, time_ms };
+    let looks =
+        spread((0..repeats.clamp(1, 3)).map(|_| timed(|| detect(&mesh, &tree, &[])).0 * 1e3))?;
+    let cost = |work: &str, time_ms| SeldomCost {
+        work: work.to_owned(),
+        faces,
+        time_ms,
+    };
     Ok(vec![
-        cost("one renewal of the patch, each 8 ms, on a thread of its own", renewals),
+        cost(
+            "one renewal of the patch, each 8 ms, on a thread of its own",
+            renewals,
+        ),
         cost("one look for features, on a thread of its own", looks),
     ])
 }

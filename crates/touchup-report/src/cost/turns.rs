@@ -16,12 +16,23 @@ pub(super) struct TimedCase<'a> {
 
 impl<'a> TimedCase<'a> {
     pub fn new(name: &'a str, run: impl FnMut(Range<usize>) -> Measured<()> + 'a) -> Self {
-        Self { name, run: Box::new(run) }
+        Self {
+            name,
+            run: Box::new(run),
+        }
     }
 
     /// Does the same with each of `items`, of which every sample has one.
-    pub fn each<T, R>(name: &'a str, items: &'a [T], mut work: impl FnMut(&'a T) -> Measured<R> + 'a) -> Self {
-        Self::new(name, move |block| items[block].iter().try_for_each(|item| work(item).map(black_box).map(drop)))
+    pub fn each<T, R>(
+        name: &'a str,
+        items: &'a [T],
+        mut work: impl FnMut(&'a T) -> Measured<R> + 'a,
+    ) -> Self {
+        Self::new(name, move |block| {
+            items[block]
+                .iter()
+                .try_for_each(|item| work(item).map(black_box).map(drop))
+        })
     }
 }
 
@@ -80,7 +91,10 @@ impl Timed {
     }
 
     pub fn per_sample(&self) -> Measured<PerSample> {
-        let share = |count: u64| self.counts.then(|| count as f64 / self.samples.max(1) as f64);
+        let share = |count: u64| {
+            self.counts
+                .then(|| count as f64 / self.samples.max(1) as f64)
+        };
         Ok(PerSample {
             time_ns: spread(self.blocks_ns.iter().copied())?,
             allocations: share(self.requests),
@@ -92,7 +106,13 @@ impl Timed {
 /// Runs all cases over the same samples: first to warm up, then block by block, another one first each time.
 pub(super) fn in_turns(cases: &mut [TimedCase], timing: Timing) -> Measured<Vec<Timed>> {
     let counts = asked().is_some();
-    let mut timed: Vec<_> = cases.iter().map(|_| Timed { counts, ..Timed::default() }).collect();
+    let mut timed: Vec<_> = cases
+        .iter()
+        .map(|_| Timed {
+            counts,
+            ..Timed::default()
+        })
+        .collect();
     for case in cases.iter_mut() {
         (case.run)(0..timing.warm)?;
     }
@@ -108,7 +128,12 @@ pub(super) fn in_turns(cases: &mut [TimedCase], timing: Timing) -> Measured<Vec<
 
 /// Block by block, the first compared with the second: their ratio, or their difference in ns.
 pub(super) fn by_block(of: &Timed, to: &Timed, compare: fn(f64, f64) -> f64) -> Measured<Spread> {
-    spread(of.blocks_ns.iter().zip(&to.blocks_ns).map(|(of, to)| compare(*of, *to)))
+    spread(
+        of.blocks_ns
+            .iter()
+            .zip(&to.blocks_ns)
+            .map(|(of, to)| compare(*of, *to)),
+    )
 }
 
 /// Of what was timed.
@@ -135,19 +160,49 @@ mod tests {
                 Ok(())
             }),
         ];
-        let timing = Timing { warm: 3, blocks: 4, block: 2 };
+        let timing = Timing {
+            warm: 3,
+            blocks: 4,
+            block: 2,
+        };
         let timed = in_turns(&mut cases, timing).unwrap();
-        assert_eq!(timed.iter().map(|timed| (timed.blocks_ns.len(), timed.samples)).collect::<Vec<_>>(), [(4, 8); 2]);
+        assert_eq!(
+            timed
+                .iter()
+                .map(|timed| (timed.blocks_ns.len(), timed.samples))
+                .collect::<Vec<_>>(),
+            [(4, 8); 2]
+        );
         drop(cases);
-        assert_eq!((first, second), ((0..11).collect(), (0..11).collect::<Vec<_>>()));
+        assert_eq!(
+            (first, second),
+            ((0..11).collect(), (0..11).collect::<Vec<_>>())
+        );
     }
 
     #[test]
     fn ratios_and_differences_are_of_blocks_side_by_side() {
-        let of = |blocks_ns: &[f64]| Timed { blocks_ns: blocks_ns.to_vec(), ..Timed::default() };
+        let of = |blocks_ns: &[f64]| Timed {
+            blocks_ns: blocks_ns.to_vec(),
+            ..Timed::default()
+        };
         let (slow, fast) = (of(&[300.0, 20.0, 100.0]), of(&[100.0, 10.0, 100.0]));
-        assert_eq!(by_block(&slow, &fast, f64::div).unwrap(), Spread { median: 2.0, p10: 1.0, p90: 3.0 });
-        assert_eq!(by_block(&slow, &fast, f64::sub).unwrap(), Spread { median: 10.0, p10: 0.0, p90: 200.0 });
+        assert_eq!(
+            by_block(&slow, &fast, f64::div).unwrap(),
+            Spread {
+                median: 2.0,
+                p10: 1.0,
+                p90: 3.0
+            }
+        );
+        assert_eq!(
+            by_block(&slow, &fast, f64::sub).unwrap(),
+            Spread {
+                median: 10.0,
+                p10: 0.0,
+                p90: 200.0
+            }
+        );
         assert_eq!(slow.per_sample().unwrap().allocations, None);
     }
 }

@@ -46,7 +46,10 @@ names! {
 impl CoverageKind {
     /// Whether it is of the vertices.
     pub fn is_of_vertices(self) -> bool {
-        matches!(self, Self::PlaneVertex | Self::EdgeVertex | Self::RimVertex | Self::InterpolatedVertex)
+        matches!(
+            self,
+            Self::PlaneVertex | Self::EdgeVertex | Self::RimVertex | Self::InterpolatedVertex
+        )
     }
 
     /// Demanded share of numbers within 1.96 standard deviations; `None`: their root mean square is what counts.

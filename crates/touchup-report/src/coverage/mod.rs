@@ -78,7 +78,12 @@ impl KindInWorld {
 
     /// Mean of their errors, m.
     pub fn mean_error(&self) -> Option<f64> {
-        mean(self.numbers.iter().filter(|number| number.score().is_some()).map(|number| number.error))
+        mean(
+            self.numbers
+                .iter()
+                .filter(|number| number.score().is_some())
+                .map(|number| number.error),
+        )
     }
 
     /// Root mean square of error over stated standard deviation; 1 where the statement holds.
@@ -88,19 +93,28 @@ impl KindInWorld {
 
     /// Share of the numbers within 1.96 stated standard deviations of the truth.
     pub fn share_within(&self) -> Option<f64> {
-        mean(self.scores().map(|score| f64::from(u8::from(score.abs() <= SIGMAS_95))))
+        mean(
+            self.scores()
+                .map(|score| f64::from(u8::from(score.abs() <= SIGMAS_95))),
+        )
     }
 
     /// How many are lower bounds, and how many of these the truth contradicts.
     pub fn bounds(&self) -> [usize; 2] {
         let bounds = || self.numbers.iter().filter(|number| number.is_at_least);
-        [bounds().count(), bounds().filter(|bound| bound.contradicts()).count()]
+        [
+            bounds().count(),
+            bounds().filter(|bound| bound.contradicts()).count(),
+        ]
     }
 
     /// Whether the statements hold as well as is demanded; `None` where there is none.
     pub fn holds(&self) -> Option<bool> {
         let rms = self.rms_score()?;
-        let is_enough = self.kind.least_within().is_none_or(|least| self.share_within() >= Some(least));
+        let is_enough = self
+            .kind
+            .least_within()
+            .is_none_or(|least| self.share_within() >= Some(least));
         Some((HONEST[0]..=HONEST[1]).contains(&rms) && is_enough)
     }
 }
@@ -114,15 +128,29 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 pub fn coverage(params: CoverageParams, progress: &mut dyn FnMut(&str)) -> Coverage {
     let (mut kinds, mut failed) = (Vec::new(), Vec::new());
     for &world in &params.worlds {
-        let mut of_world = CoverageKind::ALL.map(|kind| KindInWorld { world, kind, numbers: Vec::new() });
+        let mut of_world = CoverageKind::ALL.map(|kind| KindInWorld {
+            world,
+            kind,
+            numbers: Vec::new(),
+        });
         for seed in params.seeds.clone() {
             progress(&format!("coverage: {}, seed {seed}", world.name()));
             match case::run(world, seed, params.longest) {
-                Ok(found) => found.into_iter().for_each(|(kind, number)| of_world[kind as usize].numbers.push(number)),
+                Ok(found) => found
+                    .into_iter()
+                    .for_each(|(kind, number)| of_world[kind as usize].numbers.push(number)),
                 Err(error) => failed.push(format!("{}, seed {seed}: {error}", world.name())),
             }
         }
-        kinds.extend(of_world.into_iter().filter(|of_kind| !of_kind.numbers.is_empty()));
+        kinds.extend(
+            of_world
+                .into_iter()
+                .filter(|of_kind| !of_kind.numbers.is_empty()),
+        );
     }
-    Coverage { params, kinds, failed }
+    Coverage {
+        params,
+        kinds,
+        failed,
+    }
 }

@@ -15,17 +15,37 @@ impl Coverage {
     /// As a part of the report.
     pub fn chapter(&self) -> Chapter {
         let mut text = vec![self.introduction()];
-        text.extend(self.failed.iter().map(|reason| format!("Not run: {reason}.")));
+        text.extend(
+            self.failed
+                .iter()
+                .map(|reason| format!("Not run: {reason}.")),
+        );
         let figures = vec![
             self.figure("coverage_rms"),
-            self.curves("coverage_vertices", "vertices", CoverageKind::is_of_vertices),
-            self.curves("coverage_features", "features", |kind| !kind.is_of_vertices()),
+            self.curves(
+                "coverage_vertices",
+                "vertices",
+                CoverageKind::is_of_vertices,
+            ),
+            self.curves("coverage_features", "features", |kind| {
+                !kind.is_of_vertices()
+            }),
         ];
-        Chapter::of("Coverage: errors over stated uncertainties", text, figures, vec![self.table()])
+        Chapter::of(
+            "Coverage: errors over stated uncertainties",
+            text,
+            figures,
+            vec![self.table()],
+        )
     }
 
     fn introduction(&self) -> String {
-        let worlds: Vec<&str> = self.params.worlds.iter().map(|world| world.name()).collect();
+        let worlds: Vec<&str> = self
+            .params
+            .worlds
+            .iter()
+            .map(|world| world.name())
+            .collect();
         format!(
             "A plate with two holes, a slot, a boss and a step, scanned and touched in the simulated worlds {}, seeds {} to {} of each. \
              A world draws tip, bending, clocks, tare, friction, sensors, scan and hand; the program is told what a calibration leaves, \
@@ -42,10 +62,21 @@ impl Coverage {
     pub fn outside(&self) -> Vec<String> {
         let line = |of: &KindInWorld| {
             let rms = three_digits(of.rms_score()?);
-            let within = of.share_within().map_or_else(String::new, |share| format!(", {:.0} % within", share * 100.0));
-            Some(format!("{} in {} ({rms}{within}, n {})", of.kind.name(), of.world.name(), of.count()))
+            let within = of.share_within().map_or_else(String::new, |share| {
+                format!(", {:.0} % within", share * 100.0)
+            });
+            Some(format!(
+                "{} in {} ({rms}{within}, n {})",
+                of.kind.name(),
+                of.world.name(),
+                of.count()
+            ))
         };
-        self.kinds.iter().filter(|of| of.holds() == Some(false)).filter_map(line).collect()
+        self.kinds
+            .iter()
+            .filter(|of| of.holds() == Some(false))
+            .filter_map(line)
+            .collect()
     }
 
     fn table(&self) -> Table {
@@ -74,33 +105,58 @@ impl Coverage {
     /// Root mean square of each kind, one series a world.
     fn figure(&self, id: &str) -> Figure {
         let worlds = self.params.worlds.iter().map(|&world| {
-            let marks = self.of(world).filter_map(|of| Some(Mark::at(of.kind as usize as f64 + 1.0, of.rms_score()?)));
+            let marks = self
+                .of(world)
+                .filter_map(|of| Some(Mark::at(of.kind as usize as f64 + 1.0, of.rms_score()?)));
             Series::new(world.name(), LineStroke::Marks, marks)
         });
         let ends = [0.5, CoverageKind::ALL.len() as f64 + 0.5];
-        let band =
-            HONEST.map(|level| Series::new(three_digits(level), LineStroke::Dashed, ends.map(|x| Mark::at(x, level))));
-        let names = CoverageKind::ALL.iter().enumerate().map(|(i, kind)| format!("{} {}", i + 1, kind.name()));
+        let band = HONEST.map(|level| {
+            Series::new(
+                three_digits(level),
+                LineStroke::Dashed,
+                ends.map(|x| Mark::at(x, level)),
+            )
+        });
+        let names = CoverageKind::ALL
+            .iter()
+            .enumerate()
+            .map(|(i, kind)| format!("{} {}", i + 1, kind.name()));
         Figure::of(id, Drawing::Curves(worlds.chain(band).collect()))
             .title("Root mean square of error over stated standard deviation")
-            .axes(Axis::linear("kind of number", "kind"), Axis::log("rms of error / stated std", "rms_score"))
-            .caption(format!("Dashed: the demanded band. Kinds: {}.", names.collect::<Vec<_>>().join(", ")))
+            .axes(
+                Axis::linear("kind of number", "kind"),
+                Axis::log("rms of error / stated std", "rms_score"),
+            )
+            .caption(format!(
+                "Dashed: the demanded band. Kinds: {}.",
+                names.collect::<Vec<_>>().join(", ")
+            ))
     }
 
     /// How large a share of the numbers is within so many standard deviations.
     fn curves(&self, id: &str, what: &str, is_meant: fn(CoverageKind) -> bool) -> Figure {
         let at = |i: usize| LARGEST_SCORE * i as f64 / MARKS as f64;
         let worlds = self.params.worlds.iter().filter_map(|&world| {
-            let mut scores: Vec<f64> =
-                self.of(world).filter(|of| is_meant(of.kind)).flat_map(KindInWorld::scores).map(f64::abs).collect();
+            let mut scores: Vec<f64> = self
+                .of(world)
+                .filter(|of| is_meant(of.kind))
+                .flat_map(KindInWorld::scores)
+                .map(f64::abs)
+                .collect();
             scores.sort_by(f64::total_cmp);
-            let share = |x: f64| scores.partition_point(|score| *score <= x) as f64 / scores.len() as f64;
+            let share =
+                |x: f64| scores.partition_point(|score| *score <= x) as f64 / scores.len() as f64;
             let marks = (0..=MARKS).map(|i| Mark::at(at(i), share(at(i))));
             (!scores.is_empty()).then(|| Series::new(world.name(), LineStroke::Joined, marks))
         });
         let scaled = HONEST.into_iter().chain([1.0]).map(|factor| {
             let marks = (0..=MARKS).map(|i| Mark::at(at(i), normal_within(at(i) / factor)));
-            Series::new(format!("normal, rms {}", three_digits(factor)), LineStroke::Dashed, marks)
+            Series::new(
+                format!("normal, rms {}", three_digits(factor)),
+                LineStroke::Dashed,
+                marks,
+            )
         });
         let series = worlds.chain(scaled).collect();
         Figure::of(id, Drawing::Curves(series))
@@ -130,5 +186,9 @@ fn normal_within(x: f64) -> f64 {
         }
     };
     let step = x / parts as f64;
-    (0..=parts).map(|i| weight(i) * density(i as f64 * step)).sum::<f64>() * step / 3.0
+    (0..=parts)
+        .map(|i| weight(i) * density(i as f64 * step))
+        .sum::<f64>()
+        * step
+        / 3.0
 }

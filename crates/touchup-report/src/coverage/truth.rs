@@ -18,7 +18,11 @@ const SAME: f64 = 2e-3;
 const PARALLEL: f64 = 0.9;
 
 /// The kind of a vertex; `None` for those of the scan, and where no ball reaches.
-pub(super) fn vertex_kind(p: &Point3<f64>, support: Support, plate: &Plate) -> Option<CoverageKind> {
+pub(super) fn vertex_kind(
+    p: &Point3<f64>,
+    support: Support,
+    plate: &Plate,
+) -> Option<CoverageKind> {
     match support {
         Support::Scan | Support::Unreachable => None,
         Support::Guessed => Some(CoverageKind::InterpolatedVertex),
@@ -26,12 +30,22 @@ pub(super) fn vertex_kind(p: &Point3<f64>, support: Support, plate: &Plate) -> O
             let on_part = plate.closest(p).point;
             let mut near = Vec::new();
             plate.near(&on_part, NEAR_EDGE, &mut near);
-            let is_sharp = near.iter().any(|a| near.iter().any(|b| a.normal.dot(&b.normal) < SHARP));
-            Some(match (is_sharp, plate.features().iter().any(|feature| is_at_opening(feature, &on_part))) {
-                (false, _) => CoverageKind::PlaneVertex,
-                (true, false) => CoverageKind::EdgeVertex,
-                (true, true) => CoverageKind::RimVertex,
-            })
+            let is_sharp = near
+                .iter()
+                .any(|a| near.iter().any(|b| a.normal.dot(&b.normal) < SHARP));
+            Some(
+                match (
+                    is_sharp,
+                    plate
+                        .features()
+                        .iter()
+                        .any(|feature| is_at_opening(feature, &on_part)),
+                ) {
+                    (false, _) => CoverageKind::PlaneVertex,
+                    (true, false) => CoverageKind::EdgeVertex,
+                    (true, true) => CoverageKind::RimVertex,
+                },
+            )
         }
     }
 }
@@ -41,9 +55,17 @@ fn is_at_opening(feature: &TruthFeature, p: &Point3<f64>) -> bool {
     let off = p - feature.centre;
     let (radius, spine) = match feature.shape {
         TruthShape::Hole { diameter, .. } => (diameter / 2.0, Vector3::zeros()),
-        TruthShape::Slot { width, length, direction, .. } => {
+        TruthShape::Slot {
+            width,
+            length,
+            direction,
+            ..
+        } => {
             let reach = (length - width) / 2.0;
-            (width / 2.0, direction * off.dot(&direction).clamp(-reach, reach))
+            (
+                width / 2.0,
+                direction * off.dot(&direction).clamp(-reach, reach),
+            )
         }
         TruthShape::Boss { .. } | TruthShape::Step { .. } => return false,
     };
@@ -51,29 +73,57 @@ fn is_at_opening(feature: &TruthFeature, p: &Point3<f64>) -> bool {
 }
 
 /// The numbers of a found feature beside those of the true one; none where it is no feature of the plate.
-pub(super) fn feature_numbers(feature: &Feature, plate: &Plate) -> Vec<(CoverageKind, StatedNumber)> {
+pub(super) fn feature_numbers(
+    feature: &Feature,
+    plate: &Plate,
+) -> Vec<(CoverageKind, StatedNumber)> {
     let mut numbers = match feature.kind {
-        Kind::Hole | Kind::Slot | Kind::Boss => plate.features().iter().find_map(|truth| of_walls(feature, truth)),
+        Kind::Hole | Kind::Slot | Kind::Boss => plate
+            .features()
+            .iter()
+            .find_map(|truth| of_walls(feature, truth)),
         Kind::Plane => of_plane(feature, plate),
         Kind::Edge => of_edge(feature, plate),
         Kind::Pocket | Kind::Corner | Kind::Cylinder | Kind::Notch => None,
     }
     .unwrap_or_default();
     if feature.fitted_to == FittedTo::Mesh {
-        numbers.iter_mut().for_each(|(kind, _)| *kind = CoverageKind::OfMesh);
+        numbers
+            .iter_mut()
+            .for_each(|(kind, _)| *kind = CoverageKind::OfMesh);
     }
     numbers
 }
 
 fn stated(kind: CoverageKind, found: &Measured<f64>, truth: f64) -> (CoverageKind, StatedNumber) {
     let (error, std) = (found.value - truth, found.std.unwrap_or(0.0));
-    (kind, StatedNumber { error, std, is_at_least: found.is_at_least })
+    (
+        kind,
+        StatedNumber {
+            error,
+            std,
+            is_at_least: found.is_at_least,
+        },
+    )
 }
 
 /// Both directions across an axis: their standard deviations make up the stated one, √(σ₁² + σ₂²).
-fn across(kind: CoverageKind, off: Vector2<f64>, centre: &Measured<Point3<f64>>) -> [(CoverageKind, StatedNumber); 2] {
+fn across(
+    kind: CoverageKind,
+    off: Vector2<f64>,
+    centre: &Measured<Point3<f64>>,
+) -> [(CoverageKind, StatedNumber); 2] {
     let std = centre.std.unwrap_or(0.0) / 2f64.sqrt();
-    [off.x, off.y].map(|error| (kind, StatedNumber { error, std, is_at_least: centre.is_at_least }))
+    [off.x, off.y].map(|error| {
+        (
+            kind,
+            StatedNumber {
+                error,
+                std,
+                is_at_least: centre.is_at_least,
+            },
+        )
+    })
 }
 
 fn of_walls(feature: &Feature, truth: &TruthFeature) -> Option<Vec<(CoverageKind, StatedNumber)>> {
@@ -84,11 +134,29 @@ fn of_walls(feature: &Feature, truth: &TruthFeature) -> Option<Vec<(CoverageKind
         return None;
     }
     let (place, sizes) = match (feature.kind, truth.shape) {
-        (Kind::Hole, TruthShape::Hole { diameter, depth, through }) => {
+        (
+            Kind::Hole,
+            TruthShape::Hole {
+                diameter,
+                depth,
+                through,
+            },
+        ) => {
             let depth = (!through).then_some((K::HoleDepth, &feature.depth, depth));
-            (K::HolePosition, vec![Some((K::HoleDiameter, &feature.diameter, diameter)), depth])
+            (
+                K::HolePosition,
+                vec![Some((K::HoleDiameter, &feature.diameter, diameter)), depth],
+            )
         }
-        (Kind::Slot, TruthShape::Slot { width, length, depth, .. }) => {
+        (
+            Kind::Slot,
+            TruthShape::Slot {
+                width,
+                length,
+                depth,
+                ..
+            },
+        ) => {
             let sizes = [
                 (K::SlotWidth, &feature.width, width),
                 (K::SlotLength, &feature.length, length),
@@ -97,14 +165,22 @@ fn of_walls(feature: &Feature, truth: &TruthFeature) -> Option<Vec<(CoverageKind
             (K::SlotPosition, sizes.map(Some).to_vec())
         }
         (Kind::Boss, TruthShape::Boss { diameter, height }) => {
-            let sizes = [(K::BossDiameter, &feature.diameter, diameter), (K::BossHeight, &feature.depth, height)];
+            let sizes = [
+                (K::BossDiameter, &feature.diameter, diameter),
+                (K::BossHeight, &feature.depth, height),
+            ];
             (K::BossPosition, sizes.map(Some).to_vec())
         }
         _ => return None,
     };
     let sizes = sizes.into_iter().flatten();
     let sizes = sizes.filter_map(|(kind, found, truth)| Some(stated(kind, found.as_ref()?, truth)));
-    Some(across(place, off, &feature.centre).into_iter().chain(sizes).collect())
+    Some(
+        across(place, off, &feature.centre)
+            .into_iter()
+            .chain(sizes)
+            .collect(),
+    )
 }
 
 /// The true surface at its middle, along its normal.
@@ -112,9 +188,21 @@ fn of_plane(feature: &Feature, plate: &Plate) -> Option<Vec<(CoverageKind, State
     let (centre, normal) = (&feature.centre, feature.axis.as_ref()?.value);
     let mut near = Vec::new();
     plate.near(&centre.value, SAME, &mut near);
-    let on_part = near.iter().find(|place| place.normal.dot(&normal) > PARALLEL)?;
-    let (error, std) = ((centre.value - on_part.point).dot(&on_part.normal), centre.std.unwrap_or(0.0));
-    Some(vec![(CoverageKind::PlanePosition, StatedNumber { error, std, is_at_least: false })])
+    let on_part = near
+        .iter()
+        .find(|place| place.normal.dot(&normal) > PARALLEL)?;
+    let (error, std) = (
+        (centre.value - on_part.point).dot(&on_part.normal),
+        centre.std.unwrap_or(0.0),
+    );
+    Some(vec![(
+        CoverageKind::PlanePosition,
+        StatedNumber {
+            error,
+            std,
+            is_at_least: false,
+        },
+    )])
 }
 
 /// The true edge at its middle, where two sides meet.

@@ -21,22 +21,39 @@ pub(super) type CaseOutcome<E> = Result<(String, bool), E>;
 impl Extreme {
     /// Begins one with what is fed.
     pub(super) fn fed(fed: &str) -> Self {
-        Self { fed: fed.to_owned(), ..Self::default() }
+        Self {
+            fed: fed.to_owned(),
+            ..Self::default()
+        }
     }
 
     /// The right answer, and why.
     pub(super) fn should(self, right_answer: &str) -> Self {
-        Self { right_answer: right_answer.to_owned(), ..self }
+        Self {
+            right_answer: right_answer.to_owned(),
+            ..self
+        }
     }
 
     /// What came out.
     pub(super) fn gave<E: Display>(self, outcome: CaseOutcome<E>) -> Self {
-        let (came_out, is_right) = outcome.unwrap_or_else(|error| (format!("refused: {error}"), false));
-        Self { came_out, is_right, ..self }
+        let (came_out, is_right) =
+            outcome.unwrap_or_else(|error| (format!("refused: {error}"), false));
+        Self {
+            came_out,
+            is_right,
+            ..self
+        }
     }
 }
 
 /// What should be refused with a certain error.
-pub(super) fn refused<T, E: Display>(result: Result<T, E>, is_right: impl Fn(&E) -> bool) -> CaseOutcome<E> {
-    Ok(result.map_or_else(|error| (format!("refused: {error}"), is_right(&error)), |_| ("taken".to_owned(), false)))
+pub(super) fn refused<T, E: Display>(
+    result: Result<T, E>,
+    is_right: impl Fn(&E) -> bool,
+) -> CaseOutcome<E> {
+    Ok(result.map_or_else(
+        |error| (format!("refused: {error}"), is_right(&error)),
+        |_| ("taken".to_owned(), false),
+    ))
 }

@@ -10,14 +10,21 @@ const H_MIN: f64 = 0.5e-3;
 const F_MAX: f64 = 10.0;
 const ALPHA: f64 = 0.1;
 const DELTA: f64 = 5.0;
-const UP: FaceState = FaceState { b: Point3::new(0.0, 0.0, 0.0), n: Vector3::new(0.0, 0.0, 1.0) };
+const UP: FaceState = FaceState {
+    b: Point3::new(0.0, 0.0, 0.0),
+    n: Vector3::new(0.0, 0.0, 1.0),
+};
 
 fn robust() -> DynamicsParams {
     DynamicsParams::default()
 }
 
 fn paper() -> DynamicsParams {
-    DynamicsParams { along: Along::InitialNormal, take_out_rigid_offset: false, ..DynamicsParams::default() }
+    DynamicsParams {
+        along: Along::InitialNormal,
+        take_out_rigid_offset: false,
+        ..DynamicsParams::default()
+    }
 }
 
 type Stepped = Result<FaceState, DynamicsError>;
@@ -35,7 +42,11 @@ fn pressed(params: DynamicsParams, h: f64, force: f64, dt: f64) -> Stepped {
 /// In words, with what must hold of it.
 fn outcome(stepped: Stepped, is_right: impl Fn(&FaceState) -> bool) -> CaseOutcome<DynamicsError> {
     let face = stepped?;
-    let words = format!("b at {:.4e} m along the normal, normal turned by {:.1e} rad", face.b.z, turned(&face));
+    let words = format!(
+        "b at {:.4e} m along the normal, normal turned by {:.1e} rad",
+        face.b.z,
+        turned(&face)
+    );
     Ok((words, is_right(&face)))
 }
 
@@ -59,19 +70,32 @@ pub(super) fn rows() -> Vec<Extreme> {
 fn refusals() -> Vec<Extreme> {
     let is_not_finite = |error: &DynamicsError| matches!(error, DynamicsError::NotFinite { .. });
     let why = "a refusal that names it: a NaN or an infinity that is let in never goes away";
-    let no_normal = FaceState { n: Vector3::zeros(), ..UP };
-    let no_normal = FaceDynamics::new(robust())
-        .and_then(|dynamics| dynamics.step(&no_normal, &Point3::new(0.0, 0.0, 1e-3), &(2.0 * UP.n), 1e-3));
+    let no_normal = FaceState {
+        n: Vector3::zeros(),
+        ..UP
+    };
+    let no_normal = FaceDynamics::new(robust()).and_then(|dynamics| {
+        dynamics.step(
+            &no_normal,
+            &Point3::new(0.0, 0.0, 1e-3),
+            &(2.0 * UP.n),
+            1e-3,
+        )
+    });
     vec![
-        Extreme::fed("a force with a NaN")
-            .should(why)
-            .gave(refused(step(robust(), 1e-3, [0.0, f64::NAN, 1.0], 1e-3), is_not_finite)),
-        Extreme::fed("a tip at infinity")
-            .should(why)
-            .gave(refused(pressed(robust(), f64::INFINITY, 2.0, 1e-3), is_not_finite)),
+        Extreme::fed("a force with a NaN").should(why).gave(refused(
+            step(robust(), 1e-3, [0.0, f64::NAN, 1.0], 1e-3),
+            is_not_finite,
+        )),
+        Extreme::fed("a tip at infinity").should(why).gave(refused(
+            pressed(robust(), f64::INFINITY, 2.0, 1e-3),
+            is_not_finite,
+        )),
         Extreme::fed("a face without a normal")
             .should("a refusal: without a direction there is nothing to move along")
-            .gave(refused(no_normal, |error| matches!(error, DynamicsError::NotUnit { .. }))),
+            .gave(refused(no_normal, |error| {
+                matches!(error, DynamicsError::NotUnit { .. })
+            })),
         Extreme::fed("a step of -1 ms")
             .should("a refusal: time does not run backward")
             .gave(refused(pressed(robust(), 1e-3, 2.0, -1e-3), |error| {
@@ -85,7 +109,10 @@ fn forces_and_depths() -> Vec<Extreme> {
     let grown = 7.0 + 7f64.exp() + ALPHA * F_MAX * 1.0 / H_MIN;
     let u = (0..50).fold(8.0, |u: f64, _| (grown - u).ln());
     let pushed = -(u - 7.0) * H_MIN;
-    let turning = DynamicsParams { alpha_m_per_n_s: 0.0, ..paper() };
+    let turning = DynamicsParams {
+        alpha_m_per_n_s: 0.0,
+        ..paper()
+    };
     let far = 1e9 * H_MIN;
     vec![
         Extreme::fed("no force, tip 1 mm above the face, 1 s, rule as printed")
@@ -163,10 +190,19 @@ fn times_and_places() -> Vec<Extreme> {
 fn far_away() -> CaseOutcome<DynamicsError> {
     let far = 1e6;
     let from = |shift: Vector3<f64>| -> Result<Point3<f64>, DynamicsError> {
-        let face = FaceState { b: UP.b + shift, ..UP };
+        let face = FaceState {
+            b: UP.b + shift,
+            ..UP
+        };
         let tip = Point3::new(1e-4, 0.0, 1e-3) + shift;
-        Ok(FaceDynamics::new(robust())?.step(&face, &tip, &Vector3::new(0.5, 0.3, 2.0), 5e-3)?.b - shift)
+        Ok(FaceDynamics::new(robust())?
+            .step(&face, &tip, &Vector3::new(0.5, 0.3, 2.0), 5e-3)?
+            .b
+            - shift)
     };
     let off = (from(Vector3::new(far, -far, far))? - from(Vector3::zeros())?).norm();
-    Ok((format!("{off:.1e} m from the same step at the origin"), off <= 8.0 * far * f64::EPSILON))
+    Ok((
+        format!("{off:.1e} m from the same step at the origin"),
+        off <= 8.0 * far * f64::EPSILON,
+    ))
 }

@@ -38,14 +38,20 @@ fn plain() -> Shape {
 }
 
 fn refiner((positions, faces): Shape) -> Result<Refiner, RefineError> {
-    let tip = TipParams { radius: RADIUS, stiffness: Some(STIFFNESS) };
+    let tip = TipParams {
+        radius: RADIUS,
+        stiffness: Some(STIFFNESS),
+    };
     Refiner::new(TriMesh::new(positions, faces)?, RefineParams::robust(tip))
 }
 
 /// A ball at rest under `force`, its lowest point at `point` where nothing bends.
 fn sample(tick: i64, point: Point3<f64>, radius: f64, force: Vector3<f64>) -> Sample {
     let reported = point + Vector3::z() * radius - force / STIFFNESS;
-    let wrench = Wrench { force, torque: Vector3::zeros() };
+    let wrench = Wrench {
+        force,
+        torque: Vector3::zeros(),
+    };
     Sample {
         stamp_ns: tick * MILLISECOND_NS,
         pose_ot: Isometry3::translation(reported.x, reported.y, reported.z),
@@ -64,12 +70,20 @@ fn over(z: f64) -> Point3<f64> {
 
 /// Presses for one second where the true surface is `depth` below the scan: how far down the surface is then, m, and whether
 /// the mesh is sound (all finite, no face turned over) and down to it within a fifth of the depth.
-fn press(refiner: &mut Refiner, point: Point3<f64>, radius: f64, depth: f64) -> Result<(f64, bool), RefineError> {
+fn press(
+    refiner: &mut Refiner,
+    point: Point3<f64>,
+    radius: f64,
+    depth: f64,
+) -> Result<(f64, bool), RefineError> {
     for tick in 1..=1000 {
         refiner.push(&sample(tick, point, radius, down()))?;
     }
     let mesh = refiner.mesh();
-    let is_sound = mesh.positions().iter().all(|p| p.iter().all(|x| x.is_finite()))
+    let is_sound = mesh
+        .positions()
+        .iter()
+        .all(|p| p.iter().all(|x| x.is_finite()))
         && mesh.faces().all(|(face, _)| mesh.normal(face).z >= 0.0);
     let hit = refiner.closest_face(&Point3::new(point.x, point.y, 0.0), 1.0);
     let found = hit.map_or(f64::NAN, |hit| -hit.point.z);
@@ -80,14 +94,27 @@ fn press(refiner: &mut Refiner, point: Point3<f64>, radius: f64, depth: f64) -> 
 fn pressed(shape: Shape, [x, y]: [f64; 2]) -> Outcome {
     let mut refiner = refiner(shape)?;
     let (depth, is_right) = press(&mut refiner, Point3::new(x, y, -DEPTH), RADIUS, DEPTH)?;
-    Ok((format!("surface {:.1} um down, {} updates cut back", 1e6 * depth, refiner.counts().cut_back), is_right))
+    Ok((
+        format!(
+            "surface {:.1} um down, {} updates cut back",
+            1e6 * depth,
+            refiner.counts().cut_back
+        ),
+        is_right,
+    ))
 }
 
 /// A refused sample leaves every bit of the mesh.
-fn unchanged(mut refiner: Refiner, bad: &Sample, is_right: impl Fn(&RefineError) -> bool) -> Outcome {
+fn unchanged(
+    mut refiner: Refiner,
+    bad: &Sample,
+    is_right: impl Fn(&RefineError) -> bool,
+) -> Outcome {
     let before = refiner.mesh().positions().to_vec();
     let pushed = refiner.push(bad).map(drop);
-    refused(pushed, |error| is_right(error) && refiner.mesh().positions() == before)
+    refused(pushed, |error| {
+        is_right(error) && refiner.mesh().positions() == before
+    })
 }
 
 fn is_absurd(error: &RefineError) -> bool {
@@ -102,14 +129,19 @@ fn samples() -> Vec<Extreme> {
     // after a good one
     let bad = |change: fn(&mut Sample), is_right: fn(&RefineError) -> bool| -> Outcome {
         let good = sample(5, over(-DEPTH), RADIUS, down());
-        let mut bad = Sample { stamp_ns: 6 * MILLISECOND_NS, ..good };
+        let mut bad = Sample {
+            stamp_ns: 6 * MILLISECOND_NS,
+            ..good
+        };
         change(&mut bad);
         let mut refiner = refiner(plain())?;
         refiner.push(&good)?;
         unchanged(refiner, &bad, is_right)
     };
-    let is_not_finite = |error: &RefineError| matches!(error, RefineError::Sample(SampleError::NotFinite { .. }));
-    let is_late = |error: &RefineError| matches!(error, RefineError::Sample(SampleError::NotAfter { .. }));
+    let is_not_finite =
+        |error: &RefineError| matches!(error, RefineError::Sample(SampleError::NotFinite { .. }));
+    let is_late =
+        |error: &RefineError| matches!(error, RefineError::Sample(SampleError::NotAfter { .. }));
     let kept = "a refusal that names it, and not one bit of the mesh changed";
     vec![
         Extreme::fed("a sample with a NaN").should(kept).gave(bad(|bad| bad.wrench.force.y = f64::NAN, is_not_finite)),
@@ -141,7 +173,13 @@ fn unmoved(force: Vector3<f64>) -> Outcome {
     for tick in 1..=1000 {
         refiner.push(&sample(tick, over(1e-3), RADIUS, force))?;
     }
-    let moved = refiner.mesh().positions().iter().zip(&before).filter(|(p, q)| p != q).count();
+    let moved = refiner
+        .mesh()
+        .positions()
+        .iter()
+        .zip(&before)
+        .filter(|(p, q)| p != q)
+        .count();
     Ok((format!("{moved} vertices moved"), moved == 0))
 }
 
@@ -154,8 +192,15 @@ fn paused() -> Outcome {
         Ok(refiner.mesh().positions().to_vec())
     };
     let (short, long) = (run(30)?, run(10_000)?);
-    let off = short.iter().zip(&long).map(|(p, q)| (p - q).norm()).fold(0.0, f64::max);
-    Ok((format!("{off:.1e} m from what a pause of 30 ms does"), off <= 1e-9))
+    let off = short
+        .iter()
+        .zip(&long)
+        .map(|(p, q)| (p - q).norm())
+        .fold(0.0, f64::max);
+    Ok((
+        format!("{off:.1e} m from what a pause of 30 ms does"),
+        off <= 1e-9,
+    ))
 }
 
 fn shapes_and_sizes() -> Vec<Extreme> {
@@ -163,10 +208,16 @@ fn shapes_and_sizes() -> Vec<Extreme> {
     // one vertex more, and a face of it with two others
     let with = |corner: Point3<f64>, [a, b]: [u32; 2]| {
         let added = [a, b, positions.len() as u32];
-        ([&positions[..], &[corner]].concat(), [&faces[..], &[added]].concat())
+        (
+            [&positions[..], &[corner]].concat(),
+            [&faces[..], &[added]].concat(),
+        )
     };
     // a face of one edge, laid along a side in the middle; a fin on an edge of two faces
-    let flat = with(positions[24] + (positions[25] - positions[24]) * 0.5, [24, 25]);
+    let flat = with(
+        positions[24] + (positions[25] - positions[24]) * 0.5,
+        [24, 25],
+    );
     let fin = with(positions[17] - Vector3::z() * EDGE, [17, 18]);
     let doubled = (positions.clone(), faces.repeat(2));
     let corner = [-3.0 * EDGE + 0.2e-3, -3.0 * EDGE + 0.1e-3];
@@ -206,7 +257,11 @@ fn shapes_and_sizes() -> Vec<Extreme> {
 fn far_away() -> Outcome {
     let centre = Vector3::new(1e6, 0.0, 0.0);
     match refiner(square(EDGE, &centre)) {
-        Ok(refiner) => unchanged(refiner, &sample(1, over(-DEPTH) + centre, RADIUS, down()), is_absurd),
+        Ok(refiner) => unchanged(
+            refiner,
+            &sample(1, over(-DEPTH) + centre, RADIUS, down()),
+            is_absurd,
+        ),
         error => refused(error, |_| true),
     }
 }
@@ -215,11 +270,17 @@ fn tiny() -> Outcome {
     let (edge, radius, depth) = (2e-7, 1e-7, 5e-9);
     // a probe so stiff that it does not bend by more than such a mesh is large
     let stiffness = 2e9;
-    let params = RefineParams::robust(TipParams { radius, stiffness: Some(stiffness) });
+    let params = RefineParams::robust(TipParams {
+        radius,
+        stiffness: Some(stiffness),
+    });
     let (positions, faces) = square(edge, &Vector3::zeros());
     let mut refiner = Refiner::new(TriMesh::new(positions, faces)?, params)?;
     let point = Point3::new(3e-8, 1e-8, -depth) + down() / STIFFNESS - down() / stiffness;
     let (found, is_right) = press(&mut refiner, point, radius, depth)?;
     let (nm, of_nm, cut_back) = (1e9 * found, 1e9 * depth, refiner.counts().cut_back);
-    Ok((format!("surface {nm:.2} nm down of {of_nm:.2} nm, {cut_back} updates cut back"), is_right))
+    Ok((
+        format!("surface {nm:.2} nm down of {of_nm:.2} nm, {cut_back} updates cut back"),
+        is_right,
+    ))
 }

@@ -23,10 +23,19 @@ pub(super) fn run(
         messages: drawn.touch(&plate, &strokes)?.messages,
         tip: scene.tip_params(),
     };
-    let made = mistakes.iter().map(|mistake| (Some(mistake), mistake.made_of(&sound)));
+    let made = mistakes
+        .iter()
+        .map(|mistake| (Some(mistake), mistake.made_of(&sound)));
     std::iter::once((None, sound.clone()))
         .chain(made)
-        .map(|(mistake, told)| Ok(CheckedRecording { world, seed, mistake, findings: findings(scene.clone(), &told)? }))
+        .map(|(mistake, told)| {
+            Ok(CheckedRecording {
+                world,
+                seed,
+                mistake,
+                findings: findings(scene.clone(), &told)?,
+            })
+        })
         .collect()
 }
 

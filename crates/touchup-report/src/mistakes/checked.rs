@@ -21,13 +21,17 @@ impl CheckedRecording {
     pub fn is_right(&self) -> bool {
         match (self.mistake, self.findings.first()) {
             (None, first) => first.is_none(),
-            (Some(mistake), first) => first.is_some_and(|first| first.is_sure && first.cause == mistake.cause),
+            (Some(mistake), first) => {
+                first.is_some_and(|first| first.is_sure && first.cause == mistake.cause)
+            }
         }
     }
 
     /// What is said first; empty for nothing.
     pub fn said(&self) -> String {
-        self.findings.first().map_or_else(String::new, |first| format!("{}: {first}", first.cause))
+        self.findings
+            .first()
+            .map_or_else(String::new, |first| format!("{}: {first}", first.cause))
     }
 }
 

@@ -61,12 +61,20 @@ pub fn mistakes(params: MistakesParams, progress: &mut dyn FnMut(&str)) -> Mista
     for &world in &params.worlds {
         for seed in first..=last.saturating_add(more) {
             progress(&format!("mistakes: {}, seed {seed}", world.name()));
-            let made = if params.seeds.contains(&seed) { INPUT_MISTAKES } else { &[] };
+            let made = if params.seeds.contains(&seed) {
+                INPUT_MISTAKES
+            } else {
+                &[]
+            };
             match case::run(world, seed, params.longest, made) {
                 Ok(of_seed) => checked.extend(of_seed),
                 Err(error) => failed.push(format!("{}, seed {seed}: {error}", world.name())),
             }
         }
     }
-    Mistakes { params, checked, failed }
+    Mistakes {
+        params,
+        checked,
+        failed,
+    }
 }

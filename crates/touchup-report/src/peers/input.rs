@@ -32,11 +32,20 @@ impl PeersInput {
     /// Those of [`wavy_plate`].
     pub fn new(faces: usize, effort: Effort) -> Result<Self, MeshError> {
         let mesh = wavy_plate(faces)?;
-        let queries: Vec<_> = (0..effort.choose(1_000, 4_000)).map(|i| contact_on(SIDE, i, WIDTH).0).collect();
+        let queries: Vec<_> = (0..effort.choose(1_000, 4_000))
+            .map(|i| contact_on(SIDE, i, WIDTH).0)
+            .collect();
         let tree = FaceTree::new(&mesh);
-        let distance = |p| tree.closest(&mesh, p, REACH).map_or(f64::INFINITY, |hit| hit.distance_squared.sqrt());
+        let distance = |p| {
+            tree.closest(&mesh, p, REACH)
+                .map_or(f64::INFINITY, |hit| hit.distance_squared.sqrt())
+        };
         let distances = queries.iter().map(distance).collect();
-        Ok(Self { mesh, queries, distances })
+        Ok(Self {
+            mesh,
+            queries,
+            distances,
+        })
     }
 
     /// What the script reads, with the names of the files: V × 3 and Q × 3 doubles in m, F × 3 integers, all little-endian.
@@ -45,7 +54,10 @@ impl PeersInput {
         [
             ("positions.f64", bytes(self.mesh.positions())),
             ("queries.f64", bytes(&self.queries)),
-            ("faces.i32", corners.flat_map(|vertex| vertex.0.to_le_bytes()).collect()),
+            (
+                "faces.i32",
+                corners.flat_map(|vertex| vertex.0.to_le_bytes()).collect(),
+            ),
         ]
     }
 
@@ -63,12 +75,17 @@ impl PeersInput {
             let (seconds, hit) = timed(|| tree.closest(&self.mesh, p, REACH));
             queries.push(seconds * 1e6);
             let hint = last.or(hit.map(|hit| hit.face));
-            let near = || hint.and_then(|hint| tree.closest_nearby(&self.mesh, p, hint, REACH, &mut nearby));
+            let near = || {
+                hint.and_then(|hint| tree.closest_nearby(&self.mesh, p, hint, REACH, &mut nearby))
+            };
             let (seconds, hit) = timed(near);
             next.push(seconds * 1e6);
             last = hit.map(|hit| hit.face);
         }
-        let tip = TipParams { radius: RADIUS, stiffness: Some(STIFFNESS) };
+        let tip = TipParams {
+            radius: RADIUS,
+            stiffness: Some(STIFFNESS),
+        };
         let mut refiner = Refiner::new(self.mesh.clone(), RefineParams::robust(tip))?;
         let mut pushes = Vec::new();
         for i in 0..WARM + 5 * self.queries.len() {
@@ -92,5 +109,9 @@ impl PeersInput {
 }
 
 fn bytes(points: &[Point3<f64>]) -> Vec<u8> {
-    points.iter().flat_map(|p| [p.x, p.y, p.z]).flat_map(f64::to_le_bytes).collect()
+    points
+        .iter()
+        .flat_map(|p| [p.x, p.y, p.z])
+        .flat_map(f64::to_le_bytes)
+        .collect()
 }

@@ -95,7 +95,8 @@ pub struct UnknownLine {
 impl PeerTimes {
     /// Whether it found touchup's distances, to [`AGREEMENT`].
     pub fn agrees(&self) -> bool {
-        self.largest_difference.is_some_and(|difference| difference <= AGREEMENT)
+        self.largest_difference
+            .is_some_and(|difference| difference <= AGREEMENT)
     }
 }
 
@@ -104,7 +105,11 @@ impl PeersAtSize {
     ///
     /// # Errors
     /// [`UnknownLine`]
-    pub fn read(input: &PeersInput, touchup: [PeerTimes; 2], printed: &str) -> Result<Self, UnknownLine> {
+    pub fn read(
+        input: &PeersInput,
+        touchup: [PeerTimes; 2],
+        printed: &str,
+    ) -> Result<Self, UnknownLine> {
         let (mut peers, mut failed) = (Vec::new(), Vec::new());
         for line in printed.lines().filter(|line| !line.trim().is_empty()) {
             if let Ok(failure) = serde_json::from_str(line) {
@@ -112,29 +117,49 @@ impl PeersAtSize {
                 continue;
             }
             let read = serde_json::from_str::<PeerTimes>(line);
-            let times = read.map_err(|error| UnknownLine { line: line.chars().take(200).collect(), error })?;
+            let times = read.map_err(|error| UnknownLine {
+                line: line.chars().take(200).collect(),
+                error,
+            })?;
             let largest_difference = largest_difference(&times.distances_m, &input.distances);
-            peers.push(PeerTimes { largest_difference, ..times });
+            peers.push(PeerTimes {
+                largest_difference,
+                ..times
+            });
         }
-        Ok(Self { faces: input.mesh.face_count(), touchup, peers, failed })
+        Ok(Self {
+            faces: input.mesh.face_count(),
+            touchup,
+            peers,
+            failed,
+        })
     }
 
     /// Whole pushes, the slower of both turns, µs.
     pub fn push_us(&self) -> f64 {
-        self.touchup.iter().map(|times| times.pipeline_us.median).fold(0.0, f64::max)
+        self.touchup
+            .iter()
+            .map(|times| times.pipeline_us.median)
+            .fold(0.0, f64::max)
     }
 
     /// The fastest pipeline whose index is exact. Of Open3D single precision is taken for exact, and so is the nearest barycentre for
     /// what it asks: the strictest comparison.
     pub fn fastest_pipeline(&self) -> Option<&PeerTimes> {
-        let is_sound = |times: &&PeerTimes| times.largest_difference.is_none_or(|difference| difference < 1e-2);
+        let is_sound = |times: &&PeerTimes| {
+            times
+                .largest_difference
+                .is_none_or(|difference| difference < 1e-2)
+        };
         let sound = self.peers.iter().filter(is_sound);
         sound.min_by(|a, b| a.pipeline_us.median.total_cmp(&b.pipeline_us.median))
     }
 
     /// The fastest query alone, one per call.
     pub fn fastest_query(&self) -> Option<&PeerTimes> {
-        self.peers.iter().min_by(|a, b| a.query_us.median.total_cmp(&b.query_us.median))
+        self.peers
+            .iter()
+            .min_by(|a, b| a.query_us.median.total_cmp(&b.query_us.median))
     }
 
     /// How many times faster a push is than the fastest pipeline.
@@ -152,14 +177,18 @@ impl Peers {
     /// Whether both promises hold at every size: [`WANTED_FACTOR`] per sample, and a push faster than a query alone.
     pub fn holds(&self) -> bool {
         let beyond = |factor: Option<f64>, wanted| factor.is_some_and(|factor| factor >= wanted);
-        self.sizes.iter().all(|size| beyond(size.pipeline_factor(), WANTED_FACTOR) && beyond(size.query_factor(), 1.0))
+        self.sizes.iter().all(|size| {
+            beyond(size.pipeline_factor(), WANTED_FACTOR) && beyond(size.query_factor(), 1.0)
+        })
     }
 }
 
 fn largest_difference(found: &[Option<f64>], ours: &[f64]) -> Option<f64> {
     let pairs = found.iter().zip(ours);
     let mut differences = pairs.map(|(found, ours)| found.map(|found| (found - ours).abs() / ours));
-    differences.try_fold(0.0, |largest: f64, difference| Some(largest.max(difference?)))
+    differences.try_fold(0.0, |largest: f64, difference| {
+        Some(largest.max(difference?))
+    })
 }
 
 #[cfg(test)]
@@ -168,7 +197,8 @@ mod tests {
     use crate::{Chapter, Effort};
 
     fn line(peer: &str, query: f64, pipeline: f64, distance: f64) -> String {
-        let spread = |median: f64| format!(r#"{{"median": {median}, "p10": {median}, "p90": {median}}}"#);
+        let spread =
+            |median: f64| format!(r#"{{"median": {median}, "p10": {median}, "p90": {median}}}"#);
         format!(
             r#"{{"peer": "{peer}", "versions": "x 1", "update": "none", "build_ms": 1.0, "query_us": {}, "batched_query_us": null,
                 "pipeline_us": {}, "pipeline_samples": 3, "distances_m": [{distance:e}]}}"#,
@@ -193,7 +223,8 @@ mod tests {
             line("wrong", 20.0, 3.0, 1.5 * truth),
             r#"{"peer": "broken", "error": "ImportError: no"}"#.to_owned(),
         ];
-        let size = PeersAtSize::read(&input, [times(1.0), times(2.0)], &printed.join("\n")).unwrap();
+        let size =
+            PeersAtSize::read(&input, [times(1.0), times(2.0)], &printed.join("\n")).unwrap();
         assert_eq!((size.peers.len(), size.failed.len()), (2, 1));
         assert!(size.peers[0].agrees() && !size.peers[1].agrees());
         assert_eq!(size.pipeline_factor(), Some(150.0));
@@ -201,7 +232,9 @@ mod tests {
         let peers = Peers { sizes: vec![size] };
         assert!(peers.holds());
         // a picture and a table, under two names
-        let Chapter { figures, tables, .. } = peers.chapter();
+        let Chapter {
+            figures, tables, ..
+        } = peers.chapter();
         assert!(figures.len() == 1 && tables.len() == 1 && figures[0].id != tables[0].id);
         assert!(PeersAtSize::read(&input, [times(1.0), times(1.0)], "Segmentation fault").is_err());
     }
@@ -212,10 +245,23 @@ mod tests {
     fn distances_are_those_of_the_plate() {
         let input = PeersInput::new(100_000, Effort { is_quick: true }).unwrap();
         let chord = 1.90e-3f64.powi(2) * 49.3 / 8.0;
-        assert!(input.distances.iter().all(|d| (d - 0.05e-3).abs() < chord), "{:?}", input.distances);
-        assert!(input.distances.iter().any(|d| (d - 0.05e-3).abs() > 0.5 * chord), "no edge is met");
+        assert!(
+            input.distances.iter().all(|d| (d - 0.05e-3).abs() < chord),
+            "{:?}",
+            input.distances
+        );
+        assert!(
+            input
+                .distances
+                .iter()
+                .any(|d| (d - 0.05e-3).abs() > 0.5 * chord),
+            "no edge is met"
+        );
         let lengths = input.files().map(|(_, bytes)| bytes.len());
         let of_mesh = [24 * input.mesh.vertex_count(), 12 * input.mesh.face_count()];
-        assert_eq!(lengths, [of_mesh[0], 24 * input.distances.len(), of_mesh[1]]);
+        assert_eq!(
+            lengths,
+            [of_mesh[0], 24 * input.distances.len(), of_mesh[1]]
+        );
     }
 }

@@ -10,7 +10,9 @@ impl Peers {
                    the peers and after them. A peer's pipeline finds the closest face, moves the vertices around it, and brings its index up \
                    to date by the cheapest method that leaves it exact; touchup's push does that and filters, gates, solves the dynamics and \
                    guards the mesh. Of both turns of touchup the slower counts.";
-        let text = std::iter::once(how.to_owned()).chain(self.sizes.iter().flat_map(verdicts)).collect();
+        let text = std::iter::once(how.to_owned())
+            .chain(self.sizes.iter().flat_map(verdicts))
+            .collect();
         Chapter::of("Against peers", text, vec![figure(self)], vec![table(self)])
     }
 }
@@ -37,32 +39,65 @@ fn verdicts(size: &PeersAtSize) -> Vec<String> {
         let (name, difference) = (&peer.peer, peer.largest_difference?);
         Some(format!("{name} differs from touchup's distances by up to {difference:.1e}, more than {AGREEMENT:.0e}."))
     });
-    let failed = size.failed.iter().map(|one| format!("{} could not be measured: {}.", one.peer, one.error));
-    let all = pipeline.into_iter().chain(query).chain(differing).chain(failed);
-    all.map(|text| format!("{} faces: {text}", size.faces)).collect()
+    let failed = size
+        .failed
+        .iter()
+        .map(|one| format!("{} could not be measured: {}.", one.peer, one.error));
+    let all = pipeline
+        .into_iter()
+        .chain(query)
+        .chain(differing)
+        .chain(failed);
+    all.map(|text| format!("{} faces: {text}", size.faces))
+        .collect()
 }
 
 fn table(peers: &Peers) -> Table {
     // with the push that a peer is compared with
     let rows = peers.sizes.iter().flat_map(|size| {
-        let ours = size.touchup.iter().map(move |times| (size.faces, None, times));
-        ours.chain(size.peers.iter().map(move |times| (size.faces, Some(size.push_us()), times)))
+        let ours = size
+            .touchup
+            .iter()
+            .map(move |times| (size.faces, None, times));
+        ours.chain(
+            size.peers
+                .iter()
+                .map(move |times| (size.faces, Some(size.push_us()), times)),
+        )
     });
-    Table::of("peers", "Closest face and whole sample against libraries from PyPI", rows)
-        .column("faces", |(faces, ..)| faces)
-        .column("who", |(_, push_us, times)| match push_us {
-            None => times.peer.clone(),
-            Some(_) => format!("{} ({})", times.peer, times.versions),
-        })
-        .column("how the index is kept true", |(.., times)| times.update.as_str())
-        .column("closest face per call, µs", |(.., times)| times.query_us)
-        .column("closest face in one call for all (touchup: near the last), µs", |(.., times)| times.batched_query_us)
-        .column("whole sample, µs", |(.., times)| times.pipeline_us)
-        .column("sample over touchup's push", |(_, push_us, times)| Some(times.pipeline_us.median / push_us?))
-        .column("largest relative difference of a distance", |(_, push_us, times)| {
-            push_us.map(|_| times.largest_difference.map_or("another question (Eq 12)".into(), TableCell::Number))
-        })
-        .caption("Medians with p10 to p90, one thread. A rebuild is measured over four seconds.")
+    Table::of(
+        "peers",
+        "Closest face and whole sample against libraries from PyPI",
+        rows,
+    )
+    .column("faces", |(faces, ..)| faces)
+    .column("who", |(_, push_us, times)| match push_us {
+        None => times.peer.clone(),
+        Some(_) => format!("{} ({})", times.peer, times.versions),
+    })
+    .column("how the index is kept true", |(.., times)| {
+        times.update.as_str()
+    })
+    .column("closest face per call, µs", |(.., times)| times.query_us)
+    .column(
+        "closest face in one call for all (touchup: near the last), µs",
+        |(.., times)| times.batched_query_us,
+    )
+    .column("whole sample, µs", |(.., times)| times.pipeline_us)
+    .column("sample over touchup's push", |(_, push_us, times)| {
+        Some(times.pipeline_us.median / push_us?)
+    })
+    .column(
+        "largest relative difference of a distance",
+        |(_, push_us, times)| {
+            push_us.map(|_| {
+                times
+                    .largest_difference
+                    .map_or("another question (Eq 12)".into(), TableCell::Number)
+            })
+        },
+    )
+    .caption("Medians with p10 to p90, one thread. A rebuild is measured over four seconds.")
 }
 
 fn figure(peers: &Peers) -> Figure {
@@ -82,6 +117,9 @@ fn figure(peers: &Peers) -> Figure {
     }
     Figure::of("peers_sample", Drawing::Curves(series))
         .title("Time per sample with an index that stays exact")
-        .axes(Axis::log("faces", "faces"), Axis::log("time per sample, µs", "sample_us"))
+        .axes(
+            Axis::log("faces", "faces"),
+            Axis::log("time per sample, µs", "sample_us"),
+        )
         .caption("Medians with p10 to p90, one thread; touchup: whole push, before the peers.")
 }

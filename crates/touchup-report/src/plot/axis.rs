@@ -32,13 +32,26 @@ pub(super) struct Tick {
 impl Extent {
     /// Around `values`, with some room; those that cannot be shown do not count.
     pub fn around(scale: Scale, values: impl Iterator<Item = f64>) -> Self {
-        let (low, high) = range(values.filter_map(|value| even(scale, value))).unwrap_or((0.0, 1.0));
+        let (low, high) =
+            range(values.filter_map(|value| even(scale, value))).unwrap_or((0.0, 1.0));
         let width = high - low;
         // a single value still needs a stretch around it
-        let least = if scale == Scale::Log { 0.3 } else { (0.1 * low.abs()).max(1e-300) };
-        let room = if width > 0.05 * least { 0.05 * width } else { least };
+        let least = if scale == Scale::Log {
+            0.3
+        } else {
+            (0.1 * low.abs()).max(1e-300)
+        };
+        let room = if width > 0.05 * least {
+            0.05 * width
+        } else {
+            least
+        };
         let from_zero = scale == Scale::Linear && low >= 0.0 && low < 0.4 * high;
-        Self { scale, low: if from_zero { 0.0 } else { low - room }, high: high + room }
+        Self {
+            scale,
+            low: if from_zero { 0.0 } else { low - room },
+            high: high + room,
+        }
     }
 
     /// 0 at the low end, 1 at the high end; `None` where it cannot be shown.
@@ -52,38 +65,56 @@ impl Extent {
             Scale::Linear => self.even_ticks(),
             Scale::Log => self.power_ticks(),
         };
-        ticks.into_iter().filter(|tick| (-1e-9..=1.0 + 1e-9).contains(&tick.at)).collect()
+        ticks
+            .into_iter()
+            .filter(|tick| (-1e-9..=1.0 + 1e-9).contains(&tick.at))
+            .collect()
     }
 
     fn even_ticks(&self) -> Vec<Tick> {
         let step = nice_step((self.high - self.low) / ABOUT);
         let (first, last) = ((self.low / step).ceil(), (self.high / step).floor());
         let count = (last - first).clamp(0.0, 4.0 * ABOUT) as i32;
-        (0..=count).map(|i| (first + f64::from(i)) * step).map(|value| self.tick(value, three_digits(value))).collect()
+        (0..=count)
+            .map(|i| (first + f64::from(i)) * step)
+            .map(|value| self.tick(value, three_digits(value)))
+            .collect()
     }
 
     fn power_ticks(&self) -> Vec<Tick> {
         let (first, last) = (self.low.floor() as i32, self.high.ceil() as i32);
         let decades = last - first;
         let every = 1 + decades / MOST_POWERS;
-        let whole = (first..=last).filter(|power| (self.low..=self.high).contains(&f64::from(*power))).count();
+        let whole = (first..=last)
+            .filter(|power| (self.low..=self.high).contains(&f64::from(*power)))
+            .count();
         let ends = [self.low.ceil() as i32, self.high.floor() as i32];
         let are_written_out = whole < 2 || ends.iter().all(|end| WRITTEN_OUT.contains(end));
         let most = if decades > DECADES_WITH_NINTHS { 1 } else { 9 };
         let ninths = (first..=last).flat_map(|power| (1..=most).map(move |ninth| (power, ninth)));
         let tick = |(power, ninth): (i32, i32)| {
             // with hardly a whole decade 2 and 5 need their numbers too
-            let has_label =
-                if ninth == 1 { power.rem_euclid(every) == 0 } else { whole < 2 && [2, 5].contains(&ninth) };
+            let has_label = if ninth == 1 {
+                power.rem_euclid(every) == 0
+            } else {
+                whole < 2 && [2, 5].contains(&ninth)
+            };
             let value = f64::from(ninth) * 10f64.powi(power);
-            let label = if are_written_out { three_digits(value) } else { power_of_ten(power) };
+            let label = if are_written_out {
+                three_digits(value)
+            } else {
+                power_of_ten(power)
+            };
             self.tick(value, if has_label { label } else { String::new() })
         };
         ninths.map(tick).collect()
     }
 
     fn tick(&self, value: f64, label: String) -> Tick {
-        Tick { at: self.place(value).unwrap_or(-1.0), label }
+        Tick {
+            at: self.place(value).unwrap_or(-1.0),
+            label,
+        }
     }
 }
 
@@ -98,8 +129,12 @@ fn even(scale: Scale, value: f64) -> Option<f64> {
 /// 1, 2 or 5 times a power of ten, at least `least`.
 fn nice_step(least: f64) -> f64 {
     let power = 10f64.powf(least.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * power).find(|step| *step >= least * 0.999);
-    step.filter(|step| step.is_finite() && *step > 0.0).unwrap_or(1.0)
+    let step = [1.0, 2.0, 5.0, 10.0]
+        .into_iter()
+        .map(|m| m * power)
+        .find(|step| *step >= least * 0.999);
+    step.filter(|step| step.is_finite() && *step > 0.0)
+        .unwrap_or(1.0)
 }
 
 #[cfg(test)]
@@ -108,14 +143,24 @@ mod tests {
 
     fn labels(scale: Scale, values: &[f64]) -> Vec<String> {
         let ticks = Extent::around(scale, values.iter().copied()).ticks();
-        ticks.into_iter().map(|tick| tick.label).filter(|label| !label.is_empty()).collect()
+        ticks
+            .into_iter()
+            .map(|tick| tick.label)
+            .filter(|label| !label.is_empty())
+            .collect()
     }
 
     #[test]
     fn marks_are_where_a_person_would_put_them() {
-        assert_eq!(labels(Scale::Linear, &[0.0, 1.0]), ["0", "0.2", "0.4", "0.6", "0.8", "1"]);
+        assert_eq!(
+            labels(Scale::Linear, &[0.0, 1.0]),
+            ["0", "0.2", "0.4", "0.6", "0.8", "1"]
+        );
         assert_eq!(labels(Scale::Log, &[0.1, 100.0]), ["0.1", "1", "10", "100"]);
-        assert_eq!(labels(Scale::Log, &[1e-9, 1e-6]), ["10⁻⁹", "10⁻⁸", "10⁻⁷", "10⁻⁶"]);
+        assert_eq!(
+            labels(Scale::Log, &[1e-9, 1e-6]),
+            ["10⁻⁹", "10⁻⁸", "10⁻⁷", "10⁻⁶"]
+        );
         assert_eq!(labels(Scale::Log, &[1.5, 6.0]), ["2", "5"]);
         // every second power of 14
         assert_eq!(labels(Scale::Log, &[1e-14, 1.0]).len(), 8);
@@ -123,13 +168,23 @@ mod tests {
 
     #[test]
     fn what_cannot_be_shown_has_no_place() {
-        let extent = Extent::around(Scale::Log, [0.0, -1.0, f64::NAN, f64::INFINITY, 1.0, 10.0].into_iter());
-        assert!([0.0, -1.0, f64::NAN, f64::INFINITY].iter().all(|value| extent.place(*value).is_none()));
+        let extent = Extent::around(
+            Scale::Log,
+            [0.0, -1.0, f64::NAN, f64::INFINITY, 1.0, 10.0].into_iter(),
+        );
+        assert!(
+            [0.0, -1.0, f64::NAN, f64::INFINITY]
+                .iter()
+                .all(|value| extent.place(*value).is_none())
+        );
         assert!((extent.place(10f64.sqrt()).unwrap() - 0.5).abs() < 1e-12);
         for values in [&[][..], &[0.0], &[5.0], &[f64::NAN], &[1e308, -1e308]] {
             for scale in [Scale::Linear, Scale::Log] {
                 let ticks = Extent::around(scale, values.iter().copied()).ticks();
-                assert!(ticks.len() < 100 && ticks.iter().all(|tick| tick.at.is_finite()), "{values:?} {ticks:?}");
+                assert!(
+                    ticks.len() < 100 && ticks.iter().all(|tick| tick.at.is_finite()),
+                    "{values:?} {ticks:?}"
+                );
             }
         }
     }

@@ -37,11 +37,20 @@ impl Frame {
     /// Gridlines, their numbers, and the border.
     pub fn draw_grid(&self, svg: &mut Svg, x: &Extent, y: &Extent) {
         let (xs, ys) = (x.ticks(), y.ticks());
-        let upward = xs.iter().map(|tick| (tick, [[tick.at, 0.0], [tick.at, 1.0]]));
-        for (tick, ends) in upward.chain(ys.iter().map(|tick| (tick, [[0.0, tick.at], [1.0, tick.at]]))) {
+        let upward = xs
+            .iter()
+            .map(|tick| (tick, [[tick.at, 0.0], [tick.at, 1.0]]));
+        for (tick, ends) in upward.chain(
+            ys.iter()
+                .map(|tick| (tick, [[0.0, tick.at], [1.0, tick.at]])),
+        ) {
             let [from, to] = ends.map(|end| self.pixel(end));
             // a line without a number is fainter
-            let colour = if tick.label.is_empty() { "#efefef" } else { "#d6d6d6" };
+            let colour = if tick.label.is_empty() {
+                "#efefef"
+            } else {
+                "#d6d6d6"
+            };
             svg.line(from, to, &format!("stroke=\"{colour}\""));
         }
         self.draw_x_labels(svg, &xs);
@@ -50,7 +59,12 @@ impl Frame {
     }
 
     pub fn draw_border(&self, svg: &mut Svg) {
-        svg.rectangle([self.left, self.top], [self.width, self.height], "fill=\"none\" stroke=\"#444\"", "");
+        svg.rectangle(
+            [self.left, self.top],
+            [self.width, self.height],
+            "fill=\"none\" stroke=\"#444\"",
+            "",
+        );
     }
 
     /// Numbers below the frame, as many as have room.
@@ -77,7 +91,12 @@ impl Frame {
 
     /// Labels of the axes, below and on the left.
     pub fn name_axes(&self, svg: &mut Svg, x: &str, y: &str) {
-        svg.text([self.left + 0.5 * self.width, self.bottom() + 38.0], "middle", "", x);
+        svg.text(
+            [self.left + 0.5 * self.width, self.bottom() + 38.0],
+            "middle",
+            "",
+            x,
+        );
         svg.upward_text([self.left - 56.0, self.top + 0.5 * self.height], y);
     }
 }

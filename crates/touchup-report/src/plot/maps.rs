@@ -43,7 +43,12 @@ pub(super) fn draw(svg: &mut Svg, figure: &Figure, share_of: &str, panels: &[Pan
     for (line, panels) in panels.chunks(across).enumerate() {
         let top = TOP + line as f64 * (NAME + height + BELOW) + NAME;
         for (column, panel) in panels.iter().enumerate() {
-            let frame = Frame { left: LEFT + column as f64 * (width + GAP), top, width, height };
+            let frame = Frame {
+                left: LEFT + column as f64 * (width + GAP),
+                top,
+                width,
+                height,
+            };
             draw_panel(svg, &frame, figure, panel);
             if column == 0 {
                 frame.draw_y_labels(svg, &labels(&panel.ys, &figure.y, height / 24.0));
@@ -52,19 +57,37 @@ pub(super) fn draw(svg: &mut Svg, figure: &Figure, share_of: &str, panels: &[Pan
         }
         bottom = top + height + BELOW;
     }
-    let bar = Frame { left: WIDTH - BAR + 24.0, top: TOP + NAME, width: 18.0, height };
-    let has_gaps = panels.iter().any(|panel| panel.shares.iter().any(Option::is_none));
+    let bar = Frame {
+        left: WIDTH - BAR + 24.0,
+        top: TOP + NAME,
+        width: 18.0,
+        height,
+    };
+    let has_gaps = panels
+        .iter()
+        .any(|panel| panel.shares.iter().any(Option::is_none));
     draw_bar(svg, &bar, share_of, has_gaps);
     bottom
 }
 
 fn draw_panel(svg: &mut Svg, frame: &Frame, figure: &Figure, panel: &Panel) {
     let (columns, rows) = (panel.xs.len(), panel.ys.len());
-    svg.text([frame.left, frame.top - 7.0], "start", "font-size=\"12.5\" font-weight=\"600\"", &panel.name);
-    let size = [frame.width / columns.max(1) as f64, frame.height / rows.max(1) as f64];
+    svg.text(
+        [frame.left, frame.top - 7.0],
+        "start",
+        "font-size=\"12.5\" font-weight=\"600\"",
+        &panel.name,
+    );
+    let size = [
+        frame.width / columns.max(1) as f64,
+        frame.height / rows.max(1) as f64,
+    ];
     for (at, share) in panel.shares.iter().take(columns * rows).enumerate() {
         let (row, column) = (at / columns, at % columns);
-        let corner = [frame.left + column as f64 * size[0], frame.bottom() - (row + 1) as f64 * size[1]];
+        let corner = [
+            frame.left + column as f64 * size[0],
+            frame.bottom() - (row + 1) as f64 * size[1],
+        ];
         let (x, y) = (three_digits(panel.xs[column]), three_digits(panel.ys[row]));
         let text = share.map_or("nothing was run".to_owned(), three_digits);
         let title = format!("{}: {x}; {}: {y}; {text}", figure.x.label, figure.y.label);
@@ -73,18 +96,36 @@ fn draw_panel(svg: &mut Svg, frame: &Frame, figure: &Figure, panel: &Panel) {
     }
     frame.draw_border(svg);
     frame.draw_x_labels(svg, &labels(&panel.xs, &figure.x, frame.width / 42.0));
-    svg.text([frame.left + 0.5 * frame.width, frame.bottom() + 35.0], "middle", "", &figure.x.label);
+    svg.text(
+        [frame.left + 0.5 * frame.width, frame.bottom() + 35.0],
+        "middle",
+        "",
+        &figure.x.label,
+    );
 }
 
 /// Numbers at the middles of cells, at most about `most`; powers of ten first.
 fn labels(values: &[f64], axis: &Axis, most: f64) -> Vec<Tick> {
-    let is_power = |value: f64| axis.scale == Scale::Log && (value.log10() - value.log10().round()).abs() < 1e-9;
+    let is_power = |value: f64| {
+        axis.scale == Scale::Log && (value.log10() - value.log10().round()).abs() < 1e-9
+    };
     let by_powers = values.iter().filter(|value| is_power(**value)).count() > 2;
-    let shown: Vec<_> = values.iter().enumerate().filter(|(_, value)| !by_powers || is_power(**value)).collect();
+    let shown: Vec<_> = values
+        .iter()
+        .enumerate()
+        .filter(|(_, value)| !by_powers || is_power(**value))
+        .collect();
     let every = ((shown.len() as f64 / most.max(1.0)).ceil() as usize).max(1);
     let tick = |(at, value): (usize, &f64)| {
-        let label = if by_powers { power_of_ten(value.log10().round() as i32) } else { three_digits(*value) };
-        Tick { at: (at as f64 + 0.5) / values.len() as f64, label }
+        let label = if by_powers {
+            power_of_ten(value.log10().round() as i32)
+        } else {
+            three_digits(*value)
+        };
+        Tick {
+            at: (at as f64 + 0.5) / values.len() as f64,
+            label,
+        }
     };
     shown.into_iter().step_by(every).map(tick).collect()
 }
@@ -95,22 +136,42 @@ fn draw_bar(svg: &mut Svg, frame: &Frame, share_of: &str, has_gaps: bool) {
         let share = (step as f64 + 0.5) / STEPS as f64;
         let height = frame.height / STEPS as f64;
         let corner = [frame.left, frame.bottom() - (step + 1) as f64 * height];
-        svg.rectangle(corner, [frame.width, height], &format!("fill=\"{}\" {CRISP}", colour(share)), "");
+        svg.rectangle(
+            corner,
+            [frame.width, height],
+            &format!("fill=\"{}\" {CRISP}", colour(share)),
+            "",
+        );
     }
     frame.draw_border(svg);
     for share in [0.0, 0.25, 0.5, 0.75, 1.0] {
         let [x, y] = frame.pixel([1.0, share]);
-        svg.text([x + 5.0, y + 4.0], "start", "font-size=\"12\"", &format!("{} %", three_digits(100.0 * share)));
+        svg.text(
+            [x + 5.0, y + 4.0],
+            "start",
+            "font-size=\"12\"",
+            &format!("{} %", three_digits(100.0 * share)),
+        );
     }
     let name = format!("share of {share_of}");
     if text_width(&name, 12.0) < BAR {
-        svg.text([WIDTH - 6.0, frame.top - 7.0], "end", "font-size=\"12\"", &name);
+        svg.text(
+            [WIDTH - 6.0, frame.top - 7.0],
+            "end",
+            "font-size=\"12\"",
+            &name,
+        );
     } else {
         svg.upward_text([frame.left - 6.0, frame.top + 0.5 * frame.height], &name);
     }
     if has_gaps {
         let [x, y] = [frame.left, frame.bottom() + 14.0];
-        svg.rectangle([x, y], [18.0, 12.0], &format!("fill=\"{NOTHING}\" stroke=\"#444\""), "");
+        svg.rectangle(
+            [x, y],
+            [18.0, 12.0],
+            &format!("fill=\"{NOTHING}\" stroke=\"#444\""),
+            "",
+        );
         svg.text([x + 23.0, y + 10.0], "start", "font-size=\"12\"", "not run");
     }
 }
@@ -122,6 +183,8 @@ fn colour(share: f64) -> String {
     let at = share.clamp(0.0, 1.0) * (COLOURS.len() - 1) as f64;
     let below = (at as usize).min(COLOURS.len() - 2);
     let part = at - below as f64;
-    let mixed = |i: usize| (COLOURS[below][i] + part * (COLOURS[below + 1][i] - COLOURS[below][i])).round() as u8;
+    let mixed = |i: usize| {
+        (COLOURS[below][i] + part * (COLOURS[below + 1][i] - COLOURS[below][i])).round() as u8
+    };
     format!("#{:02x}{:02x}{:02x}", mixed(0), mixed(1), mixed(2))
 }

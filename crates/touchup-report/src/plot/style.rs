@@ -5,7 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::writer::Svg;
 
 /// Colours that colour-blind readers distinguish too (Okabe and Ito), dark enough on white.
-const COLOURS: [&str; 8] = ["#0072b2", "#d55e00", "#009e73", "#b5559b", "#3a9bd9", "#b87d00", "#000000", "#7a7a7a"];
+const COLOURS: [&str; 8] = [
+    "#0072b2", "#d55e00", "#009e73", "#b5559b", "#3a9bd9", "#b87d00", "#000000", "#7a7a7a",
+];
 /// Of the lines between marks.
 const DASHES: [&str; 4] = ["", "7 3", "2 3", "9 3 2 3"];
 /// Of lines without marks.
@@ -28,8 +30,13 @@ impl Looks {
             if looks.contains_key(*name) {
                 continue;
             }
-            let beside = figures.iter().filter(|names| names.contains(name)).flatten();
-            let taken: BTreeSet<usize> = beside.filter_map(|other| looks.get(*other).copied()).collect();
+            let beside = figures
+                .iter()
+                .filter(|names| names.contains(name))
+                .flatten();
+            let taken: BTreeSet<usize> = beside
+                .filter_map(|other| looks.get(*other).copied())
+                .collect();
             let free = (0..).find(|look| !taken.contains(look)).unwrap_or_default();
             looks.insert((*name).to_owned(), free);
         }
@@ -54,19 +61,28 @@ impl Look {
     /// Attributes of the line that joins marks.
     pub fn line(self) -> String {
         let dashes = DASHES[(self.0 / 2) % DASHES.len()];
-        format!("stroke=\"{}\" stroke-width=\"1.6\" stroke-dasharray=\"{dashes}\"", self.colour())
-            .replace(" stroke-dasharray=\"\"", "")
+        format!(
+            "stroke=\"{}\" stroke-width=\"1.6\" stroke-dasharray=\"{dashes}\"",
+            self.colour()
+        )
+        .replace(" stroke-dasharray=\"\"", "")
     }
 
     /// Attributes of a line without marks.
     pub fn dashed(self) -> String {
         let dashes = MODEL_DASHES[self.0 % MODEL_DASHES.len()];
-        format!("stroke=\"{}\" stroke-width=\"1.2\" stroke-dasharray=\"{dashes}\"", self.colour())
+        format!(
+            "stroke=\"{}\" stroke-width=\"1.2\" stroke-dasharray=\"{dashes}\"",
+            self.colour()
+        )
     }
 
     /// Attributes of an error bar.
     pub fn bar(self) -> String {
-        format!("stroke=\"{}\" stroke-width=\"1\" stroke-opacity=\"0.7\"", self.colour())
+        format!(
+            "stroke=\"{}\" stroke-width=\"1\" stroke-opacity=\"0.7\"",
+            self.colour()
+        )
     }
 
     /// Its mark: one of eight shapes.
@@ -75,8 +91,12 @@ impl Look {
         let filled = format!("fill=\"{colour}\" stroke=\"#fff\" stroke-width=\"0.6\"");
         let hollow = format!("fill=\"#fff\" stroke=\"{colour}\" stroke-width=\"1.6\"");
         let stroke = format!("stroke=\"{colour}\" stroke-width=\"1.8\"");
-        let shape =
-            |corners: &[[f64; 2]]| corners.iter().map(|[dx, dy]| [x + HALF * dx, y + HALF * dy]).collect::<Vec<_>>();
+        let shape = |corners: &[[f64; 2]]| {
+            corners
+                .iter()
+                .map(|[dx, dy]| [x + HALF * dx, y + HALF * dy])
+                .collect::<Vec<_>>()
+        };
         let square = shape(&[[-0.85, -0.85], [0.85, -0.85], [0.85, 0.85], [-0.85, 0.85]]);
         let diamond = shape(&[[0.0, -1.2], [1.2, 0.0], [0.0, 1.2], [-1.2, 0.0]]);
         // beyond eight, where colours come again, other shapes go with them
@@ -89,7 +109,8 @@ impl Look {
             5 => svg.polygon(&square, &hollow),
             6 => {
                 let ends = shape(&[[-0.8, -0.8], [0.8, 0.8], [-0.8, 0.8], [0.8, -0.8]]);
-                ends.chunks(2).for_each(|ends| svg.line(ends[0], ends[1], &stroke));
+                ends.chunks(2)
+                    .for_each(|ends| svg.line(ends[0], ends[1], &stroke));
             }
             _ => svg.polygon(&diamond, &hollow),
         }

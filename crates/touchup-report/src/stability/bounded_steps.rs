@@ -7,7 +7,9 @@ use rand_pcg::Pcg64;
 use super::face_runs::log_uniform;
 use crate::reference::{HeldFace, Reference};
 use touchup_core::haptic::dynamics::RELATIVE_ERROR;
-use touchup_core::haptic::{Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule};
+use touchup_core::haptic::{
+    Along, ContactModel, DynamicsError, DynamicsParams, FaceDynamics, FaceState, StepRule,
+};
 
 /// Roundings of |F| and of the distance of the tip, which the step cannot undo.
 const ROUNDINGS: f64 = 8.0 * f64::EPSILON;
@@ -44,10 +46,18 @@ pub fn bounded_steps(seed: u64, cases: usize) -> Vec<BoundedStepError> {
         ("spring, along the force", true, Along::Force),
         ("spring, along n*(0)", true, Along::InitialNormal),
     ];
-    groups.map(|(name, is_spring, along)| group(rng, name, is_spring, along, cases)).into()
+    groups
+        .map(|(name, is_spring, along)| group(rng, name, is_spring, along, cases))
+        .into()
 }
 
-fn group(rng: &mut Pcg64, name: &str, is_spring: bool, along: Along, cases: usize) -> BoundedStepError {
+fn group(
+    rng: &mut Pcg64,
+    name: &str,
+    is_spring: bool,
+    along: Along,
+    cases: usize,
+) -> BoundedStepError {
     let mut found = BoundedStepError {
         name: name.to_owned(),
         cases: 0,
@@ -78,7 +88,11 @@ fn group(rng: &mut Pcg64, name: &str, is_spring: bool, along: Along, cases: usiz
                 continue;
             }
         };
-        let mut errors = errors(&face, &reference, [RELATIVE_ERROR * reference.farthest_m, RELATIVE_ERROR]);
+        let mut errors = errors(
+            &face,
+            &reference,
+            [RELATIVE_ERROR * reference.farthest_m, RELATIVE_ERROR],
+        );
         if errors.iter().any(|error| *error > 1.0) {
             found.ill_conditioned += 1;
             errors = errors_beside_roundings(&held, &face, &reference);
@@ -98,9 +112,15 @@ fn draw(rng: &mut Pcg64, is_spring: bool, along: Along) -> HeldFace {
     let (h_min, f_max) = (log_uniform(rng, -9.0..-3.0), log_uniform(rng, -2.0..3.0));
     let dt = log_uniform(rng, -4.0..0.0);
     let model = if is_spring {
-        ContactModel::Spring { stiffness_n_per_m: f_max / h_min }
+        ContactModel::Spring {
+            stiffness_n_per_m: f_max / h_min,
+        }
     } else {
-        ContactModel::Sigmoid { f_max_n: f_max, h_min_m: h_min, delta: 5.0 }
+        ContactModel::Sigmoid {
+            f_max_n: f_max,
+            h_min_m: h_min,
+            delta: 5.0,
+        }
     };
     // a spring that pulls turns the face away from the force without end: milder
     let turning = if is_spring { -3.0..2.0 } else { -3.0..6.0 };
@@ -116,10 +136,19 @@ fn draw(rng: &mut Pcg64, is_spring: bool, along: Along) -> HeldFace {
     // a spring along n*(0) whose face turns beyond a right angle runs away exponentially
     let widest = if is_spring { 1.3 } else { 2.8 };
     let tilt: f64 = rng.random_range(1e-3..widest);
-    let depth = if is_spring { rng.random_range(-3.0..0.5) } else { rng.random_range(-25.0..15.0) };
+    let depth = if is_spring {
+        rng.random_range(-3.0..0.5)
+    } else {
+        rng.random_range(-25.0..15.0)
+    };
     let beside = log_uniform(rng, -2.0..1.5) * rng.random_range(-1.0..1.0);
     let arm = h_min * Vector3::new(beside, 0.3 * beside, depth);
-    let magnitude = f_max * if rng.random_bool(0.9) { rng.random_range(0.01..0.9) } else { rng.random_range(1.1..3.0) };
+    let magnitude = f_max
+        * if rng.random_bool(0.9) {
+            rng.random_range(0.01..0.9)
+        } else {
+            rng.random_range(1.1..3.0)
+        };
     let axis = Unit::new_normalize(Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0)));
     let turn = UnitQuaternion::from_axis_angle(&axis, rng.random_range(0.0..3.0));
     HeldFace {
@@ -133,20 +162,34 @@ fn draw(rng: &mut Pcg64, is_spring: bool, along: Along) -> HeldFace {
 
 fn stepped(held: &HeldFace) -> Result<FaceState, DynamicsError> {
     let dynamics = FaceDynamics::new(held.params)?;
-    let face = FaceState { b: Point3::origin(), n: held.normal };
+    let face = FaceState {
+        b: Point3::origin(),
+        n: held.normal,
+    };
     dynamics.step(&face, &Point3::from(held.arm), &held.force, held.dt_s)
 }
 
 /// Of position and normal, over what is allowed for each.
 fn errors(face: &FaceState, reference: &Reference, allowed: [f64; 2]) -> [f64; 2] {
-    [(face.b - reference.face.b).norm() / allowed[0], (face.n - reference.face.n).norm() / allowed[1]]
+    [
+        (face.b - reference.face.b).norm() / allowed[0],
+        (face.n - reference.face.n).norm() / allowed[1],
+    ]
 }
 
 /// The same, where the bound and what roundings of |F| and of the tip's place do to the reference are allowed.
 fn errors_beside_roundings(held: &HeldFace, face: &FaceState, reference: &Reference) -> [f64; 2] {
     let away = held.normal * (held.arm.norm() + 5.0 * length_scale(&held.params.model)) * ROUNDINGS;
-    let moved =
-        [HeldFace { force: held.force * (1.0 + ROUNDINGS), ..*held }, HeldFace { arm: held.arm + away, ..*held }];
+    let moved = [
+        HeldFace {
+            force: held.force * (1.0 + ROUNDINGS),
+            ..*held
+        },
+        HeldFace {
+            arm: held.arm + away,
+            ..*held
+        },
+    ];
     let mut allowed = [RELATIVE_ERROR * reference.farthest_m, RELATIVE_ERROR];
     for other in moved.iter().filter_map(HeldFace::reference) {
         allowed[0] += (other.face.b - reference.face.b).norm();

@@ -73,9 +73,15 @@ impl FaceRun {
     pub fn draw(rng: &mut Pcg64, is_spring: bool) -> Self {
         let (h_min, f_max) = (log_uniform(rng, H_MIN), log_uniform(rng, F_MAX));
         let model = if is_spring {
-            ContactModel::Spring { stiffness_n_per_m: f_max / h_min }
+            ContactModel::Spring {
+                stiffness_n_per_m: f_max / h_min,
+            }
         } else {
-            ContactModel::Sigmoid { f_max_n: f_max, h_min_m: h_min, delta: 5.0 }
+            ContactModel::Sigmoid {
+                f_max_n: f_max,
+                h_min_m: h_min,
+                delta: 5.0,
+            }
         };
         let beta = log_uniform(rng, BETA);
         let params = DynamicsParams {
@@ -87,11 +93,18 @@ impl FaceRun {
             ..DynamicsParams::default()
         };
         // z is along n first, then all is turned to where it may
-        let cosine: f64 = if rng.random_bool(0.25) { 1.0 } else { rng.random_range(SMALLEST_COSINE..1.0) };
+        let cosine: f64 = if rng.random_bool(0.25) {
+            1.0
+        } else {
+            rng.random_range(SMALLEST_COSINE..1.0)
+        };
         let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
         let magnitude = f_max * log_uniform(rng, -6.0..0.5);
-        let length =
-            if rng.random_bool(0.5) { h_min * log_uniform(rng, -3.0..1.5) } else { log_uniform(rng, -9.0..0.0) };
+        let length = if rng.random_bool(0.5) {
+            h_min * log_uniform(rng, -3.0..1.5)
+        } else {
+            log_uniform(rng, -9.0..0.0)
+        };
         let arm = length * Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0));
         let axis = Unit::new_normalize(Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0)));
         let turn = UnitQuaternion::from_axis_angle(&axis, rng.random_range(0.0..3.0));
@@ -101,18 +114,32 @@ impl FaceRun {
             dt: log_uniform(rng, STEP),
             turning: if is_spring { beta } else { 0.0 },
         };
-        Self { params, h_min, f_max, n: turn * Vector3::z(), held }
+        Self {
+            params,
+            h_min,
+            f_max,
+            n: turn * Vector3::z(),
+            held,
+        }
     }
 
     /// How stiff the position is, α f_max dt / h_min, and the normal, β f_max² dt or rate times dt.
     pub fn stiffness(&self) -> [f64; 2] {
-        let turning = (self.params.beta_per_n2_s * self.f_max * self.f_max + self.held.turning) * self.held.dt;
-        [self.params.alpha_m_per_n_s * self.f_max * self.held.dt / self.h_min, turning]
+        let turning = (self.params.beta_per_n2_s * self.f_max * self.f_max + self.held.turning)
+            * self.held.dt;
+        [
+            self.params.alpha_m_per_n_s * self.f_max * self.held.dt / self.h_min,
+            turning,
+        ]
     }
 
     /// Equilibrium h of the face under `n`, m.
     fn rest(&self, n: &Vector3<f64>) -> f64 {
-        if self.params.take_out_rigid_offset { 0.0 } else { self.params.model.distance(self.held.force.dot(n)) }
+        if self.params.take_out_rigid_offset {
+            0.0
+        } else {
+            self.params.model.distance(self.held.force.dot(n))
+        }
     }
 
     /// How it ends, and whether the integrator itself kept |n| = 1: a normal whose length is off is set to 1 after each step, as
@@ -127,7 +154,9 @@ impl FaceRun {
         let towards = held.force.normalize();
         let longest = self.rest(&n).abs() + held.arm.norm() + self.h_min;
         for _ in 0..STEPS {
-            let Some((travel, raw)) = integrator.step(&self.params, &n, &held) else { return RunEnding::GaveUp };
+            let Some((travel, raw)) = integrator.step(&self.params, &n, &held) else {
+                return RunEnding::GaveUp;
+            };
             let length = raw.norm();
             if !(travel.is_finite() && length.is_finite()) {
                 return RunEnding::NotFinite;
@@ -136,12 +165,16 @@ impl FaceRun {
             if integrator.rule().is_some() && !*kept_unit {
                 return RunEnding::NotUnit;
             }
-            let Some(turned) = raw.try_normalize(0.0) else { return RunEnding::NotUnit };
+            let Some(turned) = raw.try_normalize(0.0) else {
+                return RunEnding::NotUnit;
+            };
             if turned.dot(&self.n) <= 0.0 {
                 return RunEnding::Flipped;
             }
             let arm = held.arm - towards * travel;
-            if self.crosses(&n, &turned, [&held.arm, &arm], CROSSING * longest) || turns_past(&n, &turned, &towards) {
+            if self.crosses(&n, &turned, [&held.arm, &arm], CROSSING * longest)
+                || turns_past(&n, &turned, &towards)
+            {
                 return RunEnding::Overshot;
             }
             (held.arm, n) = (arm, turned);
@@ -151,7 +184,13 @@ impl FaceRun {
 
     /// Whether h goes over its rest point. That lies elsewhere for the normal before and after: it counts only where it is
     /// crossed for both.
-    fn crosses(&self, n: &Vector3<f64>, turned: &Vector3<f64>, arms: [&Vector3<f64>; 2], tolerance: f64) -> bool {
+    fn crosses(
+        &self,
+        n: &Vector3<f64>,
+        turned: &Vector3<f64>,
+        arms: [&Vector3<f64>; 2],
+        tolerance: f64,
+    ) -> bool {
         let [from, to] = arms.map(|arm| [n, turned].map(|n| arm.dot(n) - self.rest(n)));
         goes_over(from, to, tolerance)
     }
@@ -159,7 +198,9 @@ impl FaceRun {
 
 /// Whether a distance to the rest point changes its sign, for the normal before and for that after, and by more than `tolerance`.
 pub(super) fn goes_over(from: [f64; 2], to: [f64; 2], tolerance: f64) -> bool {
-    let over = |sign: f64| from.iter().all(|x| sign * x >= 0.0) && to.iter().all(|x| sign * x < -tolerance);
+    let over = |sign: f64| {
+        from.iter().all(|x| sign * x >= 0.0) && to.iter().all(|x| sign * x < -tolerance)
+    };
     over(1.0) || over(-1.0)
 }
 
@@ -175,7 +216,9 @@ mod tests {
     use rand::SeedableRng;
 
     fn along_the_normal(stiffness: f64) -> FaceRun {
-        let model = ContactModel::Spring { stiffness_n_per_m: 1e3 };
+        let model = ContactModel::Spring {
+            stiffness_n_per_m: 1e3,
+        };
         let params = DynamicsParams {
             model,
             alpha_m_per_n_s: 0.1,
@@ -183,18 +226,39 @@ mod tests {
             take_out_rigid_offset: false,
             ..DynamicsParams::default()
         };
-        let held =
-            HeldSample { arm: Vector3::z() * 1e-3, force: Vector3::z() * 2.0, dt: stiffness / 100.0, turning: 0.0 };
-        FaceRun { params, h_min: 1e-3, f_max: 1.0, n: Vector3::z(), held }
+        let held = HeldSample {
+            arm: Vector3::z() * 1e-3,
+            force: Vector3::z() * 2.0,
+            dt: stiffness / 100.0,
+            turning: 0.0,
+        };
+        FaceRun {
+            params,
+            h_min: 1e-3,
+            f_max: 1.0,
+            n: Vector3::z(),
+            held,
+        }
     }
 
     /// Explicit Euler on dh/dt = −h/τ overshoots from dt = τ on; RK4 keeps the sign, since its polynomial has no real root.
     #[test]
     fn explicit_euler_overshoots_from_one_time_constant_on() {
-        assert_eq!(along_the_normal(0.99).judge(Integrator::ExplicitEuler).0, RunEnding::Stable);
-        assert_eq!(along_the_normal(1.01).judge(Integrator::ExplicitEuler).0, RunEnding::Overshot);
+        assert_eq!(
+            along_the_normal(0.99).judge(Integrator::ExplicitEuler).0,
+            RunEnding::Stable
+        );
+        assert_eq!(
+            along_the_normal(1.01).judge(Integrator::ExplicitEuler).0,
+            RunEnding::Overshot
+        );
         for integrator in [Integrator::Lie, Integrator::ImplicitEuler] {
-            assert_eq!(along_the_normal(1e6).judge(integrator).0, RunEnding::Stable, "{}", integrator.name());
+            assert_eq!(
+                along_the_normal(1e6).judge(integrator).0,
+                RunEnding::Stable,
+                "{}",
+                integrator.name()
+            );
         }
     }
 
@@ -209,10 +273,14 @@ mod tests {
     #[test]
     fn draws_cover_their_decades() {
         let mut rng = Pcg64::seed_from_u64(3);
-        let runs: Vec<_> = (0..4000).map(|i| FaceRun::draw(&mut rng, i % 2 == 0)).collect();
+        let runs: Vec<_> = (0..4000)
+            .map(|i| FaceRun::draw(&mut rng, i % 2 == 0))
+            .collect();
         let spread = |of: fn(&FaceRun) -> f64| {
             let logs = runs.iter().map(|run| of(run).log10());
-            logs.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
+            logs.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+                (low.min(x), high.max(x))
+            })
         };
         for of in [
             |run: &FaceRun| run.h_min,

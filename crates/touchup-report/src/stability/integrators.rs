@@ -54,7 +54,9 @@ impl Integrator {
     /// As the end of a file name: the words of its name.
     pub fn id(self) -> String {
         let name = self.name().to_lowercase();
-        let words = name.split(|c: char| !c.is_alphanumeric()).filter(|word| word.starts_with(char::is_alphabetic));
+        let words = name
+            .split(|c: char| !c.is_alphanumeric())
+            .filter(|word| word.starts_with(char::is_alphabetic));
         words.collect::<Vec<_>>().join("_")
     }
 
@@ -69,7 +71,12 @@ impl Integrator {
     }
 
     /// Where the face is after one sample; `None` where it gives up.
-    pub(super) fn step(self, params: &DynamicsParams, n: &Vector3<f64>, held: &HeldSample) -> Option<Moved> {
+    pub(super) fn step(
+        self,
+        params: &DynamicsParams,
+        n: &Vector3<f64>,
+        held: &HeldSample,
+    ) -> Option<Moved> {
         if let Some(rule) = self.rule() {
             return by_touchup(&DynamicsParams { rule, ..*params }, n, held);
         }
@@ -92,10 +99,18 @@ impl Integrator {
 
 fn by_touchup(params: &DynamicsParams, n: &Vector3<f64>, held: &HeldSample) -> Option<Moved> {
     let dynamics = FaceDynamics::new(*params).ok()?;
-    let face = FaceState { b: nalgebra::Point3::origin(), n: *n };
-    let next = dynamics.step(&face, &held.arm.into(), &held.force, held.dt).ok()?;
+    let face = FaceState {
+        b: nalgebra::Point3::origin(),
+        n: *n,
+    };
+    let next = dynamics
+        .step(&face, &held.arm.into(), &held.force, held.dt)
+        .ok()?;
     let along = held.force.try_normalize(0.0).unwrap_or(*n);
-    Some((next.b.coords.dot(&along), turn(&next.n, &along, held.turning * held.dt)))
+    Some((
+        next.b.coords.dot(&along),
+        turn(&next.n, &along, held.turning * held.dt),
+    ))
 }
 
 /// Eq 6 and 7 along the force, written independently: velocity along F (m/s) and normal (1/s).
@@ -108,13 +123,22 @@ fn rate(params: &DynamicsParams, held: &HeldSample, y: &Unknowns) -> Unknowns {
     let (force_along_n, h) = match params.model {
         ContactModel::Sigmoid { f_max_n, .. } if params.take_out_rigid_offset => {
             let lowest = params.model.force(0.0);
-            (force_along_n.max(lowest).min(LARGEST_SHARE * f_max_n), h + params.model.rigid_offset(force_along_n))
+            (
+                force_along_n.max(lowest).min(LARGEST_SHARE * f_max_n),
+                h + params.model.rigid_offset(force_along_n),
+            )
         }
         _ => (force_along_n, h),
     };
     let expected = params.model.force(h);
-    let turning = (towards - n * towards.dot(&n)) * (params.beta_per_n2_s * magnitude * expected + held.turning);
-    Vector4::new(params.alpha_m_per_n_s * (force_along_n - expected), turning.x, turning.y, turning.z)
+    let turning = (towards - n * towards.dot(&n))
+        * (params.beta_per_n2_s * magnitude * expected + held.turning);
+    Vector4::new(
+        params.alpha_m_per_n_s * (force_along_n - expected),
+        turning.x,
+        turning.y,
+        turning.z,
+    )
 }
 
 /// The length that counts, m.
@@ -127,10 +151,16 @@ fn scale(params: &DynamicsParams, held: &HeldSample) -> f64 {
 }
 
 /// y = y₀ + dt · rate(y) by Newton's method with a Jacobian of differences; a step that makes it worse is halved.
-fn implicit_euler(start: &Unknowns, dt: f64, length: f64, rate: impl Fn(&Unknowns) -> Unknowns) -> Option<Unknowns> {
+fn implicit_euler(
+    start: &Unknowns,
+    dt: f64,
+    length: f64,
+    rate: impl Fn(&Unknowns) -> Unknowns,
+) -> Option<Unknowns> {
     let size = Vector4::new(length, 1.0, 1.0, 1.0);
     // everything in units of its size
-    let residual = |z: &Unknowns| z - (start + rate(&z.component_mul(&size)) * dt).component_div(&size);
+    let residual =
+        |z: &Unknowns| z - (start + rate(&z.component_mul(&size)) * dt).component_div(&size);
     let mut z = start.component_div(&size);
     let mut left = residual(&z);
     for _ in 0..NEWTON_STEPS {
@@ -142,7 +172,12 @@ fn implicit_euler(start: &Unknowns, dt: f64, length: f64, rate: impl Fn(&Unknown
         let step = jacobian.lu().solve(&left)?;
         let mut share = 1.0;
         let mut next = z - step;
-        let is_worse = |next: &Unknowns| residual(next).norm().partial_cmp(&left.norm()).is_none_or(|o| o.is_gt());
+        let is_worse = |next: &Unknowns| {
+            residual(next)
+                .norm()
+                .partial_cmp(&left.norm())
+                .is_none_or(|o| o.is_gt())
+        };
         while share > 1e-6 && is_worse(&next) {
             share *= 0.5;
             next = z - step * share;
@@ -166,7 +201,9 @@ mod tests {
     /// A spring from h = 1 mm to rest at 0 without force along n: dh/dt = −h/τ, whose solution and whose discrete steps are known.
     #[test]
     fn each_step_is_its_own_rule_on_a_linear_decay() {
-        let model = ContactModel::Spring { stiffness_n_per_m: 1e3 };
+        let model = ContactModel::Spring {
+            stiffness_n_per_m: 1e3,
+        };
         let params = DynamicsParams {
             model,
             alpha_m_per_n_s: 0.1,
@@ -177,7 +214,12 @@ mod tests {
         };
         // 2 N rest at h = −2 mm: 3 mm to go at z = α k dt = 0.5
         let (z, force) = (0.5f64, Vector3::new(0.0, 0.0, 2.0));
-        let held = HeldSample { arm: Vector3::new(0.0, 0.0, 1e-3), force, dt: z / 100.0, turning: 0.0 };
+        let held = HeldSample {
+            arm: Vector3::new(0.0, 0.0, 1e-3),
+            force,
+            dt: z / 100.0,
+            turning: 0.0,
+        };
         let left = |integrator: Integrator| {
             let (travel, n) = integrator.step(&params, &Vector3::z(), &held).unwrap();
             assert_eq!(n, Vector3::z());
@@ -185,14 +227,22 @@ mod tests {
         };
         let expected = [
             (Integrator::ExplicitEuler, 1.0 - z),
-            (Integrator::RungeKutta4, 1.0 - z + z * z / 2.0 - z.powi(3) / 6.0 + z.powi(4) / 24.0),
+            (
+                Integrator::RungeKutta4,
+                1.0 - z + z * z / 2.0 - z.powi(3) / 6.0 + z.powi(4) / 24.0,
+            ),
             (Integrator::ImplicitEuler, 1.0 / (1.0 + z)),
             (Integrator::DormandPrince, (-z).exp()),
             (Integrator::Lie, (-z).exp()),
             (Integrator::DriftCorrected, (-z).exp()),
         ];
         for (integrator, share) in expected {
-            assert!((left(integrator) - share).abs() < 1e-9, "{}: {} {share}", integrator.name(), left(integrator));
+            assert!(
+                (left(integrator) - share).abs() < 1e-9,
+                "{}: {} {share}",
+                integrator.name(),
+                left(integrator)
+            );
         }
     }
 
@@ -200,13 +250,26 @@ mod tests {
     fn all_agree_on_a_short_coupled_step() {
         let params = DynamicsParams::default();
         let (force, n) = (Vector3::new(0.8, -0.3, 2.0), Vector3::z());
-        let held = HeldSample { arm: Vector3::new(2e-4, 1e-4, 8e-4), force, dt: 1e-6, turning: 0.0 };
+        let held = HeldSample {
+            arm: Vector3::new(2e-4, 1e-4, 8e-4),
+            force,
+            dt: 1e-6,
+            turning: 0.0,
+        };
         let (exact, turned) = Integrator::DormandPrince.step(&params, &n, &held).unwrap();
         assert!(exact > 1e-8 && turned != n);
         for integrator in Integrator::ALL {
             let (travel, end) = integrator.step(&params, &n, &held).unwrap();
-            assert!((travel / exact - 1.0).abs() < 1e-3, "{}: {travel:e} {exact:e}", integrator.name());
-            assert!((end - turned).norm() < 1e-3 * (turned - n).norm() + 1e-15, "{}", integrator.name());
+            assert!(
+                (travel / exact - 1.0).abs() < 1e-3,
+                "{}: {travel:e} {exact:e}",
+                integrator.name()
+            );
+            assert!(
+                (end - turned).norm() < 1e-3 * (turned - n).norm() + 1e-15,
+                "{}",
+                integrator.name()
+            );
         }
     }
 }

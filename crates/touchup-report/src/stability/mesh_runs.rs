@@ -65,7 +65,12 @@ impl MeshRun {
             alpha: stiffness / (STIFFNESS * dt_s),
             // in the middle of the sheet
             face: (CELLS * CELLS / 2 + CELLS / 2) * 2 + rng.random_range(0..2),
-            tilt: 0.2 * Vector3::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0), 0.0),
+            tilt: 0.2
+                * Vector3::new(
+                    rng.random_range(-1.0..1.0),
+                    rng.random_range(-1.0..1.0),
+                    0.0,
+                ),
             depth: 1e-4 * rng.random_range(-1.0..1.0),
         }
     }
@@ -87,41 +92,76 @@ impl MeshRun {
         let faces = (0..CELLS * CELLS).flat_map(|k| {
             let (a, is_odd) = (k % CELLS + k / CELLS * row, k / CELLS % 2 == 1);
             let [b, c, d] = [a + 1, a + row + 1, a + row];
-            if is_odd && is_sliver { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] }
+            if is_odd && is_sliver {
+                [[a, b, c], [a, c, d]]
+            } else {
+                [[a, b, d], [b, c, d]]
+            }
         });
         let positions = (0..row * row).map(at).collect();
-        TriMesh::new(positions, faces.collect()).unwrap_or_else(|error| unreachable!("the sheet is sound: {error}"))
+        TriMesh::new(positions, faces.collect())
+            .unwrap_or_else(|error| unreachable!("the sheet is sound: {error}"))
     }
 
     /// Presses, and watches the mesh.
     pub fn judge(&self) -> RunEnding {
         let mesh = self.sheet();
-        let mut params = RefineParams::robust(TipParams { radius: RADIUS, stiffness: Some(STIFFNESS) });
+        let mut params = RefineParams::robust(TipParams {
+            radius: RADIUS,
+            stiffness: Some(STIFFNESS),
+        });
         params.dynamics.alpha_m_per_n_s = self.alpha;
         let before: Vec<Vector3<f64>> = mesh.faces().map(|(face, _)| mesh.normal(face)).collect();
-        let (barycentre, normal) = (mesh.barycentre(FaceId(self.face)), mesh.normal(FaceId(self.face)));
-        let Ok(mut refiner) = Refiner::new(mesh, params) else { return RunEnding::GaveUp };
+        let (barycentre, normal) = (
+            mesh.barycentre(FaceId(self.face)),
+            mesh.normal(FaceId(self.face)),
+        );
+        let Ok(mut refiner) = Refiner::new(mesh, params) else {
+            return RunEnding::GaveUp;
+        };
         let measured = (normal + self.tilt).normalize();
         let force = 2.0 * measured;
         let centre = barycentre + measured * (RADIUS + self.depth) - force / STIFFNESS;
-        let wrench = Wrench { force, torque: Vector3::zeros() };
+        let wrench = Wrench {
+            force,
+            torque: Vector3::zeros(),
+        };
         let pose_ot = Isometry3::from_parts(centre.coords.into(), UnitQuaternion::identity());
         let point = centre - measured * RADIUS;
         let mut last = None;
         for i in 1..=SAMPLES {
             let stamp_ns = (i as f64 * self.dt_s * 1e9) as i64;
-            let Ok(update) = refiner.push(&Sample { stamp_ns, pose_ot, wrench }) else { return RunEnding::GaveUp };
+            let Ok(update) = refiner.push(&Sample {
+                stamp_ns,
+                pose_ot,
+                wrench,
+            }) else {
+                return RunEnding::GaveUp;
+            };
             if update.fit == Some(RegionFit::CutBack) {
                 return RunEnding::CutBack;
             }
-            let Some(mismatch) = update.mismatch else { continue };
+            let Some(mismatch) = update.mismatch else {
+                continue;
+            };
             let face = mismatch.face;
-            let now = (face, refiner.mesh().barycentre(face), refiner.mesh().normal(face));
-            if last.replace(now).is_some_and(|last| crosses(last, now, &point, &force)) {
+            let now = (
+                face,
+                refiner.mesh().barycentre(face),
+                refiner.mesh().normal(face),
+            );
+            if last
+                .replace(now)
+                .is_some_and(|last| crosses(last, now, &point, &force))
+            {
                 return RunEnding::Overshot;
             }
         }
-        if refiner.counts().cut_back > 0 { RunEnding::CutBack } else { sound(refiner.mesh(), &before) }
+        if refiner.counts().cut_back > 0 {
+            RunEnding::CutBack
+        } else {
+            sound(refiner.mesh(), &before)
+        }
     }
 }
 
@@ -129,16 +169,26 @@ impl MeshRun {
 type PressedFace = (FaceId, Point3<f64>, Vector3<f64>);
 
 /// Whether the face went over its rest point from one sample to the `next`: for the normal before and for that after.
-fn crosses(last: PressedFace, next: PressedFace, point: &Point3<f64>, force: &Vector3<f64>) -> bool {
+fn crosses(
+    last: PressedFace,
+    next: PressedFace,
+    point: &Point3<f64>,
+    force: &Vector3<f64>,
+) -> bool {
     // distance to equilibrium, m
-    let [from, to] = [last.1, next.1]
-        .map(|barycentre| [last.2, next.2].map(|n| (point - barycentre).dot(&n) + force.dot(&n) / STIFFNESS));
+    let [from, to] = [last.1, next.1].map(|barycentre| {
+        [last.2, next.2].map(|n| (point - barycentre).dot(&n) + force.dot(&n) / STIFFNESS)
+    });
     last.0 == next.0 && goes_over(from, to, CROSSING)
 }
 
 /// Finite, with unit normals that point where they did.
 fn sound(mesh: &TriMesh, before: &[Vector3<f64>]) -> RunEnding {
-    if !mesh.positions().iter().all(|p| p.iter().all(|x| x.is_finite())) {
+    if !mesh
+        .positions()
+        .iter()
+        .all(|p| p.iter().all(|x| x.is_finite()))
+    {
         return RunEnding::NotFinite;
     }
     for (face, _) in mesh.faces() {

@@ -81,16 +81,28 @@ pub fn stability(effort: Effort, progress: &mut dyn FnMut(&str)) -> Stability {
     let faces = Integrator::ALL.map(|integrator| {
         progress(&format!("stability map, {}", integrator.name()));
         // where it is stiff this one takes ten milliseconds for nothing
-        let runs = if integrator == Integrator::DormandPrince { effort.choose(400, 4_000) } else { runs };
+        let runs = if integrator == Integrator::DormandPrince {
+            effort.choose(400, 4_000)
+        } else {
+            runs
+        };
         face_shares(integrator, runs)
     });
     progress("stability map, mesh quality");
-    let meshes = BadShape::ALL.map(|shape| mesh_shares(shape, effort.choose(600, 8_000))).into();
+    let meshes = BadShape::ALL
+        .map(|shape| mesh_shares(shape, effort.choose(600, 8_000)))
+        .into();
     progress("exact sub-flows against 32 digits");
-    let sub_flows = sub_flows::sub_flows(&mut Pcg64::seed_from_u64(SEED), effort.choose(300, 2_000));
+    let sub_flows =
+        sub_flows::sub_flows(&mut Pcg64::seed_from_u64(SEED), effort.choose(300, 2_000));
     progress("step with an error bound against 32 digits");
     let bounded_steps = bounded_steps(SEED, effort.choose(50, 2_500));
-    Stability { faces: faces.into(), meshes, sub_flows, bounded_steps }
+    Stability {
+        faces: faces.into(),
+        meshes,
+        sub_flows,
+        bounded_steps,
+    }
 }
 
 fn face_shares(integrator: Integrator, count: usize) -> FaceShares {
@@ -105,14 +117,27 @@ fn face_shares(integrator: Integrator, count: usize) -> FaceShares {
         let stiffness = of_model.map(|(run, (ending, _))| (run.stiffness(), *ending));
         share_map(name, [&STIFFNESS; 2], stiffness)
     });
-    let steps = runs.iter().map(|(run, (ending, _))| ([run.held.dt, run.h_min], *ending));
+    let steps = runs
+        .iter()
+        .map(|(run, (ending, _))| ([run.held.dt, run.h_min], *ending));
     FaceShares {
         integrator,
         endings: EndingCounts::of(runs.iter().map(|(_, (ending, _))| *ending)),
-        unit_share: share(runs.iter().filter(|(_, (_, kept_unit))| *kept_unit).count(), count),
-        stable_up_to: by_stiffness.iter().map(stable_up_to).reduce(|a, b| Some(a?.min(b?))).flatten(),
+        unit_share: share(
+            runs.iter().filter(|(_, (_, kept_unit))| *kept_unit).count(),
+            count,
+        ),
+        stable_up_to: by_stiffness
+            .iter()
+            .map(stable_up_to)
+            .reduce(|a, b| Some(a?.min(b?)))
+            .flatten(),
         by_stiffness,
-        by_step: share_map(integrator.name(), [&face_runs::STEP, &face_runs::H_MIN], steps),
+        by_step: share_map(
+            integrator.name(),
+            [&face_runs::STEP, &face_runs::H_MIN],
+            steps,
+        ),
     }
 }
 
@@ -123,30 +148,51 @@ fn mesh_shares(shape: BadShape, count: usize) -> MeshShares {
         ([run.stiffness, run.quality], run.judge())
     };
     let runs: Vec<([f64; 2], RunEnding)> = (0..count).map(run).collect();
-    let by_quality = share_map(shape.name(), [&(-6.0..6.0), &mesh_runs::QUALITY], runs.iter().copied());
+    let by_quality = share_map(
+        shape.name(),
+        [&(-6.0..6.0), &mesh_runs::QUALITY],
+        runs.iter().copied(),
+    );
     let endings = EndingCounts::of(runs.iter().map(|(_, ending)| *ending));
-    MeshShares { shape, endings, stable_from_quality: stable_from(&by_quality), by_quality }
+    MeshShares {
+        shape,
+        endings,
+        stable_from_quality: stable_from(&by_quality),
+        by_quality,
+    }
 }
 
 impl Stability {
     /// Whether the default integrator, Lie, was stable in every run of one face.
     pub fn is_default_stable(&self) -> bool {
-        let mut of_default = self.faces.iter().filter(|shares| shares.integrator == Integrator::Lie);
+        let mut of_default = self
+            .faces
+            .iter()
+            .filter(|shares| shares.integrator == Integrator::Lie);
         of_default.all(|shares| shares.endings.stable_share() == 1.0)
     }
 
     /// The smallest altitude over longest side from which on no press of the default was at fault; `None` where all shapes are.
     pub fn default_stable_from_quality(&self) -> Option<f64> {
-        self.meshes.iter().map(|shares| shares.stable_from_quality).reduce(|a, b| Some(a?.max(b?))).flatten()
+        self.meshes
+            .iter()
+            .map(|shares| shares.stable_from_quality)
+            .reduce(|a, b| Some(a?.max(b?)))
+            .flatten()
     }
 
     /// Whether the step with an error bound kept it in every sample, and refused none.
     pub fn is_bound_kept(&self) -> bool {
-        self.bounded_steps.iter().all(|group| group.refused == 0 && group.position <= 1.0 && group.normal <= 1.0)
+        self.bounded_steps
+            .iter()
+            .all(|group| group.refused == 0 && group.position <= 1.0 && group.normal <= 1.0)
     }
 
     /// The largest error of all sub-flows, over the scale.
     pub fn largest_sub_flow_error(&self) -> f64 {
-        self.sub_flows.iter().map(|flow| flow.largest_error).fold(0.0, f64::max)
+        self.sub_flows
+            .iter()
+            .map(|flow| flow.largest_error)
+            .fold(0.0, f64::max)
     }
 }

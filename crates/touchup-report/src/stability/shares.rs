@@ -26,10 +26,18 @@ pub(super) fn share_map(
     }
     let middles = |range: &Range<f64>| {
         let width = (range.end - range.start) / CELLS as f64;
-        (0..CELLS).map(|i| 10f64.powf(range.start + (i as f64 + 0.5) * width)).collect()
+        (0..CELLS)
+            .map(|i| 10f64.powf(range.start + (i as f64 + 0.5) * width))
+            .collect()
     };
-    let shares = counts.map(|[faulty, stable]| (faulty + stable > 0).then(|| share(stable, faulty + stable)));
-    Panel { name: name.to_owned(), xs: middles(x), ys: middles(y), shares: shares.to_vec() }
+    let shares = counts
+        .map(|[faulty, stable]| (faulty + stable > 0).then(|| share(stable, faulty + stable)));
+    Panel {
+        name: name.to_owned(),
+        xs: middles(x),
+        ys: middles(y),
+        shares: shares.to_vec(),
+    }
 }
 
 fn is_stable(share: &Option<f64>) -> bool {
@@ -39,7 +47,15 @@ fn is_stable(share: &Option<f64>) -> bool {
 /// The upper end of the last column up to which every run was stable.
 pub(super) fn stable_up_to(map: &Panel) -> Option<f64> {
     let width = map.xs.len();
-    let columns = (0..width).take_while(|column| map.shares.iter().skip(*column).step_by(width).all(is_stable)).count();
+    let columns = (0..width)
+        .take_while(|column| {
+            map.shares
+                .iter()
+                .skip(*column)
+                .step_by(width)
+                .all(is_stable)
+        })
+        .count();
     let half = (map.xs.get(1)? / map.xs.first()?).sqrt();
     Some(map.xs.get(columns.checked_sub(1)?)? * half)
 }
@@ -59,7 +75,9 @@ pub struct EndingCounts([usize; RunEnding::ALL.len()]);
 impl EndingCounts {
     pub(super) fn of(endings: impl IntoIterator<Item = RunEnding>) -> Self {
         let mut counts = Self::default();
-        endings.into_iter().for_each(|ending| counts.0[ending as usize] += 1);
+        endings
+            .into_iter()
+            .for_each(|ending| counts.0[ending as usize] += 1);
         counts
     }
 

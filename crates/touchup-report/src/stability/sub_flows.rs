@@ -16,7 +16,11 @@ const LARGEST_EXPONENT: f64 = 690.0;
 /// and turning away from it makes 1e-11 of that.
 const NEAREST_OPPOSITE: std::ops::Range<f64> = -5.0..-1.0;
 /// Without rounding of the input: lengths in units of h_min, forces of f_max, times of h_min/(α f_max).
-const UNIT_MODEL: ContactModel = ContactModel::Sigmoid { f_max_n: 1.0, h_min_m: 1.0, delta: 0.0 };
+const UNIT_MODEL: ContactModel = ContactModel::Sigmoid {
+    f_max_n: 1.0,
+    h_min_m: 1.0,
+    delta: 0.0,
+};
 
 /// Largest error of one sub-flow.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,23 +47,43 @@ const REGIMES: [(&str, ForceShare); 7] = [
     ("position, 0 < F < f_max", |rng| rng.random_range(0.0..1.0)),
     ("position, F = 0", |_| 0.0),
     ("position, F = f_max", |_| 1.0),
-    ("position, F near 0", |rng| log_uniform(rng, -12.0..-2.0) * either_sign(rng)),
-    ("position, F near f_max", |rng| 1.0 + log_uniform(rng, -12.0..-2.0) * either_sign(rng)),
-    ("position, F against the normal", |rng| -log_uniform(rng, -2.0..4.0)),
-    ("position, F above f_max", |rng| 1.0 + log_uniform(rng, -2.0..4.0)),
+    ("position, F near 0", |rng| {
+        log_uniform(rng, -12.0..-2.0) * either_sign(rng)
+    }),
+    ("position, F near f_max", |rng| {
+        1.0 + log_uniform(rng, -12.0..-2.0) * either_sign(rng)
+    }),
+    ("position, F against the normal", |rng| {
+        -log_uniform(rng, -2.0..4.0)
+    }),
+    ("position, F above f_max", |rng| {
+        1.0 + log_uniform(rng, -2.0..4.0)
+    }),
 ];
 
 /// All of them, `cases` of each.
 pub(super) fn sub_flows(rng: &mut Pcg64, cases: usize) -> Vec<SubFlowError> {
-    let mut errors: Vec<_> = REGIMES.iter().map(|(name, share)| of_sigmoid(rng, name, *share, cases)).collect();
+    let mut errors: Vec<_> = REGIMES
+        .iter()
+        .map(|(name, share)| of_sigmoid(rng, name, *share, cases))
+        .collect();
     errors.push(of_spring(rng, cases));
     errors.push(of_rotation(rng, cases));
     errors
 }
 
 /// The worst of `cases`: the error of each, and where it was; `None` where there is nothing to compare with.
-fn worst_of(name: &str, cases: usize, mut case: impl FnMut(usize) -> Option<(f64, String)>) -> SubFlowError {
-    let mut worst = SubFlowError { name: name.to_owned(), cases: 0, largest_error: 0.0, worst: String::new() };
+fn worst_of(
+    name: &str,
+    cases: usize,
+    mut case: impl FnMut(usize) -> Option<(f64, String)>,
+) -> SubFlowError {
+    let mut worst = SubFlowError {
+        name: name.to_owned(),
+        cases: 0,
+        largest_error: 0.0,
+        worst: String::new(),
+    };
     for (error, at) in (0..cases).filter_map(&mut case) {
         worst.cases += 1;
         // a NaN is the worst there is
@@ -71,7 +95,10 @@ fn worst_of(name: &str, cases: usize, mut case: impl FnMut(usize) -> Option<(f64
     worst
 }
 
-const FACE: FaceState = FaceState { b: Point3::new(0.0, 0.0, 0.0), n: Vector3::new(0.0, 0.0, 1.0) };
+const FACE: FaceState = FaceState {
+    b: Point3::new(0.0, 0.0, 0.0),
+    n: Vector3::new(0.0, 0.0, 1.0),
+};
 
 /// One step of a face at the origin that looks up, by the rule as printed.
 fn stepped(
@@ -80,26 +107,49 @@ fn stepped(
     (tip, force): (Point3<f64>, Vector3<f64>),
     t: f64,
 ) -> Option<FaceState> {
-    let printed =
-        DynamicsParams { along: Along::InitialNormal, take_out_rigid_offset: false, ..DynamicsParams::default() };
-    let params = DynamicsParams { model, alpha_m_per_n_s, beta_per_n2_s, ..printed };
-    FaceDynamics::new(params).ok()?.step(&FACE, &tip, &force, t).ok()
+    let printed = DynamicsParams {
+        along: Along::InitialNormal,
+        take_out_rigid_offset: false,
+        ..DynamicsParams::default()
+    };
+    let params = DynamicsParams {
+        model,
+        alpha_m_per_n_s,
+        beta_per_n2_s,
+        ..printed
+    };
+    FaceDynamics::new(params)
+        .ok()?
+        .step(&FACE, &tip, &force, t)
+        .ok()
 }
 
 /// Travel of the face under a force along its normal, in units of h_min.
 fn travel(model: ContactModel, h: f64, force: f64, t: f64) -> f64 {
-    let after = stepped(model, [1.0, 0.0], (Point3::new(0.0, 0.0, h), Vector3::z() * force), t);
+    let after = stepped(
+        model,
+        [1.0, 0.0],
+        (Point3::new(0.0, 0.0, h), Vector3::z() * force),
+        t,
+    );
     after.map_or(f64::NAN, |face| face.b.z)
 }
 
 fn of_sigmoid(rng: &mut Pcg64, name: &str, share: ForceShare, cases: usize) -> SubFlowError {
     worst_of(name, cases, |case| {
         // half of them where the logistic bends, half of them anywhere an exponential is finite
-        let u = if case % 2 == 0 { rng.random_range(-12.0..12.0) } else { rng.random_range(-600.0..600.0) };
+        let u = if case % 2 == 0 {
+            rng.random_range(-12.0..12.0)
+        } else {
+            rng.random_range(-600.0..600.0)
+        };
         let (c, t) = (share(rng), log_uniform(rng, -6.0..6.0));
         let exact = exact_travel(u, c, t)?;
         let found = travel(UNIT_MODEL, u, c, t);
-        Some(((found - exact).abs() / (1.0 + exact.abs()), format!("u {u}, F/f_max {c}, T {t}")))
+        Some((
+            (found - exact).abs() / (1.0 + exact.abs()),
+            format!("u {u}, F/f_max {c}, T {t}"),
+        ))
     })
 }
 
@@ -122,7 +172,9 @@ fn exact_travel(u: f64, c: f64, t: f64) -> Option<f64> {
     };
     let start = primitive(u.into(), c)?;
     let within = far.clamp(-LARGEST_EXPONENT, LARGEST_EXPONENT);
-    if far != within && primitive(within.into(), c).is_none_or(|there| (there - start - t.into()).high < 0.0) {
+    if far != within
+        && primitive(within.into(), c).is_none_or(|there| (there - start - t.into()).high < 0.0)
+    {
         return straight(u, c, t, far);
     }
     let (mut near, mut far) = (Double2::from(u), Double2::from(within));
@@ -132,7 +184,11 @@ fn exact_travel(u: f64, c: f64, t: f64) -> Option<f64> {
         let is_before = primitive(middle, c)
             .filter(|_| ((share(middle) - c.into()).high > 0.0) == up)
             .is_some_and(|there| (there - start - t.into()).high < 0.0);
-        if is_before { near = middle } else { far = middle }
+        if is_before {
+            near = middle
+        } else {
+            far = middle
+        }
     }
     Some((Double2::from(u) - near).value())
 }
@@ -166,15 +222,23 @@ fn primitive(u: Double2, c: f64) -> Option<Double2> {
 }
 
 fn of_spring(rng: &mut Pcg64, cases: usize) -> SubFlowError {
-    let model = ContactModel::Spring { stiffness_n_per_m: 1.0 };
+    let model = ContactModel::Spring {
+        stiffness_n_per_m: 1.0,
+    };
     worst_of("position, linear spring", cases, |_| {
-        let (h, force, t) =
-            (either_sign(rng) * log_uniform(rng, -6.0..3.0), rng.random_range(-3.0..3.0), log_uniform(rng, -6.0..6.0));
+        let (h, force, t) = (
+            either_sign(rng) * log_uniform(rng, -6.0..3.0),
+            rng.random_range(-3.0..3.0),
+            log_uniform(rng, -6.0..6.0),
+        );
         // h + F falls to e^−t of itself
         let fallen = Double2::from(1.0) - Double2::from(-t.min(300.0)).exp();
         let exact = ((Double2::from(h) + force.into()) * fallen).value();
         let found = travel(model, h, force, t);
-        Some(((found - exact).abs() / (1.0 + exact.abs()), format!("h {h}, F {force}, T {t}")))
+        Some((
+            (found - exact).abs() / (1.0 + exact.abs()),
+            format!("h {h}, F {force}, T {t}"),
+        ))
     })
 }
 
@@ -188,9 +252,17 @@ fn of_rotation(rng: &mut Pcg64, cases: usize) -> SubFlowError {
         };
         let exponent = log_uniform(rng, -6.0..2.5);
         let force = Vector3::new(angle.sin(), 0.0, angle.cos());
-        let after = stepped(UNIT_MODEL, [0.0, 1.0], (Point3::origin(), force), 2.0 * exponent);
+        let after = stepped(
+            UNIT_MODEL,
+            [0.0, 1.0],
+            (Point3::origin(), force),
+            2.0 * exponent,
+        );
         let found = after.map_or(Vector3::repeat(f64::NAN), |face| face.n);
-        Some(((found - exact_normal(&force, exponent)).norm(), format!("angle {angle}, exponent {exponent}")))
+        Some((
+            (found - exact_normal(&force, exponent)).norm(),
+            format!("angle {angle}, exponent {exponent}"),
+        ))
     })
 }
 
@@ -200,10 +272,21 @@ fn exact_normal(force: &Vector3<f64>, exponent: f64) -> Vector3<f64> {
     let one = Double2::from(1.0);
     let length = ((x * x + z * z).ln() * 0.5.into()).exp();
     // tan(θ/2) = sin / (1 + cos) or (1 − cos) / sin, whichever does not cancel
-    let tangent = if force.z > 0.0 { x / (length + z) } else { (length - z) / x };
+    let tangent = if force.z > 0.0 {
+        x / (length + z)
+    } else {
+        (length - z) / x
+    };
     let left = tangent * (-length * exponent.into()).exp();
     // the normal lies at the angle θ − θ′ from z: as the force turned back by θ′
-    let (cosine, sine) = ((one - left * left) / (one + left * left), (left + left) / (one + left * left));
+    let (cosine, sine) = (
+        (one - left * left) / (one + left * left),
+        (left + left) / (one + left * left),
+    );
     let (fx, fz) = (x / length, z / length);
-    Vector3::new((fx * cosine - fz * sine).value(), 0.0, (fz * cosine + fx * sine).value())
+    Vector3::new(
+        (fx * cosine - fz * sine).value(),
+        0.0,
+        (fz * cosine + fx * sine).value(),
+    )
 }

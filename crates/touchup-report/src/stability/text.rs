@@ -1,6 +1,9 @@
 //! The chapter: maps, tables and text.
 
-use super::{BoundedStepError, EndingCounts, FaceShares, LARGEST_SUB_FLOW_ERROR, MeshShares, RunEnding, Stability};
+use super::{
+    BoundedStepError, EndingCounts, FaceShares, LARGEST_SUB_FLOW_ERROR, MeshShares, RunEnding,
+    Stability,
+};
 use crate::{Axis, Chapter, Drawing, Figure, Panel, Table, TableOf};
 use touchup_core::haptic::GuardParams;
 use touchup_core::haptic::dynamics::RELATIVE_ERROR;
@@ -10,7 +13,11 @@ const SHARE_OF: &str = "stable runs";
 impl Stability {
     /// The maps, the tables and their text.
     pub fn chapter(&self) -> Chapter {
-        let figures = self.faces.iter().map(stiffness_map).chain([step_map(&self.faces), quality_map(&self.meshes)]);
+        let figures = self
+            .faces
+            .iter()
+            .map(stiffness_map)
+            .chain([step_map(&self.faces), quality_map(&self.meshes)]);
         let tables = vec![
             faces_table(&self.faces),
             meshes_table(&self.meshes),
@@ -23,7 +30,11 @@ impl Stability {
 
 fn percent(share: f64) -> String {
     // what is not all must not read as all
-    if share == 1.0 { "100 %".to_owned() } else { format!("{:.2} %", (100.0 * share).min(99.99)) }
+    if share == 1.0 {
+        "100 %".to_owned()
+    } else {
+        format!("{:.2} %", (100.0 * share).min(99.99))
+    }
 }
 
 /// "99.99 % of 12000".
@@ -46,22 +57,41 @@ fn texts(stability: &Stability) -> Vec<String> {
     let worst = stability.largest_sub_flow_error();
     let sub_flows = format!(
         "The exact sub-flows differ from the 32-digit solution by {worst:.1e} of their scale at most: {} the limit of {LARGEST_SUB_FLOW_ERROR:.0e}.",
-        if worst <= LARGEST_SUB_FLOW_ERROR { "within" } else { "MISSES" }
+        if worst <= LARGEST_SUB_FLOW_ERROR {
+            "within"
+        } else {
+            "MISSES"
+        }
     );
     let default = if stability.is_default_stable() {
         "One face: the integrator used by default (Lie, robust mode) was stable in every run."
     } else {
         "MISSED: the integrator used by default (Lie, robust mode) was not stable in every run; the tables show where."
     };
-    let runs = stability.faces.iter().map(of_face).chain(stability.meshes.iter().map(of_mesh));
-    let verdicts = [sub_flows, of_bounded_steps(stability), default.to_owned(), of_default_on_meshes(stability)];
-    std::iter::once(what_was_run).chain(runs).chain(verdicts).collect()
+    let runs = stability
+        .faces
+        .iter()
+        .map(of_face)
+        .chain(stability.meshes.iter().map(of_mesh));
+    let verdicts = [
+        sub_flows,
+        of_bounded_steps(stability),
+        default.to_owned(),
+        of_default_on_meshes(stability),
+    ];
+    std::iter::once(what_was_run)
+        .chain(runs)
+        .chain(verdicts)
+        .collect()
 }
 
 fn of_bounded_steps(stability: &Stability) -> String {
     let groups = &stability.bounded_steps;
     let sum = |of: fn(&BoundedStepError) -> usize| groups.iter().map(of).sum::<usize>();
-    let largest = groups.iter().map(|group| group.position.max(group.normal)).fold(0.0, f64::max);
+    let largest = groups
+        .iter()
+        .map(|group| group.position.max(group.normal))
+        .fold(0.0, f64::max);
     format!(
         "The step `bounded` solves position and normal together: on {} random stiff samples, at any angle of the force, its \
          error is {:.2} of its bound of {RELATIVE_ERROR:.0e} at most ({} that roundings of the input move by more are compared \
@@ -70,7 +100,11 @@ fn of_bounded_steps(stability: &Stability) -> String {
         largest,
         sum(|group| group.ill_conditioned),
         sum(|group| group.refused),
-        if stability.is_bound_kept() { "within" } else { "MISSES" }
+        if stability.is_bound_kept() {
+            "within"
+        } else {
+            "MISSES"
+        }
     )
 }
 
@@ -93,17 +127,32 @@ fn bounded_steps_table(stability: &Stability) -> Table {
 }
 
 fn of_default_on_meshes(stability: &Stability) -> String {
-    let (limit, share) = (GuardParams::default().smallest_quality, GuardParams::SCANNED_SHARE);
-    if stability.meshes.iter().all(|shares| shares.endings.stable_share() == 1.0) {
-        return "On meshes of any quality that was tried, the default was stable in every press.".to_owned();
+    let (limit, share) = (
+        GuardParams::default().smallest_quality,
+        GuardParams::SCANNED_SHARE,
+    );
+    if stability
+        .meshes
+        .iter()
+        .all(|shares| shares.endings.stable_share() == 1.0)
+    {
+        return "On meshes of any quality that was tried, the default was stable in every press."
+            .to_owned();
     }
-    let sum =
-        |of: &dyn Fn(&EndingCounts) -> usize| stability.meshes.iter().map(|shares| of(&shares.endings)).sum::<usize>();
+    let sum = |of: &dyn Fn(&EndingCounts) -> usize| {
+        stability
+            .meshes
+            .iter()
+            .map(|shares| of(&shares.endings))
+            .sum::<usize>()
+    };
     let runs = sum(&EndingCounts::runs);
-    let [cut_back, overshot] =
-        [RunEnding::CutBack, RunEnding::Overshot].map(|ending| sum(&|endings| endings.count(ending)));
+    let [cut_back, overshot] = [RunEnding::CutBack, RunEnding::Overshot]
+        .map(|ending| sum(&|endings| endings.count(ending)));
     let from = match stability.default_stable_from_quality() {
-        Some(quality) => format!("no press is at fault from an altitude of {quality:.2} of the longest side on"),
+        Some(quality) => {
+            format!("no press is at fault from an altitude of {quality:.2} of the longest side on")
+        }
         None => "there are faults at every quality".to_owned(),
     };
     format!(
@@ -120,7 +169,11 @@ fn of_face(shares: &FaceShares) -> String {
         Some(limit) => format!("no fault below alpha f_max dt/h_min = {limit:.0e}"),
         None => "faults in every column of the map".to_owned(),
     };
-    format!("{}: {} runs are stable; {limit}.", shares.integrator, stable_of(&shares.endings))
+    format!(
+        "{}: {} runs are stable; {limit}.",
+        shares.integrator,
+        stable_of(&shares.endings)
+    )
 }
 
 fn of_mesh(shares: &MeshShares) -> String {
@@ -132,7 +185,10 @@ fn of_mesh(shares: &MeshShares) -> String {
 }
 
 fn maps(panels: Vec<Panel>) -> Drawing {
-    Drawing::Maps { share_of: SHARE_OF.to_owned(), panels }
+    Drawing::Maps {
+        share_of: SHARE_OF.to_owned(),
+        panels,
+    }
 }
 
 fn stiffness_map(shares: &FaceShares) -> Figure {
@@ -177,9 +233,14 @@ fn quality_map(meshes: &[MeshShares]) -> Figure {
 
 /// How many runs there were, and how many percent of them ended in each way.
 fn with_endings<R: Copy>(table: TableOf<R>, of: fn(R) -> EndingCounts) -> TableOf<R> {
-    RunEnding::ALL.into_iter().fold(table.column("runs", |row| of(row).runs()), |table, ending| {
-        table.column(format!("{ending}, %"), |row| 100.0 * of(row).count(ending) as f64 / of(row).runs() as f64)
-    })
+    RunEnding::ALL.into_iter().fold(
+        table.column("runs", |row| of(row).runs()),
+        |table, ending| {
+            table.column(format!("{ending}, %"), |row| {
+                100.0 * of(row).count(ending) as f64 / of(row).runs() as f64
+            })
+        },
+    )
 }
 
 fn faces_table(faces: &[FaceShares]) -> Table {
@@ -193,8 +254,12 @@ fn faces_table(faces: &[FaceShares]) -> Table {
 }
 
 fn meshes_table(meshes: &[MeshShares]) -> Table {
-    let table = Table::of("stability_meshes", "How the presses on meshes ended", meshes)
-        .column("triangles", |shares| shares.shape.name());
+    let table = Table::of(
+        "stability_meshes",
+        "How the presses on meshes ended",
+        meshes,
+    )
+    .column("triangles", |shares| shares.shape.name());
     with_endings(table, |shares| shares.endings)
         .caption("Robust mode, from equilateral triangles to an altitude of a thousandth of the longest side.")
 }
@@ -208,7 +273,13 @@ fn sub_flows_table(stability: &Stability) -> Table {
     .column("sub-flow", |flow| flow.name.as_str())
     .column("cases", |flow| flow.cases)
     .column("largest error", |flow| flow.largest_error)
-    .column("1e-10", |flow| if flow.largest_error <= LARGEST_SUB_FLOW_ERROR { "within" } else { "beyond" })
+    .column("1e-10", |flow| {
+        if flow.largest_error <= LARGEST_SUB_FLOW_ERROR {
+            "within"
+        } else {
+            "beyond"
+        }
+    })
     .column("where", |flow| flow.worst.as_str())
     .caption(format!(
         "Largest error over the scale: of a position h_min and the travel, of a normal 1. Limit \

@@ -10,7 +10,9 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Point3, Vector3};
 
-use touchup_core::mesh::{FaceHit, FaceId, FaceTree, TriMesh, VertexId, pseudo_normal, signed_distance};
+use touchup_core::mesh::{
+    FaceHit, FaceId, FaceTree, TriMesh, VertexId, pseudo_normal, signed_distance,
+};
 
 /// Rounds in which a vertex is moved to the zero of f along its normal.
 const ROUNDS: usize = 4;
@@ -42,7 +44,16 @@ impl<'a> ContactSculptor<'a> {
     pub fn new(scan: &'a TriMesh, radius: f64, reach: f64) -> Self {
         let (scan_tree, mesh) = (FaceTree::new(scan), scan.clone());
         let tree = scan_tree.clone();
-        Self { scan, scan_tree, mesh, tree, radius, reach, moving: Vec::new(), faces: Vec::new() }
+        Self {
+            scan,
+            scan_tree,
+            mesh,
+            tree,
+            radius,
+            reach,
+            moving: Vec::new(),
+            faces: Vec::new(),
+        }
     }
 
     /// Takes the centre (m, in O) of a ball in contact; returns the point of contact through which the mesh passes now, or
@@ -59,10 +70,15 @@ impl<'a> ContactSculptor<'a> {
         // sideways nothing moves, or a sliding ball drives the mesh before it
         let step = normal * normal.dot(&(contact - hit.point));
         for &(vertex, share) in &self.moving {
-            self.mesh.set_position(vertex, self.mesh.position(vertex) + step * share);
+            self.mesh
+                .set_position(vertex, self.mesh.position(vertex) + step * share);
         }
         self.faces.clear();
-        self.faces.extend(self.moving.iter().flat_map(|&(vertex, _)| self.mesh.star(vertex)));
+        self.faces.extend(
+            self.moving
+                .iter()
+                .flat_map(|&(vertex, _)| self.mesh.star(vertex)),
+        );
         self.tree.refit(&self.mesh, &self.faces);
         Some(contact)
     }
@@ -72,13 +88,20 @@ impl<'a> ContactSculptor<'a> {
         let squares: f64 = hit.barycentric.iter().map(|weight| weight * weight).sum();
         let corners = self.mesh.corners(hit.face).into_iter().zip(hit.barycentric);
         self.moving.clear();
-        self.moving.extend(corners.map(|(corner, weight)| (corner, weight / squares)));
+        self.moving
+            .extend(corners.map(|(corner, weight)| (corner, weight / squares)));
         let mut at = 0;
         while let Some(&(vertex, _)) = self.moving.get(at) {
-            for corner in self.mesh.star(vertex).iter().flat_map(|&face| self.mesh.corners(face)) {
+            for corner in self
+                .mesh
+                .star(vertex)
+                .iter()
+                .flat_map(|&face| self.mesh.corners(face))
+            {
                 let distance = (self.mesh.position(corner) - hit.point).norm() / self.reach;
                 if distance < 1.0 && self.moving.iter().all(|&(known, _)| known != corner) {
-                    self.moving.push((corner, (1.0 - distance * distance).powi(2)));
+                    self.moving
+                        .push((corner, (1.0 - distance * distance).powi(2)));
                 }
             }
             at += 1;
@@ -122,17 +145,27 @@ impl GaussianProcess {
             params.covariance(&points[i], &points[j]) + if i == j { noise } else { 0.0 }
         });
         let weights = Cholesky::new(matrix)?.solve(&DVector::from_column_slice(&values[..count]));
-        Some(Self { params, points: points[..count].to_vec(), weights })
+        Some(Self {
+            params,
+            points: points[..count].to_vec(),
+            weights,
+        })
     }
 
     /// The expected value at `x` (m).
     pub fn mean(&self, x: &Point3<f64>) -> f64 {
-        self.points.iter().zip(&self.weights).map(|(point, weight)| self.params.covariance(x, point) * weight).sum()
+        self.points
+            .iter()
+            .zip(&self.weights)
+            .map(|(point, weight)| self.params.covariance(x, point) * weight)
+            .sum()
     }
 
     fn is_far(&self, x: &Point3<f64>) -> bool {
         let far = (FAR * self.params.length).powi(2);
-        self.points.iter().all(|point| (point - x).norm_squared() > far)
+        self.points
+            .iter()
+            .all(|point| (point - x).norm_squared() > far)
     }
 }
 
@@ -151,13 +184,22 @@ pub struct GaussianSurface<'a> {
 impl<'a> GaussianSurface<'a> {
     /// A surface that is the scan.
     pub fn new(scan: &'a TriMesh, params: GaussianParams) -> Self {
-        Self { scan, tree: FaceTree::new(scan), params, points: Vec::new(), values: Vec::new(), process: None }
+        Self {
+            scan,
+            tree: FaceTree::new(scan),
+            params,
+            points: Vec::new(),
+            values: Vec::new(),
+            process: None,
+        }
     }
 
     /// Takes a contact point (m, in O) and refits; whether that was possible. A touch that makes it impossible is
     /// forgotten.
     pub fn push(&mut self, contact: Point3<f64>) -> bool {
-        let Some(distance) = signed_distance(self.scan, &self.tree, &contact, f64::INFINITY) else { return false };
+        let Some(distance) = signed_distance(self.scan, &self.tree, &contact, f64::INFINITY) else {
+            return false;
+        };
         self.points.push(contact);
         self.values.push(-distance);
         let process = GaussianProcess::fit(self.params, &self.points, &self.values);
@@ -174,11 +216,26 @@ impl<'a> GaussianSurface<'a> {
     /// The scan with its vertices moved along their normals to where f is zero.
     pub fn mesh(&self) -> TriMesh {
         let mut mesh = self.scan.clone();
-        let Some(process) = &self.process else { return mesh };
-        for vertex in (0..mesh.vertex_slots() as u32).map(VertexId).filter(|&vertex| self.scan.has_vertex(vertex)) {
+        let Some(process) = &self.process else {
+            return mesh;
+        };
+        for vertex in (0..mesh.vertex_slots() as u32)
+            .map(VertexId)
+            .filter(|&vertex| self.scan.has_vertex(vertex))
+        {
             let position = self.scan.position(vertex);
-            let sum: Vector3<f64> = self.scan.star(vertex).iter().map(|&face| self.scan.double_area_normal(face)).sum();
-            let Some(normal) = sum.try_normalize(0.0).filter(|_| !process.is_far(&position)) else { continue };
+            let sum: Vector3<f64> = self
+                .scan
+                .star(vertex)
+                .iter()
+                .map(|&face| self.scan.double_area_normal(face))
+                .sum();
+            let Some(normal) = sum
+                .try_normalize(0.0)
+                .filter(|_| !process.is_far(&position))
+            else {
+                continue;
+            };
             // along the normal d is the displacement, so f is zero where that is −g
             let gone = (0..ROUNDS).fold(0.0, |gone, _| -process.mean(&(position + gone * normal)));
             mesh.set_position(vertex, position + gone * normal);

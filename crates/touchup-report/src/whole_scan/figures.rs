@@ -8,19 +8,43 @@ use crate::{Axis, Drawing, Figure, LineStroke, Mark, Series, Spread, Table};
 const STEPS: usize = 12;
 
 /// What an axis shows of a method: its label, its column and the value, all on a logarithmic scale.
-type Quantity = (&'static str, &'static str, fn(&MethodResult, &TouchedError) -> Spread);
+type Quantity = (
+    &'static str,
+    &'static str,
+    fn(&MethodResult, &TouchedError) -> Spread,
+);
 
 const TOTAL: Quantity = ("total run time, s", "total_s", |result, _| result.total_s);
-const PER_SAMPLE: Quantity = ("time per sample, µs", "time_per_sample_us", |result, _| result.per_sample_us);
-const MEAN: Quantity = ("mean surface error, mm", "mean_error_mm", |_, error| error.mean_mm().into());
-const P95: Quantity = ("surface error p95, mm", "p95_error_mm", |_, error| error.p95_mm().into());
-const NORMAL: Quantity = ("mean normal error, deg", "normal_error_deg", |_, error| error.normal_mean_deg.into());
+const PER_SAMPLE: Quantity = ("time per sample, µs", "time_per_sample_us", |result, _| {
+    result.per_sample_us
+});
+const MEAN: Quantity = ("mean surface error, mm", "mean_error_mm", |_, error| {
+    error.mean_mm().into()
+});
+const P95: Quantity = ("surface error p95, mm", "p95_error_mm", |_, error| {
+    error.p95_mm().into()
+});
+const NORMAL: Quantity = ("mean normal error, deg", "normal_error_deg", |_, error| {
+    error.normal_mean_deg.into()
+});
 
 /// Figures with a mark for each method: id, title, what is to the right and what is upward.
 const BY_METHOD: [(&str, &str, [Quantity; 2]); 3] = [
-    ("error_total", "Mean surface error against total run time", [TOTAL, MEAN]),
-    ("p95_sample", "Surface error, 95th percentile, against time per sample", [PER_SAMPLE, P95]),
-    ("normal_sample", "Mean normal error against time per sample", [PER_SAMPLE, NORMAL]),
+    (
+        "error_total",
+        "Mean surface error against total run time",
+        [TOTAL, MEAN],
+    ),
+    (
+        "p95_sample",
+        "Surface error, 95th percentile, against time per sample",
+        [PER_SAMPLE, P95],
+    ),
+    (
+        "normal_sample",
+        "Mean normal error against time per sample",
+        [PER_SAMPLE, NORMAL],
+    ),
 ];
 
 fn axis((label, column, _): Quantity) -> Axis {
@@ -29,13 +53,23 @@ fn axis((label, column, _): Quantity) -> Axis {
 
 impl WholeScan {
     pub(super) fn figures(&self) -> Vec<Figure> {
-        self.cases.iter().flat_map(|case| self.figures_of(case)).collect()
+        self.cases
+            .iter()
+            .flat_map(|case| self.figures_of(case))
+            .collect()
     }
 
     fn figures_of(&self, case: &CaseResult) -> Vec<Figure> {
-        let by_method = case.main().map(|scan| BY_METHOD.map(|figure| self.by_method(case, scan, figure)));
+        let by_method = case
+            .main()
+            .map(|scan| BY_METHOD.map(|figure| self.by_method(case, scan, figure)));
         let over_scans = [self.regions_and_densities(case), self.error_over_edge(case)];
-        by_method.into_iter().flatten().chain(over_scans).chain(self.gaussian_cost(case)).collect()
+        by_method
+            .into_iter()
+            .flatten()
+            .chain(over_scans)
+            .chain(self.gaussian_cost(case))
+            .collect()
     }
 
     /// How the times were come by.
@@ -53,11 +87,23 @@ impl WholeScan {
         scan: &ScanResult,
         (id, title, [x, y]): (&str, &str, [Quantity; 2]),
     ) -> Figure {
-        let mark = |result: &MethodResult, error: &TouchedError| Mark::at(x.2(result, error), y.2(result, error));
-        let one =
-            |result: &MethodResult| Some(Series::new(&result.name, LineStroke::Marks, [mark(result, &result.error?)]));
+        let mark = |result: &MethodResult, error: &TouchedError| {
+            Mark::at(x.2(result, error), y.2(result, error))
+        };
+        let one = |result: &MethodResult| {
+            Some(Series::new(
+                &result.name,
+                LineStroke::Marks,
+                [mark(result, &result.error?)],
+            ))
+        };
         let mut series: Vec<Series> = scan.methods.iter().filter_map(one).collect();
-        let xs = range(series.iter().flat_map(|series| &series.marks).map(|mark| mark.x.median));
+        let xs = range(
+            series
+                .iter()
+                .flat_map(|series| &series.marks)
+                .map(|mark| mark.x.median),
+        );
         series.extend(xs.zip(scan.methods.first()).map(|((low, high), any)| {
             let at = |x: f64| Mark::at(x, y.2(any, &scan.before));
             Series::new("unrefined scan", LineStroke::Dashed, [low, high].map(at))
@@ -74,35 +120,63 @@ impl WholeScan {
 
     /// The robust mode over the sizes of its region, and three methods over the edges of the scan.
     fn regions_and_densities(&self, case: &CaseResult) -> Figure {
-        let mark = |result: &MethodResult| Some(Mark::at(result.per_sample_us, result.error?.mean_mm()));
+        let mark =
+            |result: &MethodResult| Some(Mark::at(result.per_sample_us, result.error?.mean_mm()));
         let mut series = Vec::new();
         if let Some(scan) = case.main() {
-            let robust = scan.methods.iter().filter(|result| matches!(result.method, RefineMethod::Robust(_)));
+            let robust = scan
+                .methods
+                .iter()
+                .filter(|result| matches!(result.method, RefineMethod::Robust(_)));
             let name = "robust: handle, one ring, 0.5, 1, 2 tip radii";
-            series.push(Series::new(name, LineStroke::Joined, robust.filter_map(mark)));
+            series.push(Series::new(
+                name,
+                LineStroke::Joined,
+                robust.filter_map(mark),
+            ));
         }
-        for method in RefineMethod::BY_DENSITY.into_iter().filter(|_| case.scans.len() > 1) {
+        for method in RefineMethod::BY_DENSITY
+            .into_iter()
+            .filter(|_| case.scans.len() > 1)
+        {
             let scans = by_edge(case);
-            let edges: Vec<String> = scans.iter().map(|scan| format!("{:.1}", scan.edge_mm)).collect();
+            let edges: Vec<String> = scans
+                .iter()
+                .map(|scan| format!("{:.1}", scan.edge_mm))
+                .collect();
             let name = format!("{}: edges of {} mm", method.name(), edges.join(", "));
             let marks = scans.into_iter().filter_map(|scan| mark(scan.of(method)?));
             series.push(Series::new(name, LineStroke::Joined, marks));
         }
-        Figure::of(format!("whole_scan_regions_{}", file_name(&case.name)), Drawing::Curves(series))
-            .title(format!("Mean surface error over region sizes and mesh densities, {}", case.name))
-            .axes(axis(PER_SAMPLE), axis(MEAN))
-            .caption(format!("Each line in the order of its name. {}", self.repeats()))
+        Figure::of(
+            format!("whole_scan_regions_{}", file_name(&case.name)),
+            Drawing::Curves(series),
+        )
+        .title(format!(
+            "Mean surface error over region sizes and mesh densities, {}",
+            case.name
+        ))
+        .axes(axis(PER_SAMPLE), axis(MEAN))
+        .caption(format!(
+            "Each line in the order of its name. {}",
+            self.repeats()
+        ))
     }
 
     fn error_over_edge(&self, case: &CaseResult) -> Figure {
         let scans = by_edge(case);
-        let mark = |scan: &ScanResult, error: &TouchedError| Mark::at(scan.edge_mm, error.mean_mm());
+        let mark =
+            |scan: &ScanResult, error: &TouchedError| Mark::at(scan.edge_mm, error.mean_mm());
         let methods = RefineMethod::BY_DENSITY.into_iter().map(|method| {
-            let marks = scans.iter().filter_map(|scan| Some(mark(scan, &scan.of(method)?.error?)));
+            let marks = scans
+                .iter()
+                .filter_map(|scan| Some(mark(scan, &scan.of(method)?.error?)));
             Series::new(method.name(), LineStroke::Joined, marks)
         });
         let before = scans.iter().map(|scan| mark(scan, &scan.before));
-        let all = methods.chain([Series::new("unrefined scan", LineStroke::Dashed, before)]).collect();
+        let all = methods
+            .chain([Series::new("unrefined scan", LineStroke::Dashed, before)])
+            .collect();
         Figure::of(format!("whole_scan_density_{}", file_name(&case.name)), Drawing::Curves(all))
             .title(format!("Mean surface error over the density of the scan, {}", case.name))
             .axes(Axis::log("mean edge of the scan, mm", "edge_mm"), axis(MEAN))
@@ -116,7 +190,10 @@ impl WholeScan {
         let contacts = cost.contacts as f64;
         let at = |count: f64| at_last.median * (count / last).powf(cost.exponent);
         let step = |i: usize| last * (contacts / last).max(1.0).powf(i as f64 / STEPS as f64);
-        let measured = cost.marks.iter().map(|&(count, time)| Mark::at(count, time));
+        let measured = cost
+            .marks
+            .iter()
+            .map(|&(count, time)| Mark::at(count, time));
         let law = (0..=STEPS).map(step).map(|n| Mark::at(n, at(n)));
         let law_name = format!("extrapolated, n^{:.2}", cost.exponent);
         let mut series = vec![
@@ -125,7 +202,9 @@ impl WholeScan {
         ];
         let first = cost.marks.first().map_or(1.0, |mark| mark.0);
         for method in [RefineMethod::HAPTIC, RefineMethod::Patch] {
-            let Some(result) = case.main().and_then(|scan| scan.of(method)) else { continue };
+            let Some(result) = case.main().and_then(|scan| scan.of(method)) else {
+                continue;
+            };
             let marks = [first, contacts].map(|n| Mark::at(n, result.per_sample_us.median));
             series.push(Series::new(method.name(), LineStroke::Dashed, marks));
         }
@@ -145,14 +224,20 @@ impl WholeScan {
     }
 
     pub(super) fn table(&self) -> Table {
-        let scans = self.cases.iter().flat_map(|case| case.scans.iter().map(move |scan| (case, scan)));
+        let scans = self
+            .cases
+            .iter()
+            .flat_map(|case| case.scans.iter().map(move |scan| (case, scan)));
         let rows = scans.flat_map(|(case, scan)| {
             let results = scan.methods.iter().map(Some);
-            std::iter::once(None).chain(results).map(move |result| (case, scan, result))
+            std::iter::once(None)
+                .chain(results)
+                .map(move |result| (case, scan, result))
         });
         type Row<'a> = (&'a CaseResult, &'a ScanResult, Option<&'a MethodResult>);
         // without a method: the scan as it came
-        let error = |(_, scan, result): Row| result.map_or(Some(scan.before), |result| result.error);
+        let error =
+            |(_, scan, result): Row| result.map_or(Some(scan.before), |result| result.error);
         Table::of("whole_scan", "All methods on all scans", rows)
             .column("part", |(case, ..)| case.name.as_str())
             .column("edge, mm", |(_, scan, _)| scan.edge_mm)
@@ -188,5 +273,13 @@ pub(super) fn by_edge(case: &CaseResult) -> Vec<&ScanResult> {
 
 /// A name with the characters of a file name.
 fn file_name(name: &str) -> String {
-    name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '_' }).collect()
+    name.chars()
+        .map(|c| {
+            if c.is_ascii_alphanumeric() {
+                c.to_ascii_lowercase()
+            } else {
+                '_'
+            }
+        })
+        .collect()
 }

@@ -148,7 +148,12 @@ fn feed<T, E: Display>(
 }
 
 /// Refines `scan` by one method.
-pub(super) fn run(method: RefineMethod, part: &Part, scan: &TriMesh, limits: &RunLimits) -> Measured<Run> {
+pub(super) fn run(
+    method: RefineMethod,
+    part: &Part,
+    scan: &TriMesh,
+    limits: &RunLimits,
+) -> Measured<Run> {
     match method {
         RefineMethod::ContactPoints => Ok(sculpt(part, scan, limits)),
         RefineMethod::GaussianProcess => Ok(fit_gaussian(part, scan, limits)),
@@ -157,7 +162,12 @@ pub(super) fn run(method: RefineMethod, part: &Part, scan: &TriMesh, limits: &Ru
 }
 
 fn params(method: RefineMethod, part: &GivenPart) -> RefineParams {
-    let &GivenPart { tip, compensator, scan_noise, .. } = part;
+    let &GivenPart {
+        tip,
+        compensator,
+        scan_noise,
+        ..
+    } = part;
     let mut params = match method {
         RefineMethod::PaperOde45 | RefineMethod::PaperLie => RefineParams::paper(tip),
         _ => RefineParams::robust(tip),
@@ -168,7 +178,9 @@ fn params(method: RefineMethod, part: &GivenPart) -> RefineParams {
         RefineMethod::PaperLie => params.dynamics.rule = StepRule::Lie,
         RefineMethod::Robust(Reach::Handle) => params.roi = RoiSize::Handle,
         RefineMethod::Robust(Reach::OneRing) => params.roi = RoiSize::OneRing,
-        RefineMethod::Robust(Reach::TipRadii(radii)) => params.roi = RoiSize::Radius(radii * tip.radius),
+        RefineMethod::Robust(Reach::TipRadii(radii)) => {
+            params.roi = RoiSize::Radius(radii * tip.radius)
+        }
         _ => {}
     }
     params
@@ -176,24 +188,41 @@ fn params(method: RefineMethod, part: &GivenPart) -> RefineParams {
 
 /// The haptic update, with the patch where the method has one.
 fn refine(method: RefineMethod, part: &Part, scan: &TriMesh, limits: &RunLimits) -> Measured<Run> {
-    let GivenPart { samples, tip, scan_noise, .. } = &part.given;
+    let GivenPart {
+        samples,
+        tip,
+        scan_noise,
+        ..
+    } = &part.given;
     let copy = scan.clone();
     let (build_s, engine) = timed(|| {
-        let patch = (method == RefineMethod::Patch).then(|| PatcherParams::new(tip.radius, tip.stiffness, *scan_noise));
+        let patch = (method == RefineMethod::Patch)
+            .then(|| PatcherParams::new(tip.radius, tip.stiffness, *scan_noise));
         Engine::new(copy, params(method, &part.given), patch, Renewal::AtEnd)
     });
     let mut engine = engine?;
-    let fed = feed(samples.iter(), CLOCK_EVERY, limits.longest_s, |sample| engine.push(sample).map(drop));
+    let fed = feed(samples.iter(), CLOCK_EVERY, limits.longest_s, |sample| {
+        engine.push(sample).map(drop)
+    });
     let (end_s, finished) = timed(|| -> Measured<_> {
         let mut ended = engine.finish()?;
         let counts = *ended.refiner.counts();
-        let Some(mut patcher) = ended.patcher.take() else { return Ok((counts, ended.mesh().into_owned())) };
+        let Some(mut patcher) = ended.patcher.take() else {
+            return Ok((counts, ended.mesh().into_owned()));
+        };
         patcher.flush();
         Ok((counts, patcher.patched(scan, &FaceTree::new(scan))?.mesh))
     });
     let (counts, mesh) = finished?;
     let cut_back_share = counts.cut_back as f64 / counts.moved.max(1) as f64;
-    Ok(Run { mesh, build_s, fed, end_s, offered: samples.len(), cut_back_share })
+    Ok(Run {
+        mesh,
+        build_s,
+        fed,
+        end_s,
+        offered: samples.len(),
+        cut_back_share,
+    })
 }
 
 fn sculpt(part: &Part, scan: &TriMesh, limits: &RunLimits) -> Run {
@@ -202,19 +231,42 @@ fn sculpt(part: &Part, scan: &TriMesh, limits: &RunLimits) -> Run {
     let fed = feed(contacts.iter(), CLOCK_EVERY, limits.longest_s, |contact| {
         sculptor.push(&contact.reported).map(drop).ok_or(NO_CONTACT)
     });
-    Run { mesh: sculptor.mesh, build_s, fed, end_s: 0.0, offered: contacts.len(), cut_back_share: 0.0 }
+    Run {
+        mesh: sculptor.mesh,
+        build_s,
+        fed,
+        end_s: 0.0,
+        offered: contacts.len(),
+        cut_back_share: 0.0,
+    }
 }
 
 fn fit_gaussian(part: &Part, scan: &TriMesh, limits: &RunLimits) -> Run {
-    let GivenPart { scan_noise, tip, .. } = &part.given;
+    let GivenPart {
+        scan_noise, tip, ..
+    } = &part.given;
     let (amplitude, length) = (scan_noise.max(CONTACT_NOISE), 2.0 * tip.radius);
     let contacts = &part.contacts;
     let stride = contacts.len().div_ceil(limits.touches).max(1);
-    let process = GaussianParams { amplitude, length, noise: CONTACT_NOISE };
+    let process = GaussianParams {
+        amplitude,
+        length,
+        noise: CONTACT_NOISE,
+    };
     let (build_s, mut surface) = timed(|| GaussianSurface::new(scan, process));
-    let fed = feed(contacts.iter().step_by(stride), 1, limits.longest_s, |contact| {
-        surface.push(contact.point).then_some(()).ok_or(NO_CONTACT)
-    });
+    let fed = feed(
+        contacts.iter().step_by(stride),
+        1,
+        limits.longest_s,
+        |contact| surface.push(contact.point).then_some(()).ok_or(NO_CONTACT),
+    );
     let (end_s, mesh) = timed(|| surface.mesh());
-    Run { mesh, build_s, fed, end_s, offered: contacts.len(), cut_back_share: 0.0 }
+    Run {
+        mesh,
+        build_s,
+        fed,
+        end_s,
+        offered: contacts.len(),
+        cut_back_share: 0.0,
+    }
 }

@@ -127,7 +127,9 @@ impl ScanResult {
     }
 
     fn least<'a>(methods: impl Iterator<Item = &'a MethodResult>) -> Option<&'a MethodResult> {
-        methods.filter(|result| result.is_sound()).min_by(|a, b| a.mean_mm().total_cmp(&b.mean_mm()))
+        methods
+            .filter(|result| result.is_sound())
+            .min_by(|a, b| a.mean_mm().total_cmp(&b.mean_mm()))
     }
 
     /// The method with the least mean error.
@@ -137,12 +139,20 @@ impl ScanResult {
 
     /// The region of the haptic update alone with the least mean error.
     pub fn best_haptic(&self) -> Option<&MethodResult> {
-        Self::least(self.methods.iter().filter(|result| matches!(result.method, RefineMethod::Robust(_))))
+        Self::least(
+            self.methods
+                .iter()
+                .filter(|result| matches!(result.method, RefineMethod::Robust(_))),
+        )
     }
 
     /// Pareto front over mean error and time per sample, the fastest method first.
     pub fn front(&self) -> Vec<&MethodResult> {
-        let mut methods: Vec<_> = self.methods.iter().filter(|result| result.is_sound()).collect();
+        let mut methods: Vec<_> = self
+            .methods
+            .iter()
+            .filter(|result| result.is_sound())
+            .collect();
         methods.sort_by(|a, b| a.per_sample_us.median.total_cmp(&b.per_sample_us.median));
         let mut least = f64::INFINITY;
         methods.retain(|result| {
@@ -177,7 +187,8 @@ impl Trial<'_> {
         let run = run(self.method, self.part, self.scan, limits)?;
         let samples_s = run.fed.time_s + run.end_s;
         let per_sample_us = samples_s * 1e6 / run.fed.given.max(1) as f64;
-        self.times.push([run.build_s + samples_s, per_sample_us, run.end_s * 1e3]);
+        self.times
+            .push([run.build_s + samples_s, per_sample_us, run.end_s * 1e3]);
         if self.first.is_none() {
             let error = self.part.error_of(&run.mesh);
             self.first = Some((run, error));
@@ -186,21 +197,42 @@ impl Trial<'_> {
     }
 
     fn result(&self, before: &TouchedError) -> Option<MethodResult> {
-        let (Run { fed, offered, cut_back_share, .. }, error) = self.first.as_ref()?;
+        let (
+            Run {
+                fed,
+                offered,
+                cut_back_share,
+                ..
+            },
+            error,
+        ) = self.first.as_ref()?;
         let is_sparse = self.method == RefineMethod::GaussianProcess;
         let is_stopped = fed.refused + fed.given < *offered && !is_sparse;
         let (why_undefined, error) = (error.as_ref().err(), error.as_ref().ok().copied());
         let is_worse = error.is_none_or(|error| error.mean_mm() > before.mean_mm());
         let remarks = [
-            is_stopped.then(|| format!("stopped for its time after {} of {offered} samples", fed.given)),
-            (is_sparse && fed.given < *offered).then(|| format!("given {} of {offered} contacts", fed.given)),
-            fed.why.as_ref().map(|why| format!("{} of {} samples refused: {why}", fed.refused, fed.given)),
+            is_stopped.then(|| {
+                format!(
+                    "stopped for its time after {} of {offered} samples",
+                    fed.given
+                )
+            }),
+            (is_sparse && fed.given < *offered)
+                .then(|| format!("given {} of {offered} contacts", fed.given)),
+            fed.why
+                .as_ref()
+                .map(|why| format!("{} of {} samples refused: {why}", fed.refused, fed.given)),
             why_undefined.map(|why| format!("the error is undefined: {why}")),
-            error
-                .filter(|_| is_worse)
-                .map(|error| format!("worse than the scan ({:.3} to {:.3} mm)", before.mean_mm(), error.mean_mm())),
+            error.filter(|_| is_worse).map(|error| {
+                format!(
+                    "worse than the scan ({:.3} to {:.3} mm)",
+                    before.mean_mm(),
+                    error.mean_mm()
+                )
+            }),
         ];
-        let spread = |which: usize| Spread::of(self.times.iter().map(|times| times[which]).collect());
+        let spread =
+            |which: usize| Spread::of(self.times.iter().map(|times| times[which]).collect());
         Some(MethodResult {
             method: self.method,
             name: self.method.name(),
@@ -222,29 +254,61 @@ impl Trial<'_> {
 ///
 /// # Errors
 /// [`MeasureError`](crate::error::MeasureError), mostly of given parts: a method that fails on its own says so in its result.
-pub fn whole_scan(effort: Effort, given: Option<&GivenPart>, progress: &mut dyn FnMut(&str)) -> Measured<WholeScan> {
+pub fn whole_scan(
+    effort: Effort,
+    given: Option<&GivenPart>,
+    progress: &mut dyn FnMut(&str),
+) -> Measured<WholeScan> {
     let (repeats, slow_s) = (effort.choose(3, 7), effort.choose(0.25, 2.0));
-    let limits = RunLimits { longest_s: effort.choose(2.0, 20.0), touches: effort.choose(150, 300) };
+    let limits = RunLimits {
+        longest_s: effort.choose(2.0, 20.0),
+        touches: effort.choose(150, 300),
+    };
     let parts = parts(effort, given, progress)?;
     let mut trials: Vec<Trial> = Vec::new();
     for part in &parts {
         for (number, scan) in part.scans().enumerate() {
-            let methods: &[RefineMethod] = if number == 0 { &RefineMethod::ALL } else { &RefineMethod::BY_DENSITY };
-            let trial = |&method| Trial { part, scan, method, times: Vec::new(), first: None };
+            let methods: &[RefineMethod] = if number == 0 {
+                &RefineMethod::ALL
+            } else {
+                &RefineMethod::BY_DENSITY
+            };
+            let trial = |&method| Trial {
+                part,
+                scan,
+                method,
+                times: Vec::new(),
+                first: None,
+            };
             trials.extend(methods.iter().map(trial));
         }
     }
     for repeat in 0..repeats {
         // what is slow runs once
-        let is_due = |trial: &&mut Trial| trial.times.first().is_none_or(|&[total_s, ..]| total_s <= slow_s);
+        let is_due = |trial: &&mut Trial| {
+            trial
+                .times
+                .first()
+                .is_none_or(|&[total_s, ..]| total_s <= slow_s)
+        };
         for trial in trials.iter_mut().filter(is_due) {
             let (name, method) = (&trial.part.given.name, trial.method.name());
-            progress(&format!("whole scan: {name}, {method}, {} of {repeats}", repeat + 1));
+            progress(&format!(
+                "whole scan: {name}, {method}, {} of {repeats}",
+                repeat + 1
+            ));
             trial.run(&limits)?;
         }
     }
-    let cases = parts.iter().map(|part| case(part, &trials)).collect::<Result<_, _>>()?;
-    Ok(WholeScan { cases, repeats, slow_s })
+    let cases = parts
+        .iter()
+        .map(|part| case(part, &trials))
+        .collect::<Result<_, _>>()?;
+    Ok(WholeScan {
+        cases,
+        repeats,
+        slow_s,
+    })
 }
 
 fn case(part: &Part, trials: &[Trial]) -> Measured<CaseResult> {
@@ -252,14 +316,24 @@ fn case(part: &Part, trials: &[Trial]) -> Measured<CaseResult> {
         let before = part.error_of(scan)?;
         let own = trials.iter().filter(|trial| std::ptr::eq(trial.scan, scan));
         let methods = own.filter_map(|trial| trial.result(&before)).collect();
-        Ok(ScanResult { edge_mm: scan.mean_edge() * 1e3, faces: scan.face_count(), before, methods })
+        Ok(ScanResult {
+            edge_mm: scan.mean_edge() * 1e3,
+            faces: scan.face_count(),
+            before,
+            methods,
+        })
     };
-    let gaussian =
-        trials.iter().find(|trial| std::ptr::eq(trial.part, part) && trial.method == RefineMethod::GaussianProcess);
-    let each = gaussian.and_then(|trial| trial.first.as_ref()).map_or(&[][..], |(run, _)| &run.fed.laps);
+    let gaussian = trials.iter().find(|trial| {
+        std::ptr::eq(trial.part, part) && trial.method == RefineMethod::GaussianProcess
+    });
+    let each = gaussian
+        .and_then(|trial| trial.first.as_ref())
+        .map_or(&[][..], |(run, _)| &run.fed.laps);
     let GivenPart { name, samples, .. } = &part.given;
     let ends = samples.first().zip(samples.last());
-    let span_ns = ends.map_or(0, |(first, last)| last.stamp_ns.saturating_sub(first.stamp_ns));
+    let span_ns = ends.map_or(0, |(first, last)| {
+        last.stamp_ns.saturating_sub(first.stamp_ns)
+    });
     Ok(CaseResult {
         name: name.clone(),
         samples: samples.len(),
@@ -278,10 +352,17 @@ impl GaussianCost {
             Some(((number as f64 + 0.5) * GROUP as f64, spread))
         };
         let marks: Vec<(f64, Spread)> = groups.filter_map(mark).collect();
-        let logs: Vec<(f64, f64)> =
-            marks[marks.len() / 2..].iter().map(|(count, time)| (count.ln(), time.median.ln())).collect();
+        let logs: Vec<(f64, f64)> = marks[marks.len() / 2..]
+            .iter()
+            .map(|(count, time)| (count.ln(), time.median.ln()))
+            .collect();
         let line = straight_line(&logs)?;
         let at_all_contacts_us = (line.offset + line.slope * (contacts.max(1) as f64).ln()).exp();
-        Some(Self { marks, exponent: line.slope, contacts, at_all_contacts_us })
+        Some(Self {
+            marks,
+            exponent: line.slope,
+            contacts,
+            at_all_contacts_us,
+        })
     }
 }

@@ -10,11 +10,12 @@ use touchup_core::compare::{CompareError, TouchedRegion};
 use touchup_core::haptic::TipParams;
 use touchup_core::mesh::{FaceTree, TriMesh};
 use touchup_core::stylus::{
-    CompensatorParams, ContactEstimator, ContactEstimatorParams, ContactGateParams, Sample, SyncParams, Synchroniser,
+    CompensatorParams, ContactEstimator, ContactEstimatorParams, ContactGateParams, Sample,
+    SyncParams, Synchroniser,
 };
 use touchup_sim::{
-    Lines, PathParams, Peaks, Plate, ScannerParams, SimError, Stroke, StylusParams, Surface, add_vertex_noise,
-    plan_demo, raster, scan, touch,
+    Lines, PathParams, Peaks, Plate, ScannerParams, SimError, Stroke, StylusParams, Surface,
+    add_vertex_noise, plan_demo, raster, scan, touch,
 };
 
 /// A scan, the true part, and the contacts on it, given by the caller; all in O.
@@ -67,9 +68,15 @@ const CHORD_ERROR: f64 = 10e-6;
 const ON_PART: f64 = 1e-3;
 
 /// Peaks and plate, and the part that was given.
-pub(super) fn parts(effort: Effort, given: Option<&GivenPart>, progress: &mut dyn FnMut(&str)) -> Measured<Vec<Part>> {
+pub(super) fn parts(
+    effort: Effort,
+    given: Option<&GivenPart>,
+    progress: &mut dyn FnMut(&str),
+) -> Measured<Vec<Part>> {
     // what is given first: it may be refused
-    let given = given.map(|given| Part::new(given.clone(), Vec::new())).transpose()?;
+    let given = given
+        .map(|given| Part::new(given.clone(), Vec::new()))
+        .transpose()?;
     progress("whole scan: touching peaks");
     let peaks = touched_peaks(effort)?;
     progress("whole scan: touching the plate");
@@ -101,7 +108,10 @@ fn simulated(
         scan: scans.remove(0),
         truth,
         samples,
-        tip: TipParams { radius: params.radius, stiffness: Some(params.stiffness) },
+        tip: TipParams {
+            radius: params.radius,
+            stiffness: Some(params.stiffness),
+        },
         compensator: CompensatorParams::default(),
         scan_noise: ScannerParams::default().noise,
     };
@@ -118,9 +128,23 @@ fn touched_peaks(effort: Effort) -> Measured<Part> {
         Ok(scan)
     };
     let edges = [2.4e-3, 4.8e-3, 1.2e-3, 0.6e-3];
-    let region = region_over(&peaks, effort.choose(10e-3, 22e-3), StylusParams::default().radius);
-    let path = raster(&region, Lines::AlongX, &PathParams { pitch: 1e-3, ..PathParams::default() })?;
-    let scans = edges[..effort.choose(3, 4)].iter().map(scanned).collect::<Result<_, _>>()?;
+    let region = region_over(
+        &peaks,
+        effort.choose(10e-3, 22e-3),
+        StylusParams::default().radius,
+    );
+    let path = raster(
+        &region,
+        Lines::AlongX,
+        &PathParams {
+            pitch: 1e-3,
+            ..PathParams::default()
+        },
+    )?;
+    let scans = edges[..effort.choose(3, 4)]
+        .iter()
+        .map(scanned)
+        .collect::<Result<_, _>>()?;
     simulated("peaks", (&peaks, peaks.mesh(TRUE_EDGE)?), &path, scans)
 }
 
@@ -133,32 +157,74 @@ fn touched_plate(effort: Effort) -> Measured<Part> {
         path.truncate(3);
     }
     let edges = [usual.edge, 4.8e-3, 1.2e-3];
-    let scanned = |&edge: &f64| scan(&plate, &ScannerParams { edge, seed: SEED, ..usual });
-    let scans = edges[..effort.choose(2, 3)].iter().map(scanned).collect::<Result<_, _>>()?;
+    let scanned = |&edge: &f64| {
+        scan(
+            &plate,
+            &ScannerParams {
+                edge,
+                seed: SEED,
+                ..usual
+            },
+        )
+    };
+    let scans = edges[..effort.choose(2, 3)]
+        .iter()
+        .map(scanned)
+        .collect::<Result<_, _>>()?;
     simulated("plate", (&plate, plate.mesh(CHORD_ERROR)?), &path, scans)
 }
 
 impl Part {
     /// - `others`: scans beside the one that was given.
     fn new(given: GivenPart, others: Vec<TriMesh>) -> Measured<Self> {
-        let GivenPart { truth, tip, compensator, .. } = &given;
+        let GivenPart {
+            truth,
+            tip,
+            compensator,
+            ..
+        } = &given;
         let tree = FaceTree::new(truth);
         let (compensator, gate, tip) = (*compensator, Some(ContactGateParams::default()), *tip);
-        let params = ContactEstimatorParams { compensator, bias: None, gate, tip, sliding: None };
+        let params = ContactEstimatorParams {
+            compensator,
+            bias: None,
+            gate,
+            tip,
+            sliding: None,
+        };
         let mut estimator = ContactEstimator::new(params)?;
         let (mut contacts, mut touched) = (Vec::new(), Vec::new());
         for sample in &given.samples {
-            let Ok(sample) = estimator.observe(sample) else { continue };
-            let (centre, Some(surface)) = (sample.centre, sample.surface) else { continue };
+            let Ok(sample) = estimator.observe(sample) else {
+                continue;
+            };
+            let (centre, Some(surface)) = (sample.centre, sample.surface) else {
+                continue;
+            };
             let reported = Point3::from(sample.tip.pose_ot.translation.vector);
-            contacts.push(FeltContact { reported, point: centre - tip.radius * surface.normal });
-            touched.extend(tree.closest(truth, &centre, tip.radius + ON_PART).map(|hit| hit.point));
+            contacts.push(FeltContact {
+                reported,
+                point: centre - tip.radius * surface.normal,
+            });
+            touched.extend(
+                tree.closest(truth, &centre, tip.radius + ON_PART)
+                    .map(|hit| hit.point),
+            );
         }
         let region = TouchedRegion::of(touched);
         if region.contacts().is_empty() {
-            return Err(MeasureError::NothingTouched { samples: given.samples.len(), name: given.name });
+            return Err(MeasureError::NothingTouched {
+                samples: given.samples.len(),
+                name: given.name,
+            });
         }
-        Ok(Self { given, tree, region, contacts, others })
+        Ok(Self {
+            given,
+            tree,
+            region,
+            contacts,
+            others,
+        })
     }
 
     /// The first is the one on which all methods are run.

@@ -24,35 +24,62 @@ impl WholeScan {
             text.extend(case.densities());
             text.extend(case.gaussian.as_ref().map(|cost| case.gaussian_text(cost)));
         }
-        Chapter::of("Error against run time, whole scan", text, self.figures(), vec![self.table()])
+        Chapter::of(
+            "Error against run time, whole scan",
+            text,
+            self.figures(),
+            vec![self.table()],
+        )
     }
 }
 
 /// Name, error and time of one method.
 fn describe(result: &MethodResult) -> String {
-    let normals = result.error.map_or_else(String::new, |error| format!("normals {:.1} deg, ", error.normal_mean_deg));
+    let normals = result.error.map_or_else(String::new, |error| {
+        format!("normals {:.1} deg, ", error.normal_mean_deg)
+    });
     let (mm, us) = (result.mean_mm(), result.per_sample_us.median);
-    format!("{} ({normals}{mm:.3} mm, {us:.2} µs per sample)", result.name)
+    format!(
+        "{} ({normals}{mm:.3} mm, {us:.2} µs per sample)",
+        result.name
+    )
 }
 
 impl CaseResult {
     /// The Pareto front over error and time.
     fn verdict(&self, scan: &ScanResult) -> String {
-        let Self { name, samples, duration_s, .. } = self;
-        let ScanResult { edge_mm, faces, before, .. } = scan;
+        let Self {
+            name,
+            samples,
+            duration_s,
+            ..
+        } = self;
+        let ScanResult {
+            edge_mm,
+            faces,
+            before,
+            ..
+        } = scan;
         let [mean, p95, normals] = [before.mean_mm(), before.p95_mm(), before.normal_mean_deg];
-        let best = scan.best().map_or(" No method reduced the error.".to_owned(), |best| {
-            let (best, times) = (describe(best), mean / best.mean_mm());
-            format!(" The least mean error has {best}: {times:.1} times less than the scan.")
-        });
+        let best = scan
+            .best()
+            .map_or(" No method reduced the error.".to_owned(), |best| {
+                let (best, times) = (describe(best), mean / best.mean_mm());
+                format!(" The least mean error has {best}: {times:.1} times less than the scan.")
+            });
         let front: Vec<String> = scan.front().into_iter().map(describe).collect();
         let front = (front.len() > 1).then(|| {
-            format!(" No other method is both faster and more accurate than one of these: {}.", front.join(", "))
+            format!(
+                " No other method is both faster and more accurate than one of these: {}.",
+                front.join(", ")
+            )
         });
         let haptic = scan.best_haptic().map(|haptic| {
             let (best, regions) = (describe(haptic), same_regions(scan));
             let points = against_contact_points(haptic, scan.of(RefineMethod::ContactPoints));
-            format!(" Of the regions of the haptic update alone the best is {best}.{regions}{points}")
+            format!(
+                " Of the regions of the haptic update alone the best is {best}.{regions}{points}"
+            )
         });
         let (front, haptic) = (front.unwrap_or_default(), haptic.unwrap_or_default());
         format!(
@@ -66,20 +93,35 @@ impl CaseResult {
         let text = |method: RefineMethod| {
             let each = |scan: &ScanResult| {
                 let result = scan.of(method)?;
-                let (mm, us, edge_mm) = (result.mean_mm(), result.per_sample_us.median, scan.edge_mm);
-                let worse = if result.is_worse { ", worse than the scan" } else { "" };
-                Some(format!("{mm:.3} mm in {us:.2} µs per sample at {edge_mm:.1} mm{worse}"))
+                let (mm, us, edge_mm) =
+                    (result.mean_mm(), result.per_sample_us.median, scan.edge_mm);
+                let worse = if result.is_worse {
+                    ", worse than the scan"
+                } else {
+                    ""
+                };
+                Some(format!(
+                    "{mm:.3} mm in {us:.2} µs per sample at {edge_mm:.1} mm{worse}"
+                ))
             };
             let all: Vec<String> = by_edge(self).into_iter().rev().filter_map(each).collect();
             format!("{}: {}", method.name(), all.join(", "))
         };
         let all = RefineMethod::BY_DENSITY.map(text).join("; ");
-        (self.scans.len() > 1).then(|| format!("{} over the edge length of the scan. {all}.", self.name))
+        (self.scans.len() > 1)
+            .then(|| format!("{} over the edge length of the scan. {all}.", self.name))
     }
 
     fn gaussian_text(&self, cost: &GaussianCost) -> String {
-        let GaussianCost { marks, exponent, contacts, at_all_contacts_us } = cost;
-        let (count, time) = marks.last().map_or((0.0, 0.0), |(count, time)| (*count, time.median));
+        let GaussianCost {
+            marks,
+            exponent,
+            contacts,
+            at_all_contacts_us,
+        } = cost;
+        let (count, time) = marks
+            .last()
+            .map_or((0.0, 0.0), |(count, time)| (*count, time.median));
         format!(
             "{}: one more touch costs the Gaussian process {:.2} ms at {count:.0} touches, and that grows as n^{exponent:.2}. \
              With all {contacts} contacts it would be {} for each touch by the same law.",
@@ -102,14 +144,25 @@ fn long_time(seconds: f64) -> String {
 
 /// Whether force and normals are worth it.
 fn against_contact_points(haptic: &MethodResult, points: Option<&MethodResult>) -> String {
-    let Some(points) = points else { return String::new() };
+    let Some(points) = points else {
+        return String::new();
+    };
     if !points.is_sound() {
-        return format!(" Contact points alone did not do: {}.", points.remarks.join("; "));
+        return format!(
+            " Contact points alone did not do: {}.",
+            points.remarks.join("; ")
+        );
     }
     let share = haptic.mean_mm() / points.mean_mm();
-    let normals = haptic.error.zip(points.error).map_or_else(String::new, |(haptic, points)| {
-        format!("; normals {:.1} against {:.1} deg", haptic.normal_mean_deg, points.normal_mean_deg)
-    });
+    let normals = haptic
+        .error
+        .zip(points.error)
+        .map_or_else(String::new, |(haptic, points)| {
+            format!(
+                "; normals {:.1} against {:.1} deg",
+                haptic.normal_mean_deg, points.normal_mean_deg
+            )
+        });
     let verdict = match share {
         _ if (share - 1.0).abs() < ALIKE => "is as good as",
         ..1.0 => "beats",
@@ -125,16 +178,30 @@ fn against_contact_points(haptic: &MethodResult, points: Option<&MethodResult>) 
 
 /// Regions so small that they have nothing but the handle.
 fn same_regions(scan: &ScanResult) -> String {
-    let Some(handle) = scan.of(RefineMethod::Robust(Reach::Handle)) else { return String::new() };
-    let is_same = |result: &&MethodResult| result.method != handle.method && result.error == handle.error;
-    let same: Vec<&str> = scan.methods.iter().filter(is_same).map(|result| result.name.as_str()).collect();
-    let text = format!(" With edges of {:.1} mm nothing but the handle moves with: {}.", scan.edge_mm, same.join(", "));
+    let Some(handle) = scan.of(RefineMethod::Robust(Reach::Handle)) else {
+        return String::new();
+    };
+    let is_same =
+        |result: &&MethodResult| result.method != handle.method && result.error == handle.error;
+    let same: Vec<&str> = scan
+        .methods
+        .iter()
+        .filter(is_same)
+        .map(|result| result.name.as_str())
+        .collect();
+    let text = format!(
+        " With edges of {:.1} mm nothing but the handle moves with: {}.",
+        scan.edge_mm,
+        same.join(", ")
+    );
     if same.is_empty() { String::new() } else { text }
 }
 
 /// Methods that stopped early or made the scan worse.
 fn failures(scan: &ScanResult) -> Option<String> {
     let failed = scan.methods.iter().filter(|result| !result.is_sound());
-    let failed: Vec<String> = failed.map(|result| format!("{}: {}", result.name, result.remarks.join("; "))).collect();
+    let failed: Vec<String> = failed
+        .map(|result| format!("{}: {}", result.name, result.remarks.join("; ")))
+        .collect();
     (!failed.is_empty()).then(|| format!("What did not do: {}.", failed.join(". ")))
 }

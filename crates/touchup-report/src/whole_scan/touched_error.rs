@@ -1,7 +1,8 @@
 //! Errors of a mesh against the part in the touched region.
 
 use touchup_core::compare::{
-    CompareError, Summary, TouchedRegion, angle_between, closest_places, deviations, sample_surface, surface_area,
+    CompareError, Summary, TouchedRegion, angle_between, closest_places, deviations,
+    sample_surface, surface_area,
 };
 use touchup_core::mesh::{Alone, FaceTree, TriMesh};
 use touchup_core::numeric::quantile;
@@ -36,8 +37,18 @@ impl TouchedError {
     /// # Errors
     /// [`CompareError::NoPoints`] where no part of the mesh is near what was touched, or nothing was touched;
     /// [`CompareError::NoFaces`]; [`CompareError::NotFinite`].
-    pub fn of(mesh: &TriMesh, truth: &TriMesh, tree: &FaceTree, region: &TouchedRegion) -> Result<Self, CompareError> {
-        let missing = Summary::of(&deviations(region.contacts(), mesh, &FaceTree::new(mesh), &Alone)?);
+    pub fn of(
+        mesh: &TriMesh,
+        truth: &TriMesh,
+        tree: &FaceTree,
+        region: &TouchedRegion,
+    ) -> Result<Self, CompareError> {
+        let missing = Summary::of(&deviations(
+            region.contacts(),
+            mesh,
+            &FaceTree::new(mesh),
+            &Alone,
+        )?);
         let density = DENSITY.min(MOST_POINTS / surface_area(mesh));
         let places = sample_surface(mesh, density, SEED);
         let points: Vec<_> = places.iter().map(|place| place.point).collect();
@@ -45,11 +56,16 @@ impl TouchedError {
         closest_places(&points, truth, tree, |at, hit| {
             if region.is_near(&hit.point) {
                 wrong.push(hit.distance_squared.sqrt());
-                let normals = (mesh.double_area_normal(places[at].face), truth.double_area_normal(hit.face));
+                let normals = (
+                    mesh.double_area_normal(places[at].face),
+                    truth.double_area_normal(hit.face),
+                );
                 angles.push(angle_between(&normals.0, &normals.1).to_degrees());
             }
         })?;
-        let (Some(missing), Some(wrong)) = (missing, Summary::of(&wrong)) else { return Err(CompareError::NoPoints) };
+        let (Some(missing), Some(wrong)) = (missing, Summary::of(&wrong)) else {
+            return Err(CompareError::NoPoints);
+        };
         angles.sort_unstable_by(f64::total_cmp);
         Ok(Self {
             part_to_mesh_mean_mm: missing.mean * 1e3,

@@ -62,7 +62,11 @@ impl Method {
     /// From coarse to fine.
     pub fn settings(self, effort: Effort) -> Vec<SolverSetting> {
         let doublings = |most: u32| (0..=most).map(|k| SolverSetting::Steps(1 << k)).collect();
-        let tolerances = || (1..=12).map(|k| SolverSetting::RelativeTolerance(10f64.powi(-k))).collect();
+        let tolerances = || {
+            (1..=12)
+                .map(|k| SolverSetting::RelativeTolerance(10f64.powi(-k)))
+                .collect()
+        };
         match self {
             Self::Euler => doublings(effort.choose(12, 14)),
             Self::RungeKutta => doublings(effort.choose(11, 13)),
@@ -92,16 +96,23 @@ impl Method {
                 };
                 rosenbrock::integrate(start, end, scale, relative, rate, jacobian)?
             }
-            (Self::Lie, SolverSetting::Steps(steps)) => return exact_steps(problem, StepRule::Lie, steps),
+            (Self::Lie, SolverSetting::Steps(steps)) => {
+                return exact_steps(problem, StepRule::Lie, steps);
+            }
             (Self::DriftCorrected, SolverSetting::Steps(steps)) => {
                 return exact_steps(problem, StepRule::DriftCorrected, steps);
             }
             _ => return None,
         };
-        let face =
-            FaceState { b: Point3::from(state[0] * problem.normal), n: Vector3::new(state[1], state[2], state[3]) };
+        let face = FaceState {
+            b: Point3::from(state[0] * problem.normal),
+            n: Vector3::new(state[1], state[2], state[3]),
+        };
         let is_finite = state.iter().all(|x| x.is_finite());
-        is_finite.then_some(Solved { face, evaluations: count.get() })
+        is_finite.then_some(Solved {
+            face,
+            evaluations: count.get(),
+        })
     }
 }
 
@@ -112,7 +123,12 @@ fn euler(start: State, end: f64, steps: usize, mut rate: impl FnMut(&State) -> S
 }
 
 /// `steps` steps of the classical Runge–Kutta method: order 4, four evaluations each.
-fn runge_kutta(start: State, end: f64, steps: usize, mut rate: impl FnMut(&State) -> State) -> State {
+fn runge_kutta(
+    start: State,
+    end: f64,
+    steps: usize,
+    mut rate: impl FnMut(&State) -> State,
+) -> State {
     let dt = end / steps as f64;
     (0..steps).fold(start, |y, _| {
         let k1 = rate(&y);
@@ -133,9 +149,15 @@ fn exact_steps(problem: &Problem, rule: StepRule, steps: usize) -> Option<Solved
     let (tip, dt) = (Point3::from(problem.arm), problem.dt_s / steps as f64);
     let (mut face, mut evaluations) = (problem.face(), 0);
     for _ in 0..steps {
-        let next = dynamics.step_from(&problem.normal, &face, &tip, &problem.force, dt).ok()?;
+        let next = dynamics
+            .step_from(&problem.normal, &face, &tip, &problem.force, dt)
+            .ok()?;
         // a normal that does not turn needs no correction
-        evaluations += if rule == StepRule::Lie || next.n == face.n { 1 } else { FLOWS_CORRECTED };
+        evaluations += if rule == StepRule::Lie || next.n == face.n {
+            1
+        } else {
+            FLOWS_CORRECTED
+        };
         face = next;
     }
     Some(Solved { face, evaluations })

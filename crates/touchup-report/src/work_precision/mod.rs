@@ -82,9 +82,19 @@ impl WorkPrecision {
     pub fn measure(effort: Effort, progress: &mut dyn FnMut(&str)) -> Self {
         let repeats = effort.choose(9, 31);
         let h_mins = effort.choose(&H_MINS_QUICK_M[..], &H_MINS_M[..]);
-        let mut measured = Self { cases: Vec::new(), repeats, without_reference: Vec::new() };
-        for (h_min_m, tilt_deg) in h_mins.iter().flat_map(|h_min| TILTS_DEG.map(|tilt| (*h_min, tilt))) {
-            let name = format!("h_min {} mm, force tilted by {tilt_deg}°", three_digits(1e3 * h_min_m));
+        let mut measured = Self {
+            cases: Vec::new(),
+            repeats,
+            without_reference: Vec::new(),
+        };
+        for (h_min_m, tilt_deg) in h_mins
+            .iter()
+            .flat_map(|h_min| TILTS_DEG.map(|tilt| (*h_min, tilt)))
+        {
+            let name = format!(
+                "h_min {} mm, force tilted by {tilt_deg}°",
+                three_digits(1e3 * h_min_m)
+            );
             progress(&format!("work-precision: {name}"));
             match case(h_min_m, tilt_deg, effort, repeats) {
                 Some(case) => measured.cases.push(case),
@@ -105,15 +115,36 @@ fn case(h_min_m: f64, tilt_deg: f64, effort: Effort, repeats: usize) -> Option<F
         let settings = method.settings(effort);
         let run = |&setting: &SolverSetting| {
             let Solved { face, evaluations } = method.solve(&problem, setting)?;
-            let (error_m, normal_error) = ((face.b - right.b).norm().max(floor_m), (face.n - right.n).norm());
+            let (error_m, normal_error) = (
+                (face.b - right.b).norm().max(floor_m),
+                (face.n - right.n).norm(),
+            );
             let readings = (repeats, effort.choose(1e-4, 5e-4));
-            let time_s = time(readings, || method.solve(black_box(&problem), black_box(setting)));
-            Some(IntegratorRun { setting, error_m, normal_error, evaluations, time_s })
+            let time_s = time(readings, || {
+                method.solve(black_box(&problem), black_box(setting))
+            });
+            Some(IntegratorRun {
+                setting,
+                error_m,
+                normal_error,
+                evaluations,
+                time_s,
+            })
         };
         let points: Vec<_> = settings.iter().filter_map(run).collect();
-        Curve { method, gave_up: settings.len() - points.len(), points }
+        Curve {
+            method,
+            gave_up: settings.len() - points.len(),
+            points,
+        }
     };
-    Some(FaceCase { h_min_m, tilt_deg, travel_m, floor_m, curves: Method::ALL.map(curve).to_vec() })
+    Some(FaceCase {
+        h_min_m,
+        tilt_deg,
+        travel_m,
+        floor_m,
+        curves: Method::ALL.map(curve).to_vec(),
+    })
 }
 
 /// Seconds for one call: so many readings, each of which spans so many seconds, or one call.
@@ -125,7 +156,9 @@ fn time<T>((repeats, batch_s): (usize, f64), mut solve: impl FnMut() -> T) -> Sp
     while calls < 1 << 20 && seconds(calls) < batch_s {
         calls *= 2;
     }
-    let times = (0..repeats).map(|_| seconds(calls) / calls as f64).collect();
+    let times = (0..repeats)
+        .map(|_| seconds(calls) / calls as f64)
+        .collect();
     Spread::of(times).unwrap_or(Spread::from(f64::NAN))
 }
 
@@ -137,7 +170,10 @@ impl FaceCase {
 
     /// The integrators that reach `error_m`, the fastest first.
     pub fn ranking(&self, error_m: f64) -> Vec<(Method, IntegratorRun)> {
-        let reaching = self.curves.iter().filter_map(|curve| Some((curve.method, curve.cheapest(error_m)?)));
+        let reaching = self
+            .curves
+            .iter()
+            .filter_map(|curve| Some((curve.method, curve.cheapest(error_m)?)));
         let mut ranking: Vec<_> = reaching.collect();
         ranking.sort_by(|a, b| a.1.time_s.median.total_cmp(&b.1.time_s.median));
         ranking
@@ -147,12 +183,20 @@ impl FaceCase {
 impl Curve {
     /// The fastest point that reaches `error_m` with every finer one: a hit by luck does not count.
     pub fn cheapest(&self, error_m: f64) -> Option<IntegratorRun> {
-        let reaching = self.points.iter().rev().take_while(|point| point.error_m <= error_m);
-        reaching.min_by(|a, b| a.time_s.median.total_cmp(&b.time_s.median)).copied()
+        let reaching = self
+            .points
+            .iter()
+            .rev()
+            .take_while(|point| point.error_m <= error_m);
+        reaching
+            .min_by(|a, b| a.time_s.median.total_cmp(&b.time_s.median))
+            .copied()
     }
 
     /// With the whole sample in a single step.
     pub fn one_step(&self) -> Option<&IntegratorRun> {
-        self.points.iter().find(|point| point.setting == SolverSetting::Steps(1))
+        self.points
+            .iter()
+            .find(|point| point.setting == SolverSetting::Steps(1))
     }
 }

@@ -62,7 +62,11 @@ impl Problem {
     /// The same for [`touchup_core::haptic::FaceDynamics`], with the paper's direction of motion.
     pub fn params(&self, rule: StepRule) -> DynamicsParams {
         DynamicsParams {
-            model: ContactModel::Sigmoid { f_max_n: F_MAX_N, h_min_m: self.h_min_m, delta: DELTA },
+            model: ContactModel::Sigmoid {
+                f_max_n: F_MAX_N,
+                h_min_m: self.h_min_m,
+                delta: DELTA,
+            },
             alpha_m_per_n_s: ALPHA_M_PER_N_S,
             beta_per_n2_s: BETA_PER_N2_S,
             rule,
@@ -73,21 +77,43 @@ impl Problem {
 
     /// The same for the reference.
     pub fn held(&self) -> HeldFace {
-        let Self { arm, force, normal, dt_s, .. } = *self;
-        HeldFace { params: self.params(StepRule::Bounded), normal, arm, force, dt_s }
+        let Self {
+            arm,
+            force,
+            normal,
+            dt_s,
+            ..
+        } = *self;
+        HeldFace {
+            params: self.params(StepRule::Bounded),
+            normal,
+            arm,
+            force,
+            dt_s,
+        }
     }
 
     /// The face at the start, its barycentre at the origin.
     pub fn face(&self) -> FaceState {
-        FaceState { b: Point3::origin(), n: self.normal }
+        FaceState {
+            b: Point3::origin(),
+            n: self.normal,
+        }
     }
 
     /// Expected force, N, and its slope over h, N/m.
     pub fn expected(&self, h: f64) -> (f64, f64) {
         let u = h / self.h_min_m + DELTA;
         let e = (-u.abs()).exp();
-        let share = if u > 0.0 { e / (1.0 + e) } else { 1.0 / (1.0 + e) };
-        (F_MAX_N * share, -F_MAX_N / self.h_min_m * e / ((1.0 + e) * (1.0 + e)))
+        let share = if u > 0.0 {
+            e / (1.0 + e)
+        } else {
+            1.0 / (1.0 + e)
+        };
+        (
+            F_MAX_N * share,
+            -F_MAX_N / self.h_min_m * e / ((1.0 + e) * (1.0 + e)),
+        )
     }
 
     /// dy/dt as the paper prints it: n is taken as it comes, also where an integrator has let it drift from length 1.
@@ -96,7 +122,12 @@ impl Problem {
         let f = self.expected((self.arm - y[0] * self.normal).dot(&n)).0;
         let (pressing, squared) = (self.force.dot(&n), n.norm_squared());
         let turning = BETA_PER_N2_S * f * (squared * self.force - pressing * n);
-        [ALPHA_M_PER_N_S * (pressing - f * squared), turning.x, turning.y, turning.z]
+        [
+            ALPHA_M_PER_N_S * (pressing - f * squared),
+            turning.x,
+            turning.y,
+            turning.z,
+        ]
     }
 
     /// ∂(dy/dt)/∂y.

@@ -12,17 +12,28 @@ const SHOWN_H_MINS_M: [f64; 2] = [PAPER_H_MIN_M, 1e-9];
 impl WorkPrecision {
     /// Chapter 1 of the report.
     pub fn chapter(&self) -> Chapter {
-        let shown = self.cases.iter().filter(|case| SHOWN_H_MINS_M.contains(&case.h_min_m));
+        let shown = self
+            .cases
+            .iter()
+            .filter(|case| SHOWN_H_MINS_M.contains(&case.h_min_m));
         let figures = shown.flat_map(|case| self.error_figures(case));
-        let figures = figures.chain(TILTS_DEG.map(|tilt| self.stiffness_figure(tilt))).collect();
+        let figures = figures
+            .chain(TILTS_DEG.map(|tilt| self.stiffness_figure(tilt)))
+            .collect();
         let tables = vec![self.ranking_table(), self.one_step_table()];
         Chapter::of("Work-precision of one face", self.text(), figures, tables)
     }
 
     /// What a practitioner should take from it.
     pub fn verdict(&self) -> Vec<String> {
-        let steps = [Method::Lie, Method::DriftCorrected].into_iter().filter_map(|method| self.worst_step(method));
-        vec![format!("Integrator. {} {}", steps.collect::<Vec<_>>().join(" "), self.wins_and_losses(LEVELS_M[0]))]
+        let steps = [Method::Lie, Method::DriftCorrected]
+            .into_iter()
+            .filter_map(|method| self.worst_step(method));
+        vec![format!(
+            "Integrator. {} {}",
+            steps.collect::<Vec<_>>().join(" "),
+            self.wins_and_losses(LEVELS_M[0])
+        )]
     }
 
     fn text(&self) -> Vec<String> {
@@ -40,29 +51,44 @@ impl WorkPrecision {
                        hundred more crates along for four unknowns. Every integrator gets the same right-hand side and the \
                        same compiler.";
         let mut text = vec![setting, solvers.to_owned()];
-        text.extend([Method::Lie, Method::DriftCorrected].into_iter().filter_map(|method| self.worst_step(method)));
+        text.extend(
+            [Method::Lie, Method::DriftCorrected]
+                .into_iter()
+                .filter_map(|method| self.worst_step(method)),
+        );
         text.extend(LEVELS_M.map(|level| self.wins_and_losses(level)));
         text.extend(self.explicit_limits());
         text.extend(self.flow_cost());
         let missing = self.without_reference.iter();
-        text.extend(missing.map(|name| format!("No reference was found for {name}: not measured.")));
+        text.extend(
+            missing.map(|name| format!("No reference was found for {name}: not measured.")),
+        );
         text
     }
 
     /// Time and largest error of a single step over all cases, with and without tilt.
     fn worst_step(&self, method: Method) -> Option<String> {
-        let steps = self.cases.iter().filter_map(|case| Some((case, *case.curve(method)?.one_step()?)));
+        let steps = self
+            .cases
+            .iter()
+            .filter_map(|case| Some((case, *case.curve(method)?.one_step()?)));
         let steps: Vec<(&FaceCase, IntegratorRun)> = steps.collect();
-        let slowest = steps.iter().max_by(|a, b| a.1.time_s.median.total_cmp(&b.1.time_s.median))?;
+        let slowest = steps
+            .iter()
+            .max_by(|a, b| a.1.time_s.median.total_cmp(&b.1.time_s.median))?;
         let [straight, tilted] = TILTS_DEG.map(|tilt| {
             let tilted = steps.iter().filter(move |(case, _)| case.tilt_deg == tilt);
             tilted.max_by(|a, b| a.1.error_m.total_cmp(&b.1.error_m))
         });
         let ((straight_case, straight), (case, tilted)) = (straight?, tilted?);
         let without_friction = if straight.error_m <= straight_case.floor_m {
-            "without friction it is as exact as the reference can resolve, whatever h_min".to_owned()
+            "without friction it is as exact as the reference can resolve, whatever h_min"
+                .to_owned()
         } else {
-            format!("without friction it is off by at most {}", length(straight.error_m))
+            format!(
+                "without friction it is off by at most {}",
+                length(straight.error_m)
+            )
         };
         let (name, slowest, tilt) = (method.name(), time(slowest.1.time_s), TILTS_DEG[1]);
         let [most, h_min] = [tilted.error_m, case.h_min_m].map(length);
@@ -74,28 +100,56 @@ impl WorkPrecision {
 
     /// The fastest integrator for an error: where it is an exact step, and where not, by how much.
     fn wins_and_losses(&self, (error_m, name): (f64, &str)) -> String {
-        let outcomes: Vec<FastestSolvers> = self.cases.iter().map(|case| FastestSolvers::of(case, error_m)).collect();
+        let outcomes: Vec<FastestSolvers> = self
+            .cases
+            .iter()
+            .map(|case| FastestSolvers::of(case, error_m))
+            .collect();
         let (won, others): (Vec<_>, Vec<_>) = outcomes.iter().partition(|outcome| outcome.is_won());
-        let (lost, unreached): (Vec<_>, Vec<_>) = others.into_iter().partition(|outcome| outcome.other.is_some());
-        let faster = range(won.iter().filter_map(|outcome| outcome.factor())).map(|(least, most)| {
-            let [least, most] = [least, most].map(three_digits);
-            format!(", {least} to {most} times as fast as the best solver ({})", h_mins(&won))
-        });
-        let alone = where_any(won.iter().filter(|outcome| outcome.other.is_none()).count(), |alone| {
-            format!("; in {alone} of them nothing else gets there")
-        });
-        let mut names: Vec<&str> = lost.iter().filter_map(|outcome| Some(outcome.other?.0.name())).collect();
+        let (lost, unreached): (Vec<_>, Vec<_>) = others
+            .into_iter()
+            .partition(|outcome| outcome.other.is_some());
+        let faster =
+            range(won.iter().filter_map(|outcome| outcome.factor())).map(|(least, most)| {
+                let [least, most] = [least, most].map(three_digits);
+                format!(
+                    ", {least} to {most} times as fast as the best solver ({})",
+                    h_mins(&won)
+                )
+            });
+        let alone = where_any(
+            won.iter().filter(|outcome| outcome.other.is_none()).count(),
+            |alone| format!("; in {alone} of them nothing else gets there"),
+        );
+        let mut names: Vec<&str> = lost
+            .iter()
+            .filter_map(|outcome| Some(outcome.other?.0.name()))
+            .collect();
         names.sort_unstable();
         names.dedup();
-        let slower = range(lost.iter().filter_map(|outcome| Some(1.0 / outcome.factor()?)));
-        let slower = slower.map(|(_, most)| format!(", by at most {} times", three_digits(most))).unwrap_or_default();
-        let never = where_any(lost.iter().filter(|outcome| outcome.exact.is_none()).count(), |never| {
-            format!("; in {never} of them no exact step gets there")
-        });
+        let slower = range(
+            lost.iter()
+                .filter_map(|outcome| Some(1.0 / outcome.factor()?)),
+        );
+        let slower = slower
+            .map(|(_, most)| format!(", by at most {} times", three_digits(most)))
+            .unwrap_or_default();
+        let never = where_any(
+            lost.iter()
+                .filter(|outcome| outcome.exact.is_none())
+                .count(),
+            |never| format!("; in {never} of them no exact step gets there"),
+        );
         let losses = where_any(lost.len(), |count| {
-            format!(" In {count} it is not ({}): {} wins{slower}{never}.", h_mins(&lost), names.join(" or "))
+            format!(
+                " In {count} it is not ({}): {} wins{slower}{never}.",
+                h_mins(&lost),
+                names.join(" or ")
+            )
         });
-        let nothing = where_any(unreached.len(), |count| format!(" In {count} nothing gets there."));
+        let nothing = where_any(unreached.len(), |count| {
+            format!(" In {count} nothing gets there.")
+        });
         format!(
             "To be within {name}, an exact step is the fastest in {} of {} cases{}{alone}.{losses}{nothing}",
             won.len(),
@@ -108,19 +162,42 @@ impl WorkPrecision {
     fn explicit_limits(&self) -> Vec<String> {
         let explicit = [Method::Euler, Method::RungeKutta, Method::DormandPrince];
         let fastest = |method: Method, error_m: f64| {
-            let fails = |case: &&FaceCase| case.curve(method).is_none_or(|curve| curve.cheapest(error_m).is_none());
-            let failing: Vec<f64> = self.cases.iter().filter(fails).map(|case| case.h_min_m).collect();
+            let fails = |case: &&FaceCase| {
+                case.curve(method)
+                    .is_none_or(|curve| curve.cheapest(error_m).is_none())
+            };
+            let failing: Vec<f64> = self
+                .cases
+                .iter()
+                .filter(fails)
+                .map(|case| case.h_min_m)
+                .collect();
             let (name, count) = (method.name(), failing.len());
             range(failing).map_or_else(
                 || format!("{name} gets there everywhere"),
-                |(_, mildest)| format!("{name} misses {count} cases, the mildest at h_min {}", length(mildest)),
+                |(_, mildest)| {
+                    format!(
+                        "{name} misses {count} cases, the mildest at h_min {}",
+                        length(mildest)
+                    )
+                },
             )
         };
         let levels = LEVELS_M[..2].iter();
-        let lines =
-            levels.map(|(error_m, name)| format!("{}: {}", name, explicit.map(|m| fastest(m, *error_m)).join(", ")));
-        let first = self.cases.iter().filter_map(|case| case.curve(Method::Euler)?.points.last());
-        let Some(steps) = first.map(|point| point.evaluations).max() else { return Vec::new() };
+        let lines = levels.map(|(error_m, name)| {
+            format!(
+                "{}: {}",
+                name,
+                explicit.map(|m| fastest(m, *error_m)).join(", ")
+            )
+        });
+        let first = self
+            .cases
+            .iter()
+            .filter_map(|case| case.curve(Method::Euler)?.points.last());
+        let Some(steps) = first.map(|point| point.evaluations).max() else {
+            return Vec::new();
+        };
         vec![format!(
             "Explicit solvers, with up to {steps} steps a sample. Within {}. The expected force is bounded, so \
              steps that are too coarse do not run away: they rattle around the answer.",
@@ -130,7 +207,10 @@ impl WorkPrecision {
 
     /// What a flow costs in evaluations.
     fn flow_cost(&self) -> Option<String> {
-        let case = self.cases.iter().find(|case| case.h_min_m == PAPER_H_MIN_M && case.tilt_deg == TILTS_DEG[1])?;
+        let case = self
+            .cases
+            .iter()
+            .find(|case| case.h_min_m == PAPER_H_MIN_M && case.tilt_deg == TILTS_DEG[1])?;
         let per_count = |method| {
             let last = case.curve(method)?.points.last()?;
             Some(last.time_s.times(1.0 / last.evaluations as f64))
@@ -153,10 +233,15 @@ impl WorkPrecision {
         );
         let time = Axis::log("time for the sample, µs", "time_us");
         let counted = "The same runs by what is counted instead of timed: no spread, the counts repeat exactly.";
-        let evaluations = Axis::log("evaluations of the right-hand side, or exact flows", "evaluations");
+        let evaluations = Axis::log(
+            "evaluations of the right-hand side, or exact flows",
+            "evaluations",
+        );
         [
             case.figure("time", &caption, time, |point| point.time_s.times(1e6)),
-            case.figure("evaluations", counted, evaluations, |point| (point.evaluations as f64).into()),
+            case.figure("evaluations", counted, evaluations, |point| {
+                (point.evaluations as f64).into()
+            }),
         ]
     }
 
@@ -182,13 +267,20 @@ impl WorkPrecision {
     }
 
     fn ranking_table(&self) -> Table {
-        let at_levels = |case| LEVELS_M.map(|(error_m, name)| (case, name, FaceCase::ranking(case, error_m)));
+        let at_levels =
+            |case| LEVELS_M.map(|(error_m, name)| (case, name, FaceCase::ranking(case, error_m)));
         let rankings: Vec<_> = self.cases.iter().flat_map(at_levels).collect();
-        let table = Table::of("work_precision_fastest", "Fastest integrator for an error", &rankings)
-            .column("h_min, mm", |(case, ..)| 1e3 * case.h_min_m)
-            .column("tilt, °", |(case, ..)| case.tilt_deg)
-            .column("within", |(_, name, _)| *name)
-            .column("fastest", |(.., ranking)| ranking.first().map_or("none", |(method, _)| method.name()));
+        let table = Table::of(
+            "work_precision_fastest",
+            "Fastest integrator for an error",
+            &rankings,
+        )
+        .column("h_min, mm", |(case, ..)| 1e3 * case.h_min_m)
+        .column("tilt, °", |(case, ..)| case.tilt_deg)
+        .column("within", |(_, name, _)| *name)
+        .column("fastest", |(.., ranking)| {
+            ranking.first().map_or("none", |(method, _)| method.name())
+        });
         let times = Method::ALL.into_iter().fold(table, |table, wanted| {
             table.column(format!("{}, µs", wanted.name()), |(.., ranking)| {
                 let (_, point) = ranking.iter().find(|(method, _)| *method == wanted)?;
@@ -199,17 +291,30 @@ impl WorkPrecision {
     }
 
     fn one_step_table(&self) -> Table {
-        let table = Table::of("work_precision_one_step", "The whole sample in one exact step", &self.cases)
-            .column("h_min, mm", |case| 1e3 * case.h_min_m)
-            .column("tilt, °", |case| case.tilt_deg)
-            .column("travel, mm", |case| 1e3 * case.travel_m);
-        let methods = [("Lie", Method::Lie), ("drift-corrected", Method::DriftCorrected)];
+        let table = Table::of(
+            "work_precision_one_step",
+            "The whole sample in one exact step",
+            &self.cases,
+        )
+        .column("h_min, mm", |case| 1e3 * case.h_min_m)
+        .column("tilt, °", |case| case.tilt_deg)
+        .column("travel, mm", |case| 1e3 * case.travel_m);
+        let methods = [
+            ("Lie", Method::Lie),
+            ("drift-corrected", Method::DriftCorrected),
+        ];
         let steps = methods.into_iter().fold(table, |table, (name, method)| {
             let step = |case: &FaceCase| case.curve(method)?.one_step().copied();
             table
-                .column(format!("{name}: error, mm"), |case| Some(1e3 * step(case)?.error_m))
-                .column(format!("{name}: normal, °"), |case| Some(step(case)?.normal_error.to_degrees()))
-                .column(format!("{name}: time, µs"), |case| Some(step(case)?.time_s.times(1e6)))
+                .column(format!("{name}: error, mm"), |case| {
+                    Some(1e3 * step(case)?.error_m)
+                })
+                .column(format!("{name}: normal, °"), |case| {
+                    Some(step(case)?.normal_error.to_degrees())
+                })
+                .column(format!("{name}: time, µs"), |case| {
+                    Some(step(case)?.time_s.times(1e6))
+                })
         });
         steps.caption(
             "Travel: how far the face moves in the exact solution. Without tilt the one step is the exact solution.",
@@ -227,8 +332,17 @@ struct FastestSolvers {
 impl FastestSolvers {
     fn of(case: &FaceCase, error_m: f64) -> Self {
         let ranking = case.ranking(error_m);
-        let first = |is_exact| ranking.iter().find(|(method, _)| method.is_exact() == is_exact).copied();
-        Self { h_min_m: case.h_min_m, exact: first(true), other: first(false) }
+        let first = |is_exact| {
+            ranking
+                .iter()
+                .find(|(method, _)| method.is_exact() == is_exact)
+                .copied()
+        };
+        Self {
+            h_min_m: case.h_min_m,
+            exact: first(true),
+            other: first(false),
+        }
     }
 
     /// How many times as long the other takes; `None` where one of them does not get there.
@@ -243,7 +357,11 @@ impl FastestSolvers {
 
 /// The text of a count, where it is not 0.
 fn where_any(count: usize, text: impl Fn(usize) -> String) -> String {
-    if count > 0 { text(count) } else { String::new() }
+    if count > 0 {
+        text(count)
+    } else {
+        String::new()
+    }
 }
 
 /// "h_min 1 nm to 1 µm".
@@ -258,27 +376,47 @@ fn h_mins(outcomes: &[&FastestSolvers]) -> String {
 /// In the unit that leaves few zeros.
 fn length(metres: f64) -> String {
     let units = [(1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"), (1e-12, "pm")];
-    let (unit, name) = units.into_iter().find(|(unit, _)| metres >= 0.1 * unit).unwrap_or((1e-12, "pm"));
+    let (unit, name) = units
+        .into_iter()
+        .find(|(unit, _)| metres >= 0.1 * unit)
+        .unwrap_or((1e-12, "pm"));
     format!("{} {name}", three_digits(metres / unit))
 }
 
 /// Median and ends, in the unit that leaves few zeros.
 fn time(seconds: Spread) -> String {
-    let (unit, name) = if seconds.median < 1e-7 { (1e-9, "ns") } else { (1e-6, "µs") };
+    let (unit, name) = if seconds.median < 1e-7 {
+        (1e-9, "ns")
+    } else {
+        (1e-6, "µs")
+    };
     let [median, p10, p90] = seconds.numbers().map(|value| three_digits(value / unit));
     format!("{median} {name} ({p10}–{p90})")
 }
 
 impl FaceCase {
-    fn figure(&self, over: &str, caption: &str, axis: Axis, x: fn(&IntegratorRun) -> Spread) -> Figure {
+    fn figure(
+        &self,
+        over: &str,
+        caption: &str,
+        axis: Axis,
+        x: fn(&IntegratorRun) -> Spread,
+    ) -> Figure {
         let series = self.curves.iter().map(|curve| {
-            let marks = curve.points.iter().map(|point| Mark::at(x(point), 1e3 * point.error_m));
+            let marks = curve
+                .points
+                .iter()
+                .map(|point| Mark::at(x(point), 1e3 * point.error_m));
             Series::new(curve.method.name(), LineStroke::Joined, marks)
         });
         let (exponent, tilt_deg) = ((self.h_min_m * 1e9).round(), self.tilt_deg);
         let id = format!("work_precision_{over}_{exponent}nm_{}", force_id(tilt_deg));
         Figure::of(id, Drawing::Curves(series.collect()))
-            .title(format!("Error at the end of one sample: h_min {}, {}", length(self.h_min_m), force_name(tilt_deg)))
+            .title(format!(
+                "Error at the end of one sample: h_min {}, {}",
+                length(self.h_min_m),
+                force_name(tilt_deg)
+            ))
             .axes(axis, Axis::log("error of the barycentre, mm", "error_mm"))
             .caption(format!("{caption}{}", self.gave_up()))
     }
@@ -288,7 +426,11 @@ impl FaceCase {
         let giving_up = self.curves.iter().filter(|curve| curve.gave_up > 0);
         let failure = |curve: &Curve| {
             let all = curve.gave_up + curve.points.len();
-            format!("{} gave up at {} of {all} settings", curve.method.name(), curve.gave_up)
+            format!(
+                "{} gave up at {} of {all} settings",
+                curve.method.name(),
+                curve.gave_up
+            )
         };
         let failures: Vec<String> = giving_up.map(failure).collect();
         where_any(failures.len(), |_| format!(" {}.", failures.join("; ")))
@@ -296,9 +438,17 @@ impl FaceCase {
 }
 
 fn force_name(tilt_deg: f64) -> String {
-    if tilt_deg == 0.0 { "no friction".to_owned() } else { format!("force tilted by {}°", three_digits(tilt_deg)) }
+    if tilt_deg == 0.0 {
+        "no friction".to_owned()
+    } else {
+        format!("force tilted by {}°", three_digits(tilt_deg))
+    }
 }
 
 fn force_id(tilt_deg: f64) -> &'static str {
-    if tilt_deg == 0.0 { "straight" } else { "tilted" }
+    if tilt_deg == 0.0 {
+        "straight"
+    } else {
+        "tilted"
+    }
 }

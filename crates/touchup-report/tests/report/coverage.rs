@@ -9,18 +9,36 @@ use touchup_sim::SimWorld;
 use crate::full::is_full;
 
 fn number(error: f64, std: f64) -> StatedNumber {
-    StatedNumber { error, std, is_at_least: false }
+    StatedNumber {
+        error,
+        std,
+        is_at_least: false,
+    }
 }
 
 fn of(kind: CoverageKind, numbers: Vec<StatedNumber>) -> KindInWorld {
-    KindInWorld { world: SimWorld::Ur, kind, numbers }
+    KindInWorld {
+        world: SimWorld::Ur,
+        kind,
+        numbers,
+    }
 }
 
 #[test]
 fn scores_shares_and_bounds_are_as_counted_by_hand() {
-    let bound = |error| StatedNumber { error, std: 1e-3, is_at_least: true };
-    let numbers =
-        vec![number(3e-3, 1e-3), number(-4e-3, 4e-3), number(1e-3, 0.0), bound(1.9e-3), bound(2e-3), bound(-9e-3)];
+    let bound = |error| StatedNumber {
+        error,
+        std: 1e-3,
+        is_at_least: true,
+    };
+    let numbers = vec![
+        number(3e-3, 1e-3),
+        number(-4e-3, 4e-3),
+        number(1e-3, 0.0),
+        bound(1.9e-3),
+        bound(2e-3),
+        bound(-9e-3),
+    ];
     let found = of(CoverageKind::HoleDepth, numbers);
     // 3 and −1 standard deviations; one number without, three bounds
     assert_eq!(found.count(), 2);
@@ -37,7 +55,9 @@ fn vertices_hold_by_their_share_too() {
     // 8 of 100 at 2 standard deviations, the rest such that the root mean square is 1
     let rest = ((100.0f64 - 8.0 * 4.0) / 92.0).sqrt();
     let numbers = |outside: usize| {
-        (0..100).map(|i| number(if i < outside { 2.0 } else { rest } * 1e-3, 1e-3)).collect::<Vec<_>>()
+        (0..100)
+            .map(|i| number(if i < outside { 2.0 } else { rest } * 1e-3, 1e-3))
+            .collect::<Vec<_>>()
     };
     for (kind, holds) in [
         (CoverageKind::PlaneVertex, false),
@@ -47,30 +67,62 @@ fn vertices_hold_by_their_share_too() {
     ] {
         assert_eq!(of(kind, numbers(8)).holds(), Some(holds), "{}", kind.name());
     }
-    assert_eq!(of(CoverageKind::PlaneVertex, numbers(7)).holds(), Some(true));
+    assert_eq!(
+        of(CoverageKind::PlaneVertex, numbers(7)).holds(),
+        Some(true)
+    );
 }
 
 #[test]
 fn coverage_is_measured_and_reported() {
-    let params = CoverageParams::of(Effort { is_quick: !is_full() });
+    let params = CoverageParams::of(Effort {
+        is_quick: !is_full(),
+    });
     let found = coverage(params.clone(), &mut |_| {});
     assert_eq!(found.failed, Vec::<String>::new());
     for &world in &params.worlds {
-        let of =
-            |kind| found.kinds.iter().find(|of| of.world == world && of.kind == kind).map_or(0, KindInWorld::count);
-        for kind in [CoverageKind::PlaneVertex, CoverageKind::EdgeVertex, CoverageKind::RimVertex] {
-            assert!(of(kind) > 10, "{}: {} of {}", world.name(), of(kind), kind.name());
+        let of = |kind| {
+            found
+                .kinds
+                .iter()
+                .find(|of| of.world == world && of.kind == kind)
+                .map_or(0, KindInWorld::count)
+        };
+        for kind in [
+            CoverageKind::PlaneVertex,
+            CoverageKind::EdgeVertex,
+            CoverageKind::RimVertex,
+        ] {
+            assert!(
+                of(kind) > 10,
+                "{}: {} of {}",
+                world.name(),
+                of(kind),
+                kind.name()
+            );
         }
-        assert!(of(CoverageKind::HoleDiameter) > 0, "{} has no hole", world.name());
+        assert!(
+            of(CoverageKind::HoleDiameter) > 0,
+            "{} has no hole",
+            world.name()
+        );
     }
     let chapter = found.chapter();
     let table = &chapter.tables[0];
     assert_eq!(table.rows.len(), found.kinds.len());
-    let verdicts = table.rows.iter().filter(|row| row.last() == Some(&TableCell::from("OUTSIDE"))).count();
+    let verdicts = table
+        .rows
+        .iter()
+        .filter(|row| row.last() == Some(&TableCell::from("OUTSIDE")))
+        .count();
     assert_eq!(verdicts, found.outside().len());
     if let (true, Some(folder)) = (is_full(), std::env::var_os("TOUCHUP_RESULTS")) {
-        let mut text =
-            format!("{}\n\n| {} |\n|{}\n", chapter.text[0], table.heads.join(" | "), "---|".repeat(table.heads.len()));
+        let mut text = format!(
+            "{}\n\n| {} |\n|{}\n",
+            chapter.text[0],
+            table.heads.join(" | "),
+            "---|".repeat(table.heads.len())
+        );
         for row in &table.rows {
             let cells: Vec<String> = row.iter().map(in_words).collect();
             writeln!(text, "| {} |", cells.join(" | ")).unwrap();

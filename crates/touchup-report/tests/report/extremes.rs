@@ -6,7 +6,10 @@ use touchup_report::extremes::extremes;
 fn every_extreme_gets_the_right_answer() {
     let measured = extremes();
     for row in &measured.rows {
-        println!("{} | {} | {} | {}", row.is_right, row.fed, row.came_out, row.right_answer);
+        println!(
+            "{} | {} | {} | {}",
+            row.is_right, row.fed, row.came_out, row.right_answer
+        );
     }
     let wrong: Vec<&str> = measured.wrong().map(|row| row.fed.as_str()).collect();
     assert_eq!(wrong, Vec::<&str>::new());

@@ -10,16 +10,31 @@ use touchup_sim::{INPUT_MISTAKES, InputMistake, SimWorld};
 use crate::full::is_full;
 
 fn finding(cause: InputCause, is_sure: bool) -> InputFinding {
-    InputFinding { cause, is_sure, measured: "measured".to_owned(), remedy: "do" }
+    InputFinding {
+        cause,
+        is_sure,
+        measured: "measured".to_owned(),
+        remedy: "do",
+    }
 }
 
-fn checked(mistake: Option<&'static InputMistake>, findings: Vec<InputFinding>) -> CheckedRecording {
-    CheckedRecording { world: SimWorld::Ur, seed: 1, mistake, findings }
+fn checked(
+    mistake: Option<&'static InputMistake>,
+    findings: Vec<InputFinding>,
+) -> CheckedRecording {
+    CheckedRecording {
+        world: SimWorld::Ur,
+        seed: 1,
+        mistake,
+        findings,
+    }
 }
 
 #[test]
 fn a_mistake_is_named_by_its_cause_alone_and_surely() {
-    let reversed = INPUT_MISTAKES.iter().find(|mistake| mistake.cause == InputCause::WrenchSign);
+    let reversed = INPUT_MISTAKES
+        .iter()
+        .find(|mistake| mistake.cause == InputCause::WrenchSign);
     assert!(reversed.is_some());
     let sign = |is_sure| finding(InputCause::WrenchSign, is_sure);
     let of = |findings| checked(reversed, findings);
@@ -32,7 +47,10 @@ fn a_mistake_is_named_by_its_cause_alone_and_surely() {
         checked(None, vec![]),
         checked(None, vec![finding(InputCause::Delay, false)]),
     ];
-    assert_eq!(all.each_ref().map(CheckedRecording::is_right), [true, true, false, false, false, true, false]);
+    assert_eq!(
+        all.each_ref().map(CheckedRecording::is_right),
+        [true, true, false, false, false, true, false]
+    );
     assert_eq!(RightCount::of(all.iter()), RightCount { right: 3, all: 7 });
     assert_eq!(all[3].said(), "wrench_sign: perhaps: measured; do");
     assert_eq!(all[4].said(), "");
@@ -40,7 +58,9 @@ fn a_mistake_is_named_by_its_cause_alone_and_surely() {
 
 #[test]
 fn mistakes_are_named_and_sound_recordings_raise_no_alarm() {
-    let mut params = MistakesParams::of(Effort { is_quick: !is_full() });
+    let mut params = MistakesParams::of(Effort {
+        is_quick: !is_full(),
+    });
     if is_full() {
         params.seeds = 1..=20;
     }
@@ -49,16 +69,37 @@ fn mistakes_are_named_and_sound_recordings_raise_no_alarm() {
     let [made, sound] = found.counts();
     let seeds = params.seeds.clone().count();
     assert_eq!(made.all, params.worlds.len() * seeds * INPUT_MISTAKES.len());
-    assert_eq!(sound.all, params.worlds.len() * seeds * (1 + params.more_sound as usize));
+    assert_eq!(
+        sound.all,
+        params.worlds.len() * seeds * (1 + params.more_sound as usize)
+    );
     let chapter = found.chapter();
-    let [named, worlds, missed] = chapter.tables.as_slice() else { panic!("three tables") };
-    assert_eq!((named.rows.len(), worlds.rows.len()), (INPUT_MISTAKES.len(), params.worlds.len()));
-    assert_eq!(missed.rows.len(), made.all - made.right + sound.all - sound.right);
-    assert!(made.right as f64 >= 0.95 * made.all as f64 && sound.right == sound.all, "{:?}", missed.rows);
+    let [named, worlds, missed] = chapter.tables.as_slice() else {
+        panic!("three tables")
+    };
+    assert_eq!(
+        (named.rows.len(), worlds.rows.len()),
+        (INPUT_MISTAKES.len(), params.worlds.len())
+    );
+    assert_eq!(
+        missed.rows.len(),
+        made.all - made.right + sound.all - sound.right
+    );
+    assert!(
+        made.right as f64 >= 0.95 * made.all as f64 && sound.right == sound.all,
+        "{:?}",
+        missed.rows
+    );
     if let (true, Some(folder)) = (is_full(), std::env::var_os("TOUCHUP_RESULTS")) {
         let mut text = format!("{}\n", chapter.text[0]);
         for table in &chapter.tables {
-            write!(text, "\n| {} |\n|{}\n", table.heads.join(" | "), "---|".repeat(table.heads.len())).unwrap();
+            write!(
+                text,
+                "\n| {} |\n|{}\n",
+                table.heads.join(" | "),
+                "---|".repeat(table.heads.len())
+            )
+            .unwrap();
             for row in &table.rows {
                 let cells: Vec<String> = row.iter().map(in_words).collect();
                 writeln!(text, "| {} |", cells.join(" | ")).unwrap();

@@ -3,16 +3,31 @@
 use serde_json::Value;
 use touchup_report::document::Report;
 use touchup_report::files::{OutputFile, ReportError};
-use touchup_report::{Axis, Chapter, Drawing, Figure, LineStroke, Mark, Panel, Series, Spread, Table, TableCell};
+use touchup_report::{
+    Axis, Chapter, Drawing, Figure, LineStroke, Mark, Panel, Series, Spread, Table, TableCell,
+};
 
 const HOSTILE: &str = "a < b & \"c\" > 'd' \u{1}";
 
 fn mark(x: f64, y: f64) -> Mark {
-    Mark { x: Spread { median: x, p10: 0.9 * x, p90: 1.2 * x }, y: Spread::from(y) }
+    Mark {
+        x: Spread {
+            median: x,
+            p10: 0.9 * x,
+            p90: 1.2 * x,
+        },
+        y: Spread::from(y),
+    }
 }
 
 fn curves(id: &str, log: bool, series: Vec<Series>) -> Figure {
-    let axis = |label, column| if log { Axis::log(label, column) } else { Axis::linear(label, column) };
+    let axis = |label, column| {
+        if log {
+            Axis::log(label, column)
+        } else {
+            Axis::linear(label, column)
+        }
+    };
     Figure {
         id: id.to_owned(),
         title: HOSTILE.to_owned(),
@@ -33,8 +48,16 @@ fn series(name: &str, marks: &[(f64, f64)]) -> Series {
 
 /// Everything that a figure or table may hold, sane and not.
 fn report() -> Report {
-    let bad = [(0.0, -1.0), (f64::NAN, 1.0), (1.0, f64::INFINITY), (1e-300, 1e300), (2.0, 3.0)];
-    let many = (0..12).map(|i| series(&format!("{HOSTILE} with a long name, number {i}"), &bad)).collect();
+    let bad = [
+        (0.0, -1.0),
+        (f64::NAN, 1.0),
+        (1.0, f64::INFINITY),
+        (1e-300, 1e300),
+        (2.0, 3.0),
+    ];
+    let many = (0..12)
+        .map(|i| series(&format!("{HOSTILE} with a long name, number {i}"), &bad))
+        .collect();
     let maps = Figure {
         drawing: Drawing::Maps {
             share_of: "stable runs".to_owned(),
@@ -43,7 +66,14 @@ fn report() -> Report {
                     name: "a, b".to_owned(),
                     xs: vec![1e-3, 1e-2, 1e-1],
                     ys: vec![1.0, 2.0],
-                    shares: vec![Some(0.0), Some(1.0), None, Some(1.0 / 3.0), Some(f64::NAN), Some(7.0)],
+                    shares: vec![
+                        Some(0.0),
+                        Some(1.0),
+                        None,
+                        Some(1.0 / 3.0),
+                        Some(f64::NAN),
+                        Some(7.0)
+                    ],
                 };
                 5
             ],
@@ -51,16 +81,33 @@ fn report() -> Report {
         ..curves("maps", true, Vec::new())
     };
     let empty_maps = Figure {
-        drawing: Drawing::Maps { share_of: String::new(), panels: Vec::new() },
+        drawing: Drawing::Maps {
+            share_of: String::new(),
+            panels: Vec::new(),
+        },
         ..curves("no_maps", false, Vec::new())
     };
     let table = Table {
         id: "table".to_owned(),
         title: HOSTILE.to_owned(),
         caption: String::new(),
-        heads: ["name".to_owned(), "push, µs".to_owned(), "error, mm".to_owned()].to_vec(),
+        heads: [
+            "name".to_owned(),
+            "push, µs".to_owned(),
+            "error, mm".to_owned(),
+        ]
+        .to_vec(),
         rows: vec![
-            vec!["a,\"b\"".into(), Spread { median: 0.1 + 0.2, p10: 1e-7, p90: 5e22 }.into(), (1.0 / 3.0).into()],
+            vec![
+                "a,\"b\"".into(),
+                Spread {
+                    median: 0.1 + 0.2,
+                    p10: 1e-7,
+                    p90: 5e22,
+                }
+                .into(),
+                (1.0 / 3.0).into(),
+            ],
             vec![TableCell::Empty, TableCell::Empty, f64::NAN.into()],
         ],
     };
@@ -69,14 +116,21 @@ fn report() -> Report {
         commit: "0123456789ab".to_owned(),
         command: "touchup-report --out <x>".to_owned(),
         date: "2026-01-01 00:00 UTC".to_owned(),
-        advice: Some(Table { id: "verdict".to_owned(), ..table.clone() }),
+        advice: Some(Table {
+            id: "verdict".to_owned(),
+            ..table.clone()
+        }),
         verdict: vec![HOSTILE.to_owned()],
         chapters: vec![Chapter {
             title: HOSTILE.to_owned(),
             text: vec![HOSTILE.to_owned()],
             figures: vec![
                 curves("log", true, many),
-                curves("linear", false, vec![series("one", &[(0.1 + 0.2, 1.0 / 3.0), (1e-7, 5e22)])]),
+                curves(
+                    "linear",
+                    false,
+                    vec![series("one", &[(0.1 + 0.2, 1.0 / 3.0), (1e-7, 5e22)])],
+                ),
                 curves("nothing", true, Vec::new()),
                 maps,
                 empty_maps,
@@ -87,7 +141,10 @@ fn report() -> Report {
 }
 
 fn text(files: &[OutputFile], name: &str) -> String {
-    let file = files.iter().find(|file| file.name == name).unwrap_or_else(|| panic!("no {name}"));
+    let file = files
+        .iter()
+        .find(|file| file.name == name)
+        .unwrap_or_else(|| panic!("no {name}"));
     String::from_utf8(file.bytes.clone()).unwrap()
 }
 
@@ -114,8 +171,14 @@ fn assert_balanced(xml: &str, name: &str) {
     }
     assert!(open.is_empty(), "{name}: {open:?} not closed");
     for part in xml.split('&').skip(1) {
-        let is_entity = ["amp;", "lt;", "gt;", "quot;"].iter().any(|entity| part.starts_with(entity));
-        assert!(is_entity, "{name}: a bare & before {:?}", part.chars().take(20).collect::<String>());
+        let is_entity = ["amp;", "lt;", "gt;", "quot;"]
+            .iter()
+            .any(|entity| part.starts_with(entity));
+        assert!(
+            is_entity,
+            "{name}: a bare & before {:?}",
+            part.chars().take(20).collect::<String>()
+        );
     }
     assert!(!xml.contains('\u{1}'), "{name}: a control character");
 }
@@ -123,16 +186,33 @@ fn assert_balanced(xml: &str, name: &str) {
 #[test]
 fn pictures_and_page_are_well_formed_and_every_coordinate_is_a_number_on_the_picture() {
     let files = report().files().unwrap();
-    for file in files.iter().filter(|file| file.name.ends_with(".svg") || file.name.ends_with(".html")) {
+    for file in files
+        .iter()
+        .filter(|file| file.name.ends_with(".svg") || file.name.ends_with(".html"))
+    {
         let text = text(&files, &file.name);
         assert_balanced(&text, &file.name);
         for wrong in ["NaN", "inf\"", "inf,", "-inf"] {
             assert!(!text.contains(wrong), "{}: {wrong}", file.name);
         }
-        for attribute in [" x=\"", " y=\"", " x1=\"", " x2=\"", " y1=\"", " y2=\"", " cx=\"", " cy=\"", " width=\""] {
+        for attribute in [
+            " x=\"",
+            " y=\"",
+            " x1=\"",
+            " x2=\"",
+            " y1=\"",
+            " y2=\"",
+            " cx=\"",
+            " cy=\"",
+            " width=\"",
+        ] {
             for rest in text.split(attribute).skip(1) {
                 let value: f64 = rest.split('"').next().unwrap().parse().unwrap();
-                assert!((0.0..2000.0).contains(&value), "{}: {attribute}{value}", file.name);
+                assert!(
+                    (0.0..2000.0).contains(&value),
+                    "{}: {attribute}{value}",
+                    file.name
+                );
             }
         }
     }
@@ -140,27 +220,52 @@ fn pictures_and_page_are_well_formed_and_every_coordinate_is_a_number_on_the_pic
 
 /// The colours that a legend gives to each name: the text follows its mark.
 fn colours_by_name(svg: &str, name: &str) -> Vec<String> {
-    let at = svg.find(&format!(">{name}</text>")).unwrap_or_else(|| panic!("no {name}"));
-    let mark = svg[..at].rfind("fill=\"#").or_else(|| svg[..at].rfind("stroke=\"#")).unwrap();
+    let at = svg
+        .find(&format!(">{name}</text>"))
+        .unwrap_or_else(|| panic!("no {name}"));
+    let mark = svg[..at]
+        .rfind("fill=\"#")
+        .or_else(|| svg[..at].rfind("stroke=\"#"))
+        .unwrap();
     let stroke = svg[..at].rfind("stroke=\"#").unwrap();
-    [mark, stroke].map(|from| svg[from..].split('"').nth(1).unwrap().to_owned()).to_vec()
+    [mark, stroke]
+        .map(|from| svg[from..].split('"').nth(1).unwrap().to_owned())
+        .to_vec()
 }
 
 #[test]
 fn a_method_has_one_colour_in_all_figures_and_two_of_one_figure_have_two() {
     let points = [(1.0, 1.0), (2.0, 3.0)];
-    let names = [vec!["lie", "strang"], vec!["rk4", "strang", "dp5"], vec!["dp5", "lie"]];
+    let names = [
+        vec!["lie", "strang"],
+        vec!["rk4", "strang", "dp5"],
+        vec!["dp5", "lie"],
+    ];
     let figure = |(at, names): (usize, &Vec<&str>)| {
-        curves(&format!("figure{at}"), false, names.iter().map(|name| series(name, &points)).collect())
+        curves(
+            &format!("figure{at}"),
+            false,
+            names.iter().map(|name| series(name, &points)).collect(),
+        )
     };
     let figures = names.iter().enumerate().map(figure).collect();
-    let files = Report { chapters: vec![Chapter { figures, ..Chapter::default() }], ..report() }.files().unwrap();
-    let colours = |at: usize, name: &str| colours_by_name(&text(&files, &format!("figure{at}.svg")), name);
+    let files = Report {
+        chapters: vec![Chapter {
+            figures,
+            ..Chapter::default()
+        }],
+        ..report()
+    }
+    .files()
+    .unwrap();
+    let colours =
+        |at: usize, name: &str| colours_by_name(&text(&files, &format!("figure{at}.svg")), name);
     assert_eq!(colours(0, "strang"), colours(1, "strang"));
     assert_eq!(colours(0, "lie"), colours(2, "lie"));
     assert_eq!(colours(1, "dp5"), colours(2, "dp5"));
     for (at, names) in names.iter().enumerate() {
-        let all: std::collections::BTreeSet<_> = names.iter().map(|name| colours(at, name)).collect();
+        let all: std::collections::BTreeSet<_> =
+            names.iter().map(|name| colours(at, name)).collect();
         assert_eq!(all.len(), names.len(), "{names:?}");
     }
 }
@@ -184,28 +289,56 @@ fn numbers_come_back_from_the_csv_to_the_last_digit() {
     let files = report().files().unwrap();
     let linear = text(&files, "linear.csv");
     let lines: Vec<&str> = linear.lines().collect();
-    assert_eq!(lines[0], "series,time_us,time_us_p10,time_us_p90,error_mm,error_mm_p10,error_mm_p90");
-    let numbers = |line: &str| line.split(',').skip(1).map(|x| x.parse::<f64>().unwrap()).collect::<Vec<_>>();
+    assert_eq!(
+        lines[0],
+        "series,time_us,time_us_p10,time_us_p90,error_mm,error_mm_p10,error_mm_p90"
+    );
+    let numbers = |line: &str| {
+        line.split(',')
+            .skip(1)
+            .map(|x| x.parse::<f64>().unwrap())
+            .collect::<Vec<_>>()
+    };
     let (x, y) = (0.1 + 0.2, 1.0 / 3.0);
     assert_eq!(numbers(lines[1]), [x, 0.9 * x, 1.2 * x, y, y, y]);
     assert_eq!(numbers(lines[2])[3], 5e22);
     // what is no number is nothing
-    assert!(text(&files, "log.csv").lines().nth(2).unwrap().ends_with(",,,,1.0,1.0,1.0"));
+    assert!(
+        text(&files, "log.csv")
+            .lines()
+            .nth(2)
+            .unwrap()
+            .ends_with(",,,,1.0,1.0,1.0")
+    );
     let table = text(&files, "table.csv");
     let lines: Vec<&str> = table.lines().collect();
-    assert_eq!(lines[0], "name,\"push, µs\",\"push, µs, p10\",\"push, µs, p90\",\"error, mm\"");
-    assert_eq!(lines[1], "\"a,\"\"b\"\"\",0.30000000000000004,1e-7,5e22,0.3333333333333333");
+    assert_eq!(
+        lines[0],
+        "name,\"push, µs\",\"push, µs, p10\",\"push, µs, p90\",\"error, mm\""
+    );
+    assert_eq!(
+        lines[1],
+        "\"a,\"\"b\"\"\",0.30000000000000004,1e-7,5e22,0.3333333333333333"
+    );
     assert_eq!(lines[2], ",,,,");
-    assert_eq!(text(&files, "maps.csv").lines().nth(3), Some("\"a, b\",0.1,1.0,"));
+    assert_eq!(
+        text(&files, "maps.csv").lines().nth(3),
+        Some("\"a, b\",0.1,1.0,")
+    );
 }
 
 #[test]
 fn the_json_holds_the_report() {
-    let json: Value = serde_json::from_str(&text(&report().files().unwrap(), "report.json")).unwrap();
+    let json: Value =
+        serde_json::from_str(&text(&report().files().unwrap(), "report.json")).unwrap();
     assert_eq!(json["commit"], "0123456789ab");
-    assert_eq!(json["chapters"][0]["tables"][0]["rows"][0][1]["median"].as_f64(), Some(0.1 + 0.2));
     assert_eq!(
-        json["chapters"][0]["figures"][1]["drawing"]["curves"][0]["marks"][0]["y"]["median"].as_f64(),
+        json["chapters"][0]["tables"][0]["rows"][0][1]["median"].as_f64(),
+        Some(0.1 + 0.2)
+    );
+    assert_eq!(
+        json["chapters"][0]["figures"][1]["drawing"]["curves"][0]["marks"][0]["y"]["median"]
+            .as_f64(),
         Some(1.0 / 3.0)
     );
 }

@@ -51,8 +51,16 @@ pub struct Calibration<F> {
 impl<F> Calibration<F> {
     /// The same with what `of` makes of the result.
     pub fn map<G>(self, of: impl FnOnce(F) -> G) -> Calibration<G> {
-        let Self { found, doubts, losses } = self;
-        Calibration { found: of(found), doubts, losses }
+        let Self {
+            found,
+            doubts,
+            losses,
+        } = self;
+        Calibration {
+            found: of(found),
+            doubts,
+            losses,
+        }
     }
 }
 
@@ -65,12 +73,21 @@ const BEFORE_DATE: &str = "; ";
 ///
 /// # Errors
 /// [`SceneError`]: a text that is no scene, or in which it cannot be set.
-pub fn calibrated_scene(yaml: &str, found: &impl Calibrated, now: SystemTime) -> Result<String, SceneError> {
+pub fn calibrated_scene(
+    yaml: &str,
+    found: &impl Calibrated,
+    now: SystemTime,
+) -> Result<String, SceneError> {
     // without the files that it names: they are no part of the text
     let mut expected = Scene::from_yaml(yaml)?;
     let (settings, remark) = found.set_in(&mut expected);
     let date = DateTime::<Utc>::from(now).date_naive();
-    Scene::edited(yaml, &settings, &format!("{remark}{BEFORE_DATE}{date}"), &expected)
+    Scene::edited(
+        yaml,
+        &settings,
+        &format!("{remark}{BEFORE_DATE}{date}"),
+        &expected,
+    )
 }
 
 /// The day on which a calibration was put into the text of a scene, UTC; `None` where it does not say so.
@@ -105,7 +122,10 @@ mod tests {
     impl Calibrated for LongStylus {
         fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
             scene.tip.get_or_insert_default().offset = Some(Vector3::new(0.0, 0.0, -0.125));
-            (vec![Setting::list("tip.offset_mm", &[0.0, 0.0, -125.0])], "tip: 7 poses".to_owned())
+            (
+                vec![Setting::list("tip.offset_mm", &[0.0, 0.0, -125.0])],
+                "tip: 7 poses".to_owned(),
+            )
         }
     }
 
@@ -116,13 +136,29 @@ mod tests {
         let now = UNIX_EPOCH + Duration::from_secs(1_772_323_140);
         let made = calibrated_scene(yaml, &LongStylus, now).unwrap();
         assert!(made.starts_with(yaml), "{made}");
-        assert!(made.ends_with("  offset_mm: [0, 0, -125]  # touchup calibrate tip: 7 poses; 2026-02-28\n"), "{made}");
-        assert_eq!(calibrated_on(&made, CalibrationKind::Tip), NaiveDate::from_ymd_opt(2026, 2, 28));
+        assert!(
+            made.ends_with(
+                "  offset_mm: [0, 0, -125]  # touchup calibrate tip: 7 poses; 2026-02-28\n"
+            ),
+            "{made}"
+        );
+        assert_eq!(
+            calibrated_on(&made, CalibrationKind::Tip),
+            NaiveDate::from_ymd_opt(2026, 2, 28)
+        );
         assert_eq!(calibrated_on(&made, CalibrationKind::Scan), None);
         // one of an older version says no day, a comment of somebody else is none of ours, and the tip of an arm is another one
-        let others = [("; 2026-02-28", ""), ("touchup calibrate tip", "by hand"), ("offset_mm", "tip_position_mm")];
+        let others = [
+            ("; 2026-02-28", ""),
+            ("touchup calibrate tip", "by hand"),
+            ("offset_mm", "tip_position_mm"),
+        ];
         for (ours, other) in others {
-            assert_eq!(calibrated_on(&made.replace(ours, other), CalibrationKind::Tip), None, "{other}");
+            assert_eq!(
+                calibrated_on(&made.replace(ours, other), CalibrationKind::Tip),
+                None,
+                "{other}"
+            );
         }
     }
 
@@ -131,7 +167,10 @@ mod tests {
         let day = |days: u64| UNIX_EPOCH + Duration::from_secs(days * 86_400);
         let first = calibrated_scene("tip:\n  radius_mm: 2.5\n", &LongStylus, day(0)).unwrap();
         let second = calibrated_scene(&first, &LongStylus, day(31)).unwrap();
-        assert_eq!(calibrated_on(&second, CalibrationKind::Tip), NaiveDate::from_ymd_opt(1970, 2, 1));
+        assert_eq!(
+            calibrated_on(&second, CalibrationKind::Tip),
+            NaiveDate::from_ymd_opt(1970, 2, 1)
+        );
         assert_eq!(second.matches("touchup calibrate").count(), 1, "{second}");
     }
 }

@@ -67,7 +67,9 @@ pub enum CalibrationError {
 /// Why the static segments of an arm do not determine its payload.
 fn advice(error: &PayloadError) -> String {
     match error {
-        PayloadError::WrongAxes { rms_n, other_rms_n, .. } => format!(
+        PayloadError::WrongAxes {
+            rms_n, other_rms_n, ..
+        } => format!(
             "the raw wrench of this arm is not in the axes of its flange: residuals are {rms_n:.3} N, and {other_rms_n:.3} N in \
              those of its base; identify its payload from a recording or a scale"
         ),

@@ -15,8 +15,8 @@ mod vector;
 pub use calibrated::{Calibrated, Calibration, CalibrationKind, calibrated_on, calibrated_scene};
 pub use error::CalibrationError;
 pub use payload::{
-    PayloadCalibrationParams, PayloadFound, WeighedFound, calibrate_payload, calibrate_payload_by_arm,
-    calibrate_payload_by_table,
+    PayloadCalibrationParams, PayloadFound, WeighedFound, calibrate_payload,
+    calibrate_payload_by_arm, calibrate_payload_by_table,
 };
 pub use recording::CalibrationRecording;
 pub use scan::{ScanFound, calibrate_scan};

@@ -36,7 +36,10 @@ pub struct PayloadCalibrationParams {
 
 impl Default for PayloadCalibrationParams {
     fn default() -> Self {
-        Self { gravity: PayloadParams::default().gravity, wrench_frame: None }
+        Self {
+            gravity: PayloadParams::default().gravity,
+            wrench_frame: None,
+        }
     }
 }
 
@@ -53,12 +56,17 @@ pub fn calibrate_payload(
     at_each: &mut dyn FnMut(),
 ) -> Result<Calibration<PayloadFound>, CalibrationError> {
     let path = recording.path().to_owned();
-    let params =
-        PayloadCalibrationParams { wrench_frame: params.wrench_frame.or(Some(recording.wrench_frame())), ..params };
+    let params = PayloadCalibrationParams {
+        wrench_frame: params.wrench_frame.or(Some(recording.wrench_frame())),
+        ..params
+    };
     let mut finder = StaticSegmentFinder::new(StaticSegmentParams::default());
     let replayed = recording.replay(scene, at_each, |sample| finder.push(sample))?;
     let calibration = of_poses(&path, &finder.finish(), scene, params)?;
-    Ok(Calibration { losses: replayed.losses, ..calibration })
+    Ok(Calibration {
+        losses: replayed.losses,
+        ..calibration
+    })
 }
 
 /// From a table of static poses ([`touchup_io::static_poses`]).
@@ -70,7 +78,12 @@ pub fn calibrate_payload_by_table(
     scene: &Scene,
     params: PayloadCalibrationParams,
 ) -> Result<Calibration<PayloadFound>, CalibrationError> {
-    let pose = |(r_wt, wrench)| StaticPose { r_wt, wrench, noise: None, samples: 1 };
+    let pose = |(r_wt, wrench)| StaticPose {
+        r_wt,
+        wrench,
+        noise: None,
+        samples: 1,
+    };
     let poses: Vec<_> = read_static_poses(path)?.into_iter().map(pose).collect();
     of_poses(path, &poses, scene, params)
 }
@@ -83,12 +96,23 @@ fn of_poses(
 ) -> Result<Calibration<PayloadFound>, CalibrationError> {
     let wrench_frame = params.wrench_frame.unwrap_or_default();
     let mounted = scene.compensator_params(wrench_frame).pose_ts.rotation;
-    let params = PayloadParams { wrench_frame, r_ts: mounted, gravity: params.gravity };
-    let bad = |error| CalibrationError::Payload { path: path.to_owned(), error };
+    let params = PayloadParams {
+        wrench_frame,
+        r_ts: mounted,
+        gravity: params.gravity,
+    };
+    let bad = |error| CalibrationError::Payload {
+        path: path.to_owned(),
+        error,
+    };
     let fit = fit_payload(poses, &params).map_err(bad)?;
     let besides = "is the sensor mounted as compensation.sensor_orientation_xyzw says, ";
     let doubts = doubt_of_residuals(&fit, besides).into_iter().collect();
-    Ok(Calibration { found: PayloadFound::of(&fit, ["sensor", "poses"]), doubts, losses: Vec::new() })
+    Ok(Calibration {
+        found: PayloadFound::of(&fit, ["sensor", "poses"]),
+        doubts,
+        losses: Vec::new(),
+    })
 }
 
 /// From what an arm measured that turned its probe in free air.
@@ -101,17 +125,35 @@ pub fn calibrate_payload_by_arm(
     readings: &PayloadReadings,
     gravity: f64,
 ) -> Result<Calibration<WeighedFound>, CalibrationError> {
-    let params = PayloadParams { gravity, ..PayloadParams::default() };
+    let params = PayloadParams {
+        gravity,
+        ..PayloadParams::default()
+    };
     let fit = fit_payload(&readings.segments, &params).map_err(CalibrationError::PayloadOfArm)?;
-    let doubts = doubt_of_residuals(&fit, "does a hose pull, ").into_iter().collect();
+    let doubts = doubt_of_residuals(&fit, "does a hose pull, ")
+        .into_iter()
+        .collect();
     let payload = PayloadFound::of(&fit, ["flange", "base"]);
-    let not_reached = readings.not_reached.iter().map(NotReached::to_string).collect();
-    Ok(Calibration { found: WeighedFound { payload, not_reached }, doubts, losses: Vec::new() })
+    let not_reached = readings
+        .not_reached
+        .iter()
+        .map(NotReached::to_string)
+        .collect();
+    Ok(Calibration {
+        found: WeighedFound {
+            payload,
+            not_reached,
+        },
+        doubts,
+        losses: Vec::new(),
+    })
 }
 
 /// - `besides`: other possible causes.
 fn doubt_of_residuals(fit: &PayloadFit, besides: &str) -> Option<String> {
-    let expected = fit.expected_force.filter(|expected| fit.rms_force > UNEXPLAINED * expected)?;
+    let expected = fit
+        .expected_force
+        .filter(|expected| fit.rms_force > UNEXPLAINED * expected)?;
     Some(format!(
         "the residuals of {:.3} N are more than the noise explains ({expected:.3} N): does a cable pull, {besides}had it \
          settled?",
@@ -149,22 +191,39 @@ reported! {
 impl Calibrated for PayloadFound {
     fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
         let digits = |values: &[f64; 3], digits| values.map(|x| rounded(x, digits));
-        let (mass_kg, gravity_m_per_s2) = (rounded(self.mass_kg, 10), digits(&self.gravity_m_per_s2, 10));
+        let (mass_kg, gravity_m_per_s2) = (
+            rounded(self.mass_kg, 10),
+            digits(&self.gravity_m_per_s2, 10),
+        );
         let centre_mm = digits(&self.centre_mm.value, 7);
-        let [force_n, torque_nm] = [&self.bias_force_n, &self.bias_torque_nm].map(|bias| digits(&bias.value, 10));
+        let [force_n, torque_nm] =
+            [&self.bias_force_n, &self.bias_torque_nm].map(|bias| digits(&bias.value, 10));
         let settings = vec![
             Setting::scalar("compensation.payload.mass_kg", mass_kg),
             Setting::list("compensation.payload.centre_mm", &centre_mm),
             Setting::list("compensation.payload.gravity_m_per_s2", &gravity_m_per_s2),
-            Setting::scalar("compensation.payload.gravity_axes", GravityAxes::Space.name()),
+            Setting::scalar(
+                "compensation.payload.gravity_axes",
+                GravityAxes::Space.name(),
+            ),
             Setting::list("compensation.bias.force_n", &force_n),
             Setting::list("compensation.bias.torque_nm", &torque_nm),
         ];
         let compensation = scene.compensation.get_or_insert_default();
         let p_sc = Vector3::from(centre_mm) / 1e3;
-        let payload = Payload { mass: mass_kg, p_sc, gravity_o: gravity_m_per_s2.into() };
-        compensation.payload = Some(PayloadSection { gravity_axes: GravityAxes::Space, payload });
-        compensation.bias = Some(SensorBias { force: force_n.into(), torque: torque_nm.into() });
+        let payload = Payload {
+            mass: mass_kg,
+            p_sc,
+            gravity_o: gravity_m_per_s2.into(),
+        };
+        compensation.payload = Some(PayloadSection {
+            gravity_axes: GravityAxes::Space,
+            payload,
+        });
+        compensation.bias = Some(SensorBias {
+            force: force_n.into(),
+            torque: torque_nm.into(),
+        });
         let remark = format!(
             "payload: {} static segments, residuals {:.3} N and {:.4} N·m rms",
             self.static_segments, self.residual_force_n, self.residual_torque_nm
@@ -178,16 +237,40 @@ impl fmt::Display for PayloadFound {
         let down = Vector3::from(self.gravity_m_per_s2);
         let [x, y, z]: [f64; 3] = (down / down.norm()).into();
         let (phases, left_out, tilt) = (self.static_segments, self.left_out.len(), self.tilt_deg);
-        writeln!(f, "static segments: {phases}, left out: {left_out}; tilted by {tilt:.0}° or more about every axis")?;
-        writeln!(f, "weight      {:.4} ± {:.4} N", self.weight_n, self.weight_std_n)?;
-        writeln!(f, "mass        {:.5} ± {:.5} kg", self.mass_kg, self.mass_std_kg)?;
+        writeln!(
+            f,
+            "static segments: {phases}, left out: {left_out}; tilted by {tilt:.0}° or more about every axis"
+        )?;
+        writeln!(
+            f,
+            "weight      {:.4} ± {:.4} N",
+            self.weight_n, self.weight_std_n
+        )?;
+        writeln!(
+            f,
+            "mass        {:.5} ± {:.5} kg",
+            self.mass_kg, self.mass_std_kg
+        )?;
         let [of_sensor, of_poses] = self.axes;
-        writeln!(f, "centre      {} mm, in the axes of the {of_sensor}", self.centre_mm)?;
-        writeln!(f, "down        ({x:+.4}, {y:+.4}, {z:+.4}), in the axes of the {of_poses}")?;
+        writeln!(
+            f,
+            "centre      {} mm, in the axes of the {of_sensor}",
+            self.centre_mm
+        )?;
+        writeln!(
+            f,
+            "down        ({x:+.4}, {y:+.4}, {z:+.4}), in the axes of the {of_poses}"
+        )?;
         writeln!(f, "bias        {} N", self.bias_force_n)?;
         writeln!(f, "            {:.5} N·m", self.bias_torque_nm)?;
-        write!(f, "residuals   {:.4} N, {:.5} N·m rms", self.residual_force_n, self.residual_torque_nm)?;
-        self.expected_residual_n.iter().try_for_each(|n| write!(f, "; {n:.4} N by the noise of the sensor"))
+        write!(
+            f,
+            "residuals   {:.4} N, {:.5} N·m rms",
+            self.residual_force_n, self.residual_torque_nm
+        )?;
+        self.expected_residual_n
+            .iter()
+            .try_for_each(|n| write!(f, "; {n:.4} N by the noise of the sensor"))
     }
 }
 
@@ -202,11 +285,17 @@ pub struct WeighedFound {
 
 impl Calibrated for WeighedFound {
     fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
-        let PayloadFound { static_segments, residual_force_n, residual_torque_nm, .. } = self.payload;
+        let PayloadFound {
+            static_segments,
+            residual_force_n,
+            residual_torque_nm,
+            ..
+        } = self.payload;
         let payload_kg = rounded(self.payload.mass_kg, 10);
         let payload_centre_mm = self.payload.centre_mm.value.map(|mm| rounded(mm, 7));
         let robot = scene.robot.get_or_insert_default();
-        (robot.payload_mass, robot.payload_centre) = (payload_kg, Vector3::from(payload_centre_mm) / 1e3);
+        (robot.payload_mass, robot.payload_centre) =
+            (payload_kg, Vector3::from(payload_centre_mm) / 1e3);
         let settings = vec![
             Setting::scalar("robot.payload_kg", payload_kg),
             Setting::list("robot.payload_centre_mm", &payload_centre_mm),
@@ -220,7 +309,9 @@ impl Calibrated for WeighedFound {
 
 impl fmt::Display for WeighedFound {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.not_reached.iter().try_for_each(|line| writeln!(f, "left out    {line}"))?;
+        self.not_reached
+            .iter()
+            .try_for_each(|line| writeln!(f, "left out    {line}"))?;
         write!(f, "{}", self.payload)
     }
 }

@@ -25,7 +25,11 @@ impl CalibrationRecording {
         let layout = layout.into();
         let markers_topic = layout.topics.markers.clone();
         let recording = Recording::open(path, layout, StampSource::Header)?;
-        Ok(Self { path: path.to_owned(), recording, markers_topic })
+        Ok(Self {
+            path: path.to_owned(),
+            recording,
+            markers_topic,
+        })
     }
 
     /// How many messages it has, where it says so.
@@ -53,7 +57,18 @@ impl CalibrationRecording {
         each: impl FnMut(&Sample),
     ) -> Result<Replayed, ReplayError> {
         let markers = marker_filter(scene, self.markers_topic.as_deref())?;
-        let placement = scene.placement().map(|placement| Placement { pose_wo: None, ..placement });
-        each_sample(self.recording, placement, scene.sync_params(), markers, at_each, &mut |_| (), each)
+        let placement = scene.placement().map(|placement| Placement {
+            pose_wo: None,
+            ..placement
+        });
+        each_sample(
+            self.recording,
+            placement,
+            scene.sync_params(),
+            markers,
+            at_each,
+            &mut |_| (),
+            each,
+        )
     }
 }

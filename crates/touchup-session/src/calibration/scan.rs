@@ -36,10 +36,24 @@ pub fn calibrate_scan(
         Some(recording) => touched_pairs(table, recording, scene, at_each)?,
         None => (read_pairs(table)?, Vec::new()),
     };
-    let bad = |error| CalibrationError::Pairs { path: table.to_owned(), error };
-    let fit = fit_pairs(&pairs, &PairsParams { sigma, ..PairsParams::default() }).map_err(bad)?;
+    let bad = |error| CalibrationError::Pairs {
+        path: table.to_owned(),
+        error,
+    };
+    let fit = fit_pairs(
+        &pairs,
+        &PairsParams {
+            sigma,
+            ..PairsParams::default()
+        },
+    )
+    .map_err(bad)?;
     let doubts = doubt_of_gravity(scene).into_iter().collect();
-    Ok(Calibration { found: ScanFound::of(&pairs, &names, &fit), doubts, losses })
+    Ok(Calibration {
+        found: ScanFound::of(&pairs, &names, &fit),
+        doubts,
+        losses,
+    })
 }
 
 /// The points of the table, each with the place where the stylus dwelled, and what the recording lacks.
@@ -52,9 +66,15 @@ fn touched_pairs(
     let path = recording.path().to_owned();
     let mut file = read_scan_points(table)?;
     // the poses stay in space: that is what is looked for
-    let scene = Scene { scan_to_space: None, ..scene.clone() };
+    let scene = Scene {
+        scan_to_space: None,
+        ..scene.clone()
+    };
     let tip = scene.tip_params();
-    let mut finder = DwellFinder::new(DwellParams { radius: tip.radius, ..DwellParams::default() });
+    let mut finder = DwellFinder::new(DwellParams {
+        radius: tip.radius,
+        ..DwellParams::default()
+    });
     let mut contacts = ContactEstimator::new(ContactEstimatorParams {
         compensator: scene.compensator_params(recording.wrench_frame()),
         bias: scene.bias_tracking,
@@ -63,11 +83,18 @@ fn touched_pairs(
         tip,
     })?;
     let replayed = recording.replay(&scene, at_each, |sample| {
-        contacts.observe(sample).into_iter().for_each(|contact| finder.push(contact));
+        contacts
+            .observe(sample)
+            .into_iter()
+            .for_each(|contact| finder.push(contact));
     })?;
     let (dwells, points) = (finder.finish(), file.pairs.len());
     if dwells.len() != points {
-        return Err(CalibrationError::Dwells { path, dwells: dwells.len(), points });
+        return Err(CalibrationError::Dwells {
+            path,
+            dwells: dwells.len(),
+            points,
+        });
     }
     for (pair, dwell) in file.pairs.iter_mut().zip(dwells) {
         pair.to = dwell.point;
@@ -128,28 +155,67 @@ reported! {
 
 impl Calibrated for ScanFound {
     fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
-        let ScanMotion { position_mm, orientation_xyzw } = self.scan_to_space;
+        let ScanMotion {
+            position_mm,
+            orientation_xyzw,
+        } = self.scan_to_space;
         let position = Vector3::from(position_mm) / 1e3;
-        scene.scan_to_space = Some(ScanToSpaceSection { position, orientation_xyzw });
+        scene.scan_to_space = Some(ScanToSpaceSection {
+            position,
+            orientation_xyzw,
+        });
         let settings = vec![
             Setting::list("scan_to_space.position_mm", &position_mm),
             Setting::list("scan_to_space.orientation_xyzw", &orientation_xyzw),
         ];
-        (settings, format!("scan: {} pairs, residuals {:.3} mm rms", self.pairs.len(), self.rms_mm))
+        (
+            settings,
+            format!(
+                "scan: {} pairs, residuals {:.3} mm rms",
+                self.pairs.len(),
+                self.rms_mm
+            ),
+        )
     }
 }
 
 impl fmt::Display for ScanFound {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let width = self.pairs.iter().map(|pair| pair.name.chars().count()).max().unwrap_or(0).max(4);
-        writeln!(f, "{:width$}  {:^29}  {:^26}  {:>6}", "pair", "on the scan, mm", "residual, mm", "|r|")?;
-        for PairFound { name, scan_mm: [x, y, z], residual_mm: [u, v, w], distance_mm } in &self.pairs {
-            writeln!(f, "{name:width$}  {x:9.3} {y:9.3} {z:9.3}  {u:8.3} {v:8.3} {w:8.3}  {distance_mm:6.3}")?;
+        let width = self
+            .pairs
+            .iter()
+            .map(|pair| pair.name.chars().count())
+            .max()
+            .unwrap_or(0)
+            .max(4);
+        writeln!(
+            f,
+            "{:width$}  {:^29}  {:^26}  {:>6}",
+            "pair", "on the scan, mm", "residual, mm", "|r|"
+        )?;
+        for PairFound {
+            name,
+            scan_mm: [x, y, z],
+            residual_mm: [u, v, w],
+            distance_mm,
+        } in &self.pairs
+        {
+            writeln!(
+                f,
+                "{name:width$}  {x:9.3} {y:9.3} {z:9.3}  {u:8.3} {v:8.3} {w:8.3}  {distance_mm:6.3}"
+            )?;
         }
         let [x, y, z] = self.shift_std_mm;
         let [a, b, c] = self.turn_std_deg;
-        writeln!(f, "rms {:.3} mm; one axis of a pair is good to {:.3} mm", self.rms_mm, self.sigma_mm)?;
-        let ([p, q, r], [i, j, k, w]) = (self.scan_to_space.position_mm, self.scan_to_space.orientation_xyzw);
+        writeln!(
+            f,
+            "rms {:.3} mm; one axis of a pair is good to {:.3} mm",
+            self.rms_mm, self.sigma_mm
+        )?;
+        let ([p, q, r], [i, j, k, w]) = (
+            self.scan_to_space.position_mm,
+            self.scan_to_space.orientation_xyzw,
+        );
         writeln!(
             f,
             "scan to space: position ({p:.3}, {q:.3}, {r:.3}) mm, orientation xyzw ({i:.6}, {j:.6}, {k:.6}, {w:.6})"

@@ -25,15 +25,35 @@ impl Calibrated for StiffnessFound {
     fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
         let stiffness_n_per_mm = rounded(self.stiffness_n_per_mm, 3);
         scene.tip.get_or_insert_default().ball.stiffness = Some(stiffness_n_per_mm * 1e3);
-        let remark = format!("stiffness: {} presses, ± {:.3} N/mm", self.touches, self.std_n_per_mm);
-        (vec![Setting::scalar("tip.stiffness_n_per_mm", stiffness_n_per_mm)], remark)
+        let remark = format!(
+            "stiffness: {} presses, ± {:.3} N/mm",
+            self.touches, self.std_n_per_mm
+        );
+        (
+            vec![Setting::scalar(
+                "tip.stiffness_n_per_mm",
+                stiffness_n_per_mm,
+            )],
+            remark,
+        )
     }
 }
 
 impl fmt::Display for StiffnessFound {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { touches, stiffness_n_per_mm, std_n_per_mm, range_um } = self;
-        writeln!(f, "presses: {touches}, contact repeated within {range_um:.1} µm")?;
-        write!(f, "stiffness   {stiffness_n_per_mm:.3} ± {std_n_per_mm:.3} N/mm, of arm and probe together")
+        let Self {
+            touches,
+            stiffness_n_per_mm,
+            std_n_per_mm,
+            range_um,
+        } = self;
+        writeln!(
+            f,
+            "presses: {touches}, contact repeated within {range_um:.1} µm"
+        )?;
+        write!(
+            f,
+            "stiffness   {stiffness_n_per_mm:.3} ± {std_n_per_mm:.3} N/mm, of arm and probe together"
+        )
     }
 }

@@ -5,7 +5,8 @@ use std::fmt;
 
 use nalgebra::Vector3;
 use touchup_core::calibrate::{
-    PlaneTipError, PlaneTipFit, SwingPose, TipFit, TipFitParams, VectorEstimate, fit_tip, fit_tip_by_plane,
+    PlaneTipError, PlaneTipFit, SwingPose, TipFit, TipFitParams, VectorEstimate, fit_tip,
+    fit_tip_by_plane,
 };
 use touchup_core::probing::execute::{Cell, NotReached, TipPoses};
 
@@ -55,25 +56,44 @@ pub fn calibrate_tip(
     at_each: &mut dyn FnMut(),
 ) -> Result<Calibration<TipFound>, CalibrationError> {
     let path = recording.path().to_owned();
-    let mut swing = Swing { poses: Vec::new(), stride: 1, seen: 0 };
+    let mut swing = Swing {
+        poses: Vec::new(),
+        stride: 1,
+        seen: 0,
+    };
     let mut scene = scene.clone();
     // the poses as they are recorded: an older offset does not count
     scene.tip.iter_mut().for_each(|tip| tip.offset = None);
     let replayed = recording.replay(&scene, at_each, |sample| swing.push(sample.pose_ot))?;
     let bad = |error| CalibrationError::Tip { path, error };
     let fit = fit_tip(&swing.poses, &TipFitParams::default()).map_err(bad)?;
-    Ok(Calibration { found: TipFound::of(&fit), doubts: Vec::new(), losses: replayed.losses })
+    Ok(Calibration {
+        found: TipFound::of(&fit),
+        doubts: Vec::new(),
+        losses: replayed.losses,
+    })
 }
 
 /// From what an arm measured that touched one flat spot with its probe leaning to all sides.
 ///
 /// # Errors
 /// [`PlaneTipError`]
-pub fn calibrate_tip_by_arm(measured: &TipPoses, cell: &Cell) -> Result<Calibration<PivotFound>, PlaneTipError> {
-    let TipPoses { poses_bf, normal_b, not_reached } = measured;
+pub fn calibrate_tip_by_arm(
+    measured: &TipPoses,
+    cell: &Cell,
+) -> Result<Calibration<PivotFound>, PlaneTipError> {
+    let TipPoses {
+        poses_bf,
+        normal_b,
+        not_reached,
+    } = measured;
     let fit = fit_tip_by_plane(poses_bf, normal_b)?;
     let found = PivotFound::of(&fit, cell, not_reached);
-    Ok(Calibration { found, doubts: Vec::new(), losses: Vec::new() })
+    Ok(Calibration {
+        found,
+        doubts: Vec::new(),
+        losses: Vec::new(),
+    })
 }
 
 reported! {
@@ -97,16 +117,33 @@ impl Calibrated for TipFound {
     fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
         let offset_mm = self.offset_mm.value.map(|x| rounded(x, 7));
         scene.tip.get_or_insert_default().offset = Some(Vector3::from(offset_mm) / 1e3);
-        let remark = format!("tip: {} poses, residuals {:.3} mm rms", self.poses, self.residual_mm);
+        let remark = format!(
+            "tip: {} poses, residuals {:.3} mm rms",
+            self.poses, self.residual_mm
+        );
         (vec![Setting::list("tip.offset_mm", &offset_mm)], remark)
     }
 }
 
 impl fmt::Display for TipFound {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { poses, left_out, swing_deg, offset_mm, rest_mm, residual_mm, .. } = self;
-        writeln!(f, "poses: {poses}, left out: {left_out}; swung by {swing_deg:.0}° or more across every axis")?;
-        writeln!(f, "offset      {offset_mm} mm, in the axes of the recorded pose")?;
+        let Self {
+            poses,
+            left_out,
+            swing_deg,
+            offset_mm,
+            rest_mm,
+            residual_mm,
+            ..
+        } = self;
+        writeln!(
+            f,
+            "poses: {poses}, left out: {left_out}; swung by {swing_deg:.0}° or more across every axis"
+        )?;
+        writeln!(
+            f,
+            "offset      {offset_mm} mm, in the axes of the recorded pose"
+        )?;
         writeln!(f, "rested at   {rest_mm} mm, in the frame of the poses")?;
         write!(f, "residuals   {residual_mm:.4} mm rms")
     }
@@ -128,25 +165,43 @@ reported! {
 }
 
 fn moved(from: Vector3<f64>, by: &VectorEstimate) -> VectorEstimate {
-    VectorEstimate { value: from + by.value, sigma: by.sigma }
+    VectorEstimate {
+        value: from + by.value,
+        sigma: by.sigma,
+    }
 }
 
 impl Calibrated for PivotFound {
     fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String) {
         let tip_position_mm = self.tip_position_mm.value.map(|mm| rounded(mm, 7));
         scene.robot.get_or_insert_default().tip_position = Vector3::from(tip_position_mm) / 1e3;
-        let remark = format!("tip: {} touches, residuals {:.4} mm rms", self.touches, self.residual_mm);
-        (vec![Setting::list("robot.tip_position_mm", &tip_position_mm)], remark)
+        let remark = format!(
+            "tip: {} touches, residuals {:.4} mm rms",
+            self.touches, self.residual_mm
+        );
+        (
+            vec![Setting::list("robot.tip_position_mm", &tip_position_mm)],
+            remark,
+        )
     }
 }
 
 impl fmt::Display for PivotFound {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.not_reached.iter().try_for_each(|line| writeln!(f, "left out    {line}"))?;
+        self.not_reached
+            .iter()
+            .try_for_each(|line| writeln!(f, "left out    {line}"))?;
         let [x, y, z] = self.moved_mm;
         writeln!(f, "touches: {}", self.touches)?;
         writeln!(f, "tip         {} mm, in the flange", self.tip_position_mm)?;
-        writeln!(f, "that is     {x:+.4}, {y:+.4}, {z:+.4} mm from where the scene had it")?;
-        write!(f, "residuals   {:.4} mm rms off one plane", self.residual_mm)
+        writeln!(
+            f,
+            "that is     {x:+.4}, {y:+.4}, {z:+.4} mm from where the scene had it"
+        )?;
+        write!(
+            f,
+            "residuals   {:.4} mm rms off one plane",
+            self.residual_mm
+        )
     }
 }

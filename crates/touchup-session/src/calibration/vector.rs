@@ -19,7 +19,15 @@ impl Display for Vector {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let digits = f.precision().unwrap_or(4);
         let pair = |(x, s): (&f64, &f64)| format!("{x:+.digits$} ± {s:.digits$}");
-        f.write_str(&self.value.iter().zip(&self.std).map(pair).collect::<Vec<_>>().join(", "))
+        f.write_str(
+            &self
+                .value
+                .iter()
+                .zip(&self.std)
+                .map(pair)
+                .collect::<Vec<_>>()
+                .join(", "),
+        )
     }
 }
 

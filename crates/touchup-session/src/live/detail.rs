@@ -35,7 +35,9 @@ impl Detail {
         shared: Option<&Arc<(TriMesh, FaceTree)>>,
         refine: &mut RefineParams,
     ) -> Result<(TriMesh, Option<Self>), MeshError> {
-        let Some(edge) = refine.simplified_edge(scan.mean_edge()) else { return Ok((scan, None)) };
+        let Some(edge) = refine.simplified_edge(scan.mean_edge()) else {
+            return Ok((scan, None));
+        };
         let simplified = Simplified::new(&scan, edge)?;
         // specks alone: nothing is left of them
         if simplified.mesh.face_count() == 0 {
@@ -49,11 +51,22 @@ impl Detail {
             Some(shared) => OriginalScan::Shared(Arc::clone(shared)),
             None => OriginalScan::Own(Box::new(scan)),
         };
-        Ok((working, Some(Self { scan, simplified, shown: None, rests: 0 })))
+        Ok((
+            working,
+            Some(Self {
+                scan,
+                simplified,
+                shown: None,
+                rests: 0,
+            }),
+        ))
     }
 
     fn scans(&self) -> Scans<'_> {
-        Scans { original: self.scan.mesh(), simplified: &self.simplified }
+        Scans {
+            original: self.scan.mesh(),
+            simplified: &self.simplified,
+        }
     }
 
     /// The scan, moved as what stands for it.
@@ -82,9 +95,29 @@ impl Detail {
     ///
     /// # Errors
     /// [`MeshError::TooMany`].
-    pub fn take_changes(&mut self, refiner: &mut Refiner, most: usize, into: &mut Changes) -> Result<bool, MeshError> {
-        let Self { scan, simplified, shown: Some(shown), .. } = self else { return Ok(true) };
-        let has_followed = shown.follow(Scans { original: scan.mesh(), simplified }, refiner, most)?;
+    pub fn take_changes(
+        &mut self,
+        refiner: &mut Refiner,
+        most: usize,
+        into: &mut Changes,
+    ) -> Result<bool, MeshError> {
+        let Self {
+            scan,
+            simplified,
+            shown: Some(shown),
+            ..
+        } = self
+        else {
+            return Ok(true);
+        };
+        let has_followed = shown.follow(
+            Scans {
+                original: scan.mesh(),
+                simplified,
+            },
+            refiner,
+            most,
+        )?;
         Ok(shown.take_changes(most, into) && has_followed)
     }
 
@@ -98,7 +131,9 @@ impl Detail {
 
     /// Whether the mesh to look at is, or becomes, what [`Self::rest`] was last called with.
     pub fn is_resting(&self, refiner: &Refiner) -> bool {
-        self.shown.as_ref().is_some_and(|shown| shown.rests(refiner.mesh()))
+        self.shown
+            .as_ref()
+            .is_some_and(|shown| shown.rests(refiner.mesh()))
     }
 
     /// How often [`Self::rest`] was called.
@@ -118,7 +153,11 @@ impl Detail {
 
     /// Memory, bytes; of a scan that is shared its owner counts it.
     pub fn bytes(&self) -> usize {
-        let own = if let OriginalScan::Own(scan) = &self.scan { scan.bytes() } else { 0 };
+        let own = if let OriginalScan::Own(scan) = &self.scan {
+            scan.bytes()
+        } else {
+            0
+        };
         own + self.simplified.bytes()
     }
 }

@@ -16,6 +16,8 @@ pub enum LiveError {
     #[error("no thread for the patch: {0}; end other programs, or leave `patch` out of the scene")]
     NoThread(String),
     /// The thread of the patch ended.
-    #[error("the thread of the patch ended by a fault of touchup: please report it with the recording")]
+    #[error(
+        "the thread of the patch ended by a fault of touchup: please report it with the recording"
+    )]
     Stopped,
 }

@@ -17,8 +17,14 @@ impl EvidenceReplay {
     ///
     /// # Errors
     /// [`SettingError`] of the patch.
-    pub(super) fn new(contacts: ContactEstimator, patch: PatcherParams) -> Result<Self, SettingError> {
-        Ok(Self { contacts, patcher: Patcher::new(patch)? })
+    pub(super) fn new(
+        contacts: ContactEstimator,
+        patch: PatcherParams,
+    ) -> Result<Self, SettingError> {
+        Ok(Self {
+            contacts,
+            patcher: Patcher::new(patch)?,
+        })
     }
 
     /// Takes the next sample; one that is refused changes nothing.
@@ -54,5 +60,9 @@ pub(super) fn undo(patcher: &mut Patcher) -> Option<i64> {
 
 /// As [`EvidenceReplay::redo`].
 pub(super) fn redo(patcher: &mut Patcher) -> Option<i64> {
-    patcher.redo().then(|| patcher.last_stroke()).flatten().map(|stroke| stroke.from_ns)
+    patcher
+        .redo()
+        .then(|| patcher.last_stroke())
+        .flatten()
+        .map(|stroke| stroke.from_ns)
 }

@@ -32,13 +32,22 @@ struct GateState {
 impl Gate {
     /// Lets everything through. The time of `clock` waits for what the patch was asked.
     pub fn open(clock: &Clock) -> Self {
-        Self { permits: None, clock: clock.clone() }
+        Self {
+            permits: None,
+            clock: clock.clone(),
+        }
     }
 
     /// Lets nothing through without a permit.
     pub fn kept() -> (Self, GateKeeper) {
         let permits = Arc::new(Permits::default());
-        (Self { permits: Some(Arc::clone(&permits)), clock: Clock::system() }, GateKeeper(permits))
+        (
+            Self {
+                permits: Some(Arc::clone(&permits)),
+                clock: Clock::system(),
+            },
+            GateKeeper(permits),
+        )
     }
 
     /// To be held from a question until its answer is there.
@@ -50,7 +59,12 @@ impl Gate {
     pub(super) fn pass(&self) {
         if let Some(permits) = &self.permits {
             let is_shut = |state: &mut GateState| !state.is_open && state.done == state.given;
-            drop(permits.changed.wait_while(locked(&permits.state), is_shut).unwrap_or_else(PoisonError::into_inner));
+            drop(
+                permits
+                    .changed
+                    .wait_while(locked(&permits.state), is_shut)
+                    .unwrap_or_else(PoisonError::into_inner),
+            );
         }
     }
 
@@ -70,7 +84,12 @@ impl GateKeeper {
         state.given = state.done + 1;
         self.0.changed.notify_all();
         let is_running = |state: &mut GateState| state.done < state.given;
-        drop(self.0.changed.wait_while(state, is_running).unwrap_or_else(PoisonError::into_inner));
+        drop(
+            self.0
+                .changed
+                .wait_while(state, is_running)
+                .unwrap_or_else(PoisonError::into_inner),
+        );
     }
 }
 

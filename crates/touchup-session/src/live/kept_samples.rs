@@ -16,7 +16,11 @@ pub(super) struct KeptSamples {
 
 impl Default for KeptSamples {
     fn default() -> Self {
-        Self { samples: Vec::new(), most: MOST_KEPT, dropped: 0 }
+        Self {
+            samples: Vec::new(),
+            most: MOST_KEPT,
+            dropped: 0,
+        }
     }
 }
 
@@ -38,7 +42,11 @@ impl KeptSamples {
     /// # Errors
     /// How many were dropped.
     pub fn all(&self) -> Result<&[Sample], u64> {
-        if self.dropped > 0 { Err(self.dropped) } else { Ok(&self.samples) }
+        if self.dropped > 0 {
+            Err(self.dropped)
+        } else {
+            Ok(&self.samples)
+        }
     }
 }
 
@@ -51,14 +59,30 @@ mod tests {
 
     #[test]
     fn all_samples_are_kept_or_none_of_them_and_those_are_counted() {
-        let wrench = Wrench { force: Vector3::zeros(), torque: Vector3::zeros() };
-        let sample = |stamp_ns| Sample { stamp_ns, pose_ot: Isometry3::identity(), wrench };
-        let mut kept = KeptSamples { most: 3, ..KeptSamples::default() };
-        let stamps =
-            |kept: &KeptSamples| kept.all().map(|all| all.iter().map(|sample| sample.stamp_ns).collect::<Vec<_>>());
-        for (stamp_ns, expected) in
-            [(5, Ok(vec![5])), (6, Ok(vec![5, 6])), (7, Ok(vec![5, 6, 7])), (8, Err(4)), (9, Err(5))]
-        {
+        let wrench = Wrench {
+            force: Vector3::zeros(),
+            torque: Vector3::zeros(),
+        };
+        let sample = |stamp_ns| Sample {
+            stamp_ns,
+            pose_ot: Isometry3::identity(),
+            wrench,
+        };
+        let mut kept = KeptSamples {
+            most: 3,
+            ..KeptSamples::default()
+        };
+        let stamps = |kept: &KeptSamples| {
+            kept.all()
+                .map(|all| all.iter().map(|sample| sample.stamp_ns).collect::<Vec<_>>())
+        };
+        for (stamp_ns, expected) in [
+            (5, Ok(vec![5])),
+            (6, Ok(vec![5, 6])),
+            (7, Ok(vec![5, 6, 7])),
+            (8, Err(4)),
+            (9, Err(5)),
+        ] {
             kept.push(&sample(stamp_ns));
             assert_eq!(stamps(&kept), expected);
         }

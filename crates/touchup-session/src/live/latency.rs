@@ -41,7 +41,11 @@ impl Default for Latencies {
 impl Latencies {
     /// None yet.
     pub fn new() -> Self {
-        Self { buckets: vec![0; BUCKETS].into(), count: 0, max_ns: 0 }
+        Self {
+            buckets: vec![0; BUCKETS].into(),
+            count: 0,
+            max_ns: 0,
+        }
     }
 
     /// Adds one.
@@ -54,7 +58,12 @@ impl Latencies {
 
     /// Median and tails: the longest duration of the bucket in which each falls; 0 when there is none.
     pub fn quantiles(&self) -> Quantiles {
-        Quantiles { median: self.at(500), p99: self.at(990), p999: self.at(999), max: self.max_ns }
+        Quantiles {
+            median: self.at(500),
+            p99: self.at(990),
+            p999: self.at(999),
+            max: self.max_ns,
+        }
     }
 
     /// The duration that `per_mille` of all do not exceed, ns.
@@ -94,7 +103,10 @@ mod tests {
     fn each_duration_lies_in_its_bucket_and_buckets_follow_each_other() {
         for bucket in 1..BUCKETS {
             let (before, longest) = (longest_of(bucket - 1), longest_of(bucket));
-            assert_eq!((bucket_of(before + 1), bucket_of(longest)), (bucket, bucket));
+            assert_eq!(
+                (bucket_of(before + 1), bucket_of(longest)),
+                (bucket, bucket)
+            );
             assert!((longest - before - 1) as f64 <= longest as f64 / 64.0);
         }
         assert_eq!(longest_of(BUCKETS - 1), u64::MAX);
@@ -103,13 +115,29 @@ mod tests {
     #[test]
     fn quantiles_of_a_known_list() {
         let mut latencies = Latencies::new();
-        assert_eq!(latencies.quantiles(), Quantiles { median: 0, p99: 0, p999: 0, max: 0 });
+        assert_eq!(
+            latencies.quantiles(),
+            Quantiles {
+                median: 0,
+                p99: 0,
+                p999: 0,
+                max: 0
+            }
+        );
         for ns in 1..=1000 {
             latencies.record(Duration::from_nanos(ns));
         }
-        let Quantiles { median, p99, p999, max } = latencies.quantiles();
+        let Quantiles {
+            median,
+            p99,
+            p999,
+            max,
+        } = latencies.quantiles();
         assert!((500..508).contains(&median), "{median}");
-        assert!((990..=1000).contains(&p99) && (999..=1000).contains(&p999), "{p99} {p999}");
+        assert!(
+            (990..=1000).contains(&p99) && (999..=1000).contains(&p999),
+            "{p99} {p999}"
+        );
         assert_eq!(max, 1000);
     }
 
@@ -118,8 +146,12 @@ mod tests {
     fn a_quantile_is_exceeded_by_its_share_and_no_more() {
         let quantiles = |short: usize| {
             let mut latencies = Latencies::new();
-            (0..1000).for_each(|at| latencies.record(Duration::from_micros(if at < short { 1 } else { 1000 })));
-            let Quantiles { median, p99, p999, .. } = latencies.quantiles();
+            (0..1000).for_each(|at| {
+                latencies.record(Duration::from_micros(if at < short { 1 } else { 1000 }))
+            });
+            let Quantiles {
+                median, p99, p999, ..
+            } = latencies.quantiles();
             [median, p99, p999].map(|ns| ns > 500_000)
         };
         assert_eq!(quantiles(1000), [false, false, false]);

@@ -86,7 +86,9 @@ impl Ended {
     /// The scan as the haptic update alone has moved it.
     pub fn mesh(&self) -> Cow<'_, TriMesh> {
         let moved = self.refiner.mesh();
-        self.detail.as_ref().map_or(Cow::Borrowed(moved), |detail| Cow::Owned(detail.moved_as(moved)))
+        self.detail.as_ref().map_or(Cow::Borrowed(moved), |detail| {
+            Cow::Owned(detail.moved_as(moved))
+        })
     }
 }
 
@@ -115,23 +117,49 @@ impl Engine {
         if patch.is_some() {
             refine.bias = refine.bias.or(refine.gate.map(|_| BiasParams::default()));
         }
-        let shared = if let Renewal::Beside { scan, .. } = &renewal { Some(scan) } else { None };
+        let shared = if let Renewal::Beside { scan, .. } = &renewal {
+            Some(scan)
+        } else {
+            None
+        };
         let (working, detail) = Detail::of(mesh, shared, &mut refine).map_err(RefineError::from)?;
         let mut refiner = Refiner::new(working, refine)?;
         let patch_params = patch.filter(|_| shared.is_some());
         let patch = match (patch.map(Patcher::new).transpose()?, renewal) {
             (None, _) => Reconstruction::Without,
             (Some(patcher), Renewal::AtEnd) => Reconstruction::AtEnd(Box::new(patcher)),
-            (Some(patcher), Renewal::Beside { scan, pace, room, gate }) => {
+            (
+                Some(patcher),
+                Renewal::Beside {
+                    scan,
+                    pace,
+                    room,
+                    gate,
+                },
+            ) => {
                 refiner.expect_patch(room)?;
                 let scans = match &detail {
-                    None => PatchedScans { working: scan, shown: None },
-                    Some(detail) => PatchedScans { working: detail.working_scan(), shown: Some(scan) },
+                    None => PatchedScans {
+                        working: scan,
+                        shown: None,
+                    },
+                    Some(detail) => PatchedScans {
+                        working: detail.working_scan(),
+                        shown: Some(scan),
+                    },
                 };
                 Reconstruction::Beside(Box::new(Renewals::new(scans, patcher, pace, gate)?))
             }
         };
-        Ok(Self { refiner, patch, answered: None, detail, patch_params, since_replay: None, changed_stroke_ns: None })
+        Ok(Self {
+            refiner,
+            patch,
+            answered: None,
+            detail,
+            patch_params,
+            since_replay: None,
+            changed_stroke_ns: None,
+        })
     }
 
     /// Takes the next sample and moves the mesh by it, then by the change of the patch that is due: [`Self::answer`], then
@@ -154,7 +182,9 @@ impl Engine {
         self.follow()?;
         let update = self.refiner.push(sample)?;
         self.answered = self.refiner.contact().copied();
-        self.since_replay.iter_mut().for_each(|since| since.push(sample));
+        self.since_replay
+            .iter_mut()
+            .for_each(|since| since.push(sample));
         Ok(update)
     }
 
@@ -164,7 +194,9 @@ impl Engine {
     /// # Errors
     /// [`LiveError::Stopped`], [`LiveError::Refine`].
     pub fn follow(&mut self) -> Result<(), LiveError> {
-        let Some(contact) = self.answered.take() else { return Ok(()) };
+        let Some(contact) = self.answered.take() else {
+            return Ok(());
+        };
         match &mut self.patch {
             Reconstruction::Without => {}
             Reconstruction::AtEnd(patcher) => patcher.push(&contact),
@@ -183,7 +215,11 @@ impl Engine {
     /// [`LiveError::Stopped`], [`LiveError::Refine`].
     pub fn rest(&mut self) -> Result<(), LiveError> {
         self.follow()?;
-        if let Reconstruction::Beside(renewals) = &mut self.patch { renewals.rest(&mut self.refiner) } else { Ok(()) }
+        if let Reconstruction::Beside(renewals) = &mut self.patch {
+            renewals.rest(&mut self.refiner)
+        } else {
+            Ok(())
+        }
     }
 
     /// As [`Self::rest`], where the stream has rested for longer: the mesh becomes, bit by bit, what [`Patcher::patched`] makes of all
@@ -195,7 +231,9 @@ impl Engine {
     /// As [`Self::rest`].
     pub fn settle(&mut self) -> Result<bool, LiveError> {
         self.follow()?;
-        let Reconstruction::Beside(renewals) = &mut self.patch else { return Ok(true) };
+        let Reconstruction::Beside(renewals) = &mut self.patch else {
+            return Ok(true);
+        };
         let is_settled = renewals.settle(&mut self.refiner)?;
         if let (Some(detail), Some(patch)) = (&mut self.detail, renewals.take_at_rest()) {
             detail.rest(patch, &self.refiner);
@@ -266,7 +304,9 @@ impl Engine {
                 return Ok(of_refiner(&mut self.refiner));
             }
             Reconstruction::AtEnd(patcher) => of_patcher(patcher),
-            Reconstruction::Beside(renewals) => renewals.change_strokes(&mut self.refiner, of_patcher)?,
+            Reconstruction::Beside(renewals) => {
+                renewals.change_strokes(&mut self.refiner, of_patcher)?
+            }
         };
         Ok(self.changed_stroke_ns.is_some())
     }
@@ -284,7 +324,9 @@ impl Engine {
     /// # Errors
     /// [`LiveError::Stopped`], [`LiveError::Refine`], [`LiveError::Setting`].
     pub fn begin_replay(&mut self) -> Result<Option<EvidenceReplay>, LiveError> {
-        let Some(patch) = self.patch_params else { return Ok(None) };
+        let Some(patch) = self.patch_params else {
+            return Ok(None);
+        };
         self.follow()?;
         let replay = EvidenceReplay::new(self.refiner.fresh_contacts()?, patch)?;
         self.since_replay = Some(KeptSamples::default());
@@ -301,20 +343,26 @@ impl Engine {
     pub fn end_replay(&mut self, replay: Option<EvidenceReplay>) -> Result<u64, LiveError> {
         self.follow()?;
         let since = self.since_replay.take().unwrap_or_default();
-        let (Some(mut replay), Reconstruction::Beside(renewals)) = (replay, &mut self.patch) else { return Ok(0) };
+        let (Some(mut replay), Reconstruction::Beside(renewals)) = (replay, &mut self.patch) else {
+            return Ok(0);
+        };
         match since.all() {
             Ok(samples) => samples.iter().for_each(|sample| replay.push(sample)),
             Err(dropped) => return Ok(dropped),
         }
         let EvidenceReplay { contacts, patcher } = replay;
-        let last_ns = self.refiner.contact().map_or(i64::MIN, |contact| contact.tip.stamp_ns);
+        let last_ns = self
+            .refiner
+            .contact()
+            .map_or(i64::MIN, |contact| contact.tip.stamp_ns);
         self.refiner.set_contacts(contacts);
         renewals.replace(patcher, last_ns).map(|()| 0)
     }
 
     /// Whether the mesh does not show yet what [`Self::end_replay`] has put in place.
     pub fn is_replacing(&self) -> bool {
-        self.renewals().is_some_and(|renewals| renewals.is_replacing)
+        self.renewals()
+            .is_some_and(|renewals| renewals.is_replacing)
     }
 
     /// A copy of the evidence of the patch from all samples so far, without its results: it comes when the thread
@@ -339,7 +387,11 @@ impl Engine {
 
     /// Touches that the patch beside the samples has added or removed since the last call.
     pub fn take_probed(&mut self) -> Option<TouchDelta> {
-        if let Reconstruction::Beside(renewals) = &mut self.patch { renewals.take_probed() } else { None }
+        if let Reconstruction::Beside(renewals) = &mut self.patch {
+            renewals.take_probed()
+        } else {
+            None
+        }
     }
 
     /// From here on notes what changes in the mesh, for [`Self::take_changes`].
@@ -356,14 +408,19 @@ impl Engine {
     pub fn take_changes(&mut self, most: usize, into: &mut Changes) -> Result<bool, LiveError> {
         match &mut self.detail {
             None => Ok(self.refiner.take_changes(most, into)),
-            Some(detail) => Ok(detail.take_changes(&mut self.refiner, most, into).map_err(RefineError::from)?),
+            Some(detail) => Ok(detail
+                .take_changes(&mut self.refiner, most, into)
+                .map_err(RefineError::from)?),
         }
     }
 
     /// The mesh to look at: that of the haptic update, and where this works on a simplified scan and [`Self::watch`] was called, the scan
     /// itself as far as it has followed.
     pub fn mesh(&self) -> &TriMesh {
-        self.detail.as_ref().and_then(Detail::shown).unwrap_or_else(|| self.refiner.mesh())
+        self.detail
+            .as_ref()
+            .and_then(Detail::shown)
+            .unwrap_or_else(|| self.refiner.mesh())
     }
 
     /// How often [`Self::mesh`] was changed since [`Self::watch`], at least: it grows with each change to be taken.
@@ -373,7 +430,9 @@ impl Engine {
 
     /// A face of [`Self::mesh`] that shows a face of the haptic update; `None`: it is not shown yet.
     pub fn shown_face(&self, face: FaceId) -> Option<FaceId> {
-        self.detail.as_ref().map_or(Some(face), |detail| detail.face(face))
+        self.detail
+            .as_ref()
+            .map_or(Some(face), |detail| detail.face(face))
     }
 
     /// The haptic update, with the current mesh.
@@ -415,13 +474,18 @@ impl Engine {
 
     /// Lag of the patch beside the samples.
     pub fn counts(&self) -> LiveCounts {
-        self.renewals().map(|renewals| renewals.counts).unwrap_or_default()
+        self.renewals()
+            .map(|renewals| renewals.counts)
+            .unwrap_or_default()
     }
 
     /// Memory of the mesh under refinement, and of the scan that it stands for.
     pub fn footprint(&self) -> Footprint {
         let working = self.refiner.footprint();
-        Footprint { mesh: working.mesh + self.detail.as_ref().map_or(0, Detail::bytes), ..working }
+        Footprint {
+            mesh: working.mesh + self.detail.as_ref().map_or(0, Detail::bytes),
+            ..working
+        }
     }
 
     /// Ends the thread, if there is one; gives back what there is after the last sample.
@@ -435,10 +499,18 @@ impl Engine {
             Reconstruction::AtEnd(patcher) => Some(*patcher),
             Reconstruction::Beside(renewals) => Some(renewals.finish()?),
         };
-        Ok(Ended { refiner: self.refiner, patcher, detail: self.detail })
+        Ok(Ended {
+            refiner: self.refiner,
+            patcher,
+            detail: self.detail,
+        })
     }
 
     fn renewals(&self) -> Option<&Renewals> {
-        if let Reconstruction::Beside(renewals) = &self.patch { Some(renewals) } else { None }
+        if let Reconstruction::Beside(renewals) = &self.patch {
+            Some(renewals)
+        } else {
+            None
+        }
     }
 }

@@ -14,7 +14,10 @@ pub struct TouchDelta {
 impl Default for TouchDelta {
     /// All stay and none comes.
     fn default() -> Self {
-        Self { kept: usize::MAX, new: Vec::new() }
+        Self {
+            kept: usize::MAX,
+            new: Vec::new(),
+        }
     }
 }
 
@@ -64,7 +67,12 @@ fn name(touch: &ProbedPoint) -> (i64, u32) {
 impl PublishedList {
     /// The message about the current list: the added touches, or the whole list after a removal.
     pub fn changes(&mut self, touches: &[ProbedPoint]) -> TouchDelta {
-        let is_longer = self.count.checked_sub(1).and_then(|last| touches.get(last)).map(name) == self.last;
+        let is_longer = self
+            .count
+            .checked_sub(1)
+            .and_then(|last| touches.get(last))
+            .map(name)
+            == self.last;
         let kept = if is_longer { self.count } else { 0 };
         if kept == touches.len() && is_longer {
             return TouchDelta::default();
@@ -80,6 +88,9 @@ impl PublishedList {
     fn publish(&mut self, touches: &[ProbedPoint], kept: usize) -> TouchDelta {
         self.count = touches.len();
         self.last = touches.last().map(name);
-        TouchDelta { kept, new: touches[kept..].to_vec() }
+        TouchDelta {
+            kept,
+            new: touches[kept..].to_vec(),
+        }
     }
 }

@@ -33,15 +33,29 @@ impl Default for Pace {
     /// 8 ms and 10 ms: with a smoothing window of 32 ms to either side, a touch is in the mesh after 50 ms, and the time that it takes to take
     /// the change up. No sample waits.
     fn default() -> Self {
-        Self { every_ns: 8_000_000, after_ns: 10_000_000, is_patient: false }
+        Self {
+            every_ns: 8_000_000,
+            after_ns: 10_000_000,
+            is_patient: false,
+        }
     }
 }
 
 impl Pace {
     fn check(&self) -> Result<(), SettingError> {
         let (every, after) = (self.every_ns as f64, self.after_ns as f64);
-        SettingError::check("time between renewals of the patch (ns)", every, every > 0.0, "more than 0")?;
-        SettingError::check("time for a renewal of the patch (ns)", after, after >= 0.0, "0 or more")
+        SettingError::check(
+            "time between renewals of the patch (ns)",
+            every,
+            every > 0.0,
+            "more than 0",
+        )?;
+        SettingError::check(
+            "time for a renewal of the patch (ns)",
+            after,
+            after >= 0.0,
+            "0 or more",
+        )
     }
 }
 
@@ -88,7 +102,12 @@ pub(super) struct Renewals {
 
 impl Renewals {
     /// Starts the thread.
-    pub fn new(scans: PatchedScans, patcher: Patcher, pace: Pace, gate: Gate) -> Result<Self, LiveError> {
+    pub fn new(
+        scans: PatchedScans,
+        patcher: Patcher,
+        pace: Pace,
+        gate: Gate,
+    ) -> Result<Self, LiveError> {
         pace.check()?;
         Ok(Self {
             worker: Worker::new(scans, patcher, gate)?,
@@ -116,10 +135,18 @@ impl Renewals {
         let slot = stamp_ns.div_euclid(self.pace.every_ns);
         let has_begun = self.slot.replace(slot).is_some_and(|before| slot > before);
         if has_begun && (self.pace.is_patient || self.due_ns.len() < MOST_OPEN) {
-            self.ask(slot.saturating_mul(self.pace.every_ns).saturating_add(self.pace.after_ns))?;
+            self.ask(
+                slot.saturating_mul(self.pace.every_ns)
+                    .saturating_add(self.pace.after_ns),
+            )?;
         }
         self.batch.push(contact);
-        if self.is_done && self.due_ns.front().is_some_and(|&due_ns| due_ns <= stamp_ns) {
+        if self.is_done
+            && self
+                .due_ns
+                .front()
+                .is_some_and(|&due_ns| due_ns <= stamp_ns)
+        {
             self.take_up_due(refiner)?;
         }
         self.go_on(refiner, AT_ONCE)
@@ -220,7 +247,8 @@ impl Renewals {
     /// - `last_ns`: stamp of the last of them, whether or not that is left out.
     pub fn replace(&mut self, patcher: Patcher, last_ns: i64) -> Result<(), LiveError> {
         self.batch.clear();
-        self.worker.ask(Question::Replace(Box::new(patcher), last_ns))?;
+        self.worker
+            .ask(Question::Replace(Box::new(patcher), last_ns))?;
         self.due_ns.push_back(i64::MIN);
         (self.is_replacing, self.is_settled) = (true, false);
         Ok(())
@@ -248,7 +276,13 @@ impl Renewals {
     }
 
     fn take_up(&mut self, refiner: &mut Refiner, answer: WorkerAnswer) {
-        let WorkerAnswer { delta, at_rest, probed, has_replaced, .. } = answer;
+        let WorkerAnswer {
+            delta,
+            at_rest,
+            probed,
+            has_replaced,
+            ..
+        } = answer;
         self.has_replaced = has_replaced;
         self.due_ns.pop_front();
         self.at_rest = at_rest;

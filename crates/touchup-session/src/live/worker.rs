@@ -70,9 +70,13 @@ impl Worker {
         let work = move || {
             let gate = gate_of_thread;
             let mut published = PublishedList::default();
-            let PatchedScans { working: scan, shown } = scans;
+            let PatchedScans {
+                working: scan,
+                shown,
+            } = scans;
             for (question, _working) in inbox {
-                let (mut batch, mut changed_stroke_ns, mut has_replaced) = (Vec::new(), None, false);
+                let (mut batch, mut changed_stroke_ns, mut has_replaced) =
+                    (Vec::new(), None, false);
                 let is_renewal = matches!(question, Question::Renew(_));
                 let settles = matches!(question, Question::Settle);
                 match question {
@@ -104,14 +108,28 @@ impl Worker {
                     None => patcher.settled(&scan.0, &scan.1),
                     Some(shown) => {
                         let patch = patcher.patch_of_all(&shown.0, &shown.1);
-                        let nothing = PatchDelta { until_ns: patch.until_ns, ..PatchDelta::default() };
+                        let nothing = PatchDelta {
+                            until_ns: patch.until_ns,
+                            ..PatchDelta::default()
+                        };
                         at_rest = Some(patch);
                         nothing
                     }
                 };
                 let touches = patcher.probed();
-                let probed = if has_replaced { published.all(touches) } else { published.changes(touches) };
-                let answer = WorkerAnswer { delta, at_rest, probed, changed_stroke_ns, has_replaced, batch };
+                let probed = if has_replaced {
+                    published.all(touches)
+                } else {
+                    published.changes(touches)
+                };
+                let answer = WorkerAnswer {
+                    delta,
+                    at_rest,
+                    probed,
+                    changed_stroke_ns,
+                    has_replaced,
+                    batch,
+                };
                 if to_engine.send(answer).is_err() {
                     break;
                 }
@@ -125,7 +143,13 @@ impl Worker {
         };
         let thread = Builder::new().name("patch".to_owned()).spawn(work);
         let thread = thread.map_err(|error| LiveError::NoThread(error.to_string()))?;
-        Ok(Self { gate, questions, answers, thread, batches: Vec::new() })
+        Ok(Self {
+            gate,
+            questions,
+            answers,
+            thread,
+            batches: Vec::new(),
+        })
     }
 
     pub fn empty_batch(&mut self) -> Vec<ContactSample> {
@@ -134,7 +158,9 @@ impl Worker {
 
     /// Asks; there will be one answer more.
     pub fn ask(&self, question: Question) -> Result<(), LiveError> {
-        self.questions.send((question, self.gate.begin_work())).map_err(|_| LiveError::Stopped)
+        self.questions
+            .send((question, self.gate.begin_work()))
+            .map_err(|_| LiveError::Stopped)
     }
 
     /// The next answer, when it is there.

@@ -23,7 +23,8 @@ mod watch;
 use watch::InputWatch;
 
 /// What is said of a scene in which nothing moves the mesh.
-pub const NOTHING_MOVES: &str = "the scene says `refine: off`, so nothing would move the mesh: take that out of it";
+pub const NOTHING_MOVES: &str =
+    "the scene says `refine: off`, so nothing would move the mesh: take that out of it";
 
 /// Why nothing came of a refinement.
 #[derive(Debug, thiserror::Error)]
@@ -135,13 +136,27 @@ impl RefinementInput {
     /// [`SceneError::EmptyRegion`]
     pub fn new(scene: Scene, scan: TriMesh) -> Result<Self, SceneError> {
         let CutScan { mesh, cut } = scene.cut(scan)?;
-        Ok(Self { scene, scan: mesh, cut })
+        Ok(Self {
+            scene,
+            scan: mesh,
+            cut,
+        })
     }
 
     /// Settings of the haptic update and of the patch; `None` where nothing moves the mesh.
-    pub fn settings(&self, wrench_frame: WrenchFrame) -> Option<(RefineParams, Option<PatcherParams>)> {
-        let params = self.cut.refine_params(self.scene.refine_params(wrench_frame)?);
-        Some((params, self.scene.patcher_params().map(|params| self.cut.patcher_params(params))))
+    pub fn settings(
+        &self,
+        wrench_frame: WrenchFrame,
+    ) -> Option<(RefineParams, Option<PatcherParams>)> {
+        let params = self
+            .cut
+            .refine_params(self.scene.refine_params(wrench_frame)?);
+        Some((
+            params,
+            self.scene
+                .patcher_params()
+                .map(|params| self.cut.patcher_params(params)),
+        ))
     }
 
     /// Gives each sample to `taker`, and watches what comes.
@@ -159,7 +174,10 @@ impl RefinementInput {
         at_each: &mut dyn FnMut(),
     ) -> Result<JudgedReplay, ReplayError> {
         let (placement, sync) = (self.scene.placement(), self.scene.sync_params());
-        let watch = InputWatch::new(self.scene.input_monitor_params(touches.wrench_frame()), params)?;
+        let watch = InputWatch::new(
+            self.scene.input_monitor_params(touches.wrench_frame()),
+            params,
+        )?;
         let watch = RefCell::new(watch);
         let mut at_message = |message: &Message| watch.borrow_mut().monitor.message(message);
         let each = |sample: &Sample| {
@@ -174,13 +192,32 @@ impl RefinementInput {
         let replayed = match touches {
             TouchSource::Recorded { recording, markers } => {
                 let markers = markers.map(|markers| *markers);
-                each_sample(*recording, placement, sync, markers, at_each, &mut at_message, each)?
+                each_sample(
+                    *recording,
+                    placement,
+                    sync,
+                    markers,
+                    at_each,
+                    &mut at_message,
+                    each,
+                )?
             }
-            TouchSource::Messages { messages, wrench_frame } => {
-                each_sample_of(messages, wrench_frame, placement, sync, &mut at_message, each)?
-            }
+            TouchSource::Messages {
+                messages,
+                wrench_frame,
+            } => each_sample_of(
+                messages,
+                wrench_frame,
+                placement,
+                sync,
+                &mut at_message,
+                each,
+            )?,
         };
-        Ok(JudgedReplay { replayed, monitor: watch.into_inner().monitor })
+        Ok(JudgedReplay {
+            replayed,
+            monitor: watch.into_inner().monitor,
+        })
     }
 }
 
@@ -210,7 +247,9 @@ impl Refinement {
     /// # Errors
     /// [`RefinementError::NothingMoves`], [`RefinementError::Live`].
     pub fn new(input: RefinementInput, wrench_frame: WrenchFrame) -> Result<Self, RefinementError> {
-        let (params, patch) = input.settings(wrench_frame).ok_or(RefinementError::NothingMoves)?;
+        let (params, patch) = input
+            .settings(wrench_frame)
+            .ok_or(RefinementError::NothingMoves)?;
         let engine = Engine::new(input.scan.clone(), params, patch, Renewal::AtEnd)?;
         Ok(Self { engine, input })
     }
@@ -234,7 +273,11 @@ impl Refinement {
             Some(patcher) => RefinedMesh::patched(scan, patcher, outside, !force)?,
             None => RefinedMesh::moved(scan, &ended.mesh(), outside, !force)?,
         };
-        Ok(FinishedRefinement { mesh, counts, friction: ended.refiner.friction() })
+        Ok(FinishedRefinement {
+            mesh,
+            counts,
+            friction: ended.refiner.friction(),
+        })
     }
 }
 
@@ -309,13 +352,20 @@ impl JudgedSamples {
         names: InputNames<'_>,
         force: bool,
     ) -> Result<RefinedScan, RefinementError> {
-        let Self { monitor, mut replayed, accepted, mut refused } = self;
+        let Self {
+            monitor,
+            mut replayed,
+            accepted,
+            mut refused,
+        } = self;
         let scan = &refinement.input.scan;
         let findings = monitor.findings(scan, &FaceTree::new_by(scan, &Threads));
         if !force {
             refuse_unsound(&findings, names)?;
             if accepted == 0 {
-                return Err(RefinementError::NoSample { recording: names.recording.to_owned() });
+                return Err(RefinementError::NoSample {
+                    recording: names.recording.to_owned(),
+                });
             }
         }
         refused.append(&mut replayed.refused);
@@ -325,7 +375,13 @@ impl JudgedSamples {
         if outside_region > 0 {
             refused.insert("outside_region".to_owned(), outside_region);
         }
-        Ok(RefinedScan { finished, replayed, accepted: accepted - outside_region, refused, findings })
+        Ok(RefinedScan {
+            finished,
+            replayed,
+            accepted: accepted - outside_region,
+            refused,
+            findings,
+        })
     }
 }
 
@@ -345,10 +401,17 @@ impl JudgedRefinement {
     /// # Errors
     /// Those of [`Refinement::new`]; [`RefinementError::Setting`].
     pub fn new(input: RefinementInput, wrench_frame: WrenchFrame) -> Result<Self, RefinementError> {
-        let (params, _) = input.settings(wrench_frame).ok_or(RefinementError::NothingMoves)?;
+        let (params, _) = input
+            .settings(wrench_frame)
+            .ok_or(RefinementError::NothingMoves)?;
         let monitor = input.scene.input_monitor_params(wrench_frame);
         let watch = InputWatch::new(monitor, &params)?;
-        Ok(Self { refinement: Refinement::new(input, wrench_frame)?, watch, accepted: 0, refused: BTreeMap::new() })
+        Ok(Self {
+            refinement: Refinement::new(input, wrench_frame)?,
+            watch,
+            accepted: 0,
+            refused: BTreeMap::new(),
+        })
     }
 
     /// Takes the next sample; a refused one is counted and changes nothing.
@@ -357,8 +420,11 @@ impl JudgedRefinement {
     /// [`LiveError`] where it is refused.
     #[inline]
     pub fn push(&mut self, sample: &Sample) -> Result<Update, LiveError> {
-        let update =
-            self.refinement.engine.push(sample).inspect_err(|error| count_refusal(&mut self.refused, error))?;
+        let update = self
+            .refinement
+            .engine
+            .push(sample)
+            .inspect_err(|error| count_refusal(&mut self.refused, error))?;
         self.watch.monitor.paired_message(sample.stamp_ns);
         self.watch.sample(sample, self.refinement.engine.refiner());
         self.accepted += 1;
@@ -371,11 +437,28 @@ impl JudgedRefinement {
     ///
     /// # Errors
     /// [`RefinementError`]
-    pub fn finish(self, names: InputNames<'_>, force: bool) -> Result<RefinedScan, RefinementError> {
-        let Self { refinement, watch, accepted, refused } = self;
+    pub fn finish(
+        self,
+        names: InputNames<'_>,
+        force: bool,
+    ) -> Result<RefinedScan, RefinementError> {
+        let Self {
+            refinement,
+            watch,
+            accepted,
+            refused,
+        } = self;
         let wrenches = accepted + refused.values().sum::<u64>();
-        let replayed = Replayed { wrenches, ..Replayed::default() };
-        let samples = JudgedSamples { monitor: watch.monitor, replayed, accepted, refused };
+        let replayed = Replayed {
+            wrenches,
+            ..Replayed::default()
+        };
+        let samples = JudgedSamples {
+            monitor: watch.monitor,
+            replayed,
+            accepted,
+            refused,
+        };
         samples.finish(refinement, names, force)
     }
 }
@@ -383,7 +466,9 @@ impl JudgedRefinement {
 /// Counts it by its reason.
 #[cold]
 fn count_refusal(refused: &mut BTreeMap<String, u64>, error: &LiveError) {
-    *refused.entry(reason_of_refusal(error).to_owned()).or_default() += 1;
+    *refused
+        .entry(reason_of_refusal(error).to_owned())
+        .or_default() += 1;
 }
 
 /// Refines a scan by a recording.
@@ -401,20 +486,39 @@ pub fn refine(
     at_each: &mut dyn FnMut(),
 ) -> Result<RefinedScan, RefinementError> {
     let wrench_frame = touches.wrench_frame();
-    let (params, _) = input.settings(wrench_frame).ok_or(RefinementError::NothingMoves)?;
+    let (params, _) = input
+        .settings(wrench_frame)
+        .ok_or(RefinementError::NothingMoves)?;
     let Refinement { mut engine, input } = Refinement::new(input, wrench_frame)?;
-    let mut taker = CountingTaker { engine: &mut engine, accepted: 0, refused: BTreeMap::new() };
+    let mut taker = CountingTaker {
+        engine: &mut engine,
+        accepted: 0,
+        refused: BTreeMap::new(),
+    };
     let JudgedReplay { replayed, monitor } = input.replay(touches, &params, &mut taker, at_each)?;
-    let CountingTaker { accepted, refused, .. } = taker;
-    JudgedSamples { monitor, replayed, accepted, refused }.finish(Refinement { engine, input }, names, force)
+    let CountingTaker {
+        accepted, refused, ..
+    } = taker;
+    JudgedSamples {
+        monitor,
+        replayed,
+        accepted,
+        refused,
+    }
+    .finish(Refinement { engine, input }, names, force)
 }
 
 /// Refuses an input of which something is surely wrong.
 ///
 /// # Errors
 /// [`RefinementError::Unsound`] with the first finding that is.
-pub fn refuse_unsound(findings: &[InputFinding], names: InputNames<'_>) -> Result<(), RefinementError> {
-    let Some(finding) = findings.iter().find(|finding| finding.is_sure) else { return Ok(()) };
+pub fn refuse_unsound(
+    findings: &[InputFinding],
+    names: InputNames<'_>,
+) -> Result<(), RefinementError> {
+    let Some(finding) = findings.iter().find(|finding| finding.is_sure) else {
+        return Ok(());
+    };
     let InputNames { scan, recording } = names;
     Err(RefinementError::Unsound {
         scan: scan.to_owned(),

@@ -14,8 +14,15 @@ pub(super) struct InputWatch {
 
 impl InputWatch {
     pub fn new(monitor: InputMonitorParams, params: &RefineParams) -> Result<Self, SettingError> {
-        let observer = params.contact().completed().map(ContactEstimator::new).transpose()?;
-        Ok(Self { monitor: InputMonitor::new(monitor)?, observer })
+        let observer = params
+            .contact()
+            .completed()
+            .map(ContactEstimator::new)
+            .transpose()?;
+        Ok(Self {
+            monitor: InputMonitor::new(monitor)?,
+            observer,
+        })
     }
 
     /// A sample that was taken; returns what is decided about its contact.

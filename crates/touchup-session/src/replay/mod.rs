@@ -5,9 +5,12 @@ use std::path::Path;
 
 use touchup_core::numeric::counted;
 use touchup_core::stylus::{
-    MarkerCounts, MarkerFilter, Message, Placement, Sample, SettingError, SyncParams, Synchroniser, WrenchFrame,
+    MarkerCounts, MarkerFilter, Message, Placement, Sample, SettingError, SyncParams, Synchroniser,
+    WrenchFrame,
 };
-use touchup_io::recording::{Record, RecordingError, RecordingLayout, RecordingReader, StampSource};
+use touchup_io::recording::{
+    Record, RecordingError, RecordingLayout, RecordingReader, StampSource,
+};
 
 use crate::scene::Scene;
 
@@ -62,17 +65,30 @@ impl Recording {
     ///
     /// # Errors
     /// [`RecordingError`] of opening it.
-    pub fn open(path: &Path, layout: impl Into<RecordingLayout>, stamps: StampSource) -> Result<Self, RecordingError> {
+    pub fn open(
+        path: &Path,
+        layout: impl Into<RecordingLayout>,
+        stamps: StampSource,
+    ) -> Result<Self, RecordingError> {
         let layout = layout.into();
         let mut reader = RecordingReader::open(path, &layout)?.stamped_by(stamps);
         let mut ahead = VecDeque::new();
         while !knows_frames(&reader) && ahead.len() < MOST_AHEAD {
-            let Some(record) = reader.next_record() else { break };
+            let Some(record) = reader.next_record() else {
+                break;
+            };
             ahead.push_back(record);
         }
-        let wrench_frame =
-            if ahead.len() < MOST_AHEAD { wrench_frame(&reader) } else { find_wrench_frame(path, &layout)? };
-        Ok(Self { reader, ahead, wrench_frame })
+        let wrench_frame = if ahead.len() < MOST_AHEAD {
+            wrench_frame(&reader)
+        } else {
+            find_wrench_frame(path, &layout)?
+        };
+        Ok(Self {
+            reader,
+            ahead,
+            wrench_frame,
+        })
     }
 
     /// How many messages it has, where the recording says so.
@@ -101,7 +117,11 @@ fn knows_frames(reader: &RecordingReader) -> bool {
 }
 
 fn wrench_frame(reader: &RecordingReader) -> WrenchFrame {
-    if reader.wrench_frame() == reader.pose_frame() { WrenchFrame::Object } else { WrenchFrame::Sensor }
+    if reader.wrench_frame() == reader.pose_frame() {
+        WrenchFrame::Object
+    } else {
+        WrenchFrame::Sensor
+    }
 }
 
 /// Where one topic begins long after the other: by a reader of its own, which keeps nothing.
@@ -111,18 +131,26 @@ fn find_wrench_frame(path: &Path, layout: &RecordingLayout) -> Result<WrenchFram
     Ok(wrench_frame(&reader))
 }
 
-const NO_MARKERS: &str = "--markers-topic needs a scene that says where the markers sit: add `markers:` to it";
+const NO_MARKERS: &str =
+    "--markers-topic needs a scene that says where the markers sit: add `markers:` to it";
 
 /// What makes poses of markers, when the recording has those on `topic`.
 ///
 /// # Errors
 /// [`ReplayError::Markers`] when the scene does not say where they sit.
-pub fn marker_filter(scene: &Scene, topic: Option<&str>) -> Result<Option<MarkerFilter>, ReplayError> {
+pub fn marker_filter(
+    scene: &Scene,
+    topic: Option<&str>,
+) -> Result<Option<MarkerFilter>, ReplayError> {
     if topic.is_none() {
         return Ok(None);
     }
-    let filter = scene.marker_filter().map_err(|error| ReplayError::Markers(error.to_string()))?;
-    filter.map(Some).ok_or_else(|| ReplayError::Markers(NO_MARKERS.to_owned()))
+    let filter = scene
+        .marker_filter()
+        .map_err(|error| ReplayError::Markers(error.to_string()))?;
+    filter
+        .map(Some)
+        .ok_or_else(|| ReplayError::Markers(NO_MARKERS.to_owned()))
 }
 
 /// Gives each message of `recording` to `each`, in its order.
@@ -229,9 +257,17 @@ pub fn each_sample_of(
 impl Replayed {
     /// Adds the counts of the marker filter.
     fn account_markers(&mut self, filter: &MarkerFilter) {
-        for (reason, count) in filter.frame_counts().reasons().into_iter().filter(|(_, count)| *count > 0) {
+        for (reason, count) in filter
+            .frame_counts()
+            .reasons()
+            .into_iter()
+            .filter(|(_, count)| *count > 0)
+        {
             if !NOT_A_LOSS.contains(&reason) {
-                self.losses.push(format!("{} {reason}", counted(count, "marker frame", "marker frames")));
+                self.losses.push(format!(
+                    "{} {reason}",
+                    counted(count, "marker frame", "marker frames")
+                ));
             }
             self.refused.insert(format!("markers_{reason}"), count);
         }
@@ -240,11 +276,22 @@ impl Replayed {
 
     /// Adds the counts of the synchroniser.
     fn account_sync(&mut self, sync: &Synchroniser) {
-        let of_wrenches = sync.counts().reasons().map(|(reason, count)| (reason, reason.to_owned(), count));
-        let of_poses = sync.pose_counts().reasons().map(|(reason, count)| (reason, format!("pose_{reason}"), count));
-        for (reason, name, count) in of_wrenches.into_iter().chain(of_poses).filter(|(.., count)| *count > 0) {
+        let of_wrenches = sync
+            .counts()
+            .reasons()
+            .map(|(reason, count)| (reason, reason.to_owned(), count));
+        let of_poses = sync
+            .pose_counts()
+            .reasons()
+            .map(|(reason, count)| (reason, format!("pose_{reason}"), count));
+        for (reason, name, count) in of_wrenches
+            .into_iter()
+            .chain(of_poses)
+            .filter(|(.., count)| *count > 0)
+        {
             if !NOT_A_LOSS.contains(&reason) {
-                self.losses.push(format!("{} {name}", counted(count, "message", "messages")));
+                self.losses
+                    .push(format!("{} {name}", counted(count, "message", "messages")));
             }
             self.refused.insert(name, count);
         }
@@ -255,7 +302,10 @@ impl Replayed {
         self.losses.extend(recording.losses());
         for (reason, bad) in recording.bad_messages() {
             self.wrenches += bad.wrenches;
-            for (name, count) in [(reason.to_string(), bad.wrenches), (format!("pose_{reason}"), bad.poses)] {
+            for (name, count) in [
+                (reason.to_string(), bad.wrenches),
+                (format!("pose_{reason}"), bad.poses),
+            ] {
                 if count > 0 {
                     *self.refused.entry(name).or_default() += count;
                 }

@@ -40,14 +40,25 @@ impl RecordedAs {
     /// What is named, and the columns of a table that the scene names.
     pub fn layout(&self, scene: &Scene) -> RecordingLayout {
         let own = Topics::default();
-        let pose = if self.pose_frame.is_some() { TRANSFORMS.to_owned() } else { own.pose };
+        let pose = if self.pose_frame.is_some() {
+            TRANSFORMS.to_owned()
+        } else {
+            own.pose
+        };
         let topics = Topics {
             pose: self.pose_topic.clone().unwrap_or(pose),
             wrench: self.wrench_topic.clone().unwrap_or(own.wrench),
             markers: self.markers_topic.clone(),
         };
-        let frames = self.pose_frame.clone().map(|moving| TransformFrames { moving, base: self.base_frame.clone() });
-        RecordingLayout { topics, frames, columns: scene.table_columns() }
+        let frames = self.pose_frame.clone().map(|moving| TransformFrames {
+            moving,
+            base: self.base_frame.clone(),
+        });
+        RecordingLayout {
+            topics,
+            frames,
+            columns: scene.table_columns(),
+        }
     }
 
     /// Which time of a message counts.
@@ -58,11 +69,21 @@ impl RecordedAs {
         if self.base_frame.is_some() && self.pose_frame.is_none() {
             return Err("base_frame is the frame in which the pose of pose_frame is wanted: name pose_frame".to_owned());
         }
-        if self.markers_topic.is_some() && (self.pose_topic.is_some() || self.pose_frame.is_some()) {
-            return Err("markers_topic is read in place of the pose: leave out pose_topic and pose_frame".to_owned());
+        if self.markers_topic.is_some() && (self.pose_topic.is_some() || self.pose_frame.is_some())
+        {
+            return Err(
+                "markers_topic is read in place of the pose: leave out pose_topic and pose_frame"
+                    .to_owned(),
+            );
         }
-        let named = self.stamp.as_deref().map(|name| StampSource::of_name(name).ok_or(name)).transpose();
-        named.map(Option::unwrap_or_default).map_err(|other| format!("stamp is {other}; it must be header or log"))
+        let named = self
+            .stamp
+            .as_deref()
+            .map(|name| StampSource::of_name(name).ok_or(name))
+            .transpose();
+        named
+            .map(Option::unwrap_or_default)
+            .map_err(|other| format!("stamp is {other}; it must be header or log"))
     }
 }
 
@@ -75,16 +96,59 @@ mod tests {
         let some = |name: &str| Some(name.to_owned());
         let usual = RecordedAs::default();
         assert_eq!(usual.checked_stamps(), Ok(StampSource::Header));
-        assert_eq!(RecordedAs { stamp: some("log"), ..usual.clone() }.checked_stamps(), Ok(StampSource::Log));
+        assert_eq!(
+            RecordedAs {
+                stamp: some("log"),
+                ..usual.clone()
+            }
+            .checked_stamps(),
+            Ok(StampSource::Log)
+        );
         for (recorded, word) in [
-            (RecordedAs { stamp: some("Log"), ..usual.clone() }, "stamp is Log"),
-            (RecordedAs { base_frame: some("base"), ..usual.clone() }, "name pose_frame"),
-            (RecordedAs { markers_topic: some("/m"), pose_topic: some("/p"), ..usual.clone() }, "leave out pose_topic"),
-            (RecordedAs { markers_topic: some("/m"), pose_frame: some("t"), ..usual.clone() }, "leave out pose_topic"),
+            (
+                RecordedAs {
+                    stamp: some("Log"),
+                    ..usual.clone()
+                },
+                "stamp is Log",
+            ),
+            (
+                RecordedAs {
+                    base_frame: some("base"),
+                    ..usual.clone()
+                },
+                "name pose_frame",
+            ),
+            (
+                RecordedAs {
+                    markers_topic: some("/m"),
+                    pose_topic: some("/p"),
+                    ..usual.clone()
+                },
+                "leave out pose_topic",
+            ),
+            (
+                RecordedAs {
+                    markers_topic: some("/m"),
+                    pose_frame: some("t"),
+                    ..usual.clone()
+                },
+                "leave out pose_topic",
+            ),
         ] {
-            assert!(recorded.checked_stamps().unwrap_err().contains(word), "{recorded:?}");
+            assert!(
+                recorded.checked_stamps().unwrap_err().contains(word),
+                "{recorded:?}"
+            );
         }
-        let layout = RecordedAs { pose_frame: some("tool0"), ..usual }.layout(&Scene::default());
-        assert_eq!((layout.topics.pose.as_str(), layout.topics.wrench.as_str()), ("/tf", "/stylus/wrench"));
+        let layout = RecordedAs {
+            pose_frame: some("tool0"),
+            ..usual
+        }
+        .layout(&Scene::default());
+        assert_eq!(
+            (layout.topics.pose.as_str(), layout.topics.wrench.as_str()),
+            ("/tf", "/stylus/wrench")
+        );
     }
 }

@@ -59,14 +59,20 @@ mod rfc3339 {
     use serde::de::Error;
     use serde::{Deserialize, Deserializer, Serializer};
 
-    pub fn serialize<S: Serializer>(date: &DateTime<Utc>, serializer: S) -> Result<S::Ok, S::Error> {
+    pub fn serialize<S: Serializer>(
+        date: &DateTime<Utc>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(&date.to_rfc3339_opts(SecondsFormat::Secs, true))
     }
 
-    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<DateTime<Utc>, D::Error> {
+    pub fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<DateTime<Utc>, D::Error> {
         let text = String::deserialize(deserializer)?;
         let date = DateTime::parse_from_rfc3339(&text);
-        date.map(Into::into).map_err(|error| D::Error::custom(format_args!("its date is {text:?}: {error}")))
+        date.map(Into::into)
+            .map_err(|error| D::Error::custom(format_args!("its date is {text:?}: {error}")))
     }
 }
 
@@ -118,11 +124,19 @@ impl CheckRecord {
     /// # Errors
     /// [`CheckRecordError`]
     pub fn read(path: &Path) -> Result<Option<Self>, CheckRecordError> {
-        let text = read_text(path).map_err(|source| CheckRecordError::Read { path: path.to_owned(), source })?;
+        let text = read_text(path).map_err(|source| CheckRecordError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
         if text.is_empty() && !path.exists() {
             return Ok(None);
         }
-        Self::parse(&text).map(Some).map_err(|why| CheckRecordError::Damaged { path: path.to_owned(), why })
+        Self::parse(&text)
+            .map(Some)
+            .map_err(|why| CheckRecordError::Damaged {
+                path: path.to_owned(),
+                why,
+            })
     }
 
     fn parse(text: &str) -> Result<Self, String> {
@@ -130,21 +144,34 @@ impl CheckRecord {
         struct Versioned {
             version: u32,
         }
-        let Versioned { version } = serde_json::from_str(text).map_err(|error| error.to_string())?;
+        let Versioned { version } =
+            serde_json::from_str(text).map_err(|error| error.to_string())?;
         if version != VERSION {
-            return Err(format!("it has version {version}, this touchup reads version {VERSION}"));
+            return Err(format!(
+                "it has version {version}, this touchup reads version {VERSION}"
+            ));
         }
         let record: Self = serde_json::from_str(text).map_err(|error| error.to_string())?;
         let numbers = [
-            ("repeatability_mm", Some(record.repeatability_mm), [0.0, 10.0]),
+            (
+                "repeatability_mm",
+                Some(record.repeatability_mm),
+                [0.0, 10.0],
+            ),
             ("growth_mm_per_m", record.growth_mm_per_m, [0.0, 100.0]),
             ("tip_radius_mm", record.tip_radius_mm, [0.0, 100.0]),
-            ("tip_radius_sigma_mm", record.tip_radius_sigma_mm, [0.0, 10.0]),
+            (
+                "tip_radius_sigma_mm",
+                record.tip_radius_sigma_mm,
+                [0.0, 10.0],
+            ),
             ("temperature_c", record.temperature_c, [-100.0, 200.0]),
         ];
         for (key, value, [low, high]) in numbers {
             if let Some(value) = value.filter(|value| !(low..=high).contains(value)) {
-                return Err(format!("its {key} is {value}, which must be {low} to {high}"));
+                return Err(format!(
+                    "its {key} is {value}, which must be {low} to {high}"
+                ));
             }
         }
         Ok(record)
@@ -235,24 +262,39 @@ impl CheckStanding {
         temperature_c: Option<f64>,
     ) -> Self {
         let Some(record) = record else {
-            let doubt = file.map_or(CheckDoubt::NotNamed, |file| CheckDoubt::Missing(file.to_owned()));
-            return Self { record: None, age_days: None, doubts: vec![doubt] };
+            let doubt = file.map_or(CheckDoubt::NotNamed, |file| {
+                CheckDoubt::Missing(file.to_owned())
+            });
+            return Self {
+                record: None,
+                age_days: None,
+                doubts: vec![doubt],
+            };
         };
         let days = (DateTime::<Utc>::from(now) - record.date).num_seconds() as f64 / DAY_S;
         let temperatures = record.temperature_c.zip(temperature_c);
         let doubts = [
             (!record.passed).then(|| CheckDoubt::Failed(record.failures.join("; "))),
-            (days > most_days).then_some(CheckDoubt::Old { days, most: most_days }),
+            (days > most_days).then_some(CheckDoubt::Old {
+                days,
+                most: most_days,
+            }),
             (days < -CLOCKS).then_some(CheckDoubt::InFuture { days: -days }),
-            (!record.is_of(robot_model))
-                .then(|| CheckDoubt::OtherModel { checked: record.robot_model.clone(), model: robot_model.to_owned() }),
+            (!record.is_of(robot_model)).then(|| CheckDoubt::OtherModel {
+                checked: record.robot_model.clone(),
+                model: robot_model.to_owned(),
+            }),
             temperatures
                 .filter(|(checked_c, now_c)| (checked_c - now_c).abs() > LARGEST_TEMPERATURE_CHANGE)
                 .map(|(checked_c, now_c)| CheckDoubt::OtherTemperature { checked_c, now_c }),
         ];
         let warned = record.warnings.iter().cloned().map(CheckDoubt::Warned);
         let doubts = doubts.into_iter().flatten().chain(warned).collect();
-        Self { record: Some(record.clone()), age_days: Some(days), doubts }
+        Self {
+            record: Some(record.clone()),
+            age_days: Some(days),
+            doubts,
+        }
     }
 
     /// Its doubts in words.
@@ -264,9 +306,21 @@ impl CheckStanding {
 impl fmt::Display for CheckStanding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "check of the arm: ")?;
-        if let Some(CheckRecord { date, repeatability_mm, growth_mm_per_m, .. }) = &self.record {
-            write!(f, "{}, repeatability {repeatability_mm:.3} mm", date.to_rfc3339_opts(SecondsFormat::Secs, true))?;
-            growth_mm_per_m.iter().try_for_each(|growth| write!(f, ", growth {growth:.3} mm/m"))?;
+        if let Some(CheckRecord {
+            date,
+            repeatability_mm,
+            growth_mm_per_m,
+            ..
+        }) = &self.record
+        {
+            write!(
+                f,
+                "{}, repeatability {repeatability_mm:.3} mm",
+                date.to_rfc3339_opts(SecondsFormat::Secs, true)
+            )?;
+            growth_mm_per_m
+                .iter()
+                .try_for_each(|growth| write!(f, ", growth {growth:.3} mm/m"))?;
             let doubts = if self.doubts.is_empty() { "" } else { "; " };
             write!(f, "{doubts}")?;
         }
@@ -297,32 +351,76 @@ mod tests {
     }
 
     fn standing(record: &CheckRecord, days: u32, temperature_c: Option<f64>) -> CheckStanding {
-        CheckStanding::of((None, Some(record)), "ur5e", made() + DAY * days, 30.0, temperature_c)
+        CheckStanding::of(
+            (None, Some(record)),
+            "ur5e",
+            made() + DAY * days,
+            30.0,
+            temperature_c,
+        )
     }
 
     #[test]
     fn what_casts_doubt_on_a_check_is_said() {
         let good = standing(&record(), 30, Some(25.0));
         assert!(good.doubts.is_empty() && good.age_days == Some(30.0));
-        let words = "check of the arm: 2026-03-01T00:00:00Z, repeatability 0.031 mm, growth 0.200 mm/m";
+        let words =
+            "check of the arm: 2026-03-01T00:00:00Z, repeatability 0.031 mm, growth 0.200 mm/m";
         assert_eq!(good.to_string(), words);
         let old = standing(&record(), 31, None);
-        assert_eq!(old.doubts, [CheckDoubt::Old { days: 31.0, most: 30.0 }]);
-        assert_eq!(old.to_string(), format!("{words}; too old: 31 days, robot.check_days is 30"));
+        assert_eq!(
+            old.doubts,
+            [CheckDoubt::Old {
+                days: 31.0,
+                most: 30.0
+            }]
+        );
+        assert_eq!(
+            old.to_string(),
+            format!("{words}; too old: 31 days, robot.check_days is 30")
+        );
         let warm = standing(&record(), 1, Some(25.1));
-        assert_eq!(warm.doubts, [CheckDoubt::OtherTemperature { checked_c: 20.0, now_c: 25.1 }]);
-        let failed = CheckRecord { passed: false, failures: vec!["a".into(), "b".into()], ..record() };
+        assert_eq!(
+            warm.doubts,
+            [CheckDoubt::OtherTemperature {
+                checked_c: 20.0,
+                now_c: 25.1
+            }]
+        );
+        let failed = CheckRecord {
+            passed: false,
+            failures: vec!["a".into(), "b".into()],
+            ..record()
+        };
         assert_eq!(standing(&failed, 1, None).doubts(), ["failed: a; b"]);
         let other = CheckStanding::of((None, Some(&record())), "ur10e", made(), 30.0, None);
-        assert_eq!(other.doubts(), ["of another arm: ur5e, this one is ur10e, so its numbers are not used"]);
-        let early = CheckStanding::of((None, Some(&record())), "ur5e", made() - DAY * 2, 30.0, None);
+        assert_eq!(
+            other.doubts(),
+            ["of another arm: ur5e, this one is ur10e, so its numbers are not used"]
+        );
+        let early = CheckStanding::of(
+            (None, Some(&record())),
+            "ur5e",
+            made() - DAY * 2,
+            30.0,
+            None,
+        );
         assert_eq!(early.doubts, [CheckDoubt::InFuture { days: 2.0 }]);
-        let missing = CheckStanding::of((Some(Path::new("no.json")), None), "ur5e", made(), 30.0, None);
+        let missing = CheckStanding::of(
+            (Some(Path::new("no.json")), None),
+            "ur5e",
+            made(),
+            30.0,
+            None,
+        );
         assert_eq!(
             missing.to_string(),
             "check of the arm: none: no.json is not there; `touchup check --out` writes it"
         );
-        assert_eq!(CheckStanding::of((None, None), "ur5e", made(), 30.0, None).doubts, [CheckDoubt::NotNamed]);
+        assert_eq!(
+            CheckStanding::of((None, None), "ur5e", made(), 30.0, None).doubts,
+            [CheckDoubt::NotNamed]
+        );
     }
 
     #[test]
@@ -330,11 +428,23 @@ mod tests {
         let text = serde_json::to_string(&record()).unwrap();
         assert_eq!(CheckRecord::parse(&text), Ok(record()));
         for (change, why) in [
-            (text.replace("\"version\":1", "\"version\":2"), "it has version 2, this touchup reads version 1"),
-            (text.replace("0.031", "-0.031"), "its repeatability_mm is -0.031, which must be 0 to 10"),
+            (
+                text.replace("\"version\":1", "\"version\":2"),
+                "it has version 2, this touchup reads version 1",
+            ),
+            (
+                text.replace("0.031", "-0.031"),
+                "its repeatability_mm is -0.031, which must be 0 to 10",
+            ),
             (text.replace("0.2", "1e300"), "its growth_mm_per_m is"),
-            (text.replace("2026-03-01", "yesterday"), "its date is \"yesterday"),
-            (text.replace("\"passed\":true,", ""), "missing field `passed`"),
+            (
+                text.replace("2026-03-01", "yesterday"),
+                "its date is \"yesterday",
+            ),
+            (
+                text.replace("\"passed\":true,", ""),
+                "missing field `passed`",
+            ),
             (text[..40].to_owned(), "EOF"),
             (String::new(), "EOF"),
             ("[".repeat(100_000), "invalid type"),
@@ -344,12 +454,22 @@ mod tests {
             assert!(refused.contains(why), "{refused}");
         }
         let folder = tempfile::tempdir().unwrap();
-        assert!(CheckRecord::read(&folder.path().join("no.json")).unwrap().is_none());
+        assert!(
+            CheckRecord::read(&folder.path().join("no.json"))
+                .unwrap()
+                .is_none()
+        );
         let file = folder.path().join("check.json");
         std::fs::write(&file, b"\xff\xfe").unwrap();
-        assert!(matches!(CheckRecord::read(&file), Err(CheckRecordError::Read { .. })));
+        assert!(matches!(
+            CheckRecord::read(&file),
+            Err(CheckRecordError::Read { .. })
+        ));
         std::fs::write(&file, "").unwrap();
         let refused = CheckRecord::read(&file).unwrap_err().to_string();
-        assert!(refused.contains("check.json is no record of `touchup check`"), "{refused}");
+        assert!(
+            refused.contains("check.json is no record of `touchup check`"),
+            "{refused}"
+        );
     }
 }

@@ -76,25 +76,54 @@ impl Scene {
             ("sync", unless(self.sync.is_some(), OFF)),
             ("clock", unless(self.clock.is_some(), OFF)),
             ("markers", unless(self.markers.is_some(), NOT_NAMED)),
-            ("scan_to_space", unless(self.scan_to_space.is_some(), NOT_NAMED)),
-            ("compensation", unless(self.compensation.is_some(), NOT_NAMED)),
-            ("bias_tracking", unless(self.bias_tracking.is_some(), NOT_NAMED).or(not_robust)),
-            ("contact", unless(self.contact.is_some(), OFF).or(not_robust)),
+            (
+                "scan_to_space",
+                unless(self.scan_to_space.is_some(), NOT_NAMED),
+            ),
+            (
+                "compensation",
+                unless(self.compensation.is_some(), NOT_NAMED),
+            ),
+            (
+                "bias_tracking",
+                unless(self.bias_tracking.is_some(), NOT_NAMED).or(not_robust),
+            ),
+            (
+                "contact",
+                unless(self.contact.is_some(), OFF).or(not_robust),
+            ),
             ("tip", unless(self.tip.is_some(), OFF)),
             ("scan", unless(self.scan.is_some(), OFF)),
             ("scan.region", unless(self.region().is_some(), NOT_NAMED)),
-            ("sliding", unless(self.sliding.is_some(), OFF).or(not_either)),
+            (
+                "sliding",
+                unless(self.sliding.is_some(), OFF).or(not_either),
+            ),
             ("carve", unless(self.carve.is_some(), OFF).or(not_either)),
             ("guard", unless(self.guard.is_some(), OFF).or(not_robust)),
-            ("patch", unless(self.patch.is_some(), OFF).or(unless(self.has_patch(), PUBLISHED))),
-            ("uncertainty", unless(self.uncertainty.is_some(), OFF).or(unless(self.has_patch(), NO_PATCH))),
+            (
+                "patch",
+                unless(self.patch.is_some(), OFF).or(unless(self.has_patch(), PUBLISHED)),
+            ),
+            (
+                "uncertainty",
+                unless(self.uncertainty.is_some(), OFF).or(unless(self.has_patch(), NO_PATCH)),
+            ),
             ("robot", unless(self.robot.is_some(), NOT_NAMED)),
             ("refine", unless(self.refine.is_some(), OFF)),
         ];
-        let compiled = features.iter().map(|&(name, is_there)| (name, unless(is_there, NOT_COMPILED)));
-        let mut built = Built { built: Vec::new(), left_out: Vec::new() };
+        let compiled = features
+            .iter()
+            .map(|&(name, is_there)| (name, unless(is_there, NOT_COMPILED)));
+        let mut built = Built {
+            built: Vec::new(),
+            left_out: Vec::new(),
+        };
         for (part, reason) in parts.into_iter().chain(compiled) {
-            let of_task = unused.iter().find(|left| left.part == part).map(|left| left.reason);
+            let of_task = unused
+                .iter()
+                .find(|left| left.part == part)
+                .map(|left| left.reason);
             match reason.or(of_task) {
                 Some(reason) => built.left_out.push(LeftOut { part, reason }),
                 None => built.built.push(part),
@@ -107,7 +136,13 @@ impl Scene {
 /// Those that are left out stand together by their reason.
 impl fmt::Display for Built {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let list = |names: &[&str]| if names.is_empty() { "nothing".to_owned() } else { names.join(", ") };
+        let list = |names: &[&str]| {
+            if names.is_empty() {
+                "nothing".to_owned()
+            } else {
+                names.join(", ")
+            }
+        };
         let mut by_reason: Vec<(&str, Vec<&str>)> = Vec::new();
         for &LeftOut { part, reason } in &self.left_out {
             match by_reason.iter_mut().find(|(known, _)| *known == reason) {
@@ -115,16 +150,27 @@ impl fmt::Display for Built {
                 None => by_reason.push((reason, vec![part])),
             }
         }
-        let left_out: Vec<_> =
-            by_reason.iter().map(|(reason, parts)| format!("{} ({reason})", parts.join(", "))).collect();
+        let left_out: Vec<_> = by_reason
+            .iter()
+            .map(|(reason, parts)| format!("{} ({reason})", parts.join(", ")))
+            .collect();
         write!(f, "built: {}; left out: ", list(&self.built))?;
-        if left_out.is_empty() { f.write_str("nothing") } else { f.write_str(&left_out.join("; ")) }
+        if left_out.is_empty() {
+            f.write_str("nothing")
+        } else {
+            f.write_str(&left_out.join("; "))
+        }
     }
 }
 
 impl fmt::Display for Memory {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { mesh_mb, tree_mb, scan_mb, patch_mb } = *self;
+        let Self {
+            mesh_mb,
+            tree_mb,
+            scan_mb,
+            patch_mb,
+        } = *self;
         let all = mesh_mb + tree_mb + scan_mb + patch_mb;
         write!(
             f,

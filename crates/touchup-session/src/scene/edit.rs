@@ -21,12 +21,18 @@ impl Setting {
     /// A list of numbers in brackets.
     pub fn list(path: &'static str, values: &[f64]) -> Self {
         let values: Vec<_> = values.iter().map(f64::to_string).collect();
-        Self { path, value: format!("[{}]", values.join(", ")) }
+        Self {
+            path,
+            value: format!("[{}]", values.join(", ")),
+        }
     }
 
     /// A number or a word.
     pub fn scalar(path: &'static str, value: impl ToString) -> Self {
-        Self { path, value: value.to_string() }
+        Self {
+            path,
+            value: value.to_string(),
+        }
     }
 }
 
@@ -39,13 +45,28 @@ impl Scene {
     ///
     /// # Errors
     /// [`SceneError::CannotEdit`] when the result would not be the expected scene.
-    pub fn edited(yaml: &str, settings: &[Setting], remark: &str, expected: &Self) -> Result<String, SceneError> {
-        let listed: Vec<_> = settings.iter().map(|Setting { path, value }| format!("{path}: {value}")).collect();
-        let refused = |why: String| SceneError::CannotEdit { why, settings: listed.join("; ") };
+    pub fn edited(
+        yaml: &str,
+        settings: &[Setting],
+        remark: &str,
+        expected: &Self,
+    ) -> Result<String, SceneError> {
+        let listed: Vec<_> = settings
+            .iter()
+            .map(|Setting { path, value }| format!("{path}: {value}"))
+            .collect();
+        let refused = |why: String| SceneError::CannotEdit {
+            why,
+            settings: listed.join("; "),
+        };
         let mut text = yaml.to_owned();
         for (i, Setting { path, value }) in settings.iter().enumerate() {
             let keys: Vec<&str> = path.split('.').collect();
-            let remark = if i == 0 { format!("  {} {remark}", block::MARK) } else { String::new() };
+            let remark = if i == 0 {
+                format!("  {} {remark}", block::MARK)
+            } else {
+                String::new()
+            };
             let new = match flow::start(&text) {
                 Some(begin) => flow::set(&text, begin, &keys, value),
                 None => block::set(&text, &keys, value, &remark),
@@ -63,7 +84,11 @@ impl Scene {
     /// section has it first.
     pub fn remark<'a>(yaml: &'a str, key: &str, first: &str) -> Option<&'a str> {
         let (key, begin) = (format!("{key}:"), format!("{} {first}", block::MARK));
-        let mut of_key = yaml.lines().filter(|line| line.trim_start().starts_with(&key));
-        of_key.find_map(|line| line.split_once(&*begin)).map(|(_, rest)| rest.trim())
+        let mut of_key = yaml
+            .lines()
+            .filter(|line| line.trim_start().starts_with(&key));
+        of_key
+            .find_map(|line| line.split_once(&*begin))
+            .map(|(_, rest)| rest.trim())
     }
 }

@@ -33,7 +33,9 @@ pub enum SceneError {
     #[error(transparent)]
     Check(#[from] super::CheckRecordError),
     /// No face of the scan is near the region that is touched.
-    #[error("no face of the scan is in or near scan.region_low_mm to scan.region_high_mm; is scan.unit right?")]
+    #[error(
+        "no face of the scan is in or near scan.region_low_mm to scan.region_high_mm; is scan.unit right?"
+    )]
     EmptyRegion,
     /// A key that another one needs is not there.
     #[error("{key} needs {needs}: name both or neither")]
@@ -81,12 +83,20 @@ const FOR_PROGRAMMERS: &str = ", set DuplicateKeyPolicy in Options if acceptable
 pub(crate) fn yaml_error(error: &serde_saphyr::Error) -> SceneError {
     let plain = error.without_snippet();
     let hint = match plain {
-        serde_saphyr::Error::SerdeUnknownField { field, expected, .. } => {
-            nearest(field, expected).map(|known| format!("; did you mean `{known}`?")).unwrap_or_default()
-        }
+        serde_saphyr::Error::SerdeUnknownField {
+            field, expected, ..
+        } => nearest(field, expected)
+            .map(|known| format!("; did you mean `{known}`?"))
+            .unwrap_or_default(),
         _ => String::new(),
     };
-    SceneError::Yaml { message: plain.to_string().replace(FOR_PROGRAMMERS, "").replace('\n', " "), hint }
+    SceneError::Yaml {
+        message: plain
+            .to_string()
+            .replace(FOR_PROGRAMMERS, "")
+            .replace('\n', " "),
+        hint,
+    }
 }
 
 /// The known word that fewest insertions, deletions, replacements and swaps turn `word` into, when that is at most half of it.
@@ -94,6 +104,10 @@ pub fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
     // such a name is no typing mistake, and the distance costs the product of both lengths
     const LONGEST: usize = 64;
     let edits = |key: &&str| strsim::osa_distance(word, key);
-    let near = known.iter().copied().filter(|_| word.len() <= LONGEST).min_by_key(edits)?;
+    let near = known
+        .iter()
+        .copied()
+        .filter(|_| word.len() <= LONGEST)
+        .min_by_key(edits)?;
     (2 * edits(&near) <= word.len()).then_some(near)
 }

@@ -24,8 +24,9 @@ pub use error::{SceneError, nearest};
 pub use params::simulated_arm;
 pub use region::{CutScan, RegionCut};
 pub use sections::{
-    ArmModel, ClockSection, CompensationSection, GravityAxes, MarkersSection, Mode, ModelName, PayloadSection,
-    RefineSection, RobotSection, Ros2ControlSection, ScanSection, ScanToSpaceSection, ShapeName, TipSection,
+    ArmModel, ClockSection, CompensationSection, GravityAxes, MarkersSection, Mode, ModelName,
+    PayloadSection, RefineSection, RobotSection, Ros2ControlSection, ScanSection,
+    ScanToSpaceSection, ShapeName, TipSection,
 };
 
 use touchup_core::haptic::{CarveParams, GuardParams, SlidingParams};
@@ -113,9 +114,14 @@ impl Scene {
     /// # Errors
     /// As [`Self::read`].
     pub fn read_with_text(path: &Path) -> Result<(Self, String), SceneError> {
-        let yaml =
-            std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.to_owned(), source })?;
-        let in_file = |error| SceneError::In { path: path.to_owned(), error: Box::new(error) };
+        let yaml = std::fs::read_to_string(path).map_err(|source| SceneError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
+        let in_file = |error| SceneError::In {
+            path: path.to_owned(),
+            error: Box::new(error),
+        };
         let mut scene = Self::from_yaml(&yaml).map_err(in_file)?;
         if let Some(robot) = &mut scene.robot {
             let folder = path.parent().unwrap_or(Path::new(""));
@@ -127,8 +133,13 @@ impl Scene {
 
     /// Whether the text of a scene gives a value to the key of a section; of a text that is no scene, `false`.
     pub fn names(yaml: &str, section: &str, key: &str) -> bool {
-        let Ok(scene) = serde_saphyr::from_str::<serde_json::Value>(yaml) else { return false };
-        scene.get(section).and_then(|section| section.get(key)).is_some_and(|value| !value.is_null())
+        let Ok(scene) = serde_saphyr::from_str::<serde_json::Value>(yaml) else {
+            return false;
+        };
+        scene
+            .get(section)
+            .and_then(|section| section.get(key))
+            .is_some_and(|value| !value.is_null())
     }
 
     /// Takes the radius of the ball from who told it: a flag, or else the text of the scene. The default is nobody's word.
@@ -185,13 +196,31 @@ impl Scene {
         let tip = self.tip.as_ref();
         let shape = tip.map(|tip| tip.shape);
         let radius = tip.map_or(0.0, |tip| tip.ball.radius);
-        let corners = self.scan.as_ref().map(|scan| (scan.region_low.is_some(), scan.region_high.is_some()));
-        let asks_for_spring = self.refine.as_ref().is_some_and(|it| it.contact_model == Some(ModelName::Spring));
+        let corners = self
+            .scan
+            .as_ref()
+            .map(|scan| (scan.region_low.is_some(), scan.region_high.is_some()));
+        let asks_for_spring = self
+            .refine
+            .as_ref()
+            .is_some_and(|it| it.contact_model == Some(ModelName::Spring));
         let half_angle = tip.and_then(|tip| tip.sizes.half_angle);
         for (is_missing, key, needs) in [
-            (shape == Some(ShapeName::Cone) && half_angle.is_none(), "tip.shape: cone", "tip.half_angle_deg"),
-            (corners == Some((true, false)), "scan.region_low_mm", "scan.region_high_mm"),
-            (corners == Some((false, true)), "scan.region_high_mm", "scan.region_low_mm"),
+            (
+                shape == Some(ShapeName::Cone) && half_angle.is_none(),
+                "tip.shape: cone",
+                "tip.half_angle_deg",
+            ),
+            (
+                corners == Some((true, false)),
+                "scan.region_low_mm",
+                "scan.region_high_mm",
+            ),
+            (
+                corners == Some((false, true)),
+                "scan.region_high_mm",
+                "scan.region_low_mm",
+            ),
             (
                 asks_for_spring && self.tip_params().stiffness.is_none(),
                 "refine.contact_model: spring",
@@ -203,7 +232,9 @@ impl Scene {
                 "tip.shape: ball and tip.radius_mm above 0",
             ),
             (
-                self.robot.as_ref().is_some_and(|robot| robot.model == ArmModel::Urdf && robot.urdf.is_none()),
+                self.robot
+                    .as_ref()
+                    .is_some_and(|robot| robot.model == ArmModel::Urdf && robot.urdf.is_none()),
                 "robot.model: urdf",
                 "robot.urdf",
             ),
@@ -214,11 +245,17 @@ impl Scene {
         }
         TipBody::new(self.tip_shape(), radius)?;
         for (is_missing, needs) in [
-            (radius <= 0.0 && shape != Some(ShapeName::Cone), "tip.radius_mm above 0"),
+            (
+                radius <= 0.0 && shape != Some(ShapeName::Cone),
+                "tip.radius_mm above 0",
+            ),
             (self.contact.is_none(), "contact"),
         ] {
             if self.has_patch() && is_missing {
-                return Err(SceneError::Unmet { part: "patch", needs });
+                return Err(SceneError::Unmet {
+                    part: "patch",
+                    needs,
+                });
             }
         }
         Ok(())

@@ -6,8 +6,8 @@ use nalgebra::Isometry3;
 
 use super::sections::{NO_TURN, unit_quaternion};
 use super::{
-    CompensationSection, GravityAxes, Mode, ModelName, PayloadSection, RefineSection, RobotSection, ScanToSpaceSection,
-    Scene, TipSection,
+    CompensationSection, GravityAxes, Mode, ModelName, PayloadSection, RefineSection, RobotSection,
+    ScanToSpaceSection, Scene, TipSection,
 };
 use touchup_core::diagnose::InputMonitorParams;
 use touchup_core::haptic::{ContactModel, RefineParams, RoiSize, TipParams, relaxing_alpha};
@@ -16,15 +16,19 @@ use touchup_core::probing::execute::{Cell, ProbeParams, Tool};
 use touchup_core::probing::plan::{PatternParams, sigma_of};
 use touchup_core::reconstruct::{PatchParams, PatcherParams, UncertaintyParams};
 use touchup_core::stylus::{
-    CompensatorParams, MarkerFilter, Payload, Placement, SensorBias, SettingError, SyncParams, TipBody, TipShape,
-    Wrench, WrenchFrame,
+    CompensatorParams, MarkerFilter, Payload, Placement, SensorBias, SettingError, SyncParams,
+    TipBody, TipShape, Wrench, WrenchFrame,
 };
 use touchup_sim::ArmParams;
 
 impl Scene {
     /// Settings of the synchroniser; with `sync: off` only messages of equal stamp pair.
     pub fn sync_params(&self) -> SyncParams {
-        self.sync.unwrap_or(SyncParams { reorder_ns: 0, largest_gap_ns: 0, ..SyncParams::default() })
+        self.sync.unwrap_or(SyncParams {
+            reorder_ns: 0,
+            largest_gap_ns: 0,
+            ..SyncParams::default()
+        })
     }
 
     /// Where recorded messages belong; `None` when they are as the rooms take them.
@@ -36,16 +40,33 @@ impl Scene {
 
     /// The robot cell, and how is probed in it; `None` without `robot`.
     pub fn probing(&self) -> Option<(Cell, ProbeParams)> {
-        let (robot, TipParams { radius: ball_radius, stiffness }) = (self.robot.as_ref()?, self.tip.as_ref()?.ball);
-        let RobotSection { limits, touch, tool, .. } = robot;
+        let (
+            robot,
+            TipParams {
+                radius: ball_radius,
+                stiffness,
+            },
+        ) = (self.robot.as_ref()?, self.tip.as_ref()?.ball);
+        let RobotSection {
+            limits,
+            touch,
+            tool,
+            ..
+        } = robot;
         let cell = Cell {
             geometry: match &robot.chain {
                 Some(chain) => ArmGeometry::Chain(chain.clone()),
                 None => UrGeometry::of(robot.model.name())?.into(),
             },
-            pose_bo: self.scan_to_space.as_ref().map_or_else(Isometry3::identity, ScanToSpaceSection::pose_wo),
+            pose_bo: self
+                .scan_to_space
+                .as_ref()
+                .map_or_else(Isometry3::identity, ScanToSpaceSection::pose_wo),
             pose_ft: robot.pose_ft(),
-            tool: Tool { ball_radius, ..*tool },
+            tool: Tool {
+                ball_radius,
+                ..*tool
+            },
         };
         let touch = TouchParams {
             acceleration: limits.acceleration,
@@ -53,8 +74,21 @@ impl Scene {
             ..*touch
         };
         let sigma = sigma_of(robot.tolerance, robot.confidence);
-        let pattern = PatternParams { ball_radius, sigma, ..robot.checked_pattern() };
-        Some((cell, ProbeParams { touch, pattern, goals: BTreeMap::new(), slides: false, limits: limits.clone() }))
+        let pattern = PatternParams {
+            ball_radius,
+            sigma,
+            ..robot.checked_pattern()
+        };
+        Some((
+            cell,
+            ProbeParams {
+                touch,
+                pattern,
+                goals: BTreeMap::new(),
+                slides: false,
+                limits: limits.clone(),
+            },
+        ))
     }
 
     /// The filter that makes poses of markers, if there is one.
@@ -62,31 +96,50 @@ impl Scene {
     /// # Errors
     /// [`SettingError`] for markers on one line, or closer together than the gate allows.
     pub fn marker_filter(&self) -> Result<Option<MarkerFilter>, SettingError> {
-        let Some(markers) = &self.markers else { return Ok(None) };
+        let Some(markers) = &self.markers else {
+            return Ok(None);
+        };
         MarkerFilter::new(markers.body()?, markers.params).map(Some)
     }
 
     /// Settings of the compensator for a wrench that arrives in the axes of `wrench_frame`.
     pub fn compensator_params(&self, wrench_frame: WrenchFrame) -> CompensatorParams {
-        let Some(CompensationSection { payload, bias, mount }) = &self.compensation else {
-            return CompensatorParams { wrench_frame, ..CompensatorParams::default() };
+        let Some(CompensationSection {
+            payload,
+            bias,
+            mount,
+        }) = &self.compensation
+        else {
+            return CompensatorParams {
+                wrench_frame,
+                ..CompensatorParams::default()
+            };
         };
         let rotation = unit_quaternion(mount.orientation_xyzw.unwrap_or(NO_TURN));
-        let of_space = |payload: &PayloadSection| match (payload.gravity_axes, &self.scan_to_space) {
-            (GravityAxes::Space, Some(space)) => space.pose_wo().rotation.inverse() * payload.payload.gravity_o,
+        let of_space = |payload: &PayloadSection| match (payload.gravity_axes, &self.scan_to_space)
+        {
+            (GravityAxes::Space, Some(space)) => {
+                space.pose_wo().rotation.inverse() * payload.payload.gravity_o
+            }
             _ => payload.payload.gravity_o,
         };
         CompensatorParams {
             wrench_frame,
             pose_ts: Isometry3::from_parts(mount.position.into(), rotation),
-            payload: payload.as_ref().map(|payload| Payload { gravity_o: of_space(payload), ..payload.payload }),
+            payload: payload.as_ref().map(|payload| Payload {
+                gravity_o: of_space(payload),
+                ..payload.payload
+            }),
             bias_s: bias.map(|SensorBias { force, torque }| Wrench { force, torque }),
         }
     }
 
     /// What the input is taken for, with a wrench that arrives in the axes of `wrench_frame`.
     pub fn input_monitor_params(&self, wrench_frame: WrenchFrame) -> InputMonitorParams {
-        let has_gate = self.refine.as_ref().is_none_or(|refine| refine.mode == Mode::Robust);
+        let has_gate = self
+            .refine
+            .as_ref()
+            .is_none_or(|refine| refine.mode == Mode::Robust);
         InputMonitorParams {
             compensator: self.compensator_params(wrench_frame),
             tip: self.tip_params(),
@@ -100,12 +153,20 @@ impl Scene {
 
     /// The ball; a rigid point when the scene says `tip: off`.
     pub fn tip_params(&self) -> TipParams {
-        self.tip.as_ref().map_or(TipParams { radius: 0.0, stiffness: None }, |tip| tip.ball)
+        self.tip.as_ref().map_or(
+            TipParams {
+                radius: 0.0,
+                stiffness: None,
+            },
+            |tip| tip.ball,
+        )
     }
 
     /// Which tip touches.
     pub fn tip_shape(&self) -> TipShape {
-        self.tip.as_ref().map_or(TipShape::Ball, TipSection::tip_shape)
+        self.tip
+            .as_ref()
+            .map_or(TipShape::Ball, TipSection::tip_shape)
     }
 
     /// Standard deviation of the scan, m; 0 when the scene says `scan: off`.
@@ -129,7 +190,9 @@ impl Scene {
         };
         params.shape = self.tip_shape();
         if params.shape != TipShape::Ball {
-            params.set_scale(TipBody::new(params.shape, params.tip.radius).map_or(0.0, |tip| tip.scale()));
+            params.set_scale(
+                TipBody::new(params.shape, params.tip.radius).map_or(0.0, |tip| tip.scale()),
+            );
         }
         params.compensator = self.compensator_params(wrench_frame);
         params.scan_noise = self.scan_noise();
@@ -139,13 +202,20 @@ impl Scene {
 
     /// Whether the touched surface is reconstructed; the published rule moves triangles alone.
     pub(super) fn has_patch(&self) -> bool {
-        self.patch.is_some() && self.refine.as_ref().is_none_or(|refine| refine.mode == Mode::Robust)
+        self.patch.is_some()
+            && self
+                .refine
+                .as_ref()
+                .is_none_or(|refine| refine.mode == Mode::Robust)
     }
 
     /// Settings of the patcher; `None` without `patch` or `contact`, and in the mode of the paper.
     pub fn patcher_params(&self) -> Option<PatcherParams> {
-        let PatchParams { tolerance } = self.patch.filter(|_| self.has_patch() && self.contact.is_some())?;
-        let (shape, TipParams { radius, stiffness }, noise) = (self.tip_shape(), self.tip_params(), self.scan_noise());
+        let PatchParams { tolerance } = self
+            .patch
+            .filter(|_| self.has_patch() && self.contact.is_some())?;
+        let (shape, TipParams { radius, stiffness }, noise) =
+            (self.tip_shape(), self.tip_params(), self.scan_noise());
         // a tip that cannot be is refused by the patcher
         let mut params = PatcherParams::for_tip(shape, radius, stiffness, noise)
             .unwrap_or_else(|_| PatcherParams::new(radius, stiffness, noise));
@@ -156,7 +226,10 @@ impl Scene {
             params.touches.largest_gap_ns = sync.largest_gap_ns;
         }
         params.tolerance = tolerance.unwrap_or(params.tolerance);
-        params.uncertainty = self.uncertainty.map(|known| UncertaintyParams { scan: noise, ..known });
+        params.uncertainty = self.uncertainty.map(|known| UncertaintyParams {
+            scan: noise,
+            ..known
+        });
         Some(params)
     }
 }
@@ -166,8 +239,12 @@ impl RefineSection {
     fn override_mut(&self, params: &mut RefineParams) {
         let dynamics = &mut params.dynamics;
         dynamics.model = match (self.contact_model, dynamics.model, params.tip.stiffness) {
-            (Some(ModelName::Spring), _, Some(stiffness_n_per_m)) => ContactModel::Spring { stiffness_n_per_m },
-            (Some(ModelName::Sigmoid), ..) | (None, ContactModel::Sigmoid { .. }, _) => self.sigmoid.model(),
+            (Some(ModelName::Spring), _, Some(stiffness_n_per_m)) => {
+                ContactModel::Spring { stiffness_n_per_m }
+            }
+            (Some(ModelName::Sigmoid), ..) | (None, ContactModel::Sigmoid { .. }, _) => {
+                self.sigmoid.model()
+            }
             (_, as_is, _) => as_is,
         };
         let is_sigmoid = matches!(dynamics.model, ContactModel::Sigmoid { .. });

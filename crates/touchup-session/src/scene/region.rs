@@ -35,7 +35,10 @@ impl Scene {
     /// The box that is touched, where the scene names one.
     pub fn region(&self) -> Option<Region> {
         let scan = self.scan.as_ref()?;
-        Some(Region { low: scan.region_low?, high: scan.region_high? })
+        Some(Region {
+            low: scan.region_low?,
+            high: scan.region_high?,
+        })
     }
 
     /// Takes out of the scan what is touched, with what the haptic update and the patch need around it.
@@ -44,7 +47,10 @@ impl Scene {
     /// [`SceneError::EmptyRegion`] where no face is near.
     pub fn cut(&self, scan: TriMesh) -> Result<CutScan, SceneError> {
         let Some(region) = self.region() else {
-            return Ok(CutScan { mesh: scan, cut: RegionCut::default() });
+            return Ok(CutScan {
+                mesh: scan,
+                cut: RegionCut::default(),
+            });
         };
         let mean_edge = scan.mean_edge();
         let margin = self.margin(mean_edge);
@@ -52,8 +58,19 @@ impl Scene {
         if mesh.face_count() == 0 {
             return Err(SceneError::EmptyRegion);
         }
-        let haptic = Some(ScanRegion { region, margin, mean_edge });
-        Ok(CutScan { mesh, cut: RegionCut { outside: Some(outside), haptic, patch: Some(region) } })
+        let haptic = Some(ScanRegion {
+            region,
+            margin,
+            mean_edge,
+        });
+        Ok(CutScan {
+            mesh,
+            cut: RegionCut {
+                outside: Some(outside),
+                haptic,
+                patch: Some(region),
+            },
+        })
     }
 
     /// How far around the region a touch in it can change anything, m.
@@ -62,14 +79,23 @@ impl Scene {
         let haptic = self.refine_params(WrenchFrame::default());
         let patch = self.patcher_params();
         let of_update = haptic.map_or(0.0, |params| {
-            let roi = if let RoiSize::Radius(radius) = params.roi { radius } else { 0.0 };
+            let roi = if let RoiSize::Radius(radius) = params.roi {
+                radius
+            } else {
+                0.0
+            };
             let furthest = params.largest_move_edges * mean_edge;
             // the paper bounds no move: its handle is where the tip is
-            let furthest = if furthest.is_finite() && params.largest_move_edges < f64::MAX { furthest } else { 0.0 };
+            let furthest = if furthest.is_finite() && params.largest_move_edges < f64::MAX {
+                furthest
+            } else {
+                0.0
+            };
             roi + params.tip.radius + furthest.max(params.largest_move_noises * params.scan_noise)
         });
-        let of_patch = patch
-            .map_or(0.0, |params| TIPS * params.evidence.radius + params.evidence.scan_reach + CELLS * params.pitch());
+        let of_patch = patch.map_or(0.0, |params| {
+            TIPS * params.evidence.radius + params.evidence.scan_reach + CELLS * params.pitch()
+        });
         of_update.max(of_patch) + EDGES * mean_edge
     }
 }
@@ -82,11 +108,17 @@ impl RegionCut {
 
     /// Settings that keep to the region.
     pub fn refine_params(&self, params: RefineParams) -> RefineParams {
-        RefineParams { region: self.haptic, ..params }
+        RefineParams {
+            region: self.haptic,
+            ..params
+        }
     }
 
     /// Settings that keep to the region.
     pub fn patcher_params(&self, params: PatcherParams) -> PatcherParams {
-        PatcherParams { region: self.patch, ..params }
+        PatcherParams {
+            region: self.patch,
+            ..params
+        }
     }
 }

@@ -157,13 +157,23 @@ const USUAL_LENGTH: (f64, f64) = (2.0, 5e-3);
 impl TipSection {
     /// The shape; that of a cone without an angle is none.
     pub(super) fn tip_shape(&self) -> TipShape {
-        let TipSizes { edge_radius, half_angle, length } = self.sizes;
+        let TipSizes {
+            edge_radius,
+            half_angle,
+            length,
+        } = self.sizes;
         let (diameters, least) = USUAL_LENGTH;
         let length = length.unwrap_or((diameters * 2.0 * self.ball.radius).max(least));
         match self.shape {
             ShapeName::Ball => TipShape::Ball,
-            ShapeName::Flat => TipShape::Flat { edge_radius: edge_radius.unwrap_or(0.0), length },
-            ShapeName::Cone => TipShape::Cone { half_angle: half_angle.unwrap_or_default(), length },
+            ShapeName::Flat => TipShape::Flat {
+                edge_radius: edge_radius.unwrap_or(0.0),
+                length,
+            },
+            ShapeName::Cone => TipShape::Cone {
+                half_angle: half_angle.unwrap_or_default(),
+                length,
+            },
         }
     }
 }
@@ -196,10 +206,15 @@ parameters! {
 
 impl ScanSection {
     fn is_box(&self) -> Result<(), SettingError> {
-        let mut corners =
-            self.region_low.iter().flat_map(|p| p.iter()).zip(self.region_high.iter().flat_map(|p| p.iter()));
+        let mut corners = self
+            .region_low
+            .iter()
+            .flat_map(|p| p.iter())
+            .zip(self.region_high.iter().flat_map(|p| p.iter()));
         let allowed = "more than scan.region_low_mm along each axis";
-        corners.try_for_each(|(low, high)| SettingError::check("scan.region_high_mm", high * 1e3, low < high, allowed))
+        corners.try_for_each(|(low, high)| {
+            SettingError::check("scan.region_high_mm", high * 1e3, low < high, allowed)
+        })
     }
 }
 
@@ -299,7 +314,10 @@ parameters! {
 impl Ros2ControlSection {
     /// Pose of the sensor in the flange.
     pub fn pose_fs(&self) -> Isometry3<f64> {
-        Isometry3::from_parts(self.sensor_position.into(), unit_quaternion(self.sensor_orientation_xyzw))
+        Isometry3::from_parts(
+            self.sensor_position.into(),
+            unit_quaternion(self.sensor_orientation_xyzw),
+        )
     }
 }
 
@@ -382,8 +400,14 @@ impl RobotSection {
     ///
     /// - `folder`: of the scene.
     pub(super) fn read_urdf(&mut self, folder: &Path) -> Result<(), UrdfError> {
-        let Some(file) = self.urdf.as_ref().filter(|_| self.model == ArmModel::Urdf) else { return Ok(()) };
-        let links = ArmLinks { base: &self.base_link, flange: &self.flange_link, radius: self.link_radius };
+        let Some(file) = self.urdf.as_ref().filter(|_| self.model == ArmModel::Urdf) else {
+            return Ok(());
+        };
+        let links = ArmLinks {
+            base: &self.base_link,
+            flange: &self.flange_link,
+            radius: self.link_radius,
+        };
         self.chain = Some(Arc::new(read_urdf(&folder.join(file), &links)?));
         Ok(())
     }
@@ -392,7 +416,9 @@ impl RobotSection {
     ///
     /// - `folder`: of the scene.
     pub(super) fn read_check(&mut self, folder: &Path) -> Result<(), CheckRecordError> {
-        let Some(file) = &self.check else { return Ok(()) };
+        let Some(file) = &self.check else {
+            return Ok(());
+        };
         self.check_record = CheckRecord::read(&folder.join(file))?;
         Ok(())
     }
@@ -400,7 +426,9 @@ impl RobotSection {
     /// Its model; of a URDF also which.
     pub fn model_name(&self) -> String {
         match &self.urdf {
-            Some(file) if self.model == ArmModel::Urdf => format!("{}: {}", self.model.name(), file.display()),
+            Some(file) if self.model == ArmModel::Urdf => {
+                format!("{}: {}", self.model.name(), file.display())
+            }
             _ => self.model.name().to_owned(),
         }
     }
@@ -410,27 +438,47 @@ impl RobotSection {
     /// - `now`: of a clock of the date.
     pub fn check_standing(&self, now: SystemTime) -> CheckStanding {
         let named = (self.check.as_deref(), self.check_record.as_ref());
-        CheckStanding::of(named, &self.model_name(), now, self.check_days, self.temperature_c)
+        CheckStanding::of(
+            named,
+            &self.model_name(),
+            now,
+            self.check_days,
+            self.temperature_c,
+        )
     }
 
     /// The record of the check, where it is one of this arm.
     fn own_check(&self) -> Option<&CheckRecord> {
-        self.check_record.as_ref().filter(|record| record.is_of(&self.model_name()))
+        self.check_record
+            .as_ref()
+            .filter(|record| record.is_of(&self.model_name()))
     }
 
     /// What is wanted of a feature, with what a check of the arm has found: of repeatability and growth the larger of measured and told, for a
     /// check of few touches can be lucky, and what a maker states can be.
     pub(super) fn checked_pattern(&self) -> PatternParams {
-        let Some(record) = self.own_check() else { return self.pattern };
+        let Some(record) = self.own_check() else {
+            return self.pattern;
+        };
         let growth = record.growth_mm_per_m.map_or(0.0, |growth| growth / 1e3);
-        let shared = ArmUncertainty { growth: self.pattern.shared.growth.max(growth), ..self.pattern.shared };
+        let shared = ArmUncertainty {
+            growth: self.pattern.shared.growth.max(growth),
+            ..self.pattern.shared
+        };
         let touch_sigma = self.pattern.touch_sigma.max(record.repeatability_mm / 1e3);
-        PatternParams { touch_sigma, shared, ..self.pattern }
+        PatternParams {
+            touch_sigma,
+            shared,
+            ..self.pattern
+        }
     }
 
     /// The tip in the flange.
     pub(super) fn pose_ft(&self) -> Isometry3<f64> {
-        Isometry3::from_parts(self.tip_position.into(), unit_quaternion(self.tip_orientation_xyzw))
+        Isometry3::from_parts(
+            self.tip_position.into(),
+            unit_quaternion(self.tip_orientation_xyzw),
+        )
     }
 }
 

@@ -28,7 +28,11 @@ const STEP: usize = 2;
 impl Scene {
     /// [`Scene::default`] as YAML, with every key explained; what is left out is there as a comment.
     pub fn template() -> String {
-        Self::parameters().iter().fold(HEAD.to_owned(), |text, section| text + "\n" + &explained(section, 0, false))
+        Self::parameters()
+            .iter()
+            .fold(HEAD.to_owned(), |text, section| {
+                text + "\n" + &explained(section, 0, false)
+            })
     }
 
     /// The same without the radius of the ball, which nobody has told yet.
@@ -38,21 +42,38 @@ impl Scene {
 
     /// Every key with unit, range and default, as Markdown.
     pub fn table() -> String {
-        Self::parameters().iter().fold(TABLE_HEAD.to_owned(), |text, section| text + &rows(section))
+        Self::parameters()
+            .iter()
+            .fold(TABLE_HEAD.to_owned(), |text, section| text + &rows(section))
     }
 }
 
 /// A key with its comment, and what is in it.
 fn explained(parameter: &Parameter, indent: usize, is_off: bool) -> String {
-    let Parameter { key, default, example, inner, .. } = parameter;
+    let Parameter {
+        key,
+        default,
+        example,
+        inner,
+        ..
+    } = parameter;
     let (mark, space) = (if is_off { "#" } else { "" }, " ".repeat(indent));
     let comment = wrapped(&with_words(parameter), WIDTH - indent);
-    let mut text: String = comment.iter().map(|line| format!("{mark}{space}# {line}\n")).collect();
-    let own_mark = if !is_off && default.is_none() { "#" } else { "" };
+    let mut text: String = comment
+        .iter()
+        .map(|line| format!("{mark}{space}# {line}\n"))
+        .collect();
+    let own_mark = if !is_off && default.is_none() {
+        "#"
+    } else {
+        ""
+    };
     let value = default.as_deref().unwrap_or(example);
     text += format!("{mark}{space}{own_mark}{key}: {value}").trim_end();
     text += "\n";
-    inner.iter().fold(text, |text, below| text + &explained(below, indent + STEP, is_off || default.is_none()))
+    inner.iter().fold(text, |text, below| {
+        text + &explained(below, indent + STEP, is_off || default.is_none())
+    })
 }
 
 /// What it does, and the words to choose from.
@@ -61,7 +82,11 @@ fn with_words(parameter: &Parameter) -> String {
     if parameter.words.is_empty() {
         return summary;
     }
-    format!("{} ({}).", summary.trim_end_matches('.'), parameter.words.join(", "))
+    format!(
+        "{} ({}).",
+        summary.trim_end_matches('.'),
+        parameter.words.join(", ")
+    )
 }
 
 /// In lines of `width` letters at most.
@@ -69,7 +94,9 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
     let mut lines: Vec<String> = vec![];
     for word in text.split(' ') {
         match lines.last_mut() {
-            Some(line) if line.chars().count() + 1 + word.chars().count() <= width => *line += &format!(" {word}"),
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= width => {
+                *line += &format!(" {word}")
+            }
             _ => lines.push(word.to_owned()),
         }
     }
@@ -78,8 +105,16 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
 
 /// A section as a table, and those in it.
 fn rows(section: &Parameter) -> String {
-    let built = if section.default.is_some() { "" } else { " Off in the default scene." };
-    let mut text = format!("\n## `{}`\n\n{}{built}\n", section.name(), section.summary());
+    let built = if section.default.is_some() {
+        ""
+    } else {
+        " Off in the default scene."
+    };
+    let mut text = format!(
+        "\n## `{}`\n\n{}{built}\n",
+        section.name(),
+        section.summary()
+    );
     let keys: Vec<_> = section.inner.iter().filter(|one| !one.is_section).collect();
     if !keys.is_empty() {
         text += "\n| key | unit | range | default | what |\n|---|---|---|---|---|\n";
@@ -87,7 +122,14 @@ fn rows(section: &Parameter) -> String {
     for one in keys {
         let default = one.default.as_deref().unwrap_or("left out");
         let [symbol, allowed, what] = [one.unit.symbol, &one.allowed(), &one.summary()];
-        text += &format!("| `{}` | {symbol} | {allowed} | {default} | {what} |\n", one.key);
+        text += &format!(
+            "| `{}` | {symbol} | {allowed} | {default} | {what} |\n",
+            one.key
+        );
     }
-    section.inner.iter().filter(|one| one.is_section).fold(text, |text, inner| text + &rows(inner))
+    section
+        .inner
+        .iter()
+        .filter(|one| one.is_section)
+        .fold(text, |text, inner| text + &rows(inner))
 }

@@ -10,7 +10,8 @@ mod remade;
 mod strokes;
 
 pub use outcome::{
-    Origins, Outcome, OutcomeError, OutcomePlaces, PatchSummary, RefinedMesh, found, moved_faces, origins, sewn,
+    Origins, Outcome, OutcomeError, OutcomePlaces, PatchSummary, RefinedMesh, found, moved_faces,
+    origins, sewn,
 };
 pub use outliers::UncertaintySummary;
 pub use record::{SessionError, SessionFacts, SessionRecord, SessionRecorder, Unrecorded};

@@ -99,8 +99,12 @@ reported! {
 }
 
 fn guessed_share(support: &[Support]) -> f64 {
-    let count = |wanted: Support| support.iter().filter(|&&support| support == wanted).count() as f64;
-    let (touched, guessed) = (count(Support::Touched), count(Support::Guessed) + count(Support::Unreachable));
+    let count =
+        |wanted: Support| support.iter().filter(|&&support| support == wanted).count() as f64;
+    let (touched, guessed) = (
+        count(Support::Touched),
+        count(Support::Guessed) + count(Support::Unreachable),
+    );
     guessed / (touched + guessed).max(1.0)
 }
 
@@ -115,9 +119,14 @@ pub fn found(mesh: &TriMesh, touches: &[ProbedPoint]) -> (Detection, FeatureFile
 pub fn moved_faces(before: &TriMesh, after: &TriMesh) -> u64 {
     let is_moved = |v: VertexId| before.position(v) != after.position(v);
     let is_as_scanned = |face: FaceId, corners: [VertexId; 3]| {
-        before.has_face(face) && before.corners(face) == corners && !corners.into_iter().any(is_moved)
+        before.has_face(face)
+            && before.corners(face) == corners
+            && !corners.into_iter().any(is_moved)
     };
-    after.faces().filter(|&(face, corners)| !is_as_scanned(face, corners)).count() as u64
+    after
+        .faces()
+        .filter(|&(face, corners)| !is_as_scanned(face, corners))
+        .count() as u64
 }
 
 /// For each vertex of a refined mesh its place in the scan, m in O; `None` where it is new.
@@ -125,7 +134,9 @@ pub type Origins = Vec<Option<Point3<f64>>>;
 
 /// Where each vertex of a refined mesh was in the scan.
 pub fn origins(scan: &TriMesh, refined: &TriMesh) -> Origins {
-    (0..refined.vertex_slots()).map(|vertex| scan.positions().get(vertex).copied()).collect()
+    (0..refined.vertex_slots())
+        .map(|vertex| scan.positions().get(vertex).copied())
+        .collect()
 }
 
 /// A remeshed part with the rest of its scan, and the places of its vertices in the scan.
@@ -142,15 +153,32 @@ pub fn sewn(
 ) -> Result<(Patched, Origins), MeshError> {
     let sewn = outside.sew_to(&part.mesh)?;
     let support = sewn.column(&part.support, Support::Scan);
-    let sigma = if part.sigma.is_empty() { Vec::new() } else { sewn.column(&part.sigma, of_scan) };
+    let sigma = if part.sigma.is_empty() {
+        Vec::new()
+    } else {
+        sewn.column(&part.sigma, of_scan)
+    };
     let origins = sewn.column(origins, None);
-    Ok((Patched { mesh: sewn.mesh, support, sigma, ..part }, origins))
+    Ok((
+        Patched {
+            mesh: sewn.mesh,
+            support,
+            sigma,
+            ..part
+        },
+        origins,
+    ))
 }
 
 /// Vertices and faces in a file of the mesh: a vertex that no face uses is not in it.
 fn written_counts(mesh: &TriMesh) -> [usize; 2] {
-    let is_used = |vertex: &u32| mesh.has_vertex(VertexId(*vertex)) && !mesh.star(VertexId(*vertex)).is_empty();
-    [(0..mesh.vertex_slots() as u32).filter(is_used).count(), mesh.face_count()]
+    let is_used = |vertex: &u32| {
+        mesh.has_vertex(VertexId(*vertex)) && !mesh.star(VertexId(*vertex)).is_empty()
+    };
+    [
+        (0..mesh.vertex_slots() as u32).filter(is_used).count(),
+        mesh.face_count(),
+    ]
 }
 
 /// A refined mesh before it is written, whole: with the rest of a scan of which a part was refined.
@@ -173,7 +201,11 @@ pub struct RefinedMesh {
 }
 
 fn check_changed(must_change: bool, changed: usize) -> Result<(), OutcomeError> {
-    if must_change && changed == 0 { Err(OutcomeError::Unchanged) } else { Ok(()) }
+    if must_change && changed == 0 {
+        Err(OutcomeError::Unchanged)
+    } else {
+        Ok(())
+    }
 }
 
 impl RefinedMesh {
@@ -203,9 +235,22 @@ impl RefinedMesh {
             }
             None => (refined.clone(), own),
         };
-        let outcome = Outcome { moved_faces, patch: None, uncertainty: None, counts: written_counts(&mesh) };
+        let outcome = Outcome {
+            moved_faces,
+            patch: None,
+            uncertainty: None,
+            counts: written_counts(&mesh),
+        };
         let (support, sigma, columns, touches) = Default::default();
-        Ok(Self { mesh, origins, support, sigma, columns, touches, outcome })
+        Ok(Self {
+            mesh,
+            origins,
+            support,
+            sigma,
+            columns,
+            touches,
+            outcome,
+        })
     }
 
     /// The touched part of the scan remeshed; arguments as of [`Self::moved`].
@@ -226,8 +271,14 @@ impl RefinedMesh {
         check_changed(must_change, patched.removed_faces + patched.moved_vertices)?;
         let build_s = started.elapsed().as_secs_f64();
         debug!(open_squares = patched.open_squares, "patched");
-        let uncertainty = patcher.params().uncertainty.map(|_| UncertaintySummary::of(&patched, patcher.outliers()));
-        if let Some(known) = uncertainty.as_ref().filter(|known| must_change && known.is_contradictory()) {
+        let uncertainty = patcher
+            .params()
+            .uncertainty
+            .map(|_| UncertaintySummary::of(&patched, patcher.outliers()));
+        if let Some(known) = uncertainty
+            .as_ref()
+            .filter(|known| must_change && known.is_contradictory())
+        {
             return Err(OutcomeError::Contradictory(known.contradiction()));
         }
         let moved_faces = moved_faces(scan, &patched.mesh);
@@ -238,15 +289,33 @@ impl RefinedMesh {
             None => (patched, own),
         };
         let columns = patched.columns().into_iter();
-        let columns = columns.map(|(name, values)| VertexColumn { name, values: values.into() }).collect();
+        let columns = columns
+            .map(|(name, values)| VertexColumn {
+                name,
+                values: values.into(),
+            })
+            .collect();
         let outcome = Outcome {
             moved_faces,
             patch: Some(PatchSummary::of(&patched, build_s)),
             uncertainty,
             counts: written_counts(&patched.mesh),
         };
-        let Patched { mesh, support, sigma, .. } = patched;
-        Ok(Self { mesh, origins, support, sigma, columns, touches: patcher.probed().to_vec(), outcome })
+        let Patched {
+            mesh,
+            support,
+            sigma,
+            ..
+        } = patched;
+        Ok(Self {
+            mesh,
+            origins,
+            support,
+            sigma,
+            columns,
+            touches: patcher.probed().to_vec(),
+            outcome,
+        })
     }
 }
 
@@ -266,7 +335,12 @@ impl OutcomePlaces<'_> {
     /// # Errors
     /// [`OutcomeError`]; no file is left half written.
     pub fn write_moved(&self, scan: &TriMesh, refined: &TriMesh) -> Result<Outcome, OutcomeError> {
-        self.write(RefinedMesh::moved(scan, refined, self.outside, self.must_change)?)
+        self.write(RefinedMesh::moved(
+            scan,
+            refined,
+            self.outside,
+            self.must_change,
+        )?)
     }
 
     /// Remeshes the touched part of the scan and writes the result.
@@ -274,7 +348,12 @@ impl OutcomePlaces<'_> {
     /// # Errors
     /// [`OutcomeError`]; no file is left half written.
     pub fn write_patched(&self, scan: &TriMesh, patcher: Patcher) -> Result<Outcome, OutcomeError> {
-        self.write(RefinedMesh::patched(scan, patcher, self.outside, self.must_change)?)
+        self.write(RefinedMesh::patched(
+            scan,
+            patcher,
+            self.outside,
+            self.must_change,
+        )?)
     }
 
     /// Writes a result that is whole already.
@@ -282,7 +361,14 @@ impl OutcomePlaces<'_> {
     /// # Errors
     /// [`OutcomeError`]; no file is left half written.
     pub fn write(&self, refined: RefinedMesh) -> Result<Outcome, OutcomeError> {
-        let RefinedMesh { mesh, origins, columns, touches, outcome, .. } = refined;
+        let RefinedMesh {
+            mesh,
+            origins,
+            columns,
+            touches,
+            outcome,
+            ..
+        } = refined;
         self.write_mesh(&mesh, &origins, columns)?;
         self.write_features(&touches)?;
         Ok(outcome)
@@ -295,14 +381,18 @@ impl OutcomePlaces<'_> {
         origins: &[Option<Point3<f64>>],
         mut columns: Vec<VertexColumn>,
     ) -> Result<(), OutcomeError> {
-        let places = origins.iter().zip(mesh.positions()).map(|(origin, here)| origin.unwrap_or(*here));
+        let places = origins
+            .iter()
+            .zip(mesh.positions())
+            .map(|(origin, here)| origin.unwrap_or(*here));
         let carried = carried_over(self.scan, self.unit, mesh, &places.collect::<Vec<_>>());
         let (colours, texture) = carried.unwrap_or_else(|error| {
             warn!("colours and texture coordinates of the scan are not carried over: {error}");
             Default::default()
         });
         columns.extend(colours);
-        write_mesh_with(self.mesh, mesh, &columns, texture.as_ref(), self.unit).map_err(OutcomeError::WriteMesh)
+        write_mesh_with(self.mesh, mesh, &columns, texture.as_ref(), self.unit)
+            .map_err(OutcomeError::WriteMesh)
     }
 
     /// Writes the touches and the features of the result, where requested: of the mesh and by the touches as
@@ -312,7 +402,8 @@ impl OutcomePlaces<'_> {
             write_touches_as_named(out, touches)?;
         }
         if let Some(out) = self.features {
-            let MeshFile { mesh, .. } = read_mesh(self.mesh, self.unit).map_err(OutcomeError::ReadMesh)?;
+            let MeshFile { mesh, .. } =
+                read_mesh(self.mesh, self.unit).map_err(OutcomeError::ReadMesh)?;
             write_features_as_named(out, &found(&mesh, &as_written(touches)).1)?;
         }
         Ok(())
@@ -321,8 +412,13 @@ impl OutcomePlaces<'_> {
 
 impl fmt::Display for PatchSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { tolerance_mm, guessed_share, .. } = self;
-        let [removed, added] = [self.removed_faces, self.added_faces].map(|count| counted(count, "face", "faces"));
+        let Self {
+            tolerance_mm,
+            guessed_share,
+            ..
+        } = self;
+        let [removed, added] =
+            [self.removed_faces, self.added_faces].map(|count| counted(count, "face", "faces"));
         let guessed = guessed_share * 100.0;
         write!(
             f,
@@ -330,7 +426,11 @@ impl fmt::Display for PatchSummary {
         )?;
         match self.moved_vertices {
             0 => Ok(()),
-            moved => write!(f, ", {} of the scan moved with its detail", counted(moved, "vertex", "vertices")),
+            moved => write!(
+                f,
+                ", {} of the scan moved with its detail",
+                counted(moved, "vertex", "vertices")
+            ),
         }
     }
 }

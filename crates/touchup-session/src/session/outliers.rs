@@ -25,8 +25,10 @@ reported! {
 
 fn touched_sigma_mm(patched: &Patched) -> f64 {
     let known = patched.sigma.iter().zip(&patched.support);
-    let mut touched: Vec<f64> =
-        known.filter(|(_, support)| **support == Support::Touched).map(|(sigma, _)| sigma * 1e3).collect();
+    let mut touched: Vec<f64> = known
+        .filter(|(_, support)| **support == Support::Touched)
+        .map(|(sigma, _)| sigma * 1e3)
+        .collect();
     touched.sort_by(f64::total_cmp);
     touched.get(touched.len() / 2).copied().unwrap_or_default()
 }
@@ -72,7 +74,9 @@ impl UncertaintySummary {
 
     /// How many contacts were rejected, and what to do.
     pub fn contradiction(&self) -> String {
-        let Self { rejected, judged, .. } = self;
+        let Self {
+            rejected, judged, ..
+        } = self;
         let percent = 100.0 * *rejected as f64 / *judged as f64;
         let [rejected, judged] = [*rejected, *judged].map(in_thousands);
         format!(
@@ -83,7 +87,12 @@ impl UncertaintySummary {
 
     /// Place and distance of the last outlier.
     pub fn last_outlier(&self) -> Option<String> {
-        let OutlierSummary { point_mm: [x, y, z], off_mm, sigmas, .. } = self.outliers.last()?;
+        let OutlierSummary {
+            point_mm: [x, y, z],
+            off_mm,
+            sigmas,
+            ..
+        } = self.outliers.last()?;
         Some(format!(
             "last outlier: at ({x:.1}, {y:.1}, {z:.1}) mm, {off_mm:+.3} mm or {sigmas:.0} standard deviations off"
         ))
@@ -93,14 +102,27 @@ impl UncertaintySummary {
 /// 13547 as `13,547`.
 fn in_thousands(count: u64) -> String {
     let digits = count.to_string();
-    let groups = digits.as_bytes().rchunks(3).rev().map(String::from_utf8_lossy);
+    let groups = digits
+        .as_bytes()
+        .rchunks(3)
+        .rev()
+        .map(String::from_utf8_lossy);
     groups.collect::<Vec<_>>().join(",")
 }
 
 impl fmt::Display for UncertaintySummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { touched_sigma_mm, rejected, relocated, judged, .. } = self;
-        let (judged, places) = (in_thousands(*judged), counted(*relocated, "place", "places"));
+        let Self {
+            touched_sigma_mm,
+            rejected,
+            relocated,
+            judged,
+            ..
+        } = self;
+        let (judged, places) = (
+            in_thousands(*judged),
+            counted(*relocated, "place", "places"),
+        );
         write!(
             f,
             "± {touched_sigma_mm:.3} mm where touched (median standard deviation); {rejected} of {judged} contacts rejected as outliers, \
@@ -126,11 +148,9 @@ mod tests {
             assert_eq!((sound.loss(), sound.is_contradictory()), (None, false));
         }
         let lost = of(3_000, 12_000);
-        assert!(
-            lost.loss()
-                .unwrap()
-                .starts_with("25 % of the contacts contradicted others and did not count (3,000 of 12,000)")
-        );
+        assert!(lost.loss().unwrap().starts_with(
+            "25 % of the contacts contradicted others and did not count (3,000 of 12,000)"
+        ));
         assert!(!lost.is_contradictory() && of(4_801, 12_000).is_contradictory());
     }
 

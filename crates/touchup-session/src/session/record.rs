@@ -86,8 +86,13 @@ impl SessionFacts {
     pub fn read(folder: &Path) -> Result<Self, SessionError> {
         let path = folder.join(DESCRIPTION);
         let text = read_text(&path).map_err(io_error(&path))?;
-        let Description { begun, mesh_unit, .. } = parsed(&text, &path)?;
-        Ok(Self { begun: begun.filter(|begun| DateTime::parse_from_rfc3339(begun).is_ok()), mesh_unit })
+        let Description {
+            begun, mesh_unit, ..
+        } = parsed(&text, &path)?;
+        Ok(Self {
+            begun: begun.filter(|begun| DateTime::parse_from_rfc3339(begun).is_ok()),
+            mesh_unit,
+        })
     }
 }
 
@@ -124,10 +129,22 @@ impl SessionRecord {
         let begun = Some(DateTime::<Utc>::from(begun).to_rfc3339_opts(SecondsFormat::Secs, true));
         let (scan, scan_crc32) = fingerprint(scan).map_err(io_error(scan))?;
         let (wrench_topic, pose_topic) = (topics.wrench.clone(), topics.pose.clone());
-        let description = Description { scan, scan_crc32, mesh_unit, wrench_topic, pose_topic, begun };
-        let text = serde_json::to_string_pretty(&description).expect("paths that were read are text, or are refused");
-        folder.write_text(SCENE, scene_yaml).map_err(io_error(folder.path()))?;
-        folder.write_text(DESCRIPTION, &text).map_err(io_error(folder.path()))
+        let description = Description {
+            scan,
+            scan_crc32,
+            mesh_unit,
+            wrench_topic,
+            pose_topic,
+            begun,
+        };
+        let text = serde_json::to_string_pretty(&description)
+            .expect("paths that were read are text, or are refused");
+        folder
+            .write_text(SCENE, scene_yaml)
+            .map_err(io_error(folder.path()))?;
+        folder
+            .write_text(DESCRIPTION, &text)
+            .map_err(io_error(folder.path()))
     }
 
     /// Reads what the folder of a session holds, whether or not it was ended.
@@ -137,7 +154,14 @@ impl SessionRecord {
     pub fn open(folder: &Path) -> Result<Self, SessionError> {
         let path = folder.join(DESCRIPTION);
         let text = read_text(&path).map_err(io_error(&path))?;
-        let Description { scan, scan_crc32, mesh_unit, wrench_topic, pose_topic, .. } = parsed(&text, &path)?;
+        let Description {
+            scan,
+            scan_crc32,
+            mesh_unit,
+            wrench_topic,
+            pose_topic,
+            ..
+        } = parsed(&text, &path)?;
         let now = fingerprint(&scan).map_err(io_error(&scan))?;
         if now.1 != scan_crc32 {
             return Err(SessionError::ScanChanged { path: scan });
@@ -147,7 +171,11 @@ impl SessionRecord {
             mesh_unit,
             scene: folder.join(SCENE),
             recording: folder.join(RECORDING),
-            topics: Topics { pose: pose_topic, wrench: wrench_topic, markers: None },
+            topics: Topics {
+                pose: pose_topic,
+                wrench: wrench_topic,
+                markers: None,
+            },
             strokes: Self::strokes_of(folder)?,
         })
     }
@@ -169,8 +197,10 @@ fn read_strokes(path: &Path) -> Result<StrokeChanges, SessionError> {
 }
 
 fn parsed<T: DeserializeOwned>(json: &str, path: &Path) -> Result<T, SessionError> {
-    serde_json::from_str(json)
-        .map_err(|error| SessionError::Damaged { path: path.to_owned(), reason: error.to_string() })
+    serde_json::from_str(json).map_err(|error| SessionError::Damaged {
+        path: path.to_owned(),
+        reason: error.to_string(),
+    })
 }
 
 /// Messages missing in the recording of a session.
@@ -206,8 +236,14 @@ impl SessionRecorder {
     ///
     /// # Errors
     /// [`SessionError::Io`].
-    pub fn start(folder: &SessionFolder, topics: &Topics, clock: &Clock) -> Result<Self, SessionError> {
-        let recording = folder.create_folder(RECORDING).map_err(io_error(folder.path()))?;
+    pub fn start(
+        folder: &SessionFolder,
+        topics: &Topics,
+        clock: &Clock,
+    ) -> Result<Self, SessionError> {
+        let recording = folder
+            .create_folder(RECORDING)
+            .map_err(io_error(folder.path()))?;
         let writer = SegmentedWriter::new(&recording, topics);
         let (sender, messages) = sync_channel(MOST_WAITING);
         let unrecorded = Arc::new(Mutex::new(Unrecorded::default()));
@@ -224,8 +260,17 @@ impl SessionRecorder {
             taker.take_down(&messages);
             drop(working);
         };
-        let thread = Builder::new().name("recorder".to_owned()).spawn(work).map_err(io_error(folder.path()))?;
-        Ok(Self { folder: folder.clone(), sender, thread, unrecorded, end })
+        let thread = Builder::new()
+            .name("recorder".to_owned())
+            .spawn(work)
+            .map_err(io_error(folder.path()))?;
+        Ok(Self {
+            folder: folder.clone(),
+            sender,
+            thread,
+            unrecorded,
+            end,
+        })
     }
 
     /// Takes a message down whose header names `frame`; never waits. What finds no room is lost, and counted.
@@ -255,7 +300,9 @@ impl SessionRecorder {
     /// [`SessionError::Io`].
     pub fn write_stroke(&self, change: StrokeChange) -> Result<(), SessionError> {
         let line = serde_json::to_string(&change).expect("a name and numbers cannot fail");
-        self.folder.append_line(STROKES, &line).map_err(io_error(&self.folder.path().join(STROKES)))
+        self.folder
+            .append_line(STROKES, &line)
+            .map_err(io_error(&self.folder.path().join(STROKES)))
     }
 
     /// Messages missing in the recording so far.
@@ -265,7 +312,13 @@ impl SessionRecorder {
 
     /// Waits until all is taken down and ends the recording; returns as [`Self::unrecorded`].
     pub fn finish(self) -> Unrecorded {
-        let Self { sender, thread, unrecorded, end, .. } = self;
+        let Self {
+            sender,
+            thread,
+            unrecorded,
+            end,
+            ..
+        } = self;
         drop(sender);
         *locked(&end.has_come) = true;
         end.changed.notify_all();
@@ -280,7 +333,10 @@ impl SessionRecorder {
 
 /// The error of a file or folder.
 fn io_error(path: &Path) -> impl FnOnce(io::Error) -> SessionError {
-    |source| SessionError::Io { path: path.to_owned(), source }
+    |source| SessionError::Io {
+        path: path.to_owned(),
+        source,
+    }
 }
 
 /// What goes to the thread of the recorder.
@@ -305,10 +361,12 @@ impl Taker {
     /// Messages of a failed write are lost; writing is retried later, as space may be freed.
     fn take_down(mut self, messages: &Receiver<Note>) {
         loop {
-            drop(
-                self.clock
-                    .wait_while(&self.end.changed, locked(&self.end.has_come), FLUSH_EVERY, |has_come| !*has_come),
-            );
+            drop(self.clock.wait_while(
+                &self.end.changed,
+                locked(&self.end.has_come),
+                FLUSH_EVERY,
+                |has_come| !*has_come,
+            ));
             let mut waiting = Vec::new();
             let is_over = loop {
                 match messages.try_recv() {
@@ -341,7 +399,10 @@ impl Taker {
 
     fn take(&mut self, message: &Message, frame: &str) {
         // the disk is tried where it has not refused, or long enough ago
-        if self.refused_at.is_some_and(|at| self.clock.since(at) < ASK_AGAIN) {
+        if self
+            .refused_at
+            .is_some_and(|at| self.clock.since(at) < ASK_AGAIN)
+        {
             locked(&self.shared).messages += 1;
         } else if let Err(error) = self.writer.write(message, frame) {
             self.refuse(1, &error);
@@ -375,8 +436,14 @@ mod tests {
     use touchup_io::recording::RecordingReader;
 
     fn wrench(number: u32) -> Message {
-        let wrench = Wrench { force: Vector3::z() * f64::from(number), torque: Vector3::zeros() };
-        Message::Wrench(StampedWrench { stamp_ns: i64::from(number) * 1_000_000, wrench })
+        let wrench = Wrench {
+            force: Vector3::z() * f64::from(number),
+            torque: Vector3::zeros(),
+        };
+        Message::Wrench(StampedWrench {
+            stamp_ns: i64::from(number) * 1_000_000,
+            wrench,
+        })
     }
 
     fn folder() -> (TempDir, SessionFolder) {
@@ -386,7 +453,8 @@ mod tests {
     }
 
     fn on_disk(folder: &SessionFolder) -> Vec<Message> {
-        let reader = RecordingReader::open(&folder.path().join(RECORDING), &Topics::default()).unwrap();
+        let reader =
+            RecordingReader::open(&folder.path().join(RECORDING), &Topics::default()).unwrap();
         reader.map_while(Result::ok).collect()
     }
 
@@ -397,9 +465,20 @@ mod tests {
         let scan = parent.path().join("scan.stl");
         touchup_io::session_folder::write_text_file(&scan, "solid").unwrap();
         let begun = SystemTime::UNIX_EPOCH + Duration::from_secs(1_795_212_850);
-        SessionRecord::begin(&folder, &scan, MeshUnit::Inch, "", &Topics::default(), begun).unwrap();
+        SessionRecord::begin(
+            &folder,
+            &scan,
+            MeshUnit::Inch,
+            "",
+            &Topics::default(),
+            begun,
+        )
+        .unwrap();
         let facts = SessionFacts::read(folder.path()).unwrap();
-        assert_eq!((facts.begun.as_deref(), facts.mesh_unit), (Some("2026-11-20T22:14:10Z"), MeshUnit::Inch));
+        assert_eq!(
+            (facts.begun.as_deref(), facts.mesh_unit),
+            (Some("2026-11-20T22:14:10Z"), MeshUnit::Inch)
+        );
         let text = read_text(&folder.path().join(DESCRIPTION)).unwrap();
         let mut older: serde_json::Value = serde_json::from_str(&text).unwrap();
         older.as_object_mut().unwrap().remove("begun").unwrap();
@@ -424,9 +503,25 @@ mod tests {
             }
             hand.advance(FLUSH_EVERY - Duration::from_nanos(1));
             let before = written.len() - look as usize % 3;
-            assert_eq!(if before == 0 { Vec::new() } else { on_disk(&folder) }, written[..before], "look {look}");
+            assert_eq!(
+                if before == 0 {
+                    Vec::new()
+                } else {
+                    on_disk(&folder)
+                },
+                written[..before],
+                "look {look}"
+            );
             hand.advance(Duration::from_nanos(1));
-            assert_eq!(if written.is_empty() { Vec::new() } else { on_disk(&folder) }, written, "look {look}");
+            assert_eq!(
+                if written.is_empty() {
+                    Vec::new()
+                } else {
+                    on_disk(&folder)
+                },
+                written,
+                "look {look}"
+            );
         }
         assert_eq!(recorder.finish(), Unrecorded::default());
         assert_eq!(on_disk(&folder), written);
@@ -441,10 +536,22 @@ mod tests {
         hand.advance(Duration::ZERO);
         let count = MOST_WAITING as u32;
         (1..=count + 7).for_each(|number| recorder.write(wrench(number), "tip"));
-        assert_eq!(recorder.unrecorded(), Unrecorded { messages: 7, ..Unrecorded::default() });
+        assert_eq!(
+            recorder.unrecorded(),
+            Unrecorded {
+                messages: 7,
+                ..Unrecorded::default()
+            }
+        );
         hand.advance(FLUSH_EVERY);
         recorder.write(wrench(count + 8), "tip");
-        assert_eq!(recorder.finish(), Unrecorded { messages: 7, ..Unrecorded::default() });
+        assert_eq!(
+            recorder.finish(),
+            Unrecorded {
+                messages: 7,
+                ..Unrecorded::default()
+            }
+        );
         let kept: Vec<_> = (1..=count).chain([count + 8]).map(wrench).collect();
         assert!(on_disk(&folder) == kept);
     }
@@ -458,7 +565,11 @@ mod tests {
         (1..=5).for_each(|number| recorder.write(wrench(number), "tip"));
         hand.advance(FLUSH_EVERY);
         let refused = recorder.unrecorded();
-        assert!(refused.messages == 5 && refused.is_refused && refused.reason.unwrap().contains("touch_0000.mcap"));
+        assert!(
+            refused.messages == 5
+                && refused.is_refused
+                && refused.reason.unwrap().contains("touch_0000.mcap")
+        );
 
         folder.create_folder(RECORDING).unwrap();
         // it does not ask before its time …

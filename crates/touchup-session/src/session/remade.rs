@@ -25,7 +25,9 @@ pub enum RemakeError {
     )]
     Incomplete,
     /// Undone meanwhile was another stroke than would be undone then.
-    #[error("strokes were undone or redone since, and would be others with this one: redo or undo them first")]
+    #[error(
+        "strokes were undone or redone since, and would be others with this one: redo or undo them first"
+    )]
     OtherStroke,
 }
 
@@ -50,25 +52,41 @@ impl EvidenceSource<'_> {
     ///
     /// # Errors
     /// [`RemakeError`].
-    pub fn replayed(&self, changes: &StrokeChanges, mut replay: EvidenceReplay) -> Result<EvidenceReplay, RemakeError> {
+    pub fn replayed(
+        &self,
+        changes: &StrokeChanges,
+        mut replay: EvidenceReplay,
+    ) -> Result<EvidenceReplay, RemakeError> {
         let recording = Recording::open(self.recording, self.topics, StampSource::Header)?;
         let mut strokes = changes.replay();
         let (mut last_ns, mut are_same) = (None, true);
-        each_sample(recording, self.placement, self.sync, None, &mut || (), &mut |_| (), |sample| {
-            if sample.stamp_ns > self.until_ns {
-                return;
-            }
-            are_same &= exchanged(&mut replay, &mut strokes, sample.stamp_ns);
-            if strokes.takes(sample.stamp_ns) {
-                replay.push(sample);
-            }
-            last_ns = Some(sample.stamp_ns);
-        })?;
+        each_sample(
+            recording,
+            self.placement,
+            self.sync,
+            None,
+            &mut || (),
+            &mut |_| (),
+            |sample| {
+                if sample.stamp_ns > self.until_ns {
+                    return;
+                }
+                are_same &= exchanged(&mut replay, &mut strokes, sample.stamp_ns);
+                if strokes.takes(sample.stamp_ns) {
+                    replay.push(sample);
+                }
+                last_ns = Some(sample.stamp_ns);
+            },
+        )?;
         are_same &= exchanged(&mut replay, &mut strokes, i64::MAX);
         if last_ns != Some(self.until_ns) {
             return Err(RemakeError::Incomplete);
         }
-        if are_same { Ok(replay) } else { Err(RemakeError::OtherStroke) }
+        if are_same {
+            Ok(replay)
+        } else {
+            Err(RemakeError::OtherStroke)
+        }
     }
 }
 
@@ -76,9 +94,17 @@ impl EvidenceSource<'_> {
 fn exchanged(replay: &mut EvidenceReplay, strokes: &mut StrokeReplay, before_ns: i64) -> bool {
     let mut are_same = true;
     while let Some((Exchange { stroke_ns, .. }, is_undo)) = strokes.next_before(before_ns) {
-        let changed_ns = if is_undo { replay.undo() } else { replay.redo() };
+        let changed_ns = if is_undo {
+            replay.undo()
+        } else {
+            replay.redo()
+        };
         are_same &= match (stroke_ns, changed_ns) {
-            (Some(was_ns), Some(from_ns)) => StrokeSpan { from_ns, until_ns: i64::MAX }.begins_at(was_ns),
+            (Some(was_ns), Some(from_ns)) => StrokeSpan {
+                from_ns,
+                until_ns: i64::MAX,
+            }
+            .begins_at(was_ns),
             _ => false,
         };
     }

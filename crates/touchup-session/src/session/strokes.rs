@@ -86,7 +86,9 @@ impl StrokeChanges {
 
     /// Whether a stroke was taken back or done again.
     pub fn has_exchanges(&self) -> bool {
-        self.0.iter().any(|change| matches!(change, StrokeChange::Undo(_) | StrokeChange::Redo(_)))
+        self.0
+            .iter()
+            .any(|change| matches!(change, StrokeChange::Undo(_) | StrokeChange::Redo(_)))
     }
 
     /// What is to be done along the samples of the session for its end: strokes that are taken out never come.
@@ -102,12 +104,18 @@ impl StrokeChanges {
             _ => None,
         });
         let exchanges = exchanges.collect::<Vec<_>>().into_iter().peekable();
-        StrokeReplay { taken_out, exchanges }
+        StrokeReplay {
+            taken_out,
+            exchanges,
+        }
     }
 
     /// All that was done along the samples of the session, as it came.
     pub fn history(self) -> StrokeHistory {
-        StrokeHistory { changes: self, done: 0 }
+        StrokeHistory {
+            changes: self,
+            done: 0,
+        }
     }
 }
 
@@ -127,7 +135,8 @@ impl StrokeReplay {
     /// The next stroke that was taken back (true) or done again (false) before the sample of this stamp; strokes that are taken out are
     /// not among them.
     pub fn next_before(&mut self, stamp_ns: i64) -> Option<(Exchange, bool)> {
-        self.exchanges.next_if(|(exchange, _)| exchange.after_ns < stamp_ns)
+        self.exchanges
+            .next_if(|(exchange, _)| exchange.after_ns < stamp_ns)
     }
 }
 
@@ -141,7 +150,11 @@ pub struct StrokeHistory {
 impl StrokeHistory {
     /// The next change that was made before the sample of this stamp.
     pub fn next_before(&mut self, stamp_ns: i64) -> Option<StrokeChange> {
-        let next = self.changes.0.get(self.done).filter(|change| change.after_ns() < stamp_ns);
+        let next = self
+            .changes
+            .0
+            .get(self.done)
+            .filter(|change| change.after_ns() < stamp_ns);
         self.done += usize::from(next.is_some());
         next.copied()
     }
@@ -162,46 +175,74 @@ mod tests {
     use super::*;
 
     fn span(from_ns: i64) -> StrokeSpan {
-        StrokeSpan { from_ns, until_ns: from_ns + 100 }
+        StrokeSpan {
+            from_ns,
+            until_ns: from_ns + 100,
+        }
     }
 
     fn removal(after_ns: i64, from_ns: i64) -> Removal {
-        Removal { after_ns, stroke: span(from_ns) }
+        Removal {
+            after_ns,
+            stroke: span(from_ns),
+        }
     }
 
     fn exchange(after_ns: i64, stroke_ns: i64) -> Exchange {
-        Exchange { after_ns, stroke_ns: Some(stroke_ns) }
+        Exchange {
+            after_ns,
+            stroke_ns: Some(stroke_ns),
+        }
     }
 
     #[test]
     fn a_stroke_that_is_taken_out_is_neither_taken_back_nor_done_again() {
         use StrokeChange::{PutBack, Redo, TakeOut, Undo};
         // strokes at 100, 200 and 300; two are taken back, one is done again; then that one goes
-        let back = [Undo(exchange(390, 300)), Undo(exchange(390, 200)), Redo(exchange(390, 200))];
-        let changes: StrokeChanges =
-            back.into_iter().chain([TakeOut(removal(395, 200)), TakeOut(removal(395, 100))]).collect();
+        let back = [
+            Undo(exchange(390, 300)),
+            Undo(exchange(390, 200)),
+            Redo(exchange(390, 200)),
+        ];
+        let changes: StrokeChanges = back
+            .into_iter()
+            .chain([TakeOut(removal(395, 200)), TakeOut(removal(395, 100))])
+            .collect();
         let mut replay = changes.replay();
         assert!(replay.takes(99) && !replay.takes(100) && !replay.takes(299) && replay.takes(300));
         assert_eq!(replay.next_before(390), None);
         assert_eq!(replay.next_before(391), Some((exchange(390, 300), true)));
         assert_eq!(replay.next_before(i64::MAX), None);
 
-        let changes: StrokeChanges = changes.0.into_iter().chain([PutBack(removal(399, 200))]).collect();
+        let changes: StrokeChanges = changes
+            .0
+            .into_iter()
+            .chain([PutBack(removal(399, 200))])
+            .collect();
         assert_eq!(changes.taken_out(), [span(100)]);
         let mut replay = changes.replay();
         assert!(!replay.takes(199) && replay.takes(200));
-        let left: Vec<_> = std::iter::from_fn(|| replay.next_before(i64::MAX)).map(|(_, is_undo)| is_undo).collect();
+        let left: Vec<_> = std::iter::from_fn(|| replay.next_before(i64::MAX))
+            .map(|(_, is_undo)| is_undo)
+            .collect();
         assert_eq!(left, [true, true, false]);
     }
 
     #[test]
     fn a_history_has_each_change_once_where_it_was_made() {
         use StrokeChange::{PutBack, TakeOut, Undo};
-        let all =
-            [Undo(exchange(150, 100)), TakeOut(removal(250, 0)), PutBack(removal(250, 0)), Undo(exchange(400, 300))];
+        let all = [
+            Undo(exchange(150, 100)),
+            TakeOut(removal(250, 0)),
+            PutBack(removal(250, 0)),
+            Undo(exchange(400, 300)),
+        ];
         let mut history = all.into_iter().collect::<StrokeChanges>().history();
         for _ in 0..2 {
-            assert_eq!((history.next_before(150), history.so_far().is_empty()), (None, true));
+            assert_eq!(
+                (history.next_before(150), history.so_far().is_empty()),
+                (None, true)
+            );
             assert_eq!(history.next_before(151), Some(all[0]));
             assert_eq!(history.next_before(250), None);
             assert_eq!(
@@ -217,7 +258,10 @@ mod tests {
     #[test]
     fn a_change_is_one_object_that_names_itself() {
         let lines = [
-            (StrokeChange::Undo(exchange(5, 3)), r#"{"change":"undo","after_ns":5,"stroke_ns":3}"#),
+            (
+                StrokeChange::Undo(exchange(5, 3)),
+                r#"{"change":"undo","after_ns":5,"stroke_ns":3}"#,
+            ),
             (
                 StrokeChange::TakeOut(removal(150, 7)),
                 r#"{"change":"take_out","after_ns":150,"stroke":{"from_ns":7,"until_ns":107}}"#,

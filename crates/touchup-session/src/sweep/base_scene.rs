@@ -43,11 +43,17 @@ impl BaseScene {
     /// # Errors
     /// [`SceneError::Yaml`]
     pub fn of(yaml: &str) -> Result<Self, SceneError> {
-        let mut written = match if yaml.trim().is_empty() { Value::Null } else { parsed(yaml)? } {
+        let mut written = match if yaml.trim().is_empty() {
+            Value::Null
+        } else {
+            parsed(yaml)?
+        } {
             Value::Object(written) => written,
             _ => Map::new(),
         };
-        WITHOUT.iter().for_each(|section| drop(written.remove(*section)));
+        WITHOUT
+            .iter()
+            .for_each(|section| drop(written.remove(*section)));
         let usual = parsed(&Scene::template())?;
         Ok(Self { written, usual })
     }
@@ -59,18 +65,27 @@ impl BaseScene {
     pub fn with(&self, keys: &KeySetting) -> Result<JobScene, KeyError> {
         let mut written = self.written.clone();
         for (key, value) in keys {
-            let wrong = |why: String| KeyError { key: Some(key.clone()), why };
+            let wrong = |why: String| KeyError {
+                key: Some(key.clone()),
+                why,
+            };
             set(&mut written, key, value).map_err(wrong)?;
         }
         let text = Value::Object(written.clone()).to_string();
-        let scene = Scene::from_yaml(&text).and_then(|mut scene| scene.tell_radius(&text, None).map(|()| scene));
+        let scene = Scene::from_yaml(&text)
+            .and_then(|mut scene| scene.tell_radius(&text, None).map(|()| scene));
         let scene = scene.map_err(|error| self.blamed(keys, error))?;
         let mut whole = self.usual.clone();
         lay_over(&mut whole, &Value::Object(written));
         if let Some(Value::Object(scan)) = whole.get_mut("scan") {
-            WITHOUT_OF_SCAN.iter().for_each(|key| drop(scan.remove(*key)));
+            WITHOUT_OF_SCAN
+                .iter()
+                .for_each(|key| drop(scan.remove(*key)));
         }
-        Ok(JobScene { scene, whole: sorted(&whole) })
+        Ok(JobScene {
+            scene,
+            whole: sorted(&whole),
+        })
     }
 
     /// The error of a scene at the key that makes it.
@@ -85,7 +100,10 @@ impl BaseScene {
             is_set && Scene::from_yaml(&Value::Object(written).to_string()).is_err()
         };
         let key = keys.keys().find(alone).cloned();
-        KeyError { key, why: without_place(&error.to_string()) }
+        KeyError {
+            key,
+            why: without_place(&error.to_string()),
+        }
     }
 }
 
@@ -108,7 +126,10 @@ fn set(written: &mut Map<String, Value>, path: &str, value: &Value) -> Result<()
     let mut section = written;
     let mut keys: Vec<&str> = path.split('.').collect();
     if WITHOUT.contains(&keys[0]) {
-        return Err(format!("{} changes nothing of a refinement: take it out", keys[0]));
+        return Err(format!(
+            "{} changes nothing of a refinement: take it out",
+            keys[0]
+        ));
     }
     let last = keys.pop().unwrap_or_default();
     for key in keys {
@@ -118,7 +139,11 @@ fn set(written: &mut Map<String, Value>, path: &str, value: &Value) -> Result<()
         }
         section = match inner {
             Value::Object(inner) => inner,
-            other => return Err(format!("the scene has {key}: {other}, which has no keys: take that out of it")),
+            other => {
+                return Err(format!(
+                    "the scene has {key}: {other}, which has no keys: take that out of it"
+                ));
+            }
         };
     }
     section.insert(last.to_owned(), value.clone());
@@ -146,7 +171,12 @@ pub(super) fn sorted(value: &Value) -> Value {
         Value::Object(keys) => {
             let mut names: Vec<_> = keys.keys().collect();
             names.sort();
-            Value::Object(names.into_iter().map(|name| (name.clone(), sorted(&keys[name]))).collect())
+            Value::Object(
+                names
+                    .into_iter()
+                    .map(|name| (name.clone(), sorted(&keys[name])))
+                    .collect(),
+            )
         }
         Value::Array(values) => values.iter().map(sorted).collect(),
         Value::Number(number) => number.as_f64().map_or_else(|| value.clone(), one_form),
@@ -155,7 +185,11 @@ pub(super) fn sorted(value: &Value) -> Value {
 }
 
 fn one_form(x: f64) -> Value {
-    if x.fract() == 0.0 && x.abs() < 1e15 { Value::from(x as i64) } else { Value::from(x) }
+    if x.fract() == 0.0 && x.abs() < 1e15 {
+        Value::from(x as i64)
+    } else {
+        Value::from(x)
+    }
 }
 
 #[cfg(test)]
@@ -174,14 +208,19 @@ mod tests {
         let named = BaseScene::of(named).unwrap().with(&radius).unwrap();
         assert_eq!(none.whole, named.whole);
         assert_eq!(none.scene, named.scene);
-        let other = BaseScene::of("sync: { largest_gap_ms: 31 }").unwrap().with(&radius).unwrap();
+        let other = BaseScene::of("sync: { largest_gap_ms: 31 }")
+            .unwrap()
+            .with(&radius)
+            .unwrap();
         assert_ne!(none.whole, other.whole);
     }
 
     #[test]
     fn a_key_is_set_where_its_path_leads_and_off_is_off() {
         let base = BaseScene::of("tip: { radius_mm: 1.5 }").unwrap();
-        let set = base.with(&keys(r#"{"contact.on_n": 0.7, "guard": "off"}"#)).unwrap();
+        let set = base
+            .with(&keys(r#"{"contact.on_n": 0.7, "guard": "off"}"#))
+            .unwrap();
         assert_eq!(set.scene.contact.unwrap().on, 0.7);
         assert!(set.scene.guard.is_none());
         assert_eq!(set.whole["guard"], "off");
@@ -190,12 +229,31 @@ mod tests {
     #[test]
     fn a_misspelt_key_gets_the_error_of_the_scene_without_a_place() {
         let base = BaseScene::of("tip: { radius_mm: 1.5 }").unwrap();
-        let wrong = base.with(&keys(r#"{"contact.on_n": 0.7, "tip.stifness_n_per_mm": 20}"#)).unwrap_err();
+        let wrong = base
+            .with(&keys(
+                r#"{"contact.on_n": 0.7, "tip.stifness_n_per_mm": 20}"#,
+            ))
+            .unwrap_err();
         assert_eq!(wrong.key.as_deref(), Some("tip.stifness_n_per_mm"));
-        assert!(wrong.why.contains("did you mean `stiffness_n_per_mm`?"), "{}", wrong.why);
+        assert!(
+            wrong.why.contains("did you mean `stiffness_n_per_mm`?"),
+            "{}",
+            wrong.why
+        );
         assert!(!wrong.why.contains("line"), "{}", wrong.why);
         let range = base.with(&keys(r#"{"contact.on_n": -1}"#)).unwrap_err();
-        assert!(range.key.as_deref() == Some("contact.on_n") && range.why.contains("contact.on_n is -1"), "{range:?}");
-        assert!(BaseScene::of("").unwrap().with(&KeySetting::new()).unwrap_err().why.contains("tip.radius_mm"));
+        assert!(
+            range.key.as_deref() == Some("contact.on_n")
+                && range.why.contains("contact.on_n is -1"),
+            "{range:?}"
+        );
+        assert!(
+            BaseScene::of("")
+                .unwrap()
+                .with(&KeySetting::new())
+                .unwrap_err()
+                .why
+                .contains("tip.radius_mm")
+        );
     }
 }

@@ -64,7 +64,9 @@ pub enum SweepError {
         planned: String,
     },
     /// Another touchup made the plan.
-    #[error("job {job} was planned by touchup {planned}, and this is {own}: plan again, or run it by the same version")]
+    #[error(
+        "job {job} was planned by touchup {planned}, and this is {own}: plan again, or run it by the same version"
+    )]
     OtherVersion {
         /// by its number
         job: u64,

@@ -60,12 +60,24 @@ impl SweepGrid {
     /// - `more`: recordings of the command line, relative to the present folder.
     pub fn read(path: &Path, more: &[PathBuf]) -> Result<Self, SweepError> {
         let text = read_text(path)?;
-        let refused = |why: String| SweepError::Grid { path: path.to_owned(), why };
-        let file: GridFile = serde_saphyr::from_str(&text).map_err(|error| refused(yaml_error(&error).to_string()))?;
+        let refused = |why: String| SweepError::Grid {
+            path: path.to_owned(),
+            why,
+        };
+        let file: GridFile = serde_saphyr::from_str(&text)
+            .map_err(|error| refused(yaml_error(&error).to_string()))?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let beside = |path: PathBuf| folder.join(path);
-        let recordings = file.recordings.into_iter().map(beside).chain(more.iter().cloned()).collect();
-        let simulate = file.simulate.map(|it| SimulatedPart { part: named_part(folder, it.part), ..it });
+        let recordings = file
+            .recordings
+            .into_iter()
+            .map(beside)
+            .chain(more.iter().cloned())
+            .collect();
+        let simulate = file.simulate.map(|it| SimulatedPart {
+            part: named_part(folder, it.part),
+            ..it
+        });
         let mut grid = Self {
             path: path.to_owned(),
             text,
@@ -81,7 +93,9 @@ impl SweepGrid {
         grid.check()?;
         for (key, values) in file.keys {
             let values = KeyValues::of(values).map_err(|why| grid.at_key(&key, why))?;
-            grid.sampling.check(&values).map_err(|why| grid.at_key(&key, why))?;
+            grid.sampling
+                .check(&values)
+                .map_err(|why| grid.at_key(&key, why))?;
             grid.keys.insert(key, values);
         }
         grid.sampling.check_count(&grid.keys).map_err(refused)?;
@@ -89,17 +103,22 @@ impl SweepGrid {
     }
 
     fn check(&self) -> Result<(), SweepError> {
-        let refused = |why: &str| Err(SweepError::Grid { path: self.path.clone(), why: why.to_owned() });
+        let refused = |why: &str| {
+            Err(SweepError::Grid {
+                path: self.path.clone(),
+                why: why.to_owned(),
+            })
+        };
         match &self.simulate {
-            Some(_) if self.scan.is_some() || !self.recordings.is_empty() => {
-                refused("simulate makes scan and recordings: leave out scan, recordings, and those of the command line")
-            }
+            Some(_) if self.scan.is_some() || !self.recordings.is_empty() => refused(
+                "simulate makes scan and recordings: leave out scan, recordings, and those of the command line",
+            ),
             Some(simulate) if simulate.seeds.is_empty() => {
                 refused("simulate.seeds is empty: give at least one, as [1]")
             }
-            None if self.recordings.is_empty() => {
-                refused("there is no recording: name them under recordings, or on the command line behind the file")
-            }
+            None if self.recordings.is_empty() => refused(
+                "there is no recording: name them under recordings, or on the command line behind the file",
+            ),
             _ => Ok(()),
         }
     }
@@ -107,16 +126,32 @@ impl SweepGrid {
     /// What is wrong with a key, with its line.
     pub fn at_key(&self, key: &str, why: String) -> SweepError {
         let names = |line: &str| {
-            let rest =
-                line.split_once(key).filter(|(before, _)| !before.ends_with(|c: char| c.is_alphanumeric() || c == '_'));
-            rest.is_some_and(|(_, rest)| rest.trim_start_matches(['"', '\'']).trim_start().starts_with(':'))
+            let rest = line
+                .split_once(key)
+                .filter(|(before, _)| !before.ends_with(|c: char| c.is_alphanumeric() || c == '_'));
+            rest.is_some_and(|(_, rest)| {
+                rest.trim_start_matches(['"', '\''])
+                    .trim_start()
+                    .starts_with(':')
+            })
         };
-        let line = self.text.lines().position(names).map_or(String::new(), |at| format!("line {}: ", at + 1));
-        SweepError::Grid { path: self.path.clone(), why: format!("{line}{key}: {why}") }
+        let line = self
+            .text
+            .lines()
+            .position(names)
+            .map_or(String::new(), |at| format!("line {}: ", at + 1));
+        SweepError::Grid {
+            path: self.path.clone(),
+            why: format!("{line}{key}: {why}"),
+        }
     }
 }
 
 /// The plate has no file.
 fn named_part(folder: &Path, part: PathBuf) -> PathBuf {
-    if part.as_os_str() == "plate" { part } else { folder.join(part) }
+    if part.as_os_str() == "plate" {
+        part
+    } else {
+        folder.join(part)
+    }
 }

@@ -57,7 +57,9 @@ impl JobsFile {
     /// # Errors
     /// [`SweepError::File`]
     pub fn open(path: &Path) -> Result<Self, SweepError> {
-        Ok(Self { lines: JsonLines::open(path)? })
+        Ok(Self {
+            lines: JsonLines::open(path)?,
+        })
     }
 
     /// The folder that its paths are relative to.
@@ -78,7 +80,11 @@ impl JobsFile {
             }
             count += 1;
         }
-        Err(SweepError::NoJob { path: path.to_owned(), job: wanted, count })
+        Err(SweepError::NoJob {
+            path: path.to_owned(),
+            job: wanted,
+            count,
+        })
     }
 }
 

@@ -23,4 +23,6 @@ pub use plan::{MOST_JOBS, SweepPlan};
 pub use record::{JobRecord, read_record};
 pub use run::{GivenInput, JobReport, JobRunner};
 pub use table::{SweepTables, tables_of};
-pub use what_if::{COVERAGE, FeatureChange, JobResult, NumberChange, WhatIf, WhatIfError, changed_keys};
+pub use what_if::{
+    COVERAGE, FeatureChange, JobResult, NumberChange, WhatIf, WhatIfError, changed_keys,
+};

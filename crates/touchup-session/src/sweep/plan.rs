@@ -51,13 +51,20 @@ impl SweepPlan {
     /// [`SweepError`]
     pub fn read(grid: &Path, recordings: &[PathBuf], folder: &Path) -> Result<Self, SweepError> {
         let mut grid = SweepGrid::read(grid, recordings)?;
-        let refused = |why: String| SweepError::Grid { path: grid.path.clone(), why };
+        let refused = |why: String| SweepError::Grid {
+            path: grid.path.clone(),
+            why,
+        };
         grid.recorded.checked_stamps().map_err(refused)?;
         let (base, scene_scan, scene_hash) = match &grid.scene {
             None => (BaseScene::of("")?, None, None),
             Some(path) => {
                 let (scene, text) = Scene::read_with_text(path)?;
-                (BaseScene::of(&text)?, scene.scan_file(path), Some(hash_of(text.as_bytes())))
+                (
+                    BaseScene::of(&text)?,
+                    scene.scan_file(path),
+                    Some(hash_of(text.as_bytes())),
+                )
             }
         };
         let mut mesh_unit = grid.mesh_unit;
@@ -66,13 +73,31 @@ impl SweepPlan {
         {
             (grid.scan, mesh_unit) = (Some(file), unit);
         }
-        let settings = grid.sampling.count(&grid.keys).filter(|count| *count <= MOST_JOBS);
-        let inputs = grid.simulate.as_ref().map_or(grid.recordings.len(), |simulate| simulate.seeds.len()) as u64;
-        let jobs = settings.and_then(|settings| settings.checked_mul(inputs)).filter(|jobs| *jobs <= MOST_JOBS);
+        let settings = grid
+            .sampling
+            .count(&grid.keys)
+            .filter(|count| *count <= MOST_JOBS);
+        let inputs =
+            grid.simulate
+                .as_ref()
+                .map_or(grid.recordings.len(), |simulate| simulate.seeds.len()) as u64;
+        let jobs = settings
+            .and_then(|settings| settings.checked_mul(inputs))
+            .filter(|jobs| *jobs <= MOST_JOBS);
         let (Some(settings), Some(_)) = (settings, jobs) else {
-            let jobs = grid.sampling.count(&grid.keys).and_then(|count| count.checked_mul(inputs));
-            let jobs = jobs.map_or_else(|| "more than can be counted:".to_owned(), |jobs| jobs.to_string());
-            return Err(SweepError::TooMany { path: grid.path, jobs, most: MOST_JOBS });
+            let jobs = grid
+                .sampling
+                .count(&grid.keys)
+                .and_then(|count| count.checked_mul(inputs));
+            let jobs = jobs.map_or_else(
+                || "more than can be counted:".to_owned(),
+                |jobs| jobs.to_string(),
+            );
+            return Err(SweepError::TooMany {
+                path: grid.path,
+                jobs,
+                most: MOST_JOBS,
+            });
         };
         // every setting is checked before anything is made of one
         for at in 0..settings {
@@ -87,7 +112,14 @@ impl SweepPlan {
             (Some(path), Some(hash)) => Some((beside(path, folder)?, hash)),
             _ => None,
         };
-        Ok(Self { mesh_unit, inputs, base, scene, settings, grid })
+        Ok(Self {
+            mesh_unit,
+            inputs,
+            base,
+            scene,
+            settings,
+            grid,
+        })
     }
 
     /// How many jobs there are.
@@ -108,13 +140,33 @@ impl SweepPlan {
         };
         let first = at * self.inputs.len() as u64;
         let numbered = (first..).zip(&self.inputs);
-        numbered.map(|(number, input)| Ok(self.job(number, input, keys.clone(), whole.clone()))).collect()
+        numbered
+            .map(|(number, input)| Ok(self.job(number, input, keys.clone(), whole.clone())))
+            .collect()
     }
 
-    fn job(&self, job: u64, input: &PlannedInput, keys: KeySetting, whole: serde_json::Value) -> Job {
-        let PlannedInput { scan, scan_sha256, recording, recording_sha256, seed } = input;
+    fn job(
+        &self,
+        job: u64,
+        input: &PlannedInput,
+        keys: KeySetting,
+        whole: serde_json::Value,
+    ) -> Job {
+        let PlannedInput {
+            scan,
+            scan_sha256,
+            recording,
+            recording_sha256,
+            seed,
+        } = input;
         let recorded = self.grid.recorded.clone();
-        let record = JobRecord::new(scan_sha256, self.mesh_unit, recording_sha256, &recorded, whole);
+        let record = JobRecord::new(
+            scan_sha256,
+            self.mesh_unit,
+            recording_sha256,
+            &recorded,
+            whole,
+        );
         let (scene, scene_sha256) = self.scene.clone().unzip();
         Job {
             job,
@@ -137,7 +189,10 @@ impl SweepPlan {
 fn blamed(grid: &SweepGrid, KeyError { key, why }: KeyError) -> SweepError {
     match key {
         Some(key) => grid.at_key(&key, why),
-        None => SweepError::Grid { path: grid.path.clone(), why },
+        None => SweepError::Grid {
+            path: grid.path.clone(),
+            why,
+        },
     }
 }
 
@@ -159,17 +214,32 @@ fn inputs_of(grid: &SweepGrid, folder: &Path) -> Result<Vec<PlannedInput>, Sweep
         };
         return simulate.seeds.iter().map(of_seed).collect();
     }
-    let why = "there is no scan: name it as scan: scan.ply, or in the scene as scan: { file: scan.ply }".to_owned();
-    let scan = grid.scan.as_ref().ok_or(SweepError::Grid { path: grid.path.clone(), why })?;
+    let why =
+        "there is no scan: name it as scan: scan.ply, or in the scene as scan: { file: scan.ply }"
+            .to_owned();
+    let scan = grid.scan.as_ref().ok_or(SweepError::Grid {
+        path: grid.path.clone(),
+        why,
+    })?;
     let scan_sha256 = content_hash(scan)?;
-    grid.recordings.iter().map(|recording| input(scan, &scan_sha256, recording, None)).collect()
+    grid.recordings
+        .iter()
+        .map(|recording| input(scan, &scan_sha256, recording, None))
+        .collect()
 }
 
 /// The path of a file from a folder on.
 fn beside(path: &Path, folder: &Path) -> Result<PathBuf, FileError> {
     let whole = |path: &Path| {
-        let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
-        path.canonicalize().map_err(|source| FileError::Read { path: path.to_owned(), source })
+        let path = if path.as_os_str().is_empty() {
+            Path::new(".")
+        } else {
+            path
+        };
+        path.canonicalize().map_err(|source| FileError::Read {
+            path: path.to_owned(),
+            source,
+        })
     };
     Ok(relative(&whole(path)?, &whole(folder)?))
 }
@@ -195,7 +265,10 @@ mod tests {
             ("/a/b/scan.ply", "/a", "b/scan.ply"),
             ("/a/b/scan.ply", "/a/c/d", "../../b/scan.ply"),
         ] {
-            assert_eq!(relative(Path::new(path), Path::new(folder)), Path::new(expected));
+            assert_eq!(
+                relative(Path::new(path), Path::new(folder)),
+                Path::new(expected)
+            );
         }
     }
 }

@@ -69,7 +69,10 @@ pub(super) const RECORD: &str = "job.json";
 /// [`SweepError::NoResult`]
 pub fn read_record(result: &Path) -> Result<JobRecord, SweepError> {
     let path = result.join(RECORD);
-    let refused = |why: String| SweepError::NoResult { path: path.clone(), why };
+    let refused = |why: String| SweepError::NoResult {
+        path: path.clone(),
+        why,
+    };
     let text = read_text(&path).map_err(|error| refused(error.to_string()))?;
     serde_json::from_str(&text).map_err(|error| refused(error.to_string()))
 }

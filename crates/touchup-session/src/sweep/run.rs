@@ -71,7 +71,11 @@ impl JobRunner {
     /// - `folder`: of the file of jobs.
     /// - `results`: where each has a folder by its id; made where it is not there.
     pub fn new(folder: PathBuf, results: PathBuf) -> Self {
-        Self { folder, results, hashes: RefCell::default() }
+        Self {
+            folder,
+            results,
+            hashes: RefCell::default(),
+        }
     }
 
     /// Runs a job; one whose result is there returns at once. A refinement that fails by its input is a result as well.
@@ -89,7 +93,11 @@ impl JobRunner {
         at_each: &mut dyn FnMut(),
     ) -> Result<JobReport, SweepError> {
         if job.touchup != VERSION {
-            return Err(SweepError::OtherVersion { job: job.job, planned: job.touchup.clone(), own: VERSION });
+            return Err(SweepError::OtherVersion {
+                job: job.job,
+                planned: job.touchup.clone(),
+                own: VERSION,
+            });
         }
         if !is_id(&job.id) {
             return Err(SweepError::OtherJob { job: job.job });
@@ -98,21 +106,43 @@ impl JobRunner {
             Claim::Done(result) => return report(job, result, true),
             Claim::Ours(claimed) => claimed,
         };
-        let scan = self.input("the scan", (&job.scan, &job.scan_sha256), given.scan, &claimed)?;
-        let recording =
-            self.input("the recording", (&job.recording, &job.recording_sha256), given.recording, &claimed)?;
+        let scan = self.input(
+            "the scan",
+            (&job.scan, &job.scan_sha256),
+            given.scan,
+            &claimed,
+        )?;
+        let recording = self.input(
+            "the recording",
+            (&job.recording, &job.recording_sha256),
+            given.recording,
+            &claimed,
+        )?;
         let (scene, record) = self.scene(job)?;
         write_json(&claimed.path().join(RECORD), &record)?;
         let plain = |message: &str| {
             let mut named = [(&scan.path, "the scan"), (&recording.path, "the recording")];
             // one may begin as the other does
             named.sort_by_key(|(path, _)| std::cmp::Reverse(path.as_os_str().len()));
-            named.iter().fold(message.to_owned(), |text, (path, name)| text.replace(&*path.to_string_lossy(), name))
+            named.iter().fold(message.to_owned(), |text, (path, name)| {
+                text.replace(&*path.to_string_lossy(), name)
+            })
         };
-        match refined(job, &scan.path, &recording.path, scene, &claimed, &plain, at_each) {
+        match refined(
+            job,
+            &scan.path,
+            &recording.path,
+            scene,
+            &claimed,
+            &plain,
+            at_each,
+        ) {
             Ok(summary) => write_json(&claimed.path().join(SUMMARY), &summary)?,
             Err(JobFailure::OfInput(why)) => {
-                write_json(&claimed.path().join(FAILED), &serde_json::json!({ "error": plain(&why) }))?;
+                write_json(
+                    &claimed.path().join(FAILED),
+                    &serde_json::json!({ "error": plain(&why) }),
+                )?;
             }
             Err(JobFailure::OfSystem(error)) => return Err(error),
         }
@@ -134,11 +164,20 @@ impl JobRunner {
         };
         if found != planned {
             let what = format!("{what} {}", path.display());
-            return Err(SweepError::Changed { what, found, planned: planned.to_owned() });
+            return Err(SweepError::Changed {
+                what,
+                found,
+                planned: planned.to_owned(),
+            });
         }
-        let Some(bytes) = given else { return Ok(InputFile { path, _given: None }) };
+        let Some(bytes) = given else {
+            return Ok(InputFile { path, _given: None });
+        };
         let file = claimed.file_beside(&path, bytes)?;
-        Ok(InputFile { path: file.path().to_owned(), _given: Some(file) })
+        Ok(InputFile {
+            path: file.path().to_owned(),
+            _given: Some(file),
+        })
     }
 
     /// Read once for all jobs.
@@ -147,7 +186,9 @@ impl JobRunner {
             return Ok(known.clone());
         }
         let hash = content_hash(path)?;
-        self.hashes.borrow_mut().insert(path.to_owned(), hash.clone());
+        self.hashes
+            .borrow_mut()
+            .insert(path.to_owned(), hash.clone());
         Ok(hash)
     }
 
@@ -157,20 +198,45 @@ impl JobRunner {
             Some(path) => {
                 let path = self.folder.join(path);
                 let text = read_text(&path)?;
-                let (found, planned) = (hash_of(text.as_bytes()), job.scene_sha256.clone().unwrap_or_default());
+                let (found, planned) = (
+                    hash_of(text.as_bytes()),
+                    job.scene_sha256.clone().unwrap_or_default(),
+                );
                 if found != planned {
                     let what = format!("the scene {}", path.display());
-                    return Err(SweepError::Changed { what, found, planned });
+                    return Err(SweepError::Changed {
+                        what,
+                        found,
+                        planned,
+                    });
                 }
                 text
             }
             None => String::new(),
         };
         let other = SweepError::OtherJob { job: job.job };
-        let Ok(scene) = BaseScene::of(&text)?.with(&job.keys) else { return Err(other) };
-        let Job { scan_sha256, mesh_unit, recording_sha256, recorded, .. } = job;
-        let record = JobRecord::new(scan_sha256, *mesh_unit, recording_sha256, recorded, scene.whole.clone());
-        if record.id == job.id { Ok((scene, record)) } else { Err(other) }
+        let Ok(scene) = BaseScene::of(&text)?.with(&job.keys) else {
+            return Err(other);
+        };
+        let Job {
+            scan_sha256,
+            mesh_unit,
+            recording_sha256,
+            recorded,
+            ..
+        } = job;
+        let record = JobRecord::new(
+            scan_sha256,
+            *mesh_unit,
+            recording_sha256,
+            recorded,
+            scene.whole.clone(),
+        );
+        if record.id == job.id {
+            Ok((scene, record))
+        } else {
+            Err(other)
+        }
     }
 }
 
@@ -191,9 +257,9 @@ impl From<RefinementError> for JobFailure {
     fn from(error: RefinementError) -> Self {
         match error {
             RefinementError::Outcome(error) => match *error {
-                OutcomeError::Unchanged | OutcomeError::Contradictory(_) | OutcomeError::Mesh(_) => {
-                    Self::OfInput(error.to_string())
-                }
+                OutcomeError::Unchanged
+                | OutcomeError::Contradictory(_)
+                | OutcomeError::Mesh(_) => Self::OfInput(error.to_string()),
                 error => Self::OfSystem(error.into()),
             },
             error => Self::OfInput(error.to_string()),
@@ -211,13 +277,26 @@ fn refined(
     at_each: &mut dyn FnMut(),
 ) -> Result<JobSummary, JobFailure> {
     let of_input = |error: &dyn std::fmt::Display| JobFailure::OfInput(error.to_string());
-    let mesh = read_scan(scan, job.mesh_unit).map_err(|error| of_input(&error))?.mesh;
-    let markers = marker_filter(&scene, job.recorded.markers_topic.as_deref()).map_err(|error| of_input(&error))?;
+    let mesh = read_scan(scan, job.mesh_unit)
+        .map_err(|error| of_input(&error))?
+        .mesh;
+    let markers = marker_filter(&scene, job.recorded.markers_topic.as_deref())
+        .map_err(|error| of_input(&error))?;
     let stamps = job.recorded.checked_stamps().map_err(JobFailure::OfInput)?;
-    let opened = Recording::open(recording, job.recorded.layout(&scene), stamps).map_err(|error| of_input(&error))?;
+    let opened = Recording::open(recording, job.recorded.layout(&scene), stamps)
+        .map_err(|error| of_input(&error))?;
     let input = RefinementInput::new(scene, mesh).map_err(|error| of_input(&error))?;
-    let touches = TouchSource::Recorded { recording: Box::new(opened), markers: markers.map(Box::new) };
-    let refined = refine(input, touches, InputNames { scan, recording }, false, at_each)?;
+    let touches = TouchSource::Recorded {
+        recording: Box::new(opened),
+        markers: markers.map(Box::new),
+    };
+    let refined = refine(
+        input,
+        touches,
+        InputNames { scan, recording },
+        false,
+        at_each,
+    )?;
     let said = RefinedJob::of(&refined, plain);
     let [mesh, features] = [MESH, FEATURES].map(|name| claimed.path().join(name));
     let places = OutcomePlaces {
@@ -229,8 +308,13 @@ fn refined(
         outside: None,
         must_change: true,
     };
-    let outcome = places.write(refined.finished.mesh).map_err(|error| JobFailure::OfSystem(error.into()))?;
-    let count = read_features(&features).map_err(|error| JobFailure::OfSystem(error.into()))?.features.len();
+    let outcome = places
+        .write(refined.finished.mesh)
+        .map_err(|error| JobFailure::OfSystem(error.into()))?;
+    let count = read_features(&features)
+        .map_err(|error| JobFailure::OfSystem(error.into()))?
+        .features
+        .len();
     Ok(JobSummary::of(&said, &outcome, count))
 }
 
@@ -243,7 +327,14 @@ fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), SweepErr
 /// What is in the folder of a result.
 fn report(job: &Job, result: PathBuf, was_there: bool) -> Result<JobReport, SweepError> {
     let ResultFiles { failed, summary } = ResultFiles::read(&result)?;
-    Ok(JobReport { job: job.job, id: job.id.clone(), result, was_there, failed, summary })
+    Ok(JobReport {
+        job: job.job,
+        id: job.id.clone(),
+        result,
+        was_there,
+        failed,
+        summary,
+    })
 }
 
 /// Summary or failure of a job.
@@ -258,15 +349,27 @@ impl ResultFiles {
     pub fn read(result: &Path) -> Result<Self, SweepError> {
         let read = |name: &str| {
             let path = result.join(name);
-            let refused = |why: String| SweepError::NoResult { path: path.clone(), why };
+            let refused = |why: String| SweepError::NoResult {
+                path: path.clone(),
+                why,
+            };
             let text = read_text(&path).map_err(|error| refused(error.to_string()))?;
             serde_json::from_str::<Value>(&text).map_err(|error| refused(error.to_string()))
         };
         if result.join(FAILED).exists() {
             let failed = read(FAILED)?;
-            let why = failed.get("error").and_then(Value::as_str).unwrap_or("it does not say why");
-            return Ok(Self { failed: Some(why.to_owned()), summary: Value::Null });
+            let why = failed
+                .get("error")
+                .and_then(Value::as_str)
+                .unwrap_or("it does not say why");
+            return Ok(Self {
+                failed: Some(why.to_owned()),
+                summary: Value::Null,
+            });
         }
-        Ok(Self { failed: None, summary: read(SUMMARY)? })
+        Ok(Self {
+            failed: None,
+            summary: read(SUMMARY)?,
+        })
     }
 }

@@ -27,7 +27,12 @@ pub(super) enum KeyValues {
     /// these, one after the other; one alone is the same in all jobs
     Listed(Vec<Value>),
     /// between two numbers, both included
-    Range { from: f64, to: f64, steps: Option<u32>, scale: Scale },
+    Range {
+        from: f64,
+        to: f64,
+        steps: Option<u32>,
+        scale: Scale,
+    },
 }
 
 #[derive(Deserialize)]
@@ -73,19 +78,34 @@ impl KeyValues {
     /// As they are written: a list, a range, or one value.
     pub fn of(written: Value) -> Result<Self, String> {
         match written {
-            Value::Array(values) if values.is_empty() => Err("the list is empty: give at least one value".to_owned()),
+            Value::Array(values) if values.is_empty() => {
+                Err("the list is empty: give at least one value".to_owned())
+            }
             Value::Array(values) => Ok(Self::Listed(values.into_iter().map(tidied).collect())),
             Value::Object(range) if range.contains_key("from") || range.contains_key("to") => {
-                let range = serde_json::from_value(Value::Object(range)).map_err(|error| error.to_string())?;
-                let WrittenRange { from, to, steps, scale } = range;
+                let range = serde_json::from_value(Value::Object(range))
+                    .map_err(|error| error.to_string())?;
+                let WrittenRange {
+                    from,
+                    to,
+                    steps,
+                    scale,
+                } = range;
                 let is_positive = from > 0.0 && to > 0.0;
                 if !(from.is_finite() && to.is_finite()) {
                     return Err("from and to must be finite numbers".to_owned());
                 }
                 if scale == Scale::Log && !is_positive {
-                    return Err(format!("from {from} and to {to} must be above 0 on a scale of log"));
+                    return Err(format!(
+                        "from {from} and to {to} must be above 0 on a scale of log"
+                    ));
                 }
-                Ok(Self::Range { from, to, steps, scale })
+                Ok(Self::Range {
+                    from,
+                    to,
+                    steps,
+                    scale,
+                })
             }
             value => Ok(Self::Listed(vec![tidied(value)])),
         }
@@ -115,12 +135,25 @@ impl KeyValues {
         match self {
             Self::Listed(values) => {
                 let at = (share * values.len() as f64) as usize;
-                values.get(at.min(values.len() - 1)).cloned().unwrap_or_default()
+                values
+                    .get(at.min(values.len() - 1))
+                    .cloned()
+                    .unwrap_or_default()
             }
             Self::Range { from, to, .. } if share <= 0.0 || from == to => number(*from),
             Self::Range { to, .. } if share >= 1.0 => number(*to),
-            Self::Range { from, to, scale: Scale::Linear, .. } => number(from + (to - from) * share),
-            Self::Range { from, to, scale: Scale::Log, .. } => number(from * (to / from).powf(share)),
+            Self::Range {
+                from,
+                to,
+                scale: Scale::Linear,
+                ..
+            } => number(from + (to - from) * share),
+            Self::Range {
+                from,
+                to,
+                scale: Scale::Log,
+                ..
+            } => number(from * (to / from).powf(share)),
         }
     }
 }
@@ -128,15 +161,20 @@ impl KeyValues {
 /// A number with twelve digits, whole where it is: what is written is what counts.
 fn number(x: f64) -> Value {
     let tidy: f64 = format!("{x:.11e}").parse().unwrap_or(x);
-    if tidy.fract() == 0.0 && tidy.abs() < 1e15 { Value::from(tidy as i64) } else { Value::from(tidy) }
+    if tidy.fract() == 0.0 && tidy.abs() < 1e15 {
+        Value::from(tidy as i64)
+    } else {
+        Value::from(tidy)
+    }
 }
 
 /// Numbers of a list as they are written, whole where they are.
 fn tidied(value: Value) -> Value {
     match &value {
-        Value::Number(written) => {
-            written.as_f64().filter(|x| x.fract() == 0.0 && x.abs() < 1e15).map_or(value, |x| Value::from(x as i64))
-        }
+        Value::Number(written) => written
+            .as_f64()
+            .filter(|x| x.fract() == 0.0 && x.abs() < 1e15)
+            .map_or(value, |x| Value::from(x as i64)),
         _ => value,
     }
 }
@@ -162,12 +200,13 @@ impl Sampling {
     /// Refuses what the library does not have.
     pub fn check_count(self, keys: &BTreeMap<String, KeyValues>) -> Result<(), String> {
         match self {
-            Self::Sobol { samples, .. } if samples > MOST_SOBOL => {
-                Err(format!("sampling.sobol.samples is {samples}; it must be 1 to {MOST_SOBOL}"))
-            }
-            Self::Sobol { .. } if keys.len() > MOST_DIMENSIONS => {
-                Err(format!("sampling.sobol takes at most {MOST_DIMENSIONS} keys, and there are {}", keys.len()))
-            }
+            Self::Sobol { samples, .. } if samples > MOST_SOBOL => Err(format!(
+                "sampling.sobol.samples is {samples}; it must be 1 to {MOST_SOBOL}"
+            )),
+            Self::Sobol { .. } if keys.len() > MOST_DIMENSIONS => Err(format!(
+                "sampling.sobol takes at most {MOST_DIMENSIONS} keys, and there are {}",
+                keys.len()
+            )),
             Self::Random { samples: 0, .. } | Self::Sobol { samples: 0, .. } => {
                 Err("samples is 0; it must be at least 1".to_owned())
             }
@@ -178,7 +217,9 @@ impl Sampling {
     /// How many settings there are; `None`: more than can be counted.
     pub fn count(self, keys: &BTreeMap<String, KeyValues>) -> Option<u64> {
         match self {
-            Self::Grid => keys.values().try_fold(1_u64, |product, values| product.checked_mul(values.count())),
+            Self::Grid => keys
+                .values()
+                .try_fold(1_u64, |product, values| product.checked_mul(values.count())),
             Self::Random { samples, .. } | Self::Sobol { samples, .. } => Some(u64::from(samples)),
         }
     }
@@ -199,13 +240,17 @@ impl Sampling {
                 let mut random = Pcg64::seed_from_u64(seed);
                 random.advance(u128::from(at) * keys.len() as u128);
                 let mut share = || (random.next_u64() >> 11) as f64 * (-53_f64).exp2();
-                keys.iter().map(|(key, values)| (key.clone(), values.at(share()))).collect()
+                keys.iter()
+                    .map(|(key, values)| (key.clone(), values.at(share())))
+                    .collect()
             }
             Self::Sobol { seed, .. } => {
                 let seed = (seed ^ (seed >> 32)) as u32;
                 let share = |dimension| f64::from(sobol_burley::sample(at as u32, dimension, seed));
                 let numbered = (0..).zip(keys);
-                numbered.map(|(dimension, (key, values))| (key.clone(), values.at(share(dimension)))).collect()
+                numbered
+                    .map(|(dimension, (key, values))| (key.clone(), values.at(share(dimension))))
+                    .collect()
             }
         }
     }
@@ -217,11 +262,15 @@ mod tests {
 
     fn keys(written: &str) -> BTreeMap<String, KeyValues> {
         let keys: BTreeMap<String, Value> = serde_saphyr::from_str(written).unwrap();
-        keys.into_iter().map(|(key, values)| (key, KeyValues::of(values).unwrap())).collect()
+        keys.into_iter()
+            .map(|(key, values)| (key, KeyValues::of(values).unwrap()))
+            .collect()
     }
 
     fn all(sampling: Sampling, keys: &BTreeMap<String, KeyValues>) -> Vec<KeySetting> {
-        (0..sampling.count(keys).unwrap()).map(|at| sampling.setting(keys, at)).collect()
+        (0..sampling.count(keys).unwrap())
+            .map(|at| sampling.setting(keys, at))
+            .collect()
     }
 
     /// The values by hand: fifths of 0.8 from 0.2 on, and a factor of ten for each step.
@@ -232,11 +281,19 @@ mod tests {
         );
         let all = all(Sampling::Grid, &keys);
         assert_eq!(all.len(), 5 * 2 * 4);
-        let column = |key: &str| all.iter().map(|setting| setting[key].to_string()).collect::<Vec<_>>();
+        let column = |key: &str| {
+            all.iter()
+                .map(|setting| setting[key].to_string())
+                .collect::<Vec<_>>()
+        };
         let [a, c] = ["a", "c"].map(column);
-        assert_eq!([&a[0], &a[8], &a[16], &a[24], &a[32]], ["0.2", "0.4", "0.6", "0.8", "1"]);
+        assert_eq!(
+            [&a[0], &a[8], &a[16], &a[24], &a[32]],
+            ["0.2", "0.4", "0.6", "0.8", "1"]
+        );
         assert_eq!(c[..5], ["0.01", "0.1", "1", "10", "0.01"]);
-        let distinct: std::collections::BTreeSet<_> = all.iter().map(|one| format!("{one:?}")).collect();
+        let distinct: std::collections::BTreeSet<_> =
+            all.iter().map(|one| format!("{one:?}")).collect();
         assert_eq!(distinct.len(), 40);
     }
 
@@ -248,9 +305,19 @@ mod tests {
             let all = all(Sampling::Sobol { samples: 16, seed }, &keys);
             let place = |setting: &KeySetting, key: &str| setting[key].as_f64().unwrap();
             let counts = |cell: &dyn Fn(&KeySetting) -> (u64, u64)| {
-                all.iter().map(cell).collect::<std::collections::BTreeSet<_>>().len()
+                all.iter()
+                    .map(cell)
+                    .collect::<std::collections::BTreeSet<_>>()
+                    .len()
             };
-            assert_eq!(counts(&|one| ((place(one, "a") / 4.0) as u64, (place(one, "b") / 4.0) as u64)), 16, "{seed}");
+            assert_eq!(
+                counts(&|one| (
+                    (place(one, "a") / 4.0) as u64,
+                    (place(one, "b") / 4.0) as u64
+                )),
+                16,
+                "{seed}"
+            );
             assert_eq!(counts(&|one| (place(one, "a") as u64, 0)), 16, "{seed}");
             assert_eq!(counts(&|one| (0, place(one, "b") as u64)), 16, "{seed}");
         }
@@ -258,15 +325,23 @@ mod tests {
 
     #[test]
     fn random_settings_are_the_same_for_the_same_seed_and_within_their_ranges() {
-        let keys = keys("{ a: { from: 2, to: 3 }, b: [x, y], c: { from: 1, to: 100, scale: log } }");
+        let keys =
+            keys("{ a: { from: 2, to: 3 }, b: [x, y], c: { from: 1, to: 100, scale: log } }");
         let taken = |seed| all(Sampling::Random { samples: 200, seed }, &keys);
         let one = taken(1);
         assert_eq!(one, taken(1));
         assert_ne!(one, taken(2));
-        assert!(one.iter().all(|setting| (2.0..=3.0).contains(&setting["a"].as_f64().unwrap())));
+        assert!(
+            one.iter()
+                .all(|setting| (2.0..=3.0).contains(&setting["a"].as_f64().unwrap()))
+        );
         // half of the samples each way, within five standard deviations of a fair coin: 100 ± 35
-        let halves = |is: &dyn Fn(&KeySetting) -> bool| one.iter().filter(|setting| is(setting)).count();
-        for count in [halves(&|one| one["b"] == "x"), halves(&|one| one["c"].as_f64().unwrap() < 10.0)] {
+        let halves =
+            |is: &dyn Fn(&KeySetting) -> bool| one.iter().filter(|setting| is(setting)).count();
+        for count in [
+            halves(&|one| one["b"] == "x"),
+            halves(&|one| one["c"].as_f64().unwrap() < 10.0),
+        ] {
             assert!((65..=135).contains(&count), "{count}");
         }
     }
@@ -275,12 +350,36 @@ mod tests {
     fn what_cannot_be_sampled_is_refused_with_what_to_do() {
         let of = |written: &str| KeyValues::of(serde_saphyr::from_str(written).unwrap());
         assert!(of("[]").unwrap_err().contains("empty"));
-        assert!(of("{ from: 0, to: 1, scale: log }").unwrap_err().contains("above 0"));
+        assert!(
+            of("{ from: 0, to: 1, scale: log }")
+                .unwrap_err()
+                .contains("above 0")
+        );
         assert!(of("{ from: 0, till: 1 }").unwrap_err().contains("till"));
-        assert!(Sampling::Grid.check(&of("{ from: 0, to: 1 }").unwrap()).unwrap_err().contains("steps"));
+        assert!(
+            Sampling::Grid
+                .check(&of("{ from: 0, to: 1 }").unwrap())
+                .unwrap_err()
+                .contains("steps")
+        );
         let with_steps = of("{ from: 0, to: 1, steps: 3 }").unwrap();
-        assert!(Sampling::Random { samples: 8, seed: 1 }.check(&with_steps).unwrap_err().contains("leave steps out"));
-        assert!(Sampling::Sobol { samples: 65_537, seed: 1 }.check_count(&BTreeMap::new()).is_err());
+        assert!(
+            Sampling::Random {
+                samples: 8,
+                seed: 1
+            }
+            .check(&with_steps)
+            .unwrap_err()
+            .contains("leave steps out")
+        );
+        assert!(
+            Sampling::Sobol {
+                samples: 65_537,
+                seed: 1
+            }
+            .check_count(&BTreeMap::new())
+            .is_err()
+        );
         assert_eq!(of("7.0").unwrap(), KeyValues::Listed(vec![Value::from(7)]));
     }
 }

@@ -59,7 +59,13 @@ pub(super) struct RefinedJob {
 impl RefinedJob {
     /// - `plain`: takes paths out of a message.
     pub fn of(refined: &RefinedScan, plain: impl Fn(&str) -> String) -> Self {
-        let RefinedScan { finished, replayed, accepted, refused, findings } = refined;
+        let RefinedScan {
+            finished,
+            replayed,
+            accepted,
+            refused,
+            findings,
+        } = refined;
         Self {
             samples: replayed.wrenches,
             accepted: *accepted,
@@ -67,7 +73,10 @@ impl RefinedJob {
             contacts: finished.counts.contacts,
             cut_back: finished.counts.cut_back,
             friction: finished.friction.map(|found| [found.mu, found.sigma]),
-            findings: findings.iter().map(|finding| plain(&finding.to_string())).collect(),
+            findings: findings
+                .iter()
+                .map(|finding| plain(&finding.to_string()))
+                .collect(),
             losses: replayed.losses.iter().map(|loss| plain(loss)).collect(),
         }
     }
@@ -81,7 +90,15 @@ fn reconstruction(outcome: &Outcome) -> BTreeMap<String, Value> {
         serde_json::to_value(part).ok()
     }
     let parts = [of(&outcome.patch), of(&outcome.uncertainty)];
-    let numbers =
-        parts.into_iter().flatten().filter_map(|part| if let Value::Object(part) = part { Some(part) } else { None });
-    numbers.flatten().filter(|(name, _)| !LEFT_OUT.contains(&&**name)).collect()
+    let numbers = parts.into_iter().flatten().filter_map(|part| {
+        if let Value::Object(part) = part {
+            Some(part)
+        } else {
+            None
+        }
+    });
+    numbers
+        .flatten()
+        .filter(|(name, _)| !LEFT_OUT.contains(&&**name))
+        .collect()
 }

@@ -34,7 +34,11 @@ pub struct SweepTables {
 ///
 /// # Errors
 /// [`SweepError`]: a line of the plan or a file of a result that cannot be read.
-pub fn tables_of(jobs: &Path, results: &Path, with_features: bool) -> Result<SweepTables, SweepError> {
+pub fn tables_of(
+    jobs: &Path,
+    results: &Path,
+    with_features: bool,
+) -> Result<SweepTables, SweepError> {
     let mut tables = SweepTables::default();
     for job in JobsFile::open(jobs)? {
         let job = job?;
@@ -83,7 +87,11 @@ fn row_of(job: &Job, failed: Option<&str>) -> Vec<(String, Value)> {
         text("recording", job.recording.to_string_lossy().into()),
         text("seed", job.seed.map_or(Value::Null, Value::from)),
     ];
-    row.extend(job.keys.iter().map(|(key, value)| (key.clone(), value.clone())));
+    row.extend(
+        job.keys
+            .iter()
+            .map(|(key, value)| (key.clone(), value.clone())),
+    );
     row.push(text("failed", failed.map_or(Value::Null, Value::from)));
     row
 }

@@ -72,14 +72,24 @@ impl JobResult {
     pub fn read(folder: &Path) -> Result<Self, WhatIfError> {
         let record = read_record(folder)?;
         if let Some(why) = ResultFiles::read(folder)?.failed {
-            return Err(WhatIfError::Failed { path: folder.to_owned(), why });
+            return Err(WhatIfError::Failed {
+                path: folder.to_owned(),
+                why,
+            });
         }
         let path = folder.join(MESH);
         let MeshFile { mesh, .. } = read_mesh(&path, record.mesh_unit)?;
         let [sigma] = read_vertex_columns(&path, record.mesh_unit, &mesh, ["sigma_mm"])?;
         let sigma = sigma.map(|column| column.into_iter().map(|mm| f64::from(mm) * 1e-3).collect());
-        let features = read_features(&folder.join(FEATURES)).map_err(SweepError::from)?.features;
-        Ok(Self { record, mesh, sigma, features })
+        let features = read_features(&folder.join(FEATURES))
+            .map_err(SweepError::from)?
+            .features;
+        Ok(Self {
+            record,
+            mesh,
+            sigma,
+            features,
+        })
     }
 }
 
@@ -91,15 +101,22 @@ pub fn changed_keys(a: &JobRecord, b: &JobRecord) -> BTreeMap<String, [Value; 2]
         keys
     });
     let names: BTreeSet<&String> = of_a.keys().chain(of_b.keys()).collect();
-    let value = |keys: &BTreeMap<String, Value>, name: &str| keys.get(name).cloned().unwrap_or_default();
-    let pairs = names.into_iter().map(|name| (name.clone(), [value(&of_a, name), value(&of_b, name)]));
+    let value =
+        |keys: &BTreeMap<String, Value>, name: &str| keys.get(name).cloned().unwrap_or_default();
+    let pairs = names
+        .into_iter()
+        .map(|name| (name.clone(), [value(&of_a, name), value(&of_b, name)]));
     let mut changed: BTreeMap<_, _> = pairs.filter(|(_, [a, b])| a != b).collect();
     if a.recording_sha256 != b.recording_sha256 {
-        let short = |record: &JobRecord| Value::from(format!("sha256 {:.12}…", record.recording_sha256));
+        let short =
+            |record: &JobRecord| Value::from(format!("sha256 {:.12}…", record.recording_sha256));
         changed.insert("recording".to_owned(), [short(a), short(b)]);
     }
     if a.touchup != b.touchup {
-        changed.insert("touchup".to_owned(), [a, b].map(|record| Value::from(record.touchup.clone())));
+        changed.insert(
+            "touchup".to_owned(),
+            [a, b].map(|record| Value::from(record.touchup.clone())),
+        );
     }
     changed
 }
@@ -110,7 +127,11 @@ fn flatten(name: &str, value: &Value, into: &mut BTreeMap<String, Value>) {
         return;
     };
     for (key, value) in keys {
-        let inner = if name.is_empty() { key.clone() } else { format!("{name}.{key}") };
+        let inner = if name.is_empty() {
+            key.clone()
+        } else {
+            format!("{name}.{key}")
+        };
         flatten(&inner, value, into);
     }
 }
@@ -138,18 +159,40 @@ impl WhatIf {
         if of_a != of_b {
             return Err(WhatIfError::OtherScan { a: of_a, b: of_b });
         }
-        let (keys, features) =
-            (changed_keys(&a.record, &b.record), feature_changes(&a.features, &b.features, COVERAGE));
+        let (keys, features) = (
+            changed_keys(&a.record, &b.record),
+            feature_changes(&a.features, &b.features, COVERAGE),
+        );
         let [of_a, of_b] = [a, b].map(|result| result.sigma.as_deref());
         if let Some(displaced) = displacements_by_vertex(&a.mesh, &b.mesh, [of_a, of_b]) {
-            return Ok(Self { keys, of_a: displaced, of_b: None, features });
+            return Ok(Self {
+                keys,
+                of_a: displaced,
+                of_b: None,
+                features,
+            });
         }
         let trees = [a, b].map(|result| FaceTree::new_by(&result.mesh, &Threads));
-        let [shape_a, shape_b] =
-            [(a, &trees[0]), (b, &trees[1])].map(|(one, tree)| IndexedMesh { mesh: &one.mesh, tree });
-        let before = displacements_to_surface(&a.mesh, of_a, DisplacedFrom::Before, shape_b, of_b, &Threads)?;
-        let after = displacements_to_surface(&b.mesh, of_b, DisplacedFrom::After, shape_a, of_a, &Threads)?;
-        Ok(Self { keys, of_a: before, of_b: Some(after), features })
+        let [shape_a, shape_b] = [(a, &trees[0]), (b, &trees[1])].map(|(one, tree)| IndexedMesh {
+            mesh: &one.mesh,
+            tree,
+        });
+        let before = displacements_to_surface(
+            &a.mesh,
+            of_a,
+            DisplacedFrom::Before,
+            shape_b,
+            of_b,
+            &Threads,
+        )?;
+        let after =
+            displacements_to_surface(&b.mesh, of_b, DisplacedFrom::After, shape_a, of_a, &Threads)?;
+        Ok(Self {
+            keys,
+            of_a: before,
+            of_b: Some(after),
+            features,
+        })
     }
 }
 
@@ -200,11 +243,20 @@ const SAME_AXIS: f64 = 0.866;
 fn far(a: &FeatureRecord, b: &FeatureRecord) -> Option<f64> {
     let (p, q) = a.center_mm.zip(b.center_mm)?;
     let apart = nalgebra::Vector3::from(p) - nalgebra::Vector3::from(q);
-    let axes = a.axis.zip(b.axis).map(|(n, m)| nalgebra::Vector3::from(n).dot(&nalgebra::Vector3::from(m)).abs());
+    let axes = a.axis.zip(b.axis).map(|(n, m)| {
+        nalgebra::Vector3::from(n)
+            .dot(&nalgebra::Vector3::from(m))
+            .abs()
+    });
     let is_same = a.kind == b.kind && axes.is_none_or(|cosine| cosine > SAME_AXIS);
     // a plane is anywhere in itself: its middle moves with what was touched of it
-    let normal = a.axis.filter(|_| a.kind == "plane").map(nalgebra::Vector3::from);
-    let off = normal.map_or(apart.norm(), |normal| apart.dot(&normal).abs().max(apart.norm() / PLANE_SPREAD));
+    let normal = a
+        .axis
+        .filter(|_| a.kind == "plane")
+        .map(nalgebra::Vector3::from);
+    let off = normal.map_or(apart.norm(), |normal| {
+        apart.dot(&normal).abs().max(apart.norm() / PLANE_SPREAD)
+    });
     (is_same && off < NEAR_MM).then_some(off)
 }
 
@@ -213,10 +265,11 @@ const PLANE_SPREAD: f64 = 10.0;
 
 /// Pairs features, the nearest first, and compares them.
 fn feature_changes(a: &[FeatureRecord], b: &[FeatureRecord], k: f64) -> Vec<FeatureChange> {
-    let all = a
-        .iter()
-        .enumerate()
-        .flat_map(|(i, of_a)| b.iter().enumerate().filter_map(move |(j, of_b)| Some((far(of_a, of_b)?, i, j))));
+    let all = a.iter().enumerate().flat_map(|(i, of_a)| {
+        b.iter()
+            .enumerate()
+            .filter_map(move |(j, of_b)| Some((far(of_a, of_b)?, i, j)))
+    });
     let mut all: Vec<_> = all.collect();
     all.sort_by(|x, y| x.0.total_cmp(&y.0).then((x.1, x.2).cmp(&(y.1, y.2))));
     let (mut partner_of_a, mut partner_of_b) = (vec![None; a.len()], vec![None; b.len()]);
@@ -225,9 +278,16 @@ fn feature_changes(a: &[FeatureRecord], b: &[FeatureRecord], k: f64) -> Vec<Feat
             (partner_of_a[i], partner_of_b[j]) = (Some(j), Some(i));
         }
     }
-    let of_a = a.iter().zip(&partner_of_a).map(|(one, partner)| change(Some(one), partner.map(|j| &b[j]), k));
-    let alone = b.iter().zip(&partner_of_b).filter(|(_, partner)| partner.is_none());
-    of_a.chain(alone.map(|(one, _)| change(None, Some(one), k))).collect()
+    let of_a = a
+        .iter()
+        .zip(&partner_of_a)
+        .map(|(one, partner)| change(Some(one), partner.map(|j| &b[j]), k));
+    let alone = b
+        .iter()
+        .zip(&partner_of_b)
+        .filter(|(_, partner)| partner.is_none());
+    of_a.chain(alone.map(|(one, _)| change(None, Some(one), k)))
+        .collect()
 }
 
 fn change(a: Option<&FeatureRecord>, b: Option<&FeatureRecord>, k: f64) -> FeatureChange {
@@ -255,9 +315,20 @@ const NUMBERS: [(&str, NumberOf); 5] = [
 fn numbers(a: &FeatureRecord, b: &FeatureRecord, k: f64) -> Vec<NumberChange> {
     let changed = |name: &'static str, values: [Option<f64>; 2], change: f64| {
         let stds = [a, b].map(|one| one.std.get(name).copied());
-        let plus_minus = stds.into_iter().flatten().reduce(f64::max).map(|std| k * std);
+        let plus_minus = stds
+            .into_iter()
+            .flatten()
+            .reduce(f64::max)
+            .map(|std| k * std);
         let moved = plus_minus.is_some_and(|known| change.abs() > known);
-        NumberChange { name, a: values[0], b: values[1], change, plus_minus, moved }
+        NumberChange {
+            name,
+            a: values[0],
+            b: values[1],
+            change,
+            plus_minus,
+            moved,
+        }
     };
     let place = a.center_mm.zip(b.center_mm).map(|(p, q)| {
         let apart = nalgebra::Vector3::from(q) - nalgebra::Vector3::from(p);
@@ -272,7 +343,11 @@ fn numbers(a: &FeatureRecord, b: &FeatureRecord, k: f64) -> Vec<NumberChange> {
     });
     let axis = a.axis.zip(b.axis).map(|(n, m)| {
         let angle = angle_between(&n.into(), &m.into());
-        changed("axis_deg", [None, None], angle.min(std::f64::consts::PI - angle).to_degrees())
+        changed(
+            "axis_deg",
+            [None, None],
+            angle.min(std::f64::consts::PI - angle).to_degrees(),
+        )
     });
     let sizes = NUMBERS.iter().filter_map(|&(name, of)| {
         let (x, y) = of(a).zip(of(b))?;
@@ -307,26 +382,52 @@ mod tests {
             hole(9, [0.0, 30.0, 0.0], 5.0, 0.01),
         ];
         let changes = feature_changes(&a, &b, 2.0);
-        let pairs: Vec<_> = changes.iter().map(|one| (one.id_a, one.id_b, one.is_moved())).collect();
-        let expected =
-            [(Some(1), Some(8), true), (Some(2), Some(7), false), (Some(3), None, true), (None, Some(9), true)];
+        let pairs: Vec<_> = changes
+            .iter()
+            .map(|one| (one.id_a, one.id_b, one.is_moved()))
+            .collect();
+        let expected = [
+            (Some(1), Some(8), true),
+            (Some(2), Some(7), false),
+            (Some(3), None, true),
+            (None, Some(9), true),
+        ];
         assert_eq!(pairs, expected);
-        let moved: Vec<_> = changes[0].numbers.iter().filter(|number| number.moved).map(|number| number.name).collect();
-        assert_eq!(moved, ["diameter_mm"], "0.015 mm of its place is within ± 0.02 mm");
+        let moved: Vec<_> = changes[0]
+            .numbers
+            .iter()
+            .filter(|number| number.moved)
+            .map(|number| number.name)
+            .collect();
+        assert_eq!(
+            moved,
+            ["diameter_mm"],
+            "0.015 mm of its place is within ± 0.02 mm"
+        );
         assert_eq!(changes[0].numbers[2].plus_minus, Some(0.04));
     }
 
     #[test]
     fn keys_that_differ_are_named_with_both_values() {
         let record = |scene: &str| {
-            JobRecord::new("a", Default::default(), "b", &Default::default(), serde_json::from_str(scene).unwrap())
+            JobRecord::new(
+                "a",
+                Default::default(),
+                "b",
+                &Default::default(),
+                serde_json::from_str(scene).unwrap(),
+            )
         };
-        let a = record(r#"{"tip": {"radius_mm": 1.5, "stiffness_n_per_mm": 20}, "guard": {"x": 1}}"#);
+        let a =
+            record(r#"{"tip": {"radius_mm": 1.5, "stiffness_n_per_mm": 20}, "guard": {"x": 1}}"#);
         let b = record(r#"{"tip": {"radius_mm": 1.5, "stiffness_n_per_mm": 10}, "guard": "off"}"#);
         let changed = changed_keys(&a, &b);
         let names: Vec<_> = changed.keys().map(String::as_str).collect();
         assert_eq!(names, ["guard", "guard.x", "tip.stiffness_n_per_mm"]);
-        assert_eq!(changed["tip.stiffness_n_per_mm"], [Value::from(20), Value::from(10)]);
+        assert_eq!(
+            changed["tip.stiffness_n_per_mm"],
+            [Value::from(20), Value::from(10)]
+        );
         assert_ne!(a.id, b.id);
     }
 }

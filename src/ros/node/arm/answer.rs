@@ -1,8 +1,8 @@
 //! What came of a probing, as messages.
 
 use crate::probing::arm::{
-    ArmError, LimitError, OnsetVerdict, ProbeError, Safety, SlideEnding, StopRequest, TouchMoment, TouchOutcome,
-    TouchRecord,
+    ArmError, LimitError, OnsetVerdict, ProbeError, Safety, SlideEnding, StopRequest, TouchMoment,
+    TouchOutcome, TouchRecord,
 };
 use crate::probing::execute::{Cell, Ending, Flag, Plan, Probed, ProbedSlide, ProbedTouch};
 use crate::ros::clock::time;
@@ -13,22 +13,35 @@ use crate::ros::refusal::not_probed;
 
 /// Why nothing is probed where all that is flagged was asked for.
 pub const NOTHING_FLAGGED: &str = "nothing is flagged that was not probed already";
-const NOWHERE: Point = Point { x: f64::NAN, y: f64::NAN, z: f64::NAN };
+const NOWHERE: Point = Point {
+    x: f64::NAN,
+    y: f64::NAN,
+    z: f64::NAN,
+};
 
 /// Not begun.
 pub fn refused(target: &Flag, code: u8, message: String) -> ProbeResult {
-    ProbeResult { feature: flagged(target), ..not_probed(target.id, code, &message) }
+    ProbeResult {
+        feature: flagged(target),
+        ..not_probed(target.id, code, &message)
+    }
 }
 
 /// A dry run.
 pub fn planned(target: &Flag, plan: &Plan) -> ProbeResult {
     let (code, message) = match plan.held_back.len() {
         0 => {
-            let slides =
-                if plan.slides.is_empty() { String::new() } else { format!(" and {} slides", plan.slides.len()) };
+            let slides = if plan.slides.is_empty() {
+                String::new()
+            } else {
+                format!(" and {} slides", plan.slides.len())
+            };
             let beside = beside_the_part(plan.left_out.len());
             let touches = plan.touches.len();
-            (ProbeResult::PLANNED, format!("{touches} touches{slides} planned{beside}; the path is published"))
+            (
+                ProbeResult::PLANNED,
+                format!("{touches} touches{slides} planned{beside}; the path is published"),
+            )
         }
         _ => {
             let held_back: Vec<String> = plan.held_back.iter().map(ToString::to_string).collect();
@@ -40,20 +53,32 @@ pub fn planned(target: &Flag, plan: &Plan) -> ProbeResult {
 
 /// What was measured.
 pub fn result_of(target: &Flag, probed: &Probed) -> ProbeResult {
-    let feature = probed.found.as_ref().and_then(|found| found.feature.as_ref());
+    let feature = probed
+        .found
+        .as_ref()
+        .and_then(|found| found.feature.as_ref());
     let unknown = refused(target, 0, String::new());
     ProbeResult {
         code: code_of(&probed.ending),
-        message: probed.ending.to_string() + &beside_the_part(probed.left_out.len()) + &slid(&probed.slides),
+        message: probed.ending.to_string()
+            + &beside_the_part(probed.left_out.len())
+            + &slid(&probed.slides),
         feature: feature.map_or(unknown.feature.clone(), |feature| {
             let message = found(feature, target.id, Some(target.radius));
             match code_of(&probed.ending) {
                 // broken off
                 ProbeResult::CANCELLED.. => message,
-                _ => Feature { status: Feature::STATUS_PROBED, ..message },
+                _ => Feature {
+                    status: Feature::STATUS_PROBED,
+                    ..message
+                },
             }
         }),
-        uncertainty: probed.found.as_ref().and_then(|found| found.uncertainty).unwrap_or(f64::NAN),
+        uncertainty: probed
+            .found
+            .as_ref()
+            .and_then(|found| found.uncertainty)
+            .unwrap_or(f64::NAN),
         duration: probed.seconds,
         max_force: probed.peak_force,
         touch_count: probed.touches.len() as u32,
@@ -63,7 +88,11 @@ pub fn result_of(target: &Flag, probed: &Probed) -> ProbeResult {
 
 /// How many places were left out, in words.
 fn beside_the_part(count: usize) -> String {
-    if count == 0 { String::new() } else { format!("; places left out, for the scan has no part there: {count}") }
+    if count == 0 {
+        String::new()
+    } else {
+        format!("; places left out, for the scan has no part there: {count}")
+    }
 }
 
 /// How the slides ended, behind how the probing did.
@@ -71,13 +100,19 @@ fn slid(slides: &[ProbedSlide]) -> String {
     if slides.is_empty() {
         return String::new();
     }
-    let arrived = |one: &&ProbedSlide| one.record.as_ref().is_some_and(|record| record.ending == SlideEnding::Arrived);
+    let arrived = |one: &&ProbedSlide| {
+        one.record
+            .as_ref()
+            .is_some_and(|record| record.ending == SlideEnding::Arrived)
+    };
     let arrived = slides.iter().filter(arrived).count();
-    let others = slides.iter().filter_map(|one| match (&one.record, &one.refused) {
-        (Some(record), _) if record.ending == SlideEnding::Arrived => None,
-        (Some(record), _) => Some(record.ending.to_string()),
-        (None, why) => why.clone(),
-    });
+    let others = slides
+        .iter()
+        .filter_map(|one| match (&one.record, &one.refused) {
+            (Some(record), _) if record.ending == SlideEnding::Arrived => None,
+            (Some(record), _) => Some(record.ending.to_string()),
+            (None, why) => why.clone(),
+        });
     let others: String = others.map(|why| format!("; one slide: {why}")).collect();
     format!("; {arrived} of {} slides arrived{others}", slides.len())
 }
@@ -93,7 +128,13 @@ pub fn response_of(results: &[ProbeResult], header: Header) -> ProbeResponse {
     };
     let named = &results[results.len().saturating_sub(MOST_NAMED)..];
     let (ids, codes) = named.iter().map(|one| (one.id, one.code)).unzip();
-    ProbeResponse { header, code, message, ids, codes }
+    ProbeResponse {
+        header,
+        code,
+        message,
+        ids,
+        codes,
+    }
 }
 
 /// How all that is flagged ended, in words: each where they are few, else how many and the worst.
@@ -104,9 +145,15 @@ pub fn summary_of(results: &[ProbeResult]) -> String {
         None => NOTHING_FLAGGED.to_owned(),
         Some(_) if results.len() <= FEW => results.iter().map(line).collect::<Vec<_>>().join("; "),
         Some(worst) => {
-            let done = results.iter().filter(|one| one.code < ProbeResult::CANCELLED).count();
+            let done = results
+                .iter()
+                .filter(|one| one.code < ProbeResult::CANCELLED)
+                .count();
             let count = results.len();
-            format!("{done} of {count} done, each is on probe_results; the worst: {}", line(worst))
+            format!(
+                "{done} of {count} done, each is on probe_results; the worst: {}",
+                line(worst)
+            )
         }
     }
 }
@@ -124,8 +171,16 @@ pub fn touches_of(
 ) -> Vec<ProbeTouch> {
     let made = probed.touches.iter().zip(0..).map(|(touch, index)| {
         let (stamp, made) = touch_of(touch, radius, cell, offset_ns);
-        let header = Header { stamp, frame_id: frame.to_owned() };
-        ProbeTouch { header, id: target.id, index, ..downsampled(made) }
+        let header = Header {
+            stamp,
+            frame_id: frame.to_owned(),
+        };
+        ProbeTouch {
+            header,
+            id: target.id,
+            index,
+            ..downsampled(made)
+        }
     });
     made.collect()
 }
@@ -139,11 +194,21 @@ fn downsampled(mut touch: ProbeTouch) -> ProbeTouch {
     let thin = |row: &mut Vec<f32>| {
         if row.len() > MOST_ROWS {
             let last = row.len() - 1;
-            *row = (0..MOST_ROWS).map(|i| row[i * last / (MOST_ROWS - 1)]).collect();
+            *row = (0..MOST_ROWS)
+                .map(|i| row[i * last / (MOST_ROWS - 1)])
+                .collect();
         }
     };
-    let ProbeTouch { curve_time, curve_travel, curve_force, curve_lateral_force, .. } = &mut touch;
-    [curve_time, curve_travel, curve_force, curve_lateral_force].into_iter().for_each(thin);
+    let ProbeTouch {
+        curve_time,
+        curve_travel,
+        curve_force,
+        curve_lateral_force,
+        ..
+    } = &mut touch;
+    [curve_time, curve_travel, curve_force, curve_lateral_force]
+        .into_iter()
+        .for_each(thin);
     touch
 }
 
@@ -186,7 +251,9 @@ fn stopped(error: &ProbeError) -> u8 {
             | ArmError::Behind { .. }
             | ArmError::Late { .. }
             | ArmError::Unreadable { .. } => ProbeResult::DATA_LOST,
-            ArmError::Stopped { safety: Safety::OperatorStop } => ProbeResult::OPERATOR_STOP,
+            ArmError::Stopped {
+                safety: Safety::OperatorStop,
+            } => ProbeResult::OPERATOR_STOP,
             ArmError::Stopped { .. } => ProbeResult::PROTECTIVE_STOP,
             ArmError::Client { .. }
             | ArmError::Disobeys { .. }
@@ -194,7 +261,10 @@ fn stopped(error: &ProbeError) -> u8 {
             | ArmError::GoesOn { .. } => ProbeResult::DRIVER_LOST,
             ArmError::Refused { .. } => ProbeResult::FAULT,
         },
-        ProbeError::Limit { error: LimitError::Force { .. }, .. } => ProbeResult::FORCE_OVER_LIMIT,
+        ProbeError::Limit {
+            error: LimitError::Force { .. },
+            ..
+        } => ProbeResult::FORCE_OVER_LIMIT,
         ProbeError::Limit { .. } => ProbeResult::LIMIT_OVERRUN,
         ProbeError::LowRate { .. } => ProbeResult::DATA_LOST,
         ProbeError::Obstacle { .. } | ProbeError::Loaded { .. } | ProbeError::Unsteady { .. } => {
@@ -220,14 +290,18 @@ fn touch_of(touch: &ProbedTouch, radius: f64, cell: &Cell, offset_ns: i64) -> (T
         tip_radius: radius,
         ..ProbeTouch::default()
     };
-    let Some(record) = &touch.record else { return (Time::default(), made) };
+    let Some(record) = &touch.record else {
+        return (Time::default(), made);
+    };
     let (mut at, mut stamp_ns, mut onset_s) = (touch.planned.from, record.stamps_ns[1], 0.0);
     match &record.outcome {
         TouchOutcome::Contact { onset, force_b, .. } => {
             onset_s = onset_at(record, onset.travel);
             if let Some(centre) = touch.centre {
                 // the part pushes along its normal, but for friction
-                let normal = (cell.pose_bo.rotation.inverse() * force_b).try_normalize(0.0).unwrap_or(-approach);
+                let normal = (cell.pose_bo.rotation.inverse() * force_b)
+                    .try_normalize(0.0)
+                    .unwrap_or(-approach);
                 made.contact = point(&(centre - normal * radius));
                 made.contact_std = onset.sigma;
                 made.normal = vector(&normal);
@@ -238,12 +312,20 @@ fn touch_of(touch: &ProbedTouch, radius: f64, cell: &Cell, offset_ns: i64) -> (T
         TouchOutcome::Unclear(_) => {}
     }
     made.verdict = verdict_of(&record.outcome);
-    made.pose = pose(&at, &(cell.pose_bo.inverse() * record.target.standoff_bt).rotation);
+    made.pose = pose(
+        &at,
+        &(cell.pose_bo.inverse() * record.target.standoff_bt).rotation,
+    );
     made.speed = record.speed;
     // its size is known, and that the part pushes back
     made.peak_wrench.force = vector(&(approach * -record.peak_force));
-    let row = |value: fn(&TouchMoment) -> f64| record.curve.iter().map(|m| value(m) as f32).collect();
-    made.curve_time = record.curve.iter().map(|m| (m.t - onset_s) as f32).collect();
+    let row =
+        |value: fn(&TouchMoment) -> f64| record.curve.iter().map(|m| value(m) as f32).collect();
+    made.curve_time = record
+        .curve
+        .iter()
+        .map(|m| (m.t - onset_s) as f32)
+        .collect();
     made.curve_travel = row(|m| m.travel);
     made.curve_force = row(|m| m.force);
     made.curve_lateral_force = row(|m| m.lateral);
@@ -266,7 +348,11 @@ fn verdict_of(outcome: &TouchOutcome) -> u8 {
 
 /// When a travel is reached first, s from the beginning of the curve.
 fn onset_at(record: &TouchRecord, travel: f64) -> f64 {
-    record.curve.iter().find(|m| m.travel >= travel).map_or(0.0, |m| m.t)
+    record
+        .curve
+        .iter()
+        .find(|m| m.travel >= travel)
+        .map_or(0.0, |m| m.t)
 }
 
 #[cfg(test)]
@@ -291,19 +377,46 @@ mod tests {
     #[test]
     fn a_touch_fits_into_a_datagram_and_a_thinned_curve_keeps_its_ends() {
         let long = downsampled(touch(60_000));
-        assert!(cdr_encoding::to_vec::<_, byteorder::LittleEndian>(&long).unwrap().len() < 48_000);
+        assert!(
+            cdr_encoding::to_vec::<_, byteorder::LittleEndian>(&long)
+                .unwrap()
+                .len()
+                < 48_000
+        );
         assert!(long.curve_time.len() == MOST_ROWS && long.curve_time.is_sorted());
-        assert_eq!((long.curve_time[0], long.curve_time.last()), (0.0, Some(&59_999.0)));
+        assert_eq!(
+            (long.curve_time[0], long.curve_time.last()),
+            (0.0, Some(&59_999.0))
+        );
         assert_eq!(long.curve_time, long.curve_lateral_force);
         assert_eq!(downsampled(touch(20)), touch(20));
     }
 
     #[test]
     fn what_cannot_be_made_is_named_a_touch_or_a_slide() {
-        let held_back = [(PlannedMotion::Touch(2), "too far"), (PlannedMotion::Slide(0), "too low")];
-        let held_back = held_back.map(|(what, why)| HeldBack { what, why: why.to_owned() }).to_vec();
-        let target = Flag { id: 7, kind: None, place: Point3::origin(), radius: 3e-3 };
-        let result = planned(&target, &Plan { held_back, ..Plan::default() });
+        let held_back = [
+            (PlannedMotion::Touch(2), "too far"),
+            (PlannedMotion::Slide(0), "too low"),
+        ];
+        let held_back = held_back
+            .map(|(what, why)| HeldBack {
+                what,
+                why: why.to_owned(),
+            })
+            .to_vec();
+        let target = Flag {
+            id: 7,
+            kind: None,
+            place: Point3::origin(),
+            radius: 3e-3,
+        };
+        let result = planned(
+            &target,
+            &Plan {
+                held_back,
+                ..Plan::default()
+            },
+        );
         assert_eq!(result.code, ProbeResult::OUT_OF_LIMITS);
         assert_eq!(result.message, "touch 2: too far; slide 0: too low");
     }
@@ -312,20 +425,42 @@ mod tests {
     fn a_goal_ends_as_the_worst_of_its_features_and_names_the_last() {
         let result = |id: u32| ProbeResult {
             id,
-            code: if id == 7 { ProbeResult::BAD_REQUEST } else { ProbeResult::TOLERANCE_REACHED },
+            code: if id == 7 {
+                ProbeResult::BAD_REQUEST
+            } else {
+                ProbeResult::TOLERANCE_REACHED
+            },
             message: format!("message {id}"),
             ..ProbeResult::default()
         };
         let results: Vec<_> = (0..200).map(result).collect();
         let response = response_of(&results, Header::default());
-        assert_eq!((response.code, response.message.as_str()), (ProbeResult::BAD_REQUEST, "message 7"));
-        assert_eq!((response.ids, response.codes.len()), ((72..200).collect(), 128));
+        assert_eq!(
+            (response.code, response.message.as_str()),
+            (ProbeResult::BAD_REQUEST, "message 7")
+        );
+        assert_eq!(
+            (response.ids, response.codes.len()),
+            ((72..200).collect(), 128)
+        );
         let few = response_of(&results[6..8], Header::default());
-        assert_eq!((few.ids, few.codes), (vec![6, 7], vec![ProbeResult::TOLERANCE_REACHED, ProbeResult::BAD_REQUEST]));
-        assert_eq!(response_of(&[], Header::default()).code, ProbeResult::NO_SUCH_FEATURE);
+        assert_eq!(
+            (few.ids, few.codes),
+            (
+                vec![6, 7],
+                vec![ProbeResult::TOLERANCE_REACHED, ProbeResult::BAD_REQUEST]
+            )
+        );
+        assert_eq!(
+            response_of(&[], Header::default()).code,
+            ProbeResult::NO_SUCH_FEATURE
+        );
 
         assert_eq!(summary_of(&results[6..8]), "6: message 6; 7: message 7");
-        assert_eq!(summary_of(&results), "199 of 200 done, each is on probe_results; the worst: 7: message 7");
+        assert_eq!(
+            summary_of(&results),
+            "199 of 200 done, each is on probe_results; the worst: 7: message 7"
+        );
         assert_eq!(summary_of(&[]), NOTHING_FLAGGED);
     }
 }

@@ -29,7 +29,11 @@ struct StateSeen {
 impl Common {
     /// Nothing is known yet.
     pub fn new(stops: Arc<StopState>) -> Self {
-        Self { is_busy: AtomicBool::new(false), stops, seen: Mutex::default() }
+        Self {
+            is_busy: AtomicBool::new(false),
+            stops,
+            seen: Mutex::default(),
+        }
     }
 
     /// Takes up an order; whether no other is worked at.
@@ -94,7 +98,9 @@ impl Common {
         match (&seen.fault, &seen.stop, seen.last.map(|state| state.safety)) {
             (Some(error), ..) => Err(error.clone()),
             (None, _, Some(safety)) if safety != Safety::Normal => Err(safety.to_string()),
-            (None, Some(stop), _) => Err(format!("the arm is stopped since this: {stop}; look, then call ~/recover")),
+            (None, Some(stop), _) => Err(format!(
+                "the arm is stopped since this: {stop}; look, then call ~/recover"
+            )),
             (None, None, Some(_)) => Ok(()),
             (None, None, None) => Err("nothing has come from the arm yet".to_owned()),
         }
@@ -103,10 +109,22 @@ impl Common {
     /// `~/arm_state`
     pub fn state(&self, cell: &Cell) -> TriggerResponse {
         let ready = self.ready();
-        let work = if self.is_busy.load(Ordering::Acquire) { "it works at an order" } else { "it waits for an order" };
+        let work = if self.is_busy.load(Ordering::Acquire) {
+            "it works at an order"
+        } else {
+            "it waits for an order"
+        };
         let words = ready.clone().map_or_else(|why| why, |()| work.to_owned());
         let place = self.last().map(|state| cell.place(&state.pose_bt) * 1e3);
-        let place = place.map(|at| format!("; tip at ({:.1} {:.1} {:.1}) mm in the object", at.x, at.y, at.z));
-        TriggerResponse { success: ready.is_ok(), message: words + &place.unwrap_or_default() }
+        let place = place.map(|at| {
+            format!(
+                "; tip at ({:.1} {:.1} {:.1}) mm in the object",
+                at.x, at.y, at.z
+            )
+        });
+        TriggerResponse {
+            success: ready.is_ok(),
+            message: words + &place.unwrap_or_default(),
+        }
     }
 }

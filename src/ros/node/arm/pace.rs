@@ -19,7 +19,11 @@ pub struct Paced<'a> {
 impl<'a> Paced<'a> {
     /// From now on.
     pub fn new(clock: Clock, arm: SimArm<'a>) -> Self {
-        Self { arm, due: clock.now(), clock }
+        Self {
+            arm,
+            due: clock.now(),
+            clock,
+        }
     }
 }
 
@@ -71,11 +75,22 @@ mod tests {
         let (mut paced, mut free) = (Paced::new(clock, arm()), arm());
         for order in 0..500 {
             // one that is lost leaves the arm on a way of its own
-            let linear = Vector3::new(0.02 * f64::from(order).sin(), 0.02 * f64::from(order).cos(), 0.01);
-            let command = Command::Velocity { linear, acceleration: 2.0 };
+            let linear = Vector3::new(
+                0.02 * f64::from(order).sin(),
+                0.02 * f64::from(order).cos(),
+                0.01,
+            );
+            let command = Command::Velocity {
+                linear,
+                acceleration: 2.0,
+            };
             paced.command(&command).unwrap();
             free.command(&command).unwrap();
-            assert_eq!(paced.next_state().unwrap(), free.next_state().unwrap(), "order {order}");
+            assert_eq!(
+                paced.next_state().unwrap(),
+                free.next_state().unwrap(),
+                "order {order}"
+            );
         }
         let stop = Command::Stop { deceleration: 2.0 };
         paced.command(&stop).unwrap();
@@ -88,7 +103,10 @@ mod tests {
         let (clock, hand) = Clock::lock_step();
         let (plate, params) = (Plate::default(), ArmParams::default());
         let start = params.pose_bo * Isometry3::translation(30e-3, 25e-3, 52e-3);
-        let mut paced = Paced::new(clock.clone(), SimArm::new(&plate, params.clone(), &start).unwrap());
+        let mut paced = Paced::new(
+            clock.clone(),
+            SimArm::new(&plate, params.clone(), &start).unwrap(),
+        );
         let (begun, period) = (clock.now(), Duration::from_secs_f64(paced.period()));
         let mut next_at = || {
             paced.next_state().unwrap();

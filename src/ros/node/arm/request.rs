@@ -22,7 +22,11 @@ impl Wanted {
     ///
     /// # Errors
     /// A code of [`ProbeResult`] and why.
-    pub fn of(settings: &ProbeSettings, configured: &ProbeParams, kind: Option<Kind>) -> Result<Self, (u8, String)> {
+    pub fn of(
+        settings: &ProbeSettings,
+        configured: &ProbeParams,
+        kind: Option<Kind>,
+    ) -> Result<Self, (u8, String)> {
         let bad = |why: String| (ProbeResult::BAD_REQUEST, why);
         let some = |asked: f64| (asked != 0.0).then_some(asked);
         let by = Narrower {
@@ -31,10 +35,20 @@ impl Wanted {
             time: some(settings.max_duration),
             speed: None,
         };
-        let mut params = configured.narrowed(&by).map_err(|why| bad(why.to_string()))?;
+        let mut params = configured
+            .narrowed(&by)
+            .map_err(|why| bad(why.to_string()))?;
         for (what, asked, speed) in [
-            ("max_search_speed", settings.max_search_speed, &mut params.touch.search_speed),
-            ("max_link_speed", settings.max_link_speed, &mut params.touch.link_speed),
+            (
+                "max_search_speed",
+                settings.max_search_speed,
+                &mut params.touch.search_speed,
+            ),
+            (
+                "max_link_speed",
+                settings.max_link_speed,
+                &mut params.touch.link_speed,
+            ),
         ] {
             match some(asked) {
                 None => {}
@@ -52,11 +66,18 @@ impl Wanted {
             ProbeSettings::QUANTITY_DIAMETER => Quantity::Diameter,
             ProbeSettings::QUANTITY_LENGTH => Quantity::Length,
             ProbeSettings::QUANTITY_WIDTH => Quantity::Width,
-            other => return Err(bad(format!("touches cannot be chosen for quantity {other}"))),
+            other => {
+                return Err(bad(format!(
+                    "touches cannot be chosen for quantity {other}"
+                )));
+            }
         };
         if !params.pattern.quantity.is_of(kind) {
             let kind = kind.map_or("unknown region", Kind::name);
-            return Err(bad(format!("a {kind} has no {}", params.pattern.quantity.name())));
+            return Err(bad(format!(
+                "a {kind} has no {}",
+                params.pattern.quantity.name()
+            )));
         }
         match settings.pattern {
             ProbeSettings::PATTERN_TOUCHES => {}
@@ -67,19 +88,30 @@ impl Wanted {
         if settings.max_touches != 0 {
             let (asked, most) = (settings.max_touches as usize, params.pattern.budget);
             if asked > most {
-                return Err(bad(format!("max_touches of {asked}: it may be up to the configured {most}")));
+                return Err(bad(format!(
+                    "max_touches of {asked}: it may be up to the configured {most}"
+                )));
             }
             params.pattern.budget = asked;
         }
-        Ok(Self { params, is_dry_run: settings.dry_run })
+        Ok(Self {
+            params,
+            is_dry_run: settings.dry_run,
+        })
     }
 }
 
 /// Standard deviation that is wanted, m or rad.
 fn sigma(settings: &ProbeSettings, configured: f64) -> Result<f64, String> {
-    let confidence = if settings.confidence == 0.0 { CONFIDENCE } else { settings.confidence };
+    let confidence = if settings.confidence == 0.0 {
+        CONFIDENCE
+    } else {
+        settings.confidence
+    };
     match (settings.tolerance, confidence) {
-        (_, p) if !(p > 0.0 && p < 1.0) => Err(format!("confidence is {p}: it must be above 0 and below 1")),
+        (_, p) if !(p > 0.0 && p < 1.0) => {
+            Err(format!("confidence is {p}: it must be above 0 and below 1"))
+        }
         (0.0, _) if settings.quantity == ProbeSettings::QUANTITY_AXIS => {
             Err("an axis needs a tolerance of its own, rad".to_owned())
         }

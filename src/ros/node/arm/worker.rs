@@ -9,7 +9,9 @@ use std::time::{Duration, SystemTime};
 
 use tracing::{info, warn};
 
-use super::answer::{planned as planned_result, refused, response_of, result_of, summary_of, touches_of};
+use super::answer::{
+    planned as planned_result, refused, response_of, result_of, summary_of, touches_of,
+};
 use super::common::Common;
 use super::pace::Paced;
 use super::request::Wanted;
@@ -19,8 +21,8 @@ use crate::mesh::TriMesh;
 use crate::probing::arm::{Arm, StopRequest};
 use crate::probing::execute::{Cell, Ending, Flag, ProbeParams, Prober, WayOut, plan};
 use crate::ros::messages::{
-    Header, Path as PathMsg, Pose, PoseStamped, ProbeFeatureResponse, ProbeGoal, ProbeResult, ProbeSettings,
-    TriggerResponse,
+    Header, Path as PathMsg, Pose, PoseStamped, ProbeFeatureResponse, ProbeGoal, ProbeResult,
+    ProbeSettings, TriggerResponse,
 };
 use crate::ros::node::channels::{ArmMeasurement, FeatureInput};
 use crate::ros::node::convert::{header, point, trigger};
@@ -89,11 +91,15 @@ impl ArmHandle {
         if !self.common.begin() {
             return order.refuse(header, ProbeResult::BUSY, BUSY);
         }
-        let Err(error) = self.inputs.try_send((order, folder.to_owned())) else { return };
+        let Err(error) = self.inputs.try_send((order, folder.to_owned())) else {
+            return;
+        };
         self.common.done();
         match error {
             TrySendError::Full((order, _)) => order.refuse(header, ProbeResult::BUSY, BUSY),
-            TrySendError::Disconnected((order, _)) => order.refuse(header, ProbeResult::ARM_NOT_READY, HAS_ENDED),
+            TrySendError::Disconnected((order, _)) => {
+                order.refuse(header, ProbeResult::ARM_NOT_READY, HAS_ENDED)
+            }
         }
     }
 
@@ -133,11 +139,29 @@ pub fn start(
     let common = Arc::new(Common::new(Arc::clone(stops)));
     stops.look();
     let ends = EndsArm(Arc::clone(stops));
-    let handle = ArmHandle { inputs: to, common: Arc::clone(&common), cell: cell.clone() };
+    let handle = ArmHandle {
+        inputs: to,
+        common: Arc::clone(&common),
+        cell: cell.clone(),
+    };
     let ArmOfNode { kind, samples } = arm;
-    let link = ArmLink { setup: Arc::clone(setup), samples, common, offset_ns: None, begun: setup.clock.now() };
-    let mut worker =
-        ArmWorker { link, port: Arc::clone(port), features, cell, params, inputs, ros_ns: i64::MIN, way_out: None };
+    let link = ArmLink {
+        setup: Arc::clone(setup),
+        samples,
+        common,
+        offset_ns: None,
+        begun: setup.clock.now(),
+    };
+    let mut worker = ArmWorker {
+        link,
+        port: Arc::clone(port),
+        features,
+        cell,
+        params,
+        inputs,
+        ros_ns: i64::MIN,
+        way_out: None,
+    };
     let run = move || {
         let EndsArm(stops) = &ends;
         match kind {
@@ -163,15 +187,20 @@ struct EndsArm(Arc<StopState>);
 
 impl Drop for EndsArm {
     fn drop(&mut self) {
-        self.0.end_arm("by a fault of touchup: please report it with the session's folder");
+        self.0
+            .end_arm("by a fault of touchup: please report it with the session's folder");
     }
 }
 
 impl ArmWorker {
     fn run_simulated(&mut self, part: &TriMesh) -> Result<(), String> {
-        let surface =
-            MeshSurface::new(part).map_err(|error| format!("the simulated arm has no part to touch: {error}"))?;
-        let arm = SimArm::new(&surface, simulated_arm(&self.cell, &self.params), &self.cell.above(part));
+        let surface = MeshSurface::new(part)
+            .map_err(|error| format!("the simulated arm has no part to touch: {error}"))?;
+        let arm = SimArm::new(
+            &surface,
+            simulated_arm(&self.cell, &self.params),
+            &self.cell.above(part),
+        );
         let arm = arm.map_err(|error| format!("the simulated arm cannot begin: {error}"))?;
         self.run(&mut Paced::new(self.link.setup.clock.clone(), arm));
         Ok(())
@@ -192,9 +221,18 @@ impl ArmWorker {
     /// Nobody who still waits is left without an answer.
     fn refuse_the_rest(&self) {
         for (order, _) in self.inputs.try_iter() {
-            let why = self.link.common.ready().err().unwrap_or_else(|| HAS_ENDED.to_owned());
+            let why = self
+                .link
+                .common
+                .ready()
+                .err()
+                .unwrap_or_else(|| HAS_ENDED.to_owned());
             let is_ending = self.link.common.stops.is_ending();
-            let code = if is_ending { ProbeResult::SHUTDOWN } else { ProbeResult::ARM_NOT_READY };
+            let code = if is_ending {
+                ProbeResult::SHUTDOWN
+            } else {
+                ProbeResult::ARM_NOT_READY
+            };
             order.refuse(self.header(), code, &why);
         }
     }
@@ -217,7 +255,9 @@ impl ArmWorker {
         let followed = match self.link.offset_ns {
             // a simulated time that has not come yet, or stands still, says nothing of the arm's clock
             Some(offset) if now_ns == self.ros_ns => offset,
-            Some(offset) if (off - offset).abs() < OTHER_CLOCK_NS => offset + (off - offset) / FOLLOW,
+            Some(offset) if (off - offset).abs() < OTHER_CLOCK_NS => {
+                offset + (off - offset) / FOLLOW
+            }
             _ => off,
         };
         self.ros_ns = now_ns;
@@ -231,7 +271,8 @@ impl ArmWorker {
         loop {
             match ready.try_recv() {
                 Err(TryRecvError::Empty)
-                    if self.link.setup.clock.now() <= deadline && !self.link.common.stops.is_ending() =>
+                    if self.link.setup.clock.now() <= deadline
+                        && !self.link.common.stops.is_ending() =>
                 {
                     self.see_next(arm);
                 }
@@ -249,32 +290,56 @@ impl ArmWorker {
                 let recovered = recovered.map_err(|error| error.to_string());
                 let recovered = recovered.and_then(|()| self.link.common.stops.recover());
                 self.link.common.done();
-                reply.send(trigger(recovered.map(|()| "the arm may move again".to_owned())));
+                reply.send(trigger(
+                    recovered.map(|()| "the arm may move again".to_owned()),
+                ));
             }
             ArmOrder::All(reply) => {
                 let results = self.probe(folder, &[], &ProbeSettings::default(), arm, None);
                 self.link.common.done();
                 reply.send(TriggerResponse {
-                    success: !results.is_empty() && results.iter().all(|one| one.code < ProbeResult::CANCELLED),
+                    success: !results.is_empty()
+                        && results.iter().all(|one| one.code < ProbeResult::CANCELLED),
                     message: summary_of(&results),
                 });
             }
             ArmOrder::Feature(request, reply) => {
                 let results = self.probe(folder, &[request.id], &request.settings, arm, None);
-                let none = || self.done(not_probed(request.id, ProbeResult::ARM_NOT_READY, NO_TARGETS));
+                let none = || {
+                    self.done(not_probed(
+                        request.id,
+                        ProbeResult::ARM_NOT_READY,
+                        NO_TARGETS,
+                    ))
+                };
                 self.link.common.done();
-                reply.send(ProbeFeatureResponse { result: results.into_iter().next().unwrap_or_else(none) });
+                reply.send(ProbeFeatureResponse {
+                    result: results.into_iter().next().unwrap_or_else(none),
+                });
             }
             ArmOrder::Goal(goal, handles) => self.goal(folder, &goal, handles, arm),
         }
     }
 
     fn goal(&mut self, folder: &Path, goal: &ProbeGoal, handles: Goal, arm: &mut dyn Arm) {
-        let Goal { accept, feedback, result, is_cancelled } = handles;
+        let Goal {
+            accept,
+            feedback,
+            result,
+            is_cancelled,
+        } = handles;
         accept.send(true);
-        let results = self.probe(folder, &goal.ids, &goal.settings, arm, Some((&feedback, &is_cancelled)));
+        let results = self.probe(
+            folder,
+            &goal.ids,
+            &goal.settings,
+            arm,
+            Some((&feedback, &is_cancelled)),
+        );
         let response = response_of(&results, self.header());
-        let was_broken_off = results.last().is_some_and(|last| last.code == ProbeResult::CANCELLED);
+        let was_broken_off = results
+            .last()
+            .is_some_and(|last| last.code == ProbeResult::CANCELLED);
         let end = match response.code {
             // by who gave it, and by nobody else: a pause ends it too
             _ if was_broken_off && is_cancelled.load(Ordering::Acquire) => GoalEnd::Canceled,
@@ -295,7 +360,10 @@ impl ArmWorker {
 
     /// A result as it is now, for who follows and for who asked.
     fn done(&self, result: ProbeResult) -> ProbeResult {
-        let result = ProbeResult { header: self.header(), ..result };
+        let result = ProbeResult {
+            header: self.header(),
+            ..result
+        };
         self.port.publish(Publication::ProbeResult(result.clone()));
         result
     }
@@ -321,17 +389,23 @@ impl ArmWorker {
         let mut results: Vec<ProbeResult> = Vec::new();
         for (number, target) in targets.into_iter().enumerate() {
             let result = match self.wanted(settings, &target) {
-                _ if is_cancelled(watched) => {
-                    refused(&target, ProbeResult::CANCELLED, "cancelled before it was begun".to_owned())
-                }
+                _ if is_cancelled(watched) => refused(
+                    &target,
+                    ProbeResult::CANCELLED,
+                    "cancelled before it was begun".to_owned(),
+                ),
                 Err((code, why)) => refused(&target, code, why),
-                Ok(wanted) => self.probe_one(folder, &target, &wanted, arm, watched, [number, count]),
+                Ok(wanted) => {
+                    self.probe_one(folder, &target, &wanted, arm, watched, [number, count])
+                }
             };
             // after a cancel or a stop the others are not begun
             let goes_on = result.code < ProbeResult::CANCELLED
                 || matches!(
                     result.code,
-                    ProbeResult::OUT_OF_LIMITS | ProbeResult::NO_CLEAR_PATH | ProbeResult::BAD_REQUEST
+                    ProbeResult::OUT_OF_LIMITS
+                        | ProbeResult::NO_CLEAR_PATH
+                        | ProbeResult::BAD_REQUEST
                 );
             results.push(self.done(result));
             if !goes_on {
@@ -344,16 +418,31 @@ impl ArmWorker {
     /// What is flagged, in the order that was asked for, or nearest first.
     fn targets(&mut self, ids: &[u32], arm: &mut dyn Arm) -> Result<Vec<Flag>, Box<ProbeResult>> {
         let (to, targets) = sync_channel(1);
-        let asked = self.features.try_send(FeatureInput::Targets(ids.to_vec(), to));
+        let asked = self
+            .features
+            .try_send(FeatureInput::Targets(ids.to_vec(), to));
         let answer = asked.ok().and_then(|()| self.wait(arm, &targets));
         let first = ids.first().copied().unwrap_or(0);
-        let mut targets = answer.ok_or_else(|| Box::new(not_probed(first, ProbeResult::ARM_NOT_READY, NO_TARGETS)))?;
-        if let Some(missing) = ids.iter().find(|id| targets.iter().all(|target| target.id != **id)) {
+        let mut targets = answer
+            .ok_or_else(|| Box::new(not_probed(first, ProbeResult::ARM_NOT_READY, NO_TARGETS)))?;
+        if let Some(missing) = ids
+            .iter()
+            .find(|id| targets.iter().all(|target| target.id != **id))
+        {
             let why = format!("there is no feature with the number {missing}: flag it first");
-            return Err(Box::new(not_probed(*missing, ProbeResult::NO_SUCH_FEATURE, &why)));
+            return Err(Box::new(not_probed(
+                *missing,
+                ProbeResult::NO_SUCH_FEATURE,
+                &why,
+            )));
         }
         if ids.is_empty() {
-            let tip = self.link.common.last().map(|state| self.cell.place(&state.pose_bt)).unwrap_or_default();
+            let tip = self
+                .link
+                .common
+                .last()
+                .map(|state| self.cell.place(&state.pose_bt))
+                .unwrap_or_default();
             let far = |target: &Flag| (target.place - tip).norm();
             targets.sort_by(|a, b| far(a).total_cmp(&far(b)));
         }
@@ -363,10 +452,15 @@ impl ArmWorker {
     fn wanted(&self, settings: &ProbeSettings, target: &Flag) -> Result<Wanted, (u8, String)> {
         let wanted = Wanted::of(settings, &self.params, target.kind)?;
         if !wanted.is_dry_run {
-            let scene_allows = self.link.setup.scene.robot.as_ref().is_some_and(|robot| robot.allow_motion);
+            let scene_allows = self
+                .link
+                .setup
+                .scene
+                .robot
+                .as_ref()
+                .is_some_and(|robot| robot.allow_motion);
             if !scene_allows {
-                let why =
-                    "the arm may not move: look at a dry run first, then set robot.allow_motion: true in the scene";
+                let why = "the arm may not move: look at a dry run first, then set robot.allow_motion: true in the scene";
                 return Err((ProbeResult::MOTION_NOT_ALLOWED, why.to_owned()));
             }
             match self.link.common.stops.why(StopRequest::Retract) {
@@ -378,7 +472,10 @@ impl ArmWorker {
                 None => {}
             }
         }
-        self.link.common.ready().map_err(|why| (ProbeResult::ARM_NOT_READY, why))?;
+        self.link
+            .common
+            .ready()
+            .map_err(|why| (ProbeResult::ARM_NOT_READY, why))?;
         Ok(wanted)
     }
 
@@ -392,8 +489,15 @@ impl ArmWorker {
         counts: [usize; 2],
     ) -> ProbeResult {
         let not_ready = |why: &str| refused(target, ProbeResult::ARM_NOT_READY, why.to_owned());
-        let Some(state) = self.link.common.last() else { return not_ready("nothing has come from the arm yet") };
-        let (cell, params, flag, way_out) = (self.cell.clone(), wanted.params.clone(), *target, self.way_out.clone());
+        let Some(state) = self.link.common.last() else {
+            return not_ready("nothing has come from the arm yet");
+        };
+        let (cell, params, flag, way_out) = (
+            self.cell.clone(),
+            wanted.params.clone(),
+            *target,
+            self.way_out.clone(),
+        );
         let ready = ask_mesh(&self.link.setup, move |still| {
             let planned = plan(&cell, &params, &still, &flag, &state, way_out.as_ref());
             (still, planned)
@@ -406,16 +510,28 @@ impl ArmWorker {
             Ok(planned) => {
                 let pose = |place| PoseStamped {
                     header: header(0, &self.link.setup.shared.frame),
-                    pose: Pose { position: point(place), ..Pose::default() },
+                    pose: Pose {
+                        position: point(place),
+                        ..Pose::default()
+                    },
                 };
                 let poses = planned.path.iter().map(pose).collect();
-                self.port.publish(Publication::Path(PathMsg { header: self.header(), poses }));
+                self.port.publish(Publication::Path(PathMsg {
+                    header: self.header(),
+                    poses,
+                }));
                 if wanted.is_dry_run {
                     return planned_result(target, &planned);
                 }
             }
             // there is no such pattern, or no such number
-            Err(error) => return refused(target, ProbeResult::BAD_REQUEST, format!("nothing is planned: {error}")),
+            Err(error) => {
+                return refused(
+                    target,
+                    ProbeResult::BAD_REQUEST,
+                    format!("nothing is planned: {error}"),
+                );
+            }
         }
         let prober = Prober::new(arm, &self.cell, &wanted.params, &mut world);
         let mut prober = prober.leaving_by(self.way_out.take());
@@ -428,23 +544,56 @@ impl ArmWorker {
         }
         let ball_radius = wanted.params.pattern.ball_radius;
         let offset_ns = self.link.offset_ns.unwrap_or(0);
-        if let Err(error) = append_probed_touches(&probed, ball_radius, offset_ns, &folder.join(TOUCHES)) {
+        if let Err(error) =
+            append_probed_touches(&probed, ball_radius, offset_ns, &folder.join(TOUCHES))
+        {
             warn!(%error, "the touches of a feature are on the topic alone");
         }
         let is_whole = matches!(
             probed.ending,
-            Ending::ToleranceReached | Ending::TouchesSpent | Ending::CalibrationLimits { .. } | Ending::TimeSpent
+            Ending::ToleranceReached
+                | Ending::TouchesSpent
+                | Ending::CalibrationLimits { .. }
+                | Ending::TimeSpent
         );
-        if let Some(feature) = probed.found.as_ref().and_then(|found| found.feature.clone()).filter(|_| is_whole) {
+        if let Some(feature) = probed
+            .found
+            .as_ref()
+            .and_then(|found| found.feature.clone())
+            .filter(|_| is_whole)
+        {
             // the number that was wanted is still wanted, where it is not known well enough
             let is_done = matches!(probed.ending, Ending::ToleranceReached);
-            let session = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            let measured = ArmMeasurement { session, id: target.id, feature, is_done };
-            if self.features.try_send(FeatureInput::Measured(Box::new(measured))).is_err() {
-                warn!(feature = target.id, "what was measured is in the answer, and not among the features");
+            let session = folder
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned();
+            let measured = ArmMeasurement {
+                session,
+                id: target.id,
+                feature,
+                is_done,
+            };
+            if self
+                .features
+                .try_send(FeatureInput::Measured(Box::new(measured)))
+                .is_err()
+            {
+                warn!(
+                    feature = target.id,
+                    "what was measured is in the answer, and not among the features"
+                );
             }
         }
-        for touch in touches_of(target, &probed, ball_radius, &self.cell, offset_ns, &self.link.setup.shared.frame) {
+        for touch in touches_of(
+            target,
+            &probed,
+            ball_radius,
+            &self.cell,
+            offset_ns,
+            &self.link.setup.shared.frame,
+        ) {
             self.port.publish(Publication::ProbeTouch(touch));
         }
         let mut result = result_of(target, &probed);

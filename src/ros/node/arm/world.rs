@@ -35,7 +35,10 @@ pub fn ask_mesh<T: Send + 'static>(
     let waiting = clock.clone();
     let make = move || {
         // the snapshot goes at once: the next version of the mesh need not be a copy
-        let mesh = waiting.recv_timeout(&snapshot, COPY_WAIT).ok().and_then(|snapshot| snapshot.mesh().ok());
+        let mesh = waiting
+            .recv_timeout(&snapshot, COPY_WAIT)
+            .ok()
+            .and_then(|snapshot| snapshot.mesh().ok());
         if let Some(mesh) = mesh {
             // who asked may have gone
             let _ = to.send(make_of(StaticWorld::new(mesh)));
@@ -61,9 +64,18 @@ pub struct ArmLink {
 impl ArmLink {
     /// Publishes a state as a probe does: the pose in the frame in which the scene has poses, the wrench in the axes of the probe.
     pub fn publish(&self, state: &ArmState) {
-        let Setup { scene, shared, tool, .. } = &*self.setup;
+        let Setup {
+            scene,
+            shared,
+            tool,
+            ..
+        } = &*self.setup;
         // the base of the arm, where the scene says where the scan lies in it
-        let base = if scene.scan_to_space.is_some() { CELL } else { &shared.frame };
+        let base = if scene.scan_to_space.is_some() {
+            CELL
+        } else {
+            &shared.frame
+        };
         let stamp_ns = state.stamp_ns + self.offset_ns.unwrap_or(0);
         let (pose, wrench) = state.as_probe(stamp_ns);
         self.samples.publish_pose(as_pose(&pose, base));
@@ -98,9 +110,24 @@ impl<'a> ArmWorld<'a> {
     /// What is around the arm while it probes a feature.
     ///
     /// - `feature`: its number, from 0 on, and how many there are.
-    pub fn new(link: &'a ArmLink, still: StaticWorld, watched: Option<GoalWatcher<'a>>, feature: [usize; 2]) -> Self {
+    pub fn new(
+        link: &'a ArmLink,
+        still: StaticWorld,
+        watched: Option<GoalWatcher<'a>>,
+        feature: [usize; 2],
+    ) -> Self {
         let (phase, feedback_sent) = (Phase::Planning, link.begun);
-        Self { link, still, next: None, watched, feature, progress: None, phase, feedback_sent, last: None }
+        Self {
+            link,
+            still,
+            next: None,
+            watched,
+            feature,
+            progress: None,
+            phase,
+            feedback_sent,
+            last: None,
+        }
     }
 
     /// Takes the mesh that has become ready, and asks for the next: it is behind by a touch, or by as long as it takes to make.
@@ -115,7 +142,9 @@ impl<'a> ArmWorld<'a> {
 
     fn send_feedback(&mut self) {
         self.feedback_sent = self.link.setup.clock.now();
-        let (Some((Feedback(send), _)), Some(progress)) = (self.watched, &self.progress) else { return };
+        let (Some((Feedback(send), _)), Some(progress)) = (self.watched, &self.progress) else {
+            return;
+        };
         send(ProbeFeedback {
             id: progress.flag,
             feature: self.feature[0] as u32 + 1,
@@ -131,7 +160,9 @@ impl<'a> ArmWorld<'a> {
             },
             touch: progress.touch as u32,
             touch_count: progress.budget as u32,
-            force: self.last.map_or(f64::NAN, |last| last.wrench_b.force.norm()),
+            force: self
+                .last
+                .map_or(f64::NAN, |last| last.wrench_b.force.norm()),
             uncertainty: progress.uncertainty.unwrap_or(f64::NAN),
             elapsed: self.link.setup.clock.since(self.link.begun).as_secs_f64(),
         });
@@ -150,7 +181,11 @@ impl Observer for ArmWorld<'_> {
     }
 
     fn stop_request(&self) -> Option<StopRequest> {
-        self.link.common.stops.request().or(is_cancelled(self.watched).then_some(StopRequest::Retract))
+        self.link
+            .common
+            .stops
+            .request()
+            .or(is_cancelled(self.watched).then_some(StopRequest::Retract))
     }
 }
 
@@ -171,7 +206,11 @@ impl World for ArmWorld<'_> {
 
     fn enter(&mut self, phase: Phase) {
         self.phase = phase;
-        self.link.common.stops.enter(if phase == Phase::Retract { Motion::Retracts } else { Motion::Moves });
+        self.link.common.stops.enter(if phase == Phase::Retract {
+            Motion::Retracts
+        } else {
+            Motion::Moves
+        });
         self.send_feedback();
     }
 }

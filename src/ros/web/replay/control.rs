@@ -24,7 +24,12 @@ impl ReplayControl {
     ///
     /// - `session`: its name.
     pub fn new(session: &str, clock: Clock) -> Self {
-        Self { session: session.to_owned(), clock, progress: Mutex::default(), changed: Condvar::new() }
+        Self {
+            session: session.to_owned(),
+            clock,
+            progress: Mutex::default(),
+            changed: Condvar::new(),
+        }
     }
 
     /// Name of the session.
@@ -115,10 +120,16 @@ impl ReplayControl {
         }
     }
 
-    fn wait<'a>(&self, progress: MutexGuard<'a, ReplayProgress>, longest: Duration) -> MutexGuard<'a, ReplayProgress> {
+    fn wait<'a>(
+        &self,
+        progress: MutexGuard<'a, ReplayProgress>,
+        longest: Duration,
+    ) -> MutexGuard<'a, ReplayProgress> {
         let changes = progress.changes;
-        let is_same = |progress: &mut ReplayProgress| progress.changes == changes && !progress.is_closed;
-        self.clock.wait_while(&self.changed, progress, longest, is_same)
+        let is_same =
+            |progress: &mut ReplayProgress| progress.changes == changes && !progress.is_closed;
+        self.clock
+            .wait_while(&self.changed, progress, longest, is_same)
     }
 }
 
@@ -146,7 +157,11 @@ mod tests {
     }
 
     /// What a message of a time does, once it is known.
-    fn waiting(control: &Arc<ReplayControl>, hand: &ManualClock, at_ns: i64) -> Receiver<ReplayNext> {
+    fn waiting(
+        control: &Arc<ReplayControl>,
+        hand: &ManualClock,
+        at_ns: i64,
+    ) -> Receiver<ReplayNext> {
         let (begun, control) = (hand.begun(), Arc::clone(control));
         let (to, next) = channel();
         spawn(move || to.send(control.wait_for(at_ns)));
@@ -205,7 +220,10 @@ mod tests {
         set(&control, json!({ "at_s": 10.5 }));
         assert_eq!(control.wait_for(50 * S), ReplayNext::Again);
         let shown = control.shown();
-        assert_eq!((shown.at_s, shown.target_s, shown.is_paused), (0.0, Some(10.5), true));
+        assert_eq!(
+            (shown.at_s, shown.target_s, shown.is_paused),
+            (0.0, Some(10.5), true)
+        );
         assert_eq!(control.wait_for(10 * S), ReplayNext::Go);
         // beyond the end is the end; from there it goes back to the beginning
         set(&control, json!({ "is_paused": false, "at_s": 1e300 }));
@@ -234,7 +252,10 @@ mod tests {
         for (request, words) in [
             (json!({ "speed": 0 }), "it may be 0.1 to 100"),
             (json!({ "speed": 1e9 }), "it may be 0.1 to 100"),
-            (json!({ "at_s": -1, "is_paused": true }), "it may be 0 or more"),
+            (
+                json!({ "at_s": -1, "is_paused": true }),
+                "it may be 0 or more",
+            ),
             (json!({ "at": 1 }), "unknown field"),
             (json!("all"), "invalid type"),
         ] {
@@ -243,6 +264,11 @@ mod tests {
         }
         assert_eq!(control.shown(), before);
         let unread = ReplayControl::new("monday", Clock::system());
-        assert!(unread.call(json!({ "at_s": 1 })).unwrap_err().contains("still being read"));
+        assert!(
+            unread
+                .call(json!({ "at_s": 1 }))
+                .unwrap_err()
+                .contains("still being read")
+        );
     }
 }

@@ -31,7 +31,14 @@ pub(in crate::ros::web) async fn serve(mut socket: WebSocket, replays: &Replays,
         Some(Err(why)) => return refuse(&mut socket, session, why).await,
     };
     match PagePlace::take(&site) {
-        None => refuse(&mut socket, session, "so many pages look at it already: close one".to_owned()).await,
+        None => {
+            refuse(
+                &mut socket,
+                session,
+                "so many pages look at it already: close one".to_owned(),
+            )
+            .await
+        }
         // in a replay nobody operates
         Some(place) => {
             connection::serve(socket, site, Role::Look).await;
@@ -51,13 +58,18 @@ async fn opened(socket: &mut WebSocket, replay: &Replay) -> Option<Result<Arc<Si
         }
         say(socket, &replay.control.shown()).await?;
         if let Ok(Err(_)) = timeout(SIGN_OF_LIFE, opened.changed()).await {
-            return Some(Err("there is no thread for it: end other programs".to_owned()));
+            return Some(Err(
+                "there is no thread for it: end other programs".to_owned()
+            ));
         }
     }
 }
 
 async fn refuse(socket: &mut WebSocket, session: &str, why: String) {
-    if say(socket, &ReplayShown::refused(session, why)).await.is_some() {
+    if say(socket, &ReplayShown::refused(session, why))
+        .await
+        .is_some()
+    {
         // it may have gone meanwhile
         let _ = timeout(GONE_AFTER, socket.send(Message::Close(None))).await;
     }
@@ -66,5 +78,8 @@ async fn refuse(socket: &mut WebSocket, session: &str, why: String) {
 /// Whether the page has taken it.
 async fn say(socket: &mut WebSocket, shown: &ReplayShown) -> Option<()> {
     let text = text_of("replay", shown)?;
-    timeout(GONE_AFTER, socket.send(Message::text(text))).await.ok()?.ok()
+    timeout(GONE_AFTER, socket.send(Message::text(text)))
+        .await
+        .ok()?
+        .ok()
 }

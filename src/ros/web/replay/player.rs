@@ -31,7 +31,8 @@ use crate::stylus::Message;
 /// Messages that wait for the node at most: a pause, and another place, are obeyed after them.
 const INBOX: usize = 256;
 /// Why it goes no further when the node is gone.
-const ENDED: &str = "the replay ended by a fault of touchup: please report it with the session's folder";
+const ENDED: &str =
+    "the replay ended by a fault of touchup: please report it with the session's folder";
 
 /// What the pages of a replay are shown, once it is there; why there is none.
 pub(super) type OpenedReplay = Option<Result<Arc<Site>, String>>;
@@ -59,8 +60,19 @@ struct ReplayStage {
 impl Player {
     /// Plays until nobody looks any more.
     pub fn run(self) {
-        let Self { control, runtime, opened, .. } = &self;
-        let ReplayStage { recording, site, inbox, stylus, node } = match self.open() {
+        let Self {
+            control,
+            runtime,
+            opened,
+            ..
+        } = &self;
+        let ReplayStage {
+            recording,
+            site,
+            inbox,
+            stylus,
+            node,
+        } = match self.open() {
             Ok(stage) => stage,
             Err(why) => return drop(opened.send_replace(Some(Err(why)))),
         };
@@ -78,31 +90,62 @@ impl Player {
 
     /// Reads the session, and begins a node that is to take it.
     fn open(&self) -> Result<ReplayStage, String> {
-        let Self { folder, session_folder, entrance, control, .. } = self;
+        let Self {
+            folder,
+            session_folder,
+            entrance,
+            control,
+            ..
+        } = self;
         let record = SessionRecord::open(folder.path()).map_err(|error| error.to_string())?;
-        let SessionRecord { scan, mesh_unit, scene, recording, topics, .. } = record;
-        let source = if topics.pose.starts_with("/probe/") { "probe" } else { "stylus" };
-        let read = SessionRecording::read(recording.clone(), topics.clone(), source, || !control.is_closed());
-        let readable = read.map_err(|error| format!("the recording cannot be replayed: {error}"))?;
+        let SessionRecord {
+            scan,
+            mesh_unit,
+            scene,
+            recording,
+            topics,
+            ..
+        } = record;
+        let source = if topics.pose.starts_with("/probe/") {
+            "probe"
+        } else {
+            "stylus"
+        };
+        let read = SessionRecording::read(recording.clone(), topics.clone(), source, || {
+            !control.is_closed()
+        });
+        let readable =
+            read.map_err(|error| format!("the recording cannot be replayed: {error}"))?;
         // of a session that goes on: after its messages, so that what was undone before one of them is not missing
-        let changes = SessionRecord::strokes_of(folder.path()).map_err(|error| error.to_string())?;
+        let changes =
+            SessionRecord::strokes_of(folder.path()).map_err(|error| error.to_string())?;
         let parameters = [
             ("scene", path(&scene)?),
             ("scan", path(&scan)?),
-            ("mesh_unit", ParameterValue::String(mesh_unit.name().to_owned())),
+            (
+                "mesh_unit",
+                ParameterValue::String(mesh_unit.name().to_owned()),
+            ),
             ("source", ParameterValue::String(source.to_owned())),
         ];
         let mut all = Parameters::default();
         for (name, value) in parameters {
             all.set(name, &value).map_err(|error| error.to_string())?;
         }
-        let ready = Prepared::replayed(all, folder.clone(), ReplayedSession::new(recording, topics, changes))
-            .map_err(|error| error.to_string())?;
+        let ready = Prepared::replayed(
+            all,
+            folder.clone(),
+            ReplayedSession::new(recording, topics, changes),
+        )
+        .map_err(|error| error.to_string())?;
         let clock = Clock::system();
         let (inbox, arrivals) = inbox(INBOX, &clock);
         let (network, stylus) = in_process::start_unread(inbox.clone(), &clock);
         let scan_mesh = ready.scan_mesh();
-        let file = scan.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let file = scan
+            .file_name()
+            .map(|name| name.to_string_lossy().into_owned())
+            .unwrap_or_default();
         let site = Arc::new(Site {
             board: Board::new(ready.whole_mesh()),
             calls: Calls::new(&inbox).map_err(|error| error.to_string())?,
@@ -112,27 +155,48 @@ impl Player {
             annotations: Annotations::new(session_folder),
             nominal: None,
             reports: Reports::new(None, mesh_unit),
-            scan: ScanShown { file, faces: scan_mesh.0.face_count(), is_size_confirmed: true },
+            scan: ScanShown {
+                file,
+                faces: scan_mesh.0.face_count(),
+                is_size_confirmed: true,
+            },
             scan_mesh,
             session_folder: session_folder.clone(),
             pages: AtomicUsize::new(0),
             replay: Some(Arc::clone(control)),
         });
-        let port = Arc::new(PagePort { network, site: Arc::clone(&site) });
-        let node = ready.start(port, arrivals, None).map_err(|error| error.to_string())?;
+        let port = Arc::new(PagePort {
+            network,
+            site: Arc::clone(&site),
+        });
+        let node = ready
+            .start(port, arrivals, None)
+            .map_err(|error| error.to_string())?;
         control.begin(readable.end_ns, readable.damage.clone());
-        Ok(ReplayStage { recording: readable, site, inbox, stylus, node })
+        Ok(ReplayStage {
+            recording: readable,
+            site,
+            inbox,
+            stylus,
+            node,
+        })
     }
 }
 
 /// A path as a parameter of a node.
 fn path(path: &Path) -> Result<ParameterValue, String> {
-    let text = path.to_str().ok_or_else(|| format!("{}: parameters of ROS are UTF-8, rename it", path.display()))?;
+    let text = path
+        .to_str()
+        .ok_or_else(|| format!("{}: parameters of ROS are UTF-8, rename it", path.display()))?;
     Ok(ParameterValue::String(text.to_owned()))
 }
 
 /// Plays from the beginning, and again whenever it is to, until nobody looks.
-fn play(recording: &SessionRecording, control: &ReplayControl, stylus: &OtherParticipants) -> Result<(), String> {
+fn play(
+    recording: &SessionRecording,
+    control: &ReplayControl,
+    stylus: &OtherParticipants,
+) -> Result<(), String> {
     while play_once(recording, control, stylus)? == ReplayNext::Again {
         step(ReplayStep::Again, stylus)?;
     }
@@ -151,7 +215,9 @@ fn play_once(
             next => return Ok(next),
         }
         let is_taken = match &message {
-            Message::Wrench(wrench) => stylus.publish_wrench(as_wrench(wrench, &recording.wrench_frame)),
+            Message::Wrench(wrench) => {
+                stylus.publish_wrench(as_wrench(wrench, &recording.wrench_frame))
+            }
             Message::Pose(pose) => stylus.publish_pose(as_pose(pose, CELL)),
         };
         if !is_taken {
@@ -163,5 +229,8 @@ fn play_once(
 }
 
 fn step(step: ReplayStep, stylus: &OtherParticipants) -> Result<(), String> {
-    stylus.ask(|reply| Arrival::Replay(step, reply)).recv().map_err(|_| ENDED.to_owned())?
+    stylus
+        .ask(|reply| Arrival::Replay(step, reply))
+        .recv()
+        .map_err(|_| ENDED.to_owned())?
 }

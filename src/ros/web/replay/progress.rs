@@ -79,7 +79,14 @@ impl ReplayProgress {
     }
 
     /// Goes on as pages want it.
-    pub fn set(&mut self, ReplayRequest { speed, is_paused, at_s }: ReplayRequest) {
+    pub fn set(
+        &mut self,
+        ReplayRequest {
+            speed,
+            is_paused,
+            at_s,
+        }: ReplayRequest,
+    ) {
         self.speed = speed.unwrap_or(self.speed);
         self.is_paused = is_paused.unwrap_or(self.is_paused);
         if let Some(at_s) = at_s {

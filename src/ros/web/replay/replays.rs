@@ -74,7 +74,8 @@ impl Replays {
         if running.len() >= MOST_REPLAYS {
             return Err(BUSY.to_owned());
         }
-        let folder = SessionFolder::open(&self.session_folder, session).map_err(|error| error.to_string())?;
+        let folder = SessionFolder::open(&self.session_folder, session)
+            .map_err(|error| error.to_string())?;
         let replay = self.begin(folder);
         running.insert(session.to_owned(), Arc::downgrade(&replay));
         Ok(replay)

@@ -32,7 +32,11 @@ pub(in crate::ros::web) struct ReplayShown {
 impl ReplayShown {
     /// There is none.
     pub fn refused(session: &str, why: String) -> Self {
-        Self { session: session.to_owned(), error: Some(why), ..Self::default() }
+        Self {
+            session: session.to_owned(),
+            error: Some(why),
+            ..Self::default()
+        }
     }
 }
 
@@ -51,9 +55,14 @@ impl ReplayRequest {
     /// # Errors
     /// In words: what is wrong with it.
     pub fn read(request: Value) -> Result<Self, String> {
-        let request: Self = serde_json::from_value(request).map_err(|error| format!("~/replay: {error}"))?;
+        let request: Self =
+            serde_json::from_value(request).map_err(|error| format!("~/replay: {error}"))?;
         if let Some(speed) = request.speed.filter(|speed| !SPEEDS.contains(speed)) {
-            return Err(format!("speed is {speed}: it may be {} to {}", SPEEDS.start(), SPEEDS.end()));
+            return Err(format!(
+                "speed is {speed}: it may be {} to {}",
+                SPEEDS.start(),
+                SPEEDS.end()
+            ));
         }
         if let Some(at_s) = request.at_s.filter(|at_s| *at_s < 0.0) {
             return Err(format!("at_s is {at_s}: it may be 0 or more"));

@@ -11,13 +11,24 @@ use super::setup_state::NodeSetupError;
 ///
 /// # Errors
 /// [`NodeSetupError::Refused`]: the system gives no thread.
-pub(super) fn beside(name: &str, what: &str, work: impl FnOnce() + Send + 'static) -> Result<(), NodeSetupError> {
+pub(super) fn beside(
+    name: &str,
+    what: &str,
+    work: impl FnOnce() + Send + 'static,
+) -> Result<(), NodeSetupError> {
     let started = Builder::new().name(name.to_owned()).spawn(work).map(drop);
-    started.map_err(|error| NodeSetupError::Refused(format!("{what} is not possible now: {error}; end other programs")))
+    started.map_err(|error| {
+        NodeSetupError::Refused(format!(
+            "{what} is not possible now: {error}; end other programs"
+        ))
+    })
 }
 
 /// What comes of work beside: nobody waits for what ended by a fault.
 pub(super) fn to_its_end<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    let fault = || "a fault of touchup ended this: please report it with the file, and choose another one".to_owned();
+    let fault = || {
+        "a fault of touchup ended this: please report it with the file, and choose another one"
+            .to_owned()
+    };
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| Err(fault()))
 }

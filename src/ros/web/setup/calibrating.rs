@@ -12,8 +12,8 @@ use super::node_setup::NodeSetup;
 use super::setup_shown::{CalibrationChoice, CalibrationFacts};
 use super::setup_state::{NO_TIP, NodeSetupError};
 use crate::calibration::{
-    Calibration, CalibrationError, CalibrationKind, CalibrationRecording, PayloadCalibrationParams, calibrate_payload,
-    calibrate_scan, calibrate_tip,
+    Calibration, CalibrationError, CalibrationKind, CalibrationRecording, PayloadCalibrationParams,
+    calibrate_payload, calibrate_scan, calibrate_tip,
 };
 use crate::io::recording::Topics;
 use crate::io::scan_folder::FolderFileKind;
@@ -50,18 +50,32 @@ impl NodeSetup {
     ///
     /// # Errors
     /// [`NodeSetupError`]
-    pub(super) fn calibrate(self: &Arc<Self>, request: &CalibrateRequest) -> Result<(), NodeSetupError> {
-        let CalibrateRequest { what, recording, points } = request;
+    pub(super) fn calibrate(
+        self: &Arc<Self>,
+        request: &CalibrateRequest,
+    ) -> Result<(), NodeSetupError> {
+        let CalibrateRequest {
+            what,
+            recording,
+            points,
+        } = request;
         let what = *what;
         let file = match (what, recording, points) {
-            (CalibrationKind::Scan, _, None) => Err("name a table of the points that were picked on the scan"),
-            (CalibrationKind::Scan, recording, Some(points)) => Ok(recording.as_ref().unwrap_or(points)),
+            (CalibrationKind::Scan, _, None) => {
+                Err("name a table of the points that were picked on the scan")
+            }
+            (CalibrationKind::Scan, recording, Some(points)) => {
+                Ok(recording.as_ref().unwrap_or(points))
+            }
             (_, Some(recording), None) => Ok(recording),
             _ => Err("name a recording that was made for this calibration, and nothing else"),
         };
         let file = file.map_err(NodeSetupError::refused)?.clone();
         let place = |name: &Option<String>, kind| {
-            let place = name.as_ref().map(|name| self.folder.file(name, kind)).transpose();
+            let place = name
+                .as_ref()
+                .map(|name| self.folder.file(name, kind))
+                .transpose();
             place.map_err(NodeSetupError::refused)
         };
         let points = place(points, FolderFileKind::PointTable)?;
@@ -73,18 +87,37 @@ impl NodeSetup {
             if what == CalibrationKind::Scan && recording.is_some() && !state.has_tip() {
                 return Err(NO_TIP);
             }
-            let text = state.draft.with(state.tip, None).map_err(NodeSetupError::refused)?;
+            let text = state
+                .draft
+                .with(state.tip, None)
+                .map_err(NodeSetupError::refused)?;
             let scene = Scene::from_yaml(&text).map_err(NodeSetupError::refused)?;
-            state.calibration = CalibrationChoice::Running { what, file: file.clone(), share: None };
+            state.calibration = CalibrationChoice::Running {
+                what,
+                file: file.clone(),
+                share: None,
+            };
             scene
         };
-        let (setup, inputs) = (Arc::clone(self), CalibrationInputs { what, recording, points, scene });
+        let (setup, inputs) = (
+            Arc::clone(self),
+            CalibrationInputs {
+                what,
+                recording,
+                points,
+                scene,
+            },
+        );
         let calibrate = move || {
             let found = to_its_end(|| {
                 let found = calibrated(&inputs, &setup.topics, &|share| setup.note_share(share));
                 found.map_err(|error| setup.in_words(&error))
             });
-            let facts = |Calibration { found, doubts, losses }| CalibrationFacts {
+            let facts = |Calibration {
+                             found,
+                             doubts,
+                             losses,
+                         }| CalibrationFacts {
                 what,
                 file: file.clone(),
                 found,
@@ -109,9 +142,10 @@ impl NodeSetup {
         let mut state = self.idle()?;
         self.take_edits(&mut state)?;
         let draft = match &state.calibration {
-            CalibrationChoice::Found(facts) if facts.what == what && !facts.is_used => {
-                state.draft.calibrated(&facts.found, SystemTime::now()).map_err(NodeSetupError::refused)?
-            }
+            CalibrationChoice::Found(facts) if facts.what == what && !facts.is_used => state
+                .draft
+                .calibrated(&facts.found, SystemTime::now())
+                .map_err(NodeSetupError::refused)?,
             _ => return Err(NO_RESULT),
         };
         self.write_scene(&mut state, draft.text().to_owned())?;
@@ -132,7 +166,9 @@ impl NodeSetup {
 
     /// An error, which names files as the folder does.
     fn in_words(&self, error: &CalibrationError) -> String {
-        error.to_string().replace(&format!("{}/", self.folder.path().display()), "")
+        error
+            .to_string()
+            .replace(&format!("{}/", self.folder.path().display()), "")
     }
 }
 
@@ -144,9 +180,20 @@ fn calibrated(
     topics: &Topics,
     at_share: &dyn Fn(f64),
 ) -> Result<Calibration<FoundCalibration>, CalibrationError> {
-    let CalibrationInputs { what, recording, points, scene } = inputs;
-    let opened = recording.as_deref().map(|path| CalibrationRecording::open(path, topics)).transpose()?;
-    let count = opened.as_ref().and_then(CalibrationRecording::message_count).filter(|count| *count > 0);
+    let CalibrationInputs {
+        what,
+        recording,
+        points,
+        scene,
+    } = inputs;
+    let opened = recording
+        .as_deref()
+        .map(|path| CalibrationRecording::open(path, topics))
+        .transpose()?;
+    let count = opened
+        .as_ref()
+        .and_then(CalibrationRecording::message_count)
+        .filter(|count| *count > 0);
     let mut so_far = 0u64;
     let mut at_each = || {
         so_far += 1;
@@ -155,11 +202,15 @@ fn calibrated(
         }
     };
     match (what, opened) {
-        (CalibrationKind::Tip, Some(recording)) => {
-            calibrate_tip(recording, scene, &mut at_each).map(|found| found.map(FoundCalibration::Tip))
-        }
+        (CalibrationKind::Tip, Some(recording)) => calibrate_tip(recording, scene, &mut at_each)
+            .map(|found| found.map(FoundCalibration::Tip)),
         (CalibrationKind::Payload, Some(recording)) => {
-            let found = calibrate_payload(recording, scene, PayloadCalibrationParams::default(), &mut at_each);
+            let found = calibrate_payload(
+                recording,
+                scene,
+                PayloadCalibrationParams::default(),
+                &mut at_each,
+            );
             found.map(|found| found.map(FoundCalibration::Payload))
         }
         (_, recording) => {

@@ -18,18 +18,29 @@ impl NodeSetup {
     /// # Errors
     /// [`NodeSetupError`]
     pub(super) fn choose_scan(self: &Arc<Self>, name: &str) -> Result<(), NodeSetupError> {
-        let path = self.folder.file(name, FolderFileKind::Scan).map_err(NodeSetupError::refused)?;
+        let path = self
+            .folder
+            .file(name, FolderFileKind::Scan)
+            .map_err(NodeSetupError::refused)?;
         let stated = {
             let mut state = self.changing()?;
-            (state.scan, state.unit, state.failure) = (ScanChoice::Reading { file: name.to_owned() }, None, None);
+            (state.scan, state.unit, state.failure) = (
+                ScanChoice::Reading {
+                    file: name.to_owned(),
+                },
+                None,
+                None,
+            );
             state.draft.unit_of(name)
         };
         let (setup, file) = (Arc::clone(self), name.to_owned());
         let read = move || {
             let found = to_its_end(|| read_facts(&path, &file, stated));
-            locked(&setup.state).scan = found.map_or_else(|why| ScanChoice::Refused { file, why }, ScanChoice::Read);
+            locked(&setup.state).scan =
+                found.map_or_else(|why| ScanChoice::Refused { file, why }, ScanChoice::Read);
         };
-        beside("setup-scan", "reading a scan", read).inspect_err(|_| locked(&self.state).scan = ScanChoice::None)
+        beside("setup-scan", "reading a scan", read)
+            .inspect_err(|_| locked(&self.state).scan = ScanChoice::None)
     }
 
     /// Says the unit of the scan.
@@ -38,9 +49,17 @@ impl NodeSetup {
     /// [`NodeSetupError`]
     pub(super) fn choose_unit(&self, unit: MeshUnit) -> Result<(), NodeSetupError> {
         let mut state = self.changing()?;
-        let ScanChoice::Read(facts) = &state.scan else { return Err(NO_SCAN) };
-        if !facts.units.iter().any(|choice| choice.unit == unit.name() && choice.is_plausible) {
-            return Err(NodeSetupError::Refused(format!("in {unit} the scan has a size that no work-piece has")));
+        let ScanChoice::Read(facts) = &state.scan else {
+            return Err(NO_SCAN);
+        };
+        if !facts
+            .units
+            .iter()
+            .any(|choice| choice.unit == unit.name() && choice.is_plausible)
+        {
+            return Err(NodeSetupError::Refused(format!(
+                "in {unit} the scan has a size that no work-piece has"
+            )));
         }
         state.unit = Some(unit);
         state.clear_failure(&[SetupStep::Unit]);
@@ -58,7 +77,10 @@ impl NodeSetup {
                 "the scene says `uncertainty: off`, so nothing is made of ±: leave it empty",
             ));
         }
-        state.draft.with(Some(tip), None).map_err(NodeSetupError::refused)?;
+        state
+            .draft
+            .with(Some(tip), None)
+            .map_err(NodeSetupError::refused)?;
         state.tip = Some(tip);
         state.clear_failure(&[SetupStep::Tip]);
         Ok(())
@@ -71,11 +93,16 @@ impl NodeSetup {
     pub(super) fn start(&self) -> Result<(), NodeSetupError> {
         let mut state = self.choosing()?;
         self.take_edits(&mut state)?;
-        let (ScanChoice::Read(facts), Some(unit)) = (&state.scan, state.unit) else { return Err(NO_SCAN) };
+        let (ScanChoice::Read(facts), Some(unit)) = (&state.scan, state.unit) else {
+            return Err(NO_SCAN);
+        };
         if !state.has_tip() {
             return Err(NO_TIP);
         }
-        let text = state.draft.with(state.tip, Some((&facts.file, unit))).map_err(NodeSetupError::refused)?;
+        let text = state
+            .draft
+            .with(state.tip, Some((&facts.file, unit)))
+            .map_err(NodeSetupError::refused)?;
         self.write_scene(&mut state, text)?;
         (state.stage, state.failure) = (Stage::Starting, None);
         self.changed.notify_all();

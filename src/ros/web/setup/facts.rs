@@ -42,11 +42,24 @@ pub(super) struct UnitChoice {
 ///
 /// # Errors
 /// In words: why it cannot be used, and what to do.
-pub(super) fn read_facts(path: &Path, file: &str, stated: Option<MeshUnit>) -> Result<ScanFacts, String> {
-    let (unit, Scan { mesh, repair, cloud }) = read_in_any(path).map_err(|error| error.to_string())?;
+pub(super) fn read_facts(
+    path: &Path,
+    file: &str,
+    stated: Option<MeshUnit>,
+) -> Result<ScanFacts, String> {
+    let (
+        unit,
+        Scan {
+            mesh,
+            repair,
+            cloud,
+        },
+    ) = read_in_any(path).map_err(|error| error.to_string())?;
     let [low, high] = mesh.bounds();
     let sides = (high - low) / unit.metres();
-    let is_e57 = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("e57"));
+    let is_e57 = path
+        .extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("e57"));
     Ok(ScanFacts {
         file: file.to_owned(),
         faces: mesh.face_count(),
@@ -61,14 +74,21 @@ fn read_in_any(path: &Path) -> Result<(MeshUnit, Scan), ScanError> {
     for unit in SUGGESTED {
         match read_scan(path, unit) {
             Ok(scan) => return Ok((unit, scan)),
-            Err(error @ ScanError::File(MeshFileError::Implausible { .. } | MeshFileError::UnitOfE57 { .. })) => {
+            Err(
+                error @ ScanError::File(
+                    MeshFileError::Implausible { .. } | MeshFileError::UnitOfE57 { .. },
+                ),
+            ) => {
                 refused = Some(error);
             }
             Err(other) => return Err(other),
         }
     }
     // the last unit's refusal; there is one where no unit was taken
-    refused.map_or_else(|| read_scan(path, MeshUnit::default()).map(|scan| (MeshUnit::default(), scan)), Err)
+    refused.map_or_else(
+        || read_scan(path, MeshUnit::default()).map(|scan| (MeshUnit::default(), scan)),
+        Err,
+    )
 }
 
 /// - `sides`: in the unit of the file; `is_in_metres`: by the standard of its format.
@@ -76,11 +96,15 @@ fn choices(sides: [f64; 3], stated: Option<MeshUnit>, is_in_metres: bool) -> Vec
     let diagonal = sides.iter().map(|side| side * side).sum::<f64>().sqrt();
     let longest = sides.into_iter().fold(0.0, f64::max);
     let is_plausible = |unit: MeshUnit| {
-        (!is_in_metres || unit == MeshUnit::Metre) && (SMALLEST_M..=LARGEST_M).contains(&(diagonal * unit.metres()))
+        (!is_in_metres || unit == MeshUnit::Metre)
+            && (SMALLEST_M..=LARGEST_M).contains(&(diagonal * unit.metres()))
     };
     let plausible = || SUGGESTED.into_iter().filter(|unit| is_plausible(*unit));
     let usual = plausible().find(|unit| USUAL.contains(&(longest * unit.metres())));
-    let likely = stated.filter(|unit| is_plausible(*unit)).or(usual).or_else(|| plausible().next());
+    let likely = stated
+        .filter(|unit| is_plausible(*unit))
+        .or(usual)
+        .or_else(|| plausible().next());
     let choice = |unit: MeshUnit| UnitChoice {
         unit: unit.name(),
         sides_m: sides.map(|side| side * unit.metres()),
@@ -96,7 +120,10 @@ mod tests {
 
     fn likely(longest: f64, stated: Option<MeshUnit>) -> Vec<&'static str> {
         let all = choices([longest, longest / 2.0, longest / 4.0], stated, false);
-        all.iter().filter(|choice| choice.is_likely).map(|choice| choice.unit).collect()
+        all.iter()
+            .filter(|choice| choice.is_likely)
+            .map(|choice| choice.unit)
+            .collect()
     }
 
     #[test]
@@ -114,11 +141,17 @@ mod tests {
     #[test]
     fn sizes_are_those_of_the_file_in_each_unit_and_only_those_that_can_be_are_plausible() {
         let all = choices([127.0, 63.5, 34.9], None, false);
-        let plausible: Vec<_> = all.iter().map(|choice| (choice.unit, choice.is_plausible)).collect();
+        let plausible: Vec<_> = all
+            .iter()
+            .map(|choice| (choice.unit, choice.is_plausible))
+            .collect();
         assert_eq!(plausible, [("mm", true), ("m", false), ("inch", true)]);
         assert!((all[2].sides_m[0] - 127.0 * 0.0254).abs() < 1e-12);
         // an E57 is in metres
-        let of_e57: Vec<_> = choices([2.0, 1.0, 1.0], None, true).iter().map(|choice| choice.is_plausible).collect();
+        let of_e57: Vec<_> = choices([2.0, 1.0, 1.0], None, true)
+            .iter()
+            .map(|choice| choice.is_plausible)
+            .collect();
         assert_eq!(of_e57, [false, true, false]);
     }
 }

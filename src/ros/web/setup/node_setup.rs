@@ -49,19 +49,32 @@ impl NodeSetup {
     /// # Errors
     /// [`WebError::Setup`]: the folder or the scene cannot be used.
     pub fn new(params: SetupParams) -> Result<Self, WebError> {
-        let SetupParams { folder: path, scene, radius_mm, topics } = params;
-        let bad = |error| WebError::Setup(format!("{}: {error}; name a folder by --web-scans", path.display()));
+        let SetupParams {
+            folder: path,
+            scene,
+            radius_mm,
+            topics,
+        } = params;
+        let bad = |error| {
+            WebError::Setup(format!(
+                "{}: {error}; name a folder by --web-scans",
+                path.display()
+            ))
+        };
         let folder = ScanFolder::open(&path).map_err(bad)?;
         let kept = folder.plain_file(&format!("{SCENE}.yaml"));
         let is_kept = |scene: &PathBuf| kept.as_ref().is_some_and(|kept| is_same_file(kept, scene));
         let source = scene.or_else(|| kept.clone());
-        let draft = SceneDraft::read(source.as_deref()).map_err(|error| WebError::Setup(error.to_string()))?;
+        let draft = SceneDraft::read(source.as_deref())
+            .map_err(|error| WebError::Setup(error.to_string()))?;
         let is_target = source.as_ref().is_some_and(is_kept);
         let target = match is_target {
             true => kept.unwrap_or_else(|| folder.free_place(SCENE, "yaml")),
             false => folder.free_place(SCENE, "yaml"),
         };
-        if let Some(source) = source.filter(|source| draft.names_files() && !is_beside(source, &target)) {
+        if let Some(source) =
+            source.filter(|source| draft.names_files() && !is_beside(source, &target))
+        {
             return Err(WebError::Setup(format!(
                 "{} names files beside it, and the scene of the page will be {}: name the folder of the scene by --web-scans",
                 source.display(),
@@ -69,16 +82,30 @@ impl NodeSetup {
             )));
         }
         let known_radius_mm = radius_mm.or_else(|| draft.radius_mm());
-        let on_disk = if is_target { draft.text().to_owned() } else { String::new() };
+        let on_disk = if is_target {
+            draft.text().to_owned()
+        } else {
+            String::new()
+        };
         let (state, changed) = (Mutex::new(SetupState::new(draft, on_disk)), Condvar::new());
-        Ok(Self { folder, target, known_radius_mm, topics, state, changed })
+        Ok(Self {
+            folder,
+            target,
+            known_radius_mm,
+            topics,
+            state,
+            changed,
+        })
     }
 
     /// Waits until somebody starts the node: the scene to start it with, which names the scan and its unit.
     pub fn wait(&self) -> PathBuf {
         let mut state = locked(&self.state);
         while state.stage != Stage::Starting {
-            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+            state = self
+                .changed
+                .wait(state)
+                .unwrap_or_else(PoisonError::into_inner);
         }
         self.target.clone()
     }
@@ -97,11 +124,21 @@ impl NodeSetup {
     /// # Errors
     /// In words: the folder cannot be read.
     pub(super) fn shown(&self, role: Role) -> Result<SetupShown, String> {
-        let list =
-            |kind| self.folder.list(kind).map_err(|error| format!("the folder of scans cannot be read: {error}"));
+        let list = |kind| {
+            self.folder
+                .list(kind)
+                .map_err(|error| format!("the folder of scans cannot be read: {error}"))
+        };
         let files = list(FolderFileKind::Scan)?;
-        let (recordings, tables) = (list(FolderFileKind::Recording)?, list(FolderFileKind::PointTable)?);
-        let name = |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let (recordings, tables) = (
+            list(FolderFileKind::Recording)?,
+            list(FolderFileKind::PointTable)?,
+        );
+        let name = |path: &Path| {
+            path.file_name()
+                .map(|name| name.to_string_lossy().into_owned())
+                .unwrap_or_default()
+        };
         let state = locked(&self.state);
         Ok(SetupShown {
             stage: state.stage,
@@ -129,7 +166,9 @@ impl NodeSetup {
 
     /// Takes up what somebody else has put into the scene since it was read or written here, as `touchup calibrate` does.
     pub(super) fn take_edits(&self, state: &mut SetupState) -> Result<(), NodeSetupError> {
-        let bad = |error: &dyn Display| NodeSetupError::Refused(format!("{}: {error}", self.target.display()));
+        let bad = |error: &dyn Display| {
+            NodeSetupError::Refused(format!("{}: {error}", self.target.display()))
+        };
         let text = read_text(&self.target).map_err(|error| bad(&error))?;
         if !text.is_empty() && text != state.on_disk {
             state.draft = SceneDraft::of(text.clone()).map_err(|error| bad(&error))?;
@@ -140,8 +179,14 @@ impl NodeSetup {
     }
 
     /// Writes the scene.
-    pub(super) fn write_scene(&self, state: &mut SetupState, text: String) -> Result<(), NodeSetupError> {
-        let not_written = |error| NodeSetupError::Refused(format!("cannot write {}: {error}", self.target.display()));
+    pub(super) fn write_scene(
+        &self,
+        state: &mut SetupState,
+        text: String,
+    ) -> Result<(), NodeSetupError> {
+        let not_written = |error| {
+            NodeSetupError::Refused(format!("cannot write {}: {error}", self.target.display()))
+        };
         write_text_file(&self.target, &text).map_err(not_written)?;
         state.on_disk = text;
         Ok(())

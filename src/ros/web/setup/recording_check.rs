@@ -37,10 +37,25 @@ pub(super) struct CheckInputs<'a> {
 /// # Errors
 /// In words: why it cannot be replayed.
 pub(super) fn check_recording(file: &str, inputs: &CheckInputs<'_>) -> Result<CheckFacts, String> {
-    let CheckInputs { scan: (scan, unit), recording, scene, topics } = inputs;
-    let mesh = read_scan(scan, *unit).map_err(|error| error.to_string())?.mesh;
-    let opened = Recording::open(recording, topics, StampSource::Header).map_err(|error| error.to_string())?;
-    let found = check_input(opened, &mesh, scene, None, &mut || {}).map_err(|error| error.to_string())?;
-    let InputCheck { findings, losses, .. } = found;
-    Ok(CheckFacts { file: file.to_owned(), findings, losses })
+    let CheckInputs {
+        scan: (scan, unit),
+        recording,
+        scene,
+        topics,
+    } = inputs;
+    let mesh = read_scan(scan, *unit)
+        .map_err(|error| error.to_string())?
+        .mesh;
+    let opened = Recording::open(recording, topics, StampSource::Header)
+        .map_err(|error| error.to_string())?;
+    let found =
+        check_input(opened, &mesh, scene, None, &mut || {}).map_err(|error| error.to_string())?;
+    let InputCheck {
+        findings, losses, ..
+    } = found;
+    Ok(CheckFacts {
+        file: file.to_owned(),
+        findings,
+        losses,
+    })
 }

@@ -50,7 +50,10 @@ pub(in crate::ros::web) fn router(entrance: &Arc<Entrance>, setup: &Arc<NodeSetu
         .route("/api/setup/use", post(use_calibration))
         .route("/api/setup/check", post(check))
         .route("/api/setup/start", post(start))
-        .with_state(Served { entrance: Arc::clone(entrance), setup: Arc::clone(setup) })
+        .with_state(Served {
+            entrance: Arc::clone(entrance),
+            setup: Arc::clone(setup),
+        })
         .merge(entrance::routes(entrance))
         .fallback(entrance::nothing)
         .layer(checked)
@@ -70,8 +73,13 @@ impl Served {
     /// The setup as it is now.
     async fn answer(&self, role: Role) -> Answered {
         let setup = Arc::clone(&self.setup);
-        let shown = spawn_blocking(move || setup.shown(role)).await.map_err(|error| error.to_string()).flatten();
-        shown.map(|shown| as_json(&shown)).map_err(|why| Box::new(refusal(StatusCode::SERVICE_UNAVAILABLE, &why)))
+        let shown = spawn_blocking(move || setup.shown(role))
+            .await
+            .map_err(|error| error.to_string())
+            .flatten();
+        shown
+            .map(|shown| as_json(&shown))
+            .map_err(|why| Box::new(refusal(StatusCode::SERVICE_UNAVAILABLE, &why)))
     }
 
     /// Takes a file that an operator sends: its name in the folder.
@@ -83,7 +91,9 @@ impl Served {
         body: Body,
     ) -> Result<String, Box<Response>> {
         self.operator(headers)?;
-        let length = headers.get(header::CONTENT_LENGTH).and_then(|value| value.to_str().ok()?.parse().ok());
+        let length = headers
+            .get(header::CONTENT_LENGTH)
+            .and_then(|value| value.to_str().ok()?.parse().ok());
         let taken = upload::take(&self.setup, name, is_scan, length, body).await;
         taken.map_err(|(status, why)| Box::new(refusal(status, &why)))
     }
@@ -99,7 +109,8 @@ impl Served {
         let bad = |status, why: String| Box::new(refusal(status, &why));
         let text = to_bytes(body, LARGEST_REQUEST).await;
         let text = text.map_err(|error| bad(StatusCode::PAYLOAD_TOO_LARGE, error.to_string()))?;
-        let asked = serde_json::from_slice(&text).map_err(|error| bad(StatusCode::BAD_REQUEST, error.to_string()))?;
+        let asked = serde_json::from_slice(&text)
+            .map_err(|error| bad(StatusCode::BAD_REQUEST, error.to_string()))?;
         let setup = Arc::clone(&self.setup);
         // a file may be looked at or written
         let done = spawn_blocking(move || change(&setup, asked)).await;
@@ -178,7 +189,8 @@ struct CheckRequest {
 }
 
 async fn check(State(served): State<Served>, headers: HeaderMap, body: Body) -> Response {
-    let change = |setup: &Arc<NodeSetup>, CheckRequest { recording }| setup.check(recording.as_deref());
+    let change =
+        |setup: &Arc<NodeSetup>, CheckRequest { recording }| setup.check(recording.as_deref());
     sent(served.change(&headers, body, change).await)
 }
 

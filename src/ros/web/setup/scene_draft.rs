@@ -70,25 +70,41 @@ impl SceneDraft {
     /// # Errors
     /// [`SceneError`]
     pub fn of(text: String) -> Result<Self, SceneError> {
-        Ok(Self { scene: Scene::from_yaml(&text)?, text })
+        Ok(Self {
+            scene: Scene::from_yaml(&text)?,
+            text,
+        })
     }
 
     /// Whether files lie beside the scene that it names, besides the scan.
     pub fn names_files(&self) -> bool {
         let robot = self.scene.robot.as_ref();
         let files = robot.map(|robot| [&robot.urdf, &robot.check]);
-        files.into_iter().flatten().flatten().any(|file| file.is_relative())
+        files
+            .into_iter()
+            .flatten()
+            .flatten()
+            .any(|file| file.is_relative())
     }
 
     /// Which calibrations are in it (`touchup calibrate`).
     pub fn calibrations(&self) -> NamedCalibrations {
-        let Scene { scan_to_space, tip, compensation, .. } = &self.scene;
+        let Scene {
+            scan_to_space,
+            tip,
+            compensation,
+            ..
+        } = &self.scene;
         let named = |kind, is_there: bool| {
-            let date = calibrated_on(&self.text, kind).filter(|_| is_there).map(|date| date.to_string());
+            let date = calibrated_on(&self.text, kind)
+                .filter(|_| is_there)
+                .map(|date| date.to_string());
             NamedCalibration { is_there, date }
         };
         let has_tip = tip.as_ref().is_some_and(|tip| tip.offset.is_some());
-        let has_payload = compensation.as_ref().is_some_and(|one| one.payload.is_some() || one.bias.is_some());
+        let has_payload = compensation
+            .as_ref()
+            .is_some_and(|one| one.payload.is_some() || one.bias.is_some());
         NamedCalibrations {
             scan: named(CalibrationKind::Scan, scan_to_space.is_some()),
             tip: named(CalibrationKind::Tip, has_tip),
@@ -112,7 +128,11 @@ impl SceneDraft {
     /// The radius that it says, mm.
     pub fn radius_mm(&self) -> Option<f64> {
         let is_said = Scene::names(&self.text, "tip", "radius_mm");
-        self.scene.tip.as_ref().filter(|_| is_said).map(|tip| tip.ball.radius * 1e3)
+        self.scene
+            .tip
+            .as_ref()
+            .filter(|_| is_said)
+            .map(|tip| tip.ball.radius * 1e3)
     }
 
     /// The unit that it says of a scan in its folder; `None` where it names another one.
@@ -127,21 +147,36 @@ impl SceneDraft {
     ///
     /// # Errors
     /// [`SceneError`]: a number out of its range, or a text in which it cannot be set.
-    pub fn with(&self, tip: Option<StatedTip>, scan: Option<(&str, MeshUnit)>) -> Result<String, SceneError> {
+    pub fn with(
+        &self,
+        tip: Option<StatedTip>,
+        scan: Option<(&str, MeshUnit)>,
+    ) -> Result<String, SceneError> {
         let (mut settings, mut expected) = (Vec::new(), self.scene.clone());
-        if let Some(StatedTip { radius_mm, uncertainty_mm }) = tip {
+        if let Some(StatedTip {
+            radius_mm,
+            uncertainty_mm,
+        }) = tip
+        {
             expected.tip.get_or_insert_default().ball.radius = radius_mm / 1e3;
             settings.push(Setting::scalar("tip.radius_mm", radius_mm));
             if let Some(u_mm) = uncertainty_mm {
                 let sigma_mm = u_mm / COVERAGE_FACTOR;
-                expected.uncertainty.get_or_insert_default().calibration.radius = sigma_mm / 1e3;
+                expected
+                    .uncertainty
+                    .get_or_insert_default()
+                    .calibration
+                    .radius = sigma_mm / 1e3;
                 settings.push(Setting::scalar("uncertainty.radius_sigma_mm", sigma_mm));
             }
         }
         if let Some((file, unit)) = scan {
             let part = expected.scan.get_or_insert_default();
             (part.file, part.unit) = (Some(file.into()), unit);
-            settings.push(Setting::scalar("scan.file", format!("'{}'", file.replace('\'', "''"))));
+            settings.push(Setting::scalar(
+                "scan.file",
+                format!("'{}'", file.replace('\'', "''")),
+            ));
             settings.push(Setting::scalar("scan.unit", unit));
         }
         expected.validate()?;
@@ -158,13 +193,24 @@ mod tests {
         let text = "# bench 3\ntip: { radius_mm: 2 }\npatch: off  # no time\nuncertainty: off\n";
         let draft = SceneDraft::of(text.to_owned()).unwrap();
         assert_eq!(draft.radius_mm(), Some(2.0));
-        let tip = StatedTip { radius_mm: 1.5, uncertainty_mm: None };
-        let made = draft.with(Some(tip), Some(("it's.ply", MeshUnit::Inch))).unwrap();
+        let tip = StatedTip {
+            radius_mm: 1.5,
+            uncertainty_mm: None,
+        };
+        let made = draft
+            .with(Some(tip), Some(("it's.ply", MeshUnit::Inch)))
+            .unwrap();
         let scene = Scene::from_yaml(&made).unwrap();
         assert_eq!(scene.tip.unwrap().ball.radius, 1.5e-3);
         let part = scene.scan.unwrap();
-        assert_eq!((part.file.unwrap().to_str(), part.unit), (Some("it's.ply"), MeshUnit::Inch));
-        assert!(made.starts_with("# bench 3\n") && made.contains("patch: off  # no time"), "{made}");
+        assert_eq!(
+            (part.file.unwrap().to_str(), part.unit),
+            (Some("it's.ply"), MeshUnit::Inch)
+        );
+        assert!(
+            made.starts_with("# bench 3\n") && made.contains("patch: off  # no time"),
+            "{made}"
+        );
     }
 
     #[test]
@@ -172,9 +218,27 @@ mod tests {
         let text = "tip:\n  offset_mm: [0, 0, 1]  # touchup calibrate tip: 9 poses; 2026-02-28\nscan_to_space: {}\n";
         let draft = SceneDraft::of(text.to_owned()).unwrap();
         let NamedCalibrations { scan, tip, payload } = draft.calibrations();
-        assert_eq!(tip, NamedCalibration { is_there: true, date: Some("2026-02-28".to_owned()) });
-        assert_eq!(scan, NamedCalibration { is_there: true, date: None });
-        assert_eq!(payload, NamedCalibration { is_there: false, date: None });
+        assert_eq!(
+            tip,
+            NamedCalibration {
+                is_there: true,
+                date: Some("2026-02-28".to_owned())
+            }
+        );
+        assert_eq!(
+            scan,
+            NamedCalibration {
+                is_there: true,
+                date: None
+            }
+        );
+        assert_eq!(
+            payload,
+            NamedCalibration {
+                is_there: false,
+                date: None
+            }
+        );
     }
 
     #[test]
@@ -182,13 +246,32 @@ mod tests {
         let draft = SceneDraft::read(None).unwrap();
         assert_eq!(draft.radius_mm(), None);
         assert!(!draft.names_files());
-        let made = draft.with(Some(StatedTip { radius_mm: 1.5, uncertainty_mm: Some(0.004) }), None).unwrap();
+        let made = draft
+            .with(
+                Some(StatedTip {
+                    radius_mm: 1.5,
+                    uncertainty_mm: Some(0.004),
+                }),
+                None,
+            )
+            .unwrap();
         let scene = Scene::from_yaml(&made).unwrap();
         // the half of an expanded uncertainty with k = 2
         assert!((scene.uncertainty.unwrap().calibration.radius - 2e-6).abs() < 1e-15);
         assert!(Scene::names(&made, "tip", "radius_mm"));
         for radius_mm in [0.0, -1.0, 1e6, f64::NAN] {
-            assert!(draft.with(Some(StatedTip { radius_mm, uncertainty_mm: None }), None).is_err(), "{radius_mm}");
+            assert!(
+                draft
+                    .with(
+                        Some(StatedTip {
+                            radius_mm,
+                            uncertainty_mm: None
+                        }),
+                        None
+                    )
+                    .is_err(),
+                "{radius_mm}"
+            );
         }
     }
 }

@@ -58,8 +58,16 @@ pub(super) enum CheckChoice {
 #[serde(rename_all = "snake_case", tag = "state")]
 pub(super) enum CalibrationChoice {
     None,
-    Running { what: CalibrationKind, file: String, share: Option<f64> },
-    Refused { what: CalibrationKind, file: String, why: String },
+    Running {
+        what: CalibrationKind,
+        file: String,
+        share: Option<f64>,
+    },
+    Refused {
+        what: CalibrationKind,
+        file: String,
+        why: String,
+    },
     Found(Box<CalibrationFacts>),
 }
 

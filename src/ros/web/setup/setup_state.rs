@@ -1,7 +1,9 @@
 //! What was chosen so far, and what may be done then.
 
 use super::scene_draft::{SceneDraft, StatedTip};
-use super::setup_shown::{CalibrationChoice, CheckChoice, ScanChoice, SetupFailure, SetupStep, Stage, UploadShown};
+use super::setup_shown::{
+    CalibrationChoice, CheckChoice, ScanChoice, SetupFailure, SetupStep, Stage, UploadShown,
+};
 use crate::io::mesh_file::MeshUnit;
 
 /// Why something cannot be done now.
@@ -25,9 +27,12 @@ const STARTING: NodeSetupError = NodeSetupError::NotNow("the node is being start
 pub(super) const NO_SCAN: NodeSetupError =
     NodeSetupError::NotNow("there is no scan yet: choose one, or wait until it is read");
 pub(super) const NO_TIP: NodeSetupError = NodeSetupError::NotNow("the tip is not stated yet");
-pub(super) const READING: NodeSetupError = NodeSetupError::NotNow("a scan is being read: wait until it is");
-const CHECKING: NodeSetupError = NodeSetupError::NotNow("a recording is being looked at: wait until it is");
-const CALIBRATING: NodeSetupError = NodeSetupError::NotNow("a calibration is being made: wait until it is");
+pub(super) const READING: NodeSetupError =
+    NodeSetupError::NotNow("a scan is being read: wait until it is");
+const CHECKING: NodeSetupError =
+    NodeSetupError::NotNow("a recording is being looked at: wait until it is");
+const CALIBRATING: NodeSetupError =
+    NodeSetupError::NotNow("a calibration is being made: wait until it is");
 
 pub(super) struct SetupState {
     pub stage: Stage,
@@ -65,7 +70,11 @@ impl SetupState {
 
     /// Whether somebody may choose.
     pub fn require_choosing(&self) -> Result<(), NodeSetupError> {
-        if self.stage == Stage::Choosing { Ok(()) } else { Err(STARTING) }
+        if self.stage == Stage::Choosing {
+            Ok(())
+        } else {
+            Err(STARTING)
+        }
     }
 
     /// Whether somebody may choose, and nothing is done beside.
@@ -88,7 +97,8 @@ impl SetupState {
     ///
     /// - `mended`: where.
     pub fn clear_failure(&mut self, mended: &[SetupStep]) {
-        self.failure.take_if(|failure| mended.contains(&failure.step) || failure.step == SetupStep::Start);
+        self.failure
+            .take_if(|failure| mended.contains(&failure.step) || failure.step == SetupStep::Start);
     }
 
     /// Nobody has to state a tip any more.

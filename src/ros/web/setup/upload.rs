@@ -49,7 +49,9 @@ pub(super) async fn take(
             // a browser that still sends hears no answer
             let mut left = LARGEST_UNHEARD;
             while let Ok(Some(Ok(piece))) = timeout(STALLED, pieces.next()).await {
-                let Some(less) = left.checked_sub(piece.len()) else { break };
+                let Some(less) = left.checked_sub(piece.len()) else {
+                    break;
+                };
                 left = less;
             }
             return Err(refused);
@@ -58,11 +60,17 @@ pub(super) async fn take(
     let (mut waiting, mut count) = (Vec::with_capacity(PIECE), 0);
     loop {
         let next = timeout(STALLED, pieces.next()).await;
-        let next =
-            next.map_err(|_| (StatusCode::REQUEST_TIMEOUT, "nothing came any more: send it again".to_owned()))?;
+        let next = next.map_err(|_| {
+            (
+                StatusCode::REQUEST_TIMEOUT,
+                "nothing came any more: send it again".to_owned(),
+            )
+        })?;
         let is_last = next.is_none();
         if let Some(piece) = next {
-            waiting.extend_from_slice(&piece.map_err(|error| (StatusCode::BAD_REQUEST, error.to_string()))?);
+            waiting.extend_from_slice(
+                &piece.map_err(|error| (StatusCode::BAD_REQUEST, error.to_string()))?,
+            );
         }
         if waiting.len() >= PIECE || is_last {
             count += waiting.len() as u64;
@@ -80,16 +88,26 @@ impl NodeSetup {
     ///
     /// # Errors
     /// [`NodeSetupError::NotNow`]
-    fn begin_upload(self: &Arc<Self>, name: &str, of: Option<u64>) -> Result<UploadPlace, NodeSetupError> {
+    fn begin_upload(
+        self: &Arc<Self>,
+        name: &str,
+        of: Option<u64>,
+    ) -> Result<UploadPlace, NodeSetupError> {
         let mut state = self.choosing()?;
         match &state.scan {
             _ if state.upload.is_some() => {
-                return Err(NodeSetupError::NotNow("another file is on its way: wait for it"));
+                return Err(NodeSetupError::NotNow(
+                    "another file is on its way: wait for it",
+                ));
             }
             ScanChoice::Reading { .. } => return Err(READING),
             _ => {}
         }
-        state.upload = Some(UploadShown { name: name.chars().take(200).collect(), bytes: 0, of });
+        state.upload = Some(UploadShown {
+            name: name.chars().take(200).collect(),
+            bytes: 0,
+            of,
+        });
         Ok(UploadPlace(Arc::clone(self)))
     }
 }
@@ -125,7 +143,10 @@ async fn begin(
     Ok((place, upload))
 }
 
-async fn write(mut upload: ScanUpload, mut piece: Vec<u8>) -> Result<(ScanUpload, Vec<u8>), UploadRefusal> {
+async fn write(
+    mut upload: ScanUpload,
+    mut piece: Vec<u8>,
+) -> Result<(ScanUpload, Vec<u8>), UploadRefusal> {
     on_disk(move || {
         upload.add(&piece)?;
         piece.clear();

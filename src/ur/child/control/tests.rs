@@ -14,12 +14,21 @@ use crate::ur::protocol::ProgramState::{self, Ended, Paused, Playing};
 use crate::ur::protocol::tests::STATE;
 
 const MS: Duration = Duration::from_millis(1);
-const UP: Action = Action::Move { twist: [0.0, 0.0, 20e-3, 0.0, 0.0, 0.0], acceleration: 1.0 };
+const UP: Action = Action::Move {
+    twist: [0.0, 0.0, 20e-3, 0.0, 0.0, 0.0],
+    acceleration: 1.0,
+};
 const GOING_UP: LibraryCall = Speed(20e-3, 1.0);
 
 fn press(angle: f64, force_n: f64) -> Action {
     let frame = [0.0, 0.0, 0.0, angle, 0.0, 0.0];
-    Action::Press { frame, force_n, speed: 5e-3, feed: [0.0, 0.0, 1e-3], acceleration: 0.5 }
+    Action::Press {
+        frame,
+        force_n,
+        speed: 5e-3,
+        feed: [0.0, 0.0, 1e-3],
+        acceleration: 0.5,
+    }
 }
 
 /// A call of the library.
@@ -52,12 +61,17 @@ struct Fake {
 
 impl Fake {
     fn call(&self, call: LibraryCall) -> Result<(), ChildError> {
-        self.calls.borrow_mut().push((self.clock.since(self.begun).as_millis(), call));
+        self.calls
+            .borrow_mut()
+            .push((self.clock.since(self.begun).as_millis(), call));
         if !self.takes.get().is_zero() {
             self.clock.sleep(self.takes.get());
         }
         if self.refuses.get() {
-            return Err(ChildError::Python { call: "a call", reason: "it returned false".to_owned() });
+            return Err(ChildError::Python {
+                call: "a call",
+                reason: "it returned false".to_owned(),
+            });
         }
         Ok(())
     }
@@ -76,7 +90,13 @@ impl Control for Fake {
         self.call(Speed(twist[2], acceleration))
     }
 
-    fn press(&self, frame: [f64; 6], force: f64, _kind: i32, _limits: [f64; 6]) -> Result<(), ChildError> {
+    fn press(
+        &self,
+        frame: [f64; 6],
+        force: f64,
+        _kind: i32,
+        _limits: [f64; 6],
+    ) -> Result<(), ChildError> {
         self.call(Press(frame[3], force))
     }
 
@@ -161,17 +181,35 @@ impl ControlBench {
             gain: 0.5,
             is_lock_step: false,
         };
-        Self { hand, fake, shared, begin, reports }
+        Self {
+            hand,
+            fake,
+            shared,
+            begin,
+            reports,
+        }
     }
 
     fn driver(&self) -> Driver<'_, Fake> {
-        Driver::new(&self.fake, &self.shared, &self.begin, self.fake.clock.clone())
+        Driver::new(
+            &self.fake,
+            &self.shared,
+            &self.begin,
+            self.fake.clock.clone(),
+        )
     }
 
     /// The state says from now on that the tip goes up, m/s.
     fn goes(&self, speed: f64, program: ProgramState) {
         let velocity = [0.0, 0.0, speed, 0.0, 0.0, 0.0];
-        self.shared.see(UrState { velocity, program, ..STATE }, self.fake.clock.now());
+        self.shared.see(
+            UrState {
+                velocity,
+                program,
+                ..STATE
+            },
+            self.fake.clock.now(),
+        );
     }
 
     /// The state comes again, as it was.
@@ -210,7 +248,8 @@ impl ControlBench {
 
     fn order(&self, driver: &mut Driver<'_, Fake>, number: u64, what: Action) {
         self.see_again();
-        self.sleeping(|| driver.turn(Some(Order { number, what }))).unwrap();
+        self.sleeping(|| driver.turn(Some(Order { number, what })))
+            .unwrap();
     }
 
     fn calls(&self) -> Vec<(u128, LibraryCall)> {
@@ -223,7 +262,9 @@ impl ControlBench {
         let mut text = String::new();
         let mut reports = self.reports;
         reports.read_to_string(&mut text).unwrap();
-        text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+        text.lines()
+            .map(|line| serde_json::from_str(line).unwrap())
+            .collect()
     }
 }
 
@@ -243,7 +284,10 @@ fn orders_that_stay_away_for_20_ms_leave_the_arm_to_brake_and_then_it_is_fed() {
     bench.without_orders(&mut driver, 100);
     let braking = [35, 40, 45, 50].map(|ms| (ms, Speed(0.0, 2.0)));
     let resting = [(55, Feed), (75, Feed), (95, Feed), (115, Feed)];
-    assert_eq!(bench.calls(), [&braking[..], &[(50, HardStop(10.0))], &resting].concat());
+    assert_eq!(
+        bench.calls(),
+        [&braking[..], &[(50, HardStop(10.0))], &resting].concat()
+    );
 }
 
 #[test]
@@ -254,7 +298,10 @@ fn an_arm_that_does_not_stand_is_braked_on_and_on_and_never_fed() {
     bench.order(&mut driver, 1, UP);
     bench.without_orders(&mut driver, 1000);
     let calls = bench.calls();
-    assert!(calls[1..].iter().all(|(_, call)| *call == Speed(0.0, 2.0)), "{calls:?}");
+    assert!(
+        calls[1..].iter().all(|(_, call)| *call == Speed(0.0, 2.0)),
+        "{calls:?}"
+    );
     assert_eq!(calls.len(), 1 + (1000 - 20) / 5);
 }
 
@@ -267,7 +314,10 @@ fn orders_that_come_in_time_keep_it_going() {
         bench.order(&mut driver, number, UP);
         bench.without_orders(&mut driver, 20);
     }
-    assert_eq!(bench.calls(), std::array::from_fn::<_, 10, _>(|at| (20 * at as u128, GOING_UP)));
+    assert_eq!(
+        bench.calls(),
+        std::array::from_fn::<_, 10, _>(|at| (20 * at as u128, GOING_UP))
+    );
 }
 
 #[test]
@@ -307,7 +357,15 @@ fn a_stop_brakes_as_commanded_and_ends_hard_when_the_state_shows_rest_20_ms_late
     bench.order(&mut driver, 2, Action::Stop { deceleration: 0.5 });
     bench.without_orders(&mut driver, 30);
     let braking = [0, 5, 10, 15, 20, 25].map(|ms| (ms, Speed(0.0, 0.5)));
-    assert_eq!(bench.calls(), [&[(0, GOING_UP)], &braking[..], &[(25, HardStop(10.0)), (30, Feed)]].concat());
+    assert_eq!(
+        bench.calls(),
+        [
+            &[(0, GOING_UP)],
+            &braking[..],
+            &[(25, HardStop(10.0)), (30, Feed)]
+        ]
+        .concat()
+    );
 }
 
 #[test]
@@ -322,13 +380,28 @@ fn a_press_has_two_cycles_for_itself_and_is_repeated_after_100_ms() {
         bench.order(&mut driver, number, press(0.0, 5.0));
     }
     // since the beginning 100 ms and the two cycles
-    assert_eq!(bench.calls(), [(54, feed), (104, Press(0.0, 5.0)), (108, feed)]);
+    assert_eq!(
+        bench.calls(),
+        [(54, feed), (104, Press(0.0, 5.0)), (108, feed)]
+    );
     // another axis, another force, another motion
     bench.order(&mut driver, 4, press(0.1, 5.0));
     bench.order(&mut driver, 5, press(0.1, 4.0));
     bench.order(&mut driver, 6, UP);
-    let turned = [(108, Press(0.1, 5.0)), (112, feed), (112, Press(0.1, 4.0)), (116, feed)];
-    assert_eq!(bench.calls(), [&turned[..], &[(116, HardStop(10.0)), (116, EndPress), (116, GOING_UP)]].concat());
+    let turned = [
+        (108, Press(0.1, 5.0)),
+        (112, feed),
+        (112, Press(0.1, 4.0)),
+        (116, feed),
+    ];
+    assert_eq!(
+        bench.calls(),
+        [
+            &turned[..],
+            &[(116, HardStop(10.0)), (116, EndPress), (116, GOING_UP)]
+        ]
+        .concat()
+    );
 }
 
 #[test]
@@ -342,7 +415,12 @@ fn a_refused_call_is_reported_after_40_ms_without_a_state_of_an_ended_program() 
         assert_eq!(bench.fake.clock.since(bench.fake.begun), ends_at * MS);
         let reports = bench.reports();
         assert_eq!(reports.len(), expected);
-        assert!(reports.iter().all(|report| matches!(report, ClientReport::Failed { .. })), "{reports:?}");
+        assert!(
+            reports
+                .iter()
+                .all(|report| matches!(report, ClientReport::Failed { .. })),
+            "{reports:?}"
+        );
     }
 }
 
@@ -352,8 +430,16 @@ fn a_program_has_five_seconds_to_start_and_the_watchdog_is_set_last() {
     let mut driver = bench.driver();
     bench.fake.is_running.set(false);
     bench.sleeping(|| driver.prepare()).unwrap();
-    let set = [("payload", 0.25), ("tool", 0.15), ("damping", 0.025), ("watchdog", 10.0)];
-    assert_eq!(bench.calls(), set.map(|(what, value)| (5_000, Set(what, value))));
+    let set = [
+        ("payload", 0.25),
+        ("tool", 0.15),
+        ("damping", 0.025),
+        ("watchdog", 10.0),
+    ];
+    assert_eq!(
+        bench.calls(),
+        set.map(|(what, value)| (5_000, Set(what, value)))
+    );
 }
 
 #[test]
@@ -361,11 +447,16 @@ fn another_tool_than_the_set_one_and_a_lost_connection_end_it() {
     let (_sender, orders) = channel();
     let bench = ControlBench::new();
     bench.fake.tool.set([0.0; 6]);
-    assert!(matches!(bench.driver().run(&orders), Err(DriverEnd::BadTool(reason)) if reason.contains("0.15")));
+    assert!(
+        matches!(bench.driver().run(&orders), Err(DriverEnd::BadTool(reason)) if reason.contains("0.15"))
+    );
     assert!(!bench.calls().contains(&(0, Set("watchdog", 10.0))));
     let bench = ControlBench::new();
     bench.fake.is_connected.set(false);
-    assert!(matches!(bench.driver().run(&orders), Err(DriverEnd::Lost(Link::Control))));
+    assert!(matches!(
+        bench.driver().run(&orders),
+        Err(DriverEnd::Lost(Link::Control))
+    ));
     assert_eq!(bench.reports(), [ClientReport::Ready]);
 }
 
@@ -378,23 +469,44 @@ fn where_orders_end_it_brakes_and_ends_the_program() {
     bench.sleeping(|| driver.end());
     let braking = [0, 5, 10, 15, 20, 25].map(|ms| (ms, Speed(0.0, 2.0)));
     let end = [(25, HardStop(10.0)), (30, EndProgram)];
-    assert_eq!(bench.calls(), [&[(0, GOING_UP)], &braking[..], &end].concat());
+    assert_eq!(
+        bench.calls(),
+        [&[(0, GOING_UP)], &braking[..], &end].concat()
+    );
 }
 
 #[test]
 fn of_orders_that_wait_the_newest_counts_and_no_zero_is_left_out() {
     let (sender, orders) = channel();
-    for (number, what) in [(2, UP), (3, Action::Zero), (4, UP), (5, Action::Stop { deceleration: 1.0 })] {
+    for (number, what) in [
+        (2, UP),
+        (3, Action::Zero),
+        (4, UP),
+        (5, Action::Stop { deceleration: 1.0 }),
+    ] {
         sender.send(Order { number, what }).unwrap();
     }
-    assert_eq!(newest(Order { number: 1, what: UP }, &orders).number, 3);
+    assert_eq!(
+        newest(
+            Order {
+                number: 1,
+                what: UP
+            },
+            &orders
+        )
+        .number,
+        3
+    );
     assert_eq!(newest(orders.recv().unwrap(), &orders).number, 5);
 }
 
 /// Somebody pauses the program in mid-move, and resumes it: the thread of the motion still has the old velocity.
 #[test]
 fn an_order_that_fails_leaves_it_braking_until_it_is_seen_at_rest() {
-    for (fails, braked) in [(Action::Stop { deceleration: 0.5 }, Speed(0.0, 0.5)), (UP, Speed(0.0, 2.0))] {
+    for (fails, braked) in [
+        (Action::Stop { deceleration: 0.5 }, Speed(0.0, 0.5)),
+        (UP, Speed(0.0, 2.0)),
+    ] {
         brakes_after_a_failed(fails, braked);
     }
 }
@@ -411,7 +523,11 @@ fn brakes_after_a_failed(order: Action, braked: LibraryCall) {
     bench.goes(0.0, Paused);
     bench.calls();
     bench.without_orders(&mut driver, 2_000);
-    assert_eq!(bench.calls(), [], "a program that is paused hears nothing, and is not fed");
+    assert_eq!(
+        bench.calls(),
+        [],
+        "a program that is paused hears nothing, and is not fed"
+    );
     bench.fake.refuses.set(false);
     // its first states are those of an arm that does not move yet
     bench.goes(0.0, Playing);
@@ -425,14 +541,34 @@ fn brakes_after_a_failed(order: Action, braked: LibraryCall) {
     bench.without_orders(&mut driver, 500);
     let calls = bench.calls();
     let (last, braking) = calls.split_last().unwrap();
-    assert_eq!(last.1, HardStop(10.0), "once it is seen at rest, and nothing is fed after it: {calls:?}");
-    assert!(!braking.is_empty() && braking.iter().all(|(_, call)| *call == braked), "{calls:?}");
+    assert_eq!(
+        last.1,
+        HardStop(10.0),
+        "once it is seen at rest, and nothing is fed after it: {calls:?}"
+    );
+    assert!(
+        !braking.is_empty() && braking.iter().all(|(_, call)| *call == braked),
+        "{calls:?}"
+    );
 }
 
 #[test]
 fn once_something_has_stopped_it_no_order_moves_it() {
-    let protective = UrState { safety_bits: 1 << 2, ..STATE };
-    for stopped in [UrState { program: Paused, ..STATE }, UrState { program: Ended, ..STATE }, protective] {
+    let protective = UrState {
+        safety_bits: 1 << 2,
+        ..STATE
+    };
+    for stopped in [
+        UrState {
+            program: Paused,
+            ..STATE
+        },
+        UrState {
+            program: Ended,
+            ..STATE
+        },
+        protective,
+    ] {
         let bench = ControlBench::new();
         let mut driver = bench.driver();
         bench.shared.is_ready.store(true, Ordering::Release);
@@ -455,7 +591,10 @@ fn force_mode_is_ended_also_where_the_call_that_began_it_failed() {
     bench.fake.refuses.set(false);
     bench.order(&mut driver, 2, Action::Stop { deceleration: 0.5 });
     let calls: Vec<_> = bench.calls().into_iter().map(|(_, call)| call).collect();
-    assert_eq!(calls, [Press(0.0, 5.0), HardStop(10.0), EndPress, Speed(0.0, 0.5)]);
+    assert_eq!(
+        calls,
+        [Press(0.0, 5.0), HardStop(10.0), EndPress, Speed(0.0, 0.5)]
+    );
 }
 
 #[test]
@@ -482,7 +621,10 @@ fn a_sensor_is_not_zeroed_on_an_arm_that_does_not_come_to_rest() {
     bench.order(&mut driver, 1, UP);
     bench.order(&mut driver, 2, Action::Zero);
     let calls = bench.calls();
-    assert!(calls[1..].iter().all(|(_, call)| *call == Speed(0.0, 2.0)), "{calls:?}");
+    assert!(
+        calls[1..].iter().all(|(_, call)| *call == Speed(0.0, 2.0)),
+        "{calls:?}"
+    );
     assert!(
         matches!(&bench.reports()[..], [ClientReport::Failed { reason, .. }] if reason.contains("after braking for 5 s"))
     );

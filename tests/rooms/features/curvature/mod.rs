@@ -23,7 +23,9 @@ fn crumpled(mesh: &TriMesh, by: f64, seed: u64) -> TriMesh {
 }
 
 fn faces_of(mesh: &TriMesh) -> Vec<[u32; 3]> {
-    mesh.faces().map(|(_, corners)| corners.map(|v| v.0)).collect()
+    mesh.faces()
+        .map(|(_, corners)| corners.map(|v| v.0))
+        .collect()
 }
 
 #[test]
@@ -34,10 +36,19 @@ fn defects_of_closed_meshes_sum_to_the_euler_number() {
             let mesh = crumpled(&mesh, by, 5);
             let found = curvature(&mesh);
             let sum: f64 = found.iter().map(|c| c.defect).sum();
-            assert!((sum - TAU * euler).abs() < 1e-11 * found.len() as f64, "{sum}");
+            assert!(
+                (sum - TAU * euler).abs() < 1e-11 * found.len() as f64,
+                "{sum}"
+            );
             assert!(found.iter().all(|c| c.kind == VertexKind::Inner));
-            let area: f64 = mesh.faces().map(|(f, _)| mesh.double_area_normal(f).norm() / 2.0).sum();
-            assert!((found.iter().map(|c| c.area).sum::<f64>() / area - 1.0).abs() < 1e-12, "areas share out the mesh");
+            let area: f64 = mesh
+                .faces()
+                .map(|(f, _)| mesh.double_area_normal(f).norm() / 2.0)
+                .sum();
+            assert!(
+                (found.iter().map(|c| c.area).sum::<f64>() / area - 1.0).abs() < 1e-12,
+                "areas share out the mesh"
+            );
         }
     }
 }
@@ -65,8 +76,14 @@ fn curvature_of_a_sphere_converges_to_its_own() {
     let radius = 20.0 * MM;
     let errors = [2, 3, 4, 5].map(|halvings| {
         let found = curvature(&icosphere(radius, halvings));
-        let gaussian = found.iter().map(|c| (c.gaussian() * radius * radius - 1.0).abs()).fold(0.0, f64::max);
-        let mean = found.iter().map(|c| (c.mean() * radius - 1.0).abs()).fold(0.0, f64::max);
+        let gaussian = found
+            .iter()
+            .map(|c| (c.gaussian() * radius * radius - 1.0).abs())
+            .fold(0.0, f64::max);
+        let mean = found
+            .iter()
+            .map(|c| (c.mean() * radius - 1.0).abs())
+            .fold(0.0, f64::max);
         [gaussian, mean]
     });
     println!("{errors:?}");
@@ -75,9 +92,17 @@ fn curvature_of_a_sphere_converges_to_its_own() {
         assert!((0..2).all(|i| pair[1][i] < 0.3 * pair[0][i]), "{pair:?}");
     }
     assert!(errors[3].iter().all(|e| *e < 1e-3));
-    let inside_out: Vec<_> = faces_of(&icosphere(radius, 2)).iter().map(|[a, b, c]| [*a, *c, *b]).collect();
+    let inside_out: Vec<_> = faces_of(&icosphere(radius, 2))
+        .iter()
+        .map(|[a, b, c]| [*a, *c, *b])
+        .collect();
     let hollow = TriMesh::new(icosphere(radius, 2).positions().to_vec(), inside_out).unwrap();
-    assert!(curvature(&hollow).iter().all(|c| c.gaussian() > 0.0 && c.mean() < 0.0), "a hollow is a depression");
+    assert!(
+        curvature(&hollow)
+            .iter()
+            .all(|c| c.gaussian() > 0.0 && c.mean() < 0.0),
+        "a hollow is a depression"
+    );
 }
 
 #[test]
@@ -86,18 +111,33 @@ fn cylinder_and_plane_have_none_and_their_rim_is_no_curvature() {
     let flat = grid(20, edge, |_, _| 0.0);
     // rolled up over its x: edges along z stay, those along x become chords of one angle
     let rolled = |p: &Point3<f64>| Point3::new(r * (p.x / r).sin(), p.y, r * (p.x / r).cos());
-    let cylinder = TriMesh::new(flat.positions().iter().map(rolled).collect(), faces_of(&flat)).unwrap();
+    let cylinder = TriMesh::new(
+        flat.positions().iter().map(rolled).collect(),
+        faces_of(&flat),
+    )
+    .unwrap();
     let crumpled = crumpled(&flat, 0.0, 0);
     for (mesh, mean) in [(flat, 0.0), (crumpled, 0.0), (cylinder, 0.5 / r)] {
         let found = curvature(&mesh);
-        assert_eq!(found.iter().filter(|c| c.kind == VertexKind::Rim).count(), 80);
+        assert_eq!(
+            found.iter().filter(|c| c.kind == VertexKind::Rim).count(),
+            80
+        );
         for c in &found {
             assert!(c.gaussian().abs() * r * r < 1e-10, "{c:?}");
-            let wanted = if c.kind == VertexKind::Inner { mean } else { 0.0 };
+            let wanted = if c.kind == VertexKind::Inner {
+                mean
+            } else {
+                0.0
+            };
             assert!((c.mean() - wanted).abs() < 2e-3 / r, "{c:?}");
         }
         // the rim turns once: 2π, at the corners and (rolled up) nowhere else
-        let turn: f64 = found.iter().filter(|c| c.kind == VertexKind::Rim).map(|c| c.defect).sum();
+        let turn: f64 = found
+            .iter()
+            .filter(|c| c.kind == VertexKind::Rim)
+            .map(|c| c.defect)
+            .sum();
         assert!((turn - TAU).abs() < 1e-9);
     }
 }
@@ -105,10 +145,18 @@ fn cylinder_and_plane_have_none_and_their_rim_is_no_curvature() {
 #[test]
 fn odd_vertices_are_named() {
     let p = |x: f64, y: f64, z: f64| Point3::new(x, y, z);
-    let corners = vec![p(0.0, 0.0, 0.0), p(1.0, 0.0, 0.0), p(0.0, 1.0, 0.0), p(0.0, 0.0, 1.0)];
+    let corners = vec![
+        p(0.0, 0.0, 0.0),
+        p(1.0, 0.0, 0.0),
+        p(0.0, 1.0, 0.0),
+        p(0.0, 0.0, 1.0),
+    ];
     let tetrahedron = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
     let kinds = |positions: &[Point3<f64>], faces: &[[u32; 3]]| -> Vec<VertexKind> {
-        curvature(&TriMesh::new(positions.to_vec(), faces.to_vec()).unwrap()).iter().map(|c| c.kind).collect()
+        curvature(&TriMesh::new(positions.to_vec(), faces.to_vec()).unwrap())
+            .iter()
+            .map(|c| c.kind)
+            .collect()
     };
     use VertexKind::{Inner, Irregular, Rim, Unused};
     assert_eq!(kinds(&corners, &tetrahedron), [Inner; 4]);
@@ -116,22 +164,42 @@ fn odd_vertices_are_named() {
     assert_eq!(kinds(&corners, &tetrahedron[..1]), [Rim, Rim, Rim, Unused]);
     // one face turned over
     let turned = [tetrahedron[0], tetrahedron[1], tetrahedron[2], [1, 3, 2]];
-    assert_eq!(kinds(&corners, &turned), [Inner, Irregular, Irregular, Irregular]);
+    assert_eq!(
+        kinds(&corners, &turned),
+        [Inner, Irregular, Irregular, Irregular]
+    );
     // two tetrahedra that share a corner, then one more face at an edge
-    let mirrored: Vec<_> =
-        corners.iter().chain(&[p(-1.0, 0.0, 0.0), p(0.0, -1.0, 0.0), p(0.0, 0.0, -1.0)]).copied().collect();
+    let mirrored: Vec<_> = corners
+        .iter()
+        .chain(&[p(-1.0, 0.0, 0.0), p(0.0, -1.0, 0.0), p(0.0, 0.0, -1.0)])
+        .copied()
+        .collect();
     let other = [[0, 4, 5], [0, 6, 4], [0, 5, 6], [4, 6, 5]];
     let both: Vec<_> = tetrahedron.into_iter().chain(other).collect();
-    assert_eq!(kinds(&mirrored, &both), [Irregular, Inner, Inner, Inner, Inner, Inner, Inner]);
+    assert_eq!(
+        kinds(&mirrored, &both),
+        [Irregular, Inner, Inner, Inner, Inner, Inner, Inner]
+    );
     let fin: Vec<_> = tetrahedron.into_iter().chain([[1, 2, 4]]).collect();
-    assert_eq!(kinds(&mirrored, &fin)[1..5], [Irregular, Irregular, Inner, Rim]);
+    assert_eq!(
+        kinds(&mirrored, &fin)[1..5],
+        [Irregular, Irregular, Inner, Rim]
+    );
     // the corner of a cube: a quarter of the sphere's 4π over eight corners
     let found = curvature(&TriMesh::new(corners.clone(), tetrahedron.to_vec()).unwrap());
     assert!((found[0].defect - PI / 2.0).abs() < 1e-15);
     // a face without area adds its angle and nothing else
-    let found =
-        curvature(&TriMesh::new(vec![p(0.0, 0.0, 0.0), p(1.0, 0.0, 0.0), p(2.0, 0.0, 0.0)], vec![[0, 1, 2]]).unwrap());
-    assert_eq!(found.iter().map(|c| (c.defect, c.area)).collect::<Vec<_>>(), [(PI, 0.0), (0.0, 0.0), (PI, 0.0)]);
+    let found = curvature(
+        &TriMesh::new(
+            vec![p(0.0, 0.0, 0.0), p(1.0, 0.0, 0.0), p(2.0, 0.0, 0.0)],
+            vec![[0, 1, 2]],
+        )
+        .unwrap(),
+    );
+    assert_eq!(
+        found.iter().map(|c| (c.defect, c.area)).collect::<Vec<_>>(),
+        [(PI, 0.0), (0.0, 0.0), (PI, 0.0)]
+    );
 }
 
 #[test]
@@ -144,12 +212,18 @@ fn fans_of_any_size_and_scale_are_summed() {
                 Point3::new(angle.cos(), angle.sin(), -0.5) * scale
             });
             let positions: Vec<_> = std::iter::once(Point3::origin()).chain(ring).collect();
-            let faces = (0..count).map(|i| [0, 1 + i, 1 + (i + 1) % count]).collect();
+            let faces = (0..count)
+                .map(|i| [0, 1 + i, 1 + (i + 1) % count])
+                .collect();
             let apex = curvature(&TriMesh::new(positions, faces).unwrap())[0];
             let half = ((PI / f64::from(count)).sin() / 1.25f64.sqrt()).asin();
             let defect = TAU - 2.0 * f64::from(count) * half;
             assert_eq!(apex.kind, VertexKind::Inner);
-            assert!((apex.defect - defect).abs() < 2e-15 * f64::from(count), "{count}: {} {defect}", apex.defect);
+            assert!(
+                (apex.defect - defect).abs() < 2e-15 * f64::from(count),
+                "{count}: {} {defect}",
+                apex.defect
+            );
             assert!(apex.integrated_mean > 0.0);
         }
     }

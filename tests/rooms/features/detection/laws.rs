@@ -21,29 +21,55 @@ const PARTS: [(&str, MeshUnit); 4] = [
 const FINE: [(&str, MeshUnit); 2] = [PARTS[0], PARTS[1]];
 
 fn moved(mesh: &TriMesh, place: impl Fn(&Point3<f64>) -> Point3<f64>) -> TriMesh {
-    let faces = mesh.faces().map(|(_, corners)| corners.map(|v| v.0)).collect();
+    let faces = mesh
+        .faces()
+        .map(|(_, corners)| corners.map(|v| v.0))
+        .collect();
     TriMesh::new(mesh.positions().iter().map(place).collect(), faces).unwrap()
 }
 
 /// Whether `other` is `one` after the motion and the scale: kind, place, axis and sizes.
-fn is_image(one: &Feature, other: &Feature, motion: &Isometry3<f64>, scale: f64, limit: f64) -> bool {
+fn is_image(
+    one: &Feature,
+    other: &Feature,
+    motion: &Isometry3<f64>,
+    scale: f64,
+    limit: f64,
+) -> bool {
     let number = |f: &Feature| {
-        [&f.diameter, &f.width, &f.length, &f.depth].map(|size| size.as_ref().map_or(0.0, |size| size.value))
+        [&f.diameter, &f.width, &f.length, &f.depth]
+            .map(|size| size.as_ref().map_or(0.0, |size| size.value))
     };
-    let sizes = number(one).into_iter().zip(number(other)).all(|(a, b)| (a * scale - b).abs() < limit);
+    let sizes = number(one)
+        .into_iter()
+        .zip(number(other))
+        .all(|(a, b)| (a * scale - b).abs() < limit);
     // a plain through-hole may be described from its other end
-    let direction = one.axis.as_ref().map_or_else(Vector3::zeros, |axis| axis.value);
+    let direction = one
+        .axis
+        .as_ref()
+        .map_or_else(Vector3::zeros, |axis| axis.value);
     let depth = one.depth.as_ref().map_or(0.0, |depth| depth.value);
     let places = [one.centre.value, one.centre.value - direction * depth];
-    let is_at = |p: &Point3<f64>| (motion * Point3::from(p.coords * scale) - other.centre.value).norm() < limit;
+    let is_at = |p: &Point3<f64>| {
+        (motion * Point3::from(p.coords * scale) - other.centre.value).norm() < limit
+    };
     one.kind == other.kind && one.through == other.through && sizes && places.iter().any(is_at)
 }
 
 fn holes_slots_pockets(features: &[Feature]) -> Vec<&Feature> {
-    features.iter().filter(|f| matches!(f.kind, Kind::Hole | Kind::Slot | Kind::Pocket | Kind::Boss)).collect()
+    features
+        .iter()
+        .filter(|f| matches!(f.kind, Kind::Hole | Kind::Slot | Kind::Pocket | Kind::Boss))
+        .collect()
 }
 
-fn check(name: &str, mesh: &TriMesh, motion: &Isometry3<f64>, scale: f64) -> Result<(), TestCaseError> {
+fn check(
+    name: &str,
+    mesh: &TriMesh,
+    motion: &Isometry3<f64>,
+    scale: f64,
+) -> Result<(), TestCaseError> {
     let there = moved(mesh, |p| motion * Point3::from(p.coords * scale));
     let (here, there) = (found(mesh), found(&there));
     let (before, after) = (holes_slots_pockets(&here), holes_slots_pockets(&there));
@@ -52,7 +78,10 @@ fn check(name: &str, mesh: &TriMesh, motion: &Isometry3<f64>, scale: f64) -> Res
     // files are rounded to a millionth of the part: fits that end a step earlier or later differ by less
     let limit = 2e-6 * scale * (hi - lo).norm();
     for one in before {
-        let images = after.iter().filter(|other| is_image(one, other, motion, scale, limit)).count();
+        let images = after
+            .iter()
+            .filter(|other| is_image(one, other, motion, scale, limit))
+            .count();
         prop_assert_eq!(images, 1, "{}: {:?}", name, one);
     }
     Ok(())
@@ -66,10 +95,15 @@ fn divided(mesh: &TriMesh) -> TriMesh {
     for (_, corners) in mesh.faces() {
         let [a, b, c] = corners.map(|v| v.0);
         let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|[from, to]| {
-            *middles.entry([from.min(to), from.max(to)]).or_insert_with(|| {
-                positions.push(nalgebra::center(&positions[from as usize], &positions[to as usize]));
-                positions.len() as u32 - 1
-            })
+            *middles
+                .entry([from.min(to), from.max(to)])
+                .or_insert_with(|| {
+                    positions.push(nalgebra::center(
+                        &positions[from as usize],
+                        &positions[to as usize],
+                    ));
+                    positions.len() as u32 - 1
+                })
         });
         faces.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
     }
@@ -81,17 +115,31 @@ fn divided(mesh: &TriMesh) -> TriMesh {
 #[test]
 fn finer_faces_change_nothing() {
     for (name, unit) in FINE {
-        let Some(mut mesh) = part(name, unit) else { return };
+        let Some(mut mesh) = part(name, unit) else {
+            return;
+        };
         let [lo, hi] = mesh.bounds();
         let before = found(&mesh);
         while mesh.face_count() < 50_000 {
             mesh = divided(&mesh);
             let after = found(&mesh);
             let (one, other) = (holes_slots_pockets(&before), holes_slots_pockets(&after));
-            assert_eq!(one.len(), other.len(), "{name}, {} faces", mesh.face_count());
+            assert_eq!(
+                one.len(),
+                other.len(),
+                "{name}, {} faces",
+                mesh.face_count()
+            );
             for one in one {
-                let is_same = |f: &&&Feature| is_image(one, f, &Isometry3::identity(), 1.0, 2e-6 * (hi - lo).norm());
-                assert_eq!(other.iter().filter(is_same).count(), 1, "{name}, {} faces: {one:?}", mesh.face_count());
+                let is_same = |f: &&&Feature| {
+                    is_image(one, f, &Isometry3::identity(), 1.0, 2e-6 * (hi - lo).norm())
+                };
+                assert_eq!(
+                    other.iter().filter(is_same).count(),
+                    1,
+                    "{name}, {} faces: {one:?}",
+                    mesh.face_count()
+                );
             }
         }
     }

@@ -18,7 +18,11 @@ use crate::shared::shared;
 
 /// A part, in m.
 fn part(name: &str, unit: MeshUnit) -> Option<TriMesh> {
-    Some(read_mesh(&shared("parts/permissive")?.join(name), unit).unwrap().mesh)
+    Some(
+        read_mesh(&shared("parts/permissive")?.join(name), unit)
+            .unwrap()
+            .mesh,
+    )
 }
 
 fn found(mesh: &TriMesh) -> Vec<Feature> {
@@ -26,7 +30,10 @@ fn found(mesh: &TriMesh) -> Vec<Feature> {
 }
 
 fn of_kind(features: &[Feature], kind: Kind) -> Vec<&Feature> {
-    features.iter().filter(|feature| feature.kind == kind).collect()
+    features
+        .iter()
+        .filter(|feature| feature.kind == kind)
+        .collect()
 }
 
 fn triangles(mesh: &TriMesh) -> Vec<[Point3<f64>; 3]> {
@@ -35,6 +42,8 @@ fn triangles(mesh: &TriMesh) -> Vec<[Point3<f64>; 3]> {
 
 /// A mesh of loose triangles, as a file has them.
 fn mesh_of(triangles: &[[Point3<f64>; 3]]) -> TriMesh {
-    let faces = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let faces = (0..triangles.len() as u32)
+        .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
+        .collect();
     repair(triangles.concat(), faces).unwrap().0
 }

@@ -22,13 +22,26 @@ fn the_unit_does_not_matter() {
     let guess = hole_near(&Isometry3::identity(), 5.0 * MM);
     let in_m = fit(&guess, &touched, &FitParams::default()).unwrap();
     for scale in [1e3, 1e-3] {
-        let scaled: Vec<_> =
-            touched.iter().map(|o| Observation { point: o.point * scale, sigma: o.sigma * scale, ..*o }).collect();
+        let scaled: Vec<_> = touched
+            .iter()
+            .map(|o| Observation {
+                point: o.point * scale,
+                sigma: o.sigma * scale,
+                ..*o
+            })
+            .collect();
         let guess = hole_near(&Isometry3::identity(), 5.0 * MM * scale);
         let other = fit(&guess, &scaled, &FitParams::default()).unwrap();
         assert!((other.surface.radius / scale / in_m.surface.radius - 1.0).abs() < 1e-9);
-        assert!((other.surface.center() / scale - in_m.surface.center()).norm() < 1e-9 * in_m.surface.radius);
-        for (freedom, unit) in [(Freedom::X, scale), (Freedom::TiltY, 1.0), (Freedom::Size, scale)] {
+        assert!(
+            (other.surface.center() / scale - in_m.surface.center()).norm()
+                < 1e-9 * in_m.surface.radius
+        );
+        for (freedom, unit) in [
+            (Freedom::X, scale),
+            (Freedom::TiltY, 1.0),
+            (Freedom::Size, scale),
+        ] {
             let [a, b] = [&in_m, &other].map(|f| f.std(freedom).unwrap());
             assert!((b / unit / a - 1.0).abs() < 1e-6, "{freedom:?}: {a} {b}");
         }
@@ -46,20 +59,42 @@ fn ball_centres_give_what_the_touched_points_give() {
         let s = if concave { -1.0 } else { 1.0 };
         let (mut centres, mut points) = (Vec::new(), Vec::new());
         for group in 0..50 {
-            let (angle, along) = (between(&mut rng, 0.0, 6.0), between(&mut rng, -2.0, 2.0) * MM);
+            let (angle, along) = (
+                between(&mut rng, 0.0, 6.0),
+                between(&mut rng, -2.0, 2.0) * MM,
+            );
             let away = Vector3::new(f64::cos(angle), f64::sin(angle), 0.0);
             let point = Point3::from(away * (6.0 * MM + along * sin) + Vector3::z() * along * cos);
             let normal = (away * cos - Vector3::z() * sin) * s;
-            points.push(Observation { point, offset: 0.0, sigma, group });
-            centres.push(Observation { point: point + normal * ball, offset: ball, sigma, group });
+            points.push(Observation {
+                point,
+                offset: 0.0,
+                sigma,
+                group,
+            });
+            centres.push(Observation {
+                point: point + normal * ball,
+                offset: ball,
+                sigma,
+                group,
+            });
         }
-        let guess = Cone::new(Point3::origin(), &Vector3::new(0.02, 0.01, 1.0), 6.3 * MM, 0.65, concave);
+        let guess = Cone::new(
+            Point3::origin(),
+            &Vector3::new(0.02, 0.01, 1.0),
+            6.3 * MM,
+            0.65,
+            concave,
+        );
         for observations in [points, centres] {
             let fit = fit(&guess, &observations, &FitParams::default()).unwrap();
             assert!((fit.surface.half_angle - 40f64.to_radians()).abs() < 1e-7);
             let apex = Point3::new(0.0, 0.0, -6.0 * MM * cos / sin);
             // without errors the correction of the bias finds none to correct
-            assert!((fit.surface.apex().unwrap() - apex).norm() < 1e-9, "{concave}");
+            assert!(
+                (fit.surface.apex().unwrap() - apex).norm() < 1e-9,
+                "{concave}"
+            );
         }
     }
 }
@@ -67,10 +102,21 @@ fn ball_centres_give_what_the_touched_points_give() {
 /// A number that is twice the radius is known half as well; one of two freedoms, as their covariance has it.
 #[test]
 fn an_estimate_has_the_uncertainty_of_what_it_is_made_of() {
-    let fit = fit(&hole_near(&Isometry3::identity(), 5.0 * MM), &touched_hole(3, 40), &FitParams::default()).unwrap();
+    let fit = fit(
+        &hole_near(&Isometry3::identity(), 5.0 * MM),
+        &touched_hole(3, 40),
+        &FitParams::default(),
+    )
+    .unwrap();
     let known = |by: &[(Freedom, f64)]| fit.std_by(by).unwrap();
-    let (radius, diameter) = (fit.std(Freedom::Size).unwrap(), known(&[(Freedom::Size, 2.0)]));
-    assert!(radius > 0.0 && (diameter / radius - 2.0).abs() < 1e-12, "{diameter:?} of {radius}");
+    let (radius, diameter) = (
+        fit.std(Freedom::Size).unwrap(),
+        known(&[(Freedom::Size, 2.0)]),
+    );
+    assert!(
+        radius > 0.0 && (diameter / radius - 2.0).abs() < 1e-12,
+        "{diameter:?} of {radius}"
+    );
     let [x, size] = [Freedom::X as usize, Freedom::Size as usize];
     let covariance = |i: usize, j: usize| fit.covariance[(i, j)];
     let variance = covariance(x, x) + 9.0 * covariance(size, size) - 6.0 * covariance(x, size);
@@ -80,8 +126,18 @@ fn an_estimate_has_the_uncertainty_of_what_it_is_made_of() {
 
 fn fit_follows(motion: &Isometry3<f64>, seed: u64) {
     let touched = touched_hole(seed, 40);
-    let moved: Vec<_> = touched.iter().map(|o| Observation { point: motion * o.point, ..*o }).collect();
-    let params = FitParams { common_sigma: 0.01 * MM, axis_sigma: Some(0.05), ..FitParams::default() };
+    let moved: Vec<_> = touched
+        .iter()
+        .map(|o| Observation {
+            point: motion * o.point,
+            ..*o
+        })
+        .collect();
+    let params = FitParams {
+        common_sigma: 0.01 * MM,
+        axis_sigma: Some(0.05),
+        ..FitParams::default()
+    };
     let here = hole_near(&Isometry3::identity(), 5.0 * MM);
     let there = fit(&hole_near(motion, 5.0 * MM), &moved, &params).unwrap();
     let here = fit(&here, &touched, &params).unwrap();

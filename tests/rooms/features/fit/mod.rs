@@ -37,7 +37,12 @@ fn on_cylinder(rng: &mut Pcg64, r: f64, arc: f64, height: f64, count: u32) -> Ve
         .map(|i| {
             let angle = arc * (f64::from(i) + between(rng, 0.0, 1.0)) / f64::from(count);
             let z = between(rng, -0.5, 0.5) * height;
-            Observation { point: Point3::new(r * angle.cos(), r * angle.sin(), z), offset: 0.0, sigma: 1e-6, group: i }
+            Observation {
+                point: Point3::new(r * angle.cos(), r * angle.sin(), z),
+                offset: 0.0,
+                sigma: 1e-6,
+                group: i,
+            }
         })
         .collect()
 }
@@ -45,14 +50,22 @@ fn on_cylinder(rng: &mut Pcg64, r: f64, arc: f64, height: f64, count: u32) -> Ve
 /// A hole about z of another frame, near the true one.
 fn hole_near(pose: &Isometry3<f64>, r: f64) -> Cylinder {
     let off = Vector3::new(0.1, -0.05, 0.02) * r;
-    Cylinder::new(pose * Point3::from(off), &(pose * Vector3::new(0.03, -0.02, 1.0)), 1.1 * r, true)
+    Cylinder::new(
+        pose * Point3::from(off),
+        &(pose * Vector3::new(0.03, -0.02, 1.0)),
+        1.1 * r,
+        true,
+    )
 }
 
 /// Mean and its standard error.
 fn mean_and_error(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
-    (mean, (values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt())
+    (
+        mean,
+        (values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt(),
+    )
 }
 
 fn rms(values: &[f64]) -> f64 {

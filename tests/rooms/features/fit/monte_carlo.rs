@@ -11,8 +11,15 @@ fn noisy(exact: &[Observation], rng: &mut Pcg64, shared: f64, own: f64) -> Vec<O
     let groups = exact.iter().map(|o| o.group).max().unwrap() as usize + 1;
     let errors: Vec<_> = (0..groups).map(|_| shaken(rng, shared)).collect();
     let sigma = shared.hypot(own);
-    let shaken: Vec<_> = exact.iter().map(|o| o.point + errors[o.group as usize] + shaken(rng, own)).collect();
-    shaken.into_iter().zip(exact).map(|(point, o)| Observation { point, sigma, ..*o }).collect()
+    let shaken: Vec<_> = exact
+        .iter()
+        .map(|o| o.point + errors[o.group as usize] + shaken(rng, own))
+        .collect();
+    shaken
+        .into_iter()
+        .zip(exact)
+        .map(|(point, o)| Observation { point, sigma, ..*o })
+        .collect()
 }
 
 /// Errors over standard deviations of a cylinder about z through the origin: centre, tilt, radius.
@@ -30,13 +37,19 @@ fn normalised(fit: &Fit<Cylinder>, r: f64) -> Vec<f64> {
         (Freedom::TiltY, -axis.y),
         (Freedom::Size, f.radius - r),
     ];
-    errors.iter().map(|(freedom, error)| error / fit.std(*freedom).unwrap()).collect()
+    errors
+        .iter()
+        .map(|(freedom, error)| error / fit.std(*freedom).unwrap())
+        .collect()
 }
 
 #[test]
 fn radius_of_few_noisy_points_is_right_in_the_mean() {
     // σ = r/10. Without correction the mean is off by σ²/2r = 0.5 % at least, and by more on arcs
-    let params = FitParams { axis_sigma: Some(1e-6), ..FitParams::default() };
+    let params = FitParams {
+        axis_sigma: Some(1e-6),
+        ..FitParams::default()
+    };
     for (arc, count) in [(TAU, 8), (1.5 * PI, 12), (PI, 20), (0.5 * PI, 200)] {
         let errors: Vec<f64> = (0..1500)
             .map(|seed| {
@@ -48,7 +61,10 @@ fn radius_of_few_noisy_points_is_right_in_the_mean() {
             })
             .collect();
         let (mean, error) = mean_and_error(&errors);
-        println!("arc {:3.0}°, {count} points: bias of r {mean:.5} ± {error:.5}", arc.to_degrees());
+        println!(
+            "arc {:3.0}°, {count} points: bias of r {mean:.5} ± {error:.5}",
+            arc.to_degrees()
+        );
         assert!(mean.abs() < 3.0 * error, "arc {arc}: {mean} ± {error}");
         assert!(error < 2.5e-3, "too blunt to see the bias");
     }
@@ -61,7 +77,12 @@ fn radius_and_axis_of_a_noisy_cylinder_are_right_in_the_mean() {
         let mut rng = generator(seed);
         let exact = on_cylinder(&mut rng, 1.0, TAU, 3.0, 30);
         let touched = noisy(&exact, &mut rng, 0.0, 0.1);
-        let fit = fit(&hole_near(&Isometry3::identity(), 1.0), &touched, &FitParams::default()).unwrap();
+        let fit = fit(
+            &hole_near(&Isometry3::identity(), 1.0),
+            &touched,
+            &FitParams::default(),
+        )
+        .unwrap();
         radii.push(fit.surface.radius - 1.0);
         leans.push(fit.surface.axis().x);
     }
@@ -74,13 +95,22 @@ fn radius_and_axis_of_a_noisy_cylinder_are_right_in_the_mean() {
 
 #[test]
 fn stated_uncertainty_holds_for_independent_errors() {
-    for (name, arc, count) in [("round", TAU, 60), ("half", PI, 80), ("quarter", 0.5 * PI, 150)] {
+    for (name, arc, count) in [
+        ("round", TAU, 60),
+        ("half", PI, 80),
+        ("quarter", 0.5 * PI, 150),
+    ] {
         let z: Vec<f64> = (0..300)
             .flat_map(|seed| {
                 let mut rng = generator(seed);
                 let exact = on_cylinder(&mut rng, 1.0, arc, 2.0, count);
                 let touched = noisy(&exact, &mut rng, 0.0, 0.02);
-                let fit = fit(&hole_near(&Isometry3::identity(), 1.0), &touched, &FitParams::default()).unwrap();
+                let fit = fit(
+                    &hole_near(&Isometry3::identity(), 1.0),
+                    &touched,
+                    &FitParams::default(),
+                )
+                .unwrap();
                 normalised(&fit, 1.0)
             })
             .collect();
@@ -92,14 +122,26 @@ fn stated_uncertainty_holds_for_independent_errors() {
 #[test]
 fn stated_uncertainty_holds_for_errors_shared_in_passes() {
     // 30 passes of 20 contacts; stated: all of σ
-    for (name, shared, own) in [("all shared", 0.02, 0.0), ("half", 0.014, 0.014), ("none", 0.0, 0.02)] {
+    for (name, shared, own) in [
+        ("all shared", 0.02, 0.0),
+        ("half", 0.014, 0.014),
+        ("none", 0.0, 0.02),
+    ] {
         let z: Vec<f64> = (0..200)
             .flat_map(|seed| {
                 let mut rng = generator(seed);
                 let mut exact = on_cylinder(&mut rng, 1.0, TAU, 2.0, 600);
-                exact.iter_mut().enumerate().for_each(|(i, o)| o.group = i as u32 / 20);
+                exact
+                    .iter_mut()
+                    .enumerate()
+                    .for_each(|(i, o)| o.group = i as u32 / 20);
                 let touched = noisy(&exact, &mut rng, shared, own);
-                let fit = fit(&hole_near(&Isometry3::identity(), 1.0), &touched, &FitParams::default()).unwrap();
+                let fit = fit(
+                    &hole_near(&Isometry3::identity(), 1.0),
+                    &touched,
+                    &FitParams::default(),
+                )
+                .unwrap();
                 normalised(&fit, 1.0)
             })
             .collect();
@@ -118,7 +160,12 @@ fn sigmas_stated_too_small_are_found_out() {
         let exact = on_cylinder(&mut rng, 1.0, TAU, 2.0, 80);
         let mut touched = noisy(&exact, &mut rng, 0.0, 0.03);
         touched.iter_mut().for_each(|o| o.sigma = 0.01);
-        let fit = fit(&hole_near(&Isometry3::identity(), 1.0), &touched, &FitParams::default()).unwrap();
+        let fit = fit(
+            &hole_near(&Isometry3::identity(), 1.0),
+            &touched,
+            &FitParams::default(),
+        )
+        .unwrap();
         z.extend(normalised(&fit, 1.0));
     }
     assert!((0.8..1.25).contains(&rms(&z)), "{}", rms(&z));
@@ -135,25 +182,47 @@ fn planes_and_cones_are_right_in_the_mean_and_say_how_well() {
             .map(|group| {
                 let (angle, along) = (between(&mut rng, 0.0, TAU), between(&mut rng, -0.5, 0.5));
                 let rho = 1.0 + along * half_angle.sin();
-                let point = Point3::new(rho * angle.cos(), rho * angle.sin(), along * half_angle.cos());
-                Observation { point, offset: 0.0, sigma: 1.0, group }
+                let point = Point3::new(
+                    rho * angle.cos(),
+                    rho * angle.sin(),
+                    along * half_angle.cos(),
+                );
+                Observation {
+                    point,
+                    offset: 0.0,
+                    sigma: 1.0,
+                    group,
+                }
             })
             .collect();
         let touched = noisy(&exact, &mut rng, 0.0, 0.01);
-        let guess =
-            Cone::new(Point3::new(0.05, 0.0, 0.0), &Vector3::new(0.02, 0.0, 1.0), 1.05, half_angle + 0.05, true);
+        let guess = Cone::new(
+            Point3::new(0.05, 0.0, 0.0),
+            &Vector3::new(0.02, 0.0, 1.0),
+            1.05,
+            half_angle + 0.05,
+            true,
+        );
         let cone = fit(&guess, &touched, &FitParams::default()).unwrap();
         angles.push(cone.surface.half_angle - half_angle);
         of_cone.push((cone.surface.half_angle - half_angle) / cone.std(Freedom::Second).unwrap());
         // its diameter where its axis passes z = 0 of the true one
         let height = -cone.surface.center().z / cone.surface.axis().z;
         let cos = cone.surface.half_angle.cos();
-        let by = [(Freedom::Size, 2.0 / cos), (Freedom::Second, 2.0 * height / (cos * cos))];
+        let by = [
+            (Freedom::Size, 2.0 / cos),
+            (Freedom::Second, 2.0 * height / (cos * cos)),
+        ];
         let radius = cone.surface.radius + height * cone.surface.half_angle.tan();
         of_cone.push((2.0 * radius - 2.0) / cone.std_by(&by).unwrap());
 
-        let flat: Vec<_> =
-            exact.iter().map(|o| Observation { point: Point3::new(o.point.x, o.point.y, 0.0), ..*o }).collect();
+        let flat: Vec<_> = exact
+            .iter()
+            .map(|o| Observation {
+                point: Point3::new(o.point.x, o.point.y, 0.0),
+                ..*o
+            })
+            .collect();
         let touched = noisy(&flat, &mut rng, 0.0, 0.01);
         let guess = Plane::new(Point3::new(0.0, 0.0, 0.1), &Vector3::new(0.1, -0.1, 1.0));
         let plane = fit(&guess, &touched, &FitParams::default()).unwrap();
@@ -177,16 +246,38 @@ fn a_common_displacement_goes_into_the_place_whatever_arc_was_felt() {
             let shift = Vector3::from_fn(|_, _| shift_sigma * normal(&mut rng));
             let touched: Vec<_> = on_cylinder(&mut rng, 1.0, arc * PI, 2.0, 40)
                 .iter()
-                .map(|o| Observation { point: o.point + shift, sigma: 1e-4, ..*o })
+                .map(|o| Observation {
+                    point: o.point + shift,
+                    sigma: 1e-4,
+                    ..*o
+                })
                 .collect();
-            let found = fit(&guess, &touched, &FitParams { shift_sigma, ..FitParams::default() }).unwrap();
+            let found = fit(
+                &guess,
+                &touched,
+                &FitParams {
+                    shift_sigma,
+                    ..FitParams::default()
+                },
+            )
+            .unwrap();
             let off = found.surface.center();
-            of_place.extend([off.x / found.std(Freedom::X).unwrap(), off.y / found.std(Freedom::Y).unwrap()]);
+            of_place.extend([
+                off.x / found.std(Freedom::X).unwrap(),
+                off.y / found.std(Freedom::Y).unwrap(),
+            ]);
             of_size.push(found.std(Freedom::Size).unwrap());
         }
         // root mean square of 300: 1 ± 3 / √600
-        assert!((rms(&of_place) - 1.0).abs() < 0.13, "arc {arc}: {}", rms(&of_place));
-        assert!(of_size.iter().all(|std| *std < 0.1 * shift_sigma), "arc {arc}: it is in no size");
+        assert!(
+            (rms(&of_place) - 1.0).abs() < 0.13,
+            "arc {arc}: {}",
+            rms(&of_place)
+        );
+        assert!(
+            of_size.iter().all(|std| *std < 0.1 * shift_sigma),
+            "arc {arc}: it is in no size"
+        );
     }
 }
 
@@ -195,11 +286,27 @@ fn a_common_displacement_goes_into_the_place_whatever_arc_was_felt() {
 fn a_common_displacement_of_a_plane_is_beside_its_own_uncertainty() {
     let mut rng = generator(13);
     let at = |i: usize| Point3::new((i % 20) as f64 * 0.1, (i / 20) as f64 * 0.1, 0.0);
-    let exact: Vec<_> =
-        (0..400).map(|i| Observation { point: at(i), offset: 0.0, sigma: 0.01, group: i as u32 }).collect();
+    let exact: Vec<_> = (0..400)
+        .map(|i| Observation {
+            point: at(i),
+            offset: 0.0,
+            sigma: 0.01,
+            group: i as u32,
+        })
+        .collect();
     let touched = noisy(&exact, &mut rng, 0.0, 0.01);
     let guess = Plane::new(Point3::new(0.0, 0.0, 0.1), &Vector3::z());
-    let of = |shift_sigma| fit(&guess, &touched, &FitParams { shift_sigma, ..FitParams::default() }).unwrap();
+    let of = |shift_sigma| {
+        fit(
+            &guess,
+            &touched,
+            &FitParams {
+                shift_sigma,
+                ..FitParams::default()
+            },
+        )
+        .unwrap()
+    };
     let (without, with) = (of(0.0), of(0.02));
     let [own, all] = [&without, &with].map(|fit| fit.std(Freedom::Z).unwrap());
     // 400 places of 10 µm each
@@ -213,13 +320,34 @@ fn a_common_displacement_of_a_plane_is_beside_its_own_uncertainty() {
 fn a_common_error_goes_into_the_radius_and_not_into_the_axis() {
     let mut rng = generator(7);
     let exact = on_cylinder(&mut rng, 1.0, 0.6 * PI, 2.0, 40);
-    let touched: Vec<_> = exact.iter().map(|o| Observation { sigma: 1e-4, ..*o }).collect();
+    let touched: Vec<_> = exact
+        .iter()
+        .map(|o| Observation { sigma: 1e-4, ..*o })
+        .collect();
     let guess = hole_near(&Isometry3::identity(), 1.0);
-    let of = |common_sigma| fit(&guess, &touched, &FitParams { common_sigma, ..FitParams::default() }).unwrap();
+    let of = |common_sigma| {
+        fit(
+            &guess,
+            &touched,
+            &FitParams {
+                common_sigma,
+                ..FitParams::default()
+            },
+        )
+        .unwrap()
+    };
     let (without, with) = (of(0.0), of(0.01));
     let added = |f| with.std(f).unwrap().powi(2) - without.std(f).unwrap().powi(2);
     assert!((added(Freedom::Size) / 1e-4 - 1.0).abs() < 1e-6);
-    assert!(Freedom::ALL[..6].iter().filter(|f| without.std(**f).is_some()).all(|f| added(*f).abs() < 1e-10));
+    assert!(
+        Freedom::ALL[..6]
+            .iter()
+            .filter(|f| without.std(**f).is_some())
+            .all(|f| added(*f).abs() < 1e-10)
+    );
     let [without, with] = [without, with].map(|f| f.std_by(&[(Freedom::Size, 2.0)]).unwrap());
-    assert!(((with.powi(2) - without.powi(2)).sqrt() - 0.02).abs() < 1e-7, "twice in the diameter");
+    assert!(
+        ((with.powi(2) - without.powi(2)).sqrt() - 0.02).abs() < 1e-7,
+        "twice in the diameter"
+    );
 }

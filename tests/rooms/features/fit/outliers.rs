@@ -22,11 +22,25 @@ fn a_keyway_spoils_neither_centre_nor_radius() {
             o.point += shaken(&mut rng, sigma);
             o.sigma = sigma;
         });
-        let fit = fit(&hole_near(&Isometry3::identity(), r), &touched, &FitParams::default()).unwrap();
-        assert!(fit.used[..18].iter().all(|used| !used), "the keyway is left out");
-        assert!(fit.used[18..].iter().filter(|used| !**used).count() <= 2, "the hole is not");
+        let fit = fit(
+            &hole_near(&Isometry3::identity(), r),
+            &touched,
+            &FitParams::default(),
+        )
+        .unwrap();
+        assert!(
+            fit.used[..18].iter().all(|used| !used),
+            "the keyway is left out"
+        );
+        assert!(
+            fit.used[18..].iter().filter(|used| !**used).count() <= 2,
+            "the hole is not"
+        );
         errors.push((fit.surface.radius - r) / fit.std(Freedom::Size).unwrap());
-        let axis_at_0 = fit.surface.pose_of.inverse_transform_point(&Point3::origin());
+        let axis_at_0 = fit
+            .surface
+            .pose_of
+            .inverse_transform_point(&Point3::origin());
         assert!(axis_at_0.x.hypot(axis_at_0.y) < 0.05 * MM, "seed {seed}");
     }
     assert!((0.8..1.25).contains(&rms(&errors)), "{}", rms(&errors));
@@ -47,7 +61,12 @@ fn a_fifth_of_gross_errors_is_left_out() {
             o.point += shaken(&mut rng, sigma);
             o.sigma = sigma;
         }
-        let fit = fit(&hole_near(&Isometry3::identity(), r), &touched, &FitParams::default()).unwrap();
+        let fit = fit(
+            &hole_near(&Isometry3::identity(), r),
+            &touched,
+            &FitParams::default(),
+        )
+        .unwrap();
         errors.push((fit.surface.radius - r) / fit.std(Freedom::Size).unwrap());
     }
     println!("{}", rms(&errors));
@@ -62,13 +81,23 @@ fn points_crowded_on_one_side_do_not_pull_the_centre() {
         // nine of ten on 60°, the rest around
         let mut touched = on_cylinder(&mut rng, 1.0, PI / 3.0, 2.0, 180);
         touched.extend(
-            on_cylinder(&mut rng, 1.0, TAU, 2.0, 20).into_iter().map(|o| Observation { group: 180 + o.group, ..o }),
+            on_cylinder(&mut rng, 1.0, TAU, 2.0, 20)
+                .into_iter()
+                .map(|o| Observation {
+                    group: 180 + o.group,
+                    ..o
+                }),
         );
         touched.iter_mut().for_each(|o| {
             o.point += shaken(&mut rng, 0.05);
             o.sigma = 0.05;
         });
-        let fit = fit(&hole_near(&Isometry3::identity(), 1.0), &touched, &FitParams::default()).unwrap();
+        let fit = fit(
+            &hole_near(&Isometry3::identity(), 1.0),
+            &touched,
+            &FitParams::default(),
+        )
+        .unwrap();
         let axis = fit.surface.pose_of.rotation * Vector3::z();
         let center = fit.surface.center();
         x.push(center.x - axis.x / axis.z * center.z);

@@ -11,13 +11,27 @@ const SAMPLES: i64 = 40;
 
 /// A number of either sign, of any size that floats have, or at one of their ends.
 fn any_size(rng: &mut Pcg64) -> f64 {
-    let ends = [0.0, 5e-324, f64::MIN_POSITIVE, 1e-200, 1e-162, 1e-154, 1e-81, f64::EPSILON, 1.0];
+    let ends = [
+        0.0,
+        5e-324,
+        f64::MIN_POSITIVE,
+        1e-200,
+        1e-162,
+        1e-154,
+        1e-81,
+        f64::EPSILON,
+        1.0,
+    ];
     let size = match within(rng, 0.0, 3.0) as usize {
         0 => ends[within(rng, 0.0, ends.len() as f64) as usize],
         1 => 10f64.powf(within(rng, -323.0, -3.0)),
         _ => 10f64.powf(within(rng, -20.0, -2.0)),
     };
-    if within(rng, -1.0, 1.0) < 0.0 { -size } else { size }
+    if within(rng, -1.0, 1.0) < 0.0 {
+        -size
+    } else {
+        size
+    }
 }
 
 fn any_vector(rng: &mut Pcg64) -> Vector3<f64> {
@@ -26,7 +40,11 @@ fn any_vector(rng: &mut Pcg64) -> Vector3<f64> {
 
 /// Triangles in a fan, each corner a number of any size off another: needles, points that coincide, faces without area.
 fn needles(rng: &mut Pcg64) -> TriMesh {
-    let mut positions = vec![Point3::origin(), Point3::new(1e-2, 0.0, 0.0), Point3::new(0.0, 1e-2, 0.0)];
+    let mut positions = vec![
+        Point3::origin(),
+        Point3::new(1e-2, 0.0, 0.0),
+        Point3::new(0.0, 1e-2, 0.0),
+    ];
     let mut faces = vec![[0, 1, 2]];
     for next in 3..12u32 {
         let near = positions[within(rng, 0.0, f64::from(next)) as usize];
@@ -39,12 +57,21 @@ fn needles(rng: &mut Pcg64) -> TriMesh {
 
 fn all_settings() -> Vec<RefineParams> {
     let robust = RefineParams::robust(BALL);
-    let rigid = RefineParams::robust(TipParams { stiffness: None, ..BALL });
+    let rigid = RefineParams::robust(TipParams {
+        stiffness: None,
+        ..BALL
+    });
     vec![
         robust,
         rigid,
-        RefineParams { guard: None, ..robust },
-        RefineParams { gate: None, ..robust },
+        RefineParams {
+            guard: None,
+            ..robust
+        },
+        RefineParams {
+            gate: None,
+            ..robust
+        },
         RefineParams::paper(BALL),
     ]
 }
@@ -62,14 +89,20 @@ fn no_float_brings_a_vertex_to_nowhere() {
         let mut refiner = Refiner::new(mesh, params).unwrap();
         for tick in 0..SAMPLES {
             let faces: Vec<_> = refiner.mesh().faces().map(|(face, _)| face).collect();
-            let [a, b, c] = refiner.mesh().triangle(faces[within(rng, 0.0, faces.len() as f64) as usize]);
+            let [a, b, c] = refiner
+                .mesh()
+                .triangle(faces[within(rng, 0.0, faces.len() as f64) as usize]);
             let [u, v] = [within(rng, 0.0, 1.0), within(rng, 0.0, 1.0)];
             let on = match within(rng, 0.0, 3.0) as usize {
                 0 => a,
                 1 => a + (b - a) * u,
                 _ => a + (b - a) * u + (c - a) * (v * (1.0 - u)),
             };
-            let out = if within(rng, -1.0, 1.0) < 0.0 { Vector3::zeros() } else { Vector3::z() * RADIUS };
+            let out = if within(rng, -1.0, 1.0) < 0.0 {
+                Vector3::zeros()
+            } else {
+                Vector3::z() * RADIUS
+            };
             let force = match within(rng, 0.0, 3.0) as usize {
                 0 => Vector3::zeros(),
                 1 => any_vector(rng) * 1e3,
@@ -85,20 +118,43 @@ fn no_float_brings_a_vertex_to_nowhere() {
         moved += refiner.counts().moved;
     }
     // the runs are no runs of refusals
-    assert!(moved > 2 * runs && refused < runs, "{moved} moved, {refused} refused of {}", runs * SAMPLES as u64);
+    assert!(
+        moved > 2 * runs && refused < runs,
+        "{moved} moved, {refused} refused of {}",
+        runs * SAMPLES as u64
+    );
 }
 
 /// The case that wrote NaN: a ball without force, its centre 1e-200 m off a face.
 #[test]
 fn a_ball_a_hair_off_a_face_carves_it_as_one_right_on_it() {
     for off in [0.0, 5e-324, 1e-200, -1e-200, 1e-162, 1e-100, 1e-15] {
-        let params = RefineParams { guard: Some(GuardParams::default()), ..RefineParams::robust(BALL) };
+        let params = RefineParams {
+            guard: Some(GuardParams::default()),
+            ..RefineParams::robust(BALL)
+        };
         let mut refiner = Refiner::new(grid(15, EDGE, |_, _| 0.0), params).unwrap();
         for tick in 0..50 {
-            refiner.push(&sample(tick, Point3::new(0.3e-3, 0.2e-3, off), Vector3::zeros())).unwrap();
+            refiner
+                .push(&sample(
+                    tick,
+                    Point3::new(0.3e-3, 0.2e-3, off),
+                    Vector3::zeros(),
+                ))
+                .unwrap();
         }
-        let lowest = refiner.mesh().positions().iter().map(|p| p.z).fold(0.0, f64::min);
-        let highest = refiner.mesh().positions().iter().map(|p| p.z).fold(0.0, f64::max);
+        let lowest = refiner
+            .mesh()
+            .positions()
+            .iter()
+            .map(|p| p.z)
+            .fold(0.0, f64::min);
+        let highest = refiner
+            .mesh()
+            .positions()
+            .iter()
+            .map(|p| p.z)
+            .fold(0.0, f64::max);
         // a face is carved along its normal, into the part
         assert!(
             lowest < -1e-6 && lowest.abs() < 2.0 * RADIUS && highest <= 1e-12,

@@ -13,18 +13,38 @@ const ALPHA: f64 = 0.1;
 /// One face of 20 mm in the plane z = 0, under a point.
 fn one_face() -> Refiner {
     let p = |x, y| Point3::new(x, y, 0.0);
-    let face = TriMesh::new(vec![p(-10e-3, -6e-3), p(10e-3, -6e-3), p(0.0, 12e-3)], vec![[0, 1, 2]]).unwrap();
-    Refiner::new(face, RefineParams::paper(TipParams { radius: 0.0, stiffness: None })).unwrap()
+    let face = TriMesh::new(
+        vec![p(-10e-3, -6e-3), p(10e-3, -6e-3), p(0.0, 12e-3)],
+        vec![[0, 1, 2]],
+    )
+    .unwrap();
+    Refiner::new(
+        face,
+        RefineParams::paper(TipParams {
+            radius: 0.0,
+            stiffness: None,
+        }),
+    )
+    .unwrap()
 }
 
 /// Height of the face after holding the tip at `tip_z` with `force` along z for `ticks`; it stays level.
 fn height(tip_z: f64, force: f64, ticks: i64) -> f64 {
     let mut refiner = one_face();
     for tick in 0..=ticks {
-        refiner.push(&sample(tick, Point3::new(0.0, 0.0, tip_z), Vector3::z() * force)).unwrap();
+        refiner
+            .push(&sample(
+                tick,
+                Point3::new(0.0, 0.0, tip_z),
+                Vector3::z() * force,
+            ))
+            .unwrap();
     }
     let heights: Vec<_> = refiner.mesh().positions().iter().map(|p| p.z).collect();
-    assert!(heights.iter().all(|z| (z - heights[0]).abs() < 1e-12), "{heights:?}");
+    assert!(
+        heights.iter().all(|z| (z - heights[0]).abs() < 1e-12),
+        "{heights:?}"
+    );
     heights[0]
 }
 
@@ -34,10 +54,16 @@ fn one_face_rests_off_the_surface_by_the_rigid_contact_bias() {
     let figures = [(1.0, 1.401), (2.0, 1.807), (4.0, 2.297)];
     for (force, millimetres) in figures {
         let bias = H_MIN * (DELTA - (F_MAX / force - 1.0f64).ln());
-        assert!((bias * 1e3 - millimetres).abs() < 1e-3, "the figure by hand");
+        assert!(
+            (bias * 1e3 - millimetres).abs() < 1e-3,
+            "the figure by hand"
+        );
         let found = height(0.0, force, 20_000);
         println!("{force} N: {:.3} mm above the tip", found * 1e3);
-        assert!((found - bias).abs() < 1e-9, "{force} N: {found:e} m, {bias:e} m expected");
+        assert!(
+            (found - bias).abs() < 1e-9,
+            "{force} N: {found:e} m, {bias:e} m expected"
+        );
     }
 }
 
@@ -51,12 +77,19 @@ fn one_face_flees_from_a_stylus_that_hovers() {
     let (mut lo, mut hi) = (start, start + 10.0);
     for _ in 0..100 {
         let middle = (lo + hi) / 2.0;
-        if middle + middle.exp() < right { lo = middle } else { hi = middle }
+        if middle + middle.exp() < right {
+            lo = middle
+        } else {
+            hi = middle
+        }
     }
     let travel = (lo - start) * H_MIN;
     let found = -height(1e-3, 0.0, 1_000);
     println!("{:.3} mm in one second", found * 1e3);
-    assert!((found - travel).abs() < 1e-9, "{found:e} m, {travel:e} m expected");
+    assert!(
+        (found - travel).abs() < 1e-9,
+        "{found:e} m, {travel:e} m expected"
+    );
     assert!((found * 1e3 - 0.52).abs() < 0.01, "the figure of METHOD");
 }
 
@@ -66,10 +99,15 @@ fn one_face_flees_from_a_stylus_that_hovers() {
 fn beyond_f_max_the_printed_rule_runs_away_and_is_counted() {
     let bias = H_MIN * (DELTA + 199f64.ln());
     let found = height(0.0, 9.95, 60_000);
-    assert!((found - bias).abs() < 1e-6, "{found:e} m, {bias:e} m expected");
+    assert!(
+        (found - bias).abs() < 1e-6,
+        "{found:e} m, {bias:e} m expected"
+    );
     let mut refiner = one_face();
     for tick in 0..=2_000 {
-        refiner.push(&sample(tick, Point3::origin(), Vector3::z() * 10.5)).unwrap();
+        refiner
+            .push(&sample(tick, Point3::origin(), Vector3::z() * 10.5))
+            .unwrap();
     }
     let found = refiner.mesh().position(VertexId(0)).z;
     let least = ALPHA * (10.5 - F_MAX) * 2.0;
@@ -90,12 +128,15 @@ fn all_four_cases_have_an_expected_force_and_both_mismatches() {
     ] {
         let mut refiner = one_face();
         let felt = Vector3::new(0.6, 0.0, 0.8) * force;
-        let update = refiner.push(&sample(0, Point3::new(0.0, 0.0, tip_z), felt)).unwrap();
+        let update = refiner
+            .push(&sample(0, Point3::new(0.0, 0.0, tip_z), felt))
+            .unwrap();
         let mismatch = update.mismatch.unwrap();
         let expected = Vector3::z() * (F_MAX / (1.0 + (tip_z / H_MIN + DELTA).exp()));
         assert_eq!(update.case, case, "tip at {tip_z}, {force} N");
         assert!(
-            (mismatch.distance - tip_z).abs() < 1e-15 && (mismatch.expected_force_o - expected).norm() < 1e-14 * F_MAX
+            (mismatch.distance - tip_z).abs() < 1e-15
+                && (mismatch.expected_force_o - expected).norm() < 1e-14 * F_MAX
         );
         assert!((mismatch.linear - (felt - expected)).norm() < 1e-14 * F_MAX);
         assert!((mismatch.rotational - expected.cross(&felt)).norm() < 1e-14 * F_MAX);

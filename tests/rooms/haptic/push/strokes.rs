@@ -9,7 +9,12 @@ fn strokes() -> Vec<Vec<Sample>> {
     let length = samples.len().div_ceil(6);
     let pause = |stroke: usize| stroke as i64 * 200_000_000;
     let shifted = |(stroke, part): (usize, &[Sample])| {
-        part.iter().map(|sample| Sample { stamp_ns: sample.stamp_ns + pause(stroke), ..*sample }).collect()
+        part.iter()
+            .map(|sample| Sample {
+                stamp_ns: sample.stamp_ns + pause(stroke),
+                ..*sample
+            })
+            .collect()
     };
     samples.chunks(length).enumerate().map(shifted).collect()
 }
@@ -23,13 +28,25 @@ fn strokes_are_undone_and_redone_bit_for_bit_and_the_index_follows() {
         push_all(&mut refiner, &stroke);
         states.push(refiner.mesh().positions().to_vec());
     }
-    assert!(states.windows(2).all(|pair| pair[0] != pair[1]), "each stroke moves something");
+    assert!(
+        states.windows(2).all(|pair| pair[0] != pair[1]),
+        "each stroke moves something"
+    );
     let check = |refiner: &Refiner, expected: &[Point3<f64>]| {
         assert_eq!(refiner.mesh().positions(), expected);
         let rebuilt = FaceTree::new(refiner.mesh());
-        for p in expected.iter().map(|p| p + Vector3::new(0.4e-3, 0.3e-3, 0.5e-3)) {
+        for p in expected
+            .iter()
+            .map(|p| p + Vector3::new(0.4e-3, 0.3e-3, 0.5e-3))
+        {
             let found = refiner.closest_face(&p, 1.0).unwrap().distance_squared;
-            assert_eq!(found, rebuilt.closest(refiner.mesh(), &p, 1.0).unwrap().distance_squared);
+            assert_eq!(
+                found,
+                rebuilt
+                    .closest(refiner.mesh(), &p, 1.0)
+                    .unwrap()
+                    .distance_squared
+            );
         }
     };
     for expected in states.iter().rev().skip(1) {
@@ -43,7 +60,8 @@ fn strokes_are_undone_and_redone_bit_for_bit_and_the_index_follows() {
     }
     // a new stroke ends what could be redone
     let mut last = strokes().pop().unwrap();
-    last.iter_mut().for_each(|sample| sample.stamp_ns += 10_000_000_000);
+    last.iter_mut()
+        .for_each(|sample| sample.stamp_ns += 10_000_000_000);
     push_all(&mut refiner, &last);
     assert!(!refiner.redo() && refiner.undo());
     check(&refiner, &states[3]);

@@ -9,5 +9,7 @@ pub fn qualities(mesh: &TriMesh) -> Vec<f64> {
         let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
         (b - a).cross(&(c - a)).norm() / (longest * longest)
     };
-    mesh.faces().map(|(face, _)| quality(mesh.triangle(face))).collect()
+    mesh.faces()
+        .map(|(face, _)| quality(mesh.triangle(face)))
+        .collect()
 }

@@ -15,10 +15,16 @@ const MAX_REQUEST_BYTES: usize = 16 << 20;
 
 fn read_metered(path: &Path) -> Outcome {
     let (outcome, largest) = largest_request(|| read(path));
-    assert!(largest < MAX_REQUEST_BYTES, "{largest} bytes in one request");
+    assert!(
+        largest < MAX_REQUEST_BYTES,
+        "{largest} bytes in one request"
+    );
     if let Some(error) = &outcome.error {
         let name = path.file_name().unwrap().to_str().unwrap();
-        assert!(error.to_string().contains(name), "{error} does not name {name}");
+        assert!(
+            error.to_string().contains(name),
+            "{error} does not name {name}"
+        );
     }
     outcome
 }
@@ -26,7 +32,8 @@ fn read_metered(path: &Path) -> Outcome {
 /// Whether `part` is `whole` with messages left out.
 fn is_subsequence(part: &[Message], whole: &[Message]) -> bool {
     let mut whole = whole.iter();
-    part.iter().all(|message| whole.any(|other| other == message))
+    part.iter()
+        .all(|message| whole.any(|other| other == message))
 }
 
 /// 30,000 messages: three chunks.
@@ -41,14 +48,22 @@ fn a_cut_mcap_gives_its_whole_chunks_and_then_the_place() {
     let folder = tempfile::tempdir().unwrap();
     let (messages, bytes) = whole();
     let step = bytes.len() / 150;
-    let lengths = (0..40).chain((0..bytes.len()).step_by(step)).chain(bytes.len() - 300..bytes.len());
+    let lengths = (0..40)
+        .chain((0..bytes.len()).step_by(step))
+        .chain(bytes.len() - 300..bytes.len());
     let (mut last, mut silent) = (0, 0);
     for len in lengths {
         let outcome = read_metered(&put(folder.path(), "cut.mcap", &bytes[..len]));
-        assert!(outcome.messages == messages[..outcome.messages.len()], "cut to {len} bytes");
+        assert!(
+            outcome.messages == messages[..outcome.messages.len()],
+            "cut to {len} bytes"
+        );
         last = last.max(outcome.messages.len());
         if outcome.error.is_none() {
-            assert!(outcome.truncated && outcome.messages.len() == messages.len(), "cut to {len} bytes");
+            assert!(
+                outcome.truncated && outcome.messages.len() == messages.len(),
+                "cut to {len} bytes"
+            );
             silent += 1;
         }
     }
@@ -69,7 +84,10 @@ fn every_bit_flip_of_an_mcap_is_found_or_harmless() {
         bytes[at] ^= 1 << (random.next_u64() % 8);
         let outcome = read_metered(&put(folder.path(), "flipped.mcap", &bytes));
         assert!(is_subsequence(&outcome.messages, &messages), "byte {at}");
-        assert!(outcome.error.is_some() || outcome.messages == messages, "byte {at}: loss without a word");
+        assert!(
+            outcome.error.is_some() || outcome.messages == messages,
+            "byte {at}: loss without a word"
+        );
     }
 }
 
@@ -82,7 +100,13 @@ fn lengths_that_lie_are_refused_before_memory_is_taken() {
     let chunk = 8 + 9 + header_len;
     assert_eq!(bytes[chunk], 6, "a chunk");
     assert_eq!(&bytes[chunk + 41..chunk + 45], b"zstd");
-    for (field, width) in [(chunk + 1, 8), (chunk + 25, 8), (chunk + 37, 4), (chunk + 45, 8), (9, 8)] {
+    for (field, width) in [
+        (chunk + 1, 8),
+        (chunk + 25, 8),
+        (chunk + 37, 4),
+        (chunk + 45, 8),
+        (9, 8),
+    ] {
         for value in [u64::MAX, 1 << 62, 1 << 40, 0xffff_ffff, 255 << 20] {
             let mut bytes = bytes.clone();
             bytes[field..field + width].copy_from_slice(&value.to_le_bytes()[..width]);
@@ -99,25 +123,42 @@ fn lengths_that_lie_are_refused_before_memory_is_taken() {
 fn names_that_only_packing_makes_small_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let mut file = std::io::Cursor::new(Vec::new());
-    let mut writer = ::mcap::WriteOptions::new().profile("ros2").create(&mut file).unwrap();
-    let schema = writer.add_schema("std_msgs/msg/Empty", "ros2msg", b"").unwrap();
-    writer.add_channel(schema, &"x".repeat(1 << 20), "cdr", &Default::default()).unwrap();
+    let mut writer = ::mcap::WriteOptions::new()
+        .profile("ros2")
+        .create(&mut file)
+        .unwrap();
+    let schema = writer
+        .add_schema("std_msgs/msg/Empty", "ros2msg", b"")
+        .unwrap();
+    writer
+        .add_channel(schema, &"x".repeat(1 << 20), "cdr", &Default::default())
+        .unwrap();
     writer.finish().unwrap();
     drop(writer);
     let outcome = read_metered(&put(folder.path(), "names.mcap", &file.into_inner()));
     let error = outcome.error.expect("no topic is called that").to_string();
-    assert!(error.contains("topic of a channel of 1048576 bytes, over the limit of 65536 bytes"), "{error}");
+    assert!(
+        error.contains("topic of a channel of 1048576 bytes, over the limit of 65536 bytes"),
+        "{error}"
+    );
 }
 
 /// An unchecked, uncompressed chunk whose message and names claim more than is there.
 #[test]
 fn records_that_overrun_an_unchecked_chunk_are_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let options = ::mcap::WriteOptions::new().compression(None).calculate_chunk_crcs(false).profile("ros2");
+    let options = ::mcap::WriteOptions::new()
+        .compression(None)
+        .calculate_chunk_crcs(false)
+        .profile("ros2");
     let mut file = std::io::Cursor::new(Vec::new());
     let mut writer = options.create(&mut file).unwrap();
-    let schema = writer.add_schema("geometry_msgs/msg/PoseStamped", "ros2msg", b"").unwrap();
-    writer.add_channel(schema, "/stylus/pose", "cdr", &Default::default()).unwrap();
+    let schema = writer
+        .add_schema("geometry_msgs/msg/PoseStamped", "ros2msg", b"")
+        .unwrap();
+    writer
+        .add_channel(schema, "/stylus/pose", "cdr", &Default::default())
+        .unwrap();
     writer.finish().unwrap();
     drop(writer);
     let bytes = file.into_inner();
@@ -129,7 +170,11 @@ fn records_that_overrun_an_unchecked_chunk_are_refused() {
         // without the index the chunk itself must be searched
         bytes.truncate(bytes.len() - 1);
         let outcome = read_metered(&put(folder.path(), "overrun.mcap", &bytes));
-        assert!(matches!(outcome.error, Some(RecordingError::Damaged { .. })), "{:?}", outcome.error);
+        assert!(
+            matches!(outcome.error, Some(RecordingError::Damaged { .. })),
+            "{:?}",
+            outcome.error
+        );
     }
 }
 
@@ -144,7 +189,11 @@ fn a_cut_or_flipped_db3_ends_in_an_error_that_names_it() {
     let step = bytes.len() / 60;
     for len in (0..20).chain((0..bytes.len() - 1).step_by(step)) {
         let outcome = read_metered(&put(folder.path(), "cut.db3", &bytes[..len]));
-        assert!(outcome.error.is_some(), "cut to {len} of {} bytes", bytes.len());
+        assert!(
+            outcome.error.is_some(),
+            "cut to {len} of {} bytes",
+            bytes.len()
+        );
         assert!(is_subsequence(&outcome.messages, &messages));
     }
     let mut random = Pcg64::seed_from_u64(11);

@@ -7,13 +7,17 @@ use touchup::io::recording::{RecordingError, RecordingReader, Topics};
 use super::made::read;
 use crate::shared::shared;
 
-const TOPICS: &str = "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT);
+const TOPICS: &str =
+    "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT);
     INSERT INTO topics VALUES (1, '/stylus/pose', 'geometry_msgs/msg/PoseStamped', 'cdr'),
                               (2, '/stylus/wrench', 'geometry_msgs/msg/WrenchStamped', 'cdr');";
 const MESSAGES: &str = "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB);";
 
 fn made(path: &Path, schema: &str) {
-    rusqlite::Connection::open(path).unwrap().execute_batch(schema).unwrap();
+    rusqlite::Connection::open(path)
+        .unwrap()
+        .execute_batch(schema)
+        .unwrap();
 }
 
 /// A column that computes 400 MB of a row of a few bytes: SQLite refuses it by the limit, before it makes it.
@@ -74,9 +78,14 @@ fn the_names_of_all_topics_together_are_bounded() {
     let many = "WITH RECURSIVE n(i) AS (SELECT 3 UNION ALL SELECT i + 1 FROM n WHERE i < 1000)
                 INSERT INTO topics SELECT i, hex(zeroblob(30000)), 'a/msg/B', 'cdr' FROM n;";
     made(&path, &format!("{TOPICS} {MESSAGES} {many}"));
-    let error = RecordingReader::open(&path, &Topics::default()).err().expect("it is refused");
+    let error = RecordingReader::open(&path, &Topics::default())
+        .err()
+        .expect("it is refused");
     assert!(matches!(error, RecordingError::Damaged { .. }), "{error}");
-    assert!(error.to_string().contains("names of topics and types of"), "{error}");
+    assert!(
+        error.to_string().contains("names of topics and types of"),
+        "{error}"
+    );
 }
 
 /// Virtual tables run code of their own on what the file says.
@@ -84,7 +93,15 @@ fn the_names_of_all_topics_together_are_bounded() {
 fn a_virtual_table_is_no_table_of_messages() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("virtual.db3");
-    made(&path, &format!("{TOPICS} CREATE VIRTUAL TABLE messages USING fts5(topic_id, timestamp, data);"));
-    let error = RecordingReader::open(&path, &Topics::default()).err().expect("it is refused");
-    assert!(matches!(error, RecordingError::NotARecording { .. }), "{error}");
+    made(
+        &path,
+        &format!("{TOPICS} CREATE VIRTUAL TABLE messages USING fts5(topic_id, timestamp, data);"),
+    );
+    let error = RecordingReader::open(&path, &Topics::default())
+        .err()
+        .expect("it is refused");
+    assert!(
+        matches!(error, RecordingError::NotARecording { .. }),
+        "{error}"
+    );
 }

@@ -13,11 +13,17 @@ pub const START_NS: i64 = 1_760_000_000_000_000_000;
 
 pub fn pose(stamp_ns: i64, v: [f64; 3]) -> Message {
     let rotation = UnitQuaternion::from_euler_angles(v[0], v[1], v[2]);
-    Message::Pose(StampedPose { stamp_ns, pose_ot: Isometry3::from_parts(Translation3::from(v), rotation) })
+    Message::Pose(StampedPose {
+        stamp_ns,
+        pose_ot: Isometry3::from_parts(Translation3::from(v), rotation),
+    })
 }
 
 pub fn wrench(stamp_ns: i64, v: [f64; 3]) -> Message {
-    let wrench = Wrench { force: Vector3::from(v), torque: -0.1 * Vector3::from(v) };
+    let wrench = Wrench {
+        force: Vector3::from(v),
+        torque: -0.1 * Vector3::from(v),
+    };
     Message::Wrench(StampedWrench { stamp_ns, wrench })
 }
 
@@ -25,13 +31,29 @@ pub fn wrench(stamp_ns: i64, v: [f64; 3]) -> Message {
 pub fn touch(messages: usize) -> Vec<Message> {
     let values = |i: usize| [0.37, 0.59, 0.83].map(|rate| (rate * i as f64 * i as f64).sin());
     let stamp = |i: usize| START_NS + 500_000 * i as i64;
-    (0..messages).map(|i| if i % 3 == 0 { pose(stamp(i), values(i)) } else { wrench(stamp(i), values(i)) }).collect()
+    (0..messages)
+        .map(|i| {
+            if i % 3 == 0 {
+                pose(stamp(i), values(i))
+            } else {
+                wrench(stamp(i), values(i))
+            }
+        })
+        .collect()
 }
 
 pub fn mcap_bytes(messages: &[Message]) -> Vec<u8> {
     let mut writer = RecordingWriter::new(Cursor::new(Vec::new()), &Topics::default()).unwrap();
-    let frame = |message: &Message| if matches!(message, Message::Pose(_)) { "O" } else { "T" };
-    messages.iter().for_each(|message| writer.write(*message, frame(message)).unwrap());
+    let frame = |message: &Message| {
+        if matches!(message, Message::Pose(_)) {
+            "O"
+        } else {
+            "T"
+        }
+    };
+    messages
+        .iter()
+        .for_each(|message| writer.write(*message, frame(message)).unwrap());
     writer.finish().unwrap().into_inner()
 }
 
@@ -58,10 +80,18 @@ pub fn db3_of(path: &Path, mcap: &[u8], payload: impl Fn(&[u8]) -> Vec<u8>) {
     .unwrap();
     for message in ::mcap::MessageStream::new(mcap).unwrap() {
         let message = message.unwrap();
-        let topic = if message.channel.topic == "/stylus/pose" { 1 } else { 2 };
+        let topic = if message.channel.topic == "/stylus/pose" {
+            1
+        } else {
+            2
+        };
         db.prepare_cached("INSERT INTO messages(topic_id, timestamp, data) VALUES (?1, ?2, ?3)")
             .unwrap()
-            .execute(params![topic, message.log_time as i64, payload(&message.data)])
+            .execute(params![
+                topic,
+                message.log_time as i64,
+                payload(&message.data)
+            ])
             .unwrap();
     }
     db.execute_batch("COMMIT").unwrap();
@@ -76,7 +106,12 @@ pub struct Outcome {
 }
 
 pub fn read(path: &Path) -> Outcome {
-    let mut outcome = Outcome { messages: Vec::new(), error: None, truncated: false, bad: 0 };
+    let mut outcome = Outcome {
+        messages: Vec::new(),
+        error: None,
+        truncated: false,
+        bad: 0,
+    };
     let mut reader = match RecordingReader::open(path, &Topics::default()) {
         Ok(reader) => reader,
         Err(error) => {
@@ -92,6 +127,10 @@ pub fn read(path: &Path) -> Outcome {
         }
     }
     outcome.truncated = reader.truncated();
-    outcome.bad = reader.bad_messages().values().map(|bad| bad.poses + bad.wrenches).sum();
+    outcome.bad = reader
+        .bad_messages()
+        .values()
+        .map(|bad| bad.poses + bad.wrenches)
+        .sum();
     outcome
 }

@@ -3,13 +3,18 @@
 use std::path::Path;
 
 use nalgebra::Point3;
-use touchup::io::recording::{BadMessage, Record, RecordingError, RecordingReader, Topics, write_recording};
+use touchup::io::recording::{
+    BadMessage, Record, RecordingError, RecordingReader, Topics, write_recording,
+};
 use touchup::stylus::{MarkerFrame, MarkerObservation, Message};
 
 use crate::io::recordings::made::{START_NS, pose, put, wrench};
 
 fn topics() -> Topics {
-    Topics { markers: Some("/stylus/markers".into()), ..Topics::default() }
+    Topics {
+        markers: Some("/stylus/markers".into()),
+        ..Topics::default()
+    }
 }
 
 /// Every third frame sees nothing.
@@ -26,7 +31,10 @@ fn frame(i: usize) -> MarkerFrame {
 /// Wrench, pose and markers in turn.
 fn records(count: usize) -> Vec<Record> {
     let one = |i: usize| match i % 3 {
-        0 => Record::Message(wrench(START_NS + i as i64 * 1_000_000, [i as f64, 0.0, 1.0])),
+        0 => Record::Message(wrench(
+            START_NS + i as i64 * 1_000_000,
+            [i as f64, 0.0, 1.0],
+        )),
         1 => Record::Message(pose(START_NS + i as i64 * 1_000_000, [0.1, 0.2, 0.3])),
         _ => Record::Markers(Box::new(frame(i))),
     };
@@ -34,7 +42,11 @@ fn records(count: usize) -> Vec<Record> {
 }
 
 fn without_poses(records: &[Record]) -> Vec<Record> {
-    records.iter().filter(|record| !matches!(record, Record::Message(Message::Pose(_)))).cloned().collect()
+    records
+        .iter()
+        .filter(|record| !matches!(record, Record::Message(Message::Pose(_))))
+        .cloned()
+        .collect()
 }
 
 fn written(path: &Path, records: &[Record]) -> Vec<u8> {
@@ -55,7 +67,11 @@ fn read_all(path: &Path) -> (Vec<Record>, Option<RecordingError>, u64) {
             Err(error) => ended = Some(error),
         }
     }
-    let bad = reader.bad_messages().values().map(|bad| bad.poses + bad.wrenches).sum();
+    let bad = reader
+        .bad_messages()
+        .values()
+        .map(|bad| bad.poses + bad.wrenches)
+        .sum();
     (records, ended, bad)
 }
 
@@ -102,11 +118,25 @@ fn markers_are_read_in_place_of_poses_from_both_containers() {
         assert!(back == without_poses(&records), "{path:?}");
         let mut reader = RecordingReader::open(path, &topics()).unwrap();
         assert_eq!(reader.message_count(), Some(2000));
-        assert_eq!(reader.by_ref().filter(|message| matches!(message, Ok(Message::Wrench(_)))).count(), 1000);
-        assert_eq!((reader.pose_frame(), reader.wrench_frame()), (Some("O"), Some("T")));
+        assert_eq!(
+            reader
+                .by_ref()
+                .filter(|message| matches!(message, Ok(Message::Wrench(_))))
+                .count(),
+            1000
+        );
+        assert_eq!(
+            (reader.pose_frame(), reader.wrench_frame()),
+            (Some("O"), Some("T"))
+        );
         // and the poses are still there on request
         let poses = RecordingReader::open(path, &Topics::default()).unwrap();
-        assert_eq!(poses.filter(|message| matches!(message, Ok(Message::Pose(_)))).count(), 1000);
+        assert_eq!(
+            poses
+                .filter(|message| matches!(message, Ok(Message::Pose(_))))
+                .count(),
+            1000
+        );
     }
 }
 
@@ -115,11 +145,26 @@ fn a_recording_without_the_markers_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("touch.mcap");
     write_recording(&path, &Topics::default(), "O", "T", records(30)).unwrap();
-    let text = RecordingReader::open(&path, &topics()).err().unwrap().to_string();
-    assert!(text.contains("/stylus/markers") && text.contains("--markers-topic"), "{text}");
-    let wrong = Topics { markers: Some("/stylus/pose".into()), ..Topics::default() };
-    let text = RecordingReader::open(&path, &wrong).err().unwrap().to_string();
-    assert!(text.contains("sensor_msgs/msg/PointCloud2") && text.contains("--markers-topic"), "{text}");
+    let text = RecordingReader::open(&path, &topics())
+        .err()
+        .unwrap()
+        .to_string();
+    assert!(
+        text.contains("/stylus/markers") && text.contains("--markers-topic"),
+        "{text}"
+    );
+    let wrong = Topics {
+        markers: Some("/stylus/pose".into()),
+        ..Topics::default()
+    };
+    let text = RecordingReader::open(&path, &wrong)
+        .err()
+        .unwrap()
+        .to_string();
+    assert!(
+        text.contains("sensor_msgs/msg/PointCloud2") && text.contains("--markers-topic"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -131,7 +176,10 @@ fn cut_and_flipped_recordings_of_markers_lose_no_more_than_what_is_damaged() {
     for len in (0..bytes.len()).step_by(bytes.len() / 100) {
         let (back, error, _) = read_all(&put(folder.path(), "cut.mcap", &bytes[..len]));
         assert!(back == whole[..back.len()], "cut to {len} bytes");
-        assert!(error.is_some() || back.len() == whole.len(), "cut to {len} bytes");
+        assert!(
+            error.is_some() || back.len() == whole.len(),
+            "cut to {len} bytes"
+        );
     }
     let db3 = folder.path().join("whole.db3");
     db3_of(&db3, &bytes);
@@ -154,7 +202,12 @@ fn clouds_that_cannot_be_used_are_counted_and_reading_goes_on() {
     let clouds = "topic_id = (SELECT id FROM topics WHERE name = '/stylus/markers')";
     // width: behind 4 bytes of encapsulation, 8 of stamp, 4 + 4 of the frame's name, 4 of height
     let wide = "CAST(substr(data, 1, 24) || x'ffffffff' || substr(data, 29) AS BLOB)";
-    let changed = db.execute(&format!("UPDATE messages SET data = {wide} WHERE {clouds}"), []).unwrap();
+    let changed = db
+        .execute(
+            &format!("UPDATE messages SET data = {wide} WHERE {clouds}"),
+            [],
+        )
+        .unwrap();
     db.close().unwrap();
     let mut reader = RecordingReader::open(&path, &topics()).unwrap();
     let mut wrenches = 0;

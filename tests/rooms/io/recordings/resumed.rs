@@ -13,7 +13,9 @@ const FRAMES: [&str; 2] = ["O", "T"];
 fn write(writer: &mut SegmentedWriter, messages: &[Message]) {
     for message in messages {
         let is_wrench = matches!(message, Message::Wrench(_));
-        writer.write(message, FRAMES[usize::from(is_wrench)]).unwrap();
+        writer
+            .write(message, FRAMES[usize::from(is_wrench)])
+            .unwrap();
     }
 }
 
@@ -34,14 +36,24 @@ fn a_recording_that_was_cut_goes_on_behind_what_was_flushed() {
     let bytes = fs::read(&segment).unwrap();
     assert!(0 < lengths[0] && lengths[0] < lengths[1] && lengths[1] < bytes.len());
 
-    for cut in (0..bytes.len()).step_by(61).chain(lengths).chain([lengths[0] - 1, lengths[1] - 1]) {
+    for cut in (0..bytes.len())
+        .step_by(61)
+        .chain(lengths)
+        .chain([lengths[0] - 1, lengths[1] - 1])
+    {
         fs::write(&segment, &bytes[..cut]).unwrap();
         let mut there = Vec::new();
-        let mut writer =
-            SegmentedWriter::resume(&recording, &topics, FRAMES, &mut |message| there.push(*message)).unwrap();
+        let mut writer = SegmentedWriter::resume(&recording, &topics, FRAMES, &mut |message| {
+            there.push(*message)
+        })
+        .unwrap();
         // at least what was flushed; of the rest all that can still be read
         let flushed = 20 * lengths.iter().filter(|length| **length <= cut).count();
-        assert!(there.len() >= flushed && there.len() <= 40, "cut at {cut}: {}", there.len());
+        assert!(
+            there.len() >= flushed && there.len() <= 40,
+            "cut at {cut}: {}",
+            there.len()
+        );
         assert_eq!(there, messages[..there.len()], "cut at {cut}");
         write(&mut writer, &messages[40..]);
         writer.finish().unwrap();
@@ -49,7 +61,10 @@ fn a_recording_that_was_cut_goes_on_behind_what_was_flushed() {
         let all = [&there[..], &messages[40..]].concat();
         assert_eq!(read_all(&recording, &topics), all, "cut at {cut}");
         let reader = RecordingReader::open(&recording, &topics).unwrap();
-        assert!(!reader.truncated() && reader.message_count() == Some(all.len() as u64), "cut at {cut}");
+        assert!(
+            !reader.truncated() && reader.message_count() == Some(all.len() as u64),
+            "cut at {cut}"
+        );
         // and once more from the beginning
         SegmentedWriter::replace(&recording, &topics).unwrap();
         assert_eq!(fs::read_dir(&recording).unwrap().count(), 0);

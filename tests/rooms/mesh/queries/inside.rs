@@ -8,14 +8,21 @@ fn winding(mesh: &TriMesh, p: &Point3<f64>) -> f64 {
     let of_face = |t: Triangle| {
         let [a, b, c] = t.map(|x| x - p);
         let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
-        2.0 * a.dot(&b.cross(&c)).atan2(la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb)
+        2.0 * a
+            .dot(&b.cross(&c))
+            .atan2(la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb)
     };
-    mesh.faces().map(|(face, _)| of_face(mesh.triangle(face))).sum::<f64>() / (2.0 * TAU)
+    mesh.faces()
+        .map(|(face, _)| of_face(mesh.triangle(face)))
+        .sum::<f64>()
+        / (2.0 * TAU)
 }
 
 /// Distance from `p` to the nearest face, m.
 fn nearest_of(mesh: &TriMesh, p: &Point3<f64>) -> f64 {
-    mesh.faces().map(|(face, _)| distance(p, &mesh.triangle(face))).fold(f64::INFINITY, f64::min)
+    mesh.faces()
+        .map(|(face, _)| distance(p, &mesh.triangle(face)))
+        .fold(f64::INFINITY, f64::min)
 }
 
 #[test]

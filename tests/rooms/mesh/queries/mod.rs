@@ -24,10 +24,18 @@ fn nearest(p: &Point3<f64>, t: &Triangle) -> Point3<f64> {
     let (p, t) = (p - t[0], t.map(|x| x - t[0]));
     let on_side = |a: Vector3<f64>, b: Vector3<f64>| {
         let length = (b - a).norm();
-        if length == 0.0 { a } else { a + (b - a) * ((p - a).dot(&((b - a) / length)) / length).clamp(0.0, 1.0) }
+        if length == 0.0 {
+            a
+        } else {
+            a + (b - a) * ((p - a).dot(&((b - a) / length)) / length).clamp(0.0, 1.0)
+        }
     };
     let mut best = t[0];
-    for side in [on_side(t[0], t[1]), on_side(t[1], t[2]), on_side(t[2], t[0])] {
+    for side in [
+        on_side(t[0], t[1]),
+        on_side(t[1], t[2]),
+        on_side(t[2], t[0]),
+    ] {
         if (p - side).norm() < (p - best).norm() {
             best = side;
         }
@@ -35,7 +43,9 @@ fn nearest(p: &Point3<f64>, t: &Triangle) -> Point3<f64> {
     let sides = [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
     if let Some(normal) = t[1].cross(&t[2]).try_normalize(0.0) {
         let foot = p - normal * normal.dot(&p);
-        let is_inside = sides.iter().all(|(a, b)| normal.dot(&(b - a).cross(&(foot - a))) >= 0.0);
+        let is_inside = sides
+            .iter()
+            .all(|(a, b)| normal.dot(&(b - a).cross(&(foot - a))) >= 0.0);
         if is_inside && (p - foot).norm() < (p - best).norm() {
             best = foot;
         }
@@ -69,8 +79,15 @@ fn unit_mesh(kind: Kind, rng: &mut Pcg64) -> TriMesh {
         }),
         Kind::Slivers => soup(rng, |rng, a| {
             let along = point(rng);
-            let width = if within(rng, 0.0, 1.0) < 0.2 { 0.0 } else { 10f64.powf(within(rng, -12.0, -2.0)) };
-            [a + along, a + along * within(rng, -0.5, 1.5) + point(rng) * width]
+            let width = if within(rng, 0.0, 1.0) < 0.2 {
+                0.0
+            } else {
+                10f64.powf(within(rng, -12.0, -2.0))
+            };
+            [
+                a + along,
+                a + along * within(rng, -0.5, 1.5) + point(rng) * width,
+            ]
         }),
         Kind::Ball => ball(12, 20, |direction| direction * within(rng, 0.9, 1.0)),
         Kind::Sheet => grid(12, 1.0 / 6.0, |_, _| within(rng, -0.1, 0.1)),
@@ -81,14 +98,21 @@ fn point(rng: &mut Pcg64) -> Vector3<f64> {
     Vector3::from_fn(|_, _| within(rng, -1.0, 1.0))
 }
 
-fn soup(rng: &mut Pcg64, others: impl Fn(&mut Pcg64, Vector3<f64>) -> [Vector3<f64>; 2]) -> TriMesh {
+fn soup(
+    rng: &mut Pcg64,
+    others: impl Fn(&mut Pcg64, Vector3<f64>) -> [Vector3<f64>; 2],
+) -> TriMesh {
     let count = within(rng, 1.0, 120.0) as u32;
     let positions = (0..count).flat_map(|_| {
         let a = point(rng);
         let [b, c] = others(rng, a);
         [a, b, c].map(Point3::from)
     });
-    TriMesh::new(positions.collect(), (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect()).unwrap()
+    TriMesh::new(
+        positions.collect(),
+        (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+    )
+    .unwrap()
 }
 
 /// A closed surface about the origin: `rings` × `sectors` vertices and two poles.
@@ -96,7 +120,11 @@ fn ball(rings: u32, sectors: u32, mut place: impl FnMut(Vector3<f64>) -> Vector3
     let mut positions = vec![];
     let mut put = |up: f64, turn: f64| {
         let across = (1.0 - up * up).max(0.0).sqrt();
-        positions.push(Point3::from(place(vector![across * turn.cos(), across * turn.sin(), up])));
+        positions.push(Point3::from(place(vector![
+            across * turn.cos(),
+            across * turn.sin(),
+            up
+        ])));
     };
     put(-1.0, 0.0);
     for ring in 0..rings {
@@ -125,7 +153,13 @@ fn ball(rings: u32, sectors: u32, mut place: impl FnMut(Vector3<f64>) -> Vector3
 /// The same mesh elsewhere: x → scale · x + shift.
 fn moved(mesh: &TriMesh, scale: f64, shift: Vector3<f64>) -> TriMesh {
     let positions = mesh.positions().iter().map(|p| p * scale + shift).collect();
-    TriMesh::new(positions, mesh.faces().map(|(_, corners)| corners.map(|v| v.0)).collect()).unwrap()
+    TriMesh::new(
+        positions,
+        mesh.faces()
+            .map(|(_, corners)| corners.map(|v| v.0))
+            .collect(),
+    )
+    .unwrap()
 }
 
 /// Sizes and places: as it is, far from the origin (m), and tiny.
@@ -133,8 +167,19 @@ const PLACES: [(f64, f64); 4] = [(1.0, 0.0), (1.0, 1e6), (0.1, 10.0), (1e-6, 0.0
 
 fn any_mesh() -> impl Strategy<Value = (TriMesh, f64, Vector3<f64>, u64)> {
     let kinds = prop::sample::select(vec![Kind::Soup, Kind::Slivers, Kind::Ball, Kind::Sheet]);
-    (kinds, any::<u64>(), prop::sample::select(PLACES.to_vec())).prop_map(|(kind, seed, (scale, far))| {
-        let shift = vector![far, -0.7 * far, 0.3 * far];
-        (moved(&unit_mesh(kind, &mut Pcg64::seed_from_u64(seed)), scale, shift), scale, shift, seed)
-    })
+    (kinds, any::<u64>(), prop::sample::select(PLACES.to_vec())).prop_map(
+        |(kind, seed, (scale, far))| {
+            let shift = vector![far, -0.7 * far, 0.3 * far];
+            (
+                moved(
+                    &unit_mesh(kind, &mut Pcg64::seed_from_u64(seed)),
+                    scale,
+                    shift,
+                ),
+                scale,
+                shift,
+                seed,
+            )
+        },
+    )
 }

@@ -49,7 +49,11 @@ mod exact {
     }
 
     fn cross(a: &Cell, b: &Cell) -> Cell {
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+        [
+            a[1] * b[2] - a[2] * b[1],
+            a[2] * b[0] - a[0] * b[2],
+            a[0] * b[1] - a[1] * b[0],
+        ]
     }
 
     fn dot(a: &Cell, b: &Cell) -> i64 {
@@ -94,12 +98,19 @@ mod exact {
     }
 
     fn cross_in_plane(p: &Cell, q: &Cell, a: &Cell, b: &Cell, n: &Cell) -> bool {
-        let crossed = side(a, b, p, n) * side(a, b, q, n) < 0 && side(p, q, a, n) * side(p, q, b, n) < 0;
-        crossed || on_segment(p, a, b, n) || on_segment(q, a, b, n) || on_segment(a, p, q, n) || on_segment(b, p, q, n)
+        let crossed =
+            side(a, b, p, n) * side(a, b, q, n) < 0 && side(p, q, a, n) * side(p, q, b, n) < 0;
+        crossed
+            || on_segment(p, a, b, n)
+            || on_segment(q, a, b, n)
+            || on_segment(a, p, q, n)
+            || on_segment(b, p, q, n)
     }
 
     pub fn triangles_meet(t: &[Cell; 3], u: &[Cell; 3]) -> bool {
-        (0..3).any(|i| segment_meets(&t[i], &t[(i + 1) % 3], u) || segment_meets(&u[i], &u[(i + 1) % 3], t))
+        (0..3).any(|i| {
+            segment_meets(&t[i], &t[(i + 1) % 3], u) || segment_meets(&u[i], &u[(i + 1) % 3], t)
+        })
     }
 }
 
@@ -107,7 +118,14 @@ mod exact {
 fn a_triangle_without_area_is_its_sides() {
     let p = Point3::new;
     let (a, b) = (p(1.0, 0.0, 0.0), p(3.0, 0.0, 0.0));
-    for t in [[a, a, b], [a, b, a], [b, a, a], [a, b, b], [a, p(2.0, 0.0, 0.0), b], [b, p(1.5, 0.0, 0.0), a]] {
+    for t in [
+        [a, a, b],
+        [a, b, a],
+        [b, a, a],
+        [a, b, b],
+        [a, p(2.0, 0.0, 0.0), b],
+        [b, p(1.5, 0.0, 0.0), a],
+    ] {
         for (x, foot) in [(0.0, 1.0), (1.25, 1.25), (2.5, 2.5), (4.0, 3.0)] {
             for y in [0.0, 0.5] {
                 let (point, barycentric) = triangle::closest_point(&p(x, y, 0.0), &t);
@@ -125,14 +143,35 @@ fn crossings_by_hand() {
     let t = [p(0.0, 0.0, 0.0), p(4.0, 0.0, 0.0), p(0.0, 4.0, 0.0)];
     let crosses = |a: Point3<f64>, b: Point3<f64>, gap| triangle::segment_crosses(&a, &b, &t, gap);
     assert!(crosses(p(1.0, 1.0, 1.0), p(1.0, 1.0, -1.0), 0.0));
-    assert!(!crosses(p(3.0, 3.0, 1.0), p(3.0, 3.0, -1.0), 0.0), "beside it");
-    assert!(!crosses(p(1.0, 1.0, 2.0), p(1.0, 1.0, 1.0), 0.0), "above it");
-    assert!(crosses(p(1.0, 1.0, 2.0), p(1.0, 1.0, 0.1), 0.2), "the gap lengthens it");
-    assert!(crosses(p(-0.1, 1.0, 1.0), p(-0.1, 1.0, -1.0), 0.2), "the gap widens the triangle");
+    assert!(
+        !crosses(p(3.0, 3.0, 1.0), p(3.0, 3.0, -1.0), 0.0),
+        "beside it"
+    );
+    assert!(
+        !crosses(p(1.0, 1.0, 2.0), p(1.0, 1.0, 1.0), 0.0),
+        "above it"
+    );
+    assert!(
+        crosses(p(1.0, 1.0, 2.0), p(1.0, 1.0, 0.1), 0.2),
+        "the gap lengthens it"
+    );
+    assert!(
+        crosses(p(-0.1, 1.0, 1.0), p(-0.1, 1.0, -1.0), 0.2),
+        "the gap widens the triangle"
+    );
     assert!(!crosses(p(-0.1, 1.0, 1.0), p(-0.1, 1.0, -1.0), 0.05));
-    assert!(crosses(p(-1.0, 1.0, 0.0), p(9.0, 1.0, 0.0), 0.0), "in the plane, right across");
-    assert!(!crosses(p(-1.0, 5.0, 0.0), p(9.0, 5.0, 0.0), 0.0), "in the plane, past it");
-    assert!(!triangle::segment_crosses(&p(0.0, 0.0, 1.0), &p(0.0, 0.0, -1.0), &[t[0]; 3], 0.1), "no area, no crossing");
+    assert!(
+        crosses(p(-1.0, 1.0, 0.0), p(9.0, 1.0, 0.0), 0.0),
+        "in the plane, right across"
+    );
+    assert!(
+        !crosses(p(-1.0, 5.0, 0.0), p(9.0, 5.0, 0.0), 0.0),
+        "in the plane, past it"
+    );
+    assert!(
+        !triangle::segment_crosses(&p(0.0, 0.0, 1.0), &p(0.0, 0.0, -1.0), &[t[0]; 3], 0.1),
+        "no area, no crossing"
+    );
     let above = t.map(|corner| corner + vector![0.0, 0.0, 0.5]);
     assert!(!triangle::intersect(&t, &above, 0.1) && triangle::intersect(&t, &above, 0.6));
 }
@@ -140,8 +179,18 @@ fn crossings_by_hand() {
 #[test]
 fn shape_quality_by_hand() {
     let p = |x, y| Point3::new(x, y, 0.0);
-    let quality = |t: Triangle| triangle::shape_quality(&t, (t[1] - t[0]).cross(&(t[2] - t[0])).norm());
-    assert!((quality([p(0.0, 0.0), p(1.0, 0.0), p(0.5, 0.75f64.sqrt())]) - 0.75f64.sqrt()).abs() < 1e-15);
+    let quality =
+        |t: Triangle| triangle::shape_quality(&t, (t[1] - t[0]).cross(&(t[2] - t[0])).norm());
+    assert!(
+        (quality([p(0.0, 0.0), p(1.0, 0.0), p(0.5, 0.75f64.sqrt())]) - 0.75f64.sqrt()).abs()
+            < 1e-15
+    );
     assert_eq!(quality([p(0.0, 0.0), p(2.0, 0.0), p(0.0, 2.0)]), 0.5);
-    assert_eq!((quality([p(0.0, 0.0), p(2.0, 0.0), p(1.0, 0.0)]), quality([p(1.0, 1.0); 3])), (0.0, 0.0));
+    assert_eq!(
+        (
+            quality([p(0.0, 0.0), p(2.0, 0.0), p(1.0, 0.0)]),
+            quality([p(1.0, 1.0); 3])
+        ),
+        (0.0, 0.0)
+    );
 }

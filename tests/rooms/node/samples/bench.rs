@@ -14,8 +14,8 @@ use touchup::mesh::TriMesh;
 use touchup::ros::in_process::{OtherParticipants, start};
 use touchup::ros::inbox::inbox;
 use touchup::ros::messages::{
-    Header, MeshPatch, Point, Pose, PoseStamped, Quaternion, Time, Transform, TransformStamped, Vector3, Wrench,
-    WrenchStamped,
+    Header, MeshPatch, Point, Pose, PoseStamped, Quaternion, Time, Transform, TransformStamped,
+    Vector3, Wrench, WrenchStamped,
 };
 use touchup::ros::node::{INBOX, Node, NodeEnd, Prepared};
 use touchup::ros::parameters::{ParameterValue, Parameters};
@@ -45,11 +45,18 @@ impl Plate {
 
     fn of(share: impl Fn(usize) -> std::ops::Range<usize>) -> Self {
         let (stream, touch) = plate_stream(&StylusParams::default(), 1);
-        assert!(stream.noise > 0.0 && !stream.samples.is_empty(), "a bad scan, and a touch that pairs");
+        assert!(
+            stream.noise > 0.0 && !stream.samples.is_empty(),
+            "a bad scan, and a touch that pairs"
+        );
         let mut messages = touch.messages;
         messages.sort_by_key(Message::stamp_ns);
         let messages = messages[share(messages.len())].to_vec();
-        let plate = Self { folder: tempfile::tempdir().unwrap(), scan: stream.scan, messages };
+        let plate = Self {
+            folder: tempfile::tempdir().unwrap(),
+            scan: stream.scan,
+            messages,
+        };
         write_mesh(&plate.path("scan.ply"), &plate.scan, MeshUnit::Millimetre).unwrap();
         plate.record("touch.mcap", &plate.messages);
         plate
@@ -60,12 +67,23 @@ impl Plate {
     }
 
     pub fn record(&self, name: &str, messages: &[Message]) {
-        write_recording(&self.path(name), &Topics::default(), "object", "stylus", messages.iter().copied()).unwrap();
+        write_recording(
+            &self.path(name),
+            &Topics::default(),
+            "object",
+            "stylus",
+            messages.iter().copied(),
+        )
+        .unwrap();
     }
 
     /// What `touchup refine` makes of a recording.
     pub fn refined(&self, recording: &str) -> Vec<u8> {
-        let (scan, bag, out) = (self.path("scan.ply"), self.path(recording), self.path("refined.ply"));
+        let (scan, bag, out) = (
+            self.path("scan.ply"),
+            self.path(recording),
+            self.path("refined.ply"),
+        );
         refine(&[
             "--scan".as_ref(),
             scan.as_os_str(),
@@ -81,45 +99,117 @@ impl Plate {
 
 /// Runs `touchup refine`; a recording that has lost its end is no failure.
 pub fn refine(arguments: &[&std::ffi::OsStr]) {
-    let done = Command::new(env!("CARGO_BIN_EXE_touchup")).arg("refine").args(arguments).output().unwrap();
+    let done = Command::new(env!("CARGO_BIN_EXE_touchup"))
+        .arg("refine")
+        .args(arguments)
+        .output()
+        .unwrap();
     let output = String::from_utf8_lossy(&done.stderr);
     assert!(matches!(done.status.code(), Some(0 | 4)), "{output}");
 }
 
 fn header(stamp_ns: i64, frame: &str) -> Header {
     let (sec, nanosec) = (stamp_ns / 1_000_000_000, stamp_ns % 1_000_000_000);
-    Header { stamp: Time { sec: sec as i32, nanosec: nanosec as u32 }, frame_id: frame.to_owned() }
+    Header {
+        stamp: Time {
+            sec: sec as i32,
+            nanosec: nanosec as u32,
+        },
+        frame_id: frame.to_owned(),
+    }
 }
 
 pub fn pose(message: &Message, frame: &str) -> PoseStamped {
-    let Message::Pose(pose) = message else { panic!("no pose") };
+    let Message::Pose(pose) = message else {
+        panic!("no pose")
+    };
     let (p, q) = (pose.pose_ot.translation.vector, pose.pose_ot.rotation);
-    let orientation = Quaternion { x: q.i, y: q.j, z: q.k, w: q.w };
+    let orientation = Quaternion {
+        x: q.i,
+        y: q.j,
+        z: q.k,
+        w: q.w,
+    };
     PoseStamped {
         header: header(message.stamp_ns(), frame),
-        pose: Pose { position: Point { x: p.x, y: p.y, z: p.z }, orientation },
+        pose: Pose {
+            position: Point {
+                x: p.x,
+                y: p.y,
+                z: p.z,
+            },
+            orientation,
+        },
     }
 }
 
 pub fn wrench(message: &Message, frame: &str) -> WrenchStamped {
-    let Message::Wrench(wrench) = message else { panic!("no wrench") };
+    let Message::Wrench(wrench) = message else {
+        panic!("no wrench")
+    };
     let (f, t) = (wrench.wrench.force, wrench.wrench.torque);
-    let wrench = Wrench { force: Vector3 { x: f.x, y: f.y, z: f.z }, torque: Vector3 { x: t.x, y: t.y, z: t.z } };
-    WrenchStamped { header: header(message.stamp_ns(), frame), wrench }
+    let wrench = Wrench {
+        force: Vector3 {
+            x: f.x,
+            y: f.y,
+            z: f.z,
+        },
+        torque: Vector3 {
+            x: t.x,
+            y: t.y,
+            z: t.z,
+        },
+    };
+    WrenchStamped {
+        header: header(message.stamp_ns(), frame),
+        wrench,
+    }
 }
 
 /// A pose as somebody at `place` (in O) measures it.
 pub fn seen_from(message: &Message, place: &Isometry3<f64>, frame: &str) -> PoseStamped {
-    let Message::Pose(measured) = message else { panic!("no pose") };
+    let Message::Pose(measured) = message else {
+        panic!("no pose")
+    };
     let pose_ot = place.inv_mul(&measured.pose_ot);
-    pose(&Message::Pose(StampedPose { pose_ot, ..*measured }), frame)
+    pose(
+        &Message::Pose(StampedPose {
+            pose_ot,
+            ..*measured
+        }),
+        frame,
+    )
 }
 
-pub fn transform(stamp_ns: i64, parent: &str, child: &str, pose: &Isometry3<f64>) -> TransformStamped {
+pub fn transform(
+    stamp_ns: i64,
+    parent: &str,
+    child: &str,
+    pose: &Isometry3<f64>,
+) -> TransformStamped {
     let header = header(stamp_ns, parent);
     let (p, q) = (pose.translation.vector, pose.rotation);
-    let (translation, rotation) = (Vector3 { x: p.x, y: p.y, z: p.z }, Quaternion { x: q.i, y: q.j, z: q.k, w: q.w });
-    TransformStamped { header, child_frame_id: child.to_owned(), transform: Transform { translation, rotation } }
+    let (translation, rotation) = (
+        Vector3 {
+            x: p.x,
+            y: p.y,
+            z: p.z,
+        },
+        Quaternion {
+            x: q.i,
+            y: q.j,
+            z: q.k,
+            w: q.w,
+        },
+    );
+    TransformStamped {
+        header,
+        child_frame_id: child.to_owned(),
+        transform: Transform {
+            translation,
+            rotation,
+        },
+    }
 }
 
 /// Time passes in steps of this.
@@ -144,17 +234,32 @@ impl Bench {
     pub fn with(plate: &Plate, set: &[(&str, ParameterValue)]) -> Self {
         let mut parameters = Parameters::default();
         let text = |path: PathBuf| ParameterValue::String(path.to_str().unwrap().to_owned());
-        parameters.set("scan", &text(plate.path("scan.ply"))).unwrap();
-        parameters.set("session_folder", &text(plate.path("sessions"))).unwrap();
-        parameters.set("tip_radius_mm", &ParameterValue::Double(1.5)).unwrap();
+        parameters
+            .set("scan", &text(plate.path("scan.ply")))
+            .unwrap();
+        parameters
+            .set("session_folder", &text(plate.path("sessions")))
+            .unwrap();
+        parameters
+            .set("tip_radius_mm", &ParameterValue::Double(1.5))
+            .unwrap();
         for (name, value) in set {
             parameters.set(name, value).unwrap();
         }
         let (clock, hand) = Clock::manual();
         let (inbox, arrivals) = inbox(INBOX, &clock);
         let (port, world) = start(inbox, &clock);
-        let node = Prepared::on(clock.clone(), parameters).unwrap().start(port, arrivals, None).unwrap();
-        Self { node, world, clock, hand, published: Vec::new() }
+        let node = Prepared::on(clock.clone(), parameters)
+            .unwrap()
+            .start(port, arrivals, None)
+            .unwrap();
+        Self {
+            node,
+            world,
+            clock,
+            hand,
+            published: Vec::new(),
+        }
     }
 
     /// All at once; none is dropped. Of many some time passes in between, in which they are taken down.
@@ -186,7 +291,9 @@ impl Bench {
                 self.hand.advance(STEP);
                 *due_ns += STEP.as_nanos() as i64;
             }
-            arrivals(message).into_iter().for_each(|arrival| assert!(self.world.arrive_patiently(arrival)));
+            arrivals(message)
+                .into_iter()
+                .for_each(|arrival| assert!(self.world.arrive_patiently(arrival)));
         }
         self.taken();
     }
@@ -267,15 +374,23 @@ impl Bench {
         // the first may have been on its way already
         for _ in 0..2 {
             self.published.clear();
-            self.wait_for("diagnostics", |published| matches!(published, Publication::Diagnostics(_)).then_some(()));
+            self.wait_for("diagnostics", |published| {
+                matches!(published, Publication::Diagnostics(_)).then_some(())
+            });
         }
-        let Some(Publication::Diagnostics(message)) =
-            self.published.iter().rev().find(|published| matches!(published, Publication::Diagnostics(_)))
+        let Some(Publication::Diagnostics(message)) = self
+            .published
+            .iter()
+            .rev()
+            .find(|published| matches!(published, Publication::Diagnostics(_)))
         else {
             panic!("it was there")
         };
         let values = message.status.iter().flat_map(|status| &status.values);
-        values.filter(|value| value.key == key).map(|value| value.value.clone()).next()
+        values
+            .filter(|value| value.key == key)
+            .map(|value| value.value.clone())
+            .next()
     }
 
     /// Ends it; what was published comes too.

@@ -26,8 +26,14 @@ impl Follower {
     pub fn of(scan: &TriMesh) -> Self {
         Self {
             version: 1,
-            vertices: (0..).zip(scan.positions()).map(|(v, p)| (v, [p.x as f32, p.y as f32, p.z as f32])).collect(),
-            faces: scan.faces().map(|(face, corners)| (face.0, corners.map(|v| v.0))).collect(),
+            vertices: (0..)
+                .zip(scan.positions())
+                .map(|(v, p)| (v, [p.x as f32, p.y as f32, p.z as f32]))
+                .collect(),
+            faces: scan
+                .faces()
+                .map(|(face, corners)| (face.0, corners.map(|v| v.0)))
+                .collect(),
             ..Self::default()
         }
     }
@@ -48,7 +54,9 @@ impl Follower {
             }
         } else if patch.session == self.session && patch.version <= self.version {
             // has it already
-        } else if patch.session == self.session && (patch.base_version, patch.part) == (self.version, self.next_part) {
+        } else if patch.session == self.session
+            && (patch.base_version, patch.part) == (self.version, self.next_part)
+        {
             self.apply(patch);
         } else {
             self.ask();
@@ -60,7 +68,9 @@ impl Follower {
             (self.vertices, self.faces, self.kept) = Default::default();
             (self.begun, self.next_part) = (Some((patch.session.clone(), patch.version)), 0);
         }
-        if self.begun != Some((patch.session.clone(), patch.version)) || patch.part != self.next_part {
+        if self.begun != Some((patch.session.clone(), patch.version))
+            || patch.part != self.next_part
+        {
             return;
         }
         self.quiet = 0;
@@ -87,26 +97,51 @@ impl Follower {
 
     fn apply(&mut self, patch: &MeshPatch) {
         for face in &patch.removed_faces {
-            assert!(self.faces.remove(face).is_some(), "face {face} was not there");
+            assert!(
+                self.faces.remove(face).is_some(),
+                "face {face} was not there"
+            );
         }
         for (vertex, position) in patch.vertices.iter().zip(patch.positions.chunks(3)) {
-            self.vertices.insert(*vertex, [position[0], position[1], position[2]]);
+            self.vertices
+                .insert(*vertex, [position[0], position[1], position[2]]);
         }
         for (face, corners) in patch.faces.iter().zip(patch.corners.chunks(3)) {
             let corners = [corners[0], corners[1], corners[2]];
-            assert!(corners.iter().all(|corner| self.vertices.contains_key(corner)), "face {face} has no corners");
+            assert!(
+                corners
+                    .iter()
+                    .all(|corner| self.vertices.contains_key(corner)),
+                "face {face} has no corners"
+            );
             self.faces.insert(*face, corners);
         }
         for vertex in &patch.removed_vertices {
-            assert!(self.vertices.remove(vertex).is_some(), "vertex {vertex} was not there");
+            assert!(
+                self.vertices.remove(vertex).is_some(),
+                "vertex {vertex} was not there"
+            );
         }
         let count = patch.vertices.len();
-        assert_eq!((patch.positions.len(), patch.variance.len(), patch.support.len()), (3 * count, count, count));
+        assert_eq!(
+            (
+                patch.positions.len(),
+                patch.variance.len(),
+                patch.support.len()
+            ),
+            (3 * count, count, count)
+        );
         self.next_part = patch.part + 1;
         if self.next_part == patch.part_count {
-            (self.session, self.version, self.next_part) = (patch.session.clone(), patch.version, 0);
+            (self.session, self.version, self.next_part) =
+                (patch.session.clone(), patch.version, 0);
             let counts = (self.vertices.len() as u32, self.faces.len() as u32);
-            assert_eq!(counts, (patch.vertex_count, patch.face_count), "version {}", patch.version);
+            assert_eq!(
+                counts,
+                (patch.vertex_count, patch.face_count),
+                "version {}",
+                patch.version
+            );
         }
     }
 }

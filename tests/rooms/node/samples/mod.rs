@@ -14,8 +14,9 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use touchup::io::recording::{RecordingReader, Topics};
 use touchup::ros::messages::{
-    DetectFeaturesRequest, Feature, FlagFeatureRequest, Header, Marker, Point, PointStamped, ProbeFeatureRequest,
-    ProbeResult, ResyncMeshRequest, SaveMeshRequest, TFMessage, TransformStamped, UndoRequest, UnflagFeatureRequest,
+    DetectFeaturesRequest, Feature, FlagFeatureRequest, Header, Marker, Point, PointStamped,
+    ProbeFeatureRequest, ProbeResult, ResyncMeshRequest, SaveMeshRequest, TFMessage,
+    TransformStamped, UndoRequest, UnflagFeatureRequest,
 };
 use touchup::ros::parameters::ParameterValue;
 use touchup::ros::port::{ArmOrder, Arrival, Call, Publication};
@@ -30,7 +31,10 @@ const STALE: Duration = Duration::from_millis(100);
 fn interleaved(messages: &[Message], seed: u64) -> Vec<Message> {
     let is_pose = |message: &&Message| matches!(message, Message::Pose(_));
     let (poses, wrenches): (Vec<&Message>, Vec<&Message>) = messages.iter().partition(is_pose);
-    let (mut poses, mut wrenches) = (poses.into_iter().peekable(), wrenches.into_iter().peekable());
+    let (mut poses, mut wrenches) = (
+        poses.into_iter().peekable(),
+        wrenches.into_iter().peekable(),
+    );
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     let (mut mixed, mut left, mut is_pose) = (Vec::new(), 0u32, true);
     while poses.peek().is_some() || wrenches.peek().is_some() {
@@ -44,7 +48,14 @@ fn interleaved(messages: &[Message], seed: u64) -> Vec<Message> {
             }
         }
         left = left.saturating_sub(1);
-        mixed.extend(if is_pose { poses.next() } else { wrenches.next() }.copied());
+        mixed.extend(
+            if is_pose {
+                poses.next()
+            } else {
+                wrenches.next()
+            }
+            .copied(),
+        );
         if poses.peek().is_none() || wrenches.peek().is_none() {
             is_pose = wrenches.peek().is_none();
         }
@@ -57,16 +68,28 @@ fn the_result_is_that_of_refine_byte_for_byte_however_messages_interleave() {
     let plate = Plate::touched(0.15);
     let expected = plate.refined("touch.mcap");
     for seed in 0..3 {
-        let messages = if seed == 0 { plate.messages.clone() } else { interleaved(&plate.messages, seed) };
+        let messages = if seed == 0 {
+            plate.messages.clone()
+        } else {
+            interleaved(&plate.messages, seed)
+        };
         assert_eq!(messages.len(), plate.messages.len());
         let bench = Bench::start(&plate);
         bench.feed(&messages);
         let (end, _) = bench.end();
         assert_eq!(end.report.unrecorded, 0);
         assert!(end.report.contacts > 0 && end.report.accepted > 1000);
-        assert!(read(&end.folder, "refined.ply") == expected, "interleaving {seed}");
+        assert!(
+            read(&end.folder, "refined.ply") == expected,
+            "interleaving {seed}"
+        );
         // and what was recorded makes the same again
-        refine(&["--resume".as_ref(), end.folder.as_os_str(), "--out".as_ref(), plate.path("again.ply").as_os_str()]);
+        refine(&[
+            "--resume".as_ref(),
+            end.folder.as_os_str(),
+            "--out".as_ref(),
+            plate.path("again.ply").as_os_str(),
+        ]);
         assert!(std::fs::read(plate.path("again.ply")).unwrap() == expected);
     }
 }
@@ -80,8 +103,12 @@ fn features_and_touches_are_written_beside_it() {
     let (end, _) = bench.end();
     let [features, touches] = ["features.json", "touches.csv"].map(|name| read(&end.folder, name));
     refine(&["--resume".as_ref(), end.folder.as_os_str()]);
-    assert!(read(&end.folder, "features.json") == features && read(&end.folder, "touches.csv") == touches);
-    let report: serde_json::Value = serde_json::from_slice(&read(&end.folder, "report.json")).unwrap();
+    assert!(
+        read(&end.folder, "features.json") == features
+            && read(&end.folder, "touches.csv") == touches
+    );
+    let report: serde_json::Value =
+        serde_json::from_slice(&read(&end.folder, "report.json")).unwrap();
     assert_eq!(report["accepted"], end.report.accepted);
 }
 
@@ -93,27 +120,28 @@ fn a_follower_that_loses_messages_ends_with_the_mesh() {
     let mut rng = Pcg64Mcg::seed_from_u64(7);
     let (mut seen, mut lost) = (0, 0);
     let mut strict = Follower::of(&plate.scan);
-    let mut take = |bench: &mut Bench, is_lossy: bool, follower: &mut Follower, strict: &mut Follower| {
-        let sent = patches(bench.published());
-        for (k, patch) in sent.iter().enumerate().skip(seen) {
-            strict.take(patch);
-            // never the last, whose loss nothing shows
-            if is_lossy && k + 1 < sent.len() && rng.random_range(0..20) == 0 {
-                lost += 1;
-            } else {
-                follower.take(patch);
+    let mut take =
+        |bench: &mut Bench, is_lossy: bool, follower: &mut Follower, strict: &mut Follower| {
+            let sent = patches(bench.published());
+            for (k, patch) in sent.iter().enumerate().skip(seen) {
+                strict.take(patch);
+                // never the last, whose loss nothing shows
+                if is_lossy && k + 1 < sent.len() && rng.random_range(0..20) == 0 {
+                    lost += 1;
+                } else {
+                    follower.take(patch);
+                }
             }
-        }
-        seen = sent.len();
-        if std::mem::take(&mut follower.asks) {
-            let request = ResyncMeshRequest::default();
-            let answer = bench.call(|reply| Call::Resync(request, reply));
-            if !answer.success {
-                assert!(answer.message.contains("ask again"), "{}", answer.message);
-                follower.asks = true;
+            seen = sent.len();
+            if std::mem::take(&mut follower.asks) {
+                let request = ResyncMeshRequest::default();
+                let answer = bench.call(|reply| Call::Resync(request, reply));
+                if !answer.success {
+                    assert!(answer.message.contains("ask again"), "{}", answer.message);
+                    follower.asks = true;
+                }
             }
-        }
-    };
+        };
     for chunk in plate.messages.chunks(400) {
         bench.play(chunk);
         take(&mut bench, true, &mut follower, &mut strict);
@@ -124,9 +152,19 @@ fn a_follower_that_loses_messages_ends_with_the_mesh() {
         take(&mut bench, false, &mut follower, &mut strict);
         follower.tick();
     }
-    assert!(!follower.is_waiting(), "the follower does not catch up in 3 s");
-    assert!(lost > 0 && strict.version > 50, "{lost} lost, version {}", strict.version);
-    assert_eq!((&follower.session, follower.version), (&strict.session, strict.version));
+    assert!(
+        !follower.is_waiting(),
+        "the follower does not catch up in 3 s"
+    );
+    assert!(
+        lost > 0 && strict.version > 50,
+        "{lost} lost, version {}",
+        strict.version
+    );
+    assert_eq!(
+        (&follower.session, follower.version),
+        (&strict.session, strict.version)
+    );
     assert!(follower.vertices == strict.vertices && follower.faces == strict.faces);
     // the tiles show the same triangles
     let mut tiles = BTreeMap::new();
@@ -138,17 +176,40 @@ fn a_follower_that_loses_messages_ends_with_the_mesh() {
             }
         }
     }
-    let mut drawn: Vec<_> = tiles.values().flat_map(|tile| tile.points.chunks(3)).map(triangle).collect();
-    let mut kept: Vec<_> = strict.faces.values().map(|corners| corners.map(|v| strict.vertices[&v])).collect();
+    let mut drawn: Vec<_> = tiles
+        .values()
+        .flat_map(|tile| tile.points.chunks(3))
+        .map(triangle)
+        .collect();
+    let mut kept: Vec<_> = strict
+        .faces
+        .values()
+        .map(|corners| corners.map(|v| strict.vertices[&v]))
+        .collect();
     drawn.sort_by(|a, b| a.partial_cmp(b).unwrap());
     kept.sort_by(|a, b| a.partial_cmp(b).unwrap());
-    assert!(drawn == kept, "{} triangles drawn, {} there", drawn.len(), kept.len());
-    assert!(tiles.values().all(|tile| tile.points.len() <= 1500 && tile.colors.len() == tile.points.len()));
+    assert!(
+        drawn == kept,
+        "{} triangles drawn, {} there",
+        drawn.len(),
+        kept.len()
+    );
+    assert!(
+        tiles
+            .values()
+            .all(|tile| tile.points.len() <= 1500 && tile.colors.len() == tile.points.len())
+    );
     bench.end();
 }
 
 fn triangle(points: &[Point]) -> [[f32; 3]; 3] {
-    [0, 1, 2].map(|at| [points[at].x as f32, points[at].y as f32, points[at].z as f32])
+    [0, 1, 2].map(|at| {
+        [
+            points[at].x as f32,
+            points[at].y as f32,
+            points[at].z as f32,
+        ]
+    })
 }
 
 #[test]
@@ -157,26 +218,57 @@ fn what_cannot_be_is_refused_and_counted_and_the_rest_goes_on() {
     let mut bench = Bench::start(&plate);
     let is_pose = |message: &&Message| matches!(message, Message::Pose(_));
     let some_pose = plate.messages.iter().find(is_pose).unwrap();
-    let some_wrench = plate.messages.iter().find(|message| !is_pose(message)).unwrap();
+    let some_wrench = plate
+        .messages
+        .iter()
+        .find(|message| !is_pose(message))
+        .unwrap();
     for (at, message) in plate.messages.iter().enumerate() {
         if at % 100 == 50 {
             let mut nan = pose(some_pose, "object");
             nan.pose.position.x = f64::NAN;
             let mut zero = pose(some_pose, "object");
-            zero.pose.orientation = touchup::ros::messages::Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 0.0 };
+            zero.pose.orientation = touchup::ros::messages::Quaternion {
+                x: 0.0,
+                y: 0.0,
+                z: 0.0,
+                w: 0.0,
+            };
             let mut no_time = wrench(some_wrench, "stylus");
             no_time.header.stamp.sec = -5;
             let mut far = wrench(some_wrench, "stylus");
             far.wrench.force.z = 1e9;
-            for bad in [nan, zero, pose(some_pose, "nowhere"), pose(some_pose, ""), pose(some_pose, "object")] {
-                bench.world.arrive_patiently(Arrival::Pose(bad, bench.now()));
+            for bad in [
+                nan,
+                zero,
+                pose(some_pose, "nowhere"),
+                pose(some_pose, ""),
+                pose(some_pose, "object"),
+            ] {
+                bench
+                    .world
+                    .arrive_patiently(Arrival::Pose(bad, bench.now()));
             }
-            for bad in [no_time, far, wrench(some_wrench, "nowhere"), wrench(some_wrench, "object")] {
-                bench.world.arrive_patiently(Arrival::Wrench(bad, bench.now()));
+            for bad in [
+                no_time,
+                far,
+                wrench(some_wrench, "nowhere"),
+                wrench(some_wrench, "object"),
+            ] {
+                bench
+                    .world
+                    .arrive_patiently(Arrival::Wrench(bad, bench.now()));
             }
-            bench.world.arrive_patiently(Arrival::Unreadable("stylus/pose", "too short".to_owned()));
-            let loose = TransformStamped { child_frame_id: "x".repeat(100_000), ..TransformStamped::default() };
-            bench.world.arrive_patiently(Arrival::Tf(TFMessage { transforms: vec![loose] }));
+            bench
+                .world
+                .arrive_patiently(Arrival::Unreadable("stylus/pose", "too short".to_owned()));
+            let loose = TransformStamped {
+                child_frame_id: "x".repeat(100_000),
+                ..TransformStamped::default()
+            };
+            bench.world.arrive_patiently(Arrival::Tf(TFMessage {
+                transforms: vec![loose],
+            }));
         }
         bench.feed([message]);
     }
@@ -193,11 +285,16 @@ fn what_cannot_be_is_refused_and_counted_and_the_rest_goes_on() {
         ("unreadable", 1),
         ("bad_transform", 1),
     ] {
-        let count: usize = bench.diagnostic(&format!("refused_{reason}")).map_or(0, |count| count.parse().unwrap());
+        let count: usize = bench
+            .diagnostic(&format!("refused_{reason}"))
+            .map_or(0, |count| count.parse().unwrap());
         assert_eq!(count, times * share, "{reason}");
     }
     let (end, _) = bench.end();
-    assert!(read(&end.folder, "refined.ply") == plate.refined("touch.mcap"), "the rest is as if nothing had been");
+    assert!(
+        read(&end.folder, "refined.ply") == plate.refined("touch.mcap"),
+        "the rest is as if nothing had been"
+    );
 }
 
 /// A rig that carries the tracker moves while it looks: its transforms come after the poses that need them.
@@ -209,20 +306,29 @@ fn poses_wait_for_the_transform_of_a_moving_frame_and_not_for_ever() {
     // turns once in 20 s and goes away with 50 mm/s
     let rig = |stamp_ns: i64| {
         let t = (stamp_ns - begin_ns) as f64 * 1e-9;
-        Isometry3::new(Vector3::new(0.05 * t, 0.2, 0.3), Vector3::z() * (0.1 * PI * t))
+        Isometry3::new(
+            Vector3::new(0.05 * t, 0.2, 0.3),
+            Vector3::z() * (0.1 * PI * t),
+        )
     };
     let transforms = |stamp_ns: i64| {
-        Arrival::Tf(TFMessage { transforms: vec![transform(stamp_ns, "object", "rig", &rig(stamp_ns))] })
+        Arrival::Tf(TFMessage {
+            transforms: vec![transform(stamp_ns, "object", "rig", &rig(stamp_ns))],
+        })
     };
     bench.world.arrive_patiently(transforms(begin_ns));
     // between two transforms the rig is taken to move evenly, which it does
-    let parts: Vec<_> =
-        plate.messages.chunk_by(|a, b| a.stamp_ns() / 20_000_000 == b.stamp_ns() / 20_000_000).collect();
+    let parts: Vec<_> = plate
+        .messages
+        .chunk_by(|a, b| a.stamp_ns() / 20_000_000 == b.stamp_ns() / 20_000_000)
+        .collect();
     let (waited, given_up) = parts.split_at(parts.len() - 3);
     let give = |part: &[Message]| {
         for message in part {
             bench.world.arrive_patiently(match message {
-                Message::Pose(of) => Arrival::Pose(seen_from(message, &rig(of.stamp_ns), "rig"), bench.now()),
+                Message::Pose(of) => {
+                    Arrival::Pose(seen_from(message, &rig(of.stamp_ns), "rig"), bench.now())
+                }
                 Message::Wrench(_) => bench.arrival(message),
             });
         }
@@ -241,15 +347,33 @@ fn poses_wait_for_the_transform_of_a_moving_frame_and_not_for_ever() {
     bench.pass(STALE + Duration::from_millis(10));
     let (end, _) = bench.end();
     let poses = |messages: &[Message]| -> Vec<StampedPose> {
-        messages.iter().filter_map(|m| if let Message::Pose(pose) = m { Some(*pose) } else { None }).collect()
+        messages
+            .iter()
+            .filter_map(|m| {
+                if let Message::Pose(pose) = m {
+                    Some(*pose)
+                } else {
+                    None
+                }
+            })
+            .collect()
     };
-    let topics = Topics { markers: None, ..Topics::default() };
+    let topics = Topics {
+        markers: None,
+        ..Topics::default()
+    };
     let read = RecordingReader::open(&end.folder.join("recording"), &topics).unwrap();
     let kept = poses(&read.map(Result::unwrap).collect::<Vec<_>>());
     let expected = poses(&plate.messages);
-    let expected: Vec<_> = expected.iter().filter(|pose| pose.stamp_ns <= until(waited.last().unwrap())).collect();
+    let expected: Vec<_> = expected
+        .iter()
+        .filter(|pose| pose.stamp_ns <= until(waited.last().unwrap()))
+        .collect();
     assert_eq!(kept.len(), expected.len(), "{:?}", end.report);
-    assert_eq!(end.report.refused["transform"] as usize, poses(&given_up.concat()).len());
+    assert_eq!(
+        end.report.refused["transform"] as usize,
+        poses(&given_up.concat()).len()
+    );
     for (kept, expected) in kept.iter().zip(expected) {
         let error = kept.pose_ot.inv_mul(&expected.pose_ot);
         assert!(
@@ -270,7 +394,12 @@ fn a_burst_is_dropped_where_there_is_no_room_and_the_recording_holds_what_was_ta
     }
     let (end, _) = bench.end();
     assert_eq!(end.report.dropped[0], dropped);
-    refine(&["--resume".as_ref(), end.folder.as_os_str(), "--out".as_ref(), plate.path("again.ply").as_os_str()]);
+    refine(&[
+        "--resume".as_ref(),
+        end.folder.as_os_str(),
+        "--out".as_ref(),
+        plate.path("again.ply").as_os_str(),
+    ]);
     assert!(std::fs::read(plate.path("again.ply")).unwrap() == read(&end.folder, "refined.ply"));
 }
 
@@ -281,7 +410,13 @@ fn pause_undo_redo_and_reset() {
     let bench = Bench::start(&plate);
     let call = |strokes, is_undo: bool| {
         let request = UndoRequest { strokes };
-        let of = |reply| if is_undo { Call::Undo(request, reply) } else { Call::Redo(request, reply) };
+        let of = |reply| {
+            if is_undo {
+                Call::Undo(request, reply)
+            } else {
+                Call::Redo(request, reply)
+            }
+        };
         bench.call(of)
     };
     assert!(!call(1, true).success, "nothing was touched yet");
@@ -305,13 +440,19 @@ fn pause_undo_redo_and_reset() {
     bench.feed(&plate.messages);
     let (end, _) = bench.end();
     assert_ne!(end.folder, first);
-    assert!(read(&end.folder, "refined.ply") == plate.refined("touch.mcap"), "as if it were the first session");
+    assert!(
+        read(&end.folder, "refined.ply") == plate.refined("touch.mcap"),
+        "as if it were the first session"
+    );
     // with its strokes the first one comes again as it was
     let report: serde_json::Value = serde_json::from_slice(&read(&first, "report.json")).unwrap();
     assert_eq!(report["paused"], 100);
     let was = read(&first, "refined.ply");
     refine(&["--resume".as_ref(), first.as_os_str()]);
-    assert!(read(&first, "refined.ply") == was, "two strokes taken back, one done again");
+    assert!(
+        read(&first, "refined.ply") == was,
+        "two strokes taken back, one done again"
+    );
 }
 
 #[test]
@@ -321,7 +462,11 @@ fn a_mesh_is_saved_into_the_folder_of_the_session_and_nowhere_else() {
     bench.feed(&plate.messages);
     let folder = bench.node.folder().to_owned();
     let save = |name: &str, overwrite| {
-        let request = SaveMeshRequest { name: name.to_owned(), overwrite, with_features: true };
+        let request = SaveMeshRequest {
+            name: name.to_owned(),
+            overwrite,
+            with_features: true,
+        };
         bench.call(|reply| Call::Save(request, reply))
     };
     std::os::unix::fs::symlink(plate.path("stolen.ply"), folder.join("link.ply")).unwrap();
@@ -345,14 +490,21 @@ fn a_mesh_is_saved_into_the_folder_of_the_session_and_nowhere_else() {
         "..\\stolen.ply",
     ] {
         let answer = save(name, true);
-        assert!(!answer.success && !answer.message.is_empty(), "{name:?}: {}", answer.message);
+        assert!(
+            !answer.success && !answer.message.is_empty(),
+            "{name:?}: {}",
+            answer.message
+        );
     }
     assert!(!plate.path("stolen.ply").exists() && !plate.path("sessions/stolen.ply").exists());
     let saved = save("part.ply", false);
     assert!(saved.success, "{}", saved.message);
     let file = read(&folder, "part.ply");
     let head = String::from_utf8_lossy(&file[..500]).into_owned();
-    for count in [format!("element vertex {}\n", saved.vertex_count), format!("element face {}\n", saved.face_count)] {
+    for count in [
+        format!("element vertex {}\n", saved.vertex_count),
+        format!("element face {}\n", saved.face_count),
+    ] {
         assert!(head.contains(&count), "{count} in {head}");
     }
     assert!(folder.join("part.features.json").exists() && folder.join("part.touches.csv").exists());
@@ -371,7 +523,10 @@ fn no_more_than_a_few_meshes_are_saved_at_a_time() {
     bench.feed(&plate.messages);
     let calls: Vec<_> = (0..64)
         .map(|number| {
-            let request = SaveMeshRequest { name: format!("part{number}.ply"), ..SaveMeshRequest::default() };
+            let request = SaveMeshRequest {
+                name: format!("part{number}.ply"),
+                ..SaveMeshRequest::default()
+            };
             bench.world.call(|reply| Call::Save(request, reply))
         })
         .collect();
@@ -385,7 +540,11 @@ fn no_more_than_a_few_meshes_are_saved_at_a_time() {
     }
     let (end, _) = bench.end();
     let refined = read(&end.folder, "refined.ply");
-    assert!(saved.iter().all(|answer| std::fs::read(&answer.path).unwrap() == refined));
+    assert!(
+        saved
+            .iter()
+            .all(|answer| std::fs::read(&answer.path).unwrap() == refined)
+    );
 }
 
 /// The arrow goes from outside onto the place; onto a flag, of which nobody knows more, from the tip.
@@ -395,29 +554,55 @@ fn the_tip_shows_where_to_touch_next() {
     let mut bench = Bench::start(&plate);
     let (first, rest) = plate.messages.split_at(plate.messages.len() / 4);
     bench.feed(first);
-    let Some(Message::Pose(last)) = first.iter().rev().find(|message| matches!(message, Message::Pose(_))) else {
+    let Some(Message::Pose(last)) = first
+        .iter()
+        .rev()
+        .find(|message| matches!(message, Message::Pose(_)))
+    else {
         panic!("it has poses")
     };
     let at = last.pose_ot.translation.vector;
-    let header = Header { frame_id: "object".to_owned(), ..Header::default() };
-    let point = Point { x: at.x, y: at.y, z: at.z };
-    let request =
-        FlagFeatureRequest { kind: Feature::KIND_BOSS, point: PointStamped { header, point }, search_radius: 0.0 };
+    let header = Header {
+        frame_id: "object".to_owned(),
+        ..Header::default()
+    };
+    let point = Point {
+        x: at.x,
+        y: at.y,
+        z: at.z,
+    };
+    let request = FlagFeatureRequest {
+        kind: Feature::KIND_BOSS,
+        point: PointStamped { header, point },
+        search_radius: 0.0,
+    };
     assert!(bench.call(|reply| Call::Flag(request, reply)).success);
     let is_flagged = |published: &Publication| match published {
-        Publication::Features(array) => {
-            array.features.iter().any(|f| f.status == Feature::STATUS_FLAGGED).then_some(())
-        }
+        Publication::Features(array) => array
+            .features
+            .iter()
+            .any(|f| f.status == Feature::STATUS_FLAGGED)
+            .then_some(()),
         _ => None,
     };
     bench.wait_for("the flag", is_flagged);
     bench.play(rest);
     let tip_to_flag = bench.wait_for("the arrow onto the flag", |published| match published {
         Publication::Tip(markers) => {
-            let arrow = markers.markers.iter().find(|marker| marker.id == 3 && marker.action == Marker::ADD)?;
-            let [ball, text] = [0, 1].map(|id| markers.markers.iter().find(|marker| marker.id == id).unwrap());
+            let arrow = markers
+                .markers
+                .iter()
+                .find(|marker| marker.id == 3 && marker.action == Marker::ADD)?;
+            let [ball, text] = [0, 1].map(|id| {
+                markers
+                    .markers
+                    .iter()
+                    .find(|marker| marker.id == id)
+                    .unwrap()
+            });
             let onto = arrow.points.last().unwrap();
-            let is_flag = text.text.contains("boss?") && (onto.x, onto.y, onto.z) == (at.x, at.y, at.z);
+            let is_flag =
+                text.text.contains("boss?") && (onto.x, onto.y, onto.z) == (at.x, at.y, at.z);
             is_flag.then(|| (arrow.points[0], ball.pose.position))
         }
         _ => None,
@@ -433,51 +618,113 @@ fn features_are_found_flagged_and_labelled() {
     let found = bench.call(|reply| Call::Detect(DetectFeaturesRequest::default(), reply));
     assert!(found.success, "{}", found.message);
     assert_eq!(found.count as usize, found.ids.len());
-    let holes = DetectFeaturesRequest { kinds: vec![Feature::KIND_HOLE] };
+    let holes = DetectFeaturesRequest {
+        kinds: vec![Feature::KIND_HOLE],
+    };
     let named = bench.call(|reply| Call::Detect(holes, reply));
     // the topic has what the answer names
     let shown = bench.wait_for("what was found", |published| match published {
-        Publication::Features(array) if array.mesh_version >= named.mesh_version => Some(array.features.clone()),
+        Publication::Features(array) if array.mesh_version >= named.mesh_version => {
+            Some(array.features.clone())
+        }
         _ => None,
     });
-    assert_eq!(shown.iter().map(|feature| feature.id).collect::<Vec<_>>(), found.ids);
-    let holes: Vec<_> = shown.into_iter().filter(|feature| feature.kind == Feature::KIND_HOLE).collect();
-    assert_eq!(holes.iter().map(|hole| hole.id).collect::<Vec<_>>(), named.ids);
-    assert!(holes.iter().all(|hole| hole.status == Feature::STATUS_FOUND));
-    let header = Header { frame_id: "object".to_owned(), ..Header::default() };
+    assert_eq!(
+        shown.iter().map(|feature| feature.id).collect::<Vec<_>>(),
+        found.ids
+    );
+    let holes: Vec<_> = shown
+        .into_iter()
+        .filter(|feature| feature.kind == Feature::KIND_HOLE)
+        .collect();
+    assert_eq!(
+        holes.iter().map(|hole| hole.id).collect::<Vec<_>>(),
+        named.ids
+    );
+    assert!(
+        holes
+            .iter()
+            .all(|hole| hole.status == Feature::STATUS_FOUND)
+    );
+    let header = Header {
+        frame_id: "object".to_owned(),
+        ..Header::default()
+    };
     let flag = |kind, point, search_radius| {
-        let request = FlagFeatureRequest { kind, point: PointStamped { header: header.clone(), point }, search_radius };
+        let request = FlagFeatureRequest {
+            kind,
+            point: PointStamped {
+                header: header.clone(),
+                point,
+            },
+            search_radius,
+        };
         bench.call(|reply| Call::Flag(request, reply))
     };
     if let Some(hole) = holes.first() {
         let known = flag(Feature::KIND_HOLE, hole.center, 2e-3);
         assert!(known.success && known.id == hole.id, "{}", known.message);
     }
-    let free = Point { x: 0.5, y: 0.5, z: 0.0 };
+    let free = Point {
+        x: 0.5,
+        y: 0.5,
+        z: 0.0,
+    };
     let fresh = flag(Feature::KIND_BOSS, free, 0.0);
     assert!(fresh.success && !found.ids.contains(&fresh.id));
-    assert_eq!(flag(Feature::KIND_BOSS, free, 0.0).id, fresh.id, "the same place");
-    assert!(!flag(200, free, 0.0).success && !flag(0, free, -1.0).success && !flag(0, free, f64::NAN).success);
-    bench.world.arrive_patiently(Arrival::ClickedPoint(PointStamped {
-        header: header.clone(),
-        point: Point { x: 0.9, y: 0.5, z: 0.0 },
-    }));
+    assert_eq!(
+        flag(Feature::KIND_BOSS, free, 0.0).id,
+        fresh.id,
+        "the same place"
+    );
+    assert!(
+        !flag(200, free, 0.0).success
+            && !flag(0, free, -1.0).success
+            && !flag(0, free, f64::NAN).success
+    );
+    bench
+        .world
+        .arrive_patiently(Arrival::ClickedPoint(PointStamped {
+            header: header.clone(),
+            point: Point {
+                x: 0.9,
+                y: 0.5,
+                z: 0.0,
+            },
+        }));
     let array = bench.wait_for("the flags", |published| match published {
         Publication::Features(array) => {
-            let flagged = array.features.iter().filter(|f| f.status == Feature::STATUS_FLAGGED).count();
+            let flagged = array
+                .features
+                .iter()
+                .filter(|f| f.status == Feature::STATUS_FLAGGED)
+                .count();
             (flagged == 2).then(|| array.clone())
         }
         _ => None,
     });
     assert!(array.features.is_sorted_by_key(|feature| feature.id));
-    let clicked = array.features.iter().find(|feature| feature.center.x == 0.9).unwrap();
-    assert_eq!((clicked.kind, clicked.search_radius), (Feature::KIND_HOLE, 5e-3), "flag_kind, flag_radius_mm");
+    let clicked = array
+        .features
+        .iter()
+        .find(|feature| feature.center.x == 0.9)
+        .unwrap();
+    assert_eq!(
+        (clicked.kind, clicked.search_radius),
+        (Feature::KIND_HOLE, 5e-3),
+        "flag_kind, flag_radius_mm"
+    );
     let unflag = |id| bench.call(|reply| Call::Unflag(UnflagFeatureRequest { id }, reply));
     assert!(unflag(fresh.id).success && !unflag(fresh.id).success);
     let labels = bench.wait_for("labels", |published| match published {
-        Publication::FeatureMarkers(array) => {
-            Some(array.markers.iter().map(|marker| marker.text.clone()).filter(|text| !text.is_empty()).collect())
-        }
+        Publication::FeatureMarkers(array) => Some(
+            array
+                .markers
+                .iter()
+                .map(|marker| marker.text.clone())
+                .filter(|text| !text.is_empty())
+                .collect(),
+        ),
         _ => None,
     });
     let labels: Vec<String> = labels;
@@ -489,9 +736,15 @@ fn features_are_found_flagged_and_labelled() {
 fn without_an_arm_probing_says_so() {
     let plate = Plate::touched(0.001);
     let bench = Bench::start(&plate);
-    let request = ProbeFeatureRequest { id: 3, ..ProbeFeatureRequest::default() };
+    let request = ProbeFeatureRequest {
+        id: 3,
+        ..ProbeFeatureRequest::default()
+    };
     let answer = bench.call(|reply| Call::Arm(ArmOrder::Feature(request, reply)));
-    assert_eq!((answer.result.code, answer.result.id), (ProbeResult::NO_ARM, 3));
+    assert_eq!(
+        (answer.result.code, answer.result.id),
+        (ProbeResult::NO_ARM, 3)
+    );
     assert!(answer.result.message.starts_with("no arm configured"));
     bench.end();
 }
@@ -501,12 +754,24 @@ fn parameters_change_while_it_runs_or_say_why_not() {
     let plate = Plate::touched(0.001);
     let bench = Bench::start(&plate);
     let set = |name: &str, value: ParameterValue| {
-        bench.answer(&bench.world.ask(|reply| Arrival::SetParameter(name.to_owned(), value, reply)))
+        bench.answer(
+            &bench
+                .world
+                .ask(|reply| Arrival::SetParameter(name.to_owned(), value, reply)),
+        )
     };
     set("colour_by", ParameterValue::String("mismatch".to_owned())).unwrap();
     set("view_rate_hz", ParameterValue::Integer(50)).unwrap();
-    assert!(set("view_rate_hz", ParameterValue::Double(0.0)).unwrap_err().contains("0.1 to 100"));
-    assert!(set("scan", ParameterValue::String("other.ply".to_owned())).unwrap_err().contains("while the node runs"));
+    assert!(
+        set("view_rate_hz", ParameterValue::Double(0.0))
+            .unwrap_err()
+            .contains("0.1 to 100")
+    );
+    assert!(
+        set("scan", ParameterValue::String("other.ply".to_owned()))
+            .unwrap_err()
+            .contains("while the node runs")
+    );
     bench.end();
 }
 
@@ -528,9 +793,22 @@ fn it_holds_while_a_stream_is_away_and_after_the_clock_was_set_back_and_goes_on(
     let jumps: u64 = bench.diagnostic("clock_jumps").unwrap().parse().unwrap();
     assert!(jumps >= 1, "{jumps} jumps");
     let (end, _) = bench.end();
-    let once = plate.messages.iter().filter(|message| matches!(message, Message::Wrench(_))).count() as u64;
-    assert!(end.report.accepted > once * 3 / 2, "{} of twice {once}", end.report.accepted);
-    refine(&["--resume".as_ref(), end.folder.as_os_str(), "--out".as_ref(), plate.path("again.ply").as_os_str()]);
+    let once = plate
+        .messages
+        .iter()
+        .filter(|message| matches!(message, Message::Wrench(_)))
+        .count() as u64;
+    assert!(
+        end.report.accepted > once * 3 / 2,
+        "{} of twice {once}",
+        end.report.accepted
+    );
+    refine(&[
+        "--resume".as_ref(),
+        end.folder.as_os_str(),
+        "--out".as_ref(),
+        plate.path("again.ply").as_os_str(),
+    ]);
     assert!(std::fs::read(plate.path("again.ply")).unwrap() == read(&end.folder, "refined.ply"));
 }
 
@@ -541,7 +819,11 @@ fn what_is_on_the_disk_while_it_runs_can_be_refined_and_lacks_50_ms() {
     let bench = Bench::start(&plate);
     // 1.5 s of touch
     let first_ns = plate.messages[0].stamp_ns();
-    let fed = plate.messages.iter().take_while(|message| message.stamp_ns() - first_ns < 1_500_000_000).count();
+    let fed = plate
+        .messages
+        .iter()
+        .take_while(|message| message.stamp_ns() - first_ns < 1_500_000_000)
+        .count();
     let (fed, rest) = plate.messages.split_at(fed);
     bench.play(fed);
     bench.pass(FLUSH);
@@ -559,10 +841,19 @@ fn what_is_on_the_disk_while_it_runs_can_be_refined_and_lacks_50_ms() {
         reader.map_while(Result::ok).collect::<Vec<Message>>()
     };
     let on_disk = copy();
-    assert!(on_disk == fed || on_disk == plate.messages[..fed.len() + 80], "{} of {}", on_disk.len(), fed.len());
+    assert!(
+        on_disk == fed || on_disk == plate.messages[..fed.len() + 80],
+        "{} of {}",
+        on_disk.len(),
+        fed.len()
+    );
     bench.pass(FLUSH / 2);
     let on_disk = copy();
-    assert_eq!(on_disk, plate.messages[..fed.len() + 80], "in the order in which they came");
+    assert_eq!(
+        on_disk,
+        plate.messages[..fed.len() + 80],
+        "in the order in which they came"
+    );
     bench.end();
     plate.record("was.mcap", &on_disk);
     refine(&["--resume".as_ref(), killed.as_os_str()]);

@@ -7,8 +7,8 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use touchup::probing::arm::{
-    ArmBodies, ArmGeometry, ChainError, ChainJoint, ChainLink, Joints, LimitError, Limits, Link, SerialChain,
-    Unreached, UrGeometry,
+    ArmBodies, ArmGeometry, ChainError, ChainJoint, ChainLink, Joints, LimitError, Limits, Link,
+    SerialChain, Unreached, UrGeometry,
 };
 
 use crate::chains::{seven_joints, ur_chain};
@@ -26,17 +26,20 @@ fn by_matrices(joints: &[f64]) -> Matrix4<f64> {
         (0.0, 0.0, 0.107),
     ];
     let turns = joints.iter().copied().chain([0.0]);
-    table.into_iter().zip(turns).fold(Matrix4::identity(), |product, ((alpha, a, d), theta)| {
-        let ((st, ct), (sa, ca)) = (f64::sin_cos(theta), f64::sin_cos(alpha));
-        #[rustfmt::skip]
+    table
+        .into_iter()
+        .zip(turns)
+        .fold(Matrix4::identity(), |product, ((alpha, a, d), theta)| {
+            let ((st, ct), (sa, ca)) = (f64::sin_cos(theta), f64::sin_cos(alpha));
+            #[rustfmt::skip]
         let link = Matrix4::new(
             ct, -st, 0.0, a,
             st * ca, ct * ca, -sa, -d * sa,
             st * sa, ct * sa, ca, d * ca,
             0.0, 0.0, 0.0, 1.0,
         );
-        product * link
-    })
+            product * link
+        })
 }
 
 /// Angles in the ranges of the arm with seven joints, by shares.
@@ -121,7 +124,14 @@ proptest! {
 fn joints_go_on_smoothly_along_straight_ways() {
     let arm = ArmGeometry::from(seven_joints());
     let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
-    let corners = [[0.4, -0.1], [0.6, -0.1], [0.6, 0.1], [0.4, 0.1], [0.4, -0.1]].map(|[x, y]| Vector3::new(x, y, 0.3));
+    let corners = [
+        [0.4, -0.1],
+        [0.6, -0.1],
+        [0.6, 0.1],
+        [0.4, 0.1],
+        [0.4, -0.1],
+    ]
+    .map(|[x, y]| Vector3::new(x, y, 0.3));
     let pose = |place: Vector3<f64>| Isometry3::from_parts(place.into(), down);
     let mut joints = arm.most_dexterous(&pose(corners[0])).unwrap();
     for ends in corners.windows(2) {
@@ -129,9 +139,17 @@ fn joints_go_on_smoothly_along_straight_ways() {
             let share = f64::from(step) / 200.0;
             let pose = pose(ends[0] + (ends[1] - ends[0]) * share);
             let next = arm.nearest(&pose, &joints).unwrap();
-            let turn = next.iter().zip(joints.iter()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let turn = next
+                .iter()
+                .zip(joints.iter())
+                .map(|(a, b)| (a - b).abs())
+                .fold(0.0, f64::max);
             // 1 mm over a reach of 1 m and the dexterity here, which is above 0.1
-            assert!(arm.dexterity(&next) > 0.1 && turn < 0.01, "{turn} {}", arm.dexterity(&next));
+            assert!(
+                arm.dexterity(&next) > 0.1 && turn < 0.01,
+                "{turn} {}",
+                arm.dexterity(&next)
+            );
             let error = pose.inv_mul(&arm.flange(&next));
             assert!(error.translation.vector.norm() < 1e-9 && error.rotation.angle() < 1e-9);
             joints = next;
@@ -153,7 +171,10 @@ fn an_arm_at_the_end_of_a_range_goes_round_it_or_names_the_joint() {
     for degrees in 1..=175 {
         joints = arm.nearest(&pose(f64::from(degrees)), &joints).unwrap();
     }
-    assert!(joints[0] <= 2.8973 && joints[2].abs() > 0.1, "the third joint does what the first cannot: {joints:?}");
+    assert!(
+        joints[0] <= 2.8973 && joints[2].abs() > 0.1,
+        "the third joint does what the first cannot: {joints:?}"
+    );
     // six joints have no other way: a chain whose second joint goes no farther than 10° beyond where it is
     let ur = UrGeometry::UR5E;
     let whole = ur_chain(&ur, 0.05);
@@ -162,12 +183,22 @@ fn an_arm_at_the_end_of_a_range_goes_round_it_or_names_the_joint() {
     for (joint, angle) in narrow.iter_mut().zip(now.iter()) {
         joint.range = Some([angle - 0.35, angle + 0.35]);
     }
-    let links = (0..7).map(|number| ChainLink { name: format!("{number}").into(), body: None }).collect();
+    let links = (0..7)
+        .map(|number| ChainLink {
+            name: format!("{number}").into(),
+            body: None,
+        })
+        .collect();
     let end = Isometry3::translation(0.0, 0.0, ur.d6);
     let narrow = ArmGeometry::from(SerialChain::new(narrow, links, end, 0.05).unwrap());
     let beyond = now.mapped(|joint, angle| if joint == 1 { angle + 0.5 } else { angle });
-    let refused = narrow.nearest(&ArmGeometry::from(ur).flange(&beyond), &now).unwrap_err();
-    assert!(matches!(&refused, Unreached::Range { joint, .. } if &**joint == "joint2"), "{refused:?}");
+    let refused = narrow
+        .nearest(&ArmGeometry::from(ur).flange(&beyond), &now)
+        .unwrap_err();
+    assert!(
+        matches!(&refused, Unreached::Range { joint, .. } if &**joint == "joint2"),
+        "{refused:?}"
+    );
 }
 
 #[test]
@@ -176,14 +207,22 @@ fn what_is_out_of_reach_is_refused_at_once_and_what_is_within_is_found_from_afar
     let far = Isometry3::translation(1.3, 0.0, 0.3);
     assert_eq!(arm.nearest(&far, &in_range([0.5; 7])), Err(Unreached::Pose));
     // from each of some configurations to the flange of each other
-    let places =
-        [[0.3; 7], [0.7; 7], [0.2, 0.8, 0.4, 0.6, 0.3, 0.7, 0.5], [0.8, 0.3, 0.6, 0.4, 0.7, 0.2, 0.5]].map(in_range);
+    let places = [
+        [0.3; 7],
+        [0.7; 7],
+        [0.2, 0.8, 0.4, 0.6, 0.3, 0.7, 0.5],
+        [0.8, 0.3, 0.6, 0.4, 0.7, 0.2, 0.5],
+    ]
+    .map(in_range);
     for from in &places {
         for to in &places {
             let pose = arm.flange(to);
             let found = arm.nearest(&pose, from).unwrap();
             let error = pose.inv_mul(&arm.flange(&found));
-            assert!(error.translation.vector.norm() < 1e-9 && error.rotation.angle() < 1e-9, "{error}");
+            assert!(
+                error.translation.vector.norm() < 1e-9 && error.rotation.angle() < 1e-9,
+                "{error}"
+            );
         }
     }
 }
@@ -194,23 +233,49 @@ fn limits_hold_for_a_chain_as_for_a_ur() {
     let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
     let pose_ft = Isometry3::from_parts(Vector3::new(0.0, 0.0, 0.15).into(), down);
     let (lowest, highest) = (Point3::new(-1.0, -1.0, -1.0), Point3::new(1.5, 1.0, 1.5));
-    let limits = Limits { lowest, highest, ..Limits::default() };
+    let limits = Limits {
+        lowest,
+        highest,
+        ..Limits::default()
+    };
     let check = |place: [f64; 3], near: &Joints| {
-        limits.check_pose(&arm, &pose_ft, &Isometry3::translation(place[0], place[1], place[2]), near)
+        limits.check_pose(
+            &arm,
+            &pose_ft,
+            &Isometry3::translation(place[0], place[1], place[2]),
+            near,
+        )
     };
     let start = Isometry3::translation(0.5, 0.0, 0.1);
     let near = arm.most_dexterous(&(start * pose_ft.inverse())).unwrap();
     assert!(check([0.5, 0.0, 0.1], &near).is_ok());
     let refused = check([1.4, 0.0, 0.1], &near).unwrap_err();
-    assert!(matches!(refused, LimitError::Reach { .. } | LimitError::JointRange { .. }), "{refused}");
+    assert!(
+        matches!(
+            refused,
+            LimitError::Reach { .. } | LimitError::JointRange { .. }
+        ),
+        "{refused}"
+    );
     let refused = check([0.5, 0.0, 0.1], &[0.0; 6].into()).unwrap_err();
-    assert_eq!(refused.to_string(), "the arm has 6 joints, the one of robot.model has 7: name the arm that is there");
+    assert_eq!(
+        refused.to_string(),
+        "the arm has 6 joints, the one of robot.model has 7: name the arm that is there"
+    );
     // stretched it cannot go farther out
     let (ur, stretched) = (UrGeometry::UR5E, [0.3, -1.2, 0.0, -0.9, 1.1, 0.4]);
     let refused = limits
-        .check_pose(&ur_chain(&ur, 0.05).into(), &pose_ft, &(ur.flange(&stretched) * pose_ft), &stretched.into())
+        .check_pose(
+            &ur_chain(&ur, 0.05).into(),
+            &pose_ft,
+            &(ur.flange(&stretched) * pose_ft),
+            &stretched.into(),
+        )
         .unwrap_err();
-    assert!(matches!(refused, LimitError::Singular { dexterity, .. } if dexterity < 1e-6), "{refused}");
+    assert!(
+        matches!(refused, LimitError::Singular { dexterity, .. } if dexterity < 1e-6),
+        "{refused}"
+    );
 }
 
 /// By the matrices the flange is in the column of the base, 110 mm thick.
@@ -232,7 +297,11 @@ fn links_of_a_chain_that_meet_are_named() {
     for joints in found {
         let (one, other, gap) = pair(&joints);
         assert!(gap < -0.02, "{one} {other} {gap}");
-        assert!([&one, &other].iter().any(|link| matches!(link, Link::Named(name) if name.starts_with("link"))));
+        assert!(
+            [&one, &other]
+                .iter()
+                .any(|link| matches!(link, Link::Named(name) if name.starts_with("link")))
+        );
     }
 }
 
@@ -240,18 +309,42 @@ fn links_of_a_chain_that_meet_are_named() {
 fn what_is_no_arm_is_refused_by_name() {
     let chain = seven_joints();
     let links = |count: usize| -> Vec<_> {
-        (0..count).map(|number| ChainLink { name: format!("l{number}").into(), body: None }).collect()
+        (0..count)
+            .map(|number| ChainLink {
+                name: format!("l{number}").into(),
+                body: None,
+            })
+            .collect()
     };
     let of = |joints: Vec<ChainJoint>, count| {
-        SerialChain::new(joints, links(count), Isometry3::translation(0.0, 0.0, 0.1), 0.05)
+        SerialChain::new(
+            joints,
+            links(count),
+            Isometry3::translation(0.0, 0.0, 0.1),
+            0.05,
+        )
     };
     let joints = chain.joints().to_vec();
-    assert_eq!(of(joints[..5].to_vec(), 6), Err(ChainError::Count { count: 5 }));
-    assert_eq!(of(joints.clone(), 7), Err(ChainError::Links { count: 7, links: 7 }));
+    assert_eq!(
+        of(joints[..5].to_vec(), 6),
+        Err(ChainError::Count { count: 5 })
+    );
+    assert_eq!(
+        of(joints.clone(), 7),
+        Err(ChainError::Links { count: 7, links: 7 })
+    );
     let mut twice = joints.clone();
     twice[3].name = twice[1].name.clone();
-    assert_eq!(of(twice, 8).unwrap_err().to_string(), "joint joint2: another has the same name");
+    assert_eq!(
+        of(twice, 8).unwrap_err().to_string(),
+        "joint joint2: another has the same name"
+    );
     let mut narrow = joints;
     narrow[2].range = Some([0.4, 0.4]);
-    assert!(of(narrow, 8).unwrap_err().to_string().starts_with("joint joint3: its range has no room"));
+    assert!(
+        of(narrow, 8)
+            .unwrap_err()
+            .to_string()
+            .starts_with("joint joint3: its range has no room")
+    );
 }

@@ -28,17 +28,24 @@ impl TurnedPlate {
         let middle = Vector3::from(MIDDLE);
         let about = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
         let turn = Isometry3::from_parts((middle - about * middle).into(), about);
-        Self { plate: Plate::default(), turn }
+        Self {
+            plate: Plate::default(),
+            turn,
+        }
     }
 
     fn turned(&self, found: SurfacePoint) -> SurfacePoint {
-        SurfacePoint { point: self.turn * found.point, normal: self.turn.rotation * found.normal }
+        SurfacePoint {
+            point: self.turn * found.point,
+            normal: self.turn.rotation * found.normal,
+        }
     }
 }
 
 impl Surface for TurnedPlate {
     fn signed_distance(&self, p: &Point3<f64>) -> f64 {
-        self.plate.signed_distance(&self.turn.inverse_transform_point(p))
+        self.plate
+            .signed_distance(&self.turn.inverse_transform_point(p))
     }
 
     fn closest(&self, p: &Point3<f64>) -> SurfacePoint {
@@ -51,8 +58,11 @@ impl Surface for TurnedPlate {
 
     fn near(&self, p: &Point3<f64>, reach: f64, found: &mut Vec<SurfacePoint>) {
         let begun = found.len();
-        self.plate.near(&self.turn.inverse_transform_point(p), reach, found);
-        found[begun..].iter_mut().for_each(|one| *one = self.turned(*one));
+        self.plate
+            .near(&self.turn.inverse_transform_point(p), reach, found);
+        found[begun..]
+            .iter_mut()
+            .for_each(|one| *one = self.turned(*one));
     }
 }
 
@@ -61,23 +71,50 @@ impl Surface for TurnedPlate {
 #[test]
 fn a_wall_met_at_a_flat_angle_is_a_contact_at_its_place() {
     let plate = Plate::default();
-    for degrees in [10.0f64, 15.0, 20.0, 30.0, 40.0, 44.0, 45.0, 46.0, 50.0, 55.0, 60.0, 75.0, 90.0] {
+    for degrees in [
+        10.0f64, 15.0, 20.0, 30.0, 40.0, 44.0, 45.0, 46.0, 50.0, 55.0, 60.0, 75.0, 90.0,
+    ] {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let params = ArmParams::default();
-        let touching = TouchParams { stiffness: params.stiffness, ..TouchParams::default() };
+        let touching = TouchParams {
+            stiffness: params.stiffness,
+            ..TouchParams::default()
+        };
         let from = [19e-3, 14e-3, 9.8e-3];
-        let mut arm = SimArm::new(&plate, params.clone(), &at(&params, [from[0], from[1], 20e-3])).unwrap();
+        let mut arm = SimArm::new(
+            &plate,
+            params.clone(),
+            &at(&params, [from[0], from[1], 20e-3]),
+        )
+        .unwrap();
         let direction = Unit::new_normalize(Vector3::new(cos, sin, 0.0));
-        let target = TouchTarget { standoff_bt: at(&params, from), direction, search: 12e-3, expected: None };
+        let target = TouchTarget {
+            standoff_bt: at(&params, from),
+            direction,
+            search: 12e-3,
+            expected: None,
+        };
         let record = touched(&mut arm, &touching, &target).unwrap();
         let TouchOutcome::Contact { onset, centre, .. } = record.outcome else {
             panic!("at {degrees}°: {:?}", record.outcome)
         };
         let beside = params.pose_bo.inverse_transform_point(&centre).y - 14e-3;
-        println!("{degrees}°: {:.1} µm off, {}", (beside - 1.5e-3) * 1e6, onset.verdict.name());
-        assert!((beside - 1.5e-3).abs() < 10e-6, "{degrees}°: {:.1} µm", (beside - 1.5e-3) * 1e6);
+        println!(
+            "{degrees}°: {:.1} µm off, {}",
+            (beside - 1.5e-3) * 1e6,
+            onset.verdict.name()
+        );
+        assert!(
+            (beside - 1.5e-3).abs() < 10e-6,
+            "{degrees}°: {:.1} µm",
+            (beside - 1.5e-3) * 1e6
+        );
         assert!(onset.verdict != OnsetVerdict::Edge, "{degrees}°");
-        assert!(record.peak_force < 1.5 * touching.force, "{degrees}°: {} N", record.peak_force);
+        assert!(
+            record.peak_force < 1.5 * touching.force,
+            "{degrees}°: {} N",
+            record.peak_force
+        );
     }
 }
 
@@ -90,18 +127,31 @@ fn a_slot_is_found_at_every_angle() {
         for seed in 0..seeds {
             let angle = f64::from(degrees).to_radians();
             let plate = TurnedPlate::new(angle);
-            let params = ArmParams { seed: seed + 1, ..ArmParams::default() };
-            let touching = TouchParams { stiffness: params.stiffness, ..TouchParams::default() };
+            let params = ArmParams {
+                seed: seed + 1,
+                ..ArmParams::default()
+            };
+            let touching = TouchParams {
+                stiffness: params.stiffness,
+                ..TouchParams::default()
+            };
             let mut rng = Pcg64::seed_from_u64(seed * 1000 + u64::from(degrees));
-            let (turn, off) = (rng.random_range(0.0..std::f64::consts::TAU), rng.random_range(0.0..3e-3));
-            let flag = Point3::from(MIDDLE) + Vector3::new(off * f64::cos(turn), off * f64::sin(turn), 0.2e-3);
+            let (turn, off) = (
+                rng.random_range(0.0..std::f64::consts::TAU),
+                rng.random_range(0.0..3e-3),
+            );
+            let flag = Point3::from(MIDDLE)
+                + Vector3::new(off * f64::cos(turn), off * f64::sin(turn), 0.2e-3);
             let start = at(&params, [MIDDLE[0], MIDDLE[1], 30e-3]);
             let mut arm = SimArm::new(&plate, params.clone(), &start).unwrap();
             let mut search = Explorer::new(
                 Some(Kind::Slot),
                 &flag,
                 &Vector3::z_axis(),
-                PatternParams { touch_sigma: 5e-6, ..PatternParams::default() },
+                PatternParams {
+                    touch_sigma: 5e-6,
+                    ..PatternParams::default()
+                },
                 &plate_scan(1),
             )
             .unwrap();
@@ -110,13 +160,19 @@ fn a_slot_is_found_at_every_angle() {
                 Err(error) => error.to_string(),
                 Ok((touches, Some(slot))) if slot.kind == Kind::Slot => {
                     let off = slot.centre.value - Point3::from(MIDDLE);
-                    let along = Rotation3::from_axis_angle(&Vector3::z_axis(), angle) * Vector3::x();
-                    let number = |measured: &Option<Measured<f64>>| measured.as_ref().unwrap().value;
-                    let [width, length] = [number(&slot.width) - 6e-3, number(&slot.length) - 20e-3];
+                    let along =
+                        Rotation3::from_axis_angle(&Vector3::z_axis(), angle) * Vector3::x();
+                    let number =
+                        |measured: &Option<Measured<f64>>| measured.as_ref().unwrap().value;
+                    let [width, length] =
+                        [number(&slot.width) - 6e-3, number(&slot.length) - 20e-3];
                     // across the axis: its tilt is that of the top
                     let lean = slot.direction.unwrap().xy().perp(&along.xy()).abs();
                     let wrong = [off.xy().norm(), width.abs(), length.abs(), lean * 10e-3];
-                    println!("{degrees}° seed {seed}: {touches} touches, off {:.1?} µm", wrong.map(|w| w * 1e6));
+                    println!(
+                        "{degrees}° seed {seed}: {touches} touches, off {:.1?} µm",
+                        wrong.map(|w| w * 1e6)
+                    );
                     if wrong.iter().all(|w| *w < 20e-6) {
                         continue;
                     }

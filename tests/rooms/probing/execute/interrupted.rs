@@ -42,8 +42,22 @@ impl Case {
         let [scene, truth] = &self.files;
         let mut command = Command::new(env!("CARGO_BIN_EXE_touchup"));
         let out = self.path(out);
-        let arguments = ["probe", "--robot", "sim", "--scene", scene, "--truth", truth, "--out", out.to_str().unwrap()];
-        command.args(arguments).args(more).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let arguments = [
+            "probe",
+            "--robot",
+            "sim",
+            "--scene",
+            scene,
+            "--truth",
+            truth,
+            "--out",
+            out.to_str().unwrap(),
+        ];
+        command
+            .args(arguments)
+            .args(more)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
         command
     }
 
@@ -56,7 +70,10 @@ impl Case {
         let mut child = self.command(out, &FEATURES).spawn().unwrap();
         let begun = Instant::now();
         while !touches(&self.path(out)).iter().any(|touch| touch.flag == 2) {
-            assert!(begun.elapsed() < PATIENCE && child.try_wait().unwrap().is_none(), "the second is never begun");
+            assert!(
+                begun.elapsed() < PATIENCE && child.try_wait().unwrap().is_none(),
+                "the second is never begun"
+            );
             sleep(Duration::from_millis(5));
         }
         signal(&child, "STOP");
@@ -66,7 +83,13 @@ impl Case {
             sleep(Duration::from_millis(5));
         }
         let records = records(&self.path(out));
-        assert_eq!(records.iter().map(|record| &record["flag"]).collect::<Vec<_>>(), [1]);
+        assert_eq!(
+            records
+                .iter()
+                .map(|record| &record["flag"])
+                .collect::<Vec<_>>(),
+            [1]
+        );
         child
     }
 }
@@ -76,19 +99,30 @@ fn touches(out: &Path) -> Vec<TouchLine> {
 }
 
 fn records(out: &Path) -> Vec<Value> {
-    let probed: Value = serde_json::from_slice(&fs::read(out.join("probed.json")).unwrap()).unwrap();
+    let probed: Value =
+        serde_json::from_slice(&fs::read(out.join("probed.json")).unwrap()).unwrap();
     probed["features"].as_array().unwrap().clone()
 }
 
 /// The samples of a recording, ns of each pose and wrench.
 fn stamps(out: &Path) -> Vec<i64> {
-    let topics = Topics { pose: "/probe/pose".to_owned(), wrench: "/probe/wrench".to_owned(), markers: None };
+    let topics = Topics {
+        pose: "/probe/pose".to_owned(),
+        wrench: "/probe/wrench".to_owned(),
+        markers: None,
+    };
     let reader = RecordingReader::open(&out.join("recording"), &topics).unwrap();
-    reader.map_while(Result::ok).map(|message: Message| message.stamp_ns()).collect()
+    reader
+        .map_while(Result::ok)
+        .map(|message: Message| message.stamp_ns())
+        .collect()
 }
 
 fn signal(child: &Child, name: &str) {
-    let sent = Command::new("kill").args([&format!("-{name}"), &child.id().to_string()]).status().unwrap();
+    let sent = Command::new("kill")
+        .args([&format!("-{name}"), &child.id().to_string()])
+        .status()
+        .unwrap();
     assert!(sent.success());
 }
 
@@ -106,8 +140,15 @@ fn text(bytes: &[u8]) -> String {
 fn recording_holds(touches: &[TouchLine], stamps: &[i64]) {
     let [first, last] = [stamps.iter().min().unwrap(), stamps.iter().max().unwrap()];
     for touch in touches {
-        let (Some(begun), Some(ended)) = (touch.begun_ns, touch.ended_ns) else { continue };
-        assert!(begun >= *first && ended <= *last, "touch {} of {}", touch.index, touch.flag);
+        let (Some(begun), Some(ended)) = (touch.begun_ns, touch.ended_ns) else {
+            continue;
+        };
+        assert!(
+            begun >= *first && ended <= *last,
+            "touch {} of {}",
+            touch.index,
+            touch.flag
+        );
     }
 }
 
@@ -116,7 +157,10 @@ fn recording_holds(touches: &[TouchLine], stamps: &[i64]) {
 fn found_as_by(whole: &[Value], resumed: &[Value]) {
     assert_eq!(whole.len(), resumed.len());
     for (one, other) in whole.iter().zip(resumed) {
-        assert_eq!([&one["flag"], &one["kind"], &one["code"]], [&other["flag"], &other["kind"], &other["code"]]);
+        assert_eq!(
+            [&one["flag"], &one["kind"], &one["code"]],
+            [&other["flag"], &other["kind"], &other["code"]]
+        );
         let (one, other) = (&one["feature"], &other["feature"]);
         let allowed = |key: &str| {
             let std = |of: &Value| of["std"][key].as_f64().unwrap();
@@ -158,17 +202,30 @@ fn a_killed_probing_keeps_each_touch_and_goes_on_with_the_rest() {
     );
     let other = case.run("out", &["--feature", "edge@59,23,12", "--resume"]);
     assert_eq!(other.status.code(), Some(2), "{}", text(&other.stderr));
-    assert!(text(&other.stderr).contains("the list of features differs"), "{}", text(&other.stderr));
+    assert!(
+        text(&other.stderr).contains("the list of features differs"),
+        "{}",
+        text(&other.stderr)
+    );
     assert_eq!(touches(&out).len(), kept.len());
 
     let resumed = case.run("out", &[&FEATURES[..], &["--resume"]].concat());
     assert_eq!(resumed.status.code(), Some(0), "{}", text(&resumed.stderr));
     let all = touches(&out);
     let line = |touch: &TouchLine| serde_json::to_string(touch).unwrap();
-    assert_eq!(all[..kept.len()].iter().map(line).collect::<Vec<_>>(), kept.iter().map(line).collect::<Vec<_>>());
-    assert!(all[kept.len()..].iter().all(|touch| touch.flag == 2), "the first feature was finished");
+    assert_eq!(
+        all[..kept.len()].iter().map(line).collect::<Vec<_>>(),
+        kept.iter().map(line).collect::<Vec<_>>()
+    );
+    assert!(
+        all[kept.len()..].iter().all(|touch| touch.flag == 2),
+        "the first feature was finished"
+    );
     let stamps = stamps(&out);
-    assert!(stamps.windows(2).all(|pair| pair[0] <= pair[1]), "the clock of the recording goes on");
+    assert!(
+        stamps.windows(2).all(|pair| pair[0] <= pair[1]),
+        "the clock of the recording goes on"
+    );
     recording_holds(&all, &stamps);
 
     assert_eq!(case.run("whole", &FEATURES).status.code(), Some(0));
@@ -187,14 +244,22 @@ fn a_recording_of_something_else_is_not_written_over() {
     let recording = case.path("out/recording");
     fs::create_dir_all(&recording).unwrap();
     fs::write(recording.join("touch_0000.mcap"), "measured").unwrap();
-    for (more, why) in
-        [(&[][..], "out/recording is there and of no probing"), (&["--resume"], "holds no probing to go on with")]
-    {
+    for (more, why) in [
+        (&[][..], "out/recording is there and of no probing"),
+        (&["--resume"], "holds no probing to go on with"),
+    ] {
         let refused = case.run("out", &[&FEATURES[..], more].concat());
         assert_eq!(refused.status.code(), Some(2), "{}", text(&refused.stderr));
-        assert!(text(&refused.stderr).contains(why), "{}", text(&refused.stderr));
+        assert!(
+            text(&refused.stderr).contains(why),
+            "{}",
+            text(&refused.stderr)
+        );
     }
-    assert_eq!(fs::read(recording.join("touch_0000.mcap")).unwrap(), b"measured");
+    assert_eq!(
+        fs::read(recording.join("touch_0000.mcap")).unwrap(),
+        b"measured"
+    );
 }
 
 #[test]
@@ -210,14 +275,25 @@ fn an_interrupted_probing_retracts_says_so_and_has_an_exit_code_of_its_own() {
         let (told, stderr) = (text(&done.stdout), text(&done.stderr));
         assert_eq!(done.status.code(), Some(130), "{stderr}");
         assert!(
-            stderr.contains("touchup: the arm stops and retracts; a second signal has it stay where it is"),
+            stderr.contains(
+                "touchup: the arm stops and retracts; a second signal has it stay where it is"
+            ),
             "{stderr}"
         );
         let last = stderr.lines().last().unwrap();
         let words = "touchup: interrupted: the arm stopped and retracted; 1 of 2 features are finished, the touches (";
-        assert!(last.starts_with(words) && last.ends_with("--resume goes on"), "{stderr}");
-        assert!(told.contains("hole 2: cancelled: the arm stopped and retracted"), "{told}");
-        let codes: Vec<_> = records(&out).iter().map(|record| record["code"].clone()).collect();
+        assert!(
+            last.starts_with(words) && last.ends_with("--resume goes on"),
+            "{stderr}"
+        );
+        assert!(
+            told.contains("hole 2: cancelled: the arm stopped and retracted"),
+            "{told}"
+        );
+        let codes: Vec<_> = records(&out)
+            .iter()
+            .map(|record| record["code"].clone())
+            .collect();
         assert_eq!(codes, ["tolerance_reached", "cancelled"]);
         let touches = touches(&out);
         assert!(touches.len() >= before);
@@ -231,14 +307,34 @@ fn an_interrupted_probing_retracts_says_so_and_has_an_exit_code_of_its_own() {
 fn a_check_that_is_interrupted_keeps_its_touches() {
     let case = Case::new();
     let ([scene, truth], path) = (&case.files, case.path("touches.jsonl"));
-    let arguments =
-        ["check", "--robot", "sim", "--scene", scene, "--truth", truth, "--spot", "45,8,12", "--touches", "100"];
+    let arguments = [
+        "check",
+        "--robot",
+        "sim",
+        "--scene",
+        scene,
+        "--truth",
+        truth,
+        "--spot",
+        "45,8,12",
+        "--touches",
+        "100",
+    ];
     let mut command = Command::new(env!("CARGO_BIN_EXE_touchup"));
-    command.args(arguments).args(["--touches-out", path.to_str().unwrap()]);
-    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    command
+        .args(arguments)
+        .args(["--touches-out", path.to_str().unwrap()]);
+    let mut child = command
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
     let begun = Instant::now();
     while read_probed_touches(&path).unwrap().len() < 2 {
-        assert!(begun.elapsed() < PATIENCE && child.try_wait().unwrap().is_none(), "it does not touch");
+        assert!(
+            begun.elapsed() < PATIENCE && child.try_wait().unwrap().is_none(),
+            "it does not touch"
+        );
         sleep(Duration::from_millis(5));
     }
     signal(&child, "INT");
@@ -247,8 +343,11 @@ fn a_check_that_is_interrupted_keeps_its_touches() {
     assert_eq!(done.status.code(), Some(130), "{stderr}");
     let made = read_probed_touches(&path).unwrap();
     assert!(made.len() >= 2 && made.len() < 100);
-    let words =
-        format!("interrupted: the arm stopped and retracted; the touches ({}) are in {}", made.len(), path.display());
+    let words = format!(
+        "interrupted: the arm stopped and retracted; the touches ({}) are in {}",
+        made.len(),
+        path.display()
+    );
     assert!(stderr.contains(&words), "{stderr}");
 }
 
@@ -259,8 +358,19 @@ fn a_payload_identification_that_is_interrupted_keeps_its_static_segments() {
     let out = case.path("weighed.yaml");
     let identify = |more: &[&str]| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_touchup"));
-        command.args(["calibrate", "payload", "--robot", "sim", "--scene", scene, "--truth", truth]);
-        command.args(["--truth-payload-kg", "1.17", "--out", out.to_str().unwrap()]).args(more);
+        command.args([
+            "calibrate",
+            "payload",
+            "--robot",
+            "sim",
+            "--scene",
+            scene,
+            "--truth",
+            truth,
+        ]);
+        command
+            .args(["--truth-payload-kg", "1.17", "--out", out.to_str().unwrap()])
+            .args(more);
         command.stdout(Stdio::piped()).stderr(Stdio::piped());
         command
     };
@@ -268,7 +378,10 @@ fn a_payload_identification_that_is_interrupted_keeps_its_static_segments() {
     let mut child = identify(&kept).spawn().unwrap();
     let begun = Instant::now();
     while fs::read_to_string(&path).map_or(0, |text| text.lines().count()) < 3 {
-        assert!(begun.elapsed() < PATIENCE && child.try_wait().unwrap().is_none(), "it does not measure");
+        assert!(
+            begun.elapsed() < PATIENCE && child.try_wait().unwrap().is_none(),
+            "it does not measure"
+        );
         sleep(Duration::from_millis(5));
     }
     signal(&child, "INT");
@@ -277,15 +390,26 @@ fn a_payload_identification_that_is_interrupted_keeps_its_static_segments() {
     assert_eq!(done.status.code(), Some(130), "{stderr}");
     let made = read_static_poses(&path).unwrap();
     assert!(made.len() >= 2 && made.len() < 13, "{}", made.len());
-    let words = format!("; the static segments ({}) are in {}", made.len(), path.display());
+    let words = format!(
+        "; the static segments ({}) are in {}",
+        made.len(),
+        path.display()
+    );
     assert!(stderr.contains(&words), "{stderr}");
     assert!(!out.exists(), "nothing is concluded from a part of them");
 
     // what is kept of a whole one is what the payload was identified from: its weight is that of 1.17 kg
     assert_eq!(identify(&kept).output().unwrap().status.code(), Some(0));
     let all = read_static_poses(&path).unwrap();
-    let forces: Vec<_> = all.iter().map(|(r_bf, wrench)| r_bf * wrench.force).collect();
+    let forces: Vec<_> = all
+        .iter()
+        .map(|(r_bf, wrench)| r_bf * wrench.force)
+        .collect();
     // the bias turns with the flange, the weight does not: the mean over a cone has little of what lies across it
     let mean = forces.iter().sum::<nalgebra::Vector3<f64>>() / forces.len() as f64;
-    assert!((mean.norm() - 1.17 * 9.81).abs() < 1.3, "{mean} N of {} segments", all.len());
+    assert!(
+        (mean.norm() - 1.17 * 9.81).abs() < 1.3,
+        "{mean} N of {} segments",
+        all.len()
+    );
 }

@@ -17,13 +17,36 @@ use touchup::probing::plan::PatternParams;
 use touchup::sim::ArmParams;
 
 fn cell() -> Cell {
-    let ArmParams { geometry, pose_bo, pose_ft, .. } = ArmParams::default();
-    Cell { geometry, pose_bo, pose_ft, tool: Tool::default() }
+    let ArmParams {
+        geometry,
+        pose_bo,
+        pose_ft,
+        ..
+    } = ArmParams::default();
+    Cell {
+        geometry,
+        pose_bo,
+        pose_ft,
+        tool: Tool::default(),
+    }
 }
 
 fn params() -> ProbeParams {
-    let limits =
-        Limits { lowest: Point3::new(-0.6, -0.3, 0.0), highest: Point3::new(-0.2, 0.2, 0.4), ..Limits::default() };
-    let pattern = PatternParams { sigma: 10e-6, touch_sigma: 5e-6, ..PatternParams::default() };
-    ProbeParams { touch: TouchParams::default(), pattern, goals: Default::default(), slides: false, limits }
+    let limits = Limits {
+        lowest: Point3::new(-0.6, -0.3, 0.0),
+        highest: Point3::new(-0.2, 0.2, 0.4),
+        ..Limits::default()
+    };
+    let pattern = PatternParams {
+        sigma: 10e-6,
+        touch_sigma: 5e-6,
+        ..PatternParams::default()
+    };
+    ProbeParams {
+        touch: TouchParams::default(),
+        pattern,
+        goals: Default::default(),
+        slides: false,
+        limits,
+    }
 }

@@ -28,11 +28,25 @@ impl RefinedScan {
     fn new(scan: TriMesh) -> Self {
         let scene = Scene::from_yaml(include_str!("../../../../config/probe.yaml")).unwrap();
         let refine = scene.refine_params(WrenchFrame::Sensor).unwrap();
-        let pace = Pace { is_patient: true, every_ns: 200_000_000, ..Pace::default() };
+        let pace = Pace {
+            is_patient: true,
+            every_ns: 200_000_000,
+            ..Pace::default()
+        };
         let both = Arc::new((scan.clone(), FaceTree::new(&scan)));
-        let renewal = Renewal::Beside { scan: both, pace, room: 1 << 16, gate: Gate::default() };
+        let renewal = Renewal::Beside {
+            scan: both,
+            pace,
+            room: 1 << 16,
+            gate: Gate::default(),
+        };
         let engine = Engine::new(scan, refine, scene.patcher_params(), renewal).unwrap();
-        Self { engine, cell: cell(), stays_after: None, seen: 0 }
+        Self {
+            engine,
+            cell: cell(),
+            stays_after: None,
+            seen: 0,
+        }
     }
 }
 
@@ -41,12 +55,22 @@ impl Observer for RefinedScan {
         self.seen += 1;
         let (pose, wrench) = state.as_probe(state.stamp_ns);
         let pose_ot = self.cell.pose_bo.inverse() * pose.pose_ot;
-        let pushed = self.engine.push(&Sample { stamp_ns: state.stamp_ns, pose_ot, wrench: wrench.wrench });
-        assert!(matches!(pushed, Ok(_) | Err(LiveError::Refine(_))), "{:?}", pushed.err());
+        let pushed = self.engine.push(&Sample {
+            stamp_ns: state.stamp_ns,
+            pose_ot,
+            wrench: wrench.wrench,
+        });
+        assert!(
+            matches!(pushed, Ok(_) | Err(LiveError::Refine(_))),
+            "{:?}",
+            pushed.err()
+        );
     }
 
     fn stop_request(&self) -> Option<StopRequest> {
-        self.stays_after.is_some_and(|stays_after| self.seen > stays_after).then_some(StopRequest::Stay)
+        self.stays_after
+            .is_some_and(|stays_after| self.seen > stays_after)
+            .then_some(StopRequest::Stay)
     }
 }
 
@@ -64,16 +88,33 @@ impl World for RefinedScan {
 
 /// The through hole of the plate, Ø 8 mm at (16, 36) mm in its top at 12 mm, flagged at a height (m).
 fn hole(height: f64) -> Flag {
-    Flag { id: 7, kind: Some(Kind::Hole), place: Point3::new(16e-3, 36e-3, height), radius: 3e-3 }
+    Flag {
+        id: 7,
+        kind: Some(Kind::Hole),
+        place: Point3::new(16e-3, 36e-3, height),
+        radius: 3e-3,
+    }
 }
 
 fn arm(plate: &Plate) -> SimArm<'_> {
-    let start = cell().pose(&UnitQuaternion::identity(), &Point3::new(40e-3, 25e-3, 50e-3));
+    let start = cell().pose(
+        &UnitQuaternion::identity(),
+        &Point3::new(40e-3, 25e-3, 50e-3),
+    );
     SimArm::new(plate, ArmParams::default(), &start).unwrap()
 }
 
 fn diameter(probed: &Probed) -> Option<f64> {
-    Some(probed.found.as_ref()?.feature.as_ref()?.diameter.as_ref()?.value)
+    Some(
+        probed
+            .found
+            .as_ref()?
+            .feature
+            .as_ref()?
+            .diameter
+            .as_ref()?
+            .value,
+    )
 }
 
 /// After 25 s in it the mesh has walls, and a floor where the ball has not been; a tap into the hole flags it there.
@@ -81,16 +122,25 @@ fn diameter(probed: &Probed) -> Option<f64> {
 fn a_hole_in_which_the_arm_was_stopped_is_probed_to_the_end_when_it_is_flagged_in_its_opening() {
     let (plate, cell, params) = (Plate::default(), cell(), params());
     let mut arm = arm(&plate);
-    let mut world = RefinedScan { stays_after: Some(12_500), ..RefinedScan::new(plate_scan(1)) };
+    let mut world = RefinedScan {
+        stays_after: Some(12_500),
+        ..RefinedScan::new(plate_scan(1))
+    };
     let mut prober = Prober::new(&mut arm, &cell, &params, &mut world);
     let stopped = prober.probe(&hole(12e-3));
     let way_out = prober.into_way_out();
     assert_eq!(stopped.ending, Ending::Cancelled(StopRequest::Stay));
     assert!(stopped.touches.len() > 4 && way_out.is_some());
     world.stays_after = None;
-    let probed = Prober::new(&mut arm, &cell, &params, &mut world).leaving_by(way_out).probe(&hole(8e-3));
+    let probed = Prober::new(&mut arm, &cell, &params, &mut world)
+        .leaving_by(way_out)
+        .probe(&hole(8e-3));
     assert_eq!(probed.ending, Ending::ToleranceReached);
-    assert!((diameter(&probed).unwrap() - 8e-3).abs() < 50e-6, "{:?}", diameter(&probed));
+    assert!(
+        (diameter(&probed).unwrap() - 8e-3).abs() < 50e-6,
+        "{:?}",
+        diameter(&probed)
+    );
     assert!(probed.touches.iter().all(|touch| touch.refused.is_none()));
 }
 
@@ -104,16 +154,33 @@ fn planned(mesh: TriMesh, flag: &Flag) -> Plan {
 #[test]
 fn a_plan_for_what_is_open_begins_above_the_surface_around_it_wherever_the_flag_is() {
     // through hole, blind hole with its floor at 4 mm, slot with its floor at 7 mm
-    let flags = [(Kind::Hole, [16e-3, 36e-3]), (Kind::Hole, [32e-3, 34e-3]), (Kind::Slot, [25e-3, 14e-3])];
+    let flags = [
+        (Kind::Hole, [16e-3, 36e-3]),
+        (Kind::Hole, [32e-3, 34e-3]),
+        (Kind::Slot, [25e-3, 14e-3]),
+    ];
     for (kind, [x, y]) in flags {
         for z in [14e-3, 12e-3, 10e-3, 8e-3, 5e-3] {
-            let flag = Flag { id: 1, kind: Some(kind), place: Point3::new(x, y, z), radius: 3e-3 };
+            let flag = Flag {
+                id: 1,
+                kind: Some(kind),
+                place: Point3::new(x, y, z),
+                radius: 3e-3,
+            };
             let planned = planned(Plate::default().mesh(1e-5).unwrap(), &flag);
-            assert!(planned.held_back.is_empty(), "{kind:?} at {z}: {:?}", planned.held_back);
+            assert!(
+                planned.held_back.is_empty(),
+                "{kind:?} at {z}: {:?}",
+                planned.held_back
+            );
             // the first search begins with a ball of 1.5 mm 3 mm above the top at 12 mm
             let first = planned.touches[0];
             let off = first.from.z - 16.5e-3;
-            assert!(off.abs() < 1.5e-3, "{kind:?} at {z}: the first search begins {} mm off", off * 1e3);
+            assert!(
+                off.abs() < 1.5e-3,
+                "{kind:?} at {z}: the first search begins {} mm off",
+                off * 1e3
+            );
             assert!(first.direction.dot(&Vector3::z()) < -0.99);
         }
     }
@@ -124,11 +191,24 @@ fn a_plan_for_what_is_open_begins_above_the_surface_around_it_wherever_the_flag_
 #[test]
 fn flags_of_what_is_no_opening_are_on_what_is_nearest() {
     let mesh = || Plate::default().mesh(1e-5).unwrap();
-    let flag = |kind, place: [f64; 3]| Flag { id: 1, kind: Some(kind), place: place.into(), radius: 3e-3 };
+    let flag = |kind, place: [f64; 3]| Flag {
+        id: 1,
+        kind: Some(kind),
+        place: place.into(),
+        radius: 3e-3,
+    };
     for above in [-2e-3, 0.0, 2e-3] {
         let boss = planned(mesh(), &flag(Kind::Boss, [47e-3, 25e-3, 16e-3 + above]));
-        assert!((boss.touches[0].from.z - 20.5e-3).abs() < 1e-9, "{}", boss.touches[0].from);
+        assert!(
+            (boss.touches[0].from.z - 20.5e-3).abs() < 1e-9,
+            "{}",
+            boss.touches[0].from
+        );
         let plane = planned(mesh(), &flag(Kind::Plane, [45e-3, 8e-3, 12e-3 + above]));
-        assert!((plane.touches[0].from.z - 16.5e-3).abs() < 1e-9, "{}", plane.touches[0].from);
+        assert!(
+            (plane.touches[0].from.z - 16.5e-3).abs() < 1e-9,
+            "{}",
+            plane.touches[0].from
+        );
     }
 }

@@ -13,7 +13,8 @@ use touchup::probing::arm::{
     Arm, ArmGeometry, ArmState, Limits, Observer, ProbeError, Safety, StopRequest, UrGeometry,
 };
 use touchup::probing::execute::{
-    Cell, Clearance, Ending, Flag, PlannedMotion, ProbeParams, Probed, Prober, Progress, Tool, World, plan,
+    Cell, Clearance, Ending, Flag, PlannedMotion, ProbeParams, Probed, Prober, Progress, Tool,
+    World, plan,
 };
 use touchup::probing::plan::PatternParams;
 use touchup::sim::{ArmFault, ArmParams, Plate, SimArm, Surface};
@@ -23,16 +24,30 @@ use super::{cell, params};
 use crate::chains::seven_joints;
 use crate::plate_stream::plate_scan;
 
-const HOLE: Flag = Flag { id: 7, kind: Some(Kind::Hole), place: Point3::new(17e-3, 35e-3, 12e-3), radius: 3e-3 };
+const HOLE: Flag = Flag {
+    id: 7,
+    kind: Some(Kind::Hole),
+    place: Point3::new(17e-3, 35e-3, 12e-3),
+    radius: 3e-3,
+};
 
 fn above(cell: &Cell, place: [f64; 3]) -> Isometry3<f64> {
     cell.pose(&UnitQuaternion::identity(), &place.into())
 }
 
 /// Probes the hole of the plate, after a change of the arm.
-fn probed(params: &ProbeParams, world: &mut StaticScan, change: impl FnOnce(&mut SimArm)) -> (Probed, f64, [f64; 3]) {
+fn probed(
+    params: &ProbeParams,
+    world: &mut StaticScan,
+    change: impl FnOnce(&mut SimArm),
+) -> (Probed, f64, [f64; 3]) {
     let (plate, cell) = (Plate::default(), cell());
-    let mut arm = SimArm::new(&plate, ArmParams::default(), &above(&cell, [40e-3, 25e-3, 50e-3])).unwrap();
+    let mut arm = SimArm::new(
+        &plate,
+        ArmParams::default(),
+        &above(&cell, [40e-3, 25e-3, 50e-3]),
+    )
+    .unwrap();
     change(&mut arm);
     let probed = Prober::new(&mut arm, &cell, params, world).probe(&HOLE);
     arm.advance(0.5);
@@ -49,16 +64,36 @@ fn a_flag_becomes_a_feature() {
     let off = hole.centre.value - Point3::new(16e-3, 36e-3, 12e-3);
     assert!(off.norm() < 50e-6, "{off}");
     assert!((hole.diameter.as_ref().unwrap().value - 8e-3).abs() < 50e-6);
-    assert!(probed.touches.len() < 40 && probed.peak_force < 4.5, "{} {}", probed.touches.len(), probed.peak_force);
+    assert!(
+        probed.touches.len() < 40 && probed.peak_force < 4.5,
+        "{} {}",
+        probed.touches.len(),
+        probed.peak_force
+    );
     // it has retracted: the ball is above the part
     assert!(end[2] > 14e-3, "{end:?}");
     // each before it is made, and the last again with its result
     let count = probed.touches.len();
-    assert_eq!(world.touches, (1..=count).chain([count]).collect::<Vec<_>>());
+    assert_eq!(
+        world.touches,
+        (1..=count).chain([count]).collect::<Vec<_>>()
+    );
     assert_eq!(world.made, probed.touches);
-    let records = probed.touches.iter().filter_map(|touch| touch.record.as_ref());
-    assert!(records.clone().all(|record| record.stamps_ns[1] > record.stamps_ns[0]));
-    assert!(probed.touches.iter().any(|touch| touch.deviation.is_some_and(|deviation| deviation < -0.1e-3)));
+    let records = probed
+        .touches
+        .iter()
+        .filter_map(|touch| touch.record.as_ref());
+    assert!(
+        records
+            .clone()
+            .all(|record| record.stamps_ns[1] > record.stamps_ns[0])
+    );
+    assert!(
+        probed
+            .touches
+            .iter()
+            .any(|touch| touch.deviation.is_some_and(|deviation| deviation < -0.1e-3))
+    );
 }
 
 /// The same with an arm that is no UR: the planner's ways, the joints of the states and the checks are those of seven joints.
@@ -66,44 +101,102 @@ fn a_flag_becomes_a_feature() {
 fn a_flag_becomes_a_feature_with_seven_joints_as_with_a_ur() {
     let chain = seven_joints();
     let geometry = ArmGeometry::from(chain.clone());
-    let cell = Cell { geometry: geometry.clone(), pose_bo: Isometry3::translation(0.45, -0.03, 0.15), ..cell() };
+    let cell = Cell {
+        geometry: geometry.clone(),
+        pose_bo: Isometry3::translation(0.45, -0.03, 0.15),
+        ..cell()
+    };
     let (lowest, highest) = (Point3::new(0.35, -0.2, 0.1), Point3::new(0.65, 0.2, 0.5));
-    let params = ProbeParams { limits: Limits { lowest, highest, ..params().limits }, ..params() };
-    let simulated = ArmParams { geometry, pose_bo: cell.pose_bo, ..ArmParams::default() };
+    let params = ProbeParams {
+        limits: Limits {
+            lowest,
+            highest,
+            ..params().limits
+        },
+        ..params()
+    };
+    let simulated = ArmParams {
+        geometry,
+        pose_bo: cell.pose_bo,
+        ..ArmParams::default()
+    };
     let plate = Plate::default();
     let mut arm = SimArm::new(&plate, simulated, &above(&cell, [40e-3, 25e-3, 50e-3])).unwrap();
-    let probed = Prober::new(&mut arm, &cell, &params, &mut StaticScan::new(plate_scan(1))).probe(&HOLE);
+    let probed = Prober::new(
+        &mut arm,
+        &cell,
+        &params,
+        &mut StaticScan::new(plate_scan(1)),
+    )
+    .probe(&HOLE);
     assert_eq!(probed.ending, Ending::ToleranceReached);
     let hole = probed.found.as_ref().unwrap().feature.as_ref().unwrap();
     let off = hole.centre.value - Point3::new(16e-3, 36e-3, 12e-3);
     let diameter = hole.diameter.as_ref().unwrap().value - 8e-3;
-    println!("centre {:.1} µm off, diameter {:.1} µm", off.norm() * 1e6, diameter * 1e6);
-    assert!(off.norm() < 50e-6 && diameter.abs() < 50e-6, "{off} {diameter}");
+    println!(
+        "centre {:.1} µm off, diameter {:.1} µm",
+        off.norm() * 1e6,
+        diameter * 1e6
+    );
+    assert!(
+        off.norm() < 50e-6 && diameter.abs() < 50e-6,
+        "{off} {diameter}"
+    );
     let state = arm.next_state().unwrap();
     assert_eq!(state.joints.len(), 7);
     let reported = cell.geometry.flange(&state.joints) * cell.pose_ft;
     // 10 µm of noise in each axis
     assert!((reported.translation.vector - state.pose_bt.translation.vector).norm() < 60e-6);
     for (joint, angle) in chain.joints().iter().zip(state.joints.iter()) {
-        assert!(joint.range.is_some_and(|[low, high]| (low..=high).contains(angle)), "{}: {angle}", joint.name);
+        assert!(
+            joint
+                .range
+                .is_some_and(|[low, high]| (low..=high).contains(angle)),
+            "{}: {angle}",
+            joint.name
+        );
     }
 }
 
 #[test]
 fn exhausted_limits_are_reported() {
     let of = |params: ProbeParams| probed(&params, &mut StaticScan::new(plate_scan(1)), |_| {}).0;
-    let few = PatternParams { budget: 13, sigma: 1e-9, touch_sigma: 5e-6, ..PatternParams::default() };
-    let spent = of(ProbeParams { pattern: few, ..params() });
-    assert_eq!((spent.ending, spent.touches.len()), (Ending::TouchesSpent, 13));
+    let few = PatternParams {
+        budget: 13,
+        sigma: 1e-9,
+        touch_sigma: 5e-6,
+        ..PatternParams::default()
+    };
+    let spent = of(ProbeParams {
+        pattern: few,
+        ..params()
+    });
+    assert_eq!(
+        (spent.ending, spent.touches.len()),
+        (Ending::TouchesSpent, 13)
+    );
     assert!(spent.found.is_some(), "it is as good as they made it");
-    let late = of(ProbeParams { limits: Limits { time: 10.0, ..params().limits }, ..params() });
+    let late = of(ProbeParams {
+        limits: Limits {
+            time: 10.0,
+            ..params().limits
+        },
+        ..params()
+    });
     assert_eq!(late.ending, Ending::TimeSpent);
-    assert!(late.seconds > 10.0 && late.seconds < 16.0, "{}", late.seconds);
+    assert!(
+        late.seconds > 10.0 && late.seconds < 16.0,
+        "{}",
+        late.seconds
+    );
 }
 
 #[test]
 fn a_cancelled_probing_stops_and_retracts() {
-    let mut world = StaticScan { patience: Some(6000), ..StaticScan::new(plate_scan(1)) };
+    let mut world = StaticScan {
+        patience: Some(6000),
+        ..StaticScan::new(plate_scan(1))
+    };
     let (probed, _, end) = probed(&params(), &mut world, |_| {});
     assert_eq!(probed.ending, Ending::Cancelled(StopRequest::Retract));
     assert!(!probed.touches.is_empty());
@@ -115,12 +208,26 @@ fn a_cancelled_probing_stops_and_retracts() {
 #[test]
 fn a_cancelled_probing_goes_no_deeper() {
     // every segment of its path, also between the places of the retreat
-    for patience in (1..16).map(|times| 700 * times).chain((0..8).map(|times| 3000 + 211 * times)) {
-        let mut world = StaticScan { patience: Some(patience), ..StaticScan::new(plate_scan(1)) };
+    for patience in (1..16)
+        .map(|times| 700 * times)
+        .chain((0..8).map(|times| 3000 + 211 * times))
+    {
+        let mut world = StaticScan {
+            patience: Some(patience),
+            ..StaticScan::new(plate_scan(1))
+        };
         let (probed, _, end) = probed(&params(), &mut world, |_| {});
-        assert_eq!(probed.ending, Ending::Cancelled(StopRequest::Retract), "{patience}");
+        assert_eq!(
+            probed.ending,
+            Ending::Cancelled(StopRequest::Retract),
+            "{patience}"
+        );
         let [first, least] = world.since_then.unwrap();
-        assert!(first - least < 2.7e-3, "{patience}: {:.1} mm deeper", (first - least) * 1e3);
+        assert!(
+            first - least < 2.7e-3,
+            "{patience}: {:.1} mm deeper",
+            (first - least) * 1e3
+        );
         assert!(end[2] > 14e-3, "{patience}: {end:?}");
     }
 }
@@ -128,11 +235,24 @@ fn a_cancelled_probing_goes_no_deeper() {
 /// From 50 mm/s a stop takes 0.1 s, and a retraction is stopped as everything else is.
 #[test]
 fn a_probing_that_is_to_stay_stands_where_it_is() {
-    for (patience, stays_after) in [(None, 900), (None, 6000), (Some(6000), 6001), (Some(6000), 6020), (Some(900), 950)]
-    {
-        let mut world = StaticScan { patience, stays_after: Some(stays_after), ..StaticScan::new(plate_scan(1)) };
+    for (patience, stays_after) in [
+        (None, 900),
+        (None, 6000),
+        (Some(6000), 6001),
+        (Some(6000), 6020),
+        (Some(900), 950),
+    ] {
+        let mut world = StaticScan {
+            patience,
+            stays_after: Some(stays_after),
+            ..StaticScan::new(plate_scan(1))
+        };
         let (probed, at_rest_since, _) = probed(&params(), &mut world, |_| {});
-        assert_eq!(probed.ending, Ending::Cancelled(StopRequest::Stay), "{patience:?}, {stays_after}");
+        assert_eq!(
+            probed.ending,
+            Ending::Cancelled(StopRequest::Stay),
+            "{patience:?}, {stays_after}"
+        );
         let stood = at_rest_since - world.stayed_ns as f64 * 1e-9;
         assert!(stood < 0.13, "{patience:?}, {stays_after}: after {stood} s");
     }
@@ -157,8 +277,16 @@ fn nothing_is_zeroed_where_the_probe_is_at_the_mesh() {
     }
     let before = arm.time();
     let probed = Prober::new(&mut arm, &cell, &params, &mut world).probe(&HOLE);
-    assert!(matches!(probed.ending, Ending::NoClearPath(_)), "{}", probed.ending);
-    assert!(probed.ending.to_string().contains("free air"), "{}", probed.ending);
+    assert!(
+        matches!(probed.ending, Ending::NoClearPath(_)),
+        "{}",
+        probed.ending
+    );
+    assert!(
+        probed.ending.to_string().contains("free air"),
+        "{}",
+        probed.ending
+    );
     assert!(arm.time() - before < 0.01, "it zeroes for longer");
 }
 
@@ -168,16 +296,29 @@ fn what_is_out_of_reach_is_refused_before_anything_moves() {
     tight.limits.lowest.z = 0.07;
     let mut world = StaticScan::new(plate_scan(1));
     let (probed, stood, _) = probed(&tight, &mut world, |_| {});
-    assert!(matches!(probed.ending, Ending::OutOfLimits(_)), "{}", probed.ending);
+    assert!(
+        matches!(probed.ending, Ending::OutOfLimits(_)),
+        "{}",
+        probed.ending
+    );
     assert!(stood.abs() < 1e-9, "it moved until {stood} s");
 }
 
 #[test]
 fn a_stop_of_the_arm_ends_it_with_what_was_measured() {
     let mut world = StaticScan::new(plate_scan(1));
-    let (probed, stood, _) = probed(&params(), &mut world, |arm| arm.fail_at(20.0, ArmFault::ProtectiveStop));
-    let Ending::Stopped(ProbeError::Arm { error, .. }) = &probed.ending else { panic!("{}", probed.ending) };
-    assert_eq!(*error, touchup::probing::arm::ArmError::Stopped { safety: Safety::ProtectiveStop });
+    let (probed, stood, _) = probed(&params(), &mut world, |arm| {
+        arm.fail_at(20.0, ArmFault::ProtectiveStop)
+    });
+    let Ending::Stopped(ProbeError::Arm { error, .. }) = &probed.ending else {
+        panic!("{}", probed.ending)
+    };
+    assert_eq!(
+        *error,
+        touchup::probing::arm::ArmError::Stopped {
+            safety: Safety::ProtectiveStop
+        }
+    );
     assert!(stood - 20.0 < 0.2, "{stood}");
     assert!(!probed.touches.is_empty());
 }
@@ -187,8 +328,16 @@ fn a_stop_of_the_arm_ends_it_with_what_was_measured() {
 fn a_stop_keeps_the_force_and_the_time_of_the_touch_that_it_ended() {
     let hit = |arm: &mut SimArm| arm.fail_at(20.0, ArmFault::ForceSpike(40.0));
     let (spiked, ..) = probed(&params(), &mut StaticScan::new(plate_scan(1)), hit);
-    assert!(matches!(spiked.ending, Ending::Stopped(ProbeError::Limit { .. })), "{}", spiked.ending);
-    assert!((spiked.peak_force - 40.0).abs() < 5.0, "{}", spiked.peak_force);
+    assert!(
+        matches!(spiked.ending, Ending::Stopped(ProbeError::Limit { .. })),
+        "{}",
+        spiked.ending
+    );
+    assert!(
+        (spiked.peak_force - 40.0).abs() < 5.0,
+        "{}",
+        spiked.peak_force
+    );
     let lose = |arm: &mut SimArm| arm.fail_at(20.0, ArmFault::LinkLost);
     let (lost, ..) = probed(&params(), &mut StaticScan::new(plate_scan(1)), lose);
     // the sensor was zeroed in 64 readings before it began
@@ -200,16 +349,51 @@ fn a_stop_keeps_the_force_and_the_time_of_the_touch_that_it_ended() {
 fn the_deviation_of_a_touch_is_from_the_mesh_before_it() {
     let (plate, cell) = (Plate::default(), cell());
     let right = plate.mesh(1e-5).unwrap();
-    let corners: Vec<_> = right.faces().map(|(_, corners)| corners.map(|corner| corner.0)).collect();
-    let low = right.positions().iter().map(|p| p - Vector3::z() * 0.3e-3).collect();
-    let mut world = StaticScan { after: Some(right), ..StaticScan::new(TriMesh::new(low, corners).unwrap()) };
-    let mut arm = SimArm::new(&plate, ArmParams::default(), &above(&cell, [45e-3, 9e-3, 50e-3])).unwrap();
-    let flag = Flag { id: 1, kind: Some(Kind::Plane), place: Point3::new(45e-3, 9e-3, 12e-3), radius: 3e-3 };
-    let params = ProbeParams { pattern: PatternParams { budget: 4, ..params().pattern }, ..params() };
+    let corners: Vec<_> = right
+        .faces()
+        .map(|(_, corners)| corners.map(|corner| corner.0))
+        .collect();
+    let low = right
+        .positions()
+        .iter()
+        .map(|p| p - Vector3::z() * 0.3e-3)
+        .collect();
+    let mut world = StaticScan {
+        after: Some(right),
+        ..StaticScan::new(TriMesh::new(low, corners).unwrap())
+    };
+    let mut arm = SimArm::new(
+        &plate,
+        ArmParams::default(),
+        &above(&cell, [45e-3, 9e-3, 50e-3]),
+    )
+    .unwrap();
+    let flag = Flag {
+        id: 1,
+        kind: Some(Kind::Plane),
+        place: Point3::new(45e-3, 9e-3, 12e-3),
+        radius: 3e-3,
+    };
+    let params = ProbeParams {
+        pattern: PatternParams {
+            budget: 4,
+            ..params().pattern
+        },
+        ..params()
+    };
     let probed = Prober::new(&mut arm, &cell, &params, &mut world).probe(&flag);
-    let deviations: Vec<f64> = probed.touches.iter().map(|touch| touch.deviation.unwrap()).collect();
+    let deviations: Vec<f64> = probed
+        .touches
+        .iter()
+        .map(|touch| touch.deviation.unwrap())
+        .collect();
     assert!((deviations[0] - 0.3e-3).abs() < 30e-6, "{deviations:?}");
-    assert!(deviations[1..].iter().all(|deviation| deviation.abs() < 30e-6), "{deviations:?}");
+    assert!(
+        deviations[1..]
+            .iter()
+            .all(|deviation| deviation.abs() < 30e-6),
+        "{deviations:?}"
+    );
 }
 
 /// Records how fast a probe turns, and how near its shaft comes to the true part.
@@ -225,10 +409,16 @@ struct Turning {
 impl Observer for Turning {
     fn on_state(&mut self, state: &ArmState) {
         let rotation = state.pose_bt.rotation;
-        let turned = self.before.replace(rotation).map_or(0.0, |before| before.angle_to(&rotation));
+        let turned = self
+            .before
+            .replace(rotation)
+            .map_or(0.0, |before| before.angle_to(&rotation));
         self.fastest = self.fastest.max(turned / 2e-3);
         let (ball, shaft) = (self.cell.place(&state.pose_bt), self.cell.shaft(&rotation));
-        let along = (3..60).map(|mm| self.plate.signed_distance(&(ball + shaft.into_inner() * (f64::from(mm) * 1e-3))));
+        let along = (3..60).map(|mm| {
+            self.plate
+                .signed_distance(&(ball + shaft.into_inner() * (f64::from(mm) * 1e-3)))
+        });
         self.nearest = along.fold(self.nearest, f64::min);
         self.scan.on_state(state);
     }
@@ -266,8 +456,16 @@ fn a_leaning_probe_is_turned_slowly_and_clear_of_the_part() {
     };
     let probed = Prober::new(&mut arm, &cell, &params(), &mut world).probe(&HOLE);
     assert_eq!(probed.ending, Ending::ToleranceReached, "{}", probed.ending);
-    assert!(world.fastest < 1.01 * ArmParams::default().top_turn_speed, "{} rad/s", world.fastest);
-    assert!(world.fastest > 0.0 && world.nearest > cell.tool.shaft_radius, "{}", world.nearest);
+    assert!(
+        world.fastest < 1.01 * ArmParams::default().top_turn_speed,
+        "{} rad/s",
+        world.fastest
+    );
+    assert!(
+        world.fastest > 0.0 && world.nearest > cell.tool.shaft_radius,
+        "{}",
+        world.nearest
+    );
 }
 
 /// Beside a wall on the side it turns to, a tool turns only above it.
@@ -276,7 +474,11 @@ fn a_turn_that_would_meet_a_wall_is_made_above_it() {
     // the half space x > 10 mm below z = 50 mm
     let wall = |p: &Point3<f64>, reach: f64| {
         let (x, z) = (10e-3 - p.x, p.z - 50e-3);
-        let far = if x > 0.0 && z > 0.0 { x.hypot(z) } else { x.max(z) };
+        let far = if x > 0.0 && z > 0.0 {
+            x.hypot(z)
+        } else {
+            x.max(z)
+        };
         far.min(reach)
     };
     let tool = Tool::default();
@@ -285,18 +487,29 @@ fn a_turn_that_would_meet_a_wall_is_made_above_it() {
         let angle = share * std::f64::consts::FRAC_PI_3;
         Unit::new_normalize(Vector3::new(angle.sin(), 0.0, angle.cos()))
     };
-    let upright = Clearance { tool: &tool, shaft: Vector3::z_axis(), distance: &wall };
-    let place = upright.turning_place(&Point3::origin(), std::f64::consts::FRAC_PI_3, &shaft).unwrap();
+    let upright = Clearance {
+        tool: &tool,
+        shaft: Vector3::z_axis(),
+        distance: &wall,
+    };
+    let place = upright
+        .turning_place(&Point3::origin(), std::f64::consts::FRAC_PI_3, &shaft)
+        .unwrap();
     for step in 0..=100 {
         let direction = shaft(f64::from(step) / 100.0);
         for mm in 0..=600 {
             let p = place + direction.into_inner() * (f64::from(mm) * 1e-4);
-            assert!(wall(&p, 1.0) >= tool.shaft_radius + tool.margin - 1e-9, "{p} at {step} %");
+            assert!(
+                wall(&p, 1.0) >= tool.shaft_radius + tool.margin - 1e-9,
+                "{p} at {step} %"
+            );
         }
     }
     // away from the wall it turns where it is
     let away = |share: f64| Unit::new_normalize(Vector3::new(-share, 0.0, 1.0));
-    let place = upright.turning_place(&Point3::origin(), std::f64::consts::FRAC_PI_4, &away).unwrap();
+    let place = upright
+        .turning_place(&Point3::origin(), std::f64::consts::FRAC_PI_4, &away)
+        .unwrap();
     assert_eq!(place, Point3::origin());
 }
 
@@ -338,7 +551,11 @@ fn a_dry_run_moves_nothing() {
     let now = arm.next_state().unwrap();
     let world = StaticScan::new(plate_scan(1));
     let planned = plan(&cell, &params(), &world, &HOLE, &now, None).unwrap();
-    assert!(!planned.touches.is_empty() && planned.held_back.is_empty(), "{:?}", planned.held_back);
+    assert!(
+        !planned.touches.is_empty() && planned.held_back.is_empty(),
+        "{:?}",
+        planned.held_back
+    );
     assert_eq!(arm.at_rest_since(), 0.0);
 }
 
@@ -353,15 +570,26 @@ fn distance_to_triangle(p: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> f64 {
     let normal = (b - a).cross(&(c - a));
     let side = |from: &Point3<f64>, to: &Point3<f64>| (to - from).cross(&(p - from)).dot(&normal);
     let is_over = side(a, b) >= 0.0 && side(b, c) >= 0.0 && side(c, a) >= 0.0;
-    if is_over { edges.min((p - a).dot(&normal).abs() / normal.norm()) } else { edges }
+    if is_over {
+        edges.min((p - a).dot(&normal).abs() / normal.norm())
+    } else {
+        edges
+    }
 }
 
 fn parts() -> Option<Vec<PathBuf>> {
     let listed = std::fs::read_dir(crate::shared::shared("parts/permissive")?).unwrap();
     let is_mesh = |path: &PathBuf| {
-        path.extension().is_some_and(|e| ["stl", "ply", "obj"].iter().any(|known| e.eq_ignore_ascii_case(known)))
+        path.extension().is_some_and(|e| {
+            ["stl", "ply", "obj"]
+                .iter()
+                .any(|known| e.eq_ignore_ascii_case(known))
+        })
     };
-    let mut parts: Vec<_> = listed.map(|entry| entry.unwrap().path()).filter(is_mesh).collect();
+    let mut parts: Vec<_> = listed
+        .map(|entry| entry.unwrap().path())
+        .filter(is_mesh)
+        .collect();
     parts.sort();
     Some(parts)
 }
@@ -370,7 +598,10 @@ fn parts() -> Option<Vec<PathBuf>> {
 fn in_reach(mesh: &TriMesh) -> TriMesh {
     let [low, high] = mesh.bounds();
     let scale = 0.12 / (high - low).norm();
-    let kept: Vec<_> = mesh.faces().map(|(_, corners)| corners.map(|corner| corner.0)).collect();
+    let kept: Vec<_> = mesh
+        .faces()
+        .map(|(_, corners)| corners.map(|corner| corner.0))
+        .collect();
     TriMesh::new(mesh.positions().iter().map(|p| p * scale).collect(), kept).unwrap()
 }
 
@@ -380,18 +611,36 @@ struct Triangles(Vec<([Point3<f64>; 3], Point3<f64>, f64)>);
 impl Triangles {
     fn new(mesh: &TriMesh) -> Self {
         let ball = |corners: [Point3<f64>; 3]| {
-            let middle = Point3::from((corners[0].coords + corners[1].coords + corners[2].coords) / 3.0);
-            (corners, middle, corners.iter().map(|p| (p - middle).norm()).fold(0.0, f64::max))
+            let middle =
+                Point3::from((corners[0].coords + corners[1].coords + corners[2].coords) / 3.0);
+            (
+                corners,
+                middle,
+                corners
+                    .iter()
+                    .map(|p| (p - middle).norm())
+                    .fold(0.0, f64::max),
+            )
         };
-        Self(mesh.faces().map(|(face, _)| ball(mesh.triangle(face))).collect())
+        Self(
+            mesh.faces()
+                .map(|(face, _)| ball(mesh.triangle(face)))
+                .collect(),
+        )
     }
 
     /// Distance of a place, as far as `reach`, m.
     fn distance(&self, p: &Point3<f64>, reach: f64) -> f64 {
-        self.0.iter().fold(reach, |nearest, (corners, middle, radius)| {
-            let is_far = (p - middle).norm_squared() >= (nearest + radius).powi(2);
-            if is_far { nearest } else { nearest.min(distance_to_triangle(p, corners)) }
-        })
+        self.0
+            .iter()
+            .fold(reach, |nearest, (corners, middle, radius)| {
+                let is_far = (p - middle).norm_squared() >= (nearest + radius).powi(2);
+                if is_far {
+                    nearest
+                } else {
+                    nearest.min(distance_to_triangle(p, corners))
+                }
+            })
     }
 }
 
@@ -422,12 +671,23 @@ fn check_move(
     let mut least = f64::INFINITY;
     for at in (0..=steps).map(|at| from + (to - from) * (at as f64 / steps as f64)) {
         let ball = triangles.distance(&at, 10e-3) - tool.ball_radius - tool.margin;
-        assert!(ball >= -1e-9, "the ball comes nearer by {:.3} mm at {at}", -ball * 1e3);
+        assert!(
+            ball >= -1e-9,
+            "the ball comes nearer by {:.3} mm at {at}",
+            -ball * 1e3
+        );
         least = least.min(ball);
         let along = (1..=12).map(|part| f64::from(part) / 12.0 * tool.shaft_length);
-        for place in shaft.iter().flat_map(|shaft| along.clone().map(move |length| at + shaft * length)) {
+        for place in shaft
+            .iter()
+            .flat_map(|shaft| along.clone().map(move |length| at + shaft * length))
+        {
             let room = triangles.distance(&place, 10e-3) - tool.shaft_radius - tool.margin;
-            assert!(room >= -1e-9, "the shaft comes nearer by {:.3} mm at {place}", -room * 1e3);
+            assert!(
+                room >= -1e-9,
+                "the shaft comes nearer by {:.3} mm at {place}",
+                -room * 1e3
+            );
         }
     }
     least
@@ -445,7 +705,8 @@ fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
         // whatever unit it has
         let units = [MeshUnit::Millimetre, MeshUnit::Metre, MeshUnit::Inch];
         let read = units.iter().find_map(|unit| read_mesh(&path, *unit).ok());
-        let MeshFile { mesh, .. } = read.unwrap_or_else(|| panic!("{} cannot be read", path.display()));
+        let MeshFile { mesh, .. } =
+            read.unwrap_or_else(|| panic!("{} cannot be read", path.display()));
         let mesh = in_reach(&mesh);
         // all triangles for every place: large ones are for the slow proof
         if mesh.face_count() > if is_full { 200_000 } else { 20_000 } {
@@ -457,8 +718,18 @@ fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
         let middle = nalgebra::center(&low, &high);
         let base = Point3::new(-0.4, -0.1, 0.1);
         let pose_bo = Isometry3::translation(base.x - middle.x, base.y - middle.y, base.z - low.z);
-        let cell = Cell { pose_bo, geometry: UrGeometry::UR10E.into(), ..cell() };
-        let params = ProbeParams { pattern: PatternParams { budget: 12, ..params().pattern }, ..params() };
+        let cell = Cell {
+            pose_bo,
+            geometry: UrGeometry::UR10E.into(),
+            ..cell()
+        };
+        let params = ProbeParams {
+            pattern: PatternParams {
+                budget: 12,
+                ..params().pattern
+            },
+            ..params()
+        };
         let start = above(&cell, [middle.x, middle.y, high.z + 60e-3]);
         let faces: Vec<_> = mesh.faces().map(|(face, _)| mesh.triangle(face)).collect();
         let (triangles, world) = (Triangles::new(&mesh), StaticScan::new(mesh.clone()));
@@ -475,22 +746,34 @@ fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
         for kind in [Some(Kind::Hole), Some(Kind::Edge), Some(Kind::Plane), None] {
             let [a, b, c] = faces[rng.random_range(0..faces.len())];
             let place = Point3::from((a.coords + b.coords + c.coords) / 3.0);
-            let flag = Flag { id: 1, kind, place, radius: 4e-3 };
+            let flag = Flag {
+                id: 1,
+                kind,
+                place,
+                radius: 4e-3,
+            };
             let planned = plan(&cell, &params, &world, &flag, &now, None).unwrap();
             moves.plans += 1;
             for (number, planned_touch) in planned.touches.iter().enumerate() {
-                if planned.held_back.iter().any(|one| one.what == PlannedMotion::Touch(number)) {
+                if planned
+                    .held_back
+                    .iter()
+                    .any(|one| one.what == PlannedMotion::Touch(number))
+                {
                     continue;
                 }
                 moves.touches += 1;
                 for place in [
                     planned_touch.entry,
                     planned_touch.from,
-                    planned_touch.from + planned_touch.direction.into_inner() * planned_touch.search,
+                    planned_touch.from
+                        + planned_touch.direction.into_inner() * planned_touch.search,
                 ] {
                     let p = cell.pose_bo * place;
-                    let is_in = (0..3)
-                        .all(|i| p[i] >= params.limits.lowest[i] - 1e-9 && p[i] <= params.limits.highest[i] + 1e-9);
+                    let is_in = (0..3).all(|i| {
+                        p[i] >= params.limits.lowest[i] - 1e-9
+                            && p[i] <= params.limits.highest[i] + 1e-9
+                    });
                     assert!(is_in, "{}: {kind:?} at {p}", path.display());
                 }
             }
@@ -501,7 +784,8 @@ fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
                 moves.links += 1;
                 moves.upright += usize::from(!has_turned);
                 let step = if is_full { 0.25e-3 } else { 1e-3 };
-                moves.close += usize::from(check_move(&triangles, &cell.tool, *pair, shaft, step) < 2e-3);
+                moves.close +=
+                    usize::from(check_move(&triangles, &cell.tool, *pair, shaft, step) < 2e-3);
             }
             // up, over, and down again
             moves.around += planned
@@ -509,15 +793,27 @@ fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
                 .windows(3)
                 .filter(|path| {
                     let [from, to] = [path[0][0], path[2][1]];
-                    let mut straight = (0..=100).map(|at| from + (to - from) * (f64::from(at) / 100.0));
+                    let mut straight =
+                        (0..=100).map(|at| from + (to - from) * (f64::from(at) / 100.0));
                     straight.any(|p| triangles.distance(&p, 10e-3) < cell.tool.ball_radius)
                 })
                 .count();
         }
     }
     println!("{moves:?}");
-    let Moves { parts, plans, touches, links, upright, close, around } = moves;
-    assert!(parts >= 5 && plans == 4 * parts && touches >= 40 && links >= 40, "{moves:?}");
+    let Moves {
+        parts,
+        plans,
+        touches,
+        links,
+        upright,
+        close,
+        around,
+    } = moves;
+    assert!(
+        parts >= 5 && plans == 4 * parts && touches >= 40 && links >= 40,
+        "{moves:?}"
+    );
     assert!(upright >= 20 && close >= 20 && around >= 10, "{moves:?}");
 }
 

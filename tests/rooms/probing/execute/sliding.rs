@@ -4,9 +4,12 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use touchup::features::Kind;
 use touchup::mesh::{FaceHit, TriMesh};
 use touchup::probing::arm::{
-    Arm, ArmState, Limits, Observer, SlideEnding, SlideRecord, SlideTarget, StopRequest, TouchParams, Watched,
+    Arm, ArmState, Limits, Observer, SlideEnding, SlideRecord, SlideTarget, StopRequest,
+    TouchParams, Watched,
 };
-use touchup::probing::execute::{Ending, Flag, Phase, ProbeParams, Probed, Prober, Progress, StaticWorld, World, plan};
+use touchup::probing::execute::{
+    Ending, Flag, Phase, ProbeParams, Probed, Prober, Progress, StaticWorld, World, plan,
+};
 use touchup::probing::plan::{Slide, Station};
 use touchup::sim::{ArmParams, Plate, SimArm, Surface};
 
@@ -19,11 +22,19 @@ const TOP: f64 = 12e-3;
 const BALL: f64 = 1.5e-3;
 
 fn params() -> ProbeParams {
-    ProbeParams { slides: true, ..super::params() }
+    ProbeParams {
+        slides: true,
+        ..super::params()
+    }
 }
 
 fn flag(kind: Option<Kind>, [x, y, z]: [f64; 3], radius: f64) -> Flag {
-    Flag { id: 1, kind, place: Point3::new(x, y, z), radius }
+    Flag {
+        id: 1,
+        kind,
+        place: Point3::new(x, y, z),
+        radius,
+    }
 }
 
 fn world() -> StaticWorld {
@@ -31,7 +42,10 @@ fn world() -> StaticWorld {
 }
 
 fn start() -> Isometry3<f64> {
-    cell().pose(&UnitQuaternion::identity(), &Point3::new(40e-3, 25e-3, 50e-3))
+    cell().pose(
+        &UnitQuaternion::identity(),
+        &Point3::new(40e-3, 25e-3, 50e-3),
+    )
 }
 
 fn probed(flag: &Flag, world: &mut dyn World) -> (Probed, Point3<f64>) {
@@ -47,7 +61,11 @@ fn probed(flag: &Flag, world: &mut dyn World) -> (Probed, Point3<f64>) {
 fn lies_on(plate: &Plate, slide: &Slide) {
     for (number, station) in slide.stations.iter().enumerate() {
         let off = plate.signed_distance(&station.centre) - BALL;
-        assert!(off.abs() < 60e-6, "station {number}: {:.0} um off", off * 1e6);
+        assert!(
+            off.abs() < 60e-6,
+            "station {number}: {:.0} um off",
+            off * 1e6
+        );
         let away = station.centre - plate.closest(&station.centre).point;
         assert!(
             away.normalize().dot(&station.normal) > 0.99,
@@ -56,11 +74,20 @@ fn lies_on(plate: &Plate, slide: &Slide) {
         );
         let (lifted, above) = (slide.lifted(number), slide.above(number));
         for share in 0..=20 {
-            let room = plate.signed_distance(&(lifted + (above - lifted) * (f64::from(share) / 20.0)));
-            assert!(room > BALL + 0.2e-3, "station {number}: {:.2} mm", room * 1e3);
+            let room =
+                plate.signed_distance(&(lifted + (above - lifted) * (f64::from(share) / 20.0)));
+            assert!(
+                room > BALL + 0.2e-3,
+                "station {number}: {:.2} mm",
+                room * 1e3
+            );
         }
     }
-    let longest = slide.stations.windows(2).map(|pair| (pair[1].centre - pair[0].centre).norm()).fold(0.0, f64::max);
+    let longest = slide
+        .stations
+        .windows(2)
+        .map(|pair| (pair[1].centre - pair[0].centre).norm())
+        .fold(0.0, f64::max);
     assert!(longest < 0.2e-3, "{longest}");
 }
 
@@ -79,10 +106,16 @@ fn slides_lie_on_what_was_found_and_keep_their_force() {
     for flag in flags {
         let (probed, end) = probed(&flag, &mut world());
         assert_eq!(probed.ending, Ending::ToleranceReached, "{flag:?}");
-        assert!(!probed.slides.is_empty() && end.z > TOP + BALL, "{flag:?} {end}");
+        assert!(
+            !probed.slides.is_empty() && end.z > TOP + BALL,
+            "{flag:?} {end}"
+        );
         for one in &probed.slides {
             lies_on(&plate, &one.slide);
-            let record = one.record.as_ref().unwrap_or_else(|| panic!("{flag:?}: {:?}", one.refused));
+            let record = one
+                .record
+                .as_ref()
+                .unwrap_or_else(|| panic!("{flag:?}: {:?}", one.refused));
             println!(
                 "{}: {:.0} mm, {:.2} N, {:.2} N off at most, {:.1} N",
                 flag.kind.unwrap().name(),
@@ -91,8 +124,14 @@ fn slides_lie_on_what_was_found_and_keep_their_force() {
                 record.worst_force,
                 record.peak_force
             );
-            assert_eq!((record.ending, record.reached), (SlideEnding::Arrived, one.slide.stations.len() - 1));
-            assert!((record.mean_force - 3.0).abs() < 0.15 && record.worst_force < 0.3, "{flag:?} {record:?}");
+            assert_eq!(
+                (record.ending, record.reached),
+                (SlideEnding::Arrived, one.slide.stations.len() - 1)
+            );
+            assert!(
+                (record.mean_force - 3.0).abs() < 0.15 && record.worst_force < 0.3,
+                "{flag:?} {record:?}"
+            );
         }
         assert!(probed.peak_force < 4.5, "{}", probed.peak_force);
     }
@@ -111,7 +150,11 @@ fn an_unknown_region_is_slid_over_where_it_was_touched() {
         let off = plate.signed_distance(&station.centre) - BALL;
         assert!(off.abs() < BALL, "{off}");
     }
-    assert!(probed.slides.iter().any(|one| one.record.as_ref().is_some_and(|r| r.ending == SlideEnding::Arrived)));
+    assert!(probed.slides.iter().any(|one| {
+        one.record
+            .as_ref()
+            .is_some_and(|r| r.ending == SlideEnding::Arrived)
+    }));
 }
 
 /// A straight slide over the top of the plate, at a height over it.
@@ -122,10 +165,18 @@ fn slid(from: [f64; 2], to: [f64; 2], height: f64) -> (SlideRecord, Point3<f64>,
         let share = f64::from(at) / 200.0;
         let place = [0, 1].map(|i| from[i] + (to[i] - from[i]) * share);
         let centre = Point3::new(place[0], place[1], TOP + BALL + height);
-        Station { centre: cell.pose_bo * centre, normal: Vector3::z_axis() }
+        Station {
+            centre: cell.pose_bo * centre,
+            normal: Vector3::z_axis(),
+        }
     });
     let rotation = UnitQuaternion::identity();
-    let target = SlideTarget { rotation, stations: stations.collect(), lift: 3e-3, give: BALL };
+    let target = SlideTarget {
+        rotation,
+        stations: stations.collect(),
+        lift: 3e-3,
+        give: BALL,
+    };
     let mut onlooker = Onlooker;
     let limits = self::params().limits;
     let mut watched = Watched::new(&mut arm, limits, &mut onlooker);
@@ -148,7 +199,10 @@ impl Observer for Onlooker {
 fn a_surface_that_ends_is_left() {
     let (record, ball, peak) = slid([6e-3, 25e-3], [-6e-3, 25e-3], 0.0);
     assert_eq!(record.ending, SlideEnding::Lost);
-    assert!(ball.z > TOP + BALL + 2.5e-3 && ball.x < 0.5e-3 && ball.x > -BALL - 2.5e-3, "{ball}");
+    assert!(
+        ball.z > TOP + BALL + 2.5e-3 && ball.x < 0.5e-3 && ball.x > -BALL - 2.5e-3,
+        "{ball}"
+    );
     assert!(peak < 4.5, "{peak}");
 }
 
@@ -157,7 +211,10 @@ fn a_surface_that_ends_is_left() {
 fn an_obstacle_ends_a_slide() {
     let (record, ball, peak) = slid([30e-3, 25e-3], [47e-3, 25e-3], 0.0);
     assert_eq!(record.ending, SlideEnding::Blocked);
-    assert!((ball.x - (42e-3 - BALL)).abs() < 0.3e-3 && ball.z > TOP + BALL + 2.5e-3, "{ball}");
+    assert!(
+        (ball.x - (42e-3 - BALL)).abs() < 0.3e-3 && ball.z > TOP + BALL + 2.5e-3,
+        "{ball}"
+    );
     // 15 N/mm at 10 mm/s, until it is known, the arm has received it and is at rest
     assert!(peak < 10.0, "{peak}");
 }
@@ -204,8 +261,15 @@ impl World for Impatient {
 
 #[test]
 fn a_cancelled_slide_comes_out_of_the_hole() {
-    let mut world = Impatient { inner: world(), is_sliding: false, seen: 0 };
-    let (probed, end) = probed(&flag(Some(Kind::Hole), [17e-3, 35e-3, TOP], 3e-3), &mut world);
+    let mut world = Impatient {
+        inner: world(),
+        is_sliding: false,
+        seen: 0,
+    };
+    let (probed, end) = probed(
+        &flag(Some(Kind::Hole), [17e-3, 35e-3, TOP], 3e-3),
+        &mut world,
+    );
     assert_eq!(probed.ending, Ending::Cancelled(StopRequest::Retract));
     assert!(probed.found.is_some() && end.z > TOP + BALL + 1e-3, "{end}");
     assert!(probed.peak_force < 4.5, "{}", probed.peak_force);
@@ -219,13 +283,33 @@ fn slides_are_planned_and_checked() {
     let now = arm.next_state().unwrap();
     let flag = flag(Some(Kind::Plane), [45e-3, 9e-3, TOP], 5e-3);
     let planned = plan(&cell, &params, &world(), &flag, &now, None).unwrap();
-    assert_eq!((planned.slides.len(), planned.held_back.len()), (1, 0), "{:?}", planned.held_back);
+    assert_eq!(
+        (planned.slides.len(), planned.held_back.len()),
+        (1, 0),
+        "{:?}",
+        planned.held_back
+    );
     let on_path = |place: &Point3<f64>| planned.path.contains(place);
-    assert!(planned.slides[0].stations.iter().all(|station| on_path(&station.centre)));
+    assert!(
+        planned.slides[0]
+            .stations
+            .iter()
+            .all(|station| on_path(&station.centre))
+    );
     // a floor of the workspace between the clear height and the surface
     let floor = (cell.pose_bo * Point3::new(45e-3, 9e-3, TOP + BALL + 1e-3)).z;
     let lowest = Point3::new(-0.6, -0.3, floor);
-    let narrow = ProbeParams { limits: Limits { lowest, ..params.limits.clone() }, ..params };
+    let narrow = ProbeParams {
+        limits: Limits {
+            lowest,
+            ..params.limits.clone()
+        },
+        ..params
+    };
     let planned = plan(&cell, &narrow, &world(), &flag, &now, None).unwrap();
-    assert!(planned.held_back.len() >= planned.touches.len().max(1), "{:?}", planned.held_back);
+    assert!(
+        planned.held_back.len() >= planned.touches.len().max(1),
+        "{:?}",
+        planned.held_back
+    );
 }

@@ -36,7 +36,20 @@ impl StaticScan {
         let (patience, stays_after, stayed_ns) = (None, None, 0);
         let (seen, touches, made, after, since_then) = (0, Vec::new(), Vec::new(), None, None);
         let (part, nearest) = (None, f64::INFINITY);
-        Self { mesh, tree, patience, stays_after, stayed_ns, seen, touches, made, after, since_then, part, nearest }
+        Self {
+            mesh,
+            tree,
+            patience,
+            stays_after,
+            stayed_ns,
+            seen,
+            touches,
+            made,
+            after,
+            since_then,
+            part,
+            nearest,
+        }
     }
 }
 
@@ -53,7 +66,9 @@ impl Observer for StaticScan {
             self.stayed_ns = state.stamp_ns;
         }
         if let Some(part) = &self.part {
-            self.nearest = self.nearest.min(part.signed_distance(&cell().place(&state.pose_bt)));
+            self.nearest = self
+                .nearest
+                .min(part.signed_distance(&cell().place(&state.pose_bt)));
         }
         let z = state.pose_bt.translation.z;
         if self.stop_request().is_some() {
@@ -63,9 +78,14 @@ impl Observer for StaticScan {
     }
 
     fn stop_request(&self) -> Option<StopRequest> {
-        let is_over = |patience: Option<usize>| patience.is_some_and(|patience| self.seen > patience);
+        let is_over =
+            |patience: Option<usize>| patience.is_some_and(|patience| self.seen > patience);
         let request = is_over(self.patience).then_some(StopRequest::Retract);
-        if is_over(self.stays_after) { Some(StopRequest::Stay) } else { request }
+        if is_over(self.stays_after) {
+            Some(StopRequest::Stay)
+        } else {
+            request
+        }
     }
 }
 

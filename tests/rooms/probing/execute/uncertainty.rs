@@ -27,8 +27,18 @@ struct World {
 
 /// Sizes of the first are off by the radius, which all touches share; of the second by what they scatter.
 const WORLDS: [World; 2] = [
-    World { name: "rough", sigmas: ROUGH, wanted: 0.25e-3, turns: true },
-    World { name: "calibrated", sigmas: ArmErrorSigmas::CALIBRATED, wanted: 25e-6, turns: false },
+    World {
+        name: "rough",
+        sigmas: ROUGH,
+        wanted: 0.25e-3,
+        turns: true,
+    },
+    World {
+        name: "calibrated",
+        sigmas: ArmErrorSigmas::CALIBRATED,
+        wanted: 25e-6,
+        turns: false,
+    },
 ];
 
 /// 10 % of the stiffness, 0.05 mm of the radius, 0.2 mm and 0.2° of the place, 0.05 mm of repeatability.
@@ -109,25 +119,56 @@ impl Drawn {
     fn normalised(&self, found: &Feature) -> Normalised {
         let (place, axis) = (Point3::from(self.place), self.axis);
         let off = found.centre.value - place;
-        let across =
-            self.across.iter().map(|direction| off.dot(&Vector3::from(*direction)).powi(2)).sum::<f64>().sqrt();
+        let across = self
+            .across
+            .iter()
+            .map(|direction| off.dot(&Vector3::from(*direction)).powi(2))
+            .sum::<f64>()
+            .sqrt();
         let measured = found.axis.as_ref().unwrap();
         // no component along it counts
         let lean = measured.value.cross(&axis).norm();
-        let sizes = [&found.diameter, &found.width, &found.length].into_iter().flatten();
+        let sizes = [&found.diameter, &found.width, &found.length]
+            .into_iter()
+            .flatten();
         let sizes = sizes.filter(|_| self.kind != Kind::Edge).zip(self.sizes);
-        let sizes = sizes.map(|(size, drawn)| (size.value - drawn).abs() / size.std.unwrap()).collect();
-        (across / found.centre.std.unwrap(), lean / measured.std.unwrap(), sizes)
+        let sizes = sizes
+            .map(|(size, drawn)| (size.value - drawn).abs() / size.std.unwrap())
+            .collect();
+        (
+            across / found.centre.std.unwrap(),
+            lean / measured.std.unwrap(),
+            sizes,
+        )
     }
 }
 
 /// Told uncertainties are those that the errors are drawn from.
 fn told(world: &World) -> ProbeParams {
-    let ArmErrorSigmas { radius, shift, turn, repeatability, .. } = world.sigmas;
-    let shared =
-        ArmUncertainty { radius, place: shift, turn, registered_at: ABOUT.coords, ..ArmUncertainty::default() };
-    let pattern = PatternParams { sigma: world.wanted, touch_sigma: repeatability, shared, ..params().pattern };
-    ProbeParams { pattern, ..params() }
+    let ArmErrorSigmas {
+        radius,
+        shift,
+        turn,
+        repeatability,
+        ..
+    } = world.sigmas;
+    let shared = ArmUncertainty {
+        radius,
+        place: shift,
+        turn,
+        registered_at: ABOUT.coords,
+        ..ArmUncertainty::default()
+    };
+    let pattern = PatternParams {
+        sigma: world.wanted,
+        touch_sigma: repeatability,
+        shared,
+        ..params().pattern
+    };
+    ProbeParams {
+        pattern,
+        ..params()
+    }
 }
 
 /// Probes a feature of the plate with an arm that differs from what is told.
@@ -135,12 +176,33 @@ fn probed(drawn: &Drawn, seed: u64, scan: &TriMesh, world: &World) -> Result<Nor
     let (plate, cell, params) = (Plate::default(), cell(), told(world));
     let errors = ArmErrors::draw(&world.sigmas, ABOUT, seed);
     let mut rng = Pcg64::seed_from_u64(seed);
-    let (angle, off) = (rng.random_range(0.0..std::f64::consts::TAU), rng.random_range(0.0..2e-3));
+    let (angle, off) = (
+        rng.random_range(0.0..std::f64::consts::TAU),
+        rng.random_range(0.0..2e-3),
+    );
     let height = if drawn.kind == Kind::Boss { 4e-3 } else { 0.0 };
-    let place = Point3::from(drawn.place) + Vector3::new(off * f64::cos(angle), off * f64::sin(angle), height);
-    let flag = Flag { id: 1, kind: Some(drawn.kind), place, radius: 3e-3 };
-    let start: Isometry3<f64> = cell.pose(&UnitQuaternion::identity(), &Point3::new(30e-3, 25e-3, 50e-3));
-    let mut arm = SimArm::new(&plate, ArmParams { seed, errors, ..ArmParams::default() }, &start).unwrap();
+    let place = Point3::from(drawn.place)
+        + Vector3::new(off * f64::cos(angle), off * f64::sin(angle), height);
+    let flag = Flag {
+        id: 1,
+        kind: Some(drawn.kind),
+        place,
+        radius: 3e-3,
+    };
+    let start: Isometry3<f64> = cell.pose(
+        &UnitQuaternion::identity(),
+        &Point3::new(30e-3, 25e-3, 50e-3),
+    );
+    let mut arm = SimArm::new(
+        &plate,
+        ArmParams {
+            seed,
+            errors,
+            ..ArmParams::default()
+        },
+        &start,
+    )
+    .unwrap();
     let mut world = StaticWorld::new(scan.clone());
     let probed = Prober::new(&mut arm, &cell, &params, &mut world).probe(&flag);
     match probed.found.and_then(|found| found.feature) {
@@ -152,7 +214,10 @@ fn probed(drawn: &Drawn, seed: u64, scan: &TriMesh, world: &World) -> Result<Nor
         {
             Ok(drawn.normalised(&feature))
         }
-        _ => Err(format!("{} with seed {seed}: {}", drawn.name, probed.ending)),
+        _ => Err(format!(
+            "{} with seed {seed}: {}",
+            drawn.name, probed.ending
+        )),
     }
 }
 
@@ -167,24 +232,51 @@ fn rms(errors: &[f64]) -> f64 {
 fn errors_are_as_large_as_stated_where_told_values_are_wrong() {
     let (seeds, [least, most]) = (either(6, 200), either([0.13, 2.16], [0.8, 1.25]));
     let scan = plate_scan(1);
-    let mut table = String::from("| arm | feature | number | error over ±, rms | found |\n|---|---|---|---|---|\n");
+    let mut table = String::from(
+        "| arm | feature | number | error over ±, rms | found |\n|---|---|---|---|---|\n",
+    );
     let mut wrong = Vec::new();
-    let each = WORLDS.iter().flat_map(|world| DRAWN.iter().map(move |drawn| (world, drawn)));
+    let each = WORLDS
+        .iter()
+        .flat_map(|world| DRAWN.iter().map(move |drawn| (world, drawn)));
     for ((world, drawn), apart) in each.zip((0..).step_by(1000)) {
-        let results: Vec<_> = (1..=seeds).map(|seed| probed(drawn, apart + seed, &scan, world)).collect();
-        let found: Vec<&Normalised> = results.iter().filter_map(|result| result.as_ref().ok()).collect();
-        let missed: Vec<String> = results.iter().filter_map(|result| result.as_ref().err().cloned()).collect();
+        let results: Vec<_> = (1..=seeds)
+            .map(|seed| probed(drawn, apart + seed, &scan, world))
+            .collect();
+        let found: Vec<&Normalised> = results
+            .iter()
+            .filter_map(|result| result.as_ref().ok())
+            .collect();
+        let missed: Vec<String> = results
+            .iter()
+            .filter_map(|result| result.as_ref().err().cloned())
+            .collect();
         wrong.extend(missed);
         let of = |number: fn(&Normalised, usize) -> f64, at| {
             rms(&found.iter().map(|one| number(one, at)).collect::<Vec<_>>())
         };
-        let mut numbers = vec![("place", of(|one, _| one.0, 0)), ("direction", of(|one, _| one.1, 0))];
-        let names = if drawn.kind == Kind::Slot { ["width", "length"] } else { ["diameter", ""] };
+        let mut numbers = vec![
+            ("place", of(|one, _| one.0, 0)),
+            ("direction", of(|one, _| one.1, 0)),
+        ];
+        let names = if drawn.kind == Kind::Slot {
+            ["width", "length"]
+        } else {
+            ["diameter", ""]
+        };
         numbers.extend((0..drawn.sizes.len()).map(|at| (names[at], of(|one, at| one.2[at], at))));
         for (number, rms) in numbers {
             let (arm, feature, found) = (world.name, drawn.name, found.len());
-            writeln!(table, "| {arm} | {feature} | {number} | {rms:.2} | {found} of {seeds} |").unwrap();
-            let least = if number == "direction" && !world.turns { 0.0 } else { least };
+            writeln!(
+                table,
+                "| {arm} | {feature} | {number} | {rms:.2} | {found} of {seeds} |"
+            )
+            .unwrap();
+            let least = if number == "direction" && !world.turns {
+                0.0
+            } else {
+                least
+            };
             if !(least..=most).contains(&rms) {
                 wrong.push(format!("{arm} {feature} {number}: {rms:.2}"));
             }
@@ -192,8 +284,11 @@ fn errors_are_as_large_as_stated_where_told_values_are_wrong() {
     }
     println!("{table}");
     if let (true, Some(folder)) = (is_full(), std::env::var_os("TOUCHUP_RESULTS")) {
-        std::fs::write(std::path::Path::new(&folder).join("Errors_of_an_arm_over_their_uncertainty.md"), &table)
-            .unwrap();
+        std::fs::write(
+            std::path::Path::new(&folder).join("Errors_of_an_arm_over_their_uncertainty.md"),
+            &table,
+        )
+        .unwrap();
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }

@@ -11,18 +11,30 @@ use super::{cell, params};
 use crate::plate_stream::plate_scan;
 
 /// The through hole of the plate, Ø 8 mm at (16, 36) mm in its top.
-const HOLE: Flag = Flag { id: 7, kind: Some(Kind::Hole), place: Point3::new(16e-3, 36e-3, 12e-3), radius: 3e-3 };
+const HOLE: Flag = Flag {
+    id: 7,
+    kind: Some(Kind::Hole),
+    place: Point3::new(16e-3, 36e-3, 12e-3),
+    radius: 3e-3,
+};
 const TOP: f64 = 12e-3;
 /// After so many states the arm is stopped: some of them are inside of the hole.
 const STOPS: [usize; 7] = [3000, 5000, 6011, 7222, 8433, 9644, 11055];
 
 /// The plate and its scan; the arm is to stay where it is after some states.
 fn stopping(stays_after: Option<usize>) -> StaticScan {
-    StaticScan { stays_after, part: Some(Plate::default()), ..StaticScan::new(plate_scan(1)) }
+    StaticScan {
+        stays_after,
+        part: Some(Plate::default()),
+        ..StaticScan::new(plate_scan(1))
+    }
 }
 
 fn arm(plate: &Plate) -> SimArm<'_> {
-    let start = cell().pose(&UnitQuaternion::identity(), &Point3::new(40e-3, 25e-3, 50e-3));
+    let start = cell().pose(
+        &UnitQuaternion::identity(),
+        &Point3::new(40e-3, 25e-3, 50e-3),
+    );
     SimArm::new(plate, ArmParams::default(), &start).unwrap()
 }
 
@@ -31,7 +43,11 @@ fn stopped(arm: &mut SimArm, stays_after: usize) -> (Point3<f64>, Option<WayOut>
     let (cell, params, mut world) = (cell(), params(), stopping(Some(stays_after)));
     let mut prober = Prober::new(arm, &cell, &params, &mut world);
     let probed = prober.probe(&HOLE);
-    assert_eq!(probed.ending, Ending::Cancelled(StopRequest::Stay), "{stays_after}");
+    assert_eq!(
+        probed.ending,
+        Ending::Cancelled(StopRequest::Stay),
+        "{stays_after}"
+    );
     let way_out = prober.into_way_out();
     (arm.ball(), way_out)
 }
@@ -53,9 +69,19 @@ fn is_inside(place: &Point3<f64>) -> bool {
 /// Probes on from there, to its end.
 fn goes_on(arm: &mut SimArm, way_out: Option<WayOut>) -> (Ending, f64) {
     let (cell, params, mut world) = (cell(), params(), stopping(None));
-    let probed = Prober::new(arm, &cell, &params, &mut world).leaving_by(way_out).probe(&HOLE);
-    let found = probed.found.and_then(|found| found.feature).and_then(|hole| hole.diameter);
-    assert!(found.as_ref().is_none_or(|diameter| (diameter.value - 8e-3).abs() < 50e-6), "{found:?}");
+    let probed = Prober::new(arm, &cell, &params, &mut world)
+        .leaving_by(way_out)
+        .probe(&HOLE);
+    let found = probed
+        .found
+        .and_then(|found| found.feature)
+        .and_then(|hole| hole.diameter);
+    assert!(
+        found
+            .as_ref()
+            .is_none_or(|diameter| (diameter.value - 8e-3).abs() < 50e-6),
+        "{found:?}"
+    );
     (probed.ending, world.nearest)
 }
 
@@ -68,15 +94,33 @@ fn wherever_in_a_hole_it_was_stopped_it_goes_out_by_its_way_and_probes_to_the_en
         let (place, way_out) = stopped(&mut arm, stays_after);
         let is_inside = is_inside(&place);
         inside += usize::from(is_inside);
-        assert!(way_out.is_some() || !is_inside, "{stays_after}: no way out of {place}");
+        assert!(
+            way_out.is_some() || !is_inside,
+            "{stays_after}: no way out of {place}"
+        );
         if is_inside {
             // the scan has no hole there for the shaft, or no room for its margin
             let (refused, _) = goes_on(&mut arm, None);
-            assert!(matches!(refused, Ending::NoClearPath(_)), "{stays_after}: {refused}");
+            assert!(
+                matches!(refused, Ending::NoClearPath(_)),
+                "{stays_after}: {refused}"
+            );
         }
         let now = arm.next_state().unwrap();
-        let planned = plan(&cell(), &params(), &StaticScan::new(plate_scan(1)), &HOLE, &now, way_out.as_ref()).unwrap();
-        assert!(planned.held_back.is_empty() && (planned.path[0] - place).norm() < 0.3e-3, "{:?}", planned.held_back);
+        let planned = plan(
+            &cell(),
+            &params(),
+            &StaticScan::new(plate_scan(1)),
+            &HOLE,
+            &now,
+            way_out.as_ref(),
+        )
+        .unwrap();
+        assert!(
+            planned.held_back.is_empty() && (planned.path[0] - place).norm() < 0.3e-3,
+            "{:?}",
+            planned.held_back
+        );
         let (ending, nearest) = goes_on(&mut arm, way_out);
         assert_eq!(ending, Ending::ToleranceReached, "{stays_after}");
         // the ball presses into the part by no more than what a touch does
@@ -92,7 +136,12 @@ fn an_arm_that_was_moved_since_it_was_stopped_does_not_go_by_a_way_that_begins_e
     // by hand, 1 mm up
     let to = cell().pose(&UnitQuaternion::identity(), &(place + Vector3::z() * 1e-3));
     for _ in 0..500 {
-        arm.command(&Command::Line { to, speed: 5e-3, acceleration: 0.5 }).unwrap();
+        arm.command(&Command::Line {
+            to,
+            speed: 5e-3,
+            acceleration: 0.5,
+        })
+        .unwrap();
         arm.next_state().unwrap();
     }
     let (ending, _) = goes_on(&mut arm, Some(way_out));

@@ -18,7 +18,10 @@ pub struct FeaturesParams {
 
 impl Default for FeaturesParams {
     fn default() -> Self {
-        Self { tolerance: 0.01, size_tolerance: 0.05 }
+        Self {
+            tolerance: 0.01,
+            size_tolerance: 0.05,
+        }
     }
 }
 

@@ -54,13 +54,24 @@ fn frame(first: &Vector3<f64>, second: &Vector3<f64>) -> Option<Matrix3<f64>> {
 ///
 /// - `all_frames`: also from the other end of what goes through, and each turn of a corner: of one side of a match alone.
 pub(super) fn bases(landmarks: &[Landmark], all_frames: bool) -> Vec<Base> {
-    let located = landmarks.iter().enumerate().filter(|(_, landmark)| landmark.is_located()).take(MOST_LOCATED);
-    let ends: Vec<(usize, Landmark)> =
-        located.flat_map(|(at, landmark)| landmark.ends().map(move |end| (at, end))).collect();
+    let located = landmarks
+        .iter()
+        .enumerate()
+        .filter(|(_, landmark)| landmark.is_located())
+        .take(MOST_LOCATED);
+    let ends: Vec<(usize, Landmark)> = located
+        .flat_map(|(at, landmark)| landmark.ends().map(move |end| (at, end)))
+        .collect();
     let mut bases = Vec::new();
     for (i, first) in &ends {
-        bases.extend(ends.iter().filter(|(j, _)| i != j).filter_map(|(j, second)| pair([*i, *j], first, second)));
-        let planes = landmarks.iter().filter(|landmark| landmark.kind == Kind::Plane);
+        bases.extend(
+            ends.iter()
+                .filter(|(j, _)| i != j)
+                .filter_map(|(j, second)| pair([*i, *j], first, second)),
+        );
+        let planes = landmarks
+            .iter()
+            .filter(|landmark| landmark.kind == Kind::Plane);
         bases.extend(planes.filter_map(|plane| beside(*i, first, plane)));
         bases.extend(slot(*i, first, 1.0));
         bases.extend(slot(*i, first, -1.0).filter(|_| all_frames));
@@ -79,38 +90,81 @@ fn pair(of: [usize; 2], first: &Landmark, second: &Landmark) -> Option<Base> {
     // the displacement from one to the other is known best
     let axes = frame(&direction, &a).or_else(|| frame(&direction, &b))?;
     let class = SetClass::Pair(first.class(), second.class());
-    let cosines = [a.dot(&direction), b.dot(&direction), a.dot(&b), a.cross(&b).dot(&direction)];
-    Some(Base { class, length: between.norm(), cosines, origin: first.place, axes, of })
+    let cosines = [
+        a.dot(&direction),
+        b.dot(&direction),
+        a.dot(&b),
+        a.cross(&b).dot(&direction),
+    ];
+    Some(Base {
+        class,
+        length: between.norm(),
+        cosines,
+        origin: first.place,
+        axes,
+        of,
+    })
 }
 
 fn beside(at: usize, landmark: &Landmark, plane: &Landmark) -> Option<Base> {
     let (axis, normal) = (landmark.axis?, plane.axis?);
-    let (class, length) = (SetClass::Beside(landmark.class()), (landmark.place - plane.place).dot(&normal));
+    let (class, length) = (
+        SetClass::Beside(landmark.class()),
+        (landmark.place - plane.place).dot(&normal),
+    );
     let (cosines, axes) = ([axis.dot(&normal), 0.0, 0.0, 0.0], frame(&axis, &normal)?);
-    Some(Base { class, length, cosines, origin: landmark.place, axes, of: [at, at] })
+    Some(Base {
+        class,
+        length,
+        cosines,
+        origin: landmark.place,
+        axes,
+        of: [at, at],
+    })
 }
 
 fn slot(at: usize, landmark: &Landmark, sign: f64) -> Option<Base> {
     let axes = frame(&landmark.axis?, &(landmark.direction? * sign))?;
-    Some(Base { class: SetClass::Slot, length: 0.0, cosines: [0.0; 4], origin: landmark.place, axes, of: [at, at] })
+    Some(Base {
+        class: SetClass::Slot,
+        length: 0.0,
+        cosines: [0.0; 4],
+        origin: landmark.place,
+        axes,
+        of: [at, at],
+    })
 }
 
 fn corner(at: usize, landmark: &Landmark, turn: usize) -> Option<Base> {
     let normals = landmark.normals?;
     let [a, b, c] = [0, 1, 2].map(|i| normals[(turn + i) % 3]);
     let (cosines, axes) = ([a.dot(&b), b.dot(&c), c.dot(&a), 0.0], frame(&a, &b)?);
-    Some(Base { class: SetClass::Corner, length: 0.0, cosines, origin: landmark.place, axes, of: [at, at] })
+    Some(Base {
+        class: SetClass::Corner,
+        length: 0.0,
+        cosines,
+        origin: landmark.place,
+        axes,
+        of: [at, at],
+    })
 }
 
 /// Sets that leave the turn about an axis open, each with one turn of many.
 ///
 /// - `all_frames`: as in [`bases`].
 pub(super) fn axial_bases(landmarks: &[Landmark], all_frames: bool) -> Vec<Base> {
-    let located = landmarks.iter().enumerate().filter(|(_, landmark)| landmark.is_located()).take(MOST_LOCATED);
+    let located = landmarks
+        .iter()
+        .enumerate()
+        .filter(|(_, landmark)| landmark.is_located())
+        .take(MOST_LOCATED);
     let mut found = Vec::new();
     for (at, landmark) in located {
         for end in landmark.ends().take(if all_frames { 2 } else { 1 }) {
-            let others = landmarks.iter().enumerate().filter(|(other, _)| *other != at);
+            let others = landmarks
+                .iter()
+                .enumerate()
+                .filter(|(other, _)| *other != at);
             found.extend(others.filter_map(|(other, second)| about([at, other], &end, second)));
         }
     }
@@ -122,10 +176,23 @@ fn about(of: [usize; 2], first: &Landmark, second: &Landmark) -> Option<Base> {
     let between = second.place - first.place;
     let is_about = second.kind == Kind::Plane
         || (second.is_located() && axis.cross(&between).norm() <= LEAST_SINE * between.norm());
-    let (class, length) = (SetClass::Axis(first.class(), second.class()), between.dot(&axis));
-    let (cosines, axes) = ([axis.dot(&other), 0.0, 0.0, 0.0], frame(&axis, &Vector3::ith(axis.iamin(), 1.0))?);
+    let (class, length) = (
+        SetClass::Axis(first.class(), second.class()),
+        between.dot(&axis),
+    );
+    let (cosines, axes) = (
+        [axis.dot(&other), 0.0, 0.0, 0.0],
+        frame(&axis, &Vector3::ith(axis.iamin(), 1.0))?,
+    );
     let is_about = is_about && axis.dot(&other).abs() >= ALIKE;
-    is_about.then_some(Base { class, length, cosines, origin: first.place, axes, of })
+    is_about.then_some(Base {
+        class,
+        length,
+        cosines,
+        origin: first.place,
+        axes,
+        of,
+    })
 }
 
 impl Base {
@@ -134,12 +201,19 @@ impl Base {
         let turn = Rotation3::from_matrix_unchecked(other.axes * self.axes.transpose());
         let mut turn = UnitQuaternion::from_rotation_matrix(&turn);
         turn.renormalize();
-        Isometry3::from_parts((other.origin - turn * self.origin.coords).coords.into(), turn)
+        Isometry3::from_parts(
+            (other.origin - turn * self.origin.coords).coords.into(),
+            turn,
+        )
     }
 
     /// - `play`: by which lengths may differ, m
     fn is_like(&self, other: &Self, play: f64) -> bool {
-        let cosines = self.cosines.iter().zip(&other.cosines).all(|(a, b)| (a - b).abs() <= COSINES);
+        let cosines = self
+            .cosines
+            .iter()
+            .zip(&other.cosines)
+            .all(|(a, b)| (a - b).abs() <= COSINES);
         cosines && (self.length - other.length).abs() <= play
     }
 }
@@ -155,11 +229,14 @@ impl SortedSets {
 
     /// Those that may be `base`, by lengths and angles.
     pub fn like<'a>(&'a self, base: &'a Base, play: f64) -> impl Iterator<Item = &'a Base> {
-        let is_before = |other: &Base| (other.class, other.length) < (base.class, base.length - play);
+        let is_before =
+            |other: &Base| (other.class, other.length) < (base.class, base.length - play);
         let from = self.0.partition_point(is_before);
         self.0[from..]
             .iter()
-            .take_while(move |other| other.class == base.class && other.length <= base.length + play)
+            .take_while(move |other| {
+                other.class == base.class && other.length <= base.length + play
+            })
             .filter(move |other| base.is_like(other, play))
     }
 }

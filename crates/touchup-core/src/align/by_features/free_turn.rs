@@ -26,7 +26,10 @@ impl Judge<'_> {
     /// The axis about which a motion may be turned and explains as much: all features that it explains lie about it, and so
     /// does the surface where it is given.
     pub(super) fn free_turn(&self, best: &Judged) -> Option<FreeTurn> {
-        let explained: Vec<&Landmark> = best.explained().map(|[_, theirs]| &self.matching.target[theirs]).collect();
+        let explained: Vec<&Landmark> = best
+            .explained()
+            .map(|[_, theirs]| &self.matching.target[theirs])
+            .collect();
         let turn = axis_of(&explained, self.matching.tolerance)?;
         let is_alike = |step: u32| self.stays(best, &turn.by(f64::from(step) * STEP));
         (1..=TURNS).all(is_alike).then_some(turn)
@@ -46,7 +49,12 @@ impl FreeTurn {
     }
 
     fn by(&self, angle: f64) -> Isometry3<f64> {
-        moved_by_twist(&Isometry3::identity(), &self.through, &Vector3::zeros(), &(self.axis * angle))
+        moved_by_twist(
+            &Isometry3::identity(),
+            &self.through,
+            &Vector3::zeros(),
+            &(self.axis * angle),
+        )
     }
 }
 
@@ -57,7 +65,9 @@ fn axis_of(landmarks: &[&Landmark], near: f64) -> Option<FreeTurn> {
     let first = landmarks.iter().find(|landmark| landmark.is_located())?;
     let (axis, through) = (first.axis?, first.place);
     let is_about = |landmark: &&Landmark| {
-        let is_along = landmark.axis.is_some_and(|own| own.dot(&axis).abs() >= ALIKE);
+        let is_along = landmark
+            .axis
+            .is_some_and(|own| own.dot(&axis).abs() >= ALIKE);
         let is_on = (landmark.place - through).cross(&axis).norm() <= near;
         match landmark.kind {
             Kind::Plane => is_along,
@@ -65,5 +75,8 @@ fn axis_of(landmarks: &[&Landmark], near: f64) -> Option<FreeTurn> {
             Kind::Slot | Kind::Pocket | Kind::Edge | Kind::Corner | Kind::Notch => false,
         }
     };
-    landmarks.iter().all(is_about).then_some(FreeTurn { axis, through })
+    landmarks
+        .iter()
+        .all(is_about)
+        .then_some(FreeTurn { axis, through })
 }

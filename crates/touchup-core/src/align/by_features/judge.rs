@@ -53,20 +53,28 @@ impl Judged {
     /// Matched features: of the source, of the target.
     pub fn explained(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
         let is_there = |(own, partner): (usize, &Option<(usize, f64)>)| {
-            partner.filter(|(_, misfit)| *misfit <= 1.0).map(|(theirs, _)| [own, theirs])
+            partner
+                .filter(|(_, misfit)| *misfit <= 1.0)
+                .map(|(theirs, _)| [own, theirs])
         };
         self.partners.iter().enumerate().filter_map(is_there)
     }
 
     /// Share of the points that agree.
     pub fn agreeing(&self) -> Option<f64> {
-        let count = self.distances.iter().filter(|distance| distance.is_finite()).count();
+        let count = self
+            .distances
+            .iter()
+            .filter(|distance| distance.is_finite())
+            .count();
         (!self.distances.is_empty()).then(|| count as f64 / self.distances.len() as f64)
     }
 
     /// Of what is explained.
     pub fn weight(&self, matching: &Matching) -> f64 {
-        self.explained().map(|[own, _]| matching.source[own].weight()).sum()
+        self.explained()
+            .map(|[own, _]| matching.source[own].weight())
+            .sum()
     }
 
     /// By how much more a feature has to be off to be missing, by how well others fit.
@@ -91,10 +99,23 @@ pub(super) struct Judge<'a> {
 impl<'a> Judge<'a> {
     pub fn new(matching: Matching, surfaces: Option<&'a Surfaces<'a>>, in_mirror: bool) -> Self {
         let points = surfaces.map_or(&[][..], |surfaces| surfaces.points);
-        let flip = |v: Vector3<f64>| if in_mirror { Vector3::new(-v.x, v.y, v.z) } else { v };
-        let point = |p: &OrientedSample| OrientedSample { point: flip(p.point.coords).into(), normal: flip(p.normal) };
+        let flip = |v: Vector3<f64>| {
+            if in_mirror {
+                Vector3::new(-v.x, v.y, v.z)
+            } else {
+                v
+            }
+        };
+        let point = |p: &OrientedSample| OrientedSample {
+            point: flip(p.point.coords).into(),
+            normal: flip(p.normal),
+        };
         let points = points.iter().map(point).collect();
-        Self { matching, surfaces, points }
+        Self {
+            matching,
+            surfaces,
+            points,
+        }
     }
 
     /// Refines each motion and judges it; the best first, no two alike.
@@ -103,20 +124,38 @@ impl<'a> Judge<'a> {
         let points: Vec<Point3<f64>> = self.points.iter().step_by(step).map(|p| p.point).collect();
         let refined = motions.iter().map(|coarse| {
             let fit = self.refine(&points, coarse);
-            (fit.as_ref().map_or(*coarse, |fit| fit.source_to_target), fit)
+            (
+                fit.as_ref().map_or(*coarse, |fit| fit.source_to_target),
+                fit,
+            )
         });
         let near = SAME * self.matching.tolerance;
-        let refined = without_repeats(refined, |(before, _), (motion, _)| self.matching.apart(motion, before) <= near);
-        let mut judged: Vec<_> = refined.into_iter().map(|(motion, fit)| self.judged(motion, fit)).collect();
-        let all = self.matching.source.iter().map(|own| own.weight()).sum::<f64>();
-        let merit = |judged: &Judged| judged.weight(&self.matching) / all + judged.agreeing().unwrap_or(0.0);
+        let refined = without_repeats(refined, |(before, _), (motion, _)| {
+            self.matching.apart(motion, before) <= near
+        });
+        let mut judged: Vec<_> = refined
+            .into_iter()
+            .map(|(motion, fit)| self.judged(motion, fit))
+            .collect();
+        let all = self
+            .matching
+            .source
+            .iter()
+            .map(|own| own.weight())
+            .sum::<f64>();
+        let merit = |judged: &Judged| {
+            judged.weight(&self.matching) / all + judged.agreeing().unwrap_or(0.0)
+        };
         judged.sort_by(|a, b| merit(b).total_cmp(&merit(a)));
         judged
     }
 
     fn refine(&self, points: &[Point3<f64>], coarse: &Isometry3<f64>) -> Option<IcpFit> {
         let Surfaces { target, tree, .. } = self.surfaces?;
-        let params = IcpParams { reach: REACH * self.matching.tolerance, ..IcpParams::default() };
+        let params = IcpParams {
+            reach: REACH * self.matching.tolerance,
+            ..IcpParams::default()
+        };
         icp(points, target, tree, coarse, &params, &Alone).ok()
     }
 
@@ -128,8 +167,17 @@ impl<'a> Judge<'a> {
             let faces = target.normal(hit.face).dot(&(motion * p.normal)) > FACING;
             faces.then(|| hit.distance_squared.sqrt())
         };
-        let distances = self.points.iter().map(|p| distance(p).unwrap_or(f64::INFINITY)).collect();
-        Judged { motion, fit, partners: self.matching.partners(&motion), distances }
+        let distances = self
+            .points
+            .iter()
+            .map(|p| distance(p).unwrap_or(f64::INFINITY))
+            .collect();
+        Judged {
+            motion,
+            fit,
+            partners: self.matching.partners(&motion),
+            distances,
+        }
     }
 
     /// Whether the evidence decides for `a` against `b`: the surface, and where that does not decide, the features, which were
@@ -145,7 +193,11 @@ impl<'a> Judge<'a> {
     /// Those that no other rules out; all where each is ruled out by one.
     pub fn left_over(&self, judged: Vec<Judged>) -> Vec<Judged> {
         let is_ruled_out = |b: &Judged| judged.iter().any(|a| self.rules_out(a, b));
-        let left: Vec<Judged> = judged.iter().filter(|b| !is_ruled_out(b)).cloned().collect();
+        let left: Vec<Judged> = judged
+            .iter()
+            .filter(|b| !is_ruled_out(b))
+            .cloned()
+            .collect();
         if left.is_empty() { judged } else { left }
     }
 
@@ -157,18 +209,31 @@ impl<'a> Judge<'a> {
     /// Among all points that belong to the target at all, or among those that lie on it within the scatter of the best fit.
     fn by_surface(&self, a: &Judged, b: &Judged) -> bool {
         let alone = |a: &Judged, b: &Judged, near: f64| {
-            a.distances.iter().zip(&b.distances).filter(|(a, b)| **a <= near && **b > near).count() as f64
+            a.distances
+                .iter()
+                .zip(&b.distances)
+                .filter(|(a, b)| **a <= near && **b > near)
+                .count() as f64
         };
-        [self.near(a), COARSE * self.matching.tolerance].into_iter().any(|near| {
-            let (own, other) = (alone(a, b, near), alone(b, a, near));
-            let left_over = a.distances.iter().filter(|distance| **distance > near).count() as f64;
-            own - other >= POINTS.max(LEFT_OVER * left_over) && own > CLEARLY * other
-        })
+        [self.near(a), COARSE * self.matching.tolerance]
+            .into_iter()
+            .any(|near| {
+                let (own, other) = (alone(a, b, near), alone(b, a, near));
+                let left_over = a
+                    .distances
+                    .iter()
+                    .filter(|distance| **distance > near)
+                    .count() as f64;
+                own - other >= POINTS.max(LEFT_OVER * left_over) && own > CLEARLY * other
+            })
     }
 
     /// Within which a point lies on the target within the scatter of the fit, m.
     fn near(&self, judged: &Judged) -> f64 {
-        let (tolerance, scatter) = (self.matching.tolerance, judged.fit.as_ref().map_or(0.0, |fit| fit.scatter));
+        let (tolerance, scatter) = (
+            self.matching.tolerance,
+            judged.fit.as_ref().map_or(0.0, |fit| fit.scatter),
+        );
         (SCATTERS * scatter).clamp(LEAST_NEAR * tolerance, COARSE * tolerance)
     }
 
@@ -188,7 +253,12 @@ impl<'a> Judge<'a> {
     pub fn stays(&self, best: &Judged, turn: &Isometry3<f64>) -> bool {
         let turned = self.judged(turn * best.motion, None);
         let is_lost = |(own, turned): &(&f64, &f64)| own.is_finite() && !turned.is_finite();
-        let lost = best.distances.iter().zip(&turned.distances).filter(is_lost).count() as f64;
+        let lost = best
+            .distances
+            .iter()
+            .zip(&turned.distances)
+            .filter(is_lost)
+            .count() as f64;
         lost <= POINTS.max(AT_RIMS * self.points.len() as f64)
     }
 
@@ -197,9 +267,15 @@ impl<'a> Judge<'a> {
         let points: Vec<Point3<f64>> = self.points.iter().map(|p| p.point).collect();
         let mut alternatives: Vec<Alternative> = Vec::new();
         for judged in judged {
-            let fit = self.refine(&points, &judged.motion).or_else(|| judged.fit.clone());
-            let motion = fit.as_ref().map_or(judged.motion, |fit| fit.source_to_target);
-            let first = alternatives.first().map_or(motion, |first| first.source_to_target);
+            let fit = self
+                .refine(&points, &judged.motion)
+                .or_else(|| judged.fit.clone());
+            let motion = fit
+                .as_ref()
+                .map_or(judged.motion, |fit| fit.source_to_target);
+            let first = alternatives
+                .first()
+                .map_or(motion, |first| first.source_to_target);
             let turn = (motion.rotation * first.rotation.inverse()).scaled_axis();
             let shift = motion * self.matching.middle - first * self.matching.middle;
             alternatives.push(Alternative {

@@ -37,14 +37,21 @@ const SIGMAS: f64 = 3.0;
 const SPATIAL: f64 = 0.17;
 
 /// All features as landmarks, in their order.
-pub(super) fn landmarks(features: &[Feature], params: &FeaturesParams, diagonal: f64) -> Vec<Landmark> {
+pub(super) fn landmarks(
+    features: &[Feature],
+    params: &FeaturesParams,
+    diagonal: f64,
+) -> Vec<Landmark> {
     let planes: Vec<(Point3<f64>, Vector3<f64>)> = features
         .iter()
         .filter(|feature| feature.kind == Kind::Plane)
         .filter_map(|feature| Some((feature.centre.value, feature.axis.as_ref()?.value)))
         .collect();
     let near = params.tolerance * diagonal;
-    features.iter().map(|feature| Landmark::of(feature, &planes, near)).collect()
+    features
+        .iter()
+        .map(|feature| Landmark::of(feature, &planes, near))
+        .collect()
 }
 
 impl Landmark {
@@ -52,7 +59,10 @@ impl Landmark {
         let place = feature.centre.value;
         let size = feature.diameter.as_ref().or(feature.width.as_ref());
         let reach = match feature.kind {
-            Kind::Edge => feature.length.as_ref().map_or([0.0; 2], |length| [length.value / 2.0; 2]),
+            Kind::Edge => feature
+                .length
+                .as_ref()
+                .map_or([0.0; 2], |length| [length.value / 2.0; 2]),
             _ => [feature.depth.as_ref().map_or(0.0, |depth| depth.value), 0.0],
         };
         Self {
@@ -66,7 +76,9 @@ impl Landmark {
             is_through: feature.through == Some(true),
             is_step: feature.kind == Kind::Cylinder && feature.depth.is_some(),
             is_convex: feature.is_convex,
-            normals: (feature.kind == Kind::Corner).then(|| normals_at(&place, planes, near)).flatten(),
+            normals: (feature.kind == Kind::Corner)
+                .then(|| normals_at(&place, planes, near))
+                .flatten(),
         }
     }
 
@@ -83,16 +95,23 @@ impl Landmark {
 
     /// Its kind; where a slot ends and a pocket begins is a matter of taste.
     pub fn class(&self) -> Kind {
-        if self.kind == Kind::Pocket { Kind::Slot } else { self.kind }
+        if self.kind == Kind::Pocket {
+            Kind::Slot
+        } else {
+            self.kind
+        }
     }
 
     /// Itself, and what goes through also from its other end.
     pub fn ends(&self) -> impl Iterator<Item = Self> + '_ {
-        let other = self.axis.filter(|_| self.is_through && self.is_located()).map(|axis| Self {
-            place: self.place - axis * self.span[0],
-            axis: Some(-axis),
-            ..self.clone()
-        });
+        let other = self
+            .axis
+            .filter(|_| self.is_through && self.is_located())
+            .map(|axis| Self {
+                place: self.place - axis * self.span[0],
+                axis: Some(-axis),
+                ..self.clone()
+            });
         std::iter::once(self.clone()).chain(other)
     }
 
@@ -109,11 +128,13 @@ impl Landmark {
 
     /// Whether both may be the same thing, by what does not depend on where they are.
     pub fn is_like(&self, other: &Self, params: &FeaturesParams) -> bool {
-        let sizes = self
-            .size
-            .zip(other.size)
-            .is_none_or(|([a, s], [b, t])| (a - b).abs() <= params.size_tolerance * a.max(b) + SIGMAS * s.hypot(t));
-        let sides = self.is_convex.zip(other.is_convex).is_none_or(|(a, b)| a == b);
+        let sizes = self.size.zip(other.size).is_none_or(|([a, s], [b, t])| {
+            (a - b).abs() <= params.size_tolerance * a.max(b) + SIGMAS * s.hypot(t)
+        });
+        let sides = self
+            .is_convex
+            .zip(other.is_convex)
+            .is_none_or(|(a, b)| a == b);
         self.class() == other.class() && sizes && sides
     }
 
@@ -129,7 +150,9 @@ impl Landmark {
     pub fn misfit(&self, motion: &Isometry3<f64>, other: &Self, tolerance: f64) -> f64 {
         let play = self.play(other, tolerance);
         let offset = motion * self.place - other.place;
-        let Some((own, theirs)) = self.axis.zip(other.axis) else { return offset.norm() / play };
+        let Some((own, theirs)) = self.axis.zip(other.axis) else {
+            return offset.norm() / play;
+        };
         let cosine = (motion * own).dot(&theirs);
         let is_free = self.is_line() || other.is_line();
         if (if is_free { cosine.abs() } else { cosine }) < ALIKE {
@@ -153,7 +176,9 @@ impl Landmark {
     pub fn held(&self, other: &Self) -> Matrix3<f64> {
         match other.axis {
             Some(axis) if self.kind == Kind::Plane => axis * axis.transpose(),
-            Some(axis) if self.is_line() || other.is_line() => Matrix3::identity() - axis * axis.transpose(),
+            Some(axis) if self.is_line() || other.is_line() => {
+                Matrix3::identity() - axis * axis.transpose()
+            }
             _ => Matrix3::identity(),
         }
     }
@@ -177,16 +202,32 @@ impl Landmark {
 }
 
 /// Normals of three planes that meet in `place`; `None` where there are not just three such directions.
-fn normals_at(place: &Point3<f64>, planes: &[(Point3<f64>, Vector3<f64>)], near: f64) -> Option<[Vector3<f64>; 3]> {
+fn normals_at(
+    place: &Point3<f64>,
+    planes: &[(Point3<f64>, Vector3<f64>)],
+    near: f64,
+) -> Option<[Vector3<f64>; 3]> {
     let mut found: Vec<(f64, Vector3<f64>)> = Vec::new();
-    let mut by_distance: Vec<_> = planes.iter().map(|(p, n)| ((place - p).dot(n).abs(), *n)).collect();
+    let mut by_distance: Vec<_> = planes
+        .iter()
+        .map(|(p, n)| ((place - p).dot(n).abs(), *n))
+        .collect();
     by_distance.sort_by(|a, b| a.0.total_cmp(&b.0));
-    for (distance, normal) in by_distance.into_iter().filter(|(distance, _)| *distance <= near) {
-        if found.len() < 3 && found.iter().all(|(_, other)| other.dot(&normal).abs() < ALIKE) {
+    for (distance, normal) in by_distance
+        .into_iter()
+        .filter(|(distance, _)| *distance <= near)
+    {
+        if found.len() < 3
+            && found
+                .iter()
+                .all(|(_, other)| other.dot(&normal).abs() < ALIKE)
+        {
             found.push((distance, normal));
         }
     }
-    let &[(_, a), (_, b), (_, c)] = found.as_slice() else { return None };
+    let &[(_, a), (_, b), (_, c)] = found.as_slice() else {
+        return None;
+    };
     let volume = a.cross(&b).dot(&c);
     (volume.abs() > SPATIAL).then_some(if volume > 0.0 { [a, b, c] } else { [a, c, b] })
 }

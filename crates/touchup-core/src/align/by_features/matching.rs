@@ -25,12 +25,31 @@ const ROUNDS: usize = 4;
 
 impl Matching {
     /// - `size`: of the target, m: what tolerances are shares of
-    pub fn new(source: Vec<Landmark>, target: Vec<Landmark>, params: &FeaturesParams, size: f64) -> Self {
-        let partners = |own: &Landmark| (0..target.len()).filter(|&i| own.is_like(&target[i], params)).collect();
+    pub fn new(
+        source: Vec<Landmark>,
+        target: Vec<Landmark>,
+        params: &FeaturesParams,
+        size: f64,
+    ) -> Self {
+        let partners = |own: &Landmark| {
+            (0..target.len())
+                .filter(|&i| own.is_like(&target[i], params))
+                .collect()
+        };
         let like = source.iter().map(partners).collect();
         let middle = Point3::from(mean(source.iter().map(|own| own.place.coords)));
-        let lever = source.iter().map(|own| (own.place - middle).norm()).fold(0.0, f64::max);
-        Self { source, target, like, tolerance: params.tolerance * size, middle, lever: lever.max(size / 8.0) }
+        let lever = source
+            .iter()
+            .map(|own| (own.place - middle).norm())
+            .fold(0.0, f64::max);
+        Self {
+            source,
+            target,
+            like,
+            tolerance: params.tolerance * size,
+            middle,
+            lever: lever.max(size / 8.0),
+        }
     }
 
     /// Pairs of landmarks that could be one another.
@@ -45,12 +64,22 @@ impl Matching {
 
     /// The best partner of each feature and how well it fits: at most 1 is explained.
     pub fn partners(&self, motion: &Isometry3<f64>) -> Vec<Option<(usize, f64)>> {
-        (0..self.source.len()).map(|own| self.partner(motion, own)).collect()
+        (0..self.source.len())
+            .map(|own| self.partner(motion, own))
+            .collect()
     }
 
     fn partner(&self, motion: &Isometry3<f64>, own: usize) -> Option<(usize, f64)> {
-        let misfit = |&theirs: &usize| (theirs, self.source[own].misfit(motion, &self.target[theirs], self.tolerance));
-        self.like[own].iter().map(misfit).min_by(|a, b| a.1.total_cmp(&b.1))
+        let misfit = |&theirs: &usize| {
+            (
+                theirs,
+                self.source[own].misfit(motion, &self.target[theirs], self.tolerance),
+            )
+        };
+        self.like[own]
+            .iter()
+            .map(misfit)
+            .min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     /// Sum of the weights of the features that are explained, each the less the farther it is off.
@@ -71,7 +100,9 @@ impl Matching {
     pub fn refined(&self, start: &Isometry3<f64>) -> Isometry3<f64> {
         let mut motion = *start;
         for _ in 0..ROUNDS {
-            let Some(better) = self.step(&motion) else { return motion };
+            let Some(better) = self.step(&motion) else {
+                return motion;
+            };
             motion = better;
         }
         motion
@@ -80,20 +111,33 @@ impl Matching {
     fn step(&self, motion: &Isometry3<f64>) -> Option<Isometry3<f64>> {
         let centre = motion * self.middle;
         let (mut normal, mut right) = (Matrix6::zeros(), Vector6::zeros());
-        let mut add = |held: &Matrix3<f64>, arm: &Vector3<f64>, shifts: f64, offset: &Vector3<f64>, weight: f64| {
+        let mut add = |held: &Matrix3<f64>,
+                       arm: &Vector3<f64>,
+                       shifts: f64,
+                       offset: &Vector3<f64>,
+                       weight: f64| {
             // a small turn θ moves the arm by θ × arm; both counted by the lever
             let mut rows = nalgebra::Matrix3x6::zeros();
             rows.fixed_columns_mut::<3>(0).copy_from(&(held * shifts));
-            rows.fixed_columns_mut::<3>(3).copy_from(&(held * -arm.cross_matrix() / self.lever));
+            rows.fixed_columns_mut::<3>(3)
+                .copy_from(&(held * -arm.cross_matrix() / self.lever));
             normal += rows.transpose() * rows * weight;
             right -= rows.transpose() * (held * offset) * weight;
         };
         for (own, partner) in self.partners(motion).into_iter().enumerate() {
-            let Some((theirs, _)) = partner.filter(|(_, misfit)| *misfit <= 1.0) else { continue };
+            let Some((theirs, _)) = partner.filter(|(_, misfit)| *misfit <= 1.0) else {
+                continue;
+            };
             let (own, theirs) = (&self.source[own], &self.target[theirs]);
             let weight = own.weight() * own.trust(theirs, self.tolerance);
             let place = motion * own.place;
-            add(&own.held(theirs), &(place - centre), 1.0, &(place - theirs.place), weight);
+            add(
+                &own.held(theirs),
+                &(place - centre),
+                1.0,
+                &(place - theirs.place),
+                weight,
+            );
             if let Some((axis, onto)) = own.axis.zip(theirs.axis) {
                 let axis = motion * axis;
                 // as long as what it is the axis of may be far: a tenth of the extent
@@ -105,7 +149,13 @@ impl Matching {
         // a direction without constraint stays
         normal += Matrix6::identity() * (normal.diagonal().max() * 1e-9).max(f64::MIN_POSITIVE);
         let twist = normal.cholesky()?.solve(&right);
-        let (shift, turn) = (twist.fixed_rows::<3>(0).into_owned(), twist.fixed_rows::<3>(3) / self.lever);
-        twist.iter().all(|x| x.is_finite()).then(|| moved_by_twist(motion, &centre, &shift, &turn))
+        let (shift, turn) = (
+            twist.fixed_rows::<3>(0).into_owned(),
+            twist.fixed_rows::<3>(3) / self.lever,
+        );
+        twist
+            .iter()
+            .all(|x| x.is_finite())
+            .then(|| moved_by_twist(motion, &centre, &shift, &turn))
     }
 }

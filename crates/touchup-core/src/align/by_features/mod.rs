@@ -62,7 +62,10 @@ pub fn align_features(
     surfaces: Option<&Surfaces<'_>>,
     params: &FeaturesParams,
 ) -> Result<Alternative, FeaturesError> {
-    for (side, features) in [(FeaturesSide::Source, source), (FeaturesSide::Target, target)] {
+    for (side, features) in [
+        (FeaturesSide::Source, source),
+        (FeaturesSide::Target, target),
+    ] {
         if features.is_empty() {
             return Err(FeaturesError::NoFeatures { side });
         }
@@ -73,24 +76,44 @@ pub fn align_features(
     );
     let [own, theirs] = [source, target].map(|features| landmarks(features, params, size));
     let mirror = own.iter().map(Landmark::mirrored).collect();
-    let judge = Judge::new(Matching::new(own, theirs.clone(), params, size), surfaces, false);
+    let judge = Judge::new(
+        Matching::new(own, theirs.clone(), params, size),
+        surfaces,
+        false,
+    );
     let frames = Frames::of(&judge.matching)?;
     let judged = judge.left_over(judge.all(&candidates(&judge.matching, &frames, MOST_CANDIDATES)));
     let mirror = Judge::new(Matching::new(mirror, theirs, params, size), surfaces, true);
     let mirrored_frames = Frames::of(&mirror.matching)?;
-    let mirrored = mirror.all(&candidates(&mirror.matching, &mirrored_frames, MOST_MIRRORED)).into_iter().next();
+    let mirrored = mirror
+        .all(&candidates(
+            &mirror.matching,
+            &mirrored_frames,
+            MOST_MIRRORED,
+        ))
+        .into_iter()
+        .next();
     let is_clear = |best: &Judged| match best.agreeing() {
         Some(share) => share >= LEAST_AGREEING,
         None if frames.is_axial => best.explained().count() == source.len(),
         None => best.weight(&judge.matching) >= LEAST_EXPLAINED,
     };
-    if let Some(error) = refusal(&judge, judged.first(), mirrored.as_ref(), source.len(), is_clear) {
+    if let Some(error) = refusal(
+        &judge,
+        judged.first(),
+        mirrored.as_ref(),
+        source.len(),
+        is_clear,
+    ) {
         return Err(error);
     }
     let free = judged.first().and_then(|best| judge.free_turn(best));
     if frames.is_axial && free.is_none() {
         // the surface breaks the symmetry, but from which turn on is not known
-        return Err(FeaturesError::TooFew { side: frames.poor, found: frames.found });
+        return Err(FeaturesError::TooFew {
+            side: frames.poor,
+            found: frames.found,
+        });
     }
     let mut alternatives = judge.settled(judged);
     if let Some(turn) = free {
@@ -115,16 +138,26 @@ fn refusal(
     if let Some(mirrored) = mirrored.filter(|mirrored| is_clear(mirrored))
         && best.is_none_or(|best| judge.is_better_throughout(mirrored, best))
     {
-        return Some(FeaturesError::Mirrored { explained, mirrored: mirrored.explained().count(), of });
+        return Some(FeaturesError::Mirrored {
+            explained,
+            mirrored: mirrored.explained().count(),
+            of,
+        });
     }
     let is_believed = best.is_some_and(is_clear);
-    (!is_believed).then(|| FeaturesError::NoMatch { explained, of, agreeing: best.and_then(Judged::agreeing) })
+    (!is_believed).then(|| FeaturesError::NoMatch {
+        explained,
+        of,
+        agreeing: best.and_then(Judged::agreeing),
+    })
 }
 
 /// Twice the largest distance from the mean, m: the same wherever the shape lies.
 fn size_of(points: impl Iterator<Item = Point3<f64>> + Clone) -> f64 {
     let middle = Point3::from(mean(points.clone().map(|p| p.coords)));
-    2.0 * points.map(|p| (p - middle).norm()).fold(f64::MIN_POSITIVE, f64::max)
+    2.0 * points
+        .map(|p| (p - middle).norm())
+        .fold(f64::MIN_POSITIVE, f64::max)
 }
 
 /// The motions that explain most, the best first, no two alike.
@@ -133,10 +166,13 @@ fn candidates(matching: &Matching, frames: &Frames, most: usize) -> Vec<Isometry
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut kept: Vec<(f64, Isometry3<f64>)> = Vec::new();
     let is_new = |kept: &[(f64, Isometry3<f64>)], motion: &Isometry3<f64>| {
-        kept.iter().all(|(_, other)| matching.apart(motion, other) > SAME * matching.tolerance)
+        kept.iter()
+            .all(|(_, other)| matching.apart(motion, other) > SAME * matching.tolerance)
     };
     for (score, coarse) in found {
-        let is_worth = kept.first().is_none_or(|(best, _)| score >= 0.8 * CANDIDATE * best);
+        let is_worth = kept
+            .first()
+            .is_none_or(|(best, _)| score >= 0.8 * CANDIDATE * best);
         if kept.len() >= 2 * most || !is_worth {
             break;
         }
@@ -150,7 +186,11 @@ fn candidates(matching: &Matching, frames: &Frames, most: usize) -> Vec<Isometry
     }
     kept.sort_by(|a, b| b.0.total_cmp(&a.0));
     let least = kept.first().map_or(0.0, |(best, _)| CANDIDATE * best);
-    kept.into_iter().take(most).filter(|(score, _)| *score >= least).map(|(_, motion)| motion).collect()
+    kept.into_iter()
+        .take(most)
+        .filter(|(score, _)| *score >= least)
+        .map(|(_, motion)| motion)
+        .collect()
 }
 
 /// The frames that the features of both sides make.
@@ -166,23 +206,48 @@ struct Frames {
 
 impl Frames {
     fn of(matching: &Matching) -> Result<Self, FeaturesError> {
-        let sides = [(FeaturesSide::Source, &matching.source), (FeaturesSide::Target, &matching.target)];
-        let [own, theirs] = [bases(&matching.source, false), bases(&matching.target, true)];
+        let sides = [
+            (FeaturesSide::Source, &matching.source),
+            (FeaturesSide::Target, &matching.target),
+        ];
+        let [own, theirs] = [
+            bases(&matching.source, false),
+            bases(&matching.target, true),
+        ];
         let (poor, landmarks) = if own.is_empty() { sides[0] } else { sides[1] };
         let found = landmarks.len();
         if !own.is_empty() && !theirs.is_empty() {
-            return Ok(Self { own, theirs: SortedSets::new(theirs), is_axial: false, poor, found });
+            return Ok(Self {
+                own,
+                theirs: SortedSets::new(theirs),
+                is_axial: false,
+                poor,
+                found,
+            });
         }
-        let [own, theirs] = [axial_bases(&matching.source, false), axial_bases(&matching.target, true)];
+        let [own, theirs] = [
+            axial_bases(&matching.source, false),
+            axial_bases(&matching.target, true),
+        ];
         if own.is_empty() || theirs.is_empty() {
             return Err(FeaturesError::TooFew { side: poor, found });
         }
-        Ok(Self { own, theirs: SortedSets::new(theirs), is_axial: true, poor, found })
+        Ok(Self {
+            own,
+            theirs: SortedSets::new(theirs),
+            is_axial: true,
+            poor,
+            found,
+        })
     }
 }
 
 /// Every motion that maps a frame onto a congruent one, with the features it explains.
-fn hypotheses(matching: &Matching, own: &[Base], theirs: &SortedSets) -> Vec<(f64, Isometry3<f64>)> {
+fn hypotheses(
+    matching: &Matching,
+    own: &[Base],
+    theirs: &SortedSets,
+) -> Vec<(f64, Isometry3<f64>)> {
     let play = 2.0 * matching.tolerance;
     let like = |base| -> Vec<&Base> {
         let base: &Base = base;
@@ -194,6 +259,11 @@ fn hypotheses(matching: &Matching, own: &[Base], theirs: &SortedSets) -> Vec<(f6
     // what few can match is most specific
     matches.sort_by_key(|(_, others)| others.len());
     let most = (MOST_COMPARISONS / matching.cost().max(1)).min(MOST_HYPOTHESES);
-    let pairs = matches.iter().flat_map(|(base, others)| others.iter().map(|other| base.onto(other)));
-    pairs.take(most).map(|motion| (matching.score(&motion), motion)).collect()
+    let pairs = matches
+        .iter()
+        .flat_map(|(base, others)| others.iter().map(|other| base.onto(other)));
+    pairs
+        .take(most)
+        .map(|motion| (matching.score(&motion), motion))
+        .collect()
 }

@@ -27,12 +27,24 @@ pub(super) struct Equations {
 /// How a place across its axis, of a plane along its normal, changes with a small motion.
 ///
 /// - `arm`: from the centre of the turn.
-pub(super) fn place_rows(kind: Kind, axis: &Vector3<f64>, arm: &Vector3<f64>, lever: f64) -> Vec<Vector6<f64>> {
-    place_directions(kind, axis).iter().map(|along| point_to_plane_row(arm, along, lever)).collect()
+pub(super) fn place_rows(
+    kind: Kind,
+    axis: &Vector3<f64>,
+    arm: &Vector3<f64>,
+    lever: f64,
+) -> Vec<Vector6<f64>> {
+    place_directions(kind, axis)
+        .iter()
+        .map(|along| point_to_plane_row(arm, along, lever))
+        .collect()
 }
 
 fn place_directions(kind: Kind, axis: &Vector3<f64>) -> Vec<Vector3<f64>> {
-    if kind == Kind::Plane { vec![*axis] } else { tangent_basis(axis).to_vec() }
+    if kind == Kind::Plane {
+        vec![*axis]
+    } else {
+        tangent_basis(axis).to_vec()
+    }
 }
 
 /// The rotation vector that turns one unit vector onto another the shortest way: it says at any angle how far there is to go.
@@ -42,7 +54,12 @@ fn turn_between(from: &Vector3<f64>, to: &Vector3<f64>) -> Vector3<f64> {
 }
 
 impl Equations {
-    pub fn of(pairs: &[DatumPair], motion: &Isometry3<f64>, centre: &Point3<f64>, lever: f64) -> Self {
+    pub fn of(
+        pairs: &[DatumPair],
+        motion: &Isometry3<f64>,
+        centre: &Point3<f64>,
+        lever: f64,
+    ) -> Self {
         let mut all: Vec<(Vector6<f64>, f64, f64)> = Vec::new();
         let mut of_pair = Vec::new();
         for pair in pairs {
@@ -53,7 +70,11 @@ impl Equations {
             let along = place_directions(pair.kind, &across);
             // as many coordinates share the uncertainty
             let std = pair.place_std / (along.len() as f64).sqrt();
-            all.extend(along.iter().map(|along| (point_to_plane_row(&arm, along, lever), along.dot(&off), std)));
+            all.extend(
+                along
+                    .iter()
+                    .map(|along| (point_to_plane_row(&arm, along, lever), along.dot(&off), std)),
+            );
             let places = all.len() - first;
             if let Some((nominal, std)) = pair.nominal_axis.zip(pair.axis_std) {
                 // which end of an axis is named does not matter, which side of a plane does

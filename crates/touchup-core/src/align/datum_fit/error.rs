@@ -22,9 +22,20 @@ pub enum DatumFitError {
 fn open(turns: &[Vector3<f64>], shifts: &[Vector3<f64>]) -> String {
     // no -0.00
     let rounded = |x: f64| (x * 100.0).round() / 100.0 + 0.0;
-    let shown = |v: &Vector3<f64>| format!("({:.2} {:.2} {:.2})", rounded(v.x), rounded(v.y), rounded(v.z));
-    let turns = turns.iter().map(|axis| format!("a turn about {}", shown(axis)));
-    let shifts = shifts.iter().map(|along| format!("a shift along {}", shown(along)));
+    let shown = |v: &Vector3<f64>| {
+        format!(
+            "({:.2} {:.2} {:.2})",
+            rounded(v.x),
+            rounded(v.y),
+            rounded(v.z)
+        )
+    };
+    let turns = turns
+        .iter()
+        .map(|axis| format!("a turn about {}", shown(axis)));
+    let shifts = shifts
+        .iter()
+        .map(|along| format!("a shift along {}", shown(along)));
     let all: Vec<_> = turns.chain(shifts).collect();
     match &*all {
         [] => "all six degrees of freedom are".to_owned(),

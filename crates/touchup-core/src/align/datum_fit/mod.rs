@@ -79,11 +79,17 @@ pub fn fit_datums(
     start: &Isometry3<f64>,
 ) -> Result<DatumFit, DatumFitError> {
     let middle = Point3::from(mean(pairs.iter().map(|pair| pair.measured.coords)));
-    let lever = pairs.iter().map(|pair| (pair.measured - middle).norm()).fold(0.0, f64::max);
+    let lever = pairs
+        .iter()
+        .map(|pair| (pair.measured - middle).norm())
+        .fold(0.0, f64::max);
     // of features in one place, which leave a turn open, any will do
     let lever = if lever > LEAST_LEVER { lever } else { 1.0 };
     if pairs.is_empty() {
-        return Err(DatumFitError::Free { turns: Vec::new(), shifts: Vec::new() });
+        return Err(DatumFitError::Free {
+            turns: Vec::new(),
+            shifts: Vec::new(),
+        });
     }
     let mut motion = *start;
     for _ in 0..MOST_STEPS {
@@ -102,8 +108,16 @@ pub fn fit_datums(
     Err(DatumFitError::NotConverged)
 }
 
-fn moved(motion: &Isometry3<f64>, centre: &Point3<f64>, step: &Vector6<f64>, lever: f64) -> Isometry3<f64> {
-    let (shift, turn) = (step.fixed_rows::<3>(0).into_owned(), step.fixed_rows::<3>(3) / lever);
+fn moved(
+    motion: &Isometry3<f64>,
+    centre: &Point3<f64>,
+    step: &Vector6<f64>,
+    lever: f64,
+) -> Isometry3<f64> {
+    let (shift, turn) = (
+        step.fixed_rows::<3>(0).into_owned(),
+        step.fixed_rows::<3>(3) / lever,
+    );
     moved_by_twist(motion, centre, &shift, &turn)
 }
 
@@ -121,7 +135,9 @@ fn fit_of(
     let gain = &solution.gain;
     let observed = DMatrix::from_diagonal(&equations.stds.map(|std| std * std));
     let scaled = gain * &observed * gain.transpose();
-    let unscaled = Matrix6::from_diagonal(&Vector6::from_fn(|i, _| if i < 3 { 1.0 } else { 1.0 / lever }));
+    let unscaled = Matrix6::from_diagonal(&Vector6::from_fn(
+        |i, _| if i < 3 { 1.0 } else { 1.0 / lever },
+    ));
     let covariance = unscaled * Matrix6::from_fn(|i, j| scaled[(i, j)]) * unscaled;
     let left = DMatrix::identity(equations.len(), equations.len()) - &equations.rows * gain;
     let left = &left * &observed * left.transpose();
@@ -146,7 +162,10 @@ impl DatumFit {
     /// - `std`: of its own.
     pub fn place_std(&self, kind: Kind, place: &Point3<f64>, axis: &Vector3<f64>, std: f64) -> f64 {
         let rows = equations::place_rows(kind, axis, &(place - self.centre), 1.0);
-        let of_frame: f64 = rows.iter().map(|row| (row.transpose() * self.covariance * row)[0].max(0.0)).sum();
+        let of_frame: f64 = rows
+            .iter()
+            .map(|row| (row.transpose() * self.covariance * row)[0].max(0.0))
+            .sum();
         std.hypot(of_frame.sqrt())
     }
 }

@@ -31,12 +31,16 @@ impl Solution {
             if fixed.ncols() > 0 {
                 let fixed = &open * fixed;
                 let weights = numbers.iter().map(|&row| 1.0 / equations.stds[row]);
-                let weights = DMatrix::from_diagonal(&DVector::from_iterator(numbers.len(), weights));
+                let weights =
+                    DMatrix::from_diagonal(&DVector::from_iterator(numbers.len(), weights));
                 let weighted = &weights * &rows * &fixed;
                 let inverse = weighted.pseudo_inverse(0.0).ok()?;
                 // what is left of the misfits after the stages before
                 let mut left_over = -(&rows * &gain);
-                numbers.iter().enumerate().for_each(|(at, &row)| left_over[(at, row)] += 1.0);
+                numbers
+                    .iter()
+                    .enumerate()
+                    .for_each(|(at, &row)| left_over[(at, row)] += 1.0);
                 gain += &fixed * inverse * weights * left_over;
             }
             open = &open * left;
@@ -47,7 +51,11 @@ impl Solution {
     /// # Errors
     /// [`DatumFitError::Free`]
     pub fn check_open(&self) -> Result<(), DatumFitError> {
-        if self.open.ncols() == 0 { Ok(()) } else { Err(free(&self.open)) }
+        if self.open.ncols() == 0 {
+            Ok(())
+        } else {
+            Err(free(&self.open))
+        }
     }
 
     /// Shift, and turn by the shift at the lever, m.
@@ -61,7 +69,9 @@ impl Solution {
 fn parted(rows: &DMatrix<f64>) -> [DMatrix<f64>; 2] {
     let columns = rows.ncols();
     // as many rows as columns, so that the decomposition has all directions
-    let square = rows.clone().resize_vertically(rows.nrows().max(columns), 0.0);
+    let square = rows
+        .clone()
+        .resize_vertically(rows.nrows().max(columns), 0.0);
     let svd = SVD::new(square, false, true);
     let of = |is_fixed: bool| {
         let chosen: Vec<_> = match &svd.v_t {
@@ -71,7 +81,11 @@ fn parted(rows: &DMatrix<f64>) -> [DMatrix<f64>; 2] {
                 .collect(),
             None => Vec::new(),
         };
-        if chosen.is_empty() { DMatrix::zeros(columns, 0) } else { DMatrix::from_columns(&chosen) }
+        if chosen.is_empty() {
+            DMatrix::zeros(columns, 0)
+        } else {
+            DMatrix::from_columns(&chosen)
+        }
     };
     [of(true), of(false)]
 }
@@ -84,9 +98,18 @@ fn free(open: &DMatrix<f64>) -> DatumFitError {
     let (mut turns, mut shifts) = (Vec::new(), Vec::new());
     for (i, row) in svd.v_t.iter().flat_map(|v_t| v_t.row_iter().enumerate()) {
         let along = row.transpose();
-        let of = |part: &DMatrix<f64>| (part * &along).fixed_view::<3, 1>(0, 0).into_owned().try_normalize(0.0);
+        let of = |part: &DMatrix<f64>| {
+            (part * &along)
+                .fixed_view::<3, 1>(0, 0)
+                .into_owned()
+                .try_normalize(0.0)
+        };
         let is_turn = svd.singular_values[i] > LEAST_SHARE;
-        let (part, all) = if is_turn { (&open.rows(3, 3).into_owned(), &mut turns) } else { (&shift, &mut shifts) };
+        let (part, all) = if is_turn {
+            (&open.rows(3, 3).into_owned(), &mut turns)
+        } else {
+            (&shift, &mut shifts)
+        };
         all.extend(of(part).map(|v: Vector3<f64>| upward(&v)));
     }
     DatumFitError::Free { turns, shifts }
@@ -94,5 +117,9 @@ fn free(open: &DMatrix<f64>) -> DatumFitError {
 
 /// Of the two opposite directions that whose largest coordinate is positive.
 fn upward(direction: &Vector3<f64>) -> Vector3<f64> {
-    if direction[direction.iamax()] < 0.0 { -direction } else { *direction }
+    if direction[direction.iamax()] < 0.0 {
+        -direction
+    } else {
+        *direction
+    }
 }

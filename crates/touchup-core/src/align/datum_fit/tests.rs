@@ -34,23 +34,40 @@ fn motion() -> Isometry3<f64> {
 }
 
 fn start(motion: &Isometry3<f64>) -> Isometry3<f64> {
-    Isometry3::new(Vector3::new(0.002, -0.001, 0.001), Vector3::new(0.05, 0.03, -0.04)) * motion
+    Isometry3::new(
+        Vector3::new(0.002, -0.001, 0.001),
+        Vector3::new(0.05, 0.03, -0.04),
+    ) * motion
 }
 
 /// How far two motions bring a part of 60 mm apart, m and rad.
 fn apart(a: &Isometry3<f64>, b: &Isometry3<f64>) -> [f64; 2] {
     let middle = a.inverse() * Point3::new(0.03, 0.025, 0.012);
-    [(a * middle - b * middle).norm(), a.rotation.angle_to(&b.rotation)]
+    [
+        (a * middle - b * middle).norm(),
+        a.rotation.angle_to(&b.rotation),
+    ]
 }
 
 #[test]
 fn the_motion_of_a_part_as_drawn_is_found_by_best_fit_and_by_datums() {
-    for stages in [vec![(0..5).collect()], vec![vec![0], vec![1], vec![2]], vec![vec![0], vec![4], vec![3]]] {
+    for stages in [
+        vec![(0..5).collect()],
+        vec![vec![0], vec![1], vec![2]],
+        vec![vec![0], vec![4], vec![3]],
+    ] {
         let pairs = plate(&motion());
         let fit = fit_datums(&pairs, &stages, &start(&motion())).unwrap();
         let [shift, turn] = apart(&fit.motion, &motion());
-        assert!(shift < 1e-10 && turn < 1e-9, "{stages:?}: {shift} m, {turn} rad");
-        assert!(fit.residuals.iter().all(|residual| *residual < 1e-10), "{:?}", fit.residuals);
+        assert!(
+            shift < 1e-10 && turn < 1e-9,
+            "{stages:?}: {shift} m, {turn} rad"
+        );
+        assert!(
+            fit.residuals.iter().all(|residual| *residual < 1e-10),
+            "{:?}",
+            fit.residuals
+        );
     }
 }
 
@@ -70,17 +87,33 @@ fn datums_count_in_their_order() {
     let pairs = [
         plane(Point3::new(0.0, 0.0, 0.0), Vector3::z(), Vector3::z()),
         // leans down, and is turned about z
-        plane(Point3::new(0.05, 0.0, 0.0), Vector3::x(), Vector3::new(lean.cos(), lean.sin(), 0.02)),
+        plane(
+            Point3::new(0.05, 0.0, 0.0),
+            Vector3::x(),
+            Vector3::new(lean.cos(), lean.sin(), 0.02),
+        ),
         plane(Point3::new(0.0, 0.05, 0.0), Vector3::y(), Vector3::y()),
     ];
     let fit = fit_datums(&pairs, &[vec![0], vec![1], vec![2]], &Isometry3::identity()).unwrap();
     // by hand: the turn about z that brings the second normal over x
     let expected = Vector3::new(0.0, 0.0, -lean);
-    assert!((fit.motion.rotation.scaled_axis() - expected).norm() < 1e-6, "{:?}", fit.motion.rotation.scaled_axis());
-    assert!(fit.residuals.iter().all(|residual| *residual < 1e-10), "{:?}", fit.residuals);
-    let reversed = fit_datums(&pairs, &[vec![1], vec![0], vec![2]], &Isometry3::identity()).unwrap();
+    assert!(
+        (fit.motion.rotation.scaled_axis() - expected).norm() < 1e-6,
+        "{:?}",
+        fit.motion.rotation.scaled_axis()
+    );
+    assert!(
+        fit.residuals.iter().all(|residual| *residual < 1e-10),
+        "{:?}",
+        fit.residuals
+    );
+    let reversed =
+        fit_datums(&pairs, &[vec![1], vec![0], vec![2]], &Isometry3::identity()).unwrap();
     let met = reversed.motion * pairs[1].measured_axis;
-    assert!((met - Vector3::x()).norm() < 1e-9, "now the second is met whole: {met}");
+    assert!(
+        (met - Vector3::x()).norm() < 1e-9,
+        "now the second is met whole: {met}"
+    );
 }
 
 /// What repeated measurements scatter by, against what one of them says.
@@ -103,7 +136,11 @@ fn uncertainties_are_those_of_repeated_measurements() {
                 let across = Vector3::new(gauss(share), gauss(share), gauss(share));
                 let axis = pair.measured_axis;
                 let along = axis * axis.dot(&across);
-                pair.measured += if pair.kind == Kind::Plane { along } else { across - along };
+                pair.measured += if pair.kind == Kind::Plane {
+                    along
+                } else {
+                    across - along
+                };
                 let tilt = Vector3::new(gauss(7e-4), gauss(7e-4), gauss(7e-4));
                 pair.measured_axis = (axis + tilt - axis * axis.dot(&tilt)).normalize();
                 pair.axis_std = Some(7e-4 * 2f64.sqrt());
@@ -112,36 +149,65 @@ fn uncertainties_are_those_of_repeated_measurements() {
             let between = fit.motion * motion().inverse();
             shifts.push((between * fit.centre - fit.centre).norm_squared());
             turns.push(between.rotation.angle().powi(2));
-            off.iter_mut().zip(&fit.residuals).for_each(|(sum, residual)| *sum += residual * residual);
+            off.iter_mut()
+                .zip(&fit.residuals)
+                .for_each(|(sum, residual)| *sum += residual * residual);
             // that of the side, which is in no stage, is about its nominal normal
             stated = Some(fit);
         }
         let stated = stated.unwrap();
         let mean = |squares: &[f64]| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
         let diagonal = stated.covariance.diagonal();
-        let [shift, turn] = [diagonal.rows(0, 3).sum().sqrt(), diagonal.rows(3, 3).sum().sqrt()];
-        assert!((mean(&shifts) / shift - 1.0).abs() < 0.07, "{stages:?}: {} and {shift} m", mean(&shifts));
-        assert!((mean(&turns) / turn - 1.0).abs() < 0.07, "{stages:?}: {} and {turn} rad", mean(&turns));
+        let [shift, turn] = [
+            diagonal.rows(0, 3).sum().sqrt(),
+            diagonal.rows(3, 3).sum().sqrt(),
+        ];
+        assert!(
+            (mean(&shifts) / shift - 1.0).abs() < 0.07,
+            "{stages:?}: {} and {shift} m",
+            mean(&shifts)
+        );
+        assert!(
+            (mean(&turns) / turn - 1.0).abs() < 0.07,
+            "{stages:?}: {} and {turn} rad",
+            mean(&turns)
+        );
         for (at, (sum, std)) in off.iter().zip(&stated.place_stds).enumerate() {
             let found = (sum / f64::from(runs)).sqrt();
-            assert!((found - std).abs() < 0.07 * std.max(1e-6), "{stages:?}, {at}: {found} and {std} m");
+            assert!(
+                (found - std).abs() < 0.07 * std.max(1e-6),
+                "{stages:?}, {at}: {found} and {std} m"
+            );
         }
         let side = stated.place_std(Kind::Plane, &exact[4].nominal, &Vector3::x(), own[4]);
-        assert!((side / stated.place_stds[4] - 1.0).abs() < 1e-3, "the same by both ways: {side} m");
+        assert!(
+            (side / stated.place_stds[4] - 1.0).abs() < 1e-3,
+            "the same by both ways: {side} m"
+        );
     }
 }
 
 #[test]
 fn what_is_left_open_is_named() {
     let pairs = plate(&Isometry3::identity());
-    let open = |stages: &[Vec<usize>]| fit_datums(&pairs, stages, &Isometry3::identity()).unwrap_err();
-    let DatumFitError::Free { turns, shifts } = open(&[vec![0]]) else { panic!("no other") };
+    let open =
+        |stages: &[Vec<usize>]| fit_datums(&pairs, stages, &Isometry3::identity()).unwrap_err();
+    let DatumFitError::Free { turns, shifts } = open(&[vec![0]]) else {
+        panic!("no other")
+    };
     assert_eq!((turns.len(), shifts.len()), (1, 2));
-    assert!((turns[0] - Vector3::z()).norm() < 1e-9 && shifts.iter().all(|shift| shift.z.abs() < 1e-9));
+    assert!(
+        (turns[0] - Vector3::z()).norm() < 1e-9 && shifts.iter().all(|shift| shift.z.abs() < 1e-9)
+    );
     let error = open(&[vec![1]]);
-    let DatumFitError::Free { turns, shifts } = &error else { panic!("no other") };
+    let DatumFitError::Free { turns, shifts } = &error else {
+        panic!("no other")
+    };
     assert!((turns[0] - Vector3::z()).norm() < 1e-9 && (shifts[0] - Vector3::z()).norm() < 1e-9);
-    assert_eq!(error.to_string(), "a turn about (0.00 0.00 1.00) and a shift along (0.00 0.00 1.00) are left open");
+    assert_eq!(
+        error.to_string(),
+        "a turn about (0.00 0.00 1.00) and a shift along (0.00 0.00 1.00) are left open"
+    );
     assert!(matches!(open(&[]), DatumFitError::Free { .. }));
     assert!(fit_datums(&[], &[], &Isometry3::identity()).is_err());
 }

@@ -17,13 +17,17 @@ names! {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PairsError {
     /// Fewer than three.
-    #[error("{count} pairs do not determine a motion: pick at least 3, better 6, far apart and not on one line")]
+    #[error(
+        "{count} pairs do not determine a motion: pick at least 3, better 6, far apart and not on one line"
+    )]
     TooFew {
         /// how many there are
         count: usize,
     },
     /// NaN, infinite or absurdly far.
-    #[error("pair {pair}: its {side} point is not finite or farther than 1000 km away; pick it again")]
+    #[error(
+        "pair {pair}: its {side} point is not finite or farther than 1000 km away; pick it again"
+    )]
     BadPoint {
         /// which pair
         pair: usize,
@@ -31,7 +35,9 @@ pub enum PairsError {
         side: PairSide,
     },
     /// A standard deviation that is not positive and finite.
-    #[error("pair {pair}: its sigma is {sigma_mm} mm; it must be more than 0, leave it out where it is not known")]
+    #[error(
+        "pair {pair}: its sigma is {sigma_mm} mm; it must be more than 0, leave it out where it is not known"
+    )]
     BadSigma {
         /// which pair
         pair: usize,
@@ -39,7 +45,9 @@ pub enum PairsError {
         sigma_mm: f64,
     },
     /// The same for all pairs.
-    #[error("the sigma of the pairs is {sigma_mm} mm; it must be 1e-9 to 1e6 mm, leave it out where it is not known")]
+    #[error(
+        "the sigma of the pairs is {sigma_mm} mm; it must be 1e-9 to 1e6 mm, leave it out where it is not known"
+    )]
     BadGivenSigma {
         /// as given
         sigma_mm: f64,
@@ -72,7 +80,9 @@ pub enum PairsError {
         across_mm: f64,
     },
     /// Distances differ by a factor.
-    #[error("distances in space are {factor:.5} times those on the scan{named}: give both in one unit")]
+    #[error(
+        "distances in space are {factor:.5} times those on the scan{named}: give both in one unit"
+    )]
     Scale {
         /// space over scan
         factor: f64,
@@ -123,6 +133,8 @@ pub enum PairsError {
         hint: &'static str,
     },
     /// The decomposition did not converge.
-    #[error("the pairs determine no rotation: their coordinates are out of all proportion; check them")]
+    #[error(
+        "the pairs determine no rotation: their coordinates are out of all proportion; check them"
+    )]
     NoRotation,
 }

@@ -25,7 +25,10 @@ const MIRROR_RATIO: f64 = 3.0;
 
 /// Factors between units, space over scan, and what they are known for.
 const UNITS: [(f64, &str); 8] = [
-    (1000.0, " (1000: the scan is in m, or taken for mm, and space in mm)"),
+    (
+        1000.0,
+        " (1000: the scan is in m, or taken for mm, and space in mm)",
+    ),
     (1e-3, " (1/1000: space is in m and the scan in mm)"),
     (25.4, " (25.4: the scan is in inches)"),
     (1.0 / 25.4, " (1/25.4: space is in inches)"),
@@ -42,13 +45,17 @@ pub(super) fn check(
     solved: &SolvedMotion,
 ) -> Result<(), PairsError> {
     let total: f64 = weights.iter().sum();
-    let [rms, mirrored] = [solved.squares, solved.mirrored_squares].map(|squares| (squares / total).sqrt());
+    let [rms, mirrored] =
+        [solved.squares, solved.mirrored_squares].map(|squares| (squares / total).sqrt());
     let extent = extent(pairs);
     let limit = params.largest_rms.min(LARGEST_SHARE * extent[0]);
     if rms > limit {
         check_scale(extent)?;
         if mirrored <= limit && rms > MIRROR_RATIO * mirrored {
-            return Err(PairsError::Mirrored { rms_mm: rms * 1e3, mirrored_mm: mirrored * 1e3 });
+            return Err(PairsError::Mirrored {
+                rms_mm: rms * 1e3,
+                mirrored_mm: mirrored * 1e3,
+            });
         }
     }
     check_each(pairs, weights, params, solved)?;
@@ -56,18 +63,38 @@ pub(super) fn check(
         return Ok(());
     }
     let residual = |pair: &PointPair| (pair.to - solved.motion * pair.from).norm();
-    let worst = pairs.iter().enumerate().max_by(|a, b| residual(a.1).total_cmp(&residual(b.1)));
+    let worst = pairs
+        .iter()
+        .enumerate()
+        .max_by(|a, b| residual(a.1).total_cmp(&residual(b.1)));
     let (worst, worst_mm) = worst.map_or((0, 0.0), |(i, pair)| (i + 1, residual(pair) * 1e3));
-    let hint = if pairs.len() < FEWEST_TO_BLAME { "; with 5 pairs or more the wrong one can be named" } else { "" };
-    Err(PairsError::Disagree { rms_mm: rms * 1e3, limit_mm: limit * 1e3, worst, worst_mm, hint })
+    let hint = if pairs.len() < FEWEST_TO_BLAME {
+        "; with 5 pairs or more the wrong one can be named"
+    } else {
+        ""
+    };
+    Err(PairsError::Disagree {
+        rms_mm: rms * 1e3,
+        limit_mm: limit * 1e3,
+        worst,
+        worst_mm,
+        hint,
+    })
 }
 
 /// Rms distance from the middle, of `from` and of `to`, m.
 fn extent(pairs: &[PointPair]) -> [f64; 2] {
     let n = pairs.len() as f64;
     [super::PairSide::From, super::PairSide::To].map(|side| {
-        let mean = pairs.iter().map(|pair| pair.on(side).coords / n).sum::<nalgebra::Vector3<f64>>();
-        pairs.iter().map(|pair| (pair.on(side).coords - mean).norm_squared() / n).sum::<f64>().sqrt()
+        let mean = pairs
+            .iter()
+            .map(|pair| pair.on(side).coords / n)
+            .sum::<nalgebra::Vector3<f64>>();
+        pairs
+            .iter()
+            .map(|pair| (pair.on(side).coords - mean).norm_squared() / n)
+            .sum::<f64>()
+            .sqrt()
     })
 }
 
@@ -77,8 +104,12 @@ fn check_scale([from, to]: [f64; 2]) -> Result<(), PairsError> {
     if (factor - 1.0).abs() <= SCALE_TOLERANCE {
         return Ok(());
     }
-    let named = UNITS.iter().find(|(known, _)| (factor / known - 1.0).abs() < NAMED_TOLERANCE);
-    named.map_or(Ok(()), |&(_, named)| Err(PairsError::Scale { factor, named }))
+    let named = UNITS
+        .iter()
+        .find(|(known, _)| (factor / known - 1.0).abs() < NAMED_TOLERANCE);
+    named.map_or(Ok(()), |&(_, named)| {
+        Err(PairsError::Scale { factor, named })
+    })
 }
 
 /// Each pair against the others; as many as may matter.
@@ -93,21 +124,35 @@ fn check_each(
         return Ok(());
     }
     let mut order: Vec<usize> = (0..n).collect();
-    let residual = |i: usize| weights[i] * (pairs[i].to - all.motion * pairs[i].from).norm_squared();
+    let residual =
+        |i: usize| weights[i] * (pairs[i].to - all.motion * pairs[i].from).norm_squared();
     order.sort_by(|&i, &j| residual(j).total_cmp(&residual(i)));
     let mut worst: Option<(f64, PairsError)> = None;
     for i in order.into_iter().take(MOST_TO_BLAME) {
         let pair = &pairs[i];
-        let Some(others) = SolvedMotion::of(pairs, weights, Some(i)) else { continue };
+        let Some(others) = SolvedMotion::of(pairs, weights, Some(i)) else {
+            continue;
+        };
         let distance = (pair.to - others.motion * pair.from).norm();
-        let least = pair.sigma.or(params.sigma).map_or(params.least_misfit, |sigma| 4.0 * sigma);
+        let least = pair
+            .sigma
+            .or(params.sigma)
+            .map_or(params.least_misfit, |sigma| 4.0 * sigma);
         let chance = beta_below(others.squares / all.squares, 1.5 * (n as f64 - 3.0));
-        if distance < least || chance * n as f64 > FALSE_ALARM || worst.as_ref().is_some_and(|(c, _)| *c <= chance) {
+        if distance < least
+            || chance * n as f64 > FALSE_ALARM
+            || worst.as_ref().is_some_and(|(c, _)| *c <= chance)
+        {
             continue;
         }
         let rest: f64 = weights.iter().sum::<f64>() - weights[i];
         let rest_mm = (others.squares / rest).sqrt() * 1e3;
-        let outlier = PairsError::Outlier { pair: i + 1, distance_mm: distance * 1e3, others: n - 1, rest_mm };
+        let outlier = PairsError::Outlier {
+            pair: i + 1,
+            distance_mm: distance * 1e3,
+            others: n - 1,
+            rest_mm,
+        };
         worst = Some((chance, outlier));
     }
     worst.map_or(Ok(()), |(_, outlier)| Err(outlier))
@@ -124,7 +169,10 @@ fn beta_below(x: f64, a: f64) -> f64 {
         let to = (from * from + 64.0 / a).sqrt().min(1.0);
         let step = (to - from) / f64::from(STEPS);
         let at = |k: u32| from + (f64::from(k) + 0.5) * step;
-        (0..STEPS).map(at).map(|u| (1.0 - u * u).powf(a - 1.0) * 2.0 * u * u * step).sum::<f64>()
+        (0..STEPS)
+            .map(at)
+            .map(|u| (1.0 - u * u).powf(a - 1.0) * 2.0 * u * u * step)
+            .sum::<f64>()
     };
     integral((1.0 - x).sqrt()) / integral(0.0)
 }
@@ -140,7 +188,11 @@ mod tests {
         for x in [0.01, 0.2, 0.5, 0.9] {
             let u = (1.0_f64 - x).sqrt();
             let exact = (tail(1.0) - tail(u)) / tail(1.0);
-            assert!((beta_below(x, 3.0) / exact - 1.0).abs() < 1e-3, "{x}: {} {exact}", beta_below(x, 3.0));
+            assert!(
+                (beta_below(x, 3.0) / exact - 1.0).abs() < 1e-3,
+                "{x}: {} {exact}",
+                beta_below(x, 3.0)
+            );
         }
         assert_eq!(beta_below(0.0, 3.0), 0.0);
         // many pairs: −2 a ln t tends to χ² of three, of which 12.838 leaves 0.5 % above

@@ -31,7 +31,11 @@ pub struct PairsParams {
 
 impl Default for PairsParams {
     fn default() -> Self {
-        Self { sigma: None, largest_rms: 3e-3, least_misfit: 0.2e-3 }
+        Self {
+            sigma: None,
+            largest_rms: 3e-3,
+            least_misfit: 0.2e-3,
+        }
     }
 }
 
@@ -67,25 +71,49 @@ pub(super) struct SolvedMotion {
 impl SolvedMotion {
     /// - `without`: a pair that is left out.
     pub fn of(pairs: &[PointPair], weights: &[f64], without: Option<usize>) -> Option<Self> {
-        let kept = || pairs.iter().zip(weights).enumerate().filter(|(i, _)| Some(*i) != without).map(|(_, pair)| pair);
+        let kept = || {
+            pairs
+                .iter()
+                .zip(weights)
+                .enumerate()
+                .filter(|(i, _)| Some(*i) != without)
+                .map(|(_, pair)| pair)
+        };
         let total: f64 = kept().map(|(_, w)| w).sum();
         let mean = |side: fn(&PointPair) -> Point3<f64>| {
-            Point3::from(kept().map(|(pair, w)| side(pair).coords * *w).sum::<Vector3<f64>>() / total)
+            Point3::from(
+                kept()
+                    .map(|(pair, w)| side(pair).coords * *w)
+                    .sum::<Vector3<f64>>()
+                    / total,
+            )
         };
         let (a, b) = (mean(|pair| pair.from), mean(|pair| pair.to));
-        let cross: Matrix3<f64> = kept().map(|(p, w)| (p.to - b) * (p.from - a).transpose() * *w).sum();
+        let cross: Matrix3<f64> = kept()
+            .map(|(p, w)| (p.to - b) * (p.from - a).transpose() * *w)
+            .sum();
         let svd = SVD::try_new(cross, true, true, f64::EPSILON, 1000)?;
         let (u, v_t) = (svd.u?, svd.v_t?);
         let smallest = svd.singular_values.imin();
         let mut signs = Vector3::repeat(1.0);
         signs[smallest] = (u.determinant() * v_t.determinant()).signum();
         let turn = u * Matrix3::from_diagonal(&signs) * v_t;
-        let mut rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));
+        let mut rotation =
+            UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));
         rotation.renormalize();
         let motion = Isometry3::from_parts((b - rotation * a.coords).into(), rotation);
-        let [squares, mirrored_squares] = [motion.rotation.to_rotation_matrix().into_inner(), u * v_t]
-            .map(|turn| kept().map(|(p, w)| w * ((p.to - b) - turn * (p.from - a)).norm_squared()).sum::<f64>());
-        squares.is_finite().then_some(Self { motion, middle: a, squares, mirrored_squares })
+        let [squares, mirrored_squares] =
+            [motion.rotation.to_rotation_matrix().into_inner(), u * v_t].map(|turn| {
+                kept()
+                    .map(|(p, w)| w * ((p.to - b) - turn * (p.from - a)).norm_squared())
+                    .sum::<f64>()
+            });
+        squares.is_finite().then_some(Self {
+            motion,
+            middle: a,
+            squares,
+            mirrored_squares,
+        })
     }
 
     pub fn fit(&self, pairs: &[PointPair], weights: &[f64], given: Option<f64>) -> PairsFit {
@@ -93,7 +121,9 @@ impl SolvedMotion {
         let n = pairs.len() as f64;
         let rms = (residuals.iter().map(Vector3::norm_squared).sum::<f64>() / n).sqrt();
         let seen = (self.squares / (3.0 * n - 6.0)).sqrt();
-        let sigma = given.filter(|given| seen <= LARGEST_SIGMA_RATIO * given).unwrap_or(seen);
+        let sigma = given
+            .filter(|given| seen <= LARGEST_SIGMA_RATIO * given)
+            .unwrap_or(seen);
         let inertia: Matrix3<f64> = pairs
             .iter()
             .zip(weights)
@@ -106,8 +136,17 @@ impl SolvedMotion {
         let shift = Matrix3::identity() / weights.iter().sum::<f64>();
         covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&shift);
         // not singular: the points are on no line
-        covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&inertia.try_inverse().unwrap_or_default());
+        covariance
+            .fixed_view_mut::<3, 3>(3, 3)
+            .copy_from(&inertia.try_inverse().unwrap_or_default());
         let centroid = self.motion * self.middle;
-        PairsFit { motion: self.motion, residuals, rms, sigma, centroid, covariance: covariance * (sigma * sigma) }
+        PairsFit {
+            motion: self.motion,
+            residuals,
+            rms,
+            sigma,
+            centroid,
+            covariance: covariance * (sigma * sigma),
+        }
     }
 }

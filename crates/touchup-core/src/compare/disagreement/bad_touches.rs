@@ -44,11 +44,18 @@ const NEAR: f64 = 1e-3;
 const SHARE: f64 = 0.5;
 
 /// Those rejected, and those that lie off the surface and off what others measured there.
-pub(super) fn find(refined: &RefinedShape<'_>, touches: &[ProbedPoint]) -> Result<Vec<BadTouches>, CompareError> {
+pub(super) fn find(
+    refined: &RefinedShape<'_>,
+    touches: &[ProbedPoint],
+) -> Result<Vec<BadTouches>, CompareError> {
     let (off, feet) = distances(refined, touches)?;
     let points: Vec<Point3<f64>> = touches.iter().map(|touch| touch.point).collect();
     let reach = reach(touches);
-    let taken = PointGrid::of(&points, (0..touches.len()).filter(|&at| !touches[at].is_rejected), reach);
+    let taken = PointGrid::of(
+        &points,
+        (0..touches.len()).filter(|&at| !touches[at].is_rejected),
+        reach,
+    );
     let is_bad = |at: usize| {
         let limit = limit(&touches[at]);
         touches[at].is_rejected
@@ -56,10 +63,18 @@ pub(super) fn find(refined: &RefinedShape<'_>, touches: &[ProbedPoint]) -> Resul
                 && contradiction(touches, at, &taken, &feet[at], reach).is_some_and(|d| d > limit))
     };
     let bad: Vec<usize> = (0..touches.len()).filter(|&at| is_bad(at)).collect();
-    let good = PointGrid::of(&points, (0..touches.len()).filter(|at| bad.binary_search(at).is_err()), reach);
-    let goes_on = |a: &usize, b: &usize| touches[*b].stamp_ns.saturating_sub(touches[*a].stamp_ns) <= PAUSE_NS;
+    let good = PointGrid::of(
+        &points,
+        (0..touches.len()).filter(|at| bad.binary_search(at).is_err()),
+        reach,
+    );
+    let goes_on = |a: &usize, b: &usize| {
+        touches[*b].stamp_ns.saturating_sub(touches[*a].stamp_ns) <= PAUSE_NS
+    };
     let bad_touches_of = |numbers: &[usize]| {
-        bad_touches_of(numbers, touches, &off, |worst| against(touches, worst, &good, &feet[worst], reach).count())
+        bad_touches_of(numbers, touches, &off, |worst| {
+            against(touches, worst, &good, &feet[worst], reach).count()
+        })
     };
     Ok(bad.chunk_by(goes_on).map(bad_touches_of).collect())
 }
@@ -78,16 +93,31 @@ fn against<'a>(
     reach: f64,
 ) -> impl Iterator<Item = usize> + 'a {
     others.near(foot, reach / 2.0).filter(move |&other| {
-        let is_other = touches[other].stamp_ns.abs_diff(touches[at].stamp_ns) > PAUSE_NS.unsigned_abs();
+        let is_other =
+            touches[other].stamp_ns.abs_diff(touches[at].stamp_ns) > PAUSE_NS.unsigned_abs();
         is_other && touches[other].normal.dot(&touches[at].normal) > ALIKE
     })
 }
 
 /// How far a touch is from the planes that others measured there, the middle of them, m; `None` where they are too few.
-fn contradiction(touches: &[ProbedPoint], at: usize, taken: &PointGrid, foot: &Point3<f64>, reach: f64) -> Option<f64> {
-    let off = |other: usize| (touches[at].point - touches[other].point).dot(&touches[other].normal).abs();
+fn contradiction(
+    touches: &[ProbedPoint],
+    at: usize,
+    taken: &PointGrid,
+    foot: &Point3<f64>,
+    reach: f64,
+) -> Option<f64> {
+    let off = |other: usize| {
+        (touches[at].point - touches[other].point)
+            .dot(&touches[other].normal)
+            .abs()
+    };
     let mut off: Vec<f64> = against(touches, at, taken, foot, reach).map(off).collect();
-    if off.len() < FEWEST { None } else { median(&mut off) }
+    if off.len() < FEWEST {
+        None
+    } else {
+        median(&mut off)
+    }
 }
 
 fn bad_touches_of(
@@ -98,13 +128,20 @@ fn bad_touches_of(
 ) -> BadTouches {
     let sum: Vector3<f64> = numbers.iter().map(|&at| touches[at].point.coords).sum();
     let sigmas = |at: usize| off[at] / touches[at].sigma_along_normal().max(LEAST_SIGMA);
-    let worst = numbers.iter().copied().max_by(|a, b| off[*a].abs().total_cmp(&off[*b].abs())).unwrap_or(numbers[0]);
+    let worst = numbers
+        .iter()
+        .copied()
+        .max_by(|a, b| off[*a].abs().total_cmp(&off[*b].abs()))
+        .unwrap_or(numbers[0]);
     BadTouches {
         touches: numbers.iter().map(|&at| at as u32).collect(),
         centre: (sum / numbers.len() as f64).into(),
         off: off[worst],
         sigmas: sigmas(worst).abs(),
-        rejected: numbers.iter().filter(|&&at| touches[at].is_rejected).count(),
+        rejected: numbers
+            .iter()
+            .filter(|&&at| touches[at].is_rejected)
+            .count(),
         against: against(worst),
     }
 }
@@ -119,7 +156,11 @@ fn distances(
     let centres: Vec<Point3<f64>> = touches.iter().map(|touch| touch.centre).collect();
     let foot = |centre: &Point3<f64>, hit: &FaceHit| (signed(centre, mesh, hit), hit.point);
     let feet = at_closest_places(&centres, mesh, refined.shape.tree, &Alone, foot)?;
-    Ok(feet.into_iter().zip(touches).map(|((distance, foot), touch)| (distance - touch.radius, foot)).unzip())
+    Ok(feet
+        .into_iter()
+        .zip(touches)
+        .map(|((distance, foot), touch)| (distance - touch.radius, foot))
+        .unzip())
 }
 
 fn reach(touches: &[ProbedPoint]) -> f64 {
@@ -128,19 +169,29 @@ fn reach(touches: &[ProbedPoint]) -> f64 {
 }
 
 /// Marks the places that most touches near them say wrongly.
-pub(super) fn mark(refined: &RefinedShape<'_>, touches: &[ProbedPoint], bad: &[BadTouches], classes: &mut [Class]) {
+pub(super) fn mark(
+    refined: &RefinedShape<'_>,
+    touches: &[ProbedPoint],
+    bad: &[BadTouches],
+    classes: &mut [Class],
+) {
     let mesh = refined.shape.mesh;
     let points: Vec<Point3<f64>> = touches.iter().map(|touch| touch.point).collect();
     let reach = reach(touches);
     let all = PointGrid::of(&points, 0..points.len(), reach);
     let mut is_bad = vec![false; touches.len()];
-    bad.iter().flat_map(|bad| &bad.touches).for_each(|&at| is_bad[at as usize] = true);
+    bad.iter()
+        .flat_map(|bad| &bad.touches)
+        .for_each(|&at| is_bad[at as usize] = true);
     let near_bad = PointGrid::of(&points, (0..points.len()).filter(|&at| is_bad[at]), reach);
     for (at, class) in classes.iter_mut().enumerate() {
         let p = mesh.positions()[at];
         if class.is_touched() && near_bad.near(&p, reach).next().is_some() {
             let count = all.near(&p, reach / 2.0).count();
-            let wrong = all.near(&p, reach / 2.0).filter(|&touch| is_bad[touch]).count();
+            let wrong = all
+                .near(&p, reach / 2.0)
+                .filter(|&touch| is_bad[touch])
+                .count();
             if wrong > 0 && wrong as f64 >= SHARE * count as f64 {
                 *class = Class::BadTouch;
             }

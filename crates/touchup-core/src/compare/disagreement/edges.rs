@@ -20,7 +20,10 @@ const FITS: f64 = 0.85;
 /// Median length of the edges, m.
 fn median_edge(mesh: &TriMesh) -> f64 {
     let sides = |[a, b, c]: [Point3<f64>; 3]| [(a - b).norm(), (b - c).norm(), (c - a).norm()];
-    let mut lengths: Vec<f64> = mesh.faces().flat_map(|(face, _)| sides(mesh.triangle(face))).collect();
+    let mut lengths: Vec<f64> = mesh
+        .faces()
+        .flat_map(|(face, _)| sides(mesh.triangle(face)))
+        .collect();
     median(&mut lengths).unwrap_or(0.0)
 }
 
@@ -35,8 +38,12 @@ fn sharp_vertices(mesh: &TriMesh, is_seen: &[bool]) -> Vec<[bool; 2]> {
             }
             for other in mesh.faces_at_edge(a, b).filter(|&other| other != face) {
                 if mesh.normal(face).dot(&mesh.normal(other)) < SHARP {
-                    let side = usize::from((mesh.barycentre(other) - mesh.position(a)).dot(&mesh.normal(face)) > 0.0);
-                    [a, b].into_iter().for_each(|v| is_sharp[v.0 as usize][side] = true);
+                    let side = usize::from(
+                        (mesh.barycentre(other) - mesh.position(a)).dot(&mesh.normal(face)) > 0.0,
+                    );
+                    [a, b]
+                        .into_iter()
+                        .for_each(|v| is_sharp[v.0 as usize][side] = true);
                 }
             }
         }
@@ -59,7 +66,11 @@ impl SharpEdges {
         let (resolution, is_sharp) = (median_edge(scan), sharp_vertices(refined, is_seen));
         let sharp = (0..is_sharp.len()).filter(|&at| is_sharp[at] != [false; 2]);
         let grid = PointGrid::of(refined.positions(), sharp, ROUNDED * resolution);
-        Self { resolution, is_sharp, grid }
+        Self {
+            resolution,
+            is_sharp,
+            grid,
+        }
     }
 
     /// Edges are rounded within this, m.
@@ -85,14 +96,24 @@ impl SharpEdges {
     /// Whether an edge of the surface that a place lies on, near it, is convex, so that a scan may be too low there, and whether one turns
     /// in, so that it may be too high.
     pub fn may_be(&self, mesh: &TriMesh, p: &Point3<f64>, normal: &Vector3<f64>) -> [bool; 2] {
-        let is_own = |&other: &usize| (mesh.positions()[other] - p).dot(normal).abs() <= LEVEL * self.resolution;
-        let sides = self.near(p).filter(is_own).map(|other| self.is_sharp[other]);
-        sides.fold([false; 2], |[out, inward], [convex, concave]| [out || convex, inward || concave])
+        let is_own = |&other: &usize| {
+            (mesh.positions()[other] - p).dot(normal).abs() <= LEVEL * self.resolution
+        };
+        let sides = self
+            .near(p)
+            .filter(is_own)
+            .map(|other| self.is_sharp[other]);
+        sides.fold([false; 2], |[out, inward], [convex, concave]| {
+            [out || convex, inward || concave]
+        })
     }
 
     /// Whether a place is wide enough for a scanner of this resolution.
     pub fn is_wide(&self, shape: &IndexedMesh<'_>, p: &Point3<f64>, normal: &Vector3<f64>) -> bool {
         let radius = self.sees_from() / 2.0;
-        shape.tree.closest(shape.mesh, &(p + normal * radius), FITS * radius).is_none()
+        shape
+            .tree
+            .closest(shape.mesh, &(p + normal * radius), FITS * radius)
+            .is_none()
     }
 }

@@ -98,10 +98,21 @@ pub fn disagreement(
     let bad_touches = bad_touches::find(refined, touches)?;
     let mut classes = places.first_classes(refined, scanner.as_ref());
     let regions = scanner.as_ref().map_or_else(Vec::new, |scanner| {
-        regions::find(&regions::RegionInput { refined, places: &places, scanner, touches }, &mut classes)
+        regions::find(
+            &regions::RegionInput {
+                refined,
+                places: &places,
+                scanner,
+                touches,
+            },
+            &mut classes,
+        )
     });
     bad_touches::mark(refined, touches, &bad_touches, &mut classes);
-    off.iter_mut().zip(&classes).filter(|(_, class)| !class.is_touched()).for_each(|(off, _)| *off = 0.0);
+    off.iter_mut()
+        .zip(&classes)
+        .filter(|(_, class)| !class.is_touched())
+        .for_each(|(off, _)| *off = 0.0);
     let on_scan = carried(scan, refined, &classes)?;
     Ok(Disagreement {
         rigid_offset,
@@ -128,17 +139,40 @@ impl Places {
         })?;
         let edges = SharpEdges::of(scan.mesh, mesh, &is_seen);
         let places = || mesh.positions().iter().zip(&normals).enumerate();
-        let may_be = |(at, (p, normal))| if is_seen[at] { edges.may_be(mesh, p, normal) } else { [true; 2] };
+        let may_be = |(at, (p, normal))| {
+            if is_seen[at] {
+                edges.may_be(mesh, p, normal)
+            } else {
+                [true; 2]
+            }
+        };
         let may_be = places().map(may_be).collect();
-        let is_wide = |(at, (p, normal))| is_seen[at] && faces_alike[at] && edges.is_wide(&refined.shape, p, normal);
+        let is_wide = |(at, (p, normal))| {
+            is_seen[at] && faces_alike[at] && edges.is_wide(&refined.shape, p, normal)
+        };
         let is_wide: Vec<bool> = places().map(is_wide).collect();
-        let is_open = places().map(|(at, (p, _))| is_wide[at] && !edges.is_near(p)).collect();
-        Ok(Self { positions: mesh.positions().to_vec(), off, is_seen, is_wide, is_open, edges, may_be, normals, areas })
+        let is_open = places()
+            .map(|(at, (p, _))| is_wide[at] && !edges.is_near(p))
+            .collect();
+        Ok(Self {
+            positions: mesh.positions().to_vec(),
+            off,
+            is_seen,
+            is_wide,
+            is_open,
+            edges,
+            may_be,
+            normals,
+            areas,
+        })
     }
 
     fn take_off(&mut self, rigid_offset: &rigid_offset::OffsetFit) {
         let both = self.positions.iter().zip(&self.normals);
-        self.off.iter_mut().zip(both).for_each(|(off, (p, normal))| *off -= rigid_offset.at(p, normal));
+        self.off
+            .iter_mut()
+            .zip(both)
+            .for_each(|(off, (p, normal))| *off -= rigid_offset.at(p, normal));
     }
 
     fn first_classes(&self, refined: &RefinedShape<'_>, scanner: Option<&Scanner>) -> Vec<Class> {
@@ -146,12 +180,16 @@ impl Places {
             (VertexBasis::NotTouched, _) => Class::NeverTouched,
             (VertexBasis::Unreachable, _) => Class::Unreachable,
             (VertexBasis::Touched, None) => Class::Unsure,
-            (VertexBasis::Touched, Some(scanner)) if self.is_seen[at] => match scanner.is_noise(self.off[at], AGREES) {
-                true => Class::Agrees,
-                // at an edge, and yet by more than a rounded edge
-                false if self.is_wide[at] && !scanner.may_round(self.off[at], AGREES) => Class::Unsure,
-                false => Class::ScannerError,
-            },
+            (VertexBasis::Touched, Some(scanner)) if self.is_seen[at] => {
+                match scanner.is_noise(self.off[at], AGREES) {
+                    true => Class::Agrees,
+                    // at an edge, and yet by more than a rounded edge
+                    false if self.is_wide[at] && !scanner.may_round(self.off[at], AGREES) => {
+                        Class::Unsure
+                    }
+                    false => Class::ScannerError,
+                }
+            }
             // the scan has nothing there
             (VertexBasis::Touched, Some(_)) => Class::ScannerError,
         };
@@ -164,9 +202,15 @@ impl ClassMap {
         let mut areas = [0.0; 7];
         for (face, corners) in mesh.faces() {
             let third = mesh.double_area_normal(face).norm() / 6.0;
-            corners.into_iter().for_each(|v| areas[classes[v.0 as usize] as usize] += third);
+            corners
+                .into_iter()
+                .for_each(|v| areas[classes[v.0 as usize] as usize] += third);
         }
-        Self { disagreement, classes, areas }
+        Self {
+            disagreement,
+            classes,
+            areas,
+        }
     }
 }
 
@@ -174,11 +218,19 @@ impl ClassMap {
 fn is_on_rim(mesh: &TriMesh, hit: &FaceHit) -> bool {
     let corners = mesh.corners(hit.face);
     let is_rim = |a: VertexId, b: VertexId| mesh.faces_at_edge(a, b).count() < 2;
-    let on: Vec<VertexId> = (0..3).filter(|&i| hit.barycentric[i] > 0.0).map(|i| corners[i]).collect();
+    let on: Vec<VertexId> = (0..3)
+        .filter(|&i| hit.barycentric[i] > 0.0)
+        .map(|i| corners[i])
+        .collect();
     match on[..] {
         [vertex] => {
-            let around = mesh.star(vertex).iter().flat_map(|&face| mesh.corners(face));
-            around.into_iter().any(|other| other != vertex && is_rim(vertex, other))
+            let around = mesh
+                .star(vertex)
+                .iter()
+                .flat_map(|&face| mesh.corners(face));
+            around
+                .into_iter()
+                .any(|other| other != vertex && is_rim(vertex, other))
         }
         [a, b] => is_rim(a, b),
         _ => false,
@@ -195,18 +247,38 @@ fn vertex_normals(mesh: &TriMesh) -> (Vec<nalgebra::Vector3<f64>>, Vec<f64>) {
             areas[vertex.0 as usize] += double.norm() / 6.0;
         }
     }
-    normals.iter_mut().for_each(|n| *n = n.try_normalize(0.0).unwrap_or_default());
+    normals
+        .iter_mut()
+        .for_each(|n| *n = n.try_normalize(0.0).unwrap_or_default());
     (normals, areas)
 }
 
 /// The classes at the closest places of the refined mesh, for each vertex of the scan.
-fn carried(scan: IndexedMesh<'_>, refined: &RefinedShape<'_>, classes: &[Class]) -> Result<ClassMap, CompareError> {
+fn carried(
+    scan: IndexedMesh<'_>,
+    refined: &RefinedShape<'_>,
+    classes: &[Class],
+) -> Result<ClassMap, CompareError> {
     let mesh = scan.mesh;
     let place = |p: &Point3<f64>, hit: &FaceHit| {
-        let class = classes[nearest_corner(refined.shape.mesh.corners(hit.face), &hit.barycentric).0 as usize];
-        (if class.is_touched() { -signed(p, refined.shape.mesh, hit) } else { 0.0 }, class)
+        let class = classes
+            [nearest_corner(refined.shape.mesh.corners(hit.face), &hit.barycentric).0 as usize];
+        (
+            if class.is_touched() {
+                -signed(p, refined.shape.mesh, hit)
+            } else {
+                0.0
+            },
+            class,
+        )
     };
-    let places = at_closest_places(mesh.positions(), refined.shape.mesh, refined.shape.tree, &Alone, place)?;
+    let places = at_closest_places(
+        mesh.positions(),
+        refined.shape.mesh,
+        refined.shape.tree,
+        &Alone,
+        place,
+    )?;
     let (off, carried) = places.into_iter().unzip();
     Ok(ClassMap::of(mesh, off, carried))
 }

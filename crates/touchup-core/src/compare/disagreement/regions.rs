@@ -80,7 +80,8 @@ pub(super) fn find(seen: &RegionInput<'_>, classes: &mut [Class]) -> Vec<Disagre
             continue;
         }
         is_taken[start] = true;
-        let is_own = |at: usize| signs[at] == signs[start] && !std::mem::replace(&mut is_taken[at], true);
+        let is_own =
+            |at: usize| signs[at] == signs[start] && !std::mem::replace(&mut is_taken[at], true);
         let own = flood(vec![start], |at| neighbours(mesh, at), is_own);
         regions.extend(judged(seen, &own, classes));
     }
@@ -96,33 +97,61 @@ fn is_evidence(places: &Places, at: usize, side: usize) -> bool {
 /// Means over the surroundings, m, by slot: of open places over open ones, of others over all that are wide.
 fn smoothed(mesh: &TriMesh, places: &Places, scanner: &Scanner) -> Vec<f64> {
     let reach = scanner.correlation / 2.0;
-    let cells =
-        |is_own: &[bool]| PointGrid::of(&places.positions, (0..places.off.len()).filter(|&at| is_own[at]), reach);
+    let cells = |is_own: &[bool]| {
+        PointGrid::of(
+            &places.positions,
+            (0..places.off.len()).filter(|&at| is_own[at]),
+            reach,
+        )
+    };
     let [open, wide] = [&places.is_open, &places.is_wide].map(|is_own| cells(is_own));
     let mean = |at: usize| {
-        let near = if places.is_open[at] { &open } else { &wide }.near(&mesh.positions()[at], reach);
+        let near =
+            if places.is_open[at] { &open } else { &wide }.near(&mesh.positions()[at], reach);
         let alike = near.filter(|&other| places.normals[at].dot(&places.normals[other]) > ALIKE);
         let (sum, area) = alike.fold((0.0, f64::MIN_POSITIVE), |(sum, area), other| {
-            (sum + places.off[other] * places.areas[other], area + places.areas[other])
+            (
+                sum + places.off[other] * places.areas[other],
+                area + places.areas[other],
+            )
         });
         sum / area
     };
-    (0..places.off.len()).map(|at| if places.is_wide[at] { mean(at) } else { places.off[at] }).collect()
+    (0..places.off.len())
+        .map(|at| {
+            if places.is_wide[at] {
+                mean(at)
+            } else {
+                places.off[at]
+            }
+        })
+        .collect()
 }
 
 fn neighbours(mesh: &TriMesh, at: usize) -> impl Iterator<Item = usize> + '_ {
-    mesh.star(VertexId(at as u32)).iter().flat_map(|&face| mesh.corners(face)).map(|v| v.0 as usize)
+    mesh.star(VertexId(at as u32))
+        .iter()
+        .flat_map(|&face| mesh.corners(face))
+        .map(|v| v.0 as usize)
 }
 
 /// Area, m², and mean of touch − scan, m, of some places.
 fn mean_of(places: &Places, own: impl Iterator<Item = usize>) -> (f64, f64) {
-    let (area, sum) =
-        own.fold((0.0, 0.0), |(area, sum), at| (area + places.areas[at], sum + places.off[at] * places.areas[at]));
+    let (area, sum) = own.fold((0.0, 0.0), |(area, sum), at| {
+        (
+            area + places.areas[at],
+            sum + places.off[at] * places.areas[at],
+        )
+    });
     (area, sum / area)
 }
 
 /// What a region is, if it is worth telling; its places get its class.
-fn judged(seen: &RegionInput<'_>, own: &[usize], classes: &mut [Class]) -> Option<DisagreementRegion> {
+fn judged(
+    seen: &RegionInput<'_>,
+    own: &[usize],
+    classes: &mut [Class],
+) -> Option<DisagreementRegion> {
     let (mesh, places, scanner) = (seen.refined.shape.mesh, seen.places, seen.scanner);
     let is_open = |at: &usize| places.is_open[*at];
     let (own_area, own_mean) = mean_of(places, own.iter().copied());
@@ -130,10 +159,12 @@ fn judged(seen: &RegionInput<'_>, own: &[usize], classes: &mut [Class]) -> Optio
     if !own_mean.is_finite() || own_area < LEAST_AREA * scanner.edge.powi(2) {
         return None;
     }
-    let sigmas_of = |area: f64, mean: f64| (mean - scanner.offset).abs() / scanner.sigma_of_mean(area);
+    let sigmas_of =
+        |area: f64, mean: f64| (mean - scanner.offset).abs() / scanner.sigma_of_mean(area);
     let sigmas = sigmas_of(own_area, own_mean);
     // what lies at edges alone makes nothing sure
-    let is_sure = open_area >= LEAST_AREA * scanner.edge.powi(2) && sigmas_of(open_area, open_mean) >= CHANGED;
+    let is_sure = open_area >= LEAST_AREA * scanner.edge.powi(2)
+        && sigmas_of(open_area, open_mean) >= CHANGED;
     // on to the edges that it ends at, which the scanner rounds
     let reach = places.edges.reach();
     let near = PointGrid::of(&places.positions, own.iter().copied(), reach);
@@ -141,16 +172,23 @@ fn judged(seen: &RegionInput<'_>, own: &[usize], classes: &mut [Class]) -> Optio
         let [off, mean] = [places.off[at], own_mean].map(|off| off - scanner.offset);
         off * mean.signum() > (GOES_ON * mean.abs()).max(2.0 * scanner.noise)
     };
-    let goes_on =
-        |at: usize| places.is_seen[at] && is_off(at) && near.near(&places.positions[at], reach).next().is_some();
+    let goes_on = |at: usize| {
+        places.is_seen[at] && is_off(at) && near.near(&places.positions[at], reach).next().is_some()
+    };
     let mut is_taken = vec![false; places.off.len()];
     own.iter().for_each(|&at| is_taken[at] = true);
-    let is_new = |at: usize| !is_taken[at] && goes_on(at) && !std::mem::replace(&mut is_taken[at], true);
+    let is_new =
+        |at: usize| !is_taken[at] && goes_on(at) && !std::mem::replace(&mut is_taken[at], true);
     let all = flood(own.to_vec(), |at| neighbours(mesh, at), is_new);
     let (area, mean) = mean_of(places, all.iter().copied());
-    let moments = all.iter().map(|&at| places.positions[at].coords * places.areas[at]);
+    let moments = all
+        .iter()
+        .map(|&at| places.positions[at].coords * places.areas[at]);
     let centre = Point3::from(moments.sum::<Vector3<f64>>() / area);
-    let extent = all.iter().map(|&at| (places.positions[at] - centre).norm()).fold(0.0, f64::max);
+    let extent = all
+        .iter()
+        .map(|&at| (places.positions[at] - centre).norm())
+        .fold(0.0, f64::max);
     let evidence = RegionEvidence {
         sigmas,
         open_area,
@@ -166,7 +204,13 @@ fn judged(seen: &RegionInput<'_>, own: &[usize], classes: &mut [Class]) -> Optio
     if class != Class::ScannerError {
         all.iter().for_each(|&at| classes[at] = class);
     }
-    Some(DisagreementRegion { class, centre, area, mean, evidence })
+    Some(DisagreementRegion {
+        class,
+        centre,
+        area,
+        mean,
+        evidence,
+    })
 }
 
 /// Largest number of times that any place of a region was passed.
@@ -174,8 +218,9 @@ fn passes(touches: &[ProbedPoint], region: &PointGrid, reach: f64) -> usize {
     let (mut count, mut last) = (0, None);
     for touch in touches.iter().filter(|touch| !touch.is_rejected) {
         if region.near(&touch.point, reach).next().is_some() {
-            let is_new =
-                last.is_none_or(|(stroke, at)| stroke != touch.stroke || touch.stamp_ns.saturating_sub(at) > PASS_NS);
+            let is_new = last.is_none_or(|(stroke, at)| {
+                stroke != touch.stroke || touch.stamp_ns.saturating_sub(at) > PASS_NS
+            });
             count += usize::from(is_new);
             last = Some((touch.stroke, touch.stamp_ns));
         }
@@ -185,7 +230,14 @@ fn passes(touches: &[ProbedPoint], region: &PointGrid, reach: f64) -> usize {
 
 /// Share of the places at the rim of a region that have an edge near.
 fn rim_at_edges(mesh: &TriMesh, places: &Places, all: &[usize], is_own: &[bool]) -> f64 {
-    let rim: Vec<usize> = all.iter().copied().filter(|&at| neighbours(mesh, at).any(|other| !is_own[other])).collect();
-    let at_edge = rim.iter().filter(|&&at| places.edges.is_near(&places.positions[at])).count();
+    let rim: Vec<usize> = all
+        .iter()
+        .copied()
+        .filter(|&at| neighbours(mesh, at).any(|other| !is_own[other]))
+        .collect();
+    let at_edge = rim
+        .iter()
+        .filter(|&&at| places.edges.is_near(&places.positions[at]))
+        .count();
     at_edge as f64 / rim.len().max(1) as f64
 }

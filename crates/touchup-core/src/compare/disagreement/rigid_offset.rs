@@ -11,7 +11,8 @@ use nalgebra::{Matrix6, Point3, SMatrix, SVector, Vector3, Vector6};
 use super::places::Places;
 use super::scanner::Scanner;
 use crate::numeric::{
-    NormalEquations, SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, centroid_and_spread, median, point_to_plane_row,
+    NormalEquations, SIGMA_OF_MEDIAN, TUKEY_WIDTH, biweight, centroid_and_spread, median,
+    point_to_plane_row,
 };
 
 /// The scan against the touches, of small angles.
@@ -62,13 +63,17 @@ impl OffsetFit {
         let (centre, lever) = centroid_and_spread(open.iter().map(|&at| &places.positions[at]));
         let row = |&at: &usize| {
             let arm = places.positions[at] - centre;
-            (point_to_plane_row(&arm, &places.normals[at], lever).insert_row(0, 1.0), places.off[at])
+            (
+                point_to_plane_row(&arm, &places.normals[at], lever).insert_row(0, 1.0),
+                places.off[at],
+            )
         };
         let mut x = SVector::<f64, 7>::zeros();
         let mut width = f64::INFINITY;
         let mut spread = SMatrix::<f64, 7, 7>::zeros();
         for _ in 0..ROUNDS {
-            let (mut equations, mut sizes) = (NormalEquations::default(), Vec::with_capacity(open.len()));
+            let (mut equations, mut sizes) =
+                (NormalEquations::default(), Vec::with_capacity(open.len()));
             let weights = equations.add_reweighted(open.iter().map(row), &x, |at, left| {
                 sizes.push(left.abs());
                 biweight((left / width).powi(2)) * places.areas[open[at]]
@@ -84,10 +89,20 @@ impl OffsetFit {
             }
         }
         let is_finite = x.iter().chain(&spread).all(|x| x.is_finite());
-        let (shift, turn) = (Vector3::new(x[1], x[2], x[3]), Vector3::new(x[4], x[5], x[6]) / lever);
+        let (shift, turn) = (
+            Vector3::new(x[1], x[2], x[3]),
+            Vector3::new(x[4], x[5], x[6]) / lever,
+        );
         let area = open.iter().map(|&at| places.areas[at]).sum();
         let spread = spread.fixed_view::<6, 6>(1, 1).into_owned();
-        is_finite.then_some(Self { shift, turn, centre, lever, spread, area })
+        is_finite.then_some(Self {
+            shift,
+            turn,
+            centre,
+            lever,
+            spread,
+            area,
+        })
     }
 
     /// What of touch − scan it explains at a place, m.
@@ -108,11 +123,22 @@ impl OffsetFit {
         let variance = scanner.noise.powi(2) * (1.0 + UNKNOWNS / more);
         let covariance = self.spread * (variance * alike);
         let turn = self.turn * self.lever;
-        let motion = Vector6::new(self.shift.x, self.shift.y, self.shift.z, turn.x, turn.y, turn.z);
+        let motion = Vector6::new(
+            self.shift.x,
+            self.shift.y,
+            self.shift.z,
+            turn.x,
+            turn.y,
+            turn.z,
+        );
         let eigen = covariance.symmetric_eigen();
         let least = HELD * eigen.eigenvalues.max();
         let (mut square, mut directions) = (0.0, 0);
-        for (value, direction) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+        for (value, direction) in eigen
+            .eigenvalues
+            .iter()
+            .zip(eigen.eigenvectors.column_iter())
+        {
             if *value > least {
                 square += direction.dot(&motion).powi(2) / value;
                 directions += 1;

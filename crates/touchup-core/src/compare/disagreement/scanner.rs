@@ -47,10 +47,19 @@ impl Scanner {
         let edge = places.edges.resolution;
         let mut values: Vec<f64> = open.iter().map(|&at| places.off[at]).collect();
         let offset = median(&mut values)?;
-        values.iter_mut().for_each(|value| *value = (*value - offset).abs());
+        values
+            .iter_mut()
+            .for_each(|value| *value = (*value - offset).abs());
         let noise = (SIGMA_OF_MEDIAN * median(&mut values)?).max(LEAST_NOISE * edge);
         let correlation = correlation(places, &open, noise, edge);
-        Some(Self { offset, noise, correlation, edge, sees_from: places.edges.sees_from(), places: open.len() })
+        Some(Self {
+            offset,
+            noise,
+            correlation,
+            edge,
+            sees_from: places.edges.sees_from(),
+            places: open.len(),
+        })
     }
 
     /// Whether a disagreement is within so many standard deviations.
@@ -73,7 +82,11 @@ impl Scanner {
 /// Distance over which disagreements stay alike, m: half the mean square of their differences grows to 1 − 1/e of the
 /// variance within √2 ℓ.
 fn correlation(places: &Places, open: &[usize], noise: f64, edge: f64) -> f64 {
-    let some: Vec<usize> = open.iter().copied().step_by(open.len().div_ceil(MOST_PLACES)).collect();
+    let some: Vec<usize> = open
+        .iter()
+        .copied()
+        .step_by(open.len().div_ceil(MOST_PLACES))
+        .collect();
     let width = LONGEST * edge / BINS as f64;
     let mut bins: Vec<Vec<f64>> = vec![Vec::new(); BINS];
     for (i, &a) in some.iter().enumerate() {
@@ -85,8 +98,9 @@ fn correlation(places: &Places, open: &[usize], noise: f64, edge: f64) -> f64 {
         }
     }
     let grown = (1.0 - (-1.0f64).exp()) * noise.powi(2);
-    let is_grown =
-        |bin: &mut Vec<f64>| bin.len() >= FULL && median(bin).is_some_and(|median| median / MEDIAN_OF_SQUARE >= grown);
+    let is_grown = |bin: &mut Vec<f64>| {
+        bin.len() >= FULL && median(bin).is_some_and(|median| median / MEDIAN_OF_SQUARE >= grown)
+    };
     let at = bins.iter_mut().position(is_grown).unwrap_or(BINS);
     ((at as f64 + 0.5) * width / GROWN).max(edge / 2.0)
 }

@@ -20,9 +20,18 @@ pub(super) struct Font {
     height: RasterHeight,
 }
 
-pub(super) const TITLE: Font = Font { weight: FontWeight::Bold, height: RasterHeight::Size32 };
-pub(super) const TEXT: Font = Font { weight: FontWeight::Regular, height: RasterHeight::Size24 };
-pub(super) const NOTE: Font = Font { weight: FontWeight::Regular, height: RasterHeight::Size20 };
+pub(super) const TITLE: Font = Font {
+    weight: FontWeight::Bold,
+    height: RasterHeight::Size32,
+};
+pub(super) const TEXT: Font = Font {
+    weight: FontWeight::Regular,
+    height: RasterHeight::Size24,
+};
+pub(super) const NOTE: Font = Font {
+    weight: FontWeight::Regular,
+    height: RasterHeight::Size20,
+};
 
 impl Font {
     /// Of a line, pixels.
@@ -39,7 +48,10 @@ impl Font {
 impl Picture {
     /// One colour all over.
     pub fn blank(size: [u32; 2], colour: Rgb) -> Self {
-        Self { size, pixels: colour.repeat(size[0] as usize * size[1] as usize) }
+        Self {
+            size,
+            pixels: colour.repeat(size[0] as usize * size[1] as usize),
+        }
     }
 
     /// Mixes `share` (0 to 1) of a colour into a pixel; outside of the picture nothing happens.
@@ -66,7 +78,9 @@ impl Picture {
         let advance = font.width(" ");
         for (letter, left) in text.chars().zip((0..).map(|i| x + i * advance)) {
             let glyph = get_raster(letter, font.weight, font.height);
-            let Some(glyph) = glyph.or_else(|| get_raster('?', font.weight, font.height)) else { continue };
+            let Some(glyph) = glyph.or_else(|| get_raster('?', font.weight, font.height)) else {
+                continue;
+            };
             for (row, pixels) in (y..).zip(glyph.rows()) {
                 for (column, &grey) in (left..).zip(pixels) {
                     self.mix(column, row, colour, f64::from(grey) / 255.0);
@@ -76,8 +90,18 @@ impl Picture {
     }
 
     /// Writes one line on a box of `paper` that is a little larger than the text.
-    pub(super) fn write_on(&mut self, [x, y]: [i32; 2], font: Font, [ink, paper]: [Rgb; 2], text: &str) {
-        self.fill([x - 4, y - 1], [font.width(text) + 8, font.height() + 2], paper);
+    pub(super) fn write_on(
+        &mut self,
+        [x, y]: [i32; 2],
+        font: Font,
+        [ink, paper]: [Rgb; 2],
+        text: &str,
+    ) {
+        self.fill(
+            [x - 4, y - 1],
+            [font.width(text) + 8, font.height() + 2],
+            paper,
+        );
         self.write([x, y], font, ink, text);
     }
 
@@ -87,7 +111,10 @@ impl Picture {
         let steps = dx.abs().max(dy.abs()).max(1.0);
         for step in 0..=steps as i32 {
             let share = f64::from(step) / steps;
-            let place = [from[0] + (dx * share).round() as i32, from[1] + (dy * share).round() as i32];
+            let place = [
+                from[0] + (dx * share).round() as i32,
+                from[1] + (dy * share).round() as i32,
+            ];
             self.fill(place, [2, 2], colour);
         }
     }

@@ -12,8 +12,8 @@ use super::disagreement::Class;
 use crate::mesh::VertexId;
 pub use annotations::PictureLabel;
 use annotations::{
-    BAR, GAP, HISTOGRAM, INK, MARGIN, PAPER, SOFT_INK, draw_histograms, draw_labels, draw_legend, draw_length,
-    draw_scale,
+    BAR, GAP, HISTOGRAM, INK, MARGIN, PAPER, SOFT_INK, draw_histograms, draw_labels, draw_legend,
+    draw_length, draw_scale,
 };
 use camera::Camera;
 pub use canvas::Picture;
@@ -79,34 +79,77 @@ pub fn draw_picture(panels: &[PicturePanel<'_>], params: &PictureParams<'_>) -> 
     let frame = frame_for(panels, &camera, panel_width);
     let panel_height = frame.size[1] as i32;
 
-    let caption = if params.caption.is_empty() { 0 } else { NOTE.height() + 8 };
+    let caption = if params.caption.is_empty() {
+        0
+    } else {
+        NOTE.height() + 8
+    };
     let above = MARGIN + TITLE.height() + caption + GAP / 2;
     let foot = above + TEXT.height() + 8 + panel_height + 10 + NOTE.height() + GAP;
     let has_classes = panels.iter().any(|panel| panel.classes.is_some());
     let legend = if has_classes { NOTE.height() + GAP } else { 0 };
     let has_scale = params.legend.is_empty();
-    let histogram = if has_scale && panels.iter().any(|panel| panel.histogram.is_some()) { HISTOGRAM } else { 0 };
+    let histogram = if has_scale && panels.iter().any(|panel| panel.histogram.is_some()) {
+        HISTOGRAM
+    } else {
+        0
+    };
     let bar = foot + legend + NOTE.height() + 8 + histogram;
     let height = bar + BAR[1] + 10 + TEXT.height() + MARGIN;
     let mut picture = Picture::blank([width, height].map(|side| side as u32), PAPER);
-    picture.write([MARGIN, MARGIN], TITLE, INK, &fitted(params.title, TITLE, width - 2 * MARGIN));
+    picture.write(
+        [MARGIN, MARGIN],
+        TITLE,
+        INK,
+        &fitted(params.title, TITLE, width - 2 * MARGIN),
+    );
     let caption = fitted(params.caption, NOTE, width - 2 * MARGIN);
-    picture.write([MARGIN, MARGIN + TITLE.height() + 8], NOTE, SOFT_INK, &caption);
-    let colours = ColourScale { range: params.range, tolerance: params.tolerance };
-    for (panel, left) in panels.iter().zip((0..).map(|i| MARGIN + i * (panel_width + GAP))) {
+    picture.write(
+        [MARGIN, MARGIN + TITLE.height() + 8],
+        NOTE,
+        SOFT_INK,
+        &caption,
+    );
+    let colours = ColourScale {
+        range: params.range,
+        tolerance: params.tolerance,
+    };
+    for (panel, left) in panels
+        .iter()
+        .zip((0..).map(|i| MARGIN + i * (panel_width + GAP)))
+    {
         let top = above + TEXT.height() + 8;
-        picture.write([left, above], TEXT, INK, &fitted(panel.title, TEXT, panel_width));
+        picture.write(
+            [left, above],
+            TEXT,
+            INK,
+            &fitted(panel.title, TEXT, panel_width),
+        );
         let mut drawing = draw(panel, &camera, &frame, &colours);
         draw_labels(&mut drawing, params.labels, &camera, &frame);
         picture.paste([left, top], &drawing);
-        picture.write([left, top + panel_height + 10], NOTE, SOFT_INK, &fitted(panel.note, NOTE, panel_width));
+        picture.write(
+            [left, top + panel_height + 10],
+            NOTE,
+            SOFT_INK,
+            &fitted(panel.note, NOTE, panel_width),
+        );
     }
     if has_classes {
-        draw_legend(&mut picture, foot, &Class::ALL.map(|class| (colour_of_class(class), class.name())));
+        draw_legend(
+            &mut picture,
+            foot,
+            &Class::ALL.map(|class| (colour_of_class(class), class.name())),
+        );
     }
     let foot = foot + legend;
     if has_scale {
-        draw_scale(&mut picture, [foot, bar], &colours, if has_classes { OF_TOUCHES } else { OF_TRUTH });
+        draw_scale(
+            &mut picture,
+            [foot, bar],
+            &colours,
+            if has_classes { OF_TOUCHES } else { OF_TRUTH },
+        );
         draw_histograms(&mut picture, bar, panels, &colours);
     } else {
         draw_legend(&mut picture, foot, params.legend);
@@ -127,13 +170,30 @@ pub struct PartView {
 /// Draws a mesh alone, so that what is written around it can be drawn by somebody else.
 ///
 /// - `places`: m, in the frame of the mesh.
-pub fn draw_part(panel: &PicturePanel<'_>, params: &PictureParams<'_>, places: &[Point3<f64>]) -> PartView {
+pub fn draw_part(
+    panel: &PicturePanel<'_>,
+    params: &PictureParams<'_>,
+    places: &[Point3<f64>],
+) -> PartView {
     let panels = [*panel];
     let camera = camera_for(&panels, params);
-    let frame = frame_for(&panels, &camera, params.width.clamp(WIDTHS[0], WIDTHS[1]) as i32);
-    let colours = ColourScale { range: params.range, tolerance: params.tolerance };
+    let frame = frame_for(
+        &panels,
+        &camera,
+        params.width.clamp(WIDTHS[0], WIDTHS[1]) as i32,
+    );
+    let colours = ColourScale {
+        range: params.range,
+        tolerance: params.tolerance,
+    };
     let picture = draw(panel, &camera, &frame, &colours);
-    PartView { picture, places: places.iter().map(|place| frame.pixel(&camera.project(place).xy())).collect() }
+    PartView {
+        picture,
+        places: places
+            .iter()
+            .map(|place| frame.pixel(&camera.project(place).xy()))
+            .collect(),
+    }
 }
 
 fn camera_for(panels: &[PicturePanel<'_>], params: &PictureParams<'_>) -> Camera {
@@ -143,7 +203,10 @@ fn camera_for(panels: &[PicturePanel<'_>], params: &PictureParams<'_>) -> Camera
             // what is far off matters, but not without end
             let weight = |v: VertexId| match params.weights {
                 Some(weights) => weights.get(v.0 as usize).copied().unwrap_or(0.0),
-                None => panel.deviations.get(v.0 as usize).map_or(0.0, |d| d.abs().min(params.range)),
+                None => panel
+                    .deviations
+                    .get(v.0 as usize)
+                    .map_or(0.0, |d| d.abs().min(params.range)),
             };
             Camera::towards(panel.mesh, weight)
         }
@@ -154,12 +217,26 @@ fn camera_for(panels: &[PicturePanel<'_>], params: &PictureParams<'_>) -> Camera
 /// All panels fit into it.
 fn frame_for(panels: &[PicturePanel<'_>], camera: &Camera, width: i32) -> PictureFrame {
     let [lo, hi] = camera.bounds(panels.iter().map(|panel| panel.mesh));
-    let sides = (hi - lo).map(|side| if side.is_finite() { side.max(f64::MIN_POSITIVE) } else { 1.0 });
+    let sides = (hi - lo).map(|side| {
+        if side.is_finite() {
+            side.max(f64::MIN_POSITIVE)
+        } else {
+            1.0
+        }
+    });
     let aspect = (sides.y / sides.x).clamp(FLATTEST, (HIGHEST * panels.len() as f64).max(FLATTEST));
     let size = [f64::from(width), (f64::from(width) * aspect).round()];
     let scale = (1.0 - 2.0 * AIR) * (size[0] / sides.x).min(size[1] / sides.y);
-    let middle = if panels.is_empty() { Vector2::zeros() } else { (lo + hi) / 2.0 };
-    PictureFrame { middle, scale, size: size.map(|side| side as u32) }
+    let middle = if panels.is_empty() {
+        Vector2::zeros()
+    } else {
+        (lo + hi) / 2.0
+    };
+    PictureFrame {
+        middle,
+        scale,
+        size: size.map(|side| side as u32),
+    }
 }
 
 /// The text, cut off where it is wider than `width` pixels.
@@ -168,5 +245,8 @@ fn fitted(text: &str, font: Font, width: i32) -> String {
     if text.chars().count() <= most {
         return text.to_owned();
     }
-    text.chars().take(most.saturating_sub(3)).chain("...".chars()).collect()
+    text.chars()
+        .take(most.saturating_sub(3))
+        .chain("...".chars())
+        .collect()
 }

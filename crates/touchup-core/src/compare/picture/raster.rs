@@ -32,7 +32,15 @@ pub struct PicturePanel<'a> {
 impl<'a> PicturePanel<'a> {
     /// A mesh with nothing around it.
     pub fn of(mesh: &'a TriMesh) -> Self {
-        Self { mesh, deviations: &[], classes: None, paint: None, histogram: None, title: "", note: "" }
+        Self {
+            mesh,
+            deviations: &[],
+            classes: None,
+            paint: None,
+            histogram: None,
+            title: "",
+            note: "",
+        }
     }
 }
 
@@ -87,7 +95,12 @@ struct Samples {
 /// Draws one mesh in the colours of its deviations.
 ///
 /// - `colours`: of deviations.
-pub(super) fn draw(panel: &PicturePanel<'_>, camera: &Camera, frame: &PictureFrame, colours: &ColourScale) -> Picture {
+pub(super) fn draw(
+    panel: &PicturePanel<'_>,
+    camera: &Camera,
+    frame: &PictureFrame,
+    colours: &ColourScale,
+) -> Picture {
     let [width, height] = frame.size.map(|side| (side * FINE) as usize);
     let mut samples = Samples {
         width,
@@ -96,8 +109,9 @@ pub(super) fn draw(panel: &PicturePanel<'_>, camera: &Camera, frame: &PictureFra
         colour: vec![BACKGROUND; width * height],
     };
     let range = colours.range;
-    let shades: Vec<Rgb> =
-        (0..SHADES).map(|i| colours.colour((2.0 * i as f64 / (SHADES - 1) as f64 - 1.0) * range)).collect();
+    let shades: Vec<Rgb> = (0..SHADES)
+        .map(|i| colours.colour((2.0 * i as f64 / (SHADES - 1) as f64 - 1.0) * range))
+        .collect();
     let scale = frame.scale * f64::from(FINE);
     let place = |p: &Vector3<f64>| {
         let [x, y] = frame.pixel(&p.xy()).map(|side| side * f64::from(FINE));
@@ -106,16 +120,32 @@ pub(super) fn draw(panel: &PicturePanel<'_>, camera: &Camera, frame: &PictureFra
     // of a vertex; where there is none, deviations are shown
     let paint = |v: VertexId| match (panel.paint, panel.classes) {
         (Some(paint), _) => Some(paint.get(v.0 as usize).copied().unwrap_or(BACKGROUND)),
-        (None, Some(classes)) => Some(classes.get(v.0 as usize).map_or(BACKGROUND, |&class| colour_of_class(class))),
+        (None, Some(classes)) => Some(
+            classes
+                .get(v.0 as usize)
+                .map_or(BACKGROUND, |&class| colour_of_class(class)),
+        ),
         (None, None) => None,
     };
     for (face, corners) in panel.mesh.faces() {
-        let places = panel.mesh.triangle(face).map(|p| place(&camera.project(&p)));
-        let values = corners.map(|v| panel.deviations.get(v.0 as usize).map_or(0.0, |d| d / range));
+        let places = panel
+            .mesh
+            .triangle(face)
+            .map(|p| place(&camera.project(&p)));
+        let values = corners.map(|v| {
+            panel
+                .deviations
+                .get(v.0 as usize)
+                .map_or(0.0, |d| d / range)
+        });
         let (light, paint) = (light_on(panel, camera, face), corners.map(paint));
         samples.fill(&places, |shares| match paint[largest(&shares)] {
             Some(colour) => lit(colour, light),
-            None => shade(&shades, shares.iter().zip(values).map(|(s, v)| s * v).sum(), light),
+            None => shade(
+                &shades,
+                shares.iter().zip(values).map(|(s, v)| s * v).sum(),
+                light,
+            ),
         });
     }
     samples.silhouette((STEP * height as f64 / scale) as f32);
@@ -141,7 +171,13 @@ fn shade(shades: &[Rgb], value: f64, light: f64) -> Rgb {
 
 /// A colour in the light of [`light_on`].
 fn lit(colour: Rgb, light: f64) -> Rgb {
-    let inside = |c: f64| if light < 0.0 { INSIDE_GREY + (c - INSIDE_GREY) * INSIDE } else { c };
+    let inside = |c: f64| {
+        if light < 0.0 {
+            INSIDE_GREY + (c - INSIDE_GREY) * INSIDE
+        } else {
+            c
+        }
+    };
     colour.map(|c| (inside(f64::from(c)) * light.abs()).round() as u8)
 }
 
@@ -161,7 +197,9 @@ impl Samples {
         for y in covered(lo.y, hi.y, self.height) {
             for x in columns.clone() {
                 let p = Vector2::new(x as f64 + 0.5, y as f64 + 0.5);
-                let share = |s: &Vector3<f64>, e: &Vector3<f64>| (e - s).xy().perp(&(p - s.xy())) / double_area;
+                let share = |s: &Vector3<f64>, e: &Vector3<f64>| {
+                    (e - s).xy().perp(&(p - s.xy())) / double_area
+                };
                 let shares = [share(b, c), share(c, a), share(a, b)];
                 if shares.iter().any(|&share| share < 0.0) {
                     continue;
@@ -205,7 +243,9 @@ impl Samples {
                 for row in 0..fine {
                     let from = (y * fine + row) * self.width + x * fine;
                     for colour in &self.colour[from..from + fine] {
-                        sum.iter_mut().zip(colour).for_each(|(sum, c)| *sum += u32::from(*c));
+                        sum.iter_mut()
+                            .zip(colour)
+                            .for_each(|(sum, c)| *sum += u32::from(*c));
                     }
                 }
                 pixels.extend(sum.map(|sum| (sum / (FINE * FINE)) as u8));

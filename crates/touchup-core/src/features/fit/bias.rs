@@ -25,7 +25,11 @@ impl<M: Surface> Fit<M> {
         let surface = &self.surface;
         let fixed = self.groups.saturating_sub(self.degrees);
         // over the stated errors; as large where there are too few to say
-        let excess = if self.degrees > fixed + SPARE_GROUPS { self.chi_squared / self.degrees as f64 } else { 1.0 };
+        let excess = if self.degrees > fixed + SPARE_GROUPS {
+            self.chi_squared / self.degrees as f64
+        } else {
+            1.0
+        };
         let step = excess.sqrt();
         let moved: Vec<M> = self
             .deviations
@@ -36,7 +40,8 @@ impl<M: Surface> Fit<M> {
         let of_point = |i: usize| {
             let o = &problem.observations[i];
             let here = surface.distance(&o.point);
-            let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| axis * (o.sigma * step));
+            let axes =
+                [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| axis * (o.sigma * step));
             let around = axes.into_iter().flat_map(|e| [o.point + e, o.point - e]);
             let by_point: f64 = around.map(|p| surface.distance(&p) - here).sum();
             let by_surface: f64 = moved.iter().map(|m| m.distance(&o.point) - here).sum();

@@ -26,20 +26,41 @@ pub struct Cone {
 
 impl Cone {
     /// From the centre of a circle, the axis (any length but 0), radius of the circle, half angle.
-    pub fn new(center: Point3<f64>, axis: &Vector3<f64>, radius: f64, half_angle: f64, concave: bool) -> Self {
-        Self { pose_of: pose_along(center, axis), radius, half_angle, concave }
+    pub fn new(
+        center: Point3<f64>,
+        axis: &Vector3<f64>,
+        radius: f64,
+        half_angle: f64,
+        concave: bool,
+    ) -> Self {
+        Self {
+            pose_of: pose_along(center, axis),
+            radius,
+            half_angle,
+            concave,
+        }
     }
 
     /// Where all lines meet, m, in O; `None` for a cylinder.
     pub fn apex(&self) -> Option<Point3<f64>> {
         let height = -self.radius / self.half_angle.tan();
-        height.is_finite().then(|| self.pose_of * Point3::new(0.0, 0.0, height))
+        height
+            .is_finite()
+            .then(|| self.pose_of * Point3::new(0.0, 0.0, height))
     }
 }
 
 impl Surface for Cone {
-    const NAMES: [Option<&'static str>; FREEDOMS] =
-        [CENTRE, CENTRE, None, AXIS, AXIS, None, RADIUS, Some("half angle")];
+    const NAMES: [Option<&'static str>; FREEDOMS] = [
+        CENTRE,
+        CENTRE,
+        None,
+        AXIS,
+        AXIS,
+        None,
+        RADIUS,
+        Some("half angle"),
+    ];
 
     fn pose_of(&self) -> &Isometry3<f64> {
         &self.pose_of
@@ -74,12 +95,23 @@ impl Surface for Cone {
         let (sin, cos) = self.half_angle.sin_cos();
         let along = (rho - self.radius) * sin + q.z * cos;
         let pose_of = self.pose_of * Translation3::new(0.0, 0.0, along * cos);
-        Self { pose_of, radius: self.radius + along * sin, ..*self }
+        Self {
+            pose_of,
+            radius: self.radius + along * sin,
+            ..*self
+        }
     }
 
     fn check(&self) -> Result<(), FitError> {
         check_size("radius", self.radius)?;
         let value = self.half_angle;
-        if value.abs() < FRAC_PI_2 { Ok(()) } else { Err(FitError::BadSize { what: "half angle", value }) }
+        if value.abs() < FRAC_PI_2 {
+            Ok(())
+        } else {
+            Err(FitError::BadSize {
+                what: "half angle",
+                value,
+            })
+        }
     }
 }

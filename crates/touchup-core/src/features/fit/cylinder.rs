@@ -23,12 +23,17 @@ pub struct Cylinder {
 impl Cylinder {
     /// From a point on the axis and the axis, of any length but 0.
     pub fn new(point: Point3<f64>, axis: &Vector3<f64>, radius: f64, concave: bool) -> Self {
-        Self { pose_of: pose_along(point, axis), radius, concave }
+        Self {
+            pose_of: pose_along(point, axis),
+            radius,
+            concave,
+        }
     }
 }
 
 impl Surface for Cylinder {
-    const NAMES: [Option<&'static str>; FREEDOMS] = [CENTRE, CENTRE, None, AXIS, AXIS, None, RADIUS, None];
+    const NAMES: [Option<&'static str>; FREEDOMS] =
+        [CENTRE, CENTRE, None, AXIS, AXIS, None, RADIUS, None];
 
     fn pose_of(&self) -> &Isometry3<f64> {
         &self.pose_of
@@ -38,16 +43,27 @@ impl Surface for Cylinder {
     fn distance_at(&self, q: &Vector3<f64>) -> Distance {
         let (rho, away) = radial(q);
         let s = side(self.concave);
-        Distance { value: s * (rho - self.radius), normal: s * away, by_size: [-s, 0.0] }
+        Distance {
+            value: s * (rho - self.radius),
+            normal: s * away,
+            by_size: [-s, 0.0],
+        }
     }
 
     fn with(&self, pose_of: Isometry3<f64>, by: [f64; 2]) -> Self {
-        Self { pose_of, radius: self.radius + by[0], concave: self.concave }
+        Self {
+            pose_of,
+            radius: self.radius + by[0],
+            concave: self.concave,
+        }
     }
 
     fn described_from(&self, points: &[Vector3<f64>]) -> Self {
         let q = mean(points.iter().copied());
-        Self { pose_of: self.pose_of * Translation3::new(0.0, 0.0, q.z), ..*self }
+        Self {
+            pose_of: self.pose_of * Translation3::new(0.0, 0.0, q.z),
+            ..*self
+        }
     }
 
     fn check(&self) -> Result<(), FitError> {
@@ -69,7 +85,11 @@ impl Cylinder {
         let across = |v: Vector3<f64>| v - axis * v.dot(&axis);
         let (p, d) = (across(from - self.center()), across(*direction));
         // |p + t d|² = R²
-        let (a, b, c) = (d.norm_squared(), p.dot(&d), p.norm_squared() - self.radius * self.radius);
+        let (a, b, c) = (
+            d.norm_squared(),
+            p.dot(&d),
+            p.norm_squared() - self.radius * self.radius,
+        );
         let square = b * b - a * c;
         (a > ALONG && square >= 0.0).then(|| (square.sqrt() - b) / a)
     }
@@ -79,7 +99,8 @@ impl Fit<Cylinder> {
     /// Root mean square distance across the axis by which a place on it may be off, m.
     pub(crate) fn lateral_std(&self, at: &Point3<f64>) -> Option<f64> {
         let height = self.surface.pose_of.inverse_transform_point(at).z;
-        self.center_covariance(height).map(|covariance| covariance.trace().max(0.0).sqrt())
+        self.center_covariance(height)
+            .map(|covariance| covariance.trace().max(0.0).sqrt())
     }
 }
 
@@ -95,6 +116,10 @@ mod tests {
         let t = cylinder.exit(&from, &Vector3::new(0.6, 0.8, 0.0)).unwrap();
         assert!((t - (0.6 + f64::sqrt(0.36 + 24.0))).abs() < 1e-12, "{t}");
         assert_eq!(cylinder.exit(&from, &Vector3::z()), None, "along the axis");
-        assert_eq!(cylinder.exit(&Point3::new(6.0, 0.0, 0.0), &Vector3::y()), None, "beside it");
+        assert_eq!(
+            cylinder.exit(&Point3::new(6.0, 0.0, 0.0), &Vector3::y()),
+            None,
+            "beside it"
+        );
     }
 }

@@ -4,7 +4,9 @@
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FitError {
     /// Fewer observations than unknowns, at the start or after outliers were rejected.
-    #[error("{have} observations (of {given} given) cannot fix {need} unknowns; touch in more places")]
+    #[error(
+        "{have} observations (of {given} given) cannot fix {need} unknowns; touch in more places"
+    )]
     TooFewObservations {
         /// how many are kept
         have: usize,
@@ -31,19 +33,25 @@ pub enum FitError {
         sigma: f64,
     },
     /// The observations do not fix a number without which the surface is none.
-    #[error("the observations do not fix the {what}; touch where it makes a difference, or give a known axis")]
+    #[error(
+        "the observations do not fix the {what}; touch where it makes a difference, or give a known axis"
+    )]
     Undetermined {
         /// which number
         what: &'static str,
     },
     /// The iteration did not converge.
-    #[error("the fit did not converge in {iterations} iterations; is the first guess near the surface?")]
+    #[error(
+        "the fit did not converge in {iterations} iterations; is the first guess near the surface?"
+    )]
     NotConverged {
         /// how many were made
         iterations: usize,
     },
     /// A size that no surface has.
-    #[error("the {what} came out as {value} (SI units); is the surface hollow where it should be solid?")]
+    #[error(
+        "the {what} came out as {value} (SI units); is the surface hollow where it should be solid?"
+    )]
     BadSize {
         /// which size
         what: &'static str,

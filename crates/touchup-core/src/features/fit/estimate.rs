@@ -74,7 +74,8 @@ impl<M: Surface> Fit<M> {
     /// Standard deviation of a number, from its derivatives by some freedoms; `None` where it is not fixed.
     pub fn std_by(&self, by: &[(Freedom, f64)]) -> Option<f64> {
         let mut steps = Steps::zeros();
-        by.iter().for_each(|(freedom, x)| steps[*freedom as usize] += x);
+        by.iter()
+            .for_each(|(freedom, x)| steps[*freedom as usize] += x);
         self.std_of(&steps)
     }
 
@@ -93,11 +94,16 @@ impl<M: Surface> Fit<M> {
             }
             by
         };
-        let by = [lever(Freedom::X, Freedom::TiltX), lever(Freedom::Y, Freedom::TiltY)];
+        let by = [
+            lever(Freedom::X, Freedom::TiltX),
+            lever(Freedom::Y, Freedom::TiltY),
+        ];
         by.iter().try_for_each(|by| self.std_of(by).map(|_| ()))?;
         let r = self.surface.pose_of().rotation;
         let axes = [r * Vector3::x(), r * Vector3::y()];
-        let entry = |i: usize, j: usize| axes[i] * axes[j].transpose() * by[i].dot(&(self.covariance * by[j]));
+        let entry = |i: usize, j: usize| {
+            axes[i] * axes[j].transpose() * by[i].dot(&(self.covariance * by[j]))
+        };
         Some(entry(0, 0) + entry(0, 1) + entry(1, 0) + entry(1, 1))
     }
 }

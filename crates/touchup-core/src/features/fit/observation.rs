@@ -36,23 +36,36 @@ pub struct FitParams {
 
 impl Default for FitParams {
     fn default() -> Self {
-        Self { common_sigma: 0.0, shift_sigma: 0.0, axis_sigma: None, rejection: 4.0 }
+        Self {
+            common_sigma: 0.0,
+            shift_sigma: 0.0,
+            axis_sigma: None,
+            rejection: 4.0,
+        }
     }
 }
 
 fn positive(what: &'static str, sigma: f64) -> Result<(), FitError> {
-    if sigma > 0.0 && sigma.is_finite() { Ok(()) } else { Err(FitError::BadSigma { what, sigma }) }
+    if sigma > 0.0 && sigma.is_finite() {
+        Ok(())
+    } else {
+        Err(FitError::BadSigma { what, sigma })
+    }
 }
 
 impl FitParams {
     pub(super) fn check(&self) -> Result<(), FitError> {
-        for (what, sigma) in [("common_sigma", self.common_sigma), ("shift_sigma", self.shift_sigma)] {
+        for (what, sigma) in [
+            ("common_sigma", self.common_sigma),
+            ("shift_sigma", self.shift_sigma),
+        ] {
             if !(sigma >= 0.0 && sigma.is_finite()) {
                 return Err(FitError::BadSigma { what, sigma });
             }
         }
         positive("rejection", self.rejection)?;
-        self.axis_sigma.map_or(Ok(()), |sigma| positive("axis_sigma", sigma))
+        self.axis_sigma
+            .map_or(Ok(()), |sigma| positive("axis_sigma", sigma))
     }
 }
 

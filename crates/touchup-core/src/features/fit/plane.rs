@@ -18,7 +18,9 @@ pub struct Plane {
 impl Plane {
     /// The plane through a point with a normal of any length but 0.
     pub fn new(point: Point3<f64>, normal: &Vector3<f64>) -> Self {
-        Self { pose_of: pose_along(point, normal) }
+        Self {
+            pose_of: pose_along(point, normal),
+        }
     }
 
     /// Normal out of the material, in O.
@@ -40,8 +42,16 @@ impl Plane {
 }
 
 impl Surface for Plane {
-    const NAMES: [Option<&'static str>; FREEDOMS] =
-        [None, None, Some("position along the normal"), NORMAL, NORMAL, None, None, None];
+    const NAMES: [Option<&'static str>; FREEDOMS] = [
+        None,
+        None,
+        Some("position along the normal"),
+        NORMAL,
+        NORMAL,
+        None,
+        None,
+        None,
+    ];
 
     fn pose_of(&self) -> &Isometry3<f64> {
         &self.pose_of
@@ -49,7 +59,11 @@ impl Surface for Plane {
 
     #[inline]
     fn distance_at(&self, q: &Vector3<f64>) -> Distance {
-        Distance { value: q.z, normal: Vector3::z(), by_size: [0.0; 2] }
+        Distance {
+            value: q.z,
+            normal: Vector3::z(),
+            by_size: [0.0; 2],
+        }
     }
 
     fn with(&self, pose_of: Isometry3<f64>, _: [f64; 2]) -> Self {
@@ -58,7 +72,9 @@ impl Surface for Plane {
 
     fn described_from(&self, points: &[Vector3<f64>]) -> Self {
         let q = mean(points.iter().copied());
-        Self { pose_of: self.pose_of * nalgebra::Translation3::new(q.x, q.y, 0.0) }
+        Self {
+            pose_of: self.pose_of * nalgebra::Translation3::new(q.x, q.y, 0.0),
+        }
     }
 
     fn check(&self) -> Result<(), FitError> {

@@ -24,7 +24,11 @@ const DEBIASINGS: usize = 2;
 ///
 /// # Errors
 /// [`FitError`]; on NaN, too few observations, and where a needed number is not fixed by them.
-pub fn fit<M: Surface>(guess: &M, observations: &[Observation], params: &FitParams) -> Result<Fit<M>, FitError> {
+pub fn fit<M: Surface>(
+    guess: &M,
+    observations: &[Observation],
+    params: &FitParams,
+) -> Result<Fit<M>, FitError> {
     params.check()?;
     guess.check()?;
     Observation::check_all(observations)?;
@@ -38,7 +42,12 @@ pub fn fit<M: Surface>(guess: &M, observations: &[Observation], params: &FitPara
     let mut fit = Fit::around(&problem, surface, &kept, params);
     for _ in 0..DEBIASINGS {
         problem.shift = fit.bias(&problem);
-        fit = Fit::around(&problem, problem.solve(fit.surface, &weights)?, &kept, params);
+        fit = Fit::around(
+            &problem,
+            problem.solve(fit.surface, &weights)?,
+            &kept,
+            params,
+        );
     }
     fit.checked()
 }
@@ -49,11 +58,21 @@ fn enough<M: Surface>(problem: &FitProblem, kept: &[f64]) -> Result<(), FitError
     let known = if problem.known_axis.is_some() { 2 } else { 0 };
     let unknowns = M::freedom_count() - known;
     if have < unknowns {
-        return Err(FitError::TooFewObservations { have, given: kept.len(), need: unknowns });
+        return Err(FitError::TooFewObservations {
+            have,
+            given: kept.len(),
+            need: unknowns,
+        });
     }
-    let mut groups = (0..kept.len()).filter(|&i| kept[i] > 0.0).map(|i| problem.group[i]);
+    let mut groups = (0..kept.len())
+        .filter(|&i| kept[i] > 0.0)
+        .map(|i| problem.group[i]);
     let first = groups.next();
-    if groups.all(|group| Some(group) == first) { Err(FitError::OneGroup) } else { Ok(()) }
+    if groups.all(|group| Some(group) == first) {
+        Err(FitError::OneGroup)
+    } else {
+        Ok(())
+    }
 }
 
 fn huber(z: f64) -> f64 {
@@ -78,7 +97,11 @@ fn reweighted<M: Surface>(problem: &FitProblem, mut surface: M, weight: fn(f64) 
         let z = problem.normalised(&surface);
         let scale = scale::<M>(&z);
         let kept: Vec<f64> = z.iter().map(|z| weight(z / scale)).collect();
-        let change = kept.iter().zip(&before).map(|(a, b): (&f64, &f64)| (a - b).abs()).fold(0.0, f64::max);
+        let change = kept
+            .iter()
+            .zip(&before)
+            .map(|(a, b): (&f64, &f64)| (a - b).abs())
+            .fold(0.0, f64::max);
         surface = problem.step(surface, &problem.weights(&kept));
         if change < SETTLED_WEIGHT {
             break;
@@ -89,12 +112,19 @@ fn reweighted<M: Surface>(problem: &FitProblem, mut surface: M, weight: fn(f64) 
 }
 
 /// Least squares without what lies too far, until the same are kept twice; and which those are (1, others 0).
-fn rejected<M: Surface>(problem: &FitProblem, mut surface: M, rejection: f64) -> Result<(M, Vec<f64>), FitError> {
+fn rejected<M: Surface>(
+    problem: &FitProblem,
+    mut surface: M,
+    rejection: f64,
+) -> Result<(M, Vec<f64>), FitError> {
     let mut kept = Vec::new();
     for _ in 0..MOST_REJECTIONS {
         let z = problem.normalised(&surface);
         let limit = rejection * scale::<M>(&z);
-        let now: Vec<f64> = z.iter().map(|z| if z.abs() <= limit { 1.0 } else { 0.0 }).collect();
+        let now: Vec<f64> = z
+            .iter()
+            .map(|z| if z.abs() <= limit { 1.0 } else { 0.0 })
+            .collect();
         if now == kept {
             break;
         }

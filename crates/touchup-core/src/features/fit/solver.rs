@@ -11,8 +11,13 @@ pub(super) type FreedomMatrix = SMatrix<f64, FREEDOMS, FREEDOMS>;
 /// Steps of one solution that help; a sound problem needs fewer than ten.
 const MOST_STEPS: usize = 100;
 /// At worst one that does not comes before each.
-const SEARCH: DampedSearch =
-    DampedSearch { first: 1e-4, factors: [0.1, 10.0], least: 1e-12, most: 1e10, tries: 2 * MOST_STEPS };
+const SEARCH: DampedSearch = DampedSearch {
+    first: 1e-4,
+    factors: [0.1, 10.0],
+    least: 1e-12,
+    most: 1e10,
+    tries: 2 * MOST_STEPS,
+};
 /// A step below this many standard deviations is the last.
 const SETTLED: f64 = 1e-6;
 /// Longest step, in sizes of what was touched and in rad: a longer one may leap into the valley in which a circle fitted to
@@ -38,7 +43,10 @@ pub(super) struct FitProblem<'a> {
 impl<'a> FitProblem<'a> {
     pub fn new(observations: &'a [Observation], axis: Vector3<f64>, params: &FitParams) -> Self {
         let names = distinct(observations.iter().map(|o| o.group));
-        let group = observations.iter().map(|o| names.partition_point(|&name| name < o.group)).collect();
+        let group = observations
+            .iter()
+            .map(|o| names.partition_point(|&name| name < o.group))
+            .collect();
         let (_, size) = centroid_and_spread(observations.iter().map(|o| &o.point));
         Self {
             observations,
@@ -53,7 +61,9 @@ impl<'a> FitProblem<'a> {
     /// What a scaled step of 1 is in each freedom: `size` for lengths, 1 rad for angles.
     pub fn units<M: Surface>(&self) -> Steps {
         let second = if M::SECOND_IS_LENGTH { self.size } else { 1.0 };
-        Steps::from([self.size, self.size, self.size, 1.0, 1.0, 1.0, self.size, second])
+        Steps::from([
+            self.size, self.size, self.size, 1.0, 1.0, 1.0, self.size, second,
+        ])
     }
 
     /// Distance less offset and shift, m.
@@ -63,14 +73,21 @@ impl<'a> FitProblem<'a> {
 
     /// All residuals in their own standard deviations.
     pub fn normalised<M: Surface>(&self, surface: &M) -> Vec<f64> {
-        (0..self.observations.len()).map(|i| self.residual(surface, i) / self.observations[i].sigma).collect()
+        (0..self.observations.len())
+            .map(|i| self.residual(surface, i) / self.observations[i].sigma)
+            .collect()
     }
 
     /// Weights of the squares, 1/m²: what is `kept` (0 to 1) of each, over σ² and over how many are kept of its group.
     pub fn weights(&self, kept: &[f64]) -> Vec<f64> {
         let mut in_group = vec![0.0; self.groups];
-        self.group.iter().zip(kept).for_each(|(&g, k)| in_group[g] += k);
-        let weight = |i: usize| kept[i] / (in_group[self.group[i]].max(1.0) * self.observations[i].sigma.powi(2));
+        self.group
+            .iter()
+            .zip(kept)
+            .for_each(|(&g, k)| in_group[g] += k);
+        let weight = |i: usize| {
+            kept[i] / (in_group[self.group[i]].max(1.0) * self.observations[i].sigma.powi(2))
+        };
         (0..kept.len()).map(weight).collect()
     }
 
@@ -106,35 +123,64 @@ impl<'a> FitProblem<'a> {
     }
 
     fn cost<M: Surface>(&self, surface: &M, weights: &[f64]) -> f64 {
-        let of_points = |(i, w): (usize, &f64)| if *w > 0.0 { w * self.residual(surface, i).powi(2) } else { 0.0 };
+        let of_points = |(i, w): (usize, &f64)| {
+            if *w > 0.0 {
+                w * self.residual(surface, i).powi(2)
+            } else {
+                0.0
+            }
+        };
         self.prior(surface).square + weights.iter().enumerate().map(of_points).sum::<f64>()
     }
 
     /// Steps that do not raise the cost, until one is shorter than `last` standard deviations.
-    fn search<M: Surface>(&self, search: &DampedSearch, surface: M, weights: &[f64], last: f64) -> (M, SearchEnd) {
+    fn search<M: Surface>(
+        &self,
+        search: &DampedSearch,
+        surface: M,
+        weights: &[f64],
+        last: f64,
+    ) -> (M, SearchEnd) {
         let units = self.units::<M>();
         let start = self.cost(&surface, weights);
         let equations = |surface: &M| self.equations(surface, weights);
         let damped = |equations: NormalEquations<FREEDOMS>, damping: f64| {
-            let ridge = RIDGE * equations.information.diagonal().max().max(f64::MIN_POSITIVE);
+            let ridge = RIDGE
+                * equations
+                    .information
+                    .diagonal()
+                    .max()
+                    .max(f64::MIN_POSITIVE);
             let mut damped = equations.damped(damping);
             damped.information += FreedomMatrix::identity() * ridge;
             damped
         };
         let better = |surface: &M, step: &Steps, before: f64| {
             let next = surface.moved(&-step.component_mul(&units));
-            let cost = (step.norm() <= LONGEST_STEP && next.check().is_ok()).then(|| self.cost(&next, weights));
+            let cost = (step.norm() <= LONGEST_STEP && next.check().is_ok())
+                .then(|| self.cost(&next, weights));
             cost.filter(|cost| *cost <= before).map(|cost| (next, cost))
         };
         // in standard deviations, squared
-        let is_last = |step: &Steps, equations: &NormalEquations<FREEDOMS>| step.dot(&equations.right) < last * last;
+        let is_last = |step: &Steps, equations: &NormalEquations<FREEDOMS>| {
+            step.dot(&equations.right) < last * last
+        };
         let (surface, _, end) = search.run((surface, start), equations, damped, better, is_last);
         (surface, end)
     }
 
     /// One step that does not raise the cost, where there is one.
     pub fn step<M: Surface>(&self, surface: M, weights: &[f64]) -> M {
-        self.search(&DampedSearch { first: 1e-6, ..SEARCH }, surface, weights, f64::INFINITY).0
+        self.search(
+            &DampedSearch {
+                first: 1e-6,
+                ..SEARCH
+            },
+            surface,
+            weights,
+            f64::INFINITY,
+        )
+        .0
     }
 
     /// The surface of least cost.
@@ -143,14 +189,20 @@ impl<'a> FitProblem<'a> {
     /// [`FitError::NotConverged`].
     pub fn solve<M: Surface>(&self, surface: M, weights: &[f64]) -> Result<M, FitError> {
         match self.search(&SEARCH, surface, weights, SETTLED) {
-            (_, SearchEnd::Unsettled) => Err(FitError::NotConverged { iterations: MOST_STEPS }),
+            (_, SearchEnd::Unsettled) => Err(FitError::NotConverged {
+                iterations: MOST_STEPS,
+            }),
             (surface, _) => Ok(surface),
         }
     }
 
     /// The same surface described from amid what is kept, of which there is at least one.
     pub fn described<M: Surface>(&self, surface: &M, kept: &[f64]) -> M {
-        let is_kept = self.observations.iter().zip(kept).filter(|(_, k)| **k > 0.0);
+        let is_kept = self
+            .observations
+            .iter()
+            .zip(kept)
+            .filter(|(_, k)| **k > 0.0);
         let local = |o: &Observation| surface.pose_of().inverse_transform_point(&o.point).coords;
         surface.described_from(&is_kept.map(|(o, _)| local(o)).collect::<Vec<_>>())
     }

@@ -16,7 +16,14 @@ const LEAST_TOUCHES: usize = 2;
 pub(crate) fn from_segment(x: f64, y: f64, half: f64) -> (f64, [f64; 2]) {
     let beyond = (x.abs() - half).max(0.0).copysign(x);
     let rho = beyond.hypot(y);
-    (rho, if rho > 0.0 { [beyond / rho, y / rho] } else { [0.0, 1.0] })
+    (
+        rho,
+        if rho > 0.0 {
+            [beyond / rho, y / rho]
+        } else {
+            [0.0, 1.0]
+        },
+    )
 }
 
 /// What closes a slot.
@@ -57,7 +64,13 @@ impl Stadium {
         let upright = pose_along(center, axis);
         let x = upright.inverse_transform_vector(along);
         let turn = nalgebra::UnitQuaternion::from_axis_angle(&Vector3::z_axis(), x.y.atan2(x.x));
-        Self { pose_of: upright * turn, width, length, ends, concave }
+        Self {
+            pose_of: upright * turn,
+            width,
+            length,
+            ends,
+            concave,
+        }
     }
 
     /// Unit vector along it, in O.
@@ -68,11 +81,16 @@ impl Stadium {
     /// Where the end in direction `sign` is along x; an end that was not touched is put where no point constrains it, for
     /// otherwise the last touches of the walls, with their noise, would decide how near it is.
     fn end_beyond(&self, points: &[Vector3<f64>], sign: f64) -> f64 {
-        let faces_end = |q: &&Vector3<f64>| q.x * sign > 0.0 && self.distance_at(q).normal.x.abs() > LEAST_ALONG;
+        let faces_end = |q: &&Vector3<f64>| {
+            q.x * sign > 0.0 && self.distance_at(q).normal.x.abs() > LEAST_ALONG
+        };
         if points.iter().filter(faces_end).count() >= LEAST_TOUCHES {
             return sign * self.length / 2.0;
         }
-        let farthest = points.iter().map(|q| sign * q.x).fold(self.length / 2.0, f64::max);
+        let farthest = points
+            .iter()
+            .map(|q| sign * q.x)
+            .fold(self.length / 2.0, f64::max);
         sign * (farthest + self.width)
     }
 
@@ -94,7 +112,11 @@ impl Stadium {
             (false, true) => (dx, [1.0, 0.0]),
             (false, false) => (dy, [0.0, 1.0]),
         };
-        (value, [x.copysign(q.x), y.copysign(q.y)], [-y / 2.0, -x / 2.0])
+        (
+            value,
+            [x.copysign(q.x), y.copysign(q.y)],
+            [-y / 2.0, -x / 2.0],
+        )
     }
 }
 
@@ -123,20 +145,33 @@ impl Surface for Stadium {
         };
         let s = side(self.concave);
         let normal = Vector3::new(s * normal[0], s * normal[1], 0.0);
-        Distance { value: s * value, normal, by_size: by_size.map(|d| s * d) }
+        Distance {
+            value: s * value,
+            normal,
+            by_size: by_size.map(|d| s * d),
+        }
     }
 
     fn with(&self, pose_of: Isometry3<f64>, by: [f64; 2]) -> Self {
         let width = self.width + by[0];
         let shortest = if self.ends == Ends::Round { width } else { 0.0 };
-        Self { pose_of, width, length: (self.length + by[1]).max(shortest), ..*self }
+        Self {
+            pose_of,
+            width,
+            length: (self.length + by[1]).max(shortest),
+            ..*self
+        }
     }
 
     fn described_from(&self, points: &[Vector3<f64>]) -> Self {
         let q = mean(points.iter().copied());
         let [low, high] = [-1.0, 1.0].map(|sign| self.end_beyond(points, sign));
         let pose_of = self.pose_of * Translation3::new((low + high) / 2.0, 0.0, q.z);
-        Self { pose_of, length: high - low, ..*self }
+        Self {
+            pose_of,
+            length: high - low,
+            ..*self
+        }
     }
 
     fn check(&self) -> Result<(), FitError> {

@@ -33,8 +33,16 @@ pub enum Freedom {
 
 impl Freedom {
     /// All, in the order of [`Steps`].
-    pub const ALL: [Self; FREEDOMS] =
-        [Self::X, Self::Y, Self::Z, Self::TiltX, Self::TiltY, Self::Turn, Self::Size, Self::Second];
+    pub const ALL: [Self; FREEDOMS] = [
+        Self::X,
+        Self::Y,
+        Self::Z,
+        Self::TiltX,
+        Self::TiltY,
+        Self::Turn,
+        Self::Size,
+        Self::Second,
+    ];
 }
 
 /// Where a point lies with respect to a surface.
@@ -96,19 +104,25 @@ pub trait Surface: Clone {
     /// Its axis or normal, with the sign of a direction.
     fn axis_towards(&self, direction: &Vector3<f64>) -> Vector3<f64> {
         let axis = self.axis();
-        if axis.dot(direction) < 0.0 { -axis } else { axis }
+        if axis.dot(direction) < 0.0 {
+            -axis
+        } else {
+            axis
+        }
     }
 
     /// Signed distance of a point in O, m, positive in the air.
     #[inline]
     fn distance(&self, point: &Point3<f64>) -> f64 {
-        self.distance_at(&self.pose_of().inverse_transform_point(point).coords).value
+        self.distance_at(&self.pose_of().inverse_transform_point(point).coords)
+            .value
     }
 
     /// Signed distance of a point in O, m, and the unit normal into the air at the nearest place, in O.
     #[inline]
     fn distance_and_normal(&self, point: &Point3<f64>) -> (f64, Vector3<f64>) {
-        let Distance { value, normal, .. } = self.distance_at(&self.pose_of().inverse_transform_point(point).coords);
+        let Distance { value, normal, .. } =
+            self.distance_at(&self.pose_of().inverse_transform_point(point).coords);
         (value, self.pose_of().rotation * normal)
     }
 
@@ -124,17 +138,29 @@ pub trait Surface: Clone {
     /// the derivatives are −n by t and −q × n by ω; a tilt towards x is ω = (0, 1, 0), towards y (−1, 0, 0).
     #[inline]
     fn derivatives_at(&self, q: &Vector3<f64>) -> (f64, Steps) {
-        let Distance { value, normal: n, by_size } = self.distance_at(q);
+        let Distance {
+            value,
+            normal: n,
+            by_size,
+        } = self.distance_at(q);
         let turn = -q.cross(&n);
-        let all = [-n.x, -n.y, -n.z, turn.y, -turn.x, turn.z, by_size[0], by_size[1]];
-        (value, Steps::from_fn(|i, _| if Self::FREE[i] { all[i] } else { 0.0 }))
+        let all = [
+            -n.x, -n.y, -n.z, turn.y, -turn.x, turn.z, by_size[0], by_size[1],
+        ];
+        (
+            value,
+            Steps::from_fn(|i, _| if Self::FREE[i] { all[i] } else { 0.0 }),
+        )
     }
 
     /// Changed by so much in each of its freedoms.
     fn moved(&self, steps: &Steps) -> Self {
         let shift = Translation3::new(steps[0], steps[1], steps[2]);
         let turn = UnitQuaternion::from_scaled_axis(Vector3::new(-steps[4], steps[3], steps[5]));
-        self.with(self.pose_of() * Isometry3::from_parts(shift, turn), [steps[6], steps[7]])
+        self.with(
+            self.pose_of() * Isometry3::from_parts(shift, turn),
+            [steps[6], steps[7]],
+        )
     }
 
     /// How many freedoms it has.
@@ -161,7 +187,14 @@ pub(super) const RADIUS: Option<&str> = Some("radius");
 #[inline]
 pub(super) fn radial(q: &Vector3<f64>) -> (f64, Vector3<f64>) {
     let rho = q.xy().norm();
-    (rho, if rho > 0.0 { Vector3::new(q.x / rho, q.y / rho, 0.0) } else { Vector3::x() })
+    (
+        rho,
+        if rho > 0.0 {
+            Vector3::new(q.x / rho, q.y / rho, 0.0)
+        } else {
+            Vector3::x()
+        },
+    )
 }
 
 /// +1 where the material is inside (a boss), −1 where the air is (a hole).
@@ -172,11 +205,19 @@ pub(super) fn side(concave: bool) -> f64 {
 
 /// Refuses a size that is not more than 0.
 pub(super) fn check_size(what: &'static str, value: f64) -> Result<(), FitError> {
-    if value > 0.0 && value.is_finite() { Ok(()) } else { Err(FitError::BadSize { what, value }) }
+    if value > 0.0 && value.is_finite() {
+        Ok(())
+    } else {
+        Err(FitError::BadSize { what, value })
+    }
 }
 
 /// The frame at a point whose z is a direction of any length but 0.
 pub(super) fn pose_along(point: Point3<f64>, z: &Vector3<f64>) -> Isometry3<f64> {
-    let across = if z.x.abs() < 0.5 * z.norm() { Vector3::x() } else { Vector3::y() };
+    let across = if z.x.abs() < 0.5 * z.norm() {
+        Vector3::x()
+    } else {
+        Vector3::y()
+    };
     Isometry3::from_parts(point.into(), UnitQuaternion::face_towards(z, &across))
 }

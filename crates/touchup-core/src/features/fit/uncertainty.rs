@@ -20,11 +20,19 @@ impl<M: Surface> Fit<M> {
     /// say S = g/(g − k) Σ s sᵀ over the groups, s = Σ wᵢ rᵢ ∂dᵢ/∂y over one of them (g groups, k unknowns): the sandwich
     /// whose filling knows nothing of how errors are correlated inside a group \[Liang and Zeger 1986\]. Eigenvalues of S
     /// below 1 are raised to 1, so neither of the two is ever undercut.
-    pub(super) fn around(problem: &FitProblem, surface: M, kept: &[f64], params: &FitParams) -> Self {
+    pub(super) fn around(
+        problem: &FitProblem,
+        surface: M,
+        kept: &[f64],
+        params: &FitParams,
+    ) -> Self {
         let (units, weights) = (problem.units::<M>(), problem.weights(kept));
         let equations = problem.equations(&surface, &weights);
         let (scaled, unknown, alone) = directions(&equations.information);
-        let fixed = scaled.column_iter().filter(|c| c.norm_squared() > 0.0).count();
+        let fixed = scaled
+            .column_iter()
+            .filter(|c| c.norm_squared() > 0.0)
+            .count();
         let mut scores = vec![Steps::zeros(); problem.groups];
         let (mut common, mut in_group) = (Steps::zeros(), vec![false; problem.groups]);
         for (i, &w) in weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
@@ -36,14 +44,17 @@ impl<M: Surface> Fit<M> {
         }
         let groups = in_group.iter().filter(|is| **is).count();
         let chi_squared = equations.square;
-        let degrees = (groups + if problem.known_axis.is_some() { 2 } else { 0 }).saturating_sub(fixed);
+        let degrees =
+            (groups + if problem.known_axis.is_some() { 2 } else { 0 }).saturating_sub(fixed);
         let spread = (chi_squared / degrees.max(1) as f64).max(1.0);
         let inner = if groups < fixed + SPARE_GROUPS {
             FreedomMatrix::identity() * spread
         } else {
             let correction = groups as f64 / (groups - fixed) as f64;
             let prior = scaled.tr_mul(&(problem.prior(&surface).information * scaled));
-            let sandwich = scores.iter().fold(prior, |sum, s| sum + s * s.transpose() * correction);
+            let sandwich = scores
+                .iter()
+                .fold(prior, |sum, s| sum + s * s.transpose() * correction);
             at_least_one(sandwich)
         };
         let deviations = FreedomMatrix::from_diagonal(&units) * scaled;
@@ -51,19 +62,36 @@ impl<M: Surface> Fit<M> {
         // displaced together, observations displace what is fitted to them, whichever part of it they cover
         let shift = Steps::from_fn(|i, _| {
             let is_place = i <= Freedom::Z as usize;
-            if is_place && M::FREE[i] { params.shift_sigma * params.shift_sigma } else { 0.0 }
+            if is_place && M::FREE[i] {
+                params.shift_sigma * params.shift_sigma
+            } else {
+                0.0
+            }
         });
         let own_covariance = deviations * inner * deviations.transpose();
-        let covariance = own_covariance + common * common.transpose() + FreedomMatrix::from_diagonal(&shift);
+        let covariance =
+            own_covariance + common * common.transpose() + FreedomMatrix::from_diagonal(&shift);
         let alone = units.component_mul(&alone);
         let used: Vec<bool> = kept.iter().map(|k| *k > 0.0).collect();
-        Self { surface, covariance, own_covariance, used, chi_squared, degrees, groups, unknown, alone, deviations }
+        Self {
+            surface,
+            covariance,
+            own_covariance,
+            used,
+            chi_squared,
+            degrees,
+            groups,
+            unknown,
+            alone,
+            deviations,
+        }
     }
 
     /// # Errors
     /// [`FitError::Undetermined`] when a needed freedom is not fixed, [`FitError::BadSize`].
     pub(super) fn checked(self) -> Result<Self, FitError> {
-        let is_open = |freedom: &Freedom| M::NEEDED[*freedom as usize] && self.std(*freedom).is_none();
+        let is_open =
+            |freedom: &Freedom| M::NEEDED[*freedom as usize] && self.std(*freedom).is_none();
         let open = Freedom::ALL.into_iter().find(is_open);
         if let Some(what) = open.and_then(|freedom| M::NAMES[freedom as usize]) {
             return Err(FitError::Undetermined { what });
@@ -76,14 +104,26 @@ impl<M: Surface> Fit<M> {
 /// In scaled steps: columns of one standard deviation along the fixed directions; and, in steps that each change the
 /// residuals by one standard deviation if taken alone, the projector onto the other directions, and these steps.
 fn directions(information: &FreedomMatrix) -> (FreedomMatrix, FreedomMatrix, Steps) {
-    let alone = information.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 1.0 });
+    let alone = information
+        .diagonal()
+        .map(|x| if x > 0.0 { x.sqrt().recip() } else { 1.0 });
     let widths = FreedomMatrix::from_diagonal(&alone);
     let eigen = SymmetricEigen::new(widths * information * widths);
     let (mut fixed, mut unknown) = (FreedomMatrix::zeros(), FreedomMatrix::zeros());
-    for (direction, &share) in eigen.eigenvectors.column_iter().zip(eigen.eigenvalues.iter()) {
+    for (direction, &share) in eigen
+        .eigenvectors
+        .column_iter()
+        .zip(eigen.eigenvalues.iter())
+    {
         let deviation = widths * direction / share.max(LEAST_SHARE).sqrt();
         if share > LEAST_SHARE && deviation.norm() <= LARGEST_DEVIATION {
-            fixed.set_column(fixed.column_iter().filter(|c| c.norm_squared() > 0.0).count(), &deviation);
+            fixed.set_column(
+                fixed
+                    .column_iter()
+                    .filter(|c| c.norm_squared() > 0.0)
+                    .count(),
+                &deviation,
+            );
         } else {
             unknown += direction * direction.transpose();
         }

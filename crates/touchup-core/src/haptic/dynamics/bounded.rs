@@ -71,20 +71,33 @@ pub(super) fn integrate(
     let mut noise = Coupled::zeros();
     // the first step does not change much, and the next ones grow from there
     let Slope { rate, jacobian } = slope(&y);
-    let fastest = jacobian.amax().max(rate.y.abs() / sizes.turning).max(rate.amax() / sizes.contact);
+    let fastest = jacobian
+        .amax()
+        .max(rate.y.abs() / sizes.turning)
+        .max(rate.amax() / sizes.contact);
     let mut step = end.min(FIRST / fastest.max(f64::MIN_POSITIVE));
     for _ in 0..MOST_STEPS {
         if time >= end {
-            let allowed = Coupled::new((relative * farthest).max(sizes.rounding), relative * sizes.turning);
+            let allowed = Coupled::new(
+                (relative * farthest).max(sizes.rounding),
+                relative * sizes.turning,
+            );
             let share = noise.component_div(&allowed).amax();
-            return if share <= 1.0 { Ok(y) } else { Err(DynamicsError::Undetermined { share }) };
+            return if share <= 1.0 {
+                Ok(y)
+            } else {
+                Err(DynamicsError::Undetermined { share })
+            };
         }
         let is_last = step >= end - time;
         let dt = if is_last { end - time } else { step };
         let size = |next: &Coupled| {
             Coupled::new(
                 farthest.max(next.x.abs()).max(sizes.rounding / AGREEMENT),
-                sizes.turning.max(next.y.abs()).max(sizes.rounding / AGREEMENT),
+                sizes
+                    .turning
+                    .max(next.y.abs())
+                    .max(sizes.rounding / AGREEMENT),
             )
         };
         let halves = radau(&y, dt, size, &slope).and_then(|whole| {
@@ -97,7 +110,8 @@ pub(super) fn integrate(
             Some((next, error)) if error <= 1.0 => {
                 let grown = [&y, &next].map(|y| propagator(&slope(y).jacobian, dt).abs() * noise);
                 noise = grown[0].sup(&grown[1])
-                    + f64::EPSILON * Coupled::new(farthest.max(next.x.abs()), sizes.turning.max(next.y.abs()));
+                    + f64::EPSILON
+                        * Coupled::new(farthest.max(next.x.abs()), sizes.turning.max(next.y.abs()));
                 y = next;
                 farthest = farthest.max(y.x.abs());
                 time = if is_last { end } else { time + dt };
@@ -108,10 +122,17 @@ pub(super) fn integrate(
         };
         step = dt * change.clamp(CHANGE.0, CHANGE.1);
         if time + step == time && time < end {
-            return Err(DynamicsError::NotFinite { what: "the path of the face within the step" });
+            return Err(DynamicsError::NotFinite {
+                what: "the path of the face within the step",
+            });
         }
     }
-    Err(DynamicsError::Stiff { rule: "bounded", steps: MOST_STEPS, reached_s: time, dt_s: end })
+    Err(DynamicsError::Stiff {
+        rule: "bounded",
+        steps: MOST_STEPS,
+        reached_s: time,
+        dt_s: end,
+    })
 }
 
 /// Half of the trace, and the squared half distance of both eigenvalues, negative where they are complex.
@@ -139,7 +160,10 @@ fn propagator(jacobian: &Matrix2<f64>, dt: f64) -> Matrix2<f64> {
         (0.5 * (fast + slow), 0.5 * (fast - slow) / distance)
     } else {
         let size = (half * dt).exp();
-        (size * (distance * dt).cos(), size * (distance * dt).sin() / distance)
+        (
+            size * (distance * dt).cos(),
+            size * (distance * dt).sin() / distance,
+        )
     };
     Matrix2::identity() * even + (jacobian - Matrix2::identity() * half) * odd
 }
@@ -172,7 +196,9 @@ fn radau(
         z += change;
         let end = y + z.fixed_rows::<2>(4);
         let sizes = size(&end);
-        let left = (0..3).map(|i| change.fixed_rows::<2>(2 * i).component_div(&sizes).amax()).fold(0.0, f64::max);
+        let left = (0..3)
+            .map(|i| change.fixed_rows::<2>(2 * i).component_div(&sizes).amax())
+            .fold(0.0, f64::max);
         // … or no nearer than roundings let it come
         if left <= NEWTON * AGREEMENT || left <= AGREEMENT && left > 0.5 * last {
             return (growth * dt <= LONGEST_GROWTH).then_some(end);

@@ -75,7 +75,11 @@ impl ContactModel {
     pub fn check(&self) -> Result<(), DynamicsError> {
         let positive = |name, value| DynamicsError::check(name, value, value > 0.0);
         match *self {
-            Self::Sigmoid { f_max_n, h_min_m, delta } => {
+            Self::Sigmoid {
+                f_max_n,
+                h_min_m,
+                delta,
+            } => {
                 positive("f_max_n", f_max_n)?;
                 positive("h_min_m", h_min_m)?;
                 DynamicsError::check("delta", delta, true)
@@ -87,7 +91,11 @@ impl ContactModel {
     /// f(h), N.
     pub fn force(&self, h_m: f64) -> f64 {
         match *self {
-            Self::Sigmoid { f_max_n, h_min_m, delta } => f_max_n * share(h_m / h_min_m + delta),
+            Self::Sigmoid {
+                f_max_n,
+                h_min_m,
+                delta,
+            } => f_max_n * share(h_m / h_min_m + delta),
             Self::Spring { stiffness_n_per_m } => -stiffness_n_per_m * h_m,
         }
     }
@@ -95,7 +103,11 @@ impl ContactModel {
     /// df/dh, N/m, ≤ 0.
     pub(super) fn slope(&self, h_m: f64) -> f64 {
         match *self {
-            Self::Sigmoid { f_max_n, h_min_m, delta } => {
+            Self::Sigmoid {
+                f_max_n,
+                h_min_m,
+                delta,
+            } => {
                 let u = h_m / h_min_m + delta;
                 -f_max_n / h_min_m * share(u) * share(-u)
             }
@@ -108,10 +120,18 @@ impl ContactModel {
         match *self {
             Self::Sigmoid { f_max_n, .. } if force_n <= 0.0 => f_max_n * f64::INFINITY,
             Self::Sigmoid { f_max_n, .. } if force_n >= f_max_n => f64::NEG_INFINITY,
-            Self::Sigmoid { f_max_n, h_min_m, delta } => {
+            Self::Sigmoid {
+                f_max_n,
+                h_min_m,
+                delta,
+            } => {
                 let (rest, quotient) = (f_max_n - force_n, (f_max_n - force_n) / force_n);
                 // a force so small that the quotient overflows is still reached
-                let log = if quotient.is_finite() { quotient.ln() } else { rest.ln() - force_n.ln() };
+                let log = if quotient.is_finite() {
+                    quotient.ln()
+                } else {
+                    rest.ln() - force_n.ln()
+                };
                 h_min_m * (log - delta)
             }
             Self::Spring { stiffness_n_per_m } => -force_n / stiffness_n_per_m,
@@ -122,7 +142,9 @@ impl ContactModel {
     pub(super) fn distance_slope(&self, force_n: f64) -> f64 {
         match *self {
             Self::Sigmoid { f_max_n, .. } if force_n <= 0.0 || force_n >= f_max_n => 0.0,
-            Self::Sigmoid { f_max_n, h_min_m, .. } => -h_min_m * (1.0 / (f_max_n - force_n) + 1.0 / force_n),
+            Self::Sigmoid {
+                f_max_n, h_min_m, ..
+            } => -h_min_m * (1.0 / (f_max_n - force_n) + 1.0 / force_n),
             Self::Spring { stiffness_n_per_m } => -1.0 / stiffness_n_per_m,
         }
     }
@@ -153,7 +175,11 @@ impl ContactModel {
     #[inline]
     pub(super) fn flow(&self, hold: &Hold) -> Shift {
         match *self {
-            Self::Sigmoid { f_max_n, h_min_m, delta } => sigmoid(hold, f_max_n, h_min_m, delta),
+            Self::Sigmoid {
+                f_max_n,
+                h_min_m,
+                delta,
+            } => sigmoid(hold, f_max_n, h_min_m, delta),
             Self::Spring { stiffness_n_per_m } => spring(hold, stiffness_n_per_m),
         }
     }
@@ -176,45 +202,79 @@ fn sigmoid(hold: &Hold, f_max: f64, h_min: f64, delta: f64) -> Shift {
     let u = hold.h / h_min + delta;
     let reach = product(hold.alpha, f_max, hold.dt);
     let t = reach * hold.cosine / h_min;
-    let drift = if hold.drift == 0.0 { 0.0 } else { hold.drift / (hold.alpha * hold.cosine) };
+    let drift = if hold.drift == 0.0 {
+        0.0
+    } else {
+        hold.drift / (hold.alpha * hold.cosine)
+    };
     let c = (hold.force - drift) / f_max;
     if t.abs() < NO_TIME || !c.is_finite() {
         // the face does not move along its own normal: only the drift changes h, seen at its middle
         let load = share(u + 0.5 * hold.drift * hold.dt / h_min);
         let impulse = load * f_max * hold.dt;
-        return Shift { displacement: hold.alpha * (hold.force * hold.dt - impulse), impulse };
+        return Shift {
+            displacement: hold.alpha * (hold.force * hold.dt - impulse),
+            impulse,
+        };
     }
     if t.abs() > LONGEST {
-        return Shift { displacement: f64::NAN, impulse: f64::NAN };
+        return Shift {
+            displacement: f64::NAN,
+            impulse: f64::NAN,
+        };
     }
     let moved = advance(u, c, t);
     let impulse = moved.load / t.abs() * f_max * hold.dt;
     let along_h = -moved.delta_u / t * reach;
     if hold.drift == 0.0 {
-        return Shift { displacement: along_h, impulse };
+        return Shift {
+            displacement: along_h,
+            impulse,
+        };
     }
     // two formulas of the same number; the one with the smaller terms loses less
     let drifted = hold.drift * hold.dt / hold.cosine;
     let pushed = hold.alpha * hold.force * hold.dt;
-    let displacement = if pushed.abs() < drifted.abs() { pushed - hold.alpha * impulse } else { drifted + along_h };
-    Shift { displacement, impulse }
+    let displacement = if pushed.abs() < drifted.abs() {
+        pushed - hold.alpha * impulse
+    } else {
+        drifted + along_h
+    };
+    Shift {
+        displacement,
+        impulse,
+    }
 }
 
 /// s = α t ((F·n + k h₀) φ₁(z) + k v t φ₂(z)), z = −α (a·n) k t, and J = −k ∫ h dt likewise.
 #[inline]
 fn spring(hold: &Hold, stiffness: f64) -> Shift {
-    let Hold { h, drift, cosine, force, alpha, dt } = *hold;
+    let Hold {
+        h,
+        drift,
+        cosine,
+        force,
+        alpha,
+        dt,
+    } = *hold;
     let (phi1, phi2) = phi(-alpha * cosine * stiffness * dt);
-    let displacement = alpha * dt * ((force + stiffness * h) * phi1 + stiffness * drift * dt * phi2);
+    let displacement =
+        alpha * dt * ((force + stiffness * h) * phi1 + stiffness * drift * dt * phi2);
     let impulse = -stiffness * dt * (h * phi1 + (drift - alpha * cosine * force) * dt * phi2);
-    Shift { displacement, impulse }
+    Shift {
+        displacement,
+        impulse,
+    }
 }
 
 /// φ₁(z) = (e^z − 1)/z and φ₂(z) = (e^z − 1 − z)/z².
 #[inline]
 fn phi(z: f64) -> (f64, f64) {
     if z.abs() < SERIES_UP_TO {
-        let phi2 = INVERSE_FACTORIALS.iter().rev().fold(0.0, |sum, inverse| sum * z + inverse);
+        let phi2 = INVERSE_FACTORIALS
+            .iter()
+            .rev()
+            .fold(0.0, |sum, inverse| sum * z + inverse);
         return (1.0 + z * phi2, phi2);
     }
     let phi1 = z.exp_m1() / z;

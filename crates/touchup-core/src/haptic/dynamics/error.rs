@@ -39,7 +39,9 @@ pub enum DynamicsError {
         share: f64,
     },
     /// An adaptive solver gave up.
-    #[error("too stiff for {rule}: {steps} steps reached {reached_s} s of {dt_s} s; use lie or corrected")]
+    #[error(
+        "too stiff for {rule}: {steps} steps reached {reached_s} s of {dt_s} s; use lie or corrected"
+    )]
     Stiff {
         /// as in the scene and in `touchup step`
         rule: &'static str,
@@ -55,7 +57,11 @@ pub enum DynamicsError {
 impl DynamicsError {
     /// Refuses a parameter that is not finite or not `inside` its range.
     pub(super) fn check(name: &'static str, value: f64, inside: bool) -> Result<(), Self> {
-        if inside && value.is_finite() { Ok(()) } else { Err(Self::BadParameter { name, value }) }
+        if inside && value.is_finite() {
+            Ok(())
+        } else {
+            Err(Self::BadParameter { name, value })
+        }
     }
 }
 

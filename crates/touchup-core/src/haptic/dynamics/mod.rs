@@ -98,7 +98,11 @@ parameters! {
 impl SigmoidParams {
     /// The expected force of it.
     pub fn model(&self) -> ContactModel {
-        ContactModel::Sigmoid { f_max_n: self.f_max, h_min_m: self.h_min, delta: self.delta }
+        ContactModel::Sigmoid {
+            f_max_n: self.f_max,
+            h_min_m: self.h_min,
+            delta: self.delta,
+        }
     }
 }
 
@@ -174,9 +178,20 @@ impl FaceDynamics {
     /// [`DynamicsError::BadParameter`].
     pub fn new(params: DynamicsParams) -> Result<Self, DynamicsError> {
         params.model.check()?;
-        DynamicsError::check("alpha_m_per_n_s", params.alpha_m_per_n_s, params.alpha_m_per_n_s >= 0.0)?;
-        DynamicsError::check("beta_per_n2_s", params.beta_per_n2_s, params.beta_per_n2_s >= 0.0)?;
-        Ok(Self { params, at_zero_n: params.model.force(0.0) })
+        DynamicsError::check(
+            "alpha_m_per_n_s",
+            params.alpha_m_per_n_s,
+            params.alpha_m_per_n_s >= 0.0,
+        )?;
+        DynamicsError::check(
+            "beta_per_n2_s",
+            params.beta_per_n2_s,
+            params.beta_per_n2_s >= 0.0,
+        )?;
+        Ok(Self {
+            params,
+            at_zero_n: params.model.force(0.0),
+        })
     }
 
     /// The face after holding the tip `p` (m, in O) and the force on the stylus `force` (N, in O) for `dt` (s).
@@ -214,13 +229,26 @@ impl FaceDynamics {
         }
         let length_squared = face.n.norm_squared();
         if (length_squared - 1.0).abs() > 2.0 * UNIT_TOLERANCE {
-            return Err(DynamicsError::NotUnit { length: length_squared.sqrt() });
+            return Err(DynamicsError::NotUnit {
+                length: length_squared.sqrt(),
+            });
         }
         if dt < 0.0 {
             return Err(DynamicsError::BadTimeStep { dt_s: dt });
         }
-        let along = if self.params.along == Along::Force && magnitude > 0.0 { towards } else { *initial_normal };
-        let touch = FaceSample { n: face.n, towards, magnitude, along, arm: p - face.b, dt };
+        let along = if self.params.along == Along::Force && magnitude > 0.0 {
+            towards
+        } else {
+            *initial_normal
+        };
+        let touch = FaceSample {
+            n: face.n,
+            towards,
+            magnitude,
+            along,
+            arm: p - face.b,
+            dt,
+        };
         let (displacement, n) = match self.params.rule {
             StepRule::Lie => self.lie(&touch),
             StepRule::DriftCorrected => self.drift_corrected(&touch),
@@ -229,7 +257,9 @@ impl FaceDynamics {
         };
         let b = face.b + displacement * along;
         if !finite(&b.coords) || !finite(&n) {
-            return Err(DynamicsError::NotFinite { what: "the result of the step" });
+            return Err(DynamicsError::NotFinite {
+                what: "the result of the step",
+            });
         }
         Ok(FaceState { b, n })
     }
@@ -250,17 +280,31 @@ impl FaceDynamics {
     fn hold(&self, touch: &FaceSample) -> Hold {
         let (force, h) = self.compared(&touch.n, touch, 0.0);
         let cosine = touch.along.dot(&touch.n);
-        Hold { h, drift: 0.0, cosine, force, alpha: self.params.alpha_m_per_n_s, dt: touch.dt }
+        Hold {
+            h,
+            drift: 0.0,
+            cosine,
+            force,
+            alpha: self.params.alpha_m_per_n_s,
+            dt: touch.dt,
+        }
     }
 
     #[inline]
     fn turned(&self, touch: &FaceSample, impulse: f64) -> Vector3<f64> {
-        turn(&touch.n, &touch.towards, self.params.beta_per_n2_s * touch.magnitude * impulse)
+        turn(
+            &touch.n,
+            &touch.towards,
+            self.params.beta_per_n2_s * touch.magnitude * impulse,
+        )
     }
 
     #[inline]
     fn lie(&self, touch: &FaceSample) -> (f64, Vector3<f64>) {
-        let Shift { displacement, impulse } = self.params.model.flow(&self.hold(touch));
+        let Shift {
+            displacement,
+            impulse,
+        } = self.params.model.flow(&self.hold(touch));
         (displacement, self.turned(touch, impulse))
     }
 
@@ -279,7 +323,12 @@ impl FaceDynamics {
     }
 
     /// The flow, and what its mean of F·n leaves out of the impulse, N·s.
-    fn drifting_flow(&self, touch: &FaceSample, end: &Vector3<f64>, displacement: f64) -> (Shift, f64) {
+    fn drifting_flow(
+        &self,
+        touch: &FaceSample,
+        end: &Vector3<f64>,
+        displacement: f64,
+    ) -> (Shift, f64) {
         let start = self.hold(touch);
         let (force, h) = self.compared(end, touch, 0.0);
         let cosine = touch.along.dot(end);
@@ -293,22 +342,29 @@ impl FaceDynamics {
             force: mean(start.force, force),
             ..start
         };
-        (self.params.model.flow(&hold), (0.5 - weight) * (force - start.force) * touch.dt)
+        (
+            self.params.model.flow(&hold),
+            (0.5 - weight) * (force - start.force) * touch.dt,
+        )
     }
 
     /// Both flows at once; a face that does not turn has the exact solution of [`Self::lie`].
     fn bounded(&self, touch: &FaceSample) -> Result<(f64, Vector3<f64>), DynamicsError> {
         let turning = self.params.beta_per_n2_s * touch.magnitude;
         let (displacement, end) = self.lie(touch);
-        if turning == 0.0 || touch.dt == 0.0 || end == touch.n && touch.n.cross(&touch.towards).norm() <= f64::EPSILON {
+        if turning == 0.0
+            || touch.dt == 0.0
+            || end == touch.n && touch.n.cross(&touch.towards).norm() <= f64::EPSILON
+        {
             return Ok((displacement, end));
         }
         let (model, alpha) = (&self.params.model, self.params.alpha_m_per_n_s);
         let (contact, shift) = match *model {
             ContactModel::Sigmoid { h_min_m, delta, .. } => (h_min_m, (h_min_m * delta).abs()),
-            ContactModel::Spring { stiffness_n_per_m } => {
-                (self.hold(touch).h.abs() + touch.magnitude / stiffness_n_per_m, 0.0)
-            }
+            ContactModel::Spring { stiffness_n_per_m } => (
+                self.hold(touch).h.abs() + touch.magnitude / stiffness_n_per_m,
+                0.0,
+            ),
         };
         let rounding = 8.0 * f64::EPSILON * (touch.arm.norm() + shift);
         // the impulse times α is a length, as the travel is
@@ -340,13 +396,21 @@ impl FaceDynamics {
         };
         // of a force that turns the face by nothing
         let turned = (unit / turning).min(NO_TURNING);
-        let sizes = bounded::Sizes { rounding, turning: turned, contact };
+        let sizes = bounded::Sizes {
+            rounding,
+            turning: turned,
+            contact,
+        };
         let y = bounded::integrate(touch.dt, sizes, RELATIVE_ERROR, slope)?;
         Ok((y.x, normal(y.y)))
     }
 
     fn dormand_prince(&self, touch: &FaceSample) -> Result<(f64, Vector3<f64>), DynamicsError> {
-        let (model, alpha, beta) = (&self.params.model, self.params.alpha_m_per_n_s, self.params.beta_per_n2_s);
+        let (model, alpha, beta) = (
+            &self.params.model,
+            self.params.alpha_m_per_n_s,
+            self.params.beta_per_n2_s,
+        );
         let rate = |y: &[f64; 4]| {
             let n = Vector3::new(y[1], y[2], y[3]);
             let (force, h) = self.compared(&n, touch, y[0]);
@@ -383,8 +447,16 @@ fn end_weight(z: f64) -> f64 {
 
 #[cold]
 fn not_finite(face: &FaceState, p: &Point3<f64>, force: &Vector3<f64>) -> DynamicsError {
-    let parts = [("b", face.b.coords), ("n", face.n), ("p", p.coords), ("force", *force)];
-    let what = parts.iter().find(|(_, v)| !finite(v)).map_or("dt, |F| or a sum of the input", |(what, _)| what);
+    let parts = [
+        ("b", face.b.coords),
+        ("n", face.n),
+        ("p", p.coords),
+        ("force", *force),
+    ];
+    let what = parts
+        .iter()
+        .find(|(_, v)| !finite(v))
+        .map_or("dt, |F| or a sum of the input", |(what, _)| what);
     DynamicsError::NotFinite { what }
 }
 

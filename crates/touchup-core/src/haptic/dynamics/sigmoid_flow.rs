@@ -46,7 +46,11 @@ pub(super) struct Advance {
 /// 1/(1 + eᵘ): the expected force in units of f_max.
 pub(super) fn share(u: f64) -> f64 {
     let e = (-u.abs()).exp();
-    if u > 0.0 { e / (1.0 + e) } else { 1.0 / (1.0 + e) }
+    if u > 0.0 {
+        e / (1.0 + e)
+    } else {
+        1.0 / (1.0 + e)
+    }
 }
 
 /// Exact solution of du/dT = 1/(1 + eᵘ) − c after the time `t`, which may be negative.
@@ -57,10 +61,16 @@ pub(super) fn advance(u: f64, c: f64, t: f64) -> Advance {
     let arc = Arc::new(u, c, 1.0 - c);
     if arc.rate >= 0.0 {
         let (rise, low, _) = arc.after(t);
-        Advance { delta_u: rise.copysign(t), load: low }
+        Advance {
+            delta_u: rise.copysign(t),
+            load: low,
+        }
     } else {
         let (rise, _, high) = Arc::new(-u, 1.0 - c, c).after(t);
-        Advance { delta_u: -rise.copysign(t), load: high }
+        Advance {
+            delta_u: -rise.copysign(t),
+            load: high,
+        }
     }
 }
 
@@ -86,9 +96,24 @@ impl Arc {
     #[inline]
     fn new(u: f64, c: f64, rest: f64) -> Self {
         let small = (-u.abs()).exp();
-        let (e, margin) = if u > 0.0 { (1.0 / small, rest * small - c) } else { (small, rest - c * small) };
-        let rho = if u > 0.0 { 1.0 / margin } else { small / margin };
-        Self { u, c, rest, e, rate: margin / (1.0 + small), rho }
+        let (e, margin) = if u > 0.0 {
+            (1.0 / small, rest * small - c)
+        } else {
+            (small, rest - c * small)
+        };
+        let rho = if u > 0.0 {
+            1.0 / margin
+        } else {
+            small / margin
+        };
+        Self {
+            u,
+            c,
+            rest,
+            e,
+            rate: margin / (1.0 + small),
+            rho,
+        }
     }
 
     /// Straight parts first, where they reach that far, then the curved one.
@@ -124,7 +149,11 @@ impl Arc {
         // the vanishing one of the two integrals: the exponential tail between both ends
         let nearest = self.u.abs().min(edge.unwrap_or(free).abs());
         let tail = -(-displacement).exp_m1() * (-nearest).exp() / slope;
-        let here = if self.u < 0.0 { (displacement, spent, tail) } else { (displacement, tail, spent) };
+        let here = if self.u < 0.0 {
+            (displacement, spent, tail)
+        } else {
+            (displacement, tail, spent)
+        };
         let Some(edge) = edge else { return here };
         let left = Self::new(edge, self.c, self.rest).after(sign * (span - spent));
         (here.0 + left.0, here.1 + left.1, here.2 + left.2)
@@ -140,20 +169,35 @@ impl Arc {
         let sign = if down { -1.0 } else { 1.0 };
         let total = self.rest * span;
         // the rate falls while u rises
-        let (low, high) = if down { (self.rate * span, total) } else { (0.0, total.min(self.rate * span)) };
+        let (low, high) = if down {
+            (self.rate * span, total)
+        } else {
+            (0.0, total.min(self.rate * span))
+        };
         let start = if down { low } else { self.guess(span, high) };
         let short = !down && high <= SHORT && self.c * self.rho * SHORT_GROWTH * high < 0.5;
         let by_sum = |displacement| self.by_sum(sign, total, displacement);
         let Some(bend) = self.bend().filter(|_| !short) else {
             return self.passed(solve(low, high, start, by_sum), total, span, sign);
         };
-        let to_bend = if down == (self.e < bend) { 0.0 } else { (bend / self.e).ln().abs() };
-        let beyond = to_bend == 0.0 || (to_bend < high && to_bend + self.high_and_end(sign * to_bend).0 < total);
-        let (low, high) = if beyond { (low.max(to_bend), high) } else { (low, high.min(to_bend)) };
+        let to_bend = if down == (self.e < bend) {
+            0.0
+        } else {
+            (bend / self.e).ln().abs()
+        };
+        let beyond = to_bend == 0.0
+            || (to_bend < high && to_bend + self.high_and_end(sign * to_bend).0 < total);
+        let (low, high) = if beyond {
+            (low.max(to_bend), high)
+        } else {
+            (low, high.min(to_bend))
+        };
         let displacement = if beyond != down {
             // L must not start near 0 while eᵘ is small: its logarithm is steep there
             let start = if self.e < bend { low } else { start };
-            solve(low, high, start, |displacement| self.by_logarithm(sign, total, displacement))
+            solve(low, high, start, |displacement| {
+                self.by_logarithm(sign, total, displacement)
+            })
         } else {
             solve(low, high, start, by_sum)
         };
@@ -184,7 +228,11 @@ impl Arc {
     fn by_sum(&self, sign: f64, total: f64, displacement: f64) -> (f64, f64, f64) {
         let (high, e) = self.high_and_end(sign * displacement);
         let l = 1.0 / (self.rest / e - self.c);
-        (displacement + high - total, 1.0 + l, sign * l * (1.0 + self.c * l) / (1.0 + l))
+        (
+            displacement + high - total,
+            1.0 + l,
+            sign * l * (1.0 + self.c * l) / (1.0 + l),
+        )
     }
 
     /// D − ln(1 + y(L)/ρ) with L = (1 − c) T − D, as a function of D.
@@ -196,17 +244,29 @@ impl Arc {
             (x - (-self.c * self.rho).ln(), -self.c)
         } else if sign < 0.0 && self.c < 0.0 {
             // 1 + y/ρ nearly cancels while u is large, 1 + z does not
-            let grown = if -x < f64::EPSILON { total - displacement } else { (-x).exp_m1() / -self.c };
+            let grown = if -x < f64::EPSILON {
+                total - displacement
+            } else {
+                (-x).exp_m1() / -self.c
+            };
             let z = -grown * self.rest / self.e;
             (x + z.ln_1p(), 1.0 / (self.rho * (1.0 + z)))
         } else {
             let grown = x.exp_m1();
-            let y = if x.abs() < f64::EPSILON { sign * (total - displacement) } else { grown / -self.c };
+            let y = if x.abs() < f64::EPSILON {
+                sign * (total - displacement)
+            } else {
+                grown / -self.c
+            };
             ((y / self.rho).ln_1p(), (1.0 + grown) / (self.rho + y))
         };
         let residual = displacement - sign * mapped;
         // D too small on the descent: the logarithm does not exist there
-        let residual = if residual.is_finite() { residual } else { -f64::MAX };
+        let residual = if residual.is_finite() {
+            residual
+        } else {
+            -f64::MAX
+        };
         (residual, 1.0 + m, sign * m * (self.c + m) / (1.0 + m))
     }
 
@@ -235,8 +295,16 @@ impl Arc {
     #[inline]
     fn passed(&self, displacement: f64, total: f64, span: f64, sign: f64) -> Passed {
         let (low, high) = (displacement + self.c * span, total - displacement);
-        let low = if low > CANCELLED * displacement { low } else { self.low(displacement, sign) };
-        let high = if high > CANCELLED * total { high } else { self.high_and_end(sign * displacement).0 };
+        let low = if low > CANCELLED * displacement {
+            low
+        } else {
+            self.low(displacement, sign)
+        };
+        let high = if high > CANCELLED * total {
+            high
+        } else {
+            self.high_and_end(sign * displacement).0
+        };
         (displacement, low, high)
     }
 
@@ -261,7 +329,12 @@ impl Arc {
 ///
 /// `equation`: residual, slope, and second derivative over slope, all for the distance.
 #[inline]
-fn solve(mut low: f64, mut high: f64, start: f64, equation: impl Fn(f64) -> (f64, f64, f64)) -> f64 {
+fn solve(
+    mut low: f64,
+    mut high: f64,
+    start: f64,
+    equation: impl Fn(f64) -> (f64, f64, f64),
+) -> f64 {
     let mut displacement = start.max(low).min(high); // rounding may cross the two
     for _ in 0..MAX_ITERATIONS {
         let (residual, slope, bend) = equation(displacement);
@@ -275,7 +348,8 @@ fn solve(mut low: f64, mut high: f64, start: f64, equation: impl Fn(f64) -> (f64
         let next = displacement - step;
         let inside = next >= low && next <= high;
         if inside
-            && (step * step * step.abs() <= CUBE_BELOW_ROUNDING * displacement || step.abs() <= ROUNDING * displacement)
+            && (step * step * step.abs() <= CUBE_BELOW_ROUNDING * displacement
+                || step.abs() <= ROUNDING * displacement)
         {
             return next;
         }

@@ -12,7 +12,10 @@ pub(super) struct Aabb {
 }
 
 impl Aabb {
-    pub const EMPTY: Self = Self { lo: [f32::INFINITY; 3], hi: [f32::NEG_INFINITY; 3] };
+    pub const EMPTY: Self = Self {
+        lo: [f32::INFINITY; 3],
+        hi: [f32::NEG_INFINITY; 3],
+    };
 
     #[inline]
     pub fn union(&self, other: &Self) -> Self {
@@ -24,21 +27,34 @@ impl Aabb {
 
     /// Around some faces.
     #[inline]
-    pub fn around(mesh: &TriMesh, origin: &Point3<f64>, faces: impl Iterator<Item = FaceId>) -> Self {
+    pub fn around(
+        mesh: &TriMesh,
+        origin: &Point3<f64>,
+        faces: impl Iterator<Item = FaceId>,
+    ) -> Self {
         let mut bounds = Self::EMPTY;
         let mut is_empty = true;
         for face in faces {
             bounds.take(mesh, face, origin);
             is_empty = false;
         }
-        if is_empty { bounds } else { bounds.rounded_outward() }
+        if is_empty {
+            bounds
+        } else {
+            bounds.rounded_outward()
+        }
     }
 
     /// Takes in the corners of a face, rounded to nearest; [`Self::rounded_outward`] makes up for that.
     #[inline]
     fn take(&mut self, mesh: &TriMesh, face: FaceId, origin: &Point3<f64>) {
         for corner in mesh.triangle(face) {
-            let corner = [corner.x - origin.x, corner.y - origin.y, corner.z - origin.z].map(|x| x as f32);
+            let corner = [
+                corner.x - origin.x,
+                corner.y - origin.y,
+                corner.z - origin.z,
+            ]
+            .map(|x| x as f32);
             self.lo = std::array::from_fn(|i| lesser(self.lo[i], corner[i]));
             self.hi = std::array::from_fn(|i| greater(self.hi[i], corner[i]));
         }
@@ -49,14 +65,21 @@ impl Aabb {
     #[inline]
     pub fn rounded_outward(&self) -> Self {
         let unit = |x: f32| x.abs() * f32::EPSILON + f32::MIN_POSITIVE;
-        Self { lo: self.lo.map(|x| x - unit(x)), hi: self.hi.map(|x| x + unit(x)) }
+        Self {
+            lo: self.lo.map(|x| x - unit(x)),
+            hi: self.hi.map(|x| x + unit(x)),
+        }
     }
 
     /// At least `margin` (m) wider on each side.
     #[inline]
     pub fn grown(&self, margin: f64) -> Self {
         let grown = |x: f32, margin: f64| (f64::from(x) + margin) as f32;
-        Self { lo: self.lo.map(|x| grown(x, -margin)), hi: self.hi.map(|x| grown(x, margin)) }.rounded_outward()
+        Self {
+            lo: self.lo.map(|x| grown(x, -margin)),
+            hi: self.hi.map(|x| grown(x, margin)),
+        }
+        .rounded_outward()
     }
 
     /// Half of the surface, m²; what a query pays for a box grows with it.
@@ -69,7 +92,9 @@ impl Aabb {
     /// Whether another box is wholly inside.
     #[inline]
     pub fn encloses(&self, other: &Self) -> bool {
-        (0..3).fold(true, |all, i| all & (self.lo[i] <= other.lo[i]) & (self.hi[i] >= other.hi[i]))
+        (0..3).fold(true, |all, i| {
+            all & (self.lo[i] <= other.lo[i]) & (self.hi[i] >= other.hi[i])
+        })
     }
 
     /// Squared distance to a point (relative to the tree's origin), in single precision; 0 inside.
@@ -82,14 +107,25 @@ impl Aabb {
 
     /// The largest box of single precision within a box: it overlaps the same boxes of single precision.
     pub fn within(lo: &Vector3<f64>, hi: &Vector3<f64>) -> Self {
-        let up = |x: f64| if f64::from(x as f32) < x { (x as f32).next_up() } else { x as f32 };
-        Self { lo: [lo.x, lo.y, lo.z].map(up), hi: [hi.x, hi.y, hi.z].map(|x| -up(-x)) }
+        let up = |x: f64| {
+            if f64::from(x as f32) < x {
+                (x as f32).next_up()
+            } else {
+                x as f32
+            }
+        };
+        Self {
+            lo: [lo.x, lo.y, lo.z].map(up),
+            hi: [hi.x, hi.y, hi.z].map(|x| -up(-x)),
+        }
     }
 
     /// Whether two boxes meet; without branches, for the outcome is hard to predict.
     #[inline]
     pub fn overlaps(&self, other: &Self) -> bool {
-        (0..3).fold(true, |all, i| all & (self.lo[i] <= other.hi[i]) & (self.hi[i] >= other.lo[i]))
+        (0..3).fold(true, |all, i| {
+            all & (self.lo[i] <= other.hi[i]) & (self.hi[i] >= other.lo[i])
+        })
     }
 }
 

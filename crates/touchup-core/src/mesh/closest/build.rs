@@ -29,10 +29,21 @@ impl FaceTree {
     /// [`Self::new`] by `workers`: the same tree, whoever builds it.
     pub fn new_by(mesh: &TriMesh, workers: &dyn Workers) -> Self {
         let [lo, hi] = mesh.bounds();
-        let origin = if mesh.positions().is_empty() { Point3::origin() } else { nalgebra::center(&lo, &hi) };
-        let mut items: Vec<Item> = mesh.faces().map(|(face, _)| Item::of(mesh, face, &origin)).collect();
+        let origin = if mesh.positions().is_empty() {
+            Point3::origin()
+        } else {
+            nalgebra::center(&lo, &hi)
+        };
+        let mut items: Vec<Item> = mesh
+            .faces()
+            .map(|(face, _)| Item::of(mesh, face, &origin))
+            .collect();
         // two pieces for each worker: they are not equally large
-        let forks = if workers.count() > 1 { usize::BITS - workers.count().leading_zeros() } else { 0 };
+        let forks = if workers.count() > 1 {
+            usize::BITS - workers.count().leading_zeros()
+        } else {
+            0
+        };
         let order = LeafOrder::arrange(&mut items, forks, workers);
         let count = order.pairs();
         let (mut pairs, mut parents, mut leaf_faces) = (Vec::new(), Vec::new(), Vec::new());
@@ -42,7 +53,10 @@ impl FaceTree {
         workers.run(vec![
             Box::new(|| pairs = vec![SiblingNodes([TreeNode::NOTHING; 2]); count]),
             Box::new(|| {
-                (parents, leaf_faces) = (vec![NONE; count], vec![[FaceId(NONE); LEAF_FACES]; count + 1]);
+                (parents, leaf_faces) = (
+                    vec![NONE; count],
+                    vec![[FaceId(NONE); LEAF_FACES]; count + 1],
+                );
                 leaf_of_face = blank(mesh.face_slots());
             }),
         ]);
@@ -61,7 +75,10 @@ impl FaceTree {
             pairs,
             parents,
             leaf_faces,
-            leaf_of_face: leaf_of_face.into_iter().map(AtomicU32::into_inner).collect(),
+            leaf_of_face: leaf_of_face
+                .into_iter()
+                .map(AtomicU32::into_inner)
+                .collect(),
             free_pair: NONE,
             free_leaf: NONE,
             items: Vec::new(),
@@ -73,12 +90,26 @@ impl FaceTree {
     }
 
     /// Rebuilds the subtree of node `at`, from the faces below `nodes` and one face more if there is one to add.
-    pub(super) fn rebuild(&mut self, mesh: &TriMesh, at: u32, nodes: &[TreeNode], added: Option<FaceId>) {
-        let (mut items, mut lefts) = (std::mem::take(&mut self.items), std::mem::take(&mut self.lefts));
-        nodes.iter().for_each(|&node| self.take_apart(mesh, node, &mut items));
+    pub(super) fn rebuild(
+        &mut self,
+        mesh: &TriMesh,
+        at: u32,
+        nodes: &[TreeNode],
+        added: Option<FaceId>,
+    ) {
+        let (mut items, mut lefts) = (
+            std::mem::take(&mut self.items),
+            std::mem::take(&mut self.lefts),
+        );
+        nodes
+            .iter()
+            .for_each(|&node| self.take_apart(mesh, node, &mut items));
         items.extend(added.map(|face| Item::of(mesh, face, &self.origin)));
         arrange(&mut items, &mut lefts);
-        let boxes = Boxes { mesh, origin: self.origin };
+        let boxes = Boxes {
+            mesh,
+            origin: self.origin,
+        };
         *self.node_mut(at) = grow(&items, &mut lefts.iter(), &boxes, self, at);
         items.clear();
         lefts.clear();
@@ -88,7 +119,11 @@ impl FaceTree {
     /// Lists the faces below a node and gives back what holds them.
     fn take_apart(&mut self, mesh: &TriMesh, node: TreeNode, items: &mut Vec<Item>) {
         if node.is_leaf() {
-            items.extend(self.faces_of(&node).iter().map(|&face| Item::of(mesh, face, &self.origin)));
+            items.extend(
+                self.faces_of(&node)
+                    .iter()
+                    .map(|&face| Item::of(mesh, face, &self.origin)),
+            );
             self.give_leaf_back(node.first);
         } else {
             let SiblingNodes([left, right]) = self.pairs[node.first as usize];
@@ -110,7 +145,10 @@ impl FaceTree {
 impl Item {
     fn of(mesh: &TriMesh, face: FaceId, origin: &Point3<f64>) -> Self {
         let middle = mesh.barycentre(face) - origin;
-        Self { middle: [middle.x as f32, middle.y as f32, middle.z as f32], face }
+        Self {
+            middle: [middle.x as f32, middle.y as f32, middle.z as f32],
+            face,
+        }
     }
 }
 
@@ -206,7 +244,10 @@ impl NodeStore for PlacesLeft<'_> {
     }
 
     fn put_leaf(&mut self, items: &[Item], at: u32) -> u32 {
-        for (place, item) in self.all.leaf_faces[self.leaves as usize].iter_mut().zip(items) {
+        for (place, item) in self.all.leaf_faces[self.leaves as usize]
+            .iter_mut()
+            .zip(items)
+        {
             *place = item.face;
             self.all.leaf_of_face[item.face.0 as usize].store(at, Ordering::Relaxed);
         }
@@ -235,10 +276,9 @@ impl LeafOrder {
         let left = split(items);
         let (lower, upper) = items.split_at_mut(left);
         let mut sides = Box::new([const { Self::Whole(Vec::new()) }; 2]);
-        let work = sides
-            .iter_mut()
-            .zip([lower, upper])
-            .map(|(side, items)| Box::new(move || *side = Self::arrange(items, forks - 1, workers)) as Job<'_>);
+        let work = sides.iter_mut().zip([lower, upper]).map(|(side, items)| {
+            Box::new(move || *side = Self::arrange(items, forks - 1, workers)) as Job<'_>
+        });
         workers.run(work.collect());
         Self::Forked(left, sides)
     }
@@ -252,14 +292,38 @@ impl LeafOrder {
     }
 
     /// Makes the node `at` over the sorted items, and the nodes below it.
-    fn grow(&self, items: &[Item], boxes: &Boxes, places: Places, at: u32, workers: &dyn Workers) -> TreeNode {
+    fn grow(
+        &self,
+        items: &[Item],
+        boxes: &Boxes,
+        places: Places,
+        at: u32,
+        workers: &dyn Workers,
+    ) -> TreeNode {
         let (left, sides) = match self {
             Self::Whole(lefts) => {
-                return grow(items, &mut lefts.iter(), boxes, &mut PlacesLeft { all: places, pairs: 0, leaves: 0 }, at);
+                return grow(
+                    items,
+                    &mut lefts.iter(),
+                    boxes,
+                    &mut PlacesLeft {
+                        all: places,
+                        pairs: 0,
+                        leaves: 0,
+                    },
+                    at,
+                );
             }
             Self::Forked(left, sides) => (*left, sides),
         };
-        let Places { pairs, parents, leaf_faces, leaf_of_face, first_pair: pair, first_leaf } = places;
+        let Places {
+            pairs,
+            parents,
+            leaf_faces,
+            leaf_of_face,
+            first_pair: pair,
+            first_leaf,
+        } = places;
         let below = sides[0].pairs();
         let ((above, pairs), (parent, parents)) = (pairs.split_at_mut(1), parents.split_at_mut(1));
         let (pairs, parents) = (pairs.split_at_mut(below), parents.split_at_mut(below));
@@ -282,9 +346,11 @@ impl LeafOrder {
         };
         let mut nodes = [TreeNode::NOTHING; 2];
         let parts = [(items.0, lower, 2 * pair), (items.1, upper, 2 * pair + 1)];
-        let work = nodes.iter_mut().zip(sides.iter()).zip(parts).map(|((node, side), (items, places, at))| {
-            Box::new(move || *node = side.grow(items, boxes, places, at, workers)) as Job<'_>
-        });
+        let work = nodes.iter_mut().zip(sides.iter()).zip(parts).map(
+            |((node, side), (items, places, at))| {
+                Box::new(move || *node = side.grow(items, boxes, places, at, workers)) as Job<'_>
+            },
+        );
         workers.run(work.collect());
         above[0] = SiblingNodes(nodes);
         parent[0] = at;
@@ -306,15 +372,32 @@ fn arrange(items: &mut [Item], lefts: &mut Vec<u32>) {
 }
 
 /// Makes the node `at` over the sorted items, and the nodes below it.
-fn grow(items: &[Item], lefts: &mut slice::Iter<u32>, boxes: &Boxes, store: &mut impl NodeStore, at: u32) -> TreeNode {
-    let left = if items.len() <= LEAF_FACES { None } else { lefts.next() };
+fn grow(
+    items: &[Item],
+    lefts: &mut slice::Iter<u32>,
+    boxes: &Boxes,
+    store: &mut impl NodeStore,
+    at: u32,
+) -> TreeNode {
+    let left = if items.len() <= LEAF_FACES {
+        None
+    } else {
+        lefts.next()
+    };
     let Some(&left) = left else {
         let bounds = boxes.around(items.iter().map(|item| item.face));
-        return TreeNode { bounds, first: store.put_leaf(items, at), count: items.len() as u32 };
+        return TreeNode {
+            bounds,
+            first: store.put_leaf(items, at),
+            count: items.len() as u32,
+        };
     };
     let pair = store.take_pair(at);
     let (lower, upper) = items.split_at(left as usize);
-    let nodes = [grow(lower, lefts, boxes, store, 2 * pair), grow(upper, lefts, boxes, store, 2 * pair + 1)];
+    let nodes = [
+        grow(lower, lefts, boxes, store, 2 * pair),
+        grow(upper, lefts, boxes, store, 2 * pair + 1),
+    ];
     store.put_pair(pair, SiblingNodes(nodes));
     TreeNode::above(&nodes, pair)
 }
@@ -331,12 +414,20 @@ fn split(items: &mut [Item]) -> usize {
     }
     let extent: [f32; 3] = std::array::from_fn(|i| hi[i] - lo[i]);
     let axis = largest(&extent);
-    let left = if items.len() > FULL_LEAVES { part(items, axis, lo[axis] + extent[axis] / 2.0) } else { 0 };
+    let left = if items.len() > FULL_LEAVES {
+        part(items, axis, lo[axis] + extent[axis] / 2.0)
+    } else {
+        0
+    };
     if left.min(items.len() - left) * SMALLEST_SHARE >= items.len() {
         return left;
     }
     let half = items.len() / 2;
-    items.select_nth_unstable_by(half, |a, b| a.middle[axis].total_cmp(&b.middle[axis]).then(a.face.cmp(&b.face)));
+    items.select_nth_unstable_by(half, |a, b| {
+        a.middle[axis]
+            .total_cmp(&b.middle[axis])
+            .then(a.face.cmp(&b.face))
+    });
     half
 }
 
@@ -362,17 +453,26 @@ mod tests {
     /// A wavy sheet whose columns lie closer and closer, so that splits at the middle are lopsided; every seventh face was removed.
     fn sheet(columns: u32, rows: u32) -> TriMesh {
         let point = |i: u32, j: u32| {
-            let (x, y) = ((f64::from(i) / f64::from(columns)).powi(3), f64::from(j) * 0.01);
+            let (x, y) = (
+                (f64::from(i) / f64::from(columns)).powi(3),
+                f64::from(j) * 0.01,
+            );
             Point3::new(x, y, 0.1 * (9.0 * x + 7.0 * y).sin())
         };
-        let positions = (0..=rows).flat_map(|j| (0..=columns).map(move |i| point(i, j))).collect();
+        let positions = (0..=rows)
+            .flat_map(|j| (0..=columns).map(move |i| point(i, j)))
+            .collect();
         let quad = |i: u32, j: u32| {
             let [a, b] = [j * (columns + 1) + i, (j + 1) * (columns + 1) + i];
             [[a, a + 1, b + 1], [a, b + 1, b]]
         };
-        let faces = (0..rows).flat_map(|j| (0..columns).flat_map(move |i| quad(i, j))).collect();
+        let faces = (0..rows)
+            .flat_map(|j| (0..columns).flat_map(move |i| quad(i, j)))
+            .collect();
         let mut mesh = TriMesh::new(positions, faces).unwrap();
-        (0..mesh.face_slots() as u32).step_by(7).for_each(|face| assert!(mesh.remove_face(FaceId(face))));
+        (0..mesh.face_slots() as u32)
+            .step_by(7)
+            .for_each(|face| assert!(mesh.remove_face(FaceId(face))));
         mesh
     }
 
@@ -382,7 +482,11 @@ mod tests {
             let alone = FaceTree::new(&mesh);
             for workers in 1..6 {
                 let tree = FaceTree::new_by(&mesh, &Backwards(workers));
-                assert!(format!("{tree:?}") == format!("{alone:?}"), "{} faces by {workers}", mesh.face_count());
+                assert!(
+                    format!("{tree:?}") == format!("{alone:?}"),
+                    "{} faces by {workers}",
+                    mesh.face_count()
+                );
             }
         }
     }
@@ -394,10 +498,19 @@ mod tests {
         let tree = FaceTree::new_by(&mesh, &Backwards(3));
         for i in 0..40 {
             let p = Point3::new(0.025 * f64::from(i), 0.03 * f64::from(i), 0.05);
-            let off = |face| (crate::mesh::triangle::closest_point(&p, &mesh.triangle(face)).0 - p).norm_squared();
-            let nearest = mesh.faces().map(|(face, _)| off(face)).fold(f64::INFINITY, f64::min);
+            let off = |face| {
+                (crate::mesh::triangle::closest_point(&p, &mesh.triangle(face)).0 - p)
+                    .norm_squared()
+            };
+            let nearest = mesh
+                .faces()
+                .map(|(face, _)| off(face))
+                .fold(f64::INFINITY, f64::min);
             let hit = tree.closest(&mesh, &p, f64::INFINITY).unwrap();
-            assert!((hit.distance_squared - nearest).abs() <= 1e-12 * nearest, "point {i}");
+            assert!(
+                (hit.distance_squared - nearest).abs() <= 1e-12 * nearest,
+                "point {i}"
+            );
         }
     }
 }

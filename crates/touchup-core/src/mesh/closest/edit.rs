@@ -35,7 +35,11 @@ impl FaceTree {
         if let Some(place) = self.leaf_faces[leaf.first as usize].get_mut(leaf.count as usize) {
             *place = face;
             self.leaf_of_face[face.0 as usize] = at;
-            *self.node_mut(at) = TreeNode { bounds: leaf.bounds.union(&bounds), count: leaf.count + 1, ..leaf };
+            *self.node_mut(at) = TreeNode {
+                bounds: leaf.bounds.union(&bounds),
+                count: leaf.count + 1,
+                ..leaf
+            };
         } else {
             self.rebuild(mesh, at, &[leaf], Some(face));
         }
@@ -65,7 +69,9 @@ impl FaceTree {
 
     /// Whether a face is in the tree.
     pub fn has(&self, face: FaceId) -> bool {
-        self.leaf_of_face.get(face.0 as usize).is_some_and(|&leaf| leaf != NONE)
+        self.leaf_of_face
+            .get(face.0 as usize)
+            .is_some_and(|&leaf| leaf != NONE)
     }
 
     /// Makes room for so many faces more, so that inserting them allocates nothing.
@@ -73,21 +79,31 @@ impl FaceTree {
     /// # Errors
     /// [`MeshError::TooMany`] where memory is short.
     pub fn reserve(&mut self, faces: usize) -> Result<(), MeshError> {
-        let short = |_| MeshError::TooMany { what: "faces", count: faces };
+        let short = |_| MeshError::TooMany {
+            what: "faces",
+            count: faces,
+        };
         self.leaf_of_face.try_reserve(faces).map_err(short)?;
         self.parents.try_reserve(faces / 2).map_err(short)?;
         self.pairs.try_reserve(faces / 2).map_err(short)?;
         self.leaf_faces.try_reserve(faces / 2).map_err(short)?;
-        self.items.try_reserve(MOST_REBUILT as usize + 1).map_err(short)?;
+        self.items
+            .try_reserve(MOST_REBUILT as usize + 1)
+            .map_err(short)?;
         self.lefts.try_reserve(MOST_REBUILT as usize).map_err(short)
     }
 
     /// The lowest node that encloses a box and a face beside it: a node where the box makes nothing grow, found sooner
     /// than from the root.
     fn above_neighbour(&self, mesh: &TriMesh, face: FaceId, bounds: &Aabb) -> u32 {
-        let beside = mesh.corners(face).into_iter().flat_map(|vertex| mesh.star(vertex));
-        let mut at =
-            beside.copied().find(|&other| self.has(other)).map_or(ROOT, |other| self.leaf_of_face[other.0 as usize]);
+        let beside = mesh
+            .corners(face)
+            .into_iter()
+            .flat_map(|vertex| mesh.star(vertex));
+        let mut at = beside
+            .copied()
+            .find(|&other| self.has(other))
+            .map_or(ROOT, |other| self.leaf_of_face[other.0 as usize]);
         while at != ROOT && !self.node(at).bounds.encloses(bounds) {
             at = self.parents[at as usize / 2];
         }
@@ -120,7 +136,11 @@ impl FaceTree {
             let sibling = self.pairs[pair as usize].0[1 - at as usize % 2];
             at = self.parents[pair as usize];
             let (count, lesser) = (node.count + sibling.count, node.count.min(sibling.count));
-            let above = TreeNode { bounds: node.bounds.union(&sibling.bounds), first: pair, count };
+            let above = TreeNode {
+                bounds: node.bounds.union(&sibling.bounds),
+                first: pair,
+                count,
+            };
             *self.node_mut(at) = above;
             let is_lopsided = u64::from(lesser) * SMALLEST_SHARE < u64::from(count);
             if above.is_leaf() || (is_lopsided && count <= MOST_REBUILT) {
@@ -152,13 +172,24 @@ impl FaceTree {
         // the smaller one can always go over; the larger one if enough stays and the light one is enough beside it
         let (goes, stays) = (grandchildren[larger].count, grandchildren[1 - larger].count);
         let share = |part: u32, whole: u32| u64::from(part) * SMALLEST_SHARE >= u64::from(whole);
-        let may_choose = share(stays, goes + stays + light.count) && share(light.count, goes + light.count);
-        let over =
-            if may_choose && joined[larger].half_area() < joined[1 - larger].half_area() { larger } else { 1 - larger };
+        let may_choose =
+            share(stays, goes + stays + light.count) && share(light.count, goes + light.count);
+        let over = if may_choose && joined[larger].half_area() < joined[1 - larger].half_area() {
+            larger
+        } else {
+            1 - larger
+        };
         let count = grandchildren[over].count + light.count;
         self.place(2 * pair + heavy as u32, grandchildren[1 - over]);
         self.place(2 * inner + 1 - over as u32, light);
-        self.place(2 * pair + 1 - heavy as u32, TreeNode { bounds: joined[over], first: inner, count });
+        self.place(
+            2 * pair + 1 - heavy as u32,
+            TreeNode {
+                bounds: joined[over],
+                first: inner,
+                count,
+            },
+        );
     }
 
     /// Puts a node in a place and updates the parents of what is below it.
@@ -186,7 +217,12 @@ mod tests {
         let node = *tree.node(at);
         if node.is_leaf() {
             let faces = tree.faces_of(&node);
-            assert!(faces.iter().all(|face| tree.leaf_of_face[face.0 as usize] == at), "faces know their leaf");
+            assert!(
+                faces
+                    .iter()
+                    .all(|face| tree.leaf_of_face[face.0 as usize] == at),
+                "faces know their leaf"
+            );
             assert_eq!(node.bounds, tree.bounds_of(mesh, faces));
             assert!(node.count > 0 || at == ROOT);
             seen.extend_from_slice(faces);
@@ -194,8 +230,16 @@ mod tests {
         }
         assert_eq!(tree.parents[node.first as usize], at);
         let [left, right] = tree.pairs[node.first as usize].0;
-        assert_eq!((node.bounds, node.count), (left.bounds.union(&right.bounds), left.count + right.count));
-        assert!(5 * left.count.min(right.count) >= node.count, "{} beside {}", left.count, right.count);
+        assert_eq!(
+            (node.bounds, node.count),
+            (left.bounds.union(&right.bounds), left.count + right.count)
+        );
+        assert!(
+            5 * left.count.min(right.count) >= node.count,
+            "{} beside {}",
+            left.count,
+            right.count
+        );
         let below = [0, 1].map(|side| check(tree, mesh, 2 * node.first + side, seen));
         (1 + below[0].0.max(below[1].0), 1 + below[0].1 + below[1].1)
     }
@@ -205,21 +249,29 @@ mod tests {
         let mut seen = Vec::new();
         let (levels, nodes) = check(tree, mesh, ROOT, &mut seen);
         seen.sort_unstable();
-        assert!(seen.iter().copied().eq(mesh.faces().map(|(face, _)| face)), "each face once");
+        assert!(
+            seen.iter().copied().eq(mesh.faces().map(|(face, _)| face)),
+            "each face once"
+        );
         let chain = |first: u32, next: &dyn Fn(u32) -> u32| {
             let there = |at: u32| Some(at).filter(|&at| at != NONE);
             std::iter::successors(there(first), |&at| there(next(at))).count()
         };
         let free_pairs = chain(tree.free_pair, &|pair| tree.parents[pair as usize]);
         let free_leaves = chain(tree.free_leaf, &|leaf| tree.leaf_faces[leaf as usize][0].0);
-        assert_eq!((tree.pairs.len(), tree.leaf_faces.len()), (nodes / 2 + free_pairs, nodes / 2 + 1 + free_leaves));
+        assert_eq!(
+            (tree.pairs.len(), tree.leaf_faces.len()),
+            (nodes / 2 + free_pairs, nodes / 2 + 1 + free_leaves)
+        );
         assert_eq!(levels, tree.depth());
         levels
     }
 
     /// A row of `count` triangles along x over the vertices of a strip.
     fn strip(count: u32) -> TriMesh {
-        let positions = (0..count + 2).map(|i| Point3::new(f64::from(i), f64::from(i % 2), 0.0)).collect();
+        let positions = (0..count + 2)
+            .map(|i| Point3::new(f64::from(i), f64::from(i % 2), 0.0))
+            .collect();
         TriMesh::new(positions, (0..count).map(|i| [i, i + 1, i + 2]).collect()).unwrap()
     }
 
@@ -229,8 +281,12 @@ mod tests {
         let mut mesh = strip(1);
         let mut tree = FaceTree::new(&mesh);
         for i in 1..3_000u32 {
-            let vertex = mesh.add_vertex(Point3::new(f64::from(i + 2), f64::from(i % 2), 0.0)).unwrap();
-            let face = mesh.add_face([VertexId(vertex.0 - 2), VertexId(vertex.0 - 1), vertex]).unwrap();
+            let vertex = mesh
+                .add_vertex(Point3::new(f64::from(i + 2), f64::from(i % 2), 0.0))
+                .unwrap();
+            let face = mesh
+                .add_face([VertexId(vertex.0 - 2), VertexId(vertex.0 - 1), vertex])
+                .unwrap();
             assert!(tree.insert(&mesh, face) && !tree.insert(&mesh, face));
             if i < 300 || i % 100 == 0 {
                 let levels = check_all(&tree, &mesh);
@@ -253,6 +309,10 @@ mod tests {
         let face = mesh.add_face([0, 1, 2].map(VertexId)).unwrap();
         assert!(tree.insert(&mesh, face));
         check_all(&tree, &mesh);
-        assert_eq!(tree.closest(&mesh, &Point3::origin(), 1.0).map(|hit| hit.face), Some(face));
+        assert_eq!(
+            tree.closest(&mesh, &Point3::origin(), 1.0)
+                .map(|hit| hit.face),
+            Some(face)
+        );
     }
 }

@@ -41,13 +41,21 @@ struct TreeNode {
 }
 
 impl TreeNode {
-    const NOTHING: Self = Self { bounds: Aabb::EMPTY, first: 0, count: 0 };
+    const NOTHING: Self = Self {
+        bounds: Aabb::EMPTY,
+        first: 0,
+        count: 0,
+    };
 
     /// The node above two nodes.
     #[inline]
     fn above(nodes: &[Self; 2], pair: u32) -> Self {
         let [left, right] = nodes;
-        Self { bounds: left.bounds.union(&right.bounds), first: pair, count: left.count + right.count }
+        Self {
+            bounds: left.bounds.union(&right.bounds),
+            first: pair,
+            count: left.count + right.count,
+        }
     }
 
     #[inline]
@@ -102,7 +110,12 @@ impl FaceTree {
         while let Some((node, level)) = stack.pop() {
             deepest = deepest.max(level);
             if !node.is_leaf() {
-                stack.extend(self.pairs[node.first as usize].0.iter().map(|child| (child, level + 1)));
+                stack.extend(
+                    self.pairs[node.first as usize]
+                        .0
+                        .iter()
+                        .map(|child| (child, level + 1)),
+                );
             }
         }
         deepest
@@ -111,19 +124,28 @@ impl FaceTree {
     /// Memory, bytes.
     pub fn bytes(&self) -> usize {
         self.pairs.capacity() * size_of::<SiblingNodes>()
-            + (self.parents.capacity() + self.leaf_of_face.capacity() + self.lefts.capacity()) * size_of::<u32>()
+            + (self.parents.capacity() + self.leaf_of_face.capacity() + self.lefts.capacity())
+                * size_of::<u32>()
             + self.leaf_faces.capacity() * size_of::<[FaceId; LEAF_FACES]>()
             + self.items.capacity() * size_of::<Item>()
     }
 
     #[inline]
     fn node(&self, at: u32) -> &TreeNode {
-        if at == ROOT { &self.root } else { &self.pairs[at as usize / 2].0[at as usize % 2] }
+        if at == ROOT {
+            &self.root
+        } else {
+            &self.pairs[at as usize / 2].0[at as usize % 2]
+        }
     }
 
     #[inline]
     fn node_mut(&mut self, at: u32) -> &mut TreeNode {
-        if at == ROOT { &mut self.root } else { &mut self.pairs[at as usize / 2].0[at as usize % 2] }
+        if at == ROOT {
+            &mut self.root
+        } else {
+            &mut self.pairs[at as usize / 2].0[at as usize % 2]
+        }
     }
 
     #[inline]

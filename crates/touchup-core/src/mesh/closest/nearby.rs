@@ -31,7 +31,14 @@ pub struct Nearby {
 impl Default for Nearby {
     fn default() -> Self {
         let leaves = Vec::with_capacity(MOST_LEAVES);
-        Self { leaves, centre: Point3::origin(), radius: -1.0, changes: 0, widened: 0.0, crowded: None }
+        Self {
+            leaves,
+            centre: Point3::origin(),
+            radius: -1.0,
+            changes: 0,
+            widened: 0.0,
+            crowded: None,
+        }
     }
 }
 
@@ -50,7 +57,8 @@ impl FaceTree {
     ) -> Option<FaceHit> {
         let triangle = mesh.triangle(hint);
         // a little farther, so that the hint itself is found too; a touching point still has some reach
-        let known = (p - closest_point(p, &triangle).0).norm() * HINT_WIDTH + f64::MIN_POSITIVE.sqrt();
+        let known =
+            (p - closest_point(p, &triangle).0).norm() * HINT_WIDTH + f64::MIN_POSITIVE.sqrt();
         let reach = reach.min(known);
         // a box that was not met then is met now at most by what all became wider since
         let away = (p - nearby.centre).norm() + (self.widened - nearby.widened);
@@ -100,7 +108,8 @@ impl FaceTree {
                 depth += usize::from(child.bounds.distance_squared(&ball.q) <= ball.far);
             }
         }
-        (nearby.centre, nearby.radius, nearby.changes, nearby.widened) = (*p, radius, self.changes, self.widened);
+        (nearby.centre, nearby.radius, nearby.changes, nearby.widened) =
+            (*p, radius, self.changes, self.widened);
         true
     }
 }
@@ -112,9 +121,13 @@ mod tests {
     /// Squares of 1 m, each cut in two.
     fn plane(squares: u32) -> TriMesh {
         let n = squares + 1;
-        let positions = (0..n * n).map(|i| Point3::new(f64::from(i % n), f64::from(i / n), 0.0)).collect();
+        let positions = (0..n * n)
+            .map(|i| Point3::new(f64::from(i % n), f64::from(i / n), 0.0))
+            .collect();
         let corners = (0..squares * squares).map(|i| i / squares * n + i % squares);
-        let faces = corners.flat_map(|a| [[a, a + 1, a + n + 1], [a, a + n + 1, a + n]]).collect();
+        let faces = corners
+            .flat_map(|a| [[a, a + 1, a + n + 1], [a, a + n + 1, a + n]])
+            .collect();
         TriMesh::new(positions, faces).unwrap()
     }
 
@@ -131,8 +144,16 @@ mod tests {
         let corner = mesh.corners(FaceId(420))[0];
         assert_eq!(mesh.position(corner), Point3::new(10.0, 10.0, 0.0));
         assert_eq!(ask(&tree, &mesh, 10.4, &mut nearby), 10.4);
-        assert_eq!(ask(&tree, &mesh, 10.8, &mut nearby), 10.4, "0.4 m away, 0.7 longest edges of 1.41 m are kept");
-        assert!((4..=MOST_LEAVES).contains(&nearby.leaves.len()), "{} leaves", nearby.leaves.len());
+        assert_eq!(
+            ask(&tree, &mesh, 10.8, &mut nearby),
+            10.4,
+            "0.4 m away, 0.7 longest edges of 1.41 m are kept"
+        );
+        assert!(
+            (4..=MOST_LEAVES).contains(&nearby.leaves.len()),
+            "{} leaves",
+            nearby.leaves.len()
+        );
         // 0.6 m of the 0.99 m are left: a motion by 0.3 m with a margin of 0.2 m is within
         let mut plan = crate::mesh::RefitPlan::default();
         tree.plan(mesh.star(corner), &mut plan);
@@ -145,15 +166,27 @@ mod tests {
         assert_eq!(ask(&tree, &mesh, 10.5, &mut nearby), 10.4);
         mesh.set_position(corner, Point3::new(10.0, 10.0, -0.3));
         tree.refit_planned(&mesh, &mut plan, 0.4, 0.2);
-        assert_eq!(ask(&tree, &mesh, 10.5, &mut nearby), 10.5, "1.1 m of 0.99 m are used up");
+        assert_eq!(
+            ask(&tree, &mesh, 10.5, &mut nearby),
+            10.5,
+            "1.1 m of 0.99 m are used up"
+        );
         tree.refit(&mesh, mesh.star(corner));
-        assert_eq!(ask(&tree, &mesh, 10.6, &mut nearby), 10.6, "by an unknown margin");
+        assert_eq!(
+            ask(&tree, &mesh, 10.6, &mut nearby),
+            10.6,
+            "by an unknown margin"
+        );
         assert_eq!(ask(&tree, &mesh, 11.9, &mut nearby), 11.9, "too far away");
     }
 
     #[test]
     fn where_too_many_leaves_are_near_the_answer_is_the_same_and_nothing_is_kept() {
-        let corners = vec![Point3::origin(), Point3::new(1.0, 0.0, 0.0), Point3::new(0.0, 1.0, 0.0)];
+        let corners = vec![
+            Point3::origin(),
+            Point3::new(1.0, 0.0, 0.0),
+            Point3::new(0.0, 1.0, 0.0),
+        ];
         let mesh = TriMesh::new(corners, vec![[0, 1, 2]; 1000]).unwrap();
         let (tree, mut nearby) = (FaceTree::new(&mesh), Nearby::default());
         for i in 0..4 {
@@ -161,9 +194,20 @@ mod tests {
             let hit = tree.closest_nearby(&mesh, &p, FaceId(7), f64::INFINITY, &mut nearby);
             assert_eq!(hit.map(|hit| hit.face), Some(FaceId(0)), "the smallest id");
             assert!(
-                nearby.radius < 0.0 && nearby.leaves.capacity() == MOST_LEAVES && nearby.crowded == Some(FaceId(7))
+                nearby.radius < 0.0
+                    && nearby.leaves.capacity() == MOST_LEAVES
+                    && nearby.crowded == Some(FaceId(7))
             );
         }
-        assert_eq!(tree.closest_nearby(&mesh, &Point3::new(0.2, 0.2, 9.0), FaceId(7), 1.0, &mut nearby), None);
+        assert_eq!(
+            tree.closest_nearby(
+                &mesh,
+                &Point3::new(0.2, 0.2, 9.0),
+                FaceId(7),
+                1.0,
+                &mut nearby
+            ),
+            None
+        );
     }
 }

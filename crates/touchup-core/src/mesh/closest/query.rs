@@ -49,7 +49,11 @@ impl BoxQuery {
     /// A query with room for so many faces.
     pub(crate) fn with_room(faces: usize) -> Self {
         let (pairs, leaves) = (vec![0; faces + STACK], vec![(0, 0); faces + STACK]);
-        Self { faces: Vec::with_capacity(faces + LEAF_FACES), pairs, leaves }
+        Self {
+            faces: Vec::with_capacity(faces + LEAF_FACES),
+            pairs,
+            leaves,
+        }
     }
 }
 
@@ -74,7 +78,15 @@ impl SearchState {
         let (q, tie, reach) = (p - tree.origin, tree.tie(), reach.max(0.0));
         let slack = tree.slack(&q) + tie;
         let q = [q.x as f32, q.y as f32, q.z as f32];
-        let mut found = Self { best: None, q, far: 0.0, limit: 0.0, width: 0.0, tie, slack };
+        let mut found = Self {
+            best: None,
+            q,
+            far: 0.0,
+            limit: 0.0,
+            width: 0.0,
+            tie,
+            slack,
+        };
         found.shorten(reach * reach);
         found
     }
@@ -96,7 +108,9 @@ impl SearchState {
     ) {
         for &face in faces {
             let (limit, width) = (self.limit, self.width);
-            let Some(hit) = measure(face, limit + width) else { continue };
+            let Some(hit) = measure(face, limit + width) else {
+                continue;
+            };
             let nearer = match &self.best {
                 _ if hit.distance_squared > limit + width => false,
                 None => hit.distance_squared < limit,
@@ -120,17 +134,32 @@ impl FaceTree {
     /// Where faces meet at the closest point (an edge or a corner), the one that `p` lies most squarely above or below
     /// is named, so that the sign of (p − point)·n distinguishes inside from outside; among equals the smallest id.
     pub fn closest(&self, mesh: &TriMesh, p: &Point3<f64>, reach: f64) -> Option<FaceHit> {
-        self.search(p, reach, |face, limit| surface_hit(mesh, p, face, limit), |a, b| is_less_square(mesh, p, a, b))
+        self.search(
+            p,
+            reach,
+            |face, limit| surface_hit(mesh, p, face, limit),
+            |a, b| is_less_square(mesh, p, a, b),
+        )
     }
 
     /// The face whose barycentre is closest to `p` (Eq 12), among those nearer than `reach` (m).
-    pub fn closest_barycentre(&self, mesh: &TriMesh, p: &Point3<f64>, reach: f64) -> Option<FaceHit> {
+    pub fn closest_barycentre(
+        &self,
+        mesh: &TriMesh,
+        p: &Point3<f64>,
+        reach: f64,
+    ) -> Option<FaceHit> {
         self.search(
             p,
             reach,
             |face, _| {
                 let (point, barycentric) = (mesh.barycentre(face), [1.0 / 3.0; 3]);
-                Some(FaceHit { face, point, barycentric, distance_squared: (p - point).norm_squared() })
+                Some(FaceHit {
+                    face,
+                    point,
+                    barycentric,
+                    distance_squared: (p - point).norm_squared(),
+                })
             },
             |_, _| false,
         )
@@ -184,7 +213,9 @@ impl FaceTree {
     /// coordinate that enters it.
     fn slack(&self, q: &Vector3<f64>) -> f64 {
         let bounds = &self.root.bounds;
-        let largest = (0..3).map(|i| f64::from(bounds.hi[i].max(-bounds.lo[i])).max(q[i].abs())).fold(0.0, f64::max);
+        let largest = (0..3)
+            .map(|i| f64::from(bounds.hi[i].max(-bounds.lo[i])).max(q[i].abs()))
+            .fold(0.0, f64::max);
         4.0 * f64::from(f32::EPSILON) * largest
     }
 
@@ -193,7 +224,8 @@ impl FaceTree {
         let Aabb { lo, hi } = self.root.bounds;
         let largest = |i: usize| self.origin[i].abs() + f64::from(hi[i].max(-lo[i]));
         let diagonal = Vector3::from_fn(|i, _| f64::from(hi[i] - lo[i])).norm();
-        let tie = TIE_COORDINATE * largest(0).max(largest(1)).max(largest(2)) + TIE_DIAGONAL * diagonal;
+        let tie =
+            TIE_COORDINATE * largest(0).max(largest(1)).max(largest(2)) + TIE_DIAGONAL * diagonal;
         // an empty box, or one beyond single precision, gives no tolerance
         if tie.is_finite() { tie } else { 0.0 }
     }
@@ -201,7 +233,11 @@ impl FaceTree {
     /// Finds every face whose leaf's box meets the box from `lo` to `hi` (m, in O); those of the last query are forgotten.
     pub fn faces_in_box(&self, lo: &Point3<f64>, hi: &Point3<f64>, query: &mut BoxQuery) {
         let wanted = Aabb::within(&(lo - self.origin), &(hi - self.origin));
-        let BoxQuery { faces, pairs, leaves } = query;
+        let BoxQuery {
+            faces,
+            pairs,
+            leaves,
+        } = query;
         faces.clear();
         if self.root.is_leaf() {
             faces.extend_from_slice(self.faces_of(&self.root));
@@ -285,13 +321,28 @@ fn is_box_beyond(p: &Point3<f64>, [a, b, c]: [&Point3<f64>; 3], limit: f64) -> b
 
 /// The point of a face closest to `p`; nothing where its squared distance is surely above a limit.
 #[inline]
-pub(super) fn surface_hit(mesh: &TriMesh, p: &Point3<f64>, face: FaceId, limit: f64) -> Option<FaceHit> {
-    if is_box_beyond(p, mesh.corners(face).map(|vertex| &mesh.positions()[vertex.0 as usize]), limit) {
+pub(super) fn surface_hit(
+    mesh: &TriMesh,
+    p: &Point3<f64>,
+    face: FaceId,
+    limit: f64,
+) -> Option<FaceHit> {
+    if is_box_beyond(
+        p,
+        mesh.corners(face)
+            .map(|vertex| &mesh.positions()[vertex.0 as usize]),
+        limit,
+    ) {
         return None;
     }
     let triangle = mesh.triangle(face);
     let (point, barycentric) = closest_point(p, &triangle);
-    Some(FaceHit { face, point, barycentric, distance_squared: (p - point).norm_squared() })
+    Some(FaceHit {
+        face,
+        point,
+        barycentric,
+        distance_squared: (p - point).norm_squared(),
+    })
 }
 
 /// Whether `p` lies less squarely above or below the first face that was hit than the second.

@@ -23,7 +23,13 @@ impl RefitPlan {
     pub(crate) fn with_room(faces: usize) -> Self {
         // the path from the leaves to the root adds a level or so for each halving of the mesh
         let pairs = Vec::with_capacity(2 * faces + STACK);
-        Self { faces: Vec::with_capacity(faces), leaves: Vec::with_capacity(faces), pairs, room: 0.0, edits: 0 }
+        Self {
+            faces: Vec::with_capacity(faces),
+            leaves: Vec::with_capacity(faces),
+            pairs,
+            room: 0.0,
+            edits: 0,
+        }
     }
 
     /// Counts on no room in the boxes: others may have moved the faces.
@@ -56,7 +62,13 @@ impl FaceTree {
     /// - `margin`: by how much the boxes are made wider than they need be, m. They are left as they are until corners may
     ///   have left them: a query stays exact and looks at little more.
     #[inline]
-    pub fn refit_planned(&mut self, mesh: &TriMesh, plan: &mut RefitPlan, displacement: f64, margin: f64) {
+    pub fn refit_planned(
+        &mut self,
+        mesh: &TriMesh,
+        plan: &mut RefitPlan,
+        displacement: f64,
+        margin: f64,
+    ) {
         if displacement <= plan.room && plan.edits == self.edits {
             plan.room -= displacement;
         } else {
@@ -76,7 +88,11 @@ impl FaceTree {
         for &leaf in &plan.leaves {
             let node = *self.node(leaf);
             let bounds = self.bounds_of(mesh, self.faces_of(&node));
-            self.node_mut(leaf).bounds = if margin > 0.0 { bounds.grown(margin) } else { bounds };
+            self.node_mut(leaf).bounds = if margin > 0.0 {
+                bounds.grown(margin)
+            } else {
+                bounds
+            };
         }
         for &pair in plan.pairs.iter().rev() {
             let [left, right] = &self.pairs[pair as usize].0;
@@ -87,10 +103,20 @@ impl FaceTree {
     }
 
     fn renew(&mut self, plan: &mut RefitPlan) {
-        let RefitPlan { faces, leaves, pairs, room, edits } = plan;
+        let RefitPlan {
+            faces,
+            leaves,
+            pairs,
+            room,
+            edits,
+        } = plan;
         (*room, *edits) = (0.0, self.edits);
         leaves.clear();
-        leaves.extend(faces.iter().filter_map(|face| self.leaf_of_face.get(face.0 as usize)));
+        leaves.extend(
+            faces
+                .iter()
+                .filter_map(|face| self.leaf_of_face.get(face.0 as usize)),
+        );
         leaves.dedup();
         leaves.sort_unstable();
         leaves.dedup();
@@ -108,6 +134,8 @@ impl FaceTree {
             }
             pairs[known..].reverse();
         }
-        pairs.iter().for_each(|&pair| self.parents[pair as usize] &= !SEEN);
+        pairs
+            .iter()
+            .for_each(|&pair| self.parents[pair as usize] &= !SEEN);
     }
 }

@@ -61,7 +61,11 @@ impl fmt::Display for RepairReport {
             counted(self.components, "piece", "pieces"),
             counted(self.boundary_edges, "boundary edge", "boundary edges"),
             counted(self.boundary_loops, "loop", "loops"),
-            counted(self.non_manifold_edges, "non-manifold edge", "non-manifold edges")
+            counted(
+                self.non_manifold_edges,
+                "non-manifold edge",
+                "non-manifold edges"
+            )
         )
     }
 }
@@ -89,15 +93,22 @@ impl fmt::Display for RepairReport {
 /// assert_eq!((report.welded_vertices, report.flipped_faces), (2, 1));
 /// # Ok::<(), touchup_core::mesh::MeshError>(())
 /// ```
-pub fn repair(mut positions: Vec<Point3<f64>>, mut faces: Vec<[u32; 3]>) -> Result<(TriMesh, RepairReport), MeshError> {
+pub fn repair(
+    mut positions: Vec<Point3<f64>>,
+    mut faces: Vec<[u32; 3]>,
+) -> Result<(TriMesh, RepairReport), MeshError> {
     check(&positions, &faces)?;
-    let mut report = RepairReport { welded_vertices: weld::weld(&mut positions, &mut faces), ..Default::default() };
+    let mut report = RepairReport {
+        welded_vertices: weld::weld(&mut positions, &mut faces),
+        ..Default::default()
+    };
     let mut valences = drop_faces(&positions, &mut faces, &mut report);
     report.unused_vertices = drop_unused(&mut valences, &mut positions, &mut faces);
     if faces.is_empty() {
         return Err(MeshError::Empty);
     }
-    let (mut mesh, edges) = without_duplicates(TriMesh::of_sound(positions, faces, valences), &mut report)?;
+    let (mut mesh, edges) =
+        without_duplicates(TriMesh::of_sound(positions, faces, valences), &mut report)?;
     report.boundary_edges = edges.boundary.len();
     report.boundary_loops = boundary_loops(&edges.boundary);
     report.non_manifold_edges = edges.non_manifold;
@@ -108,7 +119,10 @@ pub fn repair(mut positions: Vec<Point3<f64>>, mut faces: Vec<[u32; 3]>) -> Resu
 /// Counts fit, indices are in range.
 fn check(positions: &[Point3<f64>], faces: &[[u32; 3]]) -> Result<(), MeshError> {
     // two ends of three edges of every face are counted in 32 bits
-    for (what, count, limit) in [("vertices", positions.len(), u32::MAX - 1), ("faces", faces.len(), u32::MAX / 6)] {
+    for (what, count, limit) in [
+        ("vertices", positions.len(), u32::MAX - 1),
+        ("faces", faces.len(), u32::MAX / 6),
+    ] {
         if count > limit as usize {
             return Err(MeshError::TooMany { what, count });
         }
@@ -119,20 +133,32 @@ fn check(positions: &[Point3<f64>], faces: &[[u32; 3]]) -> Result<(), MeshError>
     if used.iter().copied().max().is_some_and(is_beyond)
         && let Some(at) = used.iter().position(|&v| is_beyond(v))
     {
-        return Err(MeshError::VertexOutOfRange { face: at / 3, vertex: used[at], vertices });
+        return Err(MeshError::VertexOutOfRange {
+            face: at / 3,
+            vertex: used[at],
+            vertices,
+        });
     }
     Ok(())
 }
 
 /// Leaves out faces that are not finite or have no area; counts the others at their vertices.
-fn drop_faces(positions: &[Point3<f64>], faces: &mut Vec<[u32; 3]>, report: &mut RepairReport) -> Valences {
+fn drop_faces(
+    positions: &[Point3<f64>],
+    faces: &mut Vec<[u32; 3]>,
+    report: &mut RepairReport,
+) -> Valences {
     let mut valences = Valences::new(positions.len());
     faces.retain(|corners| {
         let [a, b, c] = corners.map(|v| positions[v as usize]);
         let (u, v) = (b - a, c - a);
         let double_area_2 = u.cross(&v).norm_squared();
-        let longest_2 = greater(u.norm_squared(), greater(v.norm_squared(), (c - b).norm_squared()));
-        let limit_2 = longest_2 * (ZERO_AREA * greater(largest(&a), greater(largest(&b), largest(&c)))).powi(2);
+        let longest_2 = greater(
+            u.norm_squared(),
+            greater(v.norm_squared(), (c - b).norm_squared()),
+        );
+        let limit_2 = longest_2
+            * (ZERO_AREA * greater(largest(&a), greater(largest(&b), largest(&c)))).powi(2);
         // false for NaN, which every coordinate that is not a number brings about
         let is_near = greater(largest(&a), greater(largest(&b), largest(&c))) <= FARTHEST;
         let stays = double_area_2 > limit_2 && is_near;
@@ -155,11 +181,18 @@ fn largest(p: &Point3<f64>) -> f64 {
 }
 
 /// Leaves out vertices that no face uses; returns how many.
-fn drop_unused(valences: &mut Valences, positions: &mut Vec<Point3<f64>>, faces: &mut [[u32; 3]]) -> usize {
+fn drop_unused(
+    valences: &mut Valences,
+    positions: &mut Vec<Point3<f64>>,
+    faces: &mut [[u32; 3]],
+) -> usize {
     let unused = valences.used().filter(|used| !used).count();
     if unused > 0 {
         let mut kept = 0;
-        let renamed: Vec<u32> = valences.used().map(|used| (kept, kept += u32::from(used)).0).collect();
+        let renamed: Vec<u32> = valences
+            .used()
+            .map(|used| (kept, kept += u32::from(used)).0)
+            .collect();
         let mut used = valences.used();
         positions.retain(|_| used.next() == Some(true));
         drop(used);
@@ -172,13 +205,18 @@ fn drop_unused(valences: &mut Valences, positions: &mut Vec<Point3<f64>>, faces:
 }
 
 /// The mesh with one face for each three vertices, and its edges.
-fn without_duplicates(mesh: TriMesh, report: &mut RepairReport) -> Result<(TriMesh, Edges), MeshError> {
+fn without_duplicates(
+    mesh: TriMesh,
+    report: &mut RepairReport,
+) -> Result<(TriMesh, Edges), MeshError> {
     let edges = Edges::of(&mesh);
     if edges.duplicates.is_empty() {
         return Ok((mesh, edges));
     }
     report.dropped_duplicates = edges.duplicates.len();
-    let kept = mesh.faces().filter(|(face, _)| edges.duplicates.binary_search(&face.0).is_err());
+    let kept = mesh
+        .faces()
+        .filter(|(face, _)| edges.duplicates.binary_search(&face.0).is_err());
     let faces = kept.map(|(_, corners)| corners.map(|v| v.0)).collect();
     let mesh = TriMesh::new(mesh.positions().to_vec(), faces)?;
     let edges = Edges::of(&mesh);
@@ -196,14 +234,35 @@ mod tests {
 
     /// A cube of edge 1, 12 faces, normals outside.
     fn cube(at: f64) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
-        let corner = |i: u32| Point3::new(at + f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2));
-        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        ((0..8).map(corner).collect(), quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect())
+        let corner = |i: u32| {
+            Point3::new(
+                at + f64::from(i & 1),
+                f64::from(i >> 1 & 1),
+                f64::from(i >> 2),
+            )
+        };
+        let quads = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        (
+            (0..8).map(corner).collect(),
+            quads
+                .iter()
+                .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+                .collect(),
+        )
     }
 
     /// Divergence theorem over the faces as they are.
     fn volume(mesh: &TriMesh) -> f64 {
-        mesh.faces().map(|(f, _)| mesh.barycentre(f).coords.dot(&mesh.double_area_normal(f)) / 6.0).sum()
+        mesh.faces()
+            .map(|(f, _)| mesh.barycentre(f).coords.dot(&mesh.double_area_normal(f)) / 6.0)
+            .sum()
     }
 
     #[test]
@@ -211,8 +270,19 @@ mod tests {
         let (positions, faces) = cube(0.0);
         let (mesh, report) = repair(positions.clone(), faces.clone()).unwrap();
         assert_eq!(mesh.positions(), positions);
-        assert_eq!(mesh.faces().map(|(_, c)| c.map(|v| v.0)).collect::<Vec<_>>(), faces);
-        assert_eq!(report, RepairReport { components: 1, ..Default::default() });
+        assert_eq!(
+            mesh.faces()
+                .map(|(_, c)| c.map(|v| v.0))
+                .collect::<Vec<_>>(),
+            faces
+        );
+        assert_eq!(
+            report,
+            RepairReport {
+                components: 1,
+                ..Default::default()
+            }
+        );
     }
 
     #[test]
@@ -242,9 +312,22 @@ mod tests {
     fn an_open_patch_keeps_the_side_of_its_larger_area() {
         // unit square in two halves of equal area and a flap three times as large, which lies upside down
         let p = |x, y| Point3::new(x, y, 0.0);
-        let positions = vec![p(0.0, 0.0), p(1.0, 0.0), p(1.0, 1.0), p(0.0, 1.0), p(-6.0, 0.5)];
+        let positions = vec![
+            p(0.0, 0.0),
+            p(1.0, 0.0),
+            p(1.0, 1.0),
+            p(0.0, 1.0),
+            p(-6.0, 0.5),
+        ];
         let (mesh, report) = repair(positions, vec![[0, 1, 2], [0, 2, 3], [0, 4, 3]]).unwrap();
-        assert_eq!((report.flipped_faces, report.boundary_edges, report.boundary_loops), (2, 5, 1));
+        assert_eq!(
+            (
+                report.flipped_faces,
+                report.boundary_edges,
+                report.boundary_loops
+            ),
+            (2, 5, 1)
+        );
         assert!(mesh.faces().all(|(f, _)| mesh.normal(f).z == -1.0));
     }
 
@@ -258,7 +341,14 @@ mod tests {
         faces.extend(more.iter().map(|f| f.map(|v| v + 8)));
         faces.iter_mut().for_each(|f| f.swap(0, 1));
         let (mesh, report) = repair(positions, faces).unwrap();
-        assert_eq!((report.non_manifold_edges, report.components, report.flipped_faces), (1, 2, 24));
+        assert_eq!(
+            (
+                report.non_manifold_edges,
+                report.components,
+                report.flipped_faces
+            ),
+            (1, 2, 24)
+        );
         assert_eq!((report.welded_vertices, mesh.vertex_count()), (2, 14));
         assert!((volume(&mesh) - 2.0).abs() < 1e-12);
     }
@@ -270,7 +360,15 @@ mod tests {
         positions.push(Point3::new(f64::NAN, 0.0, 0.0)); // 9
         positions.push(Point3::new(1e300, 0.0, 0.0)); // 10: finite, but no area can be worked out
         positions.push(Point3::new(-0.0, 0.0, 0.0)); // 11: vertex 0 again
-        faces.extend([[0, 8, 1], [0, 0, 1], [0, 11, 2], [1, 2, 9], [1, 2, 10], [3, 0, 2], [2, 3, 0]]);
+        faces.extend([
+            [0, 8, 1],
+            [0, 0, 1],
+            [0, 11, 2],
+            [1, 2, 9],
+            [1, 2, 10],
+            [3, 0, 2],
+            [2, 3, 0],
+        ]);
         let (mesh, report) = repair(positions, faces).unwrap();
         let wanted = RepairReport {
             welded_vertices: 1,
@@ -290,8 +388,15 @@ mod tests {
         // at 10⁶ m a coordinate is rounded to 1.2e-10 m: a height of 1e-6 m is real, one of 2e-10 m is not
         for (height, kept) in [(1e-6, 1), (2e-10, 0)] {
             let p = |x: f64, y: f64| Point3::new(1e6 + x, 1e6 + y, 1e6);
-            let outcome = repair(vec![p(0.0, 0.0), p(1e-3, 0.0), p(5e-4, height)], vec![[0, 1, 2]]);
-            assert_eq!(outcome.map_or(0, |(mesh, _)| mesh.face_count()), kept, "height {height} m");
+            let outcome = repair(
+                vec![p(0.0, 0.0), p(1e-3, 0.0), p(5e-4, height)],
+                vec![[0, 1, 2]],
+            );
+            assert_eq!(
+                outcome.map_or(0, |(mesh, _)| mesh.face_count()),
+                kept,
+                "height {height} m"
+            );
         }
     }
 
@@ -303,7 +408,11 @@ mod tests {
         assert_eq!(refusal(vec![[0, 1, 1]]), MeshError::Empty);
         assert_eq!(
             refusal(vec![[0, 1, 2], [0, 8, 1]]),
-            MeshError::VertexOutOfRange { face: 1, vertex: 8, vertices: 8 }
+            MeshError::VertexOutOfRange {
+                face: 1,
+                vertex: 8,
+                vertices: 8
+            }
         );
     }
 

@@ -65,7 +65,9 @@ impl Edges {
     fn add(&mut self, mesh: &TriMesh, ends: [u32; 2], along: &[EdgeSide], against: &[EdgeSide]) {
         match (along, against) {
             ([one], [other]) => self.add_pair(mesh, one.face(), other.face(), false),
-            ([one, other], []) | ([], [one, other]) => self.add_pair(mesh, one.face(), other.face(), true),
+            ([one, other], []) | ([], [one, other]) => {
+                self.add_pair(mesh, one.face(), other.face(), true)
+            }
             ([one], []) | ([], [one]) => self.boundary.push((ends, one.face())),
             _ => self.add_crowd(mesh, along, against),
         }
@@ -81,13 +83,23 @@ impl Edges {
 
     #[cold]
     fn add_crowd(&mut self, mesh: &TriMesh, along: &[EdgeSide], against: &[EdgeSide]) {
-        let mut corners: Vec<_> =
-            along.iter().chain(against).map(|side| (corner_sum(mesh, side.face()), side.face())).collect();
+        let mut corners: Vec<_> = along
+            .iter()
+            .chain(against)
+            .map(|side| (corner_sum(mesh, side.face()), side.face()))
+            .collect();
         corners.sort_unstable();
-        self.duplicates.extend(corners.windows(2).filter(|w| w[0].0 == w[1].0).map(|w| w[1].1));
+        self.duplicates.extend(
+            corners
+                .windows(2)
+                .filter(|w| w[0].0 == w[1].0)
+                .map(|w| w[1].1),
+        );
         let edge = self.non_manifold;
-        self.crowded.extend(along.iter().map(|side| (edge, side.face(), true)));
-        self.crowded.extend(against.iter().map(|side| (edge, side.face(), false)));
+        self.crowded
+            .extend(along.iter().map(|side| (edge, side.face(), true)));
+        self.crowded
+            .extend(against.iter().map(|side| (edge, side.face(), false)));
         self.non_manifold += 1;
     }
 
@@ -117,15 +129,21 @@ impl Edges {
 }
 
 /// Which pieces have a border: an edge of one face, or a crowded edge at which their own faces do not cancel.
-fn open_pieces(boundary: &[([u32; 2], u32)], crowded: &[(usize, u32, bool)], pieces: &Numbered) -> Vec<bool> {
+fn open_pieces(
+    boundary: &[([u32; 2], u32)],
+    crowded: &[(usize, u32, bool)],
+    pieces: &Numbered,
+) -> Vec<bool> {
     let mut open = vec![false; pieces.roots.len()];
     for &(_, face) in boundary {
         open[pieces.piece(face)] = true;
     }
     for edge in crowded.chunk_by(|a, b| a.0 == b.0) {
         let sign = |face, along| if along ^ pieces.parity(face) { 1 } else { -1 };
-        let mut signs: Vec<(usize, i32)> =
-            edge.iter().map(|&(_, face, along)| (pieces.piece(face), sign(face, along))).collect();
+        let mut signs: Vec<(usize, i32)> = edge
+            .iter()
+            .map(|&(_, face, along)| (pieces.piece(face), sign(face, along)))
+            .collect();
         signs.sort_unstable();
         for piece in signs.chunk_by(|a, b| a.0 == b.0) {
             open[piece[0].0] |= piece.iter().map(|s| s.1).sum::<i32>() != 0;
@@ -155,7 +173,11 @@ fn turned_parities(mesh: &TriMesh, pieces: &Numbered, open: &[bool]) -> Vec<bool
 /// The sides of all edges from `vertex` to a higher vertex, ordered by that vertex, then by face: first of the faces that
 /// run along the edge upwards, then of the others.
 #[inline]
-fn sides_above<'a>(mesh: &TriMesh, vertex: u32, room: &'a mut [Vec<EdgeSide>; 2]) -> [&'a [EdgeSide]; 2] {
+fn sides_above<'a>(
+    mesh: &TriMesh,
+    vertex: u32,
+    room: &'a mut [Vec<EdgeSide>; 2],
+) -> [&'a [EdgeSide]; 2] {
     let star = mesh.star(VertexId(vertex));
     let [forward, backward] = room.each_mut().map(|sides| {
         if sides.len() < star.len() {
@@ -199,7 +221,12 @@ fn lowest(forward: &[EdgeSide], backward: &[EdgeSide]) -> Option<u32> {
 /// The sides at the edge to `higher`, and the rest.
 #[inline]
 fn split_run(sides: &[EdgeSide], higher: u32) -> (&[EdgeSide], &[EdgeSide]) {
-    sides.split_at(sides.iter().take_while(|side| side.higher() == higher).count())
+    sides.split_at(
+        sides
+            .iter()
+            .take_while(|side| side.higher() == higher)
+            .count(),
+    )
 }
 
 /// How many chains the boundary edges form: one for each hole or outer rim; rims that touch in a vertex count as one.

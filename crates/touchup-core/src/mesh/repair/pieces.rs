@@ -11,7 +11,10 @@ pub(super) struct FaceSets {
 impl FaceSets {
     /// Each face in a set of its own.
     pub fn new(faces: usize) -> Self {
-        Self { parents: (0..faces as u32).map(|f| f << 1).collect(), any_against: false }
+        Self {
+            parents: (0..faces as u32).map(|f| f << 1).collect(),
+            any_against: false,
+        }
     }
 
     /// Root of the set and parity against it; shortens the path as it goes.

@@ -65,7 +65,11 @@ fn spread(positions: &[Point3<f64>]) -> f64 {
     let sample = || positions.iter().step_by((positions.len() / SAMPLE).max(1));
     let middle = |mut values: Vec<f64>| median(&mut values).unwrap_or(0.0);
     let centre = [0, 1, 2].map(|axis| middle(sample().map(|p| p[axis]).collect()));
-    middle(sample().map(|p| (p - Point3::from(centre)).amax()).collect())
+    middle(
+        sample()
+            .map(|p| (p - Point3::from(centre)).amax())
+            .collect(),
+    )
 }
 
 /// Vertices that are looked up together: their memory accesses overlap.
@@ -96,7 +100,12 @@ impl PositionTable {
     fn new(cell: f64, vertices: usize, places: usize) -> Self {
         let cells = if cell.is_normal() { cell.recip() } else { 0.0 };
         let places = vec![FREE; places.max(2 * BLOCK).next_power_of_two()];
-        Self { places, len: 0, vertex_bits: usize::BITS - vertices.leading_zeros(), cells }
+        Self {
+            places,
+            len: 0,
+            vertex_bits: usize::BITS - vertices.leading_zeros(),
+            cells,
+        }
     }
 
     /// Room for one more block; `known`: the positions of the vertices in the table.
@@ -121,8 +130,17 @@ impl PositionTable {
 
     /// The vertex in the cell of this position, or the next number, `known.len()`, which is then taken.
     #[inline]
-    fn find_or_add(&mut self, position: &Point3<f64>, probe: &PositionProbe, known: &[Point3<f64>]) -> u32 {
-        let (tag, mut place, mut entry) = (self.tag(probe.hash), self.first_place(probe.hash), probe.entry);
+    fn find_or_add(
+        &mut self,
+        position: &Point3<f64>,
+        probe: &PositionProbe,
+        known: &[Point3<f64>],
+    ) -> u32 {
+        let (tag, mut place, mut entry) = (
+            self.tag(probe.hash),
+            self.first_place(probe.hash),
+            probe.entry,
+        );
         if entry == FREE {
             // may have been taken since
             entry = self.places[place];
@@ -191,7 +209,9 @@ fn hash([x, y, z]: [u64; 3]) -> u64 {
         product as u64 ^ (product >> 64) as u64
     };
     fold(
-        fold(x ^ SPREAD, SPREAD).rotate_left(17) ^ fold(y ^ SPREAD.rotate_left(23), SPREAD) ^ z.rotate_left(41),
+        fold(x ^ SPREAD, SPREAD).rotate_left(17)
+            ^ fold(y ^ SPREAD.rotate_left(23), SPREAD)
+            ^ z.rotate_left(41),
         SPREAD,
     )
 }
@@ -214,28 +234,52 @@ mod tests {
 
     #[test]
     fn rounding_is_welded_and_a_narrow_slot_is_not() {
-        assert_eq!(left(&[[1.0, 0.0, 2.0], [1.0, 4e-16, 2.0], [1.0, -1e-17, 2.0], [1.0, -0.0, 2.0]]), 1);
+        assert_eq!(
+            left(&[
+                [1.0, 0.0, 2.0],
+                [1.0, 4e-16, 2.0],
+                [1.0, -1e-17, 2.0],
+                [1.0, -0.0, 2.0]
+            ]),
+            1
+        );
         assert_eq!(left(&[[1.0, 3.3, 2.0], [1.0 + f64::EPSILON, 3.3, 2.0]]), 1);
         assert_eq!(left(&[[1.0, 0.0, 2.0], [1.0, 1e-6, 2.0]]), 2);
     }
 
     #[test]
     fn wild_vertices_do_not_widen_the_cells() {
-        let wild = [[1e300, 0.0, 0.0], [f64::NAN, 1.0, 1.0], [f64::INFINITY, 2.0, 2.0]];
+        let wild = [
+            [1e300, 0.0, 0.0],
+            [f64::NAN, 1.0, 1.0],
+            [f64::INFINITY, 2.0, 2.0],
+        ];
         assert_eq!(left(&wild), 3);
-        assert_eq!(left(&[wild[0], wild[1], [1.0, 0.0, 2.0], [1.0, 1e-6, 2.0]]), 4);
+        assert_eq!(
+            left(&[wild[0], wild[1], [1.0, 0.0, 2.0], [1.0, 1e-6, 2.0]]),
+            4
+        );
     }
 
     #[test]
     fn far_from_the_origin_bits_decide() {
         // 1e15 m: next number 0.125 m further
-        assert_eq!(left(&[[1e15, 0.0, 0.0], [1e15 + 0.125, 0.0, 0.0], [1e15, 0.0, 0.0]]), 2);
+        assert_eq!(
+            left(&[[1e15, 0.0, 0.0], [1e15 + 0.125, 0.0, 0.0], [1e15, 0.0, 0.0]]),
+            2
+        );
     }
 
     #[test]
     fn the_first_occurrence_keeps_its_position_and_place() {
         let point = |x, y| Point3::new(x, y, 0.0);
-        let mut positions = vec![point(3.0, 1e-17), point(9.0, 5.0), point(3.0, 0.0), point(0.0, 1.0), point(6.0, 2.0)];
+        let mut positions = vec![
+            point(3.0, 1e-17),
+            point(9.0, 5.0),
+            point(3.0, 0.0),
+            point(0.0, 1.0),
+            point(6.0, 2.0),
+        ];
         let mut faces = [[2, 1, 0], [2, 3, 4]];
         assert_eq!(weld(&mut positions, &mut faces), 1);
         assert_eq!((positions[0].y, faces), (1e-17, [[0, 1, 0], [0, 2, 3]]));

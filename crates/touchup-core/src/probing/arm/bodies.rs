@@ -40,12 +40,30 @@ pub enum Link {
 }
 
 /// The links of a UR, from the base outward.
-const UR_LINKS: [Link; 7] =
-    [Link::Base, Link::UpperArm, Link::Forearm, Link::Wrist1, Link::Wrist2, Link::Wrist3, Link::Probe];
+const UR_LINKS: [Link; 7] = [
+    Link::Base,
+    Link::UpperArm,
+    Link::Forearm,
+    Link::Wrist1,
+    Link::Wrist2,
+    Link::Wrist3,
+    Link::Probe,
+];
 
 /// Pairs of them that may collide, by their numbers; those that share a joint, or lie side by side whatever the joints are, cannot.
-const UR_MEETING: [(usize, usize); 11] =
-    [(0, 2), (0, 3), (0, 4), (0, 5), (0, 6), (1, 3), (1, 4), (1, 5), (1, 6), (2, 5), (2, 6)];
+const UR_MEETING: [(usize, usize); 11] = [
+    (0, 2),
+    (0, 3),
+    (0, 4),
+    (0, 5),
+    (0, 6),
+    (1, 3),
+    (1, 4),
+    (1, 5),
+    (1, 6),
+    (2, 5),
+    (2, 6),
+];
 
 /// The links of an arm at some joint angles, in the base B.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,10 +77,14 @@ impl<'a> ArmBodies<'a> {
     /// - `pose_ft`: the tip in the flange. The probe is the line between them: how thick it is the margin of a check has to hold.
     pub fn new(geometry: &'a ArmGeometry, joints: &Joints, pose_ft: &Isometry3<f64>) -> Self {
         match geometry {
-            ArmGeometry::Ur(ur) => Self { links: of_ur(ur, six(joints), pose_ft), meeting: &UR_MEETING },
-            ArmGeometry::Chain(chain) => {
-                Self { links: of_chain(chain, joints, pose_ft), meeting: chain.meeting_links() }
-            }
+            ArmGeometry::Ur(ur) => Self {
+                links: of_ur(ur, six(joints), pose_ft),
+                meeting: &UR_MEETING,
+            },
+            ArmGeometry::Chain(chain) => Self {
+                links: of_chain(chain, joints, pose_ft),
+                meeting: chain.meeting_links(),
+            },
         }
     }
 
@@ -73,8 +95,14 @@ impl<'a> ArmBodies<'a> {
 
     /// The pair of links with the smallest gap, m, of those that may collide.
     pub fn nearest_pair(&self) -> (Link, Link, f64) {
-        let gap = |&(one, other): &(usize, usize)| (one, other, self.links[one].1.gap(&self.links[other].1));
-        let nearest = self.meeting.iter().map(gap).min_by(|a, b| a.2.total_cmp(&b.2));
+        let gap = |&(one, other): &(usize, usize)| {
+            (one, other, self.links[one].1.gap(&self.links[other].1))
+        };
+        let nearest = self
+            .meeting
+            .iter()
+            .map(gap)
+            .min_by(|a, b| a.2.total_cmp(&b.2));
         let (one, other, gap) = nearest.unwrap_or((0, self.links.len() - 1, f64::INFINITY));
         (self.links[one].0.clone(), self.links[other].0.clone(), gap)
     }
@@ -97,14 +125,26 @@ fn of_ur(ur: &UrGeometry, joints: &[f64; 6], pose_ft: &Isometry3<f64>) -> Vec<(L
         (joint(4), joint(5), wrist),
         (joint(5), tip, 0.0),
     ];
-    let capsules = ends.map(|(from, to, radius)| Capsule { ends: [from.into(), to.into()], radius });
+    let capsules = ends.map(|(from, to, radius)| Capsule {
+        ends: [from.into(), to.into()],
+        radius,
+    });
     UR_LINKS.into_iter().zip(capsules).collect()
 }
 
 /// The first is what the arm stands on, the last the probe.
-fn of_chain(chain: &SerialChain, joints: &Joints, pose_ft: &Isometry3<f64>) -> Vec<(Link, Capsule)> {
-    let moving = chain.link_names().skip(1).map(|name| Link::Named(name.clone()));
-    let names = std::iter::once(Link::Base).chain(moving).chain([Link::Probe]);
+fn of_chain(
+    chain: &SerialChain,
+    joints: &Joints,
+    pose_ft: &Isometry3<f64>,
+) -> Vec<(Link, Capsule)> {
+    let moving = chain
+        .link_names()
+        .skip(1)
+        .map(|name| Link::Named(name.clone()));
+    let names = std::iter::once(Link::Base)
+        .chain(moving)
+        .chain([Link::Probe]);
     names.zip(chain.bodies(joints, Some(pose_ft))).collect()
 }
 
@@ -122,7 +162,10 @@ mod tests {
         let (_, _, gap) = pair([0.0, -1.6, 1.6, -1.6, -1.6, 0.0]);
         assert!(gap > 0.05, "{gap}");
         let (one, other, gap) = pair([0.0, -1.6, 3.0, -1.6, -1.6, 0.0]);
-        assert!(gap < 0.0 && (&one, &other) == (&Link::Base, &Link::Forearm), "{one} {other} {gap}");
+        assert!(
+            gap < 0.0 && (&one, &other) == (&Link::Base, &Link::Forearm),
+            "{one} {other} {gap}"
+        );
         // the wrist bends the probe back along the forearm
         let (one, other, gap) = pair([0.0, -1.6, 1.6, 0.0, 3.1, 0.0]);
         assert!(gap < 0.0 && one == Link::Forearm, "{one} {other} {gap}");

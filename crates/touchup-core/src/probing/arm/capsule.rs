@@ -19,7 +19,10 @@ impl Capsule {
 
     /// The same capsule where its frame has a pose.
     pub(super) fn moved(&self, pose: &Isometry3<f64>) -> Self {
-        Self { ends: self.ends.map(|end| pose * end), radius: self.radius }
+        Self {
+            ends: self.ends.map(|end| pose * end),
+            radius: self.radius,
+        }
     }
 }
 
@@ -36,9 +39,15 @@ fn segment_distance([a, b]: &[Point3<f64>; 2], [c, d]: &[Point3<f64>; 2]) -> f64
         let t = (uu * v.dot(&w) - uv * u.dot(&w)) / determinant;
         ((0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t)).then(|| (w + u * s - v * t).norm())
     });
-    let ends =
-        [point_distance(a, [c, d]), point_distance(b, [c, d]), point_distance(c, [a, b]), point_distance(d, [a, b])];
-    ends.into_iter().chain(inside.flatten()).fold(f64::INFINITY, f64::min)
+    let ends = [
+        point_distance(a, [c, d]),
+        point_distance(b, [c, d]),
+        point_distance(c, [a, b]),
+        point_distance(d, [a, b]),
+    ];
+    ends.into_iter()
+        .chain(inside.flatten())
+        .fold(f64::INFINITY, f64::min)
 }
 
 /// Sine² of an angle below which two segments are parallel: then an end of one of them is nearest.
@@ -46,7 +55,8 @@ const PARALLEL: f64 = 1e-12;
 
 fn point_distance(point: &Point3<f64>, [from, to]: [&Point3<f64>; 2]) -> f64 {
     let along = to - from;
-    let share = ((point - from).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    let share =
+        ((point - from).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
     (point - (from + along * share)).norm()
 }
 
@@ -57,7 +67,10 @@ mod tests {
 
     #[test]
     fn gaps_between_capsules_are_those_made_by_hand() {
-        let capsule = |ends: [[f64; 3]; 2], radius| Capsule { ends: ends.map(Point3::from), radius };
+        let capsule = |ends: [[f64; 3]; 2], radius| Capsule {
+            ends: ends.map(Point3::from),
+            radius,
+        };
         let along_x = capsule([[0.0; 3], [1.0, 0.0, 0.0]], 0.1);
         for (other, gap) in [
             // crossing above the middle, parallel beside, beyond an end, one in the other, a point
@@ -67,7 +80,11 @@ mod tests {
             (capsule([[0.2, 0.0, 0.0], [0.3, 0.0, 0.0]], 0.1), -0.2),
             (capsule([[0.5, 0.3, 0.0], [0.5, 0.3, 0.0]], 0.1), 0.1),
         ] {
-            assert!((along_x.gap(&other) - gap).abs() < 1e-12, "{other:?}: {}", along_x.gap(&other));
+            assert!(
+                (along_x.gap(&other) - gap).abs() < 1e-12,
+                "{other:?}: {}",
+                along_x.gap(&other)
+            );
             assert!((other.gap(&along_x) - gap).abs() < 1e-12, "{other:?}");
         }
     }
@@ -76,14 +93,23 @@ mod tests {
     fn the_distance_of_segments_is_that_of_their_sampled_points() {
         let mut rng = rand_pcg::Pcg64::seed_from_u64(5);
         for _ in 0..200 {
-            let mut point = || Point3::from(std::array::from_fn::<f64, 3, _>(|_| rng.random_range(-1.0..1.0)));
+            let mut point = || {
+                Point3::from(std::array::from_fn::<f64, 3, _>(|_| {
+                    rng.random_range(-1.0..1.0)
+                }))
+            };
             let (one, other) = ([point(), point()], [point(), point()]);
-            let places =
-                |[from, to]: [Point3<f64>; 2]| (0..=200).map(move |at| from + (to - from) * (f64::from(at) / 200.0));
-            let sampled =
-                places(one).flat_map(|p| places(other).map(move |q| (p - q).norm())).fold(f64::INFINITY, f64::min);
+            let places = |[from, to]: [Point3<f64>; 2]| {
+                (0..=200).map(move |at| from + (to - from) * (f64::from(at) / 200.0))
+            };
+            let sampled = places(one)
+                .flat_map(|p| places(other).map(move |q| (p - q).norm()))
+                .fold(f64::INFINITY, f64::min);
             let exact = segment_distance(&one, &other);
-            assert!(exact <= sampled + 1e-12 && exact > sampled - 0.02, "{one:?} {other:?}: {exact}, {sampled}");
+            assert!(
+                exact <= sampled + 1e-12 && exact > sampled - 0.02,
+                "{one:?} {other:?}: {exact}, {sampled}"
+            );
         }
     }
 }

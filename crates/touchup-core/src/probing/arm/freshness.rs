@@ -24,7 +24,10 @@ pub struct Freshness {
 impl Freshness {
     /// - `period`: between two states of the arm, s.
     pub fn new(period: f64) -> Self {
-        Self { old: OLD * period + ROUNDING, behind_since_s: None }
+        Self {
+            old: OLD * period + ROUNDING,
+            behind_since_s: None,
+        }
     }
 
     /// Whether an order may go out.
@@ -33,7 +36,11 @@ impl Freshness {
     ///
     /// # Errors
     /// [`ArmError::Behind`] for a caller that does not catch up.
-    pub fn may_send(&mut self, followed_s: f64, (newest_s, late_s): (f64, f64)) -> Result<bool, ArmError> {
+    pub fn may_send(
+        &mut self,
+        followed_s: f64,
+        (newest_s, late_s): (f64, f64),
+    ) -> Result<bool, ArmError> {
         let age = newest_s - followed_s + late_s;
         if age.is_nan() || age <= self.old {
             self.behind_since_s = None;
@@ -83,7 +90,12 @@ mod tests {
         assert_eq!(error, None);
         let first = orders.iter().find(|(_, went)| *went).unwrap().0;
         assert!((52.0..54.0).contains(&first), "{first} ms");
-        assert!(orders.iter().skip_while(|(_, went)| !went).all(|(_, went)| *went));
+        assert!(
+            orders
+                .iter()
+                .skip_while(|(_, went)| !went)
+                .all(|(_, went)| *went)
+        );
     }
 
     /// Each 3 ms one state of 2 ms is taken: 4 ms behind after some 15 ms, and never again nearer.
@@ -91,9 +103,16 @@ mod tests {
     fn a_caller_that_is_slower_than_the_arm_orders_nothing_more_and_is_named() {
         let (orders, error) = orders(0, 3000);
         let last = orders.iter().rposition(|(_, went)| *went).unwrap();
-        assert!(orders[last].0 < 30.0 && orders.len() - last > 50, "{:?}", orders[last]);
+        assert!(
+            orders[last].0 < 30.0 && orders.len() - last > 50,
+            "{:?}",
+            orders[last]
+        );
         let error = error.unwrap();
-        assert!(matches!(error, ArmError::Behind { age_ms } if age_ms > 50.0), "{error}");
+        assert!(
+            matches!(error, ArmError::Behind { age_ms } if age_ms > 50.0),
+            "{error}"
+        );
     }
 
     #[test]
@@ -103,7 +122,10 @@ mod tests {
         assert_eq!(freshness.may_send(3.0, (3.0, 40e-3)), Ok(false));
         assert_eq!(freshness.may_send(3.1, (3.1, 40e-3)), Ok(false));
         let behind = freshness.may_send(3.25, (3.25, 40e-3));
-        assert!(matches!(behind, Err(ArmError::Behind { age_ms }) if (age_ms - 40.0).abs() < 1e-6), "{behind:?}");
+        assert!(
+            matches!(behind, Err(ArmError::Behind { age_ms }) if (age_ms - 40.0).abs() < 1e-6),
+            "{behind:?}"
+        );
     }
 
     #[test]

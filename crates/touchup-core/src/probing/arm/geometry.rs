@@ -60,7 +60,9 @@ impl ArmGeometry {
         match self {
             Self::Ur(ur) => {
                 let mut jacobian = Jacobian::zeros();
-                jacobian.columns_mut(0, 6).copy_from(&ur.jacobian(six(joints)));
+                jacobian
+                    .columns_mut(0, 6)
+                    .copy_from(&ur.jacobian(six(joints)));
                 jacobian
             }
             Self::Chain(chain) => chain.jacobian(joints),
@@ -78,10 +80,18 @@ impl ArmGeometry {
     /// The slowest turning of the joints that moves the flange with a velocity, rad/s; `None` where none does.
     ///
     /// - `linear`, `angular`: of the flange, m/s and rad/s in B.
-    pub fn turning(&self, joints: &Joints, linear: &Vector3<f64>, angular: &Vector3<f64>) -> Option<Joints> {
-        let velocity = Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z);
+    pub fn turning(
+        &self,
+        joints: &Joints,
+        linear: &Vector3<f64>,
+        angular: &Vector3<f64>,
+    ) -> Option<Joints> {
+        let velocity = Vector6::new(
+            linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
+        );
         let rates = shortest(&self.jacobian(joints), &velocity, 0.0)?;
-        Some(joints.mapped(|joint, _| rates[joint])).filter(|rates| rates.iter().all(|rate| rate.is_finite()))
+        Some(joints.mapped(|joint, _| rates[joint]))
+            .filter(|rates| rates.iter().all(|rate| rate.is_finite()))
     }
 
     /// Joint angles within their ranges that bring the flange to a pose in B, nearest to others.
@@ -93,8 +103,10 @@ impl ArmGeometry {
             Self::Ur(ur) => {
                 let solutions = ur.inverse(pose_bf, six(near)).into_iter().map(Joints::from);
                 let unwound = solutions.map(|joints| unwound(&joints, near));
-                let in_range = unwound.filter(|joints| joints.iter().all(|angle| angle.abs() <= JOINT_RANGE));
-                let nearest = in_range.min_by(|a, b| largest_turn(a, near).total_cmp(&largest_turn(b, near)));
+                let in_range =
+                    unwound.filter(|joints| joints.iter().all(|angle| angle.abs() <= JOINT_RANGE));
+                let nearest =
+                    in_range.min_by(|a, b| largest_turn(a, near).total_cmp(&largest_turn(b, near)));
                 nearest.ok_or(Unreached::Pose)
             }
             Self::Chain(chain) => chain.nearest(pose_bf, near),
@@ -107,7 +119,9 @@ impl ArmGeometry {
         match self {
             Self::Ur(ur) => {
                 let solutions = ur.inverse(pose_bf, &FOLDED).into_iter();
-                solutions.max_by(|a, b| ur.dexterity(a).total_cmp(&ur.dexterity(b))).map(Joints::from)
+                solutions
+                    .max_by(|a, b| ur.dexterity(a).total_cmp(&ur.dexterity(b)))
+                    .map(Joints::from)
             }
             Self::Chain(chain) => chain.most_dexterous(pose_bf),
         }
@@ -116,7 +130,8 @@ impl ArmGeometry {
 
 /// The joints of a UR.
 pub(super) fn six(joints: &Joints) -> &[f64; 6] {
-    <&[f64; 6]>::try_from(&**joints).expect("whoever has another arm has another geometry: `Limits::check_pose` looks")
+    <&[f64; 6]>::try_from(&**joints)
+        .expect("whoever has another arm has another geometry: `Limits::check_pose` looks")
 }
 
 /// The same angles, each within half a turn of another.

@@ -31,8 +31,17 @@ impl ArmState {
     /// - `stamp_ns`: of both.
     pub fn as_probe(&self, stamp_ns: i64) -> (StampedPose, StampedWrench) {
         let turned = |v| self.pose_bt.rotation.inverse() * v;
-        let wrench = Wrench { force: turned(self.wrench_b.force), torque: turned(self.wrench_b.torque) };
-        (StampedPose { stamp_ns, pose_ot: self.pose_bt }, StampedWrench { stamp_ns, wrench })
+        let wrench = Wrench {
+            force: turned(self.wrench_b.force),
+            torque: turned(self.wrench_b.torque),
+        };
+        (
+            StampedPose {
+                stamp_ns,
+                pose_ot: self.pose_bt,
+            },
+            StampedWrench { stamp_ns, wrench },
+        )
     }
 }
 
@@ -102,10 +111,16 @@ pub struct Slowed {
 
 impl std::fmt::Display for Slowed {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { slider_percent, is_reduced } = *self;
+        let Self {
+            slider_percent,
+            is_reduced,
+        } = *self;
         match (slider_percent < 100.0, is_reduced) {
             (true, false) => write!(f, "its speed slider is at {slider_percent:.0} %"),
-            (true, true) => write!(f, "its speed slider is at {slider_percent:.0} % and its safety in reduced mode"),
+            (true, true) => write!(
+                f,
+                "its speed slider is at {slider_percent:.0} % and its safety in reduced mode"
+            ),
             (false, _) => write!(f, "its safety is in reduced mode"),
         }
     }
@@ -115,13 +130,17 @@ impl std::fmt::Display for Slowed {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ArmError {
     /// No states arrive from it.
-    #[error("nothing has come from the arm for {silent_ms} ms: look at its controller and at the cable")]
+    #[error(
+        "nothing has come from the arm for {silent_ms} ms: look at its controller and at the cable"
+    )]
     Lost {
         /// ms
         silent_ms: u64,
     },
     /// It has closed a connection.
-    #[error("the connection for {what} was closed from the arm's side: look at its controller and at the cable")]
+    #[error(
+        "the connection for {what} was closed from the arm's side: look at its controller and at the cable"
+    )]
     Dropped {
         /// what it was for
         what: &'static str,
@@ -130,7 +149,9 @@ pub enum ArmError {
     #[error("the arm's clock is stuck: its controller has stopped")]
     Stale,
     /// The stamps go back.
-    #[error("the arm's clock went back by {back_ms:.0} ms: its controller has started again, or two arms answer")]
+    #[error(
+        "the arm's clock went back by {back_ms:.0} ms: its controller has started again, or two arms answer"
+    )]
     WentBack {
         /// ms
         back_ms: f64,
@@ -184,7 +205,9 @@ pub enum ArmError {
         silent_ms: f64,
     },
     /// The stamps go on faster than time.
-    #[error("the stamps of {topic} jumped ahead by {ahead_ms:.0} ms: its clock was set, or two senders answer")]
+    #[error(
+        "the stamps of {topic} jumped ahead by {ahead_ms:.0} ms: its clock was set, or two senders answer"
+    )]
     JumpedAhead {
         /// its name
         topic: String,
@@ -192,7 +215,9 @@ pub enum ArmError {
         ahead_ms: f64,
     },
     /// States come later than they did.
-    #[error("{topic} comes {late_ms:.0} ms later than it did: the network, the controller or this machine is busy")]
+    #[error(
+        "{topic} comes {late_ms:.0} ms later than it did: the network, the controller or this machine is busy"
+    )]
     Late {
         /// its name
         topic: String,
@@ -232,7 +257,9 @@ pub enum ArmError {
         first: String,
     },
     /// The connection to the arm has failed; the arm was stopped by other means.
-    #[error("the program that speaks to the arm {reason}; the arm was stopped without it: look, then recover")]
+    #[error(
+        "the program that speaks to the arm {reason}; the arm was stopped without it: look, then recover"
+    )]
     Client {
         /// what happened to it
         reason: String,
@@ -291,7 +318,10 @@ mod tests {
     #[test]
     fn a_wrench_in_the_base_is_felt_in_the_axes_of_the_probe() {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::FRAC_PI_2);
-        let wrench_b = Wrench { force: Vector3::new(2.0, 0.0, 1.0), torque: Vector3::new(0.0, 0.3, 0.0) };
+        let wrench_b = Wrench {
+            force: Vector3::new(2.0, 0.0, 1.0),
+            torque: Vector3::new(0.0, 0.3, 0.0),
+        };
         let state = ArmState {
             stamp_ns: 4,
             pose_bt: Isometry3::from_parts(Vector3::new(0.4, 0.1, 0.2).into(), turn),
@@ -301,8 +331,19 @@ mod tests {
             safety: Safety::Normal,
         };
         let (pose, wrench) = state.as_probe(9);
-        assert_eq!((pose.stamp_ns, pose.pose_ot, wrench.stamp_ns), (9, state.pose_bt, 9));
-        assert!((wrench.wrench.force - Vector3::new(0.0, -2.0, 1.0)).norm() < 1e-15, "{:?}", wrench.wrench);
-        assert!((wrench.wrench.torque - Vector3::new(0.3, 0.0, 0.0)).norm() < 1e-15, "{:?}", wrench.wrench);
+        assert_eq!(
+            (pose.stamp_ns, pose.pose_ot, wrench.stamp_ns),
+            (9, state.pose_bt, 9)
+        );
+        assert!(
+            (wrench.wrench.force - Vector3::new(0.0, -2.0, 1.0)).norm() < 1e-15,
+            "{:?}",
+            wrench.wrench
+        );
+        assert!(
+            (wrench.wrench.torque - Vector3::new(0.3, 0.0, 0.0)).norm() < 1e-15,
+            "{:?}",
+            wrench.wrench
+        );
     }
 }

@@ -17,14 +17,22 @@ pub struct Joints {
 impl Joints {
     /// The angles of so many joints; `None` for more than [`MOST_JOINTS`].
     pub fn of(angles: &[f64]) -> Option<Self> {
-        let mut joints = Self { angles: [0.0; MOST_JOINTS], count: angles.len() };
-        joints.angles.get_mut(..angles.len())?.copy_from_slice(angles);
+        let mut joints = Self {
+            angles: [0.0; MOST_JOINTS],
+            count: angles.len(),
+        };
+        joints
+            .angles
+            .get_mut(..angles.len())?
+            .copy_from_slice(angles);
         Some(joints)
     }
 
     /// Each angle changed by its number, from 0 on at the base.
     pub fn mapped(mut self, mut angle: impl FnMut(usize, f64) -> f64) -> Self {
-        self.iter_mut().enumerate().for_each(|(joint, it)| *it = angle(joint, *it));
+        self.iter_mut()
+            .enumerate()
+            .for_each(|(joint, it)| *it = angle(joint, *it));
         self
     }
 }
@@ -66,5 +74,8 @@ impl fmt::Debug for Joints {
 
 /// By how far the joint turns that turns most, rad.
 pub(crate) fn largest_turn(from: &Joints, to: &Joints) -> f64 {
-    from.iter().zip(to.iter()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    from.iter()
+        .zip(to.iter())
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max)
 }

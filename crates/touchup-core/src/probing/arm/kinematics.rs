@@ -85,13 +85,29 @@ impl UrGeometry {
 
     /// Of a model, by the name that `ur_type` has in ROS.
     pub fn of(name: &str) -> Option<Self> {
-        let models = [("ur3e", Self::UR3E), ("ur5e", Self::UR5E), ("ur10e", Self::UR10E), ("ur16e", Self::UR16E)];
-        models.into_iter().find(|(model, _)| *model == name).map(|(_, geometry)| geometry)
+        let models = [
+            ("ur3e", Self::UR3E),
+            ("ur5e", Self::UR5E),
+            ("ur10e", Self::UR10E),
+            ("ur16e", Self::UR16E),
+        ];
+        models
+            .into_iter()
+            .find(|(model, _)| *model == name)
+            .map(|(_, geometry)| geometry)
     }
 
     /// d, a and α of each, m and rad.
     fn links(&self) -> [(f64, f64, f64); 6] {
-        let Self { d1, a2, a3, d4, d5, d6, .. } = *self;
+        let Self {
+            d1,
+            a2,
+            a3,
+            d4,
+            d5,
+            d6,
+            ..
+        } = *self;
         let (d, a) = ([d1, 0.0, 0.0, d4, d5, d6], [0.0, a2, a3, 0.0, 0.0, 0.0]);
         let alpha = [FRAC_PI_2, 0.0, 0.0, FRAC_PI_2, -FRAC_PI_2, 0.0];
         std::array::from_fn(|i| (d[i], a[i], alpha[i]))
@@ -118,7 +134,9 @@ impl UrGeometry {
         for (column, (link, angle)) in self.links().iter().zip(joints).enumerate() {
             let axis = pose.rotation * Vector3::z();
             let linear = axis.cross(&(end - pose.translation.vector));
-            jacobian.fixed_view_mut::<3, 1>(0, column).copy_from(&linear);
+            jacobian
+                .fixed_view_mut::<3, 1>(0, column)
+                .copy_from(&linear);
             jacobian.fixed_view_mut::<3, 1>(3, column).copy_from(&axis);
             pose *= step(link, *angle);
         }
@@ -130,7 +148,9 @@ impl UrGeometry {
     /// axes 4 and 6 are parallel.
     pub fn dexterity(&self, joints: &[f64; 6]) -> f64 {
         let mut jacobian = self.jacobian(joints);
-        jacobian.rows_mut(0, 3).scale_mut(1.0 / (self.a2.abs() + self.a3.abs()));
+        jacobian
+            .rows_mut(0, 3)
+            .scale_mut(1.0 / (self.a2.abs() + self.a3.abs()));
         jacobian.singular_values().min()
     }
 
@@ -156,7 +176,9 @@ impl UrGeometry {
             return Vec::new();
         }
         let (direction, beside) = (wrist.y.atan2(wrist.x), share.acos());
-        [beside, -beside].map(|by| wrapped(direction + by + FRAC_PI_2)).to_vec()
+        [beside, -beside]
+            .map(|by| wrapped(direction + by + FRAC_PI_2))
+            .to_vec()
     }
 
     /// Fifth and sixth joint.
@@ -169,14 +191,23 @@ impl UrGeometry {
             return Vec::new();
         }
         let bend = cos_q5.clamp(-1.0, 1.0).acos();
-        let [x, y] = [Vector3::x(), Vector3::y()].map(|axis| across.dot(&(pose_bf.rotation * axis)));
+        let [x, y] =
+            [Vector3::x(), Vector3::y()].map(|axis| across.dot(&(pose_bf.rotation * axis)));
         let at = |q5: f64| {
             let sign = q5.sin();
             // axes 4 and 6 are parallel: their sum alone is determined
-            let q6 = if sign.abs() < PARALLEL { q6_near } else { (-y / sign).atan2(x / sign) };
+            let q6 = if sign.abs() < PARALLEL {
+                q6_near
+            } else {
+                (-y / sign).atan2(x / sign)
+            };
             (q5, wrapped(q6))
         };
-        if bend < PARALLEL { vec![at(bend)] } else { vec![at(bend), at(-bend)] }
+        if bend < PARALLEL {
+            vec![at(bend)]
+        } else {
+            vec![at(bend), at(-bend)]
+        }
     }
 
     /// Second to fourth joint: the triangle of upper arm and forearm.
@@ -188,7 +219,8 @@ impl UrGeometry {
         let pose = first.inverse() * pose_bf * last.inverse();
         let target = pose * nalgebra::Point3::new(0.0, -self.d4, 0.0);
         let reach = target.x.hypot(target.y);
-        let cos_q3 = (reach * reach - self.a2 * self.a2 - self.a3 * self.a3) / (2.0 * self.a2 * self.a3);
+        let cos_q3 =
+            (reach * reach - self.a2 * self.a2 - self.a3 * self.a3) / (2.0 * self.a2 * self.a3);
         if cos_q3.is_nan() || cos_q3.abs() > 1.0 + ROUNDING {
             return;
         }
@@ -216,11 +248,18 @@ const ROUNDING: f64 = 1e-12;
 fn step(&(d, a, alpha): &(f64, f64, f64), angle: f64) -> Isometry3<f64> {
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
     let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), alpha);
-    Isometry3::from_parts(Translation3::from(turn * Vector3::new(a, 0.0, d)), turn * tilt)
+    Isometry3::from_parts(
+        Translation3::from(turn * Vector3::new(a, 0.0, d)),
+        turn * tilt,
+    )
 }
 
 /// The same angle within (−π, π].
 fn wrapped(angle: f64) -> f64 {
     let turned = angle.rem_euclid(2.0 * PI);
-    if turned > PI { turned - 2.0 * PI } else { turned }
+    if turned > PI {
+        turned - 2.0 * PI
+    } else {
+        turned
+    }
 }

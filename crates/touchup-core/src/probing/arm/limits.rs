@@ -110,7 +110,9 @@ pub enum LimitError {
         high_deg: f64,
     },
     /// Another arm than the one that is planned with.
-    #[error("the arm has {joints} joints, the one of robot.model has {expected}: name the arm that is there")]
+    #[error(
+        "the arm has {joints} joints, the one of robot.model has {expected}: name the arm that is there"
+    )]
     OtherArm {
         /// of the arm
         joints: usize,
@@ -185,7 +187,9 @@ pub enum LimitError {
         limit_mm_per_s: f64,
     },
     /// A joint turns too fast.
-    #[error("joint {joint} turns with {deg_per_s:.0}°/s, over the limit of {limit_deg_per_s:.0}°/s")]
+    #[error(
+        "joint {joint} turns with {deg_per_s:.0}°/s, over the limit of {limit_deg_per_s:.0}°/s"
+    )]
     JointSpeed {
         /// from 1 on, at the base
         joint: usize,
@@ -195,7 +199,9 @@ pub enum LimitError {
         limit_deg_per_s: f64,
     },
     /// More than the configuration allows.
-    #[error("{what} of {asked} {unit} is beyond the configured {limit} {unit}: a request can only ask for less")]
+    #[error(
+        "{what} of {asked} {unit} is beyond the configured {limit} {unit}: a request can only ask for less"
+    )]
     Wider {
         /// which one
         what: &'static str,
@@ -249,14 +255,27 @@ pub struct Narrower {
 
 impl Limits {
     fn is_box(&self) -> Result<(), SettingError> {
-        self.lowest.iter().zip(self.highest.iter()).try_for_each(|(low, high)| {
-            let allowed = "robot.workspace_low_mm to 5000 mm";
-            SettingError::check("robot.workspace_high_mm", high * 1e3, high >= low, allowed)
-        })?;
-        let (Some(lowest), Some(highest)) = (self.arm_lowest, self.arm_highest) else { return Ok(()) };
-        lowest.iter().zip(highest.iter()).try_for_each(|(low, high)| {
-            SettingError::check("robot.arm_high_mm", high * 1e3, high > low, "above robot.arm_low_mm")
-        })
+        self.lowest
+            .iter()
+            .zip(self.highest.iter())
+            .try_for_each(|(low, high)| {
+                let allowed = "robot.workspace_low_mm to 5000 mm";
+                SettingError::check("robot.workspace_high_mm", high * 1e3, high >= low, allowed)
+            })?;
+        let (Some(lowest), Some(highest)) = (self.arm_lowest, self.arm_highest) else {
+            return Ok(());
+        };
+        lowest
+            .iter()
+            .zip(highest.iter())
+            .try_for_each(|(low, high)| {
+                SettingError::check(
+                    "robot.arm_high_mm",
+                    high * 1e3,
+                    high > low,
+                    "above robot.arm_low_mm",
+                )
+            })
     }
 
     /// These limits, tightened by a request.
@@ -265,12 +284,17 @@ impl Limits {
     /// [`LimitError::Wider`], [`LimitError::NoLimit`].
     pub fn narrowed(&self, by: &Narrower) -> Result<Self, LimitError> {
         let narrower = |what, asked: Option<f64>, limit: f64, unit, per_si: f64| match asked {
-            Some(asked) if asked.is_nan() || asked <= 0.0 => {
-                Err(LimitError::NoLimit { what, asked: asked * per_si, unit })
-            }
-            Some(asked) if asked > limit => {
-                Err(LimitError::Wider { what, asked: asked * per_si, limit: limit * per_si, unit })
-            }
+            Some(asked) if asked.is_nan() || asked <= 0.0 => Err(LimitError::NoLimit {
+                what,
+                asked: asked * per_si,
+                unit,
+            }),
+            Some(asked) if asked > limit => Err(LimitError::Wider {
+                what,
+                asked: asked * per_si,
+                limit: limit * per_si,
+                unit,
+            }),
             asked => Ok(asked.unwrap_or(limit)),
         };
         Ok(Self {
@@ -288,7 +312,13 @@ impl Limits {
     /// [`LimitError::Workspace`]; also for a place that is no number.
     pub(crate) fn check_place(&self, place: &Vector3<f64>) -> Result<(), LimitError> {
         let is_in = (0..3).all(|i| place[i] >= self.lowest[i] && place[i] <= self.highest[i]);
-        if is_in { Ok(()) } else { Err(LimitError::Workspace { place_mm: millimetres(place) }) }
+        if is_in {
+            Ok(())
+        } else {
+            Err(LimitError::Workspace {
+                place_mm: millimetres(place),
+            })
+        }
     }
 
     /// Whether the arm may have its tip at a pose in B; returns joints for it, the nearest to those that it has.
@@ -308,18 +338,33 @@ impl Limits {
         let place = pose_bt.translation.vector;
         self.check_place(&place)?;
         if near.len() != geometry.joint_count() {
-            return Err(LimitError::OtherArm { joints: near.len(), expected: geometry.joint_count() });
+            return Err(LimitError::OtherArm {
+                joints: near.len(),
+                expected: geometry.joint_count(),
+            });
         }
         let place_mm = millimetres(&place);
-        let joints = geometry.nearest(&(pose_bt * pose_ft.inverse()), near).map_err(|unreached| match unreached {
-            Unreached::Pose => LimitError::Reach { place_mm },
-            Unreached::Range { joint, range: [low, high] } => {
-                LimitError::JointRange { place_mm, joint, low_deg: low.to_degrees(), high_deg: high.to_degrees() }
-            }
-        })?;
+        let joints = geometry
+            .nearest(&(pose_bt * pose_ft.inverse()), near)
+            .map_err(|unreached| match unreached {
+                Unreached::Pose => LimitError::Reach { place_mm },
+                Unreached::Range {
+                    joint,
+                    range: [low, high],
+                } => LimitError::JointRange {
+                    place_mm,
+                    joint,
+                    low_deg: low.to_degrees(),
+                    high_deg: high.to_degrees(),
+                },
+            })?;
         let dexterity = geometry.dexterity(&joints);
         if dexterity < self.dexterity {
-            return Err(LimitError::Singular { place_mm, dexterity, least: self.dexterity });
+            return Err(LimitError::Singular {
+                place_mm,
+                dexterity,
+                least: self.dexterity,
+            });
         }
         self.check_links(&ArmBodies::new(geometry, &joints, pose_ft), place_mm)?;
         Ok(joints)
@@ -329,18 +374,38 @@ impl Limits {
     fn check_links(&self, bodies: &ArmBodies<'_>, place_mm: [f64; 3]) -> Result<(), LimitError> {
         let (link, other, gap) = bodies.nearest_pair();
         if gap < LINK_GAP {
-            return Err(LimitError::OwnLinks { place_mm, link, other, gap_mm: gap * 1e3, least_mm: LINK_GAP * 1e3 });
+            return Err(LimitError::OwnLinks {
+                place_mm,
+                link,
+                other,
+                gap_mm: gap * 1e3,
+                least_mm: LINK_GAP * 1e3,
+            });
         }
         // the base is bolted to what limits the others
         for (link, capsule) in bodies.links().filter(|(link, _)| **link != Link::Base) {
             let beyond = |end: &Point3<f64>| {
-                let low = self.arm_lowest.map(|low| (low - end).max() + capsule.radius);
-                let high = self.arm_highest.map(|high| (end - high).max() + capsule.radius);
-                low.into_iter().chain(high).fold(f64::NEG_INFINITY, f64::max)
+                let low = self
+                    .arm_lowest
+                    .map(|low| (low - end).max() + capsule.radius);
+                let high = self
+                    .arm_highest
+                    .map(|high| (end - high).max() + capsule.radius);
+                low.into_iter()
+                    .chain(high)
+                    .fold(f64::NEG_INFINITY, f64::max)
             };
-            let by = capsule.ends.iter().map(beyond).fold(f64::NEG_INFINITY, f64::max);
+            let by = capsule
+                .ends
+                .iter()
+                .map(beyond)
+                .fold(f64::NEG_INFINITY, f64::max);
             if by > 0.0 {
-                return Err(LimitError::ArmBox { place_mm, link: link.clone(), by_mm: by * 1e3 });
+                return Err(LimitError::ArmBox {
+                    place_mm,
+                    link: link.clone(),
+                    by_mm: by * 1e3,
+                });
             }
         }
         Ok(())
@@ -359,7 +424,14 @@ impl Limits {
         self.check_place(&state.pose_bt.translation.vector)?;
         let force_n = state.wrench_b.force.norm();
         // what is no number is over every limit
-        if force_n <= self.force { Ok(()) } else { Err(LimitError::Force { force_n, limit_n: self.force }) }
+        if force_n <= self.force {
+            Ok(())
+        } else {
+            Err(LimitError::Force {
+                force_n,
+                limit_n: self.force,
+            })
+        }
     }
 }
 

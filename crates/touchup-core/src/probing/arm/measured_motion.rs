@@ -31,18 +31,28 @@ impl MeasuredMotion {
         if self.recent.len() <= WINDOW {
             return Ok(());
         }
-        let Some((begun_ns, from, joints)) = self.recent.pop_front() else { return Ok(()) };
+        let Some((begun_ns, from, joints)) = self.recent.pop_front() else {
+            return Ok(());
+        };
         let seconds = (state.stamp_ns - begun_ns) as f64 * 1e-9;
         let speed = (place - from).norm() / seconds;
         // what is no number is over every limit
         if speed.is_nan() || speed > limits.speed * OVER.0 + OVER.1 {
-            return Err(LimitError::Speed { mm_per_s: speed * 1e3, limit_mm_per_s: limits.speed * 1e3 });
+            return Err(LimitError::Speed {
+                mm_per_s: speed * 1e3,
+                limit_mm_per_s: limits.speed * 1e3,
+            });
         }
         for (joint, (now, before)) in (1..).zip(state.joints.iter().zip(joints.iter())) {
             let turning = (now - before).abs() / seconds;
             if turning.is_nan() || turning > limits.joint_speed {
-                let (deg_per_s, limit_deg_per_s) = (turning.to_degrees(), limits.joint_speed.to_degrees());
-                return Err(LimitError::JointSpeed { joint, deg_per_s, limit_deg_per_s });
+                let (deg_per_s, limit_deg_per_s) =
+                    (turning.to_degrees(), limits.joint_speed.to_degrees());
+                return Err(LimitError::JointSpeed {
+                    joint,
+                    deg_per_s,
+                    limit_deg_per_s,
+                });
             }
         }
         Ok(())
@@ -63,11 +73,20 @@ mod tests {
 
     /// The first verdict on states 2 ms apart of a tip and a third joint with these speeds, m/s and rad/s, and how many came.
     fn moving(speed: f64, turning: f64) -> (usize, Option<LimitError>) {
-        let (mut motion, limits) =
-            (MeasuredMotion::default(), Limits { speed: 0.1, joint_speed: 1.5, ..Limits::default() });
+        let (mut motion, limits) = (
+            MeasuredMotion::default(),
+            Limits {
+                speed: 0.1,
+                joint_speed: 1.5,
+                ..Limits::default()
+            },
+        );
         for number in 0..50 {
             let seconds = number as f64 * 2e-3;
-            let nothing = Wrench { force: Vector3::zeros(), torque: Vector3::zeros() };
+            let nothing = Wrench {
+                force: Vector3::zeros(),
+                torque: Vector3::zeros(),
+            };
             let state = ArmState {
                 stamp_ns: number * 2_000_000,
                 pose_bt: Isometry3::translation(0.3, -speed * seconds, 0.1),
@@ -89,10 +108,16 @@ mod tests {
         assert_eq!(moving(0.12, 0.0), (50, None));
         let (states, error) = moving(0.2, 0.0);
         assert_eq!(states, 11);
-        assert_eq!(error.unwrap().to_string(), "the tip moves with 200 mm/s, over the limit of 100 mm/s");
+        assert_eq!(
+            error.unwrap().to_string(),
+            "the tip moves with 200 mm/s, over the limit of 100 mm/s"
+        );
         let (states, error) = moving(0.0, -2.0);
         assert_eq!(states, 11);
-        assert_eq!(error.unwrap().to_string(), "joint 3 turns with 115°/s, over the limit of 86°/s");
+        assert_eq!(
+            error.unwrap().to_string(),
+            "joint 3 turns with 115°/s, over the limit of 86°/s"
+        );
         assert!(moving(f64::NAN, 0.0).1.is_some() && moving(0.0, f64::NAN).1.is_some());
     }
 }

@@ -103,7 +103,13 @@ impl Obedience {
     ///
     /// - `now`: since some moment, as all times here.
     pub fn new(now: Duration) -> Self {
-        let rest = Ordered { at: now, linear: Vector3::zeros(), turn: 0.0, press: None, rests: true };
+        let rest = Ordered {
+            at: now,
+            linear: Vector3::zeros(),
+            turn: 0.0,
+            press: None,
+            rests: true,
+        };
         Self {
             ordered: VecDeque::from([rest]),
             target: Vector3::zeros(),
@@ -118,16 +124,33 @@ impl Obedience {
     pub fn order(&mut self, what: &OrderedMotion, now: Duration) {
         self.follow(now);
         let (target, turn, acceleration, press) = match *what {
-            OrderedMotion::Move { twist: [x, y, z, a, b, c], acceleration } => {
-                (Vector3::new(x, y, z), Vector3::new(a, b, c).norm(), acceleration, None)
-            }
-            OrderedMotion::Press { axis, speed, feed, acceleration } => (feed, 0.0, acceleration, Some((axis, speed))),
+            OrderedMotion::Move {
+                twist: [x, y, z, a, b, c],
+                acceleration,
+            } => (
+                Vector3::new(x, y, z),
+                Vector3::new(a, b, c).norm(),
+                acceleration,
+                None,
+            ),
+            OrderedMotion::Press {
+                axis,
+                speed,
+                feed,
+                acceleration,
+            } => (feed, 0.0, acceleration, Some((axis, speed))),
             OrderedMotion::Stop { deceleration } => (Vector3::zeros(), 0.0, deceleration, None),
         };
         (self.target, self.acceleration, self.ordered_at) = (target, acceleration, now);
         let linear = self.newest().linear;
         let rests = target == Vector3::zeros() && turn == 0.0 && press.is_none();
-        self.push(Ordered { at: now, linear, turn, press, rests });
+        self.push(Ordered {
+            at: now,
+            linear,
+            turn,
+            press,
+            rests,
+        });
     }
 
     fn newest(&self) -> Ordered {
@@ -138,12 +161,20 @@ impl Obedience {
     /// The ordered velocity goes on until now, or until its order is too old.
     fn follow(&mut self, now: Duration) {
         let stale = self.ordered_at + FRESH;
-        let goes = self.target != Vector3::zeros() || self.newest().turn > 0.0 || self.newest().press.is_some();
+        let goes = self.target != Vector3::zeros()
+            || self.newest().turn > 0.0
+            || self.newest().press.is_some();
         if goes && now > stale {
             self.go_on(stale);
             (self.target, self.acceleration) = (Vector3::zeros(), REST);
             let linear = self.newest().linear;
-            self.push(Ordered { at: stale, linear, turn: 0.0, press: None, rests: true });
+            self.push(Ordered {
+                at: stale,
+                linear,
+                turn: 0.0,
+                press: None,
+                rests: true,
+            });
         }
         self.go_on(now);
     }
@@ -152,13 +183,21 @@ impl Obedience {
         let last = self.newest();
         let room = self.acceleration * now.saturating_sub(last.at).as_secs_f64();
         let linear = last.linear + (self.target - last.linear).cap_magnitude(room);
-        self.push(Ordered { at: now, linear, ..last });
+        self.push(Ordered {
+            at: now,
+            linear,
+            ..last
+        });
     }
 
     fn push(&mut self, ordered: Ordered) {
         self.ordered.push_back(ordered);
         // one that is older is kept: it was in force when the time began
-        while self.ordered.get(1).is_some_and(|next| ordered.at.saturating_sub(next.at) > TURN_WINDOW) {
+        while self
+            .ordered
+            .get(1)
+            .is_some_and(|next| ordered.at.saturating_sub(next.at) > TURN_WINDOW)
+        {
             self.ordered.pop_front();
         }
     }
@@ -166,20 +205,33 @@ impl Obedience {
     /// A state of the arm; returns the fault of one that does not do what it is ordered to.
     ///
     /// - `pose`: of the tip in B; `velocity`: m/s and rad/s in B.
-    pub fn see(&mut self, pose: &Isometry3<f64>, velocity: &[f64; 6], now: Duration) -> Option<ArmError> {
+    pub fn see(
+        &mut self,
+        pose: &Isometry3<f64>,
+        velocity: &[f64; 6],
+        now: Duration,
+    ) -> Option<ArmError> {
         self.follow(now);
         let [x, y, z, a, b, c] = *velocity;
         let (linear, turn) = (Vector3::new(x, y, z), Vector3::new(a, b, c).norm());
         let recent = |window| {
-            let begin = self.ordered.iter().rposition(|one| now.saturating_sub(one.at) > window);
+            let begin = self
+                .ordered
+                .iter()
+                .rposition(|one| now.saturating_sub(one.at) > window);
             self.ordered.iter().skip(begin.unwrap_or(0))
         };
-        let is_ordered = recent(WINDOW).any(|one| one.beyond(&linear) <= NOISE + SHARE * one.linear.norm());
+        let is_ordered =
+            recent(WINDOW).any(|one| one.beyond(&linear) <= NOISE + SHARE * one.linear.norm());
         let most_turn = recent(TURN_WINDOW).map(|one| one.turn).fold(0.0, f64::max);
-        let rests = most_turn == 0.0 && recent(WINDOW).all(|one| one.rests && one.linear == Vector3::zeros());
+        let rests = most_turn == 0.0
+            && recent(WINDOW).all(|one| one.rests && one.linear == Vector3::zeros());
         let ordered_mm_per_s = self.newest().linear.norm() * 1e3;
-        let fault =
-            || ArmError::Disobeys { mm_per_s: linear.norm() * 1e3, ordered_mm_per_s, deg_per_s: turn.to_degrees() };
+        let fault = || ArmError::Disobeys {
+            mm_per_s: linear.norm() * 1e3,
+            ordered_mm_per_s,
+            deg_per_s: turn.to_degrees(),
+        };
         if self.creeps(rests, pose) {
             return Some(fault());
         }
@@ -233,13 +285,20 @@ mod tests {
     }
 
     fn go(speed: f64) -> OrderedMotion {
-        OrderedMotion::Move { twist: along(speed), acceleration: 0.5 }
+        OrderedMotion::Move {
+            twist: along(speed),
+            acceleration: 0.5,
+        }
     }
 
     const STOP: OrderedMotion = OrderedMotion::Stop { deceleration: 0.5 };
 
     /// An order and a state each 2 ms; when the first fault is seen, ms. The place does not follow the velocity.
-    fn first_fault(ms: u32, order: impl Fn(u32) -> OrderedMotion, velocity: impl Fn(u32) -> [f64; 6]) -> Option<u32> {
+    fn first_fault(
+        ms: u32,
+        order: impl Fn(u32) -> OrderedMotion,
+        velocity: impl Fn(u32) -> [f64; 6],
+    ) -> Option<u32> {
         first_fault_of(ms, |at| Some(order(at)), |at| ([0.0; 6], velocity(at)))
     }
 
@@ -274,10 +333,21 @@ mod tests {
     fn an_arm_that_is_late_by_up_to_80_ms_obeys() {
         let order = |at| if at < 200 { go(0.05) } else { STOP };
         for by in [0, 10, 40, 80] {
-            assert_eq!(first_fault(800, order, |at| along(late(at, by))), None, "late by {by} ms");
+            assert_eq!(
+                first_fault(800, order, |at| along(late(at, by))),
+                None,
+                "late by {by} ms"
+            );
         }
         // braked sooner and harder than ordered, as when the client brakes by itself
-        assert_eq!(first_fault(800, order, |at| along(if at < 150 { late(at, 10) } else { 0.0 })), None);
+        assert_eq!(
+            first_fault(800, order, |at| along(if at < 150 {
+                late(at, 10)
+            } else {
+                0.0
+            })),
+            None
+        );
     }
 
     /// From 50 to 35 mm/s, which is as much as it may be off, are 30 ms; then the 80 ms that it may be late, and the 20 ms.
@@ -290,28 +360,59 @@ mod tests {
 
     #[test]
     fn an_arm_that_moves_without_an_order_is_seen_after_20_ms() {
-        assert_eq!(first_fault(400, |_| STOP, |at| along(if at < 200 { 0.0 } else { 8e-3 })), Some(222));
-        assert_eq!(first_fault(400, |_| STOP, |_| along(4e-3)), None, "the noise of its velocity");
+        assert_eq!(
+            first_fault(400, |_| STOP, |at| along(if at < 200 { 0.0 } else { 8e-3 })),
+            Some(222)
+        );
+        assert_eq!(
+            first_fault(400, |_| STOP, |_| along(4e-3)),
+            None,
+            "the noise of its velocity"
+        );
     }
 
     /// 2 mm/s from the beginning, which is within the noise of the velocity; the place of the first state counts, and more than 0.1 mm
     /// off it is the 26th after that.
     #[test]
     fn an_arm_that_creeps_where_rest_is_ordered_is_seen_after_a_tenth_of_a_millimetre() {
-        let creeping = |speed: f64| move |at: u32| (along(speed * f64::from(at) * 1e-3), along(speed));
-        assert_eq!(first_fault_of(400, |_| Some(STOP), creeping(2e-3)), Some(52));
+        let creeping =
+            |speed: f64| move |at: u32| (along(speed * f64::from(at) * 1e-3), along(speed));
+        assert_eq!(
+            first_fault_of(400, |_| Some(STOP), creeping(2e-3)),
+            Some(52)
+        );
         // 0.1 mm/s: 1000 ms, and the state after
-        assert_eq!(first_fault_of(2000, |_| Some(STOP), creeping(0.1e-3)), Some(1002));
+        assert_eq!(
+            first_fault_of(2000, |_| Some(STOP), creeping(0.1e-3)),
+            Some(1002)
+        );
         // rest is ordered from 0 ms on, counts 80 ms later, and 0.1 mm take 50 ms
         let order = |at| Some(if at < 200 { go(2e-3) } else { STOP });
         let seen = first_fault_of(600, order, creeping(2e-3)).unwrap();
         assert!((320..=345).contains(&seen), "{seen} ms");
         // the noise of a place, 10 um, and one that follows its order
-        let noisy = |at: u32| (along(if at.is_multiple_of(4) { 30e-6 } else { -30e-6 }), along(0.0));
+        let noisy = |at: u32| {
+            (
+                along(if at.is_multiple_of(4) { 30e-6 } else { -30e-6 }),
+                along(0.0),
+            )
+        };
         assert_eq!(first_fault_of(2000, |_| Some(STOP), noisy), None);
-        assert_eq!(first_fault_of(2000, |_| Some(go(2e-3)), creeping(2e-3)), None);
-        let turning = |at: u32| ([0.0, 0.0, 0.0, 0.0, 0.0, 0.02 * f64::from(at) * 1e-3], [0.0; 6]);
-        assert_eq!(first_fault_of(400, |_| Some(STOP), turning), Some(102), "2 mrad at 20 mrad/s");
+        assert_eq!(
+            first_fault_of(2000, |_| Some(go(2e-3)), creeping(2e-3)),
+            None
+        );
+        let turning = |at: u32| {
+            (
+                [0.0, 0.0, 0.0, 0.0, 0.0, 0.02 * f64::from(at) * 1e-3],
+                [0.0; 6],
+            )
+        };
+        assert_eq!(
+            first_fault_of(400, |_| Some(STOP), turning),
+            Some(102),
+            "2 mrad at 20 mrad/s"
+        );
     }
 
     /// 25 ms after the last order its client brakes with 2 m/s², so 15 mm/s off is 7 ms later; then the 80 ms and the 20 ms.
@@ -322,7 +423,8 @@ mod tests {
         let seen = first_fault_of(800, order, goes_on).unwrap();
         assert!((300..=340).contains(&seen), "{seen} ms");
         // one whose client brakes 6 ms late
-        let speed = |at: u32| (0.05_f64).min((0.05 - 2.0 * (f64::from(at) * 1e-3 - 0.231)).max(0.0));
+        let speed =
+            |at: u32| (0.05_f64).min((0.05 - 2.0 * (f64::from(at) * 1e-3 - 0.231)).max(0.0));
         let braked = |at: u32| ([0.0; 6], along(speed(at).min(late(at.min(200), 0))));
         assert_eq!(first_fault_of(800, order, braked), None);
     }
@@ -337,12 +439,22 @@ mod tests {
             if at < 200 {
                 go(0.05)
             } else {
-                OrderedMotion::Move { twist: [0.0, 0.05, 0.0, 0.0, 0.0, 0.0], acceleration: 0.5 }
+                OrderedMotion::Move {
+                    twist: [0.0, 0.05, 0.0, 0.0, 0.0, 0.0],
+                    acceleration: 0.5,
+                }
             }
         };
         let bent = |at: u32| {
             let share = (f64::from(at.saturating_sub(220)) * 1e-3 / 0.1414).min(1.0);
-            [late(at.min(200), 20) * (1.0 - share), 0.05 * share, 0.0, 0.0, 0.0, 0.0]
+            [
+                late(at.min(200), 20) * (1.0 - share),
+                0.05 * share,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+            ]
         };
         assert_eq!(first_fault(600, bend, bent), None);
     }
@@ -353,15 +465,25 @@ mod tests {
         assert_eq!(first_fault(400, |_| STOP, turning), Some(122));
         let order = |at| {
             let turn = if at < 100 { 0.5 } else { 0.0 };
-            OrderedMotion::Move { twist: [0.0, 0.0, 0.0, 0.0, 0.0, turn], acceleration: 0.5 }
+            OrderedMotion::Move {
+                twist: [0.0, 0.0, 0.0, 0.0, 0.0, turn],
+                acceleration: 0.5,
+            }
         };
         let braked = |at: u32| [0.0, 0.0, 0.0, 0.0, 0.0, if at < 250 { 0.5 } else { 0.0 }];
         assert_eq!(first_fault(800, order, braked), None);
-        assert!(first_fault(800, order, |_| [0.0, 0.0, 0.0, 0.0, 0.0, 0.5]).is_some_and(|at| at < 450));
+        assert!(
+            first_fault(800, order, |_| [0.0, 0.0, 0.0, 0.0, 0.0, 0.5]).is_some_and(|at| at < 450)
+        );
     }
 
     fn press(feed: [f64; 3]) -> OrderedMotion {
-        OrderedMotion::Press { axis: -Vector3::x(), speed: 10e-3, feed: feed.into(), acceleration: 0.5 }
+        OrderedMotion::Press {
+            axis: -Vector3::x(),
+            speed: 10e-3,
+            feed: feed.into(),
+            acceleration: 0.5,
+        }
     }
 
     #[test]

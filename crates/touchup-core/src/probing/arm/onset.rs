@@ -119,7 +119,13 @@ pub enum OnsetError {
 /// Moments on each side of the corner at the least.
 const LEAST: usize = 5;
 /// Steps of a fit; five are usual.
-const SEARCH: DampedSearch = DampedSearch { first: 1e-6, factors: [0.1, 10.0], least: 1e-12, most: 1e9, tries: 60 };
+const SEARCH: DampedSearch = DampedSearch {
+    first: 1e-6,
+    factors: [0.1, 10.0],
+    least: 1e-12,
+    most: 1e9,
+    tries: 60,
+};
 /// The corner has converged when a step moves it by less than this, m.
 const REST: f64 = 1e-9;
 /// Times that the noise is taken from the residuals.
@@ -150,21 +156,40 @@ const CLEARLY: f64 = 4.0;
 pub fn find_onset(moments: &[TouchMoment], params: &OnsetParams) -> Result<Onset, OnsetError> {
     let is_bad = |index: usize| {
         let m = &moments[index];
-        let is_number = [m.t, m.travel, m.force, m.lateral].iter().all(|x| x.is_finite());
+        let is_number = [m.t, m.travel, m.force, m.lateral]
+            .iter()
+            .all(|x| x.is_finite());
         !is_number || index > 0 && m.t <= moments[index - 1].t
     };
     if let Some(index) = (0..moments.len()).find(|&index| is_bad(index)) {
         return Err(OnsetError::BadMoment { index });
     }
     let noise = params.force_noise;
-    let mut curve = ForceCurve { moments, path: smoothed(moments), params, noise: [noise, noise] };
+    let mut curve = ForceCurve {
+        moments,
+        path: smoothed(moments),
+        params,
+        noise: [noise, noise],
+    };
     let (free, peak) = curve.free_air()?;
     let start = curve.crossing(free, peak);
-    let deepest = moments.iter().map(|m| m.travel).fold(f64::NEG_INFINITY, f64::max);
+    let deepest = moments
+        .iter()
+        .map(|m| m.travel)
+        .fold(f64::NEG_INFINITY, f64::max);
     let stiffness = (peak - free) / (deepest - start).max(REST);
-    let starts = STARTS.map(|by| LineFit::new(start, params.delay + by * params.delay_sigma, free, stiffness));
+    let starts = STARTS.map(|by| {
+        LineFit::new(
+            start,
+            params.delay + by * params.delay_sigma,
+            free,
+            stiffness,
+        )
+    });
     let fits = starts.iter().filter_map(|line| curve.fit(*line));
-    let (mut line, _) = fits.min_by(|a, b| a.1.total_cmp(&b.1)).ok_or(OnsetError::NoFit)?;
+    let (mut line, _) = fits
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .ok_or(OnsetError::NoFit)?;
     // noise of the travel is in the force while the arm presses, and nowhere else
     for _ in 0..WEIGHINGS {
         curve.noise = curve.seen_noise(&line);
@@ -196,8 +221,9 @@ type LineFit = Vector4<f64>;
 /// Travel at each moment by a parabola through those around it \[Savitzky Golay 1964\], speed by a line through more of them. A
 /// speed that is noisy would look like one that changes, and so simulate a delay.
 fn smoothed(moments: &[TouchMoment]) -> Vec<Smooth> {
-    let around =
-        |index: usize, beside: usize| &moments[index.saturating_sub(beside)..(index + beside + 1).min(moments.len())];
+    let around = |index: usize, beside: usize| {
+        &moments[index.saturating_sub(beside)..(index + beside + 1).min(moments.len())]
+    };
     let travel = |index: usize| {
         let (here, near) = (moments[index], around(index, BESIDE));
         // in units that keep the matrix regular
@@ -206,20 +232,31 @@ fn smoothed(moments: &[TouchMoment]) -> Vec<Smooth> {
             let x = (m.t - here.t) / scale;
             (Vector3::new(1.0, x, x * x), m.travel - here.travel)
         };
-        here.travel + NormalEquations::of(near.iter().map(row)).solution().map_or(0.0, |parabola| parabola[0])
+        here.travel
+            + NormalEquations::of(near.iter().map(row))
+                .solution()
+                .map_or(0.0, |parabola| parabola[0])
     };
     let speed = |index: usize| {
         let near = around(index, BESIDE_SPEED);
         let count = near.len() as f64;
-        let [t, travel] =
-            [|m: &TouchMoment| m.t, |m: &TouchMoment| m.travel].map(|of| near.iter().map(of).sum::<f64>() / count);
+        let [t, travel] = [|m: &TouchMoment| m.t, |m: &TouchMoment| m.travel]
+            .map(|of| near.iter().map(of).sum::<f64>() / count);
         let square: f64 = near.iter().map(|m| (m.t - t).powi(2)).sum();
         let product: f64 = near.iter().map(|m| (m.t - t) * (m.travel - travel)).sum();
-        if square > 0.0 { (product / square, 1.0 / square) } else { (0.0, 0.0) }
+        if square > 0.0 {
+            (product / square, 1.0 / square)
+        } else {
+            (0.0, 0.0)
+        }
     };
     let at = |index: usize| {
         let (speed, speed_variance) = speed(index);
-        Smooth { travel: travel(index), speed, speed_variance }
+        Smooth {
+            travel: travel(index),
+            speed,
+            speed_variance,
+        }
     };
     (0..moments.len()).map(at).collect()
 }
@@ -236,8 +273,19 @@ struct Smooth {
 /// How many neighbours on average share one error: 1 + 2 Σ ρ, as long as ρ is above zero \[Geyer 1992\].
 fn shared(residuals: &[f64]) -> f64 {
     let square: f64 = residuals.iter().map(|r| r * r).sum();
-    let with = |lag: usize| residuals.iter().zip(residuals.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>() / square;
-    1.0 + 2.0 * (1..=FARTHEST).map(with).take_while(|rho| *rho > 0.0).sum::<f64>()
+    let with = |lag: usize| {
+        residuals
+            .iter()
+            .zip(residuals.iter().skip(lag))
+            .map(|(a, b)| a * b)
+            .sum::<f64>()
+            / square
+    };
+    1.0 + 2.0
+        * (1..=FARTHEST)
+            .map(with)
+            .take_while(|rho| *rho > 0.0)
+            .sum::<f64>()
 }
 
 struct ForceCurve<'a> {
@@ -252,19 +300,38 @@ struct ForceCurve<'a> {
 impl ForceCurve<'_> {
     /// Force in free air and the largest, N.
     fn free_air(&self) -> Result<(f64, f64), OnsetError> {
-        let peak = self.moments.iter().map(|m| m.force).fold(f64::NEG_INFINITY, f64::max);
+        let peak = self
+            .moments
+            .iter()
+            .map(|m| m.force)
+            .fold(f64::NEG_INFINITY, f64::max);
         // the lower quarter of all forces before the peak is free air, or there is none
-        let before: Vec<_> = self.moments.iter().map(|m| m.force).take_while(|&force| force < peak).collect();
+        let before: Vec<_> = self
+            .moments
+            .iter()
+            .map(|m| m.force)
+            .take_while(|&force| force < peak)
+            .collect();
         let least = self.contact_force();
         if !peak.is_finite() {
             return Err(OnsetError::NoFreeAir { count: 0 });
         }
-        let mut first: Vec<_> = before.iter().copied().take((before.len() / 4).max(LEAST)).collect();
+        let mut first: Vec<_> = before
+            .iter()
+            .copied()
+            .take((before.len() / 4).max(LEAST))
+            .collect();
         let free = median(&mut first).unwrap_or(peak);
         if peak - free < least {
-            return Err(OnsetError::NoContact { peak_n: peak - free, contact_n: least });
+            return Err(OnsetError::NoContact {
+                peak_n: peak - free,
+                contact_n: least,
+            });
         }
-        let count = before.iter().take_while(|&&force| force - free < least).count();
+        let count = before
+            .iter()
+            .take_while(|&&force| force - free < least)
+            .count();
         if count < LEAST {
             return Err(OnsetError::NoFreeAir { count });
         }
@@ -273,7 +340,11 @@ impl ForceCurve<'_> {
 
     /// Travel at which the last rise towards the peak began, m.
     fn crossing(&self, free: f64, peak: f64) -> f64 {
-        let top = self.moments.iter().position(|m| m.force >= peak).unwrap_or(0);
+        let top = self
+            .moments
+            .iter()
+            .position(|m| m.force >= peak)
+            .unwrap_or(0);
         let below = |m: &TouchMoment| m.force - free < self.contact_force();
         let last = self.moments[..top].iter().rposition(below).unwrap_or(0);
         self.moments[last].travel
@@ -287,7 +358,10 @@ impl ForceCurve<'_> {
         match self.path.get(after).filter(|_| after > 0) {
             Some(b) => {
                 let share = since / (self.moments[after].t - self.moments[before].t);
-                (a.travel + (b.travel - a.travel) * share, a.speed + (b.speed - a.speed) * share)
+                (
+                    a.travel + (b.travel - a.travel) * share,
+                    a.speed + (b.speed - a.speed) * share,
+                )
             }
             None => (a.travel + a.speed * since, a.speed),
         }
@@ -299,7 +373,11 @@ impl ForceCurve<'_> {
         let depth = (travel - line[S0]).max(0.0);
         let is_in = usize::from(depth > 0.0);
         let slope = -line[K] * is_in as f64;
-        (m.force - line[B] - line[K] * depth, LineFit::new(slope, slope * speed, 1.0, depth), is_in)
+        (
+            m.force - line[B] - line[K] * depth,
+            LineFit::new(slope, slope * speed, 1.0, depth),
+            is_in,
+        )
     }
 
     /// Sum of squared residuals over their variances, with what is believed of τ.
@@ -329,16 +407,27 @@ impl ForceCurve<'_> {
         let believed = self.params.delay_sigma.powi(-2);
         let equations = |line: &LineFit| {
             let mut equations = self.normal_equations(line, self.noise);
-            equations.add(&LineFit::ith(TAU, 1.0), self.params.delay - line[TAU], believed);
+            equations.add(
+                &LineFit::ith(TAU, 1.0),
+                self.params.delay - line[TAU],
+                believed,
+            );
             equations
         };
         let better = |line: &LineFit, step: &LineFit, before: f64| {
             let next = line + step;
             Some((next, self.cost(&next))).filter(|(next, cost)| *cost <= before && next[K] > 0.0)
         };
-        let is_last = |step: &LineFit, _: &NormalEquations<4>| step[S0].abs() < REST && step[TAU].abs() < REST;
-        let (line, cost, end) =
-            SEARCH.run((line, self.cost(&line)), equations, NormalEquations::damped, better, is_last);
+        let is_last = |step: &LineFit, _: &NormalEquations<4>| {
+            step[S0].abs() < REST && step[TAU].abs() < REST
+        };
+        let (line, cost, end) = SEARCH.run(
+            (line, self.cost(&line)),
+            equations,
+            NormalEquations::damped,
+            better,
+            is_last,
+        );
         (end != SearchEnd::Singular && line.iter().all(|x| x.is_finite())).then_some((line, cost))
     }
 
@@ -355,9 +444,13 @@ impl ForceCurve<'_> {
     /// What the residuals show, N; never less than the noise of the force.
     fn seen_noise(&self, line: &LineFit) -> [f64; 2] {
         // two unknowns each
-        let rms =
-            |of: &Vec<f64>| (of.iter().map(|r| r * r).sum::<f64>() / of.len().saturating_sub(2).max(1) as f64).sqrt();
-        self.residuals(line).each_ref().map(|of| rms(of).max(self.params.force_noise))
+        let rms = |of: &Vec<f64>| {
+            (of.iter().map(|r| r * r).sum::<f64>() / of.len().saturating_sub(2).max(1) as f64)
+                .sqrt()
+        };
+        self.residuals(line)
+            .each_ref()
+            .map(|of| rms(of).max(self.params.force_noise))
     }
 
     /// Of the unknowns. Neighbours that share their noise count as fewer.
@@ -366,15 +459,25 @@ impl ForceCurve<'_> {
         let [alone, all] = self.noise.map(|noise| noise * noise);
         // what the noise of the travel adds while it presses is shared over the smoothing
         let by_travel = ((all - alone) / all).max(0.0);
-        let shared = [shared(&free), shared(&pressing).max(1.0 + by_travel * (SMOOTHED - 1.0))];
+        let shared = [
+            shared(&free),
+            shared(&pressing).max(1.0 + by_travel * (SMOOTHED - 1.0)),
+        ];
         let noise = [0, 1].map(|at| self.noise[at] * f64::sqrt(shared[at]));
         let mut square = self.normal_equations(line, noise).information;
         // of the information on τ, some is noise of the speed
         let travel_variance = self.travel_variance();
-        let pressing = self.moments.iter().zip(&self.path).filter(|(m, _)| self.residual(m, line).2 == 1);
-        let noisy: f64 = pressing.map(|(_, smooth)| smooth.speed_variance * travel_variance).sum();
+        let pressing = self
+            .moments
+            .iter()
+            .zip(&self.path)
+            .filter(|(m, _)| self.residual(m, line).2 == 1);
+        let noisy: f64 = pressing
+            .map(|(_, smooth)| smooth.speed_variance * travel_variance)
+            .sum();
         let information = square[(TAU, TAU)];
-        square[(TAU, TAU)] += self.params.delay_sigma.powi(-2) - noisy * (line[K] / noise[1]).powi(2);
+        square[(TAU, TAU)] +=
+            self.params.delay_sigma.powi(-2) - noisy * (line[K] / noise[1]).powi(2);
         let corrected = Cholesky::new(square).map(|square| square.inverse());
         corrected.or_else(|| {
             square[(TAU, TAU)] = information + self.params.delay_sigma.powi(-2);
@@ -384,7 +487,11 @@ impl ForceCurve<'_> {
 
     /// Of the reported travel about its smoothed one, m².
     fn travel_variance(&self) -> f64 {
-        let squares = self.moments.iter().zip(&self.path).map(|(m, smooth)| (m.travel - smooth.travel).powi(2));
+        let squares = self
+            .moments
+            .iter()
+            .zip(&self.path)
+            .map(|(m, smooth)| (m.travel - smooth.travel).powi(2));
         let freedom = self.moments.len() as f64 * (1.0 - 1.0 / SMOOTHED);
         squares.sum::<f64>() / freedom.max(1.0)
     }
@@ -392,18 +499,29 @@ impl ForceCurve<'_> {
     /// A curve that begins in contact has no corner.
     fn check_free_air(&self, line: &LineFit) -> Result<(), OnsetError> {
         let is_free = |m: &&TouchMoment| self.travel(m.t - line[TAU]).0 <= line[S0];
-        let count = self.moments[..self.deepest()].iter().filter(is_free).count();
-        if count < LEAST { Err(OnsetError::NoFreeAir { count }) } else { Ok(()) }
+        let count = self.moments[..self.deepest()]
+            .iter()
+            .filter(is_free)
+            .count();
+        if count < LEAST {
+            Err(OnsetError::NoFreeAir { count })
+        } else {
+            Ok(())
+        }
     }
 
     /// The moment from which on it goes back.
     fn deepest(&self) -> usize {
-        (0..self.path.len()).max_by(|&a, &b| self.path[a].travel.total_cmp(&self.path[b].travel)).unwrap_or(0)
+        (0..self.path.len())
+            .max_by(|&a, &b| self.path[a].travel.total_cmp(&self.path[b].travel))
+            .unwrap_or(0)
     }
 
     /// The force that counts as contact, N: noise alone does not reach it.
     fn contact_force(&self) -> f64 {
-        self.params.contact_force.max(NOISE * self.params.force_noise)
+        self.params
+            .contact_force
+            .max(NOISE * self.params.force_noise)
     }
 
     fn verdict(&self, line: &LineFit) -> OnsetVerdict {
@@ -414,7 +532,8 @@ impl ForceCurve<'_> {
         // the tip was clearly above the surface: what pushed it was something else
         let is_above = |&(first, _): &(usize, usize)| {
             let Smooth { travel, speed, .. } = self.path[first];
-            let later = self.moments[(first + 3).min(self.moments.len() - 1)].t - self.moments[first].t;
+            let later =
+                self.moments[(first + 3).min(self.moments.len() - 1)].t - self.moments[first].t;
             travel < line[S0] - self.contact_force() / line[K] - speed.abs() * later
         };
         if contacts.iter().any(is_above) || contacts.iter().all(is_short) {
@@ -426,7 +545,11 @@ impl ForceCurve<'_> {
         if self.lateral_share(line) > self.params.lateral_share {
             return OnsetVerdict::Edge;
         }
-        if self.is_hysteretic(line) { OnsetVerdict::Slip } else { OnsetVerdict::Clean }
+        if self.is_hysteretic(line) {
+            OnsetVerdict::Slip
+        } else {
+            OnsetVerdict::Clean
+        }
     }
 
     /// First and last moments of each contact that began going in; between two the force is less than half of what counts as
@@ -435,7 +558,8 @@ impl ForceCurve<'_> {
         let mut contacts: Vec<(usize, usize)> = Vec::new();
         let (mut is_in, deepest) = (false, self.deepest());
         for index in 0..self.moments.len() {
-            let around = &self.moments[index.saturating_sub(2)..(index + 3).min(self.moments.len())];
+            let around =
+                &self.moments[index.saturating_sub(2)..(index + 3).min(self.moments.len())];
             let force = around.iter().map(|m| m.force).sum::<f64>() / around.len() as f64 - bias;
             if !is_in && force >= self.contact_force() && index <= deepest {
                 contacts.push((index, index));
@@ -452,8 +576,13 @@ impl ForceCurve<'_> {
 
     /// Median share of the force across the approach while in contact.
     fn lateral_share(&self, line: &LineFit) -> f64 {
-        let pressing = self.moments.iter().filter(|m| m.force - line[B] >= self.contact_force());
-        let mut shares: Vec<f64> = pressing.map(|m| m.lateral.abs() / (m.force - line[B])).collect();
+        let pressing = self
+            .moments
+            .iter()
+            .filter(|m| m.force - line[B] >= self.contact_force());
+        let mut shares: Vec<f64> = pressing
+            .map(|m| m.lateral.abs() / (m.force - line[B]))
+            .collect();
         median(&mut shares).unwrap_or(0.0)
     }
 
@@ -462,17 +591,29 @@ impl ForceCurve<'_> {
         if (line[TAU] - self.params.delay).abs() > CLEARLY * self.params.delay_sigma {
             return true;
         }
-        let peak = self.moments.iter().map(|m| m.force - line[B]).fold(0.0, f64::max);
+        let peak = self
+            .moments
+            .iter()
+            .map(|m| m.force - line[B])
+            .fold(0.0, f64::max);
         let (into, out) = self.moments.split_at(self.deepest());
         let mean = |of: &[TouchMoment]| {
-            let pressing = of.iter().map(|m| self.residual(m, line)).filter(|(.., is_in)| *is_in == 1);
+            let pressing = of
+                .iter()
+                .map(|m| self.residual(m, line))
+                .filter(|(.., is_in)| *is_in == 1);
             let residuals: Vec<f64> = pressing.map(|(residual, ..)| residual).collect();
             let count = residuals.len() as f64;
             (residuals.len() >= LEAST).then(|| (residuals.iter().sum::<f64>() / count, count))
         };
-        let (Some((into, n)), Some((out, m))) = (mean(into), mean(out)) else { return false };
+        let (Some((into, n)), Some((out, m))) = (mean(into), mean(out)) else {
+            return false;
+        };
         // as it should be, not as the residuals have it, of which hysteresis is a part
-        let noise = self.params.force_noise.hypot(line[K] * self.travel_variance().sqrt());
+        let noise = self
+            .params
+            .force_noise
+            .hypot(line[K] * self.travel_variance().sqrt());
         (into - out).abs() > (HYSTERESIS * peak).max(CLEARLY * noise * (1.0 / n + 1.0 / m).sqrt())
     }
 }

@@ -146,35 +146,72 @@ impl SerialChain {
             return Err(ChainError::Count { count });
         }
         if links.len() != count + 1 {
-            return Err(ChainError::Links { count, links: links.len() });
+            return Err(ChainError::Links {
+                count,
+                links: links.len(),
+            });
         }
         for (number, joint) in joints.iter().enumerate() {
-            let fault = |what| Err(ChainError::Joint { name: joint.name.clone(), what });
-            if joint.range.is_some_and(|[low, high]| !(low < high && low.is_finite() && high.is_finite())) {
+            let fault = |what| {
+                Err(ChainError::Joint {
+                    name: joint.name.clone(),
+                    what,
+                })
+            };
+            if joint
+                .range
+                .is_some_and(|[low, high]| !(low < high && low.is_finite() && high.is_finite()))
+            {
                 return fault("its range has no room: give a lower limit below the upper one");
             }
             if !is_finite(&joint.origin) || !joint.axis.iter().all(|part| part.is_finite()) {
                 return fault("its origin or axis is no number");
             }
-            if joints[..number].iter().any(|other| other.name == joint.name) {
+            if joints[..number]
+                .iter()
+                .any(|other| other.name == joint.name)
+            {
                 return fault("another has the same name");
             }
         }
-        let starts = |number: usize| joints.get(number).map_or(&end, |joint| &joint.origin).translation.vector;
+        let starts = |number: usize| {
+            joints
+                .get(number)
+                .map_or(&end, |joint| &joint.origin)
+                .translation
+                .vector
+        };
         let body = |(number, link): (usize, ChainLink)| {
-            let between = Capsule { ends: [Point3::origin(), Point3::from(starts(number))], radius };
+            let between = Capsule {
+                ends: [Point3::origin(), Point3::from(starts(number))],
+                radius,
+            };
             (link.name, link.body.unwrap_or(between))
         };
         let links: Vec<_> = links.into_iter().enumerate().map(body).collect();
-        let thick = links.iter().map(|(_, body)| body.radius).find(|radius| !(*radius > 0.0 && *radius <= 1.0));
+        let thick = links
+            .iter()
+            .map(|(_, body)| body.radius)
+            .find(|radius| !(*radius > 0.0 && *radius <= 1.0));
         if let Some(radius) = thick {
-            return Err(ChainError::Radius { radius_mm: radius * 1e3 });
+            return Err(ChainError::Radius {
+                radius_mm: radius * 1e3,
+            });
         }
         let reach = (2..=count).map(|number| starts(number).norm()).sum();
         if !is_finite(&end) || reach <= 0.0 {
-            return Err(ChainError::Joint { name: joints[count - 1].name.clone(), what: "its flange is nowhere" });
+            return Err(ChainError::Joint {
+                name: joints[count - 1].name.clone(),
+                what: "its flange is nowhere",
+            });
         }
-        let mut chain = Self { joints, links, end, meeting: Vec::new(), reach };
+        let mut chain = Self {
+            joints,
+            links,
+            end,
+            meeting: Vec::new(),
+            reach,
+        };
         chain.meeting = chain.meeting();
         Ok(chain)
     }
@@ -187,8 +224,9 @@ impl SerialChain {
         let mut meeting = Vec::new();
         for joints in (1..=MEETINGS).map(|number| self.configuration(number)) {
             let bodies = self.bodies(&joints, None);
-            let (clear, still): (Vec<_>, Vec<_>) =
-                hidden.into_iter().partition(|(one, other)| bodies[*one].gap(&bodies[*other]) > 0.0);
+            let (clear, still): (Vec<_>, Vec<_>) = hidden
+                .into_iter()
+                .partition(|(one, other)| bodies[*one].gap(&bodies[*other]) > 0.0);
             meeting.extend(clear);
             hidden = still;
         }
@@ -206,15 +244,23 @@ impl SerialChain {
                 share += part * (rest % BASES[joint]) as f64;
                 rest /= BASES[joint];
             }
-            let [low, high] = self.joints[joint].range.unwrap_or([-PI, PI]).map(|end| end.clamp(-TAU, TAU));
+            let [low, high] = self.joints[joint]
+                .range
+                .unwrap_or([-PI, PI])
+                .map(|end| end.clamp(-TAU, TAU));
             low + (high - low) * share
         })
     }
 
     /// Each joint in the middle of its range.
     pub(super) fn middle(&self) -> Joints {
-        let zeros = Joints::of(&[0.0; MOST_JOINTS][..self.joints.len()]).unwrap_or([0.0; MOST_JOINTS].into());
-        zeros.mapped(|joint, _| self.joints[joint].range.map_or(0.0, |[low, high]| f64::midpoint(low, high)))
+        let zeros = Joints::of(&[0.0; MOST_JOINTS][..self.joints.len()])
+            .unwrap_or([0.0; MOST_JOINTS].into());
+        zeros.mapped(|joint, _| {
+            self.joints[joint]
+                .range
+                .map_or(0.0, |[low, high]| f64::midpoint(low, high))
+        })
     }
 
     /// Its joints, from the base on.
@@ -238,7 +284,10 @@ impl SerialChain {
             pose *= joint.origin * UnitQuaternion::from_axis_angle(&joint.axis, *angle);
             *frame = pose;
         }
-        ChainFrames { joints: frames, flange: pose * self.end }
+        ChainFrames {
+            joints: frames,
+            flange: pose * self.end,
+        }
     }
 
     /// Pose of the flange in the base B.
@@ -257,7 +306,9 @@ impl SerialChain {
         for (column, (joint, frame)) in self.joints.iter().zip(&frames.joints).enumerate() {
             let axis = frame.rotation * joint.axis.into_inner();
             let linear = axis.cross(&(end - frame.translation.vector));
-            jacobian.fixed_view_mut::<3, 1>(0, column).copy_from(&linear);
+            jacobian
+                .fixed_view_mut::<3, 1>(0, column)
+                .copy_from(&linear);
             jacobian.fixed_view_mut::<3, 1>(3, column).copy_from(&axis);
         }
         jacobian
@@ -269,7 +320,11 @@ impl SerialChain {
         let mut jacobian = self.jacobian(joints);
         jacobian.rows_mut(0, 3).scale_mut(1.0 / self.reach);
         // of six rows, whatever columns of zeros there are
-        (jacobian * jacobian.transpose()).symmetric_eigenvalues().min().max(0.0).sqrt()
+        (jacobian * jacobian.transpose())
+            .symmetric_eigenvalues()
+            .min()
+            .max(0.0)
+            .sqrt()
     }
 
     /// The capsules of its links in B, from the base on, then the probe.
@@ -278,16 +333,26 @@ impl SerialChain {
     pub(super) fn bodies(&self, joints: &Joints, pose_ft: Option<&Isometry3<f64>>) -> Vec<Capsule> {
         let frames = self.frames(joints);
         let carriers = std::iter::once(Isometry3::identity()).chain(frames.joints);
-        let links = self.links.iter().zip(carriers).map(|((_, body), carrier)| body.moved(&carrier));
+        let links = self
+            .links
+            .iter()
+            .zip(carriers)
+            .map(|((_, body), carrier)| body.moved(&carrier));
         let tip = frames.flange * pose_ft.copied().unwrap_or_else(Isometry3::identity);
-        let probe = Capsule { ends: [frames.flange, tip].map(|pose| pose.translation.vector.into()), radius: 0.0 };
+        let probe = Capsule {
+            ends: [frames.flange, tip].map(|pose| pose.translation.vector.into()),
+            radius: 0.0,
+        };
         links.chain([probe]).collect()
     }
 
     /// The smallest gap between links that may meet, m.
     fn own_gap(&self, joints: &Joints) -> f64 {
         let bodies = self.bodies(joints, None);
-        self.meeting.iter().map(|(one, other)| bodies[*one].gap(&bodies[*other])).fold(f64::INFINITY, f64::min)
+        self.meeting
+            .iter()
+            .map(|(one, other)| bodies[*one].gap(&bodies[*other]))
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// Joint angles within their ranges that bring the flange to a pose in B, near others.
@@ -297,7 +362,11 @@ impl SerialChain {
     ///
     /// # Errors
     /// [`Unreached`]
-    pub(super) fn nearest(&self, pose_bf: &Isometry3<f64>, near: &Joints) -> Result<Joints, Unreached> {
+    pub(super) fn nearest(
+        &self,
+        pose_bf: &Isometry3<f64>,
+        near: &Joints,
+    ) -> Result<Joints, Unreached> {
         let from = self.flange(near);
         let first = self.joints[0].origin.translation.vector;
         if (pose_bf.translation.vector - first).norm() > self.reach_of_all() {
@@ -308,12 +377,17 @@ impl SerialChain {
             Err(unreached) => unreached,
         };
         let part = |part: usize| from.try_lerp_slerp(pose_bf, part as f64 / PARTS as f64, 1e-9);
-        let along = (1..PARTS).try_fold(*near, |joints, number| self.search(&part(number)?, &joints).ok());
+        let along = (1..PARTS).try_fold(*near, |joints, number| {
+            self.search(&part(number)?, &joints).ok()
+        });
         if let Some(found) = along.and_then(|joints| self.search(pose_bf, &joints).ok()) {
             return Ok(found);
         }
-        let solutions = self.solutions(pose_bf).map(|joints| self.unwound(&joints, near));
-        let nearest = solutions.min_by(|a, b| largest_turn(a, near).total_cmp(&largest_turn(b, near)));
+        let solutions = self
+            .solutions(pose_bf)
+            .map(|joints| self.unwound(&joints, near));
+        let nearest =
+            solutions.min_by(|a, b| largest_turn(a, near).total_cmp(&largest_turn(b, near)));
         nearest.ok_or(unreached)
     }
 
@@ -324,11 +398,14 @@ impl SerialChain {
         let room = |joints: &Joints| (self.own_gap(joints) > 0.0, self.dexterity(joints));
         let solutions = from_middle.into_iter().chain(self.solutions(pose_bf));
         let rated = solutions.map(|joints| (room(&joints), joints));
-        rated.max_by(|((a, x), _), ((b, y), _)| a.cmp(b).then(x.total_cmp(y))).map(|(_, joints)| joints)
+        rated
+            .max_by(|((a, x), _), ((b, y), _)| a.cmp(b).then(x.total_cmp(y)))
+            .map(|(_, joints)| joints)
     }
 
     fn solutions<'a>(&'a self, pose_bf: &'a Isometry3<f64>) -> impl Iterator<Item = Joints> + 'a {
-        (1..=CONFIGURATIONS).filter_map(move |number| self.search(pose_bf, &self.configuration(number)).ok())
+        (1..=CONFIGURATIONS)
+            .filter_map(move |number| self.search(pose_bf, &self.configuration(number)).ok())
     }
 
     /// No flange is farther from the first joint, m.
@@ -340,7 +417,9 @@ impl SerialChain {
     fn unwound(&self, joints: &Joints, near: &Joints) -> Joints {
         joints.mapped(|joint, angle| {
             let turned = angle + TAU * ((near[joint] - angle) / TAU).round();
-            let is_in = self.joints[joint].range.is_none_or(|[low, high]| (low..=high).contains(&turned));
+            let is_in = self.joints[joint]
+                .range
+                .is_none_or(|[low, high]| (low..=high).contains(&turned));
             if is_in { turned } else { angle }
         })
     }
@@ -358,7 +437,12 @@ impl SerialChain {
             if error.amax() < REACHED {
                 return Ok(joints);
             }
-            let next = self.step(&joints, &frames, &error, damping * error.norm_squared() + LEAST_DAMPING);
+            let next = self.step(
+                &joints,
+                &frames,
+                &error,
+                damping * error.norm_squared() + LEAST_DAMPING,
+            );
             let Some(next) = next else { break };
             let next_frames = self.frames(&next);
             let next_error = self.error(&next_frames, pose_bf);
@@ -372,10 +456,17 @@ impl SerialChain {
                 }
             }
         }
-        let held = self.joints.iter().zip(joints.iter()).find_map(|(joint, angle)| {
-            let range = joint.range.filter(|ends| ends.contains(angle))?;
-            Some(Unreached::Range { joint: joint.name.clone(), range })
-        });
+        let held = self
+            .joints
+            .iter()
+            .zip(joints.iter())
+            .find_map(|(joint, angle)| {
+                let range = joint.range.filter(|ends| ends.contains(angle))?;
+                Some(Unreached::Range {
+                    joint: joint.name.clone(),
+                    range,
+                })
+            });
         Err(held.unwrap_or(Unreached::Pose))
     }
 
@@ -387,7 +478,13 @@ impl SerialChain {
     }
 
     /// The joints after one step, all within their ranges.
-    fn step(&self, joints: &Joints, frames: &ChainFrames, error: &Vector6<f64>, damping: f64) -> Option<Joints> {
+    fn step(
+        &self,
+        joints: &Joints,
+        frames: &ChainFrames,
+        error: &Vector6<f64>,
+        damping: f64,
+    ) -> Option<Joints> {
         let mut jacobian = self.jacobian_at(frames);
         jacobian.rows_mut(0, 3).scale_mut(1.0 / self.reach);
         let (mut left, mut next, mut is_held) = (*error, *joints, [false; MOST_JOINTS]);
@@ -401,7 +498,10 @@ impl SerialChain {
                     continue;
                 }
                 let turned = joints[column] + turns[column] * share;
-                let held = joint.range.map(|[low, high]| turned.clamp(low, high)).filter(|held| *held != turned);
+                let held = joint
+                    .range
+                    .map(|[low, high]| turned.clamp(low, high))
+                    .filter(|held| *held != turned);
                 next[column] = held.unwrap_or(turned);
                 if let Some(held) = held {
                     (is_held[column], is_over) = (true, true);
@@ -428,7 +528,11 @@ pub(super) fn shortest(
 }
 
 fn is_finite(pose: &Isometry3<f64>) -> bool {
-    pose.translation.vector.iter().chain(pose.rotation.coords.iter()).all(|part| part.is_finite())
+    pose.translation
+        .vector
+        .iter()
+        .chain(pose.rotation.coords.iter())
+        .all(|part| part.is_finite())
 }
 
 #[cfg(test)]
@@ -446,18 +550,32 @@ mod tests {
             axis,
             range: (number > 0).then_some([-1.0, 2.0]),
         };
-        let link = |number: usize| ChainLink { name: format!("l{number}").into(), body: None };
+        let link = |number: usize| ChainLink {
+            name: format!("l{number}").into(),
+            body: None,
+        };
         let joints = (0..6).map(joint).collect();
-        let chain = SerialChain::new(joints, (0..7).map(link).collect(), Isometry3::identity(), 0.01).unwrap();
+        let chain = SerialChain::new(
+            joints,
+            (0..7).map(link).collect(),
+            Isometry3::identity(),
+            0.01,
+        )
+        .unwrap();
         let at = |joint: usize| (1..=64).map(move |number| (number, joint));
         for joint in 0..6 {
             let (low, high) = if joint == 0 { (-PI, PI) } else { (-1.0, 2.0) };
-            let angles: Vec<f64> = at(joint).map(|(number, joint)| chain.configuration(number)[joint]).collect();
+            let angles: Vec<f64> = at(joint)
+                .map(|(number, joint)| chain.configuration(number)[joint])
+                .collect();
             assert!(angles.iter().all(|angle| (low..high).contains(angle)));
             // each third of the range has its share
             for third in 0..3 {
                 let from = low + (high - low) * f64::from(third) / 3.0;
-                let in_it = angles.iter().filter(|angle| (from..from + (high - low) / 3.0).contains(angle)).count();
+                let in_it = angles
+                    .iter()
+                    .filter(|angle| (from..from + (high - low) / 3.0).contains(angle))
+                    .count();
                 assert!((16..=26).contains(&in_it), "{joint} {third}: {in_it}");
             }
         }

@@ -26,7 +26,10 @@ pub struct SlideTarget {
 impl SlideTarget {
     fn lifted(&self, station: usize) -> Isometry3<f64> {
         let Station { centre, normal } = self.stations[station];
-        Isometry3::from_parts((centre + normal.into_inner() * self.lift).into(), self.rotation)
+        Isometry3::from_parts(
+            (centre + normal.into_inner() * self.lift).into(),
+            self.rotation,
+        )
     }
 }
 
@@ -113,7 +116,10 @@ impl Slid<'_> {
     fn ahead(&self) -> (Vector3<f64>, f64) {
         let stations = &self.target.stations;
         let direction = stations[self.station + 1].centre - stations[self.station].centre;
-        (direction.try_normalize(0.0).unwrap_or_else(Vector3::zeros), direction.norm())
+        (
+            direction.try_normalize(0.0).unwrap_or_else(Vector3::zeros),
+            direction.norm(),
+        )
     }
 
     /// Goes on to the station that the ball has passed; whether there are more.
@@ -130,20 +136,32 @@ impl Slid<'_> {
 
     fn press(&self, normal: &Unit<Vector3<f64>>, feed: Vector3<f64>) -> Command {
         let speed = self.speed.min(self.params.search_speed);
-        Command::Press { axis: -normal.into_inner(), force: self.params.force, feed, speed }
+        Command::Press {
+            axis: -normal.into_inner(),
+            force: self.params.force,
+            feed,
+            speed,
+        }
     }
 
     /// On along the path, and back to it where the ball is beside it; no faster than a slide may be, and with no more than the
     /// acceleration that is allowed.
     fn command(&mut self, place: &Vector3<f64>) -> Command {
-        let Station { centre, normal: here } = self.target.stations[self.station];
+        let Station {
+            centre,
+            normal: here,
+        } = self.target.stations[self.station];
         let next = self.target.stations[self.station + 1].normal;
         let (direction, length) = self.ahead();
-        let speed = self.speed.min(TURNING * length / here.angle(&next).max(f64::MIN_POSITIVE));
+        let speed = self
+            .speed
+            .min(TURNING * length / here.angle(&next).max(f64::MIN_POSITIVE));
         // where the ball is when the command takes effect: half of the latency is the transmission
         let gone = (place - centre.coords).dot(&direction) + speed * self.params.latency / 2.0;
         let share = (gone / length.max(f64::MIN_POSITIVE)).clamp(0.0, MOST_AHEAD);
-        let normal = Unit::new_normalize(here.into_inner() + (next.into_inner() - here.into_inner()) * share);
+        let normal = Unit::new_normalize(
+            here.into_inner() + (next.into_inner() - here.into_inner()) * share,
+        );
         let side = normal.cross(&direction);
         let beside = (place - centre.coords).dot(&side);
         let along = direction - normal.into_inner() * direction.dot(&normal);
@@ -159,10 +177,16 @@ impl Slid<'_> {
         let (direction, _) = self.ahead();
         let off = (state.pose_bt.translation.vector - centre.coords).dot(&normal);
         self.forces.push(force);
-        self.none = if force < NONE * self.params.force { self.none + 1 } else { 0 };
+        self.none = if force < NONE * self.params.force {
+            self.none + 1
+        } else {
+            0
+        };
         let is_against = -state.wrench_b.force.dot(&direction) > AGAINST * self.params.force;
         self.against = if is_against { self.against + 1 } else { 0 };
-        if self.none > 2 * self.window || off.abs() > self.target.give + self.params.force / self.params.stiffness {
+        if self.none > 2 * self.window
+            || off.abs() > self.target.give + self.params.force / self.params.stiffness
+        {
             Some(SlideEnding::Lost)
         } else if self.against >= BLOCKED {
             Some(SlideEnding::Blocked)
@@ -186,16 +210,41 @@ impl Watched<'_> {
     ///
     /// # Errors
     /// [`ProbeError`]; a surface that is not there, or ends, is none.
-    pub fn slide(&mut self, target: &SlideTarget, params: &TouchParams) -> Result<SlideRecord, ProbeError> {
+    pub fn slide(
+        &mut self,
+        target: &SlideTarget,
+        params: &TouchParams,
+    ) -> Result<SlideRecord, ProbeError> {
         (self.peak_force, self.reached) = (0.0, None);
-        self.line("going to where a slide begins", &target.lifted(0), params.safe_speed(), params, params.trigger)?;
+        self.line(
+            "going to where a slide begins",
+            &target.lifted(0),
+            params.safe_speed(),
+            params,
+            params.trigger,
+        )?;
         self.reached = Some(0);
         let stamps_ns = [self.next(SLIDING)?.stamp_ns; 2];
         let window = (WINDOW / self.arm.period()).ceil() as usize;
         let speed = params.slide_speed.min(params.bounded_speed(&self.limits));
-        let (feed, ramp) = (Vector3::zeros(), self.limits.acceleration * self.arm.period());
+        let (feed, ramp) = (
+            Vector3::zeros(),
+            self.limits.acceleration * self.arm.period(),
+        );
         let (station, forces, none, against) = (0, Vec::new(), 0, 0);
-        let mut slid = Slid { target, params, speed, feed, ramp, station, stamps_ns, forces, none, against, window };
+        let mut slid = Slid {
+            target,
+            params,
+            speed,
+            feed,
+            ramp,
+            station,
+            stamps_ns,
+            forces,
+            none,
+            against,
+            window,
+        };
         let mut ending = SlideEnding::NoSurface;
         if self.find_surface(target, params)? {
             self.settle(&slid)?;
@@ -204,9 +253,18 @@ impl Watched<'_> {
         // off the surface along its normal
         let leaving = "leaving the surface after a slide";
         self.halt(leaving, &mut |_| {})?;
-        self.leave(leaving, &target.lifted(slid.station), params.safe_speed(), params)?;
+        self.leave(
+            leaving,
+            &target.lifted(slid.station),
+            params.safe_speed(),
+            params,
+        )?;
         let mean = |forces: &[f64]| forces.iter().sum::<f64>() / forces.len().max(1) as f64;
-        let worst = slid.forces.windows(window).map(|forces| (mean(forces) - params.force).abs()).fold(0.0, f64::max);
+        let worst = slid
+            .forces
+            .windows(window)
+            .map(|forces| (mean(forces) - params.force).abs())
+            .fold(0.0, f64::max);
         Ok(SlideRecord {
             ending,
             stamps_ns: slid.stamps_ns,
@@ -218,12 +276,23 @@ impl Watched<'_> {
     }
 
     /// Down to the surface at the first station; whether it is there.
-    fn find_surface(&mut self, target: &SlideTarget, params: &TouchParams) -> Result<bool, ProbeError> {
+    fn find_surface(
+        &mut self,
+        target: &SlideTarget,
+        params: &TouchParams,
+    ) -> Result<bool, ProbeError> {
         let normal = target.stations[0].normal.into_inner();
         let mut contacts = 0;
-        let (doing, far) = ("looking for the surface of a slide", target.lift + target.give);
+        let (doing, far) = (
+            "looking for the surface of a slide",
+            target.lift + target.give,
+        );
         self.search(doing, -normal * params.safe_speed(), far, &mut |state| {
-            contacts = if state.wrench_b.force.norm() > params.trigger { contacts + 1 } else { 0 };
+            contacts = if state.wrench_b.force.norm() > params.trigger {
+                contacts + 1
+            } else {
+                0
+            };
             contacts >= TRIGGERS
         })
     }
@@ -234,12 +303,22 @@ impl Watched<'_> {
         let normal = slid.target.stations[0].normal;
         let begun_ns = self.next(doing)?.stamp_ns;
         let mut settled = 0;
-        self.repeat(doing, &slid.press(&normal, Vector3::zeros()), None, f64::INFINITY, &mut |state| {
-            let off = state.wrench_b.force.dot(&normal) - slid.params.force;
-            settled = if off.abs() < SETTLED * slid.params.force { settled + 1 } else { 0 };
-            let is_over = (state.stamp_ns - begun_ns) as f64 * 1e-9 > SETTLING;
-            (settled >= slid.window || is_over).then_some(())
-        })
+        self.repeat(
+            doing,
+            &slid.press(&normal, Vector3::zeros()),
+            None,
+            f64::INFINITY,
+            &mut |state| {
+                let off = state.wrench_b.force.dot(&normal) - slid.params.force;
+                settled = if off.abs() < SETTLED * slid.params.force {
+                    settled + 1
+                } else {
+                    0
+                };
+                let is_over = (state.stamp_ns - begun_ns) as f64 * 1e-9 > SETTLING;
+                (settled >= slid.window || is_over).then_some(())
+            },
+        )
     }
 
     fn go_along(&mut self, slid: &mut Slid<'_>) -> Result<SlideEnding, ProbeError> {

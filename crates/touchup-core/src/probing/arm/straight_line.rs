@@ -27,7 +27,9 @@ pub fn velocity_towards(
         .min((2.0 * BRAKE * acceleration / distance).sqrt())
         .min(TURN / turn.norm());
     let (linear, angular) = (left * share, turn * share);
-    [linear.x, linear.y, linear.z, angular.x, angular.y, angular.z]
+    [
+        linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
+    ]
 }
 
 #[cfg(test)]
@@ -49,10 +51,20 @@ mod tests {
         let near = velocity_towards(&at(0.39, 0.0), &at(0.4, 0.0), [0.1, 0.5], 60e-3)[0];
         assert!((near - 0.083_666).abs() < 1e-6, "{near}");
         // half a millimetre: 0.5 / 60 ms
-        assert!((velocity_towards(&at(0.3995, 0.0), &at(0.4, 0.0), [0.1, 0.5], 60e-3)[0] - 8.333e-3).abs() < 1e-6);
-        assert_eq!(velocity_towards(&at(0.4, 0.0), &at(0.4, 0.0), [0.1, 0.5], 60e-3), [0.0; 6]);
+        assert!(
+            (velocity_towards(&at(0.3995, 0.0), &at(0.4, 0.0), [0.1, 0.5], 60e-3)[0] - 8.333e-3)
+                .abs()
+                < 1e-6
+        );
+        assert_eq!(
+            velocity_towards(&at(0.4, 0.0), &at(0.4, 0.0), [0.1, 0.5], 60e-3),
+            [0.0; 6]
+        );
         // one radian at 0.5 rad/s takes 2 s, and so do the 20 mm
         let turning = velocity_towards(&at(0.0, 0.0), &at(0.02, 1.0), [0.1, 0.5], 60e-3);
-        assert!((turning[0] - 0.01).abs() < 1e-12 && (turning[5] - 0.5).abs() < 1e-12, "{turning:?}");
+        assert!(
+            (turning[0] - 0.01).abs() < 1e-12 && (turning[5] - 0.5).abs() < 1e-12,
+            "{turning:?}"
+        );
     }
 }

@@ -60,30 +60,52 @@ impl TouchParams {
     /// [`SettingError`]
     pub fn check_within(&self, limits: &Limits) -> Result<(), SettingError> {
         let hardest = format!("0.1 N to robot.largest_force_n, which is {}", limits.force);
-        SettingError::check("robot.touch_force_n", self.force, self.force <= limits.force, &hardest)?;
+        SettingError::check(
+            "robot.touch_force_n",
+            self.force,
+            self.force <= limits.force,
+            &hardest,
+        )?;
         let is_early = self.trigger <= MOST_TRIGGER * self.force;
-        SettingError::check("robot.trigger_n", self.trigger, is_early, "0.05 N to 0.8 of robot.touch_force_n")?;
-        let fastest = format!("at most robot.largest_mm_per_s, which is {}", limits.speed * 1e3);
+        SettingError::check(
+            "robot.trigger_n",
+            self.trigger,
+            is_early,
+            "0.05 N to 0.8 of robot.touch_force_n",
+        )?;
+        let fastest = format!(
+            "at most robot.largest_mm_per_s, which is {}",
+            limits.speed * 1e3
+        );
         let speeds = [
             ("robot.link_mm_per_s", self.link_speed),
             ("robot.search_mm_per_s", self.search_speed),
             ("robot.measure_mm_per_s", self.measure_speed),
             ("robot.slide_mm_per_s", self.slide_speed),
         ];
-        speeds.iter().try_for_each(|&(key, v)| SettingError::check(key, v * 1e3, v <= limits.speed, &fastest))
+        speeds.iter().try_for_each(|&(key, v)| {
+            SettingError::check(key, v * 1e3, v <= limits.speed, &fastest)
+        })
     }
 
     /// Speed at which a search that stops at [`Self::trigger`] ends below [`Self::force`].
     ///
     /// After the trigger the tip goes on by v τ + v²/2a, and each metre of it is k more: v = a (√(τ² + 2 Δ/(k a)) − τ).
     pub(crate) fn safe_speed(&self) -> f64 {
-        self.speed_below(self.force - self.trigger, self.acceleration).min(self.search_speed).max(CRAWL)
+        self.speed_below(self.force - self.trigger, self.acceleration)
+            .min(self.search_speed)
+            .max(CRAWL)
     }
 
     /// Speed at which whatever the tip meets is pressed with no more than the largest force, where it stops as hard as it may once it
     /// feels a contact; m/s.
     pub(crate) fn bounded_speed(&self, limits: &Limits) -> f64 {
-        self.speed_below(limits.force - UNEXPECTED * self.trigger, limits.fault_stop()).min(limits.speed).max(CRAWL)
+        self.speed_below(
+            limits.force - UNEXPECTED * self.trigger,
+            limits.fault_stop(),
+        )
+        .min(limits.speed)
+        .max(CRAWL)
     }
 
     /// - `room`: by which the force may grow, N; `deceleration`: m/s².

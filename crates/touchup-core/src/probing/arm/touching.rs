@@ -71,13 +71,27 @@ impl Watched<'_> {
     ///
     /// # Errors
     /// [`ProbeError`]; a miss is none.
-    pub fn touch(&mut self, target: &TouchTarget, params: &TouchParams) -> Result<TouchRecord, ProbeError> {
+    pub fn touch(
+        &mut self,
+        target: &TouchTarget,
+        params: &TouchParams,
+    ) -> Result<TouchRecord, ProbeError> {
         (self.peak_force, self.reached) = (0.0, None);
         let going = "going to the stand-off";
-        self.line(going, &target.standoff_bt, params.safe_speed(), params, params.trigger)?;
+        self.line(
+            going,
+            &target.standoff_bt,
+            params.safe_speed(),
+            params,
+            params.trigger,
+        )?;
         let begun = self.next(going)?.stamp_ns;
         self.reached = Some(0);
-        let line = ApproachLine { start: target.standoff_bt.translation.vector, target, params };
+        let line = ApproachLine {
+            start: target.standoff_bt.translation.vector,
+            target,
+            params,
+        };
         let travel = target.search.min(self.limits.search);
 
         let fast = line.along(params.safe_speed().min(self.limits.speed));
@@ -86,19 +100,25 @@ impl Watched<'_> {
         let mut searched = |watched: &mut Self, doing, far: f64| {
             watched.search(doing, fast, far, &mut |state| {
                 reached = line.depth(state);
-                contacts = if line.felt(state) > params.trigger { contacts + 1 } else { 0 };
+                contacts = if line.felt(state) > params.trigger {
+                    contacts + 1
+                } else {
+                    0
+                };
                 contacts >= TRIGGERS
             })
         };
         let mut states = Vec::new();
         let mut outcome = None;
         // where the surface is known it is measured at once, from just above it
-        let known = target.expected.map(|expected| (expected.travel, KNOWN * expected.sigma + params.back_off));
+        let known = target
+            .expected
+            .map(|expected| (expected.travel, KNOWN * expected.sigma + params.back_off));
         let mut gone = 0.0;
         let mut is_contact = false;
-        if let Some((at, room)) =
-            known.filter(|(at, room)| *room <= MOST_ROOM * params.back_off && room < at && at + room <= travel)
-        {
+        if let Some((at, room)) = known.filter(|(at, room)| {
+            *room <= MOST_ROOM * params.back_off && room < at && at + room <= travel
+        }) {
             gone = at - room;
             is_contact = searched(self, "approaching", gone)?;
             self.halt("approaching", &mut |_| {})?;
@@ -119,8 +139,14 @@ impl Watched<'_> {
                     true => line.outcome_of(&states),
                     // the first search made a contact that the second did not
                     false => {
-                        let peak_n = states.iter().map(|state| line.felt(state)).fold(0.0, f64::max);
-                        TouchOutcome::Unclear(OnsetError::NoContact { peak_n, contact_n: params.force })
+                        let peak_n = states
+                            .iter()
+                            .map(|state| line.felt(state))
+                            .fold(0.0, f64::max);
+                        TouchOutcome::Unclear(OnsetError::NoContact {
+                            peak_n,
+                            contact_n: params.force,
+                        })
                     }
                 }
             }
@@ -146,13 +172,18 @@ impl Watched<'_> {
 
     /// A part pushes: where it pulls, the force has the other sign.
     fn check_sign(&mut self, doing: &'static str, line: &ApproachLine) -> Result<(), ProbeError> {
-        let Some(state) = self.last else { return Ok(()) };
+        let Some(state) = self.last else {
+            return Ok(());
+        };
         let force_n = state.wrench_b.force.norm();
         let pulls = force_n > line.params.trigger && -line.presses(&state) > PULLS * force_n;
         if !pulls {
             return Ok(());
         }
-        self.come_free(&Command::Velocity { linear: line.along(CRAWL), acceleration: self.limits.acceleration })?;
+        self.come_free(&Command::Velocity {
+            linear: line.along(CRAWL),
+            acceleration: self.limits.acceleration,
+        })?;
         Err(ProbeError::Pulls { doing, force_n })
     }
 
@@ -161,7 +192,10 @@ impl Watched<'_> {
     /// No farther than the stand-off: whether it is free there.
     fn back_off(&mut self, line: &ApproachLine) -> Result<bool, ProbeError> {
         let (params, slow) = (line.params, line.along(self.slow(line)));
-        let way_back = self.last.map_or(0.0, |state| line.depth(&state)).max(SECOND * params.back_off);
+        let way_back = self
+            .last
+            .map_or(0.0, |state| line.depth(&state))
+            .max(SECOND * params.back_off);
         let mut free_at = None;
         let is_free = self.search("backing off", -slow * BACK, way_back, &mut |state| {
             if line.felt(state) < params.trigger * FREE {
@@ -176,24 +210,41 @@ impl Watched<'_> {
     /// The measuring search, from just above the surface, in and out; whether it reached the wanted force.
     ///
     /// - `room`: so far away the surface is at most, m.
-    fn press(&mut self, line: &ApproachLine, room: f64, states: &mut Vec<ArmState>) -> Result<bool, ProbeError> {
+    fn press(
+        &mut self,
+        line: &ApproachLine,
+        room: f64,
+        states: &mut Vec<ArmState>,
+    ) -> Result<bool, ProbeError> {
         let (params, slow) = (line.params, line.along(self.slow(line)));
         states.clear();
         let stop_at = params.force - self.overshoot(params, slow.norm());
         let is_pressed = |state: &ArmState| line.felt(state) > stop_at;
-        self.search("measuring", slow, room + params.force / params.stiffness * SECOND, &mut |state| {
-            states.push(*state);
-            is_pressed(state)
-        })?;
+        self.search(
+            "measuring",
+            slow,
+            room + params.force / params.stiffness * SECOND,
+            &mut |state| {
+                states.push(*state);
+                is_pressed(state)
+            },
+        )?;
         let pressed = states.iter().any(is_pressed);
         self.halt("measuring", &mut |state| states.push(*state))?;
-        if let Some(corner) =
-            states.iter().find(|state| state.wrench_b.force.norm() > params.trigger).map(|at| line.depth(at))
+        if let Some(corner) = states
+            .iter()
+            .find(|state| state.wrench_b.force.norm() > params.trigger)
+            .map(|at| line.depth(at))
         {
-            self.search("coming back from the surface", -slow, self.limits.search, &mut |state| {
-                states.push(*state);
-                line.depth(state) < corner - params.back_off
-            })?;
+            self.search(
+                "coming back from the surface",
+                -slow,
+                self.limits.search,
+                &mut |state| {
+                    states.push(*state);
+                    line.depth(state) < corner - params.back_off
+                },
+            )?;
             self.halt("coming back from the surface", &mut |_| {})?;
         }
         Ok(pressed)
@@ -201,7 +252,10 @@ impl Watched<'_> {
 
     /// Speed of the measuring search, m/s.
     fn slow(&self, ApproachLine { params, .. }: &ApproachLine) -> f64 {
-        params.measure_speed.min(params.safe_speed()).min(self.limits.speed)
+        params
+            .measure_speed
+            .min(params.safe_speed())
+            .min(self.limits.speed)
     }
 
     /// Force by which a search goes beyond where it is stopped, N.
@@ -246,7 +300,12 @@ impl ApproachLine<'_> {
         let moment = |state: &ArmState| {
             let force = state.wrench_b.force.dot(axis);
             let lateral = (state.wrench_b.force - axis * force).norm();
-            TouchMoment { t: (state.stamp_ns - begun) as f64 * 1e-9, travel: self.depth(state), force, lateral }
+            TouchMoment {
+                t: (state.stamp_ns - begun) as f64 * 1e-9,
+                travel: self.depth(state),
+                force,
+                lateral,
+            }
         };
         states.iter().map(moment).collect()
     }
@@ -257,10 +316,17 @@ impl ApproachLine<'_> {
         let back = -self.along(1.0);
         let norm = |state: &ArmState| state.wrench_b.force.norm();
         let most = states.iter().map(norm).fold(0.0, f64::max);
-        let hard: Vector3<f64> =
-            states.iter().filter(|state| norm(state) > 0.5 * most).map(|state| state.wrench_b.force).sum();
+        let hard: Vector3<f64> = states
+            .iter()
+            .filter(|state| norm(state) > 0.5 * most)
+            .map(|state| state.wrench_b.force)
+            .sum();
         let pushes = hard.try_normalize(0.0).unwrap_or(back);
-        if pushes.dot(&back) < FLAT { pushes } else { back }
+        if pushes.dot(&back) < FLAT {
+            pushes
+        } else {
+            back
+        }
     }
 
     /// The outcome of a curve that reached the wanted force.
@@ -276,10 +342,19 @@ impl ApproachLine<'_> {
             gone - self.along(gone.dot(&self.target.direction))
         }));
         let force = |state: &ArmState| state.wrench_b.force;
-        let hard = states.iter().map(force).filter(|force| force.dot(&axis) - onset.bias > 0.5 * onset.peak);
-        let (sum, count) = hard.fold((Vector3::zeros(), 0u32), |(sum, n), force| (sum + force, n + 1));
+        let hard = states
+            .iter()
+            .map(force)
+            .filter(|force| force.dot(&axis) - onset.bias > 0.5 * onset.peak);
+        let (sum, count) = hard.fold((Vector3::zeros(), 0u32), |(sum, n), force| {
+            (sum + force, n + 1)
+        });
         let centre = Point3::from(self.start + self.along(onset.travel) + aside);
-        TouchOutcome::Contact { onset, centre, force_b: sum / f64::from(count.max(1)) }
+        TouchOutcome::Contact {
+            onset,
+            centre,
+            force_b: sum / f64::from(count.max(1)),
+        }
     }
 }
 

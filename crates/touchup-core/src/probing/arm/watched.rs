@@ -76,7 +76,9 @@ pub enum ProbeError {
         is_link: bool,
     },
     /// States come too seldom to stop in time.
-    #[error("while {doing}: the arm's states came {gap_ms:.0} ms apart; they have to come each {period_ms:.0} ms")]
+    #[error(
+        "while {doing}: the arm's states came {gap_ms:.0} ms apart; they have to come each {period_ms:.0} ms"
+    )]
     LowRate {
         /// what was being done
         doing: &'static str,
@@ -227,44 +229,68 @@ impl<'a> Watched<'a> {
         if let Some(last) = self.last.replace(state) {
             let gap = (state.stamp_ns - last.stamp_ns) as f64 * 1e-9;
             if gap < 0.0 {
-                return Err(arm(ArmError::WentBack { back_ms: -gap * 1e3 }));
+                return Err(arm(ArmError::WentBack {
+                    back_ms: -gap * 1e3,
+                }));
             }
             self.frozen = if gap > 0.0 { 0 } else { self.frozen + 1 };
             if self.frozen >= FROZEN {
                 return Err(arm(ArmError::Stale));
             }
             if gap > LATE * self.arm.period() {
-                return Err(ProbeError::LowRate { doing, gap_ms: gap * 1e3, period_ms: self.arm.period() * 1e3 });
+                return Err(ProbeError::LowRate {
+                    doing,
+                    gap_ms: gap * 1e3,
+                    period_ms: self.arm.period() * 1e3,
+                });
             }
         }
         if state.safety != Safety::Normal {
-            return Err(arm(ArmError::Stopped { safety: state.safety }));
+            return Err(arm(ArmError::Stopped {
+                safety: state.safety,
+            }));
         }
         self.peak_force = self.peak_force.max(state.wrench_b.force.norm());
         // frozen stamps have no speed
         if self.frozen == 0 {
-            self.motion.take(&state, &self.limits).map_err(|error| ProbeError::Limit { doing, error })?;
+            self.motion
+                .take(&state, &self.limits)
+                .map_err(|error| ProbeError::Limit { doing, error })?;
         }
         match self.limits.check_state(&state) {
             Err(LimitError::Force { .. }) if self.comes_free => {}
             checked => checked.map_err(|error| ProbeError::Limit { doing, error })?,
         }
-        match self.observer.stop_request().filter(|request| *request >= self.heeds) {
+        match self
+            .observer
+            .stop_request()
+            .filter(|request| *request >= self.heeds)
+        {
             Some(request) => Err(ProbeError::Cancelled { doing, request }),
             None => Ok(state),
         }
     }
 
     fn stop(&self) -> Command {
-        Command::Stop { deceleration: self.limits.acceleration }
+        Command::Stop {
+            deceleration: self.limits.acceleration,
+        }
     }
 
     fn hard_stop(&self) -> Command {
-        Command::Stop { deceleration: self.limits.fault_stop() }
+        Command::Stop {
+            deceleration: self.limits.fault_stop(),
+        }
     }
 
-    pub(super) fn send(&mut self, doing: &'static str, command: &Command) -> Result<(), ProbeError> {
-        self.arm.command(command).map_err(|error| ProbeError::Arm { doing, error })
+    pub(super) fn send(
+        &mut self,
+        doing: &'static str,
+        command: &Command,
+    ) -> Result<(), ProbeError> {
+        self.arm
+            .command(command)
+            .map_err(|error| ProbeError::Arm { doing, error })
     }
 
     /// Repeats a command, as the watchdog of the arm needs it, until a state gives a result.
@@ -281,7 +307,12 @@ impl<'a> Watched<'a> {
         loop {
             self.send(doing, command)?;
             let state = match self.next(doing) {
-                Err(error @ ProbeError::Limit { error: LimitError::Force { .. }, .. }) if !self.comes_free => {
+                Err(
+                    error @ ProbeError::Limit {
+                        error: LimitError::Force { .. },
+                        ..
+                    },
+                ) if !self.comes_free => {
                     self.come_free(command)?;
                     return Err(error);
                 }
@@ -302,7 +333,10 @@ impl<'a> Watched<'a> {
     /// Returns how far beside the way it is to go on, m in B, where it went aside and is free.
     ///
     /// - `command`: that led to the contact.
-    pub(super) fn come_free(&mut self, command: &Command) -> Result<Option<Vector3<f64>>, ProbeError> {
+    pub(super) fn come_free(
+        &mut self,
+        command: &Command,
+    ) -> Result<Option<Vector3<f64>>, ProbeError> {
         let (heeds, doing) = (self.heeds, "coming free of what it met");
         (self.comes_free, self.heeds) = (true, StopRequest::Stay);
         let met = self.last.map(|state| state.pose_bt.translation.vector);
@@ -318,19 +352,33 @@ impl<'a> Watched<'a> {
     ) -> Result<Option<Vector3<f64>>, ProbeError> {
         self.stand(doing, &self.hard_stop(), &mut |_| {})?;
         let is_free = |state: &ArmState| state.wrench_b.force.norm() < FREE_N;
-        let (Some(way), Some(stood)) = (way, self.last.filter(|state| !is_free(state))) else { return Ok(None) };
+        let (Some(way), Some(stood)) = (way, self.last.filter(|state| !is_free(state))) else {
+            return Ok(None);
+        };
         let (push, met_n) = (stood.wrench_b.force, stood.wrench_b.force.norm());
         let along = push.dot(&way);
-        let aside = (push - way * along).try_normalize(0.0).filter(|_| along.abs() < BESIDE * met_n);
+        let aside = (push - way * along)
+            .try_normalize(0.0)
+            .filter(|_| along.abs() < BESIDE * met_n);
         let (mut free, mut worse) = (0, 0);
-        self.search(doing, aside.unwrap_or(-way) * FREEING, FREEING_WAY, &mut |state| {
-            free = if is_free(state) { free + 1 } else { 0 };
-            // what was met is not that way, or was no contact
-            worse = if state.wrench_b.force.norm() > met_n + WORSE_N { worse + 1 } else { 0 };
-            free >= TRIGGERS || worse >= TRIGGERS
-        })?;
+        self.search(
+            doing,
+            aside.unwrap_or(-way) * FREEING,
+            FREEING_WAY,
+            &mut |state| {
+                free = if is_free(state) { free + 1 } else { 0 };
+                // what was met is not that way, or was no contact
+                worse = if state.wrench_b.force.norm() > met_n + WORSE_N {
+                    worse + 1
+                } else {
+                    0
+                };
+                free >= TRIGGERS || worse >= TRIGGERS
+            },
+        )?;
         self.stand(doing, &self.stop(), &mut |_| {})?;
-        let gone = |state: ArmState| state.pose_bt.translation.vector - stood.pose_bt.translation.vector;
+        let gone =
+            |state: ArmState| state.pose_bt.translation.vector - stood.pose_bt.translation.vector;
         let by = self.last.filter(is_free).map(gone).zip(aside);
         Ok(by.map(|(gone, aside)| aside * (gone.dot(&aside).max(0.0) + OFF)))
     }
@@ -377,12 +425,18 @@ impl<'a> Watched<'a> {
             let met = self.go(doing, &to, speed, params, &mut |force| {
                 let most = *most.get_or_insert(limit.max(force + WORSE_N));
                 is_free |= force < params.trigger;
-                if is_free { (UNEXPECTED * params.trigger).min(limit) } else { most }
+                if is_free {
+                    (UNEXPECTED * params.trigger).min(limit)
+                } else {
+                    most
+                }
             });
             self.comes_free = false;
             let Some(met) = met? else { return Ok(()) };
             grazes += 1;
-            let Some(aside) = met.aside.filter(|_| grazes <= GRAZES) else { return Err(met.obstacle(doing)) };
+            let Some(aside) = met.aside.filter(|_| grazes <= GRAZES) else {
+                return Err(met.obstacle(doing));
+            };
             to.translation.vector += aside;
         }
     }
@@ -399,31 +453,53 @@ impl<'a> Watched<'a> {
         trigger: &mut dyn FnMut(f64) -> f64,
     ) -> Result<Option<Met>, ProbeError> {
         let place = to.translation.vector;
-        self.limits.check_place(&place).map_err(|error| ProbeError::Limit { doing, error })?;
+        self.limits
+            .check_place(&place)
+            .map_err(|error| ProbeError::Limit { doing, error })?;
         let begun = self.next(doing)?;
         let speed = speed.min(params.bounded_speed(&self.limits));
         let acceleration = params.acceleration.min(self.limits.acceleration);
         let distance = (place - begun.pose_bt.translation.vector).norm();
         let turn = begun.pose_bt.rotation.angle_to(&to.rotation);
-        let limit_s = PATIENCE.0 * (distance / speed + speed / acceleration + turn / TURN_SPEED) + PATIENCE.1;
-        let command = Command::Line { to: *to, speed, acceleration };
+        let limit_s =
+            PATIENCE.0 * (distance / speed + speed / acceleration + turn / TURN_SPEED) + PATIENCE.1;
+        let command = Command::Line {
+            to: *to,
+            speed,
+            acceleration,
+        };
         let mut contacts = 0;
-        let met = self.repeat(doing, &command, Some(begun.stamp_ns), limit_s, &mut |state| {
-            let here = state.pose_bt.translation.vector;
-            let force_n = state.wrench_b.force.norm();
-            contacts = if force_n > trigger(force_n) { contacts + 1 } else { 0 };
-            if contacts >= TRIGGERS {
-                return Some(Some(here));
-            }
-            let turn = state.pose_bt.rotation.angle_to(&to.rotation);
-            ((here - place).norm() < THERE && turn < TURNED).then_some(None)
-        })?;
+        let met = self.repeat(
+            doing,
+            &command,
+            Some(begun.stamp_ns),
+            limit_s,
+            &mut |state| {
+                let here = state.pose_bt.translation.vector;
+                let force_n = state.wrench_b.force.norm();
+                contacts = if force_n > trigger(force_n) {
+                    contacts + 1
+                } else {
+                    0
+                };
+                if contacts >= TRIGGERS {
+                    return Some(Some(here));
+                }
+                let turn = state.pose_bt.rotation.angle_to(&to.rotation);
+                ((here - place).norm() < THERE && turn < TURNED).then_some(None)
+            },
+        )?;
         let Some(place) = met else { return Ok(None) };
         let before = std::mem::take(&mut self.peak_force);
         let aside = self.come_free(&command)?;
         let force_n = self.peak_force;
         self.peak_force = before.max(force_n);
-        Ok(Some(Met { place, force_n, is_link: speed > params.safe_speed(), aside }))
+        Ok(Some(Met {
+            place,
+            force_n,
+            is_link: speed > params.safe_speed(),
+            aside,
+        }))
     }
 
     /// Stops, waits until the arm is at rest, and zeroes the sensor.
@@ -440,19 +516,33 @@ impl<'a> Watched<'a> {
     pub(crate) fn zero_below(&mut self, most_n: f64) -> Result<(), ProbeError> {
         let doing = "zeroing the sensor in free air";
         let mut forces = Vec::new();
-        self.dwell(doing, STEADY, &mut |state| forces.push(state.wrench_b.force))?;
-        let mean = |forces: &[Vector3<f64>]| forces.iter().sum::<Vector3<f64>>() / forces.len().max(1) as f64;
+        self.dwell(doing, STEADY, &mut |state| {
+            forces.push(state.wrench_b.force)
+        })?;
+        let mean = |forces: &[Vector3<f64>]| {
+            forces.iter().sum::<Vector3<f64>>() / forces.len().max(1) as f64
+        };
         let (all, (first, second)) = (mean(&forces), forces.split_at(forces.len() / 2));
-        let spread = forces.iter().map(|force| (force - all).norm_squared()).sum::<f64>() / forces.len().max(1) as f64;
+        let spread = forces
+            .iter()
+            .map(|force| (force - all).norm_squared())
+            .sum::<f64>()
+            / forces.len().max(1) as f64;
         let change_n = (mean(second) - mean(first)).norm();
         if all.norm() > most_n {
-            return Err(ProbeError::Loaded { doing, force_n: all.norm(), most_n });
+            return Err(ProbeError::Loaded {
+                doing,
+                force_n: all.norm(),
+                most_n,
+            });
         }
         // of two means of n/2 with that spread in all three directions
         if change_n > DRIFT + CHANGED * (spread * 4.0 / forces.len().max(1) as f64).sqrt() {
             return Err(ProbeError::Unsteady { doing, change_n });
         }
-        self.arm.zero_sensor().map_err(|error| ProbeError::Arm { doing, error })?;
+        self.arm
+            .zero_sensor()
+            .map_err(|error| ProbeError::Arm { doing, error })?;
         // that took its time
         self.last = None;
         self.motion.forget();
@@ -482,7 +572,11 @@ impl<'a> Watched<'a> {
     }
 
     /// Stops, and waits until the arm is at rest.
-    pub(super) fn halt(&mut self, doing: &'static str, each: &mut dyn FnMut(&ArmState)) -> Result<(), ProbeError> {
+    pub(super) fn halt(
+        &mut self,
+        doing: &'static str,
+        each: &mut dyn FnMut(&ArmState),
+    ) -> Result<(), ProbeError> {
         self.stand(doing, &self.stop(), each)
     }
 
@@ -498,8 +592,14 @@ impl<'a> Watched<'a> {
             each(state);
             let place = state.pose_bt.translation.vector;
             places.push_back(place);
-            let before: Option<Vector3<f64>> = if places.len() > REST_STATES { places.pop_front() } else { None };
-            before.filter(|before| (place - before).norm() < REST).map(|_| ())
+            let before: Option<Vector3<f64>> = if places.len() > REST_STATES {
+                places.pop_front()
+            } else {
+                None
+            };
+            before
+                .filter(|before| (place - before).norm() < REST)
+                .map(|_| ())
         })
     }
 
@@ -512,19 +612,40 @@ impl<'a> Watched<'a> {
         until: &mut dyn FnMut(&ArmState) -> bool,
     ) -> Result<bool, ProbeError> {
         let velocity = velocity * (self.limits.speed / velocity.norm()).min(1.0);
-        let command = Command::Velocity { linear: velocity, acceleration: self.limits.acceleration };
+        let command = Command::Velocity {
+            linear: velocity,
+            acceleration: self.limits.acceleration,
+        };
         let begun = self.next(doing)?;
         let limit_s = PATIENCE.0 * travel / velocity.norm() + PATIENCE.1;
-        self.repeat(doing, &command, Some(begun.stamp_ns), limit_s, &mut |state| {
-            let gone = || state.pose_bt.translation.vector - begun.pose_bt.translation.vector;
-            let is_over = || gone().dot(&velocity) / velocity.norm() >= travel;
-            if until(state) { Some(true) } else { is_over().then_some(false) }
-        })
+        self.repeat(
+            doing,
+            &command,
+            Some(begun.stamp_ns),
+            limit_s,
+            &mut |state| {
+                let gone = || state.pose_bt.translation.vector - begun.pose_bt.translation.vector;
+                let is_over = || gone().dot(&velocity) / velocity.norm() >= travel;
+                if until(state) {
+                    Some(true)
+                } else {
+                    is_over().then_some(false)
+                }
+            },
+        )
     }
 
-    pub(super) fn too_long<T>(&mut self, doing: &'static str, limit_s: f64) -> Result<T, ProbeError> {
+    pub(super) fn too_long<T>(
+        &mut self,
+        doing: &'static str,
+        limit_s: f64,
+    ) -> Result<T, ProbeError> {
         self.send(doing, &self.hard_stop())?;
-        Err(ProbeError::TooLong { doing, limit_s, slowed: self.arm.slowed() })
+        Err(ProbeError::TooLong {
+            doing,
+            limit_s,
+            slowed: self.arm.slowed(),
+        })
     }
 }
 
@@ -542,8 +663,18 @@ struct Met {
 
 impl Met {
     fn obstacle(&self, doing: &'static str) -> ProbeError {
-        let Self { place, force_n, is_link, .. } = *self;
-        ProbeError::Obstacle { doing, force_n, place_mm: (place * 1e3).into(), is_link }
+        let Self {
+            place,
+            force_n,
+            is_link,
+            ..
+        } = *self;
+        ProbeError::Obstacle {
+            doing,
+            force_n,
+            place_mm: (place * 1e3).into(),
+            is_link,
+        }
     }
 }
 

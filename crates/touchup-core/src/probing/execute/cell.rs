@@ -34,7 +34,8 @@ impl Cell {
 
     /// Place of O of a pose of the tip in B.
     pub fn place(&self, pose_bt: &Isometry3<f64>) -> Point3<f64> {
-        self.pose_bo.inverse_transform_point(&Point3::from(pose_bt.translation.vector))
+        self.pose_bo
+            .inverse_transform_point(&Point3::from(pose_bt.translation.vector))
     }
 
     /// Direction of the shaft in O, from the tip to the handle.
@@ -43,20 +44,32 @@ impl Cell {
     }
 
     /// Orientation of the tip in B that aligns the shaft with the normal of a surface: as it is now where that is near enough.
-    pub fn upright(&self, now: &UnitQuaternion<f64>, normal: &Unit<Vector3<f64>>) -> UnitQuaternion<f64> {
-        let (shaft, out) = (now * Vector3::z(), self.pose_bo.rotation * normal.into_inner());
+    pub fn upright(
+        &self,
+        now: &UnitQuaternion<f64>,
+        normal: &Unit<Vector3<f64>>,
+    ) -> UnitQuaternion<f64> {
+        let (shaft, out) = (
+            now * Vector3::z(),
+            self.pose_bo.rotation * normal.into_inner(),
+        );
         if shaft.angle(&out) < LEANS {
             return *now;
         }
-        let turn = UnitQuaternion::rotation_between(&shaft, &out)
-            .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&(now * Vector3::x_axis()), std::f64::consts::PI));
+        let turn = UnitQuaternion::rotation_between(&shaft, &out).unwrap_or_else(|| {
+            UnitQuaternion::from_axis_angle(&(now * Vector3::x_axis()), std::f64::consts::PI)
+        });
         turn * now
     }
 
     /// The tip well above the middle of a part, the shaft along z of O, in B: where a simulated arm begins.
     pub fn above(&self, part: &TriMesh) -> Isometry3<f64> {
         let [low, high] = part.bounds();
-        let middle = Point3::new(f64::midpoint(low.x, high.x), f64::midpoint(low.y, high.y), high.z + ABOVE);
+        let middle = Point3::new(
+            f64::midpoint(low.x, high.x),
+            f64::midpoint(low.y, high.y),
+            high.z + ABOVE,
+        );
         self.pose(&turned_to(&(self.pose_bo.rotation * Vector3::z())), &middle)
     }
 }

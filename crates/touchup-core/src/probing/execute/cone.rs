@@ -25,12 +25,18 @@ pub struct NotReached {
 pub(super) fn rings<const N: usize>(rings: [(f64, usize); N]) -> impl Iterator<Item = Orientation> {
     rings.into_iter().flat_map(|(lean_deg, count)| {
         let towards = move |at: usize| std::f64::consts::TAU * at as f64 / count as f64;
-        (0..count).map(move |at| Orientation { lean: lean_deg.to_radians(), towards: towards(at) })
+        (0..count).map(move |at| Orientation {
+            lean: lean_deg.to_radians(),
+            towards: towards(at),
+        })
     })
 }
 
 /// The shaft leans to one side, without turning about itself.
-pub(super) fn leaned(rotation: &UnitQuaternion<f64>, orientation: &Orientation) -> UnitQuaternion<f64> {
+pub(super) fn leaned(
+    rotation: &UnitQuaternion<f64>,
+    orientation: &Orientation,
+) -> UnitQuaternion<f64> {
     let (sin, cos) = orientation.towards.sin_cos();
     let axis = Unit::new_unchecked(Vector3::new(-sin, cos, 0.0));
     rotation * UnitQuaternion::from_axis_angle(&axis, orientation.lean)

@@ -54,10 +54,22 @@ impl Cell {
     /// The arm at rest with its tip at a pose in B and nothing on it, in the configuration that leaves it most room to move; for
     /// a plan without an arm. `None` where it does not reach.
     pub fn at_rest(&self, pose_bt: &Isometry3<f64>) -> Option<ArmState> {
-        let joints = self.geometry.most_dexterous(&(pose_bt * self.pose_ft.inverse()))?;
-        let nothing = Wrench { force: Vector3::zeros(), torque: Vector3::zeros() };
+        let joints = self
+            .geometry
+            .most_dexterous(&(pose_bt * self.pose_ft.inverse()))?;
+        let nothing = Wrench {
+            force: Vector3::zeros(),
+            torque: Vector3::zeros(),
+        };
         let (wrench_b, raw_wrench_f) = (nothing, nothing);
-        Some(ArmState { stamp_ns: 0, pose_bt: *pose_bt, wrench_b, raw_wrench_f, joints, safety: Safety::Normal })
+        Some(ArmState {
+            stamp_ns: 0,
+            pose_bt: *pose_bt,
+            wrench_b,
+            raw_wrench_f,
+            joints,
+            safety: Safety::Normal,
+        })
     }
 }
 
@@ -78,11 +90,22 @@ pub fn plan(
     let way_out = way_out.filter(|way_out| way_out.begins_at(now));
     let in_free_air = way_out.map_or(*now, |way_out| way_out.end(cell, now));
     let (mut explorer, rotation) = flag.explorer(cell, params, world, &in_free_air)?;
-    let space = FreeSpace { cell, limits: &params.limits, world };
+    let space = FreeSpace {
+        cell,
+        limits: &params.limits,
+        world,
+    };
     let mut at = ToolState::of(cell, &in_free_air);
-    let mut plan = Plan { path: vec![cell.place(&now.pose_bt)], ..Plan::default() };
-    plan.path.extend(way_out.into_iter().flat_map(WayOut::places));
-    let reach = |allowed: Result<(), LimitError>, above: &Point3<f64>, at: &mut ToolState, plan: &mut Plan| {
+    let mut plan = Plan {
+        path: vec![cell.place(&now.pose_bt)],
+        ..Plan::default()
+    };
+    plan.path
+        .extend(way_out.into_iter().flat_map(WayOut::places));
+    let reach = |allowed: Result<(), LimitError>,
+                 above: &Point3<f64>,
+                 at: &mut ToolState,
+                 plan: &mut Plan| {
         allowed?;
         let route = space.route(at, &rotation, above)?;
         for (place, turned) in route.stops {
@@ -98,18 +121,30 @@ pub fn plan(
         plan.touches.push(planned);
         let allowed = space.may_touch(&rotation, &planned, &at.joints);
         if let Err(ending) = reach(allowed, &planned.entry, &mut at, &mut plan) {
-            plan.held_back.push(HeldBack { what, why: ending.why() });
+            plan.held_back.push(HeldBack {
+                what,
+                why: ending.why(),
+            });
             explorer.take(&TouchResult::Unclear);
             continue;
         }
         let result = contact_on_mesh(&planned, &params.pattern, world);
-        let end = if let TouchResult::At { centre, .. } = result { centre } else { planned.from };
+        let end = if let TouchResult::At { centre, .. } = result {
+            centre
+        } else {
+            planned.from
+        };
         // in again and out, slowly
-        plan.path.extend([planned.from, end, planned.from, at.place]);
+        plan.path
+            .extend([planned.from, end, planned.from, at.place]);
         explorer.take(&result);
     }
     plan.left_out = explorer.left_out().to_vec();
-    let slides = if params.slides { explorer.slides() } else { Vec::new() };
+    let slides = if params.slides {
+        explorer.slides()
+    } else {
+        Vec::new()
+    };
     for slide in slides {
         let what = PlannedMotion::Slide(plan.slides.len());
         let allowed = space.may_slide(&rotation, &slide, &at.joints);
@@ -117,10 +152,15 @@ pub fn plan(
             Ok(()) => {
                 let last = slide.stations.len() - 1;
                 plan.path.extend([slide.above(0), slide.lifted(0)]);
-                plan.path.extend(slide.stations.iter().map(|station| station.centre));
-                plan.path.extend([slide.lifted(last), slide.above(last), at.place]);
+                plan.path
+                    .extend(slide.stations.iter().map(|station| station.centre));
+                plan.path
+                    .extend([slide.lifted(last), slide.above(last), at.place]);
             }
-            Err(ending) => plan.held_back.push(HeldBack { what, why: ending.why() }),
+            Err(ending) => plan.held_back.push(HeldBack {
+                what,
+                why: ending.why(),
+            }),
         }
         plan.slides.push(slide);
     }
@@ -129,7 +169,14 @@ pub fn plan(
 
 /// First contact of a ball with the mesh, by sphere tracing: each step is the distance that is left.
 fn contact_on_mesh(planned: &TouchPlan, pattern: &PatternParams, world: &dyn World) -> TouchResult {
-    let (PatternParams { ball_radius, touch_sigma: sigma, .. }, distance) = (*pattern, distance(world));
+    let (
+        PatternParams {
+            ball_radius,
+            touch_sigma: sigma,
+            ..
+        },
+        distance,
+    ) = (*pattern, distance(world));
     let mut gone = 0.0;
     while gone <= planned.search {
         let centre = planned.from + planned.direction.into_inner() * gone;

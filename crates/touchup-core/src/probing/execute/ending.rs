@@ -79,10 +79,16 @@ impl Ending {
     /// Where a decision was the goal.
     pub(super) fn of_decisions(characteristics: &[DecidedCharacteristic]) -> Self {
         let names = |is_it: fn(&DecidedCharacteristic) -> bool| {
-            let named = characteristics.iter().filter(|one| is_it(one)).map(|one| one.sought.name.as_str());
+            let named = characteristics
+                .iter()
+                .filter(|one| is_it(one))
+                .map(|one| one.sought.name.as_str());
             named.collect::<Vec<_>>().join(", ")
         };
-        let (open, limited) = (names(DecidedCharacteristic::is_open), names(|one| one.is_limited));
+        let (open, limited) = (
+            names(DecidedCharacteristic::is_open),
+            names(|one| one.is_limited),
+        );
         match (open.is_empty(), limited.is_empty()) {
             (true, true) => Self::Decided,
             (true, false) => Self::Undecidable { names: limited },
@@ -92,13 +98,17 @@ impl Ending {
 
     /// The reason alone.
     pub(super) fn why(&self) -> String {
-        self.source().map_or_else(|| self.to_string(), ToString::to_string)
+        self.source()
+            .map_or_else(|| self.to_string(), ToString::to_string)
     }
 
     /// Whether only this touch or slide cannot be made.
     pub(super) fn is_of_one(&self) -> bool {
         use Ending::{NoClearPath, OutOfLimits, Stopped};
-        matches!(self, OutOfLimits(_) | NoClearPath(_) | Stopped(ProbeError::Obstacle { is_link: false, .. }))
+        matches!(
+            self,
+            OutOfLimits(_) | NoClearPath(_) | Stopped(ProbeError::Obstacle { is_link: false, .. })
+        )
     }
 }
 

@@ -8,7 +8,8 @@ use super::route::ToolState;
 use super::way_out::WayOut;
 use super::world::{Phase, Progress, World};
 use crate::probing::arm::{
-    ArmState, OnsetVerdict, ProbeError, StopRequest, TouchOutcome, TouchRecord, TouchTarget, UNEXPECTED,
+    ArmState, OnsetVerdict, ProbeError, StopRequest, TouchOutcome, TouchRecord, TouchTarget,
+    UNEXPECTED,
 };
 use crate::probing::plan::{Explorer, TouchPlan, TouchResult};
 
@@ -49,7 +50,16 @@ impl<'a> Prober<'a> {
             Err(ending) => {
                 let (touches, slides) = (Vec::new(), Vec::new());
                 let (found, left_out, seconds, peak_force) = (None, Vec::new(), 0.0, 0.0);
-                return Probed { flag: flag.id, ending, found, touches, slides, left_out, seconds, peak_force };
+                return Probed {
+                    flag: flag.id,
+                    ending,
+                    found,
+                    touches,
+                    slides,
+                    left_out,
+                    seconds,
+                    peak_force,
+                };
             }
         };
         let mut ended = probing.explore(&mut explorer);
@@ -60,10 +70,16 @@ impl<'a> Prober<'a> {
         let found = explorer.found();
         let ending = match (ended, &found) {
             (Err(ending), _) => ending,
-            (Ok(()), Ok(found)) if !found.characteristics.is_empty() => Ending::of_decisions(&found.characteristics),
+            (Ok(()), Ok(found)) if !found.characteristics.is_empty() => {
+                Ending::of_decisions(&found.characteristics)
+            }
             (Ok(()), Ok(found)) if found.is_as_asked => Ending::ToleranceReached,
             (Ok(()), Ok(found)) => {
-                found.limited.map_or(Ending::TouchesSpent, |over| Ending::CalibrationLimits { over })
+                found
+                    .limited
+                    .map_or(Ending::TouchesSpent, |over| Ending::CalibrationLimits {
+                        over,
+                    })
             }
             (Ok(()), Err(error)) => Ending::NothingFound(error.clone()),
         };
@@ -80,7 +96,10 @@ impl<'a> Prober<'a> {
     }
 
     /// The explorer and where the arm is, when both can begin.
-    pub(super) fn begin(&mut self, flag: &Flag) -> Result<(Explorer, FeatureProbing<'_, 'a>), Ending> {
+    pub(super) fn begin(
+        &mut self,
+        flag: &Flag,
+    ) -> Result<(Explorer, FeatureProbing<'_, 'a>), Ending> {
         self.leave(flag)?;
         let state = self.in_free_air(self.params.limits.tare)?;
         let (explorer, rotation) = flag.explorer(self.cell, self.params, self.world, &state)?;
@@ -90,15 +109,28 @@ impl<'a> Prober<'a> {
 
     /// Out of the feature that another probing was stopped in, where the arm still stands there.
     fn leave(&mut self, flag: &Flag) -> Result<(), Ending> {
-        let Some(way_out) = self.way_out.take() else { return Ok(()) };
-        let arm = |error| ProbeError::Arm { doing: "asking where the arm is", error };
+        let Some(way_out) = self.way_out.take() else {
+            return Ok(());
+        };
+        let arm = |error| ProbeError::Arm {
+            doing: "asking where the arm is",
+            error,
+        };
         let now = self.arm.next_state().map_err(arm)?;
         if !way_out.begins_at(&now) {
             return Ok(());
         }
-        let WayOut { from, entry, out, .. } = way_out;
+        let WayOut {
+            from, entry, out, ..
+        } = way_out;
         let begun = FeatureProbing::new(self, flag.id, out.rotation, &now);
-        let mut probing = FeatureProbing { out, is_out: false, from, entry, ..begun };
+        let mut probing = FeatureProbing {
+            out,
+            is_out: false,
+            from,
+            entry,
+            ..begun
+        };
         let left = probing.retract();
         probing.finish(left)
     }
@@ -108,7 +140,12 @@ impl<'p, 'a> FeatureProbing<'p, 'a> {
     /// Nothing is touched yet.
     ///
     /// - `flag`: its number; `rotation`: that it is touched with, of the tip in B; `state`: of the arm, in free air.
-    pub fn new(prober: &'p mut Prober<'a>, flag: u32, rotation: UnitQuaternion<f64>, state: &ArmState) -> Self {
+    pub fn new(
+        prober: &'p mut Prober<'a>,
+        flag: u32,
+        rotation: UnitQuaternion<f64>,
+        state: &ArmState,
+    ) -> Self {
         Self {
             flag,
             rotation,
@@ -147,9 +184,15 @@ impl FeatureProbing<'_, '_> {
     pub fn finish<T>(&mut self, ended: Result<T, Ending>) -> Result<T, Ending> {
         use Ending::{Cancelled, NoClearPath, OutOfLimits, Stopped, TimeSpent};
         // a failed retraction outranks these
-        let is_unbroken = matches!(ended, Ok(_) | Err(Cancelled(StopRequest::Retract) | TimeSpent));
-        let may_move =
-            is_unbroken || matches!(ended, Err(NoClearPath(_) | OutOfLimits(_) | Stopped(ProbeError::TooLong { .. })));
+        let is_unbroken = matches!(
+            ended,
+            Ok(_) | Err(Cancelled(StopRequest::Retract) | TimeSpent)
+        );
+        let may_move = is_unbroken
+            || matches!(
+                ended,
+                Err(NoClearPath(_) | OutOfLimits(_) | Stopped(ProbeError::TooLong { .. }))
+            );
         let retracted = if may_move { self.retract() } else { Ok(()) };
         // where nothing comes any more it ended when it was seen last
         let last = self.prober.arm.next_state();
@@ -181,12 +224,20 @@ impl FeatureProbing<'_, '_> {
             let (result, touch) = match self.go_and_touch(&planned) {
                 Ok(touched) => touched,
                 // the first one is where the feature is
-                Err(ending @ (Ending::OutOfLimits(_) | Ending::NoClearPath(_))) if self.touches.is_empty() => {
+                Err(ending @ (Ending::OutOfLimits(_) | Ending::NoClearPath(_)))
+                    if self.touches.is_empty() =>
+                {
                     return Err(ending);
                 }
                 Err(ending) if ending.is_of_one() => {
                     let refused = Some(ending.why());
-                    let touch = ProbedTouch { planned, record: None, centre: None, deviation: None, refused };
+                    let touch = ProbedTouch {
+                        planned,
+                        record: None,
+                        centre: None,
+                        deviation: None,
+                        refused,
+                    };
                     (TouchResult::Unclear, touch)
                 }
                 Err(ending) => return Err(ending),
@@ -201,36 +252,74 @@ impl FeatureProbing<'_, '_> {
 
     fn publish(&mut self, explorer: &Explorer, touch: usize) {
         let (budget, uncertainty) = (self.prober.params.pattern.budget, explorer.uncertainty());
-        self.prober.world.publish(&Progress { flag: self.flag, touch, budget, uncertainty });
+        self.prober.world.publish(&Progress {
+            flag: self.flag,
+            touch,
+            budget,
+            uncertainty,
+        });
     }
 
     /// A link move, or one that is guarded, to a pose of the tip in B.
-    fn line(&mut self, doing: &'static str, to: &Isometry3<f64>, guard: LineGuard) -> Result<(), Ending> {
+    fn line(
+        &mut self,
+        doing: &'static str,
+        to: &Isometry3<f64>,
+        guard: LineGuard,
+    ) -> Result<(), Ending> {
         let touch = &self.prober.params.touch;
         let mut watched = self.prober.watched();
-        watched.heeds = if guard == LineGuard::Retract { StopRequest::Stay } else { StopRequest::Retract };
+        watched.heeds = if guard == LineGuard::Retract {
+            StopRequest::Stay
+        } else {
+            StopRequest::Retract
+        };
         let moved = match guard {
-            LineGuard::Link => watched.line(doing, to, touch.link_speed, touch, UNEXPECTED * touch.trigger),
+            LineGuard::Link => watched.line(
+                doing,
+                to,
+                touch.link_speed,
+                touch,
+                UNEXPECTED * touch.trigger,
+            ),
             LineGuard::Slow => watched.line(doing, to, touch.safe_speed(), touch, touch.trigger),
             // the part may be in contact
-            LineGuard::Out | LineGuard::Retract => watched.leave(doing, to, touch.link_speed, touch),
+            LineGuard::Out | LineGuard::Retract => {
+                watched.leave(doing, to, touch.link_speed, touch)
+            }
         };
         let seen = watched.seen();
         self.keep(seen);
         // however slow a link is, nothing should be there
         moved.map_err(|error| match (error, guard) {
-            (ProbeError::Obstacle { doing, force_n, place_mm, .. }, LineGuard::Link) => {
-                ProbeError::Obstacle { doing, force_n, place_mm, is_link: true }.into()
+            (
+                ProbeError::Obstacle {
+                    doing,
+                    force_n,
+                    place_mm,
+                    ..
+                },
+                LineGuard::Link,
+            ) => ProbeError::Obstacle {
+                doing,
+                force_n,
+                place_mm,
+                is_link: true,
             }
+            .into(),
             (error, _) => error.into(),
         })
     }
 
     /// Brings the ball to where a touch is entered from, and touches.
     fn go_and_touch(&mut self, planned: &TouchPlan) -> Result<(TouchResult, ProbedTouch), Ending> {
-        self.prober.space().may_touch(&self.rotation, planned, &self.out.joints)?;
+        self.prober
+            .space()
+            .may_touch(&self.rotation, planned, &self.out.joints)?;
         let near = INSIDE * self.prober.params.pattern.ball_radius;
-        let is_near = self.from.is_some_and(|from| (from - planned.from).norm() < near);
+        let is_near = self
+            .from
+            .is_some_and(|from| (from - planned.from).norm() < near);
         // else it stays inside of the feature
         if !is_near || planned.from == planned.entry {
             self.reach(&planned.entry)?;
@@ -242,7 +331,10 @@ impl FeatureProbing<'_, '_> {
     pub fn reach(&mut self, above: &Point3<f64>) -> Result<(), Ending> {
         self.prober.world.enter(Phase::Link);
         self.go_out("going up out of the feature", LineGuard::Out)?;
-        let route = self.prober.space().route(&self.out, &self.rotation, above)?;
+        let route = self
+            .prober
+            .space()
+            .route(&self.out, &self.rotation, above)?;
         for (place, rotation) in route.stops {
             let pose = self.prober.cell.pose(&rotation, &place);
             self.line("going through free air", &pose, LineGuard::Link)?;
@@ -284,29 +376,54 @@ impl FeatureProbing<'_, '_> {
             self.from = Some(planned.from);
         }
         let (result, touch) = self.probed_touch(*planned, touched?);
-        let deviation = touch.centre.and_then(|centre| deviation(&before, planned, &centre));
+        let deviation = touch
+            .centre
+            .and_then(|centre| deviation(&before, planned, &centre));
         Ok((result, ProbedTouch { deviation, ..touch }))
     }
 
     /// The result for the explorer, and the record of the touch.
     fn probed_touch(&self, planned: TouchPlan, record: TouchRecord) -> (TouchResult, ProbedTouch) {
         let (result, refused) = match &record.outcome {
-            TouchOutcome::Contact { onset, .. } if onset.verdict == OnsetVerdict::Impact => {
-                (TouchResult::Unclear, Some("an impact: the force was over before the surface held".to_owned()))
-            }
+            TouchOutcome::Contact { onset, .. } if onset.verdict == OnsetVerdict::Impact => (
+                TouchResult::Unclear,
+                Some("an impact: the force was over before the surface held".to_owned()),
+            ),
             TouchOutcome::Contact { onset, centre, .. } => {
                 let centre = self.prober.cell.pose_bo.inverse_transform_point(centre);
-                (TouchResult::At { centre, sigma: onset.sigma }, None)
+                (
+                    TouchResult::At {
+                        centre,
+                        sigma: onset.sigma,
+                    },
+                    None,
+                )
             }
             TouchOutcome::Miss { travel } if *travel < planned.search - SHORT => {
-                let why = format!("nothing within {:.1} mm, where the limit of a search ends", travel * 1e3);
+                let why = format!(
+                    "nothing within {:.1} mm, where the limit of a search ends",
+                    travel * 1e3
+                );
                 (TouchResult::Unclear, Some(why))
             }
             TouchOutcome::Miss { .. } => (TouchResult::Nothing, None),
             TouchOutcome::Unclear(error) => (TouchResult::Unclear, Some(error.to_string())),
         };
-        let centre = if let TouchResult::At { centre, .. } = result { Some(centre) } else { None };
-        (result, ProbedTouch { planned, record: Some(record), centre, deviation: None, refused })
+        let centre = if let TouchResult::At { centre, .. } = result {
+            Some(centre)
+        } else {
+            None
+        };
+        (
+            result,
+            ProbedTouch {
+                planned,
+                record: Some(record),
+                centre,
+                deviation: None,
+                refused,
+            },
+        )
     }
 
     /// Out of the feature into free air.
@@ -317,8 +434,15 @@ impl FeatureProbing<'_, '_> {
 
     /// What remains of it; `None` in free air.
     fn way_out(&self, now: &ArmState) -> Option<WayOut> {
-        let Self { from, entry, out, .. } = *self;
-        (!self.is_out).then_some(WayOut { stopped_bt: now.pose_bt, from, entry, out })
+        let Self {
+            from, entry, out, ..
+        } = *self;
+        (!self.is_out).then_some(WayOut {
+            stopped_bt: now.pose_bt,
+            from,
+            entry,
+            out,
+        })
     }
 
     /// Back through the places where the ball has been before, none of them twice, whatever breaks off the remaining path.

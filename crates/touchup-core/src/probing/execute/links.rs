@@ -89,9 +89,16 @@ impl Clearance<'_> {
     ///
     /// - `reach`: no more room than that matters, m.
     pub fn room(&self, centre: &Point3<f64>, reach: f64) -> f64 {
-        let Tool { ball_radius, shaft_radius, shaft_length, margin } = *self.tool;
+        let Tool {
+            ball_radius,
+            shaft_radius,
+            shaft_length,
+            margin,
+        } = *self.tool;
         let reach = reach.max(LEAST_STEP);
-        let around = |p: &Point3<f64>, radius: f64| (self.distance)(p, radius + margin + reach) - radius - margin;
+        let around = |p: &Point3<f64>, radius: f64| {
+            (self.distance)(p, radius + margin + reach) - radius - margin
+        };
         let mut room = around(centre, ball_radius);
         // balls of a little more than the shaft's radius hide all of it
         let spacing = shaft_radius;
@@ -99,7 +106,10 @@ impl Clearance<'_> {
         let count = (shaft_length / spacing).ceil() as usize;
         let mut at = 1;
         while at <= count && room >= 0.0 {
-            let here = around(&(centre + self.shaft.into_inner() * (at as f64 * spacing)), radius);
+            let here = around(
+                &(centre + self.shaft.into_inner() * (at as f64 * spacing)),
+                radius,
+            );
             // those within half of the room here have the other half at the least
             let skipped = (here / 2.0 / spacing).max(0.0) as usize;
             room = room.min(if skipped > 0 { here / 2.0 } else { here });
@@ -111,7 +121,9 @@ impl Clearance<'_> {
     /// Whether a straight line is clear.
     fn is_clear(&self, from: &Point3<f64>, to: &Point3<f64>) -> bool {
         let length = (to - from).norm();
-        let direction = (to - from).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
+        let direction = (to - from)
+            .try_normalize(0.0)
+            .unwrap_or_else(Vector3::zeros);
         let room = |gone: f64| self.room(&(from + direction * gone), length - gone);
         is_clear_along(length, room, |room| room.max(LEAST_STEP))
     }
@@ -119,10 +131,21 @@ impl Clearance<'_> {
     /// Whether the tool keeps clear while it turns about the ball.
     ///
     /// - `angle`: of the turn, rad; `shaft`: after a share of it.
-    fn can_turn(&self, centre: &Point3<f64>, angle: f64, shaft: &dyn Fn(f64) -> Unit<Vector3<f64>>) -> bool {
+    fn can_turn(
+        &self,
+        centre: &Point3<f64>,
+        angle: f64,
+        shaft: &dyn Fn(f64) -> Unit<Vector3<f64>>,
+    ) -> bool {
         let length = self.tool.shaft_length + self.tool.shaft_radius;
         // nothing of it moves farther than its far end
-        let room = |turned: f64| Self { shaft: shaft(turned / angle), ..*self }.room(centre, length * (angle - turned));
+        let room = |turned: f64| {
+            Self {
+                shaft: shaft(turned / angle),
+                ..*self
+            }
+            .room(centre, length * (angle - turned))
+        };
         is_clear_along(angle, room, |room| (room / length).max(LEAST_TURN))
     }
 
@@ -138,10 +161,16 @@ impl Clearance<'_> {
         angle: f64,
         shaft: &dyn Fn(f64) -> Unit<Vector3<f64>>,
     ) -> Result<Point3<f64>, LinkError> {
-        let places = (0..TURN_PLACES).map(|times| from + self.shaft.into_inner() * (TURN_RAISE * times as f64));
+        let places = (0..TURN_PLACES)
+            .map(|times| from + self.shaft.into_inner() * (TURN_RAISE * times as f64));
         let mut reached = places.take_while(|place| self.is_clear(from, place));
-        let no_turn = LinkError::NoTurn { place_mm: (from * 1e3).coords.into(), angle_deg: angle.to_degrees() };
-        reached.find(|place| self.can_turn(place, angle, shaft)).ok_or(no_turn)
+        let no_turn = LinkError::NoTurn {
+            place_mm: (from * 1e3).coords.into(),
+            angle_deg: angle.to_degrees(),
+        };
+        reached
+            .find(|place| self.can_turn(place, angle, shaft))
+            .ok_or(no_turn)
     }
 
     /// The place at or above an entry that is clear: from there on down nothing is fast.
@@ -149,8 +178,11 @@ impl Clearance<'_> {
     /// # Errors
     /// [`LinkError::NoPath`].
     pub(super) fn entry(&self, entry: &Point3<f64>) -> Result<Point3<f64>, LinkError> {
-        let mut raised = (0..RAISES).map(|times| entry + self.shaft.into_inner() * (RAISE * times as f64));
-        raised.find(|entry| self.room(entry, 0.0) >= 0.0).ok_or(self.no_path(entry))
+        let mut raised =
+            (0..RAISES).map(|times| entry + self.shaft.into_inner() * (RAISE * times as f64));
+        raised
+            .find(|entry| self.room(entry, 0.0) >= 0.0)
+            .ok_or(self.no_path(entry))
     }
 
     /// The places that the tool goes through from one place to another, without the first; both are in free air.
@@ -176,7 +208,10 @@ impl Clearance<'_> {
         for step in 1..=HEIGHTS {
             let at = lowest + (top - lowest) * step as f64 / HEIGHTS as f64;
             let places = [*from, lifted(from, at), lifted(to, at), *to];
-            if places.windows(2).all(|pair| self.is_clear(&pair[0], &pair[1])) {
+            if places
+                .windows(2)
+                .all(|pair| self.is_clear(&pair[0], &pair[1]))
+            {
                 return Ok(places[1..].to_vec());
             }
         }
@@ -184,7 +219,10 @@ impl Clearance<'_> {
     }
 
     fn no_path(&self, to: &Point3<f64>) -> LinkError {
-        LinkError::NoPath { place_mm: (to * 1e3).coords.into(), margin_mm: self.tool.margin * 1e3 }
+        LinkError::NoPath {
+            place_mm: (to * 1e3).coords.into(),
+            margin_mm: self.tool.margin * 1e3,
+        }
     }
 }
 
@@ -224,7 +262,11 @@ mod tests {
     }
 
     fn upright(tool: &Tool) -> Clearance<'_> {
-        Clearance { tool, shaft: Vector3::z_axis(), distance: &above_a_plate }
+        Clearance {
+            tool,
+            shaft: Vector3::z_axis(),
+            distance: &above_a_plate,
+        }
     }
 
     #[test]
@@ -235,7 +277,10 @@ mod tests {
             let entry = Point3::new(3e-3, -2e-3, height);
             let clear = upright(&tool).entry(&entry).unwrap();
             let raises = ((needed - height).max(0.0) / RAISE).ceil();
-            assert!((clear - entry - up.into_inner() * (raises * RAISE)).norm() < 1e-12, "from {height}: {clear}");
+            assert!(
+                (clear - entry - up.into_inner() * (raises * RAISE)).norm() < 1e-12,
+                "from {height}: {clear}"
+            );
             assert!(clear.z >= needed);
         }
     }
@@ -244,6 +289,12 @@ mod tests {
     fn an_entry_that_is_never_clear_is_refused() {
         let deep = Point3::new(0.0, 0.0, -1.0);
         let refused = upright(&Tool::default()).entry(&deep);
-        assert_eq!(refused, Err(LinkError::NoPath { place_mm: [0.0, 0.0, -1e3], margin_mm: 0.5 }));
+        assert_eq!(
+            refused,
+            Err(LinkError::NoPath {
+                place_mm: [0.0, 0.0, -1e3],
+                margin_mm: 0.5
+            })
+        );
     }
 }

@@ -55,25 +55,45 @@ impl LevelPlane {
 
     /// The plane that most places of a ring are on, where enough are.
     fn of_ring(ring: &Ring) -> Option<Self> {
-        let count = |plane: &Self| ring.iter().flatten().filter(|place| plane.has(place)).count();
+        let count = |plane: &Self| {
+            ring.iter()
+                .flatten()
+                .filter(|place| plane.has(place))
+                .count()
+        };
         // three a third of a turn apart, or, beside an edge, a quarter
-        let hypotheses = [DIRECTIONS / 3, DIRECTIONS / 4].into_iter().flat_map(|step| {
-            (0..DIRECTIONS).filter_map(move |at| {
-                let place = |times: usize| ring[(at + times * step) % DIRECTIONS];
-                Self::through([place(0)?, place(1)?, place(2)?])
-            })
-        });
+        let hypotheses = [DIRECTIONS / 3, DIRECTIONS / 4]
+            .into_iter()
+            .flat_map(|step| {
+                (0..DIRECTIONS).filter_map(move |at| {
+                    let place = |times: usize| ring[(at + times * step) % DIRECTIONS];
+                    Self::through([place(0)?, place(1)?, place(2)?])
+                })
+            });
         let best = hypotheses.max_by_key(count)?;
         (count(&best) as f64 >= ENOUGH * DIRECTIONS as f64).then_some(best)
     }
 
     /// The plane of least squares through all places that are on it.
     fn refined(self, rings: &[Ring]) -> Option<Self> {
-        let places = || rings.iter().flatten().flatten().filter(|place| self.has(place)).map(|place| place.coords);
+        let places = || {
+            rings
+                .iter()
+                .flatten()
+                .flatten()
+                .filter(|place| self.has(place))
+                .map(|place| place.coords)
+        };
         let axes = scatter(places()).symmetric_eigen();
-        let normal = axes.eigenvectors.column(axes.eigenvalues.imin()).into_owned();
+        let normal = axes
+            .eigenvectors
+            .column(axes.eigenvalues.imin())
+            .into_owned();
         let normal = Unit::try_new(normal * normal.z.signum(), 0.0)?;
-        (normal.z > ALIKE).then(|| Self { point: mean(places()).into(), normal })
+        (normal.z > ALIKE).then(|| Self {
+            point: mean(places()).into(),
+            normal,
+        })
     }
 }
 
@@ -95,10 +115,14 @@ pub(super) fn on_surface_around(
     let planes = rings.iter().filter_map(LevelPlane::of_ring);
     let around = planes.min_by(|a, b| a.above_flag().abs().total_cmp(&b.above_flag().abs()));
     let around = around.and_then(|plane| plane.refined(&rings));
-    match around.filter(|plane| plane.off(&pose_of.inverse_transform_point(&nearest)) < -IN_OPENING) {
+    match around.filter(|plane| plane.off(&pose_of.inverse_transform_point(&nearest)) < -IN_OPENING)
+    {
         Some(plane) => {
             let place = Point3::new(0.0, 0.0, plane.above_flag());
-            (pose_of * place, Unit::new_unchecked(pose_of.rotation * plane.normal.into_inner()))
+            (
+                pose_of * place,
+                Unit::new_unchecked(pose_of.rotation * plane.normal.into_inner()),
+            )
         }
         None => (nearest, normal),
     }
@@ -109,8 +133,12 @@ fn rings(mesh: &TriMesh, pose_of: &Isometry3<f64>, [radius, step]: [f64; 2]) -> 
     let to_f = pose_of.inverse();
     let radii = (0..RINGS).map(|ring| radius + step * ring as f64);
     let directions = (0..DIRECTIONS).map(|at| at as f64 / DIRECTIONS as f64 * TAU);
-    let directions: Vec<_> = directions.map(|angle| Point2::new(angle.cos(), angle.sin())).collect();
-    let wanted: Vec<_> = radii.map(|radius| directions.iter().map(|at| at * radius).collect::<Vec<_>>()).collect();
+    let directions: Vec<_> = directions
+        .map(|angle| Point2::new(angle.cos(), angle.sin()))
+        .collect();
+    let wanted: Vec<_> = radii
+        .map(|radius| directions.iter().map(|at| at * radius).collect::<Vec<_>>())
+        .collect();
     let farthest = radius + step * RINGS as f64;
     let mut rings = vec![[None; DIRECTIONS]; RINGS];
     for (face, _) in mesh.faces() {
@@ -123,7 +151,8 @@ fn rings(mesh: &TriMesh, pose_of: &Isometry3<f64>, [radius, step]: [f64; 2]) -> 
             for (found, at) in ring.iter_mut().zip(wanted) {
                 let is_near = (0..2).all(|i| low[i] <= at[i] && at[i] <= high[i]);
                 let height = if is_near { height(&corners, at) } else { None };
-                let higher = |z: &f64| z.abs() < NEAR && found.is_none_or(|found: Point3<f64>| *z > found.z);
+                let higher =
+                    |z: &f64| z.abs() < NEAR && found.is_none_or(|found: Point3<f64>| *z > found.z);
                 if let Some(z) = height.filter(higher) {
                     *found = Some(Point3::new(at.x, at.y, z));
                 }
@@ -145,7 +174,14 @@ fn height(corners: &[Point3<f64>; 3], at: &Point2<f64>) -> Option<f64> {
     let shares = [b.perp(&c), c.perp(&a), a.perp(&b)];
     let area: f64 = shares.iter().sum();
     let is_in = area > 0.0 && shares.iter().all(|share| *share >= 0.0);
-    is_in.then(|| shares.iter().zip(corners).map(|(share, corner)| share * corner.z).sum::<f64>() / area)
+    is_in.then(|| {
+        shares
+            .iter()
+            .zip(corners)
+            .map(|(share, corner)| share * corner.z)
+            .sum::<f64>()
+            / area
+    })
 }
 
 #[cfg(test)]
@@ -155,26 +191,51 @@ mod tests {
     /// Heights over a grid of 0.5 mm, 40 × 40 mm, m; where there is none the part is open.
     fn surface(height: impl Fn(f64, f64) -> Option<f64>) -> TriMesh {
         let (side, at) = (81usize, |i: usize| i as f64 * 0.5e-3 - 20e-3);
-        let places: Vec<_> = (0..side * side).map(|i| [at(i % side), at(i / side)]).collect();
+        let places: Vec<_> = (0..side * side)
+            .map(|i| [at(i % side), at(i / side)])
+            .collect();
         let heights: Vec<_> = places.iter().map(|[x, y]| height(*x, *y)).collect();
-        let positions = places.iter().zip(&heights).map(|([x, y], z)| Point3::new(*x, *y, z.unwrap_or(0.0)));
-        let cells = (0..side - 1).flat_map(|row| (0..side - 1).map(move |column| row * side + column));
+        let positions = places
+            .iter()
+            .zip(&heights)
+            .map(|([x, y], z)| Point3::new(*x, *y, z.unwrap_or(0.0)));
+        let cells =
+            (0..side - 1).flat_map(|row| (0..side - 1).map(move |column| row * side + column));
         let faces = cells.flat_map(|a| [[a, a + 1, a + side + 1], [a, a + side + 1, a + side]]);
         let faces = faces.filter(|corners| corners.iter().all(|corner| heights[*corner].is_some()));
-        TriMesh::new(positions.collect(), faces.map(|face| face.map(|corner| corner as u32)).collect()).unwrap()
+        TriMesh::new(
+            positions.collect(),
+            faces.map(|face| face.map(|corner| corner as u32)).collect(),
+        )
+        .unwrap()
     }
 
     /// By the rings of a flag with a radius of 3 mm and a ball of 1.5 mm.
-    fn found(mesh: &TriMesh, flag: [f64; 3], nearest: [f64; 3]) -> (Point3<f64>, Unit<Vector3<f64>>) {
+    fn found(
+        mesh: &TriMesh,
+        flag: [f64; 3],
+        nearest: [f64; 3],
+    ) -> (Point3<f64>, Unit<Vector3<f64>>) {
         let mm = |place: [f64; 3]| Point3::from(place) * 1e-3;
-        on_surface_around(mesh, &mm(flag), [4.5e-3, 1.5e-3], (mm(nearest), Vector3::z_axis()))
+        on_surface_around(
+            mesh,
+            &mm(flag),
+            [4.5e-3, 1.5e-3],
+            (mm(nearest), Vector3::z_axis()),
+        )
     }
 
     /// A hole of Ø 7 mm, 5 mm deep or through, in z = 0.
     #[test]
     fn the_level_of_an_open_hole_is_that_of_the_surface_around_it_wherever_its_flag_is() {
         for floor in [Some(-5e-3), None] {
-            let mesh = surface(|x, y| if x.hypot(y) < 3.5e-3 { floor } else { Some(0.0) });
+            let mesh = surface(|x, y| {
+                if x.hypot(y) < 3.5e-3 {
+                    floor
+                } else {
+                    Some(0.0)
+                }
+            });
             for (flag, nearest, level) in [
                 ([0.0, 0.0, 0.0], [0.0, 0.0, -5.0], 0.0),
                 ([1.0, -1.0, -4.0], [1.0, -1.0, -5.0], 0.0),
@@ -186,7 +247,10 @@ mod tests {
                 ([0.0, 0.0, -1.0], [0.0, 4.0, -1.0], -1.0),
             ] {
                 let (place, normal) = found(&mesh, flag, nearest);
-                assert!((place.z - level * 1e-3).abs() < 1e-9, "{flag:?}, {nearest:?}: {place}");
+                assert!(
+                    (place.z - level * 1e-3).abs() < 1e-9,
+                    "{flag:?}, {nearest:?}: {place}"
+                );
                 assert!(normal.z > 1.0 - 1e-12);
             }
         }
@@ -202,7 +266,10 @@ mod tests {
         };
         let (place, normal) = found(&surface(slope), [0.0, 0.0, 0.0], [0.0, 0.0, -6.0]);
         let expected = Vector3::new(-0.1, 0.0, 1.0).normalize();
-        assert!((normal.into_inner() - expected).norm() < 1e-3 && place.z.abs() < 0.05e-3, "{place} {normal:?}");
+        assert!(
+            (normal.into_inner() - expected).norm() < 1e-3 && place.z.abs() < 0.05e-3,
+            "{place} {normal:?}"
+        );
     }
 
     /// A pocket of 20 × 20 mm, 6 mm deep, and a hole in its floor.
@@ -214,7 +281,8 @@ mod tests {
             _ => Some(-6e-3),
         };
         let mesh = surface(depth);
-        let level = |flag: f64, nearest: f64| found(&mesh, [0.0, 0.0, flag], [0.0, 0.0, nearest]).0.z * 1e3;
+        let level =
+            |flag: f64, nearest: f64| found(&mesh, [0.0, 0.0, flag], [0.0, 0.0, nearest]).0.z * 1e3;
         // the hole, flagged on the floor; the pocket, flagged where its face was
         // where a ring crosses its wall the places between have a share
         assert!((level(-6.0, -11.0) + 6.0).abs() < 0.1 && level(0.0, -6.0).abs() < 0.1);
@@ -226,9 +294,15 @@ mod tests {
     #[test]
     fn a_flag_without_a_surface_around_it_stays_where_it_is() {
         let mesh = surface(|x, y| (x.hypot(y) < 2e-3).then_some(-5e-3));
-        assert_eq!(found(&mesh, [0.0, 0.0, 0.0], [0.0, 0.0, -5.0]).0, Point3::new(0.0, 0.0, -5e-3));
+        assert_eq!(
+            found(&mesh, [0.0, 0.0, 0.0], [0.0, 0.0, -5.0]).0,
+            Point3::new(0.0, 0.0, -5e-3)
+        );
         // 45° from what was expected
         let steep = surface(|x, _| Some(x));
-        assert_eq!(found(&steep, [0.0, 0.0, 0.0], [0.0, 0.0, -12.0]).0, Point3::new(0.0, 0.0, -12e-3));
+        assert_eq!(
+            found(&steep, [0.0, 0.0, 0.0], [0.0, 0.0, -12.0]).0,
+            Point3::new(0.0, 0.0, -12e-3)
+        );
     }
 }

@@ -65,18 +65,36 @@ impl Prober<'_> {
         let home = ToolState::of(self.cell, &state);
         // all of the probe up to the flange keeps clear
         let length = self.cell.pose_ft.translation.vector.norm();
-        let cell = Cell { tool: Tool { shaft_length: length, ..self.cell.tool }, ..self.cell.clone() };
-        let space = FreeSpace { cell: &cell, ..self.space() };
+        let cell = Cell {
+            tool: Tool {
+                shaft_length: length,
+                ..self.cell.tool
+            },
+            ..self.cell.clone()
+        };
+        let space = FreeSpace {
+            cell: &cell,
+            ..self.space()
+        };
         let (routes, not_reached, last) = routes(&space, &home);
         if routes.len() < FEWEST {
-            let why = not_reached.into_iter().next().map_or_else(String::new, |first: NotReached| first.why);
-            return Err(PayloadProbeError::TooFew { reached: routes.len(), wanted: orientations().count(), why });
+            let why = not_reached
+                .into_iter()
+                .next()
+                .map_or_else(String::new, |first: NotReached| first.why);
+            return Err(PayloadProbeError::TooFew {
+                reached: routes.len(),
+                wanted: orientations().count(),
+                why,
+            });
         }
         let back = space.route(&last, &home.rotation, &home.place)?;
         let mut segments = Vec::new();
         for route in &routes {
             self.turn_along(route)?;
-            let Some((segment, ended_ns)) = self.dwell()? else { continue };
+            let Some((segment, ended_ns)) = self.dwell()? else {
+                continue;
+            };
             if (ended_ns - state.stamp_ns) as f64 * 1e-9 > self.params.limits.time {
                 return Err(Ending::TimeSpent.into());
             }
@@ -84,7 +102,10 @@ impl Prober<'_> {
             segments.push(segment);
         }
         self.turn_along(&back)?;
-        Ok(PayloadReadings { segments, not_reached })
+        Ok(PayloadReadings {
+            segments,
+            not_reached,
+        })
     }
 
     pub(super) fn turn_along(&mut self, route: &Route) -> Result<(), Ending> {
@@ -105,7 +126,11 @@ impl Prober<'_> {
         watched.dwell("settling in free air", SETTLE, &mut |_| {})?;
         let (mut block, mut r_bt) = (None::<SampleBlock>, UnitQuaternion::identity());
         watched.dwell("measuring the payload", AVERAGED, &mut |state| {
-            let sample = Sample { stamp_ns: state.stamp_ns, pose_ot: state.pose_bt, wrench: state.raw_wrench_f };
+            let sample = Sample {
+                stamp_ns: state.stamp_ns,
+                pose_ot: state.pose_bt,
+                wrench: state.raw_wrench_f,
+            };
             match &mut block {
                 Some(block) => block.add(&sample),
                 None => block = Some(SampleBlock::of(&sample)),
@@ -114,7 +139,15 @@ impl Prober<'_> {
         })?;
         let most = watched.limits.force;
         watched.zero_below(most)?;
-        Ok(block.map(|block| (StaticPose { r_wt: r_bt * r_tf, ..block.static_pose() }, block.end_ns)))
+        Ok(block.map(|block| {
+            (
+                StaticPose {
+                    r_wt: r_bt * r_tf,
+                    ..block.static_pose()
+                },
+                block.end_ns,
+            )
+        }))
     }
 }
 
@@ -126,10 +159,17 @@ fn routes(space: &FreeSpace, home: &ToolState) -> (Vec<Route>, Vec<NotReached>, 
         match space.route(&at, &rotation, &home.place) {
             Ok(route) => {
                 let place = route.stops.last().map_or(at.place, |(place, _)| *place);
-                at = ToolState { place, rotation, joints: route.joints };
+                at = ToolState {
+                    place,
+                    rotation,
+                    joints: route.joints,
+                };
                 routes.push(route);
             }
-            Err(ending) => not_reached.push(NotReached { orientation, why: ending.why() }),
+            Err(ending) => not_reached.push(NotReached {
+                orientation,
+                why: ending.why(),
+            }),
         }
     }
     (routes, not_reached, at)
@@ -147,8 +187,14 @@ mod tests {
 
     #[test]
     fn the_shaft_leans_as_far_and_to_where_it_should() {
-        let shafts: Vec<_> =
-            orientations().map(|one| (one, leaned(&UnitQuaternion::identity(), &one) * Vector3::z())).collect();
+        let shafts: Vec<_> = orientations()
+            .map(|one| {
+                (
+                    one,
+                    leaned(&UnitQuaternion::identity(), &one) * Vector3::z(),
+                )
+            })
+            .collect();
         assert_eq!(shafts.len(), 13);
         for (one, shaft) in &shafts {
             let (sin, cos) = one.towards.sin_cos();

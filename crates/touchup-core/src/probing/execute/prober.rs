@@ -12,7 +12,9 @@ use super::route::FreeSpace;
 use super::way_out::WayOut;
 use super::world::{World, distance, normal_about, on_mesh};
 use crate::features::Kind;
-use crate::probing::arm::{Arm, ArmState, LimitError, Limits, Narrower, ProbeError, TouchParams, Watched};
+use crate::probing::arm::{
+    Arm, ArmState, LimitError, Limits, Narrower, ProbeError, TouchParams, Watched,
+};
 use crate::probing::plan::{DecisionGoal, ExploreError, Explorer, PatternParams};
 
 /// A place to probe.
@@ -56,9 +58,16 @@ impl ProbeParams {
         let mut touch = self.touch;
         touch.force = touch.force.min(limits.force / HEADROOM);
         if touch.force <= touch.trigger {
-            return Err(LimitError::TooSoft { asked_n: limits.force, least_n: touch.trigger * HEADROOM });
+            return Err(LimitError::TooSoft {
+                asked_n: limits.force,
+                least_n: touch.trigger * HEADROOM,
+            });
         }
-        Ok(Self { touch, limits, ..self.clone() })
+        Ok(Self {
+            touch,
+            limits,
+            ..self.clone()
+        })
     }
 }
 
@@ -76,13 +85,21 @@ impl Flag {
         world: &dyn World,
         now: &ArmState,
     ) -> Result<(Explorer, UnitQuaternion<f64>), ExploreError> {
-        let pattern = PatternParams { flag_radius: self.radius, ..params.pattern };
+        let pattern = PatternParams {
+            flag_radius: self.radius,
+            ..params.pattern
+        };
         let nearest = on_mesh(world, &self.place);
         let normal = normal_about(world, &nearest, &cell.shaft(&now.pose_bt.rotation));
         let (place, normal) = match self.kind {
             Some(Kind::Hole | Kind::Slot | Kind::Pocket) => {
                 let ball = pattern.ball_radius;
-                on_surface_around(world.mesh(), &self.place, [self.radius + ball, ball], (nearest, normal))
+                on_surface_around(
+                    world.mesh(),
+                    &self.place,
+                    [self.radius + ball, ball],
+                    (nearest, normal),
+                )
             }
             _ => (nearest, normal),
         };
@@ -106,8 +123,19 @@ pub struct Prober<'a> {
 
 impl<'a> Prober<'a> {
     /// - `arm`: at rest in free air, or where [`Self::leaving_by`] begins.
-    pub fn new(arm: &'a mut dyn Arm, cell: &'a Cell, params: &'a ProbeParams, world: &'a mut dyn World) -> Self {
-        Self { arm, cell, params, world, way_out: None }
+    pub fn new(
+        arm: &'a mut dyn Arm,
+        cell: &'a Cell,
+        params: &'a ProbeParams,
+        world: &'a mut dyn World,
+    ) -> Self {
+        Self {
+            arm,
+            cell,
+            params,
+            world,
+            way_out: None,
+        }
     }
 
     /// Has the next probing begin with the way out of the feature that another one was stopped in, where the arm still stands there.
@@ -129,7 +157,11 @@ impl<'a> Prober<'a> {
 
     /// Where the arm may go.
     pub(super) fn space(&self) -> FreeSpace<'_> {
-        FreeSpace { cell: self.cell, limits: &self.params.limits, world: &*self.world }
+        FreeSpace {
+            cell: self.cell,
+            limits: &self.params.limits,
+            world: &*self.world,
+        }
     }
 
     /// Where the arm is, at rest in free air with its sensor zeroed.
@@ -137,11 +169,25 @@ impl<'a> Prober<'a> {
     /// - `most_n`: that the sensor may feel before, N.
     pub(super) fn in_free_air(&mut self, most_n: f64) -> Result<ArmState, Ending> {
         // zeroing the sensor would remove a force that acts now
-        let arm = |error| ProbeError::Arm { doing: "asking where the arm is", error };
+        let arm = |error| ProbeError::Arm {
+            doing: "asking where the arm is",
+            error,
+        };
         let now = self.arm.next_state().map_err(arm)?;
-        let (here, bare) = (self.cell.place(&now.pose_bt), Tool { margin: 0.0, ..self.cell.tool });
+        let (here, bare) = (
+            self.cell.place(&now.pose_bt),
+            Tool {
+                margin: 0.0,
+                ..self.cell.tool
+            },
+        );
         let shaft = self.cell.shaft(&now.pose_bt.rotation);
-        let room = Clearance { tool: &bare, shaft, distance: &distance(&*self.world) }.room(&here, 0.0);
+        let room = Clearance {
+            tool: &bare,
+            shaft,
+            distance: &distance(&*self.world),
+        }
+        .room(&here, 0.0);
         if room < 0.0 {
             let place_mm = (here * 1e3).coords.into();
             return Err(LinkError::InPart { place_mm }.into());

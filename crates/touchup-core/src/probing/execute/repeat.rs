@@ -69,13 +69,20 @@ impl Prober<'_> {
     pub fn repeat(&mut self, spot: &Point3<f64>, count: usize) -> Result<Repeatability, SpotError> {
         self.at_spot(spot, |probing, place, normal| {
             let across = tangent_basis(&normal)[0];
-            let from = place + normal.into_inner() * (probing.prober.params.pattern.ball_radius + STANDOFF);
+            let from = place
+                + normal.into_inner() * (probing.prober.params.pattern.ball_radius + STANDOFF);
             let mut touches = Vec::with_capacity(count);
             for touch in 1..=count {
                 let side = if touch % 2 == 1 { 1 } else { -1 };
                 let aside = across * (f64::from(side) * ASIDE);
                 let entry = from + normal.into_inner() * ABOVE + aside;
-                let planned = TouchPlan { entry, from, direction: -normal, search: 2.0 * STANDOFF, expected: None };
+                let planned = TouchPlan {
+                    entry,
+                    from,
+                    direction: -normal,
+                    search: 2.0 * STANDOFF,
+                    expected: None,
+                };
                 let (onset, centre) = probing.touch_spot(&planned, touch)?;
                 touches.push(SpotTouch {
                     side,
@@ -85,7 +92,11 @@ impl Prober<'_> {
                     verdict: onset.verdict,
                 });
             }
-            Ok(Repeatability { touches, place, normal })
+            Ok(Repeatability {
+                touches,
+                place,
+                normal,
+            })
         })
     }
 
@@ -95,9 +106,18 @@ impl Prober<'_> {
     pub(super) fn at_spot<T>(
         &mut self,
         spot: &Point3<f64>,
-        touch_all: impl FnOnce(&mut FeatureProbing, Point3<f64>, Unit<Vector3<f64>>) -> Result<T, SpotError>,
+        touch_all: impl FnOnce(
+            &mut FeatureProbing,
+            Point3<f64>,
+            Unit<Vector3<f64>>,
+        ) -> Result<T, SpotError>,
     ) -> Result<T, SpotError> {
-        let flag = Flag { id: 0, kind: Some(Kind::Plane), place: *spot, radius: ASIDE };
+        let flag = Flag {
+            id: 0,
+            kind: Some(Kind::Plane),
+            place: *spot,
+            radius: ASIDE,
+        };
         let (_, mut probing) = self.begin(&flag)?;
         let (cell, world) = (probing.prober.cell, &*probing.prober.world);
         let place = on_mesh(world, spot);
@@ -120,16 +140,26 @@ impl FeatureProbing<'_, '_> {
     /// One touch of a spot, and the centre of the ball then.
     ///
     /// - `touch`: its number, from 1 on.
-    pub fn touch_spot(&mut self, planned: &TouchPlan, touch: usize) -> Result<(Onset, Point3<f64>), SpotError> {
+    pub fn touch_spot(
+        &mut self,
+        planned: &TouchPlan,
+        touch: usize,
+    ) -> Result<(Onset, Point3<f64>), SpotError> {
         if self.is_spent() {
             return Err(Ending::TimeSpent.into());
         }
-        let ProbedTouch { record, centre, refused, .. } = self.touch_and_retract(planned)?;
+        let ProbedTouch {
+            record,
+            centre,
+            refused,
+            ..
+        } = self.touch_and_retract(planned)?;
         match (record.map(|record| record.outcome), centre, refused) {
             (Some(TouchOutcome::Contact { onset, .. }), Some(centre), None) => Ok((onset, centre)),
-            (_, _, why) => {
-                Err(SpotError::NoContact { touch, why: why.unwrap_or_else(|| "nothing is there".to_owned()) })
-            }
+            (_, _, why) => Err(SpotError::NoContact {
+                touch,
+                why: why.unwrap_or_else(|| "nothing is there".to_owned()),
+            }),
         }
     }
 }
@@ -138,14 +168,21 @@ impl Repeatability {
     /// From the lowest to the highest, m.
     pub fn range(&self) -> f64 {
         let heights = self.touches.iter().map(|touch| touch.height);
-        let [low, high] = heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], h| [a.min(h), b.max(h)]);
+        let [low, high] = heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], h| {
+            [a.min(h), b.max(h)]
+        });
         high - low
     }
 
     /// Mean height of those from one side, or from both, m.
     fn mean(&self, side: Option<i8>) -> f64 {
-        let heights = self.touches.iter().filter(|touch| side.is_none_or(|side| touch.side == side));
-        let [sum, count] = heights.fold([0.0, 0.0], |[sum, count], touch| [sum + touch.height, count + 1.0]);
+        let heights = self
+            .touches
+            .iter()
+            .filter(|touch| side.is_none_or(|side| touch.side == side));
+        let [sum, count] = heights.fold([0.0, 0.0], |[sum, count], touch| {
+            [sum + touch.height, count + 1.0]
+        });
         sum / count
     }
 
@@ -158,7 +195,10 @@ impl Repeatability {
     /// How far each touch is from their mean, m.
     pub fn deviations(&self) -> Vec<f64> {
         let mean = self.mean(None);
-        self.touches.iter().map(|touch| touch.height - mean).collect()
+        self.touches
+            .iter()
+            .map(|touch| touch.height - mean)
+            .collect()
     }
 
     /// How much higher the spot is when the tool comes from the first side, m.
@@ -169,7 +209,9 @@ impl Repeatability {
     /// Stiffness of arm, probe and part together, and its standard uncertainty, N/m: the mean of what the curves say, and how
     /// far they scatter.
     pub fn stiffness(&self) -> [f64; 2] {
-        let (count, all) = (self.touches.len() as f64, || self.touches.iter().map(|touch| touch.stiffness[0]));
+        let (count, all) = (self.touches.len() as f64, || {
+            self.touches.iter().map(|touch| touch.stiffness[0])
+        });
         let mean = all().sum::<f64>() / count;
         let scatter = (all().map(|k| (k - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt();
         [mean, scatter / count.sqrt()]
@@ -190,15 +232,34 @@ mod tests {
             stiffness: [k * 1e3, 100.0],
             verdict: OnsetVerdict::Clean,
         };
-        let touches = [(0, 1.0, 14.0), (1, -3.0, 16.0), (2, 5.0, 14.0), (3, -3.0, 16.0)].map(touch).to_vec();
-        let spot = Repeatability { touches, place: Point3::origin(), normal: Vector3::z_axis() };
-        let near = |value: f64, expected: f64| (value - expected).abs() < 1e-12 + 1e-9 * expected.abs();
+        let touches = [
+            (0, 1.0, 14.0),
+            (1, -3.0, 16.0),
+            (2, 5.0, 14.0),
+            (3, -3.0, 16.0),
+        ]
+        .map(touch)
+        .to_vec();
+        let spot = Repeatability {
+            touches,
+            place: Point3::origin(),
+            normal: Vector3::z_axis(),
+        };
+        let near =
+            |value: f64, expected: f64| (value - expected).abs() < 1e-12 + 1e-9 * expected.abs();
         assert!(near(spot.range(), 8e-6), "{}", spot.range());
         assert!(near(spot.reversal(), 6e-6), "{}", spot.reversal());
         // mean 0, squares 1 + 9 + 25 + 9 over 3
-        assert!(near(spot.deviation(), (44.0f64 / 3.0).sqrt() * 1e-6), "{}", spot.deviation());
+        assert!(
+            near(spot.deviation(), (44.0f64 / 3.0).sqrt() * 1e-6),
+            "{}",
+            spot.deviation()
+        );
         let [k, u] = spot.stiffness();
         // mean 15, squares 4 over 3, over 4 touches
-        assert!(near(k, 15e3) && near(u, (4.0f64 / 3.0).sqrt() / 2.0 * 1e3), "{k} {u}");
+        assert!(
+            near(k, 15e3) && near(u, (4.0f64 / 3.0).sqrt() / 2.0 * 1e3),
+            "{k} {u}"
+        );
     }
 }

@@ -6,7 +6,9 @@ use super::cell::Cell;
 use super::ending::Ending;
 use super::links::Clearance;
 use super::world::{World, distance, highest};
-use crate::probing::arm::{ArmBodies, ArmState, Capsule, Joints, LimitError, Limits, Link, largest_turn, millimetres};
+use crate::probing::arm::{
+    ArmBodies, ArmState, Capsule, Joints, LimitError, Limits, Link, largest_turn, millimetres,
+};
 use crate::probing::plan::{Slide, TouchPlan};
 
 /// Where the tool is, in free air.
@@ -21,7 +23,11 @@ pub(super) struct ToolState {
 
 impl ToolState {
     pub fn of(cell: &Cell, state: &ArmState) -> Self {
-        Self { place: cell.place(&state.pose_bt), rotation: state.pose_bt.rotation, joints: state.joints }
+        Self {
+            place: cell.place(&state.pose_bt),
+            rotation: state.pose_bt.rotation,
+            joints: state.joints,
+        }
     }
 }
 
@@ -62,17 +68,30 @@ impl FreeSpace<'_> {
     ///
     /// # Errors
     /// As [`Limits::check_pose`]; [`LimitError::Part`].
-    pub fn check(&self, rotation: &UnitQuaternion<f64>, at: &Point3<f64>, near: &Joints) -> Result<Joints, LimitError> {
-        let Cell { geometry, pose_ft, .. } = self.cell;
+    pub fn check(
+        &self,
+        rotation: &UnitQuaternion<f64>,
+        at: &Point3<f64>,
+        near: &Joints,
+    ) -> Result<Joints, LimitError> {
+        let Cell {
+            geometry, pose_ft, ..
+        } = self.cell;
         let pose_bt = self.cell.pose(rotation, at);
         let joints = self.limits.check_pose(geometry, pose_ft, &pose_bt, near)?;
         let bodies = ArmBodies::new(geometry, &joints, pose_ft);
         // the probe is to be at the part: where it is clear says `Clearance`
-        let mut links = bodies.links().filter(|(link, _)| !matches!(link, Link::Base | Link::Probe));
+        let mut links = bodies
+            .links()
+            .filter(|(link, _)| !matches!(link, Link::Base | Link::Probe));
         match links.find(|(_, capsule)| self.is_at_part(capsule)) {
             Some((link, _)) => {
                 let place_mm = millimetres(&pose_bt.translation.vector);
-                Err(LimitError::Part { place_mm, link: link.clone(), least_mm: PART_GAP * 1e3 })
+                Err(LimitError::Part {
+                    place_mm,
+                    link: link.clone(),
+                    least_mm: PART_GAP * 1e3,
+                })
             }
             None => Ok(joints),
         }
@@ -80,12 +99,16 @@ impl FreeSpace<'_> {
 
     /// Whether a link is nearer to the mesh than it may be: balls along its axis, a radius apart, that hide all of it.
     fn is_at_part(&self, capsule: &Capsule) -> bool {
-        let [from, to] = capsule.ends.map(|end| self.cell.pose_bo.inverse_transform_point(&end));
+        let [from, to] = capsule
+            .ends
+            .map(|end| self.cell.pose_bo.inverse_transform_point(&end));
         let reach = capsule.radius * 1.25f64.sqrt() + PART_GAP;
         let [low, high] = self.world.mesh().bounds();
-        let is_far = (0..3).any(|i| from[i].max(to[i]) < low[i] - reach || from[i].min(to[i]) > high[i] + reach);
+        let is_far = (0..3)
+            .any(|i| from[i].max(to[i]) < low[i] - reach || from[i].min(to[i]) > high[i] + reach);
         let count = ((to - from).norm() / capsule.radius).ceil() as usize;
-        let mut places = (0..=count).map(|at| from + (to - from) * (at as f64 / count.max(1) as f64));
+        let mut places =
+            (0..=count).map(|at| from + (to - from) * (at as f64 / count.max(1) as f64));
         !is_far && places.any(|place| self.world.closest_face(&place, reach).is_some())
     }
 
@@ -103,17 +126,29 @@ impl FreeSpace<'_> {
     ) -> Result<Joints, LimitError> {
         let count = ((to - from).norm() / WAY_STEP).ceil().max(1.0) as usize;
         (1..=count).try_fold(*near, |joints, step| {
-            self.step(rotation, &(from + (to - from) * (step as f64 / count as f64)), &joints)
+            self.step(
+                rotation,
+                &(from + (to - from) * (step as f64 / count as f64)),
+                &joints,
+            )
         })
     }
 
     /// One step of a way.
-    fn step(&self, rotation: &UnitQuaternion<f64>, to: &Point3<f64>, near: &Joints) -> Result<Joints, LimitError> {
+    fn step(
+        &self,
+        rotation: &UnitQuaternion<f64>,
+        to: &Point3<f64>,
+        near: &Joints,
+    ) -> Result<Joints, LimitError> {
         let joints = self.check(rotation, to, near)?;
         let turn = largest_turn(&joints, near);
         if turn > JUMP {
             let place_mm = millimetres(&self.cell.pose(rotation, to).translation.vector);
-            return Err(LimitError::Jump { place_mm, turn_deg: turn.to_degrees() });
+            return Err(LimitError::Jump {
+                place_mm,
+                turn_deg: turn.to_degrees(),
+            });
         }
         Ok(joints)
     }
@@ -131,10 +166,12 @@ impl FreeSpace<'_> {
         near: &Joints,
     ) -> Result<(), LimitError> {
         let TouchPlan { entry, from, .. } = planned;
-        let deepest = from + planned.direction.into_inner() * planned.search.min(self.limits.search);
+        let deepest =
+            from + planned.direction.into_inner() * planned.search.min(self.limits.search);
         let at_entry = self.check(rotation, entry, near)?;
         let begun = self.check_way(rotation, [entry, from], &at_entry)?;
-        self.check_way(rotation, [from, &deepest], &begun).map(|_| ())
+        self.check_way(rotation, [from, &deepest], &begun)
+            .map(|_| ())
     }
 
     /// Whether the arm may be everywhere on a slide, from above its beginning to above its end.
@@ -143,7 +180,12 @@ impl FreeSpace<'_> {
     ///
     /// # Errors
     /// As [`Self::check`]; [`LimitError::Jump`].
-    pub fn may_slide(&self, rotation: &UnitQuaternion<f64>, slide: &Slide, near: &Joints) -> Result<(), LimitError> {
+    pub fn may_slide(
+        &self,
+        rotation: &UnitQuaternion<f64>,
+        slide: &Slide,
+        near: &Joints,
+    ) -> Result<(), LimitError> {
         let last = slide.stations.len() - 1;
         let mut joints = self.check(rotation, &slide.above(0), near)?;
         joints = self.check_way(rotation, [&slide.above(0), &slide.lifted(0)], &joints)?;
@@ -152,32 +194,52 @@ impl FreeSpace<'_> {
                 joints = self.step(rotation, &place, &joints)?;
             }
         }
-        self.check_way(rotation, [&slide.lifted(last), &slide.above(last)], &joints).map(|_| ())
+        self.check_way(rotation, [&slide.lifted(last), &slide.above(last)], &joints)
+            .map(|_| ())
     }
 
     /// The path from where the tool is to a place at or above where a touch is entered from: first it turns, then it goes.
     ///
     /// # Errors
     /// [`Ending::OutOfLimits`], [`Ending::NoClearPath`].
-    pub fn route(&self, from: &ToolState, rotation: &UnitQuaternion<f64>, to: &Point3<f64>) -> Result<Route, Ending> {
+    pub fn route(
+        &self,
+        from: &ToolState,
+        rotation: &UnitQuaternion<f64>,
+        to: &Point3<f64>,
+    ) -> Result<Route, Ending> {
         let (cell, clear) = (self.cell, distance(self.world));
-        let mut route = Route { stops: Vec::new(), joints: from.joints };
+        let mut route = Route {
+            stops: Vec::new(),
+            joints: from.joints,
+        };
         let mut place = from.place;
         let turn = from.rotation.rotation_to(rotation);
         let angle = turn.angle();
         if let Some(axis) = turn.axis().filter(|_| angle > TURNS) {
-            let turned = |share: f64| UnitQuaternion::from_axis_angle(&axis, share * angle) * from.rotation;
+            let turned =
+                |share: f64| UnitQuaternion::from_axis_angle(&axis, share * angle) * from.rotation;
             let shaft = |share: f64| cell.shaft(&turned(share));
-            let upon = Clearance { tool: &cell.tool, shaft: shaft(0.0), distance: &clear };
+            let upon = Clearance {
+                tool: &cell.tool,
+                shaft: shaft(0.0),
+                distance: &clear,
+            };
             place = upon.turning_place(&from.place, angle, &shaft)?;
             route.joints = self.check_way(&from.rotation, [&from.place, &place], &route.joints)?;
             let steps = (angle / TURN_STEP).ceil().max(1.0);
             for step in 0..=steps as usize {
                 route.joints = self.step(&turned(step as f64 / steps), &place, &route.joints)?;
             }
-            route.stops.extend([(place, from.rotation), (place, *rotation)]);
+            route
+                .stops
+                .extend([(place, from.rotation), (place, *rotation)]);
         }
-        let clearance = Clearance { tool: &cell.tool, shaft: cell.shaft(rotation), distance: &clear };
+        let clearance = Clearance {
+            tool: &cell.tool,
+            shaft: cell.shaft(rotation),
+            distance: &clear,
+        };
         let entry = clearance.entry(to)?;
         for next in clearance.path(&place, &entry, highest(self.world.mesh(), &clearance.shaft))? {
             route.joints = self.check_way(rotation, [&place, &next], &route.joints)?;
@@ -201,14 +263,24 @@ mod tests {
 
     /// A UR5e whose base is the frame of the part, its probe down.
     fn cell() -> Cell {
-        let down = UnitQuaternion::from_axis_angle(&nalgebra::Vector3::x_axis(), std::f64::consts::PI);
+        let down =
+            UnitQuaternion::from_axis_angle(&nalgebra::Vector3::x_axis(), std::f64::consts::PI);
         let pose_ft = Isometry3::from_parts(nalgebra::Vector3::new(0.0, 0.0, 0.15).into(), down);
-        Cell { geometry: UrGeometry::UR5E.into(), pose_bo: Isometry3::identity(), pose_ft, tool: Tool::default() }
+        Cell {
+            geometry: UrGeometry::UR5E.into(),
+            pose_bo: Isometry3::identity(),
+            pose_ft,
+            tool: Tool::default(),
+        }
     }
 
     fn wide() -> Limits {
         let (lowest, highest) = (Point3::new(-1.0, -1.0, -1.0), Point3::new(1.0, 1.0, 1.0));
-        Limits { lowest, highest, ..Limits::default() }
+        Limits {
+            lowest,
+            highest,
+            ..Limits::default()
+        }
     }
 
     /// One square millimetre of a part, horizontal, with its middle there.
@@ -222,18 +294,29 @@ mod tests {
     const FAR: [f64; 3] = [0.0, 0.0, -0.9];
 
     fn joints_at(space: &FreeSpace<'_>, place: &Point3<f64>) -> Joints {
-        space.cell.at_rest(&space.cell.pose(&UnitQuaternion::identity(), place)).unwrap().joints
+        space
+            .cell
+            .at_rest(&space.cell.pose(&UnitQuaternion::identity(), place))
+            .unwrap()
+            .joints
     }
 
     /// Both ends are half a metre from the base, on either side of it; halfway the tip would be in it.
     #[test]
     fn a_straight_way_through_the_base_is_refused_though_both_its_ends_are_reached() {
-        let (cell, limits, world, upright) = (cell(), wide(), world(FAR), UnitQuaternion::identity());
-        let space = FreeSpace { cell: &cell, limits: &limits, world: &world };
+        let (cell, limits, world, upright) =
+            (cell(), wide(), world(FAR), UnitQuaternion::identity());
+        let space = FreeSpace {
+            cell: &cell,
+            limits: &limits,
+            world: &world,
+        };
         let [from, to] = [[-0.5, 0.05, 0.1], [0.5, 0.05, 0.1]].map(Point3::from);
         let joints = joints_at(&space, &from);
         assert!(space.check(&upright, &to, &joints).is_ok());
-        let refused = space.check_way(&upright, [&from, &to], &joints).unwrap_err();
+        let refused = space
+            .check_way(&upright, [&from, &to], &joints)
+            .unwrap_err();
         let is_on_the_way = matches!(
             refused,
             LimitError::Reach { .. }
@@ -244,7 +327,9 @@ mod tests {
         assert!(is_on_the_way, "{refused}");
         // beside the base the same ends can be reached one after the other
         let beside = Point3::new(-0.5, -0.4, 0.1);
-        let aside = space.check_way(&upright, [&from, &beside], &joints).unwrap();
+        let aside = space
+            .check_way(&upright, [&from, &beside], &joints)
+            .unwrap();
         assert!(largest_turn(&aside, &joints) < 2.0);
     }
 
@@ -253,31 +338,91 @@ mod tests {
         let (cell, limits, upright) = (cell(), wide(), UnitQuaternion::identity());
         let place = Point3::new(-0.4, -0.1, 0.1);
         let free = world(FAR);
-        let joints = joints_at(&FreeSpace { cell: &cell, limits: &limits, world: &free }, &place);
-        let elbow = ArmBodies::new(&cell.geometry, &joints, &cell.pose_ft).links().nth(2).unwrap().1.ends[0];
+        let joints = joints_at(
+            &FreeSpace {
+                cell: &cell,
+                limits: &limits,
+                world: &free,
+            },
+            &place,
+        );
+        let elbow = ArmBodies::new(&cell.geometry, &joints, &cell.pose_ft)
+            .links()
+            .nth(2)
+            .unwrap()
+            .1
+            .ends[0];
         // a corner of the part 50 mm above the axis of the forearm at its elbow: inside of its radius of 58 mm
         let at_elbow = world([elbow.x, elbow.y, elbow.z + 50e-3]);
-        let space = FreeSpace { cell: &cell, limits: &limits, world: &at_elbow };
+        let space = FreeSpace {
+            cell: &cell,
+            limits: &limits,
+            world: &at_elbow,
+        };
         let refused = space.check(&upright, &place, &joints).unwrap_err();
-        assert!(matches!(refused, LimitError::Part { link: Link::Forearm | Link::UpperArm, .. }), "{refused}");
+        assert!(
+            matches!(
+                refused,
+                LimitError::Part {
+                    link: Link::Forearm | Link::UpperArm,
+                    ..
+                }
+            ),
+            "{refused}"
+        );
         // the elbow is the highest place; its radius sticks out of a box that ends at its axis
-        let boxed = Limits { arm_highest: Some(Point3::new(1.0, 1.0, elbow.z)), ..wide() };
-        let space = FreeSpace { cell: &cell, limits: &boxed, world: &free };
+        let boxed = Limits {
+            arm_highest: Some(Point3::new(1.0, 1.0, elbow.z)),
+            ..wide()
+        };
+        let space = FreeSpace {
+            cell: &cell,
+            limits: &boxed,
+            world: &free,
+        };
         let refused = space.check(&upright, &place, &joints).unwrap_err();
-        assert!(matches!(refused, LimitError::ArmBox { by_mm, .. } if by_mm > 50.0), "{refused}");
-        let roomy = Limits { arm_highest: Some(Point3::new(1.0, 1.0, elbow.z + 0.2)), ..wide() };
-        assert!(FreeSpace { limits: &roomy, ..space }.check(&upright, &place, &joints).is_ok());
+        assert!(
+            matches!(refused, LimitError::ArmBox { by_mm, .. } if by_mm > 50.0),
+            "{refused}"
+        );
+        let roomy = Limits {
+            arm_highest: Some(Point3::new(1.0, 1.0, elbow.z + 0.2)),
+            ..wide()
+        };
+        assert!(
+            FreeSpace {
+                limits: &roomy,
+                ..space
+            }
+            .check(&upright, &place, &joints)
+            .is_ok()
+        );
     }
 
     /// Where a joint has made a turn it does not go back by it.
     #[test]
     fn joints_stay_on_the_turn_that_they_have_made() {
-        let (cell, limits, world, upright) = (cell(), wide(), world(FAR), UnitQuaternion::identity());
-        let space = FreeSpace { cell: &cell, limits: &limits, world: &world };
+        let (cell, limits, world, upright) =
+            (cell(), wide(), world(FAR), UnitQuaternion::identity());
+        let space = FreeSpace {
+            cell: &cell,
+            limits: &limits,
+            world: &world,
+        };
         let place = Point3::new(-0.4, -0.1, 0.1);
         let mut joints = joints_at(&space, &place);
-        joints[5] += if joints[5] > 0.0 { -std::f64::consts::TAU } else { std::f64::consts::TAU };
-        let next = space.check(&upright, &(place + nalgebra::Vector3::new(5e-3, 0.0, 0.0)), &joints).unwrap();
+        joints[5] += if joints[5] > 0.0 {
+            -std::f64::consts::TAU
+        } else {
+            std::f64::consts::TAU
+        };
+        let next = space
+            .check(
+                &upright,
+                &(place + nalgebra::Vector3::new(5e-3, 0.0, 0.0)),
+                &joints,
+            )
+            .unwrap();
         assert!(largest_turn(&next, &joints) < 0.1, "{joints:?} {next:?}");
     }
 

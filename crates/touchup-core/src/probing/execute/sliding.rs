@@ -14,8 +14,16 @@ impl FeatureProbing<'_, '_> {
     /// Slides along each path in turn, as long as there is time. What cannot be slid over is recorded with its reason.
     pub fn slide_over(&mut self, slides: Vec<Slide>) -> Result<(), Ending> {
         for slide in slides {
-            let held_back = |why: String| ProbedSlide { slide: slide.clone(), record: None, refused: Some(why) };
-            let slid = if self.is_spent() { Ok(held_back("the time is spent".to_owned())) } else { self.slide(&slide) };
+            let held_back = |why: String| ProbedSlide {
+                slide: slide.clone(),
+                record: None,
+                refused: Some(why),
+            };
+            let slid = if self.is_spent() {
+                Ok(held_back("the time is spent".to_owned()))
+            } else {
+                self.slide(&slide)
+            };
             self.slides.push(match slid {
                 Ok(probed) => probed,
                 Err(ending) if ending.is_of_one() => held_back(ending.why()),
@@ -27,7 +35,9 @@ impl FeatureProbing<'_, '_> {
 
     fn slide(&mut self, slide: &Slide) -> Result<ProbedSlide, Ending> {
         let Prober { cell, params, .. } = *self.prober;
-        self.prober.space().may_slide(&self.rotation, slide, &self.out.joints)?;
+        self.prober
+            .space()
+            .may_slide(&self.rotation, slide, &self.out.joints)?;
         // after the touches
         self.is_zeroed = true;
         self.reach(&slide.above(0))?;
@@ -49,7 +59,11 @@ impl FeatureProbing<'_, '_> {
         if let Some(station) = reached {
             self.leave_from(slide, station);
         }
-        Ok(ProbedSlide { slide: slide.clone(), record: Some(slid?), refused: None })
+        Ok(ProbedSlide {
+            slide: slide.clone(),
+            record: Some(slid?),
+            refused: None,
+        })
     }
 
     /// The retraction is straight up from where the slide ended.
@@ -59,7 +73,14 @@ impl FeatureProbing<'_, '_> {
         let space = self.prober.space();
         // where nothing says that it is clear there, it goes back to where it came from
         let (tool, shaft) = (&space.cell.tool, space.cell.shaft(&self.rotation));
-        let Ok(place) = Clearance { tool, shaft, distance: &distance(space.world) }.entry(&above) else { return };
+        let Ok(place) = Clearance {
+            tool,
+            shaft,
+            distance: &distance(space.world),
+        }
+        .entry(&above) else {
+            return;
+        };
         if let Ok(joints) = space.check(&self.rotation, &place, &self.out.joints) {
             (self.out.place, self.out.joints) = (place, joints);
         }

@@ -57,11 +57,17 @@ impl Prober<'_> {
     /// [`SpotError`]; the arm is stopped then, and has retracted wherever it was still allowed to move.
     pub fn touch_sphere(&mut self, sphere: &ReferenceSphere) -> Result<SphereTouches, SpotError> {
         let home = ToolState::of(self.cell, &self.in_free_air(self.params.limits.tare)?);
-        let mut touched = SphereTouches { orientations: Vec::new(), not_reached: Vec::new() };
+        let mut touched = SphereTouches {
+            orientations: Vec::new(),
+            not_reached: Vec::new(),
+        };
         let mut made = 0;
         for orientation in rings(RINGS) {
             match self.touch_oriented(sphere, &leaned(&home.rotation, &orientation), &mut made)? {
-                Ok(centres) => touched.orientations.push(SphereOrientation { orientation, centres }),
+                Ok(centres) => touched.orientations.push(SphereOrientation {
+                    orientation,
+                    centres,
+                }),
                 Err(why) => touched.not_reached.push(NotReached { orientation, why }),
             }
         }
@@ -81,41 +87,69 @@ impl Prober<'_> {
         rotation: &UnitQuaternion<f64>,
         made: &mut usize,
     ) -> Result<Result<Vec<Point3<f64>>, String>, SpotError> {
-        let planned = touches(sphere, self.params.pattern.ball_radius, &self.cell.shaft(rotation));
+        let planned = touches(
+            sphere,
+            self.params.pattern.ball_radius,
+            &self.cell.shaft(rotation),
+        );
         // its time is that of a feature
         let state = self.in_free_air(self.params.limits.tare)?;
         let mut probing = FeatureProbing::new(self, 0, *rotation, &state);
         let (mut centres, mut left_out) = (Vec::new(), None);
-        let touched = planned.iter().try_for_each(|planned| match probing.touch_spot(planned, *made + 1) {
-            Ok((_, centre)) => {
-                *made += 1;
-                centres.push(centre);
-                Ok(())
-            }
-            Err(SpotError::Ended(ending @ (Ending::OutOfLimits(_) | Ending::NoClearPath(_)))) => {
-                left_out.get_or_insert(ending.why());
-                Ok(())
-            }
-            Err(error) => Err(error),
-        });
+        let touched =
+            planned
+                .iter()
+                .try_for_each(|planned| match probing.touch_spot(planned, *made + 1) {
+                    Ok((_, centre)) => {
+                        *made += 1;
+                        centres.push(centre);
+                        Ok(())
+                    }
+                    Err(SpotError::Ended(
+                        ending @ (Ending::OutOfLimits(_) | Ending::NoClearPath(_)),
+                    )) => {
+                        left_out.get_or_insert(ending.why());
+                        Ok(())
+                    }
+                    Err(error) => Err(error),
+                });
         probing.finish_spot(touched)?;
-        Ok(if centres.len() >= FEWEST { Ok(centres) } else { Err(left_out.unwrap_or_default()) })
+        Ok(if centres.len() >= FEWEST {
+            Ok(centres)
+        } else {
+            Err(left_out.unwrap_or_default())
+        })
     }
 }
 
 /// A pole and a ring around it.
-fn touches(sphere: &ReferenceSphere, ball_radius: f64, shaft: &Unit<Vector3<f64>>) -> Vec<TouchPlan> {
+fn touches(
+    sphere: &ReferenceSphere,
+    ball_radius: f64,
+    shaft: &Unit<Vector3<f64>>,
+) -> Vec<TouchPlan> {
     let [u, v] = tangent_basis(shaft);
     let around = (0..AROUND).map(|at| std::f64::consts::TAU * at as f64 / AROUND as f64);
-    let ring =
-        around.map(|towards| (u * towards.cos() + v * towards.sin()) * POLAR.sin() + shaft.as_ref() * POLAR.cos());
+    let ring = around.map(|towards| {
+        (u * towards.cos() + v * towards.sin()) * POLAR.sin() + shaft.as_ref() * POLAR.cos()
+    });
     let touch = |out: Vector3<f64>| {
         let from = sphere.centre + out * (sphere.radius + ball_radius + STANDOFF);
         let entry = from + shaft.into_inner() * ABOVE;
         let direction = Unit::new_normalize(-out);
-        TouchPlan { entry, from, direction, search: 2.0 * STANDOFF, expected: None }
+        TouchPlan {
+            entry,
+            from,
+            direction,
+            search: 2.0 * STANDOFF,
+            expected: None,
+        }
     };
-    [shaft.into_inner()].into_iter().chain(ring).map(touch).collect()
+    [shaft.into_inner()]
+        .into_iter()
+        .chain(ring)
+        .map(touch)
+        .collect()
 }
 
 #[cfg(test)]
@@ -125,9 +159,17 @@ mod tests {
     /// Neither the shaft behind the ball nor the way in comes nearer to the sphere than the ball, and none of the touches is below the equator.
     #[test]
     fn the_shaft_leads_away_from_the_sphere_and_its_post_is_left_alone() {
-        let (sphere, ball) = (ReferenceSphere { centre: Point3::new(0.1, 0.0, 0.05), radius: 12.5e-3 }, 1.5e-3);
+        let (sphere, ball) = (
+            ReferenceSphere {
+                centre: Point3::new(0.1, 0.0, 0.05),
+                radius: 12.5e-3,
+            },
+            1.5e-3,
+        );
         for orientation in rings(RINGS) {
-            let shaft = Unit::new_normalize(leaned(&UnitQuaternion::identity(), &orientation) * Vector3::z());
+            let shaft = Unit::new_normalize(
+                leaned(&UnitQuaternion::identity(), &orientation) * Vector3::z(),
+            );
             let planned = touches(&sphere, ball, &shaft);
             assert_eq!(planned.len(), 7);
             for touch in planned {

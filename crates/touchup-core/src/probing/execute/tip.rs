@@ -40,24 +40,50 @@ impl Prober<'_> {
         self.at_spot(spot, |probing, place, normal| {
             let Prober { cell, params, .. } = *probing.prober;
             let normal_b = Unit::new_normalize(cell.pose_bo.rotation * normal.into_inner());
-            let mut measured = TipPoses { poses_bf: Vec::new(), normal_b, not_reached: Vec::new() };
+            let mut measured = TipPoses {
+                poses_bf: Vec::new(),
+                normal_b,
+                not_reached: Vec::new(),
+            };
             let [u, v] = tangent_basis(&normal).map(|across| across * ASIDE);
-            let around = [u, v, -u, -v].map(|aside| (Orientation { lean: 0.0, towards: 0.0 }, aside));
+            let around = [u, v, -u, -v].map(|aside| {
+                (
+                    Orientation {
+                        lean: 0.0,
+                        towards: 0.0,
+                    },
+                    aside,
+                )
+            });
             let leaning = rings(RINGS).map(|orientation| (orientation, Vector3::zeros()));
             let upright = probing.rotation;
             for (orientation, aside) in around.into_iter().chain(leaning) {
                 probing.rotation = leaned(&upright, &orientation);
-                let from = place + normal.into_inner() * (params.pattern.ball_radius + STANDOFF) + aside;
+                let from =
+                    place + normal.into_inner() * (params.pattern.ball_radius + STANDOFF) + aside;
                 let entry = from + normal.into_inner() * ABOVE;
-                let planned = TouchPlan { entry, from, direction: -normal, search: 2.0 * STANDOFF, expected: None };
+                let planned = TouchPlan {
+                    entry,
+                    from,
+                    direction: -normal,
+                    search: 2.0 * STANDOFF,
+                    expected: None,
+                };
                 match probing.touch_spot(&planned, measured.poses_bf.len() + 1) {
                     Ok((_, centre)) => {
                         let tip = cell.pose(&probing.rotation, &centre);
                         let rotation = tip.rotation * cell.pose_ft.rotation.inverse();
-                        measured.poses_bf.push(Isometry3::from_parts(tip.translation, rotation));
+                        measured
+                            .poses_bf
+                            .push(Isometry3::from_parts(tip.translation, rotation));
                     }
-                    Err(SpotError::Ended(ending @ (Ending::OutOfLimits(_) | Ending::NoClearPath(_)))) => {
-                        measured.not_reached.push(NotReached { orientation, why: ending.why() });
+                    Err(SpotError::Ended(
+                        ending @ (Ending::OutOfLimits(_) | Ending::NoClearPath(_)),
+                    )) => {
+                        measured.not_reached.push(NotReached {
+                            orientation,
+                            why: ending.why(),
+                        });
                     }
                     Err(error) => return Err(error),
                 }

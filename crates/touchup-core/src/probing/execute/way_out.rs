@@ -33,11 +33,17 @@ impl WayOut {
 
     /// The places that the ball's centre goes through, the last in free air; m in O.
     pub(super) fn places(&self) -> impl Iterator<Item = Point3<f64>> {
-        [self.from, self.entry, Some(self.out.place)].into_iter().flatten()
+        [self.from, self.entry, Some(self.out.place)]
+            .into_iter()
+            .flatten()
     }
 
     /// The arm at its end.
     pub(super) fn end(&self, cell: &Cell, now: &ArmState) -> ArmState {
-        ArmState { pose_bt: cell.pose(&self.out.rotation, &self.out.place), joints: self.out.joints, ..*now }
+        ArmState {
+            pose_bt: cell.pose(&self.out.rotation, &self.out.place),
+            joints: self.out.joints,
+            ..*now
+        }
     }
 }

@@ -71,7 +71,10 @@ pub struct StaticWorld {
 impl StaticWorld {
     /// - `mesh`: in O.
     pub fn new(mesh: TriMesh) -> Self {
-        Self { tree: FaceTree::new(&mesh), mesh }
+        Self {
+            tree: FaceTree::new(&mesh),
+            mesh,
+        }
     }
 }
 
@@ -100,22 +103,36 @@ const ALIKE: f64 = 0.7;
 
 /// Distance of a place from the mesh, m; at most the reach.
 pub(super) fn distance(world: &dyn World) -> impl Fn(&Point3<f64>, f64) -> f64 {
-    |place, reach| world.closest_face(place, reach).map_or(reach, |hit| (place - hit.point).norm())
+    |place, reach| {
+        world
+            .closest_face(place, reach)
+            .map_or(reach, |hit| (place - hit.point).norm())
+    }
 }
 
 /// Outward normal of the surface around a flag: the mean of the faces there that face the handle of the probe, weighted by
 /// their area; where there are none, the shaft.
-pub(super) fn normal_about(world: &dyn World, flag: &Point3<f64>, shaft: &Unit<Vector3<f64>>) -> Unit<Vector3<f64>> {
+pub(super) fn normal_about(
+    world: &dyn World,
+    flag: &Point3<f64>,
+    shaft: &Unit<Vector3<f64>>,
+) -> Unit<Vector3<f64>> {
     let mesh = world.mesh();
-    let near = mesh.faces().filter(|(face, _)| (mesh.barycentre(*face) - flag).norm() < AROUND);
+    let near = mesh
+        .faces()
+        .filter(|(face, _)| (mesh.barycentre(*face) - flag).norm() < AROUND);
     let areas = near.map(|(face, _)| mesh.double_area_normal(face));
-    let sum: Vector3<f64> = areas.filter(|area| area.dot(shaft) > ALIKE * area.norm()).sum();
+    let sum: Vector3<f64> = areas
+        .filter(|area| area.dot(shaft) > ALIKE * area.norm())
+        .sum();
     Unit::try_new(sum, 0.0).unwrap_or(*shaft)
 }
 
 /// The flag on the mesh: the place below or above it along a direction, where there is one.
 pub(super) fn on_mesh(world: &dyn World, flag: &Point3<f64>) -> Point3<f64> {
-    world.closest_face(flag, NEAR).map_or(*flag, |hit| hit.point)
+    world
+        .closest_face(flag, NEAR)
+        .map_or(*flag, |hit| hit.point)
 }
 
 /// The highest place of the mesh along a direction, m from the origin of O.

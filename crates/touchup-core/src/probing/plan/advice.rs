@@ -47,7 +47,10 @@ pub fn advise_next_touch(feature: &Feature, touches: &[ProbedPoint]) -> Option<N
         Walls::Slot(walls) => {
             let turned = place.each(&[Freedom::Turn], 2.0 * ENOUGH / walls.length);
             let asked = turned.each(&[Freedom::Second, Freedom::Size], ENOUGH);
-            let (radius, half) = (walls.width / 2.0, (walls.length - walls.width).max(0.0) / 2.0);
+            let (radius, half) = (
+                walls.width / 2.0,
+                (walls.length - walls.width).max(0.0) / 2.0,
+            );
             let out = |(middle, angle): (f64, f64)| {
                 let out = Vector3::new(angle.cos(), angle.sin(), 0.0);
                 (Vector3::new(middle, 0.0, 0.0) + out * radius, out)
@@ -74,7 +77,10 @@ fn best<M: Surface>(
         Kind::Boss => (*axis, 1.0),
         _ => (-axis, -1.0),
     };
-    let depth = feature.depth.as_ref().map_or(UNKNOWN_DEPTH * radius, |depth| depth.value);
+    let depth = feature
+        .depth
+        .as_ref()
+        .map_or(UNKNOWN_DEPTH * radius, |depth| depth.value);
     // the frame of the walls is somewhere on their axis
     let on_axis = Point3::from(pose_of.translation.vector);
     let opening = on_axis + axis * axis.dot(&(feature.centre.value - on_axis));
@@ -82,23 +88,42 @@ fn best<M: Surface>(
         place: opening + pose_of.rotation * place + up * (share * depth),
         normal: pose_of.rotation * out * sign,
     };
-    let all: Vec<NextTouch> = DOWN.iter().flat_map(|share| places.iter().map(move |place| at(*share, place))).collect();
-    let candidate = |next: &NextTouch| Candidate { point: next.place, sigma: PLACE_SIGMA };
+    let all: Vec<NextTouch> = DOWN
+        .iter()
+        .flat_map(|share| places.iter().map(move |place| at(*share, place)))
+        .collect();
+    let candidate = |next: &NextTouch| Candidate {
+        point: next.place,
+        sigma: PLACE_SIGMA,
+    };
     let mut is_touched = vec![false; all.len()];
     for number in feature.touch_numbers() {
-        let Some(touch) = touches.get(number as usize) else { continue };
+        let Some(touch) = touches.get(number as usize) else {
+            continue;
+        };
         let far = |next: &NextTouch| (next.place - touch.point).norm_squared();
         let nearest = (0..all.len()).min_by(|&a, &b| far(&all[a]).total_cmp(&far(&all[b])))?;
         is_touched[nearest] = true;
     }
     let before = Knowledge::before::<M>(radius, SQUARE);
-    let made = all.iter().zip(&is_touched).filter(|(_, is_touched)| **is_touched);
-    let known = made.fold(before, |known, (next, _)| known.with(surface, &candidate(next)));
+    let made = all
+        .iter()
+        .zip(&is_touched)
+        .filter(|(_, is_touched)| **is_touched);
+    let known = made.fold(before, |known, (next, _)| {
+        known.with(surface, &candidate(next))
+    });
     if known.worst(asked) <= 1.0 {
         return None;
     }
-    let open = all.iter().zip(&is_touched).filter(|(_, is_touched)| !**is_touched).map(|(next, _)| *next);
-    known.best(surface, open, candidate, asked).map(|(best, _)| best)
+    let open = all
+        .iter()
+        .zip(&is_touched)
+        .filter(|(_, is_touched)| !**is_touched)
+        .map(|(next, _)| *next);
+    known
+        .best(surface, open, candidate, asked)
+        .map(|(best, _)| best)
 }
 
 #[cfg(test)]
@@ -137,14 +162,20 @@ mod tests {
         let numbers = (0..touches.len() as u32).collect();
         let feature = Feature {
             kind: Kind::Hole,
-            axis: Some(Measured { value: Vector3::z(), ..Measured::default() }),
+            axis: Some(Measured {
+                value: Vector3::z(),
+                ..Measured::default()
+            }),
             diameter: Some(Measured {
                 value: 2.0 * wall.radius,
                 std: Some(1e-5),
                 touches: numbers,
                 ..Measured::default()
             }),
-            depth: Some(Measured { value: 10e-3, ..Measured::default() }),
+            depth: Some(Measured {
+                value: 10e-3,
+                ..Measured::default()
+            }),
             walls: Some(Walls::Round(wall)),
             ..Feature::default()
         };
@@ -153,24 +184,35 @@ mod tests {
 
     #[test]
     fn a_hole_touched_on_one_side_is_to_be_touched_on_the_other() {
-        let touched: Vec<_> =
-            (0..7).flat_map(|at| DOWN.map(|d| (f64::from(at) / 6.0 * PI - PI / 2.0, d * 10e-3))).collect();
+        let touched: Vec<_> = (0..7)
+            .flat_map(|at| DOWN.map(|d| (f64::from(at) / 6.0 * PI - PI / 2.0, d * 10e-3)))
+            .collect();
         let (feature, touches) = hole(&touched);
         let next = advise_next_touch(&feature, &touches).unwrap();
         // touched where x is above 0
-        assert!(next.place.x < -3e-3 && (next.place.xy().coords.norm() - 4e-3).abs() < 1e-9, "{next:?}");
-        assert!(next.normal.x > 0.7 && next.place.z < 0.0 && next.place.z > -10e-3, "{next:?}");
+        assert!(
+            next.place.x < -3e-3 && (next.place.xy().coords.norm() - 4e-3).abs() < 1e-9,
+            "{next:?}"
+        );
+        assert!(
+            next.normal.x > 0.7 && next.place.z < 0.0 && next.place.z > -10e-3,
+            "{next:?}"
+        );
     }
 
     #[test]
     fn nothing_is_asked_of_a_hole_touched_all_around_and_the_first_touch_is_on_its_wall() {
-        let touched: Vec<_> =
-            (0..AROUND).flat_map(|at| DOWN.map(|d| (at as f64 / AROUND as f64 * TAU, d * 10e-3))).collect();
+        let touched: Vec<_> = (0..AROUND)
+            .flat_map(|at| DOWN.map(|d| (at as f64 / AROUND as f64 * TAU, d * 10e-3)))
+            .collect();
         let (feature, touches) = hole(&touched);
         assert_eq!(advise_next_touch(&feature, &touches), None);
         let (feature, touches) = hole(&[]);
         let next = advise_next_touch(&feature, &touches).unwrap();
-        assert!((next.place.xy().coords.norm() - 4e-3).abs() < 1e-9 && next.normal.dot(&next.place.coords) < 0.0);
+        assert!(
+            (next.place.xy().coords.norm() - 4e-3).abs() < 1e-9
+                && next.normal.dot(&next.place.coords) < 0.0
+        );
     }
 
     /// Following the advice measures the hole in few places, none of them twice.
@@ -185,7 +227,9 @@ mod tests {
                 break;
             };
             let place = (next.place.y.atan2(next.place.x), -next.place.z);
-            let is_new = |(angle, depth): &(f64, f64)| (angle - place.0).abs() > 1e-6 || (depth - place.1).abs() > 1e-6;
+            let is_new = |(angle, depth): &(f64, f64)| {
+                (angle - place.0).abs() > 1e-6 || (depth - place.1).abs() > 1e-6
+            };
             assert!(touched.iter().all(is_new), "{place:?} again");
             touched.push(place);
         }

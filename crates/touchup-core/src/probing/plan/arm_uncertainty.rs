@@ -65,7 +65,9 @@ impl ArmUncertainty {
     pub(super) fn widened(&self, mut feature: Feature) -> Feature {
         let (radius, shift) = (self.radius, self.shift(&feature.centre.value));
         if let Some(axis) = feature.axis.as_ref().map(|axis| axis.value) {
-            let across = (shift.trace() - along(&shift, &axis).powi(2)).max(0.0).sqrt();
+            let across = (shift.trace() - along(&shift, &axis).powi(2))
+                .max(0.0)
+                .sqrt();
             let place = match feature.kind {
                 Kind::Plane => along(&shift, &axis).hypot(radius),
                 // perpendicular faces; both move outward with the radius
@@ -75,11 +77,23 @@ impl ArmUncertainty {
             widen(&mut feature.centre, place);
         }
         // about each of two axes across it
-        feature.axis.iter_mut().for_each(|axis| widen(axis, std::f64::consts::SQRT_2 * self.turn));
-        feature.diameter.iter_mut().for_each(|size| widen(size, 2.0 * radius));
-        feature.width.iter_mut().for_each(|size| widen(size, 2.0 * radius));
+        feature
+            .axis
+            .iter_mut()
+            .for_each(|axis| widen(axis, std::f64::consts::SQRT_2 * self.turn));
+        feature
+            .diameter
+            .iter_mut()
+            .for_each(|size| widen(size, 2.0 * radius));
+        feature
+            .width
+            .iter_mut()
+            .for_each(|size| widen(size, 2.0 * radius));
         if feature.kind == Kind::Slot {
-            feature.length.iter_mut().for_each(|size| widen(size, 2.0 * radius));
+            feature
+                .length
+                .iter_mut()
+                .for_each(|size| widen(size, 2.0 * radius));
         }
         feature
     }
@@ -103,8 +117,20 @@ mod tests {
     /// does not count; about x nothing.
     #[test]
     fn shared_parts_are_those_reckoned_by_hand() {
-        let known = ArmUncertainty { radius: 50e-6, place: 0.2e-3, turn: 4e-3, ..ArmUncertainty::default() };
-        let number = |std| Some(Measured { value: 8e-3, std: Some(std), touches: Vec::new(), ..Measured::default() });
+        let known = ArmUncertainty {
+            radius: 50e-6,
+            place: 0.2e-3,
+            turn: 4e-3,
+            ..ArmUncertainty::default()
+        };
+        let number = |std| {
+            Some(Measured {
+                value: 8e-3,
+                std: Some(std),
+                touches: Vec::new(),
+                ..Measured::default()
+            })
+        };
         let hole = Feature {
             kind: Kind::Hole,
             centre: Measured {
@@ -113,16 +139,29 @@ mod tests {
                 touches: Vec::new(),
                 ..Measured::default()
             },
-            axis: Some(Measured { value: Vector3::z(), std: Some(1e-3), touches: Vec::new(), ..Measured::default() }),
+            axis: Some(Measured {
+                value: Vector3::z(),
+                std: Some(1e-3),
+                touches: Vec::new(),
+                ..Measured::default()
+            }),
             diameter: number(20e-6),
             depth: number(7e-6),
             ..Feature::default()
         };
         let wide = known.widened(hole);
-        let near = |value: Option<f64>, square: f64| (value.unwrap().powi(2) - square).abs() < 1e-9 * square;
-        assert!(near(wide.centre.std, 10e-6f64.powi(2) + 2.0 * 0.2e-3f64.powi(2) + 0.12e-3f64.powi(2)));
+        let near = |value: Option<f64>, square: f64| {
+            (value.unwrap().powi(2) - square).abs() < 1e-9 * square
+        };
+        assert!(near(
+            wide.centre.std,
+            10e-6f64.powi(2) + 2.0 * 0.2e-3f64.powi(2) + 0.12e-3f64.powi(2)
+        ));
         assert!(near(wide.axis.unwrap().std, 1e-6 + 2.0 * 16e-6));
-        assert!(near(wide.diameter.unwrap().std, 20e-6f64.powi(2) + 100e-6f64.powi(2)));
+        assert!(near(
+            wide.diameter.unwrap().std,
+            20e-6f64.powi(2) + 100e-6f64.powi(2)
+        ));
         assert_eq!(wide.depth.unwrap().std, Some(7e-6));
     }
 }

@@ -53,8 +53,15 @@ pub(super) struct BossPattern {
 
 impl BossPattern {
     pub fn new() -> Self {
-        let wall = RoundWall { is_boss: true, ..RoundWall::default() };
-        Self { wall, ground_z: f64::NEG_INFINITY, ..Self::default() }
+        let wall = RoundWall {
+            is_boss: true,
+            ..RoundWall::default()
+        };
+        Self {
+            wall,
+            ground_z: f64::NEG_INFINITY,
+            ..Self::default()
+        }
     }
 
     /// How far below the top the wall is touched: between the edge of the top and the ground, m; at the highest and the deepest.
@@ -73,9 +80,14 @@ impl BossPattern {
         context.level(&mut top, true, &mut []);
         let places: Vec<_> = top.iter().map(|o| context.in_f(&o.point)).collect();
         if top.len() < 3 {
-            context.height = places.iter().map(|p| context.below(p)).fold(f64::NEG_INFINITY, f64::max);
+            context.height = places
+                .iter()
+                .map(|p| context.below(p))
+                .fold(f64::NEG_INFINITY, f64::max);
         }
-        let high = places.iter().filter(|p| (context.below(p) - context.height).abs() < FLAT);
+        let high = places
+            .iter()
+            .filter(|p| (context.below(p) - context.height).abs() < FLAT);
         self.wall.middle = mean(high.map(|place| Vector3::new(place.x, place.y, 0.0))).into();
         self.seen = top;
         self.phase = BossPhase::Out(context.params.flag_radius + context.params.ball_radius);
@@ -96,13 +108,16 @@ impl BossPattern {
     fn take_in(&mut self, context: &SearchContext, touch: &Touched, distance: f64) {
         let before = self.wall.measuring.observations.len();
         self.wall.measuring.take(touch);
-        if self.wall.measuring.observations.len() == before && touch.result == TouchResult::Unclear {
+        if self.wall.measuring.observations.len() == before && touch.result == TouchResult::Unclear
+        {
             // another surface was hit
             self.phase = BossPhase::Out(distance * FARTHER);
             return;
         }
         self.direction += 1;
-        let reached = touch.place.map_or(distance, |place| (place - self.wall.middle).xy().norm());
+        let reached = touch
+            .place
+            .map_or(distance, |place| (place - self.wall.middle).xy().norm());
         if self.wall.measuring.observations.len() < FIRST {
             self.phase = BossPhase::Out(reached + context.params.clearance);
         } else {
@@ -117,14 +132,23 @@ impl Stage for BossPattern {
         let (ball, clearance) = (context.params.ball_radius, context.params.clearance);
         let (middle, outward) = (self.wall.middle, RoundWall::first_direction(self.direction));
         Ok(Some(match self.phase {
-            BossPhase::Top => context.ring(self.around, context.params.flag_radius, clearance + DEEPEST * ball + ROUGH),
+            BossPhase::Top => context.ring(
+                self.around,
+                context.params.flag_radius,
+                clearance + DEEPEST * ball + ROUGH,
+            ),
             BossPhase::Out(distance) if distance > LARGEST || self.direction >= MOST_FIRST => {
                 return Err(self.wall.missing(self.direction + 1, LARGEST));
             }
-            BossPhase::Out(distance) => context.down(&(middle + outward * distance), clearance + DEEPEST * ball),
-            BossPhase::In(distance) => {
-                context.sideways(&(middle + outward * distance), self.depths(context)?[1], &-outward, distance)
+            BossPhase::Out(distance) => {
+                context.down(&(middle + outward * distance), clearance + DEEPEST * ball)
             }
+            BossPhase::In(distance) => context.sideways(
+                &(middle + outward * distance),
+                self.depths(context)?[1],
+                &-outward,
+                distance,
+            ),
             BossPhase::Ground => {
                 let away = self.wall.radius(context) + 2.0 * BESIDE * ball;
                 let place = context.around(self.around, 0.5, &middle, away);
@@ -140,8 +164,9 @@ impl Stage for BossPattern {
             BossPhase::Out(distance) => self.take_out(context, touch, distance),
             BossPhase::In(distance) => self.take_in(context, touch, distance),
             BossPhase::Ground => {
-                let is_ground =
-                    touch.place.is_some_and(|p| (context.below(&p) - self.ground_z).abs() < context.params.ball_radius);
+                let is_ground = touch.place.is_some_and(|p| {
+                    (context.below(&p) - self.ground_z).abs() < context.params.ball_radius
+                });
                 self.ground.extend(touch.observation.filter(|_| is_ground));
                 self.around += 1;
                 if self.around >= AROUND {
@@ -154,12 +179,17 @@ impl Stage for BossPattern {
 
     fn feature(&self, context: &SearchContext) -> Result<Option<Feature>, ExploreError> {
         if self.ground.len() < 3 || self.wall.measuring.observations.len() < FIRST {
-            return Err(ExploreError::NotDone { touches: context.touches });
+            return Err(ExploreError::NotDone {
+                touches: context.touches,
+            });
         }
         let foot = surface_about(context, &self.wall.middle, &self.ground)?;
         let wall = self.wall.fitted(context, &foot)?;
         let height = |o: &Observation| context.in_f(&o.point).z;
-        let highest = self.seen.iter().max_by(|a, b| height(a).total_cmp(&height(b)));
+        let highest = self
+            .seen
+            .iter()
+            .max_by(|a, b| height(a).total_cmp(&height(b)));
         let top = highest.map(|contact| context.end(contact));
         let touches = numbers([&self.wall.measuring.observations, &self.ground]);
         Ok(Some(Feature::round(&wall, &foot, top.as_ref(), touches)))
@@ -170,8 +200,14 @@ impl Stage for BossPattern {
     }
 
     fn slides(&self, context: &SearchContext) -> Vec<Slide> {
-        let Ok(depths) = self.depths(context) else { return Vec::new() };
-        let back = context.params.ball_radius.min(HALF * self.wall.radius(context));
-        self.wall.slides(context, back, depths, context.params.clearance)
+        let Ok(depths) = self.depths(context) else {
+            return Vec::new();
+        };
+        let back = context
+            .params
+            .ball_radius
+            .min(HALF * self.wall.radius(context));
+        self.wall
+            .slides(context, back, depths, context.params.clearance)
     }
 }

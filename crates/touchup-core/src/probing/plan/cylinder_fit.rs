@@ -10,7 +10,9 @@ use super::measuring::{Measuring, Possible, Wanted};
 use super::pattern::Touched;
 use super::search_context::{OpenNumbers, Quantity, SearchContext, TouchPlan, toward};
 use super::slide::{RimStation, Slide};
-use crate::features::fit::{Cylinder, Fit, FitError, FitParams, Freedom, Observation, Plane, Surface, fit};
+use crate::features::fit::{
+    Cylinder, Fit, FitError, FitParams, Freedom, Observation, Plane, Surface, fit,
+};
 use crate::numeric::{NormalEquations, mean};
 
 /// Directions that are candidates.
@@ -49,7 +51,12 @@ impl RoundWall {
     /// Why there is none after these directions.
     pub fn missing(&self, asked: usize, reach: f64) -> ExploreError {
         let kind = if self.is_boss { "boss" } else { "hole" };
-        ExploreError::NoWall { kind, walls: self.measuring.observations.len(), asked, reach_mm: reach * 1e3 }
+        ExploreError::NoWall {
+            kind,
+            walls: self.measuring.observations.len(),
+            asked,
+            reach_mm: reach * 1e3,
+        }
     }
 
     /// Takes a touch of the wall.
@@ -66,7 +73,12 @@ impl RoundWall {
     }
 
     fn circle(&self, context: &SearchContext) -> Option<(Point3<f64>, f64)> {
-        let points: Vec<_> = self.measuring.observations.iter().map(|o| context.in_f(&o.point)).collect();
+        let points: Vec<_> = self
+            .measuring
+            .observations
+            .iter()
+            .map(|o| context.in_f(&o.point))
+            .collect();
         circle_through(&points)
     }
 
@@ -74,34 +86,57 @@ impl RoundWall {
     pub fn radius(&self, context: &SearchContext) -> f64 {
         let ball = context.params.ball_radius;
         let centres = self.circle(context).map_or(0.0, |(_, radius)| radius);
-        if self.is_boss { centres - ball } else { centres + ball }
+        if self.is_boss {
+            centres - ball
+        } else {
+            centres + ball
+        }
     }
 
     fn guess(&self, context: &SearchContext) -> Cylinder {
         let middle = context.pose_of * Point3::new(self.middle.x, self.middle.y, context.height);
         let pose_of = Isometry3::from_parts(middle.coords.into(), context.pose_of.rotation);
-        Cylinder { pose_of, radius: self.radius(context), concave: !self.is_boss }
+        Cylinder {
+            pose_of,
+            radius: self.radius(context),
+            concave: !self.is_boss,
+        }
     }
 
     fn wanted(&self, context: &SearchContext, guess: &Cylinder) -> Wanted {
         let sigma = context.params.sigma;
         let asked = Asked::default();
-        let (lean, fit) = squareness(context.square(context.lean), guess, &self.measuring.observations, &LEAN);
+        let (lean, fit) = squareness(
+            context.square(context.lean),
+            guess,
+            &self.measuring.observations,
+            &LEAN,
+        );
         let asked = match context.params.quantity {
-            _ if context.open.is_some_and(|open| open != OpenNumbers::default()) => {
+            _ if context
+                .open
+                .is_some_and(|open| open != OpenNumbers::default()) =>
+            {
                 let OpenNumbers { place, size, .. } = context.open.unwrap_or_default();
-                let asked = place.map_or(asked.clone(), |sigma| asked.each(&[Freedom::X, Freedom::Y], sigma));
-                size.map_or(asked.clone(), |sigma| asked.and(&[(Freedom::Size, 2.0)], sigma))
+                let asked = place.map_or(asked.clone(), |sigma| {
+                    asked.each(&[Freedom::X, Freedom::Y], sigma)
+                });
+                size.map_or(asked.clone(), |sigma| {
+                    asked.and(&[(Freedom::Size, 2.0)], sigma)
+                })
             }
             Quantity::Position => asked.each(&[Freedom::X, Freedom::Y], sigma),
             Quantity::Axis => asked.each(&[Freedom::TiltX, Freedom::TiltY], sigma),
             Quantity::Diameter => asked.and(&[(Freedom::Size, 2.0)], sigma),
-            Quantity::All | Quantity::Length | Quantity::Width => {
-                asked.each(&[Freedom::X, Freedom::Y], sigma).and(&[(Freedom::Size, 2.0)], sigma)
-            }
+            Quantity::All | Quantity::Length | Quantity::Width => asked
+                .each(&[Freedom::X, Freedom::Y], sigma)
+                .and(&[(Freedom::Size, 2.0)], sigma),
         };
         Wanted {
-            before: Knowledge::before::<Cylinder>(guess.radius.max(context.params.ball_radius), lean),
+            before: Knowledge::before::<Cylinder>(
+                guess.radius.max(context.params.ball_radius),
+                lean,
+            ),
             asked: asked.and_the_rest::<Cylinder>(sigma, guess.radius),
             fit,
             least: LEAST_WALL,
@@ -112,7 +147,8 @@ impl RoundWall {
     /// Standard uncertainty of the requested number, m or rad.
     pub fn uncertainty(&self, context: &SearchContext) -> Option<f64> {
         let guess = self.guess(context);
-        self.measuring.uncertainty(&guess, &self.wanted(context, &guess))
+        self.measuring
+            .uncertainty(&guess, &self.wanted(context, &guess))
     }
 
     /// The touch of the wall with the largest gain.
@@ -122,40 +158,84 @@ impl RoundWall {
         let surface = self.guess(context);
         let ball = context.params.ball_radius;
         // in a hole from the middle, of a boss from beside it
-        let from = if self.is_boss { surface.radius + ball + context.params.clearance } else { 0.0 };
-        let travel = if self.is_boss { context.params.clearance } else { surface.radius - ball };
-        let possible = (0..DIRECTIONS).flat_map(|at| depths.map(|depth| (at as f64 / DIRECTIONS as f64, depth)));
+        let from = if self.is_boss {
+            surface.radius + ball + context.params.clearance
+        } else {
+            0.0
+        };
+        let travel = if self.is_boss {
+            context.params.clearance
+        } else {
+            surface.radius - ball
+        };
+        let possible = (0..DIRECTIONS)
+            .flat_map(|at| depths.map(|depth| (at as f64 / DIRECTIONS as f64, depth)));
         let (middle, is_boss) = (self.middle, self.is_boss);
         let possible = possible.map(|(turned, depth)| {
             let direction = toward(turned);
             let into = if is_boss { -direction } else { direction };
-            let planned = context.sideways(&(middle + direction * from), depth, &into, travel + REACH);
-            let point = surface.pose_of * (Point3::origin() + direction * surface.radius - Vector3::z() * depth);
-            Possible { point, travel, planned }
+            let planned =
+                context.sideways(&(middle + direction * from), depth, &into, travel + REACH);
+            let point = surface.pose_of
+                * (Point3::origin() + direction * surface.radius - Vector3::z() * depth);
+            Possible {
+                point,
+                travel,
+                planned,
+            }
         });
         let wanted = self.wanted(context, &surface);
-        self.measuring.next(&surface, &wanted, context.on_part(possible))
+        self.measuring
+            .next(&surface, &wanted, context.on_part(possible))
     }
 
     /// The cylinder through the contacts of the wall, perpendicular to a surface.
-    pub fn fitted(&self, context: &SearchContext, top: &Fit<Plane>) -> Result<Fit<Cylinder>, FitError> {
+    pub fn fitted(
+        &self,
+        context: &SearchContext,
+        top: &Fit<Plane>,
+    ) -> Result<Fit<Cylinder>, FitError> {
         let middle = self.guess(context).pose_of.translation.vector.into();
-        let guess = Cylinder::new(middle, &top.surface.normal(), self.radius(context), !self.is_boss);
+        let guess = Cylinder::new(
+            middle,
+            &top.surface.normal(),
+            self.radius(context),
+            !self.is_boss,
+        );
         let lean = top.axis_std().map_or(context.lean, |both| both / SQRT_2);
-        let (_, params) = squareness(context.square(lean), &guess, &self.measuring.observations, &LEAN);
+        let (_, params) = squareness(
+            context.square(lean),
+            &guess,
+            &self.measuring.observations,
+            &LEAN,
+        );
         fit(&guess, &self.measuring.observations, &params)
     }
 
     /// Paths along the wall and across its rim.
     ///
     /// - `back`: how far the surface above the rim is known, m; `depths`: below it, m; `room`: beside the ball at the wall, m.
-    pub fn slides(&self, context: &SearchContext, back: f64, depths: [f64; 2], room: f64) -> Vec<Slide> {
+    pub fn slides(
+        &self,
+        context: &SearchContext,
+        back: f64,
+        depths: [f64; 2],
+        room: f64,
+    ) -> Vec<Slide> {
         let radius = self.radius(context);
         let middle = Point3::new(self.middle.x, self.middle.y, context.height);
         // the open is around a boss, and inside of a hole
         let side = if self.is_boss { 1.0 } else { -1.0 };
         let at = &|share: f64| (middle + toward(share) * radius, toward(share) * side);
-        RimStation { at, length: TAU * radius, is_closed: true, back, depths, room }.slides(context)
+        RimStation {
+            at,
+            length: TAU * radius,
+            is_closed: true,
+            back,
+            depths,
+            room,
+        }
+        .slides(context)
     }
 }
 
@@ -178,19 +258,32 @@ pub(super) fn squareness<M: Surface>(
     touches: &[Observation],
     leans: &[Freedom],
 ) -> (f64, FitParams) {
-    let freely = fit(guess, touches, &FitParams::default()).ok().filter(|free| free.degrees >= LEAST_DEGREES);
+    let freely = fit(guess, touches, &FitParams::default())
+        .ok()
+        .filter(|free| free.degrees >= LEAST_DEGREES);
     let is_leaning = freely.is_some_and(|free| {
         // how far its axis is off that of the guess, in the directions of its own x and y
         let before = guess.pose_of().rotation * Vector3::z();
         let off = free.surface.pose_of().inverse_transform_vector(&before);
         leans.iter().any(|lean| {
-            let off = if *lean == Freedom::TiltX { off.x } else { off.y };
-            free.std(*lean).is_some_and(|std| off.abs() > LEANS * std.hypot(known))
+            let off = if *lean == Freedom::TiltX {
+                off.x
+            } else {
+                off.y
+            };
+            free.std(*lean)
+                .is_some_and(|std| off.abs() > LEANS * std.hypot(known))
         })
     });
     match is_leaning {
         true => (MOST_LEAN, FitParams::default()),
-        false => (known, FitParams { axis_sigma: Some(known), ..FitParams::default() }),
+        false => (
+            known,
+            FitParams {
+                axis_sigma: Some(known),
+                ..FitParams::default()
+            },
+        ),
     }
 }
 
@@ -204,7 +297,11 @@ pub(super) fn surface_about(
     observations: &[Observation],
 ) -> Result<Fit<Plane>, FitError> {
     let middle = context.pose_of * Point3::new(middle.x, middle.y, context.height);
-    fit(&Plane::new(middle, &context.out()), observations, &FitParams::default())
+    fit(
+        &Plane::new(middle, &context.out()),
+        observations,
+        &FitParams::default(),
+    )
 }
 
 /// Middle and radius of the circle through points of a plane, by least squares of x² + y² = 2ax + 2by + c \[Kåsa 1976\].
@@ -235,8 +332,14 @@ mod tests {
             let angle = TAU * f64::from(group) / 12.0;
             let depth = if group.is_multiple_of(2) { 1e-3 } else { 5e-3 };
             let noise = 5e-6 * (7.0 * f64::from(group)).sin();
-            let point = turn * Point3::from(toward(angle / TAU) * (4e-3 - BALL + noise) - Vector3::z() * depth);
-            Observation { point, offset: BALL, sigma: 5e-6, group }
+            let point = turn
+                * Point3::from(toward(angle / TAU) * (4e-3 - BALL + noise) - Vector3::z() * depth);
+            Observation {
+                point,
+                offset: BALL,
+                sigma: 5e-6,
+                group,
+            }
         };
         (0..12).map(place).collect()
     }
@@ -255,6 +358,9 @@ mod tests {
         let drawn = Vector3::new(5f64.to_radians().sin(), 0.0, 5f64.to_radians().cos());
         assert!(axis.cross(&drawn).norm() < 3e-3, "{axis:?}");
         // half of them: not enough to say so
-        assert_eq!(squareness(known, &guess, &leaning[..6], &LEAN).1.axis_sigma, Some(known));
+        assert_eq!(
+            squareness(known, &guess, &leaning[..6], &LEAN).1.axis_sigma,
+            Some(known)
+        );
     }
 }

@@ -8,8 +8,8 @@ use nalgebra::Point3;
 
 use super::search_context::OpenNumbers;
 use crate::conformity::{
-    Assessment, Decision, DecisionParams, InspectedQuantity, MeasuredNumber, ToleranceLimits, assess, measured_number,
-    repeated_confidence,
+    Assessment, Decision, DecisionParams, InspectedQuantity, MeasuredNumber, ToleranceLimits,
+    assess, measured_number, repeated_confidence,
 };
 use crate::features::{Feature, Kind};
 use crate::numeric::normal_quantile;
@@ -79,7 +79,10 @@ impl DecisionGoal {
     ///
     /// - `budget`: touches of the feature at most.
     pub(super) fn of_one_look(&self, budget: usize) -> DecisionParams {
-        DecisionParams { confidence: repeated_confidence(self.params.confidence, FEWEST, budget), ..self.params }
+        DecisionParams {
+            confidence: repeated_confidence(self.params.confidence, FEWEST, budget),
+            ..self.params
+        }
     }
 
     /// What the touches say of each.
@@ -92,7 +95,8 @@ impl DecisionGoal {
         feature: Option<(&Feature, &Feature)>,
     ) -> Vec<DecidedCharacteristic> {
         let standing = |sought: &SoughtCharacteristic| {
-            let number = |feature| measured_number(feature, sought.quantity, sought.nominal.as_ref());
+            let number =
+                |feature| measured_number(feature, sought.quantity, sought.nominal.as_ref());
             let measured = feature.and_then(|(feature, _)| number(feature));
             let of_touches = feature.and_then(|(_, by_touches)| number(by_touches)?.std);
             decided(sought, measured, of_touches, params)
@@ -107,24 +111,43 @@ fn decided(
     of_touches: Option<f64>,
     params: &DecisionParams,
 ) -> DecidedCharacteristic {
-    let judged = |number: &MeasuredNumber| assess(number, sought.limits, sought.quantity.distribution(), params);
+    let judged = |number: &MeasuredNumber| {
+        assess(
+            number,
+            sought.limits,
+            sought.quantity.distribution(),
+            params,
+        )
+    };
     let (mut shared, mut is_limited) = (0.0, false);
     let assessment = measured.as_ref().map_or_else(Assessment::default, judged);
     if let Some(MeasuredNumber { value, std, .. }) = measured {
         let parts = std.zip(of_touches);
         shared = parts.map_or(0.0, |(std, own)| (std * std - own * own).max(0.0).sqrt());
         let is_open_at = |value: f64| {
-            let number = MeasuredNumber { value, std: Some(shared), is_at_least: false };
+            let number = MeasuredNumber {
+                value,
+                std: Some(shared),
+                is_at_least: false,
+            };
             judged(&number).decision == Decision::Undecided
         };
         let stays_open = |own: f64| {
             let moved = |at: i32| value + MOVES * own * f64::from(at) / f64::from(TRIED);
-            (-TRIED..=TRIED).all(|at| is_open_at(moved(at))) || own <= LEAST_SHARE * shared && is_open_at(value)
+            (-TRIED..=TRIED).all(|at| is_open_at(moved(at)))
+                || own <= LEAST_SHARE * shared && is_open_at(value)
         };
         // what its touches do not fix stays without a number
-        is_limited = assessment.decision == Decision::Undecided && parts.is_none_or(|(_, own)| stays_open(own));
+        is_limited = assessment.decision == Decision::Undecided
+            && parts.is_none_or(|(_, own)| stays_open(own));
     }
-    DecidedCharacteristic { sought: sought.clone(), measured, shared, assessment, is_limited }
+    DecidedCharacteristic {
+        sought: sought.clone(),
+        measured,
+        shared,
+        assessment,
+        is_limited,
+    }
 }
 
 impl DecidedCharacteristic {
@@ -137,7 +160,10 @@ impl DecidedCharacteristic {
     fn asked(&self, guard: f64) -> Option<f64> {
         let MeasuredNumber { value, std, .. } = self.measured.filter(|_| self.is_open())?;
         let ToleranceLimits { lower, upper } = self.sought.limits;
-        let nearest = [lower, upper].into_iter().flatten().map(|limit| (value - limit).abs());
+        let nearest = [lower, upper]
+            .into_iter()
+            .flatten()
+            .map(|limit| (value - limit).abs());
         let wanted = nearest.fold(f64::INFINITY, f64::min) / guard;
         let own = (std?.powi(2) - self.shared.powi(2)).max(0.0).sqrt();
         let asked = (wanted.powi(2) - self.shared.powi(2)).max(0.0).sqrt();
@@ -146,14 +172,21 @@ impl DecidedCharacteristic {
 }
 
 /// What is asked of the numbers of a feature; the half of a diameter of position is the place itself.
-pub(super) fn open_numbers(standing: &[DecidedCharacteristic], params: &DecisionParams) -> OpenNumbers {
+pub(super) fn open_numbers(
+    standing: &[DecidedCharacteristic],
+    params: &DecisionParams,
+) -> OpenNumbers {
     let guard = normal_quantile(params.confidence);
     let mut open = OpenNumbers::default();
     for one in standing {
-        let Some(sigma) = one.asked(guard) else { continue };
+        let Some(sigma) = one.asked(guard) else {
+            continue;
+        };
         let (number, sigma) = match one.sought.quantity {
             InspectedQuantity::Position => (&mut open.place, sigma / 2.0),
-            InspectedQuantity::X | InspectedQuantity::Y | InspectedQuantity::Z => (&mut open.place, sigma),
+            InspectedQuantity::X | InspectedQuantity::Y | InspectedQuantity::Z => {
+                (&mut open.place, sigma)
+            }
             InspectedQuantity::Length => (&mut open.length, sigma),
             _ => (&mut open.size, sigma),
         };
@@ -169,21 +202,44 @@ mod tests {
     const Z: f64 = 1.644_853_626_951_472_2;
 
     fn diameter(value: f64, own: f64, shared: f64) -> DecidedCharacteristic {
-        let limits = ToleranceLimits { lower: Some(9.0), upper: Some(11.0) };
+        let limits = ToleranceLimits {
+            lower: Some(9.0),
+            upper: Some(11.0),
+        };
         let (name, quantity) = (String::new(), InspectedQuantity::Diameter);
-        let sought = SoughtCharacteristic { name, quantity, limits, nominal: None };
-        let measured = MeasuredNumber { value, std: Some(own.hypot(shared)), is_at_least: false };
-        decided(&sought, Some(measured), Some(own), &DecisionParams::default())
+        let sought = SoughtCharacteristic {
+            name,
+            quantity,
+            limits,
+            nominal: None,
+        };
+        let measured = MeasuredNumber {
+            value,
+            std: Some(own.hypot(shared)),
+            is_at_least: false,
+        };
+        decided(
+            &sought,
+            Some(measured),
+            Some(own),
+            &DecisionParams::default(),
+        )
     }
 
     /// 0.5 from its limit, a guard band of 1.645 u: u has to be 0.304, of which 0.1 is no touch's.
     #[test]
     fn an_open_number_is_asked_for_as_well_as_its_distance_from_the_limit_needs() {
         let open = diameter(10.5, 0.4, 0.1);
-        assert!(open.is_open() && (open.shared - 0.1).abs() < 1e-12, "{open:?}");
+        assert!(
+            open.is_open() && (open.shared - 0.1).abs() < 1e-12,
+            "{open:?}"
+        );
         let asked = open_numbers(&[open], &DecisionParams::default());
         let expected = ((0.5 / Z).powi(2) - 0.01).sqrt();
-        assert!((asked.size.unwrap() - expected).abs() < 1e-9, "{asked:?} {expected}");
+        assert!(
+            (asked.size.unwrap() - expected).abs() < 1e-9,
+            "{asked:?} {expected}"
+        );
         assert_eq!((asked.place, asked.length), (None, None));
     }
 
@@ -192,7 +248,10 @@ mod tests {
         for (value, decision) in [(10.0, Decision::Pass), (11.5, Decision::Fail)] {
             let found = diameter(value, 0.1, 0.1);
             assert_eq!(found.assessment.decision, decision);
-            assert_eq!(open_numbers(&[found], &DecisionParams::default()), OpenNumbers::default());
+            assert_eq!(
+                open_numbers(&[found], &DecisionParams::default()),
+                OpenNumbers::default()
+            );
         }
     }
 
@@ -200,17 +259,36 @@ mod tests {
     #[test]
     fn what_the_shared_part_leaves_open_is_limited_and_what_touches_may_move_is_not() {
         assert!(diameter(10.95, 0.08, 0.2).is_limited);
-        assert!(!diameter(10.95, 0.2, 0.2).is_limited, "it may turn out to be 10.5");
-        assert!(!diameter(11.0, 0.2, 0.0).is_limited, "nothing is shared, so touches alone decide");
+        assert!(
+            !diameter(10.95, 0.2, 0.2).is_limited,
+            "it may turn out to be 10.5"
+        );
+        assert!(
+            !diameter(11.0, 0.2, 0.0).is_limited,
+            "nothing is shared, so touches alone decide"
+        );
     }
 
     #[test]
     fn nothing_is_decided_before_the_shape_is_fixed() {
-        let limits = ToleranceLimits { lower: None, upper: Some(1.0) };
-        let sought =
-            SoughtCharacteristic { name: String::new(), quantity: InspectedQuantity::Diameter, limits, nominal: None };
-        let goal = DecisionGoal { characteristics: vec![sought], params: DecisionParams::default() };
+        let limits = ToleranceLimits {
+            lower: None,
+            upper: Some(1.0),
+        };
+        let sought = SoughtCharacteristic {
+            name: String::new(),
+            quantity: InspectedQuantity::Diameter,
+            limits,
+            nominal: None,
+        };
+        let goal = DecisionGoal {
+            characteristics: vec![sought],
+            params: DecisionParams::default(),
+        };
         let standing = goal.standing(&goal.params, None);
-        assert!(standing.iter().all(DecidedCharacteristic::is_open), "{standing:?}");
+        assert!(
+            standing.iter().all(DecidedCharacteristic::is_open),
+            "{standing:?}"
+        );
     }
 }

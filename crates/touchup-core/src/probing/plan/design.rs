@@ -35,14 +35,17 @@ impl Asked {
     /// One more number, that is to be known with a standard deviation of `sigma` (m or rad).
     pub fn and(mut self, by: &[(Freedom, f64)], sigma: f64) -> Self {
         let mut steps = Steps::zeros();
-        by.iter().for_each(|(freedom, x)| steps[*freedom as usize] += x / sigma);
+        by.iter()
+            .for_each(|(freedom, x)| steps[*freedom as usize] += x / sigma);
         self.by.push(steps);
         self
     }
 
     /// Several more, each of one freedom.
     pub(super) fn each(self, freedoms: &[Freedom], sigma: f64) -> Self {
-        freedoms.iter().fold(self, |asked, freedom| asked.and(&[(*freedom, 1.0)], sigma))
+        freedoms
+            .iter()
+            .fold(self, |asked, freedom| asked.and(&[(*freedom, 1.0)], sigma))
     }
 
     /// Whether a fit fixes all requested numbers.
@@ -55,10 +58,14 @@ impl Asked {
     ///
     /// - `sigma`: requested of the numbers, m; `size`: of the surface, m, by which a lean counts.
     pub fn and_the_rest<M: Surface>(mut self, sigma: f64, size: f64) -> Self {
-        for freedom in Freedom::ALL.into_iter().filter(|freedom| M::FREE[*freedom as usize]) {
+        for freedom in Freedom::ALL
+            .into_iter()
+            .filter(|freedom| M::FREE[*freedom as usize])
+        {
             let is_angle = matches!(freedom, Freedom::TiltX | Freedom::TiltY | Freedom::Turn);
             let lever = if is_angle { size } else { 1.0 };
-            self.rest.push(Steps::ith(freedom as usize, lever / (REST * sigma)));
+            self.rest
+                .push(Steps::ith(freedom as usize, lever / (REST * sigma)));
         }
         self
     }
@@ -79,7 +86,11 @@ impl Knowledge {
             Freedom::Second if !M::SECOND_IS_LENGTH => angle,
             _ => length,
         });
-        Self { covariance: InformationMatrix::from_diagonal(&Steps::from(sigma.map(|sigma| sigma * sigma))) }
+        Self {
+            covariance: InformationMatrix::from_diagonal(&Steps::from(
+                sigma.map(|sigma| sigma * sigma),
+            )),
+        }
     }
 
     /// With one more touch of the surface.
@@ -88,7 +99,9 @@ impl Knowledge {
         let cg = self.covariance * g;
         let covariance = self.covariance - cg * cg.transpose() / (touch.sigma.powi(2) + g.dot(&cg));
         // rounding must not make it lopsided
-        Self { covariance: (covariance + covariance.transpose()) / 2.0 }
+        Self {
+            covariance: (covariance + covariance.transpose()) / 2.0,
+        }
     }
 
     /// Standard deviation of the surface along its normal at a place of it, m.
@@ -99,7 +112,10 @@ impl Knowledge {
 
     /// The largest of the deviations over the requested ones; at most 1 when all are met.
     pub fn worst(&self, asked: &Asked) -> f64 {
-        let shares = asked.by.iter().map(|c| c.dot(&(self.covariance * c)).max(0.0).sqrt());
+        let shares = asked
+            .by
+            .iter()
+            .map(|c| c.dot(&(self.covariance * c)).max(0.0).sqrt());
         shares.fold(0.0, f64::max)
     }
 
@@ -107,7 +123,12 @@ impl Knowledge {
     pub fn gain<M: Surface>(&self, surface: &M, touch: &Candidate, asked: &Asked) -> f64 {
         let (_, g) = surface.derivatives(&touch.point);
         let cg = self.covariance * g;
-        let reduction: f64 = asked.by.iter().chain(&asked.rest).map(|c| c.dot(&cg).powi(2)).sum();
+        let reduction: f64 = asked
+            .by
+            .iter()
+            .chain(&asked.rest)
+            .map(|c| c.dot(&cg).powi(2))
+            .sum();
         reduction / (touch.sigma.powi(2) + g.dot(&cg))
     }
 
@@ -122,8 +143,12 @@ impl Knowledge {
         asked: &Asked,
     ) -> Option<(T, f64)> {
         let gain = |candidate: &T| self.gain(surface, &touch(candidate), asked);
-        let gains = candidates.into_iter().map(|candidate| (gain(&candidate), candidate));
-        let best = gains.filter(|(gain, _)| *gain > 0.0).reduce(|best, next| if next.0 > best.0 { next } else { best });
+        let gains = candidates
+            .into_iter()
+            .map(|candidate| (gain(&candidate), candidate));
+        let best = gains
+            .filter(|(gain, _)| *gain > 0.0)
+            .reduce(|best, next| if next.0 > best.0 { next } else { best });
         best.map(|(gain, candidate)| (candidate, gain))
     }
 }

@@ -79,7 +79,12 @@ pub(super) struct EdgePattern {
 
 impl EdgePattern {
     pub fn new() -> Self {
-        Self { over: Vector3::x(), ground_z: f64::NEG_INFINITY, is_top_next: true, ..Self::default() }
+        Self {
+            over: Vector3::x(),
+            ground_z: f64::NEG_INFINITY,
+            is_top_next: true,
+            ..Self::default()
+        }
     }
 
     fn along(&self) -> Vector3<f64> {
@@ -95,7 +100,8 @@ impl EdgePattern {
         // as deep as the search went
         let lowest = || context.in_f(&touch.planned.end());
         if touch.result != TouchResult::Unclear {
-            self.seen.push((touch.place.unwrap_or_else(lowest), touch.observation));
+            self.seen
+                .push((touch.place.unwrap_or_else(lowest), touch.observation));
         }
         self.tried += 1;
     }
@@ -103,16 +109,34 @@ impl EdgePattern {
     /// Parts the touches into high and low, and finds the direction over the edge; whether there are both.
     fn part(&mut self, context: &mut SearchContext) -> bool {
         let ring = || self.seen.iter().take(RING + 1).map(|(place, _)| place);
-        context.height = ring().map(|p| context.below(p)).fold(f64::NEG_INFINITY, f64::max);
-        let is_low = |p: &&Point3<f64>| context.height - context.below(p) > BEYOND * context.params.ball_radius;
+        context.height = ring()
+            .map(|p| context.below(p))
+            .fold(f64::NEG_INFINITY, f64::max);
+        let is_low = |p: &&Point3<f64>| {
+            context.height - context.below(p) > BEYOND * context.params.ball_radius
+        };
         let (low, high): (Vec<_>, Vec<_>) = ring().partition(is_low);
-        let middle = |places: &[&Point3<f64>]| mean(places.iter().map(|place| Vector3::new(place.x, place.y, 0.0)));
-        let over = (middle(&low) - middle(&high)).try_normalize(0.0).unwrap_or_else(Vector3::x);
+        let middle = |places: &[&Point3<f64>]| {
+            mean(
+                places
+                    .iter()
+                    .map(|place| Vector3::new(place.x, place.y, 0.0)),
+            )
+        };
+        let over = (middle(&low) - middle(&high))
+            .try_normalize(0.0)
+            .unwrap_or_else(Vector3::x);
         // nearer to the edge the ball may hang on it
         let far = |p: &Point3<f64>| p.coords.dot(&over);
         let farthest = low.iter().map(|place| far(place)).fold(0.0, f64::max);
-        let ground = low.iter().filter(|place| far(place) > CLEAR * farthest).map(|place| context.below(place));
-        let (ground_z, has_both) = (ground.fold(f64::NEG_INFINITY, f64::max), !low.is_empty() && !high.is_empty());
+        let ground = low
+            .iter()
+            .filter(|place| far(place) > CLEAR * farthest)
+            .map(|place| context.below(place));
+        let (ground_z, has_both) = (
+            ground.fold(f64::NEG_INFINITY, f64::max),
+            !low.is_empty() && !high.is_empty(),
+        );
         (self.over, self.ground_z) = (over, ground_z);
         has_both
     }
@@ -121,7 +145,11 @@ impl EdgePattern {
         self.record(context, touch);
         if self.tried > RING {
             self.tried = 0;
-            self.phase = if self.part(context) { EdgePhase::Top } else { EdgePhase::NoEdge };
+            self.phase = if self.part(context) {
+                EdgePhase::Top
+            } else {
+                EdgePhase::NoEdge
+            };
         }
     }
 
@@ -133,13 +161,22 @@ impl EdgePattern {
         }
         self.tried = 0;
         let before = context.pose_of;
-        let mut top: Vec<Observation> = self.seen.iter().filter_map(|(_, observation)| *observation).collect();
+        let mut top: Vec<Observation> = self
+            .seen
+            .iter()
+            .filter_map(|(_, observation)| *observation)
+            .collect();
         if context.level(&mut top, false, &mut []) {
-            self.seen.iter_mut().for_each(|(place, _)| *place = context.in_f(&(before * *place)));
+            self.seen
+                .iter_mut()
+                .for_each(|(place, _)| *place = context.in_f(&(before * *place)));
         }
         let has_both = self.part(context);
-        context.height =
-            top.iter().map(|o| context.below(&context.in_f(&o.point))).sum::<f64>() / top.len().max(1) as f64;
+        context.height = top
+            .iter()
+            .map(|o| context.below(&context.in_f(&o.point)))
+            .sum::<f64>()
+            / top.len().max(1) as f64;
         self.top.observations = top;
         self.phase = match (has_both, self.depths(context)) {
             (false, _) => EdgePhase::NoEdge,
@@ -151,7 +188,11 @@ impl EdgePattern {
     /// A ball that hangs on the rim is less than its radius beyond the edge; farther out by more than that is the ground.
     fn take_ground(&mut self, context: &SearchContext, touch: &Touched) {
         if touch.result != TouchResult::Unclear {
-            self.ground_z = context.below(&touch.place.unwrap_or_else(|| context.in_f(&touch.planned.end())));
+            self.ground_z = context.below(
+                &touch
+                    .place
+                    .unwrap_or_else(|| context.in_f(&touch.planned.end())),
+            );
         }
         self.phase = EdgePhase::Side;
     }
@@ -163,7 +204,12 @@ impl EdgePattern {
 
     /// The side through its contacts: with its z out of the material, x along the edge.
     fn side_plane(&self, context: &SearchContext) -> Plane {
-        let points: Vec<_> = self.side.observations.iter().map(|o| context.in_f(&o.point)).collect();
+        let points: Vec<_> = self
+            .side
+            .observations
+            .iter()
+            .map(|o| context.in_f(&o.point))
+            .collect();
         let mean = mean(points.iter().map(|p| p.coords));
         // a line along the edge by least squares: how much farther over by each metre along
         let (mut sxx, mut sxy) = (0.0, 0.0);
@@ -193,69 +239,127 @@ impl EdgePattern {
     }
 
     fn places(params: &PatternParams) -> impl Iterator<Item = f64> + '_ {
-        (0..ALONG).map(|at| (at as f64 / (ALONG - 1) as f64 * 2.0 - 1.0) * REACH * params.flag_radius)
+        (0..ALONG)
+            .map(|at| (at as f64 / (ALONG - 1) as f64 * 2.0 - 1.0) * REACH * params.flag_radius)
     }
 
     fn possible_top(&self, context: &SearchContext, top: &Plane) -> Vec<Possible> {
-        let PatternParams { ball_radius, clearance, .. } = context.params;
+        let PatternParams {
+            ball_radius,
+            clearance,
+            ..
+        } = context.params;
         let at = |along: f64, back: f64| {
             let point = top.pose_of * Point3::new(-back * ball_radius, along, 0.0);
             let planned = context.down(&context.in_f(&point), clearance + ball_radius + ROUGH);
-            Possible { point, travel: clearance, planned }
+            Possible {
+                point,
+                travel: clearance,
+                planned,
+            }
         };
-        context.on_part(Self::places(&context.params).flat_map(|along| TOP.map(|back| at(along, back))))
+        context.on_part(
+            Self::places(&context.params).flat_map(|along| TOP.map(|back| at(along, back))),
+        )
     }
 
     fn possible_side(&self, context: &SearchContext, side: &Plane, deep: f64) -> Vec<Possible> {
-        let PatternParams { ball_radius, clearance, .. } = context.params;
+        let PatternParams {
+            ball_radius,
+            clearance,
+            ..
+        } = context.params;
         let at = |along: f64, depth: f64| {
             let point = side.pose_of * Point3::new(along, 0.0, 0.0) - context.out() * depth;
             let from = context.in_f(&(point + side.normal() * (ball_radius + clearance)));
             let direction = context.pose_of.inverse_transform_vector(&-side.normal());
-            Possible { point, travel: clearance, planned: context.sideways(&from, depth, &direction, 2.0 * clearance) }
+            Possible {
+                point,
+                travel: clearance,
+                planned: context.sideways(&from, depth, &direction, 2.0 * clearance),
+            }
         };
-        context
-            .on_part(Self::places(&context.params).flat_map(|along| [0.5 * deep, deep].map(|depth| at(along, depth))))
+        context.on_part(
+            Self::places(&context.params)
+                .flat_map(|along| [0.5 * deep, deep].map(|depth| at(along, depth))),
+        )
     }
 
     /// Of the top or of the side, whichever gains more.
     fn next_of_both(&mut self, context: &SearchContext, deep: f64) -> Option<TouchPlan> {
         let (top, side) = (self.top_plane(context), self.side_plane(context));
-        let [of_top, of_side] = [Freedom::TiltY, Freedom::TiltX].map(|lean| Self::wanted(&context.params, lean));
-        let of_top = self.top.best(&top, &of_top, self.possible_top(context, &top));
-        let of_side = self.side.best(&side, &of_side, self.possible_side(context, &side, deep));
+        let [of_top, of_side] =
+            [Freedom::TiltY, Freedom::TiltX].map(|lean| Self::wanted(&context.params, lean));
+        let of_top = self
+            .top
+            .best(&top, &of_top, self.possible_top(context, &top));
+        let of_side = self
+            .side
+            .best(&side, &of_side, self.possible_side(context, &side, deep));
         let gain = |best: &Option<(Possible, f64)>| best.as_ref().map_or(0.0, |(_, gain)| *gain);
         self.is_top_next = gain(&of_top) >= gain(&of_side);
-        let (chosen, measuring) = if self.is_top_next { (of_top, &mut self.top) } else { (of_side, &mut self.side) };
+        let (chosen, measuring) = if self.is_top_next {
+            (of_top, &mut self.top)
+        } else {
+            (of_side, &mut self.side)
+        };
         chosen.map(|(possible, _)| measuring.aim(&possible))
     }
 }
 
 impl Stage for EdgePattern {
     fn next(&mut self, context: &mut SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
-        let PatternParams { ball_radius: ball, clearance, flag_radius, .. } = context.params;
-        let (ring, from_above) = (Self::ring(&context.params), clearance + GROUND * ball + ROUGH);
+        let PatternParams {
+            ball_radius: ball,
+            clearance,
+            flag_radius,
+            ..
+        } = context.params;
+        let (ring, from_above) = (
+            Self::ring(&context.params),
+            clearance + GROUND * ball + ROUGH,
+        );
         Ok(Some(match self.phase {
-            EdgePhase::NoEdge => return Err(ExploreError::NoEdge { radius_mm: ring * 1e3 }),
+            EdgePhase::NoEdge => {
+                return Err(ExploreError::NoEdge {
+                    radius_mm: ring * 1e3,
+                });
+            }
             EdgePhase::Ring => context.ring(self.tried, ring, from_above),
-            EdgePhase::Ground => context.down(&Point3::from(self.over * (ring + FARTHER * ball)), from_above),
+            EdgePhase::Ground => context.down(
+                &Point3::from(self.over * (ring + FARTHER * ball)),
+                from_above,
+            ),
             EdgePhase::Top => {
-                let place = |[back, along]: [f64; 2]| Point3::from((self.along() * along - self.over * back) * ring);
-                let others = ELSEWHERE.map(|back| ELSEWHERE.map(|along| place([back, 1.2 * along - 0.9])));
+                let place = |[back, along]: [f64; 2]| {
+                    Point3::from((self.along() * along - self.over * back) * ring)
+                };
+                let others =
+                    ELSEWHERE.map(|back| ELSEWHERE.map(|along| place([back, 1.2 * along - 0.9])));
                 let place = context.over_part(self.tried, &MORE.map(place), others.as_flattened());
                 context.down(&place, from_above)
             }
             EdgePhase::Side if self.tried >= MOST_FIRST => {
                 let (walls, reach_mm) = (self.side.observations.len(), 2e3 * (ring + ball));
-                return Err(ExploreError::NoWall { kind: "edge", walls, asked: self.tried, reach_mm });
+                return Err(ExploreError::NoWall {
+                    kind: "edge",
+                    walls,
+                    asked: self.tried,
+                    reach_mm,
+                });
             }
             EdgePhase::Side => {
                 // inward from beyond the edge
-                let (along, beyond) = ([0.0, SPREAD, -SPREAD][self.tried % FIRST] * flag_radius, ring + ball);
+                let (along, beyond) = (
+                    [0.0, SPREAD, -SPREAD][self.tried % FIRST] * flag_radius,
+                    ring + ball,
+                );
                 // where the edge ends before that, nearer to the flag
                 let high = |along: f64| Point3::from(self.along() * along - self.over * ring);
-                let along =
-                    NEARER.map(|share| share * along).into_iter().find(|along| context.is_over_part(&high(*along)));
+                let along = NEARER
+                    .map(|share| share * along)
+                    .into_iter()
+                    .find(|along| context.is_over_part(&high(*along)));
                 let from = Point3::from(self.over * beyond + self.along() * along.unwrap_or(0.0));
                 context.sideways(&from, self.depths(context)?[1], &-self.over, 2.0 * beyond)
             }
@@ -272,13 +376,17 @@ impl Stage for EdgePattern {
                 self.side.take(touch);
                 self.tried += 1;
                 if self.tried >= FIRST && self.side.observations.len() >= 2 {
-                    self.over = context.pose_of.inverse_transform_vector(&self.side_plane(context).normal());
+                    self.over = context
+                        .pose_of
+                        .inverse_transform_vector(&self.side_plane(context).normal());
                     self.phase = EdgePhase::Both;
                 }
             }
             EdgePhase::Both if self.is_top_next => {
                 self.top.take(touch);
-                let is_far = |p: Point3<f64>| (context.below(&p) - context.height).abs() > context.params.ball_radius;
+                let is_far = |p: Point3<f64>| {
+                    (context.below(&p) - context.height).abs() > context.params.ball_radius
+                };
                 if touch.place.is_some_and(is_far) {
                     self.top.refuse_last(touch);
                 }
@@ -289,15 +397,36 @@ impl Stage for EdgePattern {
 
     fn feature(&self, context: &SearchContext) -> Result<Option<Feature>, ExploreError> {
         if self.phase != EdgePhase::Both {
-            return Err(ExploreError::NotDone { touches: context.touches });
+            return Err(ExploreError::NotDone {
+                touches: context.touches,
+            });
         }
-        let top = fit(&self.top_plane(context), &self.top.observations, &FitParams::default())?;
-        let side = fit(&self.side_plane(context), &self.side.observations, &FitParams::default())?;
+        let top = fit(
+            &self.top_plane(context),
+            &self.top.observations,
+            &FitParams::default(),
+        )?;
+        let side = fit(
+            &self.side_plane(context),
+            &self.side.observations,
+            &FitParams::default(),
+        )?;
         let along = |o: &Observation| context.in_f(&o.point).coords.dot(&self.along());
-        let all = || self.top.observations.iter().chain(&self.side.observations).map(along);
-        let ends = [all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max)];
+        let all = || {
+            self.top
+                .observations
+                .iter()
+                .chain(&self.side.observations)
+                .map(along)
+        };
+        let ends = [
+            all().fold(f64::INFINITY, f64::min),
+            all().fold(f64::NEG_INFINITY, f64::max),
+        ];
         let start = context.in_f(&side.surface.point());
-        let at = |along: f64| context.pose_of * (start + self.along() * (along - start.coords.dot(&self.along())));
+        let at = |along: f64| {
+            context.pose_of * (start + self.along() * (along - start.coords.dot(&self.along())))
+        };
         let touches = numbers([&self.top.observations, &self.side.observations]);
         Ok(Feature::edge([&top, &side], &ends.map(at), true, touches))
     }
@@ -310,26 +439,54 @@ impl Stage for EdgePattern {
             measuring.uncertainty(plane, &Self::wanted(&context.params, lean))
         };
         let of_top = known(&self.top, &self.top_plane(context), Freedom::TiltY)?;
-        Some(of_top.max(known(&self.side, &self.side_plane(context), Freedom::TiltX)?))
+        Some(of_top.max(known(
+            &self.side,
+            &self.side_plane(context),
+            Freedom::TiltX,
+        )?))
     }
 
     fn is_known(&self, context: &SearchContext) -> bool {
-        self.is_fixed(context) && self.uncertainty(context).is_some_and(|sigma| sigma <= context.params.sigma)
+        self.is_fixed(context)
+            && self
+                .uncertainty(context)
+                .is_some_and(|sigma| sigma <= context.params.sigma)
     }
 
     fn is_fixed(&self, context: &SearchContext) -> bool {
-        let is_enough = self.top.observations.len() >= LEAST && self.side.observations.len() >= LEAST;
+        let is_enough =
+            self.top.observations.len() >= LEAST && self.side.observations.len() >= LEAST;
         is_enough && self.uncertainty(context).is_some()
     }
 
     fn slides(&self, context: &SearchContext) -> Vec<Slide> {
-        let Ok(depths) = self.depths(context) else { return Vec::new() };
-        let PatternParams { ball_radius, clearance, flag_radius, .. } = context.params;
+        let Ok(depths) = self.depths(context) else {
+            return Vec::new();
+        };
+        let PatternParams {
+            ball_radius,
+            clearance,
+            flag_radius,
+            ..
+        } = context.params;
         let to_f = context.pose_of.inverse() * self.side_plane(context).pose_of;
         let reach = REACH * flag_radius;
-        let at = |share: f64| (to_f * Point3::new(reach * (2.0 * share - 1.0), 0.0, 0.0), to_f.rotation * Vector3::z());
+        let at = |share: f64| {
+            (
+                to_f * Point3::new(reach * (2.0 * share - 1.0), 0.0, 0.0),
+                to_f.rotation * Vector3::z(),
+            )
+        };
         let (length, back) = (2.0 * reach, BACK * ball_radius);
-        RimStation { at: &at, length, is_closed: false, back, depths, room: clearance }.slides(context)
+        RimStation {
+            at: &at,
+            length,
+            is_closed: false,
+            back,
+            depths,
+            room: clearance,
+        }
+        .slides(context)
     }
 }
 
@@ -337,5 +494,7 @@ impl Stage for EdgePattern {
 fn plane(context: &SearchContext, origin: Vector3<f64>, axes: [Vector3<f64>; 3]) -> Plane {
     let turn = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&axes));
     let in_f = Isometry3::from_parts(origin.into(), UnitQuaternion::from_rotation_matrix(&turn));
-    Plane { pose_of: context.pose_of * in_f }
+    Plane {
+        pose_of: context.pose_of * in_f,
+    }
 }

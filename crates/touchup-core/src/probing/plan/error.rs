@@ -36,7 +36,9 @@ pub enum ExploreError {
         reach_mm: f64,
     },
     /// Nothing closes a slot.
-    #[error("an end of the slot was not touched in {searches} searches along it: is it open? Then probe its edges")]
+    #[error(
+        "an end of the slot was not touched in {searches} searches along it: is it open? Then probe its edges"
+    )]
     NoEnd {
         /// made towards it
         searches: usize,

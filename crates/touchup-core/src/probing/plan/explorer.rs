@@ -78,7 +78,10 @@ impl Explorer {
     ) -> Result<Self, ExploreError> {
         if !params.quantity.is_of(kind) {
             let kind = kind.map_or("unknown region", Kind::name);
-            return Err(ExploreError::NoSuchNumber { kind, number: params.quantity.name() });
+            return Err(ExploreError::NoSuchNumber {
+                kind,
+                number: params.quantity.name(),
+            });
         }
         let stage: Box<dyn Stage> = match kind {
             Some(Kind::Hole) => Box::new(hole::HolePattern::new(&params)),
@@ -94,14 +97,35 @@ impl Explorer {
         let pose_of = Isometry3::from_parts(flag.coords.into(), turned_to(normal));
         let (shared, wanted) = (params.shared_part(kind, flag, normal), params.sigma);
         // of the touches no more is asked than makes a difference
-        let sigma = (wanted.powi(2) - shared.powi(2)).max(0.0).sqrt().max(LEAST_SHARE * shared);
+        let sigma = (wanted.powi(2) - shared.powi(2))
+            .max(0.0)
+            .sqrt()
+            .max(LEAST_SHARE * shared);
         let params = PatternParams { sigma, ..params };
         let deep = params.depth.max(DEEPEST * params.ball_radius) + ROUGH;
         let outline = Arc::new(Outline::new(scan, flag, normal, deep));
         let (lean, left_out) = (UNTOUCHED, Vec::new());
         let open = None;
-        let context = SearchContext { params, pose_of, lean, height: 0.0, touches: 0, open, outline, left_out };
-        Ok(Self { context, stage, asked: None, ended: None, kind, wanted, shared, goal: None })
+        let context = SearchContext {
+            params,
+            pose_of,
+            lean,
+            height: 0.0,
+            touches: 0,
+            open,
+            outline,
+            left_out,
+        };
+        Ok(Self {
+            context,
+            stage,
+            asked: None,
+            ended: None,
+            kind,
+            wanted,
+            shared,
+            goal: None,
+        })
     }
 
     /// Touches until each characteristic of the feature is decided, in place of until a number has an uncertainty.
@@ -114,18 +138,31 @@ impl Explorer {
 
     /// What the touches so far say of each characteristic that is to be decided.
     pub fn characteristics(&self) -> Vec<DecidedCharacteristic> {
-        let Some((goal, params)) = &self.goal else { return Vec::new() };
+        let Some((goal, params)) = &self.goal else {
+            return Vec::new();
+        };
         // the shape is fixed where each of its numbers is
-        let of_all = SearchContext { open: None, ..self.context.clone() };
+        let of_all = SearchContext {
+            open: None,
+            ..self.context.clone()
+        };
         let is_fixed = self.stage.is_fixed(&of_all);
-        let by_touches = if is_fixed { self.stage.feature(&of_all).ok().flatten() } else { None };
-        let feature = by_touches.clone().map(|feature| self.context.params.shared.widened(feature));
+        let by_touches = if is_fixed {
+            self.stage.feature(&of_all).ok().flatten()
+        } else {
+            None
+        };
+        let feature = by_touches
+            .clone()
+            .map(|feature| self.context.params.shared.widened(feature));
         goal.standing(params, feature.as_ref().zip(by_touches.as_ref()))
     }
 
     /// Whether nothing is left that touches are made for.
     fn is_done(&mut self) -> bool {
-        let Some((_, params)) = self.goal.as_ref() else { return self.stage.is_known(&self.context) };
+        let Some((_, params)) = self.goal.as_ref() else {
+            return self.stage.is_known(&self.context);
+        };
         let standing = self.characteristics();
         let is_measured = standing.iter().any(|one| one.measured.is_some());
         self.context.open = is_measured.then(|| open_numbers(&standing, params));
@@ -145,8 +182,13 @@ impl Explorer {
     /// Standard uncertainty of the wanted number now, m or rad; `None` while there is none.
     pub fn uncertainty(&self) -> Option<f64> {
         // also where a decision asks for less
-        let of_all = SearchContext { open: None, ..self.context.clone() };
-        self.stage.uncertainty(&of_all).map(|sigma| sigma.hypot(self.shared))
+        let of_all = SearchContext {
+            open: None,
+            ..self.context.clone()
+        };
+        self.stage
+            .uncertainty(&of_all)
+            .map(|sigma| sigma.hypot(self.shared))
     }
 
     /// The next planned touch; `None` when it is done, or cannot be ([`Self::found`] says which).
@@ -157,7 +199,11 @@ impl Explorer {
         }
         while self.asked.is_none() && self.ended.is_none() {
             let is_known = self.is_done();
-            match if is_known { Ok(None) } else { self.stage.next(&mut self.context) } {
+            match if is_known {
+                Ok(None)
+            } else {
+                self.stage.next(&mut self.context)
+            } {
                 Ok(Some(planned)) if self.context.is_beside(&planned) => self.leave_out(planned),
                 Ok(Some(planned)) => self.asked = Some(planned),
                 Ok(None) => self.ended = Some(Ok(is_known)),
@@ -171,29 +217,58 @@ impl Explorer {
     fn leave_out(&mut self, planned: TouchPlan) {
         self.context.leave_out(&self.context.in_f(&planned.from));
         let (result, is_left_out) = (TouchResult::Nothing, true);
-        self.stage.take(&mut self.context, &Touched { planned, result, is_left_out, place: None, observation: None });
+        self.stage.take(
+            &mut self.context,
+            &Touched {
+                planned,
+                result,
+                is_left_out,
+                place: None,
+                observation: None,
+            },
+        );
     }
 
     /// Paths on which the ball slides over the whole feature; none where nothing was found, or where a ball has no room.
     pub fn slides(&self) -> Vec<Slide> {
-        if self.found().is_ok() { self.stage.slides(&self.context) } else { Vec::new() }
+        if self.found().is_ok() {
+            self.stage.slides(&self.context)
+        } else {
+            Vec::new()
+        }
     }
 
     /// Takes the result of the planned touch.
     pub fn take(&mut self, result: &TouchResult) {
-        let Some(planned) = self.asked.take() else { return };
+        let Some(planned) = self.asked.take() else {
+            return;
+        };
         self.context.touches += 1;
         let (offset, group) = (self.context.params.ball_radius, self.context.touches as u32);
         let observation = match *result {
             TouchResult::At { centre, sigma } => {
                 let sigma = sigma.hypot(self.context.params.touch_sigma);
-                Some(Observation { point: centre, offset, sigma, group })
+                Some(Observation {
+                    point: centre,
+                    offset,
+                    sigma,
+                    group,
+                })
             }
             TouchResult::Nothing | TouchResult::Unclear => None,
         };
         let place = observation.map(|contact| self.context.in_f(&contact.point));
         let is_left_out = false;
-        self.stage.take(&mut self.context, &Touched { planned, result: *result, is_left_out, place, observation });
+        self.stage.take(
+            &mut self.context,
+            &Touched {
+                planned,
+                result: *result,
+                is_left_out,
+                place,
+                observation,
+            },
+        );
     }
 
     /// What was found, once [`Self::next_touch`] plans nothing more.
@@ -205,23 +280,37 @@ impl Explorer {
             Some(Err(error)) => return Err(error.clone()),
             Some(Ok(is_as_asked)) => *is_as_asked,
             // the last touch that may be made was enough
-            None => self.context.touches >= self.context.params.budget && self.stage.is_known(&self.context),
+            None => {
+                self.context.touches >= self.context.params.budget
+                    && self.stage.is_known(&self.context)
+            }
         };
         let characteristics = self.characteristics();
-        let is_decided = characteristics.iter().all(|one| one.assessment.decision != Decision::Undecided);
-        let is_as_asked = if self.goal.is_some() { is_decided } else { is_as_asked };
+        let is_decided = characteristics
+            .iter()
+            .all(|one| one.assessment.decision != Decision::Undecided);
+        let is_as_asked = if self.goal.is_some() {
+            is_decided
+        } else {
+            is_as_asked
+        };
         let over = self.uncertainty().map(|sigma| sigma / self.wanted);
-        let limited = over.filter(|over| self.goal.is_none() && is_as_asked && *over > 1.0 + ROUNDING);
+        let limited =
+            over.filter(|over| self.goal.is_none() && is_as_asked && *over > 1.0 + ROUNDING);
         let by_touches = self.stage.feature(&self.context)?;
         let place = by_touches.as_ref().map(|feature| feature.centre.value);
         let (params, out) = (&self.context.params, self.context.out());
         Ok(Found {
-            feature: by_touches.clone().map(|feature| params.shared.widened(feature)),
+            feature: by_touches
+                .clone()
+                .map(|feature| params.shared.widened(feature)),
             touches: self.context.touches,
             is_as_asked: is_as_asked && limited.is_none(),
             limited,
             uncertainty: self.uncertainty(),
-            shared: place.map_or(self.shared, |place| params.shared_part(self.kind, &place, &out)),
+            shared: place.map_or(self.shared, |place| {
+                params.shared_part(self.kind, &place, &out)
+            }),
             by_touches,
             characteristics,
         })

@@ -43,7 +43,10 @@ pub(super) struct HolePattern {
 
 impl HolePattern {
     pub fn new(params: &PatternParams) -> Self {
-        Self { depth: params.depth.max(SHALLOW * params.ball_radius), ..Self::default() }
+        Self {
+            depth: params.depth.max(SHALLOW * params.ball_radius),
+            ..Self::default()
+        }
     }
 
     fn take_first(&mut self, context: &SearchContext, touch: &Touched) {
@@ -57,7 +60,8 @@ impl HolePattern {
         if self.wall.measuring.observations.len() >= FIRST {
             self.wall.recentre(context);
             let (rim, middle) = (self.wall.radius(context) + CHAMFER, self.wall.middle);
-            self.opening.forget(|p| (p - middle).xy().norm() <= rim, context);
+            self.opening
+                .forget(|p| (p - middle).xy().norm() <= rim, context);
             self.phase = HolePhase::Floor;
         }
     }
@@ -80,10 +84,15 @@ impl Stage for HolePattern {
         let (ball, middle) = (context.params.ball_radius, self.wall.middle);
         Ok(Some(match self.phase {
             HolePhase::Opening => self.opening.next(context)?,
-            HolePhase::First if self.first >= MOST_FIRST => return Err(self.wall.missing(self.first, REACH)),
-            HolePhase::First => {
-                context.sideways(&middle, SHALLOW * ball, &RoundWall::first_direction(self.first), REACH)
+            HolePhase::First if self.first >= MOST_FIRST => {
+                return Err(self.wall.missing(self.first, REACH));
             }
+            HolePhase::First => context.sideways(
+                &middle,
+                SHALLOW * ball,
+                &RoundWall::first_direction(self.first),
+                REACH,
+            ),
             HolePhase::Floor => context.sideways(&middle, SHALLOW * ball, &-Vector3::z(), REACH),
             HolePhase::Around => {
                 let away = self.wall.radius(context) + BESIDE * ball;
@@ -115,12 +124,20 @@ impl Stage for HolePattern {
 
     fn feature(&self, context: &SearchContext) -> Result<Option<Feature>, ExploreError> {
         if self.opening.top.len() < 3 || self.wall.measuring.observations.len() < FIRST {
-            return Err(OpeningSearch::not_done(context, self.phase == HolePhase::Opening));
+            return Err(OpeningSearch::not_done(
+                context,
+                self.phase == HolePhase::Opening,
+            ));
         }
         let top = surface_about(context, &self.wall.middle, &self.opening.top)?;
         let wall = self.wall.fitted(context, &top)?;
         let touches = numbers([&self.wall.measuring.observations, &self.opening.top]);
-        Ok(Some(Feature::round(&wall, &top, self.floor.as_ref(), touches)))
+        Ok(Some(Feature::round(
+            &wall,
+            &top,
+            self.floor.as_ref(),
+            touches,
+        )))
     }
 
     fn uncertainty(&self, context: &SearchContext) -> Option<f64> {
@@ -130,13 +147,18 @@ impl Stage for HolePattern {
     fn slides(&self, context: &SearchContext) -> Vec<Slide> {
         let ball = context.params.ball_radius;
         let room = self.wall.radius(context) - ball;
-        self.wall.slides(context, BESIDE * ball, [BELOW_RIM * ball, self.depth], room)
+        self.wall
+            .slides(context, BESIDE * ball, [BELOW_RIM * ball, self.depth], room)
     }
 }
 
 /// Numbers of the touches with contact, in ascending order.
 pub(super) fn numbers<const N: usize>(observations: [&Vec<Observation>; N]) -> Vec<u32> {
-    let mut numbers: Vec<u32> = observations.into_iter().flatten().map(|o| o.group).collect();
+    let mut numbers: Vec<u32> = observations
+        .into_iter()
+        .flatten()
+        .map(|o| o.group)
+        .collect();
     numbers.sort_unstable();
     numbers
 }

@@ -31,11 +31,14 @@ impl SearchContext {
         is_top: bool,
         places: &mut [&mut Point3<f64>],
     ) -> bool {
-        let Some((normal, inliers)) = self.most_plane(observations, is_top) else { return false };
+        let Some((normal, inliers)) = self.most_plane(observations, is_top) else {
+            return false;
+        };
         observations.clone_from(&inliers);
         let mean = Point3::from(mean(inliers.iter().map(|o| o.point.coords)));
         let before = self.pose_of;
-        let turn = UnitQuaternion::rotation_between(&self.out(), &normal).unwrap_or_else(UnitQuaternion::identity);
+        let turn = UnitQuaternion::rotation_between(&self.out(), &normal)
+            .unwrap_or_else(UnitQuaternion::identity);
         let rotation = turn * before.rotation;
         // the flag as it is seen along the normal
         let flag = Point3::from(before.translation.vector);
@@ -45,7 +48,9 @@ impl SearchContext {
         self.pose_of = Isometry3::from_parts(origin.coords.into(), rotation);
         self.height = 0.0;
         let plane = fit(&Plane::new(mean, &normal), &inliers, &FitParams::default()).ok();
-        self.lean = plane.and_then(|plane| plane.axis_std()).map_or(UNTOUCHED, |both| both / SQRT_2);
+        self.lean = plane
+            .and_then(|plane| plane.axis_std())
+            .map_or(UNTOUCHED, |both| both / SQRT_2);
         for place in places {
             let moved = self.in_f(&(before * Point3::new(place.x, place.y, height)));
             **place = Point3::new(moved.x, moved.y, 0.0);
@@ -55,7 +60,11 @@ impl SearchContext {
 
     /// Normal of the plane that most touches lie on, and those touches: of the planes through three of them the one with the least truncated
     /// squares \[Torr Zisserman 2000, MSAC\], where the normal of the scan counts as one more observation.
-    fn most_plane(&self, observations: &[Observation], is_top: bool) -> Option<(Unit<Vector3<f64>>, Vec<Observation>)> {
+    fn most_plane(
+        &self,
+        observations: &[Observation],
+        is_top: bool,
+    ) -> Option<(Unit<Vector3<f64>>, Vec<Observation>)> {
         let least = SPREAD * self.params.ball_radius;
         let of_plane = self.params.beyond(OF_PLANE);
         let (mut best, mut least_cost) = (Vec::new(), f64::INFINITY);
@@ -73,19 +82,28 @@ impl SearchContext {
                     let is_allowed = !is_top || observations.iter().all(|o| off(o) < of_plane);
                     let alike = normal.dot(&self.out());
                     // −ln of the probability, without what is the same for all
-                    let of_touch = |o: &Observation| (off(o) / of_plane).powi(2).min(1.0) * GATE.powi(2) / 2.0;
+                    let of_touch =
+                        |o: &Observation| (off(o) / of_plane).powi(2).min(1.0) * GATE.powi(2) / 2.0;
                     let turned = alike.clamp(-1.0, 1.0).acos() / UNTOUCHED;
-                    let cost = observations.iter().map(of_touch).sum::<f64>() + turned.powi(2) / 2.0;
+                    let cost =
+                        observations.iter().map(of_touch).sum::<f64>() + turned.powi(2) / 2.0;
                     if is_allowed && alike > ALIKE && cost < least_cost {
                         least_cost = cost;
-                        best = observations.iter().filter(|o| off(o).abs() < of_plane).copied().collect();
+                        best = observations
+                            .iter()
+                            .filter(|o| off(o).abs() < of_plane)
+                            .copied()
+                            .collect();
                     }
                 }
             }
         }
         let scatter = scatter(best.iter().map(|o| o.point.coords));
         let axes = scatter.symmetric_eigen();
-        let normal = axes.eigenvectors.column(axes.eigenvalues.imin()).into_owned();
+        let normal = axes
+            .eigenvectors
+            .column(axes.eigenvalues.imin())
+            .into_owned();
         let normal = Unit::try_new(normal * normal.dot(&self.out()).signum(), 0.0)?;
         (best.len() >= 3).then_some((normal, best))
     }

@@ -4,7 +4,9 @@ use nalgebra::Point3;
 
 use super::design::{Asked, Candidate, Knowledge};
 use super::pattern::Touched;
-use super::search_context::{Expected, PatternParams, Quantity, SearchContext, TouchPlan, TouchResult};
+use super::search_context::{
+    Expected, PatternParams, Quantity, SearchContext, TouchPlan, TouchResult,
+};
 use crate::features::fit::{FitParams, Freedom, Observation, Plane, Surface, fit};
 
 /// A candidate touch: where the surface would be touched, and how.
@@ -23,9 +25,15 @@ impl SearchContext {
     /// Those of the candidates that the scan has a part for: all around a touch from above, behind a wall that is touched.
     pub fn on_part(&self, possible: impl IntoIterator<Item = Possible>) -> Vec<Possible> {
         let is_part = |p: &Possible| {
-            let (behind, radius) =
-                if self.is_down(&p.planned) { (0.0, self.params.ball_radius) } else { (BEHIND, 0.0) };
-            self.outline.is_part(&(p.point + p.planned.direction.into_inner() * behind), radius)
+            let (behind, radius) = if self.is_down(&p.planned) {
+                (0.0, self.params.ball_radius)
+            } else {
+                (BEHIND, 0.0)
+            };
+            self.outline.is_part(
+                &(p.point + p.planned.direction.into_inner() * behind),
+                radius,
+            )
         };
         possible.into_iter().filter(is_part).collect()
     }
@@ -45,22 +53,47 @@ impl Wanted {
     /// What is wanted of a plane.
     ///
     /// - `leans`: those that count, as far as `reach` from its middle, m; `most`: what leans more is another surface, rad.
-    pub fn of_plane(params: &PatternParams, leans: &[Freedom], reach: f64, most: f64, least: usize) -> Self {
+    pub fn of_plane(
+        params: &PatternParams,
+        leans: &[Freedom],
+        reach: f64,
+        most: f64,
+        least: usize,
+    ) -> Self {
         let (asked, sigma) = (Asked::default(), params.sigma);
         let asked = match params.quantity {
             Quantity::Axis => asked.each(leans, sigma),
             Quantity::Position => asked.each(&[Freedom::Z], sigma),
             _ => asked.each(&[Freedom::Z], sigma).each(leans, sigma / reach),
         };
-        let (before, fit) = (Knowledge::before::<Plane>(params.flag_radius, most), FitParams::default());
-        Self { before, asked, fit, least, params: *params }
+        let (before, fit) = (
+            Knowledge::before::<Plane>(params.flag_radius, most),
+            FitParams::default(),
+        );
+        Self {
+            before,
+            asked,
+            fit,
+            least,
+            params: *params,
+        }
     }
 
     /// The covariance of a surface after touches of it.
-    fn known<'a, M: Surface>(&self, surface: &M, touches: impl Iterator<Item = &'a Observation>) -> Knowledge {
+    fn known<'a, M: Surface>(
+        &self,
+        surface: &M,
+        touches: impl Iterator<Item = &'a Observation>,
+    ) -> Knowledge {
         touches.fold(self.before.clone(), |known, o| {
             // the ball's centre lies on the same normal as the place that it touches
-            known.with(surface, &Candidate { point: o.point, sigma: o.sigma })
+            known.with(
+                surface,
+                &Candidate {
+                    point: o.point,
+                    sigma: o.sigma,
+                },
+            )
         })
     }
 }
@@ -92,7 +125,9 @@ impl Measuring {
 
     /// A contact where none should be belongs to another surface.
     pub fn refuse_last(&mut self, touch: &Touched) {
-        if self.observations.last() == touch.observation.as_ref() && self.observations.pop().is_some() {
+        if self.observations.last() == touch.observation.as_ref()
+            && self.observations.pop().is_some()
+        {
             self.dead.push(touch.planned.from);
         }
     }
@@ -107,29 +142,59 @@ impl Measuring {
         }
         let fit = fit(guess, &self.observations, &wanted.fit).ok()?;
         let refused = fit.used.iter().filter(|used| !**used).count() as f64;
-        if !wanted.asked.is_fixed_by(&fit) || refused > MOST_REFUSED * self.observations.len() as f64 {
+        if !wanted.asked.is_fixed_by(&fit)
+            || refused > MOST_REFUSED * self.observations.len() as f64
+        {
             return None;
         }
-        let kept = self.observations.iter().zip(&fit.used).filter(|(_, used)| **used).map(|(o, _)| o);
+        let kept = self
+            .observations
+            .iter()
+            .zip(&fit.used)
+            .filter(|(_, used)| **used)
+            .map(|(o, _)| o);
         let share = wanted.known(guess, kept).worst(&wanted.asked);
-        Some(share * (fit.chi_squared / fit.degrees.max(1) as f64).sqrt().max(1.0) * wanted.params.sigma)
+        Some(
+            share
+                * (fit.chi_squared / fit.degrees.max(1) as f64)
+                    .sqrt()
+                    .max(1.0)
+                * wanted.params.sigma,
+        )
     }
 
     /// The touch with the largest gain for the requested numbers, and its gain.
-    pub fn best<M: Surface>(&self, surface: &M, wanted: &Wanted, possible: Vec<Possible>) -> Option<(Possible, f64)> {
+    pub fn best<M: Surface>(
+        &self,
+        surface: &M,
+        wanted: &Wanted,
+        possible: Vec<Possible>,
+    ) -> Option<(Possible, f64)> {
         let known = wanted.known(surface, self.observations.iter());
         let is_alive = |p: &Possible| self.dead.iter().all(|dead| (dead - p.point).norm() > DEAD);
-        let candidate = |p: &Possible| Candidate { point: p.point, sigma: wanted.params.touch_sigma };
+        let candidate = |p: &Possible| Candidate {
+            point: p.point,
+            sigma: wanted.params.touch_sigma,
+        };
         let possible = possible.into_iter().filter(is_alive);
         let (mut chosen, gain) = known.best(surface, possible, candidate, &wanted.asked)?;
         let sigma = known.sigma_at(surface, &chosen.point);
-        chosen.planned.expected = Some(Expected { travel: chosen.travel, sigma });
+        chosen.planned.expected = Some(Expected {
+            travel: chosen.travel,
+            sigma,
+        });
         Some((chosen, gain))
     }
 
     /// The planned touch with the largest gain.
-    pub fn next<M: Surface>(&mut self, surface: &M, wanted: &Wanted, possible: Vec<Possible>) -> Option<TouchPlan> {
-        self.best(surface, wanted, possible).map(|(best, _)| self.aim(&best))
+    pub fn next<M: Surface>(
+        &mut self,
+        surface: &M,
+        wanted: &Wanted,
+        possible: Vec<Possible>,
+    ) -> Option<TouchPlan> {
+        self.best(surface, wanted, possible)
+            .map(|(best, _)| self.aim(&best))
     }
 
     /// The planned touch is one of this surface.

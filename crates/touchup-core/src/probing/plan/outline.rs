@@ -33,12 +33,21 @@ impl Outline {
     /// - `scan`: in O; `flag`, `normal`: in O; `deep`: how far below the flag touches reach, m.
     pub fn new(scan: &TriMesh, flag: &Point3<f64>, normal: &Unit<Vector3<f64>>, deep: f64) -> Self {
         let pose_fo = Isometry3::from_parts(flag.coords.into(), turned_to(normal)).inverse();
-        let triangles = || scan.faces().map(|(face, _)| scan.triangle(face).map(|p| pose_fo * p));
+        let triangles = || {
+            scan.faces()
+                .map(|(face, _)| scan.triangle(face).map(|p| pose_fo * p))
+        };
         let near = || triangles().filter(|corners| corners.iter().any(|p| p.z > -deep));
-        let (low, high) = near().flatten().fold((Point2::origin(), Point2::origin()), |(low, high), p| {
-            let p = p.xy();
-            (Point2::from(low.coords.inf(&p.coords)), Point2::from(high.coords.sup(&p.coords)))
-        });
+        let (low, high) =
+            near()
+                .flatten()
+                .fold((Point2::origin(), Point2::origin()), |(low, high), p| {
+                    let p = p.xy();
+                    (
+                        Point2::from(low.coords.inf(&p.coords)),
+                        Point2::from(high.coords.sup(&p.coords)),
+                    )
+                });
         let size = high - low;
         let cell = CELL.max(size.max() / MOST);
         let [columns, rows] = [size.x, size.y].map(|length| (length / cell).ceil() as usize + 3);
@@ -47,9 +56,17 @@ impl Outline {
         let mut is_part = vec![false; columns * rows];
         for corners in near() {
             let corners = corners.map(|p| (p.xy() - lowest) / cell);
-            cover(corners, |column, row| is_part[row * columns + column] = true);
+            cover(corners, |column, row| {
+                is_part[row * columns + column] = true
+            });
         }
-        Self { pose_fo, lowest, cell, columns, is_outside: reached_from_border(&is_part, columns) }
+        Self {
+            pose_fo,
+            lowest,
+            cell,
+            columns,
+            is_outside: reached_from_border(&is_part, columns),
+        }
     }
 
     fn is_outside(&self, p: &Point2<f64>) -> bool {
@@ -63,8 +80,11 @@ impl Outline {
     pub fn is_part(&self, place: &Point3<f64>, radius: f64) -> bool {
         let place = (self.pose_fo * place).xy();
         let turn = |at: usize| at as f64 / AROUND as f64 * std::f64::consts::TAU;
-        let around = (0..AROUND).map(|at| place + Vector2::new(turn(at).cos(), turn(at).sin()) * radius);
-        std::iter::once(place).chain(around).all(|p| !self.is_outside(&p))
+        let around =
+            (0..AROUND).map(|at| place + Vector2::new(turn(at).cos(), turn(at).sin()) * radius);
+        std::iter::once(place)
+            .chain(around)
+            .all(|p| !self.is_outside(&p))
     }
 }
 
@@ -80,7 +100,8 @@ fn cover(corners: [Vector2<f64>; 3], mut found: impl FnMut(usize, usize)) {
     for row in (from(low.y)..).take_while(|row| *row as f64 <= to(high.y)) {
         for column in (from(low.x)..).take_while(|column| *column as f64 <= to(high.x)) {
             let p = Vector2::new(column as f64 + 0.5, row as f64 + 0.5);
-            let is_left = |u: Vector2<f64>, v: Vector2<f64>| (v - u).perp(&(p - u)) * turned >= -INCLUDED;
+            let is_left =
+                |u: Vector2<f64>, v: Vector2<f64>| (v - u).perp(&(p - u)) * turned >= -INCLUDED;
             if is_left(a, b) && is_left(b, c) && is_left(c, a) {
                 found(column, row);
             }

@@ -39,7 +39,8 @@ pub(super) trait Stage: Debug + Send {
     fn uncertainty(&self, context: &SearchContext) -> Option<f64>;
     /// Whether it has the requested uncertainty.
     fn is_known(&self, context: &SearchContext) -> bool {
-        self.uncertainty(context).is_some_and(|sigma| sigma <= context.params.sigma)
+        self.uncertainty(context)
+            .is_some_and(|sigma| sigma <= context.params.sigma)
     }
     /// Whether its touches fix its shape, so that its numbers can be believed.
     fn is_fixed(&self, context: &SearchContext) -> bool {

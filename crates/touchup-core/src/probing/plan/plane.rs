@@ -34,20 +34,36 @@ const FIRST: usize = 3;
 impl PlanePattern {
     pub fn new(params: &PatternParams) -> Self {
         let places = hexagonal(2.0 * params.flag_radius / ACROSS, params.flag_radius);
-        Self { measuring: Measuring::default(), places, first: 0 }
+        Self {
+            measuring: Measuring::default(),
+            places,
+            first: 0,
+        }
     }
 
     fn guess(context: &SearchContext) -> Plane {
-        Plane { pose_of: context.pose_of * nalgebra::Translation3::new(0.0, 0.0, context.height) }
+        Plane {
+            pose_of: context.pose_of * nalgebra::Translation3::new(0.0, 0.0, context.height),
+        }
     }
 
     fn wanted(params: &PatternParams) -> Wanted {
         // at the rim of the field it is to be known as well as in its middle
-        Wanted::of_plane(params, &[Freedom::TiltX, Freedom::TiltY], params.flag_radius, LEAN, LEAST)
+        Wanted::of_plane(
+            params,
+            &[Freedom::TiltX, Freedom::TiltY],
+            params.flag_radius,
+            LEAN,
+            LEAST,
+        )
     }
 
     fn possible(&self, context: &SearchContext) -> Vec<Possible> {
-        let PatternParams { clearance, ball_radius, .. } = context.params;
+        let PatternParams {
+            clearance,
+            ball_radius,
+            ..
+        } = context.params;
         let search = clearance + ball_radius + ROUGH;
         let at = |place: &Point3<f64>| Possible {
             point: context.pose_of * Point3::new(place.x, place.y, context.height),
@@ -65,16 +81,27 @@ impl Stage for PlanePattern {
             // a third of a turn apart, near the rim
             let direction = toward(self.first as f64 / FIRST as f64);
             let far = |p: &Possible| context.in_f(&p.point).coords.dot(&direction);
-            let farthest = possible.into_iter().max_by(|a, b| far(a).total_cmp(&far(b)));
+            let farthest = possible
+                .into_iter()
+                .max_by(|a, b| far(a).total_cmp(&far(b)));
             return Ok(farthest.map(|farthest| self.measuring.aim(&farthest)));
         }
-        Ok(self.measuring.next(&Self::guess(context), &Self::wanted(&context.params), possible))
+        Ok(self.measuring.next(
+            &Self::guess(context),
+            &Self::wanted(&context.params),
+            possible,
+        ))
     }
 
     fn take(&mut self, context: &mut SearchContext, touch: &Touched) {
         self.first += 1;
         self.measuring.take(touch);
-        let Some(place) = touch.place.filter(|_| matches!(touch.result, TouchResult::At { .. })) else { return };
+        let Some(place) = touch
+            .place
+            .filter(|_| matches!(touch.result, TouchResult::At { .. }))
+        else {
+            return;
+        };
         let surface = context.below(&place);
         if self.measuring.observations.len() == 1 {
             context.height = surface;
@@ -86,21 +113,33 @@ impl Stage for PlanePattern {
 
     fn feature(&self, context: &SearchContext) -> Result<Option<Feature>, ExploreError> {
         if self.measuring.observations.len() < FIRST {
-            return Err(ExploreError::NotDone { touches: context.touches });
+            return Err(ExploreError::NotDone {
+                touches: context.touches,
+            });
         }
         let fitted = surface_about(context, &Point3::origin(), &self.measuring.observations)?;
         let middle = context.pose_of * Point3::origin();
-        Ok(Some(Feature::plane(&fitted, &middle, numbers([&self.measuring.observations]))))
+        Ok(Some(Feature::plane(
+            &fitted,
+            &middle,
+            numbers([&self.measuring.observations]),
+        )))
     }
 
     fn uncertainty(&self, context: &SearchContext) -> Option<f64> {
-        self.measuring.uncertainty(&Self::guess(context), &Self::wanted(&context.params))
+        self.measuring
+            .uncertainty(&Self::guess(context), &Self::wanted(&context.params))
     }
 
     fn slides(&self, context: &SearchContext) -> Vec<Slide> {
         let fitted = surface_about(context, &Point3::origin(), &self.measuring.observations).ok();
-        let level = |pose_of| SearchContext { pose_of, height: 0.0, ..context.clone() };
-        let slide = fitted.map(|fitted| level(fitted.surface.pose_of).raster(context.params.flag_radius));
+        let level = |pose_of| SearchContext {
+            pose_of,
+            height: 0.0,
+            ..context.clone()
+        };
+        let slide =
+            fitted.map(|fitted| level(fitted.surface.pose_of).raster(context.params.flag_radius));
         slide.into_iter().collect()
     }
 }

@@ -33,20 +33,40 @@ impl RegionPattern {
         let mut places = hexagonal(step, params.flag_radius);
         let ring = |p: &Point3<f64>| (p.coords.norm() / step).round();
         let turn = |p: &Point3<f64>| p.y.atan2(p.x);
-        places.sort_by(|a, b| ring(b).total_cmp(&ring(a)).then(turn(b).total_cmp(&turn(a))));
-        Self { places, surface: Vec::new(), step }
+        places.sort_by(|a, b| {
+            ring(b)
+                .total_cmp(&ring(a))
+                .then(turn(b).total_cmp(&turn(a)))
+        });
+        Self {
+            places,
+            surface: Vec::new(),
+            step,
+        }
     }
 }
 
 impl Stage for RegionPattern {
     fn next(&mut self, context: &mut SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
-        let PatternParams { clearance, ball_radius, depth, .. } = context.params;
-        Ok(self.places.last().map(|place| context.down(place, clearance + ball_radius + depth.max(ROUGH))))
+        let PatternParams {
+            clearance,
+            ball_radius,
+            depth,
+            ..
+        } = context.params;
+        Ok(self
+            .places
+            .last()
+            .map(|place| context.down(place, clearance + ball_radius + depth.max(ROUGH))))
     }
 
     fn take(&mut self, context: &mut SearchContext, touch: &Touched) {
         self.places.pop();
-        self.surface.push(touch.place.map(|place| Point3::new(place.x, place.y, context.below(&place))));
+        self.surface.push(
+            touch
+                .place
+                .map(|place| Point3::new(place.x, place.y, context.below(&place))),
+        );
         if let Some(place) = touch.place {
             // the next one begins clear of the highest
             context.height = context.height.max(context.below(&place));
@@ -63,11 +83,16 @@ impl Stage for RegionPattern {
 
     fn slides(&self, context: &SearchContext) -> Vec<Slide> {
         let is_next = |pair: &[Option<Point3<f64>>]| {
-            let [Some(a), Some(b)] = pair else { return false };
+            let [Some(a), Some(b)] = pair else {
+                return false;
+            };
             (b - a).xy().norm() <= NEXT * self.step && (b.z - a.z).abs() <= STEEP * self.step
         };
         let surface = self.surface.chunk_by(|a, b| is_next(&[*a, *b]));
         let chains = surface.map(|chain| chain.iter().flatten().copied().collect::<Vec<_>>());
-        chains.filter(|chain| chain.len() > 1).map(|chain| context.along(&chain)).collect()
+        chains
+            .filter(|chain| chain.len() > 1)
+            .map(|chain| context.along(&chain))
+            .collect()
     }
 }

@@ -43,7 +43,9 @@ const HIGH: f64 = 0.6;
 impl SearchContext {
     /// How far below the surface a wall may be touched, with the floor of its opening at a place of the ball's centre, m.
     pub fn above_floor(&self, depth: f64, centre: &Point3<f64>) -> f64 {
-        depth.min(self.height - centre.z - OFF_FLOOR).max(BELOW_RIM * self.params.ball_radius)
+        depth
+            .min(self.height - centre.z - OFF_FLOOR)
+            .max(BELOW_RIM * self.params.ball_radius)
     }
 
     /// How far below the surface a wall may be touched that stands on the ground, m; at the highest and the deepest.
@@ -52,14 +54,23 @@ impl SearchContext {
     ///
     /// # Errors
     /// [`ExploreError::TooLow`].
-    pub fn above_ground(&self, kind: &'static str, ground_z: f64, off: f64) -> Result<[f64; 2], ExploreError> {
+    pub fn above_ground(
+        &self,
+        kind: &'static str,
+        ground_z: f64,
+        off: f64,
+    ) -> Result<[f64; 2], ExploreError> {
         let ball = self.params.ball_radius;
         let deepest = self.height - ground_z - ball - off;
         if deepest > TOO_LOW * ball {
             let deep = deepest.min(SHALLOW * ball);
             return Ok([(BELOW_RIM * ball).min(HIGH * deep), deep]);
         }
-        Err(ExploreError::TooLow { kind, height_mm: (self.height - ground_z) * 1e3, ball_mm: ball * 2e3 })
+        Err(ExploreError::TooLow {
+            kind,
+            height_mm: (self.height - ground_z) * 1e3,
+            ball_mm: ball * 2e3,
+        })
     }
 }
 
@@ -74,7 +85,10 @@ pub(super) struct OpeningSearch {
 
 impl OpeningSearch {
     fn not_found(params: &PatternParams) -> ExploreError {
-        ExploreError::NotFound { radius_mm: params.flag_radius * 1e3, ball_mm: params.ball_radius * 2e3 }
+        ExploreError::NotFound {
+            radius_mm: params.flag_radius * 1e3,
+            ball_mm: params.ball_radius * 2e3,
+        }
     }
 
     /// Radius of the search around the flag, m: no farther than all touches lead, each a step from the last.
@@ -88,17 +102,32 @@ impl OpeningSearch {
     /// # Errors
     /// [`ExploreError::NotFound`] when all have been tried.
     pub fn next(&mut self, context: &mut SearchContext) -> Result<TouchPlan, ExploreError> {
-        let PatternParams { ball_radius, clearance, .. } = context.params;
+        let PatternParams {
+            ball_radius,
+            clearance,
+            ..
+        } = context.params;
         let step = STEP * ball_radius;
         let sunk = context.params.beyond(SUNK);
-        let deepest = self.tried.iter().max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, depth)| *depth > sunk);
+        let deepest = self
+            .tried
+            .iter()
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .filter(|(_, depth)| *depth > sunk);
         let centre = deepest.map_or(Point3::origin(), |(place, _)| *place);
-        let near = |place: &Point3<f64>| (place - centre).xy().norm() + 1e-3 * place.coords.xy().norm();
+        let near =
+            |place: &Point3<f64>| (place - centre).xy().norm() + 1e-3 * place.coords.xy().norm();
         let places = hexagonal(step, Self::farthest(&context.params));
         loop {
-            let is_new =
-                |place: &&Point3<f64>| self.tried.iter().all(|(tried, _)| (tried - **place).xy().norm() > step / 2.0);
-            let best = places.iter().filter(is_new).min_by(|a, b| near(a).total_cmp(&near(b)));
+            let is_new = |place: &&Point3<f64>| {
+                self.tried
+                    .iter()
+                    .all(|(tried, _)| (tried - **place).xy().norm() > step / 2.0)
+            };
+            let best = places
+                .iter()
+                .filter(is_new)
+                .min_by(|a, b| near(a).total_cmp(&near(b)));
             let best = best.ok_or_else(|| Self::not_found(&context.params))?;
             if context.is_over_part(best) {
                 return Ok(context.down(best, clearance + SHALLOW * ball_radius + ROUGH));
@@ -144,7 +173,9 @@ impl OpeningSearch {
     pub fn not_done(context: &SearchContext, is_open: bool) -> ExploreError {
         match is_open {
             true => Self::not_found(&context.params),
-            false => ExploreError::NotDone { touches: context.touches },
+            false => ExploreError::NotDone {
+                touches: context.touches,
+            },
         }
     }
 
@@ -161,8 +192,11 @@ pub(super) fn hexagonal(step: f64, radius: f64) -> Vec<Point3<f64>> {
         let x = step * (f64::from(column) + 0.5 * f64::from(row));
         Point3::new(x, step * 0.75f64.sqrt() * f64::from(row), 0.0)
     };
-    let places = (-rings..=rings).flat_map(|row| (-2 * rings..=2 * rings).map(move |column| place(row, column)));
-    places.filter(|place| place.coords.norm() <= radius).collect()
+    let places = (-rings..=rings)
+        .flat_map(|row| (-2 * rings..=2 * rings).map(move |column| place(row, column)));
+    places
+        .filter(|place| place.coords.norm() <= radius)
+        .collect()
 }
 
 #[cfg(test)]
@@ -172,7 +206,10 @@ mod tests {
     /// A hexagonal grid has 2π/√3 (R/s)² places within R: with 39 touches within 39 steps that is 5518, and 1.6 million within 1 m.
     #[test]
     fn a_flag_that_may_be_a_metre_off_makes_no_millions_of_places() {
-        let params = PatternParams { flag_radius: 1.0, ..PatternParams::default() };
+        let params = PatternParams {
+            flag_radius: 1.0,
+            ..PatternParams::default()
+        };
         let places = hexagonal(STEP * params.ball_radius, OpeningSearch::farthest(&params)).len();
         assert!((5000..6000).contains(&places), "{places}");
     }

@@ -88,9 +88,17 @@ impl PatternParams {
     /// The part of the wanted number of a feature that no touch reduces: the largest of its numbers; m, or rad of an axis.
     ///
     /// - `out`: of the surface, unit vector.
-    pub(super) fn shared_part(&self, kind: Option<Kind>, place: &Point3<f64>, out: &Vector3<f64>) -> f64 {
+    pub(super) fn shared_part(
+        &self,
+        kind: Option<Kind>,
+        place: &Point3<f64>,
+        out: &Vector3<f64>,
+    ) -> f64 {
         let Some(kind) = kind else { return 0.0 };
-        let (position, size) = (self.shared.position(kind, place, out), 2.0 * self.shared.radius);
+        let (position, size) = (
+            self.shared.position(kind, place, out),
+            2.0 * self.shared.radius,
+        );
         match self.quantity {
             Quantity::Axis => self.shared.turn,
             Quantity::Diameter | Quantity::Width | Quantity::Length => size,
@@ -199,21 +207,39 @@ impl SearchContext {
 
     /// Notes that a place of F is not touched.
     pub fn leave_out(&mut self, place: &Point3<f64>) {
-        self.left_out.push(self.pose_of * Point3::new(place.x, place.y, self.height));
+        self.left_out
+            .push(self.pose_of * Point3::new(place.x, place.y, self.height));
     }
 
     /// Whether all of the ball is over the part at a place of F.
     pub fn is_over_part(&self, place: &Point3<f64>) -> bool {
-        self.outline.is_part(&(self.pose_of * place), self.params.ball_radius)
+        self.outline
+            .is_part(&(self.pose_of * place), self.params.ball_radius)
     }
 
     /// One of several places of F that are touched from above; where it is beside the part, the place of others that is over it and
     /// farthest from all that are touched.
-    pub fn over_part(&mut self, at: usize, wanted: &[Point3<f64>], others: &[Point3<f64>]) -> Point3<f64> {
-        let mut taken: Vec<_> = wanted.iter().filter(|place| self.is_over_part(place)).copied().collect();
+    pub fn over_part(
+        &mut self,
+        at: usize,
+        wanted: &[Point3<f64>],
+        others: &[Point3<f64>],
+    ) -> Point3<f64> {
+        let mut taken: Vec<_> = wanted
+            .iter()
+            .filter(|place| self.is_over_part(place))
+            .copied()
+            .collect();
         for (index, place) in wanted.iter().enumerate().take(at + 1) {
-            let near = |p: &Point3<f64>| taken.iter().map(|t| (t - p).norm()).fold(f64::INFINITY, f64::min);
-            let other = others.iter().filter(|p| self.is_over_part(p) && near(p) > self.params.ball_radius);
+            let near = |p: &Point3<f64>| {
+                taken
+                    .iter()
+                    .map(|t| (t - p).norm())
+                    .fold(f64::INFINITY, f64::min)
+            };
+            let other = others
+                .iter()
+                .filter(|p| self.is_over_part(p) && near(p) > self.params.ball_radius);
             let farthest = other.max_by(|a, b| near(a).total_cmp(&near(b))).copied();
             match farthest.filter(|_| !self.is_over_part(place)) {
                 Some(farthest) if index == at => {
@@ -229,10 +255,17 @@ impl SearchContext {
     /// One of [`AROUND`] places of F around a middle, or elsewhere around it where that one is beside the part.
     ///
     /// - `first`: so many of their steps from x to the first; `away`: from the middle, m.
-    pub fn around(&mut self, at: usize, first: f64, middle: &Point3<f64>, away: f64) -> Point3<f64> {
-        let place = |at: usize, count: usize| middle + toward((at as f64 + first) / count as f64) * away;
-        let [wanted, others] =
-            [AROUND, DIRECTIONS].map(|count| (0..count).map(|at| place(at, count)).collect::<Vec<_>>());
+    pub fn around(
+        &mut self,
+        at: usize,
+        first: f64,
+        middle: &Point3<f64>,
+        away: f64,
+    ) -> Point3<f64> {
+        let place =
+            |at: usize, count: usize| middle + toward((at as f64 + first) / count as f64) * away;
+        let [wanted, others] = [AROUND, DIRECTIONS]
+            .map(|count| (0..count).map(|at| place(at, count)).collect::<Vec<_>>());
         self.over_part(at, &wanted, &others)
     }
 
@@ -252,14 +285,32 @@ impl SearchContext {
     /// Down at a place of F.
     pub fn down(&self, place: &Point3<f64>, search: f64) -> TouchPlan {
         let from = self.pose_of * Point3::new(place.x, place.y, self.clear());
-        TouchPlan { entry: from, from, direction: Unit::new_unchecked(-self.out()), search, expected: None }
+        TouchPlan {
+            entry: from,
+            from,
+            direction: Unit::new_unchecked(-self.out()),
+            search,
+            expected: None,
+        }
     }
 
     /// From a place of F, at a depth below the surface, along a direction of F.
-    pub fn sideways(&self, place: &Point3<f64>, depth: f64, direction: &Vector3<f64>, search: f64) -> TouchPlan {
+    pub fn sideways(
+        &self,
+        place: &Point3<f64>,
+        depth: f64,
+        direction: &Vector3<f64>,
+        search: f64,
+    ) -> TouchPlan {
         let at = |z: f64| self.pose_of * Point3::new(place.x, place.y, z);
         let direction = Unit::new_normalize(self.pose_of.rotation * direction);
-        TouchPlan { entry: at(self.clear()), from: at(self.height - depth), direction, search, expected: None }
+        TouchPlan {
+            entry: at(self.clear()),
+            from: at(self.height - depth),
+            direction,
+            search,
+            expected: None,
+        }
     }
 
     /// Down at the flag, then at the places of a ring around it.
@@ -275,7 +326,10 @@ impl SearchContext {
 
     /// The same of a contact from above, in O.
     pub fn end(&self, contact: &Observation) -> End {
-        End { point: contact.point - self.out() * contact.offset, sigma: contact.sigma }
+        End {
+            point: contact.point - self.out() * contact.offset,
+            sigma: contact.sigma,
+        }
     }
 }
 

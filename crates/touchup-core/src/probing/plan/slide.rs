@@ -46,7 +46,10 @@ impl Slide {
 
     /// Of the ball's path, m.
     pub fn length(&self) -> f64 {
-        self.stations.windows(2).map(|pair| (pair[1].centre - pair[0].centre).norm()).sum()
+        self.stations
+            .windows(2)
+            .map(|pair| (pair[1].centre - pair[0].centre).norm())
+            .sum()
     }
 }
 
@@ -89,11 +92,17 @@ impl RimStation<'_> {
         let normal = Vector3::z() * angle.cos() + over * angle.sin();
         let down = (path - FRAC_PI_2 * ball).max(0.0);
         let centre = rim + normal * ball + over * path.min(0.0) - Vector3::z() * down;
-        Station { centre: context.pose_of * centre, normal: Unit::new_normalize(context.pose_of.rotation * normal) }
+        Station {
+            centre: context.pose_of * centre,
+            normal: Unit::new_normalize(context.pose_of.rotation * normal),
+        }
     }
 
     fn slide(&self, context: &SearchContext, stations: Vec<Station>) -> Slide {
-        Slide { lift: context.params.clearance.min(self.room), ..context.slide(stations) }
+        Slide {
+            lift: context.params.clearance.min(self.room),
+            ..context.slide(stations)
+        }
     }
 
     /// Along the wall at several depths, then across the rim again and again.
@@ -107,10 +116,14 @@ impl RimStation<'_> {
         let levels = (((deepest - highest) / (LINES * ball)).ceil() as usize + 1).min(MOST_LEVELS);
         let along_wall = |level: usize| {
             let depth = highest + (deepest - highest) * level as f64 / (levels - 1).max(1) as f64;
-            let around = steps(self.length, ball).map(|share| self.station(context, share, on_wall(depth)));
+            let around =
+                steps(self.length, ball).map(|share| self.station(context, share, on_wall(depth)));
             self.slide(context, around.collect())
         };
-        (0..levels).map(along_wall).chain([self.zigzag(context, on_wall(highest))]).collect()
+        (0..levels)
+            .map(along_wall)
+            .chain([self.zigzag(context, on_wall(highest))])
+            .collect()
     }
 
     /// Down over the rim, on along the wall, up over the rim, on along the surface above, and again.
@@ -118,18 +131,29 @@ impl RimStation<'_> {
         let ball = context.params.ball_radius;
         let count = ((self.length / (CROSSINGS * ball)) as usize).clamp(2, MOST_CROSSINGS);
         // where the end is the beginning it is not crossed again
-        let share = |crossing: usize| crossing as f64 / if self.is_closed { count } else { count - 1 } as f64;
+        let share = |crossing: usize| {
+            crossing as f64 / if self.is_closed { count } else { count - 1 } as f64
+        };
         let mut stations = Vec::new();
         for crossing in 0..count {
-            let (from, to) = if crossing % 2 == 0 { (-self.back, deep) } else { (deep, -self.back) };
+            let (from, to) = if crossing % 2 == 0 {
+                (-self.back, deep)
+            } else {
+                (deep, -self.back)
+            };
             let across = steps((to - from).abs(), ball).map(|gone| from + (to - from) * gone);
             stations.extend(across.map(|path| self.station(context, share(crossing), path)));
             if crossing + 1 < count {
                 let [here, next] = [share(crossing), share(crossing + 1)];
                 let between = |gone: f64| self.station(context, here + (next - here) * gone, to);
                 // beside a round rim the path is longer, or shorter, than the rim
-                let pieces: Vec<_> = (0..=PIECES).map(|at| between(at as f64 / PIECES as f64).centre).collect();
-                let length = pieces.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum();
+                let pieces: Vec<_> = (0..=PIECES)
+                    .map(|at| between(at as f64 / PIECES as f64).centre)
+                    .collect();
+                let length = pieces
+                    .windows(2)
+                    .map(|pair| (pair[1] - pair[0]).norm())
+                    .sum();
                 stations.extend(steps(length, ball).skip(1).map(between));
             }
         }
@@ -144,21 +168,34 @@ fn steps(length: f64, ball: f64) -> impl Iterator<Item = f64> {
 }
 
 /// Length of the rim of a slot, m, and the rim in the frame of the slot: x along it, the origin in its middle.
-pub(super) fn stadium_rim(width: f64, length: f64) -> (f64, impl Fn(f64) -> (Point3<f64>, Vector3<f64>)) {
+pub(super) fn stadium_rim(
+    width: f64,
+    length: f64,
+) -> (f64, impl Fn(f64) -> (Point3<f64>, Vector3<f64>)) {
     let (radius, half) = (width / 2.0, (length - width).max(0.0) / 2.0);
     let (straight, round) = (2.0 * half, FRAC_PI_2 * width);
     let total = 2.0 * (straight + round);
     let at = move |share: f64| {
         let gone = share * total;
         // one half is the other one turned by half a turn
-        let (gone, sign) = if gone < total / 2.0 { (gone, 1.0) } else { (gone - total / 2.0, -1.0) };
+        let (gone, sign) = if gone < total / 2.0 {
+            (gone, 1.0)
+        } else {
+            (gone - total / 2.0, -1.0)
+        };
         let (middle, direction) = if gone < straight {
             (Vector3::new(half - gone, 0.0, 0.0), Vector3::y())
         } else {
             let angle = FRAC_PI_2 + (gone - straight) / radius;
-            (Vector3::new(-half, 0.0, 0.0), Vector3::new(angle.cos(), angle.sin(), 0.0))
+            (
+                Vector3::new(-half, 0.0, 0.0),
+                Vector3::new(angle.cos(), angle.sin(), 0.0),
+            )
         };
-        (Point3::from((middle + direction * radius) * sign), -direction * sign)
+        (
+            Point3::from((middle + direction * radius) * sign),
+            -direction * sign,
+        )
     };
     (total, at)
 }
@@ -168,7 +205,12 @@ impl SearchContext {
     fn slide(&self, stations: Vec<Station>) -> Slide {
         let up = Unit::new_normalize(self.out());
         let above = self.pose_of * Point3::new(0.0, 0.0, self.clear());
-        Slide { stations, lift: self.params.clearance, up, height: above.coords.dot(&up) }
+        Slide {
+            stations,
+            lift: self.params.clearance,
+            up,
+            height: above.coords.dot(&up),
+        }
     }
 
     /// To and fro over a field of the surface, within a radius around the flag.
@@ -190,8 +232,12 @@ impl SearchContext {
         let mut stations = Vec::new();
         for pair in places.windows(2) {
             let direction = pair[1] - pair[0];
-            let Some(along) = direction.try_normalize(0.0) else { continue };
-            let normal = (Vector3::z() - along * along.z).try_normalize(0.0).unwrap_or_else(Vector3::z);
+            let Some(along) = direction.try_normalize(0.0) else {
+                continue;
+            };
+            let normal = (Vector3::z() - along * along.z)
+                .try_normalize(0.0)
+                .unwrap_or_else(Vector3::z);
             let station = |gone: f64| Station {
                 centre: self.pose_of * (pair[0] + direction * gone + normal * ball),
                 normal: Unit::new_normalize(self.pose_of.rotation * normal),

@@ -46,7 +46,11 @@ const LEAST_WALL: usize = 10;
 const BEYOND: f64 = 3e-3;
 /// An end is believed when it was touched on its middle and on both sides of it: angles from the slot's direction, rad. One touch
 /// alone may have met anything; three that lie on one half circle as wide as the slot have met its end.
-const PARTS: [[f64; 2]; 3] = [[-PI / 3.0, -PI / 8.0], [-PI / 8.0, PI / 8.0], [PI / 8.0, PI / 3.0]];
+const PARTS: [[f64; 2]; 3] = [
+    [-PI / 3.0, -PI / 8.0],
+    [-PI / 8.0, PI / 8.0],
+    [PI / 8.0, PI / 3.0],
+];
 /// The same parts of a straight end: across the slot, over the distance of the ball's centre from the middle line.
 const STRAIGHT_PARTS: [[f64; 2]; 3] = [[-0.5, -0.15], [-0.15, 0.15], [0.15, 0.5]];
 /// So far from the middle of a wall candidates go at the most, over where its corners begin: they are met a little elsewhere.
@@ -97,7 +101,10 @@ pub(super) struct SlotPattern {
 
 impl SlotPattern {
     pub fn new(params: &PatternParams) -> Self {
-        Self { depth: params.depth.max(SHALLOW * params.ball_radius), ..Self::default() }
+        Self {
+            depth: params.depth.max(SHALLOW * params.ball_radius),
+            ..Self::default()
+        }
     }
 
     /// The walls through the contacts, at the height of the surface, so that depths are coordinates of their frame.
@@ -105,31 +112,61 @@ impl SlotPattern {
         let corners = std::mem::take(&mut self.corners);
         self.measuring.observations.extend(corners);
         self.measuring.observations.sort_by_key(|o| o.group);
-        let flat: Vec<_> = self.measuring.observations.iter().map(|o| context.in_f(&o.point).xy()).collect();
-        let free: Vec<_> = self.free.iter().map(|place| context.in_f(place).xy()).collect();
+        let flat: Vec<_> = self
+            .measuring
+            .observations
+            .iter()
+            .map(|o| context.in_f(&o.point).xy())
+            .collect();
+        let free: Vec<_> = self
+            .free
+            .iter()
+            .map(|place| context.in_f(place).xy())
+            .collect();
         let agrees = AGREES * context.params.touch_sigma;
         self.slot_fit = match self.slot_fit {
-            Some(known) if self.phase == SlotPhase::Wall => Some(known.fitted_to_more(&flat, &free, agrees)),
+            Some(known) if self.phase == SlotPhase::Wall => {
+                Some(known.fitted_to_more(&flat, &free, agrees))
+            }
             // the first guess of its length may be far off
             known => SlotFit::through(&flat, &free, &self.middle.xy(), agrees)
                 .map(|slot_fit| known.map_or(slot_fit, |known| slot_fit.along_as(&known))),
         };
         let observations = std::mem::take(&mut self.measuring.observations);
-        let is_in_corner =
-            |o: &Observation| self.slot_fit.is_some_and(|fit| fit.is_in_corner(&context.in_f(&o.point).xy()));
-        (self.corners, self.measuring.observations) = observations.into_iter().partition(is_in_corner);
-        self.walls = self.slot_fit.map(|slot_fit| Self::walls_of(context, &slot_fit));
+        let is_in_corner = |o: &Observation| {
+            self.slot_fit
+                .is_some_and(|fit| fit.is_in_corner(&context.in_f(&o.point).xy()))
+        };
+        (self.corners, self.measuring.observations) =
+            observations.into_iter().partition(is_in_corner);
+        self.walls = self
+            .slot_fit
+            .map(|slot_fit| Self::walls_of(context, &slot_fit));
     }
 
     fn walls_of(context: &SearchContext, slot_fit: &SlotFit) -> Stadium {
-        let centre = context.pose_of * Point3::new(slot_fit.middle.x, slot_fit.middle.y, context.height);
-        let along = context.pose_of.rotation * Vector3::new(slot_fit.along().x, slot_fit.along().y, 0.0);
+        let centre =
+            context.pose_of * Point3::new(slot_fit.middle.x, slot_fit.middle.y, context.height);
+        let along =
+            context.pose_of.rotation * Vector3::new(slot_fit.along().x, slot_fit.along().y, 0.0);
         let width = 2.0 * (slot_fit.radius + context.params.ball_radius);
-        Stadium::new(centre, &context.out(), &along, [width, width + 2.0 * slot_fit.half], slot_fit.ends, true)
+        Stadium::new(
+            centre,
+            &context.out(),
+            &along,
+            [width, width + 2.0 * slot_fit.half],
+            slot_fit.ends,
+            true,
+        )
     }
 
     fn squareness(&self, context: &SearchContext, walls: &Stadium) -> (f64, FitParams) {
-        squareness(context.square(context.lean), walls, &self.measuring.observations, &LEAN)
+        squareness(
+            context.square(context.lean),
+            walls,
+            &self.measuring.observations,
+            &LEAN,
+        )
     }
 
     fn wanted(&self, context: &SearchContext, walls: &Stadium) -> Wanted {
@@ -137,9 +174,18 @@ impl SlotPattern {
         let (sigma, (lean, fit)) = (params.sigma, self.squareness(context, walls));
         let asked = Asked::default();
         let asked = match params.quantity {
-            _ if context.open.is_some_and(|open| open != OpenNumbers::default()) => {
-                let OpenNumbers { place, size, length } = context.open.unwrap_or_default();
-                let asked = place.map_or(asked.clone(), |sigma| asked.each(&[Freedom::X, Freedom::Y], sigma));
+            _ if context
+                .open
+                .is_some_and(|open| open != OpenNumbers::default()) =>
+            {
+                let OpenNumbers {
+                    place,
+                    size,
+                    length,
+                } = context.open.unwrap_or_default();
+                let asked = place.map_or(asked.clone(), |sigma| {
+                    asked.each(&[Freedom::X, Freedom::Y], sigma)
+                });
                 let asked = size.map_or(asked.clone(), |sigma| asked.each(&[Freedom::Size], sigma));
                 length.map_or(asked.clone(), |sigma| asked.each(&[Freedom::Second], sigma))
             }
@@ -150,7 +196,9 @@ impl SlotPattern {
             Quantity::All | Quantity::Diameter => {
                 // its direction as well as its ends are known
                 let asked = asked.each(&[Freedom::X, Freedom::Y], sigma);
-                asked.each(&[Freedom::Turn], 2.0 * sigma / walls.length).each(&[Freedom::Second, Freedom::Size], sigma)
+                asked
+                    .each(&[Freedom::Turn], 2.0 * sigma / walls.length)
+                    .each(&[Freedom::Second, Freedom::Size], sigma)
             }
         };
         Wanted {
@@ -165,15 +213,27 @@ impl SlotPattern {
     /// The part of an end that was not touched yet: the sign of the end along the slot, and its angles. Touches that the fit holds
     /// for none of these walls do not count.
     fn open_part(&self, context: &SearchContext, walls: &Stadium) -> Option<(f64, [f64; 2])> {
-        let (half, ball) = ((walls.length - walls.width).max(0.0) / 2.0, context.params.ball_radius);
+        let (half, ball) = (
+            (walls.length - walls.width).max(0.0) / 2.0,
+            context.params.ball_radius,
+        );
         let (_, params) = self.squareness(context, walls);
         let fitted = fit(walls, &self.measuring.observations, &params).ok();
         let used = fitted.iter().flat_map(|fitted| &fitted.used);
-        let kept = self.measuring.observations.iter().zip(used).filter(|(_, used)| **used);
-        let kept: Vec<_> = kept.map(|(o, _)| walls.pose_of.inverse_transform_point(&o.point)).collect();
+        let kept = self
+            .measuring
+            .observations
+            .iter()
+            .zip(used)
+            .filter(|(_, used)| **used);
+        let kept: Vec<_> = kept
+            .map(|(o, _)| walls.pose_of.inverse_transform_point(&o.point))
+            .collect();
         let is_touched = |sign: f64, [low, high]: [f64; 2]| {
             kept.iter().any(|q| match walls.ends {
-                Ends::Round => sign * q.x > half && (low..=high).contains(&q.y.atan2(sign * q.x - half)),
+                Ends::Round => {
+                    sign * q.x > half && (low..=high).contains(&q.y.atan2(sign * q.x - half))
+                }
                 Ends::Straight => {
                     let is_of_end = walls.length / 2.0 - sign * q.x < walls.width / 2.0 - q.y.abs();
                     is_of_end && (low..=high).contains(&(q.y / (walls.width / 2.0 - ball)))
@@ -181,10 +241,17 @@ impl SlotPattern {
             })
         };
         // the middle of an end first: it says where its sides are
-        let parts = if walls.ends == Ends::Round { PARTS } else { STRAIGHT_PARTS };
+        let parts = if walls.ends == Ends::Round {
+            PARTS
+        } else {
+            STRAIGHT_PARTS
+        };
         let parts = [1, 0, 2].map(|part| parts[part]);
-        let all = [1.0, -1.0].into_iter().flat_map(|sign| parts.map(|part| (sign, part)));
-        all.into_iter().find(|(sign, part)| !is_touched(*sign, *part))
+        let all = [1.0, -1.0]
+            .into_iter()
+            .flat_map(|sign| parts.map(|part| (sign, part)));
+        all.into_iter()
+            .find(|(sign, part)| !is_touched(*sign, *part))
     }
 
     /// Whether the walls agree with the free places of the ball, which lie inside, and with those on top, which do not.
@@ -192,16 +259,25 @@ impl SlotPattern {
         let ball = context.params.ball_radius;
         let has_room = |centre: &Point3<f64>| walls.distance(centre) > ball - SLACK;
         let sunk = |centre: &Point3<f64>| context.height - context.below(&context.in_f(centre));
-        let is_over = |centre: &Point3<f64>| sunk(centre) < FLAT && walls.distance(centre) > ON_RIM * ball;
+        let is_over =
+            |centre: &Point3<f64>| sunk(centre) < FLAT && walls.distance(centre) > ON_RIM * ball;
         self.free.iter().all(has_room) && !self.on_top.iter().any(is_over)
     }
 
     /// Touches of walls and ends, each from the middle line of the slot; of one part of an end alone where that is open.
-    fn possible(&self, context: &SearchContext, walls: &Stadium, part: Option<(f64, [f64; 2])>) -> Vec<Possible> {
+    fn possible(
+        &self,
+        context: &SearchContext,
+        walls: &Stadium,
+        part: Option<(f64, [f64; 2])>,
+    ) -> Vec<Possible> {
         if walls.ends == Ends::Straight {
             return self.possible_straight(context, walls, part);
         }
-        let (half, radius) = ((walls.length - walls.width).max(0.0) / 2.0, walls.width / 2.0);
+        let (half, radius) = (
+            (walls.length - walls.width).max(0.0) / 2.0,
+            walls.width / 2.0,
+        );
         let travel = radius - context.params.ball_radius;
         let is_wanted = |&(x, angle): &(f64, f64)| {
             part.is_none_or(|(sign, [low, high])| {
@@ -210,7 +286,12 @@ impl SlotPattern {
             })
         };
         let places = around_stadium(half, ALONG).filter(is_wanted);
-        let places = places.map(|(x, angle)| (Point3::new(x, 0.0, 0.0), Vector3::new(angle.cos(), angle.sin(), 0.0)));
+        let places = places.map(|(x, angle)| {
+            (
+                Point3::new(x, 0.0, 0.0),
+                Vector3::new(angle.cos(), angle.sin(), 0.0),
+            )
+        });
         self.sideways_from(context, walls, places, radius, travel)
     }
 
@@ -221,19 +302,37 @@ impl SlotPattern {
         walls: &Stadium,
         part: Option<(f64, [f64; 2])>,
     ) -> Vec<Possible> {
-        let (ball, radius, half) = (context.params.ball_radius, walls.width / 2.0, (walls.length - walls.width) / 2.0);
+        let (ball, radius, half) = (
+            context.params.ball_radius,
+            walls.width / 2.0,
+            (walls.length - walls.width) / 2.0,
+        );
         let room = radius - ball;
         let flat = OFF_CORNER * (1.0 - CORNER);
         let along = half + room * flat;
         let sides = (0..ALONG).flat_map(|at| {
-            [-1.0, 1.0].map(|sign| (Point3::new(spread(at, ALONG) * along, 0.0, 0.0), Vector3::y() * sign))
+            [-1.0, 1.0].map(|sign| {
+                (
+                    Point3::new(spread(at, ALONG) * along, 0.0, 0.0),
+                    Vector3::y() * sign,
+                )
+            })
         });
-        let ends = (0..ALONG).flat_map(|at| [-1.0, 1.0].map(|sign| (spread(at, ALONG) * flat, sign)));
+        let ends =
+            (0..ALONG).flat_map(|at| [-1.0, 1.0].map(|sign| (spread(at, ALONG) * flat, sign)));
         let in_part = |&(y, sign): &(f64, f64)| {
             part.is_none_or(|(wanted, [low, high])| sign == wanted && (low..=high).contains(&y))
         };
-        let ends = ends.filter(in_part).map(|(y, sign)| (Point3::new(sign * half, y * room, 0.0), Vector3::x() * sign));
-        self.sideways_from(context, walls, sides.filter(|_| part.is_none()).chain(ends), radius, room)
+        let ends = ends
+            .filter(in_part)
+            .map(|(y, sign)| (Point3::new(sign * half, y * room, 0.0), Vector3::x() * sign));
+        self.sideways_from(
+            context,
+            walls,
+            sides.filter(|_| part.is_none()).chain(ends),
+            radius,
+            room,
+        )
     }
 
     /// Touches from places of the middle plane of the walls along directions of it, at both depths.
@@ -246,11 +345,19 @@ impl SlotPattern {
         travel: f64,
     ) -> Vec<Possible> {
         let depths = [BELOW_RIM * context.params.ball_radius, self.depth];
-        let in_f = |v: Vector3<f64>| context.pose_of.inverse_transform_vector(&(walls.pose_of.rotation * v));
+        let in_f = |v: Vector3<f64>| {
+            context
+                .pose_of
+                .inverse_transform_vector(&(walls.pose_of.rotation * v))
+        };
         let planned = |(place, direction): (Point3<f64>, Vector3<f64>), depth: f64| {
             let from = context.in_f(&(walls.pose_of * place));
             let point = walls.pose_of * (place - Vector3::z() * depth + direction * radius);
-            Possible { point, travel, planned: context.sideways(&from, depth, &in_f(direction), travel + BEYOND) }
+            Possible {
+                point,
+                travel,
+                planned: context.sideways(&from, depth, &in_f(direction), travel + BEYOND),
+            }
         };
         context.on_part(places.flat_map(|place| depths.map(|depth| planned(place, depth))))
     }
@@ -262,7 +369,10 @@ impl SlotPattern {
             self.unclear += 1;
         }
         // one unclear touch may have been anything
-        if self.measuring.observations.is_empty() && self.corners.is_empty() && self.unclear >= SLID_IN {
+        if self.measuring.observations.is_empty()
+            && self.corners.is_empty()
+            && self.unclear >= SLID_IN
+        {
             self.opening.slid_in(self.middle, context);
             (self.phase, self.tried, self.unclear) = (SlotPhase::Opening, 0, 0);
             return;
@@ -334,7 +444,8 @@ fn spread(at: usize, count: usize) -> f64 {
 /// from, and the angle towards it.
 pub(super) fn around_stadium(half: f64, count: usize) -> impl Iterator<Item = (f64, f64)> {
     let spread = move |at: usize| spread(at, count);
-    let sides = (0..count).flat_map(move |at| [-PI, PI].map(|turn| (spread(at) * half, turn / 2.0)));
+    let sides =
+        (0..count).flat_map(move |at| [-PI, PI].map(|turn| (spread(at) * half, turn / 2.0)));
     let ends = (0..count).flat_map(move |at| {
         let angle = spread(at) * PI / 3.0;
         [(half, angle), (-half, PI - angle)]
@@ -350,34 +461,65 @@ impl Stage for SlotPattern {
             SlotPhase::Opening => return self.opening.next(context).map(Some),
             SlotPhase::First => {
                 let direction = toward(self.tried as f64 / FIRST as f64);
-                return Ok(Some(context.sideways(&self.middle, shallow, &direction, REACH)));
+                return Ok(Some(context.sideways(
+                    &self.middle,
+                    shallow,
+                    &direction,
+                    REACH,
+                )));
             }
             _ => {}
         }
         let touched = self.measuring.observations.len() + self.corners.len();
         let walls = self.walls.filter(|_| touched >= LEAST_FIRST);
-        let no_wall = ExploreError::NoWall { kind: "slot", walls: touched, asked: FIRST, reach_mm: REACH * 1e3 };
+        let no_wall = ExploreError::NoWall {
+            kind: "slot",
+            walls: touched,
+            asked: FIRST,
+            reach_mm: REACH * 1e3,
+        };
         let walls = walls.ok_or(no_wall)?;
-        let in_f = |v: Vector3<f64>| context.pose_of.inverse_transform_vector(&(walls.pose_of.rotation * v));
+        let in_f = |v: Vector3<f64>| {
+            context
+                .pose_of
+                .inverse_transform_vector(&(walls.pose_of.rotation * v))
+        };
         let centre = context.in_f(&walls.center());
         Ok(Some(match self.phase {
             SlotPhase::Around => {
                 // beside both walls, towards both ends
                 let away = walls.width / 2.0 + BESIDE * ball;
-                let beside = |x: f64, y: f64| centre + in_f(Vector3::new(x * walls.length / 3.0, y * away, 0.0));
-                let wanted = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]].map(|[x, y]| beside(x, y));
+                let beside = |x: f64, y: f64| {
+                    centre + in_f(Vector3::new(x * walls.length / 3.0, y * away, 0.0))
+                };
+                let wanted =
+                    [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]].map(|[x, y]| beside(x, y));
                 // elsewhere beside it, and beyond its ends
-                let beyond =
-                    [-1.0, 1.0].map(|x| centre + in_f(Vector3::x() * x * (walls.length / 2.0 + BESIDE * ball)));
-                let others = (0..ALONG).flat_map(|at| [-1.0, 1.0].map(|y| beside(1.5 * spread(at, ALONG), y)));
-                let place = context.over_part(self.tried, &wanted, &others.chain(beyond).collect::<Vec<_>>());
+                let beyond = [-1.0, 1.0].map(|x| {
+                    centre + in_f(Vector3::x() * x * (walls.length / 2.0 + BESIDE * ball))
+                });
+                let others = (0..ALONG)
+                    .flat_map(|at| [-1.0, 1.0].map(|y| beside(1.5 * spread(at, ALONG), y)));
+                let place = context.over_part(
+                    self.tried,
+                    &wanted,
+                    &others.chain(beyond).collect::<Vec<_>>(),
+                );
                 context.down(&place, context.params.clearance + 2.0 * ball + ROUGH)
             }
-            SlotPhase::End(..) if self.tried >= SEARCHES => return Err(ExploreError::NoEnd { searches: self.tried }),
+            SlotPhase::End(..) if self.tried >= SEARCHES => {
+                return Err(ExploreError::NoEnd {
+                    searches: self.tried,
+                });
+            }
             SlotPhase::End(sign, beyond) => {
                 // from the middle line of the slot
-                let at = walls.pose_of.inverse_transform_point(&(context.pose_of * self.middle)).x;
-                let from = context.in_f(&(walls.pose_of * Point3::new(at + sign * beyond, 0.0, 0.0)));
+                let at = walls
+                    .pose_of
+                    .inverse_transform_point(&(context.pose_of * self.middle))
+                    .x;
+                let from =
+                    context.in_f(&(walls.pose_of * Point3::new(at + sign * beyond, 0.0, 0.0)));
                 context.sideways(&from, shallow, &in_f(Vector3::x() * sign), REACH + ball)
             }
             SlotPhase::Floor => context.sideways(&centre, shallow, &-Vector3::z(), REACH),
@@ -412,34 +554,67 @@ impl Stage for SlotPattern {
 
     fn feature(&self, context: &SearchContext) -> Result<Option<Feature>, ExploreError> {
         let not_done = || OpeningSearch::not_done(context, self.phase == SlotPhase::Opening);
-        let walls = self.walls.as_ref().filter(|_| self.opening.top.len() >= 3).ok_or_else(not_done)?;
+        let walls = self
+            .walls
+            .as_ref()
+            .filter(|_| self.opening.top.len() >= 3)
+            .ok_or_else(not_done)?;
         let top = surface_about(context, &context.in_f(&walls.center()), &self.opening.top)?;
         let (_, params) = self.squareness(context, walls);
         let fitted = fit(walls, &self.measuring.observations, &params)?;
         // where an end was not touched it has no length, and no middle
         fitted.std(Freedom::Second).ok_or_else(not_done)?;
         let touches = numbers([&self.measuring.observations, &self.opening.top]);
-        Ok(Some(Feature::slot(&fitted, &top, self.floor.as_ref(), touches)))
+        Ok(Some(Feature::slot(
+            &fitted,
+            &top,
+            self.floor.as_ref(),
+            touches,
+        )))
     }
 
     fn uncertainty(&self, context: &SearchContext) -> Option<f64> {
-        let walls = self.walls.as_ref().filter(|_| self.phase == SlotPhase::Wall)?;
-        let is_determined = self.open_part(context, walls).is_none() && self.is_consistent(context, walls);
-        let known = || self.measuring.uncertainty(walls, &self.wanted(context, walls));
+        let walls = self
+            .walls
+            .as_ref()
+            .filter(|_| self.phase == SlotPhase::Wall)?;
+        let is_determined =
+            self.open_part(context, walls).is_none() && self.is_consistent(context, walls);
+        let known = || {
+            self.measuring
+                .uncertainty(walls, &self.wanted(context, walls))
+        };
         is_determined.then(known).flatten()
     }
 
     fn slides(&self, context: &SearchContext) -> Vec<Slide> {
-        let Some(walls) = self.walls.as_ref().filter(|walls| walls.ends == Ends::Round) else { return Vec::new() };
+        let Some(walls) = self
+            .walls
+            .as_ref()
+            .filter(|walls| walls.ends == Ends::Round)
+        else {
+            return Vec::new();
+        };
         let ball = context.params.ball_radius;
         let (length, rim) = stadium_rim(walls.width, walls.length);
         let to_f = context.pose_of.inverse() * walls.pose_of;
         let at = |share: f64| {
             let (place, over) = rim(share);
             let place = to_f * place;
-            (Point3::new(place.x, place.y, context.height), to_f.rotation * over)
+            (
+                Point3::new(place.x, place.y, context.height),
+                to_f.rotation * over,
+            )
         };
         let (depths, room) = ([BELOW_RIM * ball, self.depth], walls.width / 2.0 - ball);
-        RimStation { at: &at, length, is_closed: true, back: BESIDE * ball, depths, room }.slides(context)
+        RimStation {
+            at: &at,
+            length,
+            is_closed: true,
+            back: BESIDE * ball,
+            depths,
+            room,
+        }
+        .slides(context)
     }
 }

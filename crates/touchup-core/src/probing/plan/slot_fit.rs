@@ -47,10 +47,18 @@ const LEAST_KEPT: f64 = 0.6;
 /// Of the fit.
 const FREEDOMS: usize = 5;
 /// All of its steps are made: no touch says how near is near enough.
-const SEARCH: DampedSearch =
-    DampedSearch { first: 1e-3, factors: [0.2, 5.0], least: 0.0, most: f64::INFINITY, tries: 60 };
+const SEARCH: DampedSearch = DampedSearch {
+    first: 1e-3,
+    factors: [0.2, 5.0],
+    least: 0.0,
+    most: f64::INFINITY,
+    tries: 60,
+};
 /// Of first guesses with straight ends, whose best one is fitted in full.
-const COARSE: DampedSearch = DampedSearch { tries: 12, ..SEARCH };
+const COARSE: DampedSearch = DampedSearch {
+    tries: 12,
+    ..SEARCH
+};
 /// A fit that does not agree with the points is looked for anew at each so many of them.
 const ANEW: usize = 4;
 /// What no touch determines stays where it is: weight of the guess against one touch.
@@ -77,8 +85,15 @@ impl SlotFit {
         let by_middle = -(v * n[0] + w * n[1]);
         // turning the segment by a moves the point to (x + a y, y − a x) of its axes
         let by_angle = n[0] * y - n[1] * x;
-        let by_radius = if self.ends == Ends::Round { -1.0 } else { -n[0].abs() - n[1].abs() };
-        (residual, Vector5::new(by_middle.x, by_middle.y, by_angle, -n[0].abs(), by_radius))
+        let by_radius = if self.ends == Ends::Round {
+            -1.0
+        } else {
+            -n[0].abs() - n[1].abs()
+        };
+        (
+            residual,
+            Vector5::new(by_middle.x, by_middle.y, by_angle, -n[0].abs(), by_radius),
+        )
     }
 
     /// Distance of a place of its axes from its nearest side, m, and the unit vector away from it.
@@ -92,7 +107,12 @@ impl SlotFit {
     }
 
     fn rms(&self, points: &[Point2<f64>]) -> f64 {
-        (points.iter().map(|p| self.residual(p).0.powi(2)).sum::<f64>() / points.len().max(1) as f64).sqrt()
+        (points
+            .iter()
+            .map(|p| self.residual(p).0.powi(2))
+            .sum::<f64>()
+            / points.len().max(1) as f64)
+            .sqrt()
     }
 
     /// By least squares from a first guess.
@@ -101,7 +121,10 @@ impl SlotFit {
     }
 
     fn fitted_by(self, search: &DampedSearch, points: &[Point2<f64>]) -> Self {
-        let scale = points.iter().map(|p| (p - self.middle).norm()).fold(1e-6, f64::max);
+        let scale = points
+            .iter()
+            .map(|p| (p - self.middle).norm())
+            .fold(1e-6, f64::max);
         // in units of the size, an angle is as large as a length
         let units = Vector5::new(scale, scale, 1.0, scale, scale);
         let damped = |mut equations: NormalEquations<5>, damping: f64| {
@@ -109,8 +132,10 @@ impl SlotFit {
             equations
         };
         let equations = |slot: &Self| {
-            let mut equations =
-                NormalEquations { information: Matrix5::identity() * HELD, ..NormalEquations::default() };
+            let mut equations = NormalEquations {
+                information: Matrix5::identity() * HELD,
+                ..NormalEquations::default()
+            };
             for p in points {
                 let (r, by) = slot.residual(p);
                 equations.add(&(by.component_mul(&units) / scale), -(r / scale), 1.0);
@@ -120,7 +145,11 @@ impl SlotFit {
         let better = |slot: &Self, solved: &Vector5<f64>, before: f64| {
             let step = solved.component_mul(&units);
             let radius = (slot.radius + step[4]).abs();
-            let shortest = if slot.ends == Ends::Round { 0.0 } else { -SHORTER * radius };
+            let shortest = if slot.ends == Ends::Round {
+                0.0
+            } else {
+                -SHORTER * radius
+            };
             let next = Self {
                 middle: slot.middle + step.fixed_rows::<2>(0),
                 angle: slot.angle + step[2],
@@ -130,18 +159,34 @@ impl SlotFit {
             };
             Some((next, next.rms(points))).filter(|(_, rms)| *rms < before)
         };
-        search.run((self, self.rms(points)), equations, damped, better, |_, _| false).0
+        search
+            .run(
+                (self, self.rms(points)),
+                equations,
+                damped,
+                better,
+                |_, _| false,
+            )
+            .0
     }
 
     /// The same of a slot with straight ends, without the points of its corners; what is longer than wide.
     fn fitted_straight(self, search: &DampedSearch, points: &[Point2<f64>]) -> Self {
         let begun = self.fitted_by(search, points);
-        let fitted = (0..CORNER_ROUNDS).fold(begun, |fit, _| fit.fitted_by(search, &fit.off_corners(points)));
+        let fitted = (0..CORNER_ROUNDS).fold(begun, |fit, _| {
+            fit.fitted_by(search, &fit.off_corners(points))
+        });
         if fitted.half >= -SQUARE * fitted.radius {
             return fitted;
         }
         let [radius, half] = [fitted.radius + fitted.half, -fitted.half];
-        Self { angle: fitted.angle + FRAC_PI_2, radius, half, ..fitted }.fitted_by(search, &fitted.off_corners(points))
+        Self {
+            angle: fitted.angle + FRAC_PI_2,
+            radius,
+            half,
+            ..fitted
+        }
+        .fitted_by(search, &fitted.off_corners(points))
     }
 
     /// Whether a point may be of a corner of straight ends, which is no corner of the fit.
@@ -149,11 +194,17 @@ impl SlotFit {
         let (u, v) = (p - self.middle, self.along());
         let corner = CORNER * self.radius;
         let is_near = |place: f64, half: f64| half - place.abs() < corner;
-        self.ends == Ends::Straight && is_near(u.dot(&v), self.half + self.radius) && is_near(v.perp(&u), self.radius)
+        self.ends == Ends::Straight
+            && is_near(u.dot(&v), self.half + self.radius)
+            && is_near(v.perp(&u), self.radius)
     }
 
     fn off_corners(&self, points: &[Point2<f64>]) -> Vec<Point2<f64>> {
-        points.iter().filter(|p| !self.is_in_corner(p)).copied().collect()
+        points
+            .iter()
+            .filter(|p| !self.is_in_corner(p))
+            .copied()
+            .collect()
     }
 
     /// How many free places are outside of it, and its residuals but for corners, rms by the degrees of freedom, m; infinite where too few
@@ -161,11 +212,20 @@ impl SlotFit {
     fn cost(&self, points: &[Point2<f64>], free: &[Point2<f64>]) -> (usize, f64) {
         let kept = self.off_corners(points);
         let beside = free.iter().filter(|p| self.residual(p).0 > BESIDE).count();
-        let is_enough = kept.len() > FREEDOMS && kept.len() as f64 >= LEAST_KEPT * points.len() as f64;
+        let is_enough =
+            kept.len() > FREEDOMS && kept.len() as f64 >= LEAST_KEPT * points.len() as f64;
         let squares: f64 = kept.iter().map(|p| self.residual(p).0.powi(2)).sum();
         let all_round = self.ends == Ends::Round && kept.len() <= FREEDOMS;
-        let degrees = if all_round { kept.len() } else { kept.len().saturating_sub(FREEDOMS) };
-        let rms = if is_enough || all_round { (squares / degrees.max(1) as f64).sqrt() } else { f64::INFINITY };
+        let degrees = if all_round {
+            kept.len()
+        } else {
+            kept.len().saturating_sub(FREEDOMS)
+        };
+        let rms = if is_enough || all_round {
+            (squares / degrees.max(1) as f64).sqrt()
+        } else {
+            f64::INFINITY
+        };
         (beside, rms)
     }
 
@@ -173,7 +233,11 @@ impl SlotFit {
     ///
     /// - `agrees`: residuals of a fit that does, m.
     pub fn fitted_to_more(self, points: &[Point2<f64>], free: &[Point2<f64>], agrees: f64) -> Self {
-        let near = if self.ends == Ends::Round { self.fitted(points) } else { self.fitted_straight(&SEARCH, points) };
+        let near = if self.ends == Ends::Round {
+            self.fitted(points)
+        } else {
+            self.fitted_straight(&SEARCH, points)
+        };
         let cost = near.cost(points, free);
         if cost.0 == 0 && cost.1 <= agrees || !points.len().is_multiple_of(ANEW) {
             return near;
@@ -190,14 +254,20 @@ impl SlotFit {
     /// do not say otherwise.
     ///
     /// - `agrees`: residuals of a fit that agrees with the points, m.
-    pub fn through(points: &[Point2<f64>], free: &[Point2<f64>], place: &Point2<f64>, agrees: f64) -> Option<Self> {
+    pub fn through(
+        points: &[Point2<f64>],
+        free: &[Point2<f64>],
+        place: &Point2<f64>,
+        agrees: f64,
+    ) -> Option<Self> {
         let agrees = agrees.max(AGREES);
         let round = Self::best(points, free, place, Ends::Round, agrees)?;
         let (beside, rms) = round.cost(points, free);
         if beside == 0 && rms <= agrees {
             return Some(round);
         }
-        let straight = Self::best(points, free, place, Ends::Straight, agrees)?.fitted_straight(&SEARCH, points);
+        let straight = Self::best(points, free, place, Ends::Straight, agrees)?
+            .fitted_straight(&SEARCH, points);
         let (straight_beside, straight_rms) = straight.cost(points, free);
         let is_straight = straight_beside <= beside && straight_rms < BETTER * rms;
         Some(if is_straight { straight } else { round })
@@ -216,7 +286,13 @@ impl SlotFit {
         // a point beside the segment determines neither end: one of them has to be near where it really is
         let guess = |angle: f64, half: f64, shift: f64| {
             let direction = Vector2::new(angle.cos(), angle.sin());
-            Self { middle: place + direction * (shift * half), angle, half, radius: near, ends }
+            Self {
+                middle: place + direction * (shift * half),
+                angle,
+                half,
+                radius: near,
+                ends,
+            }
         };
         let angles = (0..ANGLES).map(|step| step as f64 / ANGLES as f64 * PI);
         let sized = angles.flat_map(|angle| HALVES.map(|half| (angle, half * far)));
@@ -230,13 +306,25 @@ impl SlotFit {
             (beside, rms.max(agrees), fit)
         });
         let shorter = |a: &Self, b: &Self| a.half.total_cmp(&b.half);
-        fits.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(shorter(&a.2, &b.2))).map(|(.., fit)| fit)
+        fits.min_by(|a, b| {
+            a.0.cmp(&b.0)
+                .then(a.1.total_cmp(&b.1))
+                .then(shorter(&a.2, &b.2))
+        })
+        .map(|(.., fit)| fit)
     }
 
     /// The same, with its direction as that of another rather than against it.
     pub fn along_as(self, other: &Self) -> Self {
-        let turn = if self.along().dot(&other.along()) < 0.0 { PI } else { 0.0 };
-        Self { angle: self.angle + turn, ..self }
+        let turn = if self.along().dot(&other.along()) < 0.0 {
+            PI
+        } else {
+            0.0
+        };
+        Self {
+            angle: self.angle + turn,
+            ..self
+        }
     }
 }
 
@@ -247,8 +335,16 @@ mod tests {
     /// Places of a slot from (−9, 0) to (5, 0) with a distance of 1.5 around its segment, by hand.
     #[test]
     fn eight_touches_determine_a_slot() {
-        let points =
-            [[6.5, 0.0], [4.0, 1.5], [0.0, 1.5], [-3.0, 1.5], [-10.5, 0.0], [-2.0, -1.5], [0.0, -1.5], [2.0, -1.5]];
+        let points = [
+            [6.5, 0.0],
+            [4.0, 1.5],
+            [0.0, 1.5],
+            [-3.0, 1.5],
+            [-10.5, 0.0],
+            [-2.0, -1.5],
+            [0.0, -1.5],
+            [2.0, -1.5],
+        ];
         let turn = nalgebra::Rotation2::new(0.7);
         let points = points.map(|p| {
             let p = turn * Point2::new(p[0] * 1e-3, p[1] * 1e-3);
@@ -257,18 +353,39 @@ mod tests {
         let found = SlotFit::through(&points, &[], &Point2::origin(), 0.0).unwrap();
         let middle = turn * Point2::new(-2e-3, 0.0);
         assert!((found.middle - middle).norm() < 1e-8, "{found:?}");
-        assert!((found.half - 7e-3).abs() < 1e-8 && (found.radius - 1.5e-3).abs() < 1e-8, "{found:?}");
-        assert!((found.along().perp(&Vector2::new(0.7f64.cos(), 0.7f64.sin()))).abs() < 1e-6, "{found:?}");
+        assert!(
+            (found.half - 7e-3).abs() < 1e-8 && (found.radius - 1.5e-3).abs() < 1e-8,
+            "{found:?}"
+        );
+        assert!(
+            (found
+                .along()
+                .perp(&Vector2::new(0.7f64.cos(), 0.7f64.sin())))
+            .abs()
+                < 1e-6,
+            "{found:?}"
+        );
     }
 
     /// Touched on its straight walls alone, a slot may have any length from that of what was touched on: no more is believed.
     #[test]
     fn a_slot_with_open_ends_is_no_longer_than_what_was_touched() {
-        let walls =
-            [[-4.0, 1.5], [-1.0, 1.5], [0.5, 1.5], [3.0, 1.5], [-3.0, -1.5], [-0.5, -1.5], [1.0, -1.5], [4.5, -1.5]];
+        let walls = [
+            [-4.0, 1.5],
+            [-1.0, 1.5],
+            [0.5, 1.5],
+            [3.0, 1.5],
+            [-3.0, -1.5],
+            [-0.5, -1.5],
+            [1.0, -1.5],
+            [4.5, -1.5],
+        ];
         let points = walls.map(|[x, y]| Point2::new(x * 1e-3, y * 1e-3));
         let found = SlotFit::through(&points, &[], &Point2::origin(), 0.0).unwrap();
-        assert!(found.along().y.abs() < 0.02 && (found.radius - 1.5e-3).abs() < 0.05e-3, "{found:?}");
+        assert!(
+            found.along().y.abs() < 0.02 && (found.radius - 1.5e-3).abs() < 0.05e-3,
+            "{found:?}"
+        );
         assert!(found.half > 3.5e-3 && found.half < 7e-3, "{found:?}");
     }
 
@@ -276,11 +393,22 @@ mod tests {
     #[test]
     fn a_free_place_determines_the_direction_of_a_slot() {
         // the ball's centre 0.35 mm before the centre of the right end, as if by hand
-        let points = [[1.15, 0.0], [0.85, 1.08], [0.0, 1.46], [-1.5, 1.5], [-1.5, -1.5], [0.0, -1.46], [0.85, -1.08]];
+        let points = [
+            [1.15, 0.0],
+            [0.85, 1.08],
+            [0.0, 1.46],
+            [-1.5, 1.5],
+            [-1.5, -1.5],
+            [0.0, -1.46],
+            [0.85, -1.08],
+        ];
         let points = points.map(|[x, y]| Point2::new(x * 1e-3, y * 1e-3));
         let free = [Point2::new(-12e-3, 0.0)];
         let found = SlotFit::through(&points, &free, &Point2::origin(), 0.0).unwrap();
-        assert!(found.along().y.abs() < 0.05 && (found.radius - 1.5e-3).abs() < 0.1e-3, "{found:?}");
+        assert!(
+            found.along().y.abs() < 0.05 && (found.radius - 1.5e-3).abs() < 0.1e-3,
+            "{found:?}"
+        );
         assert!(found.half > 5e-3, "{found:?}");
     }
 }

@@ -8,7 +8,11 @@ pub fn sigma_of(half_width: f64, confidence: f64) -> f64 {
     let (mut low, mut high) = (0.0, HIGHEST);
     for _ in 0..BISECTIONS {
         let middle = f64::midpoint(low, high);
-        if within(middle) < confidence { low = middle } else { high = middle }
+        if within(middle) < confidence {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     half_width / f64::midpoint(low, high)
 }
@@ -39,10 +43,17 @@ mod tests {
     /// From tables of the normal distribution.
     #[test]
     fn deviations_are_those_of_the_tables() {
-        for (confidence, z) in
-            [(0.5, 0.674_490), (0.682_689, 1.0), (0.95, 1.959_964), (0.99, 2.575_829), (0.9999, 3.890_592)]
-        {
-            assert!((1.0 / sigma_of(1.0, confidence) - z).abs() < 2e-6, "{confidence}");
+        for (confidence, z) in [
+            (0.5, 0.674_490),
+            (0.682_689, 1.0),
+            (0.95, 1.959_964),
+            (0.99, 2.575_829),
+            (0.9999, 3.890_592),
+        ] {
+            assert!(
+                (1.0 / sigma_of(1.0, confidence) - z).abs() < 2e-6,
+                "{confidence}"
+            );
         }
     }
 }

@@ -7,7 +7,9 @@ use crate::reconstruct::contour::crossing::Crossing;
 use crate::reconstruct::contour::dual_contouring::contour;
 use crate::reconstruct::contour::patched::Patch;
 use crate::reconstruct::contour::scan_clipping::Cut;
-use crate::reconstruct::field::lattice::{Edge, Lattice, LatticeNode, LatticeRegion, NodeValues, node_at};
+use crate::reconstruct::field::lattice::{
+    Edge, Lattice, LatticeNode, LatticeRegion, NodeValues, node_at,
+};
 use crate::reconstruct::table::CellTable;
 
 /// Points whose planes are averaged at a place at most …
@@ -33,9 +35,20 @@ pub(super) struct OrientedPoints {
 }
 
 impl OrientedPoints {
-    pub fn new(positions: Vec<Point3<f64>>, normals: Vec<Vector3<f64>>, spacing: f64, noise: f64) -> Self {
+    pub fn new(
+        positions: Vec<Point3<f64>>,
+        normals: Vec<Vector3<f64>>,
+        spacing: f64,
+        noise: f64,
+    ) -> Self {
         let tree = PointTree::new(&positions);
-        Self { positions, normals, tree, spacing, width: (WIDTH.0 * spacing).max(WIDTH.1 * noise) }
+        Self {
+            positions,
+            normals,
+            tree,
+            spacing,
+            width: (WIDTH.0 * spacing).max(WIDTH.1 * noise),
+        }
     }
 
     /// f and its direction of growth at a place, by the points near it that face alike; `None` where there are none.
@@ -44,7 +57,8 @@ impl OrientedPoints {
     /// much (d: their distance, κ: curvature), so half the sum of both is free of that.
     fn plane_at(&self, p: &Point3<f64>) -> Option<(f64, Vector3<f64>)> {
         let mut facing = None;
-        let (mut weights, mut to_planes, mut arms, mut normal) = (0.0, 0.0, Vector3::zeros(), Vector3::zeros());
+        let (mut weights, mut to_planes, mut arms, mut normal) =
+            (0.0, 0.0, Vector3::zeros(), Vector3::zeros());
         for (at, far) in self.tree.nearest(p, AVERAGED, FARTHEST_WIDTHS * self.width) {
             // the other side of a thin sheet is another surface
             let n = self.normals[at];
@@ -63,7 +77,11 @@ impl OrientedPoints {
     }
 
     /// The zero set of f in the cells at the points and beside these: vertices, m, and faces.
-    pub fn contoured(&self, lattice: &Lattice, workers: &dyn Workers) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
+    pub fn contoured(
+        &self,
+        lattice: &Lattice,
+        workers: &dyn Workers,
+    ) -> (Vec<Point3<f64>>, Vec<[u32; 3]>) {
         let (mut region, mut last) = (LatticeRegion::default(), None);
         for p in &self.positions {
             let cell = lattice.cell_of(p);
@@ -81,39 +99,63 @@ impl OrientedPoints {
             Some(crossing) => *crossing,
             None => self.crossing(edge, &values, lattice),
         };
-        let Patch { vertices, faces, .. } = contour(lattice, &region, &values, &Cut::default(), crossing);
+        let Patch {
+            vertices, faces, ..
+        } = contour(lattice, &region, &values, &Cut::default(), crossing);
         let positions = vertices.iter().map(|(_, position)| *position).collect();
         (positions, faces.iter().map(|face| face.corners).collect())
     }
 
     /// f at the corners of the cells.
-    fn values_in(&self, region: &LatticeRegion, lattice: &Lattice, workers: &dyn Workers) -> NodeValues {
+    fn values_in(
+        &self,
+        region: &LatticeRegion,
+        lattice: &Lattice,
+        workers: &dyn Workers,
+    ) -> NodeValues {
         let mut nodes = LatticeRegion::default();
         for (cell, ()) in region.iter() {
             for corner in 0..8 {
                 nodes.insert_with(node_at(cell, corner), || ());
             }
         }
-        let found = map_by(workers, nodes.len(), |at| self.plane_at(&lattice.position(nodes.entry(at as u32).0)));
+        let found = map_by(workers, nodes.len(), |at| {
+            self.plane_at(&lattice.position(nodes.entry(at as u32).0))
+        });
         let mut values = NodeValues::default();
         for ((node, ()), found) in nodes.iter().zip(found) {
-            found.into_iter().for_each(|(value, _)| values.insert(node, value));
+            found
+                .into_iter()
+                .for_each(|(value, _)| values.insert(node, value));
         }
         values
     }
 
     /// The crossings of all edges whose ends differ in sign.
-    fn crossings(&self, values: &NodeValues, lattice: &Lattice, workers: &dyn Workers) -> CellTable<Edge, Crossing> {
-        let is_crossed =
-            |edge: &Edge, value: f64| values.get(&edge.end()).is_some_and(|beyond| (*beyond < 0.0) != (value < 0.0));
+    fn crossings(
+        &self,
+        values: &NodeValues,
+        lattice: &Lattice,
+        workers: &dyn Workers,
+    ) -> CellTable<Edge, Crossing> {
+        let is_crossed = |edge: &Edge, value: f64| {
+            values
+                .get(&edge.end())
+                .is_some_and(|beyond| (*beyond < 0.0) != (value < 0.0))
+        };
         let edges_at = |(node, &value): (LatticeNode, &f64)| {
             let edges = (0..3).map(move |axis| Edge { node, axis });
             edges.filter(move |edge| is_crossed(edge, value))
         };
         let edges: Vec<Edge> = values.iter().flat_map(edges_at).collect();
-        let found = map_by(workers, edges.len(), |at| self.crossing(&edges[at], values, lattice));
+        let found = map_by(workers, edges.len(), |at| {
+            self.crossing(&edges[at], values, lattice)
+        });
         let mut crossings = CellTable::default();
-        edges.into_iter().zip(found).for_each(|(edge, crossing)| crossings.insert(edge, crossing));
+        edges
+            .into_iter()
+            .zip(found)
+            .for_each(|(edge, crossing)| crossings.insert(edge, crossing));
         crossings
     }
 
@@ -126,7 +168,9 @@ impl OrientedPoints {
         let mut normal = (b - a) * (values[1] - values[0]).signum();
         for _ in 0..STEPS {
             let point = ends[0] + (ends[1] - ends[0]) * (values[0] / (values[0] - values[1]));
-            let Some((value, grows)) = self.plane_at(&point) else { break };
+            let Some((value, grows)) = self.plane_at(&point) else {
+                break;
+            };
             normal = grows;
             // the end of the same sign moves up
             let side = usize::from((value < 0.0) == (values[1] < 0.0));
@@ -135,8 +179,15 @@ impl OrientedPoints {
                 break;
             }
         }
-        let share = if values[0] == values[1] { 0.5 } else { values[0] / (values[0] - values[1]) };
+        let share = if values[0] == values[1] {
+            0.5
+        } else {
+            values[0] / (values[0] - values[1])
+        };
         let normal = normal.try_normalize(0.0).unwrap_or_else(Vector3::z);
-        Crossing { point: ends[0] + (ends[1] - ends[0]) * share, normal }
+        Crossing {
+            point: ends[0] + (ends[1] - ends[0]) * share,
+            normal,
+        }
     }
 }

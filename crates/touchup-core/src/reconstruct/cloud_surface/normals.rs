@@ -39,7 +39,10 @@ impl Neighbourhood {
     fn of(own: usize, positions: &[Point3<f64>], tree: &PointTree) -> Self {
         let p = &positions[own];
         let near: Vec<_> = tree.nearest(p, PLANE + 1, f64::INFINITY).collect();
-        let ring = near.get(RING).or(near.last()).map_or(0.0, |(_, distance)| *distance);
+        let ring = near
+            .get(RING)
+            .or(near.last())
+            .map_or(0.0, |(_, distance)| *distance);
         let count = near.len() as f64;
         let offset = |at: usize| positions[at] - p;
         let mean = near.iter().map(|(at, _)| offset(*at)).sum::<Vector3<f64>>() / count;
@@ -53,24 +56,44 @@ impl Neighbourhood {
         let thinnest = planes.eigenvalues.imin();
         let normal = Unit::try_new(planes.eigenvectors.column(thinnest).into_owned(), 0.0);
         // three numbers of the plane are fitted
-        let noise = (planes.eigenvalues[thinnest].max(0.0) * largest / (count - 3.0).max(1.0)).sqrt();
+        let noise =
+            (planes.eigenvalues[thinnest].max(0.0) * largest / (count - 3.0).max(1.0)).sqrt();
         let normal = normal.map_or(Vector3::z(), Unit::into_inner);
         let mut others = near.iter().map(|(at, _)| *at).filter(|at| *at != own);
         let nearest = std::array::from_fn(|_| others.next().unwrap_or(own) as u32);
-        Self { normal, spacing: ring / RING_SPACINGS, noise, nearest }
+        Self {
+            normal,
+            spacing: ring / RING_SPACINGS,
+            noise,
+            nearest,
+        }
     }
 }
 
 /// A unit normal of each point that points outside, and what says so.
-pub(super) fn oriented(points: &UsablePoints, near: &[Neighbourhood]) -> (Vec<Vector3<f64>>, NormalSource) {
-    let given: Vec<_> = points.normals.iter().map_while(|n| n.try_normalize(0.0).filter(is_finite)).collect();
+pub(super) fn oriented(
+    points: &UsablePoints,
+    near: &[Neighbourhood],
+) -> (Vec<Vector3<f64>>, NormalSource) {
+    let given: Vec<_> = points
+        .normals
+        .iter()
+        .map_while(|n| n.try_normalize(0.0).filter(is_finite))
+        .collect();
     if given.len() == points.positions.len() {
         return (given, NormalSource::File);
     }
     let mut normals: Vec<_> = near.iter().map(|near| near.normal).collect();
-    if points.stations.iter().all(|station| station.eye.is_some() && station.is_sure) {
+    if points
+        .stations
+        .iter()
+        .all(|station| station.eye.is_some() && station.is_sure)
+    {
         for (at, (normal, p)) in normals.iter_mut().zip(&points.positions).enumerate() {
-            if points.eye(at).is_some_and(|eye| normal.dot(&(eye - p)) < 0.0) {
+            if points
+                .eye(at)
+                .is_some_and(|eye| normal.dot(&(eye - p)) < 0.0)
+            {
                 normal.neg_mut();
             }
         }
@@ -92,7 +115,8 @@ fn turn_along_tree(points: &UsablePoints, near: &[Neighbourhood], normals: &mut 
         for other in found.nearest {
             // where each is a neighbour of the other, once
             if at < other || !near[other as usize].nearest.contains(&at) {
-                let cost = (1.0 - normals[at as usize].dot(&normals[other as usize]).abs()).max(0.0);
+                let cost =
+                    (1.0 - normals[at as usize].dot(&normals[other as usize]).abs()).max(0.0);
                 pairs.push(((cost * COST_STEPS) as u32, [at, other]));
             }
         }
@@ -162,10 +186,17 @@ fn looks_outside(piece: &[usize], points: &UsablePoints, normals: &[Vector3<f64>
     if votes != 0.0 {
         return votes > 0.0;
     }
-    let middle = piece.iter().map(|&at| positions[at].coords).sum::<Vector3<f64>>() / piece.len() as f64;
+    let middle = piece
+        .iter()
+        .map(|&at| positions[at].coords)
+        .sum::<Vector3<f64>>()
+        / piece.len() as f64;
     let [flux, reach] = piece.iter().fold([0.0; 2], |[flux, reach], &at| {
         let from_middle = positions[at].coords - middle;
-        [flux + normals[at].dot(&from_middle), reach + from_middle.norm()]
+        [
+            flux + normals[at].dot(&from_middle),
+            reach + from_middle.norm(),
+        ]
     });
     /// Of a flat piece there is no flux but that of noise; then up is outside, as of a part on a table.
     const FLAT: f64 = 0.02;
@@ -184,10 +215,26 @@ mod tests {
     fn sides_follow_every_chain_of_pairs() {
         // 0 ≠ 1 ≠ 2 = 3, and 4 = 5; the last pair closes a circle and says nothing
         let mut sides = Sides::of(6);
-        for (pair, is_opposite) in [([2, 3], false), ([0, 1], true), ([5, 4], false), ([2, 1], true), ([3, 0], true)] {
+        for (pair, is_opposite) in [
+            ([2, 3], false),
+            ([0, 1], true),
+            ([5, 4], false),
+            ([2, 1], true),
+            ([3, 0], true),
+        ] {
             sides.join(pair, is_opposite);
         }
         let found: Vec<_> = (0..6).map(|at| sides.root(at)).collect();
-        assert_eq!(found, [(0, false), (0, true), (0, false), (0, false), (4, false), (4, false)]);
+        assert_eq!(
+            found,
+            [
+                (0, false),
+                (0, true),
+                (0, false),
+                (0, false),
+                (4, false),
+                (4, false)
+            ]
+        );
     }
 }

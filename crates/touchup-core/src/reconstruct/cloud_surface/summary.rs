@@ -49,7 +49,15 @@ pub struct CloudSummary {
 
 impl fmt::Display for CloudSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { points, not_finite, duplicates, isolated, reconstruction, faces, .. } = self;
+        let Self {
+            points,
+            not_finite,
+            duplicates,
+            isolated,
+            reconstruction,
+            faces,
+            ..
+        } = self;
         write!(f, "{points} points")?;
         if not_finite + duplicates + isolated > 0 {
             write!(

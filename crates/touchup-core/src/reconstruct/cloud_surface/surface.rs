@@ -51,7 +51,9 @@ pub enum CloudError {
         points: usize,
     },
     /// The field has no zero set near them.
-    #[error("no surface passes through its {points} points: look at it in a viewer, and export it again or as a mesh")]
+    #[error(
+        "no surface passes through its {points} points: look at it in a viewer, and export it again or as a mesh"
+    )]
     NoSurface {
         /// of the file
         points: usize,
@@ -76,28 +78,47 @@ pub struct CloudSurface {
 ///
 /// # Errors
 /// [`CloudError`]: one line with what to do.
-pub fn surface_of_cloud(cloud: PointCloud, workers: &dyn Workers) -> Result<CloudSurface, CloudError> {
+pub fn surface_of_cloud(
+    cloud: PointCloud,
+    workers: &dyn Workers,
+) -> Result<CloudSurface, CloudError> {
     let (points, mut summary) = UsablePoints::of(cloud);
     let (count, left) = (summary.points, points.positions.len());
     if left > MOST {
         return Err(CloudError::TooMany { points: count });
     }
     if left < FEWEST {
-        return Err(CloudError::TooFew { left, points: count });
+        return Err(CloudError::TooFew {
+            left,
+            points: count,
+        });
     }
     let tree = PointTree::new(&points.positions);
     let near = Neighbourhood::of_all(&points.positions, &tree, workers);
     let spacing = median(near.iter().map(|near| near.spacing).collect());
     let noise = median(near.iter().map(|near| near.noise).collect());
     let (normals, source) = oriented(&points, &near);
-    let kept: Vec<usize> = (0..left).filter(|&at| near[at].spacing <= ISOLATED * spacing).collect();
+    let kept: Vec<usize> = (0..left)
+        .filter(|&at| near[at].spacing <= ISOLATED * spacing)
+        .collect();
     if kept.len() < FEWEST {
-        return Err(CloudError::TooFew { left: kept.len(), points: count });
+        return Err(CloudError::TooFew {
+            left: kept.len(),
+            points: count,
+        });
     }
     drop((tree, near));
     let positions = kept.iter().map(|&at| points.positions[at]).collect();
-    let points = OrientedPoints::new(positions, kept.iter().map(|&at| normals[at]).collect(), spacing, noise);
-    let lattice = Lattice { origin: Point3::from(Vector3::from(ORIGIN) * CELL * spacing), pitch: CELL * spacing };
+    let points = OrientedPoints::new(
+        positions,
+        kept.iter().map(|&at| normals[at]).collect(),
+        spacing,
+        noise,
+    );
+    let lattice = Lattice {
+        origin: Point3::from(Vector3::from(ORIGIN) * CELL * spacing),
+        pitch: CELL * spacing,
+    };
     let (positions, mut faces) = points.contoured(&lattice, workers);
     let made = faces.len();
     cut_invented(&positions, &mut faces, &points, workers);
@@ -113,7 +134,11 @@ pub fn surface_of_cloud(cloud: PointCloud, workers: &dyn Workers) -> Result<Clou
     summary.resolution_mm = lattice.pitch * 1e3;
     summary.faces = faces.len();
     summary.cut_faces = made - faces.len();
-    Ok(CloudSurface { positions, faces, summary })
+    Ok(CloudSurface {
+        positions,
+        faces,
+        summary,
+    })
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
@@ -122,12 +147,22 @@ fn median(mut values: Vec<f64>) -> f64 {
 }
 
 /// Leaves out the faces of which a vertex is not among the points.
-fn cut_invented(vertices: &[Point3<f64>], faces: &mut Vec<[u32; 3]>, points: &OrientedPoints, workers: &dyn Workers) {
+fn cut_invented(
+    vertices: &[Point3<f64>],
+    faces: &mut Vec<[u32; 3]>,
+    points: &OrientedPoints,
+    workers: &dyn Workers,
+) {
     let (count, within, part) = RIM_NEIGHBOURS;
     let mut is_scanned = map_by(workers, vertices.len(), |at| {
         let vertex = vertices[at];
-        let near: Vec<_> = points.tree.nearest(&vertex, count, within * points.spacing).collect();
-        let [Some((_, nearest)), Some((_, farthest))] = [near.first(), near.last()] else { return false };
+        let near: Vec<_> = points
+            .tree
+            .nearest(&vertex, count, within * points.spacing)
+            .collect();
+        let [Some((_, nearest)), Some((_, farthest))] = [near.first(), near.last()] else {
+            return false;
+        };
         let arms = near.iter().map(|(at, _)| points.positions[*at] - vertex);
         let middle = arms.sum::<Vector3<f64>>() / near.len() as f64;
         *nearest <= FARTHEST * points.spacing && middle.norm() <= part * farthest
@@ -139,16 +174,31 @@ fn cut_invented(vertices: &[Point3<f64>], faces: &mut Vec<[u32; 3]>, points: &Or
 /// Takes the vertices of the smallest holes for scanned; no hole is what ends at a rim.
 fn keep_pinholes_closed(faces: &[[u32; 3]], is_scanned: &mut [bool]) {
     let is_invented = |v: &u32| !is_scanned[*v as usize];
-    let at_invented = faces.iter().filter(|corners| corners.iter().any(is_invented));
-    let mut edges: Vec<[u32; 2]> = at_invented.flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
+    let at_invented = faces
+        .iter()
+        .filter(|corners| corners.iter().any(is_invented));
+    let mut edges: Vec<[u32; 2]> = at_invented
+        .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
+        .collect();
     edges.sort_unstable();
     let mut sets = DisjointSets::of(is_scanned.len());
-    edges.iter().filter(|edge| edge.iter().all(is_invented)).for_each(|&[a, b]| sets.join(a, b));
+    edges
+        .iter()
+        .filter(|edge| edge.iter().all(is_invented))
+        .for_each(|&[a, b]| sets.join(a, b));
     let mut sizes = vec![0; is_scanned.len()];
     let invented: Vec<u32> = (0..is_scanned.len() as u32).filter(is_invented).collect();
-    invented.iter().for_each(|&v| sizes[sets.root(v) as usize] += 1);
-    for &[a, b] in edges.iter().filter(|[a, b]| edges.binary_search(&[*b, *a]).is_err()) {
-        [a, b].iter().filter(|v| is_invented(v)).for_each(|&v| sizes[sets.root(v) as usize] = usize::MAX);
+    invented
+        .iter()
+        .for_each(|&v| sizes[sets.root(v) as usize] += 1);
+    for &[a, b] in edges
+        .iter()
+        .filter(|[a, b]| edges.binary_search(&[*b, *a]).is_err())
+    {
+        [a, b]
+            .iter()
+            .filter(|v| is_invented(v))
+            .for_each(|&v| sizes[sets.root(v) as usize] = usize::MAX);
     }
     for v in invented {
         is_scanned[v as usize] = sizes[sets.root(v) as usize] <= PINHOLE;
@@ -173,9 +223,15 @@ mod tests {
         let hole = [at(7, 7), at(8, 7), at(7, 8), at(8, 8)];
         let rim = [at(0, 5), at(1, 5)];
         let mut is_scanned = vec![true; 144];
-        [&pinhole[..], &hole, &rim].concat().iter().for_each(|&v| is_scanned[v as usize] = false);
+        [&pinhole[..], &hole, &rim]
+            .concat()
+            .iter()
+            .for_each(|&v| is_scanned[v as usize] = false);
         keep_pinholes_closed(&faces, &mut is_scanned);
         let left: Vec<u32> = (0..144).filter(|&v| !is_scanned[v as usize]).collect();
-        assert_eq!(left, [at(0, 5), at(1, 5), at(7, 7), at(8, 7), at(7, 8), at(8, 8)]);
+        assert_eq!(
+            left,
+            [at(0, 5), at(1, 5), at(7, 7), at(8, 7), at(7, 8), at(8, 8)]
+        );
     }
 }

@@ -6,7 +6,9 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::mesh::{FaceId, TriMesh, VertexId};
-use crate::reconstruct::field::lattice::{Edge, Lattice, LatticeNode, Square, VertexKey, across, stepped};
+use crate::reconstruct::field::lattice::{
+    Edge, Lattice, LatticeNode, Square, VertexKey, across, stepped,
+};
 use crate::reconstruct::table::CellTable;
 
 /// Where a side of a piece comes from.
@@ -63,16 +65,31 @@ pub(in crate::reconstruct) struct Pieces {
 impl Pieces {
     /// Cuts a face by those planes of the lattice that lie between the cells from `lo` to `hi`; what lies beyond these
     /// cells is given to the outermost of them.
-    pub fn cut(&mut self, mesh: &TriMesh, face: FaceId, lattice: &Lattice, lo: LatticeNode, hi: LatticeNode) {
+    pub fn cut(
+        &mut self,
+        mesh: &TriMesh,
+        face: FaceId,
+        lattice: &Lattice,
+        lo: LatticeNode,
+        hi: LatticeNode,
+    ) {
         (self.face, self.normal, self.vertices) = (face, mesh.normal(face), mesh.corners(face));
         self.triangle = mesh.triangle(face);
         self.points.clear();
-        self.points.extend((0..3).map(|i| (PointSupport::Corner(i), self.triangle[i as usize])));
+        self.points
+            .extend((0..3).map(|i| (PointSupport::Corner(i), self.triangle[i as usize])));
         self.pierces.clear();
         self.corners.clear();
-        self.corners.extend((0..3).map(|i| Corner { point: u32::from(i), side: SideOrigin::Face(i) }));
+        self.corners.extend((0..3).map(|i| Corner {
+            point: u32::from(i),
+            side: SideOrigin::Face(i),
+        }));
         self.spans.clear();
-        self.spans.push(Span { cell: lo, first: 0, count: 3 });
+        self.spans.push(Span {
+            cell: lo,
+            first: 0,
+            count: 3,
+        });
         for (axis, last) in hi.into_iter().enumerate() {
             for span in std::mem::take(&mut self.spans) {
                 self.cut_along(span, axis, last, lattice);
@@ -82,7 +99,9 @@ impl Pieces {
 
     /// The pieces and the cells they lie in.
     pub fn iter(&self) -> impl Iterator<Item = (LatticeNode, &[Corner])> + '_ {
-        self.spans.iter().map(|span| (span.cell, self.corners_of(span)))
+        self.spans
+            .iter()
+            .map(|span| (span.cell, self.corners_of(span)))
     }
 
     /// Position of a point, m, in O.
@@ -105,8 +124,15 @@ impl Pieces {
         match self.place(point) {
             PointSupport::Corner(i) => VertexKey::Scan(self.vertices[i as usize]),
             PointSupport::Trace { side, axis, plane } => {
-                let (a, b) = (self.vertices[side as usize], self.vertices[(side as usize + 1) % 3]);
-                VertexKey::Trace { ends: [a.min(b), a.max(b)], axis, plane }
+                let (a, b) = (
+                    self.vertices[side as usize],
+                    self.vertices[(side as usize + 1) % 3],
+                );
+                VertexKey::Trace {
+                    ends: [a.min(b), a.max(b)],
+                    axis,
+                    plane,
+                }
             }
             PointSupport::Pierce { axis, planes } => {
                 let (u, v) = across(axis as usize);
@@ -125,7 +151,11 @@ impl Pieces {
     fn cut_along(&mut self, mut span: Span, axis: usize, last: i32, lattice: &Lattice) {
         for plane in span.cell[axis].saturating_add(1)..=last {
             let height = lattice.coordinate(axis, plane);
-            let above = self.corners_of(&span).iter().filter(|c| self.position(c.point)[axis] >= height).count();
+            let above = self
+                .corners_of(&span)
+                .iter()
+                .filter(|c| self.position(c.point)[axis] >= height)
+                .count();
             if above == 0 {
                 break;
             }
@@ -151,15 +181,25 @@ impl Pieces {
             halves[usize::from(is_above)].push(corner);
             if is_above != (self.position(next.point)[axis] >= height) {
                 let point = self.cut_side(&span, corner.side, axis, plane, lattice);
-                let chord = SideOrigin::Plane { axis: axis as u8, above: !is_above };
+                let chord = SideOrigin::Plane {
+                    axis: axis as u8,
+                    above: !is_above,
+                };
                 halves[usize::from(is_above)].push(Corner { point, side: chord });
-                halves[usize::from(!is_above)].push(Corner { point, side: corner.side });
+                halves[usize::from(!is_above)].push(Corner {
+                    point,
+                    side: corner.side,
+                });
             }
         }
         let [below, above] = [&halves[0], &halves[1]].map(|half| {
             let first = self.corners.len() as u32;
             self.corners.extend_from_slice(half);
-            Span { cell: span.cell, first, count: half.len() as u32 }
+            Span {
+                cell: span.cell,
+                first,
+                count: half.len() as u32,
+            }
         });
         self.halves = halves;
         self.spans.push(above);
@@ -167,23 +207,49 @@ impl Pieces {
     }
 
     /// The point in which a plane cuts a side of a piece.
-    fn cut_side(&mut self, span: &Span, side: SideOrigin, axis: usize, plane: i32, lattice: &Lattice) -> u32 {
+    fn cut_side(
+        &mut self,
+        span: &Span,
+        side: SideOrigin,
+        axis: usize,
+        plane: i32,
+        lattice: &Lattice,
+    ) -> u32 {
         let next = self.points.len() as u32;
         match side {
             SideOrigin::Face(side) => {
-                let place = PointSupport::Trace { side, axis: axis as u8, plane };
-                self.points.push((place, self.trace(side as usize, axis, lattice.coordinate(axis, plane))));
+                let place = PointSupport::Trace {
+                    side,
+                    axis: axis as u8,
+                    plane,
+                };
+                self.points.push((
+                    place,
+                    self.trace(side as usize, axis, lattice.coordinate(axis, plane)),
+                ));
                 next
             }
             SideOrigin::Plane { axis: other, above } => {
                 let other = other as usize;
                 let other_plane = span.cell[other].saturating_add(i32::from(above));
                 let line = 3 - axis - other;
-                let planes = if across(line).0 == axis { [plane, other_plane] } else { [other_plane, plane] };
-                let (at, is_new) = self.pierces.insert_with([planes[0], planes[1], line as i32], || next);
+                let planes = if across(line).0 == axis {
+                    [plane, other_plane]
+                } else {
+                    [other_plane, plane]
+                };
+                let (at, is_new) = self
+                    .pierces
+                    .insert_with([planes[0], planes[1], line as i32], || next);
                 if is_new {
                     let position = self.pierce(other, other_plane, axis, plane, lattice);
-                    self.points.push((PointSupport::Pierce { axis: line as u8, planes }, position));
+                    self.points.push((
+                        PointSupport::Pierce {
+                            axis: line as u8,
+                            planes,
+                        },
+                        position,
+                    ));
                     return next;
                 }
                 self.pierces.entry(at).1
@@ -200,19 +266,34 @@ impl Pieces {
     }
 
     /// Where the face meets two planes: on the chord that the first of them cuts out of it.
-    fn pierce(&self, first: usize, first_plane: i32, second: usize, plane: i32, lattice: &Lattice) -> Point3<f64> {
-        let (at, height) = (lattice.coordinate(first, first_plane), lattice.coordinate(second, plane));
+    fn pierce(
+        &self,
+        first: usize,
+        first_plane: i32,
+        second: usize,
+        plane: i32,
+        lattice: &Lattice,
+    ) -> Point3<f64> {
+        let (at, height) = (
+            lattice.coordinate(first, first_plane),
+            lattice.coordinate(second, plane),
+        );
         let is_above = self.triangle.map(|corner| corner[first] >= at);
-        let mut chord =
-            (0..3).filter(|&i| is_above[i] != is_above[(i + 1) % 3]).map(|side| self.trace(side, first, at));
+        let mut chord = (0..3)
+            .filter(|&i| is_above[i] != is_above[(i + 1) % 3])
+            .map(|side| self.trace(side, first, at));
         match (chord.next(), chord.next()) {
             (Some(a), Some(b)) => between(&a, &b, second, height),
             // only where rounding lets a plane miss the face that it cuts
-            _ => Point3::from(self.triangle[0].coords.map_with_location(|i, _, x| match i {
-                i if i == first => at,
-                i if i == second => height,
-                _ => x,
-            })),
+            _ => Point3::from(
+                self.triangle[0]
+                    .coords
+                    .map_with_location(|i, _, x| match i {
+                        i if i == first => at,
+                        i if i == second => height,
+                        _ => x,
+                    }),
+            ),
         }
     }
 }
@@ -221,17 +302,30 @@ impl Pieces {
 /// beyond the ends, and monotone in `height`.
 fn between(a: &Point3<f64>, b: &Point3<f64>, axis: usize, height: f64) -> Point3<f64> {
     let rise = b[axis] - a[axis];
-    let share = if rise == 0.0 { 0.5 } else { (height - a[axis]) / rise };
+    let share = if rise == 0.0 {
+        0.5
+    } else {
+        (height - a[axis]) / rise
+    };
     let mut point = a + (b - a) * share;
     for i in 0..3 {
-        point[i] = if i == axis { height } else { point[i].clamp(a[i].min(b[i]), a[i].max(b[i])) };
+        point[i] = if i == axis {
+            height
+        } else {
+            point[i].clamp(a[i].min(b[i]), a[i].max(b[i]))
+        };
     }
     point
 }
 
 /// The square of the lattice on which a side of a piece in `cell` lies, and the cell beyond it.
-pub(in crate::reconstruct) fn wall(cell: LatticeNode, side: SideOrigin) -> Option<(Square, LatticeNode)> {
-    let SideOrigin::Plane { axis, above } = side else { return None };
+pub(in crate::reconstruct) fn wall(
+    cell: LatticeNode,
+    side: SideOrigin,
+) -> Option<(Square, LatticeNode)> {
+    let SideOrigin::Plane { axis, above } = side else {
+        return None;
+    };
     let upper = stepped(cell, axis as usize, i32::from(above));
     let beyond = stepped(cell, axis as usize, if above { 1 } else { -1 });
     Some((Square { node: upper, axis }, beyond))
@@ -245,8 +339,11 @@ mod tests {
 
     /// Two triangles on a common side, anywhere within a few cells.
     fn pair(rng: &mut rand_pcg::Pcg64) -> TriMesh {
-        let mut coordinate = || <StandardUniform as Distribution<f64>>::sample(&StandardUniform, rng) * 4.0;
-        let positions = (0..4).map(|_| Point3::new(coordinate(), coordinate(), coordinate())).collect();
+        let mut coordinate =
+            || <StandardUniform as Distribution<f64>>::sample(&StandardUniform, rng) * 4.0;
+        let positions = (0..4)
+            .map(|_| Point3::new(coordinate(), coordinate(), coordinate()))
+            .collect();
         TriMesh::new(positions, vec![[0, 1, 2], [2, 1, 3]]).unwrap()
     }
 
@@ -255,7 +352,10 @@ mod tests {
     #[test]
     fn a_wall_between_two_pieces_is_the_same_from_both() {
         let mut rng = rand_pcg::Pcg64::seed_from_u64(5);
-        let lattice = Lattice { origin: Point3::new(0.1, 0.2, 0.3), pitch: 0.7 };
+        let lattice = Lattice {
+            origin: Point3::new(0.1, 0.2, 0.3),
+            pitch: 0.7,
+        };
         let mut pieces = Pieces::default();
         let mut walls = 0;
         for _ in 0..100 {
@@ -264,18 +364,38 @@ mod tests {
             for (cell, corners) in pieces.iter() {
                 for (at, corner) in corners.iter().enumerate() {
                     let ends = [corner.point, corners[(at + 1) % corners.len()].point];
-                    let Some((square, beyond)) = wall(cell, corner.side) else { continue };
+                    let Some((square, beyond)) = wall(cell, corner.side) else {
+                        continue;
+                    };
                     let axis = square.axis as usize;
                     let height = lattice.coordinate(axis, square.node[axis]);
-                    assert!(ends.iter().all(|&end| (pieces.position(end)[axis] - height).abs() < 1e-12));
-                    let across = (0..3).filter(|&i| i != axis).all(|i| square.node[i] == cell[i]);
-                    assert!(across && cell.into_iter().zip(beyond).map(|(a, b)| a.abs_diff(b)).sum::<u32>() == 1);
-                    sides.push(([ends[0].min(ends[1]), ends[0].max(ends[1])], square, [cell, beyond]));
+                    assert!(
+                        ends.iter()
+                            .all(|&end| (pieces.position(end)[axis] - height).abs() < 1e-12)
+                    );
+                    let across = (0..3)
+                        .filter(|&i| i != axis)
+                        .all(|i| square.node[i] == cell[i]);
+                    assert!(
+                        across
+                            && cell
+                                .into_iter()
+                                .zip(beyond)
+                                .map(|(a, b)| a.abs_diff(b))
+                                .sum::<u32>()
+                                == 1
+                    );
+                    sides.push((
+                        [ends[0].min(ends[1]), ends[0].max(ends[1])],
+                        square,
+                        [cell, beyond],
+                    ));
                 }
             }
             for (ends, square, [cell, beyond]) in &sides {
-                let is_other =
-                    |other: &&([u32; 2], Square, [LatticeNode; 2])| other.0 == *ends && other.2 == [*beyond, *cell];
+                let is_other = |other: &&([u32; 2], Square, [LatticeNode; 2])| {
+                    other.0 == *ends && other.2 == [*beyond, *cell]
+                };
                 let others: Vec<_> = sides.iter().filter(is_other).collect();
                 assert_eq!(others.len(), 1, "{square:?} is a wall of {cell:?} alone");
                 assert_eq!(others[0].1, *square);
@@ -288,7 +408,10 @@ mod tests {
     #[test]
     fn pieces_cover_a_face_each_in_its_cell_and_meet_the_neighbours() {
         let mut rng = rand_pcg::Pcg64::seed_from_u64(3);
-        let lattice = Lattice { origin: Point3::new(0.1, 0.2, 0.3), pitch: 0.7 };
+        let lattice = Lattice {
+            origin: Point3::new(0.1, 0.2, 0.3),
+            pitch: 0.7,
+        };
         let mut pieces = Pieces::default();
         for _ in 0..300 {
             let mesh = pair(&mut rng);
@@ -299,9 +422,14 @@ mod tests {
                 for (cell, corners) in pieces.iter() {
                     let at = |i: usize| pieces.position(corners[i].point);
                     let double = |i: usize| (at(i) - at(0)).cross(&(at(i + 1) - at(0)));
-                    area += (1..corners.len() - 1).map(|i| double(i).dot(&mesh.normal(face))).sum::<f64>();
+                    area += (1..corners.len() - 1)
+                        .map(|i| double(i).dot(&mesh.normal(face)))
+                        .sum::<f64>();
                     let [lo, hi] = lattice.inner_box(cell, -1e-12);
-                    assert!((0..corners.len()).all(|i| at(i) >= lo && at(i) <= hi), "a piece leaves cell {cell:?}");
+                    assert!(
+                        (0..corners.len()).all(|i| at(i) >= lo && at(i) <= hi),
+                        "a piece leaves cell {cell:?}"
+                    );
                 }
                 assert!((area - mesh.double_area_normal(face).norm()).abs() < 1e-12);
                 let key = |point| pieces.key(point, [0; 3]);
@@ -310,7 +438,10 @@ mod tests {
                 points.extend(all.filter(|(key, _)| is_common(key)));
                 points.sort_by_key(|(key, _)| *key);
             }
-            assert_eq!(on_common_side[0], on_common_side[1], "the same names and the same places, bit for bit");
+            assert_eq!(
+                on_common_side[0], on_common_side[1],
+                "the same names and the same places, bit for bit"
+            );
         }
     }
 }

@@ -34,7 +34,12 @@ pub(in crate::reconstruct) struct Crossings {
 impl Crossings {
     /// The crossing of an edge whose ends differ in sign: by the touched field itself between touched nodes, else between
     /// the values at the ends, and where the ball was there, on its surface.
-    pub fn at(&mut self, grid: &ReconstructionGrid, evidence: &Evidence<'_>, edge: &Edge) -> Crossing {
+    pub fn at(
+        &mut self,
+        grid: &ReconstructionGrid,
+        evidence: &Evidence<'_>,
+        edge: &Edge,
+    ) -> Crossing {
         let ends = [edge.node, edge.end()];
         let [Some(a), Some(b)] = ends.map(|node| grid.nodes.get(&node)) else {
             return between(grid, edge, [0.0; 2]);
@@ -62,8 +67,16 @@ fn between_beside_free_space(
     edge: &Edge,
     values: [f64; 2],
 ) -> Crossing {
-    let inner = if values[0] < 0.0 { edge.node } else { edge.end() };
-    out_of_free_space(evidence, between(grid, edge, values), &grid.lattice.position(inner))
+    let inner = if values[0] < 0.0 {
+        edge.node
+    } else {
+        edge.end()
+    };
+    out_of_free_space(
+        evidence,
+        between(grid, edge, values),
+        &grid.lattice.position(inner),
+    )
 }
 
 /// The crossing of an edge by the values at its ends.
@@ -74,12 +87,19 @@ fn between(grid: &ReconstructionGrid, edge: &Edge, values: [f64; 2]) -> Crossing
     let slope = gradient(grid, &ends[0]) * (1.0 - share) + gradient(grid, &ends[1]) * share;
     let outward = (b - a) * (values[1] - values[0]).signum();
     let normal = direction(&slope).unwrap_or_else(|| outward.normalize());
-    Crossing { point: a + (b - a) * share, normal }
+    Crossing {
+        point: a + (b - a) * share,
+        normal,
+    }
 }
 
 /// Where a straight line between two values is 0, as a share of the segment.
 fn share_of([at_a, at_b]: [f64; 2]) -> f64 {
-    if at_a == at_b { 0.5 } else { (at_a / (at_a - at_b)).clamp(0.0, 1.0) }
+    if at_a == at_b {
+        0.5
+    } else {
+        (at_a / (at_a - at_b)).clamp(0.0, 1.0)
+    }
 }
 
 /// A crossing that lies where the ball was, moved to where the ball ended on the way into the material: the values at the nodes
@@ -89,7 +109,9 @@ fn share_of([at_a, at_b]: [f64; 2]) -> f64 {
 fn out_of_free_space(evidence: &Evidence<'_>, crossing: Crossing, inner: &Point3<f64>) -> Crossing {
     let depth = |x: &Point3<f64>| evidence.free_depth(x).map(|(depth, _)| depth);
     let depths = [&crossing.point, inner].map(depth);
-    let [Some(here @ 0.0..), Some(at_inner @ ..0.0)] = depths else { return crossing };
+    let [Some(here @ 0.0..), Some(at_inner @ ..0.0)] = depths else {
+        return crossing;
+    };
     let field = |x: &Point3<f64>| {
         let (depth, centre) = evidence.free_depth(x)?;
         let outward = direction(&(centre - x)).filter(|_| evidence.free_space.is_of_ball());
@@ -153,11 +175,16 @@ fn gradient(grid: &ReconstructionGrid, node: &LatticeNode) -> Vector3<f64> {
         (state.source != Source::Beyond).then_some(state.value)
     };
     let here = value(*node).unwrap_or(0.0);
-    Vector3::from_fn(|axis, _| match (value(stepped(*node, axis, -1)), value(stepped(*node, axis, 1))) {
-        (Some(below), Some(above)) => (above - below) / 2.0,
-        (None, Some(above)) => above - here,
-        (Some(below), None) => here - below,
-        (None, None) => 0.0,
+    Vector3::from_fn(|axis, _| {
+        match (
+            value(stepped(*node, axis, -1)),
+            value(stepped(*node, axis, 1)),
+        ) {
+            (Some(below), Some(above)) => (above - below) / 2.0,
+            (None, Some(above)) => above - here,
+            (Some(below), None) => here - below,
+            (None, None) => 0.0,
+        }
     })
 }
 
@@ -175,8 +202,13 @@ mod tests {
     fn just_below_an_edge_the_crossing_is_that_of_the_wall() {
         // a step: the face z = 0 for y < 0, the wall y = 0 below it
         let mut contacts = ContactMap::new(RADIUS / 3.0, 2.0 * RADIUS, None);
-        for (i, j) in (-12..=12).flat_map(|i| (1..=16).map(move |j| (f64::from(i) * 0.5e-3, f64::from(j) * 0.5e-3))) {
-            for (point, normal) in [(Point3::new(i, -j, 0.0), Vector3::z()), (Point3::new(i, 0.0, -j), Vector3::y())] {
+        for (i, j) in (-12..=12)
+            .flat_map(|i| (1..=16).map(move |j| (f64::from(i) * 0.5e-3, f64::from(j) * 0.5e-3)))
+        {
+            for (point, normal) in [
+                (Point3::new(i, -j, 0.0), Vector3::z()),
+                (Point3::new(i, 0.0, -j), Vector3::y()),
+            ] {
                 contacts.add(&SurfaceContact {
                     point,
                     normal,
@@ -187,7 +219,11 @@ mod tests {
             }
         }
         let scan = TriMesh::new(
-            vec![Point3::origin(), Point3::new(1.0, 0.0, 0.0), Point3::new(0.0, 1.0, 0.0)],
+            vec![
+                Point3::origin(),
+                Point3::new(1.0, 0.0, 0.0),
+                Point3::new(0.0, 1.0, 0.0),
+            ],
             vec![[0, 1, 2]],
         );
         let scan = scan.unwrap();
@@ -207,18 +243,24 @@ mod tests {
         };
         let mut scratch = FieldScratch::default();
         for (depth, share) in [(0.02e-3, 0.5), (0.05e-3, 0.7), (0.1e-3, 0.9), (0.3e-3, 0.2)] {
-            let [a, b] = [-share, 1.0 - share].map(|y| Point3::new(0.1e-3, y * RADIUS / 2.0, -depth));
-            let values = [&a, &b].map(|p| params.field.at(contacts, p, &mut scratch).unwrap().value);
+            let [a, b] =
+                [-share, 1.0 - share].map(|y| Point3::new(0.1e-3, y * RADIUS / 2.0, -depth));
+            let values =
+                [&a, &b].map(|p| params.field.at(contacts, p, &mut scratch).unwrap().value);
             assert!(values[0] < 0.0 && values[1] > 0.0);
             let found = of_touches(&evidence, [&a, &b], values, &mut scratch).unwrap();
             assert!(
-                found.point.y.abs() < 0.02 * RADIUS / 2.0 && (found.normal - Vector3::y()).norm() < 1e-9,
+                found.point.y.abs() < 0.02 * RADIUS / 2.0
+                    && (found.normal - Vector3::y()).norm() < 1e-9,
                 "{depth}: {found:?}"
             );
         }
         // from outside below into the material above the face: no surface of the touches
         let [a, b] = [-0.2e-3, 0.2e-3].map(|z| Point3::new(0.1e-3, -4e-3, z));
         assert!(of_touches(&evidence, [&a, &b], [-0.2e-3, 0.2e-3], &mut scratch).is_some());
-        assert_eq!(of_touches(&evidence, [&a, &b], [0.2e-3, -0.2e-3], &mut scratch), None);
+        assert_eq!(
+            of_touches(&evidence, [&a, &b], [0.2e-3, -0.2e-3], &mut scratch),
+            None
+        );
     }
 }

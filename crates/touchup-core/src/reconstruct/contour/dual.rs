@@ -22,11 +22,17 @@ const STEPS: u32 = 8;
 const CORNER: f64 = 0.6;
 
 /// Whether the segment from `a` to `b`, which lie on either side, passes through the inside of a square.
-pub(in crate::reconstruct) fn passes(lattice: &Lattice, square: &Square, a: &Point3<f64>, b: &Point3<f64>) -> bool {
+pub(in crate::reconstruct) fn passes(
+    lattice: &Lattice,
+    square: &Square,
+    a: &Point3<f64>,
+    b: &Point3<f64>,
+) -> bool {
     let axis = square.axis as usize;
     let share = (lattice.coordinate(axis, square.node[axis]) - a[axis]) / (b[axis] - a[axis]);
     let is_inside = |i: usize| {
-        let step = (a[i] + (b[i] - a[i]) * share - lattice.coordinate(i, square.node[i])) / lattice.pitch;
+        let step =
+            (a[i] + (b[i] - a[i]) * share - lattice.coordinate(i, square.node[i])) / lattice.pitch;
         (INSET..=1.0 - INSET).contains(&step)
     };
     let (u, v) = across(axis);
@@ -83,7 +89,8 @@ pub(in crate::reconstruct) fn diagonal(
     let is_safe = |i: usize| {
         let (a, b, opposite, d) = (&c[i], &c[i + 1], &c[i + 2], &c[(i + 3) % 4]);
         [(b, d), (d, b)].iter().any(|(near, far)| {
-            pierces(a, opposite, [e0, e1, near], slack) && pierces(e0, e1, [a, opposite, far], slack)
+            pierces(a, opposite, [e0, e1, near], slack)
+                && pierces(e0, e1, [a, opposite, far], slack)
         })
     };
     match [is_safe(0), is_safe(1)] {
@@ -110,7 +117,9 @@ pub(in crate::reconstruct) fn unfolded(
 ) -> Point3<f64> {
     let least_height = |move_by: Vector3<f64>| {
         let from = middle + move_by;
-        let height = |[p, q]: &[Point3<f64>; 2]| (p - from).cross(&(q - from)).dot(normal) / (q - p).norm().max(drift);
+        let height = |[p, q]: &[Point3<f64>; 2]| {
+            (p - from).cross(&(q - from)).dot(normal) / (q - p).norm().max(drift)
+        };
         ring.iter().map(height).fold(f64::INFINITY, f64::min)
     };
     let (mut best, mut most) = (Vector3::zeros(), least_height(Vector3::zeros()));
@@ -140,7 +149,11 @@ fn better(c: &[Point3<f64>; 4]) -> usize {
         (m.dot(&n), worse[0].min(worse[1]))
     };
     let ((flat0, shape0), (flat1, shape1)) = (rate(0), rate(1));
-    let is_first = if (flat0 - flat1).abs() > CREASE { flat0 > flat1 } else { shape0 >= shape1 };
+    let is_first = if (flat0 - flat1).abs() > CREASE {
+        flat0 > flat1
+    } else {
+        shape0 >= shape1
+    };
     usize::from(!is_first)
 }
 
@@ -159,10 +172,20 @@ mod tests {
     #[test]
     fn a_convex_quadrilateral_is_split_along_its_shorter_or_flatter_diagonal() {
         let [e0, e1] = edge();
-        let flat = points([(0.3, 0.4, 0.0), (-0.6, 0.7, 0.0), (-0.4, -0.3, 0.0), (0.6, -0.6, 0.0)]);
+        let flat = points([
+            (0.3, 0.4, 0.0),
+            (-0.6, 0.7, 0.0),
+            (-0.4, -0.3, 0.0),
+            (0.6, -0.6, 0.0),
+        ]);
         assert_eq!(diagonal(&e0, &e1, &flat, 1.0), Some(0));
         // along c1–c3 it bends by a right angle, along c0–c2 by a few degrees
-        let bent = points([(0.1, 0.11, -0.1), (-0.9, 0.9, 0.0), (-0.1, -0.1, -0.1), (0.9, -0.9, 0.0)]);
+        let bent = points([
+            (0.1, 0.11, -0.1),
+            (-0.9, 0.9, 0.0),
+            (-0.1, -0.1, -0.1),
+            (0.9, -0.9, 0.0),
+        ]);
         assert_eq!(diagonal(&e0, &e1, &bent, 1.0), Some(0));
         let turned = [bent[3], bent[0], bent[1], bent[2]];
         assert_eq!(better(&turned), 1);
@@ -172,7 +195,12 @@ mod tests {
     fn only_the_fan_is_safe_where_the_edge_is_missed() {
         let [e0, e1] = edge();
         // c0 is drawn in so far that c1–c3 leaves it on the edge's side
-        let c = points([(0.05, 0.05, 0.0), (-0.5, 0.9, 0.0), (-0.5, -0.6, 0.0), (0.9, -0.5, 0.0)]);
+        let c = points([
+            (0.05, 0.05, 0.0),
+            (-0.5, 0.9, 0.0),
+            (-0.5, -0.6, 0.0),
+            (0.9, -0.5, 0.0),
+        ]);
         assert_eq!(diagonal(&e0, &e1, &c, 1.0), Some(0));
         // all four lie above the upper end of the edge
         let high = c.map(|p| p + Vector3::new(0.0, 0.0, 0.7));
@@ -181,25 +209,43 @@ mod tests {
 
     #[test]
     fn a_segment_passes_a_square_or_misses_it() {
-        let lattice = Lattice { origin: Point3::origin(), pitch: 0.5 };
-        let square = Square { node: [1, 0, 0], axis: 0 };
+        let lattice = Lattice {
+            origin: Point3::origin(),
+            pitch: 0.5,
+        };
+        let square = Square {
+            node: [1, 0, 0],
+            axis: 0,
+        };
         let a = Point3::new(0.4, 0.1, 0.1);
         assert!(passes(&lattice, &square, &a, &Point3::new(0.9, 0.4, 0.4)));
-        assert!(!passes(&lattice, &square, &Point3::new(0.1, 0.45, 0.1), &Point3::new(0.6, 0.55, 0.4)));
+        assert!(!passes(
+            &lattice,
+            &square,
+            &Point3::new(0.1, 0.45, 0.1),
+            &Point3::new(0.6, 0.55, 0.4)
+        ));
     }
 
     #[test]
     fn the_middle_of_a_fan_that_folds_over_moves_to_where_it_does_not() {
         // a square in the plane x = 0, which holds the edge
-        let ring = [(-1.0, 0.2), (1.0, 0.2), (1.0, 0.6), (-1.0, 0.6)].map(|(y, z)| Point3::new(0.0, y, z));
+        let ring =
+            [(-1.0, 0.2), (1.0, 0.2), (1.0, 0.6), (-1.0, 0.6)].map(|(y, z)| Point3::new(0.0, y, z));
         let steps: Vec<_> = (0..4).map(|i| [ring[i], ring[(i + 1) % 4]]).collect();
         let unfold = |z: f64, normal: Vector3<f64>| {
             let edge = [Vector3::new(0.0, 0.0, -z), Vector3::new(0.0, 0.0, 1.0 - z)];
             unfolded(&Point3::new(0.0, 0.0, z), &normal, edge, &steps, 0.05).z
         };
         assert_eq!(unfold(0.3, Vector3::x()), 0.3, "it does not fold over");
-        assert!((0.2..=0.6).contains(&unfold(0.1, Vector3::x())) && (0.2..=0.6).contains(&unfold(0.9, Vector3::x())));
+        assert!(
+            (0.2..=0.6).contains(&unfold(0.1, Vector3::x()))
+                && (0.2..=0.6).contains(&unfold(0.9, Vector3::x()))
+        );
         let steep = Vector3::new(0.8, 0.0, 0.6);
-        assert!(unfold(0.1, steep) - 0.1 <= 0.05 / 0.6 + 1e-12, "it stays near the surface");
+        assert!(
+            unfold(0.1, steep) - 0.1 <= 0.05 / 0.6 + 1e-12,
+            "it stays near the surface"
+        );
     }
 }

@@ -16,7 +16,8 @@ use crate::reconstruct::contour::qef::Planes;
 use crate::reconstruct::contour::scan_clipping::{Cut, TraceSegment};
 use crate::reconstruct::contour::trace::Polyline;
 use crate::reconstruct::field::lattice::{
-    CellBox, Edge, Lattice, LatticeNode, LatticeRegion, NodeValues, Owner, PatchFace, Square, VertexKey, node_at,
+    CellBox, Edge, Lattice, LatticeNode, LatticeRegion, NodeValues, Owner, PatchFace, Square,
+    VertexKey, node_at,
 };
 use crate::reconstruct::table::CellTable;
 
@@ -72,13 +73,21 @@ pub(in crate::reconstruct) fn contour_in(
         moved: Vec::new(),
         patch: cut.patch.clone(),
     };
-    core.widened(1, 1).each_in(region, |cell, ()| skin.take_cell(cell));
+    core.widened(1, 1)
+        .each_in(region, |cell, ()| skin.take_cell(cell));
     for at in 0..skin.cells.len() as u32 {
         skin.close_edges(at);
     }
-    let Skin { mut patch, fans, moved, .. } = skin;
+    let Skin {
+        mut patch,
+        fans,
+        moved,
+        ..
+    } = skin;
     patch.faces.extend(fans);
-    moved.into_iter().for_each(|(vertex, point)| *patch.vertices.value_mut(vertex) = point);
+    moved
+        .into_iter()
+        .for_each(|(vertex, point)| *patch.vertices.value_mut(vertex) = point);
     patch
 }
 
@@ -133,7 +142,9 @@ struct Skin<'a, F> {
 impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
     /// Finds the loops of a cell and places their vertices.
     fn take_cell(&mut self, node: LatticeNode) {
-        let Some(material) = self.material(node) else { return };
+        let Some(material) = self.material(node) else {
+            return;
+        };
         let is_crossed = material != 0 && material != u8::MAX;
         let mut loops = Loops::EMPTY;
         self.rim.clear();
@@ -152,7 +163,10 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
             } else if is_crossed {
                 let signs = ring_corners(side).map(|corner| material >> corner & 1 == 1);
                 let found = segments(signs, || self.is_joined(&square));
-                found.into_iter().flatten().for_each(|segment| loops.add(side, segment));
+                found
+                    .into_iter()
+                    .flatten()
+                    .for_each(|segment| loops.add(side, segment));
             }
         }
         if is_crossed {
@@ -170,7 +184,12 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
 
     /// Whether the material in opposite corners of a square is connected: the sign in the middle, the same for both cells.
     fn is_joined(&self, square: &Square) -> bool {
-        square.corners().iter().filter_map(|node| self.values.get(node)).sum::<f64>() < 0.0
+        square
+            .corners()
+            .iter()
+            .filter_map(|node| self.values.get(node))
+            .sum::<f64>()
+            < 0.0
     }
 
     /// The trace on a square on the rim of the region; `None` where patch and scan cannot meet there.
@@ -191,24 +210,44 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         let (loop_at, count) = loops.numbers();
         let mut points = [Point3::origin(); 4];
         for (number, point) in (0..count).zip(&mut points) {
-            let first = (0..12).find(|&edge| loop_at[edge as usize] == number).unwrap_or(0);
+            let first = (0..12)
+                .find(|&edge| loop_at[edge as usize] == number)
+                .unwrap_or(0);
             self.gather_planes(node, loops, first);
             let mean = self.planes.mean();
             let bounds = self.lattice.inner_box(node, MARGIN);
             let start = mean.sup(&bounds[0]).inf(&bounds[1]);
-            *point = if count == 1 { self.planes.solve(&start, FLAT_SHARE, &bounds) } else { start };
+            *point = if count == 1 {
+                self.planes.solve(&start, FLAT_SHARE, &bounds)
+            } else {
+                start
+            };
         }
         // the crossings on the loops have their vertices by now
         let vertex = self.patch.vertices.len() as u32;
         for (number, point) in (0..count).zip(points) {
-            self.patch.vertices.insert(VertexKey::Cell(node, number), point);
+            self.patch
+                .vertices
+                .insert(VertexKey::Cell(node, number), point);
         }
-        let cell = SurfaceCell { material, loop_at, loops: count, vertex };
+        let cell = SurfaceCell {
+            material,
+            loop_at,
+            loops: count,
+            vertex,
+        };
         self.cells.insert(node, cell);
         for (side, line) in self.rim.iter().filter(|_| self.core.contains(&node)) {
-            let (owner, vertex) = (Owner::Square(square_of(node, *side)), cell.vertex_at(line.from));
-            let corners = line.segments.iter().map(|segment| [vertex, segment.from, segment.to]);
-            self.fans.extend(corners.map(|corners| PatchFace { corners, owner }));
+            let (owner, vertex) = (
+                Owner::Square(square_of(node, *side)),
+                cell.vertex_at(line.from),
+            );
+            let corners = line
+                .segments
+                .iter()
+                .map(|segment| [vertex, segment.from, segment.to]);
+            self.fans
+                .extend(corners.map(|corners| PatchFace { corners, owner }));
         }
     }
 
@@ -218,10 +257,19 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         self.planes.0.clear();
         for (edge, side) in loops.walk(first) {
             let (vertex, normal) = self.crossing(&edge_of(node, edge));
-            self.planes.0.push((self.patch.vertices.entry(vertex).1, normal, 1.0));
-            let rim = self.rim.iter().find(|(of, line)| *of == side && line.to == edge);
-            let Some((_, Polyline { segments, .. })) = rim else { continue };
-            let ends = |segment: &TraceSegment| [segment.from, segment.to].map(|v| self.patch.vertices.entry(v).1);
+            self.planes
+                .0
+                .push((self.patch.vertices.entry(vertex).1, normal, 1.0));
+            let rim = self
+                .rim
+                .iter()
+                .find(|(of, line)| *of == side && line.to == edge);
+            let Some((_, Polyline { segments, .. })) = rim else {
+                continue;
+            };
+            let ends = |segment: &TraceSegment| {
+                [segment.from, segment.to].map(|v| self.patch.vertices.entry(v).1)
+            };
             let length = |segment: &TraceSegment| {
                 let [a, b] = ends(segment);
                 (b - a).norm()
@@ -229,7 +277,11 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
             let total: f64 = segments.iter().map(length).sum();
             for segment in segments.iter().filter(|_| total > 0.0) {
                 let [a, b] = ends(segment);
-                self.planes.0.push((nalgebra::center(&a, &b), segment.normal, length(segment) / total));
+                self.planes.0.push((
+                    nalgebra::center(&a, &b),
+                    segment.normal,
+                    length(segment) / total,
+                ));
             }
         }
     }
@@ -244,7 +296,10 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
             None => {
                 let Crossing { point, normal } = (self.crossing)(edge);
                 let point = self.lattice.clamped(point, edge.node, edge.end(), MARGIN);
-                let (vertex, _) = self.patch.vertices.insert_with(VertexKey::Edge(*edge), || point);
+                let (vertex, _) = self
+                    .patch
+                    .vertices
+                    .insert_with(VertexKey::Edge(*edge), || point);
                 (vertex, normal)
             }
         };
@@ -270,20 +325,36 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
     /// - `around`: the cells of the region there.
     /// - `is_upward`: whether the material is at the edge's lower end.
     fn close_edge(&mut self, edge: &Edge, around: [Option<u32>; 4], is_upward: bool) {
-        let vertices: [Option<u32>; 4] =
-            std::array::from_fn(|i| around[i].map(|at| self.cells.entry(at).1.vertex_at(number_in(edge.axis, i))));
+        let vertices: [Option<u32>; 4] = std::array::from_fn(|i| {
+            around[i].map(|at| self.cells.entry(at).1.vertex_at(number_in(edge.axis, i)))
+        });
         let squares = edge.squares();
         let middles: [Option<u32>; 4] = std::array::from_fn(|i| {
             let pair = [around[i]?, around[(i + 1) % 4]?];
-            self.middle(edge, &squares[i], pair, [vertices[i]?, vertices[(i + 1) % 4]?])
+            self.middle(
+                edge,
+                &squares[i],
+                pair,
+                [vertices[i]?, vertices[(i + 1) % 4]?],
+            )
         });
-        if let ([Some(a), Some(b), Some(c), Some(d)], [None, None, None, None]) = (vertices, middles) {
+        if let ([Some(a), Some(b), Some(c), Some(d)], [None, None, None, None]) =
+            (vertices, middles)
+        {
             let corners = [a, b, c, d];
             let points = corners.map(|v| self.patch.vertices.entry(v).1);
             let ends = [edge.node, edge.end()].map(|node| self.lattice.position(node));
             if let Some(i) = diagonal(&ends[0], &ends[1], &points, self.lattice.pitch) {
-                self.add_face(edge, is_upward, [corners[i], corners[i + 1], corners[i + 2]]);
-                self.add_face(edge, is_upward, [corners[i], corners[i + 2], corners[(i + 3) % 4]]);
+                self.add_face(
+                    edge,
+                    is_upward,
+                    [corners[i], corners[i + 1], corners[i + 2]],
+                );
+                self.add_face(
+                    edge,
+                    is_upward,
+                    [corners[i], corners[i + 2], corners[(i + 3) % 4]],
+                );
                 return;
             }
         }
@@ -292,7 +363,9 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
             self.unfold(edge, (centre, &normal), is_upward, [a, b, c, d], middles);
         }
         for i in 0..4 {
-            let (Some(from), Some(to)) = (vertices[i], vertices[(i + 1) % 4]) else { continue };
+            let (Some(from), Some(to)) = (vertices[i], vertices[(i + 1) % 4]) else {
+                continue;
+            };
             if !self.is_fanned(i, &vertices, &squares) {
                 continue;
             }
@@ -330,7 +403,11 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         let margin = MARGIN * self.lattice.pitch;
         let ends = [edge.node, edge.end()].map(|node| self.lattice.position(node) - middle);
         let within = ends.map(|end| end * (1.0 - margin / end.norm().max(margin)));
-        let steps = ring.iter().filter(|[from, to]| from != to).copied().collect::<Vec<_>>();
+        let steps = ring
+            .iter()
+            .filter(|[from, to]| from != to)
+            .copied()
+            .collect::<Vec<_>>();
         let point = unfolded(&middle, normal, within, &steps, DRIFT * self.lattice.pitch);
         if point != middle {
             self.moved.push((centre, point));
@@ -339,23 +416,39 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
 
     fn add_face(&mut self, edge: &Edge, is_upward: bool, [a, b, c]: [u32; 3]) {
         let corners = if is_upward { [a, b, c] } else { [a, c, b] };
-        self.patch.faces.push(PatchFace { corners, owner: Owner::Edge(*edge) });
+        self.patch.faces.push(PatchFace {
+            corners,
+            owner: Owner::Edge(*edge),
+        });
     }
 
     /// Whether the fan around an edge covers the step from cell `i` to the next: always when it goes all around, else only
     /// where the row of cells meets the scan at either end.
     fn is_fanned(&self, i: usize, vertices: &[Option<u32>; 4], squares: &[Square; 4]) -> bool {
-        let Some(gap) = (0..4).find(|&k| vertices[(i + 4 - k) % 4].is_none()) else { return true };
+        let Some(gap) = (0..4).find(|&k| vertices[(i + 4 - k) % 4].is_none()) else {
+            return true;
+        };
         let before = squares[(i + 4 - gap) % 4];
-        let after = (1..4).find(|&k| vertices[(i + k) % 4].is_none()).map(|k| squares[(i + k + 3) % 4]);
+        let after = (1..4)
+            .find(|&k| vertices[(i + k) % 4].is_none())
+            .map(|k| squares[(i + k + 3) % 4]);
         self.shared.contains(&before) || after.is_some_and(|square| self.shared.contains(&square))
     }
 
     /// The vertex on a square between two cells, on the segment that ends at `edge`; `None` where the straight segment from
     /// one cell's vertex to the other's passes through the square and serves no other segment.
-    fn middle(&mut self, edge: &Edge, square: &Square, around: [u32; 2], vertices: [u32; 2]) -> Option<u32> {
+    fn middle(
+        &mut self,
+        edge: &Edge,
+        square: &Square,
+        around: [u32; 2],
+        vertices: [u32; 2],
+    ) -> Option<u32> {
         let cells = around.map(|at| *self.cells.entry(at));
-        let above = cells.iter().find(|(node, _)| *node == square.node).map_or(cells[0].1, |(_, cell)| *cell);
+        let above = cells
+            .iter()
+            .find(|(node, _)| *node == square.node)
+            .map_or(cells[0].1, |(_, cell)| *cell);
         let signs = ring_corners(2 * square.axis).map(|corner| above.is_material(corner));
         let found = segments(signs, || self.is_joined(square));
         let [a, b] = vertices.map(|v| self.patch.vertices.entry(v).1);
@@ -373,7 +466,16 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
             (self.patch.vertices.entry(vertex).1, normal)
         });
         // several loops in one cell stay disjoint as long as each keeps to the hull of its crossings
-        let point = if is_plain { bend(self.lattice, square, &ends) } else { nalgebra::center(&ends[0].0, &ends[1].0) };
-        Some(self.patch.vertices.insert_with(VertexKey::Square(*square, number), || point).0)
+        let point = if is_plain {
+            bend(self.lattice, square, &ends)
+        } else {
+            nalgebra::center(&ends[0].0, &ends[1].0)
+        };
+        Some(
+            self.patch
+                .vertices
+                .insert_with(VertexKey::Square(*square, number), || point)
+                .0,
+        )
     }
 }

@@ -15,10 +15,15 @@ pub(in crate::reconstruct) type Segments = [Option<[u8; 2]>; 2];
 /// The segments on a square from the signs at its corners (true: material). Where all four edges are crossed,
 /// `is_joined`: whether the material in the two opposite corners is connected.
 #[inline]
-pub(in crate::reconstruct) fn segments(is_material: [bool; 4], is_joined: impl FnOnce() -> bool) -> Segments {
+pub(in crate::reconstruct) fn segments(
+    is_material: [bool; 4],
+    is_joined: impl FnOnce() -> bool,
+) -> Segments {
     let leaves = |i: usize| is_material[i] && !is_material[(i + 1) % 4];
     let enters = |i: usize| !is_material[i] && is_material[(i + 1) % 4];
-    let Some(first) = (0..4).find(|&i| leaves(i)) else { return [None; 2] };
+    let Some(first) = (0..4).find(|&i| leaves(i)) else {
+        return [None; 2];
+    };
     if !leaves((first + 2) % 4) {
         let last = (0..4).find(|&i| enters(i)).unwrap_or(first);
         return [Some([first as u8, last as u8]), None];
@@ -41,8 +46,15 @@ pub(in crate::reconstruct) fn edge_corners(edge: u8) -> [u8; 2] {
 pub(in crate::reconstruct) fn edge_of(cell: LatticeNode, edge: u8) -> Edge {
     let axis = edge as usize / 4;
     let (u, v) = across(axis);
-    let node = stepped(stepped(cell, u, i32::from(edge & 1)), v, i32::from(edge >> 1 & 1));
-    Edge { node, axis: axis as u8 }
+    let node = stepped(
+        stepped(cell, u, i32::from(edge & 1)),
+        v,
+        i32::from(edge >> 1 & 1),
+    );
+    Edge {
+        node,
+        axis: axis as u8,
+    }
 }
 
 /// Number of an edge along `axis` in the `i`-th of the cells around it ([`Edge::cells`]).
@@ -54,7 +66,10 @@ pub(in crate::reconstruct) fn number_in(axis: u8, i: usize) -> u8 {
 /// Square number `side` of a cell.
 #[inline]
 pub(in crate::reconstruct) fn square_of(cell: LatticeNode, side: u8) -> Square {
-    Square { node: stepped(cell, side as usize / 2, i32::from(side % 2)), axis: side / 2 }
+    Square {
+        node: stepped(cell, side as usize / 2, i32::from(side % 2)),
+        axis: side / 2,
+    }
 }
 
 /// The edges of square number `side`, numbered in the cell, in the order of [`Square::edges`].
@@ -72,7 +87,12 @@ pub(in crate::reconstruct) fn ring_corners(side: u8) -> [u8; 4] {
     let (axis, above) = (side as usize / 2, side % 2);
     let (u, v) = across(axis);
     let lowest = above << axis;
-    [lowest, lowest | 1 << u, lowest | 1 << u | 1 << v, lowest | 1 << v]
+    [
+        lowest,
+        lowest | 1 << u,
+        lowest | 1 << u | 1 << v,
+        lowest | 1 << v,
+    ]
 }
 
 /// The closed loops of a cell.
@@ -83,14 +103,20 @@ pub(in crate::reconstruct) struct Loops {
 }
 
 impl Loops {
-    pub const EMPTY: Self = Self { next: [[NONE; 2]; 12] };
+    pub const EMPTY: Self = Self {
+        next: [[NONE; 2]; 12],
+    };
 
     /// Adds a segment on square number `side`, given as numbers of edges in [`Square::edges`].
     pub fn add(&mut self, side: u8, [from, to]: [u8; 2]) {
         let ring = ring_edges(side);
         let (from, to) = (ring[from as usize], ring[to as usize]);
         // the material is on the left of a loop seen from outside the cell: below, that is against the axis
-        let (from, to) = if side % 2 == 1 { (from, to) } else { (to, from) };
+        let (from, to) = if side % 2 == 1 {
+            (from, to)
+        } else {
+            (to, from)
+        };
         self.link(from, to, side);
     }
 
@@ -120,7 +146,8 @@ impl Loops {
         let (mut numbers, mut count) = ([NONE; 12], 0);
         for edge in 0..12 {
             if self.next[edge as usize][0] != NONE && numbers[edge as usize] == NONE {
-                self.walk(edge).for_each(|(at, _)| numbers[at as usize] = count);
+                self.walk(edge)
+                    .for_each(|(at, _)| numbers[at as usize] = count);
                 count += 1;
             }
         }
@@ -145,9 +172,14 @@ mod tests {
         }
         for number in 0..12 {
             let edge = edge_of(cell, number);
-            let i = edge.cells().iter().position(|&other| other == cell).unwrap();
+            let i = edge
+                .cells()
+                .iter()
+                .position(|&other| other == cell)
+                .unwrap();
             assert_eq!(number_in(edge.axis, i), number);
-            let ends = edge_corners(number).map(|n| std::array::from_fn(|i| cell[i] + i32::from(n >> i & 1)));
+            let ends = edge_corners(number)
+                .map(|n| std::array::from_fn(|i| cell[i] + i32::from(n >> i & 1)));
             assert_eq!(ends, [edge.node, edge.end()]);
             for (i, square) in edge.squares().iter().enumerate() {
                 assert!(square.edges().contains(&edge));
@@ -165,15 +197,24 @@ mod tests {
                 let is_material = |corner: u8| mask >> corner & 1 == 1;
                 let mut loops = Loops::EMPTY;
                 for side in 0..6 {
-                    let found = segments(ring_corners(side).map(is_material), || joined >> side & 1 == 1);
-                    found.into_iter().flatten().for_each(|segment| loops.add(side, segment));
+                    let found = segments(ring_corners(side).map(is_material), || {
+                        joined >> side & 1 == 1
+                    });
+                    found
+                        .into_iter()
+                        .flatten()
+                        .for_each(|segment| loops.add(side, segment));
                 }
                 let (numbers, count) = loops.numbers();
                 for edge in 0..12 {
                     let [a, b] = edge_corners(edge).map(is_material);
                     assert_eq!(numbers[edge as usize] != NONE, a != b);
                     let walked: Vec<_> = loops.walk(edge).collect();
-                    assert!(walked.iter().all(|(e, _)| numbers[*e as usize] == numbers[edge as usize]));
+                    assert!(
+                        walked
+                            .iter()
+                            .all(|(e, _)| numbers[*e as usize] == numbers[edge as usize])
+                    );
                     assert!(a == b || walked.len() >= 3);
                 }
                 assert!(count <= 4);

@@ -26,7 +26,10 @@ impl Patch {
     /// # Errors
     /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`] when the field's crossings were not
     /// finite.
-    pub fn applied_to(&self, mut mesh: TriMesh) -> Result<(TriMesh, Vec<Option<VertexId>>), MeshError> {
+    pub fn applied_to(
+        &self,
+        mut mesh: TriMesh,
+    ) -> Result<(TriMesh, Vec<Option<VertexId>>), MeshError> {
         for &face in &self.removed {
             mesh.remove_face(face);
         }
@@ -113,10 +116,24 @@ impl Support {
 impl Patched {
     /// Columns of a file for each vertex beside its position, by id: `touched`, `support`, and `sigma_mm` where that is known.
     pub fn columns(&self) -> Vec<(&'static str, Vec<f32>)> {
-        let of_support = |number: fn(Support) -> f32| self.support.iter().map(|&support| number(support)).collect();
-        let mut columns = vec![("touched", of_support(Support::touched)), ("support", of_support(Support::number))];
+        let of_support = |number: fn(Support) -> f32| {
+            self.support
+                .iter()
+                .map(|&support| number(support))
+                .collect()
+        };
+        let mut columns = vec![
+            ("touched", of_support(Support::touched)),
+            ("support", of_support(Support::number)),
+        ];
         if !self.sigma.is_empty() {
-            columns.push(("sigma_mm", self.sigma.iter().map(|sigma| (sigma * 1e3) as f32).collect()));
+            columns.push((
+                "sigma_mm",
+                self.sigma
+                    .iter()
+                    .map(|sigma| (sigma * 1e3) as f32)
+                    .collect(),
+            ));
         }
         columns
     }
@@ -129,8 +146,17 @@ mod tests {
     #[test]
     fn each_vertex_has_its_columns() {
         let p = |x: f64, y: f64| Point3::new(x, y, 0.0);
-        let mesh = TriMesh::new(vec![p(0., 0.), p(1., 0.), p(1., 1.), p(0., 1.)], vec![[0, 1, 2], [0, 2, 3]]).unwrap();
-        let support = vec![Support::Scan, Support::Touched, Support::Guessed, Support::Unreachable];
+        let mesh = TriMesh::new(
+            vec![p(0., 0.), p(1., 0.), p(1., 1.), p(0., 1.)],
+            vec![[0, 1, 2], [0, 2, 3]],
+        )
+        .unwrap();
+        let support = vec![
+            Support::Scan,
+            Support::Touched,
+            Support::Guessed,
+            Support::Unreachable,
+        ];
         let sigma = vec![0.6e-3, 2e-6, 0.1e-3, 0.25e-3];
         let mut patched = Patched {
             mesh,
@@ -142,9 +168,15 @@ mod tests {
             moved_vertices: 0,
             open_squares: 0,
         };
-        let [touched, number] = [("touched", vec![0.0, 1.0, 0.5, 0.5]), ("support", vec![0.0, 1.0, 2.0, 3.0])];
+        let [touched, number] = [
+            ("touched", vec![0.0, 1.0, 0.5, 0.5]),
+            ("support", vec![0.0, 1.0, 2.0, 3.0]),
+        ];
         let sigma_mm = ("sigma_mm", vec![0.6f32, 2e-3, 0.1, 0.25]);
-        assert_eq!(patched.columns(), [touched.clone(), number.clone(), sigma_mm]);
+        assert_eq!(
+            patched.columns(),
+            [touched.clone(), number.clone(), sigma_mm]
+        );
         patched.sigma.clear();
         assert_eq!(patched.columns(), [touched, number], "without uncertainty");
     }

@@ -24,12 +24,23 @@ impl Planes {
     /// Weighted mean of the points.
     pub fn mean(&self) -> Point3<f64> {
         let total: f64 = self.0.iter().map(|(.., weight)| weight).sum();
-        Point3::from(self.0.iter().map(|(p, _, weight)| p.coords * *weight).sum::<Vector3<f64>>() / total)
+        Point3::from(
+            self.0
+                .iter()
+                .map(|(p, _, weight)| p.coords * *weight)
+                .sum::<Vector3<f64>>()
+                / total,
+        )
     }
 
     /// The point nearest to `start` at which Σ w (n·(x − p))² is least within the box from `lo` to `hi`, which holds
     /// `start`, and from which no part of the loop is seen from behind. Directions in which the sum of the w n nᵀ has an eigenvalue below `threshold` times their sum do not count.
-    pub fn solve(&self, start: &Point3<f64>, threshold: f64, [lo, hi]: &[Point3<f64>; 2]) -> Point3<f64> {
+    pub fn solve(
+        &self,
+        start: &Point3<f64>,
+        threshold: f64,
+        [lo, hi]: &[Point3<f64>; 2],
+    ) -> Point3<f64> {
         let (mut a, mut b) = (Matrix3::zeros(), Vector3::zeros());
         for (p, n, weight) in &self.0 {
             let weighted = n * *weight;
@@ -57,8 +68,14 @@ impl Planes {
     /// points, in their order, is seen from behind; where there is none, the one from which that is least.
     fn unturned(&self, start: &Point3<f64>, best: &Vector3<f64>) -> Point3<f64> {
         // on all planes at once it is their edge or corner, however its loop looks from there
-        let size = self.steps().map(|(a, _)| (a.0 - start).norm()).fold(0.0, f64::max);
-        if self.steps().all(|(a, _)| a.1.dot(&(start + best - a.0)).abs() < ON_PLANE * size) {
+        let size = self
+            .steps()
+            .map(|(a, _)| (a.0 - start).norm())
+            .fold(0.0, f64::max);
+        if self
+            .steps()
+            .all(|(a, _)| a.1.dot(&(start + best - a.0)).abs() < ON_PLANE * size)
+        {
             return start + best;
         }
         let sum = |term: &dyn Fn(&WeightedPlane, &WeightedPlane) -> Vector3<f64>| {
@@ -67,8 +84,9 @@ impl Planes {
         let area = sum(&|a, b| (a.0 - start).cross(&(b.0 - start)));
         let side = area.dot(&sum(&|a, _| a.1)).signum();
         let volume = |from: &Point3<f64>| {
-            let of_step =
-                |(a, b): (&WeightedPlane, &WeightedPlane)| side * (a.0 - from).cross(&(b.0 - from)).dot(&(a.1 + b.1));
+            let of_step = |(a, b): (&WeightedPlane, &WeightedPlane)| {
+                side * (a.0 - from).cross(&(b.0 - from)).dot(&(a.1 + b.1))
+            };
             self.steps().map(of_step).fold(f64::INFINITY, f64::min)
         };
         let mut found = (start + best, volume(&(start + best)));
@@ -89,7 +107,12 @@ impl Planes {
 }
 
 /// The x within a box at which ½ xᵀ A x − bᵀ x is least, by projected Gauss–Seidel steps.
-fn least_in_box(a: &Matrix3<f64>, b: &Vector3<f64>, lo: &Vector3<f64>, hi: &Vector3<f64>) -> Vector3<f64> {
+fn least_in_box(
+    a: &Matrix3<f64>,
+    b: &Vector3<f64>,
+    lo: &Vector3<f64>,
+    hi: &Vector3<f64>,
+) -> Vector3<f64> {
     let mut x: Vector3<f64> = Vector3::zeros();
     for _ in 0..STEPS {
         for i in (0..3).filter(|&i| a[(i, i)] > 0.0) {
@@ -161,10 +184,17 @@ mod tests {
     fn planes_through_a_corner_an_edge_and_a_face_are_met_there() {
         let mut planes = Planes::default();
         let corner = Point3::new(0.3, -0.2, 0.5);
-        for (i, wanted) in [[0.0, 0.0, 0.5], [0.3, 0.0, 0.5], [0.3, -0.2, 0.5]].into_iter().enumerate() {
+        for (i, wanted) in [[0.0, 0.0, 0.5], [0.3, 0.0, 0.5], [0.3, -0.2, 0.5]]
+            .into_iter()
+            .enumerate()
+        {
             let axis = [2, 0, 1][i];
             planes.0.push((corner, Vector3::ith(axis, 1.0), 1.0));
-            let found = planes.solve(&Point3::origin(), 0.1, &[Point3::from([-1.0; 3]), Point3::from([1.0; 3])]);
+            let found = planes.solve(
+                &Point3::origin(),
+                0.1,
+                &[Point3::from([-1.0; 3]), Point3::from([1.0; 3])],
+            );
             assert!((found - Point3::from(wanted)).norm() < 1e-15, "{found}");
         }
         assert!((planes.mean() - corner).norm() < 1e-15);
@@ -174,12 +204,19 @@ mod tests {
     fn a_point_beyond_the_box_is_brought_to_the_best_place_on_its_rim() {
         // the line x = y leaves the box at x = 1: with the plane z = 0.5 that leaves one point
         let mut planes = Planes::default();
-        for normal in [Vector3::new(1.0, -1.0, 0.0).normalize(), Vector3::z(), Vector3::x()] {
+        for normal in [
+            Vector3::new(1.0, -1.0, 0.0).normalize(),
+            Vector3::z(),
+            Vector3::x(),
+        ] {
             planes.0.push((Point3::new(3.0, 3.0, 0.5), normal, 1.0));
         }
         let bounds = [Point3::origin(), Point3::from([1.0; 3])];
         let found = planes.solve(&Point3::from([0.1; 3]), 0.05, &bounds);
-        assert!((found - Point3::new(1.0, 1.0, 0.5)).norm() < 5e-3, "{found}");
+        assert!(
+            (found - Point3::new(1.0, 1.0, 0.5)).norm() < 5e-3,
+            "{found}"
+        );
     }
 
     #[test]
@@ -189,12 +226,21 @@ mod tests {
             planes.0.push((Point3::new(x, y, 0.0), Vector3::z(), 1.0));
         }
         // over the square every step is seen from the front, beside it one is not
-        let found = |x: f64| planes.unturned(&Point3::origin(), &Vector3::new(x, 0.0, 0.1)).x;
+        let found = |x: f64| {
+            planes
+                .unturned(&Point3::origin(), &Vector3::new(x, 0.0, 0.1))
+                .x
+        };
         assert_eq!(found(0.2), 0.2);
         assert_eq!(found(0.5), 0.25);
         assert_eq!(found(0.9), 0.225);
         // the reverse as well
         planes.0.reverse();
-        assert_eq!(planes.unturned(&Point3::origin(), &Vector3::new(0.9, 0.0, 0.1)).x, 0.225);
+        assert_eq!(
+            planes
+                .unturned(&Point3::origin(), &Vector3::new(0.9, 0.0, 0.1))
+                .x,
+            0.225
+        );
     }
 }

@@ -83,7 +83,10 @@ impl Cut {
         scan: &TriMesh,
         faces: &[FaceId],
     ) -> Self {
-        let mut cut = Self { pitch: lattice.pitch, ..Self::default() };
+        let mut cut = Self {
+            pitch: lattice.pitch,
+            ..Self::default()
+        };
         let mut scratch = Scratch::default();
         for &face in faces {
             let cells = cells_around(lattice, scan, face);
@@ -104,8 +107,14 @@ impl Cut {
     }
 
     /// The segments on a square on the rim of the region, the last one first.
-    pub(in crate::reconstruct) fn segments_on(&self, square: &Square) -> impl Iterator<Item = &TraceSegment> + '_ {
-        self.segments.get(square).into_iter().flat_map(|segments| segments.iter().rev())
+    pub(in crate::reconstruct) fn segments_on(
+        &self,
+        square: &Square,
+    ) -> impl Iterator<Item = &TraceSegment> + '_ {
+        self.segments
+            .get(square)
+            .into_iter()
+            .flat_map(|segments| segments.iter().rev())
     }
 
     /// Where the scan crosses an edge on the rim of the region.
@@ -114,8 +123,15 @@ impl Cut {
     }
 
     /// Takes in the pieces of a face, if the region holds any of them.
-    fn take(&mut self, region: &LatticeRegion, scratch: &mut Scratch, double_area_normal: &Vector3<f64>) {
-        let Scratch { pieces, vertex_of, .. } = scratch;
+    fn take(
+        &mut self,
+        region: &LatticeRegion,
+        scratch: &mut Scratch,
+        double_area_normal: &Vector3<f64>,
+    ) {
+        let Scratch {
+            pieces, vertex_of, ..
+        } = scratch;
         if pieces.iter().all(|(cell, _)| !region.contains(&cell)) {
             return;
         }
@@ -124,29 +140,49 @@ impl Cut {
         vertex_of.resize(pieces.point_count(), NONE);
         for (cell, corners) in pieces.iter().filter(|(cell, _)| region.contains(cell)) {
             for (i, corner) in corners.iter().enumerate() {
-                let Some((square, beyond)) = wall(cell, corner.side) else { continue };
+                let Some((square, beyond)) = wall(cell, corner.side) else {
+                    continue;
+                };
                 if region.contains(&beyond) {
                     continue;
                 }
                 let ends = [corner.point, corners[(i + 1) % corners.len()].point];
                 let [from, to] = ends.map(|point| self.vertex(pieces, point, cell, vertex_of));
-                self.segments.get_or_default(square).push(TraceSegment { from, to, normal: pieces.normal });
+                self.segments.get_or_default(square).push(TraceSegment {
+                    from,
+                    to,
+                    normal: pieces.normal,
+                });
             }
         }
         self.take_remainder(region, double_area_normal, scratch);
     }
 
     /// The vertex of a point; notes which edge of the lattice it is on.
-    fn vertex(&mut self, pieces: &Pieces, point: u32, cell: LatticeNode, vertex_of: &mut [u32]) -> u32 {
+    fn vertex(
+        &mut self,
+        pieces: &Pieces,
+        point: u32,
+        cell: LatticeNode,
+        vertex_of: &mut [u32],
+    ) -> u32 {
         let known = vertex_of[point as usize];
         if known != NONE {
             return known;
         }
         let key = pieces.key(point, cell);
-        let (vertex, _) = self.patch.vertices.insert_with(key, || loosened(key, pieces.position(point), self.pitch));
+        let (vertex, _) = self
+            .patch
+            .vertices
+            .insert_with(key, || loosened(key, pieces.position(point), self.pitch));
         vertex_of[point as usize] = vertex;
         if let VertexKey::Pierce(edge, face) = key {
-            let new = || Pierced { vertex, normal: pieces.normal, face, is_repeated: false };
+            let new = || Pierced {
+                vertex,
+                normal: pieces.normal,
+                face,
+                is_repeated: false,
+            };
             let (at, _) = self.pierced.insert_with(edge, new);
             let known = self.pierced.value_mut(at);
             known.is_repeated |= known.face != face;
@@ -155,11 +191,21 @@ impl Cut {
     }
 
     /// Fills what the region leaves of the face with triangles.
-    fn take_remainder(&mut self, region: &LatticeRegion, normal: &Vector3<f64>, scratch: &mut Scratch) {
+    fn take_remainder(
+        &mut self,
+        region: &LatticeRegion,
+        normal: &Vector3<f64>,
+        scratch: &mut Scratch,
+    ) {
         let loops = outline(&scratch.pieces, region);
-        let Scratch { pieces, vertex_of, plane } = scratch;
+        let Scratch {
+            pieces,
+            vertex_of,
+            plane,
+        } = scratch;
         // seen along the normal
-        let across = direction(&normal.cross(&Vector3::ith(normal.iamin(), 1.0))).unwrap_or_else(Vector3::x);
+        let across =
+            direction(&normal.cross(&Vector3::ith(normal.iamin(), 1.0))).unwrap_or_else(Vector3::x);
         let up = direction(&normal.cross(&across)).unwrap_or_else(Vector3::y);
         let origin = pieces.position(0);
         plane.clear();
@@ -175,11 +221,15 @@ impl Cut {
             // every pierced point of an outline is on the rim and has its vertex already
             let corners = corners.map(|point| {
                 debug_assert!(
-                    vertex_of[point as usize] != NONE || !matches!(pieces.place(point), PointSupport::Pierce { .. })
+                    vertex_of[point as usize] != NONE
+                        || !matches!(pieces.place(point), PointSupport::Pierce { .. })
                 );
                 self.vertex(pieces, point, [0; 3], vertex_of)
             });
-            self.patch.faces.push(PatchFace { corners, owner: Owner::Scan(pieces.face) });
+            self.patch.faces.push(PatchFace {
+                corners,
+                owner: Owner::Scan(pieces.face),
+            });
         }
     }
 }
@@ -191,7 +241,9 @@ fn loosened(key: VertexKey, mut point: Point3<f64>, pitch: f64) -> Point3<f64> {
         point[axis] += LOOSENING * pitch * ((bits >> 32) as f64 / f64::from(u32::MAX) - 0.5) * 2.0;
     };
     match key {
-        VertexKey::Trace { axis, .. } => (0..3).filter(|&i| i != axis as usize).for_each(move_along),
+        VertexKey::Trace { axis, .. } => {
+            (0..3).filter(|&i| i != axis as usize).for_each(move_along)
+        }
         VertexKey::Pierce(edge, _) => move_along(edge.axis as usize),
         _ => {}
     }
@@ -199,10 +251,17 @@ fn loosened(key: VertexKey, mut point: Point3<f64>, pitch: f64) -> Point3<f64> {
 }
 
 /// The box of the cells that a face may meet.
-pub(in crate::reconstruct) fn cells_around(lattice: &Lattice, scan: &TriMesh, face: FaceId) -> CellBox {
+pub(in crate::reconstruct) fn cells_around(
+    lattice: &Lattice,
+    scan: &TriMesh,
+    face: FaceId,
+) -> CellBox {
     let [a, b, c] = scan.triangle(face);
     let (lo, hi) = (a.inf(&b).inf(&c), a.sup(&b).sup(&c));
-    CellBox { lo: lattice.cell_of(&lo), hi: lattice.cell_of(&hi) }
+    CellBox {
+        lo: lattice.cell_of(&lo),
+        hi: lattice.cell_of(&hi),
+    }
 }
 
 /// The faces of the scan that may meet any of `cells`, by id.
@@ -211,7 +270,9 @@ pub(in crate::reconstruct) fn faces_near(
     cells: impl Iterator<Item = LatticeNode>,
     tree: &FaceTree,
 ) -> Vec<FaceId> {
-    let blocks: CellTable<LatticeNode, ()> = cells.map(|cell| cell.map(|x| x.div_euclid(BLOCK))).collect();
+    let blocks: CellTable<LatticeNode, ()> = cells
+        .map(|cell| cell.map(|x| x.div_euclid(BLOCK)))
+        .collect();
     let (mut faces, mut query) = (Vec::new(), BoxQuery::default());
     for (block, ()) in blocks.iter() {
         let lo = block.map(|x| x.saturating_mul(BLOCK));
@@ -249,13 +310,28 @@ fn outline(pieces: &Pieces, region: &LatticeRegion) -> Vec<Vec<u32>> {
 }
 
 fn rims(pieces: &Pieces, region: &LatticeRegion) -> Vec<PieceRim> {
-    let ends_at =
-        |cell: LatticeNode, side: SideOrigin| wall(cell, side).is_none_or(|(_, beyond)| region.contains(&beyond));
+    let ends_at = |cell: LatticeNode, side: SideOrigin| {
+        wall(cell, side).is_none_or(|(_, beyond)| region.contains(&beyond))
+    };
     let mut rims = Vec::new();
-    for (piece, (cell, corners)) in pieces.iter().enumerate().filter(|(_, (cell, _))| !region.contains(cell)) {
-        for (i, corner) in corners.iter().enumerate().filter(|(_, corner)| ends_at(cell, corner.side)) {
+    for (piece, (cell, corners)) in pieces
+        .iter()
+        .enumerate()
+        .filter(|(_, (cell, _))| !region.contains(cell))
+    {
+        for (i, corner) in corners
+            .iter()
+            .enumerate()
+            .filter(|(_, corner)| ends_at(cell, corner.side))
+        {
             let to = corners[(i + 1) % corners.len()].point;
-            rims.push(PieceRim { from: corner.point, to, side: corner.side, piece: piece as u32, is_used: false });
+            rims.push(PieceRim {
+                from: corner.point,
+                to,
+                side: corner.side,
+                piece: piece as u32,
+                is_used: false,
+            });
         }
     }
     rims
@@ -271,9 +347,15 @@ fn next(rims: &[PieceRim], i: usize) -> Option<usize> {
 /// The points of a loop, without those on a side of the face where neither this face nor its neighbour ends.
 fn kept_points(pieces: &Pieces, rims: &[PieceRim], corners: &[usize]) -> Vec<u32> {
     let is_kept = |at: usize| {
-        let (before, here) = (&rims[corners[(at + corners.len() - 1) % corners.len()]], &rims[corners[at]]);
+        let (before, here) = (
+            &rims[corners[(at + corners.len() - 1) % corners.len()]],
+            &rims[corners[at]],
+        );
         let is_trace = matches!(pieces.place(here.from), PointSupport::Trace { .. });
         !(is_trace && before.side == here.side)
     };
-    (0..corners.len()).filter(|&at| is_kept(at)).map(|at| rims[corners[at]].from).collect()
+    (0..corners.len())
+        .filter(|&at| is_kept(at))
+        .map(|at| rims[corners[at]].from)
+        .collect()
 }

@@ -46,7 +46,11 @@ impl Splice {
     ) -> Result<bool, MeshError> {
         self.added.clear();
         let left = most - self.place(delta, most, mesh, tree)?;
-        let left = if self.placed.len() < delta.vertices.len() { 0 } else { left };
+        let left = if self.placed.len() < delta.vertices.len() {
+            0
+        } else {
+            left
+        };
         for &(owner, count) in delta.owners.iter().skip(self.next_owner).take(left) {
             self.remove_faces(owner, mesh, tree);
             let mut ours = Vec::with_capacity(count as usize);
@@ -62,7 +66,8 @@ impl Splice {
                 self.faces.insert(owner, ours);
             }
         }
-        let is_done = self.placed.len() >= delta.vertices.len() && self.next_owner >= delta.owners.len();
+        let is_done =
+            self.placed.len() >= delta.vertices.len() && self.next_owner >= delta.owners.len();
         for key in delta.gone.iter().filter(|_| is_done) {
             if let Some(vertex) = self.vertices.remove(key) {
                 mesh.remove_vertex(vertex);
@@ -103,8 +108,11 @@ impl Splice {
     ) -> Result<usize, MeshError> {
         self.refit.clear();
         let before = self.placed.len();
-        for &PatchVertex { key, position, .. } in
-            delta.vertices.iter().skip(before).take(most.saturating_mul(VERTICES_OF_A_PART))
+        for &PatchVertex { key, position, .. } in delta
+            .vertices
+            .iter()
+            .skip(before)
+            .take(most.saturating_mul(VERTICES_OF_A_PART))
         {
             let known = match key {
                 VertexKey::Scan(id) => Some(id),

@@ -4,7 +4,9 @@ use nalgebra::{Point2, Point3};
 
 use crate::reconstruct::contour::patched::OpenSquare;
 use crate::reconstruct::contour::scan_clipping::{Cut, Pierced, TraceSegment};
-use crate::reconstruct::field::lattice::{Edge, LatticeNode, NodeValues, Square, VertexKey, across};
+use crate::reconstruct::field::lattice::{
+    Edge, LatticeNode, NodeValues, Square, VertexKey, across,
+};
 
 /// A polyline in which the scan crosses a square, from one of the square's edges to another, by their numbers; walking along it
 /// with the normal of the scan up, the region is on the left.
@@ -19,12 +21,24 @@ pub(in crate::reconstruct) struct Polyline {
 const SEGMENTS: usize = 256;
 
 impl Cut {
-    pub(in crate::reconstruct) fn open_square(&self, square: Square, beyond: LatticeNode) -> OpenSquare {
-        OpenSquare { square, beyond, is_scanned: self.segments_on(&square).next().is_some() }
+    pub(in crate::reconstruct) fn open_square(
+        &self,
+        square: Square,
+        beyond: LatticeNode,
+    ) -> OpenSquare {
+        OpenSquare {
+            square,
+            beyond,
+            is_scanned: self.segments_on(&square).next().is_some(),
+        }
     }
 
     /// What the scan leaves on a square; `None` where scan and field disagree.
-    pub(in crate::reconstruct) fn trace_on(&self, square: &Square, values: &NodeValues) -> Option<Vec<Polyline>> {
+    pub(in crate::reconstruct) fn trace_on(
+        &self,
+        square: &Square,
+        values: &NodeValues,
+    ) -> Option<Vec<Polyline>> {
         let is_material = signs(square, values)?;
         let edges = square.edges();
         let agrees = |i: usize| {
@@ -38,32 +52,56 @@ impl Cut {
         if !(0..4).all(agrees) {
             return None;
         }
-        let all: Vec<TraceSegment> = self.segments_on(square).take(SEGMENTS + 1).copied().collect();
+        let all: Vec<TraceSegment> = self
+            .segments_on(square)
+            .take(SEGMENTS + 1)
+            .copied()
+            .collect();
         if all.is_empty() {
-            return is_material.iter().all(|&sign| sign == is_material[0]).then(Vec::new);
+            return is_material
+                .iter()
+                .all(|&sign| sign == is_material[0])
+                .then(Vec::new);
         }
-        let lines = if all.len() <= SEGMENTS { self.chain(&edges, &all) } else { None };
+        let lines = if all.len() <= SEGMENTS {
+            self.chain(&edges, &all)
+        } else {
+            None
+        };
         lines.filter(|lines| !self.is_crossed(square, lines))
     }
 
     /// The crossing of an edge by the scan, where it is the only one and has the direction of the field.
-    pub(in crate::reconstruct) fn shared_crossing(&self, edge: &Edge, values: &NodeValues) -> Option<&Pierced> {
+    pub(in crate::reconstruct) fn shared_crossing(
+        &self,
+        edge: &Edge,
+        values: &NodeValues,
+    ) -> Option<&Pierced> {
         let pierced = self.pierced(edge).filter(|pierced| !pierced.is_repeated)?;
         let [start, end] = [edge.node, edge.end()].map(|node| values.get(&node).map(|f| *f < 0.0));
         let outward = pierced.normal[edge.axis as usize];
-        let is_alike = if start? { !end? && outward > 0.0 } else { end? && outward < 0.0 };
+        let is_alike = if start? {
+            !end? && outward > 0.0
+        } else {
+            end? && outward < 0.0
+        };
         is_alike.then_some(pierced)
     }
 
     /// Sorts segments into polylines from edge to edge; `None` where that does not use all of them.
     fn chain(&self, edges: &[Edge; 4], all: &[TraceSegment]) -> Option<Vec<Polyline>> {
         let edge_at = |vertex: u32| match self.patch.vertices.entry(vertex).0 {
-            VertexKey::Pierce(edge, _) => edges.iter().position(|&other| other == edge).map(|at| at as u8),
+            VertexKey::Pierce(edge, _) => edges
+                .iter()
+                .position(|&other| other == edge)
+                .map(|at| at as u8),
             _ => None,
         };
         let (mut lines, mut used) = (Vec::new(), 0);
         for start in all {
-            let Some(from) = edge_at(start.from) else { continue };
+            let Some(from) = edge_at(start.from) else {
+                continue;
+            };
             let mut segments = vec![*start];
             used += 1;
             let mut end = start.to;
@@ -72,7 +110,9 @@ impl Cut {
                     break to;
                 }
                 let mut following = all.iter().filter(|segment| segment.from == end);
-                let (Some(next), None) = (following.next(), following.next()) else { return None };
+                let (Some(next), None) = (following.next(), following.next()) else {
+                    return None;
+                };
                 if used >= all.len() {
                     return None;
                 }
@@ -88,7 +128,10 @@ impl Cut {
     /// Whether each edge that is crossed starts or ends just one polyline.
     fn is_paired(&self, edges: &[Edge; 4], lines: &[Polyline]) -> bool {
         (0..).zip(edges).all(|(i, edge)| {
-            let ends = lines.iter().flat_map(|line| [line.from, line.to]).filter(|&end| end == i);
+            let ends = lines
+                .iter()
+                .flat_map(|line| [line.from, line.to])
+                .filter(|&end| end == i);
             ends.count() == usize::from(self.pierced(edge).is_some())
         })
     }
@@ -103,7 +146,9 @@ impl Cut {
         let segments: Vec<&TraceSegment> = lines.iter().flat_map(|line| &line.segments).collect();
         segments.iter().enumerate().any(|(i, a)| {
             segments[i + 1..].iter().any(|b| {
-                a.to != b.from && a.from != b.to && crosses(&flat(a.from), &flat(a.to), &flat(b.from), &flat(b.to))
+                a.to != b.from
+                    && a.from != b.to
+                    && crosses(&flat(a.from), &flat(a.to), &flat(b.from), &flat(b.to))
             })
         })
     }
@@ -111,7 +156,9 @@ impl Cut {
 
 /// Which corners of a square are in the material; `None` where the field has no value.
 fn signs(square: &Square, values: &NodeValues) -> Option<[bool; 4]> {
-    let [a, b, c, d] = square.corners().map(|corner| values.get(&corner).map(|f| *f < 0.0));
+    let [a, b, c, d] = square
+        .corners()
+        .map(|corner| values.get(&corner).map(|f| *f < 0.0));
     Some([a?, b?, c?, d?])
 }
 

@@ -16,7 +16,10 @@ type Delaunay = ConstrainedDelaunayTriangulation<spade::Point2<f64>>;
 ///
 /// Loops may share points, and pass one twice. `None` when rounding has put two points in one place or lets two sides
 /// cross.
-pub(in crate::reconstruct) fn fill(points: &[Point2<f64>], loops: &[Vec<u32>]) -> Option<Vec<Triangle>> {
+pub(in crate::reconstruct) fn fill(
+    points: &[Point2<f64>],
+    loops: &[Vec<u32>],
+) -> Option<Vec<Triangle>> {
     if let [corners] = loops
         && let [a, b, c] = corners[..]
     {
@@ -35,7 +38,11 @@ pub(in crate::reconstruct) fn fill(points: &[Point2<f64>], loops: &[Vec<u32>]) -
     if delaunay.num_vertices() != names.len() {
         return None;
     }
-    let sides = || loops.iter().flat_map(|corners| corners.iter().zip(corners.iter().cycle().skip(1)));
+    let sides = || {
+        loops
+            .iter()
+            .flat_map(|corners| corners.iter().zip(corners.iter().cycle().skip(1)))
+    };
     let ends = |(a, b): (&u32, &u32)| Some([handles[*a as usize]?, handles[*b as usize]?]);
     for [from, to] in sides().filter_map(ends) {
         if !delaunay.can_add_constraint(from, to) {
@@ -45,7 +52,17 @@ pub(in crate::reconstruct) fn fill(points: &[Point2<f64>], loops: &[Vec<u32>]) -
     }
     let inside = faces_inside(&delaunay, sides().filter_map(ends));
     let name = |handle: FixedVertexHandle| names[handle.index()];
-    Some(inside.into_iter().map(|face| delaunay.face(face).vertices().map(|vertex| name(vertex.fix()))).collect())
+    Some(
+        inside
+            .into_iter()
+            .map(|face| {
+                delaunay
+                    .face(face)
+                    .vertices()
+                    .map(|vertex| name(vertex.fix()))
+            })
+            .collect(),
+    )
 }
 
 /// The faces on the left of the sides, and those that are reached from there without crossing a side.
@@ -54,14 +71,22 @@ fn faces_inside(
     sides: impl Iterator<Item = [FixedVertexHandle; 2]>,
 ) -> Vec<FixedFaceHandle<InnerTag>> {
     let mut is_inside = vec![false; delaunay.num_all_faces()];
-    let mut takes = |face: FixedFaceHandle<InnerTag>| !std::mem::replace(&mut is_inside[face.index()], true);
+    let mut takes =
+        |face: FixedFaceHandle<InnerTag>| !std::mem::replace(&mut is_inside[face.index()], true);
     let beside = |side: [FixedVertexHandle; 2]| {
         let side = delaunay.get_edge_from_neighbors(side[0], side[1])?;
         Some(side.face().as_inner()?.fix())
     };
-    let first = sides.filter_map(beside).filter(|&face| takes(face)).collect();
+    let first = sides
+        .filter_map(beside)
+        .filter(|&face| takes(face))
+        .collect();
     let neighbours = |face: FixedFaceHandle<InnerTag>| {
-        let open = delaunay.face(face).adjacent_edges().into_iter().filter(|edge| !edge.is_constraint_edge());
+        let open = delaunay
+            .face(face)
+            .adjacent_edges()
+            .into_iter()
+            .filter(|edge| !edge.is_constraint_edge());
         open.filter_map(|edge| Some(edge.rev().face().as_inner()?.fix()))
     };
     flood(first, neighbours, takes)
@@ -73,18 +98,24 @@ mod tests {
 
     fn areas(points: &[Point2<f64>], triangles: &[Triangle]) -> Vec<f64> {
         let at = |i: u32| points[i as usize];
-        triangles.iter().map(|t| (at(t[1]) - at(t[0])).perp(&(at(t[2]) - at(t[0])))).collect()
+        triangles
+            .iter()
+            .map(|t| (at(t[1]) - at(t[0])).perp(&(at(t[2]) - at(t[0]))))
+            .collect()
     }
 
     /// A square with so many square holes in a row, and points on its lower side.
     fn holed(holes: u32) -> (Vec<Point2<f64>>, Vec<Vec<u32>>) {
         let width = f64::from(2 * holes + 1);
-        let mut points: Vec<_> =
-            [(0.0, 0.0), (width, 0.0), (width, 3.0), (0.0, 3.0)].map(|(x, y)| Point2::new(x, y)).into();
+        let mut points: Vec<_> = [(0.0, 0.0), (width, 0.0), (width, 3.0), (0.0, 3.0)]
+            .map(|(x, y)| Point2::new(x, y))
+            .into();
         let mut loops = vec![vec![0, 1, 2, 3]];
         for hole in 0..holes {
             let (x, first) = (f64::from(2 * hole + 1), points.len() as u32);
-            points.extend([(0., 1.), (0., 2.), (1., 2.), (1., 1.)].map(|(dx, y)| Point2::new(x + dx, y)));
+            points.extend(
+                [(0., 1.), (0., 2.), (1., 2.), (1., 1.)].map(|(dx, y)| Point2::new(x + dx, y)),
+            );
             loops.push((first..first + 4).collect());
         }
         let first = points.len() as u32;
@@ -111,11 +142,32 @@ mod tests {
     fn holes_that_meet_at_a_point_and_islands_are_filled() {
         let at = |(x, y): (i32, i32)| Point2::new(f64::from(x), f64::from(y));
         // two squares meet at (2, 2); one loop goes round both
-        let points = [(0, 0), (4, 0), (4, 4), (0, 4), (2, 2), (1, 2), (1, 1), (2, 1), (3, 2), (3, 3), (2, 3)].map(at);
+        let points = [
+            (0, 0),
+            (4, 0),
+            (4, 4),
+            (0, 4),
+            (2, 2),
+            (1, 2),
+            (1, 1),
+            (2, 1),
+            (3, 2),
+            (3, 3),
+            (2, 3),
+        ]
+        .map(at);
         let triangles = fill(&points, &[vec![0, 1, 2, 3], vec![4, 7, 6, 5, 4, 10, 9, 8]]).unwrap();
-        assert_eq!(areas(&points, &triangles).iter().sum::<f64>(), 2.0 * (16.0 - 2.0));
+        assert_eq!(
+            areas(&points, &triangles).iter().sum::<f64>(),
+            2.0 * (16.0 - 2.0)
+        );
         let points = [(0, 0), (1, 0), (0, 1), (5, 0), (6, 0), (5, 1)].map(at);
-        assert_eq!(fill(&points, &[vec![0, 1, 2], vec![3, 4, 5]]).unwrap().len(), 2);
+        assert_eq!(
+            fill(&points, &[vec![0, 1, 2], vec![3, 4, 5]])
+                .unwrap()
+                .len(),
+            2
+        );
     }
 
     #[test]

@@ -35,8 +35,15 @@ pub(crate) struct Agreement {
 }
 
 impl Agreement {
-    pub fn agreeing<'a>(&'a self, contacts: &'a ContactMap) -> impl Iterator<Item = (&'a MeanContact, f64)> {
-        contacts.means().iter().zip(&self.mismatch).filter_map(|(contact, mismatch)| Some((contact, (*mismatch)?)))
+    pub fn agreeing<'a>(
+        &'a self,
+        contacts: &'a ContactMap,
+    ) -> impl Iterator<Item = (&'a MeanContact, f64)> {
+        contacts
+            .means()
+            .iter()
+            .zip(&self.mismatch)
+            .filter_map(|(contact, mismatch)| Some((contact, (*mismatch)?)))
     }
 
     /// u(x), m, and s.
@@ -44,7 +51,11 @@ impl Agreement {
         let of = |index: u32| self.mismatch[index as usize];
         let mut nearest = f64::INFINITY;
         contacts.near(x, RESTS * self.radius, |distance_squared, index| {
-            nearest = if of(index).is_some() { nearest.min(distance_squared) } else { nearest };
+            nearest = if of(index).is_some() {
+                nearest.min(distance_squared)
+            } else {
+                nearest
+            };
         });
         if !nearest.is_finite() {
             return (Vector3::zeros(), 0.0);
@@ -68,7 +79,12 @@ impl Agreement {
     ///
     /// - `normal`: of what was touched there.
     /// - returns: `None` where it is not.
-    pub fn around(&self, contacts: &ContactMap, foot: &Point3<f64>, normal: &Vector3<f64>) -> Option<ContactsAround> {
+    pub fn around(
+        &self,
+        contacts: &ContactMap,
+        foot: &Point3<f64>,
+        normal: &Vector3<f64>,
+    ) -> Option<ContactsAround> {
         let (mut is_known, mut is_bent) = (false, false);
         let (mut sum, mut count) = (Vector3::zeros(), 0.0);
         let (mut refusing, mut weights) = (0.0, 0.0);
@@ -85,7 +101,11 @@ impl Agreement {
             }
         });
         let is_ringed = count > 0.0 && sum.norm() < RINGED * self.radius * count;
-        let surroundings = if is_ringed && !is_bent { ContactsAround::Smooth } else { ContactsAround::BentOrOpen };
+        let surroundings = if is_ringed && !is_bent {
+            ContactsAround::Smooth
+        } else {
+            ContactsAround::BentOrOpen
+        };
         (is_known && refusing <= REFUSING * weights).then_some(surroundings)
     }
 

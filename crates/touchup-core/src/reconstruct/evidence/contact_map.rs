@@ -84,7 +84,11 @@ struct Kept {
 impl Kept {
     /// What it counts in queries.
     fn weight(&self) -> f64 {
-        if self.is_refuted || self.is_mixed { 0.0 } else { self.sums.weight }
+        if self.is_refuted || self.is_mixed {
+            0.0
+        } else {
+            self.sums.weight
+        }
     }
 }
 
@@ -173,7 +177,9 @@ impl ContactMap {
         let Kept { sums, rejected, .. } = &mut self.kept[index as usize];
         sums.add(contact);
         if let Some(gate) = self.gate
-            && sums.passes.note(contact.stamp_ns, contact.weight, gate.window_ns)
+            && sums
+                .passes
+                .note(contact.stamp_ns, contact.weight, gate.window_ns)
         {
             // a pass that confirms the mean: what is rejected was an outlier
             *rejected = None;
@@ -188,38 +194,64 @@ impl ContactMap {
     /// Whether a contact contradicts what is known at its place, and would be rejected.
     pub(in crate::reconstruct) fn contradicts(&self, contact: &SurfaceContact) -> bool {
         let bin = self.bin_of(contact);
-        self.gate.is_some_and(|gate| self.rival(contact, bin.cell, self.find(&bin), &gate).is_some())
+        self.gate.is_some_and(|gate| {
+            self.rival(contact, bin.cell, self.find(&bin), &gate)
+                .is_some()
+        })
     }
 
     fn bin_of(&self, contact: &SurfaceContact) -> Bin {
-        let facing = [contact.normal.x, contact.normal.y, contact.normal.z].map(|x| (x / FACING).floor() as i8);
-        Bin { cell: voxel_of(&contact.point, self.cell), facing }
+        let facing = [contact.normal.x, contact.normal.y, contact.normal.z]
+            .map(|x| (x / FACING).floor() as i8);
+        Bin {
+            cell: voxel_of(&contact.point, self.cell),
+            facing,
+        }
     }
 
     /// The means of a cell, the last one first.
     fn in_cell(&self, cell: LatticeNode) -> impl Iterator<Item = u32> + '_ {
-        self.of_cell.get(&cell).into_iter().flat_map(|means| means.iter().rev().copied())
+        self.of_cell
+            .get(&cell)
+            .into_iter()
+            .flat_map(|means| means.iter().rev().copied())
     }
 
     fn find(&self, bin: &Bin) -> Option<u32> {
-        self.in_cell(bin.cell).find(|&index| self.kept[index as usize].bin == *bin)
+        self.in_cell(bin.cell)
+            .find(|&index| self.kept[index as usize].bin == *bin)
     }
 
     /// The mean that a contact contradicts: that of its own cell, or where it is among the first there the nearest around
     /// that faces alike, or where there is none the one before it on its path.
-    fn rival(&self, contact: &SurfaceContact, cell: LatticeNode, own: Option<u32>, gate: &GateParams) -> Option<Rival> {
+    fn rival(
+        &self,
+        contact: &SurfaceContact,
+        cell: LatticeNode,
+        own: Option<u32>,
+        gate: &GateParams,
+    ) -> Option<Rival> {
         let nearest = |found: &mut dyn Iterator<Item = u32>| {
-            let distance = |index: u32| (self.means[index as usize].point - contact.point).norm_squared();
+            let distance =
+                |index: u32| (self.means[index as usize].point - contact.point).norm_squared();
             let nearer = |a: &u32, b: &u32| distance(*a).total_cmp(&distance(*b)).then(a.cmp(b));
-            found.filter(|&index| self.faces_alike(index, contact)).min_by(nearer)
+            found
+                .filter(|&index| self.faces_alike(index, contact))
+                .min_by(nearer)
         };
         let here = own.filter(|&index| self.faces_alike(index, contact));
         let index = match here.or_else(|| nearest(&mut self.in_cell(cell))) {
-            None => nearest(&mut self.around(contact, cell)).or_else(|| self.before(contact, gate))?,
+            None => {
+                nearest(&mut self.around(contact, cell)).or_else(|| self.before(contact, gate))?
+            }
             Some(index) => index,
         };
         let (innovation, sigmas) = self.innovation(index, contact);
-        (sigmas > gate.sigmas).then_some(Rival { index, innovation, sigmas })
+        (sigmas > gate.sigmas).then_some(Rival {
+            index,
+            innovation,
+            sigmas,
+        })
     }
 
     /// Whether a mean belongs to the surface that a contact is of.
@@ -229,11 +261,17 @@ impl ContactMap {
     }
 
     /// The means in the cells around a contact, and above and below it.
-    fn around(&self, contact: &SurfaceContact, cell: LatticeNode) -> impl Iterator<Item = u32> + '_ {
+    fn around(
+        &self,
+        contact: &SurfaceContact,
+        cell: LatticeNode,
+    ) -> impl Iterator<Item = u32> + '_ {
         let (point, step) = (contact.point, contact.normal * self.cell);
         let deep = (2..=DEPTH).flat_map(|k| [-k, k]);
         let deep = deep.map(move |k| voxel_of(&(point + step * f64::from(k)), self.cell));
-        voxel_neighbourhood(cell).chain(deep).flat_map(|cell| self.in_cell(cell))
+        voxel_neighbourhood(cell)
+            .chain(deep)
+            .flat_map(|cell| self.in_cell(cell))
     }
 
     /// The mean that the contact before went into, while that is near in time and place.
@@ -241,47 +279,88 @@ impl ContactMap {
         let (index, last_ns) = self.last?;
         let is_recent = contact.stamp_ns.saturating_sub(last_ns) <= gate.window_ns;
         let distance = (self.means[index as usize].point - contact.point).norm();
-        (is_recent && distance < PREDICTION_REACH * self.cell && self.faces_alike(index, contact)).then_some(index)
+        (is_recent && distance < PREDICTION_REACH * self.cell && self.faces_alike(index, contact))
+            .then_some(index)
     }
 
     fn innovation(&self, index: u32, contact: &SurfaceContact) -> (f64, f64) {
-        self.kept[index as usize].sums.innovation(contact, ROUGHNESS * self.cell)
+        self.kept[index as usize]
+            .sums
+            .innovation(contact, ROUGHNESS * self.cell)
     }
 
     /// Rejects a contact, or lets it take the place of the mean that it contradicts in a second pass.
-    fn contest(&mut self, rival: &Rival, contact: &SurfaceContact, bin: &Bin, gate: &GateParams) -> Verdict {
+    fn contest(
+        &mut self,
+        rival: &Rival,
+        contact: &SurfaceContact,
+        bin: &Bin,
+        gate: &GateParams,
+    ) -> Verdict {
         let roughness = ROUGHNESS * self.cell;
         self.note_mean(rival.index);
-        let rejected = self.kept[rival.index as usize].rejected.get_or_insert_default();
+        let rejected = self.kept[rival.index as usize]
+            .rejected
+            .get_or_insert_default();
         let RejectedContacts { sums, last_ns } = &mut **rejected;
         let agrees = sums.weight > 0.0 && sums.innovation(contact, roughness).1 <= gate.sigmas;
-        let is_second = agrees && contact.stamp_ns.saturating_sub(*last_ns) > PAUSE * gate.window_ns;
+        let is_second =
+            agrees && contact.stamp_ns.saturating_sub(*last_ns) > PAUSE * gate.window_ns;
         if !agrees {
             *sums = ContactStatistics::default();
         }
         sums.add(contact);
-        sums.passes.note(contact.stamp_ns, contact.weight, gate.window_ns);
+        sums.passes
+            .note(contact.stamp_ns, contact.weight, gate.window_ns);
         *last_ns = contact.stamp_ns;
         if is_second {
             let sums = std::mem::take(sums);
             self.move_to(rival.index, sums, contact, bin, gate.sigmas);
             return Verdict::Relocated;
         }
-        let SurfaceContact { stamp_ns, point, normal, .. } = *contact;
-        let Rival { innovation, sigmas, .. } = *rival;
-        self.outliers.note(Outlier { stamp_ns, point, normal, innovation, sigmas, contacts: 1 }, gate.window_ns);
+        let SurfaceContact {
+            stamp_ns,
+            point,
+            normal,
+            ..
+        } = *contact;
+        let Rival {
+            innovation, sigmas, ..
+        } = *rival;
+        self.outliers.note(
+            Outlier {
+                stamp_ns,
+                point,
+                normal,
+                innovation,
+                sigmas,
+                contacts: 1,
+            },
+            gate.window_ns,
+        );
         Verdict::Rejected
     }
 
     /// Empties the means that a contact contradicts and puts what was rejected in the cell of its contacts.
-    fn move_to(&mut self, rival: u32, sums: ContactStatistics, contact: &SurfaceContact, bin: &Bin, sigmas: f64) {
+    fn move_to(
+        &mut self,
+        rival: u32,
+        sums: ContactStatistics,
+        contact: &SurfaceContact,
+        bin: &Bin,
+        sigmas: f64,
+    ) {
         self.outliers.relocated += 1;
         let contradicts = |&index: &u32| {
             let is_alike = self.kept[index as usize].sums.weight > 0.0
                 && self.means[index as usize].normal.dot(&contact.normal) > ALIKE;
             index == rival || is_alike && self.innovation(index, contact).1 > sigmas
         };
-        let old: Vec<u32> = self.around(contact, bin.cell).chain([rival]).filter(contradicts).collect();
+        let old: Vec<u32> = self
+            .around(contact, bin.cell)
+            .chain([rival])
+            .filter(contradicts)
+            .collect();
         for index in old {
             self.note_mean(index);
             self.changed.insert(index, ());
@@ -300,7 +379,12 @@ impl ContactMap {
             self.note_mean(index);
             return index;
         }
-        let SurfaceContact { point, normal, weight, .. } = *contact;
+        let SurfaceContact {
+            point,
+            normal,
+            weight,
+            ..
+        } = *contact;
         let index = self.means.len() as u32;
         self.history.note(index, || None);
         let kept = Kept {
@@ -312,13 +396,26 @@ impl ContactMap {
             is_mixed: false,
             reported: (point, normal),
         };
-        self.push(kept, MeanContact { point, normal, weight, is_fan: false });
+        self.push(
+            kept,
+            MeanContact {
+                point,
+                normal,
+                weight,
+                is_fan: false,
+            },
+        );
         self.changed.insert(index, ());
         index
     }
 
     fn note_mean(&mut self, index: u32) {
-        self.history.note(index, || Some((self.kept[index as usize].clone(), self.means[index as usize])));
+        self.history.note(index, || {
+            Some((
+                self.kept[index as usize].clone(),
+                self.means[index as usize],
+            ))
+        });
     }
 
     /// Adds a mean.
@@ -382,7 +479,10 @@ impl ContactMap {
             Some((state, mean)) if at == self.means.len() => self.push(state, mean),
             Some((state, mean)) => {
                 let there = (&mut self.kept[at], &mut self.means[at]);
-                *past = Some((std::mem::replace(there.0, state), std::mem::replace(there.1, mean)));
+                *past = Some((
+                    std::mem::replace(there.0, state),
+                    std::mem::replace(there.1, mean),
+                ));
             }
         }
     }
@@ -441,9 +541,16 @@ impl ContactMap {
     /// Finds whether normals within `width` (m) of a mean differ by more than the angle of `cosine`; returns whether that
     /// is new.
     pub(crate) fn mark_fan(&mut self, at: u32, width: f64, cosine: f64) -> bool {
-        let MeanContact { point, normal, is_fan: before, .. } = self.means[at as usize];
+        let MeanContact {
+            point,
+            normal,
+            is_fan: before,
+            ..
+        } = self.means[at as usize];
         let mut is_fan = false;
-        self.near(&point, width, |_, other| is_fan |= self.means[other as usize].normal.dot(&normal) < cosine);
+        self.near(&point, width, |_, other| {
+            is_fan |= self.means[other as usize].normal.dot(&normal) < cosine
+        });
         self.means[at as usize].is_fan = is_fan;
         is_fan != before
     }
@@ -466,7 +573,12 @@ impl ContactMap {
 
     /// As [`Self::near`], but also those that are taken out of queries.
     #[inline]
-    pub(in crate::reconstruct) fn near_known(&self, x: &Point3<f64>, reach: f64, mut each: impl FnMut(f64, u32)) {
+    pub(in crate::reconstruct) fn near_known(
+        &self,
+        x: &Point3<f64>,
+        reach: f64,
+        mut each: impl FnMut(f64, u32),
+    ) {
         let limit = reach.min(self.reach).powi(2);
         for bin in voxel_neighbourhood(voxel_of(x, self.reach)) {
             for &index in self.nearby.get(&bin).into_iter().flatten() {
@@ -503,13 +615,17 @@ mod tests {
         store.add(&contact(0.2e-3, Vector3::x(), 1.0));
         assert_eq!(store.means().len(), 2);
         assert!((store.means()[0].point.x - 0.325e-3).abs() < 1e-18);
-        assert_eq!((store.means()[0].weight, store.means()[1].normal), (4.0, Vector3::x()));
+        assert_eq!(
+            (store.means()[0].weight, store.means()[1].normal),
+            (4.0, Vector3::x())
+        );
     }
 
     #[test]
     fn near_finds_what_a_walk_over_all_finds() {
         let mut store = ContactMap::new(0.5e-3, 3e-3, None);
-        let scattered = |i: u32| f64::from(i.wrapping_mul(2_654_435_761) >> 20) / 4096.0 * 10e-3 - 5e-3;
+        let scattered =
+            |i: u32| f64::from(i.wrapping_mul(2_654_435_761) >> 20) / 4096.0 * 10e-3 - 5e-3;
         for i in 0..900 {
             let point = Point3::new(scattered(3 * i), scattered(3 * i + 1), scattered(3 * i + 2));
             store.add(&SurfaceContact {
@@ -526,7 +642,11 @@ mod tests {
             store.near(&x, 2e-3, |_, index| found.push(index));
             found.sort_unstable();
             let within = |mean: &MeanContact| (mean.point - x).norm() < 2e-3;
-            let all: Vec<u32> = (0..).zip(store.means()).filter(|(_, mean)| within(mean)).map(|(at, _)| at).collect();
+            let all: Vec<u32> = (0..)
+                .zip(store.means())
+                .filter(|(_, mean)| within(mean))
+                .map(|(at, _)| at)
+                .collect();
             assert_eq!(found, all);
         }
     }
@@ -540,8 +660,18 @@ mod tests {
             store.near(&Point3::origin(), 1e-3, |_, _| count += 1);
             count
         };
-        assert_eq!((store.refute(0, true), store.refute(0, true), count(&store)), (true, false, 0));
-        assert_eq!((store.refute(0, false), store.refute(0, false), count(&store)), (true, false, 1));
+        assert_eq!(
+            (store.refute(0, true), store.refute(0, true), count(&store)),
+            (true, false, 0)
+        );
+        assert_eq!(
+            (
+                store.refute(0, false),
+                store.refute(0, false),
+                count(&store)
+            ),
+            (true, false, 1)
+        );
     }
 
     #[test]
@@ -550,17 +680,32 @@ mod tests {
         for x in [0.6e-3, 0.1e-3, 0.2e-3, 0.7e-3] {
             store.add(&contact(x, Vector3::z(), 1.0));
         }
-        let changed = |store: &mut ContactMap| store.take_changed().iter().map(|(at, ())| at).collect::<Vec<_>>();
-        assert_eq!((changed(&mut store), changed(&mut store)), (vec![0, 1], vec![]));
+        let changed = |store: &mut ContactMap| {
+            store
+                .take_changed()
+                .iter()
+                .map(|(at, ())| at)
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(
+            (changed(&mut store), changed(&mut store)),
+            (vec![0, 1], vec![])
+        );
         store.add(&contact(0.3e-3, Vector3::z(), 1.0));
         assert!(changed(&mut store).is_empty(), "it went along the surface");
-        store.add(&SurfaceContact { point: Point3::new(0.3e-3, 0.1e-3, 0.2e-3), ..contact(0.0, Vector3::z(), 1.0) });
+        store.add(&SurfaceContact {
+            point: Point3::new(0.3e-3, 0.1e-3, 0.2e-3),
+            ..contact(0.0, Vector3::z(), 1.0)
+        });
         assert_eq!(changed(&mut store), [1], "it rose by 20 µm");
     }
 
     /// A pass of eight contacts at height `z` (m) from `stamp_ns` on; what became of the last.
     fn pass(store: &mut ContactMap, z: f64, stamp_ns: i64) -> Verdict {
-        let sigma = ContactSigma { noise: 10e-6, ..ContactSigma::default() };
+        let sigma = ContactSigma {
+            noise: 10e-6,
+            ..ContactSigma::default()
+        };
         let at = |i: i64| Point3::new(0.1e-3 + 0.03e-3 * i as f64, 0.1e-3, 0.1e-3 + z);
         let contact = |i: i64| SurfaceContact {
             point: at(i),
@@ -574,7 +719,10 @@ mod tests {
 
     #[test]
     fn what_contradicts_is_rejected_until_a_second_pass_agrees() {
-        let gate = GateParams { sigmas: 4.0, window_ns: 64_000_000 };
+        let gate = GateParams {
+            sigmas: 4.0,
+            window_ns: 64_000_000,
+        };
         let second = 1_000_000_000;
         // within the cell, and in the one above
         for moved in [0.2e-3, 0.45e-3] {

@@ -71,7 +71,13 @@ pub(in crate::reconstruct) struct ContactStatistics {
 
 impl ContactStatistics {
     pub fn add(&mut self, contact: &SurfaceContact) {
-        let SurfaceContact { point, normal, weight, sigma, .. } = contact;
+        let SurfaceContact {
+            point,
+            normal,
+            weight,
+            sigma,
+            ..
+        } = contact;
         self.point += point.coords * *weight;
         self.normal += normal * *weight;
         self.weight += weight;
@@ -88,9 +94,16 @@ impl ContactStatistics {
 
     /// Uncertainty of the place by one of the passes that were added.
     pub fn sigma(&self) -> ContactSigma {
-        let [noise, reach, tilt] = [self.noise, self.reach, self.tilt].map(|sum| (sum / self.weight).sqrt());
+        let [noise, reach, tilt] =
+            [self.noise, self.reach, self.tilt].map(|sum| (sum / self.weight).sqrt());
         let [calibration, place] = [self.calibration, self.place].map(|sum| sum / self.weight);
-        ContactSigma { noise, reach, calibration, place, normal: tilt }
+        ContactSigma {
+            noise,
+            reach,
+            calibration,
+            place,
+            normal: tilt,
+        }
     }
 
     /// How far a contact is off the chord to the mean, m, and how many standard deviations that is. The chord is at right
@@ -101,11 +114,13 @@ impl ContactStatistics {
         let normal = direction(&self.normal).unwrap_or(contact.normal);
         let arm = contact.point - self.point();
         let own = self.sigma();
-        let [tilt, of_contact] = [own.normal, contact.sigma.normal].map(|tilt| tilt * tilt + LEAST_TILT * LEAST_TILT);
+        let [tilt, of_contact] =
+            [own.normal, contact.sigma.normal].map(|tilt| tilt * tilt + LEAST_TILT * LEAST_TILT);
         let share = of_contact / (tilt + of_contact);
         let off = (normal * share + contact.normal * (1.0 - share)).dot(&arm);
         let across = (arm.norm_squared() - off * off).max(0.0);
-        let [of_mean, of_one] = [own, contact.sigma].map(|sigma| sigma.noise.powi(2) + sigma.reach.powi(2));
+        let [of_mean, of_one] =
+            [own, contact.sigma].map(|sigma| sigma.noise.powi(2) + sigma.reach.powi(2));
         let variance = of_one
             + of_mean / f64::from(self.passes.count.max(1))
             + across * tilt * of_contact / (tilt + of_contact)

@@ -53,7 +53,10 @@ impl ContactSigma {
 impl UncertaintyParams {
     /// The defaults, for a scan whose points are off by `noise` (m).
     pub fn new(noise: f64) -> Self {
-        Self { scan: noise, ..Self::default() }
+        Self {
+            scan: noise,
+            ..Self::default()
+        }
     }
 }
 

@@ -57,9 +57,12 @@ impl TouchedWall {
     /// Standard deviation of the places from which it was touched, across the corner that it makes with another, m.
     fn width(&self, other: &Self) -> f64 {
         // of two that face the same way there is no corner, and no width
-        let across = direction(&self.facing.cross(&self.facing.cross(&other.facing))).unwrap_or_default();
+        let across =
+            direction(&self.facing.cross(&self.facing.cross(&other.facing))).unwrap_or_default();
         let mean = across.dot(&self.offset) / self.count;
-        (across.dot(&(self.spread * across)) / self.count - mean * mean).max(0.0).sqrt()
+        (across.dot(&(self.spread * across)) / self.count - mean * mean)
+            .max(0.0)
+            .sqrt()
     }
 }
 
@@ -72,14 +75,23 @@ pub(in crate::reconstruct) fn double_contact(
     normal: &Vector3<f64>,
 ) -> Option<[Vector3<f64>; 2]> {
     let (walls, count) = walls(contacts, radius, centre, &(centre - normal * radius));
-    let known = || walls[..count].iter().filter(|wall| wall.weight >= LEAST_WEIGHT);
-    let pairs = known().enumerate().flat_map(|(at, a)| known().skip(at + 1).map(move |b| [a, b]));
+    let known = || {
+        walls[..count]
+            .iter()
+            .filter(|wall| wall.weight >= LEAST_WEIGHT)
+    };
+    let pairs = known()
+        .enumerate()
+        .flat_map(|(at, a)| known().skip(at + 1).map(move |b| [a, b]));
     // two bridges of one corner are no walls of another
     let between = pairs.filter(|[a, b]| {
-        let is_corner = a.facing.dot(&b.facing) < DISTINCT && is_between(normal, &a.facing, &b.facing);
+        let is_corner =
+            a.facing.dot(&b.facing) < DISTINCT && is_between(normal, &a.facing, &b.facing);
         is_corner && is_wide([a.width(b), b.width(a)], radius)
     });
-    between.map(|[a, b]| [a.facing, b.facing]).min_by(|[a, b], [c, d]| a.dot(b).total_cmp(&c.dot(d)))
+    between
+        .map(|[a, b]| [a.facing, b.facing])
+        .min_by(|[a, b], [c, d]| a.dot(b).total_cmp(&c.dot(d)))
 }
 
 /// Whether two surfaces were touched from places so far from each other (m) that none of them is a bridge over their corner.
@@ -106,7 +118,13 @@ pub(in crate::reconstruct) fn split(
 /// Whether a mean was kept as one contact before it was known to be two.
 pub(in crate::reconstruct) fn is_mixed(contacts: &ContactMap, radius: f64, at: u32) -> bool {
     let mean = &contacts.means()[at as usize];
-    double_contact(contacts, radius, &(mean.point + mean.normal * radius), &mean.normal).is_some()
+    double_contact(
+        contacts,
+        radius,
+        &(mean.point + mean.normal * radius),
+        &mean.normal,
+    )
+    .is_some()
 }
 
 /// The surfaces that a ball lies on, and how many.
@@ -126,12 +144,19 @@ fn walls(
         let weight = contacts.sums(index).weight;
         let height = mean.normal.dot(&(centre - mean.point));
         let aside_squared = distance_squared - height * height;
-        let is_on = (height - radius).abs() <= ON_SURFACE * radius && aside_squared <= (NEARBY * radius).powi(2);
-        if weight == 0.0 || !is_on || (mean.point - point).norm_squared() > (ASKED * radius).powi(2) {
+        let is_on = (height - radius).abs() <= ON_SURFACE * radius
+            && aside_squared <= (NEARBY * radius).powi(2);
+        if weight == 0.0 || !is_on || (mean.point - point).norm_squared() > (ASKED * radius).powi(2)
+        {
             return;
         }
-        let cosines = walls[..count].iter().map(|wall| wall.facing.dot(&mean.normal)).enumerate();
-        let known = cosines.filter(|(_, cosine)| *cosine > ALIKE).max_by(|a, b| a.1.total_cmp(&b.1));
+        let cosines = walls[..count]
+            .iter()
+            .map(|wall| wall.facing.dot(&mean.normal))
+            .enumerate();
+        let known = cosines
+            .filter(|(_, cosine)| *cosine > ALIKE)
+            .max_by(|a, b| a.1.total_cmp(&b.1));
         let at = known.map_or(count, |(at, _)| at);
         if at < MOST {
             count = count.max(at + 1);
@@ -159,7 +184,10 @@ fn is_between(normal: &Vector3<f64>, a: &Vector3<f64>, b: &Vector3<f64>) -> bool
         return false;
     }
     let (along_a, along_b) = (normal.dot(a), normal.dot(b));
-    let [share_a, share_b] = [(along_a - cosine * along_b) / squared_sine, (along_b - cosine * along_a) / squared_sine];
+    let [share_a, share_b] = [
+        (along_a - cosine * along_b) / squared_sine,
+        (along_b - cosine * along_a) / squared_sine,
+    ];
     let off = normal - a * share_a - b * share_b;
     let is_shared = share_a > PRESSED * share_b && share_b > PRESSED * share_a;
     is_shared && share_a + share_b < MOST_FORCE && off.norm() < OFF_PLANE
@@ -173,7 +201,13 @@ mod tests {
     const RADIUS: f64 = 1.5e-3;
 
     fn contact(point: Point3<f64>, normal: Vector3<f64>, weight: f64) -> SurfaceContact {
-        SurfaceContact { point, normal, weight, stamp_ns: 0, sigma: ContactSigma::default() }
+        SurfaceContact {
+            point,
+            normal,
+            weight,
+            stamp_ns: 0,
+            sigma: ContactSigma::default(),
+        }
     }
 
     /// Contacts each 0.4 mm on the floor z = 0 and on the wall x = 0, as far as a ball in the corner reaches.
@@ -210,9 +244,25 @@ mod tests {
             }
         }
         // the floor alone is pressed, or the ball is 0.2 mm from the wall
-        assert_eq!(double_contact(&store, RADIUS, &centre, &Vector3::new(0.05, 0.0, 1.0).normalize()), None);
+        assert_eq!(
+            double_contact(
+                &store,
+                RADIUS,
+                &centre,
+                &Vector3::new(0.05, 0.0, 1.0).normalize()
+            ),
+            None
+        );
         let beside = centre + Vector3::x() * 0.2e-3;
-        assert_eq!(double_contact(&store, RADIUS, &beside, &Vector3::new(1.0, 0.0, 1.0).normalize()), None);
+        assert_eq!(
+            double_contact(
+                &store,
+                RADIUS,
+                &beside,
+                &Vector3::new(1.0, 0.0, 1.0).normalize()
+            ),
+            None
+        );
     }
 
     #[test]
@@ -221,7 +271,15 @@ mod tests {
         for degrees in [5.0f64, 25.0, 45.0, 85.0] {
             let (sin, cos) = degrees.to_radians().sin_cos();
             let normal = Vector3::new(-sin, 0.0, cos);
-            assert_eq!(double_contact(&store, RADIUS, &(Point3::origin() + normal * RADIUS), &normal), None);
+            assert_eq!(
+                double_contact(
+                    &store,
+                    RADIUS,
+                    &(Point3::origin() + normal * RADIUS),
+                    &normal
+                ),
+                None
+            );
         }
     }
 
@@ -235,7 +293,11 @@ mod tests {
             let is_mixed = is_mixed(&store, RADIUS, at);
             assert_eq!(store.mark_mixed(at, is_mixed), is_mixed);
         }
-        let dropped: Vec<_> = store.means().iter().filter(|mean| mean.weight == 0.0).collect();
+        let dropped: Vec<_> = store
+            .means()
+            .iter()
+            .filter(|mean| mean.weight == 0.0)
+            .collect();
         assert!(dropped.len() == 1 && (dropped[0].point - point).norm() < 1e-15);
     }
 }

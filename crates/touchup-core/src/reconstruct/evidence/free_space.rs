@@ -44,7 +44,10 @@ pub(in crate::reconstruct) struct Posture {
 impl Key for Posture {
     #[inline]
     fn bits(&self) -> u64 {
-        let lean = self.lean.iter().fold(0u64, |bits, &x| bits << 6 | u64::from(x as u8 & 63));
+        let lean = self
+            .lean
+            .iter()
+            .fold(0u64, |bits, &x| bits << 6 | u64::from(x as u8 & 63));
         self.cell.bits() ^ lean << 40
     }
 }
@@ -60,15 +63,26 @@ impl Keyed for TipPlace {
     type Key = Posture;
     fn key(&self, cell: f64) -> Posture {
         let lean = [self.axis.x, self.axis.y, self.axis.z].map(|x| (x / LEAN).floor() as i8);
-        Posture { cell: voxel_of(&self.centre, cell), lean }
+        Posture {
+            cell: voxel_of(&self.centre, cell),
+            lean,
+        }
     }
 }
 
 impl FreeSpace {
     /// Empty: one place is kept for each cube of edge `cell` (m); queries of a ball go up to `reach` (m).
     pub fn new(tip: TipBody, cell: f64, reach: f64) -> Self {
-        let body = (!tip.is_ball()).then(|| SweptVolume { tip, places: VoxelSet::new(cell) });
-        Self { reach, centres: VoxelSet::new(cell), body, changed: Vec::new() }
+        let body = (!tip.is_ball()).then(|| SweptVolume {
+            tip,
+            places: VoxelSet::new(cell),
+        });
+        Self {
+            reach,
+            centres: VoxelSet::new(cell),
+            body,
+            changed: Vec::new(),
+        }
     }
 
     /// Whether the tip is a ball.
@@ -93,12 +107,19 @@ impl FreeSpace {
     /// Forgets where the tip was nearer to `p` with its middle than `distance` (m, up to the reach); of a tip that is no
     /// ball, as much nearer with its surface as a ball of its scale.
     pub fn forget(&mut self, p: &Point3<f64>, distance: f64) {
-        let Self { reach, centres, body, changed } = self;
+        let Self {
+            reach,
+            centres,
+            body,
+            changed,
+        } = self;
         for bin in voxel_neighbourhood(voxel_of(p, *reach)) {
             let stays = |centre: &Point3<f64>| (centre - p).norm_squared() >= distance * distance;
             centres.retain(bin, stays, |centre| changed.push(*centre));
         }
-        let Some(SweptVolume { tip, places }) = body else { return };
+        let Some(SweptVolume { tip, places }) = body else {
+            return;
+        };
         for bin in bins_around(p, tip.scale(), tip.bound().1 + distance).iter() {
             let stays = |place: &TipPlace| tip.signed_distance(place, p) + tip.scale() >= distance;
             places.retain(bin, stays, |place| changed.push(place.centre));
@@ -113,12 +134,17 @@ impl FreeSpace {
     /// Begins a stroke, which can be undone.
     pub fn begin_stroke(&mut self) {
         self.centres.begin_stroke();
-        self.body.iter_mut().for_each(|body| body.places.begin_stroke());
+        self.body
+            .iter_mut()
+            .for_each(|body| body.places.begin_stroke());
     }
 
     /// How many strokes can be undone.
     pub fn strokes(&self) -> usize {
-        self.body.as_ref().map_or(usize::MAX, |body| body.places.strokes()).min(self.centres.strokes())
+        self.body
+            .as_ref()
+            .map_or(usize::MAX, |body| body.places.strokes())
+            .min(self.centres.strokes())
     }
 
     /// Undoes the last stroke, or does the one again that was undone last; returns whether there was one.
@@ -144,14 +170,20 @@ impl FreeSpace {
     pub fn cover(&self, mut each: impl FnMut(&Point3<f64>)) {
         match &self.body {
             None => self.centres().for_each(each),
-            Some(body) => body.places.iter().for_each(|place| body.cover(place, &mut each)),
+            Some(body) => body
+                .places
+                .iter()
+                .for_each(|place| body.cover(place, &mut each)),
         }
     }
 
     /// Whether the path of the ball ended at `centre`, going in `direction` (unit): within `width` (m) all of it is behind.
     pub fn is_end(&self, centre: &Point3<f64>, direction: &Vector3<f64>, width: f64) -> bool {
         let (mut sum, mut count) = (Vector3::zeros(), 0.0f64);
-        for other in self.around(centre).filter(|other| (*other - centre).norm_squared() < width * width) {
+        for other in self
+            .around(centre)
+            .filter(|other| (*other - centre).norm_squared() < width * width)
+        {
             sum += other - centre;
             count += 1.0;
         }
@@ -167,7 +199,9 @@ impl FreeSpace {
         if let Some(body) = &self.body {
             return body.nearest(x);
         }
-        let all = self.around(x).map(|centre| ((centre - x).norm_squared(), *centre));
+        let all = self
+            .around(x)
+            .map(|centre| ((centre - x).norm_squared(), *centre));
         let near = all.filter(|(distance_squared, _)| *distance_squared < self.reach * self.reach);
         let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0));
         nearest.map(|(distance_squared, centre)| (distance_squared.sqrt(), centre))
@@ -182,13 +216,18 @@ impl FreeSpace {
 impl SweptVolume {
     /// The cell of a place.
     fn bin(&self, place: &TipPlace) -> LatticeNode {
-        voxel_of(&(place.centre + place.axis * self.tip.bound().0), self.tip.scale())
+        voxel_of(
+            &(place.centre + place.axis * self.tip.bound().0),
+            self.tip.scale(),
+        )
     }
 
     /// Calls `each` with the middles of balls that cover the tip at a place.
     fn cover(&self, TipPlace { centre, axis }: &TipPlace, mut each: impl FnMut(&Point3<f64>)) {
         let (heights, _) = self.tip.cover();
-        heights.iter().for_each(|&height| each(&(centre + axis * height)));
+        heights
+            .iter()
+            .for_each(|&height| each(&(centre + axis * height)));
     }
 
     /// As [`FreeSpace::nearest`].
@@ -222,7 +261,14 @@ fn bins_around(x: &Point3<f64>, size: f64, reach: f64) -> CellBox {
 
 /// Squared distance of a point from a cell of edge `size`, m².
 fn cell_distance_squared(cell: &LatticeNode, size: f64, x: &Point3<f64>) -> f64 {
-    (0..3).map(|i| (f64::from(cell[i]) * size - x[i]).max(x[i] - f64::from(cell[i] + 1) * size).max(0.0).powi(2)).sum()
+    (0..3)
+        .map(|i| {
+            (f64::from(cell[i]) * size - x[i])
+                .max(x[i] - f64::from(cell[i] + 1) * size)
+                .max(0.0)
+                .powi(2)
+        })
+        .sum()
 }
 
 #[cfg(test)]
@@ -231,27 +277,51 @@ mod tests {
     use crate::stylus::TipShape;
 
     fn upright(centre: Point3<f64>) -> TipPlace {
-        TipPlace { centre, axis: Vector3::z() }
+        TipPlace {
+            centre,
+            axis: Vector3::z(),
+        }
     }
 
     #[test]
     fn a_path_ends_where_all_of_it_is_behind() {
-        let mut free_space = FreeSpace::new(TipBody::new(TipShape::Ball, 1e-3).unwrap(), 0.1e-3, 2e-3);
+        let mut free_space =
+            FreeSpace::new(TipBody::new(TipShape::Ball, 1e-3).unwrap(), 0.1e-3, 2e-3);
         for i in 0..=100 {
             free_space.add_place(&upright(Point3::new(0.0, 0.0, f64::from(i) * -1e-4)));
         }
         let [top, middle, bottom] = [0.0, -5e-3, -1e-2].map(|z| Point3::new(0.0, 0.0, z));
-        assert!(free_space.is_end(&bottom, &-Vector3::z(), 1e-3) && free_space.is_end(&top, &Vector3::z(), 1e-3));
-        assert!(!free_space.is_end(&bottom, &Vector3::z(), 1e-3) && !free_space.is_end(&bottom, &Vector3::x(), 1e-3));
-        assert!(!free_space.is_end(&middle, &-Vector3::z(), 1e-3) && !free_space.is_end(&middle, &Vector3::x(), 1e-3));
+        assert!(
+            free_space.is_end(&bottom, &-Vector3::z(), 1e-3)
+                && free_space.is_end(&top, &Vector3::z(), 1e-3)
+        );
+        assert!(
+            !free_space.is_end(&bottom, &Vector3::z(), 1e-3)
+                && !free_space.is_end(&bottom, &Vector3::x(), 1e-3)
+        );
+        assert!(
+            !free_space.is_end(&middle, &-Vector3::z(), 1e-3)
+                && !free_space.is_end(&middle, &Vector3::x(), 1e-3)
+        );
     }
 
     #[test]
     fn a_flat_end_sweeps_its_whole_width_and_a_cone_its_flank() {
         let shapes = [
-            (TipShape::Flat { edge_radius: 0.0, length: 4e-3 }, 2e-3, 2e-3, 0.0),
             (
-                TipShape::Cone { half_angle: 0.5, length: 4e-3 },
+                TipShape::Flat {
+                    edge_radius: 0.0,
+                    length: 4e-3,
+                },
+                2e-3,
+                2e-3,
+                0.0,
+            ),
+            (
+                TipShape::Cone {
+                    half_angle: 0.5,
+                    length: 4e-3,
+                },
                 0.3e-3,
                 0.5f64.tan() * 2e-3 + 0.3e-3 / 0.5f64.cos(),
                 -0.3e-3,
@@ -263,11 +333,20 @@ mod tests {
             // along x, upright: 2 mm above its origin the tip is `wide` to either side
             for i in 0..=100 {
                 let centre = Point3::new(f64::from(i) * 1e-4, 0.0, 0.0);
-                free_space.add_place(&TipPlace { centre, axis: Vector3::z() });
+                free_space.add_place(&TipPlace {
+                    centre,
+                    axis: Vector3::z(),
+                });
             }
-            let depth =
-                |y: f64, z: f64| free_space.nearest(&Point3::new(5e-3, y, z)).map(|found| tip.scale() - found.0);
-            assert!(depth(wide - 0.05e-3, 2e-3).unwrap() > 0.0 && depth(wide + 0.05e-3, 2e-3).unwrap() < 0.0);
+            let depth = |y: f64, z: f64| {
+                free_space
+                    .nearest(&Point3::new(5e-3, y, z))
+                    .map(|found| tip.scale() - found.0)
+            };
+            assert!(
+                depth(wide - 0.05e-3, 2e-3).unwrap() > 0.0
+                    && depth(wide + 0.05e-3, 2e-3).unwrap() < 0.0
+            );
             assert!(depth(0.0, low - 0.05e-3).unwrap() < 0.0);
             assert_eq!(depth(0.0, low - 2e-3), None, "far below");
             let (mut covered, mut farthest) = (0, 0.0f64);
@@ -281,17 +360,23 @@ mod tests {
 
     #[test]
     fn the_nearest_centre_is_found_up_to_the_reach() {
-        let mut free_space = FreeSpace::new(TipBody::new(TipShape::Ball, 1e-3).unwrap(), 0.1e-3, 2e-3);
+        let mut free_space =
+            FreeSpace::new(TipBody::new(TipShape::Ball, 1e-3).unwrap(), 0.1e-3, 2e-3);
         for i in 0..1000 {
             free_space.add_place(&upright(Point3::new(f64::from(i) * 1e-5, 0.0, 0.0)));
         }
-        assert_eq!(free_space.centres().count(), 100, "one for each tenth of a millimetre");
+        assert_eq!(
+            free_space.centres().count(),
+            100,
+            "one for each tenth of a millimetre"
+        );
         let (distance, centre) = free_space.nearest(&Point3::new(5e-3, 1.2e-3, 0.0)).unwrap();
         assert!((distance - 1.2e-3).abs() < 1e-5 && (centre.x - 5e-3).abs() < 1e-4);
         assert_eq!(free_space.nearest(&Point3::new(5e-3, 2.1e-3, 0.0)), None);
         // what is forgotten can be swept again
         free_space.forget(&Point3::new(5e-3, 0.0, 0.0), 1.01e-3);
-        let nearest = |free_space: &FreeSpace| free_space.nearest(&Point3::new(5e-3, 0.0, 0.0)).unwrap().0;
+        let nearest =
+            |free_space: &FreeSpace| free_space.nearest(&Point3::new(5e-3, 0.0, 0.0)).unwrap().0;
         assert!(nearest(&free_space) > 1e-3 && free_space.centres().count() < 82);
         free_space.add_place(&upright(Point3::new(5.01e-3, 0.0, 0.0)));
         assert!(nearest(&free_space) < 0.02e-3);

@@ -65,31 +65,59 @@ impl KeptDetail {
         let mut near = BoxQuery::default();
         for (contact, _) in agreement.agreeing(evidence.contacts) {
             let reach = Vector3::repeat(RESTS * radius);
-            tree.faces_in_box(&(contact.point - reach), &(contact.point + reach), &mut near);
-            near.faces.iter().flat_map(|&face| scan.corners(face)).for_each(|v| is_near[v.0 as usize] = true);
+            tree.faces_in_box(
+                &(contact.point - reach),
+                &(contact.point + reach),
+                &mut near,
+            );
+            near.faces
+                .iter()
+                .flat_map(|&face| scan.corners(face))
+                .for_each(|v| is_near[v.0 as usize] = true);
         }
         let (mut moved_scan, mut moved) = (scan.clone(), Vec::new());
-        for vertex in (0..is_near.len() as u32).filter(|&v| is_near[v as usize]).map(VertexId) {
+        for vertex in (0..is_near.len() as u32)
+            .filter(|&v| is_near[v as usize])
+            .map(VertexId)
+        {
             let here = scan.position(vertex);
             let (step, share) = agreement.displacement(evidence.contacts, &here);
             if step != Vector3::zeros() {
                 moved_scan.set_position(vertex, here + step);
-                moved.push((vertex, if share < 1.0 { Support::Guessed } else { Support::Touched }));
+                moved.push((
+                    vertex,
+                    if share < 1.0 {
+                        Support::Guessed
+                    } else {
+                        Support::Touched
+                    },
+                ));
             }
         }
         let tree = FaceTree::new(&moved_scan);
-        Some(Self { scan: moved_scan, tree, moved, agreement })
+        Some(Self {
+            scan: moved_scan,
+            tree,
+            moved,
+            agreement,
+        })
     }
 
     /// What a vertex of the patch rests on that lies on the scan; `None` for any other.
     pub fn support(&self, key: &VertexKey) -> Option<Support> {
         let of = |vertex: &VertexId| {
-            let at = self.moved.binary_search_by_key(&vertex.0, |(moved, _)| moved.0);
+            let at = self
+                .moved
+                .binary_search_by_key(&vertex.0, |(moved, _)| moved.0);
             at.map_or(Support::Scan, |at| self.moved[at].1)
         };
         let of_all = |vertices: &[VertexId]| {
             let first = of(&vertices[0]);
-            if vertices.iter().all(|vertex| of(vertex) == first) { first } else { Support::Guessed }
+            if vertices.iter().all(|vertex| of(vertex) == first) {
+                first
+            } else {
+                Support::Guessed
+            }
         };
         match key {
             VertexKey::Scan(vertex) => Some(of(vertex)),
@@ -109,26 +137,48 @@ fn agreement_of(evidence: &Evidence<'_>) -> Agreement {
     let (contacts, radius) = (evidence.contacts, evidence.params.radius);
     let mut fineness = Fineness::new(evidence);
     let alone = contacts.means().iter().map(|contact| {
-        let mismatch = if contact.weight > 0.0 { mismatch_of(evidence, contact)? } else { return None };
+        let mismatch = if contact.weight > 0.0 {
+            mismatch_of(evidence, contact)?
+        } else {
+            return None;
+        };
         fineness.is_fine(contact).then_some(mismatch)
     });
-    let mut agreement = Agreement { mismatch: alone.collect(), radius };
-    let rest = |(contact, mismatch): (&MeanContact, &Option<f64>)| {
-        Some((*mismatch)? - agreement.displacement(contacts, &contact.point).0.dot(&contact.normal))
+    let mut agreement = Agreement {
+        mismatch: alone.collect(),
+        radius,
     };
-    let rest: Vec<Option<f64>> = contacts.means().iter().zip(&agreement.mismatch).map(rest).collect();
+    let rest = |(contact, mismatch): (&MeanContact, &Option<f64>)| {
+        Some(
+            (*mismatch)?
+                - agreement
+                    .displacement(contacts, &contact.point)
+                    .0
+                    .dot(&contact.normal),
+        )
+    };
+    let rest: Vec<Option<f64>> = contacts
+        .means()
+        .iter()
+        .zip(&agreement.mismatch)
+        .map(rest)
+        .collect();
     // its square, and what it may be, m²
     let averaged = |contact: &MeanContact| {
         let (mut sum, mut variance, mut weights) = (0.0, 0.0, 0.0);
-        contacts.near(&contact.point, AVERAGED_WITHIN * radius, |distance_squared, index| {
-            if let Some(rest) = rest[index as usize] {
-                let weight =
-                    contacts.means()[index as usize].weight * (-distance_squared / (AVERAGED * radius).powi(2)).exp();
-                sum += weight * rest;
-                variance += weight * weight * contacts.noise_variance(index);
-                weights += weight;
-            }
-        });
+        contacts.near(
+            &contact.point,
+            AVERAGED_WITHIN * radius,
+            |distance_squared, index| {
+                if let Some(rest) = rest[index as usize] {
+                    let weight = contacts.means()[index as usize].weight
+                        * (-distance_squared / (AVERAGED * radius).powi(2)).exp();
+                    sum += weight * rest;
+                    variance += weight * weight * contacts.noise_variance(index);
+                    weights += weight;
+                }
+            },
+        );
         let noise = LIMIT * LIMIT * variance / (weights * weights) + (SLACK * radius).powi(2);
         [(sum / weights).powi(2), noise]
     };
@@ -136,13 +186,17 @@ fn agreement_of(evidence: &Evidence<'_>) -> Agreement {
     let agrees = |(index, mismatch): (u32, &Option<f64>)| {
         let (mismatch, own) = ((*mismatch)?, rest[index as usize]?);
         let (mut left, mut noise) = (0.0, 0.0);
-        contacts.near(&contacts.means()[index as usize].point, radius, |_, index| {
-            if rest[index as usize].is_some() {
-                let weight = contacts.means()[index as usize].weight;
-                left += weight * averaged[index as usize][0];
-                noise += weight * averaged[index as usize][1];
-            }
-        });
+        contacts.near(
+            &contacts.means()[index as usize].point,
+            radius,
+            |_, index| {
+                if rest[index as usize].is_some() {
+                    let weight = contacts.means()[index as usize].weight;
+                    left += weight * averaged[index as usize][0];
+                    noise += weight * averaged[index as usize][1];
+                }
+            },
+        );
         let may_be_off = AGREES * radius + SIGMAS * contacts.variance(index).sqrt();
         (own.abs() <= may_be_off && left <= noise).then_some(mismatch)
     };
@@ -154,7 +208,9 @@ fn agreement_of(evidence: &Evidence<'_>) -> Agreement {
 fn mismatch_of(evidence: &Evidence<'_>, contact: &MeanContact) -> Option<f64> {
     let radius = evidence.params.radius;
     let centre = contact.point + contact.normal * radius;
-    let hit = evidence.tree.closest(evidence.scan, &centre, (1.0 + LARGEST_MISMATCH) * radius)?;
+    let hit = evidence
+        .tree
+        .closest(evidence.scan, &centre, (1.0 + LARGEST_MISMATCH) * radius)?;
     let arm = centre - hit.point;
     let distance = arm.norm();
     let is_along = arm.dot(&contact.normal) > ALONG * distance;
@@ -173,14 +229,23 @@ struct Fineness<'a> {
 impl<'a> Fineness<'a> {
     fn new(evidence: &'a Evidence<'a>) -> Self {
         let scatter = vec![f64::NAN; evidence.scan.vertex_slots()];
-        Self { evidence, scatter, near: BoxQuery::default(), around: Vec::new() }
+        Self {
+            evidence,
+            scatter,
+            near: BoxQuery::default(),
+            around: Vec::new(),
+        }
     }
 
     /// Around a contact.
     fn is_fine(&mut self, contact: &MeanContact) -> bool {
         let (scan, radius) = (self.evidence.scan, self.evidence.params.radius);
         let reach = Vector3::repeat(AROUND * radius);
-        self.evidence.tree.faces_in_box(&(contact.point - reach), &(contact.point + reach), &mut self.near);
+        self.evidence.tree.faces_in_box(
+            &(contact.point - reach),
+            &(contact.point + reach),
+            &mut self.near,
+        );
         let mut longest = 0.0f64;
         self.around.clear();
         for &face in &self.near.faces {
@@ -203,9 +268,16 @@ impl<'a> Fineness<'a> {
 /// How far a vertex is off the straightest of the lines through it from one neighbour to the one across, along its normal, m.
 fn scatter_of(scan: &TriMesh, vertex: VertexId) -> f64 {
     let star = scan.star(vertex);
-    let normal = star.iter().map(|&face| scan.double_area_normal(face)).sum::<Vector3<f64>>();
+    let normal = star
+        .iter()
+        .map(|&face| scan.double_area_normal(face))
+        .sum::<Vector3<f64>>();
     let here = scan.position(vertex);
-    let others = || star.iter().flat_map(|&face| scan.corners(face)).filter(|other| *other != vertex);
+    let others = || {
+        star.iter()
+            .flat_map(|&face| scan.corners(face))
+            .filter(|other| *other != vertex)
+    };
     let arms = || others().map(|other| scan.position(other) - here);
     let off = |arm: Vector3<f64>| {
         let cosine = |other: &Vector3<f64>| arm.dot(other) / other.norm();

@@ -51,8 +51,16 @@ impl Outliers {
         match self.last.back_mut().filter(|_| goes_on) {
             Some(last) => {
                 let (stamp_ns, contacts) = (last.stamp_ns, last.contacts + 1);
-                let most = if outlier.sigmas > last.sigmas { outlier } else { *last };
-                *last = Outlier { stamp_ns, contacts, ..most };
+                let most = if outlier.sigmas > last.sigmas {
+                    outlier
+                } else {
+                    *last
+                };
+                *last = Outlier {
+                    stamp_ns,
+                    contacts,
+                    ..most
+                };
             }
             None => {
                 if self.last.len() == KEPT {
@@ -75,11 +83,27 @@ mod tests {
             for (after_ns, sigmas) in [(0, 5.0), (10, 9.0), (20, 6.0)] {
                 let (point, normal) = (Point3::origin(), Vector3::z());
                 let stamp_ns = 1000 * (i + 1) + after_ns;
-                outliers.note(Outlier { stamp_ns, point, normal, innovation: 1e-4, sigmas, contacts: 1 }, 64);
+                outliers.note(
+                    Outlier {
+                        stamp_ns,
+                        point,
+                        normal,
+                        innovation: 1e-4,
+                        sigmas,
+                        contacts: 1,
+                    },
+                    64,
+                );
             }
         }
         assert_eq!((outliers.rejected, outliers.last().count()), (300, KEPT));
-        let (first, last) = (outliers.last().next().unwrap(), outliers.last().last().unwrap());
-        assert_eq!((first.stamp_ns, last.stamp_ns, last.contacts, last.sigmas), (37_000, 100_000, 3, 9.0));
+        let (first, last) = (
+            outliers.last().next().unwrap(),
+            outliers.last().last().unwrap(),
+        );
+        assert_eq!(
+            (first.stamp_ns, last.stamp_ns, last.contacts, last.sigmas),
+            (37_000, 100_000, 3, 9.0)
+        );
     }
 }

@@ -54,7 +54,11 @@ pub(in crate::reconstruct) const SWEPT_REACH: f64 = 0.067;
 impl EvidenceParams {
     /// Settings that hold for a ball of `radius` (m) and a scan whose points are off by `noise` (m).
     pub fn new(radius: f64, noise: f64) -> Self {
-        Self { radius, field: FieldParams::for_ball(radius), scan_reach: (3.0 * noise).max(radius / 2.0) }
+        Self {
+            radius,
+            field: FieldParams::for_ball(radius),
+            scan_reach: (3.0 * noise).max(radius / 2.0),
+        }
     }
 }
 
@@ -205,8 +209,9 @@ impl Evidence<'_> {
             (value, source) = (scan.value, Source::Scan);
         }
         let is_corner = matches!(source, Source::Nothing | Source::Both)
-            && touched
-                .is_some_and(|touched| swept_depth <= touched.value.max(0.0) && self.is_corner(&touched, scratch));
+            && touched.is_some_and(|touched| {
+                swept_depth <= touched.value.max(0.0) && self.is_corner(&touched, scratch)
+            });
         if let Some(touched) = touched.filter(|_| is_corner) {
             (value, source) = (touched.value, Source::Touch);
         }
@@ -228,13 +233,19 @@ impl Evidence<'_> {
         }
         let widest = WIDEST * pitch;
         let is_swept = source != Source::Touch && swept_depth > 0.0;
-        let least = if is_swept { swept_depth.min(widest) } else { f64::NEG_INFINITY };
+        let least = if is_swept {
+            swept_depth.min(widest)
+        } else {
+            f64::NEG_INFINITY
+        };
         let value = value.clamp(-widest, widest).max(least);
         NodeState {
             value,
             source,
             scan: scan.value.clamp(-widest, widest),
-            straight: straight.map_or((0.0, 0.0), |(value, share)| (value.clamp(-widest, widest), share)),
+            straight: straight.map_or((0.0, 0.0), |(value, share)| {
+                (value.clamp(-widest, widest), share)
+            }),
             least,
             is_free_end: least > 0.0 && is_free_end && scan.value < -self.params.scan_reach,
             is_further: false,
@@ -277,14 +288,21 @@ impl Evidence<'_> {
     }
 
     /// Ends a touched surface beyond its last contact where the ball was: it rolled around an edge there, or sank into a hole.
-    pub(in crate::reconstruct) fn end_at_free_space(&self, found: &mut FieldValue, x: &Point3<f64>) {
+    pub(in crate::reconstruct) fn end_at_free_space(
+        &self,
+        found: &mut FieldValue,
+        x: &Point3<f64>,
+    ) {
         let radius = self.params.radius;
         // a tip of another shape reaches along its flank, and the nearest place of it says little of its surface
         if found.lateral() < ENDS_FROM * radius || !self.free_space.is_of_ball() {
             return;
         }
-        let Some((distance, centre)) = self.free_space.nearest(x) else { return };
-        let margin = ENDS_MARGIN * radius + ENDS_SIGMAS * self.contacts.variance(found.contact).sqrt();
+        let Some((distance, centre)) = self.free_space.nearest(x) else {
+            return;
+        };
+        let margin =
+            ENDS_MARGIN * radius + ENDS_SIGMAS * self.contacts.variance(found.contact).sqrt();
         let depth = radius - margin - distance;
         if depth > found.value
             && let Some(outward) = direction(&(centre - x))
@@ -303,7 +321,8 @@ impl Evidence<'_> {
             (true, false) => BORDER_SUPPORT,
             (true, true) => FAN_SUPPORT,
         };
-        let is_supported = lateral <= support * p.radius && touched.value.abs() <= TOUCH_DEPTH * p.radius;
+        let is_supported =
+            lateral <= support * p.radius && touched.value.abs() <= TOUCH_DEPTH * p.radius;
         if is_supported && (!touched.is_border || touched.is_edge) {
             return (touched.value, Source::Touch);
         }
@@ -311,19 +330,39 @@ impl Evidence<'_> {
         let ends_at_wall = is_wall && scan.value > touched.value;
         if (ends_at_wall || !is_supported) && self.scan_holds(scan) {
             // a wall of the scan ends the surface that was touched
-            return (if is_wall { scan.value.max(touched.value) } else { scan.value }, Source::Both);
+            return (
+                if is_wall {
+                    scan.value.max(touched.value)
+                } else {
+                    scan.value
+                },
+                Source::Both,
+            );
         }
-        if is_supported { (touched.value, Source::Touch) } else { (scan.value, Source::Nothing) }
+        if is_supported {
+            (touched.value, Source::Touch)
+        } else {
+            (scan.value, Source::Nothing)
+        }
     }
 
     /// Whether the scan has the shape that was touched here, and in more detail.
-    fn is_detail(&self, touched: Option<&FieldValue>, scan: &ScanDistance, swept_depth: f64) -> bool {
-        let Some(agreement) = self.agreement.filter(|_| !scan.is_on_rim) else { return false };
+    fn is_detail(
+        &self,
+        touched: Option<&FieldValue>,
+        scan: &ScanDistance,
+        swept_depth: f64,
+    ) -> bool {
+        let Some(agreement) = self.agreement.filter(|_| !scan.is_on_rim) else {
+            return false;
+        };
         if scan.value < 0.0 && !agreement.is_alike(-swept_depth.max(0.0), TouchedPart::Border) {
             return false;
         }
         let normal = touched.map_or(scan.normal, |touched| touched.gradient);
-        let Some(around) = agreement.around(self.contacts, &scan.foot, &normal) else { return false };
+        let Some(around) = agreement.around(self.contacts, &scan.foot, &normal) else {
+            return false;
+        };
         let Some(touched) = touched else { return true };
         // where a touched surface ends the scan may go around a blurred edge
         if around == ContactsAround::BentOrOpen && scan.normal.dot(&touched.gradient) < BENT {
@@ -341,16 +380,30 @@ impl Evidence<'_> {
 
     /// Whether a point out of reach of contacts that is behind the scan is behind the part: a radius nearer to the scan it is in front of a touched
     /// surface that faces away from there, and farther away from both there is no other scan.
-    fn is_behind_part(&self, scan: &ScanDistance, x: &Point3<f64>, scratch: &mut FieldScratch) -> bool {
-        let Some(towards) = direction(&(scan.foot - x)).filter(|_| scan.value < 0.0) else { return false };
+    fn is_behind_part(
+        &self,
+        scan: &ScanDistance,
+        x: &Point3<f64>,
+        scratch: &mut FieldScratch,
+    ) -> bool {
+        let Some(towards) = direction(&(scan.foot - x)).filter(|_| scan.value < 0.0) else {
+            return false;
+        };
         let nearer = x + towards * self.params.radius;
         let touched = self.params.field.at(self.contacts, &nearer, scratch);
-        if !touched.is_some_and(|touched| touched.value > 0.0 && touched.gradient.dot(&towards) < -ALIKE) {
+        if !touched
+            .is_some_and(|touched| touched.value > 0.0 && touched.gradient.dot(&towards) < -ALIKE)
+        {
             return false;
         }
         AWAY.iter().all(|away| {
-            let (beyond, farther) = (x + towards * (away * scan.value), (1.0 + away) * -scan.value);
-            self.tree.closest(self.scan, &beyond, ALONE * farther).is_none()
+            let (beyond, farther) = (
+                x + towards * (away * scan.value),
+                (1.0 + away) * -scan.value,
+            );
+            self.tree
+                .closest(self.scan, &beyond, ALONE * farther)
+                .is_none()
         })
     }
 
@@ -359,7 +412,8 @@ impl Evidence<'_> {
     fn straight_on(&self, touched: &FieldValue, scan: &ScanDistance) -> Option<(f64, f64)> {
         let p = self.params;
         let inside = (1.0 - scan.value / p.scan_reach).clamp(0.0, 1.0);
-        let share = (p.field.reach - touched.lateral()) / (p.field.reach - BORDER_SUPPORT * p.radius);
+        let share =
+            (p.field.reach - touched.lateral()) / (p.field.reach - BORDER_SUPPORT * p.radius);
         let goes_on = !touched.is_fan && touched.value.abs() <= TOUCH_DEPTH * p.radius;
         goes_on.then(|| (touched.value, inside * share.clamp(0.0, 1.0).powi(2)))
     }
@@ -367,7 +421,8 @@ impl Evidence<'_> {
     /// Whether two touched surfaces go straight on into an inner corner, there where the field was evaluated last.
     fn is_corner(&self, touched: &FieldValue, scratch: &FieldScratch) -> bool {
         let p = self.params;
-        touched.value.abs() <= TOUCH_DEPTH * p.radius && is_inner_corner(self.contacts, &p.field, p.radius, scratch)
+        touched.value.abs() <= TOUCH_DEPTH * p.radius
+            && is_inner_corner(self.contacts, &p.field, p.radius, scratch)
     }
 
     fn away_from_touches(&self, scan: &ScanDistance) -> Source {
@@ -388,22 +443,29 @@ impl Evidence<'_> {
         }
         let (scan_removal, wall_removal) = (SCAN_REMOVAL * p.radius, p.radius / WALL_REMOVAL);
         let mut holds = true;
-        self.contacts.near(&scan.foot, scan_removal, |distance_squared, index| {
-            let contact = &self.contacts.means()[index as usize];
-            let cosine = contact.normal.dot(&scan.normal);
-            // a scan that faces a touched surface and is not clearly behind it leaves its wall no thickness; in front of
-            // it the ball had no room for it
-            let depth = contact.normal.dot(&(contact.point - scan.foot));
-            let is_pierced = cosine < -ALIKE && depth < wall_removal;
-            let limit = if cosine > ALIKE || is_pierced { scan_removal } else { wall_removal };
-            holds &= distance_squared > limit * limit;
-        });
+        self.contacts
+            .near(&scan.foot, scan_removal, |distance_squared, index| {
+                let contact = &self.contacts.means()[index as usize];
+                let cosine = contact.normal.dot(&scan.normal);
+                // a scan that faces a touched surface and is not clearly behind it leaves its wall no thickness; in front of
+                // it the ball had no room for it
+                let depth = contact.normal.dot(&(contact.point - scan.foot));
+                let is_pierced = cosine < -ALIKE && depth < wall_removal;
+                let limit = if cosine > ALIKE || is_pierced {
+                    scan_removal
+                } else {
+                    wall_removal
+                };
+                holds &= distance_squared > limit * limit;
+            });
         holds
     }
 
     fn is_swept_away(&self, scan: &ScanDistance) -> bool {
         let limit = self.params.radius + SWEPT_REACH * self.params.radius;
-        self.free_space.nearest(&scan.foot).is_some_and(|(distance, _)| distance < limit)
+        self.free_space
+            .nearest(&scan.foot)
+            .is_some_and(|(distance, _)| distance < limit)
     }
 
     /// How deep `x` lies in the space that the ball went through, m, and where it was then; `None` far from there.
@@ -415,13 +477,16 @@ impl Evidence<'_> {
     /// How deep `x` lies in the space that the ball went through, m, and whether that ball ended its path here freely.
     fn swept_depth(&self, x: &Point3<f64>) -> (f64, bool) {
         let p = self.params;
-        let Some((depth, centre)) = self.free_depth(x) else { return (f64::NEG_INFINITY, false) };
+        let Some((depth, centre)) = self.free_depth(x) else {
+            return (f64::NEG_INFINITY, false);
+        };
         if depth <= 0.0 {
             return (depth, false);
         }
         let mut is_free = direction(&(x - centre))
             .is_some_and(|direction| self.free_space.is_end(&centre, &direction, p.radius / 2.0));
-        self.contacts.near(&centre, FREE_REACH * p.radius, |_, _| is_free = false);
+        self.contacts
+            .near(&centre, FREE_REACH * p.radius, |_, _| is_free = false);
         (depth, is_free)
     }
 }
@@ -438,31 +503,84 @@ mod tests {
     #[test]
     fn a_face_ends_where_the_ball_rolled_around_its_edge() {
         let radius = 1.5e-3;
-        let free_space = || FreeSpace::new(TipBody::new(TipShape::Ball, radius).unwrap(), 0.05 * radius, 2.0 * radius);
-        let (mut contacts, mut rolled) = (ContactMap::new(radius / 3.0, 2.0 * radius, None), free_space());
+        let free_space = || {
+            FreeSpace::new(
+                TipBody::new(TipShape::Ball, radius).unwrap(),
+                0.05 * radius,
+                2.0 * radius,
+            )
+        };
+        let (mut contacts, mut rolled) = (
+            ContactMap::new(radius / 3.0, 2.0 * radius, None),
+            free_space(),
+        );
         let along = || (-12..=12).map(|i| f64::from(i) * 0.25e-3);
         for (x, j) in along().flat_map(|x| (0..=16).map(move |j| (x, f64::from(j)))) {
-            let (point, normal, sigma) = (Point3::new(x, -j * 0.25e-3, 0.0), Vector3::z(), ContactSigma::default());
-            contacts.add(&SurfaceContact { point, normal, weight: 5.0, stamp_ns: 0, sigma });
+            let (point, normal, sigma) = (
+                Point3::new(x, -j * 0.25e-3, 0.0),
+                Vector3::z(),
+                ContactSigma::default(),
+            );
+            contacts.add(&SurfaceContact {
+                point,
+                normal,
+                weight: 5.0,
+                stamp_ns: 0,
+                sigma,
+            });
         }
-        for (x, angle) in along().flat_map(|x| (0..=60).map(move |degrees| (x, f64::from(degrees).to_radians()))) {
+        for (x, angle) in
+            along().flat_map(|x| (0..=60).map(move |degrees| (x, f64::from(degrees).to_radians())))
+        {
             let centre = Point3::new(x, radius * angle.sin(), radius * angle.cos());
-            rolled.add_place(&TipPlace { centre, axis: Vector3::z() });
+            rolled.add_place(&TipPlace {
+                centre,
+                axis: Vector3::z(),
+            });
         }
-        let corners = vec![Point3::origin(), Point3::new(1.0, 0.0, 0.0), Point3::new(0.0, 1.0, 0.0)];
+        let corners = vec![
+            Point3::origin(),
+            Point3::new(1.0, 0.0, 0.0),
+            Point3::new(0.0, 1.0, 0.0),
+        ];
         let scan = TriMesh::new(corners, vec![[0, 1, 2]]).unwrap();
         let (tree, params) = (FaceTree::new(&scan), EvidenceParams::new(radius, 0.3e-3));
         let nowhere = free_space();
         let value = |free_space: &FreeSpace, y: f64| {
             let (contacts, scan, tree, params) = (&contacts, &scan, &tree, &params);
-            let evidence =
-                Evidence { params, contacts, free_space, scan, tree, prior: None, agreement: None, is_closed: false };
-            evidence.touched(&Point3::new(0.0, y, 0.0), None, &mut FieldScratch::default()).unwrap().value
+            let evidence = Evidence {
+                params,
+                contacts,
+                free_space,
+                scan,
+                tree,
+                prior: None,
+                agreement: None,
+                is_closed: false,
+            };
+            evidence
+                .touched(
+                    &Point3::new(0.0, y, 0.0),
+                    None,
+                    &mut FieldScratch::default(),
+                )
+                .unwrap()
+                .value
         };
-        assert!(value(&nowhere, 0.5 * radius).abs() < 1e-9, "it would go straight on");
+        assert!(
+            value(&nowhere, 0.5 * radius).abs() < 1e-9,
+            "it would go straight on"
+        );
         // deepest below the ball at an angle of 60°: r − |(0.5 − sin 60°, cos 60°)| r, less the margin of 0.05 r
         let depth = radius * (1.0 - (0.5 - 0.75f64.sqrt()).hypot(0.5) - 0.05);
-        assert!((value(&rolled, 0.5 * radius) - depth).abs() < 0.02 * radius, "{}", value(&rolled, 0.5 * radius));
-        assert!(value(&rolled, -radius).abs() < 1e-9, "what was touched stays");
+        assert!(
+            (value(&rolled, 0.5 * radius) - depth).abs() < 0.02 * radius,
+            "{}",
+            value(&rolled, 0.5 * radius)
+        );
+        assert!(
+            value(&rolled, -radius).abs() < 1e-9,
+            "what was touched stays"
+        );
     }
 }

@@ -67,10 +67,20 @@ impl ProbedLog {
     }
 
     /// Keeps a contact, which may be one of two of its touch, unless the last one is too recent.
-    pub(in crate::reconstruct) fn note(&mut self, touch: &TipTouch, contact: &SurfaceContact, verdict: Verdict) {
-        let is_of_last = self.points.last().is_some_and(|last| last.stamp_ns == touch.stamp_ns);
-        let is_due =
-            self.points.last().is_none_or(|last| touch.stamp_ns.saturating_sub(last.stamp_ns) >= self.spacing_ns);
+    pub(in crate::reconstruct) fn note(
+        &mut self,
+        touch: &TipTouch,
+        contact: &SurfaceContact,
+        verdict: Verdict,
+    ) {
+        let is_of_last = self
+            .points
+            .last()
+            .is_some_and(|last| last.stamp_ns == touch.stamp_ns);
+        let is_due = self
+            .points
+            .last()
+            .is_none_or(|last| touch.stamp_ns.saturating_sub(last.stamp_ns) >= self.spacing_ns);
         if !is_due && !is_of_last {
             return;
         }
@@ -84,7 +94,11 @@ impl ProbedLog {
         self.points.push(ProbedPoint {
             stamp_ns: touch.stamp_ns,
             stroke: self.strokes.saturating_sub(1),
-            centre: if self.ball.is_some() { touch.centre } else { contact.point },
+            centre: if self.ball.is_some() {
+                touch.centre
+            } else {
+                contact.point
+            },
             radius: self.ball.unwrap_or(0.0),
             point: contact.point,
             normal: contact.normal,
@@ -110,7 +124,9 @@ impl ProbedLog {
 
     fn count_cells(&mut self) {
         self.of_cell = CellTable::default();
-        self.points.iter().for_each(|touch| *self.of_cell.get_or_default(cell_of(&touch.point)) += 1);
+        self.points
+            .iter()
+            .for_each(|touch| *self.of_cell.get_or_default(cell_of(&touch.point)) += 1);
     }
 
     /// Takes the last stroke back, or does the one again that was undone last.
@@ -118,12 +134,18 @@ impl ProbedLog {
         match direction {
             Direction::Undo => {
                 self.strokes = self.strokes.saturating_sub(1);
-                let first = self.points.partition_point(|point| point.stroke < self.strokes);
+                let first = self
+                    .points
+                    .partition_point(|point| point.stroke < self.strokes);
                 self.undone.extend(self.points.drain(first..).rev());
             }
             Direction::Redo => {
                 self.strokes += 1;
-                while self.undone.last().is_some_and(|next| next.stroke < self.strokes) {
+                while self
+                    .undone
+                    .last()
+                    .is_some_and(|next| next.stroke < self.strokes)
+                {
                     self.points.extend(self.undone.pop());
                 }
             }
@@ -142,7 +164,13 @@ mod tests {
     fn noted(log: &mut ProbedLog, ms: i64) {
         let (point, normal) = (Point3::new(ms as f64, 0.0, 0.0), Vector3::z());
         let stamp_ns = ms * 1_000_000;
-        let contact = SurfaceContact { point, normal, weight: 1.0, stamp_ns, sigma: ContactSigma::default() };
+        let contact = SurfaceContact {
+            point,
+            normal,
+            weight: 1.0,
+            stamp_ns,
+            sigma: ContactSigma::default(),
+        };
         let touch = TipTouch {
             stamp_ns,
             centre: point + normal * 1.5e-3,
@@ -173,7 +201,11 @@ mod tests {
         log.begin_stroke();
         noted(&mut log, 5000);
         log.exchange(Direction::Redo);
-        assert_eq!(log.points().len(), 11, "what was undone is gone once something else was touched");
+        assert_eq!(
+            log.points().len(),
+            11,
+            "what was undone is gone once something else was touched"
+        );
     }
 
     /// An hour without a pause over 6 mm x 6 mm, 30 mm/s: what is kept has the bound of its cells at any time, and every cell keeps
@@ -184,20 +216,37 @@ mod tests {
         log.begin_stroke();
         let normal = Vector3::z();
         // back and forth between 0.5 and 6.5 of a cell, at speeds that share no period
-        let swings = |t: f64, speed: f64| 0.5 * CELL + 6.0 * CELL * (1.0 - ((t * speed).rem_euclid(2.0) - 1.0).abs());
+        let swings = |t: f64, speed: f64| {
+            0.5 * CELL + 6.0 * CELL * (1.0 - ((t * speed).rem_euclid(2.0) - 1.0).abs())
+        };
         let mut most = 0;
         for at in 0..900_000i64 {
             let stamp_ns = at * SPACING_NS;
             let t = stamp_ns as f64 * 1e-9;
             let point = Point3::new(swings(t, 5.0), swings(t, 0.377), 0.5 * CELL);
-            let contact = SurfaceContact { point, normal, weight: 1.0, stamp_ns, sigma: ContactSigma::default() };
+            let contact = SurfaceContact {
+                point,
+                normal,
+                weight: 1.0,
+                stamp_ns,
+                sigma: ContactSigma::default(),
+            };
             let centre = point + normal * 1.5e-3;
-            let touch = TipTouch { stamp_ns, centre, axis: normal, contact: Some(contact), state: TouchState::Contact };
+            let touch = TipTouch {
+                stamp_ns,
+                centre,
+                axis: normal,
+                contact: Some(contact),
+                state: TouchState::Contact,
+            };
             log.note(&touch, &contact, Verdict::Taken);
             most = most.max(log.points().len());
         }
         assert_eq!(log.of_cell.len(), 49);
-        assert!(most <= ALWAYS_KEPT + 49 * OF_A_CELL && most > ALWAYS_KEPT, "{most}");
+        assert!(
+            most <= ALWAYS_KEPT + 49 * OF_A_CELL && most > ALWAYS_KEPT,
+            "{most}"
+        );
         assert!(log.points.is_sorted_by_key(|touch| touch.stamp_ns));
         let fewest = log.of_cell.iter().map(|(_, count)| *count).min();
         assert!(fewest >= Some(OF_A_CELL / 4), "{fewest:?}");

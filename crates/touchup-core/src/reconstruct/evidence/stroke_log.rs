@@ -56,7 +56,9 @@ impl StrokeLog {
         if is_first {
             let down_ns = self.touched_down_ns.unwrap_or(stamp_ns);
             // without a free sample in between, as where it was undone while touching, it goes on from there
-            let from_ns = self.last_contact_ns.map_or(down_ns, |last_ns| down_ns.max(last_ns.saturating_add(1)));
+            let from_ns = self
+                .last_contact_ns
+                .map_or(down_ns, |last_ns| down_ns.max(last_ns.saturating_add(1)));
             self.undone.clear();
             self.done.push(self.begun_ns.len());
             self.begun_ns.push(from_ns);
@@ -82,7 +84,10 @@ impl StrokeLog {
     pub fn span(&self, number: usize) -> Option<StrokeSpan> {
         let at = *self.done.get(number)?;
         let until_ns = self.begun_ns.get(at + 1).copied().unwrap_or(i64::MAX);
-        Some(StrokeSpan { from_ns: self.begun_ns[at], until_ns })
+        Some(StrokeSpan {
+            from_ns: self.begun_ns[at],
+            until_ns,
+        })
     }
 }
 
@@ -92,7 +97,10 @@ mod tests {
 
     /// A touch of three samples from `ms` on, of which the middle one is a contact.
     fn touch(log: &mut StrokeLog, ms: i64) {
-        for (at, state) in [TouchState::Light, TouchState::Contact, TouchState::Free].into_iter().enumerate() {
+        for (at, state) in [TouchState::Light, TouchState::Contact, TouchState::Free]
+            .into_iter()
+            .enumerate()
+        {
             let stamp_ns = ms + at as i64;
             log.note(stamp_ns, state);
             if state == TouchState::Contact {
@@ -103,13 +111,17 @@ mod tests {
 
     fn spans(log: &StrokeLog) -> Vec<(i64, i64)> {
         let spans = (0..log.count()).filter_map(|number| log.span(number));
-        spans.map(|StrokeSpan { from_ns, until_ns }| (from_ns, until_ns)).collect()
+        spans
+            .map(|StrokeSpan { from_ns, until_ns }| (from_ns, until_ns))
+            .collect()
     }
 
     #[test]
     fn a_stroke_is_what_comes_from_touch_down_to_the_next_touch_down_undone_ones_among_them() {
         let mut log = StrokeLog::default();
-        [100, 200, 300].into_iter().for_each(|ms| touch(&mut log, ms));
+        [100, 200, 300]
+            .into_iter()
+            .for_each(|ms| touch(&mut log, ms));
         assert_eq!(spans(&log), [(100, 200), (200, 300), (300, i64::MAX)]);
         log.exchange(Direction::Undo);
         log.exchange(Direction::Undo);
@@ -118,7 +130,11 @@ mod tests {
         assert_eq!(spans(&log), [(100, 200), (200, 300)]);
         touch(&mut log, 400);
         log.exchange(Direction::Redo);
-        assert_eq!(spans(&log), [(100, 200), (200, 300), (400, i64::MAX)], "nothing is left to be done again");
+        assert_eq!(
+            spans(&log),
+            [(100, 200), (200, 300), (400, i64::MAX)],
+            "nothing is left to be done again"
+        );
     }
 
     #[test]

@@ -52,12 +52,18 @@ impl TouchHistory {
     pub fn keep(&mut self, touch: &TipTouch) {
         self.note_until(touch.stamp_ns);
         self.stroke_log.note(touch.stamp_ns, touch.state);
-        let place = TipPlace { centre: touch.centre, axis: touch.axis };
-        let is_between_strokes =
-            self.last_contact_ns.is_none_or(|last| touch.stamp_ns.saturating_sub(last) > STROKE_PAUSE_NS);
+        let place = TipPlace {
+            centre: touch.centre,
+            axis: touch.axis,
+        };
+        let is_between_strokes = self
+            .last_contact_ns
+            .is_none_or(|last| touch.stamp_ns.saturating_sub(last) > STROKE_PAUSE_NS);
         let Some(contact) = &touch.contact else {
             // a firm touch of which no contact is known belongs to the stroke that it is in
-            if touch.state == TouchState::Free || touch.state == TouchState::Contact && !is_between_strokes {
+            if touch.state == TouchState::Free
+                || touch.state == TouchState::Contact && !is_between_strokes
+            {
                 self.sweep(&place);
             }
             return;
@@ -67,11 +73,17 @@ impl TouchHistory {
             self.free_space.begin_stroke();
             self.probed.begin_stroke();
         }
-        self.stroke_log.note_contact(touch.stamp_ns, is_between_strokes);
+        self.stroke_log
+            .note_contact(touch.stamp_ns, is_between_strokes);
         self.last_contact_ns = Some(touch.stamp_ns);
-        let two = self.ball.and_then(|radius| split(&self.contacts, radius, &touch.centre, contact));
+        let two = self
+            .ball
+            .and_then(|radius| split(&self.contacts, radius, &touch.centre, contact));
         let mut is_accepted = false;
-        for contact in two.as_ref().map_or(std::slice::from_ref(contact), |two| two) {
+        for contact in two
+            .as_ref()
+            .map_or(std::slice::from_ref(contact), |two| two)
+        {
             // a wall that the ball would have to be nearer to is not touched: that is no outlier
             if two.is_some() && self.contacts.contradicts(contact) {
                 continue;
@@ -80,7 +92,8 @@ impl TouchHistory {
             self.probed.note(touch, contact, verdict);
             is_accepted |= verdict != Verdict::Rejected;
             if verdict == Verdict::Relocated {
-                self.free_space.forget(&contact.point, FORGOTTEN * self.radius);
+                self.free_space
+                    .forget(&contact.point, FORGOTTEN * self.radius);
             }
         }
         if is_accepted {
@@ -108,7 +121,8 @@ impl TouchHistory {
     pub fn exchange(&mut self, direction: Direction) -> bool {
         self.last_contact_ns = None;
         let is_possible = direction == Direction::Redo || self.strokes() > 0;
-        let has_changed = is_possible && self.contacts.exchange(direction) && self.free_space.exchange(direction);
+        let has_changed =
+            is_possible && self.contacts.exchange(direction) && self.free_space.exchange(direction);
         if has_changed {
             self.probed.exchange(direction);
             self.stroke_log.exchange(direction);
@@ -119,7 +133,12 @@ impl TouchHistory {
     /// Decides which contacts count and which are those of an edge, where there is new evidence; returns
     /// where that is.
     pub fn update(&mut self, scan: &TriMesh, tree: &FaceTree) -> GridChanges {
-        let Self { contacts, free_space, radius, .. } = self;
+        let Self {
+            contacts,
+            free_space,
+            radius,
+            ..
+        } = self;
         let (deepest, outside) = (*radius * (1.0 - REFUTED_DEPTH), OUTSIDE * *radius);
         let bounds = self.bounds.get_or_insert_with(|| {
             let [lo, hi] = scan.bounds();
@@ -133,7 +152,9 @@ impl TouchHistory {
         }
         for (at, ()) in doubtful.iter() {
             let point = contacts.means()[at as usize].point;
-            let is_refuted = free_space.nearest(&point).is_some_and(|(distance, _)| distance < deepest)
+            let is_refuted = free_space
+                .nearest(&point)
+                .is_some_and(|(distance, _)| distance < deepest)
                 || is_elsewhere(&point, scan, tree, bounds, outside);
             if contacts.refute(at, is_refuted) {
                 changed.insert(at, ());
@@ -152,7 +173,13 @@ impl TouchHistory {
                 changed.insert(at, ());
             }
         }
-        GridChanges { means: changed.iter().map(|(at, ())| contacts.means()[at as usize].point).collect(), centres }
+        GridChanges {
+            means: changed
+                .iter()
+                .map(|(at, ())| contacts.means()[at as usize].point)
+                .collect(),
+            centres,
+        }
     }
 }
 
@@ -160,14 +187,28 @@ impl TouchHistory {
 fn beside(contacts: &ContactMap, means: &CellTable<u32, ()>, reach: f64) -> CellTable<u32, ()> {
     let mut beside = means.clone();
     for (at, ()) in means.iter() {
-        contacts.near_known(&contacts.means()[at as usize].point, reach, |_, other| beside.insert(other, ()));
+        contacts.near_known(&contacts.means()[at as usize].point, reach, |_, other| {
+            beside.insert(other, ())
+        });
     }
     beside
 }
 
 /// Whether a contact is so far outside that the part of the scan cannot have been touched there. Beyond an open rim the scan has no
 /// outside: there it may be on what was not scanned, below a scan without sides or in a hole of it, but not beyond the box around it.
-fn is_elsewhere(p: &Point3<f64>, scan: &TriMesh, tree: &FaceTree, bounds: &[Point3<f64>; 2], reach: f64) -> bool {
+fn is_elsewhere(
+    p: &Point3<f64>,
+    scan: &TriMesh,
+    tree: &FaceTree,
+    bounds: &[Point3<f64>; 2],
+    reach: f64,
+) -> bool {
     let is_within = bounds[0].inf(p) == bounds[0] && bounds[1].sup(p) == bounds[1];
-    ScanDistance::at(scan, tree, p).is_none_or(|scan| if scan.is_on_rim { !is_within } else { scan.value > reach })
+    ScanDistance::at(scan, tree, p).is_none_or(|scan| {
+        if scan.is_on_rim {
+            !is_within
+        } else {
+            scan.value > reach
+        }
+    })
 }

@@ -11,8 +11,9 @@ use nalgebra::{Point3, Vector3};
 use crate::numeric::RunningMedian;
 use crate::reconstruct::evidence::contact_uncertainty::{CalibrationParams, ContactSigma};
 use crate::stylus::{
-    ContactSample, ForceNoise, Friction, FrictionCoefficient, LocalMotion, NormalEstimate, SettingError, Sliding,
-    SmoothedMotion, TipBody, TipContact, TipPlace, TipShape, TouchState, WIDEST_CONE_COSINE,
+    ContactSample, ForceNoise, Friction, FrictionCoefficient, LocalMotion, NormalEstimate,
+    SettingError, Sliding, SmoothedMotion, TipBody, TipContact, TipPlace, TipShape, TouchState,
+    WIDEST_CONE_COSINE,
 };
 
 /// A touch whose normal is uncertain by this many degrees has half the weight: what curved pieces take for smooth.
@@ -122,8 +123,13 @@ impl TouchFinder {
         Ok(Self {
             body: TipBody::new(params.shape, params.radius)?,
             params,
-            friction: params.cone_cosine.map(|cosine| Friction::new(cosine.clamp(-1.0, 1.0).acos())),
-            noise: RunningMedian { length: USUAL_NOISE, least: LEAST_NOISE },
+            friction: params
+                .cone_cosine
+                .map(|cosine| Friction::new(cosine.clamp(-1.0, 1.0).acos())),
+            noise: RunningMedian {
+                length: USUAL_NOISE,
+                least: LEAST_NOISE,
+            },
             force_noise: ForceNoise::new(),
             held: VecDeque::new(),
             next: 0,
@@ -133,8 +139,9 @@ impl TouchFinder {
     /// Takes the next sample, which is later than the one before; gives each touch whose window is complete to `each`.
     pub fn push(&mut self, sample: &ContactSample, mut each: impl FnMut(TipTouch)) {
         let tip = &sample.tip;
-        if self.held.back().is_some_and(|last| tip.stamp_ns.saturating_sub(last.stamp_ns) > self.params.largest_gap_ns)
-        {
+        if self.held.back().is_some_and(|last| {
+            tip.stamp_ns.saturating_sub(last.stamp_ns) > self.params.largest_gap_ns
+        }) {
             self.flush(&mut each);
         }
         if let Some(last) = self.held.back() {
@@ -147,11 +154,15 @@ impl TouchFinder {
             force_o: tip.force_o,
             state: sample.state(),
         });
-        while tip.stamp_ns.saturating_sub(self.held[self.next].stamp_ns) >= self.params.half_window_ns {
+        while tip.stamp_ns.saturating_sub(self.held[self.next].stamp_ns)
+            >= self.params.half_window_ns
+        {
             each(self.touch(self.next));
             self.next += 1;
         }
-        let needed = self.held[self.next.min(self.held.len() - 1)].stamp_ns.saturating_sub(self.params.half_window_ns);
+        let needed = self.held[self.next.min(self.held.len() - 1)]
+            .stamp_ns
+            .saturating_sub(self.params.half_window_ns);
         while self.held[0].stamp_ns < needed {
             self.held.pop_front();
             self.next -= 1;
@@ -186,10 +197,19 @@ impl TouchFinder {
             velocity: motion.velocity,
             velocity_sigma,
         };
-        let place = TipPlace { centre: motion.centre, axis: self.held[at].axis };
+        let place = TipPlace {
+            centre: motion.centre,
+            axis: self.held[at].axis,
+        };
         let mut contact = None;
         if window.is_alike && self.held[at].is_in_contact() {
-            let dt = if at > 0 { self.held[at].stamp_ns.saturating_sub(self.held[at - 1].stamp_ns) } else { 0 };
+            let dt = if at > 0 {
+                self.held[at]
+                    .stamp_ns
+                    .saturating_sub(self.held[at - 1].stamp_ns)
+            } else {
+                0
+            };
             let normal = match &mut self.friction {
                 Some(friction) => {
                     friction.observe(&sliding, dt as f64 * 1e-9);
@@ -197,12 +217,24 @@ impl TouchFinder {
                 }
                 None => NormalEstimate::of_force(&sliding.force_o),
             };
-            contact = normal.and_then(|estimate| self.contact(at, &motion, &sliding.force_o, &estimate));
+            contact =
+                normal.and_then(|estimate| self.contact(at, &motion, &sliding.force_o, &estimate));
         } else {
             self.lift();
         }
-        let WindowEntry { stamp_ns, axis, state, .. } = self.held[at];
-        TipTouch { stamp_ns, centre: place.centre, axis, contact, state }
+        let WindowEntry {
+            stamp_ns,
+            axis,
+            state,
+            ..
+        } = self.held[at];
+        TipTouch {
+            stamp_ns,
+            centre: place.centre,
+            axis,
+            contact,
+            state,
+        }
     }
 
     /// The longest window around a sample over which the path is a parabola and contact does not change; the shortest in
@@ -243,25 +275,46 @@ impl TouchFinder {
         estimate: &NormalEstimate,
     ) -> Option<SurfaceContact> {
         let WindowEntry { stamp_ns, axis, .. } = self.held[at];
-        let place = TipPlace { centre: motion.centre, axis };
-        let TipContact { point, normal, is_vague } = self.body.touched(&place, &estimate.normal, estimate.sigma)?;
+        let place = TipPlace {
+            centre: motion.centre,
+            axis,
+        };
+        let TipContact {
+            point,
+            normal,
+            is_vague,
+        } = self
+            .body
+            .touched(&place, &estimate.normal, estimate.sigma)?;
         let share = if is_vague { VAGUE } else { 1.0 };
         let mut weight = share / (1.0 + (estimate.sigma / UNCERTAIN_NORMAL.to_radians()).powi(2));
-        let sigma = self.params.calibration.map_or_else(ContactSigma::default, |calibration| {
-            weight /= 1.0 + self.roughness(motion);
-            let softness = self.params.stiffness.map_or(0.0, |stiffness| 1.0 / stiffness);
-            let both = [self.noise.length, self.force_noise.sigma() * softness];
-            let [pose, force] = both.map(|noise| noise * motion.centre_gain.sqrt());
-            let bend = force_o.dot(&normal) * softness;
-            ContactSigma {
-                noise: (pose * SHARED_POSE).hypot(force),
-                reach: self.params.radius * (1.0 - estimate.sigma.cos()),
-                calibration: calibration.radius.hypot(calibration.stiffness_share * bend),
-                place: calibration.place,
-                normal: estimate.sigma,
-            }
-        });
-        Some(SurfaceContact { point, normal, weight, stamp_ns, sigma })
+        let sigma = self
+            .params
+            .calibration
+            .map_or_else(ContactSigma::default, |calibration| {
+                weight /= 1.0 + self.roughness(motion);
+                let softness = self
+                    .params
+                    .stiffness
+                    .map_or(0.0, |stiffness| 1.0 / stiffness);
+                let both = [self.noise.length, self.force_noise.sigma() * softness];
+                let [pose, force] = both.map(|noise| noise * motion.centre_gain.sqrt());
+                let bend = force_o.dot(&normal) * softness;
+                ContactSigma {
+                    noise: (pose * SHARED_POSE).hypot(force),
+                    reach: self.params.radius * (1.0 - estimate.sigma.cos()),
+                    calibration: calibration.radius.hypot(calibration.stiffness_share * bend),
+                    place: calibration.place,
+                    normal: estimate.sigma,
+                }
+            });
+        Some(SurfaceContact {
+            point,
+            normal,
+            weight,
+            stamp_ns,
+            sigma,
+        })
     }
 }
 
@@ -296,9 +349,18 @@ struct Window {
 
 impl Window {
     fn new(middle: &WindowEntry, at: usize, longest_ns: i64) -> Self {
-        let mut sums = LocalMotion::new(middle.centre, (longest_ns as f64 * 1e-9).max(f64::MIN_POSITIVE));
+        let mut sums = LocalMotion::new(
+            middle.centre,
+            (longest_ns as f64 * 1e-9).max(f64::MIN_POSITIVE),
+        );
         sums.add(0.0, &middle.centre);
-        Self { first: at, last: at, sums, force: middle.force_o, is_alike: true }
+        Self {
+            first: at,
+            last: at,
+            sums,
+            force: middle.force_o,
+            is_alike: true,
+        }
     }
 
     /// Takes in all samples up to `half_ns` before and after.
@@ -308,14 +370,19 @@ impl Window {
             self.first -= 1;
             self.add(&held[self.first], &held[at]);
         }
-        while self.last + 1 < held.len() && held[self.last + 1].stamp_ns.saturating_sub(middle) <= half_ns {
+        while self.last + 1 < held.len()
+            && held[self.last + 1].stamp_ns.saturating_sub(middle) <= half_ns
+        {
             self.last += 1;
             self.add(&held[self.last], &held[at]);
         }
     }
 
     fn add(&mut self, entry: &WindowEntry, middle: &WindowEntry) {
-        self.sums.add(entry.stamp_ns.saturating_sub(middle.stamp_ns) as f64 * 1e-9, &entry.centre);
+        self.sums.add(
+            entry.stamp_ns.saturating_sub(middle.stamp_ns) as f64 * 1e-9,
+            &entry.centre,
+        );
         self.force += entry.force_o;
         self.is_alike &= entry.is_in_contact() == middle.is_in_contact();
     }

@@ -31,7 +31,12 @@ pub(in crate::reconstruct) struct VoxelSet<T: Keyed> {
 impl<T: Keyed> VoxelSet<T> {
     /// An empty set, with small cells of edge `cell` (m).
     pub fn new(cell: f64) -> Self {
-        Self { cell, is_kept: CellTable::default(), bins: CellTable::default(), history: History::new(MOST_KEPT) }
+        Self {
+            cell,
+            is_kept: CellTable::default(),
+            bins: CellTable::default(),
+            history: History::new(MOST_KEPT),
+        }
     }
 
     /// Puts a thing into a cube, unless one with its key is there; returns whether it did.
@@ -45,12 +50,19 @@ impl<T: Keyed> VoxelSet<T> {
     }
 
     /// Takes out of a cube what `stays` does not hold, and gives it to `each`.
-    pub fn retain(&mut self, bin: LatticeNode, stays: impl Fn(&T) -> bool, mut each: impl FnMut(&T)) {
+    pub fn retain(
+        &mut self,
+        bin: LatticeNode,
+        stays: impl Fn(&T) -> bool,
+        mut each: impl FnMut(&T),
+    ) {
         if self.get(&bin).iter().all(&stays) {
             return;
         }
         self.note(bin);
-        let Some(things) = self.bins.get_mut(&bin) else { return };
+        let Some(things) = self.bins.get_mut(&bin) else {
+            return;
+        };
         things.retain(|thing| {
             let stays = stays(thing);
             if !stays {
@@ -97,10 +109,19 @@ impl<T: Keyed> VoxelSet<T> {
     /// Exchanges the things of a cube with those that were kept; cubes inserted last go first.
     fn swap(&mut self, bin: LatticeNode, past: &mut Bucket<T>) {
         let before = past.take();
-        let there = if before.is_some() { self.bins.get_mut(&bin).map(std::mem::take) } else { self.bins.remove(&bin) };
-        there.iter().flatten().for_each(|thing| self.is_kept.insert(thing.key(self.cell), false));
+        let there = if before.is_some() {
+            self.bins.get_mut(&bin).map(std::mem::take)
+        } else {
+            self.bins.remove(&bin)
+        };
+        there
+            .iter()
+            .flatten()
+            .for_each(|thing| self.is_kept.insert(thing.key(self.cell), false));
         if let Some(before) = before {
-            before.iter().for_each(|thing| self.is_kept.insert(thing.key(self.cell), true));
+            before
+                .iter()
+                .for_each(|thing| self.is_kept.insert(thing.key(self.cell), true));
             self.bins.insert(bin, before);
         }
         *past = there;
@@ -128,7 +149,11 @@ mod tests {
         let bin = |x: u32| [(x / 10) as i32, 0, 0];
         let mut set = VoxelSet::<u32>::new(1.0);
         let mut states = vec![state(&set)];
-        for (come, go) in [(vec![1, 11, 2, 1], vec![]), (vec![3, 25], vec![1, 11]), (vec![11, 1, 40], vec![2, 25])] {
+        for (come, go) in [
+            (vec![1, 11, 2, 1], vec![]),
+            (vec![3, 25], vec![1, 11]),
+            (vec![11, 1, 40], vec![2, 25]),
+        ] {
             set.begin_stroke();
             for &x in &come {
                 set.add(bin(x), x);
@@ -138,7 +163,10 @@ mod tests {
             }
             states.push(state(&set));
         }
-        assert_eq!(states[1..], [vec![1, 2, 11], vec![2, 3, 25], vec![3, 1, 11, 40]]);
+        assert_eq!(
+            states[1..],
+            [vec![1, 2, 11], vec![2, 3, 25], vec![3, 1, 11, 40]]
+        );
         for expected in states.iter().rev().skip(1) {
             assert!(set.exchange(Direction::Undo));
             assert_eq!(state(&set), *expected);
@@ -148,6 +176,9 @@ mod tests {
             assert!(set.exchange(Direction::Redo));
             assert_eq!(state(&set), *expected);
         }
-        assert!(!set.add(bin(40), 40) && set.add(bin(2), 2), "what is kept is known");
+        assert!(
+            !set.add(bin(40), 40) && set.add(bin(2), 2),
+            "what is kept is known"
+        );
     }
 }

@@ -45,7 +45,8 @@ fn floating(
     while let Some(node) = next.pop_front() {
         // what was reached before is attached, or would have been found to float with this component
         let is_known = !seen.insert_with(node, || ()).1;
-        let is_attached = |state: &NodeState| matches!(state.source, Source::Touch | Source::Beyond);
+        let is_attached =
+            |state: &NodeState| matches!(state.source, Source::Touch | Source::Beyond);
         if is_known || piece.len() > MOST || grid.nodes.get(&node).is_some_and(is_attached) {
             piece.iter().for_each(|(node, ())| seen.insert(node, ()));
             return Vec::new();

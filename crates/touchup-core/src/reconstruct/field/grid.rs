@@ -80,14 +80,22 @@ const NEAR: f64 = 1.1;
 impl ReconstructionGrid {
     /// Without nodes yet.
     pub fn new(lattice: Lattice) -> Self {
-        Self { lattice, ..Self::default() }
+        Self {
+            lattice,
+            ..Self::default()
+        }
     }
 
     /// Brings the field up to date with the changes of `evidence`.
     ///
     /// - `changes`: taken in up to where they count most.
     /// - `late`: earlier changes, taken in up to where they count at all.
-    pub fn renew(&mut self, evidence: &Evidence<'_>, changes: &GridChanges, late: &GridChanges) -> Changed {
+    pub fn renew(
+        &mut self,
+        evidence: &Evidence<'_>,
+        changes: &GridChanges,
+        late: &GridChanges,
+    ) -> Changed {
         self.renewals += 1;
         let mut look = EarlierStates::default();
         if !self.nodes.is_empty() {
@@ -95,8 +103,16 @@ impl ReconstructionGrid {
             let cover = evidence.free_space.cover_radius(p.radius);
             self.look_near(&changes.means, NEAR * p.radius, &mut look);
             self.look_near(&changes.centres, cover, &mut look);
-            self.look_near(&late.means, p.field.reach.max(SCAN_REMOVAL * p.radius + p.scan_reach), &mut look);
-            self.look_near(&late.centres, cover + SWEPT_REACH * p.radius + p.scan_reach, &mut look);
+            self.look_near(
+                &late.means,
+                p.field.reach.max(SCAN_REMOVAL * p.radius + p.scan_reach),
+                &mut look,
+            );
+            self.look_near(
+                &late.centres,
+                cover + SWEPT_REACH * p.radius + p.scan_reach,
+                &mut look,
+            );
             self.look_at_ends(evidence, late, &mut look);
         }
         self.widen(evidence, changes, &mut look);
@@ -106,9 +122,13 @@ impl ReconstructionGrid {
             let known = self.nodes.index_of(&node);
             let before = known.map(|known| self.nodes.entry(known).1);
             let scan = known.map(|known| self.scan[known as usize]);
-            let Some(scan) = scan.or_else(|| evidence.scan_at(&self.lattice.position(node))) else { continue };
+            let Some(scan) = scan.or_else(|| evidence.scan_at(&self.lattice.position(node))) else {
+                continue;
+            };
             let mut state = self.evaluate(evidence, node, &scan);
-            if let Some(before) = before.filter(|before| before.is_open_question() && state.is_open_question()) {
+            if let Some(before) =
+                before.filter(|before| before.is_open_question() && state.is_open_question())
+            {
                 state.value = before.value.max(state.least);
             }
             *look.value_mut(at) = before;
@@ -138,9 +158,18 @@ impl ReconstructionGrid {
         if self.nodes.contains(&node) {
             return false;
         }
-        let Some(scan) = evidence.scan_at(&self.lattice.position(node)) else { return false };
+        let Some(scan) = evidence.scan_at(&self.lattice.position(node)) else {
+            return false;
+        };
         let state = self.evaluate(evidence, node, &scan);
-        self.put(node, NodeState { is_further, ..state }, scan);
+        self.put(
+            node,
+            NodeState {
+                is_further,
+                ..state
+            },
+            scan,
+        );
         true
     }
 
@@ -152,10 +181,15 @@ impl ReconstructionGrid {
     /// Drops, or restores, the values of the touches at discontinuities: at the nodes looked at and beside them.
     fn drop_discontinuities(&mut self, look: &mut EarlierStates, area: &mut CellBox) {
         let beside = |node: LatticeNode| std::iter::once(node).chain(neighbours(node));
-        let near: CellTable<LatticeNode, ()> = look.iter().flat_map(|(node, _)| beside(node)).collect();
+        let near: CellTable<LatticeNode, ()> =
+            look.iter().flat_map(|(node, _)| beside(node)).collect();
         for (node, ()) in near.iter() {
-            let Some(before) = self.nodes.get(&node).copied() else { continue };
-            let Some(touched_value) = before.touched_value else { continue };
+            let Some(before) = self.nodes.get(&node).copied() else {
+                continue;
+            };
+            let Some(touched_value) = before.touched_value else {
+                continue;
+            };
             let is_discontinuous = self.is_discontinuous(node, touched_value);
             if is_discontinuous == (before.source == Source::Nothing) {
                 continue;
@@ -163,8 +197,16 @@ impl ReconstructionGrid {
             let (at, _) = look.insert_with(node, || Some(before));
             let last = look.entry(at).1.filter(NodeState::is_open_question);
             let state = NodeState {
-                source: if is_discontinuous { Source::Nothing } else { Source::Touch },
-                value: if is_discontinuous { last.map_or(touched_value, |last| last.value) } else { touched_value },
+                source: if is_discontinuous {
+                    Source::Nothing
+                } else {
+                    Source::Touch
+                },
+                value: if is_discontinuous {
+                    last.map_or(touched_value, |last| last.value)
+                } else {
+                    touched_value
+                },
                 straight: (0.0, 0.0),
                 ..before
             };
@@ -177,9 +219,14 @@ impl ReconstructionGrid {
     /// neighbour: the two are values of different surfaces, and which of them is wrong is unknown. What is left around both
     /// fills the gap. Depends on the touched values one step away alone.
     fn is_discontinuous(&self, node: LatticeNode, value: f64) -> bool {
-        let is_other =
-            |other: f64| (value < 0.0) != (other < 0.0) && (value - other).abs() > LARGEST_STEP * self.lattice.pitch;
-        neighbours(node).into_iter().filter_map(|node| self.nodes.get(&node)?.touched_value).any(is_other)
+        let is_other = |other: f64| {
+            (value < 0.0) != (other < 0.0)
+                && (value - other).abs() > LARGEST_STEP * self.lattice.pitch
+        };
+        neighbours(node)
+            .into_iter()
+            .filter_map(|node| self.nodes.get(&node)?.touched_value)
+            .any(is_other)
     }
 
     fn put(&mut self, node: LatticeNode, state: NodeState, scan: ScanDistance) {
@@ -210,12 +257,20 @@ impl ReconstructionGrid {
     }
 
     /// Adds the ends of paths near the changes: whether a path ended there depends on the path, and on contacts beside its end.
-    fn look_at_ends(&self, evidence: &Evidence<'_>, changes: &GridChanges, look: &mut EarlierStates) {
+    fn look_at_ends(
+        &self,
+        evidence: &Evidence<'_>,
+        changes: &GridChanges,
+        look: &mut EarlierStates,
+    ) {
         let p = evidence.params;
         for (end, ()) in self.ends.iter() {
             let x = self.lattice.position(end);
-            let is_near = |points: &[Point3<f64>], reach: f64| points.iter().any(|p| (p - x).norm() < reach);
-            if is_near(&changes.means, p.radius + FREE_REACH * p.radius) || is_near(&changes.centres, 1.5 * p.radius) {
+            let is_near =
+                |points: &[Point3<f64>], reach: f64| points.iter().any(|p| (p - x).norm() < reach);
+            if is_near(&changes.means, p.radius + FREE_REACH * p.radius)
+                || is_near(&changes.centres, 1.5 * p.radius)
+            {
                 look.insert_with(end, || None);
             }
         }
@@ -234,16 +289,30 @@ impl ReconstructionGrid {
                 }
             }
         };
-        for cell in changes.means.iter().map(|point| self.lattice.cell_of(point)) {
+        for cell in changes
+            .means
+            .iter()
+            .map(|point| self.lattice.cell_of(point))
+        {
             if self.touched.insert_with(cell, || ()).1 {
                 add(&cell, &around_contact);
             }
         }
         for centre in &changes.centres {
             let cell = self.lattice.cell_of(centre);
-            let is_near = || evidence.tree.closest(evidence.scan, centre, cover + self.lattice.pitch).is_some();
+            let is_near = || {
+                evidence
+                    .tree
+                    .closest(evidence.scan, centre, cover + self.lattice.pitch)
+                    .is_some()
+            };
             // in a closed scan all of the path is a void with a surface around it
-            let is_inside = || evidence.is_closed && evidence.scan_at(centre).is_some_and(|scan| scan.value < 0.0);
+            let is_inside = || {
+                evidence.is_closed
+                    && evidence
+                        .scan_at(centre)
+                        .is_some_and(|scan| scan.value < 0.0)
+            };
             if !self.free_space.contains(&cell) && (is_near() || is_inside()) {
                 self.free_space.insert_with(cell, || ());
                 add(&cell, &around_ball);
@@ -251,21 +320,39 @@ impl ReconstructionGrid {
         }
     }
 
-    fn evaluate(&mut self, evidence: &Evidence<'_>, node: LatticeNode, scan: &ScanDistance) -> NodeState {
-        evidence.beside(scan, &self.lattice.position(node), self.lattice.pitch, &mut self.scratch)
+    fn evaluate(
+        &mut self,
+        evidence: &Evidence<'_>,
+        node: LatticeNode,
+        scan: &ScanDistance,
+    ) -> NodeState {
+        evidence.beside(
+            scan,
+            &self.lattice.position(node),
+            self.lattice.pitch,
+            &mut self.scratch,
+        )
     }
 
     /// Whether the skin in a cell is not the scan.
     pub fn is_in_region(&self, cell: LatticeNode) -> bool {
         let corners = || (0..8).filter_map(|corner| self.nodes.get(&node_at(cell, corner)));
         let is_on_rim = corners().any(|state| state.source == Source::Rim);
-        let is_other = if is_on_rim { NodeState::is_turned } else { NodeState::is_changed };
+        let is_other = if is_on_rim {
+            NodeState::is_turned
+        } else {
+            NodeState::is_changed
+        };
         self.can_take(cell) && corners().any(is_other)
     }
 
     /// Whether the field is known at all corners of a cell that is not to stay open.
     pub fn can_take(&self, cell: LatticeNode) -> bool {
-        let is_known = |node: LatticeNode| self.nodes.get(&node).is_some_and(|state| state.source != Source::Beyond);
+        let is_known = |node: LatticeNode| {
+            self.nodes
+                .get(&node)
+                .is_some_and(|state| state.source != Source::Beyond)
+        };
         !self.open.contains(&cell) && (0..8).all(|corner| is_known(node_at(cell, corner)))
     }
 
@@ -301,8 +388,13 @@ pub(in crate::reconstruct) fn nodes_around_contacts(
 
 /// The steps from a node to those within `radius` steps.
 fn ball(radius: i32) -> Vec<LatticeNode> {
-    let all = CellBox { lo: [-radius; 3], hi: [radius; 3] };
-    all.iter().filter(|[i, j, k]| i * i + j * j + k * k <= radius * radius).collect()
+    let all = CellBox {
+        lo: [-radius; 3],
+        hi: [radius; 3],
+    };
+    all.iter()
+        .filter(|[i, j, k]| i * i + j * j + k * k <= radius * radius)
+        .collect()
 }
 
 fn moved(node: &LatticeNode, offset: &LatticeNode) -> LatticeNode {
@@ -311,7 +403,10 @@ fn moved(node: &LatticeNode, offset: &LatticeNode) -> LatticeNode {
 
 /// The cells that a renewal may have taken into the region or out of it.
 pub(in crate::reconstruct) fn cells_of(changed: &Changed) -> LatticeRegion {
-    let around = changed.nodes.iter().flat_map(|&node| (0..8).map(move |corner| cell_at(node, corner)));
+    let around = changed
+        .nodes
+        .iter()
+        .flat_map(|&node| (0..8).map(move |corner| cell_at(node, corner)));
     around.chain(changed.open.iter().copied()).collect()
 }
 
@@ -321,7 +416,10 @@ mod tests {
 
     /// A grid of pitch 2 mm with these values of the touches, m.
     fn touched(values: impl Iterator<Item = (LatticeNode, f64)>) -> ReconstructionGrid {
-        let mut grid = ReconstructionGrid::new(Lattice { origin: Point3::origin(), pitch: 2e-3 });
+        let mut grid = ReconstructionGrid::new(Lattice {
+            origin: Point3::origin(),
+            pitch: 2e-3,
+        });
         values.for_each(|(node, value)| grid.nodes.insert(node, NodeState::touched(value)));
         grid
     }
@@ -329,7 +427,10 @@ mod tests {
     /// Which of a line of nodes one pitch (2 mm) apart are discontinuous.
     fn discontinuous(value: &[f64]) -> Vec<bool> {
         let grid = touched((0..).zip(value).map(|(i, value)| ([i, 0, 0], value * 1e-3)));
-        (0..).zip(value).map(|(i, value)| grid.is_discontinuous([i, 0, 0], value * 1e-3)).collect()
+        (0..)
+            .zip(value)
+            .map(|(i, value)| grid.is_discontinuous([i, 0, 0], value * 1e-3))
+            .collect()
     }
 
     #[test]
@@ -337,7 +438,10 @@ mod tests {
         // a wall at 3.1 mm, met head-on: its distance changes by the pitch
         assert_eq!(discontinuous(&[3.1, 1.1, -0.9, -2.9]), [false; 4]);
         // 0.3 mm before one surface and, one node on, 2.5 mm behind another
-        assert_eq!(discontinuous(&[2.3, 0.3, -2.5, -4.5]), [false, true, true, false]);
+        assert_eq!(
+            discontinuous(&[2.3, 0.3, -2.5, -4.5]),
+            [false, true, true, false]
+        );
         // far inside it makes no surface
         assert_eq!(discontinuous(&[-0.3, -5.0]), [false; 2]);
     }

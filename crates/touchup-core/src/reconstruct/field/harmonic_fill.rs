@@ -36,7 +36,12 @@ const NONE: u32 = u32::MAX;
 ///
 /// - `numbers`: of the nodes around these.
 /// - `radius`: of the ball, m.
-pub(in crate::reconstruct) fn harmonic_fill(grid: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers, radius: f64) {
+pub(in crate::reconstruct) fn harmonic_fill(
+    grid: &mut ReconstructionGrid,
+    at: &[u32],
+    numbers: &Numbers,
+    radius: f64,
+) {
     // it reaches two radii deep
     let pull = (grid.lattice.pitch / (2.0 * radius)).powi(2);
     relax(grid, at, numbers, pull);
@@ -53,9 +58,15 @@ fn blunt(grid: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers) {
     for &at in at {
         let state = grid.nodes.entry(at).1;
         if state.value.abs() < nearly && state.least <= 0.0 {
-            let is_other = |other: u32| (grid.nodes.entry(other).1.value < 0.0) != (state.value < 0.0);
+            let is_other =
+                |other: u32| (grid.nodes.entry(other).1.value < 0.0) != (state.value < 0.0);
             let around = neighbours(grid, at, numbers);
-            if around.into_iter().filter(|&other| other != NONE && is_other(other)).count() >= ALONE {
+            if around
+                .into_iter()
+                .filter(|&other| other != NONE && is_other(other))
+                .count()
+                >= ALONE
+            {
                 grid.nodes.value_mut(at).value = -f64::MIN_POSITIVE.copysign(state.value);
             }
         }
@@ -78,11 +89,18 @@ struct OpenQuestion {
 ///
 /// - `pull`: weight of the scan beside the six neighbours of a node that is far from it.
 fn relax(grid: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers, pull: f64) {
-    let open: Vec<u32> = at.iter().copied().filter(|&at| grid.nodes.entry(at).1.is_open_question()).collect();
+    let open: Vec<u32> = at
+        .iter()
+        .copied()
+        .filter(|&at| grid.nodes.entry(at).1.is_open_question())
+        .collect();
     // the values, gathered close together
     let mut met: CellTable<u32, f64> = CellTable::default();
     let mut number = |at: u32| met.insert_with(at, || grid.nodes.entry(at).1.value).0;
-    let questions: Vec<OpenQuestion> = open.iter().map(|&at| question(grid, at, numbers, pull, &mut number)).collect();
+    let questions: Vec<OpenQuestion> = open
+        .iter()
+        .map(|&at| question(grid, at, numbers, pull, &mut number))
+        .collect();
     let mut values: Vec<f64> = met.iter().map(|(_, value)| *value).collect();
     for _ in 0..SWEEPS {
         let mut largest = 0.0f64;
@@ -129,8 +147,12 @@ fn question(
         least: state.least,
     };
     // what was looked at further follows; its extent does not matter here
-    let counts = |other: u32| other != NONE && (state.is_further || !grid.nodes.entry(other).1.is_further);
-    for other in neighbours(grid, at, numbers).into_iter().filter(|&other| counts(other)) {
+    let counts =
+        |other: u32| other != NONE && (state.is_further || !grid.nodes.entry(other).1.is_further);
+    for other in neighbours(grid, at, numbers)
+        .into_iter()
+        .filter(|&other| counts(other))
+    {
         question.around[question.neighbours as usize] = number(other);
         question.neighbours += 1;
         question.weight += 1.0;
@@ -142,7 +164,9 @@ fn question(
 fn neighbours(grid: &ReconstructionGrid, at: u32, numbers: &Numbers) -> [u32; 6] {
     lattice::neighbours(grid.nodes.entry(at).0).map(|other| {
         let index = numbers.of(&grid.nodes, &other);
-        index.filter(|&index| grid.nodes.entry(index).1.source != Source::Beyond).unwrap_or(NONE)
+        index
+            .filter(|&index| grid.nodes.entry(index).1.source != Source::Beyond)
+            .unwrap_or(NONE)
     })
 }
 
@@ -150,7 +174,8 @@ fn neighbours(grid: &ReconstructionGrid, at: u32, numbers: &Numbers) -> [u32; 6]
 /// neither touched nor swept, or is smaller than a ball can resolve. Returns whether there was any.
 fn drop_islands(grid: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers) -> bool {
     let mut seen = vec![Visited::Outside; grid.nodes.len()];
-    at.iter().for_each(|&at| seen[at as usize] = Visited::NotYet);
+    at.iter()
+        .for_each(|&at| seen[at as usize] = Visited::NotYet);
     let (mut island, mut has_dropped) = (Vec::new(), false);
     for &start in at {
         if seen[start as usize] != Visited::NotYet {
@@ -181,7 +206,12 @@ enum Visited {
 
 /// Gathers the piece of one sign around its first node; whether what lies beyond those looked at holds it, or evidence and
 /// its size.
-fn is_attached(grid: &ReconstructionGrid, piece: &mut Vec<u32>, seen: &mut [Visited], numbers: &Numbers) -> bool {
+fn is_attached(
+    grid: &ReconstructionGrid,
+    piece: &mut Vec<u32>,
+    seen: &mut [Visited],
+    numbers: &Numbers,
+) -> bool {
     let (mut next, mut is_touched, mut goes_on) = (0, false, false);
     while let Some(&at) = piece.get(next) {
         next += 1;
@@ -208,9 +238,16 @@ pub(in crate::reconstruct) fn end_reach(grid: &ReconstructionGrid, radius: f64) 
 
 /// The cells in which a filled surface depends on a ball that ended its path freely, from there to the nearest evidence within
 /// `reach` cells: a hole that the ball left at its far end has no bottom.
-pub(in crate::reconstruct) fn open_cells(grid: &ReconstructionGrid, reach: i32) -> CellTable<LatticeNode, ()> {
+pub(in crate::reconstruct) fn open_cells(
+    grid: &ReconstructionGrid,
+    reach: i32,
+) -> CellTable<LatticeNode, ()> {
     let is_end = |state: &NodeState| state.is_free_end && state.value <= state.least;
-    let ends = grid.ends.iter().map(|(end, ())| end).filter(|end| grid.nodes.get(end).is_some_and(is_end));
+    let ends = grid
+        .ends
+        .iter()
+        .map(|(end, ())| end)
+        .filter(|end| grid.nodes.get(end).is_some_and(is_end));
     let mut open = CellTable::default();
     let mut takes = |(cell, end): (LatticeNode, LatticeNode)| {
         let is_near = (0..3).map(|i| (cell[i] - end[i]).pow(2)).sum::<i32>() <= reach * reach;
@@ -218,7 +255,11 @@ pub(in crate::reconstruct) fn open_cells(grid: &ReconstructionGrid, reach: i32) 
     };
     let cells = ends.flat_map(|end| (0..8).map(move |corner| (cell_at(end, corner), end)));
     let first = cells.filter(|&cell| takes(cell)).collect();
-    flood(first, |(cell, end)| lattice::neighbours(cell).map(|cell| (cell, end)), takes);
+    flood(
+        first,
+        |(cell, end)| lattice::neighbours(cell).map(|cell| (cell, end)),
+        takes,
+    );
     open
 }
 
@@ -226,7 +267,9 @@ pub(in crate::reconstruct) fn open_cells(grid: &ReconstructionGrid, reach: i32) 
 fn is_unsupported_surface(grid: &ReconstructionGrid, cell: LatticeNode) -> bool {
     let mut material = 0;
     for corner in 0..8 {
-        let Some(state) = grid.nodes.get(&node_at(cell, corner)) else { return false };
+        let Some(state) = grid.nodes.get(&node_at(cell, corner)) else {
+            return false;
+        };
         if !state.is_open_question() || state.source == Source::Rim {
             return false;
         }
@@ -241,13 +284,20 @@ mod tests {
     use crate::reconstruct::field::lattice::{CellBox, Lattice};
 
     const PITCH: f64 = 0.75e-3;
-    const BOX: CellBox = CellBox { lo: [0; 3], hi: [6; 3] };
+    const BOX: CellBox = CellBox {
+        lo: [0; 3],
+        hi: [6; 3],
+    };
 
     /// The signs of nodes that were touched everywhere, filled in: those of `value` (pitches) before, at each node.
     fn completed(value: impl Fn(LatticeNode) -> f64) -> ReconstructionGrid {
-        let mut grid = ReconstructionGrid::new(Lattice { pitch: PITCH, ..Lattice::default() });
+        let mut grid = ReconstructionGrid::new(Lattice {
+            pitch: PITCH,
+            ..Lattice::default()
+        });
         BOX.each(|node| {
-            grid.nodes.insert(node, NodeState::touched(value(node) * PITCH));
+            grid.nodes
+                .insert(node, NodeState::touched(value(node) * PITCH));
         });
         let at: Vec<u32> = (0..grid.nodes.len() as u32).collect();
         let numbers = Numbers::new(&grid.nodes, &BOX);
@@ -267,10 +317,17 @@ mod tests {
     #[test]
     fn a_tip_of_noise_goes_and_a_ridge_stays() {
         let tip = [3, 3, 3];
-        let with_tip = |depth: f64| completed(move |node| if node == tip { -depth } else { floor(node) });
+        let with_tip =
+            |depth: f64| completed(move |node| if node == tip { -depth } else { floor(node) });
         assert!(!is_material(&with_tip(0.1), tip));
         assert!(is_material(&with_tip(0.6), tip), "more than noise");
-        let ridge = completed(|node| if node[0] == 3 && node[2] == 3 { -0.1 } else { floor(node) });
+        let ridge = completed(|node| {
+            if node[0] == 3 && node[2] == 3 {
+                -0.1
+            } else {
+                floor(node)
+            }
+        });
         assert!(is_material(&ridge, tip));
     }
 
@@ -279,6 +336,9 @@ mod tests {
         let speck = completed(|node| if node == [3, 3, 5] { -1.0 } else { floor(node) });
         assert!(!is_material(&speck, [3, 3, 5]) && is_material(&speck, [3, 3, 2]));
         let block = completed(|node| if node[2] == 5 { -1.0 } else { floor(node) });
-        assert!(is_material(&block, [3, 3, 5]), "it goes on beyond what was looked at");
+        assert!(
+            is_material(&block, [3, 3, 5]),
+            "it goes on beyond what was looked at"
+        );
     }
 }

@@ -31,9 +31,16 @@ pub(in crate::reconstruct) fn is_inner_corner(
     scratch: &FieldScratch,
 ) -> bool {
     let is_known = |piece: &Piece| {
-        piece.flat_weight >= params.least_weight && piece.nearest_squared < (TOUCHED_WITHIN * radius).powi(2)
+        piece.flat_weight >= params.least_weight
+            && piece.nearest_squared < (TOUCHED_WITHIN * radius).powi(2)
     };
-    let Some(one) = scratch.pieces.get(scratch.decides as usize).filter(|one| is_known(one)) else { return false };
+    let Some(one) = scratch
+        .pieces
+        .get(scratch.decides as usize)
+        .filter(|one| is_known(one))
+    else {
+        return false;
+    };
     (0..).zip(&scratch.pieces).any(|(at, other)| {
         let cosine = one.facing.dot(&other.facing);
         at != scratch.decides
@@ -47,7 +54,13 @@ pub(in crate::reconstruct) fn is_inner_corner(
 
 /// Whether a ball that touches the piece `at` where it ends near the point has room before `other`, and no more of it than
 /// one that lies in the corner.
-fn is_beside(contacts: &ContactMap, radius: f64, scratch: &FieldScratch, at: u32, other: &Piece) -> bool {
+fn is_beside(
+    contacts: &ContactMap,
+    radius: f64,
+    scratch: &FieldScratch,
+    at: u32,
+    other: &Piece,
+) -> bool {
     let piece = &scratch.pieces[at as usize];
     let limit = piece.nearest_squared.sqrt() + BESIDE * radius;
     let members = scratch.near.iter().filter(|member| member.piece == at);
@@ -71,9 +84,21 @@ mod tests {
     /// Contacts every 0.5 mm along y at these places in x and z (mm) with these normals.
     fn store_of(line: &[([f64; 2], [f64; 2])]) -> ContactMap {
         let mut store = ContactMap::new(RADIUS / 3.0, 2.0 * RADIUS, None);
-        for (([x, z], normal), j) in line.iter().flat_map(|place| (-8..=8).map(move |j| (place, f64::from(j)))) {
-            let (point, normal) = (Point3::new(*x, 0.5 * j, *z) * 1e-3, Vector3::new(normal[0], 0.0, normal[1]));
-            store.add(&SurfaceContact { point, normal, weight: 5.0, stamp_ns: 0, sigma: ContactSigma::default() });
+        for (([x, z], normal), j) in line
+            .iter()
+            .flat_map(|place| (-8..=8).map(move |j| (place, f64::from(j))))
+        {
+            let (point, normal) = (
+                Point3::new(*x, 0.5 * j, *z) * 1e-3,
+                Vector3::new(normal[0], 0.0, normal[1]),
+            );
+            store.add(&SurfaceContact {
+                point,
+                normal,
+                weight: 5.0,
+                stamp_ns: 0,
+                sigma: ContactSigma::default(),
+            });
         }
         store
     }
@@ -88,16 +113,30 @@ mod tests {
     /// Whether there is an inner corner, and the value of the field (mm), at a place in x and z, mm.
     fn found(store: &ContactMap, x: f64, z: f64) -> (bool, f64) {
         let (params, mut scratch) = (FieldParams::for_ball(RADIUS), FieldScratch::default());
-        let value = params.at(store, &(Point3::new(x, 0.1, z) * 1e-3), &mut scratch).unwrap().value;
-        (is_inner_corner(store, &params, RADIUS, &scratch), value * 1e3)
+        let value = params
+            .at(store, &(Point3::new(x, 0.1, z) * 1e-3), &mut scratch)
+            .unwrap()
+            .value;
+        (
+            is_inner_corner(store, &params, RADIUS, &scratch),
+            value * 1e3,
+        )
     }
 
     #[test]
     fn both_sides_go_on_to_where_they_meet() {
         let corner = corner(1.5);
-        for (x, z, value) in [(0.2, 0.3, 0.2), (0.3, 0.1, 0.1), (-0.2, 0.3, -0.2), (0.4, -0.3, -0.3)] {
+        for (x, z, value) in [
+            (0.2, 0.3, 0.2),
+            (0.3, 0.1, 0.1),
+            (-0.2, 0.3, -0.2),
+            (0.4, -0.3, -0.3),
+        ] {
             let (is_corner, found) = found(&corner, x, z);
-            assert!(is_corner && (found - value).abs() < 1e-9, "{x} {z}: {found}");
+            assert!(
+                is_corner && (found - value).abs() < 1e-9,
+                "{x} {z}: {found}"
+            );
         }
         // far along the floor, or where the wall is out of reach
         assert!(!found(&corner, 3.5, 0.1).0);
@@ -112,12 +151,17 @@ mod tests {
     fn a_hollow_is_no_corner() {
         // a groove of radius 2.5 mm around y, touched from wall to wall and evaluated from within the material
         let groove = (0..=18).map(|i| f64::from(i) * 10f64.to_radians());
-        let places: Vec<_> = groove.map(|a| ([-2.5 * a.cos(), -2.5 * a.sin()], [a.cos(), a.sin()])).collect();
+        let places: Vec<_> = groove
+            .map(|a| ([-2.5 * a.cos(), -2.5 * a.sin()], [a.cos(), a.sin()]))
+            .collect();
         let store = store_of(&places);
         for degrees in [0.0f64, 20.0, 45.0, 70.0, 90.0] {
             let (sin, cos) = degrees.to_radians().sin_cos();
             for radius in [2.2, 2.5, 3.0, 3.6] {
-                assert!(!found(&store, -radius * cos, -radius * sin).0, "{degrees} {radius}");
+                assert!(
+                    !found(&store, -radius * cos, -radius * sin).0,
+                    "{degrees} {radius}"
+                );
             }
         }
     }

@@ -20,14 +20,19 @@ const NODE_BITS: u32 = 21;
 impl Key for LatticeNode {
     #[inline]
     fn bits(&self) -> u64 {
-        let part = |i: usize| u64::from(self[i] as u32 & ((1 << NODE_BITS) - 1)) << (NODE_BITS * i as u32);
+        let part =
+            |i: usize| u64::from(self[i] as u32 & ((1 << NODE_BITS) - 1)) << (NODE_BITS * i as u32);
         part(0) | part(1) | part(2)
     }
 }
 
 /// `node`, `count` steps along `axis`.
 #[inline]
-pub(in crate::reconstruct) fn stepped(mut node: LatticeNode, axis: usize, count: i32) -> LatticeNode {
+pub(in crate::reconstruct) fn stepped(
+    mut node: LatticeNode,
+    axis: usize,
+    count: i32,
+) -> LatticeNode {
     node[axis] = node[axis].saturating_add(count);
     node
 }
@@ -61,14 +66,24 @@ pub(in crate::reconstruct) fn across(axis: usize) -> (usize, usize) {
 fn ring(node: LatticeNode, axis: u8, step: i32) -> [LatticeNode; 4] {
     let (u, v) = across(axis as usize);
     let beside = stepped(node, u, step);
-    [node, beside, stepped(beside, v, step), stepped(node, v, step)]
+    [
+        node,
+        beside,
+        stepped(beside, v, step),
+        stepped(node, v, step),
+    ]
 }
 
 /// What lies between consecutive nodes of a [`ring`], by node and axis: edges where it goes up, squares where it goes down.
 #[inline]
 fn ring_sides(node: LatticeNode, axis: u8, step: i32) -> [(LatticeNode, u8); 4] {
     let (u, v) = across(axis as usize);
-    [(node, u as u8), (stepped(node, u, step), v as u8), (stepped(node, v, step), u as u8), (node, v as u8)]
+    [
+        (node, u as u8),
+        (stepped(node, u, step), v as u8),
+        (stepped(node, v, step), u as u8),
+        (node, v as u8),
+    ]
 }
 
 /// A cubic lattice in the object frame O.
@@ -90,7 +105,11 @@ impl Lattice {
     /// Position of a node, m, in O.
     #[inline]
     pub fn position(&self, node: LatticeNode) -> Point3<f64> {
-        Point3::new(self.coordinate(0, node[0]), self.coordinate(1, node[1]), self.coordinate(2, node[2]))
+        Point3::new(
+            self.coordinate(0, node[0]),
+            self.coordinate(1, node[1]),
+            self.coordinate(2, node[2]),
+        )
     }
 
     /// The last plane across `axis` at or below coordinate `x` (m), exactly as [`Self::coordinate`] places it.
@@ -110,22 +129,44 @@ impl Lattice {
     /// The cell that holds `p`; a point on a plane belongs to the cell above it.
     #[inline]
     pub fn cell_of(&self, p: &Point3<f64>) -> LatticeNode {
-        [self.index_of(0, p.x), self.index_of(1, p.y), self.index_of(2, p.z)]
+        [
+            self.index_of(0, p.x),
+            self.index_of(1, p.y),
+            self.index_of(2, p.z),
+        ]
     }
 
     /// Lowest and highest corner of a cell, drawn in by `margin` (share of the pitch).
     #[inline]
-    pub(in crate::reconstruct) fn inner_box(&self, cell: LatticeNode, margin: f64) -> [Point3<f64>; 2] {
+    pub(in crate::reconstruct) fn inner_box(
+        &self,
+        cell: LatticeNode,
+        margin: f64,
+    ) -> [Point3<f64>; 2] {
         let inset = Vector3::repeat(margin * self.pitch);
-        [self.position(cell) + inset, self.position(cell.map(|x| x.saturating_add(1))) - inset]
+        [
+            self.position(cell) + inset,
+            self.position(cell.map(|x| x.saturating_add(1))) - inset,
+        ]
     }
 
     /// `p` brought into the box from node `lo` to node `hi`, `margin` (share of the pitch) inside where the box has any extent.
     #[inline]
-    pub(crate) fn clamped(&self, p: Point3<f64>, lo: LatticeNode, hi: LatticeNode, margin: f64) -> Point3<f64> {
+    pub(crate) fn clamped(
+        &self,
+        p: Point3<f64>,
+        lo: LatticeNode,
+        hi: LatticeNode,
+        margin: f64,
+    ) -> Point3<f64> {
         Point3::from(Vector3::from_fn(|i, _| {
             let [below, above] = [lo, hi].map(|node| self.coordinate(i, node[i]));
-            if lo[i] == hi[i] { below } else { p[i].max(below + margin * self.pitch).min(above - margin * self.pitch) }
+            if lo[i] == hi[i] {
+                below
+            } else {
+                p[i].max(below + margin * self.pitch)
+                    .min(above - margin * self.pitch)
+            }
         }))
     }
 }
@@ -145,9 +186,15 @@ impl Default for CellBox {
 
 impl CellBox {
     /// No cell.
-    pub const EMPTY: Self = Self { lo: [i32::MAX; 3], hi: [i32::MIN; 3] };
+    pub const EMPTY: Self = Self {
+        lo: [i32::MAX; 3],
+        hi: [i32::MIN; 3],
+    };
     /// Every cell.
-    pub const ALL: Self = Self { lo: [i32::MIN; 3], hi: [i32::MAX; 3] };
+    pub const ALL: Self = Self {
+        lo: [i32::MIN; 3],
+        hi: [i32::MAX; 3],
+    };
 
     pub fn is_empty(&self) -> bool {
         (0..3).any(|i| self.lo[i] > self.hi[i])
@@ -173,23 +220,33 @@ impl CellBox {
     /// The cells in both.
     pub fn meet(&self, other: &Self) -> Self {
         let lo = std::array::from_fn(|i| self.lo[i].max(other.lo[i]));
-        Self { lo, hi: std::array::from_fn(|i| self.hi[i].min(other.hi[i])) }
+        Self {
+            lo,
+            hi: std::array::from_fn(|i| self.hi[i].min(other.hi[i])),
+        }
     }
 
     /// Wider by `below` cells below and `above` cells above, on each axis.
     pub fn widened(&self, below: i32, above: i32) -> Self {
-        Self { lo: self.lo.map(|x| x.saturating_sub(below)), hi: self.hi.map(|x| x.saturating_add(above)) }
+        Self {
+            lo: self.lo.map(|x| x.saturating_sub(below)),
+            hi: self.hi.map(|x| x.saturating_add(above)),
+        }
     }
 
     /// Number of cells: ∞ where it is beyond what a float can count.
     pub fn volume(&self) -> f64 {
-        (0..3).map(|i| (f64::from(self.hi[i]) - f64::from(self.lo[i]) + 1.0).max(0.0)).product()
+        (0..3)
+            .map(|i| (f64::from(self.hi[i]) - f64::from(self.lo[i]) + 1.0).max(0.0))
+            .product()
     }
 
     /// The cells, x slowest.
     pub fn iter(&self) -> impl Iterator<Item = LatticeNode> + use<> {
         let Self { lo, hi } = *self;
-        (lo[0]..=hi[0]).flat_map(move |x| (lo[1]..=hi[1]).flat_map(move |y| (lo[2]..=hi[2]).map(move |z| [x, y, z])))
+        (lo[0]..=hi[0]).flat_map(move |x| {
+            (lo[1]..=hi[1]).flat_map(move |y| (lo[2]..=hi[2]).map(move |z| [x, y, z]))
+        })
     }
 
     /// Calls `each` with the cells, x slowest; faster than [`Self::iter`].
@@ -206,7 +263,11 @@ impl CellBox {
 
     /// Calls `each` with the keys of a table that lie in the box, by whichever loop is shorter; in no particular order.
     #[inline]
-    pub fn each_in<V>(&self, table: &CellTable<LatticeNode, V>, mut each: impl FnMut(LatticeNode, &V)) {
+    pub fn each_in<V>(
+        &self,
+        table: &CellTable<LatticeNode, V>,
+        mut each: impl FnMut(LatticeNode, &V),
+    ) {
         if self.volume() < table.len() as f64 {
             self.each(|cell| {
                 if let Some(value) = table.get(&cell) {
@@ -214,7 +275,10 @@ impl CellBox {
                 }
             });
         } else {
-            table.iter().filter(|(cell, _)| self.contains(cell)).for_each(|(cell, value)| each(cell, value));
+            table
+                .iter()
+                .filter(|(cell, _)| self.contains(cell))
+                .for_each(|(cell, value)| each(cell, value));
         }
     }
 }
@@ -234,11 +298,25 @@ impl Numbers {
 
     /// Looks the keys in `cells` up.
     pub fn new<V>(table: &CellTable<LatticeNode, V>, cells: &CellBox) -> Self {
-        let cells = if cells.volume() < table.len() as f64 { *cells } else { CellBox::EMPTY };
+        let cells = if cells.volume() < table.len() as f64 {
+            *cells
+        } else {
+            CellBox::EMPTY
+        };
         let mut numbers = Vec::with_capacity(cells.volume() as usize);
         cells.each(|node| numbers.push(table.index_of(&node).unwrap_or(Self::NONE)));
-        let size = std::array::from_fn(|i| if cells.is_empty() { 0 } else { (cells.hi[i] - cells.lo[i]) as usize + 1 });
-        Self { cells, size, numbers }
+        let size = std::array::from_fn(|i| {
+            if cells.is_empty() {
+                0
+            } else {
+                (cells.hi[i] - cells.lo[i]) as usize + 1
+            }
+        });
+        Self {
+            cells,
+            size,
+            numbers,
+        }
     }
 
     /// The number of `node` in the table that this was made of.

@@ -32,7 +32,13 @@ pub struct FieldParams {
 impl FieldParams {
     /// Settings that hold for a ball of `radius` (m): two radii are what passes of a hand leave between them.
     pub(crate) fn for_ball(radius: f64) -> Self {
-        Self { reach: 2.0 * radius, sigma: radius / 2.0, piece_cosine: 0.819, chord: radius / 5.0, least_weight: 2.0 }
+        Self {
+            reach: 2.0 * radius,
+            sigma: radius / 2.0,
+            piece_cosine: 0.819,
+            chord: radius / 5.0,
+            least_weight: 2.0,
+        }
     }
 }
 
@@ -58,7 +64,9 @@ pub struct FieldValue {
 impl FieldValue {
     /// Distance from the nearest contact along the surface, m.
     pub fn lateral(&self) -> f64 {
-        (self.nearest * self.nearest - self.value * self.value).max(0.0).sqrt()
+        (self.nearest * self.nearest - self.value * self.value)
+            .max(0.0)
+            .sqrt()
     }
 }
 
@@ -121,8 +129,12 @@ pub struct FieldScratch {
 impl FieldScratch {
     /// How far the value of the piece that decided is from that of the nearest other piece, m.
     pub(in crate::reconstruct) fn nearest_other(&self, value: f64) -> f64 {
-        let others = (0..).zip(&self.pieces).filter(|(at, _)| *at != self.decides);
-        others.map(|(_, piece)| (piece.value() - value).abs()).fold(f64::INFINITY, f64::min)
+        let others = (0..)
+            .zip(&self.pieces)
+            .filter(|(at, _)| *at != self.decides);
+        others
+            .map(|(_, piece)| (piece.value() - value).abs())
+            .fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -147,14 +159,33 @@ const UNDER: f64 = 0.13;
 
 impl FieldParams {
     /// The field at `x` (m, in O); `None` where no contact is within reach.
-    pub fn at(&self, store: &ContactMap, x: &Point3<f64>, scratch: &mut FieldScratch) -> Option<FieldValue> {
+    pub fn at(
+        &self,
+        store: &ContactMap,
+        x: &Point3<f64>,
+        scratch: &mut FieldScratch,
+    ) -> Option<FieldValue> {
         scratch.at = *x;
-        let FieldScratch { near, pieces, angles, decides, .. } = scratch;
+        let FieldScratch {
+            near,
+            pieces,
+            angles,
+            decides,
+            ..
+        } = scratch;
         near.clear();
         store.near(x, self.reach, |distance_squared, index| {
-            near.push(Member { distance_squared, index, piece: NO_PIECE });
+            near.push(Member {
+                distance_squared,
+                index,
+                piece: NO_PIECE,
+            });
         });
-        near.sort_unstable_by(|a, b| a.distance_squared.total_cmp(&b.distance_squared).then(a.index.cmp(&b.index)));
+        near.sort_unstable_by(|a, b| {
+            a.distance_squared
+                .total_cmp(&b.distance_squared)
+                .then(a.index.cmp(&b.index))
+        });
         let nearest = *near.first()?;
         let means = store.means();
         self.group(means, near, pieces);
@@ -184,7 +215,10 @@ impl FieldParams {
             let at = match self.piece_of(mean, pieces) {
                 Some(at) => at,
                 None if pieces.len() < MOST_PIECES => {
-                    pieces.push(Piece { nearest_squared: member.distance_squared, ..Piece::default() });
+                    pieces.push(Piece {
+                        nearest_squared: member.distance_squared,
+                        ..Piece::default()
+                    });
                     pieces.len() - 1
                 }
                 None => continue,
@@ -206,21 +240,32 @@ impl FieldParams {
         for (at, piece) in pieces.iter().enumerate() {
             let cosine = piece.facing.dot(&mean.normal);
             let arm = mean.point.coords - piece.point / piece.weight;
-            if cosine > closest && (0.5 * (mean.normal + piece.facing).dot(&arm)).abs() < self.chord {
+            if cosine > closest && (0.5 * (mean.normal + piece.facing).dot(&arm)).abs() < self.chord
+            {
                 (best, closest) = (Some(at), cosine);
             }
         }
         best
     }
 
-    fn fit(&self, means: &[MeanContact], x: &Point3<f64>, near: &mut [Member], pieces: &mut [Piece]) {
+    fn fit(
+        &self,
+        means: &[MeanContact],
+        x: &Point3<f64>,
+        near: &mut [Member],
+        pieces: &mut [Piece],
+    ) {
         for piece in pieces.iter_mut() {
             (piece.point, piece.normal) = (Vector3::zeros(), Vector3::zeros());
         }
         for member in near.iter_mut().filter(|member| member.piece != NO_PIECE) {
-            let (mean, piece) = (&means[member.index as usize], &mut pieces[member.piece as usize]);
+            let (mean, piece) = (
+                &means[member.index as usize],
+                &mut pieces[member.piece as usize],
+            );
             let width = (self.sigma * self.sigma).max(piece.nearest_squared / 2.0);
-            let weight = mean.weight * (-(member.distance_squared - piece.nearest_squared) / width).exp();
+            let weight =
+                mean.weight * (-(member.distance_squared - piece.nearest_squared) / width).exp();
             piece.fit_weight += weight;
             piece.normal += mean.normal * weight;
             piece.point += mean.point.coords * weight;
@@ -232,8 +277,12 @@ impl FieldParams {
             piece.point /= piece.fit_weight;
         }
         for member in near.iter().filter(|member| member.piece != NO_PIECE) {
-            let (mean, piece) = (&means[member.index as usize], &mut pieces[member.piece as usize]);
-            piece.fit_value += member.distance_squared * 0.5 * (mean.normal + piece.facing).dot(&(x - mean.point));
+            let (mean, piece) = (
+                &means[member.index as usize],
+                &mut pieces[member.piece as usize],
+            );
+            piece.fit_value +=
+                member.distance_squared * 0.5 * (mean.normal + piece.facing).dot(&(x - mean.point));
         }
     }
 
@@ -244,31 +293,39 @@ impl FieldParams {
     /// - `arm`: from the point to that contact, m.
     fn combine(&self, pieces: &[Piece], arm: &Vector3<f64>) -> Option<(f64, usize, bool)> {
         let is_flat = |at: usize| pieces[at].flat_weight >= self.least_weight;
-        let is_tilted_afar =
-            |at: usize| !is_flat(at) && pieces[at].nearest_squared > (TILTED_REACH * self.reach).powi(2);
+        let is_tilted_afar = |at: usize| {
+            !is_flat(at) && pieces[at].nearest_squared > (TILTED_REACH * self.reach).powi(2)
+        };
         let supported = || (0..pieces.len()).filter(|&at| pieces[at].weight >= self.least_weight);
         let near = supported().filter(|&at| !is_tilted_afar(at));
         let mut in_order = near.chain(supported().filter(|&at| is_tilted_afar(at)));
         let first_at = in_order.next().unwrap_or(0);
         let first = pieces.get(first_at)?;
-        let mut solid = Solid { values: [0.0; MOST_PIECES], is_convex: [0; MOST_PIECES] };
+        let mut solid = Solid {
+            values: [0.0; MOST_PIECES],
+            is_convex: [0; MOST_PIECES],
+        };
         solid.values[first_at] = first.value();
         let (mut taken, mut is_edge) = (1u8 << first_at, false);
         for at in in_order {
             let piece = &pieces[at];
-            let Some(convex) = self.convex_among(pieces, taken, piece) else { continue };
+            let Some(convex) = self.convex_among(pieces, taken, piece) else {
+                continue;
+            };
             if is_tilted_afar(at) && convex != taken {
                 continue;
             }
             let cuts_by = piece.value() + piece.facing.dot(arm);
-            if convex >> first_at & 1 == 1 && cuts_by > CUT * self.sigma && arm.norm() < self.sigma {
+            if convex >> first_at & 1 == 1 && cuts_by > CUT * self.sigma && arm.norm() < self.sigma
+            {
                 continue;
             }
             solid.values[at] = piece.value();
             solid.take(at, convex);
             taken |= 1 << at;
             let is_near = piece.value().max(first.value()) < EDGE_NEAR * self.sigma;
-            let meets = first.facing.dot(&piece.facing) < EDGE_COSINE && convex >> first_at & 1 == 1;
+            let meets =
+                first.facing.dot(&piece.facing) < EDGE_COSINE && convex >> first_at & 1 == 1;
             is_edge |= is_near && meets && is_flat(first_at) && is_flat(at);
         }
         let (value, at) = solid.evaluate(taken, first_at);
@@ -335,14 +392,21 @@ impl Solid {
         };
         if self.connected(set, true) != set {
             let parts = of_parts(true).map(|part| self.evaluate(part, first));
-            return parts.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((self.values[first], first));
+            return parts
+                .min_by(|a, b| a.0.total_cmp(&b.0))
+                .unwrap_or((self.values[first], first));
         }
         if self.connected(set, false) != set {
             let parts = of_parts(false).map(|part| self.evaluate(part, first));
-            return parts.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((self.values[first], first));
+            return parts
+                .max_by(|a, b| a.0.total_cmp(&b.0))
+                .unwrap_or((self.values[first], first));
         }
         // the farthest contradicts
-        let last = members(set).filter(|&at| at != first).last().unwrap_or(first);
+        let last = members(set)
+            .filter(|&at| at != first)
+            .last()
+            .unwrap_or(first);
         self.evaluate(set & !(1 << last), first)
     }
 
@@ -350,7 +414,13 @@ impl Solid {
     fn connected(&self, set: u8, by_convex: bool) -> u8 {
         let mut part = set & set.wrapping_neg();
         loop {
-            let joined = |at: usize| if by_convex { self.is_convex[at] } else { !self.is_convex[at] };
+            let joined = |at: usize| {
+                if by_convex {
+                    self.is_convex[at]
+                } else {
+                    !self.is_convex[at]
+                }
+            };
             let next = members(part).fold(part, |next, at| next | joined(at) & set);
             if next == part {
                 return part;
@@ -369,25 +439,39 @@ fn is_border(
 ) -> bool {
     let [u, v] = tangent_basis(normal);
     angles.clear();
-    let flat = arms.map(|arm| (arm.dot(&u), arm.dot(&v))).filter(|(a, b)| a * a + b * b > under * under);
+    let flat = arms
+        .map(|arm| (arm.dot(&u), arm.dot(&v)))
+        .filter(|(a, b)| a * a + b * b > under * under);
     angles.extend(flat.map(|(a, b)| (turn(a, b), a, b)));
     angles.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-    let (Some(first), Some(last)) = (angles.first(), angles.last()) else { return true };
+    let (Some(first), Some(last)) = (angles.first(), angles.last()) else {
+        return true;
+    };
     let next = angles.iter().cycle().skip(1);
-    first.0 == last.0 || angles.iter().zip(next).any(|(&(_, a, b), &(_, c, d))| is_gap(a, b, c, d))
+    first.0 == last.0
+        || angles
+            .iter()
+            .zip(next)
+            .any(|(&(_, a, b), &(_, c, d))| is_gap(a, b, c, d))
 }
 
 /// Grows with the angle of (a, b), from −2 at −180° to 2 at 180°.
 fn turn(a: f64, b: f64) -> f64 {
     let side = b / (a.abs() + b.abs());
-    if a >= 0.0 { side } else { (2.0 - side.abs()).copysign(b) }
+    if a >= 0.0 {
+        side
+    } else {
+        (2.0 - side.abs()).copysign(b)
+    }
 }
 
 /// Whether the turn to the left from (a, b) to (c, d) is a gap at a border.
 fn is_gap(a: f64, b: f64, c: f64, d: f64) -> bool {
     let (cross, dot) = (a * d - b * c, a * c + b * d);
     // the same direction twice is no gap
-    cross < 0.0 || dot < 0.0 && dot * dot >= BORDER_COSINE * BORDER_COSINE * ((a * a + b * b) * (c * c + d * d))
+    cross < 0.0
+        || dot < 0.0
+            && dot * dot >= BORDER_COSINE * BORDER_COSINE * ((a * a + b * b) * (c * c + d * d))
 }
 
 #[cfg(test)]
@@ -405,9 +489,16 @@ mod tests {
         let mut store = ContactMap::new(RADIUS / 3.0, 2.0 * RADIUS, None);
         for surface in surfaces {
             for (i, j) in (-16..=16).flat_map(|i| (-16..=16).map(move |j| (i, j))) {
-                if let Some((point, normal)) = surface(f64::from(i) * 0.5e-3, f64::from(j) * 0.5e-3) {
+                if let Some((point, normal)) = surface(f64::from(i) * 0.5e-3, f64::from(j) * 0.5e-3)
+                {
                     let sigma = ContactSigma::default();
-                    store.add(&SurfaceContact { point, normal, weight: 5.0, stamp_ns: 0, sigma });
+                    store.add(&SurfaceContact {
+                        point,
+                        normal,
+                        weight: 5.0,
+                        stamp_ns: 0,
+                        sigma,
+                    });
                 }
             }
         }
@@ -416,27 +507,48 @@ mod tests {
 
     fn value(store: &ContactMap, x: f64, y: f64, z: f64) -> f64 {
         let x = Point3::new(x, y, z) * 1e-3;
-        FieldParams::for_ball(RADIUS).at(store, &x, &mut FieldScratch::default()).unwrap().value * 1e3
+        FieldParams::for_ball(RADIUS)
+            .at(store, &x, &mut FieldScratch::default())
+            .unwrap()
+            .value
+            * 1e3
     }
 
     /// A cylinder around z of radius `radius` (m), seen from outside (1) or inside (−1), below z = 0; `a` runs around it.
-    fn cylinder(radius: f64, side: f64) -> impl Fn(f64, f64) -> Option<(Point3<f64>, Vector3<f64>)> {
+    fn cylinder(
+        radius: f64,
+        side: f64,
+    ) -> impl Fn(f64, f64) -> Option<(Point3<f64>, Vector3<f64>)> {
         move |a, z| {
             let normal = Vector3::new((a / radius).cos(), (a / radius).sin(), 0.0);
-            (z < -0.4e-3).then(|| (Point3::from(normal * radius + Vector3::z() * z), normal * side))
+            (z < -0.4e-3).then(|| {
+                (
+                    Point3::from(normal * radius + Vector3::z() * z),
+                    normal * side,
+                )
+            })
         }
     }
 
     #[test]
     fn a_gap_of_more_than_150_degrees_makes_a_border() {
         let is_border_of = |degrees: &[f64]| {
-            let arms = degrees.iter().map(|a| Vector3::new(a.to_radians().cos(), a.to_radians().sin(), 0.3) * 1e-3);
+            let arms = degrees
+                .iter()
+                .map(|a| Vector3::new(a.to_radians().cos(), a.to_radians().sin(), 0.3) * 1e-3);
             is_border(arms, &Vector3::z(), 0.1e-3, &mut Vec::new())
         };
         for start in [-170.0, -80.0, 0.0, 33.0, 95.0] {
             let at = |gap: f64| [0.0, 100.0, 360.0 - gap].map(|a| a + start);
-            assert!(is_border_of(&at(151.0)) && !is_border_of(&at(149.0)) && is_border_of(&at(200.0)), "{start}");
-            assert!(is_border_of(&[start]) && is_border_of(&[start; 3]) && is_border_of(&[start, start + 120.0]));
+            assert!(
+                is_border_of(&at(151.0)) && !is_border_of(&at(149.0)) && is_border_of(&at(200.0)),
+                "{start}"
+            );
+            assert!(
+                is_border_of(&[start])
+                    && is_border_of(&[start; 3])
+                    && is_border_of(&[start, start + 120.0])
+            );
         }
         assert!(is_border_of(&[]));
     }
@@ -447,22 +559,37 @@ mod tests {
         assert!((value(&plane, 0.3, 0.2, 0.7) - 0.7).abs() < 1e-9);
         let tube = store_of(&[&cylinder(4e-3, 1.0)]);
         for radius in [3.6, 4.0, 4.5] {
-            assert!((value(&tube, radius, 0.1, -3.0) - (radius.hypot(0.1) - 4.0)).abs() < 0.02, "{radius}");
+            assert!(
+                (value(&tube, radius, 0.1, -3.0) - (radius.hypot(0.1) - 4.0)).abs() < 0.02,
+                "{radius}"
+            );
         }
     }
 
     #[test]
     fn the_far_side_of_a_hole_does_not_cut_the_face_around_it() {
         let radius = 2.5e-3;
-        let around = |x: f64, y: f64| (x.hypot(y) > radius).then(|| (Point3::new(x, y, 0.0), Vector3::z()));
+        let around =
+            |x: f64, y: f64| (x.hypot(y) > radius).then(|| (Point3::new(x, y, 0.0), Vector3::z()));
         let hole = store_of(&[&around, &cylinder(radius, -1.0)]);
         for turn in 0..24 {
             let angle = f64::from(turn) * std::f64::consts::TAU / 24.0;
-            for (from_axis, z) in [(2.9, -0.4), (3.3, -0.8), (3.3, -0.2), (2.8, 0.3), (2.1, -0.5), (2.2, 0.2)] {
+            for (from_axis, z) in [
+                (2.9, -0.4),
+                (3.3, -0.8),
+                (3.3, -0.2),
+                (2.8, 0.3),
+                (2.1, -0.5),
+                (2.2, 0.2),
+            ] {
                 let (x, y) = (from_axis * angle.cos(), from_axis * angle.sin());
                 // the solid: below the face and outside the hole
                 let is_material = z < 0.0 && from_axis > 2.5;
-                assert_eq!(value(&hole, x, y, z) < 0.0, is_material, "{from_axis} {z} at {angle}");
+                assert_eq!(
+                    value(&hole, x, y, z) < 0.0,
+                    is_material,
+                    "{from_axis} {z} at {angle}"
+                );
             }
         }
     }
@@ -472,11 +599,17 @@ mod tests {
         // a step along y = 0; the wall was touched 2 mm aside alone, and drag has tilted its normals
         let top = |x: f64, y: f64| (y <= 0.0).then(|| (Point3::new(x, y, 0.0), Vector3::z()));
         let tilted = Vector3::new(0.15, 0.99, 0.0).normalize();
-        let wall =
-            |x: f64, z: f64| ((-4.1e-3..-1.9e-3).contains(&x) && z < -0.4e-3).then(|| (Point3::new(x, 0.0, z), tilted));
+        let wall = |x: f64, z: f64| {
+            ((-4.1e-3..-1.9e-3).contains(&x) && z < -0.4e-3)
+                .then(|| (Point3::new(x, 0.0, z), tilted))
+        };
         let step = store_of(&[&top, &wall]);
         for y in [-0.2, -0.1] {
-            assert!((value(&step, 0.0, y, -0.2) + 0.2).abs() < 1e-9, "{y}: {}", value(&step, 0.0, y, -0.2));
+            assert!(
+                (value(&step, 0.0, y, -0.2) + 0.2).abs() < 1e-9,
+                "{y}: {}",
+                value(&step, 0.0, y, -0.2)
+            );
         }
         // where it was touched it ends the face
         assert!(value(&step, -3.0, 0.4, -0.4) > 0.2);
@@ -486,13 +619,20 @@ mod tests {
     fn convex_pieces_on_a_floor_stay_a_boss() {
         // two walls of a boss (0, 1) on a floor (2), as seen from the foot of its corner
         let solid = |values: [f64; 3]| {
-            let mut solid = Solid { values: [0.0; MOST_PIECES], is_convex: [0; MOST_PIECES] };
+            let mut solid = Solid {
+                values: [0.0; MOST_PIECES],
+                is_convex: [0; MOST_PIECES],
+            };
             solid.values[..3].copy_from_slice(&values);
             solid.take(1, 0b001);
             solid.take(2, 0);
             solid.evaluate(0b111, 0)
         };
-        assert_eq!(solid([-1.0, 0.5, 2.0]), (0.5, 1), "beside the boss, above the floor");
+        assert_eq!(
+            solid([-1.0, 0.5, 2.0]),
+            (0.5, 1),
+            "beside the boss, above the floor"
+        );
         assert_eq!(solid([-1.0, -0.5, 2.0]), (-0.5, 1), "in the boss");
         assert_eq!(solid([1.0, 0.5, -0.2]), (-0.2, 2), "in the floor");
     }
@@ -500,7 +640,10 @@ mod tests {
     #[test]
     fn edges_that_contradict_each_other_leave_out_the_farthest() {
         // a path 0–1–2–3 of convex edges has no solid
-        let mut solid = Solid { values: [1.0, 2.0, 3.0, -9.0, 0.0, 0.0, 0.0, 0.0], is_convex: [0; MOST_PIECES] };
+        let mut solid = Solid {
+            values: [1.0, 2.0, 3.0, -9.0, 0.0, 0.0, 0.0, 0.0],
+            is_convex: [0; MOST_PIECES],
+        };
         solid.take(1, 0b001);
         solid.take(2, 0b010);
         solid.take(3, 0b100);

@@ -9,7 +9,9 @@ use nalgebra::Point3;
 use crate::reconstruct::contour::patched::Support;
 use crate::reconstruct::evidence::contact_map::ContactMap;
 use crate::reconstruct::evidence::point_evidence::Evidence;
-use crate::reconstruct::field::piecewise::{FieldParams, FieldScratch, FieldValue, Member, PassShare};
+use crate::reconstruct::field::piecewise::{
+    FieldParams, FieldScratch, FieldValue, Member, PassShare,
+};
 
 /// Uncertainty of the fit, by cause; standard deviations, m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -33,8 +35,18 @@ pub struct FitSigma {
 impl FitSigma {
     /// All causes together, m.
     pub fn total(&self) -> f64 {
-        let Self { noise, tilt, calibration, scatter, turning, meeting, edge } = *self;
-        [tilt, calibration, scatter, turning, meeting, edge].iter().fold(noise, |sum, part| sum.hypot(*part))
+        let Self {
+            noise,
+            tilt,
+            calibration,
+            scatter,
+            turning,
+            meeting,
+            edge,
+        } = *self;
+        [tilt, calibration, scatter, turning, meeting, edge]
+            .iter()
+            .fold(noise, |sum, part| sum.hypot(*part))
     }
 }
 
@@ -78,8 +90,16 @@ impl FieldParams {
         scratch: &mut FieldScratch,
     ) -> FitSigma {
         let nearest_other = scratch.nearest_other(found.value);
-        let FieldScratch { near, pieces, shares, decides, .. } = scratch;
-        let Some(piece) = pieces.get(*decides as usize) else { return FitSigma::default() };
+        let FieldScratch {
+            near,
+            pieces,
+            shares,
+            decides,
+            ..
+        } = scratch;
+        let Some(piece) = pieces.get(*decides as usize) else {
+            return FitSigma::default();
+        };
         let (mut calibration, mut scatter) = (0.0, 0.0);
         shares.clear();
         for member in near.iter().filter(|member| member.piece == *decides) {
@@ -95,10 +115,18 @@ impl FieldParams {
             shares.extend(sums.passes.iter().map(|pass| {
                 let share = weight * pass.weight / mean.weight / f64::from(pass.count).sqrt();
                 let tilt = share * 0.5 * lateral * sigma.normal;
-                PassShare { began_ns: pass.began_ns, noise: share * sigma.noise.hypot(sigma.reach), tilt }
+                PassShare {
+                    began_ns: pass.began_ns,
+                    noise: share * sigma.noise.hypot(sigma.reach),
+                    tilt,
+                }
             }));
         }
-        shares.sort_unstable_by(|a, b| a.began_ns.cmp(&b.began_ns).then(a.noise.total_cmp(&b.noise)));
+        shares.sort_unstable_by(|a, b| {
+            a.began_ns
+                .cmp(&b.began_ns)
+                .then(a.noise.total_cmp(&b.noise))
+        });
         let [noise, tilt] = variances(shares, (window_ns as f64 / WINDOW_TO_CORRELATION) as i64);
         let nearness = |reach: f64| (1.0 - nearest_other / (reach * self.sigma)).max(0.0);
         let gap = found.lateral() / (DOUBLING_GAP * self.sigma);
@@ -107,7 +135,11 @@ impl FieldParams {
             (false, true) => TURN_SHARE_AT_BORDER,
             (false, false) => (TURN_SHARE * (1.0 + gap * gap)).min(TURN_SHARE_IN_GAP),
         };
-        let turn = (share * self.turn_around(found, store, x, near)).hypot(if found.is_border { TURN } else { 0.0 });
+        let turn = (share * self.turn_around(found, store, x, near)).hypot(if found.is_border {
+            TURN
+        } else {
+            0.0
+        });
         let fit = FitSigma {
             noise: noise.sqrt(),
             tilt: tilt.sqrt(),
@@ -117,15 +149,29 @@ impl FieldParams {
         };
         FitSigma {
             turning: turn * found.lateral(),
-            meeting: if found.is_edge { 0.0 } else { MEETING * self.sigma * nearness(MEETING_REACH) },
-            edge: if found.is_edge { fit.total() * nearness(EDGE_REACH) } else { 0.0 },
+            meeting: if found.is_edge {
+                0.0
+            } else {
+                MEETING * self.sigma * nearness(MEETING_REACH)
+            },
+            edge: if found.is_edge {
+                fit.total() * nearness(EDGE_REACH)
+            } else {
+                0.0
+            },
             ..fit
         }
     }
 
     /// Root mean square angle between the field at `x` and the contacts around the nearest one, of whichever piece, beyond what noise makes of it,
     /// rad.
-    fn turn_around(&self, found: &FieldValue, store: &ContactMap, x: &Point3<f64>, near: &[Member]) -> f64 {
+    fn turn_around(
+        &self,
+        found: &FieldValue,
+        store: &ContactMap,
+        x: &Point3<f64>,
+        near: &[Member],
+    ) -> f64 {
         let reach_squared = (found.nearest + TURN_REACH * self.sigma).powi(2);
         let (mut sum, mut count) = (0.0, 0.0f64);
         for member in near {
@@ -137,7 +183,9 @@ impl FieldParams {
                 count += 1.0;
             }
         }
-        (sum / count.max(1.0) - TURN_NOISE * TURN_NOISE).max(0.0).sqrt()
+        (sum / count.max(1.0) - TURN_NOISE * TURN_NOISE)
+            .max(0.0)
+            .sqrt()
     }
 }
 
@@ -147,14 +195,20 @@ impl FieldParams {
 fn variances(shares: &[PassShare], correlation_ns: i64) -> [f64; 2] {
     let mut sums = [0.0; 2];
     for (at, one) in shares.iter().enumerate() {
-        sums = [sums[0] + one.noise * one.noise, sums[1] + one.tilt * one.tilt];
+        sums = [
+            sums[0] + one.noise * one.noise,
+            sums[1] + one.tilt * one.tilt,
+        ];
         for other in &shares[at + 1..] {
             let apart = other.began_ns.saturating_sub(one.began_ns);
             if apart >= correlation_ns {
                 break;
             }
             let shared = 2.0 * (1.0 - apart as f64 / correlation_ns as f64);
-            sums = [sums[0] + shared * one.noise * other.noise, sums[1] + shared * one.tilt * other.tilt];
+            sums = [
+                sums[0] + shared * one.noise * other.noise,
+                sums[1] + shared * one.tilt * other.tilt,
+            ];
         }
     }
     sums
@@ -181,10 +235,14 @@ pub(in crate::reconstruct) fn vertex_sigma(
     }
     let (field, radius) = (&evidence.params.field, evidence.params.radius);
     let Some(mut found) = field.at(evidence.contacts, p, scratch) else {
-        let from_scan = evidence.scan_at(p).map_or(0.0, |scan| (scan.foot - p).norm());
+        let from_scan = evidence
+            .scan_at(p)
+            .map_or(0.0, |scan| (scan.foot - p).norm());
         return scan.hypot(guess(field.reach.max(from_scan), radius));
     };
-    let fit = field.sigma_of(&found, evidence.contacts, p, window_ns, scratch).total();
+    let fit = field
+        .sigma_of(&found, evidence.contacts, p, window_ns, scratch)
+        .total();
     match support {
         Support::Guessed => fit.hypot(guess(found.nearest, radius)),
         _ => {
@@ -210,12 +268,21 @@ mod tests {
     /// σ of the fit over the middle of a plane on which each of `passes` passes of 64 contacts ran along x, 1 s apart; all
     /// passes on one line.
     fn sigma_after(passes: i64, spacing_ns: i64) -> FitSigma {
-        let gate = GateParams { sigmas: 4.0, window_ns: WINDOW_NS };
+        let gate = GateParams {
+            sigmas: 4.0,
+            window_ns: WINDOW_NS,
+        };
         let mut store = ContactMap::new(0.5e-3, 3e-3, Some(gate));
         for i in 0..64 * passes {
             let along = (i % 64) as f64 * 0.04e-3 - 1.28e-3;
             let stamp_ns = i / 64 * 1_000_000_000 + i % 64 * spacing_ns;
-            let sigma = ContactSigma { noise: 10e-6, reach: 0.0, calibration: 3e-6, place: 0.0, normal: 0.0 };
+            let sigma = ContactSigma {
+                noise: 10e-6,
+                reach: 0.0,
+                calibration: 3e-6,
+                place: 0.0,
+                normal: 0.0,
+            };
             store.add(&SurfaceContact {
                 point: Point3::new(along, 0.1e-3, 0.0),
                 normal: Vector3::z(),
@@ -224,7 +291,11 @@ mod tests {
                 sigma,
             });
         }
-        let (field, mut scratch, x) = (FieldParams::for_ball(1.5e-3), FieldScratch::default(), Point3::origin());
+        let (field, mut scratch, x) = (
+            FieldParams::for_ball(1.5e-3),
+            FieldScratch::default(),
+            Point3::origin(),
+        );
         let found = field.at(&store, &x, &mut scratch).unwrap();
         field.sigma_of(&found, &store, &x, WINDOW_NS, &mut scratch)
     }
@@ -237,7 +308,10 @@ mod tests {
         for passes in [2, 4, 16] {
             let often = sigma_after(passes, 100_000);
             let fell_by = once.noise / often.noise;
-            assert!((fell_by / (passes as f64).sqrt() - 1.0).abs() < 0.02, "{passes}: {fell_by}");
+            assert!(
+                (fell_by / (passes as f64).sqrt() - 1.0).abs() < 0.02,
+                "{passes}: {fell_by}"
+            );
             assert!((often.calibration - 3e-6).abs() < 1e-12, "{often:?}");
         }
         // slow enough for each place to be a window of its own, they are independent: five places count
@@ -247,7 +321,11 @@ mod tests {
 
     #[test]
     fn noise_that_is_shared_adds_up_and_else_its_squares_do() {
-        let share = |began_ns| PassShare { began_ns, noise: 1.0, tilt: 2.0 };
+        let share = |began_ns| PassShare {
+            began_ns,
+            noise: 1.0,
+            tilt: 2.0,
+        };
         assert_eq!(variances(&[share(0), share(0)], 100), [4.0, 16.0]);
         assert_eq!(variances(&[share(0), share(100)], 100), [2.0, 8.0]);
         assert_eq!(variances(&[share(0), share(50)], 100), [3.0, 12.0]);

@@ -21,9 +21,16 @@ pub(in crate::reconstruct) fn mark_unreachable(
     free_space: &FreeSpace,
     radius: f64,
 ) -> Result<(), MeshError> {
-    let is_new = |corners: &[VertexId; 3]| corners.iter().all(|v| support[v.0 as usize] != Support::Scan);
-    let faces: Vec<[u32; 3]> =
-        mesh.faces().filter(|(_, corners)| is_new(corners)).map(|(_, corners)| corners.map(|v| v.0)).collect();
+    let is_new = |corners: &[VertexId; 3]| {
+        corners
+            .iter()
+            .all(|v| support[v.0 as usize] != Support::Scan)
+    };
+    let faces: Vec<[u32; 3]> = mesh
+        .faces()
+        .filter(|(_, corners)| is_new(corners))
+        .map(|(_, corners)| corners.map(|v| v.0))
+        .collect();
     if faces.is_empty() {
         return Ok(());
     }
@@ -32,10 +39,16 @@ pub(in crate::reconstruct) fn mark_unreachable(
     let tree = FaceTree::new(&patch);
     let deepest = radius * (1.0 - SLACK);
     for (vertex, support) in (0..).map(VertexId).zip(support) {
-        let Some(normal) = direction(&corner_normal(&patch, vertex)) else { continue };
+        let Some(normal) = direction(&corner_normal(&patch, vertex)) else {
+            continue;
+        };
         let centre = mesh.position(vertex) + normal * radius;
         let is_blocked = tree.closest(&patch, &centre, deepest).is_some();
-        let was_there = || free_space.nearest(&centre).is_some_and(|(distance, _)| distance < SLACK * radius);
+        let was_there = || {
+            free_space
+                .nearest(&centre)
+                .is_some_and(|(distance, _)| distance < SLACK * radius)
+        };
         if is_blocked && !was_there() {
             *support = Support::Unreachable;
         }

@@ -132,7 +132,11 @@ impl PublishedPatch {
         for &face in &renewed.scanned {
             let owner = Owner::Scan(face);
             if !next.contains(&owner) && self.faces.contains(&owner) {
-                self.replace(owner, vec![scan.corners(face).map(VertexKey::Scan)], &mut draft);
+                self.replace(
+                    owner,
+                    vec![scan.corners(face).map(VertexKey::Scan)],
+                    &mut draft,
+                );
             }
         }
         for (owner, faces) in next.iter() {
@@ -140,7 +144,11 @@ impl PublishedPatch {
         }
         self.place(&renewed.patch, scan, remesh, &mut draft);
         for key in draft.left {
-            if self.vertices.get(&key).is_some_and(|placed| placed.uses == 0) {
+            if self
+                .vertices
+                .get(&key)
+                .is_some_and(|placed| placed.uses == 0)
+            {
                 self.vertices.remove(&key);
                 draft.delta.gone.push(key);
             }
@@ -156,21 +164,30 @@ impl PublishedPatch {
             Owner::Square(square) => {
                 let cells = square.cells();
                 cells.iter().all(|cell| core.contains(cell))
-                    || cells.iter().any(|cell| core.contains(cell) && region.contains(cell))
+                    || cells
+                        .iter()
+                        .any(|cell| core.contains(cell) && region.contains(cell))
             }
             Owner::Scan(_) => false,
         };
         let near = core.widened(0, 1);
-        let blocks = CellBox { lo: block_of(near.lo), hi: block_of(near.hi) };
+        let blocks = CellBox {
+            lo: block_of(near.lo),
+            hi: block_of(near.hi),
+        };
         let mut owners = Vec::new();
-        blocks.each_in(&self.blocks, |_, block| owners.extend(block.iter().copied().filter(is_around)));
+        blocks.each_in(&self.blocks, |_, block| {
+            owners.extend(block.iter().copied().filter(is_around))
+        });
         owners
     }
 
     /// Forgets an owner that has no faces any more.
     fn forget(&mut self, owner: Owner) {
         self.faces.remove(&owner);
-        if let Some(block) = owner.node().and_then(|node| self.blocks.get_mut(&block_of(node)))
+        if let Some(block) = owner
+            .node()
+            .and_then(|node| self.blocks.get_mut(&block_of(node)))
             && let Some(at) = block.iter().position(|&other| other == owner)
         {
             block.swap_remove(at);
@@ -190,7 +207,11 @@ impl PublishedPatch {
         for key in faces.iter().flatten() {
             self.vertices.get_or_default(*key).uses += 1;
         }
-        draft.delta.faces.extend(faces.iter().map(|face| face.map(|key| draft.at.insert_with(key, || ()).0)));
+        draft.delta.faces.extend(
+            faces
+                .iter()
+                .map(|face| face.map(|key| draft.at.insert_with(key, || ()).0)),
+        );
         let before = std::mem::replace(self.faces.value_mut(at), faces);
         for key in before.into_iter().flatten() {
             if let Some(placed) = self.vertices.get_mut(&key) {
@@ -208,7 +229,9 @@ impl PublishedPatch {
                 continue;
             }
             let (key, position) = patch.vertices.entry(vertex);
-            let Some(placed) = self.vertices.get_mut(key) else { continue };
+            let Some(placed) = self.vertices.get_mut(key) else {
+                continue;
+            };
             let support = remesh.support(key);
             if placed.position != *position || placed.support != support {
                 (placed.position, placed.support) = (*position, support);
@@ -216,24 +239,37 @@ impl PublishedPatch {
             }
         }
         for (key, ()) in draft.at.iter() {
-            let Some(placed) = self.vertices.get_mut(&key) else { continue };
+            let Some(placed) = self.vertices.get_mut(&key) else {
+                continue;
+            };
             if let VertexKey::Scan(vertex) = key {
                 placed.position = scan.position(vertex);
             }
-            let Placed { position, support, .. } = *placed;
-            draft.delta.vertices.push(PatchVertex { key, position, support });
+            let Placed {
+                position, support, ..
+            } = *placed;
+            draft.delta.vertices.push(PatchVertex {
+                key,
+                position,
+                support,
+            });
         }
     }
 }
 
 /// The faces of a patch by those of their owners that are `wanted`; faces of the scan that go without a remainder have none.
-fn faces_by_owner(patch: &Patch, wanted: impl Fn(&Owner) -> bool) -> CellTable<Owner, Vec<NamedFace>> {
+fn faces_by_owner(
+    patch: &Patch,
+    wanted: impl Fn(&Owner) -> bool,
+) -> CellTable<Owner, Vec<NamedFace>> {
     let mut by_owner: CellTable<Owner, Vec<NamedFace>> = CellTable::default();
     for face in &patch.removed {
         by_owner.insert_with(Owner::Scan(*face), Vec::new);
     }
     for face in patch.faces.iter().filter(|face| wanted(&face.owner)) {
-        by_owner.get_or_default(face.owner).push(face.corners.map(|vertex| patch.vertices.entry(vertex).0));
+        by_owner
+            .get_or_default(face.owner)
+            .push(face.corners.map(|vertex| patch.vertices.entry(vertex).0));
     }
     by_owner
 }

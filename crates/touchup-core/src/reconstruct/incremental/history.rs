@@ -33,13 +33,23 @@ pub struct History<K, V> {
 impl<K: Key, V> History<K, V> {
     /// Keeps at most `room` values; the oldest strokes go first.
     pub fn new(room: usize) -> Self {
-        Self { done: VecDeque::new(), undone: Vec::new(), noted: CellTable::default(), room, kept: 0 }
+        Self {
+            done: VecDeque::new(),
+            undone: Vec::new(),
+            noted: CellTable::default(),
+            room,
+            kept: 0,
+        }
     }
 
     /// Begins a stroke; what was undone can be redone no more.
     pub fn begin(&mut self) {
         self.noted.clear();
-        self.kept -= self.undone.drain(..).map(|stroke| stroke.len()).sum::<usize>();
+        self.kept -= self
+            .undone
+            .drain(..)
+            .map(|stroke| stroke.len())
+            .sum::<usize>();
         self.done.push_back(Vec::new());
         self.forget();
     }
@@ -47,7 +57,9 @@ impl<K: Key, V> History<K, V> {
     /// Keeps the value of `key` as it is before it changes, unless this stroke changed it already. Before the first stroke
     /// nothing is kept; a stroke too long to be kept can not be undone, nor those before it.
     pub fn note(&mut self, key: K, before: impl FnOnce() -> V) {
-        let Some(stroke) = self.done.back_mut() else { return };
+        let Some(stroke) = self.done.back_mut() else {
+            return;
+        };
         if self.noted.insert_with(key, || ()).1 {
             stroke.push((key, before()));
             self.kept += 1;
@@ -59,7 +71,9 @@ impl<K: Key, V> History<K, V> {
 
     fn forget(&mut self) {
         while self.kept > self.room || self.done.len() > MOST_STROKES {
-            let Some(oldest) = self.done.pop_front() else { return };
+            let Some(oldest) = self.done.pop_front() else {
+                return;
+            };
             self.kept -= oldest.len();
         }
     }
@@ -75,7 +89,11 @@ impl<K: Key, V> History<K, V> {
     }
 
     /// [`Self::undo`] or [`Self::redo`].
-    pub(in crate::reconstruct) fn exchange(&mut self, direction: Direction, swap: impl FnMut(K, &mut V)) -> bool {
+    pub(in crate::reconstruct) fn exchange(
+        &mut self,
+        direction: Direction,
+        swap: impl FnMut(K, &mut V),
+    ) -> bool {
         match direction {
             Direction::Undo => self.undo(swap),
             Direction::Redo => self.redo(swap),
@@ -85,8 +103,13 @@ impl<K: Key, V> History<K, V> {
     /// Undoes the last stroke, the last change first: `swap` exchanges what is kept with what is there. Returns whether
     /// there was one.
     pub fn undo(&mut self, mut swap: impl FnMut(K, &mut V)) -> bool {
-        let Some(mut stroke) = self.done.pop_back() else { return false };
-        stroke.iter_mut().rev().for_each(|(key, value)| swap(*key, value));
+        let Some(mut stroke) = self.done.pop_back() else {
+            return false;
+        };
+        stroke
+            .iter_mut()
+            .rev()
+            .for_each(|(key, value)| swap(*key, value));
         self.undone.push(stroke);
         self.noted.clear();
         true
@@ -94,7 +117,9 @@ impl<K: Key, V> History<K, V> {
 
     /// Does again what was undone last. Returns whether there was anything.
     pub fn redo(&mut self, mut swap: impl FnMut(K, &mut V)) -> bool {
-        let Some(mut stroke) = self.undone.pop() else { return false };
+        let Some(mut stroke) = self.undone.pop() else {
+            return false;
+        };
         stroke.iter_mut().for_each(|(key, value)| swap(*key, value));
         self.noted = stroke.iter().map(|(key, _)| *key).collect();
         self.done.push_back(stroke);
@@ -127,7 +152,10 @@ mod tests {
             assert!(history.undo(|key, value| std::mem::swap(&mut values[key as usize], value)));
             assert_eq!(values, *state);
         }
-        assert!(!history.undo(|_, _| ()), "what came before the first stroke stays");
+        assert!(
+            !history.undo(|_, _| ()),
+            "what came before the first stroke stays"
+        );
         for state in &states[1..] {
             assert!(history.redo(|key, value| std::mem::swap(&mut values[key as usize], value)));
             assert_eq!(values, *state);
@@ -147,7 +175,10 @@ mod tests {
         assert_eq!((history.len(), history.kept), (2, 8));
         history.begin();
         (0..11).for_each(|i| history.note(i, || ()));
-        assert!(history.is_empty() && history.kept == 0, "too long to be kept");
+        assert!(
+            history.is_empty() && history.kept == 0,
+            "too long to be kept"
+        );
         (0..11).for_each(|i| history.note(100 + i, || ()));
         assert_eq!(history.kept, 0, "nor its remainder");
     }

@@ -88,7 +88,10 @@ impl PatcherParams {
 
     /// When contacts are rejected.
     fn gate(&self) -> Option<GateParams> {
-        self.uncertainty.map(|known| GateParams { sigmas: known.gate_sigmas, window_ns: self.window_ns() })
+        self.uncertainty.map(|known| GateParams {
+            sigmas: known.gate_sigmas,
+            window_ns: self.window_ns(),
+        })
     }
 
     /// How well the scan is known; a scan free of noise is no better than touches that contradict it.
@@ -101,7 +104,12 @@ impl PatcherParams {
     ///
     /// # Errors
     /// [`SettingError`] for sizes of which no tip can be made.
-    pub fn for_tip(shape: TipShape, radius: f64, stiffness: Option<f64>, noise: f64) -> Result<Self, SettingError> {
+    pub fn for_tip(
+        shape: TipShape,
+        radius: f64,
+        stiffness: Option<f64>,
+        noise: f64,
+    ) -> Result<Self, SettingError> {
         let mut params = Self::new(TipBody::new(shape, radius)?.scale(), stiffness, noise);
         (params.touches.shape, params.touches.radius) = (shape, radius);
         Ok(params)
@@ -110,7 +118,11 @@ impl PatcherParams {
     /// Refuses a lattice so fine that what a few contacts need does not fit: nothing is built before.
     fn check_cost(&self) -> Result<(), SettingError> {
         let around = format!("one contact of a tip of {} mm", self.evidence.radius * 1e3);
-        self.check_nodes(nodes_around_contact(self.evidence.radius, self.pitch()), MOST_NODES, &around)
+        self.check_nodes(
+            nodes_around_contact(self.evidence.radius, self.pitch()),
+            MOST_NODES,
+            &around,
+        )
     }
 
     /// Refuses a lattice of more than `most` nodes.
@@ -123,7 +135,12 @@ impl PatcherParams {
             self.tolerance * (nodes / most).cbrt().powi(2) * 1e3,
             nodes * NODE_BYTES * 1e-9,
         );
-        SettingError::check("patch.tolerance_mm", self.tolerance * 1e3, nodes <= most, &why)
+        SettingError::check(
+            "patch.tolerance_mm",
+            self.tolerance * 1e3,
+            nodes <= most,
+            &why,
+        )
     }
 
     /// # Errors
@@ -131,12 +148,22 @@ impl PatcherParams {
     pub fn check(&self) -> Result<(), SettingError> {
         let radius = self.evidence.radius;
         let is_tip = radius >= SMALLEST_TIP;
-        SettingError::check("tip.radius_mm", radius * 1e3, is_tip, "0.01 or more where there is a patch")?;
-        PatchParams { tolerance: Some(self.tolerance) }.check()?;
+        SettingError::check(
+            "tip.radius_mm",
+            radius * 1e3,
+            is_tip,
+            "0.01 or more where there is a patch",
+        )?;
+        PatchParams {
+            tolerance: Some(self.tolerance),
+        }
+        .check()?;
         self.check_cost()?;
         let noise = self.uncertainty.map_or(0.0, |known| known.scan);
         SettingError::check("scan.noise_mm", noise * 1e3, noise >= 0.0, "0 to 1000 mm")?;
-        self.uncertainty.iter().try_for_each(UncertaintyParams::check)
+        self.uncertainty
+            .iter()
+            .try_for_each(UncertaintyParams::check)
     }
 }
 
@@ -200,7 +227,11 @@ impl LivePatch {
     fn take_changes(&mut self) -> (GridChanges, GridChanges) {
         let changes = std::mem::take(&mut self.changes);
         self.late.extend(&changes);
-        if changes.is_empty() { (changes, self.take_late()) } else { (changes, GridChanges::default()) }
+        if changes.is_empty() {
+            (changes, self.take_late())
+        } else {
+            (changes, GridChanges::default())
+        }
     }
 
     /// What was taken in only nearby.
@@ -238,9 +269,16 @@ impl Patcher {
         let calibration = params.uncertainty.map(|known| known.calibration);
         let body = TipBody::new(params.touches.shape, params.touches.radius)?;
         Ok(Self {
-            finder: TouchFinder::new(TouchFinderParams { calibration, ..params.touches })?,
+            finder: TouchFinder::new(TouchFinderParams {
+                calibration,
+                ..params.touches
+            })?,
             history: TouchHistory {
-                contacts: ContactMap::new(CONTACT_CELL * radius, params.evidence.field.reach, params.gate()),
+                contacts: ContactMap::new(
+                    CONTACT_CELL * radius,
+                    params.evidence.field.reach,
+                    params.gate(),
+                ),
                 free_space: FreeSpace::new(body, SWEPT_CELL * radius, 5.0 / 3.0 * radius),
                 probed: ProbedLog::new(params.ball()),
                 stroke_log: StrokeLog::default(),
@@ -264,9 +302,23 @@ impl Patcher {
 
     /// A copy of the touch history, without the state of a mesh that follows: it may go on with another scan of the part.
     pub fn copy(&self) -> Self {
-        let Self { params, finder, history, .. } = self;
-        let history = TouchHistory { bounds: None, ..history.clone() };
-        Self { params: *params, finder: finder.clone(), history, live: None, is_closed: None }
+        let Self {
+            params,
+            finder,
+            history,
+            ..
+        } = self;
+        let history = TouchHistory {
+            bounds: None,
+            ..history.clone()
+        };
+        Self {
+            params: *params,
+            finder: finder.clone(),
+            history,
+            live: None,
+            is_closed: None,
+        }
     }
 
     /// The settings.
@@ -277,7 +329,9 @@ impl Patcher {
     /// Takes the next sample, which is later than the one before. It counts once the smoothing window around it
     /// is complete.
     pub fn push(&mut self, sample: &ContactSample) {
-        self.finder.push(sample, |touch| keep(&mut self.history, &self.params, &touch));
+        self.finder.push(sample, |touch| {
+            keep(&mut self.history, &self.params, &touch)
+        });
     }
 
     /// Refuses to reconstruct what was touched so far by a lattice that would not fit, before any of it is made.
@@ -287,7 +341,8 @@ impl Patcher {
     pub fn check_extent(&self) -> Result<(), SettingError> {
         let means = self.history.contacts.means().iter().map(|mean| mean.point);
         let nodes = nodes_around_contacts(means, self.params.evidence.radius, self.params.pitch());
-        self.params.check_nodes(nodes, MOST_NODES_IN_ALL, "all that was touched")
+        self.params
+            .check_nodes(nodes, MOST_NODES_IN_ALL, "all that was touched")
     }
 
     /// The touches themselves, in order of time.
@@ -302,7 +357,8 @@ impl Patcher {
 
     /// Takes in what is still in the smoothing window: the stream has ended or pauses.
     pub fn flush(&mut self) {
-        self.finder.flush(|touch| keep(&mut self.history, &self.params, &touch));
+        self.finder
+            .flush(|touch| keep(&mut self.history, &self.params, &touch));
     }
 
     /// How many strokes can be undone. A stroke is what was touched without a pause of a tenth of a second, and where the
@@ -343,7 +399,12 @@ impl Patcher {
     ///
     /// - `until_ns`: stamp of the last sample of either: what that mesh shows up to there goes.
     pub fn take_over(&mut self, before: Self, until_ns: i64) {
-        let Self { live, is_closed, history: TouchHistory { bounds, .. }, .. } = before;
+        let Self {
+            live,
+            is_closed,
+            history: TouchHistory { bounds, .. },
+            ..
+        } = before;
         self.live = live.map(|live| LivePatch {
             remesh: live.remesh,
             published: live.published,
@@ -376,10 +437,15 @@ impl Patcher {
         let kept = KeptDetail::of(&self.evidence(scan, tree, None));
         let (remesh, Renewed { mut patch, .. }) = self.remeshed(scan, tree, kept.as_ref());
         let (known, _) = self.coarsen(&mut patch, &remesh, kept.as_ref(), (scan, tree));
-        let (base, moved) = kept.map_or_else(|| (scan.clone(), Vec::new()), |kept| (kept.scan, kept.moved));
+        let (base, moved) = kept.map_or_else(
+            || (scan.clone(), Vec::new()),
+            |kept| (kept.scan, kept.moved),
+        );
         let (mesh, ids) = patch.applied_to(base)?;
         let mut support = vec![Support::Scan; mesh.vertex_slots()];
-        moved.iter().for_each(|&(vertex, known)| support[vertex.0 as usize] = known);
+        moved
+            .iter()
+            .for_each(|&(vertex, known)| support[vertex.0 as usize] = known);
         for (known, id) in known.into_iter().zip(ids) {
             if let Some(id) = id {
                 support[id.0 as usize] = known;
@@ -388,7 +454,11 @@ impl Patcher {
         if let Some(radius) = self.params.ball() {
             mark_unreachable(&mesh, &mut support, &self.history.free_space, radius)?;
         }
-        let places = mesh.positions().iter().copied().zip(support.iter().copied());
+        let places = mesh
+            .positions()
+            .iter()
+            .copied()
+            .zip(support.iter().copied());
         let sigma = self.sigma(scan, tree, places);
         Ok(Patched {
             mesh,
@@ -406,18 +476,42 @@ impl Patcher {
     ///
     /// - `scan`, `tree`: as in [`Self::patched`].
     /// - `places`: vertices of the patch, m, in O, and what each rests on.
-    pub fn sigma_at(&mut self, scan: &TriMesh, tree: &FaceTree, places: &[(Point3<f64>, Support)]) -> Vec<f64> {
+    pub fn sigma_at(
+        &mut self,
+        scan: &TriMesh,
+        tree: &FaceTree,
+        places: &[(Point3<f64>, Support)],
+    ) -> Vec<f64> {
         self.history.contacts.note_all();
         self.update(scan, tree);
         self.sigma(scan, tree, places.iter().copied())
     }
 
     /// Standard deviation at each place, where the settings ask for it.
-    fn sigma(&self, scan: &TriMesh, tree: &FaceTree, places: impl Iterator<Item = (Point3<f64>, Support)>) -> Vec<f64> {
-        let Some(uncertainty) = &self.params.uncertainty else { return Vec::new() };
-        let evidence = Evidence { prior: None, ..self.evidence(scan, tree, None) };
+    fn sigma(
+        &self,
+        scan: &TriMesh,
+        tree: &FaceTree,
+        places: impl Iterator<Item = (Point3<f64>, Support)>,
+    ) -> Vec<f64> {
+        let Some(uncertainty) = &self.params.uncertainty else {
+            return Vec::new();
+        };
+        let evidence = Evidence {
+            prior: None,
+            ..self.evidence(scan, tree, None)
+        };
         let (window_ns, mut scratch) = (self.params.window_ns(), FieldScratch::default());
-        let mut of = |(p, support)| vertex_sigma(&evidence, &p, support, uncertainty.scan, window_ns, &mut scratch);
+        let mut of = |(p, support)| {
+            vertex_sigma(
+                &evidence,
+                &p,
+                support,
+                uncertainty.scan,
+                window_ns,
+                &mut scratch,
+            )
+        };
         places.map(&mut of).collect()
     }
 
@@ -439,14 +533,20 @@ impl Patcher {
         let delta = if live.is_outdated {
             let (remesh, renewed) = self.remeshed(scan, tree, None);
             (live.remesh, live.is_outdated) = (remesh, false);
-            live.published.take_all(renewed, CoarseBlocks::default(), &live.remesh, scan)
+            live.published
+                .take_all(renewed, CoarseBlocks::default(), &live.remesh, scan)
         } else {
             let evidence = self.evidence(scan, tree, None);
-            let renewed = live.remesh.renew(&evidence, &changes, &late, live.published.coarse());
+            let renewed = live
+                .remesh
+                .renew(&evidence, &changes, &late, live.published.coarse());
             live.published.take(&renewed, &live.remesh, scan)
         };
         self.live = Some(live);
-        PatchDelta { until_ns: self.history.until_ns, ..delta }
+        PatchDelta {
+            until_ns: self.history.until_ns,
+            ..delta
+        }
     }
 
     /// Each fourth time, brings the field up to date where changes count less, farther off than [`Self::renewed`] looks: to be called when
@@ -454,11 +554,14 @@ impl Patcher {
     ///
     /// - `scan`, `tree`: as there.
     pub fn renew_far(&mut self, scan: &TriMesh, tree: &FaceTree) {
-        let Some(mut live) = self.live.take() else { return };
+        let Some(mut live) = self.live.take() else {
+            return;
+        };
         live.since_late += 1;
         if live.since_late >= LATE_EVERY && !live.is_outdated {
             let late = live.take_late();
-            live.remesh.renew_far(&self.evidence(scan, tree, None), &late);
+            live.remesh
+                .renew_far(&self.evidence(scan, tree, None), &late);
         }
         self.live = Some(live);
     }
@@ -469,7 +572,8 @@ impl Patcher {
     /// It takes the time of a whole reconstruction.
     pub fn settled(&mut self, scan: &TriMesh, tree: &FaceTree) -> PatchDelta {
         let all = self.flushed(scan, tree);
-        let ((remesh, mut renewed), until_ns) = (all.remeshed(scan, tree, None), all.history.until_ns);
+        let ((remesh, mut renewed), until_ns) =
+            (all.remeshed(scan, tree, None), all.history.until_ns);
         let (_, coarse) = self.coarsen(&mut renewed.patch, &remesh, None, (scan, tree));
         let mut live = self.live.take().unwrap_or_default();
         (live.remesh, live.is_outdated) = (remesh, false);
@@ -498,9 +602,16 @@ impl Patcher {
         let moved = kept.iter().flat_map(|kept| &kept.moved);
         delta.vertices.extend(moved.map(|&(vertex, support)| {
             let key = VertexKey::Scan(vertex);
-            PatchVertex { key, position: base.position(vertex), support }
+            PatchVertex {
+                key,
+                position: base.position(vertex),
+                support,
+            }
         }));
-        PatchDelta { until_ns: all.history.until_ns, ..delta }
+        PatchDelta {
+            until_ns: all.history.until_ns,
+            ..delta
+        }
     }
 
     /// A copy that has taken in all touches so far, those in the smoothing window among them.
@@ -521,14 +632,36 @@ impl Patcher {
     }
 
     fn all_changes(&self) -> GridChanges {
-        let means = self.history.contacts.means().iter().map(|mean| mean.point).collect();
+        let means = self
+            .history
+            .contacts
+            .means()
+            .iter()
+            .map(|mean| mean.point)
+            .collect();
         let mut centres = Vec::new();
-        self.history.free_space.cover(|centre| centres.push(*centre));
+        self.history
+            .free_space
+            .cover(|centre| centres.push(*centre));
         GridChanges { means, centres }
     }
 
-    fn evidence<'a>(&'a self, scan: &'a TriMesh, tree: &'a FaceTree, agreement: Option<&'a Agreement>) -> Evidence<'a> {
-        let Self { history: TouchHistory { contacts, free_space, .. }, params, .. } = self;
+    fn evidence<'a>(
+        &'a self,
+        scan: &'a TriMesh,
+        tree: &'a FaceTree,
+        agreement: Option<&'a Agreement>,
+    ) -> Evidence<'a> {
+        let Self {
+            history:
+                TouchHistory {
+                    contacts,
+                    free_space,
+                    ..
+                },
+            params,
+            ..
+        } = self;
         Evidence {
             params: &params.evidence,
             contacts,
@@ -544,13 +677,28 @@ impl Patcher {
     /// The patch of everything, by the faces of the lattice.
     ///
     /// - `kept`: in place of the scan, where its detail is kept.
-    fn remeshed(&self, scan: &TriMesh, tree: &FaceTree, kept: Option<&KeptDetail>) -> (Remesh, Renewed) {
+    fn remeshed(
+        &self,
+        scan: &TriMesh,
+        tree: &FaceTree,
+        kept: Option<&KeptDetail>,
+    ) -> (Remesh, Renewed) {
         let evidence = match kept {
             None => self.evidence(scan, tree, None),
-            Some(KeptDetail { scan, tree, agreement, .. }) => self.evidence(scan, tree, Some(agreement)),
+            Some(KeptDetail {
+                scan,
+                tree,
+                agreement,
+                ..
+            }) => self.evidence(scan, tree, Some(agreement)),
         };
         let mut remesh = Remesh::new(lattice_of(self.params.pitch()));
-        let renewed = remesh.renew(&evidence, &self.all_changes(), &GridChanges::default(), &CoarseBlocks::default());
+        let renewed = remesh.renew(
+            &evidence,
+            &self.all_changes(),
+            &GridChanges::default(),
+            &CoarseBlocks::default(),
+        );
         (remesh, renewed)
     }
 
@@ -565,17 +713,29 @@ impl Patcher {
         scan: (&TriMesh, &FaceTree),
     ) -> (Vec<Support>, CoarseBlocks) {
         let of_moved = |key: &VertexKey| kept.and_then(|kept| kept.support(key));
-        let support = patch.vertices.iter().map(|(key, _)| of_moved(&key).unwrap_or_else(|| remesh.support(&key)));
+        let support = patch
+            .vertices
+            .iter()
+            .map(|(key, _)| of_moved(&key).unwrap_or_else(|| remesh.support(&key)));
         let support: Vec<Support> = support.collect();
         let scan = kept.map_or(scan, |kept| (&kept.scan, &kept.tree));
-        let coarse = coarsen(patch, &support, &remesh.grid.lattice, scan, self.params.tolerance);
+        let coarse = coarsen(
+            patch,
+            &support,
+            &remesh.grid.lattice,
+            scan,
+            self.params.tolerance,
+        );
         (support, coarse)
     }
 }
 
 /// What the tip does outside the region is not looked at.
 fn keep(history: &mut TouchHistory, params: &PatcherParams, touch: &TipTouch) {
-    if params.region.is_none_or(|region| region.contains(&touch.centre)) {
+    if params
+        .region
+        .is_none_or(|region| region.contains(&touch.centre))
+    {
         history.keep(touch);
     } else {
         history.note_until(touch.stamp_ns);
@@ -583,5 +743,8 @@ fn keep(history: &mut TouchHistory, params: &PatcherParams, touch: &TipTouch) {
 }
 
 fn lattice_of(pitch: f64) -> Lattice {
-    Lattice { origin: Point3::from(Vector3::from(ORIGIN) * pitch), pitch }
+    Lattice {
+        origin: Point3::from(Vector3::from(ORIGIN) * pitch),
+        pitch,
+    }
 }

@@ -49,7 +49,10 @@ pub(in crate::reconstruct) struct Renewed {
 impl Remesh {
     /// Nothing remeshed yet.
     pub fn new(lattice: Lattice) -> Self {
-        Self { grid: ReconstructionGrid::new(lattice), ..Self::default() }
+        Self {
+            grid: ReconstructionGrid::new(lattice),
+            ..Self::default()
+        }
     }
 
     /// Updates everything by the changes of `evidence`: as [`ReconstructionGrid::renew`].
@@ -64,7 +67,11 @@ impl Remesh {
     ) -> Renewed {
         let mut changed = self.grid.renew(evidence, changes, late);
         let (mut core, mut left) = self.take_pending();
-        for _ in 0..if evidence.is_closed { UNTIL_CLOSED } else { FURTHER } {
+        for _ in 0..if evidence.is_closed {
+            UNTIL_CLOSED
+        } else {
+            FURTHER
+        } {
             self.take_up(&changed, &mut core, &mut left);
             let renewed = self.grow(evidence, core, &left, coarse);
             let open = renewed.patch.open.iter().map(|open| open.beyond);
@@ -87,7 +94,10 @@ impl Remesh {
     }
 
     fn take_pending(&mut self) -> (CellBox, Vec<LatticeNode>) {
-        (std::mem::take(&mut self.pending), std::mem::take(&mut self.left))
+        (
+            std::mem::take(&mut self.pending),
+            std::mem::take(&mut self.left),
+        )
     }
 
     /// The support of a vertex: touched when most of the corners of its cell are near the surface that was; those on the scan are its own.
@@ -95,12 +105,30 @@ impl Remesh {
         let is_of_touch = |state: &NodeState| state.source == Source::Touch && !state.is_corner;
         let is_touched = |node: &LatticeNode| self.grid.nodes.get(node).is_some_and(is_of_touch);
         let touched = match *key {
-            VertexKey::Scan(_) | VertexKey::Trace { .. } | VertexKey::Pierce(..) => return Support::Scan,
-            VertexKey::Cell(cell, _) => (0..8).filter(|&corner| is_touched(&node_at(cell, corner))).count() >= 4,
-            VertexKey::Square(square, _) => square.corners().iter().filter(|node| is_touched(node)).count() >= 2,
+            VertexKey::Scan(_) | VertexKey::Trace { .. } | VertexKey::Pierce(..) => {
+                return Support::Scan;
+            }
+            VertexKey::Cell(cell, _) => {
+                (0..8)
+                    .filter(|&corner| is_touched(&node_at(cell, corner)))
+                    .count()
+                    >= 4
+            }
+            VertexKey::Square(square, _) => {
+                square
+                    .corners()
+                    .iter()
+                    .filter(|node| is_touched(node))
+                    .count()
+                    >= 2
+            }
             VertexKey::Edge(edge) => is_touched(&edge.node) || is_touched(&edge.end()),
         };
-        if touched { Support::Touched } else { Support::Guessed }
+        if touched {
+            Support::Touched
+        } else {
+            Support::Guessed
+        }
     }
 
     /// Takes cells into the region, or out of it, as the field has changed.
@@ -126,7 +154,10 @@ impl Remesh {
                 core.take_around(&cell, 1, 1);
             }
         }
-        changed.open.iter().for_each(|cell| core.take_around(cell, 1, 1));
+        changed
+            .open
+            .iter()
+            .for_each(|cell| core.take_around(cell, 1, 1));
     }
 
     /// Makes the faces around `core`, and takes cells into the region where they cannot be joined to the scan.
@@ -140,9 +171,18 @@ impl Remesh {
         coarse: &CoarseBlocks,
     ) -> Renewed {
         let mut renewed = self.contoured(evidence, core, left, coarse);
-        for _ in 0..if evidence.is_closed { UNTIL_CLOSED } else { GROWTH } {
+        for _ in 0..if evidence.is_closed {
+            UNTIL_CLOSED
+        } else {
+            GROWTH
+        } {
             let mut has_grown = false;
-            for open in renewed.patch.open.iter().filter(|open| open.is_scanned && self.grid.can_take(open.beyond)) {
+            for open in renewed
+                .patch
+                .open
+                .iter()
+                .filter(|open| open.is_scanned && self.grid.can_take(open.beyond))
+            {
                 has_grown |= self.region.insert_with(open.beyond, || ()).1;
                 self.wanted.remove(&open.beyond);
                 self.bounds.take(&open.beyond);
@@ -167,15 +207,31 @@ impl Remesh {
         coarse: &CoarseBlocks,
     ) -> Renewed {
         let whole = coarse.around(&core);
-        let Self { grid, region, bounds, crossings, .. } = self;
+        let Self {
+            grid,
+            region,
+            bounds,
+            crossings,
+            ..
+        } = self;
         let lattice = &grid.lattice;
         let (mut cells, around) = (left.to_vec(), whole.widened(2, 2));
         around.each_in(region, |cell, ()| cells.push(cell));
         let mut scanned = faces_near(lattice, cells.into_iter(), evidence.tree);
-        scanned.retain(|&face| !cells_around(lattice, evidence.scan, face).meet(&around).is_empty());
+        scanned.retain(|&face| {
+            !cells_around(lattice, evidence.scan, face)
+                .meet(&around)
+                .is_empty()
+        });
         let cut = Cut::of_faces(lattice, region, bounds, evidence.scan, &scanned);
         let values = grid.values_in(&whole.widened(1, 1));
-        let patch = contour_in(lattice, region, &whole, &values, &cut, |edge| crossings.at(grid, evidence, edge));
-        Renewed { core, patch, scanned }
+        let patch = contour_in(lattice, region, &whole, &values, &cut, |edge| {
+            crossings.at(grid, evidence, edge)
+        });
+        Renewed {
+            core,
+            patch,
+            scanned,
+        }
     }
 }

@@ -29,7 +29,10 @@ impl ReconstructionGrid {
         harmonic_fill(self, &at, &numbers, radius);
         let dropped = self.drop_floating_components(evidence, &at);
         if !dropped.is_empty() {
-            let known = at.iter().zip(was).map(|(&at, was)| (self.nodes.entry(at).0, was));
+            let known = at
+                .iter()
+                .zip(was)
+                .map(|(&at, was)| (self.nodes.entry(at).0, was));
             let mut before: EarlierStates = known.collect();
             for (node, was) in dropped.iter() {
                 before.insert_with(node, || *was);
@@ -56,10 +59,15 @@ impl ReconstructionGrid {
             }
         }
         let nodes = changed.nodes.iter().zip(turned);
-        let at_surface = nodes.filter(|(node, has_turned)| *has_turned || self.is_at_surface(&numbers, node));
+        let at_surface =
+            nodes.filter(|(node, has_turned)| *has_turned || self.is_at_surface(&numbers, node));
         changed.at_surface = at_surface.map(|(node, _)| *node).collect();
         // behind a closed scan the bottom is known
-        changed.open = if evidence.is_closed { Vec::new() } else { self.renew_open(&area, radius) };
+        changed.open = if evidence.is_closed {
+            Vec::new()
+        } else {
+            self.renew_open(&area, radius)
+        };
         changed
     }
 
@@ -72,12 +80,24 @@ impl ReconstructionGrid {
         };
         let here = is_material(*node);
         let beyond = (0..6).map(|i| stepped(*node, i / 2, if i % 2 == 0 { 2 } else { -2 }));
-        let is_other = |other: LatticeNode| is_material(other).is_some_and(|other| Some(other) != here);
-        CellBox { lo: *node, hi: *node }.widened(1, 1).iter().chain(beyond).any(is_other)
+        let is_other =
+            |other: LatticeNode| is_material(other).is_some_and(|other| Some(other) != here);
+        CellBox {
+            lo: *node,
+            hi: *node,
+        }
+        .widened(1, 1)
+        .iter()
+        .chain(beyond)
+        .any(is_other)
     }
 
     /// The nodes in `area` and their earlier state: of `before`, or the current one.
-    fn known_in(&self, area: &CellBox, before: &EarlierStates) -> (Vec<u32>, Vec<Option<NodeState>>) {
+    fn known_in(
+        &self,
+        area: &CellBox,
+        before: &EarlierStates,
+    ) -> (Vec<u32>, Vec<Option<NodeState>>) {
         let at = self.indices_in(area);
         let was = |&at: &u32| {
             let (node, state) = self.nodes.entry(at);
@@ -100,8 +120,12 @@ impl ReconstructionGrid {
         }
         for node in &floating_components {
             if let Some(state) = self.nodes.get_mut(node) {
-                (state.source, state.value, state.straight, state.touched_value) =
-                    (Source::Nothing, 0.0, (0.0, 0.0), None);
+                (
+                    state.source,
+                    state.value,
+                    state.straight,
+                    state.touched_value,
+                ) = (Source::Nothing, 0.0, (0.0, 0.0), None);
             }
         }
         dropped
@@ -114,7 +138,9 @@ impl ReconstructionGrid {
             area.each(|node| at.extend(self.nodes.index_of(&node)));
             at
         } else {
-            (0..self.nodes.len() as u32).filter(|&at| area.contains(&self.nodes.entry(at).0)).collect()
+            (0..self.nodes.len() as u32)
+                .filter(|&at| area.contains(&self.nodes.entry(at).0))
+                .collect()
         }
     }
 
@@ -128,6 +154,8 @@ impl ReconstructionGrid {
         let open = open_cells(self, reach);
         let old = std::mem::replace(&mut self.open, open);
         let gone = old.iter().filter(|(cell, ())| !self.open.contains(cell));
-        gone.chain(self.open.iter().filter(|(cell, ())| !old.contains(cell))).map(|(cell, ())| cell).collect()
+        gone.chain(self.open.iter().filter(|(cell, ())| !old.contains(cell)))
+            .map(|(cell, ())| cell)
+            .collect()
     }
 }

@@ -27,7 +27,9 @@ pub struct MarkerBody {
 impl Default for MarkerBody {
     /// Six LEDs around the handle, 120 to 180 mm above the ball: the stylus of the simulation.
     fn default() -> Self {
-        let markers_t = Self::STYLUS_MM.map(|place| Point3::from(place.map(|x| x * 1e-3))).to_vec();
+        let markers_t = Self::STYLUS_MM
+            .map(|place| Point3::from(place.map(|x| x * 1e-3)))
+            .to_vec();
         Self::new(markers_t).expect("six distinct markers that are not on one line")
     }
 }
@@ -54,20 +56,47 @@ impl MarkerBody {
     pub fn new(markers_t: Vec<Point3<f64>>) -> Result<Self, SettingError> {
         let count = markers_t.len();
         let fits = (3..=MOST_MARKERS).contains(&count);
-        SettingError::check("the number of markers.positions_mm", count as f64, fits, "3 to 16")?;
+        SettingError::check(
+            "the number of markers.positions_mm",
+            count as f64,
+            fits,
+            "3 to 16",
+        )?;
         for x in markers_t.iter().flat_map(|p| p.iter()) {
-            SettingError::check("markers.positions_mm", *x * 1e3, x.abs() <= 10.0, "-10000 to 10000 mm")?;
+            SettingError::check(
+                "markers.positions_mm",
+                *x * 1e3,
+                x.abs() <= 10.0,
+                "-10000 to 10000 mm",
+            )?;
         }
         let centroid_t = centroid(markers_t.iter().copied());
         let pairs = (0..count).flat_map(|i| (0..i).map(move |j| (i, j)));
-        let smallest_distance = pairs.map(|(i, j)| (markers_t[i] - markers_t[j]).norm()).fold(f64::MAX, f64::min);
+        let smallest_distance = pairs
+            .map(|(i, j)| (markers_t[i] - markers_t[j]).norm())
+            .fold(f64::MAX, f64::min);
         let [first, second_extent, _] = extents(markers_t.iter().copied());
         let apart = smallest_distance > 0.0;
-        SettingError::check("the smallest distance of markers.positions_mm", smallest_distance, apart, "more than 0")?;
+        SettingError::check(
+            "the smallest distance of markers.positions_mm",
+            smallest_distance,
+            apart,
+            "more than 0",
+        )?;
         let is_no_line = second_extent > FLAT_SHARE * first;
         let what = "the extent of markers.positions_mm beside their line, in m,";
-        SettingError::check(what, second_extent, is_no_line, "more: they must not be on one line")?;
-        Ok(Self { markers_t, centroid_t, smallest_distance, second_extent })
+        SettingError::check(
+            what,
+            second_extent,
+            is_no_line,
+            "more: they must not be on one line",
+        )?;
+        Ok(Self {
+            markers_t,
+            centroid_t,
+            smallest_distance,
+            second_extent,
+        })
     }
 
     /// Each marker, m, in T.
@@ -82,7 +111,9 @@ impl MarkerBody {
 
     /// Whether these markers hold the body in all six directions: three that are not on a line.
     pub(super) fn is_held_by(&self, pairs: &MarkerPairs) -> bool {
-        pairs.len() >= 3 && extents(pairs.iter().map(|&(i, _)| self.markers_t[i]))[1] > LINE_SHARE * self.second_extent
+        pairs.len() >= 3
+            && extents(pairs.iter().map(|&(i, _)| self.markers_t[i]))[1]
+                > LINE_SHARE * self.second_extent
     }
 
     /// The pose of T in O with the least squares of distances between markers and their measured places
@@ -90,14 +121,28 @@ impl MarkerBody {
     pub(super) fn fit(&self, pairs: &MarkerPairs) -> Option<Isometry3<f64>> {
         let from = centroid(pairs.iter().map(|&(i, _)| self.markers_t[i]));
         let to = centroid(pairs.iter().map(|&(_, m)| m));
-        let spread: Matrix3<f64> = pairs.iter().map(|&(i, m)| (self.markers_t[i] - from) * (m - to).transpose()).sum();
+        let spread: Matrix3<f64> = pairs
+            .iter()
+            .map(|&(i, m)| (self.markers_t[i] - from) * (m - to).transpose())
+            .sum();
         let svd = spread.svd(true, true);
         let (u, v) = (svd.u?, svd.v_t?.transpose());
-        let handed = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, (v * u.transpose()).determinant().signum()));
-        let rotation =
-            UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(v * handed * u.transpose()));
+        let handed = Matrix3::from_diagonal(&Vector3::new(
+            1.0,
+            1.0,
+            (v * u.transpose()).determinant().signum(),
+        ));
+        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(
+            v * handed * u.transpose(),
+        ));
         let pose_ot = Isometry3::from_parts((to - rotation * from).into(), rotation);
-        pose_ot.translation.vector.iter().chain(&rotation.coords).all(|x| x.is_finite()).then_some(pose_ot)
+        pose_ot
+            .translation
+            .vector
+            .iter()
+            .chain(&rotation.coords)
+            .all(|x| x.is_finite())
+            .then_some(pose_ot)
     }
 
     /// The pose at which most of the seen markers, and at least three, are within `gate` of a marker of the body, and
@@ -105,12 +150,18 @@ impl MarkerBody {
     ///
     /// Every three markers are tried in turn, each identified by its label, so that swapped labels and outliers
     /// are outvoted.
-    pub(super) fn acquire(&self, seen: &[MarkerObservation], gate: f64) -> Option<(Isometry3<f64>, Matches)> {
+    pub(super) fn acquire(
+        &self,
+        seen: &[MarkerObservation],
+        gate: f64,
+    ) -> Option<(Isometry3<f64>, Matches)> {
         let mut best: Option<Matches> = None;
         for (i, a) in seen.iter().enumerate() {
             for (j, b) in seen[..i].iter().enumerate() {
                 for c in &seen[..j] {
-                    let Some(pose_ot) = self.pose_of_three([a, b, c], gate) else { continue };
+                    let Some(pose_ot) = self.pose_of_three([a, b, c], gate) else {
+                        continue;
+                    };
                     let matches = self.matched(&pose_ot, seen, gate);
                     if best.as_ref().is_none_or(|best| matches.beats(best)) {
                         best = Some(matches);
@@ -118,7 +169,8 @@ impl MarkerBody {
                 }
             }
         }
-        let matches = best.filter(|best| 2 * best.pairs().len() > seen.len() && self.is_held_by(best.pairs()))?;
+        let matches = best
+            .filter(|best| 2 * best.pairs().len() > seen.len() && self.is_held_by(best.pairs()))?;
         Some((self.fit(matches.pairs())?, matches))
     }
 
@@ -130,18 +182,28 @@ impl MarkerBody {
             return None;
         }
         let pose_ot = self.fit(&pairs)?;
-        pairs.iter().all(|&(i, m)| (pose_ot * self.markers_t[i] - m).norm() <= gate).then_some(pose_ot)
+        pairs
+            .iter()
+            .all(|&(i, m)| (pose_ot * self.markers_t[i] - m).norm() <= gate)
+            .then_some(pose_ot)
     }
 
     /// Which seen marker is which of the body at that pose: the labelled one when it is within `gate`, or else the one
     /// that is. Nothing else can be, for markers are farther apart than twice the gate.
-    pub(super) fn matched(&self, pose_ot: &Isometry3<f64>, seen: &[MarkerObservation], gate: f64) -> Matches {
+    pub(super) fn matched(
+        &self,
+        pose_ot: &Isometry3<f64>,
+        seen: &[MarkerObservation],
+        gate: f64,
+    ) -> Matches {
         let mut matches = Matches::new();
         for marker in seen {
             let distance = |i: &usize| (pose_ot * self.markers_t[*i] - marker.position).norm();
             let label = marker.label as usize;
             let is_right = |i: &usize| distance(i) <= gate;
-            let found = (label < self.markers_t.len()).then_some(label).filter(is_right);
+            let found = (label < self.markers_t.len())
+                .then_some(label)
+                .filter(is_right);
             match found.or_else(|| (0..self.markers_t.len()).find(is_right)) {
                 Some(i) => matches.add(i, marker.position, distance(&i), i != label),
                 None => matches.rejected += 1,
@@ -166,7 +228,13 @@ pub(super) struct Matches {
 impl Matches {
     fn new() -> Self {
         let pairs = [(0, Point3::origin()); MOST_MARKERS];
-        Self { pairs, distances: [0.0; MOST_MARKERS], count: 0, relabelled: 0, rejected: 0 }
+        Self {
+            pairs,
+            distances: [0.0; MOST_MARKERS],
+            count: 0,
+            relabelled: 0,
+            rejected: 0,
+        }
     }
 
     pub fn pairs(&self) -> &MarkerPairs {
@@ -188,7 +256,12 @@ impl Matches {
 
     /// More markers, or as many at less distance.
     fn beats(&self, other: &Self) -> bool {
-        let off = |matches: &Self| matches.distances[..matches.count].iter().map(|d| d * d).sum::<f64>();
+        let off = |matches: &Self| {
+            matches.distances[..matches.count]
+                .iter()
+                .map(|d| d * d)
+                .sum::<f64>()
+        };
         self.count > other.count || (self.count == other.count && off(self) < off(other))
     }
 }

@@ -85,15 +85,31 @@ impl MarkerFilter {
     /// [`SettingError`] naming the first setting outside its range.
     pub fn new(body: MarkerBody, params: MarkerParams) -> Result<Self, SettingError> {
         params.check_for(&body)?;
-        let order = SyncParams { reorder_ns: params.reorder_ns, capacity: HELD_FRAMES, ..SyncParams::default() };
+        let order = SyncParams {
+            reorder_ns: params.reorder_ns,
+            capacity: HELD_FRAMES,
+            ..SyncParams::default()
+        };
         let frames = Stream::new(HELD_FRAMES, params.reorder_ns.saturating_add(1));
-        Ok(Self { body, params, order, frames, tracked: None, counts: MarkerCounts::default() })
+        Ok(Self {
+            body,
+            params,
+            order,
+            frames,
+            tracked: None,
+            counts: MarkerCounts::default(),
+        })
     }
 
     /// Takes the next frame and gives the poses that no later frame can change to `each`, in order of time.
     pub fn push(&mut self, frame: &MarkerFrame, mut each: impl FnMut(StampedPose)) {
         self.frames.push(*frame, &self.order);
-        while self.frames.held.front().is_some_and(|frame| frame.stamp_ns <= self.frames.watermark) {
+        while self
+            .frames
+            .held
+            .front()
+            .is_some_and(|frame| frame.stamp_ns <= self.frames.watermark)
+        {
             self.step(&mut each);
         }
     }
@@ -127,13 +143,20 @@ impl MarkerFilter {
 
     /// Uses the earliest frame that is held.
     fn step(&mut self, each: &mut impl FnMut(StampedPose)) {
-        let Some(frame) = self.frames.held.front().copied() else { return };
+        let Some(frame) = self.frames.held.front().copied() else {
+            return;
+        };
         self.frames.pop();
         let before = self.tracked.take();
-        self.tracked = before.and_then(|before| self.follow(&before, &frame)).or_else(|| self.acquire(&frame));
+        self.tracked = before
+            .and_then(|before| self.follow(&before, &frame))
+            .or_else(|| self.acquire(&frame));
         match (&before, &self.tracked) {
             (Some(before), Some(now)) if now.motion.frames > 1 => self.give(before, now, each),
-            (_, Some(now)) => each(StampedPose { stamp_ns: now.stamp_ns, pose_ot: now.motion.pose_ot(&self.body) }),
+            (_, Some(now)) => each(StampedPose {
+                stamp_ns: now.stamp_ns,
+                pose_ot: now.motion.pose_ot(&self.body),
+            }),
             _ => {}
         }
         let count = match self.tracking() {
@@ -149,7 +172,11 @@ impl MarkerFilter {
         self.counts.relabelled += matches.relabelled;
         self.counts.rejected += matches.rejected;
         let motion = BodyMotion::at_rest(&self.body, &pose_ot);
-        Some(Tracked { stamp_ns: frame.stamp_ns, held_ns: frame.stamp_ns, motion })
+        Some(Tracked {
+            stamp_ns: frame.stamp_ns,
+            held_ns: frame.stamp_ns,
+            motion,
+        })
     }
 
     /// The body flown on to the frame and pulled by its markers; `None` when too little has held it for too long.
@@ -159,16 +186,36 @@ impl MarkerFilter {
         }
         let dt = frame.stamp_ns.saturating_sub(before.stamp_ns) as f64 * 1e-9;
         let mut motion = before.motion.fly(dt);
-        let matches = self.body.matched(&motion.pose_ot(&self.body), frame.seen(), self.params.gate);
+        let matches =
+            self.body
+                .matched(&motion.pose_ot(&self.body), frame.seen(), self.params.gate);
         self.counts.relabelled += matches.relabelled;
         self.counts.rejected += matches.rejected;
         let is_held = self.body.is_held_by(matches.pairs());
         // what has gone astray since the speed was last corrected is not taken for the speed of the last moment
-        let since_ns = if is_held { before.held_ns } else { before.stamp_ns };
+        let since_ns = if is_held {
+            before.held_ns
+        } else {
+            before.stamp_ns
+        };
         let since = frame.stamp_ns.saturating_sub(since_ns) as f64 * 1e-9;
-        motion.pull(&self.body, matches.pairs(), &self.params.spring, self.params.noise, since);
-        let held_ns = if is_held { frame.stamp_ns } else { before.held_ns };
-        Some(Tracked { stamp_ns: frame.stamp_ns, held_ns, motion })
+        motion.pull(
+            &self.body,
+            matches.pairs(),
+            &self.params.spring,
+            self.params.noise,
+            since,
+        );
+        let held_ns = if is_held {
+            frame.stamp_ns
+        } else {
+            before.held_ns
+        };
+        Some(Tracked {
+            stamp_ns: frame.stamp_ns,
+            held_ns,
+            motion,
+        })
     }
 
     /// Poses at the multiples of the period after one frame, up to the next.
@@ -178,9 +225,15 @@ impl MarkerFilter {
         let span = now.stamp_ns.saturating_sub(before.stamp_ns) as f64;
         let mut stamp_ns = (before.stamp_ns.div_euclid(period) + 1).saturating_mul(period);
         while stamp_ns <= now.stamp_ns {
-            let pose_ot = interpolated(&from, &to, stamp_ns.saturating_sub(before.stamp_ns) as f64 / span);
+            let pose_ot = interpolated(
+                &from,
+                &to,
+                stamp_ns.saturating_sub(before.stamp_ns) as f64 / span,
+            );
             each(StampedPose { stamp_ns, pose_ot });
-            let Some(next) = stamp_ns.checked_add(period) else { break };
+            let Some(next) = stamp_ns.checked_add(period) else {
+                break;
+            };
             stamp_ns = next;
         }
     }

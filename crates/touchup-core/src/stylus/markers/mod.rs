@@ -43,13 +43,24 @@ pub struct MarkerFrame {
 impl MarkerFrame {
     /// A frame without markers.
     pub fn new(stamp_ns: i64) -> Self {
-        let none = MarkerObservation { label: 0, position: Point3::origin() };
-        Self { stamp_ns, seen: [none; MOST_MARKERS], count: 0 }
+        let none = MarkerObservation {
+            label: 0,
+            position: Point3::origin(),
+        };
+        Self {
+            stamp_ns,
+            seen: [none; MOST_MARKERS],
+            count: 0,
+        }
     }
 
     /// Adds a marker; `false` when it is not finite, absurdly far or one too many, and not added.
     pub fn see(&mut self, marker: MarkerObservation) -> bool {
-        let fits = marker.position.iter().all(|x| x.abs() <= super::LARGEST_POSITION) && self.count < MOST_MARKERS;
+        let fits = marker
+            .position
+            .iter()
+            .all(|x| x.abs() <= super::LARGEST_POSITION)
+            && self.count < MOST_MARKERS;
         if fits {
             self.seen[self.count] = marker;
             self.count += 1;

@@ -71,7 +71,13 @@ pub(super) struct BodyMotion {
 impl BodyMotion {
     pub fn at_rest(body: &MarkerBody, pose_ot: &Isometry3<f64>) -> Self {
         let centroid = pose_ot * body.centroid_t();
-        Self { centroid, rotation: pose_ot.rotation, velocity: Vector3::zeros(), spin: Vector3::zeros(), frames: 1 }
+        Self {
+            centroid,
+            rotation: pose_ot.rotation,
+            velocity: Vector3::zeros(),
+            spin: Vector3::zeros(),
+            frames: 1,
+        }
     }
 
     pub fn pose_ot(&self, body: &MarkerBody) -> Isometry3<f64> {
@@ -83,12 +89,25 @@ impl BodyMotion {
     pub fn fly(&self, dt: f64) -> Self {
         let mut rotation = UnitQuaternion::from_scaled_axis(self.spin * dt) * self.rotation;
         rotation.renormalize();
-        Self { centroid: self.centroid + self.velocity * dt, rotation, ..*self }
+        Self {
+            centroid: self.centroid + self.velocity * dt,
+            rotation,
+            ..*self
+        }
     }
 
     /// Pulled by the seen markers after a flight of `dt` s.
-    pub fn pull(&mut self, body: &MarkerBody, pairs: &MarkerPairs, spring: &SpringParams, noise: f64, dt: f64) {
-        let Some(twist) = self.twist(body, pairs, noise) else { return };
+    pub fn pull(
+        &mut self,
+        body: &MarkerBody,
+        pairs: &MarkerPairs,
+        spring: &SpringParams,
+        noise: f64,
+        dt: f64,
+    ) {
+        let Some(twist) = self.twist(body, pairs, noise) else {
+            return;
+        };
         self.frames = self.frames.saturating_add(1);
         let (alpha, beta) = spring.gains(dt);
         // a body just found has no past: n frames in a row have the gains of a straight line through them
@@ -98,7 +117,10 @@ impl BodyMotion {
         let rate = (beta / dt.max(SHORTEST)).max(first_beta / dt.max(FIRST_SHORTEST));
         // markers that do not determine the pose give no velocity: the body flies on
         let rate = if body.is_held_by(pairs) { rate } else { 0.0 };
-        let (shift, turn) = (twist.fixed_rows::<3>(0).into_owned(), twist.fixed_rows::<3>(3).into_owned());
+        let (shift, turn) = (
+            twist.fixed_rows::<3>(0).into_owned(),
+            twist.fixed_rows::<3>(3).into_owned(),
+        );
         self.centroid += shift * alpha;
         self.rotation = UnitQuaternion::from_scaled_axis(turn * alpha) * self.rotation;
         self.velocity += shift * rate;
@@ -118,12 +140,17 @@ impl BodyMotion {
             for &(i, measured) in pairs {
                 let arm = arm(i);
                 let error = measured - (self.centroid + arm);
-                let left = error - (twist.fixed_rows::<3>(0) + twist.fixed_rows::<3>(3).cross(&arm));
-                let weight =
-                    if round == 0 { 1.0 } else { cauchy_weight(left.norm_squared() / (HALF_WEIGHT * noise).powi(2)) };
+                let left =
+                    error - (twist.fixed_rows::<3>(0) + twist.fixed_rows::<3>(3).cross(&arm));
+                let weight = if round == 0 {
+                    1.0
+                } else {
+                    cauchy_weight(left.norm_squared() / (HALF_WEIGHT * noise).powi(2))
+                };
                 add_mass(&mut mass, &arm, weight);
                 let torque = arm.cross(&error);
-                pull += Vector6::new(error.x, error.y, error.z, torque.x, torque.y, torque.z) * weight;
+                pull +=
+                    Vector6::new(error.x, error.y, error.z, torque.x, torque.y, torque.z) * weight;
             }
             twist = mass.cholesky()?.solve(&pull);
         }

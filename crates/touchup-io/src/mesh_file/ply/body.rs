@@ -21,15 +21,31 @@ pub(super) struct Body<'a> {
 
 impl<'a> Body<'a> {
     pub fn new(bytes: &'a [u8], header: &PlyHeader) -> Self {
-        let PlyHeader { encoding, end_of_line, lines, len, .. } = *header;
-        Self { bytes, encoding, end_of_line, at: len, lines }
+        let PlyHeader {
+            encoding,
+            end_of_line,
+            lines,
+            len,
+            ..
+        } = *header;
+        Self {
+            bytes,
+            encoding,
+            end_of_line,
+            at: len,
+            lines,
+        }
     }
 
     /// Refuses an element for whose rows there are not enough bytes: after this its count may be trusted for memory.
     pub fn check_count(&self, element: &Element) -> Result<(), Syntax> {
         let place = FilePlace::Line(element.line);
         if element.count > 0 && element.properties.is_empty() {
-            return Err(Syntax::unexpected(place, "properties of the element", "none"));
+            return Err(Syntax::unexpected(
+                place,
+                "properties of the element",
+                "none",
+            ));
         }
         let left = self.bytes.len().saturating_sub(self.at);
         let needed = element.count as u128 * element.shortest_row(self.encoding) as u128;
@@ -37,7 +53,12 @@ impl<'a> Body<'a> {
         if needed <= left as u128 + 1 {
             return Ok(());
         }
-        let defect = Defect::Length { what: element.name.clone() + " rows", count: element.count as u64, needed, left };
+        let defect = Defect::Length {
+            what: element.name.clone() + " rows",
+            count: element.count as u64,
+            needed,
+            left,
+        };
         Err(Syntax { place, defect })
     }
 
@@ -56,9 +77,13 @@ impl<'a> Body<'a> {
             for _ in 0..count {
                 let place = FilePlace::Byte(self.at as u64);
                 read_row(element, list, place, &mut row, |scalar| {
-                    let value = bytes.get(self.at..).and_then(|rest| scalar.value(rest, big));
+                    let value = bytes
+                        .get(self.at..)
+                        .and_then(|rest| scalar.value(rest, big));
                     self.at += scalar.size();
-                    value.ok_or_else(|| Syntax::ends(FilePlace::Byte(bytes.len() as u64), "the rest of a row"))
+                    value.ok_or_else(|| {
+                        Syntax::ends(FilePlace::Byte(bytes.len() as u64), "the rest of a row")
+                    })
                 })?;
                 take(&row, place)?;
             }
@@ -68,10 +93,16 @@ impl<'a> Body<'a> {
         for _ in 0..count {
             let line = std::iter::from_fn(|| lines.next()).find(|line| !line.is_empty());
             let place = FilePlace::Line(self.lines + lines.number());
-            let line =
-                line.ok_or_else(|| Syntax::ends(FilePlace::Line(self.lines + lines.number() + 1), "a row of numbers"))?;
+            let line = line.ok_or_else(|| {
+                Syntax::ends(
+                    FilePlace::Line(self.lines + lines.number() + 1),
+                    "a row of numbers",
+                )
+            })?;
             let mut words = line.split_ascii_whitespace();
-            read_row(element, list, place, &mut row, |_| number(words.next(), place))?;
+            read_row(element, list, place, &mut row, |_| {
+                number(words.next(), place)
+            })?;
             if let Some(word) = words.next() {
                 return Err(Syntax::unexpected(place, "the end of the line", word));
             }
@@ -84,26 +115,42 @@ impl<'a> Body<'a> {
 
     /// Three columns, multiplied by `scale`, of all rows of a binary element without lists; `None`, and nothing read, when it has lists, is
     /// ASCII, or the file ends before its last row.
-    pub fn fixed_rows(&mut self, element: &Element, columns: [usize; 3], scale: f64) -> Option<Vec<Point3<f64>>> {
+    pub fn fixed_rows(
+        &mut self,
+        element: &Element,
+        columns: [usize; 3],
+        scale: f64,
+    ) -> Option<Vec<Point3<f64>>> {
         let (mut offsets, mut len) = (Vec::new(), 0);
         for property in &element.properties {
-            let PlyKind::Scalar(scalar) = property.kind else { return None };
+            let PlyKind::Scalar(scalar) = property.kind else {
+                return None;
+            };
             offsets.push((len, scalar));
             len += scalar.size();
         }
         let end = self.at.checked_add(len.checked_mul(element.count)?)?;
-        let rows = self.bytes.get(self.at..end).filter(|_| self.encoding != Encoding::Ascii)?.chunks_exact(len);
+        let rows = self
+            .bytes
+            .get(self.at..end)
+            .filter(|_| self.encoding != Encoding::Ascii)?
+            .chunks_exact(len);
         self.at = end;
         let [x, y, z] = columns.map(|column| offsets[column]);
         let big = self.encoding == Encoding::Big;
-        let column =
-            |row: &[u8], (at, scalar): (usize, Scalar)| scale * scalar.value(&row[at..], big).unwrap_or(f64::NAN);
+        let column = |row: &[u8], (at, scalar): (usize, Scalar)| {
+            scale * scalar.value(&row[at..], big).unwrap_or(f64::NAN)
+        };
         // the types are known to the compiler in the two usual cases
         let point = |row, x, y, z| Point3::new(column(row, x), column(row, y), column(row, z));
         let of_type = |row, t| point(row, (x.0, t), (y.0, t), (z.0, t));
         Some(match [x.1, y.1, z.1] {
-            [Scalar::F32, Scalar::F32, Scalar::F32] => rows.map(|row| of_type(row, Scalar::F32)).collect(),
-            [Scalar::F64, Scalar::F64, Scalar::F64] => rows.map(|row| of_type(row, Scalar::F64)).collect(),
+            [Scalar::F32, Scalar::F32, Scalar::F32] => {
+                rows.map(|row| of_type(row, Scalar::F32)).collect()
+            }
+            [Scalar::F64, Scalar::F64, Scalar::F64] => {
+                rows.map(|row| of_type(row, Scalar::F64)).collect()
+            }
             _ => rows.map(|row| point(row, x, y, z)).collect(),
         })
     }
@@ -112,17 +159,32 @@ impl<'a> Body<'a> {
     /// up to the first row that is not. Strips look the same and are left alone.
     pub fn triangles(&mut self, element: &Element) -> Vec<[u32; 3]> {
         const ROW: usize = 13;
-        let usual = |kind| matches!(kind, PlyKind::List { count: Scalar::U8, item: Scalar::I32 | Scalar::U32 });
-        let layout_is_usual = element.name == "face" && matches!(&element.properties[..], [only] if usual(only.kind));
+        let usual = |kind| {
+            matches!(
+                kind,
+                PlyKind::List {
+                    count: Scalar::U8,
+                    item: Scalar::I32 | Scalar::U32
+                }
+            )
+        };
+        let layout_is_usual =
+            element.name == "face" && matches!(&element.properties[..], [only] if usual(only.kind));
         if self.encoding != Encoding::Little || !layout_is_usual {
             return Vec::new();
         }
         let rows = self.bytes[self.at..].as_chunks::<ROW>().0;
         let rows = &rows[..element.count.min(rows.len())];
-        let rows = &rows[..rows.iter().position(|row| row[0] != 3).unwrap_or(rows.len())];
+        let rows = &rows[..rows
+            .iter()
+            .position(|row| row[0] != 3)
+            .unwrap_or(rows.len())];
         self.at += rows.len() * ROW;
-        let number = |row: &[u8; ROW], i| u32::from_le_bytes([row[i], row[i + 1], row[i + 2], row[i + 3]]);
-        rows.iter().map(|row| [number(row, 1), number(row, 5), number(row, 9)]).collect()
+        let number =
+            |row: &[u8; ROW], i| u32::from_le_bytes([row[i], row[i + 1], row[i + 2], row[i + 3]]);
+        rows.iter()
+            .map(|row| [number(row, 1), number(row, 5), number(row, 9)])
+            .collect()
     }
 }
 

@@ -37,12 +37,16 @@ pub(super) struct Element {
 impl Element {
     /// Column of a scalar property.
     pub fn scalar(&self, name: &str) -> Option<usize> {
-        self.properties.iter().position(|p| p.name == name && matches!(p.kind, PlyKind::Scalar(_)))
+        self.properties
+            .iter()
+            .position(|p| p.name == name && matches!(p.kind, PlyKind::Scalar(_)))
     }
 
     /// Column of a list property.
     pub fn list(&self, name: &str) -> Option<usize> {
-        self.properties.iter().position(|p| p.name == name && matches!(p.kind, PlyKind::List { .. }))
+        self.properties
+            .iter()
+            .position(|p| p.name == name && matches!(p.kind, PlyKind::List { .. }))
     }
 
     /// Bytes of the shortest row: every list empty; in ASCII a digit and a blank for each value.
@@ -79,7 +83,9 @@ impl PlyHeader {
             let place = FilePlace::Line(lines.number());
             let words: Vec<&str> = line.split_ascii_whitespace().collect();
             match words[..] {
-                _ if lines.number() == 1 && line != "ply" => return Err(Syntax::unexpected(place, "'ply'", &line)),
+                _ if lines.number() == 1 && line != "ply" => {
+                    return Err(Syntax::unexpected(place, "'ply'", &line));
+                }
                 [] | ["ply" | "comment" | "obj_info", ..] => {}
                 ["format", name, _] => encoding = Some(encoding_of(name, place)?),
                 ["element", name, _] if elements.iter().any(|e| e.name == name) => {
@@ -88,18 +94,35 @@ impl PlyHeader {
                 ["element", name, count] => elements.push(element(name, count, lines.number())?),
                 ["property", ref words @ ..] => {
                     let owner = elements.last_mut();
-                    let owner = owner.ok_or_else(|| Syntax::unexpected(place, "an element before it", &line))?;
+                    let owner = owner
+                        .ok_or_else(|| Syntax::unexpected(place, "an element before it", &line))?;
                     owner.properties.push(property(words, place)?);
                 }
                 ["end_header"] => {
-                    let encoding =
-                        encoding.ok_or_else(|| Syntax::unexpected(place, "a line 'format' before it", &line))?;
-                    return Ok(Self { encoding, elements, end_of_line, lines: lines.number(), len: lines.offset() });
+                    let encoding = encoding.ok_or_else(|| {
+                        Syntax::unexpected(place, "a line 'format' before it", &line)
+                    })?;
+                    return Ok(Self {
+                        encoding,
+                        elements,
+                        end_of_line,
+                        lines: lines.number(),
+                        len: lines.offset(),
+                    });
                 }
-                _ => return Err(Syntax::unexpected(place, "format, comment, element, property or end_header", &line)),
+                _ => {
+                    return Err(Syntax::unexpected(
+                        place,
+                        "format, comment, element, property or end_header",
+                        &line,
+                    ));
+                }
             }
         }
-        Err(Syntax::ends(FilePlace::Line(lines.number() + 1), "'ply' or the rest of the header up to 'end_header'"))
+        Err(Syntax::ends(
+            FilePlace::Line(lines.number() + 1),
+            "'ply' or the rest of the header up to 'end_header'",
+        ))
     }
 }
 
@@ -108,26 +131,51 @@ fn encoding_of(name: &str, place: FilePlace) -> Result<Encoding, Syntax> {
         "ascii" => Ok(Encoding::Ascii),
         "binary_little_endian" => Ok(Encoding::Little),
         "binary_big_endian" => Ok(Encoding::Big),
-        _ => Err(Syntax::unexpected(place, "ascii, binary_little_endian or binary_big_endian", name)),
+        _ => Err(Syntax::unexpected(
+            place,
+            "ascii, binary_little_endian or binary_big_endian",
+            name,
+        )),
     }
 }
 
 fn element(name: &str, count: &str, line: usize) -> Result<Element, Syntax> {
-    let count = count.parse().map_err(|_| Syntax::unexpected(FilePlace::Line(line), "how many there are", count))?;
-    Ok(Element { name: name.into(), count, properties: Vec::new(), line })
+    let count = count
+        .parse()
+        .map_err(|_| Syntax::unexpected(FilePlace::Line(line), "how many there are", count))?;
+    Ok(Element {
+        name: name.into(),
+        count,
+        properties: Vec::new(),
+        line,
+    })
 }
 
 fn scalar(name: &str, place: FilePlace) -> Result<Scalar, Syntax> {
-    Scalar::of_name(name).ok_or_else(|| Syntax::unexpected(place, "a type such as float or int", name))
+    Scalar::of_name(name)
+        .ok_or_else(|| Syntax::unexpected(place, "a type such as float or int", name))
 }
 
 fn property(words: &[&str], place: FilePlace) -> Result<Property, Syntax> {
     let (kind, name) = match *words {
-        ["list", count, item, name] => {
-            (PlyKind::List { count: scalar(count, place)?, item: scalar(item, place)? }, name)
-        }
+        ["list", count, item, name] => (
+            PlyKind::List {
+                count: scalar(count, place)?,
+                item: scalar(item, place)?,
+            },
+            name,
+        ),
         [kind, name] => (PlyKind::Scalar(scalar(kind, place)?), name),
-        _ => return Err(Syntax::unexpected(place, "type and name of a property", words.join(" "))),
+        _ => {
+            return Err(Syntax::unexpected(
+                place,
+                "type and name of a property",
+                words.join(" "),
+            ));
+        }
     };
-    Ok(Property { name: name.into(), kind })
+    Ok(Property {
+        name: name.into(),
+        kind,
+    })
 }

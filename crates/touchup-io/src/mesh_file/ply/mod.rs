@@ -97,17 +97,32 @@ fn position_columns(element: &Element) -> Result<[usize; 3], Syntax> {
     let mut columns = [0; 3];
     for (column, name) in columns.iter_mut().zip(["x", "y", "z"]) {
         *column = element.scalar(name).ok_or_else(|| {
-            Syntax::unexpected(FilePlace::Line(element.line), "a vertex with x, y and z", format!("no property {name}"))
+            Syntax::unexpected(
+                FilePlace::Line(element.line),
+                "a vertex with x, y and z",
+                format!("no property {name}"),
+            )
         })?;
     }
     Ok(columns)
 }
 
-fn read_polygons(body: &mut Body, element: &Element, soup: &mut Soup, cut: Triangulate) -> Result<(), Syntax> {
+fn read_polygons(
+    body: &mut Body,
+    element: &Element,
+    soup: &mut Soup,
+    cut: Triangulate,
+) -> Result<(), Syntax> {
     let list = VERTEX_LISTS
         .iter()
         .find_map(|name| element.list(name))
-        .ok_or_else(|| Syntax::unexpected(FilePlace::Line(element.line), "faces with a list vertex_indices", "none"))?;
+        .ok_or_else(|| {
+            Syntax::unexpected(
+                FilePlace::Line(element.line),
+                "faces with a list vertex_indices",
+                "none",
+            )
+        })?;
     let triangles = body.triangles(element);
     let rest = element.count - triangles.len();
     if soup.faces.is_empty() {
@@ -115,13 +130,19 @@ fn read_polygons(body: &mut Body, element: &Element, soup: &mut Soup, cut: Trian
     } else {
         soup.faces.extend(triangles);
     }
-    body.rows(element, rest, Some(list), |row, place| cut(row, place, &mut soup.faces))
+    body.rows(element, rest, Some(list), |row, place| {
+        cut(row, place, &mut soup.faces)
+    })
 }
 
 /// The vertices that three numbers name.
 fn triangle(corners: [f64; 3], place: FilePlace) -> Result<[u32; 3], Syntax> {
     let whole = corners.map(|number| number as u32);
-    match corners.into_iter().zip(whole).find(|(number, whole)| f64::from(*whole) != *number) {
+    match corners
+        .into_iter()
+        .zip(whole)
+        .find(|(number, whole)| f64::from(*whole) != *number)
+    {
         Some((number, _)) => Err(Syntax::unexpected(place, "a vertex number", number)),
         None => Ok(whole),
     }
@@ -162,10 +183,15 @@ pub(super) fn write(
         ColumnValues::Single(_) => "float",
         ColumnValues::Byte(_) => "uchar",
     };
-    let properties: String =
-        columns.iter().map(|column| format!("property {} {}\n", kind(&column.values), column.name)).collect();
-    let images: String =
-        texture.iter().flat_map(|texture| &texture.images).map(|name| format!("{IMAGE}{name}\n")).collect();
+    let properties: String = columns
+        .iter()
+        .map(|column| format!("property {} {}\n", kind(&column.values), column.name))
+        .collect();
+    let images: String = texture
+        .iter()
+        .flat_map(|texture| &texture.images)
+        .map(|name| format!("{IMAGE}{name}\n"))
+        .collect();
     let [coordinates, number] = OF_CORNERS;
     let of_faces = match texture {
         None => String::new(),
@@ -180,7 +206,9 @@ pub(super) fn write(
         soup.faces.len()
     )?;
     for (p, &id) in soup.positions.iter().zip(ids) {
-        p.coords.iter().try_for_each(|x| out.write_all(&x.to_le_bytes()))?;
+        p.coords
+            .iter()
+            .try_for_each(|x| out.write_all(&x.to_le_bytes()))?;
         columns.iter().try_for_each(|column| match &column.values {
             ColumnValues::Single(values) => out.write_all(&values[id].to_le_bytes()),
             ColumnValues::Byte(values) => out.write_all(&[values[id]]),
@@ -193,7 +221,10 @@ pub(super) fn write(
         }
         if let Some(texture) = texture {
             out.write_all(&[6])?;
-            texture.corners[at].as_flattened().iter().try_for_each(|x| out.write_all(&x.to_le_bytes()))?;
+            texture.corners[at]
+                .as_flattened()
+                .iter()
+                .try_for_each(|x| out.write_all(&x.to_le_bytes()))?;
             out.write_all(&texture.shown[at].to_le_bytes())?;
         }
     }

@@ -11,28 +11,53 @@ use crate::file_error::FilePlace;
 use crate::scalar::Scalar;
 
 /// Names of the colours, as programs write them; the fourth says how opaque they are.
-const COLOURS: [[&str; 4]; 2] =
-    [["red", "green", "blue", "alpha"], ["diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"]];
+const COLOURS: [[&str; 4]; 2] = [
+    ["red", "green", "blue", "alpha"],
+    [
+        "diffuse_red",
+        "diffuse_green",
+        "diffuse_blue",
+        "diffuse_alpha",
+    ],
+];
 /// … of the texture coordinates of vertices.
-const COORDINATES: [[&str; 2]; 4] = [["s", "t"], ["u", "v"], ["texture_u", "texture_v"], ["texture_s", "texture_t"]];
+const COORDINATES: [[&str; 2]; 4] = [
+    ["s", "t"],
+    ["u", "v"],
+    ["texture_u", "texture_v"],
+    ["texture_s", "texture_t"],
+];
 /// The triangles as [`read`] has them, and how they look.
 pub(in crate::mesh_file) fn read_painted(bytes: &[u8], scale: f64) -> Result<PaintedSoup, Syntax> {
     let header = PlyHeader::read(bytes)?;
     let element = |name: &str| header.elements.iter().find(|element| element.name == name);
-    let Some(vertex) = element("vertex") else { return Ok(PaintedSoup::default()) };
-    let colours = COLOURS.into_iter().find(|names| names[..3].iter().all(|name| vertex.scalar(name).is_some()));
-    let coordinates = COORDINATES.into_iter().find(|names| names.iter().all(|name| vertex.scalar(name).is_some()));
+    let Some(vertex) = element("vertex") else {
+        return Ok(PaintedSoup::default());
+    };
+    let colours = COLOURS
+        .into_iter()
+        .find(|names| names[..3].iter().all(|name| vertex.scalar(name).is_some()));
+    let coordinates = COORDINATES
+        .into_iter()
+        .find(|names| names.iter().all(|name| vertex.scalar(name).is_some()));
     let face = element("face").filter(|face| face.list(OF_CORNERS[0]).is_some());
     if colours.is_none() && coordinates.is_none() && face.is_none() {
         return Ok(PaintedSoup::default());
     }
     let ([r, g, b, a], [u, v]) = (colours.unwrap_or([""; 4]), coordinates.unwrap_or([""; 2]));
     let mut body = body_of(bytes, &header, "vertex")?;
-    let (positions, [r, g, b, a, u, v]) = read_vertices(&mut body, vertex, scale, [r, g, b, a, u, v])?;
+    let (positions, [r, g, b, a, u, v]) =
+        read_vertices(&mut body, vertex, scale, [r, g, b, a, u, v])?;
     let byte = |name: Option<&str>| {
-        let kind = name.and_then(|name| vertex.scalar(name)).map(|column| vertex.properties[column].kind);
+        let kind = name
+            .and_then(|name| vertex.scalar(name))
+            .map(|column| vertex.properties[column].kind);
         // 0 to 1 where they are no whole numbers
-        let full = if matches!(kind, Some(PlyKind::Scalar(Scalar::F32 | Scalar::F64))) { 255.0 } else { 1.0 };
+        let full = if matches!(kind, Some(PlyKind::Scalar(Scalar::F32 | Scalar::F64))) {
+            255.0
+        } else {
+            1.0
+        };
         move |value: f32| (value * full).round() as u8
     };
     let byte = byte(colours.map(|names| names[0]));
@@ -41,23 +66,44 @@ pub(in crate::mesh_file) fn read_painted(bytes: &[u8], scale: f64) -> Result<Pai
             let of = |i: usize| [r[i], g[i], b[i], a[i]].map(byte);
             Some(VertexColours::Rgba((0..r.len()).map(of).collect()))
         }
-        (Some(r), Some(g), Some(b), None) => {
-            Some(VertexColours::Rgb((0..r.len()).map(|i| [r[i], g[i], b[i]].map(byte)).collect()))
-        }
+        (Some(r), Some(g), Some(b), None) => Some(VertexColours::Rgb(
+            (0..r.len()).map(|i| [r[i], g[i], b[i]].map(byte)).collect(),
+        )),
         _ => None,
     };
     let images = images(&bytes[..header.len]);
     if let Some(face) = face {
         let (faces, texture) = read_corners(bytes, &header, face)?;
-        return Ok(PaintedSoup { positions, faces, colours, texture: Some(SoupTexture { images, ..texture }) });
+        return Ok(PaintedSoup {
+            positions,
+            faces,
+            colours,
+            texture: Some(SoupTexture { images, ..texture }),
+        });
     }
     let faces = read(bytes, scale)?.faces;
     let texture = u.zip(v).map(|(u, v)| {
-        let of = |&v_id: &u32| u.get(v_id as usize).zip(v.get(v_id as usize)).map_or([0.0; 2], |(&u, &v)| [u, v]);
-        let corners = faces.iter().map(|face| [of(&face[0]), of(&face[1]), of(&face[2])]).collect();
-        SoupTexture { corners, shown: vec![0; faces.len()], images }
+        let of = |&v_id: &u32| {
+            u.get(v_id as usize)
+                .zip(v.get(v_id as usize))
+                .map_or([0.0; 2], |(&u, &v)| [u, v])
+        };
+        let corners = faces
+            .iter()
+            .map(|face| [of(&face[0]), of(&face[1]), of(&face[2])])
+            .collect();
+        SoupTexture {
+            corners,
+            shown: vec![0; faces.len()],
+            images,
+        }
     });
-    Ok(PaintedSoup { positions, faces, colours, texture })
+    Ok(PaintedSoup {
+        positions,
+        faces,
+        colours,
+        texture,
+    })
 }
 
 /// The body, with all before the element `name` passed over.
@@ -74,13 +120,23 @@ fn body_of<'a>(bytes: &'a [u8], header: &PlyHeader, name: &str) -> Result<Body<'
 }
 
 /// Faces with the texture coordinates of their corners: each row once for either list, and once for the image.
-fn read_corners(bytes: &[u8], header: &PlyHeader, face: &Element) -> Result<(Vec<[u32; 3]>, SoupTexture), Syntax> {
+fn read_corners(
+    bytes: &[u8],
+    header: &PlyHeader,
+    face: &Element,
+) -> Result<(Vec<[u32; 3]>, SoupTexture), Syntax> {
     let body = || body_of(bytes, header, "face");
     let list = VERTEX_LISTS.iter().find_map(|name| face.list(name));
-    let list =
-        list.ok_or_else(|| Syntax::unexpected(FilePlace::Line(face.line), "faces with a list vertex_indices", "none"))?;
+    let list = list.ok_or_else(|| {
+        Syntax::unexpected(
+            FilePlace::Line(face.line),
+            "faces with a list vertex_indices",
+            "none",
+        )
+    })?;
     // of each triangle its row, and which corners of the polygon it has
-    let (mut faces, mut places, mut row_count, mut numbers) = (Vec::new(), Vec::new(), 0usize, Vec::new());
+    let (mut faces, mut places, mut row_count, mut numbers) =
+        (Vec::new(), Vec::new(), 0usize, Vec::new());
     body()?.rows(face, face.count, Some(list), |row, place| {
         fan(row, place, &mut faces)?;
         numbers.clear();
@@ -106,14 +162,33 @@ fn read_corners(bytes: &[u8], header: &PlyHeader, face: &Element) -> Result<(Vec
     }
     let corner = |row: usize, corner: u32| {
         let own = &values[starts[row]..starts[row + 1]];
-        own.get(2 * corner as usize..).and_then(|rest| rest.first_chunk()).copied().unwrap_or([0.0; 2])
+        own.get(2 * corner as usize..)
+            .and_then(|rest| rest.first_chunk())
+            .copied()
+            .unwrap_or([0.0; 2])
     };
-    let corners = places.iter().map(|&(row, corners)| corners.map(|at| corner(row, at))).collect();
-    let shown = places.iter().map(|&(row, _)| shown_by_row.get(row).copied().unwrap_or(0)).collect();
-    Ok((faces, SoupTexture { corners, shown, images: Vec::new() }))
+    let corners = places
+        .iter()
+        .map(|&(row, corners)| corners.map(|at| corner(row, at)))
+        .collect();
+    let shown = places
+        .iter()
+        .map(|&(row, _)| shown_by_row.get(row).copied().unwrap_or(0))
+        .collect();
+    Ok((
+        faces,
+        SoupTexture {
+            corners,
+            shown,
+            images: Vec::new(),
+        },
+    ))
 }
 
 fn images(header: &[u8]) -> Vec<String> {
     let text = String::from_utf8_lossy(header);
-    text.lines().filter_map(|line| line.trim().strip_prefix(IMAGE)).map(|name| name.trim().to_owned()).collect()
+    text.lines()
+        .filter_map(|line| line.trim().strip_prefix(IMAGE))
+        .map(|name| name.trim().to_owned())
+        .collect()
 }

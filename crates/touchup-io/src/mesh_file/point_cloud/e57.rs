@@ -17,13 +17,20 @@ pub(super) fn is_e57(bytes: &[u8]) -> bool {
 /// Reads the points of all scans in the frame of the file, each scan by its pose; coordinates are multiplied by `scale`. Points that the
 /// file calls invalid come out as NaN.
 pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
-    let foreign = |offset: u64| move |why: e57::Error| Syntax { place: FilePlace::Byte(offset), defect: defect(&why) };
+    let foreign = |offset: u64| {
+        move |why: e57::Error| Syntax {
+            place: FilePlace::Byte(offset),
+            defect: defect(&why),
+        }
+    };
     let mut reader = E57Reader::new(Cursor::new(bytes)).map_err(foreign(0))?;
     let mut cloud = PointCloud::default();
     for scan in reader.pointclouds() {
         check_count(scan.records, scan.file_offset, bytes.len())?;
         let first = cloud.positions.len();
-        let mut points = reader.pointcloud_simple(&scan).map_err(foreign(scan.file_offset))?;
+        let mut points = reader
+            .pointcloud_simple(&scan)
+            .map_err(foreign(scan.file_offset))?;
         points.intensity_to_color(false);
         for point in points {
             let position = match point.map_err(foreign(scan.file_offset))?.cartesian {
@@ -34,10 +41,17 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
         }
         let origin = scan.transform.as_ref().map(|pose| &pose.translation);
         let eye = origin.map(|at| Point3::new(at.x, at.y, at.z) * scale);
-        cloud.stations.push(ScanStation { points: cloud.positions.len() - first, eye, is_sure: eye.is_some() });
+        cloud.stations.push(ScanStation {
+            points: cloud.positions.len() - first,
+            eye,
+            is_sure: eye.is_some(),
+        });
     }
     match cloud.positions.is_empty() {
-        true => Err(Syntax { place: FilePlace::Byte(0), defect: Defect::NoPoints }),
+        true => Err(Syntax {
+            place: FilePlace::Byte(0),
+            defect: Defect::NoPoints,
+        }),
         false => Ok(cloud),
     }
 }
@@ -48,8 +62,16 @@ fn check_count(records: u64, offset: u64, len: usize) -> Result<(), Syntax> {
     if needed <= len as u128 {
         return Ok(());
     }
-    let defect = Defect::Length { what: "points".into(), count: records, needed, left: len };
-    Err(Syntax { place: FilePlace::Byte(offset), defect })
+    let defect = Defect::Length {
+        what: "points".into(),
+        count: records,
+        needed,
+        left: len,
+    };
+    Err(Syntax {
+        place: FilePlace::Byte(offset),
+        defect,
+    })
 }
 
 /// With what lies behind it, on one line.
@@ -60,7 +82,9 @@ fn defect(error: &e57::Error) -> Defect {
         reason = format!("{reason}: {source}");
         next = source.source();
     }
-    Defect::E57 { reason: reason.split_whitespace().collect::<Vec<_>>().join(" ") }
+    Defect::E57 {
+        reason: reason.split_whitespace().collect::<Vec<_>>().join(" "),
+    }
 }
 
 #[cfg(test)]
@@ -72,16 +96,29 @@ mod tests {
         let mut bytes = Cursor::new(Vec::new());
         let mut writer = E57Writer::new(&mut bytes, "file").unwrap();
         for pose in poses {
-            let records = vec![Record::CARTESIAN_X_F64, Record::CARTESIAN_Y_F64, Record::CARTESIAN_Z_F64];
+            let records = vec![
+                Record::CARTESIAN_X_F64,
+                Record::CARTESIAN_Y_F64,
+                Record::CARTESIAN_Z_F64,
+            ];
             let mut scan = writer.add_pointcloud("scan", records).unwrap();
             if let Some([x, y, z]) = *pose {
                 // a quarter of a turn about z
                 let half = 0.5f64.sqrt();
-                let rotation = Quaternion { w: half, x: 0.0, y: 0.0, z: half };
-                scan.set_transform(Some(Transform { rotation, translation: Translation { x, y, z } }));
+                let rotation = Quaternion {
+                    w: half,
+                    x: 0.0,
+                    y: 0.0,
+                    z: half,
+                };
+                scan.set_transform(Some(Transform {
+                    rotation,
+                    translation: Translation { x, y, z },
+                }));
             }
             for i in 0..3 {
-                scan.add_point([f64::from(i), 0.0, 1.0].map(RecordValue::Double).to_vec()).unwrap();
+                scan.add_point([f64::from(i), 0.0, 1.0].map(RecordValue::Double).to_vec())
+                    .unwrap();
             }
             scan.finalize().unwrap();
         }
@@ -93,13 +130,25 @@ mod tests {
     #[test]
     fn the_scans_of_a_file_come_together_by_their_poses() {
         let cloud = read(&file(&[None, Some([10.0, 0.0, 0.5])]), 2.0).unwrap();
-        let expected = [[0., 0., 2.], [2., 0., 2.], [4., 0., 2.], [20., 0., 3.], [20., 2., 3.], [20., 4., 3.]];
+        let expected = [
+            [0., 0., 2.],
+            [2., 0., 2.],
+            [4., 0., 2.],
+            [20., 0., 3.],
+            [20., 2., 3.],
+            [20., 4., 3.],
+        ];
         for (found, expected) in cloud.positions.iter().zip(expected) {
             assert!((found - Point3::from(expected)).norm() < 1e-12, "{found}");
         }
-        let [first, second] = cloud.stations[..] else { panic!("{cloud:?}") };
+        let [first, second] = cloud.stations[..] else {
+            panic!("{cloud:?}")
+        };
         assert_eq!((first.points, first.eye, second.points), (3, None, 3));
-        assert_eq!((second.eye, second.is_sure), (Some(Point3::new(20.0, 0.0, 1.0)), true));
+        assert_eq!(
+            (second.eye, second.is_sure),
+            (Some(Point3::new(20.0, 0.0, 1.0)), true)
+        );
     }
 
     #[test]
@@ -113,7 +162,10 @@ mod tests {
         damaged[100] ^= 1;
         for bytes in [&whole[..60], &whole[..1024], &damaged, &file(&[])] {
             let message = message(bytes);
-            assert!(message.contains("export it again") && !message.contains('\n'), "{message}");
+            assert!(
+                message.contains("export it again") && !message.contains('\n'),
+                "{message}"
+            );
         }
     }
 }

@@ -49,8 +49,16 @@ mod tests {
         assert_eq!(unpacked(&packed, text.len()), Some(text.to_vec()));
         assert_eq!(unpacked(&packed, text.len() - 1), None);
         assert_eq!(unpacked(&packed, text.len() + 1), None);
-        assert_eq!(unpacked(&[1 << 5, 0], 3), None, "nothing is before the start");
+        assert_eq!(
+            unpacked(&[1 << 5, 0], 3),
+            None,
+            "nothing is before the start"
+        );
         assert_eq!(unpacked(&[5, b'a'], 6), None, "the literals are cut off");
-        assert_eq!(unpacked(&[0, b'a', 7 << 5], 10), None, "the copy is cut off");
+        assert_eq!(
+            unpacked(&[0, b'a', 7 << 5], 10),
+            None,
+            "the copy is cut off"
+        );
     }
 }

@@ -56,9 +56,14 @@ pub(super) fn of_ply(positions: Vec<Point3<f64>>, normals: [Option<Vec<f32>>; 3]
     let normals = match normals {
         [Some(x), Some(y), Some(z)] => {
             let rows = x.into_iter().zip(y).zip(z);
-            rows.map(|((x, y), z)| Vector3::new(x, y, z).cast()).collect()
+            rows.map(|((x, y), z)| Vector3::new(x, y, z).cast())
+                .collect()
         }
         _ => Vec::new(),
     };
-    PointCloud { stations: vec![ScanStation::unknown(positions.len())], positions, normals }
+    PointCloud {
+        stations: vec![ScanStation::unknown(positions.len())],
+        positions,
+        normals,
+    }
 }

@@ -79,7 +79,9 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
     let mut cloud = PointCloud::default();
     // every point takes at least a byte, which is checked before anything is reserved
     let mut take = |row: [f64; 6], has_normals: bool| {
-        cloud.positions.push(Point3::new(row[0], row[1], row[2]) * scale);
+        cloud
+            .positions
+            .push(Point3::new(row[0], row[1], row[2]) * scale);
         if has_normals {
             cloud.normals.push(Vector3::new(row[3], row[4], row[5]));
         }
@@ -88,8 +90,15 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
         Some(Encoding::Ascii) => header.ascii(body, &columns, &mut take)?,
         Some(Encoding::Binary) => {
             header.check_length(body.len(), header.row_bytes())?;
-            let rows = body.chunks_exact(header.row_bytes()).take(header.points as usize);
-            rows.for_each(|row| take(columns.map(|c| value(row, c.offset, c.scalar)), columns[3].scalar.is_some()));
+            let rows = body
+                .chunks_exact(header.row_bytes())
+                .take(header.points as usize);
+            rows.for_each(|row| {
+                take(
+                    columns.map(|c| value(row, c.offset, c.scalar)),
+                    columns[3].scalar.is_some(),
+                )
+            });
         }
         _ => {
             let body = header.unpacked(body)?;
@@ -97,14 +106,24 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
             // all values of a field follow one another
             let place = |c: Column, at: usize| c.offset * points + at * c.step;
             (0..points).for_each(|at| {
-                take(columns.map(|c| value(&body, place(c, at), c.scalar)), columns[3].scalar.is_some());
+                take(
+                    columns.map(|c| value(&body, place(c, at), c.scalar)),
+                    columns[3].scalar.is_some(),
+                );
             });
         }
     }
     let is_grid = header.height > 1;
-    let eye = header.eye.or(is_grid.then(Point3::origin)).map(|eye| eye * scale);
+    let eye = header
+        .eye
+        .or(is_grid.then(Point3::origin))
+        .map(|eye| eye * scale);
     let is_sure = is_grid || eye.is_some_and(|eye| eye != Point3::origin());
-    cloud.stations = vec![ScanStation { points: cloud.positions.len(), eye, is_sure }];
+    cloud.stations = vec![ScanStation {
+        points: cloud.positions.len(),
+        eye,
+        is_sure,
+    }];
     Ok(cloud)
 }
 
@@ -138,14 +157,23 @@ impl PcdHeader {
             let words: Vec<&str> = words.collect();
             match key {
                 "FIELDS" | "COLUMNS" => {
-                    let field = |name: &&str| Field { name: (*name).into(), size: 4, kind: 'F', count: 1 };
+                    let field = |name: &&str| Field {
+                        name: (*name).into(),
+                        size: 4,
+                        kind: 'F',
+                        count: 1,
+                    };
                     header.fields = words.iter().map(field).collect();
                 }
-                "SIZE" => header.set(&words, place, |field, word| word.parse().map(|found| field.size = found).ok())?,
-                "TYPE" => header.set(&words, place, |field, word| word.parse().map(|found| field.kind = found).ok())?,
-                "COUNT" => {
-                    header.set(&words, place, |field, word| word.parse().map(|found| field.count = found).ok())?
-                }
+                "SIZE" => header.set(&words, place, |field, word| {
+                    word.parse().map(|found| field.size = found).ok()
+                })?,
+                "TYPE" => header.set(&words, place, |field, word| {
+                    word.parse().map(|found| field.kind = found).ok()
+                })?,
+                "COUNT" => header.set(&words, place, |field, word| {
+                    word.parse().map(|found| field.count = found).ok()
+                })?,
                 "WIDTH" => header.width = count(&words, place)?,
                 "HEIGHT" => header.height = count(&words, place)?,
                 "POINTS" => points = Some(count(&words, place)?),
@@ -158,10 +186,19 @@ impl PcdHeader {
                 }
                 "" | "VERSION" => {}
                 _ if key.starts_with('#') => {}
-                _ => return Err(Syntax::unexpected(place, "a line of a PCD header such as FIELDS or DATA", &line)),
+                _ => {
+                    return Err(Syntax::unexpected(
+                        place,
+                        "a line of a PCD header such as FIELDS or DATA",
+                        &line,
+                    ));
+                }
             }
         }
-        Err(Syntax::ends(FilePlace::Line(lines.number() + 1), "the rest of the header up to 'DATA'"))
+        Err(Syntax::ends(
+            FilePlace::Line(lines.number() + 1),
+            "the rest of the header up to 'DATA'",
+        ))
     }
 
     /// One word for each field.
@@ -174,11 +211,19 @@ impl PcdHeader {
         /// No field of a point is longer than that: a histogram has some hundred values.
         const MOST: usize = 1 << 16;
         if words.len() != self.fields.len() {
-            return Err(Syntax::unexpected(place, "one word for each of the FIELDS before it", words.join(" ")));
+            return Err(Syntax::unexpected(
+                place,
+                "one word for each of the FIELDS before it",
+                words.join(" "),
+            ));
         }
         for (field, word) in self.fields.iter_mut().zip(words) {
             if set(field, word).is_none() || field.size > 8 || field.count > MOST {
-                return Err(Syntax::unexpected(place, "a size of 1, 2, 4 or 8, a type F, I or U, or a count", word));
+                return Err(Syntax::unexpected(
+                    place,
+                    "a size of 1, 2, 4 or 8, a type F, I or U, or a count",
+                    word,
+                ));
             }
         }
         Ok(())
@@ -190,8 +235,17 @@ impl PcdHeader {
             (Some(grid), Some(points)) if grid == points || self.width == 0 => Ok(points),
             (Some(grid), None) => Ok(grid),
             _ => {
-                let found = format!("{} x {}, POINTS {}", self.width, self.height, points.unwrap_or_default());
-                Err(Syntax::unexpected(place, "POINTS to be WIDTH x HEIGHT", found))
+                let found = format!(
+                    "{} x {}, POINTS {}",
+                    self.width,
+                    self.height,
+                    points.unwrap_or_default()
+                );
+                Err(Syntax::unexpected(
+                    place,
+                    "POINTS to be WIDTH x HEIGHT",
+                    found,
+                ))
             }
         }
     }
@@ -199,7 +253,10 @@ impl PcdHeader {
     /// Where the values of [`NAMES`] are.
     fn columns(&self) -> Result<[Column; 6], Syntax> {
         let find = |name: &str| {
-            let at = self.fields.iter().position(|field| field.name == name && field.count > 0)?;
+            let at = self
+                .fields
+                .iter()
+                .position(|field| field.name == name && field.count > 0)?;
             let before = &self.fields[..at];
             let field = &self.fields[at];
             Some(Column {
@@ -209,12 +266,24 @@ impl PcdHeader {
                 scalar: field.scalar(),
             })
         };
-        let none = Column { index: usize::MAX, offset: 0, step: 0, scalar: None };
+        let none = Column {
+            index: usize::MAX,
+            offset: 0,
+            step: 0,
+            scalar: None,
+        };
         let mut columns = NAMES.map(|name| find(name).unwrap_or(none));
-        if let Some(at) = columns[..3].iter().position(|column| column.scalar.is_none()) {
+        if let Some(at) = columns[..3]
+            .iter()
+            .position(|column| column.scalar.is_none())
+        {
             let found = format!("no field {} of such a type", NAMES[at]);
             let place = FilePlace::Line(self.lines);
-            return Err(Syntax::unexpected(place, "fields x, y and z of type F, I or U and size 1 to 8", found));
+            return Err(Syntax::unexpected(
+                place,
+                "fields x, y and z of type F, I or U and size 1 to 8",
+                found,
+            ));
         }
         if columns[3..].iter().any(|column| column.scalar.is_none()) {
             columns[3..].fill(none);
@@ -232,11 +301,24 @@ impl PcdHeader {
         if needed <= left as u128 {
             return Ok(());
         }
-        let defect = Defect::Length { what: "points".into(), count: self.points, needed, left };
-        Err(Syntax { place: FilePlace::Byte(self.len as u64), defect })
+        let defect = Defect::Length {
+            what: "points".into(),
+            count: self.points,
+            needed,
+            left,
+        };
+        Err(Syntax {
+            place: FilePlace::Byte(self.len as u64),
+            defect,
+        })
     }
 
-    fn ascii(&self, body: &[u8], columns: &[Column; 6], take: &mut impl FnMut([f64; 6], bool)) -> Result<(), Syntax> {
+    fn ascii(
+        &self,
+        body: &[u8],
+        columns: &[Column; 6],
+        take: &mut impl FnMut([f64; 6], bool),
+    ) -> Result<(), Syntax> {
         let words_of_row: usize = self.fields.iter().map(|field| field.count).sum();
         // a digit and a blank each; the last line may lack its end
         self.check_length(body.len() + 1, 2 * words_of_row)?;
@@ -257,7 +339,10 @@ impl PcdHeader {
             if let Some(word) = words.next() {
                 return Err(Syntax::unexpected(place, "the end of the line", word));
             }
-            take(columns.map(|c| row.get(c.index).copied().unwrap_or(f64::NAN)), columns[3].scalar.is_some());
+            take(
+                columns.map(|c| row.get(c.index).copied().unwrap_or(f64::NAN)),
+                columns[3].scalar.is_some(),
+            );
         }
         Ok(())
     }
@@ -267,19 +352,41 @@ impl PcdHeader {
         let place = FilePlace::Byte(self.len as u64);
         let lengths = body.as_chunks::<4>().0;
         let [packed, plain, ..] = lengths else {
-            return Err(Syntax::ends(FilePlace::Byte((self.len + body.len()) as u64), "two lengths of 4 bytes"));
+            return Err(Syntax::ends(
+                FilePlace::Byte((self.len + body.len()) as u64),
+                "two lengths of 4 bytes",
+            ));
         };
-        let [packed_len, plain_len] = [packed, plain].map(|bytes| u64::from(u32::from_le_bytes(*bytes)));
+        let [packed_len, plain_len] =
+            [packed, plain].map(|bytes| u64::from(u32::from_le_bytes(*bytes)));
         let needed = u128::from(self.points) * self.row_bytes() as u128;
         if needed != u128::from(plain_len) {
             let found = format!("{plain_len} for {} points", self.points);
-            return Err(Syntax::unexpected(place, "the unpacked length that the header asks for", found));
+            return Err(Syntax::unexpected(
+                place,
+                "the unpacked length that the header asks for",
+                found,
+            ));
         }
         let packed = body[8..].get(..packed_len as usize).ok_or_else(|| {
             let (count, left) = (self.points, body.len() - 8);
-            Syntax { place, defect: Defect::Length { what: "points".into(), count, needed: packed_len.into(), left } }
+            Syntax {
+                place,
+                defect: Defect::Length {
+                    what: "points".into(),
+                    count,
+                    needed: packed_len.into(),
+                    left,
+                },
+            }
         })?;
-        let broken = || Syntax::unexpected(place, "points packed by LZF", "bytes that cannot be unpacked");
+        let broken = || {
+            Syntax::unexpected(
+                place,
+                "points packed by LZF",
+                "bytes that cannot be unpacked",
+            )
+        };
         if plain_len > packed_len.saturating_mul(lzf::MOST_EXPANSION) {
             return Err(broken());
         }
@@ -289,7 +396,8 @@ impl PcdHeader {
 
 fn count(words: &[&str], place: FilePlace) -> Result<u64, Syntax> {
     let word = words.first().copied().unwrap_or_default();
-    word.parse().map_err(|_| Syntax::unexpected(place, "how many there are", word))
+    word.parse()
+        .map_err(|_| Syntax::unexpected(place, "how many there are", word))
 }
 
 fn encoding(words: &[&str], place: FilePlace) -> Result<Encoding, Syntax> {
@@ -297,7 +405,11 @@ fn encoding(words: &[&str], place: FilePlace) -> Result<Encoding, Syntax> {
         ["ascii"] => Ok(Encoding::Ascii),
         ["binary"] => Ok(Encoding::Binary),
         ["binary_compressed"] => Ok(Encoding::Compressed),
-        _ => Err(Syntax::unexpected(place, "ascii, binary or binary_compressed", words.join(" "))),
+        _ => Err(Syntax::unexpected(
+            place,
+            "ascii, binary or binary_compressed",
+            words.join(" "),
+        )),
     }
 }
 
@@ -329,43 +441,96 @@ mod tests {
         let normal = [0.0f32, 0.6, 0.8].map(f32::to_le_bytes).concat();
         let ascii = header("ascii") + "1 9 9 9 2 3 0 .6 .8\n\nnan 9 9 9 5 6 0 .6 .8";
         let row = |(x, y, z): &(f32, f64, f32)| {
-            [&x.to_le_bytes()[..], &[9; 3], &y.to_le_bytes(), &z.to_le_bytes(), &normal].concat()
+            [
+                &x.to_le_bytes()[..],
+                &[9; 3],
+                &y.to_le_bytes(),
+                &z.to_le_bytes(),
+                &normal,
+            ]
+            .concat()
         };
-        let binary = [header("binary").into_bytes(), rows.iter().flat_map(row).collect()].concat();
+        let binary = [
+            header("binary").into_bytes(),
+            rows.iter().flat_map(row).collect(),
+        ]
+        .concat();
         // field by field, packed as literals alone: 32 at most in a run
         let mut plain: Vec<u8> = rows.iter().flat_map(|row| row.0.to_le_bytes()).collect();
         plain.extend([9; 6]);
         plain.extend(rows.iter().flat_map(|row| row.1.to_le_bytes()));
         plain.extend(rows.iter().flat_map(|row| row.2.to_le_bytes()));
-        plain.extend([0.0f32, 0.0, 0.6, 0.6, 0.8, 0.8].iter().flat_map(|x| x.to_le_bytes()));
-        let packed: Vec<u8> = plain.chunks(32).flat_map(|run| [&[run.len() as u8 - 1], run].concat()).collect();
-        let lengths = [packed.len() as u32, plain.len() as u32].map(u32::to_le_bytes).concat();
+        plain.extend(
+            [0.0f32, 0.0, 0.6, 0.6, 0.8, 0.8]
+                .iter()
+                .flat_map(|x| x.to_le_bytes()),
+        );
+        let packed: Vec<u8> = plain
+            .chunks(32)
+            .flat_map(|run| [&[run.len() as u8 - 1], run].concat())
+            .collect();
+        let lengths = [packed.len() as u32, plain.len() as u32]
+            .map(u32::to_le_bytes)
+            .concat();
         let compressed = [header("binary_compressed").into_bytes(), lengths, packed].concat();
         for file in [ascii.as_bytes(), &binary, &compressed] {
             let cloud = read(file, 1.0).unwrap_or_else(|e| panic!("{e:?}"));
             assert_eq!(cloud.positions[0], Point3::new(1.0, 2.0, 3.0));
             assert!(cloud.positions[1].x.is_nan());
             assert_eq!([cloud.positions[1].y, cloud.positions[1].z], [5.0, 6.0]);
-            assert!(cloud.normals.iter().all(|n| (n - Vector3::new(0.0, 0.6, 0.8)).norm() < 1e-7), "{cloud:?}");
-            let ScanStation { points, eye, is_sure } = cloud.stations[0];
-            assert_eq!((points, eye, is_sure), (2, Some(Point3::new(0.0, 0.0, 2.0)), true));
+            assert!(
+                cloud
+                    .normals
+                    .iter()
+                    .all(|n| (n - Vector3::new(0.0, 0.6, 0.8)).norm() < 1e-7),
+                "{cloud:?}"
+            );
+            let ScanStation {
+                points,
+                eye,
+                is_sure,
+            } = cloud.stations[0];
+            assert_eq!(
+                (points, eye, is_sure),
+                (2, Some(Point3::new(0.0, 0.0, 2.0)), true)
+            );
         }
     }
 
     #[test]
     fn a_header_that_claims_too_much_is_refused_before_memory_is_taken() {
         let small = |points: u64, data: &str| {
-            format!("FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {points}\nHEIGHT 1\nDATA {data}\n")
+            format!(
+                "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {points}\nHEIGHT 1\nDATA {data}\n"
+            )
         };
         let huge = 1 << 60;
-        assert!(message(small(huge, "ascii").as_bytes()).contains("the header announces 1152921504606846976 points"));
-        assert!(message(small(huge, "binary").as_bytes()).contains("the file is damaged or cut short"));
-        let packed =
-            [small(300_000_000, "binary_compressed").as_bytes(), &[1, 0, 0, 0], &3_600_000_000u32.to_le_bytes(), &[0]]
-                .concat();
-        assert_eq!(message(&packed), "byte 95: expected points packed by LZF, found 'bytes that cannot be unpacked'");
-        assert!(message(b"FIELDS x y z\nSIZE 4 4\nDATA ascii\n").starts_with("line 2: expected one word for each"));
-        assert!(message(b"FIELDS x y\nWIDTH 1\nDATA ascii\n1 2\n").contains("'no field z of such a type'"));
+        assert!(
+            message(small(huge, "ascii").as_bytes())
+                .contains("the header announces 1152921504606846976 points")
+        );
+        assert!(
+            message(small(huge, "binary").as_bytes()).contains("the file is damaged or cut short")
+        );
+        let packed = [
+            small(300_000_000, "binary_compressed").as_bytes(),
+            &[1, 0, 0, 0],
+            &3_600_000_000u32.to_le_bytes(),
+            &[0],
+        ]
+        .concat();
+        assert_eq!(
+            message(&packed),
+            "byte 95: expected points packed by LZF, found 'bytes that cannot be unpacked'"
+        );
+        assert!(
+            message(b"FIELDS x y z\nSIZE 4 4\nDATA ascii\n")
+                .starts_with("line 2: expected one word for each")
+        );
+        assert!(
+            message(b"FIELDS x y\nWIDTH 1\nDATA ascii\n1 2\n")
+                .contains("'no field z of such a type'")
+        );
         assert!(message(b"# .PCD\nFIELDS x y z\n").contains("up to 'DATA'"));
         assert_eq!(
             message(b"FIELDS x y z\nWIDTH 2\nDATA ascii\n1 2 3\n4 x 6\n"),

@@ -17,9 +17,15 @@ const UNIT_LENGTH: std::ops::RangeInclusive<f64> = 0.98..=1.02;
 /// normals where they are of length 1 in every line.
 pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
     let end_of_line = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
-    let mut lines = NumberedLines::new(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), end_of_line);
+    let mut lines = NumberedLines::new(
+        bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes),
+        end_of_line,
+    );
     let mut positions = Vec::with_capacity(bytes.len() / (4 * SHORTEST));
-    let mut normals = Normals { after_xyz: Some(Vec::new()), at_end: Some(Vec::new()) };
+    let mut normals = Normals {
+        after_xyz: Some(Vec::new()),
+        at_end: Some(Vec::new()),
+    };
     let mut row = Vec::new();
     while let Some(line) = lines.next() {
         if is_comment(&line) {
@@ -27,8 +33,14 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
         }
         let place = FilePlace::Line(lines.number());
         row.clear();
-        for word in line.split(|c: char| c.is_whitespace() || c == ',' || c == ';').filter(|word| !word.is_empty()) {
-            row.push(word.parse::<f64>().map_err(|_| Syntax::unexpected(place, "a number", word))?);
+        for word in line
+            .split(|c: char| c.is_whitespace() || c == ',' || c == ';')
+            .filter(|word| !word.is_empty())
+        {
+            row.push(
+                word.parse::<f64>()
+                    .map_err(|_| Syntax::unexpected(place, "a number", word))?,
+            );
         }
         match row[..] {
             [] => {}
@@ -41,15 +53,26 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
         }
     }
     if positions.is_empty() {
-        return Err(Syntax { place: FilePlace::Line(lines.number().max(1)), defect: Defect::NoPoints });
+        return Err(Syntax {
+            place: FilePlace::Line(lines.number().max(1)),
+            defect: Defect::NoPoints,
+        });
     }
     let stations = vec![ScanStation::unknown(positions.len())];
-    Ok(PointCloud { positions, normals: normals.found(), stations })
+    Ok(PointCloud {
+        positions,
+        normals: normals.found(),
+        stations,
+    })
 }
 
 /// A line that is none of numbers; "nan" and "inf" are numbers.
 fn is_comment(line: &str) -> bool {
-    let word = line.split(|c: char| !c.is_ascii_alphabetic()).next().unwrap_or_default().to_ascii_lowercase();
+    let word = line
+        .split(|c: char| !c.is_ascii_alphabetic())
+        .next()
+        .unwrap_or_default()
+        .to_ascii_lowercase();
     let is_number = ["", "nan", "inf", "infinity"].contains(&word.as_str());
     line.starts_with(['#', '/', '%', '!', '"', '\'']) || !is_number
 }
@@ -62,12 +85,19 @@ struct Normals {
 
 impl Normals {
     fn take(&mut self, row: &[f64]) {
-        let starts = [(&mut self.after_xyz, 3), (&mut self.at_end, row.len().saturating_sub(3).max(3))];
+        let starts = [
+            (&mut self.after_xyz, 3),
+            (&mut self.at_end, row.len().saturating_sub(3).max(3)),
+        ];
         for (normals, start) in starts {
             let normal = row.get(start..start + 3).map(Vector3::from_row_slice);
             match (normal, &mut *normals) {
                 // a point without a place may be without a normal
-                (Some(n), Some(found)) if UNIT_LENGTH.contains(&n.norm()) || !n.norm().is_finite() => found.push(n),
+                (Some(n), Some(found))
+                    if UNIT_LENGTH.contains(&n.norm()) || !n.norm().is_finite() =>
+                {
+                    found.push(n)
+                }
                 _ => *normals = None,
             }
         }
@@ -86,8 +116,13 @@ mod tests {
     fn numbers_are_read_with_any_separator_between_comments() {
         let text = "3\n# a cloud\n//x y z\nX,Y,Z\n1 2\t3\r\n\n4;5;6\n7, 8, nan\n-1e1,+.5,2.\n";
         let cloud = read(text.as_bytes(), 2.0).unwrap();
-        let [a, b, c, d] = cloud.positions[..] else { panic!("{cloud:?}") };
-        assert_eq!([a, b, d], [[2.0, 4.0, 6.0], [8.0, 10.0, 12.0], [-20.0, 1.0, 4.0]].map(Point3::from));
+        let [a, b, c, d] = cloud.positions[..] else {
+            panic!("{cloud:?}")
+        };
+        assert_eq!(
+            [a, b, d],
+            [[2.0, 4.0, 6.0], [8.0, 10.0, 12.0], [-20.0, 1.0, 4.0]].map(Point3::from)
+        );
         assert!(c.z.is_nan());
         assert!(cloud.normals.is_empty());
     }
@@ -95,8 +130,14 @@ mod tests {
     #[test]
     fn columns_of_length_one_are_normals_and_colours_are_not() {
         let normals = |text: &str| read(text.as_bytes(), 1.0).unwrap().normals;
-        assert_eq!(normals("0 0 0 0 0 1\n1 0 0 0 0.6 0.8\n"), [Vector3::z(), Vector3::new(0.0, 0.6, 0.8)]);
-        assert_eq!(normals("0 0 0 255 0 0 0 0 1\n1 0 0 9 9 9 0 1 0\n"), [Vector3::z(), Vector3::y()]);
+        assert_eq!(
+            normals("0 0 0 0 0 1\n1 0 0 0 0.6 0.8\n"),
+            [Vector3::z(), Vector3::new(0.0, 0.6, 0.8)]
+        );
+        assert_eq!(
+            normals("0 0 0 255 0 0 0 0 1\n1 0 0 9 9 9 0 1 0\n"),
+            [Vector3::z(), Vector3::y()]
+        );
         assert!(normals("0 0 0 0 0 1\n1 0 0 255 9 9\n").is_empty());
         assert!(normals("0 0 0 0.5\n1 0 0 0.25\n").is_empty());
     }
@@ -107,8 +148,17 @@ mod tests {
             let Syntax { place, defect } = read(text.as_bytes(), 1.0).unwrap_err();
             format!("{place}: {defect}")
         };
-        assert_eq!(error("1 2 3\n4 5\n"), "line 2: expected x, y and z of a point, found '4 5'");
-        assert_eq!(error("1 2 3\n4 5 6x\n"), "line 2: expected a number, found '6x'");
-        assert_eq!(error("# nothing\n"), "line 1: no point in it: export it again with x, y and z of each point");
+        assert_eq!(
+            error("1 2 3\n4 5\n"),
+            "line 2: expected x, y and z of a point, found '4 5'"
+        );
+        assert_eq!(
+            error("1 2 3\n4 5 6x\n"),
+            "line 2: expected a number, found '6x'"
+        );
+        assert_eq!(
+            error("# nothing\n"),
+            "line 1: no point in it: export it again with x, y and z of each point"
+        );
     }
 }

@@ -25,30 +25,56 @@ fn a_time_keeps_its_last_digit() {
     ] {
         assert_eq!(nanoseconds(text, factor), Some(ns), "{text}");
     }
-    for bad in ["", "a", "1e300", "99999999999999999999", "nan", "1.2.3", "inf"] {
+    for bad in [
+        "",
+        "a",
+        "1e300",
+        "99999999999999999999",
+        "nan",
+        "1.2.3",
+        "inf",
+    ] {
         assert_eq!(nanoseconds(bad, 1.0), None, "{bad}");
     }
 }
 
 #[test]
 fn a_log_of_rtde_needs_no_names() {
-    let names = |what: &str, count: usize| (0..count).map(|at| format!("{what}_{at}")).collect::<Vec<_>>();
-    let header: Vec<_> = [vec!["timestamp".to_owned()], names("actual_q", 6), names("actual_TCP_pose", 6)]
-        .into_iter()
-        .chain([names("actual_TCP_force", 6)])
-        .flatten()
-        .collect();
+    let names = |what: &str, count: usize| {
+        (0..count)
+            .map(|at| format!("{what}_{at}"))
+            .collect::<Vec<_>>()
+    };
+    let header: Vec<_> = [
+        vec!["timestamp".to_owned()],
+        names("actual_q", 6),
+        names("actual_TCP_pose", 6),
+    ]
+    .into_iter()
+    .chain([names("actual_TCP_force", 6)])
+    .flatten()
+    .collect();
     let values = "12.5 9 9 9 9 9 9 0.1 0.2 0.3 0 0 1.5707963267948966 1 2 3 4 5 6";
     for separator in [",", " "] {
-        let text = format!("{}\n{}\n", header.join(separator), values.replace(' ', separator));
+        let text = format!(
+            "{}\n{}\n",
+            header.join(separator),
+            values.replace(' ', separator)
+        );
         let rows = read(&text, &TableColumns::default()).unwrap();
         let row = rows[0].as_ref().unwrap();
         let (pose, wrench) = (row.pose.unwrap(), row.wrench.unwrap());
-        assert_eq!((pose.stamp_ns, wrench.stamp_ns), (12_500_000_000, 12_500_000_000));
+        assert_eq!(
+            (pose.stamp_ns, wrench.stamp_ns),
+            (12_500_000_000, 12_500_000_000)
+        );
         assert_eq!(pose.pose_ot.translation.vector, Vector3::new(0.1, 0.2, 0.3));
         assert!((pose.pose_ot.rotation * Vector3::x() - Vector3::y()).norm() < 1e-15);
         let Wrench { force, torque } = wrench.wrench;
-        assert_eq!((force, torque), (Vector3::new(1.0, 2.0, 3.0), Vector3::new(4.0, 5.0, 6.0)));
+        assert_eq!(
+            (force, torque),
+            (Vector3::new(1.0, 2.0, 3.0), Vector3::new(4.0, 5.0, 6.0))
+        );
     }
 }
 
@@ -63,12 +89,29 @@ fn columns_are_named_in_the_scene_with_the_unit_that_the_header_lacks() {
     let rows = read(text, &columns).unwrap();
     let there: Vec<_> = rows
         .iter()
-        .map(|row| row.as_ref().map(|row| (row.pose.is_some(), row.wrench.is_some())).map_err(|bad| *bad))
+        .map(|row| {
+            row.as_ref()
+                .map(|row| (row.pose.is_some(), row.wrench.is_some()))
+                .map_err(|bad| *bad)
+        })
         .collect();
     let bad = Err(BadMessage::Malformed);
-    assert_eq!(there, [Ok((true, true)), Ok((false, true)), Ok((true, false)), bad, bad, bad]);
+    assert_eq!(
+        there,
+        [
+            Ok((true, true)),
+            Ok((false, true)),
+            Ok((true, false)),
+            bad,
+            bad,
+            bad
+        ]
+    );
     let first = rows[0].as_ref().unwrap();
-    assert_eq!(first.pose.unwrap().pose_ot.translation.vector, Vector3::new(1.0, 0.0, 0.0));
+    assert_eq!(
+        first.pose.unwrap().pose_ot.translation.vector,
+        Vector3::new(1.0, 0.0, 0.0)
+    );
     assert_eq!(first.pose.unwrap().stamp_ns, 1_000_000);
 }
 
@@ -77,28 +120,67 @@ fn what_is_not_understood_is_answered_by_the_columns_and_the_key() {
     let why = |text: &str, columns: &TableColumns| read(text, columns).err().unwrap();
     let usual = TableColumns::default();
     let text = why("a,b\n1,2\n", &usual);
-    assert!(text.contains("columns: { time: … }") && text.contains("It has: a, b"), "{text}");
+    assert!(
+        text.contains("columns: { time: … }") && text.contains("It has: a, b"),
+        "{text}"
+    );
     let text = why("t_s,x,y,z,fx_n,fy_n,fz_n\n", &usual);
-    assert!(text.contains("\"x\" has no unit (m, mm, um or inch)") && text.contains("x [mm]"), "{text}");
-    for header in ["t_s,x_mm,y_mm,z_mm,x_m,fx_n,fy_n,fz_n\n", "t_s,x_m,y_m,z_m,x_m,fx_n,fy_n,fz_n\n"] {
+    assert!(
+        text.contains("\"x\" has no unit (m, mm, um or inch)") && text.contains("x [mm]"),
+        "{text}"
+    );
+    for header in [
+        "t_s,x_mm,y_mm,z_mm,x_m,fx_n,fy_n,fz_n\n",
+        "t_s,x_m,y_m,z_m,x_m,fx_n,fy_n,fz_n\n",
+    ] {
         let text = why(header, &usual);
-        assert!(text.contains("and \"x_m\" could both be meant by the position"), "{text}");
+        assert!(
+            text.contains("and \"x_m\" could both be meant by the position"),
+            "{text}"
+        );
     }
-    let wanted = TableColumns { position: names(&["x_mm", "y_mm", "z_mm"]), ..usual.clone() };
+    let wanted = TableColumns {
+        position: names(&["x_mm", "y_mm", "z_mm"]),
+        ..usual.clone()
+    };
     assert!(read("t_s,x_mm,y_mm,z_mm,x_m,fx_n,fy_n,fz_n\n", &wanted).is_ok());
-    let wanted = TableColumns { force: names(&["u", "v", "w"]), ..usual.clone() };
+    let wanted = TableColumns {
+        force: names(&["u", "v", "w"]),
+        ..usual.clone()
+    };
     let text = why("t_s,x_m,y_m,z_m,fx_n,fy_n,fz_n\n", &wanted);
-    assert!(text.contains("no column \"u\"") && text.contains("columns.force") && text.contains("fz_n"), "{text}");
-    let wanted = TableColumns { position: names(&["x [mm]", "y [mm]", "z [mm]"]), ..usual.clone() };
+    assert!(
+        text.contains("no column \"u\"") && text.contains("columns.force") && text.contains("fz_n"),
+        "{text}"
+    );
+    let wanted = TableColumns {
+        position: names(&["x [mm]", "y [mm]", "z [mm]"]),
+        ..usual.clone()
+    };
     assert!(why("t_s,x_m,y_m,z_m,fx_n,fy_n,fz_n\n", &wanted).contains("another unit"));
-    let wanted = TableColumns { wrench_axes: WrenchAxes::Tip, ..usual.clone() };
-    assert!(why("t_s,x_m,y_m,z_m,fx_n,fy_n,fz_n\n", &wanted).contains("wrench_axes: tip needs an orientation"));
+    let wanted = TableColumns {
+        wrench_axes: WrenchAxes::Tip,
+        ..usual.clone()
+    };
+    assert!(
+        why("t_s,x_m,y_m,z_m,fx_n,fy_n,fz_n\n", &wanted)
+            .contains("wrench_axes: tip needs an orientation")
+    );
     let header = "t_s;x_m;y_m;z_m;qx;qy;qz;qw;fx_n;fy_n;fz_n\n";
     for (line, word) in [
-        ("0;0,1;0,2;0,3;0;0;0;1;1;2;3\n", "line 2 has a value that is no number"),
+        (
+            "0;0,1;0,2;0,3;0;0;0;1;1;2;3\n",
+            "line 2 has a value that is no number",
+        ),
         ("0,5;0.1;0.2;0.3;0;0;0;1;1;2;3\n", "the time in line 2"),
-        ("0;0.1;0.2;0.3;0;0;0;2;1;2;3\n", "the orientation in line 2 has not the length 1"),
-        ("0;0.1;0.2;0.3;0;0;0;1;1;2\n", "line 2 has 10 values for 11 columns"),
+        (
+            "0;0.1;0.2;0.3;0;0;0;2;1;2;3\n",
+            "the orientation in line 2 has not the length 1",
+        ),
+        (
+            "0;0.1;0.2;0.3;0;0;0;1;1;2\n",
+            "line 2 has 10 values for 11 columns",
+        ),
     ] {
         let text = why(&[header, line].concat(), &usual);
         assert!(text.contains(word), "{text}");

@@ -18,7 +18,10 @@ impl RecordingReader {
             let (source, damage) = open_file(file, &self.layout)?;
             first_damage = first_damage.or(damage);
             self.truncated |= source.truncated();
-            self.message_count = self.message_count.zip(source.promised()).map(|(a, b)| a.saturating_add(b));
+            self.message_count = self
+                .message_count
+                .zip(source.promised())
+                .map(|(a, b)| a.saturating_add(b));
             found.extend(source.topics());
             found.sort_unstable();
             found.dedup();
@@ -43,7 +46,10 @@ impl RecordingReader {
                     }
                 }
                 Ok(None) => {
-                    let next = self.rest.pop_front().and_then(|path| open_file(&path, &self.layout).ok());
+                    let next = self
+                        .rest
+                        .pop_front()
+                        .and_then(|path| open_file(&path, &self.layout).ok());
                     self.source = next.map(|(source, _)| source);
                 }
                 Err(_) => break,

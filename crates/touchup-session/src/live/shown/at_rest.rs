@@ -5,7 +5,9 @@ use std::collections::HashMap;
 use touchup_core::mesh::{FaceId, MeshError, TriMesh, VertexId};
 use touchup_core::reconstruct::{Owner, PatchDelta, Support, VertexKey};
 
-use super::followed::{FaceShown, FollowedScan, Scans, VERTICES_OF_A_CHANGE, remove_from, return_to};
+use super::followed::{
+    FaceShown, FollowedScan, Scans, VERTICES_OF_A_CHANGE, remove_from, return_to,
+};
 
 /// The patch of all touches, as far as it is shown.
 #[derive(Debug, Default)]
@@ -83,8 +85,16 @@ impl AtRest {
 
     /// The patch of all touches so far is to be shown, from when the working mesh is followed until it changes again.
     pub fn want(&mut self, patch: PatchDelta, working: &TriMesh) {
-        let Self { phase, patch: shown, edits, wanted, .. } = self;
-        let is_same = shown.vertices == patch.vertices && shown.owners == patch.owners && shown.faces == patch.faces;
+        let Self {
+            phase,
+            patch: shown,
+            edits,
+            wanted,
+            ..
+        } = self;
+        let is_same = shown.vertices == patch.vertices
+            && shown.owners == patch.owners
+            && shown.faces == patch.faces;
         let is_shown = is_same && *phase == RestPhase::Resting && *edits == working.edits();
         *wanted = (!is_shown).then_some(patch);
     }
@@ -96,7 +106,9 @@ impl AtRest {
 
     /// Where the patch of all touches is wanted, begins with it; returns whether there is anything to do for it.
     pub fn begin(&mut self, followed: &FollowedScan, scans: Scans<'_>, working: &TriMesh) -> bool {
-        let Some(patch) = self.wanted.take() else { return false };
+        let Some(patch) = self.wanted.take() else {
+            return false;
+        };
         let slots = || (0..followed.shown.len() as u32).map(FaceId);
         let mut is_hidden: Vec<bool> = vec![true; followed.parts.len()];
         for shown in &followed.shown {
@@ -108,14 +120,17 @@ impl AtRest {
         let hidden = details.filter(|detail| is_hidden[detail.0 as usize]);
         let mut steps: Vec<Step> = Vec::new();
         steps.extend(
-            slots().filter(|face| matches!(followed.shown[face.0 as usize], FaceShown::Same(_))).map(Step::Park),
+            slots()
+                .filter(|face| matches!(followed.shown[face.0 as usize], FaceShown::Same(_)))
+                .map(Step::Park),
         );
         steps.extend(hidden.map(Step::BringBack));
         // in an order that does not hang on the table
         let mut moved: Vec<u32> = followed.moved.iter().copied().collect();
         moved.sort_unstable();
         steps.extend(moved.into_iter().map(Step::PutBack));
-        let added = (0..followed.added.len() as u32).filter(|&at| followed.added[at as usize].is_some());
+        let added =
+            (0..followed.added.len() as u32).filter(|&at| followed.added[at as usize].is_some());
         steps.extend(added.map(|at| Step::Forget(VertexId(at))));
         steps.extend((0..patch.vertices.len() as u32).map(Step::Place));
         steps.extend(patch.owners.iter().filter_map(|(owner, _)| match owner {
@@ -159,8 +174,15 @@ impl AtRest {
                 continue;
             };
             left = left.saturating_sub(match step {
-                Step::BringBack(detail) | Step::Hide(detail) => followed.parts[detail.0 as usize].len().max(1),
-                Step::PutBack(cell) => followed.vertices.of(cell).len().div_ceil(VERTICES_OF_A_CHANGE).max(1),
+                Step::BringBack(detail) | Step::Hide(detail) => {
+                    followed.parts[detail.0 as usize].len().max(1)
+                }
+                Step::PutBack(cell) => followed
+                    .vertices
+                    .of(cell)
+                    .len()
+                    .div_ceil(VERTICES_OF_A_CHANGE)
+                    .max(1),
                 _ => 1,
             });
             self.take_step(step, followed, scans, working)?;
@@ -178,7 +200,8 @@ impl AtRest {
     ) -> Result<(), MeshError> {
         let back = match step {
             Step::Park(face) => {
-                let shown = std::mem::replace(&mut followed.shown[face.0 as usize], FaceShown::Gone);
+                let shown =
+                    std::mem::replace(&mut followed.shown[face.0 as usize], FaceShown::Gone);
                 if let FaceShown::Same(same) = shown {
                     followed.mesh.remove_face(same);
                 }
@@ -190,7 +213,8 @@ impl AtRest {
             }
             Step::PutBack(cell) => {
                 for &vertex in followed.vertices.of(cell) {
-                    let (vertex, place) = (VertexId(vertex), scans.original.position(VertexId(vertex)));
+                    let (vertex, place) =
+                        (VertexId(vertex), scans.original.position(VertexId(vertex)));
                     if followed.mesh.position(vertex) != place {
                         followed.mesh.set_position(vertex, place);
                     }
@@ -241,7 +265,9 @@ impl AtRest {
             }
             Step::Return(vertex) => {
                 self.support.remove(&vertex);
-                followed.mesh.set_position(vertex, scans.original.position(vertex));
+                followed
+                    .mesh
+                    .set_position(vertex, scans.original.position(vertex));
                 return Ok(());
             }
             Step::Unplace(vertex) => {
@@ -249,7 +275,14 @@ impl AtRest {
                 followed.mesh.remove_vertex(vertex);
                 return Ok(());
             }
-            Step::Restore(face) => return return_to(&mut followed.mesh, &mut followed.returned, scans.original, face),
+            Step::Restore(face) => {
+                return return_to(
+                    &mut followed.mesh,
+                    &mut followed.returned,
+                    scans.original,
+                    face,
+                );
+            }
             Step::Empty(face) => {
                 followed.mesh.remove_face(face);
                 return Ok(());

@@ -4,7 +4,9 @@ use std::collections::{HashMap, HashSet};
 
 use super::groups::Groups;
 use touchup_core::haptic::Refiner;
-use touchup_core::mesh::{Changes, FaceId, IdSet, MeshError, Simplified, TriMesh, VertexId, triangle};
+use touchup_core::mesh::{
+    Changes, FaceId, IdSet, MeshError, Simplified, TriMesh, VertexId, triangle,
+};
 use touchup_core::reconstruct::Support;
 
 /// Vertices of the scan that are moved for one change of a vertex of the working mesh, about.
@@ -57,21 +59,33 @@ pub(in crate::live) struct Scans<'a> {
 
 impl FollowedScan {
     /// The scan as it is.
-    pub fn new(Scans { original, simplified }: Scans<'_>) -> Self {
+    pub fn new(
+        Scans {
+            original,
+            simplified,
+        }: Scans<'_>,
+    ) -> Self {
         let (mut mesh, working) = (original.clone(), &simplified.mesh);
         mesh.watch();
         let cells = working.vertex_slots();
         let cell_of = |vertex: VertexId| simplified.cell_of(vertex).map(|cell| cell.0);
-        let vertices = Groups::new(cells, original.vertex_slots(), |vertex| cell_of(VertexId(vertex)));
+        let vertices = Groups::new(cells, original.vertex_slots(), |vertex| {
+            cell_of(VertexId(vertex))
+        });
         let faces = Groups::new(cells, original.face_slots(), |face| {
-            original.has_face(FaceId(face)).then(|| cell_of(original.corners(FaceId(face))[0])).flatten()
+            original
+                .has_face(FaceId(face))
+                .then(|| cell_of(original.corners(FaceId(face))[0]))
+                .flatten()
         });
         Self {
             vertices,
             faces,
             parts: vec![Vec::new(); working.face_slots()],
             is_parted: vec![false; cells],
-            shown: (0..working.face_slots() as u32).map(|face| FaceShown::Detail(FaceId(face))).collect(),
+            shown: (0..working.face_slots() as u32)
+                .map(|face| FaceShown::Detail(FaceId(face)))
+                .collect(),
             returned: HashMap::new(),
             added: vec![None; cells],
             working: HashMap::new(),
@@ -87,7 +101,12 @@ impl FollowedScan {
     ///
     /// # Errors
     /// [`MeshError::TooMany`].
-    pub fn follow(&mut self, scans: Scans<'_>, refiner: &mut Refiner, most: usize) -> Result<bool, MeshError> {
+    pub fn follow(
+        &mut self,
+        scans: Scans<'_>,
+        refiner: &mut Refiner,
+        most: usize,
+    ) -> Result<bool, MeshError> {
         let mut changes = std::mem::take(&mut self.changes);
         changes.clear();
         let is_all = refiner.take_changes(most, &mut changes);
@@ -118,7 +137,11 @@ impl FollowedScan {
             FaceShown::Same(face) => Some(face),
             FaceShown::Detail(face) => {
                 let [corner, ..] = scans.simplified.mesh.corners(face);
-                let mut faces = self.faces.of(corner.0).iter().map(|&face| self.current(FaceId(face)));
+                let mut faces = self
+                    .faces
+                    .of(corner.0)
+                    .iter()
+                    .map(|&face| self.current(FaceId(face)));
                 faces.find(|&face| self.mesh.has_face(face))
             }
         }
@@ -128,13 +151,20 @@ impl FollowedScan {
         self.returned.get(&face).copied().unwrap_or(face)
     }
 
-    pub fn follow_face(&mut self, scans: Scans<'_>, working: &TriMesh, face: FaceId) -> Result<(), MeshError> {
+    pub fn follow_face(
+        &mut self,
+        scans: Scans<'_>,
+        working: &TriMesh,
+        face: FaceId,
+    ) -> Result<(), MeshError> {
         let at = face.0 as usize;
         if at >= self.shown.len() {
             self.shown.resize(at + 1, FaceShown::Gone);
         }
         let corners = working.has_face(face).then(|| working.corners(face));
-        let detail = corners.as_ref().and_then(|corners| detail_of(&scans.simplified.mesh, corners));
+        let detail = corners
+            .as_ref()
+            .and_then(|corners| detail_of(&scans.simplified.mesh, corners));
         if detail.is_some_and(|detail| self.shown[at] == FaceShown::Detail(detail)) {
             return Ok(());
         }
@@ -170,7 +200,10 @@ impl FollowedScan {
         }
         let simplified = &scans.simplified.mesh;
         if (vertex.0 as usize) < simplified.vertex_slots() {
-            let around = simplified.star(vertex).iter().flat_map(|&face| simplified.corners(face));
+            let around = simplified
+                .star(vertex)
+                .iter()
+                .flat_map(|&face| simplified.corners(face));
             around.for_each(|corner| self.moving.insert(corner.0));
         }
     }
@@ -192,7 +225,9 @@ impl FollowedScan {
 
     /// Removes what shows a vertex that is gone; whether no face uses it any more.
     pub fn remove(&mut self, vertex: VertexId) -> bool {
-        let Some(added) = self.added[vertex.0 as usize] else { return true };
+        let Some(added) = self.added[vertex.0 as usize] else {
+            return true;
+        };
         let is_removed = self.mesh.remove_vertex(added);
         if is_removed {
             self.added[vertex.0 as usize] = None;
@@ -230,7 +265,8 @@ impl FollowedScan {
                     (middle - point).norm_squared()
                 };
                 let near = simplified.star(cell).iter().map(|&near| (off(near), near));
-                if let Some((_, near)) = near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))) {
+                if let Some((_, near)) = near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+                {
                     self.parts[near.0 as usize].push(FaceId(face));
                 }
             }
@@ -248,17 +284,27 @@ impl FollowedScan {
             self.moved.insert(cell);
             let mesh = &mut self.mesh;
             let members = vertices.iter().map(|&vertex| VertexId(vertex));
-            scans.simplified.carry_cell(VertexId(cell), members, scans.original, working, |vertex, place| {
-                if mesh.position(vertex) != place {
-                    mesh.set_position(vertex, place);
-                }
-            });
+            scans.simplified.carry_cell(
+                VertexId(cell),
+                members,
+                scans.original,
+                working,
+                |vertex, place| {
+                    if mesh.position(vertex) != place {
+                        mesh.set_position(vertex, place);
+                    }
+                },
+            );
         }
     }
 }
 
 /// Removes a face of the scan.
-pub(super) fn remove_from(mesh: &mut TriMesh, returned: &mut HashMap<FaceId, FaceId>, face: FaceId) {
+pub(super) fn remove_from(
+    mesh: &mut TriMesh,
+    returned: &mut HashMap<FaceId, FaceId>,
+    face: FaceId,
+) {
     mesh.remove_face(returned.remove(&face).unwrap_or(face));
 }
 

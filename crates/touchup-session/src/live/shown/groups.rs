@@ -11,7 +11,9 @@ impl Groups {
     /// - `group_of`: of each id below `count`, if it has one.
     pub fn new(groups: usize, count: usize, group_of: impl Fn(u32) -> Option<u32>) -> Self {
         let mut starts = vec![0u32; groups + 1];
-        (0..count as u32).filter_map(&group_of).for_each(|group| starts[group as usize + 1] += 1);
+        (0..count as u32)
+            .filter_map(&group_of)
+            .for_each(|group| starts[group as usize + 1] += 1);
         (0..groups).for_each(|group| starts[group + 1] += starts[group]);
         let (mut next, mut ids) = (starts.clone(), vec![0; starts[groups] as usize]);
         for id in 0..count as u32 {

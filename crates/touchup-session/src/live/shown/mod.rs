@@ -22,7 +22,10 @@ pub(super) struct Shown {
 impl Shown {
     /// The scan as it is.
     pub fn new(scans: Scans<'_>) -> Self {
-        Self { followed: FollowedScan::new(scans), at_rest: AtRest::default() }
+        Self {
+            followed: FollowedScan::new(scans),
+            at_rest: AtRest::default(),
+        }
     }
 
     /// The mesh as far as it has followed.
@@ -35,7 +38,12 @@ impl Shown {
     ///
     /// # Errors
     /// [`MeshError::TooMany`].
-    pub fn follow(&mut self, scans: Scans<'_>, refiner: &mut Refiner, most: usize) -> Result<bool, MeshError> {
+    pub fn follow(
+        &mut self,
+        scans: Scans<'_>,
+        refiner: &mut Refiner,
+        most: usize,
+    ) -> Result<bool, MeshError> {
         let Self { followed, at_rest } = self;
         if !at_rest.go_on(followed, scans, refiner.mesh(), most)? {
             return Ok(false);
@@ -64,7 +72,9 @@ impl Shown {
 
     /// The support of a vertex of the patch, by what is shown; `None`: it is one of the scan.
     pub fn support(&self, refiner: &Refiner, vertex: VertexId) -> Option<Support> {
-        self.at_rest.support(vertex).or_else(|| self.followed.support(refiner, vertex))
+        self.at_rest
+            .support(vertex)
+            .or_else(|| self.followed.support(refiner, vertex))
     }
 
     /// A face that shows a face of the working mesh.

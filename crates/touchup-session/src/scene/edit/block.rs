@@ -13,8 +13,15 @@ const STEP: usize = 2;
 /// The text with `path` set to `value`; the line of the key ends with `remark` where it has no comment of its own.
 pub(super) fn set(text: &str, path: &[&str], value: &str, remark: &str) -> Option<String> {
     let lines: Vec<&str> = text.split_inclusive('\n').collect();
-    let whole = 0..lines.iter().position(|line| line.trim_end() == "...").unwrap_or(lines.len());
-    let indent = whole.clone().map(|at| lines[at]).find(|line| is_content(line)).map_or(0, indent_of);
+    let whole = 0..lines
+        .iter()
+        .position(|line| line.trim_end() == "...")
+        .unwrap_or(lines.len());
+    let indent = whole
+        .clone()
+        .map(|at| lines[at])
+        .find(|line| is_content(line))
+        .map_or(0, indent_of);
     set_in(&lines, whole, indent, path, value, remark)
 }
 
@@ -28,18 +35,36 @@ fn set_in(
     remark: &str,
 ) -> Option<String> {
     let (first, rest) = path.split_first()?;
-    let Some(key_line) = range.clone().find(|&at| key_end(lines[at], indent, first).is_some()) else {
+    let Some(key_line) = range
+        .clone()
+        .find(|&at| key_end(lines[at], indent, first).is_some())
+    else {
         let is_root = range.start == 0 && indent == 0 && range.end == lines.len();
-        let at = if is_root { lines.len() } else { end_of(lines, range, indent) };
-        return Some(inserted(lines, at, &new_lines(indent, path, value, remark, is_root && at > 0)));
+        let at = if is_root {
+            lines.len()
+        } else {
+            end_of(lines, range, indent)
+        };
+        return Some(inserted(
+            lines,
+            at,
+            &new_lines(indent, path, value, remark, is_root && at > 0),
+        ));
     };
     let behind = key_end(lines[key_line], indent, first)?;
     let body = key_line + 1..body_end(lines, key_line + 1..range.end, indent);
     let (inline, comment) = split_comment(&lines[key_line][behind..]);
     if rest.is_empty() {
-        let kept: String = body.map(|at| lines[at]).filter(|line| !is_content(line)).collect();
+        let kept: String = body
+            .map(|at| lines[at])
+            .filter(|line| !is_content(line))
+            .collect();
         let is_free = comment.is_empty() || comment.starts_with(MARK);
-        let comment = if is_free { remark.to_owned() } else { format!("  {comment}") };
+        let comment = if is_free {
+            remark.to_owned()
+        } else {
+            format!("  {comment}")
+        };
         let line = format!("{} {value}{comment}\n", &lines[key_line][..behind]);
         let after = body_end(lines, key_line + 1..range.end, indent);
         return Some(lines[..key_line].concat() + &line + &kept + &lines[after..].concat());
@@ -51,8 +76,19 @@ fn set_in(
     }
     match inline {
         "" => {
-            let inner = body.clone().map(|at| lines[at]).find(|line| is_content(line)).map(indent_of);
-            set_in(lines, body, inner.unwrap_or(indent + STEP), rest, value, remark)
+            let inner = body
+                .clone()
+                .map(|at| lines[at])
+                .find(|line| is_content(line))
+                .map(indent_of);
+            set_in(
+                lines,
+                body,
+                inner.unwrap_or(indent + STEP),
+                rest,
+                value,
+                remark,
+            )
         }
         "~" | "null" | "off" => {
             let line = lines[key_line].replacen(inline, "", 1);
@@ -68,7 +104,11 @@ fn set_in(
 /// are.
 fn end_of(lines: &[&str], range: Range<usize>, indent: usize) -> usize {
     let is_part = |at: &usize| !lines[*at].trim().is_empty() && indent_of(lines[*at]) >= indent;
-    range.clone().rev().find(is_part).map_or(range.start, |at| at + 1)
+    range
+        .clone()
+        .rev()
+        .find(is_part)
+        .map_or(range.start, |at| at + 1)
 }
 
 /// Behind the last line of the value of a key: deeper ones, and items of a list at its own depth. Comments and
@@ -76,16 +116,26 @@ fn end_of(lines: &[&str], range: Range<usize>, indent: usize) -> usize {
 fn body_end(lines: &[&str], range: Range<usize>, indent: usize) -> usize {
     let is_item = |line: &str| indent_of(line) == indent && line.trim_start().starts_with('-');
     let is_inside = |line: &str| indent_of(line) > indent || is_item(line);
-    let next = range.clone().find(|&at| is_content(lines[at]) && !is_inside(lines[at])).unwrap_or(range.end);
+    let next = range
+        .clone()
+        .find(|&at| is_content(lines[at]) && !is_inside(lines[at]))
+        .unwrap_or(range.end);
     let is_part = |at: &usize| !lines[*at].trim().is_empty() && is_inside(lines[*at]);
-    (range.start..next).rev().find(is_part).map_or(range.start, |at| at + 1)
+    (range.start..next)
+        .rev()
+        .find(is_part)
+        .map_or(range.start, |at| at + 1)
 }
 
 fn new_lines(indent: usize, path: &[&str], value: &str, remark: &str, gap: bool) -> String {
     let mut text = if gap { "\n".to_owned() } else { String::new() };
     for (depth, key) in path.iter().enumerate() {
         let is_last = depth + 1 == path.len();
-        let rest = if is_last { format!(" {value}{remark}") } else { String::new() };
+        let rest = if is_last {
+            format!(" {value}{remark}")
+        } else {
+            String::new()
+        };
         text += &format!("{:width$}{key}:{rest}\n", "", width = indent + STEP * depth);
     }
     text
@@ -93,7 +143,11 @@ fn new_lines(indent: usize, path: &[&str], value: &str, remark: &str, gap: bool)
 
 fn inserted(lines: &[&str], at: usize, new: &str) -> String {
     let before = lines[..at].concat();
-    let end = if before.is_empty() || before.ends_with('\n') { "" } else { "\n" };
+    let end = if before.is_empty() || before.ends_with('\n') {
+        ""
+    } else {
+        "\n"
+    };
     before + end + new + &lines[at..].concat()
 }
 
@@ -103,11 +157,14 @@ fn key_end(line: &str, indent: usize, key: &str) -> Option<usize> {
         return None;
     }
     let quoted = [key.to_owned(), format!("\"{key}\""), format!("'{key}'")];
-    let written = quoted.iter().find(|written| line[indent..].starts_with(written.as_str()))?;
+    let written = quoted
+        .iter()
+        .find(|written| line[indent..].starts_with(written.as_str()))?;
     let rest = &line[indent + written.len()..];
     let colon = rest.len() - rest.trim_start_matches(' ').len();
     let after = rest[colon..].strip_prefix(':')?;
-    (after.is_empty() || after.starts_with(char::is_whitespace)).then_some(indent + written.len() + colon + 1)
+    (after.is_empty() || after.starts_with(char::is_whitespace))
+        .then_some(indent + written.len() + colon + 1)
 }
 
 /// Value and comment behind a colon; a `#` in quotes is none.
@@ -117,7 +174,9 @@ fn split_comment(text: &str) -> (&str, &str) {
         match (quote, c) {
             (Some(open), _) if c == open => quote = None,
             (None, '"' | '\'') => quote = Some(c),
-            (None, '#') if before.is_whitespace() => return (text[..at].trim(), text[at..].trim_end()),
+            (None, '#') if before.is_whitespace() => {
+                return (text[..at].trim(), text[at..].trim_end());
+            }
             _ => {}
         }
         before = c;

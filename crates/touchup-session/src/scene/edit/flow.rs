@@ -6,7 +6,9 @@ pub(super) fn start(text: &str) -> Option<usize> {
     for line in text.split_inclusive('\n') {
         let content = line.trim_start();
         if !content.is_empty() && !content.starts_with(['#', '%']) && content.trim_end() != "---" {
-            return content.starts_with('{').then(|| at + line.len() - content.len());
+            return content
+                .starts_with('{')
+                .then(|| at + line.len() - content.len());
         }
         at += line.len();
     }
@@ -16,15 +18,28 @@ pub(super) fn start(text: &str) -> Option<usize> {
 /// The text with `path` set to `value` in the mapping whose brace is at `begin`.
 pub(super) fn set(text: &str, begin: usize, path: &[&str], value: &str) -> Option<String> {
     let (first, rest) = path.split_first()?;
-    let Mapping { entries, last, is_separated } = Mapping::read(text, begin)?;
-    let inner = rest.iter().rev().fold(value.to_owned(), |inner, key| format!("{{ {key}: {inner} }}"));
+    let Mapping {
+        entries,
+        last,
+        is_separated,
+    } = Mapping::read(text, begin)?;
+    let inner = rest.iter().rev().fold(value.to_owned(), |inner, key| {
+        format!("{{ {key}: {inner} }}")
+    });
     let Some(entry) = entries.iter().find(|entry| entry.key == *first) else {
         let separator = if is_separated { "" } else { "," };
-        return Some(spliced(text, last, last, &format!("{separator} {first}: {inner}")));
+        return Some(spliced(
+            text,
+            last,
+            last,
+            &format!("{separator} {first}: {inner}"),
+        ));
     };
     let old = &text[entry.begin..entry.end];
     match old.trim_start() {
-        "" | "~" | "null" | "off" => Some(spliced(text, entry.begin, entry.end, &format!(" {inner}"))),
+        "" | "~" | "null" | "off" => {
+            Some(spliced(text, entry.begin, entry.end, &format!(" {inner}")))
+        }
         _ if rest.is_empty() => Some(spliced(text, entry.begin, entry.end, &format!(" {inner}"))),
         old if old.starts_with('{') => set(text, entry.end - old.len(), rest, value),
         _ => None,
@@ -53,7 +68,11 @@ struct Mapping<'a> {
 impl<'a> Mapping<'a> {
     /// Up to the closing brace; `None` when there is none.
     fn read(text: &'a str, begin: usize) -> Option<Self> {
-        let mut mapping = Self { entries: Vec::new(), last: begin + 1, is_separated: true };
+        let mut mapping = Self {
+            entries: Vec::new(),
+            last: begin + 1,
+            is_separated: true,
+        };
         let (mut depth, mut quote, mut in_comment, mut before) = (0usize, None, false, ' ');
         let (mut from, mut colon) = (begin + 1, None);
         for (at, c) in text[begin..].char_indices().map(|(at, c)| (begin + at, c)) {
@@ -72,7 +91,9 @@ impl<'a> Mapping<'a> {
                 (None, '{' | '[') => depth += 1,
                 (None, ':') if depth == 1 => colon = colon.or(Some(at)),
                 (None, ',' | '}') if depth == 1 => {
-                    mapping.entries.extend(entry(text, from, colon.take(), mapping.last));
+                    mapping
+                        .entries
+                        .extend(entry(text, from, colon.take(), mapping.last));
                     from = at + 1;
                     if c == '}' {
                         return Some(mapping);
@@ -92,6 +113,13 @@ impl<'a> Mapping<'a> {
 
 fn entry(text: &str, from: usize, colon: Option<usize>, end: usize) -> Option<FlowEntry<'_>> {
     let colon = colon?;
-    let key = text[from..colon].lines().map(str::trim).rfind(|line| !line.is_empty() && !line.starts_with('#'))?;
-    Some(FlowEntry { key: key.trim_matches(['"', '\'']), begin: colon + 1, end: end.max(colon + 1) })
+    let key = text[from..colon]
+        .lines()
+        .map(str::trim)
+        .rfind(|line| !line.is_empty() && !line.starts_with('#'))?;
+    Some(FlowEntry {
+        key: key.trim_matches(['"', '\'']),
+        begin: colon + 1,
+        end: end.max(colon + 1),
+    })
 }

@@ -20,7 +20,9 @@ use crate::ur::child::shared::ChildShared;
 use crate::ur::child::states::LastReport;
 use crate::ur::guard::{AGAIN, ClientLoss, GuardState};
 use crate::ur::params::Deadlines;
-use crate::ur::protocol::{Action, Begin, ClientReport, Link, Order, ProgramState, UrState, vector_of};
+use crate::ur::protocol::{
+    Action, Begin, ClientReport, Link, Order, ProgramState, UrState, vector_of,
+};
 
 #[path = "../../../../../examples/ur_controller/model/mod.rs"]
 #[expect(dead_code, reason = "what the wire alone needs")]
@@ -77,8 +79,16 @@ impl<'a> World<'a> {
     /// - `script`: what happens when, s, in this order.
     pub fn new(surface: &'a Plate, script: Vec<(f64, String)>, seed: u64) -> Self {
         let (clock, hand) = Clock::manual();
-        let payload = Payload { mass: 0.25, p_sc: Vector3::new(0.0, 0.0, 0.05), ..WEIGHTLESS };
-        let params = ArmParams { payload, seed, ..ArmParams::default() };
+        let payload = Payload {
+            mass: 0.25,
+            p_sc: Vector3::new(0.0, 0.0, 0.05),
+            ..WEIGHTLESS
+        };
+        let params = ArmParams {
+            payload,
+            seed,
+            ..ArmParams::default()
+        };
         let client = UrParams::new("", "");
         let begin = Begin {
             host: String::new(),
@@ -100,7 +110,10 @@ impl<'a> World<'a> {
             shared: ChildShared::new(move |report| sink.lock().unwrap().push_back(report.clone())),
             said,
             guard: RefCell::new(GuardState::new(Deadlines::default(), clock.now())),
-            last_report: RefCell::new(LastReport { stamp_s: f64::INFINITY, at: clock.now() }),
+            last_report: RefCell::new(LastReport {
+                stamp_s: f64::INFINITY,
+                at: clock.now(),
+            }),
             heard: Cell::new(clock.now()),
             states: RefCell::new(states),
             script: RefCell::new(script.into()),
@@ -125,7 +138,10 @@ impl<'a> World<'a> {
     fn due(&self, now: f64) -> Option<String> {
         let mut script = self.script.borrow_mut();
         let is_due = script.front().is_some_and(|(at, _)| *at <= now);
-        is_due.then(|| script.pop_front()).flatten().map(|(_, line)| line)
+        is_due
+            .then(|| script.pop_front())
+            .flatten()
+            .map(|(_, line)| line)
     }
 
     /// One period of the controller, and what follows from it at once.
@@ -134,12 +150,15 @@ impl<'a> World<'a> {
         let mut controller = self.controller.borrow_mut();
         while let Some(line) = self.due(controller.body.time) {
             if let Some(ms) = line.strip_prefix("hold ") {
-                self.held_until.set(controller.body.time + ms.parse::<f64>().unwrap() * 1e-3);
+                self.held_until
+                    .set(controller.body.time + ms.parse::<f64>().unwrap() * 1e-3);
                 continue;
             }
             happen(&mut controller, &line);
-            self.is_dropped.set(self.is_dropped.get() || line == "drop" || line == "die");
-            self.has_dashboard.set(self.has_dashboard.get() && line != "undash" && line != "die");
+            self.is_dropped
+                .set(self.is_dropped.get() || line == "drop" || line == "die");
+            self.has_dashboard
+                .set(self.has_dashboard.get() && line != "undash" && line != "die");
         }
         controller.tick();
         let [linear, angular] = controller.body.velocity();
@@ -154,14 +173,20 @@ impl<'a> World<'a> {
             newest = Some(states);
         }
         drop(controller);
-        if self.asked.get().is_some_and(|asked| self.clock.since(asked) >= AGAIN) {
+        if self
+            .asked
+            .get()
+            .is_some_and(|asked| self.clock.since(asked) >= AGAIN)
+        {
             self.stop();
         }
         if self.is_killed.get() {
             return;
         }
         if self.is_dropped.get() {
-            return self.take(ClientReport::Lost { which: Link::States });
+            return self.take(ClientReport::Lost {
+                which: Link::States,
+            });
         }
         let state = newest.map(|states| {
             let state = self.state_of(&states);
@@ -169,9 +194,14 @@ impl<'a> World<'a> {
             self.shared.see(state, self.clock.now());
             state
         });
-        let report = self.last_report.borrow_mut().next(state, self.shared.number(), self.clock.now());
+        let report =
+            self.last_report
+                .borrow_mut()
+                .next(state, self.shared.number(), self.clock.now());
         let said: Vec<_> = self.said.lock().unwrap().drain(..).collect();
-        said.into_iter().chain(report).for_each(|report| self.take(report));
+        said.into_iter()
+            .chain(report)
+            .for_each(|report| self.take(report));
         self.look();
     }
 
@@ -198,7 +228,8 @@ impl<'a> World<'a> {
     fn take(&self, report: ClientReport) {
         self.heard.set(self.clock.now());
         let mut guard = self.guard.borrow_mut();
-        let is_to_be_ended = matches!(&report, ClientReport::State(state) if guard.is_to_be_ended(state));
+        let is_to_be_ended =
+            matches!(&report, ClientReport::State(state) if guard.is_to_be_ended(state));
         let broken = guard.take(report, self.clock.now());
         drop(guard);
         if is_to_be_ended {
@@ -211,12 +242,15 @@ impl<'a> World<'a> {
 
     /// … and looks at its deadline and its dashboard.
     fn look(&self) {
-        let late = self.clock.since(self.heard.get()) > self.guard.borrow().patience(self.clock.now());
+        let late =
+            self.clock.since(self.heard.get()) > self.guard.borrow().patience(self.clock.now());
         if late {
             let missed = self.guard.borrow().missed();
             self.break_off(missed);
         } else if !self.has_dashboard.get() {
-            self.break_off(ClientLoss::Arm(ArmError::Dropped { what: "its dashboard" }));
+            self.break_off(ClientLoss::Arm(ArmError::Dropped {
+                what: "its dashboard",
+            }));
         }
     }
 
@@ -229,7 +263,8 @@ impl<'a> World<'a> {
 
     /// The dashboard is asked to stop, again and again while it does not answer.
     fn stop(&self) {
-        self.asked.set(self.dashboard("stop").is_none().then(|| self.clock.now()));
+        self.asked
+            .set(self.dashboard("stop").is_none().then(|| self.clock.now()));
     }
 
     /// Its answer, where it gives one.
@@ -252,7 +287,10 @@ impl<'a> World<'a> {
         drop(controller);
         let now = self.clock.now();
         *self.guard.borrow_mut() = GuardState::new(Deadlines::default(), now);
-        *self.last_report.borrow_mut() = LastReport { stamp_s: f64::INFINITY, at: now };
+        *self.last_report.borrow_mut() = LastReport {
+            stamp_s: f64::INFINITY,
+            at: now,
+        };
         self.said.lock().unwrap().clear();
         self.shared.served.store(0, Ordering::Release);
         self.shared.is_ready.store(false, Ordering::Release);
@@ -293,15 +331,27 @@ impl Library<'_, '_> {
         let is_realtime = matches!(id, 6 | 10);
         let mut is_done = self.until(1);
         if is_done {
-            let doubles = doubles.iter().enumerate().map(|(at, value)| Written::Double(at, *value));
+            let doubles = doubles
+                .iter()
+                .enumerate()
+                .map(|(at, value)| Written::Double(at, *value));
             let ints = (1..).zip(ints).map(|(at, value)| Written::Int(at, *value));
-            self.0.controller.borrow_mut().write(doubles.chain(ints).chain([Written::Int(0, id)]).collect());
+            self.0
+                .controller
+                .borrow_mut()
+                .write(doubles.chain(ints).chain([Written::Int(0, id)]).collect());
             if !is_realtime {
                 is_done = self.until(2);
-                self.0.controller.borrow_mut().write(vec![Written::Int(0, 0)]);
+                self.0
+                    .controller
+                    .borrow_mut()
+                    .write(vec![Written::Int(0, 0)]);
             }
         }
-        is_done.then_some(()).ok_or(ChildError::Python { call: "a call", reason: "it returned false".to_owned() })
+        is_done.then_some(()).ok_or(ChildError::Python {
+            call: "a call",
+            reason: "it returned false".to_owned(),
+        })
     }
 }
 
@@ -318,9 +368,19 @@ impl Control for Library<'_, '_> {
         self.send(10, &[], &[&twist[..], &[acceleration, 2e-3]].concat())
     }
 
-    fn press(&self, frame: [f64; 6], force: f64, kind: i32, limits: [f64; 6]) -> Result<(), ChildError> {
+    fn press(
+        &self,
+        frame: [f64; 6],
+        force: f64,
+        kind: i32,
+        limits: [f64; 6],
+    ) -> Result<(), ChildError> {
         let wrench = [0.0, 0.0, force, 0.0, 0.0, 0.0];
-        self.send(6, &[kind, 0, 0, 1, 0, 0, 0], &[frame, wrench, limits].concat())
+        self.send(
+            6,
+            &[kind, 0, 0, 1, 0, 0, 0],
+            &[frame, wrench, limits].concat(),
+        )
     }
 
     fn end_press(&self) -> Result<(), ChildError> {
@@ -359,12 +419,18 @@ impl Control for Library<'_, '_> {
 
     fn feed(&self) -> Result<(), ChildError> {
         self.until(1);
-        self.0.controller.borrow_mut().write(vec![Written::Int(0, 0)]);
+        self.0
+            .controller
+            .borrow_mut()
+            .write(vec![Written::Int(0, 0)]);
         Ok(())
     }
 
     fn end_program(&self) -> Result<(), ChildError> {
-        self.0.controller.borrow_mut().write(vec![Written::Int(0, 255)]);
+        self.0
+            .controller
+            .borrow_mut()
+            .write(vec![Written::Int(0, 255)]);
         Ok(())
     }
 
@@ -397,7 +463,9 @@ impl<'a, 'b> ScriptedArm<'a, 'b> {
     pub fn connect(world: &'b World<'a>, library: &'b Library<'a, 'b>) -> Result<Self, ArmError> {
         world.upload();
         let mut driver = Driver::new(library, &world.shared, &world.begin, world.clock.clone());
-        driver.prepare().map_err(|end| ArmError::Client { reason: format!("{end:?}") })?;
+        driver.prepare().map_err(|end| ArmError::Client {
+            reason: format!("{end:?}"),
+        })?;
         world.shared.is_ready.store(true, Ordering::Release);
         world.shared.report(&ClientReport::Ready);
         // states of before have the pose of another tool
@@ -419,11 +487,19 @@ impl<'a, 'b> ScriptedArm<'a, 'b> {
         if let Some(broken) = &guard.broken {
             return Err(broken.error());
         }
-        if guard.has_ended(self.world.clock.now()) { Err(guard.ended()) } else { Ok(()) }
+        if guard.has_ended(self.world.clock.now()) {
+            Err(guard.ended())
+        } else {
+            Ok(())
+        }
     }
 
     fn send(&mut self, what: Action) -> u64 {
-        let number = self.world.guard.borrow_mut().send(&what, self.world.clock.now());
+        let number = self
+            .world
+            .guard
+            .borrow_mut()
+            .send(&what, self.world.clock.now());
         self.waiting.push(Order { number, what });
         number
     }
@@ -434,7 +510,10 @@ impl<'a, 'b> ScriptedArm<'a, 'b> {
         if self.world.is_killed.get() {
             return;
         }
-        let zero = self.waiting.iter().position(|order| order.what == Action::Zero);
+        let zero = self
+            .waiting
+            .iter()
+            .position(|order| order.what == Action::Zero);
         let taken = zero.map_or(self.waiting.len(), |at| at + 1);
         let order = self.waiting.drain(..taken).next_back();
         let is_due = self.world.clock.since(self.looked) >= TURN;
@@ -491,15 +570,25 @@ impl Arm for ScriptedArm<'_, '_> {
     /// As `UrArm::recover`; a protective stop can be unlocked at once.
     fn recover(&mut self) -> Result<(), ArmError> {
         let lost = || ArmError::Lost { silent_ms: 500 };
-        self.world.dashboard("unlock protective stop").ok_or_else(lost)?;
+        self.world
+            .dashboard("unlock protective stop")
+            .ok_or_else(lost)?;
         let controller = self.world.controller.borrow();
-        let (safety, can_start) = (controller.safety, controller.is_remote && controller.is_powered);
+        let (safety, can_start) = (
+            controller.safety,
+            controller.is_remote && controller.is_powered,
+        );
         drop(controller);
         if safety != SafetyStatus::Normal {
-            return Err(ArmError::Stopped { safety: Safety::OperatorStop });
+            return Err(ArmError::Stopped {
+                safety: Safety::OperatorStop,
+            });
         }
         if !can_start {
-            return Err(ArmError::Refused { what: "to recover", reason: "no power, or local control".to_owned() });
+            return Err(ArmError::Refused {
+                what: "to recover",
+                reason: "no power, or local control".to_owned(),
+            });
         }
         self.world.dashboard("stop").ok_or_else(lost)?;
         *self = Self::connect(self.world, self.library)?;

@@ -34,13 +34,17 @@ struct Outcome {
 impl Outcome {
     /// The last moment before the recovery at which the arm moved, s.
     fn stood_at(&self) -> f64 {
-        self.before().rfind(|moment| moment.speed > 0.0).map_or(0.0, |moment| moment.time)
+        self.before()
+            .rfind(|moment| moment.speed > 0.0)
+            .map_or(0.0, |moment| moment.time)
     }
 
     /// Until somebody orders something again.
     fn before(&self) -> impl DoubleEndedIterator<Item = &Moment> {
         let until = self.recovered.as_ref().map_or(f64::INFINITY, |(at, _)| *at);
-        self.record.iter().filter(move |moment| moment.time <= until)
+        self.record
+            .iter()
+            .filter(move |moment| moment.time <= until)
     }
 
     /// How far it went later than some time (s) after the report, m; and until when after it, s.
@@ -51,7 +55,10 @@ impl Outcome {
     }
 
     fn peak(&self) -> f64 {
-        self.record.iter().map(|moment| moment.force).fold(0.0, f64::max)
+        self.record
+            .iter()
+            .map(|moment| moment.force)
+            .fold(0.0, f64::max)
     }
 }
 
@@ -68,11 +75,21 @@ fn played(script: Vec<(f64, String)>, seed: u64, seconds: f64) -> Outcome {
         session.arm.step();
     }
     let recovered = error.is_some().then(|| match session.arm.recover() {
-        Ok(()) => (world.now(), session.go_on().map_err(|error| error.to_string())),
+        Ok(()) => (
+            world.now(),
+            session.go_on().map_err(|error| error.to_string()),
+        ),
         Err(error) => (world.now(), Err(error.to_string())),
     });
     drop(session);
-    Outcome { error, at, touches, record: world.record.take(), missing, recovered }
+    Outcome {
+        error,
+        at,
+        touches,
+        record: world.record.take(),
+        missing,
+        recovered,
+    }
 }
 
 /// A kind of fault.
@@ -87,56 +104,204 @@ pub struct Kind {
 }
 
 /// The end of a program by its watchdog, of orders that do not arrive.
-const UNHEARD: &[&str] =
-    &["has ended", "has not returned", "are ordered", "refused a call", "has come", "did not arrive"];
+const UNHEARD: &[&str] = &[
+    "has ended",
+    "has not returned",
+    "are ordered",
+    "refused a call",
+    "has come",
+    "did not arrive",
+];
 
 /// Of a press that goes on where the thread of the motion lives.
 const OVER: &str = "over the limit";
 
 /// The same where the thread of the motion lives: a press goes on until its force is over the limit.
-const STILL_PRESSING: &[&str] =
-    &["has ended", "has not returned", "are ordered", "refused a call", "has come", "did not arrive", OVER];
+const STILL_PRESSING: &[&str] = &[
+    "has ended",
+    "has not returned",
+    "are ordered",
+    "refused a call",
+    "has come",
+    "did not arrive",
+    OVER,
+];
 
 pub const KINDS: &[Kind] = &[
-    Kind { line: "pause", ends: "resume", stands: Some(0.05), reasons: &["was paused"] },
-    Kind { line: "open", ends: "shut", stands: Some(0.05), reasons: &["by the operator", "was paused"] },
-    Kind { line: "protective", ends: "", stands: Some(0.05), reasons: &["protective stop"] },
-    Kind { line: "operator", ends: "release", stands: Some(0.05), reasons: &["by the operator", "has ended"] },
-    Kind { line: "halt", ends: "", stands: Some(0.05), reasons: &["has ended"] },
-    Kind { line: "off", ends: "on", stands: Some(0.05), reasons: &["has ended"] },
-    Kind { line: "local", ends: "remote", stands: Some(0.05), reasons: &["has ended"] },
-    Kind { line: "drop", ends: "", stands: Some(0.05), reasons: &["was closed"] },
-    Kind { line: "undash", ends: "", stands: Some(0.05), reasons: &["was closed"] },
-    Kind { line: "die", ends: "mend", stands: Some(0.05), reasons: &["was closed"] },
-    Kind { line: "silent", ends: "mend", stands: Some(0.2), reasons: &["has come", "states came", "has not returned"] },
-    Kind { line: "unplug", ends: "mend", stands: Some(0.2), reasons: &["has come", "states came", "has ended"] },
-    Kind { line: "deaf", ends: "mend", stands: Some(0.2), reasons: UNHEARD },
-    Kind { line: "stuck", ends: "mend", stands: Some(0.2), reasons: UNHEARD },
-    Kind { line: "hung", ends: "mend", stands: None, reasons: STILL_PRESSING },
-    Kind { line: "tired", ends: "mend", stands: None, reasons: UNHEARD },
+    Kind {
+        line: "pause",
+        ends: "resume",
+        stands: Some(0.05),
+        reasons: &["was paused"],
+    },
+    Kind {
+        line: "open",
+        ends: "shut",
+        stands: Some(0.05),
+        reasons: &["by the operator", "was paused"],
+    },
+    Kind {
+        line: "protective",
+        ends: "",
+        stands: Some(0.05),
+        reasons: &["protective stop"],
+    },
+    Kind {
+        line: "operator",
+        ends: "release",
+        stands: Some(0.05),
+        reasons: &["by the operator", "has ended"],
+    },
+    Kind {
+        line: "halt",
+        ends: "",
+        stands: Some(0.05),
+        reasons: &["has ended"],
+    },
+    Kind {
+        line: "off",
+        ends: "on",
+        stands: Some(0.05),
+        reasons: &["has ended"],
+    },
+    Kind {
+        line: "local",
+        ends: "remote",
+        stands: Some(0.05),
+        reasons: &["has ended"],
+    },
+    Kind {
+        line: "drop",
+        ends: "",
+        stands: Some(0.05),
+        reasons: &["was closed"],
+    },
+    Kind {
+        line: "undash",
+        ends: "",
+        stands: Some(0.05),
+        reasons: &["was closed"],
+    },
+    Kind {
+        line: "die",
+        ends: "mend",
+        stands: Some(0.05),
+        reasons: &["was closed"],
+    },
+    Kind {
+        line: "silent",
+        ends: "mend",
+        stands: Some(0.2),
+        reasons: &["has come", "states came", "has not returned"],
+    },
+    Kind {
+        line: "unplug",
+        ends: "mend",
+        stands: Some(0.2),
+        reasons: &["has come", "states came", "has ended"],
+    },
+    Kind {
+        line: "deaf",
+        ends: "mend",
+        stands: Some(0.2),
+        reasons: UNHEARD,
+    },
+    Kind {
+        line: "stuck",
+        ends: "mend",
+        stands: Some(0.2),
+        reasons: UNHEARD,
+    },
+    Kind {
+        line: "hung",
+        ends: "mend",
+        stands: None,
+        reasons: STILL_PRESSING,
+    },
+    Kind {
+        line: "tired",
+        ends: "mend",
+        stands: None,
+        reasons: UNHEARD,
+    },
     Kind {
         line: "late states 40",
         ends: "mend",
         stands: None,
         reasons: &["states came", "has come", "N at (", "N over", "ms behind"],
     },
-    Kind { line: "late orders 40", ends: "mend", stands: None, reasons: &["are ordered", "N at (", "N over"] },
-    Kind { line: "spike 40", ends: "", stands: None, reasons: &["over the limit", "N at ("] },
+    Kind {
+        line: "late orders 40",
+        ends: "mend",
+        stands: None,
+        reasons: &["are ordered", "N at (", "N over"],
+    },
+    Kind {
+        line: "spike 40",
+        ends: "",
+        stands: None,
+        reasons: &["over the limit", "N at ("],
+    },
     Kind {
         line: "raise 3",
         ends: "raise -3",
         stands: None,
         reasons: &["N at (", "over the limit", "N at rest", "protective stop"],
     },
-    Kind { line: "slider 5", ends: "slider 100", stands: None, reasons: &["its speed slider is at 5 %"] },
-    Kind { line: "reduced", ends: "full", stands: None, reasons: &["reduced mode"] },
-    Kind { line: "noise 0.3", ends: "noise 0", stands: None, reasons: &["N at ("] },
-    Kind { line: "payload 1.5", ends: "", stands: None, reasons: &["N at (", "N at rest", "over the limit"] },
-    Kind { line: "rate 125", ends: "rate 500", stands: None, reasons: &["states came"] },
-    Kind { line: "drift 1", ends: "steady", stands: None, reasons: &["N at (", "N at rest", "N over", "pulls with"] },
-    Kind { line: "hold 300", ends: "", stands: None, reasons: &["states came", "ms behind"] },
-    Kind { line: "watchdog counts", ends: "", stands: None, reasons: &[] },
-    Kind { line: "mute", ends: "mend", stands: None, reasons: &[] },
+    Kind {
+        line: "slider 5",
+        ends: "slider 100",
+        stands: None,
+        reasons: &["its speed slider is at 5 %"],
+    },
+    Kind {
+        line: "reduced",
+        ends: "full",
+        stands: None,
+        reasons: &["reduced mode"],
+    },
+    Kind {
+        line: "noise 0.3",
+        ends: "noise 0",
+        stands: None,
+        reasons: &["N at ("],
+    },
+    Kind {
+        line: "payload 1.5",
+        ends: "",
+        stands: None,
+        reasons: &["N at (", "N at rest", "over the limit"],
+    },
+    Kind {
+        line: "rate 125",
+        ends: "rate 500",
+        stands: None,
+        reasons: &["states came"],
+    },
+    Kind {
+        line: "drift 1",
+        ends: "steady",
+        stands: None,
+        reasons: &["N at (", "N at rest", "N over", "pulls with"],
+    },
+    Kind {
+        line: "hold 300",
+        ends: "",
+        stands: None,
+        reasons: &["states came", "ms behind"],
+    },
+    Kind {
+        line: "watchdog counts",
+        ends: "",
+        stands: None,
+        reasons: &[],
+    },
+    Kind {
+        line: "mute",
+        ends: "mend",
+        stands: None,
+        reasons: &[],
+    },
 ];
 
 /// Faults of one script: kind, moment and length, s.
@@ -147,25 +312,39 @@ pub fn random_faults(rng: &mut Pcg64, from: f64, until: f64) -> Faults {
     let count = 1 + usize::from(rng.random_range(0.0..1.0) < 0.4);
     let one = |_| {
         let kind = &KINDS[rng.random_range(0..KINDS.len())];
-        (kind, rng.random_range(from..until), rng.random_range(0.05..1.5))
+        (
+            kind,
+            rng.random_range(from..until),
+            rng.random_range(0.05..1.5),
+        )
     };
     (0..count).map(one).collect()
 }
 
 pub fn script_of(faults: &[(&'static Kind, f64, f64)]) -> Vec<(f64, String)> {
-    let begin = faults.iter().map(|(kind, at, _)| (*at, kind.line.to_owned()));
+    let begin = faults
+        .iter()
+        .map(|(kind, at, _)| (*at, kind.line.to_owned()));
     let ends = faults.iter().filter(|(kind, ..)| !kind.ends.is_empty());
-    let mut script: Vec<_> = begin.chain(ends.map(|(kind, at, length)| (at + length, kind.ends.to_owned()))).collect();
+    let mut script: Vec<_> = begin
+        .chain(ends.map(|(kind, at, length)| (at + length, kind.ends.to_owned())))
+        .collect();
     script.sort_by(|a, b| a.0.total_cmp(&b.0));
     script
 }
 
 /// Whether the words are true of some of the faults.
 fn is_true(words: &str, faults: &Faults, peak: f64) -> bool {
-    let reasons = faults.iter().flat_map(|(kind, ..)| kind.reasons.iter().map(|reason| (kind.line, *reason)));
+    let reasons = faults
+        .iter()
+        .flat_map(|(kind, ..)| kind.reasons.iter().map(|reason| (kind.line, *reason)));
     // of a program that hangs only where the part was pressed with that much; 1 N is what its sensor is off
-    let is_felt = |(line, reason): (&str, &str)| line != "hung" || reason != OVER || peak > limits().force - 1.0;
-    reasons.filter(|(_, reason)| words.contains(reason)).any(is_felt)
+    let is_felt = |(line, reason): (&str, &str)| {
+        line != "hung" || reason != OVER || peak > limits().force - 1.0
+    };
+    reasons
+        .filter(|(_, reason)| words.contains(reason))
+        .any(is_felt)
 }
 
 /// What is wrong with how a script ended.
@@ -176,11 +355,17 @@ fn judged(faults: &Faults, outcome: &Outcome) -> Option<String> {
         if !is_true(&words, faults, outcome.peak()) {
             return Some(format!("the reason is not true: {words}"));
         }
-        let most = if has(&["mute", "unplug", "die"]) && has(&["pause", "open"]) { RESUMED_WAY } else { 0.0 };
+        let most = if has(&["mute", "unplug", "die"]) && has(&["pause", "open"]) {
+            RESUMED_WAY
+        } else {
+            0.0
+        };
         let (way, until) = outcome.after_report(0.2);
         if way > most {
             let (way, until) = (way * 1e3, until * 1e3);
-            return Some(format!("{way:.2} mm after the report, until {until:.0} ms after it: {words}"));
+            return Some(format!(
+                "{way:.2} mm after the report, until {until:.0} ms after it: {words}"
+            ));
         }
     }
     let has_dashboard = !has(&["mute", "unplug"]);
@@ -188,26 +373,59 @@ fn judged(faults: &Faults, outcome: &Outcome) -> Option<String> {
         let late = outcome.stood_at() - at;
         let is_resumed = !has_dashboard && matches!(kind.line, "pause" | "open");
         // without a dashboard its watchdog stops it
-        let most = kind.stands.map(|most| if has_dashboard { most } else { most.max(WATCHDOG) });
+        let most = kind.stands.map(|most| {
+            if has_dashboard {
+                most
+            } else {
+                most.max(WATCHDOG)
+            }
+        });
         // what another one ends was there for a shorter time
-        let mends = faults.iter().filter(|(other, ..)| other.ends == "mend").map(|(_, at, length)| at + length);
-        let lasts = mends.filter(|end| end > at).map(|end| end - at).fold(*length, f64::min);
+        let mends = faults
+            .iter()
+            .filter(|(other, ..)| other.ends == "mend")
+            .map(|(_, at, length)| at + length);
+        let lasts = mends
+            .filter(|end| end > at)
+            .map(|end| end - at)
+            .fold(*length, f64::min);
         if let Some(most) = most.filter(|most| !is_resumed && lasts > *most && late > *most) {
-            return Some(format!("`{}`: stands after {:.0} of {:.0} ms", kind.line, late * 1e3, most * 1e3));
+            return Some(format!(
+                "`{}`: stands after {:.0} of {:.0} ms",
+                kind.line,
+                late * 1e3,
+                most * 1e3
+            ));
         }
     }
     match &outcome.recovered {
-        Some((_, Err(why))) => return Some(format!("does not go on after {:?}: {why}", outcome.error)),
+        Some((_, Err(why))) => {
+            return Some(format!("does not go on after {:?}: {why}", outcome.error));
+        }
         Some((_, Ok(None))) => return Some("finds no surface after it has recovered".to_owned()),
         Some((_, Ok(Some(off)))) if off.abs() > FOUND => {
-            return Some(format!("finds the surface {:.3} mm off after it has recovered", off * 1e3));
+            return Some(format!(
+                "finds the surface {:.3} mm off after it has recovered",
+                off * 1e3
+            ));
         }
         _ => {}
     }
     // states that never came, that a caller was held up for, or that came at once, of which the library has the newest
-    let may_miss = has(&["silent", "unplug", "die", "rate 125", "hold 300", "drop", "late states 40"]);
+    let may_miss = has(&[
+        "silent",
+        "unplug",
+        "die",
+        "rate 125",
+        "hold 300",
+        "drop",
+        "late states 40",
+    ]);
     if outcome.missing != 0 && !may_miss {
-        return Some(format!("{} states never reached the observer", outcome.missing));
+        return Some(format!(
+            "{} states never reached the observer",
+            outcome.missing
+        ));
     }
     let most = 1.5 * limits().force;
     (outcome.peak() > most).then(|| format!("{:.1} N of at most {most} N", outcome.peak()))
@@ -217,8 +435,16 @@ fn judged(faults: &Faults, outcome: &Outcome) -> Option<String> {
 fn without_a_fault_it_touches_and_touches() {
     let outcome = played(Vec::new(), 1, 14.0);
     assert!(outcome.error.is_none(), "{}", outcome.error.unwrap());
-    assert!(outcome.touches >= 3 && outcome.peak() < 2.0 * TouchParams::default().force, "{}", outcome.peak());
-    println!("{} touches, at most {:.1} N", outcome.touches, outcome.peak());
+    assert!(
+        outcome.touches >= 3 && outcome.peak() < 2.0 * TouchParams::default().force,
+        "{}",
+        outcome.peak()
+    );
+    println!(
+        "{} touches, at most {:.1} N",
+        outcome.touches,
+        outcome.peak()
+    );
 }
 
 /// A part that is 7 mm higher than where the links are clear, met from above at the speed of links.
@@ -227,8 +453,15 @@ fn a_part_met_at_link_speed_is_pressed_with_no_more_than_the_limit_and_left() {
     let outcome = played(vec![(0.2, "raise 7".to_owned())], 1, 6.0);
     let error = outcome.error.as_ref().unwrap().to_string();
     println!("{:.1} N at most; {error}", outcome.peak());
-    assert!(error.contains("where the path is clear by the mesh"), "{error}");
-    assert!(outcome.peak() > 1.0 && outcome.peak() < limits().force, "{} N", outcome.peak());
+    assert!(
+        error.contains("where the path is clear by the mesh"),
+        "{error}"
+    );
+    assert!(
+        outcome.peak() > 1.0 && outcome.peak() < limits().force,
+        "{} N",
+        outcome.peak()
+    );
     let last = outcome.record.last().unwrap().force;
     assert!(last < 1.0, "{last} N are left");
 }
@@ -253,8 +486,15 @@ fn before(line: &str) -> &'static str {
 fn each_fault_alone_ends_as_it_should() {
     let mut wrong = Vec::new();
     let free = played(Vec::new(), 1, 8.0).record;
-    let later: Vec<_> = free.iter().filter(|moment| moment.time > 2.0 && moment.time < 7.0).collect();
-    let link = later.iter().max_by(|a, b| a.speed.total_cmp(&b.speed)).unwrap().time;
+    let later: Vec<_> = free
+        .iter()
+        .filter(|moment| moment.time > 2.0 && moment.time < 7.0)
+        .collect();
+    let link = later
+        .iter()
+        .max_by(|a, b| a.speed.total_cmp(&b.speed))
+        .unwrap()
+        .time;
     let pressed = later.iter().find(|moment| moment.force > 2.0).unwrap().time;
     // 50 ms before the ball meets the surface
     let search = later.iter().find(|moment| moment.force > 0.0).unwrap().time - 0.05;
@@ -265,18 +505,39 @@ fn each_fault_alone_ends_as_it_should() {
         for kind in KINDS {
             let faults = vec![(kind, moment, 1.5)];
             let outcome = played(script_of(&faults), 1, 10.0);
-            let reason = outcome.error.as_ref().map_or("none: it goes on".to_owned(), ToString::to_string);
+            let reason = outcome
+                .error
+                .as_ref()
+                .map_or("none: it goes on".to_owned(), ToString::to_string);
             let stands = (outcome.stood_at() - moment) * 1e3;
-            let stands = outcome.error.as_ref().map_or("-".to_owned(), |_| format!("{:.0}", stands.max(0.0)));
-            let speed = outcome.record.iter().find(|seen| seen.time >= moment).map_or(0.0, |seen| seen.speed * 1e3);
+            let stands = outcome
+                .error
+                .as_ref()
+                .map_or("-".to_owned(), |_| format!("{:.0}", stands.max(0.0)));
+            let speed = outcome
+                .record
+                .iter()
+                .find(|seen| seen.time >= moment)
+                .map_or(0.0, |seen| seen.speed * 1e3);
             let (line, peak, before) = (kind.line, outcome.peak(), before(kind.line));
-            table += &format!("| {line} | {name} | {speed:.0} | {stands} | {peak:.1} | {reason} | {before} |\n");
-            wrong.extend(judged(&faults, &outcome).map(|why| format!("{} in {name}: {why}", kind.line)));
+            table += &format!(
+                "| {line} | {name} | {speed:.0} | {stands} | {peak:.1} | {reason} | {before} |\n"
+            );
+            wrong.extend(
+                judged(&faults, &outcome).map(|why| format!("{} in {name}: {why}", kind.line)),
+            );
         }
     }
     println!("{table}");
-    if let (true, Some(folder)) = (std::env::var_os("TOUCHUP_FULL").is_some(), std::env::var_os("TOUCHUP_RESULTS")) {
-        std::fs::write(std::path::Path::new(&folder).join("Faults_of_the_arm.md"), &table).unwrap();
+    if let (true, Some(folder)) = (
+        std::env::var_os("TOUCHUP_FULL").is_some(),
+        std::env::var_os("TOUCHUP_RESULTS"),
+    ) {
+        std::fs::write(
+            std::path::Path::new(&folder).join("Faults_of_the_arm.md"),
+            &table,
+        )
+        .unwrap();
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
@@ -284,11 +545,27 @@ fn each_fault_alone_ends_as_it_should() {
 /// Searching at 5.3 mm/s; its program is paused, nobody ends it, and somebody resumes it.
 #[test]
 fn an_arm_that_is_resumed_while_its_dashboard_is_mute_is_braked_by_its_client() {
-    let lines = [(1.91, "mute"), (1.989, "pause"), (2.211, "resume"), (2.224, "mend")];
-    let outcome = played(lines.map(|(at, line)| (at, line.to_owned())).to_vec(), 1, 6.0);
+    let lines = [
+        (1.91, "mute"),
+        (1.989, "pause"),
+        (2.211, "resume"),
+        (2.224, "mend"),
+    ];
+    let outcome = played(
+        lines.map(|(at, line)| (at, line.to_owned())).to_vec(),
+        1,
+        6.0,
+    );
     let (way, until) = outcome.after_report(0.1);
-    println!("{:.3} mm after it was resumed, until {:.0} ms after the report", way * 1e3, until * 1e3);
-    assert!(way < RESUMED_WAY && matches!(outcome.recovered, Some((_, Ok(Some(_))))), "{way} m");
+    println!(
+        "{:.3} mm after it was resumed, until {:.0} ms after the report",
+        way * 1e3,
+        until * 1e3
+    );
+    assert!(
+        way < RESUMED_WAY && matches!(outcome.recovered, Some((_, Ok(Some(_))))),
+        "{way} m"
+    );
 }
 
 /// Held up for 300 ms in its fastest link: 20 ms until the client brakes, and as many to see that it looks, to order and to brake.
@@ -296,15 +573,32 @@ fn an_arm_that_is_resumed_while_its_dashboard_is_mute_is_braked_by_its_client() 
 #[test]
 fn an_arm_whose_caller_is_held_up_stands_also_where_its_program_hangs() {
     let free = played(Vec::new(), 1, 8.0).record;
-    let later = free.iter().filter(|moment| moment.time > 2.0 && moment.time < 7.0);
-    let at = later.max_by(|a, b| a.speed.total_cmp(&b.speed)).unwrap().time;
+    let later = free
+        .iter()
+        .filter(|moment| moment.time > 2.0 && moment.time < 7.0);
+    let at = later
+        .max_by(|a, b| a.speed.total_cmp(&b.speed))
+        .unwrap()
+        .time;
     let stands = |script: Vec<(f64, String)>| {
         let record = played(script, 1, 5.0).record;
-        record.iter().find(|moment| moment.time > at + 4e-3 && moment.speed == 0.0).unwrap().time - at
+        record
+            .iter()
+            .find(|moment| moment.time > at + 4e-3 && moment.speed == 0.0)
+            .unwrap()
+            .time
+            - at
     };
     let hold = || (at, "hold 300".to_owned());
-    let (held, both) = (stands(vec![hold()]), stands(vec![(at, "hung".to_owned()), hold()]));
-    println!("held up: stands after {:.0} ms; its program hangs too: {:.0} ms", held * 1e3, both * 1e3);
+    let (held, both) = (
+        stands(vec![hold()]),
+        stands(vec![(at, "hung".to_owned()), hold()]),
+    );
+    println!(
+        "held up: stands after {:.0} ms; its program hangs too: {:.0} ms",
+        held * 1e3,
+        both * 1e3
+    );
     assert!(held < 0.07 && both < 0.2, "{held} s, {both} s");
 }
 
@@ -322,12 +616,23 @@ fn random_scripts_end_as_they_should() {
             let outcome = played(script_of(&faults), seed, 6.0);
             reported += usize::from(outcome.error.is_some());
             (touches, peak) = (touches + outcome.touches, outcome.peak().max(peak));
-            let names: Vec<_> = faults.iter().map(|(kind, at, length)| (kind.line, *at, *length)).collect();
-            wrong
-                .extend(judged(&faults, &outcome).map(|why| format!("seed {seed}, script {number}, {names:?}: {why}")));
+            let names: Vec<_> = faults
+                .iter()
+                .map(|(kind, at, length)| (kind.line, *at, *length))
+                .collect();
+            wrong.extend(
+                judged(&faults, &outcome)
+                    .map(|why| format!("seed {seed}, script {number}, {names:?}: {why}")),
+            );
         }
     }
-    println!("| scripts | with a reported fault | touches | largest force, N | wrong |\n|---|---|---|---|---|");
-    println!("| {} | {reported} | {touches} | {peak:.1} | {} |", scripts * seeds as usize, wrong.len());
+    println!(
+        "| scripts | with a reported fault | touches | largest force, N | wrong |\n|---|---|---|---|---|"
+    );
+    println!(
+        "| {} | {reported} | {touches} | {peak:.1} | {} |",
+        scripts * seeds as usize,
+        wrong.len()
+    );
     assert!(wrong.is_empty(), "{wrong:#?}");
 }

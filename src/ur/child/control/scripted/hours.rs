@@ -37,7 +37,10 @@ fn hours_of_faults_and_recoveries_leave_no_stuck_state_and_no_memory_behind() {
             world.script.borrow_mut().extend(script_of(&next));
         }
         // one that nobody noticed would be in this zero, and the force off by its weight after the next recovery
-        world.script.borrow_mut().push_front((world.now(), "payload 0.25".to_owned()));
+        world
+            .script
+            .borrow_mut()
+            .push_front((world.now(), "payload 0.25".to_owned()));
         let until = world.now() + rng.random_range(5.0..20.0);
         if let Err(error) = session.probe(until) {
             reported += 1;
@@ -47,15 +50,39 @@ fn hours_of_faults_and_recoveries_leave_no_stuck_state_and_no_memory_behind() {
             }
             // it stands since, whatever has happened meanwhile
             let quiet_since = world.now() - 0.05;
-            let moved = |moment: &&super::chain::Moment| moment.time > quiet_since && moment.speed > 0.0;
-            let way: f64 = world.record.borrow().iter().filter(moved).map(|m| m.speed * STEP.as_secs_f64()).sum();
-            assert!(way == 0.0, "at {at:.1} s it still moves, {:.3} mm, after: {error}", way * 1e3);
-            session.arm.recover().unwrap_or_else(|why| panic!("at {at:.1} s, after `{error}`: {why}"));
-            let found = session.go_on().unwrap_or_else(|why| panic!("{recent:?}, at {at:.1} s, `{error}`: {why}"));
-            assert!(found.is_some_and(|off| off.abs() < 0.1e-3), "at {at:.1} s, after `{error}`: {found:?}");
+            let moved =
+                |moment: &&super::chain::Moment| moment.time > quiet_since && moment.speed > 0.0;
+            let way: f64 = world
+                .record
+                .borrow()
+                .iter()
+                .filter(moved)
+                .map(|m| m.speed * STEP.as_secs_f64())
+                .sum();
+            assert!(
+                way == 0.0,
+                "at {at:.1} s it still moves, {:.3} mm, after: {error}",
+                way * 1e3
+            );
+            session
+                .arm
+                .recover()
+                .unwrap_or_else(|why| panic!("at {at:.1} s, after `{error}`: {why}"));
+            let found = session
+                .go_on()
+                .unwrap_or_else(|why| panic!("{recent:?}, at {at:.1} s, `{error}`: {why}"));
+            assert!(
+                found.is_some_and(|off| off.abs() < 0.1e-3),
+                "at {at:.1} s, after `{error}`: {found:?}"
+            );
             recoveries += 1;
         }
-        peak = world.record.borrow().iter().map(|moment| moment.force).fold(peak, f64::max);
+        peak = world
+            .record
+            .borrow()
+            .iter()
+            .map(|moment| moment.force)
+            .fold(peak, f64::max);
         world.record.borrow_mut().clear();
         let bytes = live_bytes();
         match world.now() / end {
@@ -73,8 +100,15 @@ fn hours_of_faults_and_recoveries_leave_no_stuck_state_and_no_memory_behind() {
     );
     println!("{table}");
     if let (true, Some(folder)) = (is_full, std::env::var_os("TOUCHUP_RESULTS")) {
-        std::fs::write(std::path::Path::new(&folder).join("Hours_of_faults_at_the_arm.md"), &table).unwrap();
+        std::fs::write(
+            std::path::Path::new(&folder).join("Hours_of_faults_at_the_arm.md"),
+            &table,
+        )
+        .unwrap();
     }
-    assert!(reported > 5 && touches > 10 && peak <= 1.5 * limits().force, "{table}");
+    assert!(
+        reported > 5 && touches > 10 && peak <= 1.5 * limits().force,
+        "{table}"
+    );
     assert!(last - first < FLAT, "{table}");
 }

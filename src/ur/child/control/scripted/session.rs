@@ -25,7 +25,9 @@ pub struct Heard {
 
 impl Observer for Heard {
     fn on_state(&mut self, state: &ArmState) {
-        let periods = self.last_ns.map_or(1, |last| (state.stamp_ns - last + 1_000_000) / 2_000_000);
+        let periods = self
+            .last_ns
+            .map_or(1, |last| (state.stamp_ns - last + 1_000_000) / 2_000_000);
         self.missing += periods - 1;
         self.last_ns = Some(state.stamp_ns);
     }
@@ -40,12 +42,21 @@ pub struct ProbingSession<'a, 'b> {
 }
 
 pub fn limits() -> Limits {
-    Limits { lowest: Point3::new(-0.6, -0.3, 0.0), highest: Point3::new(-0.2, 0.2, 0.4), ..Limits::default() }
+    Limits {
+        lowest: Point3::new(-0.6, -0.3, 0.0),
+        highest: Point3::new(-0.2, 0.2, 0.4),
+        ..Limits::default()
+    }
 }
 
 impl<'a, 'b> ProbingSession<'a, 'b> {
     pub fn new(world: &'b World<'a>, arm: ScriptedArm<'a, 'b>) -> Self {
-        Self { world, arm, heard: Heard::default(), touches: 0 }
+        Self {
+            world,
+            arm,
+            heard: Heard::default(),
+            touches: 0,
+        }
     }
 
     /// Zeroes the sensor, and touches until some time of the model, s.
@@ -70,12 +81,21 @@ impl<'a, 'b> ProbingSession<'a, 'b> {
         let params = ArmParams::default();
         let standoff = params.pose_bo * Point3::new(x, y, TOP + 5e-3);
         let standoff_bt = Isometry3::from_parts(standoff.coords.into(), UnitQuaternion::identity());
-        let target = TouchTarget { standoff_bt, direction: -Vector3::z_axis(), search: 8e-3, expected: None };
+        let target = TouchTarget {
+            standoff_bt,
+            direction: -Vector3::z_axis(),
+            search: 8e-3,
+            expected: None,
+        };
         let mut watched = Watched::new(&mut self.arm, limits(), &mut self.heard);
         let record = watched.touch(&target, &TouchParams::default())?;
         self.touches += 1;
-        let TouchOutcome::Contact { centre, .. } = record.outcome else { return Ok(None) };
-        Ok(Some(params.pose_bo.inverse_transform_point(&centre).z - TOP - params.radius))
+        let TouchOutcome::Contact { centre, .. } = record.outcome else {
+            return Ok(None);
+        };
+        Ok(Some(
+            params.pose_bo.inverse_transform_point(&centre).z - TOP - params.radius,
+        ))
     }
 
     /// After a fault: recovers, backs off, zeroes, and touches once; what the touch finds.
@@ -87,11 +107,19 @@ impl<'a, 'b> ProbingSession<'a, 'b> {
 
     fn back_off(&mut self) -> Result<(), ProbeError> {
         let doing = "backing off";
-        let state = self.arm.next_state().map_err(|error| ProbeError::Arm { doing, error })?;
+        let state = self
+            .arm
+            .next_state()
+            .map_err(|error| ProbeError::Arm { doing, error })?;
         let mut above = state.pose_bt;
         above.translation.vector.z += BACK_OFF;
         self.heard.last_ns = None;
         let touch = TouchParams::default();
-        Watched::new(&mut self.arm, limits(), &mut self.heard).leave(doing, &above, BACK_OFF_SPEED, &touch)
+        Watched::new(&mut self.arm, limits(), &mut self.heard).leave(
+            doing,
+            &above,
+            BACK_OFF_SPEED,
+            &touch,
+        )
     }
 }
