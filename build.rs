@@ -1,6 +1,6 @@
-//! What is made before the program is compiled: the messages of ROS, from the files that define them; and with feature `ur` the
-//! place of the Python that the program was built for, so that the loader finds it also where there are two; with feature `web` the
-//! operator's page.
+//! What is made before the program is compiled: the messages of ROS, from the files that define
+//! them; and with feature `ur` the place of the Python that the program was built for, so that the
+//! loader finds it also where there are two; with feature `web` the operator's page.
 
 #[path = "generate/definition.rs"]
 mod definition;

@@ -1,4 +1,5 @@
-//! Deviation of a million points and registration of a hundred thousand: `cargo bench --bench compare`.
+//! Deviation of a million points and registration of a hundred thousand: `cargo bench --bench
+//! compare`.
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
@@ -41,7 +42,8 @@ fn truth(faces: usize) -> (TriMesh, FaceTree) {
     (mesh, tree)
 }
 
-/// Signed distance of a million points from a surface of so many faces, as `touchup compare` measures it.
+/// Signed distance of a million points from a surface of so many faces, as `touchup compare`
+/// measures it.
 #[divan::bench(args = [100_000, 1_000_000, 2_000_000], sample_count = 5)]
 fn point_to_surface(bencher: Bencher, faces: usize) {
     distances(bencher, faces, &Threads);

@@ -1,11 +1,13 @@
-//! Cost of one sample on scans of any density: [`Engine::answer`] and [`Engine::follow`] for edges from a thirtieth of the tip's radius to
-//! twice that, and from 10 thousand to 5 million faces.
+//! Cost of one sample on scans of any density: [`Engine::answer`] and [`Engine::follow`] for edges
+//! from a thirtieth of the tip's radius to twice that, and from 10 thousand to 5 million faces.
 //!
-//! A ball slides over a wavy plate in a raster at 1 kHz, with contacts a little below the scan. One line for each density and size:
-//! time to begin, time from a sample to its answer and until the next one is awaited, how many vertices a sample may move, memory of the
-//! process. As a recording is replayed, as fast as samples can be read, with the patch made at the end; with `live` in real time, the patch
-//! on a thread of its own: how old the touches are that it shows, and how many of its renewals were late. A sample that is due before the
-//! one before is followed waits: that counts as its time.
+//! A ball slides over a wavy plate in a raster at 1 kHz, with contacts a little below the scan. One
+//! line for each density and size: time to begin, time from a sample to its answer and until the
+//! next one is awaited, how many vertices a sample may move, memory of the process. As a recording
+//! is replayed, as fast as samples can be read, with the patch made at the end; with `live` in real
+//! time, the patch on a thread of its own: how old the touches are that it shows, and how many of
+//! its renewals were late. A sample that is due before the one before is followed waits: that
+//! counts as its time.
 //!
 //! `cargo bench --bench dense [-- live] [SECONDS [FACES…]]`
 

@@ -1,4 +1,5 @@
-//! How long does it take to find the features of a scan of 1M vertices, and to take new touches into those that are known?
+//! How long does it take to find the features of a scan of 1M vertices, and to take new touches
+//! into those that are known?
 
 #[path = "../tests/common/plate_stream.rs"]
 mod plate_stream;

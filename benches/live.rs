@@ -1,12 +1,13 @@
-//! Cost of one sample with everything on, and lag of the patch: samples come at 1 kHz in real time, the
-//! patch has a thread of its own.
+//! Cost of one sample with everything on, and lag of the patch: samples come at 1 kHz in real time,
+//! the patch has a thread of its own.
 //!
-//! A ball slides over a wavy plate in a raster, with contacts a little below the scan. One line for each minute: times of
-//! [`Engine::answer`], with the wait for what followed the sample before, how old the touches are that the patch shows (in time of
-//! the samples), how many renewals of it were late, faces, and memory of the process.
+//! A ball slides over a wavy plate in a raster, with contacts a little below the scan. One line for
+//! each minute: times of [`Engine::answer`], with the wait for what followed the sample before, how
+//! old the touches are that the patch shows (in time of the samples), how many renewals of it were
+//! late, faces, and memory of the process.
 //!
-//! `cargo bench --bench live [-- FACES [SECONDS [fast]]]`; `fast` does not wait for real time, so that each push waits for
-//! the patch and pushes are not timed.
+//! `cargo bench --bench live [-- FACES [SECONDS [fast]]]`; `fast` does not wait for real time, so
+//! that each push waits for the patch and pushes are not timed.
 
 mod memory;
 mod sliding;

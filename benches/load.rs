@@ -1,5 +1,5 @@
-//! Reading a mesh file of a million triangles, with repair and adjacency; and of five million with the tree over its faces:
-//! `cargo bench --bench load`.
+//! Reading a mesh file of a million triangles, with repair and adjacency; and of five million with
+//! the tree over its faces: `cargo bench --bench load`.
 
 use std::fs::File;
 use std::hint::black_box;

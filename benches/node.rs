@@ -1,12 +1,14 @@
-//! Cost of a sample in the node: from the arrival of what completes it to the mesh, with view, features and recording
-//! beside it. A ball slides over a wavy plate in real time, wrench and pose each at 1 kHz.
+//! Cost of a sample in the node: from the arrival of what completes it to the mesh, with view,
+//! features and recording beside it. A ball slides over a wavy plate in real time, wrench and pose
+//! each at 1 kHz.
 //!
 //! - `cargo bench --bench node [-- FACES…]`: alone, what arrives is put in by hand.
-//! - `cargo bench --bench node --features web -- pages [FACES [TURNS]]`: the same beside pages: none, one that reads, and one that never
-//!   reads, by turns; at the end the middle p99 of each against that without a page.
-//! - `cargo bench --bench node -- dds [FACES [SECONDS [FOLDER]]]`: sensors and viewer are a process each, over DDS on the loopback
-//!   interface; before and after it a bare echo over the same. 600 s is the soak; memory is printed each minute. Into `FOLDER` go plots
-//!   and a table of each second.
+//! - `cargo bench --bench node --features web -- pages [FACES [TURNS]]`: the same beside pages:
+//!   none, one that reads, and one that never reads, by turns; at the end the middle p99 of each
+//!   against that without a page.
+//! - `cargo bench --bench node -- dds [FACES [SECONDS [FOLDER]]]`: sensors and viewer are a process
+//!   each, over DDS on the loopback interface; before and after it a bare echo over the same. 600 s
+//!   is the soak; memory is printed each minute. Into `FOLDER` go plots and a table of each second.
 
 #[path = "node/course.rs"]
 mod course;
@@ -44,7 +46,8 @@ use touchup::ros::{dds, in_process};
 use touchup::sim::wavy::{RADIUS, slide, wavy_plate};
 use touchup::stylus::Sample;
 
-/// Width of the raster, m: 2.3 minutes each time, so that a soak comes to the same places again and again.
+/// Width of the raster, m: 2.3 minutes each time, so that a soak comes to the same places again and
+/// again.
 const WIDTH: f64 = 20e-3;
 /// So long it slides in process.
 const SECONDS: usize = 20;

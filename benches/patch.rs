@@ -1,4 +1,5 @@
-//! The patch: clipping the scan at a region, and remeshing the region, for each cell that the surface passes through.
+//! The patch: clipping the scan at a region, and remeshing the region, for each cell that the
+//! surface passes through.
 
 use divan::Bencher;
 use divan::counter::ItemsCount;

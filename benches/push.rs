@@ -1,8 +1,9 @@
-//! Cost of one sample: `Refiner::push` on meshes of 10k to 5M faces, and the hand-written minimal loop beside it.
+//! Cost of one sample: `Refiner::push` on meshes of 10k to 5M faces, and the hand-written minimal
+//! loop beside it.
 //!
-//! A ball slides over a wavy plate at 50 mm/s and 1 kHz with contacts a little below the scan, so that every
-//! timed push is in contact and moves vertices. Afterwards 1,000 queries are compared with brute force. Figures are per
-//! push, from an own sorted list: a mean would hide the tails.
+//! A ball slides over a wavy plate at 50 mm/s and 1 kHz with contacts a little below the scan, so
+//! that every timed push is in contact and moves vertices. Afterwards 1,000 queries are compared
+//! with brute force. Figures are per push, from an own sorted list: a mean would hide the tails.
 //!
 //! `cargo bench --bench push [-- FACES…]`
 
@@ -91,7 +92,8 @@ fn check_index(refiner: &Refiner) {
             "query {i}"
         );
         if mesh.face_count() > 200_000 && i >= 50 {
-            // brute force over millions of faces: fifty full scans, the rest by rebuilding the tree once
+            // brute force over millions of faces: fifty full scans, the rest by rebuilding the tree
+            // once
             return check_against_new_tree(refiner);
         }
     }

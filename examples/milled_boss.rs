@@ -1,6 +1,8 @@
-//! A part before and after work on it, for `touchup disagree`: the plate of the demo, and the same with its boss 1 mm lower.
+//! A part before and after work on it, for `touchup disagree`: the plate of the demo, and the same
+//! with its boss 1 mm lower.
 //!
-//! `cargo run --release --example milled_boss -- FOLDER` writes `before.ply` and `now.ply` into a folder, in mm.
+//! `cargo run --release --example milled_boss -- FOLDER` writes `before.ply` and `now.ply` into a
+//! folder, in mm.
 
 use std::path::PathBuf;
 

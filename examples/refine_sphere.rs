@@ -54,7 +54,8 @@ fn on_unit_sphere(turns: f64, down: f64) -> Vector3<f64> {
     )
 }
 
-/// One minute at 1 kHz: from pole to pole in `turns`, pressed along the normal. The tip deflects by FORCE / stiffness.
+/// One minute at 1 kHz: from pole to pole in `turns`, pressed along the normal. The tip deflects by
+/// FORCE / stiffness.
 fn spiral(turns: u32, samples: u32) -> impl Iterator<Item = Sample> {
     let reach = RADIUS + BALL.radius - BALL.stiffness.map_or(0.0, |stiffness| FORCE / stiffness);
     (0..samples).map(move |i| {

@@ -29,7 +29,8 @@ fn main() -> anyhow::Result<()> {
     let mut recording = RecordingReader::open(Path::new(bag), &Topics::default())?;
     let mut sync = Synchroniser::new(SyncParams::default())?;
     for message in recording.by_ref() {
-        // poses and wrenches come at different rates: a sample is a wrench with the pose interpolated at its stamp
+        // poses and wrenches come at different rates: a sample is a wrench with the pose
+        // interpolated at its stamp
         sync.push(message?);
         from_fn(|| sync.next_sample()).try_for_each(|sample| refiner.push(&sample).map(drop))?;
     }

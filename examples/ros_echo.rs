@@ -1,7 +1,8 @@
-//! Answers every wrench with a mismatch that has its stamp and force, over DDS: the cost of the transport alone,
-//! and a second node to test another node with.
+//! Answers every wrench with a mismatch that has its stamp and force, over DDS: the cost of the
+//! transport alone, and a second node to test another node with.
 //!
-//! cargo run --release --example ros_echo -- [TILES] [--ros-args ...]; ends when its standard input does
+//! cargo run --release --example ros_echo -- [TILES] [--ros-args ...]; ends when its standard input
+//! does
 
 use std::io::{Write, stdin, stdout};
 use std::thread;
@@ -111,7 +112,8 @@ fn main() -> anyhow::Result<()> {
                 ..HapticMismatch::default()
             })),
             Arrival::Call(Call::Undo(request, reply)) => {
-                // as long as it is asked for: in the enhanced mapping it is cut where it fits into no packet
+                // as long as it is asked for: in the enhanced mapping it is cut where it fits into
+                // no packet
                 let message = "echo".repeat(request.strokes as usize);
                 let answer = UndoResponse {
                     success: true,

@@ -1,7 +1,8 @@
-//! Reads definitions of messages as ROS 2 has them: the lines of `.msg`, `.srv` and `.action` files.
+//! Reads definitions of messages as ROS 2 has them: the lines of `.msg`, `.srv` and `.action`
+//! files.
 //!
-//! A comment belongs to the lines below it up to an empty one; of constants to the next line alone. The first comment of a file
-//! that an empty line follows is that of the whole file.
+//! A comment belongs to the lines below it up to an empty one; of constants to the next line alone.
+//! The first comment of a file that an empty line follows is that of the whole file.
 
 use std::mem::{replace, take};
 

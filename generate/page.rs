@@ -1,4 +1,5 @@
-//! The operator's page: npm builds it from `web/` in the folder of the build, and every file of it becomes a constant.
+//! The operator's page: npm builds it from `web/` in the folder of the build, and every file of it
+//! becomes a constant.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,5 @@
-//! Messages as Rust: structs, and what the macros in `src/ros/r2r` make conversions and stand-ins of.
+//! Messages as Rust: structs, and what the macros in `src/ros/r2r` make conversions and stand-ins
+//! of.
 
 use super::definition::{BASIC, Constant, Field, Length, Message};
 
@@ -106,7 +107,8 @@ pub fn carried(messages: &[Message]) -> String {
     format!("carried!({});\n", parts.join(", "))
 }
 
-/// In a package of Rust names stand alone: `FlagFeatureRequest`; the result of an action gives way to the message of that name.
+/// In a package of Rust names stand alone: `FlagFeatureRequest`; the result of an action gives way
+/// to the message of that name.
 fn name(message: &Message) -> String {
     format!(
         "{}{}",
@@ -253,7 +255,8 @@ fn raw(name: &str) -> String {
     }
 }
 
-/// For `message!` and `service!`: each message and service, what r2r calls it, and the fields on both sides.
+/// For `message!` and `service!`: each message and service, what r2r calls it, and the fields on
+/// both sides.
 pub fn conversions(messages: &[Message]) -> String {
     let lines = messages.iter().map(|message| {
         let fields = message

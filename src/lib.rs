@@ -1,10 +1,11 @@
 //! Repairs a 3D scan of a work-piece by touch.
 //!
-//! A stylus or a robot-held probe touches the real part. From the tip's pose and the measured force touchup predicts what
-//! the force that the scan implies, compares it with the measured force (the *haptic mismatch*), and moves the mesh until the
-//! two agree.
+//! A stylus or a robot-held probe touches the real part. From the tip's pose and the measured force
+//! touchup predicts what the force that the scan implies, compares it with the measured force (the
+//! *haptic mismatch*), and moves the mesh until the two agree.
 //!
-//! This crate is the ROS 2 node and the command line; the rest is in crates of its own, shown here under one name:
+//! This crate is the ROS 2 node and the command line; the rest is in crates of its own, shown here
+//! under one name:
 //!
 //! | crate | modules |
 //! |---|---|

@@ -1,5 +1,5 @@
-//! Lines of the log for who passes them on, as the node does to `/rosout`: a bounded queue, from which a place in the program that
-//! repeats itself takes one line in a second.
+//! Lines of the log for who passes them on, as the node does to `/rosout`: a bounded queue, from
+//! which a place in the program that repeats itself takes one line in a second.
 
 use std::collections::BTreeMap;
 use std::fmt::{Debug, Write};

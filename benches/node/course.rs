@@ -39,7 +39,8 @@ impl Times {
 pub struct Answers {
     /// time of the first sample, ns since 1970, a whole second
     pub begin_ns: i64,
-    /// for each second the samples that were not answered, and how long the answers to the others took
+    /// for each second the samples that were not answered, and how long the answers to the others
+    /// took
     pub seconds: Vec<(u64, Option<Times>)>,
 }
 
@@ -55,7 +56,8 @@ pub struct Drawn {
 pub struct SecondDrawn {
     /// from a sample that moves a vertex to where the viewer has it
     pub drawn: Option<Times>,
-    /// age of the touches that the patch in the mesh shows, as the node says; renewals of the patch so far, and those that were late
+    /// age of the touches that the patch in the mesh shows, as the node says; renewals of the patch
+    /// so far, and those that were late
     pub shown: Option<(Times, [u64; 2])>,
 }
 

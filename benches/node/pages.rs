@@ -1,4 +1,5 @@
-//! Clients of the operator's page for the bench: one that reads as fast as it can, and one that never reads.
+//! Clients of the operator's page for the bench: one that reads as fast as it can, and one that
+//! never reads.
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpStream};

@@ -1,4 +1,5 @@
-//! The other processes of the bench over DDS: one sends what sensors send and takes the answers, one sees what a viewer sees.
+//! The other processes of the bench over DDS: one sends what sensors send and takes the answers,
+//! one sees what a viewer sees.
 
 use std::collections::{BTreeMap, HashMap};
 use std::io::{Read, stdin};
@@ -178,12 +179,14 @@ struct Viewer {
     drawn: HashMap<VertexBits, i64>,
     /// vertices reported at a place and not yet drawn there
     pending: HashMap<VertexBits, u32>,
-    /// of each of these vertices the stamps of the samples that moved it, ns, and where to, in their order
+    /// of each of these vertices the stamps of the samples that moved it, ns, and where to, in
+    /// their order
     moves: HashMap<u32, Vec<(i64, VertexBits)>>,
     visible: Latencies,
     /// the same by the second of the stamp
     seconds: BTreeMap<i64, Latencies>,
-    /// what the node says of each second: age of what the patch shows, renewals, and those that were late
+    /// what the node says of each second: age of what the patch shows, renewals, and those that
+    /// were late
     shown: BTreeMap<i64, (Times, [u64; 2])>,
 }
 
@@ -355,7 +358,8 @@ pub fn view(domain: u16) -> Drawn {
     seen.seen()
 }
 
-/// Sends wrenches at 1 kHz, and poses where the other end is the node, from a whole second on; measures how long answers take.
+/// Sends wrenches at 1 kHz, and poses where the other end is the node, from a whole second on;
+/// measures how long answers take.
 pub fn touch(domain: u16, seconds: usize, is_node: bool) -> Answers {
     let (context, mut node) = joined(domain, "sensors");
     let mut mismatches = reader::<HapticMismatch>(&mut node, "/mismatch", SAMPLES);

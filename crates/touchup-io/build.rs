@@ -14,7 +14,8 @@ fn main() {
     );
 }
 
-/// `None` without git, and where this is no checkout of its own: a tarball, or inside another repository.
+/// `None` without git, and where this is no checkout of its own: a tarball, or inside another
+/// repository.
 fn commit() -> Option<String> {
     git(&["ls-files", "--error-unmatch", "build.rs"])?;
     // asked again when HEAD moves, and when a source changes, which is built again anyway

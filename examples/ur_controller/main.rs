@@ -1,17 +1,23 @@
-//! A stand-in for the controller of a UR5e, to test against: RTDE, dashboard and script ports, and an arm that touches a part.
+//! A stand-in for the controller of a UR5e, to test against: RTDE, dashboard and script ports, and
+//! an arm that touches a part.
 //!
-//! cargo run --features ur --example ur_controller -- ADDRESS [--record FILE] [--version 5.15.0] [--start-mm X,Y,Z]
+//! cargo run --features ur --example ur_controller -- ADDRESS [--record FILE] [--version 5.15.0]
+//! [--start-mm X,Y,Z]
 //!     [--payload KG,X,Y,Z]
 //!
-//! It does what ur_rtde 1.6.5 and its program see of a controller; how a real one stops, presses and watches is modelled, not
-//! copied. Lines on stdin make faults: drop, undash, mute, silent, deaf, stuck, hung, tired, late states MS, late orders MS, rate HZ,
-//! slider PERCENT, reduced, full, watchdog counts, pause, resume, open, shut, unplug, die, protective, operator, release, halt, off,
-//! local, spike N, drift N_PER_S, noise N, payload KG, raise MM, mend, mark TEXT. It ends when stdin does.
+//! It does what ur_rtde 1.6.5 and its program see of a controller; how a real one stops, presses
+//! and watches is modelled, not copied. Lines on stdin make faults: drop, undash, mute, silent,
+//! deaf, stuck, hung, tired, late states MS, late orders MS, rate HZ, slider PERCENT, reduced,
+//! full, watchdog counts, pause, resume, open, shut, unplug, die, protective, operator, release,
+//! halt, off, local, spike N, drift N_PER_S, noise N, payload KG, raise MM, mend, mark TEXT. It
+//! ends when stdin does.
 //!
-//! It has a clock of its own, in lock step with its client: while a program of the client plays, a period passes when the client has
-//! sent its next order, so a machine that is late changes nothing. No period is shorter than on a robot; without a program the clock
-//! is that of the machine. A line `run MS` lets so much time pass whatever the client says. States, motion, safety, watchdog and
-//! record go by this clock. Each line is repeated on stdout when it has been done.
+//! It has a clock of its own, in lock step with its client: while a program of the client plays, a
+//! period passes when the client has sent its next order, so a machine that is late changes
+//! nothing. No period is shorter than on a robot; without a program the clock is that of the
+//! machine. A line `run MS` lets so much time pass whatever the client says. States, motion,
+//! safety, watchdog and record go by this clock. Each line is repeated on stdout when it has been
+//! done.
 
 mod dashboard;
 mod model;
@@ -199,7 +205,8 @@ fn accept(
             }
             served.sockets.push(copy);
             let serve = &serve;
-            // small packets, each wanted at once; a client that goes in the middle of an answer is no matter
+            // small packets, each wanted at once; a client that goes in the middle of an answer is
+            // no matter
             scope.spawn(move || {
                 socket
                     .set_nodelay(true)

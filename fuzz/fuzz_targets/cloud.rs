@@ -1,5 +1,5 @@
-//! A point cloud of any kind: what is read has as many points as the bytes can hold. The surface through them is left out: its grid takes longer
-//! than all else.
+//! A point cloud of any kind: what is read has as many points as the bytes can hold. The surface
+//! through them is left out: its grid takes longer than all else.
 
 #![no_main]
 

@@ -1,4 +1,5 @@
-//! A mesh file of either kind: what is read has places alone, and comes back from the file that is written of it.
+//! A mesh file of either kind: what is read has places alone, and comes back from the file that is
+//! written of it.
 
 #![no_main]
 

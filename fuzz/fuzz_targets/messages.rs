@@ -1,4 +1,5 @@
-//! Messages in CDR: all types of poses and wrenches, transforms and clouds of markers, in a recording around them that is sound.
+//! Messages in CDR: all types of poses and wrenches, transforms and clouds of markers, in a
+//! recording around them that is sound.
 
 #![no_main]
 

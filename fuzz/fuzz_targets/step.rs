@@ -1,4 +1,5 @@
-//! One held sample of the face dynamics, by every rule: a face somewhere, of unit normal, or an error.
+//! One held sample of the face dynamics, by every rule: a face somewhere, of unit normal, or an
+//! error.
 
 #![no_main]
 

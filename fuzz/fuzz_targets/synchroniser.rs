@@ -1,4 +1,5 @@
-//! Messages of any stamps and numbers, paired and doubted: samples come finite, in order of time, and explain themselves.
+//! Messages of any stamps and numbers, paired and doubted: samples come finite, in order of time,
+//! and explain themselves.
 
 #![no_main]
 

@@ -1,4 +1,5 @@
-//! The tables that are read: pairs of points, static poses, touches, and the lines of the touches of an arm.
+//! The tables that are read: pairs of points, static poses, touches, and the lines of the touches
+//! of an arm.
 
 #![no_main]
 

@@ -1,4 +1,5 @@
-//! What the fuzz targets share: bytes as a file, numbers of any size, small parts, and what must hold of a mesh.
+//! What the fuzz targets share: bytes as a file, numbers of any size, small parts, and what must
+//! hold of a mesh.
 //!
 //! `fuzz/run` builds and runs the targets.
 
@@ -94,7 +95,8 @@ pub fn rotation(bytes: &mut Unstructured) -> Result<UnitQuaternion<f64>> {
     })
 }
 
-/// The sample after `stamp_ns`: near `near`, within about `usual` m, without force or pressed by any.
+/// The sample after `stamp_ns`: near `near`, within about `usual` m, without force or pressed by
+/// any.
 ///
 /// # Errors
 /// Where the bytes end.

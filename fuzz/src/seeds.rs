@@ -1,4 +1,5 @@
-//! What every run begins from: a small sound input of each kind, and recordings made around given bytes.
+//! What every run begins from: a small sound input of each kind, and recordings made around given
+//! bytes.
 
 use std::fs;
 use std::io::Cursor;
@@ -89,7 +90,8 @@ fn e57_bytes() -> Vec<u8> {
     bytes.into_inner()
 }
 
-/// An MCAP file without chunks, index and end, its messages on the topics of a touch by their number.
+/// An MCAP file without chunks, index and end, its messages on the topics of a touch by their
+/// number.
 pub fn mcap_of(messages: &[(u16, &[u8])]) -> Vec<u8> {
     let mut file = MAGIC.to_vec();
     record(&mut file, 1, &[&text("ros2"), &text("")]);
@@ -176,7 +178,8 @@ pub fn mcap_bytes() -> Vec<u8> {
     writer.finish().expect("memory takes bytes").into_inner()
 }
 
-/// A ROS 1 bag without index: a connection for the pose and one for the wrench, and a message of each.
+/// A ROS 1 bag without index: a connection for the pose and one for the wrench, and a message of
+/// each.
 fn bag_bytes() -> Vec<u8> {
     let fields = |fields: &[(&str, &[u8])]| {
         let field = |(name, value): &(&str, &[u8])| {

@@ -32,9 +32,11 @@ use crate::ur::{UrArm, UrParams};
 pub(super) enum RobotName {
     /// A simulated one, against the part of --truth
     Sim,
-    /// A UR, at robot.host of the scene (docs/ur.md); only where touchup was built with the feature `ur`
+    /// A UR, at robot.host of the scene (docs/ur.md); only where touchup was built with the feature
+    /// `ur`
     Ur,
-    /// Any arm behind ros2_control, on the topics of robot.ros2_control of the scene (docs/ros2_control.md)
+    /// Any arm behind ros2_control, on the topics of robot.ros2_control of the scene
+    /// (docs/ros2_control.md)
     #[value(name = "ros2_control")]
     Ros2Control,
 }
@@ -50,7 +52,8 @@ const NO_HOST: &str =
 /// The UR of a scene.
 ///
 /// # Errors
-/// [`CliError::usage`] where the scene names none, or touchup was built without it; [`CliError::arm`] where it does not answer.
+/// [`CliError::usage`] where the scene names none, or touchup was built without it;
+/// [`CliError::arm`] where it does not answer.
 #[cfg(feature = "ur")]
 pub(super) fn connect_ur(scene: &Scene) -> Result<Box<dyn Arm + Send>, CliError> {
     Ok(Box::new(
@@ -105,7 +108,8 @@ const NO_UR: &str = "this touchup was built without a UR: `cargo install --locke
 /// The arm behind ros2_control of a scene, on the network of the environment.
 ///
 /// # Errors
-/// [`CliError::usage`] where the scene names no arm, or touchup was built without ROS; [`CliError::arm`] where it is not at command.
+/// [`CliError::usage`] where the scene names no arm, or touchup was built without ROS;
+/// [`CliError::arm`] where it is not at command.
 #[cfg(any(feature = "ros", feature = "r2r"))]
 fn connect_ros2_control(scene: &Scene) -> Result<Box<dyn Arm + Send>, CliError> {
     let config = NodeConfig::named("touchup_arm", &[], |name| std::env::var(name).ok())?;
@@ -197,7 +201,8 @@ pub(super) struct ArmArguments {
 #[derive(Debug, Args)]
 #[group(id = "cell")]
 pub(super) struct CellArguments {
-    /// The scan: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57; not needed when the scene names its file
+    /// The scan: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57; not needed when the scene
+    /// names its file
     #[arg(long, value_name = "MESH")]
     scan: Option<PathBuf>,
     /// Unit of the coordinates in the scan's file, and in the part's
@@ -227,7 +232,8 @@ pub(super) struct Measurement<'a> {
 /// Where the touches of a measurement go.
 #[derive(Debug, Args)]
 pub(super) struct TouchesOutput {
-    /// Output: each touch as it is made, a line of JSON each, so that none is lost whatever ends the measurement
+    /// Output: each touch as it is made, a line of JSON each, so that none is lost whatever ends
+    /// the measurement
     #[arg(long, value_name = "JSONL", requires = "robot")]
     pub touches_out: Option<PathBuf>,
 }
@@ -315,7 +321,8 @@ impl CellArguments {
         }
     }
 
-    /// Measures something with the probe of an arm about the scan as it is, until a signal stops it; returns also the cell.
+    /// Measures something with the probe of an arm about the scan as it is, until a signal stops
+    /// it; returns also the cell.
     ///
     /// - `truth`: as in [`Self::with`].
     pub fn measure<T, E: Into<CliError>>(

@@ -10,8 +10,9 @@ use crate::sim::{ArmErrorSigmas, ArmErrors};
 pub(super) enum ArmErrorsName {
     /// By nothing
     None,
-    /// By what is left of a UR after calibration, drawn from --seed: standard deviations 10 % of the stiffness, 0.002 mm of the ball's radius,
-    /// 0.05 mm and 0.02° of the place of the part, 0.03 mm of repeatability
+    /// By what is left of a UR after calibration, drawn from --seed: standard deviations 10 % of
+    /// the stiffness, 0.002 mm of the ball's radius, 0.05 mm and 0.02° of the place of the part,
+    /// 0.03 mm of repeatability
     Calibrated,
 }
 

@@ -33,11 +33,13 @@ const SAMPLES: u32 = 200_000;
 
 #[derive(Debug, Default, Args)]
 pub(super) struct CompareArguments {
-    /// The mesh to be judged: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57; of a refined PLY touched and untouched parts are listed apart
+    /// The mesh to be judged: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57; of a refined
+    /// PLY touched and untouched parts are listed apart
     mesh: PathBuf,
     /// The nominal or true part: PLY, STL or OBJ
     truth: PathBuf,
-    /// With --align pairs: the same points on MESH (columns scan_x_mm …) and on TRUTH (space_x_mm …), as CSV
+    /// With --align pairs: the same points on MESH (columns scan_x_mm …) and on TRUTH (space_x_mm
+    /// …), as CSV
     #[arg(value_name = "PAIRS")]
     pairs: Option<PathBuf>,
     /// Unit of the coordinates in MESH, and in the mesh of --before
@@ -64,16 +66,19 @@ pub(super) struct CompareArguments {
     /// Ends of the colours and of the histogram, mm; by default from the 95th percentile
     #[arg(long, value_name = "R", value_parser = positive)]
     range_mm: Option<f64>,
-    /// Deviations of at most this are within tolerance: their share is listed, and the picture has one colour for them
+    /// Deviations of at most this are within tolerance: their share is listed, and the picture has
+    /// one colour for them
     #[arg(long, value_name = "T", value_parser = positive)]
     tolerance_mm: Option<f64>,
-    /// Names the holes, slots, pockets and bosses of this file in the picture; it is in the frame of MESH, as `refine` writes it
+    /// Names the holes, slots, pockets and bosses of this file in the picture; it is in the frame
+    /// of MESH, as `refine` writes it
     #[arg(long, value_name = "JSON", requires = "picture")]
     features: Option<PathBuf>,
     /// Named in the picture beside those
     #[arg(skip)]
     named: Vec<FeatureRecord>,
-    /// From which direction the picture is taken, in the frame of TRUTH; by default the side that was touched
+    /// From which direction the picture is taken, in the frame of TRUTH; by default the side that
+    /// was touched
     #[arg(
         long,
         value_name = "X,Y,Z",
@@ -233,7 +238,8 @@ pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, Cl
 }
 
 impl CompareArguments {
-    /// The picture deviation.png of refined.ply and scan.ply beside truth.ply in one folder, all in mm.
+    /// The picture deviation.png of refined.ply and scan.ply beside truth.ply in one folder, all in
+    /// mm.
     ///
     /// - `named`: features whose names are written beside them.
     pub(super) fn in_folder(folder: &Path, named: Vec<FeatureRecord>) -> Self {

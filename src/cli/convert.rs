@@ -1,5 +1,5 @@
-//! `touchup convert`: poses and wrenches of any recording, as a recording that every verb reads without flags; features and touches as
-//! tables.
+//! `touchup convert`: poses and wrenches of any recording, as a recording that every verb reads
+//! without flags; features and touches as tables.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -17,11 +17,12 @@ use crate::scene::Scene;
 
 #[derive(Debug, Args)]
 pub(super) struct ConvertArguments {
-    /// A recording: MCAP or SQLite of ROS 2, a file or a folder, a bag of ROS 1, or a table (CSV, log of a UR's RTDE); or features.json or
-    /// touches.csv of touchup
+    /// A recording: MCAP or SQLite of ROS 2, a file or a folder, a bag of ROS 1, or a table (CSV,
+    /// log of a UR's RTDE); or features.json or touches.csv of touchup
     #[arg(value_name = "INPUT")]
     input: PathBuf,
-    /// Output: .mcap of a recording, with /stylus/pose and /stylus/wrench; .csv or .parquet of features or touches
+    /// Output: .mcap of a recording, with /stylus/pose and /stylus/wrench; .csv or .parquet of
+    /// features or touches
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// Names the columns of a table
@@ -29,7 +30,8 @@ pub(super) struct ConvertArguments {
     scene: Option<PathBuf>,
     #[command(flatten)]
     recorded: RecordedFlags,
-    /// Which time of a message counts: that of its header, or when it was recorded, for headers without a usable one
+    /// Which time of a message counts: that of its header, or when it was recorded, for headers
+    /// without a usable one
     #[arg(long, value_name = "S", default_value = "header")]
     stamp: StampSource,
     /// Prints the counts as one JSON object
@@ -45,7 +47,8 @@ struct Converted {
     wrenches: u64,
     pose_frame: String,
     wrench_frame: String,
-    /// where the pose is taken from transforms: poses for which some were interpolated, and stamps that they do not cover
+    /// where the pose is taken from transforms: poses for which some were interpolated, and stamps
+    /// that they do not cover
     #[serde(skip_serializing_if = "Option::is_none")]
     transforms: Option<TransformCounts>,
     out: PathBuf,

@@ -1,5 +1,5 @@
-//! `touchup demo`: makes a plate, scans it badly, touches it, refines the scan, and says how much better it became and what
-//! was found on it.
+//! `touchup demo`: makes a plate, scans it badly, touches it, refines the scan, and says how much
+//! better it became and what was found on it.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -43,14 +43,15 @@ const CHORD_ERROR: f64 = 10e-6;
 
 #[derive(Debug, Args)]
 pub(super) struct DemoArguments {
-    /// Folder for truth.ply, scan.ply, touch.mcap, refined.ply, features.json, touches.csv, deviation.png (all in mm) and
-    /// summary.json
+    /// Folder for truth.ply, scan.ply, touch.mcap, refined.ply, features.json, touches.csv,
+    /// deviation.png (all in mm) and summary.json
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
     /// Another seed makes another scan and another path
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// An arm touches instead of a hand: it probes the flagged features (probed.json, plan.png, touches.png)
+    /// An arm touches instead of a hand: it probes the flagged features (probed.json, plan.png,
+    /// touches.png)
     #[arg(long, value_name = "ARM")]
     robot: Option<RobotName>,
     #[cfg(any(feature = "ros", feature = "r2r"))]

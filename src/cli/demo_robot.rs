@@ -1,4 +1,5 @@
-//! `touchup demo --robot sim`: a plate whose scan has lost its holes is probed by a simulated arm, from one click for each feature.
+//! `touchup demo --robot sim`: a plate whose scan has lost its holes is probed by a simulated arm,
+//! from one click for each feature.
 
 use std::f64::consts::TAU;
 use std::fmt;
@@ -29,7 +30,8 @@ use crate::sim::{Plate, ScannerParams, SimArm, TruthFeature, TruthShape, WithSph
 
 /// Its scene, written beside the other files …
 const SCENE: &str = include_str!("../../config/probe.yaml");
-/// … with what is told of an arm that differs from it by errors of `ArmErrorSigmas::CALIBRATED`, and the record of its check.
+/// … with what is told of an arm that differs from it by errors of `ArmErrorSigmas::CALIBRATED`,
+/// and the record of its check.
 const CALIBRATED: &str =
     "  # what is not known of arm and place of the part, and what its check found
   check: check.json
@@ -60,7 +62,8 @@ const SPHERES: [[f64; 3]; 4] = [
 const DIAMETER: f64 = 25.0;
 /// Uncertainties are printed with this coverage factor.
 const COVERAGE: f64 = 2.0;
-/// The triangles of the part are this near to it, m: what is probed on them differs from the drawing by no more than a touch does.
+/// The triangles of the part are this near to it, m: what is probed on them differs from the
+/// drawing by no more than a touch does.
 const CHORD_ERROR: f64 = 0.5e-6;
 /// Largest error of a click, m.
 const CLICK: f64 = 3e-3;
@@ -244,7 +247,8 @@ fn clicked(id: u32, feature: &TruthFeature, rng: &mut Pcg64) -> Flag {
     }
 }
 
-/// Error of the place in the directions that its uncertainty is of, m: across the axis, of the step across its edge.
+/// Error of the place in the directions that its uncertainty is of, m: across the axis, of the step
+/// across its edge.
 fn place_error(found: &Feature, truth: &TruthFeature) -> f64 {
     let off = found.centre.value - truth.centre;
     let along = match truth.shape {

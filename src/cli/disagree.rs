@@ -1,4 +1,5 @@
-//! `touchup disagree`: where touch and scan disagree, and whether the scanner, the part or a touch is to blame.
+//! `touchup disagree`: where touch and scan disagree, and whether the scanner, the part or a touch
+//! is to blame.
 
 use std::fmt;
 use std::path::{Path, PathBuf};

@@ -24,7 +24,8 @@ pub(super) struct DoctorArguments {
     /// The scan: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57
     #[arg(value_name = "SCAN")]
     scan: PathBuf,
-    /// The touches: a ROS 2 recording, MCAP or SQLite, a file or a folder; a bag of ROS 1; or a table (CSV, log of a UR's RTDE)
+    /// The touches: a ROS 2 recording, MCAP or SQLite, a file or a folder; a bag of ROS 1; or a
+    /// table (CSV, log of a UR's RTDE)
     #[arg(value_name = "RECORDING")]
     recording: PathBuf,
     /// Unit of the coordinates in the scan's file
@@ -35,7 +36,8 @@ pub(super) struct DoctorArguments {
     scene: Option<PathBuf>,
     #[command(flatten)]
     recorded: RecordedFlags,
-    /// Which time of a message counts: that of its header, or when it was recorded, for headers without a usable one
+    /// Which time of a message counts: that of its header, or when it was recorded, for headers
+    /// without a usable one
     #[arg(long, value_name = "S", default_value = "header")]
     stamp: StampSource,
     #[command(flatten)]

@@ -1,4 +1,5 @@
-//! What a verb ends with: the losses of work that was done, or an error: one line of text, or one JSON object where `--json` is asked for.
+//! What a verb ends with: the losses of work that was done, or an error: one line of text, or one
+//! JSON object where `--json` is asked for.
 
 use std::error::Error;
 use std::ffi::OsString;

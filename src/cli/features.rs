@@ -1,4 +1,5 @@
-//! `touchup features`: a mesh in, and touches where there are any; its holes, slots, edges and planes out.
+//! `touchup features`: a mesh in, and touches where there are any; its holes, slots, edges and
+//! planes out.
 
 use std::iter;
 use std::path::PathBuf;

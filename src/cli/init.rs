@@ -24,7 +24,8 @@ pub(super) struct InitArguments {
     /// Standard deviation of the scan from the true surface, mm; not given: 0.6
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     scan_noise_mm: Option<f64>,
-    /// The scan: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57; relative to the folder of the scene
+    /// The scan: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57; relative to the folder of
+    /// the scene
     #[arg(long, value_name = "MESH")]
     scan: Option<PathBuf>,
     /// Unit of the coordinates in the scan's file

@@ -1,8 +1,9 @@
 //! The command line: one file for each verb.
 //!
-//! Results go to stdout, everything else to stderr. Exit codes, which other tools rely on: 0 done, 1 the result could
-//! not be written, 2 wrong usage, 3 bad input file, 4 done with losses, which are named, 5 the arm stopped, 130 a signal stopped it.
-//! With `--json` an error is one object on stderr.
+//! Results go to stdout, everything else to stderr. Exit codes, which other tools rely on: 0 done,
+//! 1 the result could not be written, 2 wrong usage, 3 bad input file, 4 done with losses, which
+//! are named, 5 the arm stopped, 130 a signal stopped it. With `--json` an error is one object on
+//! stderr.
 
 mod arm;
 mod arm_errors;
@@ -108,7 +109,8 @@ ROS_AUTOMATIC_DISCOVERY_RANGE are heeded. Topics, services and parameters: docs/
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// Identifies parameters of the scene: pose of the scan, payload of the sensor, centre of the ball
+    /// Identifies parameters of the scene: pose of the scan, payload of the sensor, centre of the
+    /// ball
     #[command(subcommand, after_help = ARM_SIGNALS)]
     Calibrate(calibrate::CalibrateArguments),
     /// Makes a plate, scans it badly, touches it and refines the scan: needs no input
@@ -119,7 +121,8 @@ enum Verb {
     Convert(convert::ConvertArguments),
     /// Finds where touch and scan disagree, and whether scanner, part or touch is to blame
     Disagree(disagree::DisagreeArguments),
-    /// Doubts a recording: sign, axes, units, tare, stamps, clock and frames, against the scan that it touched
+    /// Doubts a recording: sign, axes, units, tare, stamps, clock and frames, against the scan that
+    /// it touched
     Doctor(doctor::DoctorArguments),
     /// Writes a scene with every key explained
     Init(init::InitArguments),
@@ -127,7 +130,8 @@ enum Verb {
     Refine(refine::RefineArguments),
     /// Finds holes, slots, pockets, bosses, edges, corners and planes on a mesh, and measures them
     Features(features::FeaturesArguments),
-    /// Inspects measured features against a drawing: pass, fail or undecided, and a report that prints
+    /// Inspects measured features against a drawing: pass, fail or undecided, and a report that
+    /// prints
     Inspect(inspect::InspectArguments),
     /// Probes flagged features with an arm
     #[command(after_help = ARM_SIGNALS)]
@@ -139,12 +143,14 @@ enum Verb {
     Recover(recover::RecoverArguments),
     /// Scans and touches a known part: makes the input of refine
     Simulate(simulate::SimulateArguments),
-    /// Refines many recordings with many settings: plans jobs, runs them, and makes a table of what came of them
+    /// Refines many recordings with many settings: plans jobs, runs them, and makes a table of what
+    /// came of them
     #[command(subcommand)]
     Sweep(sweep::SweepArguments),
     /// Says what moved between two results of a sweep by more than its ±
     Whatif(whatif::WhatIfArguments),
-    /// Measures error against run time, stability and cost on this machine: runs `touchup-report`, a program of its own
+    /// Measures error against run time, stability and cost on this machine: runs `touchup-report`,
+    /// a program of its own
     #[command(disable_help_flag = true)]
     Report(report::HandedOver),
     /// Refines a scan live, as a ROS 2 node
@@ -155,10 +161,12 @@ enum Verb {
     #[cfg(any(feature = "ros", feature = "r2r"))]
     #[command(after_help = ROS_ARGUMENTS)]
     Replay(replay::ReplayArguments),
-    /// Answers one held sample per JSON line on stdin, so that other implementations can be compared
+    /// Answers one held sample per JSON line on stdin, so that other implementations can be
+    /// compared
     #[command(after_help = STEP_FIELDS)]
     Step,
-    /// Prints what a shell needs to complete commands and flags: touchup completions bash > ~/.local/share/bash-completion/completions/touchup
+    /// Prints what a shell needs to complete commands and flags: touchup completions bash >
+    /// ~/.local/share/bash-completion/completions/touchup
     Completions {
         /// Which shell
         shell: clap_complete::Shell,
@@ -284,9 +292,10 @@ pub fn log_filter(arguments: &[OsString]) -> Targets {
     let level = level
         .and_then(|level| log_level(level).ok()?.parse().ok())
         .unwrap_or(LevelFilter::WARN);
-    // the libraries below say what is no matter of the user; the last three complain, whenever a node ends, about writers that have left
-    // the graph already, and that a group was joined for each network and is not left for all of them at once; and about a topic that
-    // turns to the type that others publish, which the node itself says
+    // the libraries below say what is no matter of the user; the last three complain, whenever a
+    // node ends, about writers that have left the graph already, and that a group was joined for
+    // each network and is not left for all of them at once; and about a topic that turns to the
+    // type that others publish, which the node itself says
     let libraries = [
         ("ros2_client", LevelFilter::ERROR),
         // what it sends to /rosout is in the log already

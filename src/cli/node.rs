@@ -39,8 +39,8 @@ pub(super) struct NodeArguments {
     tip_radius_mm: Option<f64>,
     #[command(flatten)]
     web: WebFlags,
-    /// Where scans lie that can be chosen on the page when none is named, and where the page puts scans and scene.yaml; default: the
-    /// current folder
+    /// Where scans lie that can be chosen on the page when none is named, and where the page puts
+    /// scans and scene.yaml; default: the current folder
     #[arg(long, value_name = "FOLDER", requires = "web")]
     web_scans: Option<PathBuf>,
     /// Prints the report of the session as one JSON object
@@ -140,7 +140,8 @@ fn arm_of(config: &NodeConfig, scene: &Scene) -> Result<Option<ArmOfNode>, CliEr
 }
 
 impl NodeArguments {
-    /// All that may go wrong before a node is there, so that an operator can mend it and begin anew.
+    /// All that may go wrong before a node is there, so that an operator can mend it and begin
+    /// anew.
     fn begin(&self, config: &NodeConfig, signals: &SignalledNode) -> Result<Begun, BeginError> {
         let ready = Prepared::new(config.parameters.clone())?;
         let (inbox, arrivals) = inbox(INBOX, &Clock::system());

@@ -1,4 +1,5 @@
-//! Estimates of clock offset and registration from a replay: reported in the summary, never applied.
+//! Estimates of clock offset and registration from a replay: reported in the summary, never
+//! applied.
 
 use std::fmt;
 
@@ -13,7 +14,8 @@ reported! {
     /// Clock offset of the wrench against the pose; never applied automatically.
     #[derive(Clone, Copy)]
     pub(super) struct WrenchOffset, pub fn of(found: &ClockOffset, applied: &SyncParams) {
-        /// total offset: that which the scene applies, and the correction; where there is a drift, at the first sample
+        /// total offset: that which the scene applies, and the correction; where there is a drift,
+        /// at the first sample
         wrench_offset_ms: f64 =
             found.drift.map_or(found.offset, |of| of.offset_at_first) * 1e3 + applied.wrench_offset_ns as f64 * 1e-6,
         /// standard uncertainty

@@ -1,4 +1,5 @@
-//! What the verbs write: results on stdout, files, and the checks of their places before the work begins.
+//! What the verbs write: results on stdout, files, and the checks of their places before the work
+//! begins.
 
 use std::collections::BTreeMap;
 use std::io::{self, ErrorKind, Write, stdout};
@@ -10,7 +11,8 @@ use super::error::{CliError, require};
 use crate::io::atomic::{AtomicFile, is_same_file, write_atomically};
 use crate::io::file_error::FileError;
 
-/// One line, or several, on stdout: whole, or an error. A reader that has gone away wants no more and is none.
+/// One line, or several, on stdout: whole, or an error. A reader that has gone away wants no more
+/// and is none.
 pub(super) fn print_result(text: &str) -> Result<(), CliError> {
     let mut out = stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {

@@ -21,8 +21,8 @@ use crate::stylus::MarkerFilter;
 /// Period of the look for a page.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// Plays a recording in real time as soon as a page is open; the node goes on until a signal ends it, so that what was found can be
-/// looked at and saved. What it leaves behind.
+/// Plays a recording in real time as soon as a page is open; the node goes on until a signal ends
+/// it, so that what was found can be looked at and saved. What it leaves behind.
 pub(super) fn on_page(
     web: &WebFlags,
     parameters: Parameters,

@@ -23,7 +23,8 @@ pub(super) struct ProbeArguments {
     /// The scene, with `robot` (config/probe.yaml is an example)
     #[arg(long, value_name = "YAML")]
     scene: PathBuf,
-    /// Features to probe, in the frame of the scan: KIND@X,Y,Z or KIND@X,Y,Z,RADIUS in mm; repeat for each
+    /// Features to probe, in the frame of the scan: KIND@X,Y,Z or KIND@X,Y,Z,RADIUS in mm; repeat
+    /// for each
     #[arg(
         long = "feature",
         value_name = "FLAG",
@@ -34,16 +35,19 @@ pub(super) struct ProbeArguments {
     /// How far a feature may be from its flag, mm, where the flag does not say
     #[arg(long, value_name = "R", default_value_t = 3.0)]
     search_radius_mm: f64,
-    /// Target half width of the confidence interval of each dimension, at the confidence of the scene, mm
+    /// Target half width of the confidence interval of each dimension, at the confidence of the
+    /// scene, mm
     #[arg(long, value_name = "T")]
     tolerance_mm: Option<f64>,
-    /// Touches until each characteristic of a drawing passes or fails, in place of until a dimension has a tolerance
+    /// Touches until each characteristic of a drawing passes or fails, in place of until a
+    /// dimension has a tolerance
     #[arg(long, value_name = "GOAL", value_parser = ["decided"], requires = "nominal", conflicts_with = "tolerance_mm")]
     until: Option<String>,
     /// The drawing of --until decided: nominal values and tolerances, CSV or JSON (docs/inspect.md)
     #[arg(long, value_name = "FILE", requires = "until")]
     nominal: Option<PathBuf>,
-    /// Probability of conformity that a pass needs, and of nonconformity that a fail needs; of all looks together
+    /// Probability of conformity that a pass needs, and of nonconformity that a fail needs; of all
+    /// looks together
     #[arg(long, value_name = "P", default_value_t = 0.95, requires = "until")]
     confidence: f64,
     /// Most touches of a feature
@@ -55,16 +59,20 @@ pub(super) struct ProbeArguments {
     /// Longest time for a feature, s: less than the scene allows
     #[arg(long, value_name = "T")]
     max_duration_s: Option<f64>,
-    /// Temperature of the cell, °C: where the arm was checked at another, that stands in the results; default: robot.temperature_c of the scene
+    /// Temperature of the cell, °C: where the arm was checked at another, that stands in the
+    /// results; default: robot.temperature_c of the scene
     #[arg(long, value_name = "T", allow_hyphen_values = true)]
     temperature_c: Option<f64>,
-    /// Slides over the found feature with constant force, so that the mesh follows: along walls and across rims
+    /// Slides over the found feature with constant force, so that the mesh follows: along walls and
+    /// across rims
     #[arg(long)]
     slide: bool,
-    /// Plans, checks reach and paths, and draws the plan, by the scene alone: no arm is asked, none moves
+    /// Plans, checks reach and paths, and draws the plan, by the scene alone: no arm is asked, none
+    /// moves
     #[arg(long)]
     dry_run: bool,
-    /// Where the ball is when the plan of --dry-run begins, in the frame of the scan, mm; default: 40 mm above the scan
+    /// Where the ball is when the plan of --dry-run begins, in the frame of the scan, mm; default:
+    /// 40 mm above the scan
     #[arg(
         long,
         value_name = "X,Y,Z",
@@ -72,14 +80,16 @@ pub(super) struct ProbeArguments {
         allow_hyphen_values = true
     )]
     from_mm: Option<String>,
-    /// Goes on with a probing that was broken off in the folder of --out: what is finished there is not probed again
+    /// Goes on with a probing that was broken off in the folder of --out: what is finished there is
+    /// not probed again
     #[arg(long, conflicts_with = "dry_run")]
     resume: bool,
-    /// Writes mesh and features also where something of what the arm measured is surely wrong (`touchup doctor`)
+    /// Writes mesh and features also where something of what the arm measured is surely wrong
+    /// (`touchup doctor`)
     #[arg(long, conflicts_with = "dry_run")]
     force: bool,
-    /// Folder for plan.png, probing.json, probed_touches.jsonl, recording, probed.json, refined.ply, features.json, touches.csv,
-    /// touches.png
+    /// Folder for plan.png, probing.json, probed_touches.jsonl, recording, probed.json,
+    /// refined.ply, features.json, touches.csv, touches.png
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Prints the result as one JSON object

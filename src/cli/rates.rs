@@ -87,7 +87,8 @@ impl Rates {
             .map_or(0, |real_time| real_time.scan_bytes)
     }
 
-    /// Takes the next sample, in real time when it is due; returns whether it was refused, and how long that took.
+    /// Takes the next sample, in real time when it is due; returns whether it was refused, and how
+    /// long that took.
     pub fn push(&mut self, sample: &Sample) -> (Result<(), RefineError>, Duration) {
         if let Some(real_time) = &mut self.real_time {
             real_time.wait_for(sample.stamp_ns);
@@ -124,7 +125,8 @@ impl Rates {
         }
     }
 
-    /// Ends the thread of the patch, if there is one; gives back what there is after the last sample, and the lag of the patch.
+    /// Ends the thread of the patch, if there is one; gives back what there is after the last
+    /// sample, and the lag of the patch.
     ///
     /// # Errors
     /// [`LiveError::Stopped`] when it ended before.

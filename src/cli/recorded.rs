@@ -1,4 +1,5 @@
-//! Where in a recording the poses and wrenches are, as flags name it: the same for every verb that reads one.
+//! Where in a recording the poses and wrenches are, as flags name it: the same for every verb that
+//! reads one.
 
 use clap::Args;
 
@@ -8,20 +9,24 @@ use crate::scene::Scene;
 
 #[derive(Clone, Debug, Default, Args)]
 pub(super) struct RecordedFlags {
-    /// geometry_msgs/WrenchStamped or another wrench: of the part on the stylus [default: /stylus/wrench]
+    /// geometry_msgs/WrenchStamped or another wrench: of the part on the stylus [default:
+    /// /stylus/wrench]
     #[arg(long, value_name = "TOPIC")]
     wrench_topic: Option<String>,
-    /// geometry_msgs/PoseStamped or another pose: centre of the ball in the frame of the scan, or as tip.offset_mm and scan_to_space
-    /// in the scene say [default: /stylus/pose, with --pose-frame /tf]
+    /// geometry_msgs/PoseStamped or another pose: centre of the ball in the frame of the scan, or
+    /// as tip.offset_mm and scan_to_space in the scene say [default: /stylus/pose, with
+    /// --pose-frame /tf]
     #[arg(long, value_name = "TOPIC")]
     pose_topic: Option<String>,
-    /// The pose of this frame is taken from the transforms on --pose-topic and its _static, as that of tool0
+    /// The pose of this frame is taken from the transforms on --pose-topic and its _static, as that
+    /// of tool0
     #[arg(long, value_name = "FRAME")]
     pose_frame: Option<String>,
     /// With --pose-frame: the frame in which the pose is wanted [default: the root of the tree]
     #[arg(long, value_name = "FRAME", requires = "pose_frame")]
     base_frame: Option<String>,
-    /// sensor_msgs/PointCloud2: the markers on the stylus, read in place of the pose; the scene says where they sit
+    /// sensor_msgs/PointCloud2: the markers on the stylus, read in place of the pose; the scene
+    /// says where they sit
     #[arg(long, value_name = "TOPIC", conflicts_with_all = ["pose_topic", "pose_frame"])]
     pub markers_topic: Option<String>,
 }

@@ -52,10 +52,12 @@ use crate::threads::Threads;
 
 #[derive(Clone, Debug, Default, Args)]
 pub(super) struct RefineArguments {
-    /// The scan: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57; not needed when the scene names its file
+    /// The scan: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57; not needed when the scene
+    /// names its file
     #[arg(long, value_name = "MESH", required_unless_present_any = ["resume", "scene"], default_value = "", value_parser = path_or_none())]
     scan: PathBuf,
-    /// The touches: a ROS 2 recording, MCAP or SQLite, a file or a folder; a bag of ROS 1; or a table (CSV, log of a UR's RTDE)
+    /// The touches: a ROS 2 recording, MCAP or SQLite, a file or a folder; a bag of ROS 1; or a
+    /// table (CSV, log of a UR's RTDE)
     #[arg(long, value_name = "RECORDING", required_unless_present = "resume", default_value = "", value_parser = path_or_none())]
     bag: PathBuf,
     /// Output: the refined mesh as PLY, STL or OBJ, in the unit of the scan
@@ -69,7 +71,8 @@ pub(super) struct RefineArguments {
     scene: Option<PathBuf>,
     #[command(flatten)]
     recorded: RecordedFlags,
-    /// Which time of a message counts: that of its header, or when it was recorded, for headers without a usable one
+    /// Which time of a message counts: that of its header, or when it was recorded, for headers
+    /// without a usable one
     #[arg(long, value_name = "S", default_value = "header")]
     stamp: StampSource,
     #[command(flatten)]
@@ -80,28 +83,32 @@ pub(super) struct RefineArguments {
     /// Also estimates the rigid offset of the scan from the touched part; the scan is not moved
     #[arg(long)]
     registration: bool,
-    /// Replays in real time with the patch beside it, as next to a stylus, and reports how far it is behind; the result is
-    /// the same
+    /// Replays in real time with the patch beside it, as next to a stylus, and reports how far it
+    /// is behind; the result is the same
     #[arg(long)]
     live: bool,
-    /// With --live: the touching is shown on the operator's page while it is replayed, and what is undone there is left out
+    /// With --live: the touching is shown on the operator's page while it is replayed, and what is
+    /// undone there is left out
     #[cfg(any(feature = "ros", feature = "r2r"))]
     #[command(flatten)]
     web: WebFlags,
-    /// Output: the features of the refined mesh, measured by the touches: JSON, or a table, .csv or .parquet
+    /// Output: the features of the refined mesh, measured by the touches: JSON, or a table, .csv or
+    /// .parquet
     #[arg(long, value_name = "FEATURES")]
     features_out: Option<PathBuf>,
     /// Output: the touches that features name: .csv or .parquet
     #[arg(long, value_name = "TOUCHES")]
     touches_out: Option<PathBuf>,
-    /// Folder of a session of the node: takes scan, scene and touches from there, also after a crash, and writes refined.ply,
-    /// features.json and touches.csv there unless they have places of their own
+    /// Folder of a session of the node: takes scan, scene and touches from there, also after a
+    /// crash, and writes refined.ply, features.json and touches.csv there unless they have places
+    /// of their own
     #[arg(long, value_name = "SESSION", conflicts_with_all = ["scan", "bag", "scene", "mesh_unit", "wrench_topic", "pose_topic", "pose_frame", "markers_topic"])]
     resume: Option<PathBuf>,
     /// Refines also where something of the recording is surely wrong (`touchup doctor`)
     #[arg(long)]
     pub force: bool,
-    /// The touches are on what the scan may lack, as a hole that it closed: how they lie on it is then a doubt and not sure
+    /// The touches are on what the scan may lack, as a hole that it closed: how they lie on it is
+    /// then a doubt and not sure
     #[arg(skip)]
     pub touches_flaws: bool,
     /// Strokes that were taken back, done again, taken out or put back in the session
@@ -131,7 +138,8 @@ reported! {
         input: (ToldNumbers, Vec<InputFinding>, Option<CloudSummary>),
         offsets: (Option<WrenchOffset>, Option<ScanOffset>)
     ) {
-        /// stages built from the scene, those left out with the reason of each, and the memory at start
+        /// stages built from the scene, those left out with the reason of each, and the memory at
+        /// start
         scene: SceneCost = run.0,
         /// what was told of tip and scan, and by what
         told: ToldNumbers = input.0,
@@ -147,7 +155,8 @@ reported! {
         contacts: u64 = refiner.counts().contacts,
         /// of the markers, where they give the pose
         markers?: MarkerCounts = replayed.markers,
-        /// how late the clock of the wrench reads beyond what the scene says, where the touches determine it and the scene has `clock`
+        /// how late the clock of the wrench reads beyond what the scene says, where the touches
+        /// determine it and the scene has `clock`
         wrench_offset?: WrenchOffset = offsets.0,
         /// rigid offset of the scan from the part, with --registration
         registration?: ScanOffset = offsets.1,
@@ -332,7 +341,8 @@ impl RefineArguments {
         Ok(self)
     }
 
-    /// What is left to be refined when the page was closed: the session that was made on it, without what was undone there.
+    /// What is left to be refined when the page was closed: the session that was made on it,
+    /// without what was undone there.
     #[cfg(any(feature = "ros", feature = "r2r"))]
     fn after_the_page(self) -> Result<Self, CliError> {
         if !self.web.is_wanted() {

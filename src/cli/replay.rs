@@ -23,7 +23,8 @@ use crate::scene::Scene;
 use crate::stylus::MarkerFilter;
 use crate::stylus::{Message, SyncParams};
 
-/// Wait after discovery of the subscribers: whether they have discovered us in turn they do not announce.
+/// Wait after discovery of the subscribers: whether they have discovered us in turn they do not
+/// announce.
 const DISCOVERY: Duration = Duration::from_secs(1);
 /// Period of the look for subscribers.
 const LOOK: Duration = Duration::from_millis(50);
@@ -34,7 +35,8 @@ const LINGER: Duration = Duration::from_millis(300);
 
 #[derive(Debug, Args)]
 pub(super) struct ReplayArguments {
-    /// A ROS 2 recording, MCAP or SQLite, a file or a folder; a bag of ROS 1; or a table (CSV, log of a UR's RTDE)
+    /// A ROS 2 recording, MCAP or SQLite, a file or a folder; a bag of ROS 1; or a table (CSV, log
+    /// of a UR's RTDE)
     #[arg(value_name = "RECORDING")]
     recording: PathBuf,
     /// Speed, in multiples of the recorded one
@@ -120,7 +122,8 @@ pub(super) fn replay(arguments: &ReplayArguments, ros: &[String]) -> Result<Loss
     Ok(losses)
 }
 
-/// Plays a recording in real time, each stream in the order of its stamps; what was played, and what of the recording was lost.
+/// Plays a recording in real time, each stream in the order of its stamps; what was played, and
+/// what of the recording was lost.
 ///
 /// - `source`: who touches, `stylus` or `probe`: its sensor gives the wrenches their frame.
 pub(super) fn play(
@@ -176,8 +179,8 @@ fn wait_for_listeners(port: &mut dyn SamplePort, config: &NodeConfig, recording:
     sleep(DISCOVERY);
 }
 
-/// Puts each stream in the order of its stamps, in which a sensor sends and the node takes it: what came into the recording
-/// later than what was measured after it.
+/// Puts each stream in the order of its stamps, in which a sensor sends and the node takes it: what
+/// came into the recording later than what was measured after it.
 #[derive(Default)]
 struct StampOrder {
     /// poses and wrenches

@@ -44,8 +44,9 @@ pub(super) fn set_up(
     })?)
 }
 
-/// Waits until a node has begun that was set up on the page: what `begin` makes of it, and in `config` what that was made of. Whatever is
-/// wrong with what is chosen, with the network or with the arm is shown on the page.
+/// Waits until a node has begun that was set up on the page: what `begin` makes of it, and in
+/// `config` what that was made of. Whatever is wrong with what is chosen, with the network or with
+/// the arm is shown on the page.
 ///
 /// # Errors
 /// A path that is no parameter.

@@ -54,8 +54,9 @@ pub(super) struct SignalledNode(Arc<Mutex<Option<Inbox>>>);
 
 #[cfg(any(feature = "ros", feature = "r2r"))]
 impl SignalledNode {
-    /// Listens from now on. The first signal ends the node, which saves, and its arm stops and retracts. The next one has an arm that still
-    /// retracts stop and stay; one more, or the second where no arm moves, waits for nothing.
+    /// Listens from now on. The first signal ends the node, which saves, and its arm stops and
+    /// retracts. The next one has an arm that still retracts stop and stay; one more, or the second
+    /// where no arm moves, waits for nothing.
     pub fn listen() -> io::Result<Self> {
         let node = Arc::new(Mutex::new(None::<Inbox>));
         let heard = Arc::clone(&node);
@@ -113,7 +114,8 @@ pub(super) struct StopSignals {
 }
 
 impl StopSignals {
-    /// Listens from now on: the first signal has the arm stop and retract, the second has it stay where it is.
+    /// Listens from now on: the first signal has the arm stop and retract, the second has it stay
+    /// where it is.
     ///
     /// # Errors
     /// Where the system has no thread for that: kind `signals`.

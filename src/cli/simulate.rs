@@ -1,5 +1,5 @@
-//! `touchup simulate`: scan and touches of a known surface by a bad scanner and a stylus, as the files that
-//! `refine` reads.
+//! `touchup simulate`: scan and touches of a known surface by a bad scanner and a stylus, as the
+//! files that `refine` reads.
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -30,7 +30,8 @@ const CONTACTS_NAME: &str = "truth_contacts.csv";
 const CONTACT_EVERY: usize = 10;
 const CONTACTS_HEAD: &str =
     "t_s,centre_x_mm,centre_y_mm,centre_z_mm,contact_x_mm,contact_y_mm,contact_z_mm\n";
-/// The hand moves 0.08 mm in each tick of the simulation: a smaller ball would go through the part and take for ever.
+/// The hand moves 0.08 mm in each tick of the simulation: a smaller ball would go through the part
+/// and take for ever.
 const TIP_RADII_MM: RangeInclusive<f64> = 0.1..=100.0;
 /// Frame of the poses in the recordings.
 const OBJECT_FRAME: &str = "object";
@@ -52,7 +53,8 @@ pub(super) struct SimulateArguments {
     out: PathBuf,
     #[command(flatten)]
     settings: SimulationSettings,
-    /// Also writes the markers on the stylus, with occlusion, swaps and outliers, as the topic /stylus/markers
+    /// Also writes the markers on the stylus, with occlusion, swaps and outliers, as the topic
+    /// /stylus/markers
     #[arg(long)]
     markers: bool,
 }
@@ -63,18 +65,21 @@ pub struct SimulationSettings {
     /// Another seed makes another scan and another path
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Draws the truth of all that is not named from the ranges of a world, and writes what a calibration tells of it as scene.yaml (for
-    /// refine --scene) and each true value as truth.json: workshop_stylus, optical_tracker, ur, soft_probe, careless_operator
+    /// Draws the truth of all that is not named from the ranges of a world, and writes what a
+    /// calibration tells of it as scene.yaml (for refine --scene) and each true value as
+    /// truth.json: workshop_stylus, optical_tracker, ur, soft_probe, careless_operator
     #[arg(long, value_name = "NAME", value_parser = world_named, conflicts_with = "markers")]
     pub world: Option<SimWorld>,
-    /// By which factor the errors of what is told are larger than the scene says: 3 for all, radius=3 for one (radius, stiffness,
-    /// tip-offset, registration, clock, tare); may be given again
+    /// By which factor the errors of what is told are larger than the scene says: 3 for all,
+    /// radius=3 for one (radius, stiffness, tip-offset, registration, clock, tare); may be given
+    /// again
     #[arg(long, value_name = "FACTOR", requires = "world")]
     pub told_off: Vec<OffFactor>,
     /// True radius of the ball, mm [default: 1.5, or as the world draws it]
     #[arg(long, value_name = "R", allow_negative_numbers = true)]
     pub tip_radius_mm: Option<f64>,
-    /// True stiffness of stylus and holder at the ball, N/mm [default: 20, or as the world draws it]
+    /// True stiffness of stylus and holder at the ball, N/mm [default: 20, or as the world draws
+    /// it]
     #[arg(long, value_name = "K", allow_negative_numbers = true)]
     pub stiffness_n_per_mm: Option<f64>,
     /// Coefficient of friction between ball and part [default: 0.15, or as the world draws it]
@@ -154,7 +159,8 @@ impl FromStr for Side {
     }
 }
 
-/// The command: scans the part from above (along −z), touches it from there, and prints where the files are.
+/// The command: scans the part from above (along −z), touches it from there, and prints where the
+/// files are.
 pub(super) fn simulate(arguments: &SimulateArguments) -> Result<Losses, CliError> {
     arguments.settings.check()?;
     check_kept("--truth", &arguments.truth, &arguments.out.join(TRUTH_NAME))?;
@@ -326,8 +332,9 @@ pub(super) struct Simulated {
     pub touch: Touch,
 }
 
-/// Scans and touches `surface`, and writes truth.ply, scan.ply (both in mm) and touch.mcap into `folder`; with a
-/// camera the recording also has what that saw of the markers on the stylus. All randomness comes from the seed of `scanner`.
+/// Scans and touches `surface`, and writes truth.ply, scan.ply (both in mm) and touch.mcap into
+/// `folder`; with a camera the recording also has what that saw of the markers on the stylus. All
+/// randomness comes from the seed of `scanner`.
 pub(super) fn write_simulation(
     surface: &dyn Surface,
     truth: &TriMesh,

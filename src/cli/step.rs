@@ -1,10 +1,12 @@
-//! `touchup step`: the paper's equations for one held sample per JSON line, so that any other implementation can be
-//! compared.
+//! `touchup step`: the paper's equations for one held sample per JSON line, so that any other
+//! implementation can be compared.
 //!
-//! In: `{"p_m","force_n","b_m","n","dt_s","h_min_m","delta","f_max_n","alpha_m_per_n_s","beta_per_n2_s",
-//! "step":"lie|corrected|bounded|dp5","along":"normal0|force"}`, vectors as arrays of three, all in one frame;
-//! `k_n_per_m` instead of the three sigmoid values selects the linear spring. Out, in the same order:
-//! `{"b_m","n"}` with 17 digits, or `{"error"}`; a bad line does not end the run. No rigid-contact offset is taken out.
+//! In:
+//! `{"p_m","force_n","b_m","n","dt_s","h_min_m","delta","f_max_n","alpha_m_per_n_s","beta_per_n2_s",
+//! "step":"lie|corrected|bounded|dp5","along":"normal0|force"}`, vectors as arrays of three, all in
+//! one frame; `k_n_per_m` instead of the three sigmoid values selects the linear spring. Out, in
+//! the same order: `{"b_m","n"}` with 17 digits, or `{"error"}`; a bad line does not end the run.
+//! No rigid-contact offset is taken out.
 
 use std::io::{self, BufRead, Write};
 
@@ -52,7 +54,8 @@ enum StepError {
     Dynamics(#[from] DynamicsError),
 }
 
-/// Answers every line of `input` with one line on `output`, flushed at once; blank lines are skipped.
+/// Answers every line of `input` with one line on `output`, flushed at once; blank lines are
+/// skipped.
 ///
 /// # Errors
 /// Only of reading and writing; a line that cannot be answered gets `{"error": …}`.

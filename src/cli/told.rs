@@ -26,7 +26,8 @@ pub(super) struct ToldFlags {
 }
 
 impl ToldFlags {
-    /// The scene of a file, or the usual one, with the flags over it, and by what its numbers are told.
+    /// The scene of a file, or the usual one, with the flags over it, and by what its numbers are
+    /// told.
     ///
     /// # Errors
     /// Where nobody told the radius, and for a scene or a flag out of its range.

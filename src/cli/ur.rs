@@ -9,7 +9,8 @@ use crate::ur::{child, setup};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum UrArguments {
-    /// Makes a virtual environment with ur-rtde and prints the folder that the parameter site_packages has to name
+    /// Makes a virtual environment with ur-rtde and prints the folder that the parameter
+    /// site_packages has to name
     Setup {
         /// Folder of the environment
         folder: PathBuf,

@@ -43,7 +43,8 @@ const NOT_BUILT: &str = "this touchup was built without the page: cargo install 
 /// Where the page is served.
 #[derive(Clone, Debug, Default, Args)]
 pub(super) struct WebFlags {
-    /// Serves the operator's page at this address; another one than that of this machine alone lets in who has a link
+    /// Serves the operator's page at this address; another one than that of this machine alone lets
+    /// in who has a link
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8321", value_parser = address)]
     web: Option<SocketAddr>,
     /// Name of this machine by which the page may be called, beside its address; can be given again
@@ -52,7 +53,8 @@ pub(super) struct WebFlags {
     /// Lets in by link alone also on this machine, where else every user is
     #[arg(long, requires = "web")]
     web_links: bool,
-    /// The part as it should be, in the frame and the unit of the scan: the page colours by the deviation from it
+    /// The part as it should be, in the frame and the unit of the scan: the page colours by the
+    /// deviation from it
     #[arg(long, value_name = "MESH", requires = "web")]
     web_nominal: Option<PathBuf>,
     /// Serves the page by TLS with this certificate chain, PEM
@@ -109,7 +111,8 @@ impl WebFlags {
         Ok((begin(config)?, None))
     }
 
-    /// What `begin` makes of a configuration, or where that names no scan, of what is set up on the page, which then is served already.
+    /// What `begin` makes of a configuration, or where that names no scan, of what is set up on the
+    /// page, which then is served already.
     ///
     /// - `scans`: where scans lie.
     #[cfg(feature = "web")]

@@ -1,4 +1,5 @@
-//! What the part should be: characteristics with their limits, from a file, or from the features of a CAD mesh.
+//! What the part should be: characteristics with their limits, from a file, or from the features of
+//! a CAD mesh.
 
 use std::path::Path;
 
@@ -261,7 +262,8 @@ fn features_of_mesh(path: &Path, params: &DrawingParams) -> Result<FeatureFile, 
 /// Kinds that have sizes.
 const WITH_SIZES: [&str; 6] = ["hole", "slot", "pocket", "boss", "notch", "cylinder"];
 
-/// Sizes of features as nominal values without tolerances; those of a through hole without its depth.
+/// Sizes of features as nominal values without tolerances; those of a through hole without its
+/// depth.
 fn of_features(features: &[FeatureRecord], params: &DrawingParams) -> Vec<NominalRecord> {
     let mut records = Vec::new();
     let mut counts = std::collections::BTreeMap::new();
@@ -321,7 +323,8 @@ fn rounded(mm: f64) -> f64 {
     (mm * 1e3).round() / 1e3
 }
 
-/// Nominal values to be edited: those of a CAD mesh, or else of what was measured, with the general tolerance where there is one.
+/// Nominal values to be edited: those of a CAD mesh, or else of what was measured, with the general
+/// tolerance where there is one.
 ///
 /// - `mesh`: the CAD mesh.
 ///

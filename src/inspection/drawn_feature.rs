@@ -36,7 +36,8 @@ impl DrawnFeature {
     }
 }
 
-/// A feature of a file as a shape: kind, place, axis and sizes with their uncertainties; `None` without a place.
+/// A feature of a file as a shape: kind, place, axis and sizes with their uncertainties; `None`
+/// without a place.
 pub(super) fn shape_of(record: &FeatureRecord) -> Option<Feature> {
     let std = |name: &str, unit: f64| record.std.get(name).map(|std| std * unit);
     let size = |value: Option<f64>, name: &str| Some(measured(value? * 1e-3, std(name, 1e-3)));

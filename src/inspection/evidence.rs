@@ -32,7 +32,8 @@ pub(super) struct TouchEvidence {
     pub stated_mm: f64,
 }
 
-/// How far the touches behind a quantity are off the surface that was fitted to them; `None` where that surface is not in the file.
+/// How far the touches behind a quantity are off the surface that was fitted to them; `None` where
+/// that surface is not in the file.
 pub(super) fn touch_evidence(
     quantity: InspectedQuantity,
     feature: &FeatureRecord,
@@ -45,7 +46,8 @@ pub(super) fn touch_evidence(
     let mut all: Vec<&ProbedPoint> = numbers
         .map(|number| touches.get(number as usize))
         .collect::<Option<_>>()?;
-    // of the touches behind a number those on its own surface: walls lie along the axis, floors and planes across it
+    // of the touches behind a number those on its own surface: walls lie along the axis, floors and
+    // planes across it
     let is_flat = quantity == InspectedQuantity::Depth || feature.kind == "plane";
     all.retain(|touch| (touch.normal.dot(&axis).abs() > HALF_WAY) == is_flat);
     if all.is_empty() {
@@ -140,7 +142,8 @@ pub(super) fn touch_evidence(
     })
 }
 
-/// Of each point the distance along the axis from the plane of least squares through those of its end, mm.
+/// Of each point the distance along the axis from the plane of least squares through those of its
+/// end, mm.
 ///
 /// - `level`: height of the other end along the axis.
 fn off_two_planes(seats: &[Vector3<f64>], axis: &Vector3<f64>, level: f64) -> Vec<f64> {
@@ -270,7 +273,8 @@ mod tests {
         assert!((widest_gap_deg(&found.drawn) - 270.0).abs() < 0.5);
     }
 
-    /// Opening and floor lean off the axis: each has a plane of its own, and the point above one is off by its height.
+    /// Opening and floor lean off the axis: each has a plane of its own, and the point above one is
+    /// off by its height.
     #[test]
     fn touches_of_a_depth_are_off_the_plane_of_their_end() {
         let corners = [(0.0, 0.0), (9.0, 0.0), (0.0, 9.0), (9.0, 9.0)];

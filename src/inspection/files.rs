@@ -48,7 +48,8 @@ impl ReportFiles {
     /// Writes each as a whole; nothing, unless the report could be made.
     ///
     /// # Errors
-    /// [`InspectionError`] of the mesh and the scene, which are read for it, and of files that cannot be written.
+    /// [`InspectionError`] of the mesh and the scene, which are read for it, and of files that
+    /// cannot be written.
     pub fn write(
         &self,
         source: &InspectionSource,

@@ -17,8 +17,8 @@ pub struct InspectionParams {
     pub decision: DecisionParams,
     /// k of the expanded uncertainties U = k u. Default 2: about 95 %, as certificates have it.
     pub coverage_factor: f64,
-    /// A feature is the nominal one where its centre is no farther off than this across its axis, mm. Default 1.5: less than what
-    /// separates neighbours on most parts.
+    /// A feature is the nominal one where its centre is no farther off than this across its axis,
+    /// mm. Default 1.5: less than what separates neighbours on most parts.
     pub match_mm: f64,
     /// how the frame of the drawing is found on the part; `None`: it is that of the mesh
     pub align: Option<AlignmentMethod>,

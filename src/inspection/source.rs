@@ -31,7 +31,8 @@ pub struct InspectionSource {
 
 impl InspectionSource {
     /// - `path`: a file of features, or a folder with one.
-    /// - `named`: touches, mesh and scene, where flags name them; else they are looked for beside the features.
+    /// - `named`: touches, mesh and scene, where flags name them; else they are looked for beside
+    ///   the features.
     pub fn read(path: &Path, named: [Option<&Path>; 3]) -> Result<Self, InspectionError> {
         if let Some(probed) = probed_file(path) {
             return Self::of_probing(&probed, named);
@@ -83,7 +84,8 @@ impl InspectionSource {
         })
     }
 
-    /// What an arm measured: the feature of each flag, by the number of the flag, and the touches that it was measured by.
+    /// What an arm measured: the feature of each flag, by the number of the flag, and the touches
+    /// that it was measured by.
     fn of_probing(
         path: &Path,
         [_, mesh, scene]: [Option<&Path>; 3],
@@ -148,14 +150,15 @@ fn not_read(path: &Path, source: io::Error) -> InspectionError {
     }
 }
 
-/// The features of a folder, and how the file of their touches is called: those of a session that was ended or refined, else those that
-/// `~/save_mesh` has saved of one that runs.
+/// The features of a folder, and how the file of their touches is called: those of a session that
+/// was ended or refined, else those that `~/save_mesh` has saved of one that runs.
 const IN_FOLDER: [(&str, &str); 2] = [
     ("features.json", "touches.csv"),
     ("refined.features.json", "refined.touches.csv"),
 ];
 
-/// The file of features that `path` is, or that is in the folder `path`, and the name of the touches beside it.
+/// The file of features that `path` is, or that is in the folder `path`, and the name of the
+/// touches beside it.
 fn features_of(path: &Path) -> Result<(PathBuf, &'static str), InspectionError> {
     if !path.is_dir() {
         let is_saved = path.file_name().is_some_and(|name| name == IN_FOLDER[1].0);
@@ -179,7 +182,8 @@ struct ProbedFeature {
     feature: Option<FeatureRecord>,
 }
 
-/// The file of a probing: it has the features that were flagged, also where few touches leave none in features.json.
+/// The file of a probing: it has the features that were flagged, also where few touches leave none
+/// in features.json.
 fn probed_file(path: &Path) -> Option<PathBuf> {
     let probed = if path.is_dir() {
         path.join("probed.json")
@@ -209,7 +213,8 @@ fn point_of(touch: &TouchLine) -> ProbedPoint {
     }
 }
 
-/// A feature by another number, and its touches counted from `offset` on: those of a flag are numbered from 1 on.
+/// A feature by another number, and its touches counted from `offset` on: those of a flag are
+/// numbered from 1 on.
 fn renumbered(mut feature: FeatureRecord, id: u32, offset: u32) -> FeatureRecord {
     feature.id = id;
     let of_all = |number: &mut u32| *number = (*number + offset).saturating_sub(1);

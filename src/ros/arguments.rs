@@ -131,7 +131,8 @@ struct Override {
     is_file: bool,
 }
 
-/// Takes what stands between `--ros-args` and `--` (or the end) out of a command line: what remains, what was taken.
+/// Takes what stands between `--ros-args` and `--` (or the end) out of a command line: what
+/// remains, what was taken.
 pub fn split<T: AsRef<OsStr>>(arguments: impl IntoIterator<Item = T>) -> (Vec<T>, Vec<T>) {
     let (mut others, mut ros) = (Vec::new(), Vec::new());
     let mut is_ros = false;
@@ -242,7 +243,8 @@ impl NodeConfig {
         }
     }
 
-    /// Where wrenches and poses come from, not yet remapped: as [`Self::sample_topics`], or transforms.
+    /// Where wrenches and poses come from, not yet remapped: as [`Self::sample_topics`], or
+    /// transforms.
     pub fn heard_topics(&self) -> [&'static str; 2] {
         let [wrench, pose] = self.sample_topics();
         [

@@ -84,7 +84,8 @@ impl Exchange {
         })
     }
 
-    /// Starts the threads that send: one what is urgent, one the mesh, where a slow listener may hold things up.
+    /// Starts the threads that send: one what is urgent, one the mesh, where a slow listener may
+    /// hold things up.
     pub fn senders(
         self: &Arc<Self>,
         urgent: impl Fn(Publication) -> Sent<Publication> + Send + 'static,

@@ -1,4 +1,5 @@
-//! The port without any network: what is to arrive is put in by hand, what is published is read back.
+//! The port without any network: what is to arrive is put in by hand, what is published is read
+//! back.
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -81,8 +82,8 @@ pub struct OtherParticipants {
     port: Arc<InProcess>,
 }
 
-/// A port, and the world around it. What is put into the world goes to `inbox`. The time of ROS is 0 now, and passes as that of
-/// `clock`.
+/// A port, and the world around it. What is put into the world goes to `inbox`. The time of ROS is
+/// 0 now, and passes as that of `clock`.
 pub fn start(inbox: Inbox, clock: &Clock) -> (Arc<dyn Port>, OtherParticipants) {
     start_keeping(MOST_KEPT, inbox, clock)
 }
@@ -109,7 +110,8 @@ fn start_keeping(
 }
 
 impl OtherParticipants {
-    /// Something arrives; where the node is too slow it is dropped and counted, as on a network. Whether it got in.
+    /// Something arrives; where the node is too slow it is dropped and counted, as on a network.
+    /// Whether it got in.
     pub fn arrive(&self, arrival: Arrival) -> bool {
         self.port.inbox.put(arrival)
     }

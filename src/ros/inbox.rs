@@ -1,9 +1,10 @@
 //! What arrives, in its order, on its way from the port to the thread of the samples.
 //!
-//! Two kinds wait there, each with room of its own: samples and transforms, of which what finds no room is lost and counted; and
-//! calls and changes of parameters, of which none is lost: one that finds no room is refused. All are taken in the order in which they
-//! came, so that a mesh is saved, or a stroke taken back, with the samples before the call. What stops the arm does not wait here at
-//! all: it acts in [`StopState`], on the thread that puts it in.
+//! Two kinds wait there, each with room of its own: samples and transforms, of which what finds no
+//! room is lost and counted; and calls and changes of parameters, of which none is lost: one that
+//! finds no room is refused. All are taken in the order in which they came, so that a mesh is
+//! saved, or a stroke taken back, with the samples before the call. What stops the arm does not
+//! wait here at all: it acts in [`StopState`], on the thread that puts it in.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel};
@@ -96,7 +97,8 @@ fn kind_of(arrival: &Arrival) -> Option<usize> {
 }
 
 impl Inbox {
-    /// Puts it in, or refuses or counts it where there is no room; never waits. Whether it got in, or was done at once.
+    /// Puts it in, or refuses or counts it where there is no room; never waits. Whether it got in,
+    /// or was done at once.
     pub fn put(&self, arrival: Arrival) -> bool {
         self.put_in(arrival, |_, waiting, _| waiting)
     }
@@ -153,7 +155,8 @@ impl Inbox {
         false
     }
 
-    /// What stops the arm does so here, on the thread that hears it; what is still to be done by the node.
+    /// What stops the arm does so here, on the thread that hears it; what is still to be done by
+    /// the node.
     fn stop(&self, arrival: Arrival) -> Option<Arrival> {
         let stops = self.stops();
         match arrival {

@@ -97,7 +97,8 @@ pub(super) fn checked(whole: String) -> Result<String, NameError> {
     Ok(whole)
 }
 
-/// Whether the pattern of a parameter file names the node: `*` is one part, `**` any number of them.
+/// Whether the pattern of a parameter file names the node: `*` is one part, `**` any number of
+/// them.
 pub(super) fn matches(pattern: &str, full_name: &str) -> bool {
     fn fits(pattern: &[&str], name: &[&str]) -> bool {
         match (pattern.split_first(), name.split_first()) {

@@ -1,6 +1,7 @@
 //! The six services of parameters, as `ros2 param` calls them.
 //!
-//! Own ones: those of the client libraries know neither ranges nor descriptions, and cannot wait for the node's answer.
+//! Own ones: those of the client libraries know neither ranges nor descriptions, and cannot wait
+//! for the node's answer.
 
 use std::sync::{Arc, Mutex};
 

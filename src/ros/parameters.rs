@@ -349,7 +349,8 @@ impl ParameterDescriptor {
         }
     }
 
-    /// The value as it is to be kept from now on, while the node runs. To set what is set already is no change, and allowed.
+    /// The value as it is to be kept from now on, while the node runs. To set what is set already
+    /// is no change, and allowed.
     ///
     /// # Errors
     /// As [`Self::check`]; [`ParameterError::NotLive`], [`ParameterError::OnlyToFalse`].
@@ -508,7 +509,8 @@ impl Parameters {
         }
     }
 
-    /// The frame whose pose is taken from transforms, and the one in which it is wanted: `tool0 in base`, or `tool0`, which is in the cell.
+    /// The frame whose pose is taken from transforms, and the one in which it is wanted: `tool0 in
+    /// base`, or `tool0`, which is in the cell.
     pub fn pose_frames(&self) -> Option<[&str; 2]> {
         let named = self.string("pose_frame").trim();
         let [frame, base] = named

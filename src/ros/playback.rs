@@ -1,4 +1,5 @@
-//! What it takes to play a recording, of whatever: when each message is due, and the frames that headers name.
+//! What it takes to play a recording, of whatever: when each message is due, and the frames that
+//! headers name.
 
 use super::node::CELL;
 use crate::stylus::WrenchFrame;
@@ -14,7 +15,8 @@ pub struct PlayedTime {
 }
 
 impl PlayedTime {
-    /// Time since the first message at which this one is due, ns. One whose stamp goes back is due at once.
+    /// Time since the first message at which this one is due, ns. One whose stamp goes back is due
+    /// at once.
     pub fn at_ns(&mut self, stamp_ns: i64) -> i64 {
         let last_ns = *self.last_ns.get_or_insert(stamp_ns);
         let step_ns = stamp_ns.saturating_sub(last_ns);

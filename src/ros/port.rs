@@ -1,7 +1,8 @@
 //! What the node needs of ROS 2, and no more: what comes in, what goes out, and a way to answer.
 //!
-//! Behind it stand native DDS, r2r, or nothing at all (in-process, for tests and the demo). No type of theirs leaves their
-//! file: messages are the plain structs of [`super::messages`], a request carries the closure that answers it.
+//! Behind it stand native DDS, r2r, or nothing at all (in-process, for tests and the demo). No type
+//! of theirs leaves their file: messages are the plain structs of [`super::messages`], a request
+//! carries the closure that answers it.
 
 use std::fmt;
 use std::sync::mpsc::Receiver;
@@ -32,7 +33,8 @@ pub enum Arrival {
     ClickedPoint(PointStamped),
     /// `/clock`
     Clock(Clock),
-    /// a pose (0) or wrench (1) that is refused before its numbers are looked at: why, by the name of the reason, and when it came
+    /// a pose (0) or wrench (1) that is refused before its numbers are looked at: why, by the name
+    /// of the reason, and when it came
     Refused(usize, &'static str, Instant),
     /// a message that could not be read: its topic, and why
     Unreadable(&'static str, String),
@@ -44,7 +46,8 @@ pub enum Arrival {
     Matched(Endpoint),
     /// somebody new listens to `mesh`
     Viewer,
-    /// somebody wants to see how well the mesh is known: a copy of the evidence, once it is made; `None` where nothing was touched
+    /// somebody wants to see how well the mesh is known: a copy of the evidence, once it is made;
+    /// `None` where nothing was touched
     Evidence(Reply<Option<Receiver<Patcher>>>),
     /// a session that is replayed is at its end, or begins again; answered when that is done
     Replay(ReplayStep, Reply<Result<(), String>>),
@@ -191,8 +194,8 @@ pub struct Endpoint {
     pub mismatch: Option<String>,
 }
 
-/// The way out. What comes in goes to the [`Inbox`](super::inbox::Inbox) that a port is started with, which counts what it drops
-/// ([`Port::dropped`]).
+/// The way out. What comes in goes to the [`Inbox`](super::inbox::Inbox) that a port is started
+/// with, which counts what it drops ([`Port::dropped`]).
 pub trait Port: Send + Sync {
     /// Sends; never blocks for longer than it takes to write the message down.
     fn publish(&self, publication: Publication);
@@ -203,7 +206,8 @@ pub trait Port: Send + Sync {
     /// Names of the topics that wrenches and poses come on, whole, as [`Endpoint::topic`] has them.
     fn sample_topics(&self) -> [&str; 2];
 
-    /// Name of the topic that followers of the mesh listen to, whole, as [`Endpoint::topic`] has it.
+    /// Name of the topic that followers of the mesh listen to, whole, as [`Endpoint::topic`] has
+    /// it.
     fn mesh_patch_topic(&self) -> &str;
 
     /// Time of ROS, ns: the system's, or that of `/clock` with `use_sim_time`.
@@ -212,7 +216,8 @@ pub trait Port: Send + Sync {
     /// Arrivals dropped so far because the node did not take them: wrenches and poses, others.
     fn dropped(&self) -> [u64; 2];
 
-    /// Wrenches and poses that were sent and did not come: gaps in the numbers of their senders, where the port sees them.
+    /// Wrenches and poses that were sent and did not come: gaps in the numbers of their senders,
+    /// where the port sees them.
     fn lost(&self) -> [u64; 2];
 
     /// Publications not sent so far because nobody took them fast enough: tiles, others.

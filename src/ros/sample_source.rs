@@ -1,4 +1,5 @@
-//! Where poses and wrenches come from: which type of messages is listened to, and what is made of them.
+//! Where poses and wrenches come from: which type of messages is listened to, and what is made of
+//! them.
 
 use std::time::Instant;
 
@@ -21,10 +22,12 @@ pub(super) struct SampleSource {
 }
 
 impl SampleSource {
-    /// That of poses, or of wrenches, as the parameters have it; `None` for poses that are taken from transforms.
+    /// That of poses, or of wrenches, as the parameters have it; `None` for poses that are taken
+    /// from transforms.
     ///
     /// # Errors
-    /// In words, where the type named by a parameter gives nothing: the parameters are checked before.
+    /// In words, where the type named by a parameter gives nothing: the parameters are checked
+    /// before.
     pub fn of(config: &NodeConfig, kind: SampleKind) -> Result<Option<Self>, String> {
         let parameters = &config.parameters;
         let name = |of: &str| parameters.string(of).to_owned();
@@ -33,7 +36,8 @@ impl SampleSource {
             SampleKind::Pose => name("pose_type"),
             SampleKind::Wrench => name("wrench_type"),
         };
-        // as in a recording: of two without headers both are in the same axes, else the wrench is in those of its sensor
+        // as in a recording: of two without headers both are in the same axes, else the wrench is
+        // in those of its sensor
         let is_pose_unnamed = || {
             LiveType::of(SampleKind::Pose, &name("pose_type")).is_ok_and(|pose| !pose.has_header())
         };
@@ -57,7 +61,8 @@ impl SampleSource {
 
     /// The type to listen to, and why what is published cannot be read, where none of it can.
     ///
-    /// - `now`: that which is listened to; it stays as long as somebody publishes it, or nobody what can be read.
+    /// - `now`: that which is listened to; it stays as long as somebody publishes it, or nobody
+    ///   what can be read.
     /// - `published`: names of types, as ROS 2 has them.
     pub fn choose<'a>(
         &self,
@@ -97,8 +102,8 @@ impl SampleSource {
         }
     }
 
-    /// What goes to the node of a message on `topic`, read as `of`. A header that names no frame is refused there: only a type without
-    /// one is in the frame of the parameters.
+    /// What goes to the node of a message on `topic`, read as `of`. A header that names no frame is
+    /// refused there: only a type without one is in the frame of the parameters.
     pub fn arrival(
         &self,
         topic: &'static str,

@@ -1,7 +1,8 @@
 //! What waits to be sent, so that nobody who publishes or answers waits for the network.
 //!
-//! A port has two: one for what is small and urgent, answers among it, one for the mesh, which whoever listens slowly may hold
-//! up. Tiles of the mesh give way first: they go when nothing else waits.
+//! A port has two: one for what is small and urgent, answers among it, one for the mesh, which
+//! whoever listens slowly may hold up. Tiles of the mesh give way first: they go when nothing else
+//! waits.
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -10,7 +11,8 @@ use std::sync::{Condvar, Mutex, PoisonError};
 use super::locked;
 use super::port::Publication;
 
-/// Messages that wait at most, beside tiles: 0.4 s of mismatches at 10 kHz; a follower of the mesh sees the gap.
+/// Messages that wait at most, beside tiles: 0.4 s of mismatches at 10 kHz; a follower of the mesh
+/// sees the gap.
 const MOST: usize = 4096;
 /// Tiles that wait at most: those of 4 million faces, as at the end all are left here.
 const MOST_TILES: usize = 8192;

@@ -39,7 +39,8 @@ macro_rules! services {
 pub(super) use services;
 
 services! {
-    /// Offers those whose requests go to the inbox of the node, and those that stop its arm at once.
+    /// Offers those whose requests go to the inbox of the node, and those that stop its arm at
+    /// once.
     fn serve(Inbox);
     "~/flag_feature": FlagFeature, |to, request, reply| to.call(Call::Flag(request, reply));
     "~/unflag_feature": UnflagFeature, |to, request, reply| to.call(Call::Unflag(request, reply));

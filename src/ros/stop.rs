@@ -1,8 +1,9 @@
 //! What stops the arm of the node, and the samples.
 //!
-//! Whoever asks for a stop sets it here, on the thread that hears the request; the arm's thread reads it after each of its states. So
-//! a stop waits for no queue and for no other thread: it acts within one period of the arm, and the answer goes out at once. The
-//! table of events is in docs/ros.md.
+//! Whoever asks for a stop sets it here, on the thread that hears the request; the arm's thread
+//! reads it after each of its states. So a stop waits for no queue and for no other thread: it acts
+//! within one period of the arm, and the answer goes out at once. The table of events is in
+//! docs/ros.md.
 
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
@@ -15,20 +16,23 @@ use crate::probing::arm::StopRequest;
 
 /// The parameter that only the start of the node sets to true.
 pub const ALLOW_MOTION: &str = "allow_motion";
-/// An arm's thread that has not looked here for so long hangs, or its arm keeps it waiting: it looks with each state, some 500 a
-/// second, and five times a second while none comes.
+/// An arm's thread that has not looked here for so long hangs, or its arm keeps it waiting: it
+/// looks with each state, some 500 a second, and five times a second while none comes.
 const HANGS: Duration = Duration::from_secs(1);
 /// Why an order or a stop of an arm does nothing where there is none.
 pub const NO_ARM: &str = "no arm configured: start the node with robot:=sim or robot:=ur";
 /// What is left where the arm's thread does not stop it.
 const BY_HAND: &str = "if the arm moves, press its emergency stop";
 
-/// After a silence of the button that is held for the arm to move that is longer than this the arm stops and stays.
+/// After a silence of the button that is held for the arm to move that is longer than this the arm
+/// stops and stays.
 ///
-/// The arm is to stand within 200 ms of the last beat. It looks here with each state, 2 ms apart, and then brakes as at a fault: a tip of
-/// 100 mm/s with 5 m/s² stands 20 ms later (`largest_mm_per_s`, `fault_stop_mm_per_s2`). That leaves 58 ms for threads that wake late and
-/// for the link of an arm. The page beats each 20 ms, so that the arm goes on where four beats in a row are lost and the next is less than
-/// 20 ms late, or where none is lost and one is less than 100 ms late.
+/// The arm is to stand within 200 ms of the last beat. It looks here with each state, 2 ms apart,
+/// and then brakes as at a fault: a tip of 100 mm/s with 5 m/s² stands 20 ms later
+/// (`largest_mm_per_s`, `fault_stop_mm_per_s2`). That leaves 58 ms for threads that wake late and
+/// for the link of an arm. The page beats each 20 ms, so that the arm goes on where four beats in a
+/// row are lost and the next is less than 20 ms late, or where none is lost and one is less than
+/// 100 ms late.
 pub const LONGEST_BEAT: Duration = Duration::from_millis(120);
 
 /// What the arm does now.
@@ -141,7 +145,8 @@ impl StopState {
         }
     }
 
-    /// `~/pause`: samples are passed over, what moves stops and retracts. It fails where the arm's thread does not hear it.
+    /// `~/pause`: samples are passed over, what moves stops and retracts. It fails where the arm's
+    /// thread does not hear it.
     pub fn pause(&self, is_paused: bool) -> SetBoolResponse {
         let mut stops = locked(&self.stops);
         stops.is_paused = is_paused;
@@ -170,8 +175,8 @@ impl StopState {
         locked(&self.stops).is_paused
     }
 
-    /// `~/stop`: what moves stops and stays, a retraction too; nothing moves until `~/recover`. It fails where there is no arm, or
-    /// its thread does not hear it.
+    /// `~/stop`: what moves stops and stays, a retraction too; nothing moves until `~/recover`. It
+    /// fails where there is no arm, or its thread does not hear it.
     pub fn stop(&self) -> TriggerResponse {
         let mut stops = locked(&self.stops);
         stops.stay("~/stop was called");
@@ -214,8 +219,8 @@ impl StopState {
         locked(&self.stops).beat = Some(now);
     }
 
-    /// From here on the arm moves only while the button is held: after a longer silence than [`LONGEST_BEAT`] it stops and stays, until
-    /// `~/recover`.
+    /// From here on the arm moves only while the button is held: after a longer silence than
+    /// [`LONGEST_BEAT`] it stops and stays, until `~/recover`.
     ///
     /// # Errors
     /// In words, where the button is not held.
@@ -237,7 +242,8 @@ impl StopState {
         stops.held_orders = stops.held_orders.saturating_sub(1);
     }
 
-    /// What is known of the arm: whether it may move, what it does, and why it stays where it is; `None` where there is none.
+    /// What is known of the arm: whether it may move, what it does, and why it stays where it is;
+    /// `None` where there is none.
     pub fn arm(&self) -> Option<(bool, Motion, Option<&'static str>)> {
         let stops = locked(&self.stops);
         (!matches!(stops.thread, ArmThread::None)).then_some((
@@ -247,8 +253,8 @@ impl StopState {
         ))
     }
 
-    /// The node is to end: what moves stops and retracts; asked for again, it stops and stays. Whether that is new: `false` when
-    /// nothing is left to wait for.
+    /// The node is to end: what moves stops and retracts; asked for again, it stops and stays.
+    /// Whether that is new: `false` when nothing is left to wait for.
     pub fn interrupt(&self) -> bool {
         let mut stops = locked(&self.stops);
         if !stops.is_ending {

@@ -57,7 +57,8 @@ pub(super) const MESH: Topic = Topic::latched("mesh", 4096);
 pub(super) const PROBE_TOUCHES: Topic = Topic::reliable("probe_touches", 4096);
 pub(super) const MESH_PATCH: Topic = Topic::reliable(MESH_PATCH_TOPIC, 4096);
 
-/// Samples are the last that may be lost: two tenths of a second at 10 kHz. What is kept is no matter of matching.
+/// Samples are the last that may be lost: two tenths of a second at 10 kHz. What is kept is no
+/// matter of matching.
 const SAMPLES: usize = 2048;
 
 /// Sends messages of one topic.

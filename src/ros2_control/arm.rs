@@ -42,8 +42,9 @@ const AGAIN: Duration = Duration::from_millis(10);
 const ORDERED: f64 = 20e-3;
 /// … they must have gone this share of it.
 const FOLLOWED: f64 = 0.2;
-/// The same kind of order is sent again after this time, s: a controller that is given a new trajectory in each of its periods repeats its
-/// last set point for ever (ros2_controllers before pull request 780).
+/// The same kind of order is sent again after this time, s: a controller that is given a new
+/// trajectory in each of its periods repeats its last set point for ever (ros2_controllers before
+/// pull request 780).
 const ORDER_EVERY: f64 = 8e-3;
 /// States of which the mean is the zero of the sensor.
 const ZEROING: usize = 64;
@@ -52,7 +53,8 @@ const CALM_FORCE: f64 = 0.5;
 
 /// An arm behind ros2_control that holds a probe.
 ///
-/// After a fault it is braked until its joints stand, and every call but a stop returns the fault, until [`Arm::recover`].
+/// After a fault it is braked until its joints stand, and every call but a stop returns the fault,
+/// until [`Arm::recover`].
 pub struct Ros2ControlArm {
     params: Ros2ControlParams,
     reader: StateReader,
@@ -85,8 +87,9 @@ impl Ros2ControlArm {
     /// Listens until states have come on all topics. Nothing moves.
     ///
     /// # Errors
-    /// [`ArmError::TopicSilent`] for one that brings nothing; [`ArmError::Unreadable`]; [`ArmError::Refused`] for parameters out of range,
-    /// states that come too seldom, and orders that nobody listens to.
+    /// [`ArmError::TopicSilent`] for one that brings nothing; [`ArmError::Unreadable`];
+    /// [`ArmError::Refused`] for parameters out of range, states that come too seldom, and orders
+    /// that nobody listens to.
     pub fn connect(params: &Ros2ControlParams, port: Box<dyn ArmPort>) -> Result<Self, ArmError> {
         params.check()?;
         let mut reader = StateReader::new(port, params);
@@ -220,7 +223,8 @@ impl Ros2ControlArm {
             .velocity(now.saturating_duration_since(self.planned_at).as_secs_f64())
     }
 
-    /// Changes of velocity take no shorter, s: the controller may be behind what it is thought to do by its share of the latency.
+    /// Changes of velocity take no shorter, s: the controller may be behind what it is thought to
+    /// do by its share of the latency.
     fn least_ramp(&self) -> f64 {
         (2.0 * self.period).max(0.5 * self.params.latency)
     }
@@ -307,7 +311,8 @@ impl Ros2ControlArm {
         let (mut moving, mut still_since) = (None, None);
         let mut last_ns = self.last.sample.stamp_ns;
         while clock.since(begun) < BRAKING {
-            // an order that is not sent is one that the trajectory before does without: it ends at rest
+            // an order that is not sent is one that the trajectory before does without: it ends at
+            // rest
             let _ = self.stop(FAULT_STOP);
             let Some(sample) = self.reader.watch(&self.params, AGAIN) else {
                 continue;
@@ -417,7 +422,8 @@ impl Ros2ControlArm {
                 else {
                     return refuse("a press", "its axis is no direction");
                 };
-                // dF/dt = K v: with v = (F − F_now)/(K T) the force comes to its end with T, stable while T is some latencies
+                // dF/dt = K v: with v = (F − F_now)/(K T) the force comes to its end with T, stable
+                // while T is some latencies
                 let felt = -self.seen(&self.last).wrench_b.force.dot(&axis);
                 let gain =
                     1.0 / (CALM * self.params.stiffness * (self.params.latency + self.period));
@@ -497,7 +503,8 @@ impl Way {
         self.until = now;
     }
 
-    /// How far they were ordered to go and went, rad, once that is clear and where it is not enough.
+    /// How far they were ordered to go and went, rad, once that is clear and where it is not
+    /// enough.
     fn ignored(&mut self, joints: &Joints, now: Instant) -> Option<[f64; 2]> {
         let ordered = self.ordered.norm();
         if ordered < ORDERED {
@@ -592,8 +599,8 @@ impl Arm for Ros2ControlArm {
         })
     }
 
-    /// Listens anew: states have to come on all topics, and the arm has to stand. No order is sent, and the sensor is not zeroed, for the
-    /// probe may still be pressed.
+    /// Listens anew: states have to come on all topics, and the arm has to stand. No order is sent,
+    /// and the sensor is not zeroed, for the probe may still be pressed.
     fn recover(&mut self) -> Result<(), ArmError> {
         self.reader.restart(&self.params);
         let (last, period) = rated(&mut self.reader, &self.params)?;

@@ -1,9 +1,10 @@
 //! An order as a short trajectory that ends at rest.
 //!
-//! joint_trajectory_controller goes on with the newest trajectory from where its own set point is, and holds its last point. So each
-//! order is: to the velocity wanted, with it for [`HOLD`], and to rest. The next one replaces it long before that; when none comes, as this
-//! process has died, the arm brakes by itself. The points have velocities alone and no places, so that the controller integrates from where it
-//! is: it cannot jump, however late the order comes.
+//! joint_trajectory_controller goes on with the newest trajectory from where its own set point is,
+//! and holds its last point. So each order is: to the velocity wanted, with it for [`HOLD`], and to
+//! rest. The next one replaces it long before that; when none comes, as this process has died, the
+//! arm brakes by itself. The points have velocities alone and no places, so that the controller
+//! integrates from where it is: it cannot jump, however late the order comes.
 
 use nalgebra::SVector;
 
@@ -68,8 +69,8 @@ impl BrakePlan {
         }
     }
 
-    /// Way of the joints from one time after the order to another, rad: the velocity is linear between points, so the middle of
-    /// short times is near enough.
+    /// Way of the joints from one time after the order to another, rad: the velocity is linear
+    /// between points, so the middle of short times is near enough.
     pub fn way(&self, from: f64, to: f64) -> SVector<f64, MOST_JOINTS> {
         let middle = self.velocity(f64::midpoint(from, to));
         let mut way = SVector::zeros();

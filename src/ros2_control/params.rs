@@ -56,7 +56,8 @@ pub struct Ros2ControlParams {
 }
 
 impl Default for Ros2ControlParams {
-    /// Topics as the controllers have them by default; a UR5e with a probe of 150 mm and 0.25 kg, held upright, its sensor in the flange.
+    /// Topics as the controllers have them by default; a UR5e with a probe of 150 mm and 0.25 kg,
+    /// held upright, its sensor in the flange.
     fn default() -> Self {
         let upright = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
         let gravity_o = Vector3::new(0.0, 0.0, -9.81);

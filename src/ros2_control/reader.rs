@@ -123,7 +123,8 @@ impl StateReader {
         Ok(())
     }
 
-    /// The next joints, whatever is wrong with them or with the wrench: to see whether the arm stands.
+    /// The next joints, whatever is wrong with them or with the wrench: to see whether the arm
+    /// stands.
     pub fn watch(&mut self, params: &Ros2ControlParams, timeout: Duration) -> Option<JointSample> {
         match self.port.next_report(timeout)? {
             ArmReport::Joints(message) => self.sample(&message, params).ok().flatten(),
@@ -278,7 +279,8 @@ fn nanoseconds(header: &Header) -> i64 {
     i64::from(header.stamp.sec) * 1_000_000_000 + i64::from(header.stamp.nanosec)
 }
 
-/// What the sensor S has, in the axes of the flange F about its origin: f_F = R_FS f_S, τ_F = R_FS τ_S + p_FS × f_F.
+/// What the sensor S has, in the axes of the flange F about its origin: f_F = R_FS f_S, τ_F = R_FS
+/// τ_S + p_FS × f_F.
 fn wrench_in_flange(
     message: &WrenchStamped,
     params: &Ros2ControlParams,

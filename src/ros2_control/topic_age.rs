@@ -1,7 +1,8 @@
 //! How old what a topic brings is.
 //!
-//! The clocks of the controller and of this machine need not agree: a message is late by how much more lies between its stamp and its
-//! arrival than before. The least of that is followed, and let grow as fast as two clocks may drift apart.
+//! The clocks of the controller and of this machine need not agree: a message is late by how much
+//! more lies between its stamp and its arrival than before. The least of that is followed, and let
+//! grow as fast as two clocks may drift apart.
 
 use std::time::{Duration, Instant};
 
@@ -9,7 +10,8 @@ use crate::probing::arm::ArmError;
 
 /// Two clocks drift apart by this share at most.
 const DRIFT: f64 = 2e-4;
-/// Stamps that are so much ahead of time have jumped, s: what waited on the way comes at once, and is late before, not ahead.
+/// Stamps that are so much ahead of time have jumped, s: what waited on the way comes at once, and
+/// is late before, not ahead.
 const JUMP: f64 = 0.1;
 
 /// What has come on a topic so far.
@@ -85,7 +87,8 @@ impl TopicAge {
     /// How long it may still be silent.
     ///
     /// # Errors
-    /// [`ArmError::TopicSilent`], or [`ArmError::Stale`] where only the same comes again: it has been so for longer.
+    /// [`ArmError::TopicSilent`], or [`ArmError::Stale`] where only the same comes again: it has
+    /// been so for longer.
     pub fn patience(&self, silent: Duration, now: Instant) -> Result<Duration, ArmError> {
         let waited = now.saturating_duration_since(self.heard_at);
         if waited < silent {

@@ -1,8 +1,9 @@
 //! A UR behind the trait [`Arm`]: commands become velocities, and reports become states.
 //!
-//! Every motion is a velocity that is sent again with each state (`speedL`), lines too: v = min(v_max, √(2 η a d), d/T) towards
-//! the end, d away. So there is one kind of motion, no thread of the controller's program that would have to be ended before the next
-//! one begins, and an arm that hears nothing any more has nothing left to finish.
+//! Every motion is a velocity that is sent again with each state (`speedL`), lines too: v =
+//! min(v_max, √(2 η a d), d/T) towards the end, d away. So there is one kind of motion, no thread
+//! of the controller's program that would have to be ended before the next one begins, and an arm
+//! that hears nothing any more has nothing left to finish.
 
 use nalgebra::{Isometry3, Rotation3, UnitQuaternion, Vector3};
 
@@ -26,10 +27,11 @@ pub(super) const PERIOD: f64 = 2e-3;
 const RATED: usize = 5;
 /// The least time between two of them may be longer than it should be by this factor.
 const SAME_PERIOD: f64 = 1.5;
-/// `actual_TCP_force` times this is the force of the part on the tip, and `ft_raw_wrench` likewise. An assumption, not yet
-/// verified on a robot: docs/ur.md has the check.
+/// `actual_TCP_force` times this is the force of the part on the tip, and `ft_raw_wrench` likewise.
+/// An assumption, not yet verified on a robot: docs/ur.md has the check.
 const FORCE_SIGN: f64 = 1.0;
-/// A line comes to its end with this time constant, s: four times what passes from a state to the motion that answers it.
+/// A line comes to its end with this time constant, s: four times what passes from a state to the
+/// motion that answers it.
 const SETTLING_TIME: f64 = 60e-3;
 /// Of the feed while pressing, m/s².
 const FEED_ACCELERATION: f64 = 0.5;
@@ -38,8 +40,9 @@ const TOP_ACCELERATION: f64 = 10.0;
 
 /// A UR arm that holds a probe.
 ///
-/// Its client lives in a process of its own. Whatever happens to it, the arm is stopped by the dashboard, and where that does
-/// not answer by the watchdog of the controller. After such a fault every call returns it, until [`Arm::recover`].
+/// Its client lives in a process of its own. Whatever happens to it, the arm is stopped by the
+/// dashboard, and where that does not answer by the watchdog of the controller. After such a fault
+/// every call returns it, until [`Arm::recover`].
 pub struct UrArm {
     params: UrParams,
     client: Client,
@@ -116,16 +119,19 @@ impl UrArm {
         })
     }
 
-    /// Clears the stop of an arm, as far as a call can, and connects as [`Self::connect`]. Nothing moves.
+    /// Clears the stop of an arm, as far as a call can, and connects as [`Self::connect`]. Nothing
+    /// moves.
     ///
     /// # Errors
-    /// [`ArmError::Stopped`] while the cause of the stop persists, [`ArmError::Lost`], [`ArmError::Refused`] where it cannot be connected.
+    /// [`ArmError::Stopped`] while the cause of the stop persists, [`ArmError::Lost`],
+    /// [`ArmError::Refused`] where it cannot be connected.
     pub fn recovered(params: &UrParams) -> Result<Self, ArmError> {
         Self::unlock(params)?;
         Self::connect(params).map_err(|error| refused("to recover", error.to_string()))
     }
 
-    /// How the arm was stopped at the last fault of its connection or of its client; `None`: there was none.
+    /// How the arm was stopped at the last fault of its connection or of its client; `None`: there
+    /// was none.
     pub fn halt(&mut self) -> Option<Halt> {
         self.client.halt()
     }
@@ -193,9 +199,10 @@ impl Arm for UrArm {
         Ok(())
     }
 
-    /// With a new client in any case: the program of the controller does at once what the registers hold from before, and only a new
-    /// client clears them first. Tool, payload and watchdog are set again. The sensor is not zeroed, for the probe may still be
-    /// pressed: back off, then [`crate::probing::arm::Watched::zero`].
+    /// With a new client in any case: the program of the controller does at once what the registers
+    /// hold from before, and only a new client clears them first. Tool, payload and watchdog are
+    /// set again. The sensor is not zeroed, for the probe may still be pressed: back off, then
+    /// [`crate::probing::arm::Watched::zero`].
     fn recover(&mut self) -> Result<(), ArmError> {
         Self::unlock(&self.params)?;
         self.client

@@ -1,4 +1,5 @@
-//! The process that speaks to the arm, as seen from here: how it is started, commanded, queried and ended.
+//! The process that speaks to the arm, as seen from here: how it is started, commanded, queried and
+//! ended.
 
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::process::CommandExt;
@@ -172,7 +173,8 @@ impl Client {
         known.states.pop_front().ok_or(ArmError::Lost { silent_ms })
     }
 
-    /// Stamp of the newest state that has come, also where it was not given yet, and how late that came, s.
+    /// Stamp of the newest state that has come, also where it was not given yet, and how late that
+    /// came, s.
     pub fn newest(&self) -> (f64, f64) {
         let known = self.shared.known();
         (known.newest_s, known.lateness.newest_s())
@@ -274,8 +276,8 @@ mod tests {
     use super::*;
     use crate::ur::dashboard::tests::listen;
 
-    /// Time is the controller's only where both say so: a controller that could lift the deadlines by its greeting alone would be
-    /// without a guard.
+    /// Time is the controller's only where both say so: a controller that could lift the deadlines
+    /// by its greeting alone would be without a guard.
     #[test]
     fn a_greeting_alone_starts_no_lock_step() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! The dashboard of a UR, on a connection of its own: a stop of the arm that needs neither Python nor a program.
+//! The dashboard of a UR, on a connection of its own: a stop of the arm that needs neither Python
+//! nor a program.
 
 use std::io::{BufRead, BufReader, ErrorKind, Write};
 use std::net::{TcpStream, ToSocketAddrs};

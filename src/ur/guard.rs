@@ -1,8 +1,9 @@
 //! Waits for each line of the client with a deadline.
 //!
-//! When one stays away, or the arm does not do what it is ordered to, the guard kills the client, so that nothing feeds the arm any
-//! more, and stops the arm by the dashboard; then it says why. A program that somebody else has paused it ends by the dashboard, so that
-//! nothing of an old order is left when it is resumed.
+//! When one stays away, or the arm does not do what it is ordered to, the guard kills the client,
+//! so that nothing feeds the arm any more, and stops the arm by the dashboard; then it says why. A
+//! program that somebody else has paused it ends by the dashboard, so that nothing of an old order
+//! is left when it is resumed.
 
 use std::collections::VecDeque;
 use std::process::Child;
@@ -63,7 +64,8 @@ pub(super) struct GuardState {
     asked: Option<u64>,
     /// when the last new state came
     fresh_at: Option<Instant>,
-    /// since when the program of the controller does not run, though nothing of the safety system says why
+    /// since when the program of the controller does not run, though nothing of the safety system
+    /// says why
     ended_since: Option<Instant>,
     /// whether it was paused before
     was_paused: bool,
@@ -96,8 +98,8 @@ pub(super) struct SharedGuard {
     asker: Mutex<Option<Asker>>,
 }
 
-/// Asks a dashboard to stop the arm until it has done so, on connections of its own. Who lets it go waits for the answer on its way,
-/// so that it never stops the program of a later client.
+/// Asks a dashboard to stop the arm until it has done so, on connections of its own. Who lets it go
+/// waits for the answer on its way, so that it never stops the program of a later client.
 struct Asker {
     over: Option<Sender<()>>,
     thread: Option<JoinHandle<()>>,
@@ -242,7 +244,8 @@ impl GuardState {
         self.closing_since = Some(now);
     }
 
-    /// Whether the program of the controller does not run, for long enough that the reason would have arrived.
+    /// Whether the program of the controller does not run, for long enough that the reason would
+    /// have arrived.
     pub fn has_ended(&self, now: Instant) -> bool {
         self.ended_since
             .is_some_and(|since| now.saturating_duration_since(since) > ENDED)
@@ -257,7 +260,8 @@ impl GuardState {
         }
     }
 
-    /// Notes a state of a client that is ready; whether it is the first in which something else stops a program that is still there.
+    /// Notes a state of a client that is ready; whether it is the first in which something else
+    /// stops a program that is still there.
     pub fn is_to_be_ended(&mut self, state: &UrState) -> bool {
         let is_first = self.is_ready && !state.may_move() && !self.has_halted;
         self.has_halted |= is_first;
@@ -277,7 +281,8 @@ impl GuardState {
         ClientLoss::client(format!("hangs: {misses} for {} ms", deadline.as_millis()))
     }
 
-    /// What is waited for: since when, where that was before now, how long, and what is said when it stays away.
+    /// What is waited for: since when, where that was before now, how long, and what is said when
+    /// it stays away.
     fn awaited(&self) -> (Option<Instant>, Duration, &'static str) {
         match (self.closing_since, self.is_ready) {
             (Some(since), _) => (Some(since), FAREWELL, "it does not end"),

@@ -1,16 +1,19 @@
 //! How late the states of an arm come.
 //!
-//! Nothing says when a state was made by the clock of this machine. But the one that came soonest after its stamp was the least late, so
-//! another is later than that by what its arrival less its stamp is more. A clock of the controller that goes a little faster or slower
-//! is followed: only the last seconds count.
+//! Nothing says when a state was made by the clock of this machine. But the one that came soonest
+//! after its stamp was the least late, so another is later than that by what its arrival less its
+//! stamp is more. A clock of the controller that goes a little faster or slower is followed: only
+//! the last seconds count.
 
 use std::time::{Duration, Instant};
 
-/// The soonest of one to two such times counts: two clocks differ by less than a millisecond after it.
+/// The soonest of one to two such times counts: two clocks differ by less than a millisecond after
+/// it.
 const MEMORY: Duration = Duration::from_secs(5);
 /// States that are looked at before anything moves: one second of them.
 pub(super) const LOOKED_AT: usize = 500;
-/// Before anything moves 99 of 100 are late by at most this, ms: two periods, as an order that follows one that is older is not sent.
+/// Before anything moves 99 of 100 are late by at most this, ms: two periods, as an order that
+/// follows one that is older is not sent.
 const USUAL_MS: f64 = 4.0;
 /// … and none by more than this, ms: a motion ends there.
 const WORST_MS: f64 = 20.0;
@@ -141,7 +144,8 @@ mod tests {
             "{}",
             late.newest_s()
         );
-        // 50 millionths for an hour are 180 ms: of that the memory of at most ten seconds keeps 0.5 ms
+        // 50 millionths for an hour are 180 ms: of that the memory of at most ten seconds keeps 0.5
+        // ms
         let drifting = after(1_800_000, |number| number as f64 * 2.0 * 50e-6);
         assert!(drifting.newest_s() < 0.51e-3, "{}", drifting.newest_s());
         assert_eq!(after(0, |_| 0.0).newest_s(), 0.0);

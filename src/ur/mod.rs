@@ -1,10 +1,12 @@
 //! A UR arm, through the Python library ur-rtde in a process of its own (feature `ur`).
 //!
-//! The library waits without end for a controller that is silent, ends with a fault of memory when a connection is lost and comes
-//! back, and leaves the arm moving when it goes. So it lives in a child process: `touchup ur child`. [`UrArm`] speaks to it over a
-//! pipe, watches each line with a deadline, and stops the arm over the dashboard, without Python, when one is missed. Three
-//! things stop an uncommanded arm, each for when the one before fails: the child, which brakes when no order comes;
-//! the dashboard; the watchdog of the controller, which the child feeds while it lives.
+//! The library waits without end for a controller that is silent, ends with a fault of memory when
+//! a connection is lost and comes back, and leaves the arm moving when it goes. So it lives in a
+//! child process: `touchup ur child`. [`UrArm`] speaks to it over a pipe, watches each line with a
+//! deadline, and stops the arm over the dashboard, without Python, when one is missed. Three things
+//! stop an uncommanded arm, each for when the one before fails: the child, which brakes when no
+//! order comes; the dashboard; the watchdog of the controller, which the child feeds while it
+//! lives.
 
 mod arm;
 pub(crate) mod child;

@@ -35,8 +35,9 @@ pub struct UrParams {
     pub deadlines: Deadlines,
     /// On which the deadlines are kept.
     pub clock: Clock,
-    /// Whether a controller that greets as a simulation in lock step is believed: its stamps then take the place of the machine's
-    /// clock. Both have to say so, for a deadline that a controller could lift would be none.
+    /// Whether a controller that greets as a simulation in lock step is believed: its stamps then
+    /// take the place of the machine's clock. Both have to say so, for a deadline that a controller
+    /// could lift would be none.
     pub is_lock_step: bool,
 }
 
@@ -139,8 +140,9 @@ pub struct Deadlines {
 }
 
 impl Default for Deadlines {
-    /// A fault and the braking after it take less than 200 ms together; a machine that is not real-time is late by 25 ms now
-    /// and then. While a call hangs the watchdog of the controller, 100 ms, is not fed: it is sooner where it works.
+    /// A fault and the braking after it take less than 200 ms together; a machine that is not
+    /// real-time is late by 25 ms now and then. While a call hangs the watchdog of the controller,
+    /// 100 ms, is not fed: it is sooner where it works.
     fn default() -> Self {
         Self {
             connect: Duration::from_secs(10),

@@ -1,7 +1,7 @@
 //! Real-time priority of the threads that keep an arm moving, where this user may have it.
 //!
-//! A thread of ordinary priority waits for whatever else runs. `SCHED_FIFO` is asked for as sched(7) has it: the kernel allows it up to
-//! `RLIMIT_RTPRIO`, or to who has `CAP_SYS_NICE`.
+//! A thread of ordinary priority waits for whatever else runs. `SCHED_FIFO` is asked for as
+//! sched(7) has it: the kernel allows it up to `RLIMIT_RTPRIO`, or to who has `CAP_SYS_NICE`.
 
 use std::io;
 
@@ -26,8 +26,8 @@ pub(super) fn raise(priority: i32, inherits: bool) -> io::Result<()> {
             libc::SCHED_RESET_ON_FORK
         };
     let mut param = std::mem::MaybeUninit::<libc::sched_param>::zeroed();
-    // SAFETY: all zeros is a value of this plain struct; 0 is the calling thread, and the kernel only reads `param`, which outlives
-    // the call
+    // SAFETY: all zeros is a value of this plain struct; 0 is the calling thread, and the kernel
+    // only reads `param`, which outlives the call
     let result = unsafe {
         (*param.as_mut_ptr()).sched_priority = priority;
         libc::sched_setscheduler(0, policy, param.as_ptr())
@@ -67,7 +67,8 @@ mod tests {
         )
     }
 
-    /// A thread is what the kernel says it is, whether this user may have it or not; one that it starts is so only where it is asked.
+    /// A thread is what the kernel says it is, whether this user may have it or not; one that it
+    /// starts is so only where it is asked.
     #[test]
     fn a_thread_has_the_priority_that_it_was_granted_and_hands_it_on_where_it_is_asked() {
         for inherits in [false, true] {

@@ -1,5 +1,5 @@
-//! Whether a controller speaks RTDE, which version it runs, and whether its clock goes, before the library is let near it: that
-//! waits for a silent one without end.
+//! Whether a controller speaks RTDE, which version it runs, and whether its clock goes, before the
+//! library is let near it: that waits for a silent one without end.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;

@@ -1,7 +1,7 @@
 //! The protocol of the two processes: one JSON object on each line.
 //!
-//! Orders go down the client's stdin, reports come up its stdout. Poses and velocities are those of ur_rtde: place and rotation
-//! vector in the base B, m and rad.
+//! Orders go down the client's stdin, reports come up its stdout. Poses and velocities are those of
+//! ur_rtde: place and rotation vector in the base B, m and rad.
 
 use std::path::PathBuf;
 
@@ -37,7 +37,8 @@ pub struct Order {
     pub what: Action,
 }
 
-/// What is to be done. The newest motion takes the place of those before; a zero is done whatever comes after it.
+/// What is to be done. The newest motion takes the place of those before; a zero is done whatever
+/// comes after it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Action {
     /// Goes with a velocity, until the next order or until orders stay away.
@@ -67,7 +68,8 @@ pub enum ClientReport {
     Beat { served: u64 },
     /// `Zero` is done.
     Done { number: u64 },
-    /// A connection of the library is gone. The last line of all: after that the library cannot be trusted.
+    /// A connection of the library is gone. The last line of all: after that the library cannot be
+    /// trusted.
     Lost { which: Link },
     /// No or another library.
     BadWheel { reason: String },
@@ -113,13 +115,15 @@ pub struct UrState {
 pub enum ProgramState {
     /// It runs.
     Playing,
-    /// It is paused, or on its way there or back: the next to resume it has it go on with what it did.
+    /// It is paused, or on its way there or back: the next to resume it has it go on with what it
+    /// did.
     Paused,
     /// There is none.
     Ended,
 }
 
-/// Bits of `safety_status_bits`, as the RTDE guide has them: violation, fault, and recovery, which takes a panel.
+/// Bits of `safety_status_bits`, as the RTDE guide has them: violation, fault, and recovery, which
+/// takes a panel.
 const FAULT_BITS: u32 = 1 << 3 | 1 << 8 | 1 << 9;
 /// Safeguard, and the buttons.
 const OPERATOR_BITS: u32 = 1 << 4 | 1 << 5 | 1 << 6 | 1 << 7;

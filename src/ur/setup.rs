@@ -31,7 +31,8 @@ pub enum SetupError {
     },
 }
 
-/// Makes a virtual environment with ur-rtde in it; returns the folder of packages, for [`super::UrParams::site_packages`].
+/// Makes a virtual environment with ur-rtde in it; returns the folder of packages, for
+/// [`super::UrParams::site_packages`].
 ///
 /// - `folder`: of the environment; one that is there already is kept and completed.
 /// - `python`: the interpreter; `None`: that of the version touchup was built with.

@@ -1,6 +1,7 @@
 //! Distances of colours under red-green colour blindness.
 
-/// Linear RGB as seen without the cones for red, and without those for green (Machado, Oliveira and Fernandes 2009, severity 1).
+/// Linear RGB as seen without the cones for red, and without those for green (Machado, Oliveira and
+/// Fernandes 2009, severity 1).
 const SEEN: [[[f64; 3]; 3]; 3] = [
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
     [
@@ -42,7 +43,8 @@ fn lab(colour: [u8; 3], seen: &[[f64; 3]; 3]) -> [f64; 3] {
     [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
 }
 
-/// The least difference (CIE 1976) between two of the colours, with all cones, without those for red, without those for green.
+/// The least difference (CIE 1976) between two of the colours, with all cones, without those for
+/// red, without those for green.
 pub fn least_difference(colours: &[[u8; 3]]) -> f64 {
     let mut least = f64::INFINITY;
     for seen in &SEEN {

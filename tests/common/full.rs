@@ -1,5 +1,5 @@
-//! What belongs to the quick checks, and what to `tests/all.sh --full`. What proofs print there is taken into docs/results.md: the
-//! list is in tests/results.sh.
+//! What belongs to the quick checks, and what to `tests/all.sh --full`. What proofs print there is
+//! taken into docs/results.md: the list is in tests/results.sh.
 
 /// Whether the slow proofs run too.
 pub fn is_full() -> bool {

@@ -11,8 +11,8 @@ pub fn within(rng: &mut Pcg64, lo: f64, hi: f64) -> f64 {
     lo + (hi - lo) * share
 }
 
-/// The height field z = `height(x, y)` over a square about the origin: `cells` × `cells` squares of side `edge` (m), two
-/// triangles each, normals up.
+/// The height field z = `height(x, y)` over a square about the origin: `cells` × `cells` squares of
+/// side `edge` (m), two triangles each, normals up.
 pub fn grid(cells: u32, edge: f64, mut height: impl FnMut(f64, f64) -> f64) -> TriMesh {
     let row = cells + 1;
     let at = |i: u32| (f64::from(i) - f64::from(cells) / 2.0) * edge;

@@ -22,8 +22,8 @@ pub struct PlateStream {
     pub samples: Vec<Sample>,
 }
 
-/// A ball or a flat end goes over the plate as in the demo; a cone, which would get stuck in holes, over it in two rasters
-/// that let it sink into them a little.
+/// A ball or a flat end goes over the plate as in the demo; a cone, which would get stuck in holes,
+/// over it in two rasters that let it sink into them a little.
 fn path(stylus: &StylusParams) -> Vec<Stroke> {
     let plate = Plate::default();
     let hand = PathParams {

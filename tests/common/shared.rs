@@ -14,7 +14,8 @@ pub fn shared(below: &str) -> Option<PathBuf> {
     None
 }
 
-/// Reports that this test was skipped: `tests/all.sh` counts the line as a skipped test, not as a passed one.
+/// Reports that this test was skipped: `tests/all.sh` counts the line as a skipped test, not as a
+/// passed one.
 pub fn skip(reason: &str) {
     let thread = std::thread::current();
     println!(

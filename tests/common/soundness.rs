@@ -1,4 +1,5 @@
-//! Whether a mesh is one closed skin: edges, rims, intersections; by other methods than the code that made it.
+//! Whether a mesh is one closed skin: edges, rims, intersections; by other methods than the code
+//! that made it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -73,7 +74,8 @@ fn volume(a: &Point3<f64>, b: &Point3<f64>, c: &Point3<f64>, d: &Point3<f64>) ->
     (b - a).dot(&(c - a).cross(&(d - a)))
 }
 
-/// Whether a segment passes through the inside of a triangle; volumes below `slack` count as touching only.
+/// Whether a segment passes through the inside of a triangle; volumes below `slack` count as
+/// touching only.
 fn pierces(p: &Point3<f64>, q: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3], slack: f64) -> bool {
     let (below, above) = (volume(p, a, b, c), volume(q, a, b, c));
     if below.min(above) > -slack || below.max(above) < slack {
@@ -83,7 +85,8 @@ fn pierces(p: &Point3<f64>, q: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3], slack
     turns.iter().all(|&x| x > slack) || turns.iter().all(|&x| x < -slack)
 }
 
-/// Whether two faces meet elsewhere than at their common vertices, or lie on each other at a common edge.
+/// Whether two faces meet elsewhere than at their common vertices, or lie on each other at a common
+/// edge.
 fn meet(mesh: &TriMesh, f: FaceId, g: FaceId, slack: f64) -> bool {
     let (cf, cg) = (mesh.corners(f), mesh.corners(g));
     let (tf, tg) = (mesh.triangle(f), mesh.triangle(g));

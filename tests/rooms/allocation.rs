@@ -27,8 +27,8 @@ const TIP: TipParams = TipParams {
     stiffness: Some(20e3),
 };
 
-/// A figure of eight on the true plane z = 0, pressed with 2 N for four fifths of the path and lifted off for the rest;
-/// the scan lies up to 0.3 mm off.
+/// A figure of eight on the true plane z = 0, pressed with 2 N for four fifths of the path and
+/// lifted off for the rest; the scan lies up to 0.3 mm off.
 fn sample(tick: i64) -> Sample {
     let turn = std::f64::consts::TAU * tick as f64 / PATH as f64;
     let force = if tick % PATH < PATH * 4 / 5 { 2.0 } else { 0.0 };

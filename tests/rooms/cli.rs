@@ -78,14 +78,16 @@ fn help_is_a_result() {
     assert!(text(&touchup(&["--help"], "").stdout).contains("4 done with losses"));
 }
 
-// ---- refine -----------------------------------------------------------------------------------------------------
+// ---- refine
+// -----------------------------------------------------------------------------------------------------
 
 /// Half the width of the scan of [`Case`], mm.
 const HALF: i32 = 10;
 /// Radius of the ball, m.
 const RADIUS: f64 = 1.5e-3;
 
-/// A flat scan in mm, and a stylus that comes down onto the true surface 0.3 mm above it, presses with 2 N, and goes up.
+/// A flat scan in mm, and a stylus that comes down onto the true surface 0.3 mm above it, presses
+/// with 2 N, and goes up.
 struct Case {
     folder: tempfile::TempDir,
 }
@@ -120,7 +122,8 @@ impl Case {
         .unwrap();
     }
 
-    /// `touchup refine` of `scan.ply` by `bag` into `out`, with the radius of the ball and further flags.
+    /// `touchup refine` of `scan.ply` by `bag` into `out`, with the radius of the ball and further
+    /// flags.
     fn refine(&self, bag: &str, out: &str, flags: &[&str]) -> Output {
         self.refine_untold(bag, out, &[flags, &["--tip-radius-mm", "1.5"]].concat())
     }
@@ -175,7 +178,8 @@ const SURFACE: f64 = 0.3e-3;
 /// Stiffness of the tip in the default scene, N/m.
 const STIFFNESS: f64 = 20e3;
 
-/// One second: poses at 500 Hz, wrenches at 1 kHz. The wrench is in the axes of O, or of a stylus held at `rotation`.
+/// One second: poses at 500 Hz, wrenches at 1 kHz. The wrench is in the axes of O, or of a stylus
+/// held at `rotation`.
 pub fn touch(rotation: UnitQuaternion<f64>, wrench_in_object: bool) -> Vec<Message> {
     let mut messages = Vec::new();
     for tick in 0..=1000_i64 {
@@ -449,7 +453,8 @@ fn the_header_of_the_wrench_names_its_axes() {
     );
 }
 
-/// The frames are known only when both topics have begun; messages read before are not lost, nor are they kept for ever.
+/// The frames are known only when both topics have begun; messages read before are not lost, nor
+/// are they kept for ever.
 #[test]
 fn a_topic_that_begins_late_loses_no_message() {
     let case = Case::new();
@@ -592,7 +597,8 @@ fn wrong_flags_are_2_before_anything_is_read() {
     assert!(!case.path("out.ply").exists());
 }
 
-/// Nobody has told the radius of a scene that does not name it, whoever asks; refined by a ball of 1.5 mm, a hole is found too small.
+/// Nobody has told the radius of a scene that does not name it, whoever asks; refined by a ball of
+/// 1.5 mm, a hole is found too small.
 #[test]
 fn a_scene_that_names_no_radius_has_told_none() {
     let case = Case::new();
@@ -949,7 +955,8 @@ fn a_recording_that_moves_nothing_reports_the_reason() {
     );
 }
 
-// ---- demo -------------------------------------------------------------------------------------------------------
+// ---- demo
+// -------------------------------------------------------------------------------------------------------
 
 #[test]
 fn demo_lowers_the_error_at_least_fivefold_and_depends_on_its_seed_alone() {
@@ -1011,7 +1018,8 @@ fn demo_that_cannot_write_is_1() {
     assert!(text(&output.stderr).contains("file") && text(&output.stderr).lines().count() == 1);
 }
 
-// ---- init -------------------------------------------------------------------------------------------------------
+// ---- init
+// -------------------------------------------------------------------------------------------------------
 
 /// A scene that `init` writes is taken as it is, and each of its sources is the scene.
 #[test]
@@ -1079,9 +1087,11 @@ fn init_writes_a_scene_that_refine_takes() {
     );
 }
 
-// ---- simulate ---------------------------------------------------------------------------------------------------
+// ---- simulate
+// ---------------------------------------------------------------------------------------------------
 
-/// The markers on the stylus in place of its pose, with occlusion, swaps and outliers, lower the error as poses do.
+/// The markers on the stylus in place of its pose, with occlusion, swaps and outliers, lower the
+/// error as poses do.
 #[test]
 fn simulated_markers_refine_the_scan() {
     let folder = tempfile::tempdir().unwrap();
@@ -1220,7 +1230,8 @@ fn simulate_makes_the_input_of_refine() {
         summary["moved_faces"].as_u64().unwrap() > 100 && summary["contacts"].as_u64().unwrap() > 0,
         "{summary}"
     );
-    // the scan is in mm: 25 times as large it is a plausible part that has nothing to do with the touches
+    // the scan is in mm: 25 times as large it is a plausible part that has nothing to do with the
+    // touches
     fs::remove_file(&out).unwrap();
     let output = touchup(&[&refine[..], &["--mesh-unit", "inch"]].concat(), "");
     let message = text(&output.stderr);
@@ -1267,7 +1278,8 @@ fn simulate_makes_the_input_of_refine() {
     assert_eq!((code(&missing), text(&missing.stdout)), (3, ""));
 }
 
-// ---- step -------------------------------------------------------------------------------------------------------
+// ---- step
+// -------------------------------------------------------------------------------------------------------
 
 /// A linear spring at rest under no force: h = 0 stays 0, whatever the rest.
 #[test]
@@ -1288,9 +1300,11 @@ fn step_answers_each_line_in_order_and_goes_on_after_a_bad_one() {
     assert_eq!(answers[2], answers[0]);
 }
 
-// ---- report -----------------------------------------------------------------------------------------------------
+// ---- report
+// -----------------------------------------------------------------------------------------------------
 
-/// The program is copied into a folder of its own, with a script beside it that replaces `touchup-report`.
+/// The program is copied into a folder of its own, with a script beside it that replaces
+/// `touchup-report`.
 #[test]
 fn report_passes_its_arguments_to_a_program_of_its_own_and_ends_with_its_code() {
     let folder = tempfile::tempdir().unwrap();
@@ -1362,7 +1376,8 @@ fn the_version_names_the_commit() {
     );
 }
 
-// ---- stdout that takes nothing ------------------------------------------------------------------------------------
+// ---- stdout that takes nothing
+// ------------------------------------------------------------------------------------
 
 /// A result that did not reach stdout was not written: exit 1, whatever the verb.
 #[test]

@@ -16,7 +16,8 @@ struct Part {
 }
 
 impl Part {
-    /// A hole of 8.003 mm ± 2 × 0.004 mm at (16 36 12), one of the mesh at (60 10 12), and a blind one whose floor was not touched.
+    /// A hole of 8.003 mm ± 2 × 0.004 mm at (16 36 12), one of the mesh at (60 10 12), and a blind
+    /// one whose floor was not touched.
     fn new() -> Self {
         let hole = |id: u32, center: [f64; 3], diameter: f64| {
             json!({
@@ -113,7 +114,8 @@ fn what_does_not_ends_with_4_and_one_line_that_names_it() {
     assert_eq!(text(&output.stderr), expected);
 }
 
-/// 8.003 ± 0.004: guard bands of 1.645 × 0.004 = 0.0066 mm, so that ± 0.011 passes, ± 0.009 does not, and neither fails.
+/// 8.003 ± 0.004: guard bands of 1.645 × 0.004 = 0.0066 mm, so that ± 0.011 passes, ± 0.009 does
+/// not, and neither fails.
 #[test]
 fn guard_bands_leave_a_value_near_its_limit_undecided_unless_the_rule_is_simple() {
     let part = Part::new();
@@ -410,7 +412,8 @@ fn features_of_a_cad_mesh_are_nominal_values() {
     assert_eq!(record["without_characteristic"], json!([3]));
 }
 
-/// A flag whose hole was measured by the second to the fourth of its touches, which are numbered from 1 on.
+/// A flag whose hole was measured by the second to the fourth of its touches, which are numbered
+/// from 1 on.
 #[test]
 fn the_folder_of_a_probing_is_inspected_by_the_features_of_its_flags() {
     let part = Part::new();

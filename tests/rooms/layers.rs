@@ -1,13 +1,15 @@
-//! Rules that the order of the crates cannot enforce: reads the sources and fails on a reference that a room may not make, on files of
-//! a crate that use one another in a circle, and on files, threads, clock, environment or printing in a crate that is pure. Comments,
-//! strings and inline tests do not count.
+//! Rules that the order of the crates cannot enforce: reads the sources and fails on a reference
+//! that a room may not make, on files of a crate that use one another in a circle, and on files,
+//! threads, clock, environment or printing in a crate that is pure. Comments, strings and inline
+//! tests do not count.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Each room and the rooms it may use; itself always. A room that is missing here fails the check. The crates of the simulator, of files and
-/// of the report are a room each. Circles between crates need no check: cargo refuses them.
+/// Each room and the rooms it may use; itself always. A room that is missing here fails the check.
+/// The crates of the simulator, of files and of the report are a room each. Circles between crates
+/// need no check: cargo refuses them.
 const MAY_USE: &[(&str, &str)] = &[
     ("clock", ""),
     ("log_lines", ""),
@@ -116,10 +118,12 @@ const IMPURE_NAMES: &[&str] = &[
 /// The only places with file access.
 const MAY_OPEN_FILES: &[&str] = &["crates/touchup-io/", "crates/touchup-session/src/scene/"];
 
-/// The files that ask the system about itself, which answers by files: the packet sizes of its networks, the open sockets.
+/// The files that ask the system about itself, which answers by files: the packet sizes of its
+/// networks, the open sockets.
 const MAY_ASK_THE_SYSTEM: &[&str] = &["src/ros/dds/answers.rs", "src/ros/dds/sockets.rs"];
 
-/// The code alone: comments, the insides of strings and characters, and `#[cfg(test)] mod … { … }` are blanked.
+/// The code alone: comments, the insides of strings and characters, and `#[cfg(test)] mod … { … }`
+/// are blanked.
 fn code_of(source: &str) -> String {
     without_inline_tests(&without_comments_and_strings(source))
 }
@@ -352,7 +356,8 @@ const WHOLE: &[(&str, &str)] = &[
 /// Crates with several rooms, as other crates name them.
 const WITH_ROOMS: &[&str] = &["touchup_core", "touchup_session"];
 
-/// The rooms that `tokens` reach: of other crates by their names, of the own one from its root or by enough `super`.
+/// The rooms that `tokens` reach: of other crates by their names, of the own one from its root or
+/// by enough `super`.
 ///
 /// - `depth`, `has_siblings`: of [`Place`].
 fn rooms_reached<'a>(tokens: &[&'a str], depth: usize, has_siblings: bool) -> Vec<&'a str> {
@@ -498,7 +503,8 @@ fn paths_at<'a>(tokens: &[&'a str], at: &mut usize, before: &[&'a str]) -> Vec<V
     vec![path]
 }
 
-/// What a module names of its crate, as paths from the root: what it uses, and what it has by `use`, of other crates too.
+/// What a module names of its crate, as paths from the root: what it uses, and what it has by
+/// `use`, of other crates too.
 fn paths_of<'a>(
     module: &[&'a str],
     modules: &Modules<'a>,
@@ -553,8 +559,9 @@ fn module_in(file: &str) -> Vec<&str> {
     }
 }
 
-/// The module in which what a path names is defined: its longest start that is one, through what modules import, for themselves or
-/// for others; the root, which uses none, for what is of another crate.
+/// The module in which what a path names is defined: its longest start that is one, through what
+/// modules import, for themselves or for others; the root, which uses none, for what is of another
+/// crate.
 fn module_of<'a>(
     path: &[&'a str],
     modules: &Modules<'a>,
@@ -653,8 +660,8 @@ fn every_room_keeps_to_the_flow_of_data() {
     assert!(found.is_empty(), "\n{}", found.join("\n"));
 }
 
-/// The modules that a file has for its tests alone, without extension: those that it declares below `#[cfg(test)]`. They and all that is
-/// below them may use all rooms.
+/// The modules that a file has for its tests alone, without extension: those that it declares below
+/// `#[cfg(test)]`. They and all that is below them may use all rooms.
 fn modules_of_tests(file: &str, source: &str) -> Vec<PathBuf> {
     let folder = file
         .strip_suffix("/mod.rs")

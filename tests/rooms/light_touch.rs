@@ -1,4 +1,5 @@
-//! A touch too light for a contact says neither where the surface is nor where none is: the scan stays as it was.
+//! A touch too light for a contact says neither where the surface is nor where none is: the scan
+//! stays as it was.
 
 use std::fs;
 
@@ -20,7 +21,8 @@ const TIP: TipParams = TipParams {
 /// How much lower than the scan the ball goes, m.
 const BELOW: f64 = 1e-3;
 
-/// A ball that goes to and fro at 40 mm/s, 1 mm below the scan at z = 0, and presses upwards as a part does.
+/// A ball that goes to and fro at 40 mm/s, 1 mm below the scan at z = 0, and presses upwards as a
+/// part does.
 ///
 /// - `force`: at a time, s; N.
 fn slide(seconds: f64, noise: f64, force: impl Fn(f64) -> f64) -> Vec<Sample> {
@@ -93,8 +95,8 @@ fn a_light_touch_leaves_the_scan_as_it_was_and_free_motion_does_not() {
     }
 }
 
-/// A robot's ball that slid over a phantom at some 0.24 N, and as its scan the plane through the mean of the
-/// centres, a radius too high.
+/// A robot's ball that slid over a phantom at some 0.24 N, and as its scan the plane through the
+/// mean of the centres, a radius too high.
 #[test]
 fn a_real_recording_of_light_touches_does_not_carve() {
     let Some(file) = crate::shared::shared("force/vu_dvrk_exploration/KidneyZ4-21Oct.csv") else {

@@ -1,4 +1,5 @@
-//! The patch beside the haptic update: the same skin as all at once, sound at every moment, whatever the machine does.
+//! The patch beside the haptic update: the same skin as all at once, sound at every moment,
+//! whatever the machine does.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -208,8 +209,8 @@ fn renewed_bit_by_bit_it_is_the_skin_of_all_at_once_and_sound_all_along() {
     }
 }
 
-/// In a pause faces are merged where the surface is plain; where touches come after it, those of the lattice come again. No crack is
-/// between, and at rest it is what is saved.
+/// In a pause faces are merged where the surface is plain; where touches come after it, those of
+/// the lattice come again. No crack is between, and at rest it is what is saved.
 #[test]
 fn after_a_pause_touches_go_on_beside_merged_faces_without_a_crack() {
     let stream = stream(4, either(0.12, 0.2));
@@ -280,8 +281,8 @@ fn by_lattice(scan: &TriMesh, tree: &FaceTree, patcher: &Patcher) -> TriMesh {
     mesh
 }
 
-/// The same by hand, on one thread, with nothing looked up ahead: the mesh after the last sample and at the end, and the answer to
-/// each sample.
+/// The same by hand, on one thread, with nothing looked up ahead: the mesh after the last sample
+/// and at the end, and the answer to each sample.
 fn one_after_the_other(stream: &PlateStream, pace: Pace) -> ([TriMesh; 2], Vec<Update>) {
     let tree = FaceTree::new(&stream.scan);
     let (mut patcher, mut refiner) = (patcher(stream), refiner(&stream.scan));
@@ -445,8 +446,8 @@ fn assert_knows_all(stream: &PlateStream, live: Engine) {
     assert!(whole(stream, &known) == whole(stream, &all_at_once));
 }
 
-/// The patch gets a permit for each 100 ms alone: every sample is taken all the same, the patch is renewed as often as it may
-/// be, each time late, and the result at the end is the same.
+/// The patch gets a permit for each 100 ms alone: every sample is taken all the same, the patch is
+/// renewed as often as it may be, each time late, and the result at the end is the same.
 #[test]
 fn a_late_patch_holds_no_sample_up_and_changes_nothing_of_the_result() {
     let stream = stream(5, 0.1);
@@ -460,7 +461,8 @@ fn a_late_patch_holds_no_sample_up_and_changes_nothing_of_the_result() {
         }
         kept.push(sample);
     }
-    // the first permit lets the renewal through that is due since 18 ms after the first sample at most, and so on
+    // the first permit lets the renewal through that is due since 18 ms after the first sample at
+    // most, and so on
     let renewals = permits as u64;
     assert!(renewals > 50);
     assert_eq!(
@@ -501,8 +503,8 @@ fn a_patch_in_time_equals_one_awaited_at_every_sample() {
     assert_same(kept.live.refiner().mesh(), patient.refiner().mesh());
 }
 
-/// The patch is late by two renewals and all that came since when the samples end: while none comes the mesh goes on to what the
-/// patch knows of all of them, as it does by hand.
+/// The patch is late by two renewals and all that came since when the samples end: while none comes
+/// the mesh goes on to what the patch knows of all of them, as it does by hand.
 #[test]
 fn without_samples_the_mesh_catches_up_with_the_patch() {
     let stream = stream(6, 0.05);
@@ -532,7 +534,8 @@ fn without_samples_the_mesh_catches_up_with_the_patch() {
         patcher.renew_far(&stream.scan, &tree);
         by_hand.begin_to_follow(&delta);
         while !by_hand.go_on_following(&delta, AT_ONCE).unwrap() {}
-        // nothing is done without a permit, and the third is requested when the first two are taken up
+        // nothing is done without a permit, and the third is requested when the first two are taken
+        // up
         live.rest().unwrap();
         assert_eq!(live.counts().renewals, k as u64);
         keeper.let_one_through();
@@ -638,8 +641,8 @@ fn triangles(mesh: &TriMesh) -> Vec<[[u64; 3]; 3]> {
     triangles
 }
 
-/// The reconstruction from the current evidence, to the last bit: triangles, and how well vertices are known; and the
-/// touches of which features are measured.
+/// The reconstruction from the current evidence, to the last bit: triangles, and how well vertices
+/// are known; and the touches of which features are measured.
 fn whole(
     stream: &PlateStream,
     patcher: &Patcher,
@@ -702,7 +705,8 @@ fn take(engine: &mut Engine, samples: &[Sample]) {
     }
 }
 
-/// The samples go on while the evidence is made again without one in the middle; the last one goes when nothing comes any more.
+/// The samples go on while the evidence is made again without one in the middle; the last one goes
+/// when nothing comes any more.
 #[test]
 fn evidence_made_again_without_a_stroke_is_that_of_an_engine_that_never_took_it() {
     let stream = last_strokes(4, 0.15);

@@ -82,7 +82,8 @@ fn the_scene_of_the_demo_is_the_default_with_a_scan() {
     );
 }
 
-/// Every key that the code knows, asked by giving each section a key that none has: the refusal lists the known ones.
+/// Every key that the code knows, asked by giving each section a key that none has: the refusal
+/// lists the known ones.
 #[test]
 fn every_key_of_the_code_is_in_the_shipped_file_and_documented() {
     let mut known = BTreeSet::new();
@@ -169,7 +170,8 @@ fn the_default_scene_is_the_preset_of_each_mode() {
     assert_eq!(scene.refine_params(WrenchFrame::Sensor), Some(rigid));
 }
 
-/// What a right result needs is there unless the scene says `off`; what only some sensors need is there where it is named.
+/// What a right result needs is there unless the scene says `off`; what only some sensors need is
+/// there where it is named.
 #[test]
 fn a_scene_says_what_differs() {
     assert_eq!(Scene::from_yaml("{}").unwrap(), Scene::default());
@@ -657,7 +659,8 @@ fn bias_tracking_is_built_only_when_named_and_not_in_the_paper() {
     assert!(text.contains("bias_tracking.time_s is 0"), "{text}");
 }
 
-// ---- settings put into the text ---------------------------------------------------------------------------------
+// ---- settings put into the text
+// ---------------------------------------------------------------------------------
 
 /// A scene as a user wrote it, with what each calibration sets.
 fn calibrated(yaml: &str) -> Result<String, SceneError> {
@@ -746,7 +749,8 @@ compensation: { payload: { mass_kg: 1, centre_mm: [1, 2, 3] }, # the new sensor
     }
 }
 
-/// However a scene is written, the result is right (which `edited` checks itself), or it is refused with what to do.
+/// However a scene is written, the result is right (which `edited` checks itself), or it is refused
+/// with what to do.
 #[test]
 fn every_form_of_writing_is_edited_or_refused() {
     let forms = [
@@ -801,7 +805,8 @@ fn every_form_of_writing_is_edited_or_refused() {
 }
 
 proptest! {
-    /// Sections in any order, in lines or in braces, set in by two or four, with comments and empty lines anywhere.
+    /// Sections in any order, in lines or in braces, set in by two or four, with comments and empty
+    /// lines anywhere.
     #[test]
     fn any_plain_scene_is_edited_and_keeps_its_comments(
         order in Just(vec![0usize, 1, 2, 3]).prop_shuffle(),
@@ -908,7 +913,8 @@ fn a_scene_reports_what_is_built_of_it_and_what_is_left_out() {
         )),
         "{off}"
     );
-    // the mode of the paper takes neither contact, sliding, carving, guard nor a patch, whatever is named
+    // the mode of the paper takes neither contact, sliding, carving, guard nor a patch, whatever is
+    // named
     let paper = built(
         "contact:\ntip:\nsliding:\ncarve:\npatch:\nuncertainty:\nguard:\nrefine: { mode: paper }",
     );
@@ -931,7 +937,8 @@ fn a_scene_reports_what_is_built_of_it_and_what_is_left_out() {
     assert_eq!(paper.built.len() + paper.left_out.len(), 18);
 }
 
-/// What is said to be left out is in no settings: of a part that the scene names and the published rule has not, none are left.
+/// What is said to be left out is in no settings: of a part that the scene names and the published
+/// rule has not, none are left.
 #[test]
 fn what_is_left_out_is_not_in_the_settings() {
     let settings = |yaml: &str| {
@@ -967,7 +974,8 @@ fn what_is_left_out_is_not_in_the_settings() {
     );
 }
 
-/// Seven joints, one after the other, 100 mm apart and turned by a right angle from one to the next.
+/// Seven joints, one after the other, 100 mm apart and turned by a right angle from one to the
+/// next.
 fn urdf_of_seven_joints() -> String {
     let quarter = std::f64::consts::FRAC_PI_2;
     let joint = |number: usize| {

@@ -1,4 +1,5 @@
-//! `touchup sweep` and `touchup whatif` at the boundary of the process: ids, results that are whole or not there, tables, and what moved.
+//! `touchup sweep` and `touchup whatif` at the boundary of the process: ids, results that are whole
+//! or not there, tables, and what moved.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -130,7 +131,8 @@ fn names_in(folder: &Path) -> Vec<String> {
 
 const ONE_JOB: &str = "keys: { tip.radius_mm: 1.5 }\n";
 
-// ---- plan -------------------------------------------------------------------------------------------------------
+// ---- plan
+// -------------------------------------------------------------------------------------------------------
 
 #[test]
 fn a_plan_has_every_setting_with_every_recording_in_the_order_of_the_alphabet() {
@@ -274,7 +276,8 @@ fn a_misspelt_key_is_refused_with_its_line_and_the_key_that_is_meant() {
     }
 }
 
-// ---- run --------------------------------------------------------------------------------------------------------
+// ---- run
+// --------------------------------------------------------------------------------------------------------
 
 #[test]
 fn a_result_has_the_same_bytes_wherever_and_under_whatever_names_it_is_made() {
@@ -351,7 +354,8 @@ fn a_job_is_what_refine_does() {
     }
 }
 
-/// First while it waits for its scan, a pipe that nobody writes to; then at whatever it does once its first file is there.
+/// First while it waits for its scan, a pipe that nobody writes to; then at whatever it does once
+/// its first file is there.
 #[test]
 fn a_killed_job_leaves_nothing_half_and_the_next_one_gives_the_same_bytes() {
     let sweep = Sweep::new(ONE_JOB);
@@ -467,7 +471,8 @@ fn a_file_that_is_not_what_was_planned_is_refused_and_nothing_is_written() {
     );
 }
 
-// ---- table ------------------------------------------------------------------------------------------------------
+// ---- table
+// ------------------------------------------------------------------------------------------------------
 
 /// The touch presses with 2 N: a threshold of 3 N sees no contact, which refine refuses.
 #[test]
@@ -572,9 +577,11 @@ fn a_job_that_fails_is_in_the_table_with_its_reason_and_a_missing_one_is_named()
     );
 }
 
-// ---- whatif -----------------------------------------------------------------------------------------------------
+// ---- whatif
+// -----------------------------------------------------------------------------------------------------
 
-/// A result as a job leaves it: a sheet of 21 × 21 vertices that rises by `step` mm from column to column, known to `sigma` mm.
+/// A result as a job leaves it: a sheet of 21 × 21 vertices that rises by `step` mm from column to
+/// column, known to `sigma` mm.
 fn sheet_result(
     folder: &Path,
     scan: &str,
@@ -609,8 +616,8 @@ fn sheet_result(
     folder.to_str().unwrap().to_owned()
 }
 
-/// By hand: column c rises by c · 0.01 mm; ± is 2 · 0.05 mm, the larger of both; so columns 11 to 20 move, 21 vertices each. The
-/// hole's diameter grows by 0.05 mm with ± 2 · 0.02 mm.
+/// By hand: column c rises by c · 0.01 mm; ± is 2 · 0.05 mm, the larger of both; so columns 11 to
+/// 20 move, 21 vertices each. The hole's diameter grows by 0.05 mm with ± 2 · 0.02 mm.
 #[test]
 fn vertices_and_features_that_moved_by_more_than_the_larger_plus_minus_are_counted() {
     let folder = tempfile::tempdir().unwrap();
@@ -727,7 +734,8 @@ fn vertices_and_features_that_moved_by_more_than_the_larger_plus_minus_are_count
     );
 }
 
-/// The stylus is bent by 2 N: of 20 N/mm by 0.1 mm, of 10 N/mm by 0.2 mm. So the touched place comes out 0.1 mm higher.
+/// The stylus is bent by 2 N: of 20 N/mm by 0.1 mm, of 10 N/mm by 0.2 mm. So the touched place
+/// comes out 0.1 mm higher.
 #[test]
 fn a_softer_stylus_lifts_the_touched_place_by_the_difference_of_its_bending() {
     let sweep = Sweep::new("keys: { tip.radius_mm: 1.5, tip.stiffness_n_per_mm: [20, 10] }\n");
@@ -767,8 +775,9 @@ fn a_softer_stylus_lifts_the_touched_place_by_the_difference_of_its_bending() {
     assert_eq!(one_object(&same)["keys"], json!({}));
 }
 
-/// On the plate of the demo, where the stylus is said to be softer than it is, every touched surface comes out farther by the same bending: the top
-/// rises by it, holes and slot shrink and the boss grows by twice as much. What does not bend, the axes, stays.
+/// On the plate of the demo, where the stylus is said to be softer than it is, every touched
+/// surface comes out farther by the same bending: the top rises by it, holes and slot shrink and
+/// the boss grows by twice as much. What does not bend, the axes, stays.
 #[test]
 #[ignore = "full"]
 fn the_plate_touched_by_a_softer_stylus_grows_everywhere_by_its_bending() {
@@ -839,7 +848,8 @@ fn the_plate_touched_by_a_softer_stylus_grows_everywhere_by_its_bending() {
     }
 }
 
-// ---- simulated --------------------------------------------------------------------------------------------------
+// ---- simulated
+// --------------------------------------------------------------------------------------------------
 
 /// The scan of `touchup demo` with the same seed, byte for byte.
 #[test]

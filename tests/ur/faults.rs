@@ -1,4 +1,5 @@
-//! What goes wrong in mid-move: the arm comes to rest, the reported reason is the true one, and it recovers on command.
+//! What goes wrong in mid-move: the arm comes to rest, the reported reason is the true one, and it
+//! recovers on command.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -171,7 +172,8 @@ enum Passes {
     Nothing,
     /// that of the controller, ms
     Controller(u32),
-    /// that of the guard, line by line of the client, which come each 10 ms; and of the controller, ms
+    /// that of the guard, line by line of the client, which come each 10 ms; and of the controller,
+    /// ms
     Guard(u32),
     /// that of the guard, which gets no lines any more
     GuardAlone,
@@ -431,8 +433,9 @@ fn one_fault(packages: &Path, fault: &Fault) -> Result<(), ProbeError> {
     Ok(())
 }
 
-/// The thread of the motion still has its velocity when the program is resumed, as by the automatic reset of a safeguard. With
-/// a dashboard its program is gone by then; without one the client brakes it as soon as it is resumed, and its watchdog ends it.
+/// The thread of the motion still has its velocity when the program is resumed, as by the automatic
+/// reset of a safeguard. With a dashboard its program is gone by then; without one the client
+/// brakes it as soon as it is resumed, and its watchdog ends it.
 #[test]
 fn an_arm_that_was_paused_does_not_go_on_when_it_is_resumed() {
     for (pause, resume, is_mute) in [
@@ -526,7 +529,8 @@ impl Drop for Passing {
     }
 }
 
-/// Neither the client nor the guard does anything: the watchdog of the controller does, in its time and not before.
+/// Neither the client nor the guard does anything: the watchdog of the controller does, in its time
+/// and not before.
 #[test]
 fn the_watchdog_stops_an_uncommanded_arm() {
     with_library(|packages| {
@@ -617,7 +621,8 @@ fn after_a_protective_stop_it_is_recovered() {
     });
 }
 
-/// `touchup recover`: the program that drove it has ended, and a new one is refused until somebody says that he has looked.
+/// `touchup recover`: the program that drove it has ended, and a new one is refused until somebody
+/// says that he has looked.
 #[test]
 fn a_stopped_arm_is_recovered_by_a_verb_and_nothing_moves() {
     with_library(|packages| {
@@ -690,8 +695,9 @@ fn after_a_lost_client_it_is_recovered() {
     });
 }
 
-/// The client lives, the program of the controller does not: by a hand at the panel, or by the watchdog while nothing arrived.
-/// The restarted program executes what the registers hold: a velocity from before the fault, unless they are cleared.
+/// The client lives, the program of the controller does not: by a hand at the panel, or by the
+/// watchdog while nothing arrived. The restarted program executes what the registers hold: a
+/// velocity from before the fault, unless they are cleared.
 #[test]
 fn after_an_ended_program_it_is_recovered() {
     with_library(|packages| {

@@ -1,8 +1,10 @@
-//! The real ur-rtde client against a stand-in for the controller: the library, the child process, the wire and the arm behind it.
+//! The real ur-rtde client against a stand-in for the controller: the library, the child process,
+//! the wire and the arm behind it.
 //!
-//! Whether the arm is at rest is read in the record of the stand-in, by its own clock. That waits for the client, and so do the
-//! deadlines of client and guard: how busy this machine is changes nothing. When a fault is noticed is a test of the guard and of
-//! the driver (`src/ur`), on clocks that are moved by hand.
+//! Whether the arm is at rest is read in the record of the stand-in, by its own clock. That waits
+//! for the client, and so do the deadlines of client and guard: how busy this machine is changes
+//! nothing. When a fault is noticed is a test of the guard and of the driver (`src/ur`), on clocks
+//! that are moved by hand.
 
 mod faults;
 mod motion;
@@ -25,7 +27,8 @@ use touchup::probing::arm::{
 use touchup::sim::ArmParams;
 use touchup::ur::UrArm;
 
-/// From an order to the arm that follows it, and from a stop to the last of the motion, s: some periods of the controller.
+/// From an order to the arm that follows it, and from a stop to the last of the motion, s: some
+/// periods of the controller.
 const LATENCY: f64 = 20e-3;
 /// Top of the plate, m in O.
 const TOP: f64 = 12e-3;

@@ -56,7 +56,8 @@ fn a_line_ends_at_its_place_and_turn() {
     });
 }
 
-/// Over the top of the plate, around the rim of its step at x = 60 mm and down its side: 3 N along a normal that turns by 90°.
+/// Over the top of the plate, around the rim of its step at x = 60 mm and down its side: 3 N along
+/// a normal that turns by 90°.
 #[test]
 fn a_slide_goes_over_a_rim() {
     with_library(|packages| {
@@ -163,7 +164,8 @@ fn a_slide_keeps_its_force() {
     });
 }
 
-/// The controller reads one command in a cycle: a velocity right behind a press would take its place.
+/// The controller reads one command in a cycle: a velocity right behind a press would take its
+/// place.
 #[test]
 fn a_press_is_never_lost() {
     with_library(|packages| {
@@ -282,7 +284,8 @@ fn a_cancelled_move_brakes_to_rest() {
     });
 }
 
-/// While it is still getting faster; the controller would else first reach the speed and then read its next command.
+/// While it is still getting faster; the controller would else first reach the speed and then read
+/// its next command.
 #[test]
 fn a_stop_while_it_accelerates_is_not_put_off() {
     with_library(|packages| {

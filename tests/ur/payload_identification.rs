@@ -9,8 +9,8 @@ use super::probing::cell;
 use super::stand_in::StandIn;
 use super::with_library;
 
-/// 1.17 kg off the axis, where the scene says 0.25 kg: the controller takes off the configured payload, and the sensor has all of
-/// it.
+/// 1.17 kg off the axis, where the scene says 0.25 kg: the controller takes off the configured
+/// payload, and the sensor has all of it.
 #[test]
 fn a_ur_identifies_the_payload_on_its_flange() {
     with_library(|packages| {

@@ -11,7 +11,8 @@ use touchup::sim::{Plate, ScannerParams, scan};
 use super::stand_in::StandIn;
 use super::with_library;
 
-/// A folder with the scan of the demo, and with its scene, which has the controller on a loopback address.
+/// A folder with the scan of the demo, and with its scene, which has the controller on a loopback
+/// address.
 pub fn cell(stand_in: &StandIn, packages: &Path) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let scanned = scan(&Plate::default(), &ScannerParams::default()).unwrap();

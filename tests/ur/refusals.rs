@@ -141,7 +141,8 @@ fn a_controller_whose_states_come_at_125_hz_is_refused() {
     });
 }
 
-/// In local control, without power, silent, gone. The library would wait for a silent one without end.
+/// In local control, without power, silent, gone. The library would wait for a silent one without
+/// end.
 #[test]
 fn a_controller_that_is_not_at_hand_is_reported_at_once() {
     with_library(|packages| {

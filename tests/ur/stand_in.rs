@@ -198,7 +198,8 @@ impl StandIn {
         })
     }
 
-    /// From the last such event, which is in mid-move, to the last motion before the arm is at rest, s.
+    /// From the last such event, which is in mid-move, to the last motion before the arm is at
+    /// rest, s.
     pub fn stood_after(&self, event: &str) -> f64 {
         let moves = |line: &Line| line.speed > 0.0 || line.turn > 0.0;
         let (at_event, stood) = self.wait(&format!("an arm at rest after `{event}`"), |record| {

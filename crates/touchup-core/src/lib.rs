@@ -1,7 +1,8 @@
 //! The method: samples to mesh, features, registration and probing.
 //!
-//! Nothing here opens a file, reads a clock, starts a thread or speaks ROS: the same samples give the same bytes. The modules, in the order
-//! in which data flows through them and in which they may use one another:
+//! Nothing here opens a file, reads a clock, starts a thread or speaks ROS: the same samples give
+//! the same bytes. The modules, in the order in which data flows through them and in which they may
+//! use one another:
 //!
 //! | module | what it does |
 //! |---|---|
@@ -24,17 +25,19 @@
 //!
 //! # Frames
 //!
-//! O object (the mesh) · T stylus tip (origin: centre of the ball; z: along the shaft, from tip to handle) · S force
-//! sensor · H the stylus as it is tracked (axes of T; the scene gives the place of the ball in it) · W world or space, in which
-//! it is tracked (the scene gives the pose of O in it; in the simulator z is up) · V view (in the simulator alone; z: towards the scanner
-//! or the hand) · F fitted surface (in [`features`] alone; z: its axis or normal). `pose_ot` maps T to O, `p_ot` is the tip in
-//! O, `force_o` is a force expressed in O. A wrench is what the object does to the stylus and normals point out of the
-//! object, so a stylus that presses has `force_o · normal > 0`.
+//! O object (the mesh) · T stylus tip (origin: centre of the ball; z: along the shaft, from tip to
+//! handle) · S force sensor · H the stylus as it is tracked (axes of T; the scene gives the place
+//! of the ball in it) · W world or space, in which it is tracked (the scene gives the pose of O in
+//! it; in the simulator z is up) · V view (in the simulator alone; z: towards the scanner or the
+//! hand) · F fitted surface (in [`features`] alone; z: its axis or normal). `pose_ot` maps T to O,
+//! `p_ot` is the tip in O, `force_o` is a force expressed in O. A wrench is what the object does to
+//! the stylus and normals point out of the object, so a stylus that presses has `force_o · normal >
+//! 0`.
 //!
 //! # Units
 //!
-//! SI throughout: m, N, N·m, kg, s, rad. A bare number that leaves the code carries its unit in its name
-//! (`mass_kg`, `stamp_ns`). Stamps are `i64` nanoseconds.
+//! SI throughout: m, N, N·m, kg, s, rad. A bare number that leaves the code carries its unit in its
+//! name (`mass_kg`, `stamp_ns`). Stamps are `i64` nanoseconds.
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 pub mod align;

@@ -1,7 +1,8 @@
 //! Parameters of the scene, each declared once, in the module that it belongs to.
 //!
-//! [`parameters!`](crate::parameters!) makes of one declaration the struct in SI, its defaults, its check, how it reads itself from YAML,
-//! and a [`Parameter`] for each key, of which the template of the scene and the table of docs/scene.md are made:
+//! [`parameters!`](crate::parameters!) makes of one declaration the struct in SI, its defaults, its
+//! check, how it reads itself from YAML, and a [`Parameter`] for each key, of which the template of
+//! the scene and the table of docs/scene.md are made:
 //!
 //! ```
 //! use touchup_core::{parameters, parameters::Section};
@@ -24,8 +25,8 @@
 //! assert_eq!(wide.check().unwrap_err().to_string(), "door.opening_mm is 3000; it must be 1 to 2000 mm; it is left out by default");
 //! ```
 //!
-//! A struct may end `with { part: Part }`, whose keys are in the same section, and name a `check path;` of what several parameters
-//! must hold together.
+//! A struct may end `with { part: Part }`, whose keys are in the same section, and name a `check
+//! path;` of what several parameters must hold together.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -217,7 +218,8 @@ pub trait Value: Sized {
     /// As YAML on one line; `None`: it is left out.
     fn yaml(&self, unit: Unit) -> Option<String>;
 
-    /// The value of a key that is there, also without a value: that names a section with its defaults; `off` is no section.
+    /// The value of a key that is there, also without a value: that names a section with its
+    /// defaults; `off` is no section.
     fn given(written: Self::Written, unit: Unit) -> Self {
         Self::of(written, unit)
     }

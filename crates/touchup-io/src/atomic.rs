@@ -8,9 +8,10 @@ use tempfile::TempPath;
 
 /// A file that appears under its name only by [`AtomicFile::commit`].
 ///
-/// Until then it lies beside its target under a temporary name; dropped without commit it is removed and an older
-/// file of that name stays untouched. A link is followed, also one that leads to no file yet, so that what it points to is
-/// replaced. What a process that was killed has left under a temporary name goes when the next one writes to the same place.
+/// Until then it lies beside its target under a temporary name; dropped without commit it is
+/// removed and an older file of that name stays untouched. A link is followed, also one that leads
+/// to no file yet, so that what it points to is replaced. What a process that was killed has left
+/// under a temporary name goes when the next one writes to the same place.
 #[derive(Debug)]
 pub struct AtomicFile {
     target: PathBuf,
@@ -23,7 +24,8 @@ impl AtomicFile {
     /// Opens a temporary file beside `path`.
     ///
     /// # Errors
-    /// The folder is missing, or may not be written to; `path` names something other than a plain file.
+    /// The folder is missing, or may not be written to; `path` names something other than a plain
+    /// file.
     pub fn create(path: &Path) -> io::Result<Self> {
         let target = followed(path)?;
         let refused = |kind, why: String| Err(io::Error::new(kind, why));
@@ -68,7 +70,8 @@ impl AtomicFile {
         self.temporary
             .persist(&self.target)
             .map_err(|error| error.error)?;
-        // the new name is on the disk once its folder is; some file systems cannot be asked for that
+        // the new name is on the disk once its folder is; some file systems cannot be asked for
+        // that
         let _ = File::open(folder_of(&self.target)).and_then(|folder| folder.sync_all());
         Ok(())
     }
@@ -142,7 +145,8 @@ fn followed(path: &Path) -> io::Result<PathBuf> {
     ))
 }
 
-/// Removes temporary files `stem`PID-….part of processes that are gone. Where that cannot be known they stay.
+/// Removes temporary files `stem`PID-….part of processes that are gone. Where that cannot be known
+/// they stay.
 pub(super) fn remove_left(folder: &Path, stem: &str) {
     let (processes, Ok(entries)) = (Path::new("/proc"), fs::read_dir(folder)) else {
         return;

@@ -18,8 +18,8 @@ pub fn hash_of(bytes: &[u8]) -> String {
     hex(Sha256::new_with_prefix(bytes))
 }
 
-/// SHA-256 of a file, as `sha256sum` prints it; of a folder, as of a recording in parts, that of a list: a line with hash, two spaces and
-/// path for each file below it, ordered by path.
+/// SHA-256 of a file, as `sha256sum` prints it; of a folder, as of a recording in parts, that of a
+/// list: a line with hash, two spaces and path for each file below it, ordered by path.
 ///
 /// # Errors
 /// [`FileError::Read`]

@@ -1,6 +1,7 @@
 //! Lines of comma-separated values that spreadsheets open.
 
-/// One line without its end; a value with a comma, a quotation mark or a line end is quoted (RFC 4180).
+/// One line without its end; a value with a comma, a quotation mark or a line end is quoted (RFC
+/// 4180).
 pub(crate) fn csv_line<'a>(values: impl Iterator<Item = &'a str>) -> String {
     let quoted = |value: &str| match value.contains([',', '"', '\n', '\r']) {
         true => format!("\"{}\"", value.replace('"', "\"\"")),

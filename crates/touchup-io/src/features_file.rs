@@ -52,21 +52,24 @@ reported! {
         pub center_mm: [f64; 3] = point_mm(&cluster.center),
         /// how many
         pub vertices: usize = cluster.vertices.len(),
-        /// whether they bend outward, as the rim of a hole; left out where the number of clusters was given
+        /// whether they bend outward, as the rim of a hole; left out where the number of clusters
+        /// was given
         pub convex?: bool = cluster.bend.map(|bend| bend == Bend::Convex),
     }
 }
 
 reported! {
-    /// How far a touched surface is off its ideal form: widths of the narrowest zones (ISO 1101) over what was touched of it. 0 where
-    /// nothing stands out of the noise: then `std` is what noise may hide.
+    /// How far a touched surface is off its ideal form: widths of the narrowest zones (ISO 1101)
+    /// over what was touched of it. 0 where nothing stands out of the noise: then `std` is what
+    /// noise may hide.
     #[derive(Clone, Deserialize)]
     pub struct FormRecord, fn of(form: &Form) {
         /// round walls: of the mean section
         pub roundness_mm?: f64 = form_number(form, "roundness_mm"),
         /// round walls that were touched at several heights
         pub cylindricity_mm?: f64 = form_number(form, "cylindricity_mm"),
-        /// round walls that were touched at three heights all around: diameter of the cylinder that holds the axis
+        /// round walls that were touched at three heights all around: diameter of the cylinder that
+        /// holds the axis
         pub straightness_mm?: f64 = form_number(form, "straightness_mm"),
         /// planes
         pub flatness_mm?: f64 = form_number(form, "flatness_mm"),
@@ -76,7 +79,8 @@ reported! {
         /// standard uncertainties by name of the number
         #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
         pub std: BTreeMap<String, f64> = estimates(form, |deviation| deviation.minimum_zone.std),
-        /// share of the turn, or of the rectangle around the touches, that they cover: the form of the rest is not known
+        /// share of the turn, or of the rectangle around the touches, that they cover: the form of
+        /// the rest is not known
         #[serde(default)]
         pub coverage: f64 = match form {
             Form::Round(round) => round.coverage,
@@ -135,7 +139,8 @@ reported! {
         pub of: u32 = relation.of,
         /// `id` of the datum
         pub to: u32 = relation.to,
-        /// width of the zone between parallel planes, of an axis square to a plane diameter of the cylinder
+        /// width of the zone between parallel planes, of an axis square to a plane diameter of the
+        /// cylinder
         pub perpendicularity_mm?: f64 = relation_number(relation, "perpendicularity_mm"),
         /// width of the zone between parallel planes, of an axis diameter of the cylinder
         pub parallelism_mm?: f64 = relation_number(relation, "parallelism_mm"),
@@ -187,24 +192,28 @@ reported! {
         pub id: u32 = feature.id,
         /// `hole`, `slot`, `pocket`, `boss`, `edge`, `corner` or `plane`
         pub kind: String = feature.kind.name().to_owned(),
-        /// hole, slot, pocket: where the axis goes through the opening; boss: middle of its foot; edge, plane: its middle;
-        /// corner: itself
+        /// hole, slot, pocket: where the axis goes through the opening; boss: middle of its foot;
+        /// edge, plane: its middle; corner: itself
         pub center_mm?: [f64; 3] = Some(point_mm(&feature.centre.value)),
-        /// hole, slot, pocket: out of the opening; boss: away from its foot; edge: along it; plane: outward normal. Unit vector
+        /// hole, slot, pocket: out of the opening; boss: away from its foot; edge: along it; plane:
+        /// outward normal. Unit vector
         pub axis?: [f64; 3] = feature.axis.as_ref().map(|axis| axis.value.into()),
         /// hole, boss
         pub diameter_mm?: f64 = times(&feature.diameter, 1e3),
-        /// slot: over its ends, of an open one as far as its walls go; pocket; edge: as far as it was seen
+        /// slot: over its ends, of an open one as far as its walls go; pocket; edge: as far as it
+        /// was seen
         pub length_mm?: f64 = times(&feature.length, 1e3),
         /// slot, pocket
         pub width_mm?: f64 = times(&feature.width, 1e3),
-        /// hole, slot, pocket: from opening to floor, of one that goes through as far as its wall goes (of a drilled hole
-        /// without the tip; of a round opening in a sheet left out, as is `through`); boss: its height. Where the wall was touched
-        /// and floor or top was not, as far as that was: see `depth_is_at_least`
+        /// hole, slot, pocket: from opening to floor, of one that goes through as far as its wall
+        /// goes (of a drilled hole without the tip; of a round opening in a sheet left out, as is
+        /// `through`); boss: its height. Where the wall was touched and floor or top was not, as
+        /// far as that was: see `depth_is_at_least`
         pub depth_mm?: f64 = times(&feature.depth, 1e3),
         /// whether `depth_mm` is a lower bound; left out where it is none
         pub depth_is_at_least?: bool = feature.depth.as_ref().filter(|depth| depth.is_at_least).map(|_| true),
-        /// hole, slot, pocket; left out where the mesh ends before the hole does, or its floor is untouched
+        /// hole, slot, pocket; left out where the mesh ends before the hole does, or its floor is
+        /// untouched
         pub through?: bool = feature.through,
         /// hole: full angle of its countersink
         pub cone_angle_deg?: f64 = times(&feature.cone_angle, 1f64.to_degrees()),
@@ -217,8 +226,9 @@ reported! {
         pub points_mm: Vec<[f64; 3]> = feature.points.iter().map(point_mm).collect(),
         /// edge: whether the material is inside of it
         pub convex?: bool = feature.is_convex,
-        /// standard uncertainties by name of the number: `center_mm` (across the axis, of a plane along its normal, of a corner
-        /// in space), `axis_deg`, `diameter_mm`, `length_mm`, `width_mm`, `depth_mm`, `cone_angle_deg`
+        /// standard uncertainties by name of the number: `center_mm` (across the axis, of a plane
+        /// along its normal, of a corner in space), `axis_deg`, `diameter_mm`, `length_mm`,
+        /// `width_mm`, `depth_mm`, `cone_angle_deg`
         #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
         pub std: BTreeMap<String, f64> =
             known(feature).filter_map(|(name, std, _)| Some((name.to_owned(), std?))).collect(),
@@ -230,7 +240,8 @@ reported! {
         /// `touches`, or `mesh` where too little was touched
         #[serde(default)]
         pub fitted_to: String = feature.fitted_to.name().to_owned(),
-        /// the touches behind each number, by its name: runs of numbers in the file of touches, first and last
+        /// the touches behind each number, by its name: runs of numbers in the file of touches,
+        /// first and last
         #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
         pub touches: BTreeMap<String, Vec<[u32; 2]>> = known(feature)
             .filter(|(.., touches)| !touches.is_empty())

@@ -1,4 +1,5 @@
-//! What can be wrong with any file: it cannot be read or written, and the place of what is wrong in it.
+//! What can be wrong with any file: it cannot be read or written, and the place of what is wrong in
+//! it.
 
 use std::fmt;
 use std::fs::File;
@@ -33,9 +34,11 @@ pub enum FileError {
 pub enum FilePlace {
     /// counted from 1
     Line(usize),
-    /// counted from 0; in a recording the offset of the record (for a chunk: of the whole chunk) in the MCAP stream
+    /// counted from 0; in a recording the offset of the record (for a chunk: of the whole chunk) in
+    /// the MCAP stream
     Byte(u64),
-    /// `id` in the table `messages`; what fails inside SQLite is placed at the last row that could be read
+    /// `id` in the table `messages`; what fails inside SQLite is placed at the last row that could
+    /// be read
     Row(i64),
 }
 
@@ -54,7 +57,8 @@ const MAX_FILE_BYTES: u64 = 4 << 30;
 /// … and longest input whose end is not known before, as that of a pipe.
 const MAX_STREAM_BYTES: u64 = 256 << 20;
 
-/// All bytes of a file, or of a pipe, that is not longer than [`MAX_FILE_BYTES`] or [`MAX_STREAM_BYTES`].
+/// All bytes of a file, or of a pipe, that is not longer than [`MAX_FILE_BYTES`] or
+/// [`MAX_STREAM_BYTES`].
 pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, FileError> {
     let read = || {
         let file = File::open(path)?;

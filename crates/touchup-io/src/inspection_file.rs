@@ -1,4 +1,5 @@
-//! Results of an inspection: JSON, and its characteristics as a table. Lengths in mm, angles in degrees.
+//! Results of an inspection: JSON, and its characteristics as a table. Lengths in mm, angles in
+//! degrees.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -28,24 +29,28 @@ pub struct InspectionRecord {
     pub confidence: f64,
     /// k of the expanded uncertainties
     pub coverage_factor: f64,
-    /// of the whole: `fail` where one characteristic fails, else `undecided` where one is, else `pass`
+    /// of the whole: `fail` where one characteristic fails, else `undecided` where one is, else
+    /// `pass`
     pub verdict: String,
     /// by decision
     pub counts: BTreeMap<String, usize>,
     /// what it rests on
     pub files: Vec<InspectedFile>,
-    /// how drawing and part were brought into one frame; left out where both were taken to be in that of the mesh
+    /// how drawing and part were brought into one frame; left out where both were taken to be in
+    /// that of the mesh
     #[serde(skip_serializing_if = "Option::is_none")]
     pub alignment: Option<AlignmentRecord>,
     /// in the order of the drawing
     pub characteristics: Vec<CharacteristicRecord>,
-    /// measured holes, slots, pockets, bosses, cylinders and notches that no characteristic is about, by `id`
+    /// measured holes, slots, pockets, bosses, cylinders and notches that no characteristic is
+    /// about, by `id`
     pub without_characteristic: Vec<u32>,
     /// what else has to be known, a sentence each
     pub notes: Vec<String>,
 }
 
-/// The motion that takes the frame of the mesh into that of the drawing: x ↦ rotation · x + translation.
+/// The motion that takes the frame of the mesh into that of the drawing: x ↦ rotation · x +
+/// translation.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct AlignmentRecord {
     /// `best-fit` or `datums`
@@ -79,7 +84,8 @@ pub struct AlignedFeatureRecord {
     pub kind: String,
     /// `id` of the measured feature
     pub feature: u32,
-    /// how far it is off its nominal place after the alignment: across its axis, of a plane along its normal
+    /// how far it is off its nominal place after the alignment: across its axis, of a plane along
+    /// its normal
     pub residual_mm: f64,
 }
 
@@ -241,7 +247,8 @@ const BEHIND: [&str; 9] = [
     "frame",
 ];
 
-/// Writes the characteristics as a table, as a whole or not at all; columns in degrees only where there is an angle.
+/// Writes the characteristics as a table, as a whole or not at all; columns in degrees only where
+/// there is an angle.
 ///
 /// - `frame`: what positions and coordinates are about, in each line.
 ///

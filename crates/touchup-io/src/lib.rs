@@ -1,8 +1,10 @@
-//! Mesh files, recordings and picked points: with the scene file the only code that touches the disk.
+//! Mesh files, recordings and picked points: with the scene file the only code that touches the
+//! disk.
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
-/// Declares a struct of a report and how it is made, a field at a time: its name with the unit, its type, and the number that it shows.
-/// A field `name?` is left out of JSON where it is `None`, and has the type within the `Option`.
+/// Declares a struct of a report and how it is made, a field at a time: its name with the unit, its
+/// type, and the number that it shows. A field `name?` is left out of JSON where it is `None`, and
+/// has the type within the `Option`.
 ///
 /// ```
 /// touchup_io::reported! {

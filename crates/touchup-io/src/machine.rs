@@ -3,7 +3,8 @@
 use std::fs;
 use std::thread::available_parallelism;
 
-/// The commit that the program is built from, and whether something was changed since; "unknown" where there is no checkout.
+/// The commit that the program is built from, and whether something was changed since; "unknown"
+/// where there is no checkout.
 pub const COMMIT: &str = env!("TOUCHUP_COMMIT");
 /// Version and commit.
 pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("TOUCHUP_COMMIT"), ")");

@@ -1,7 +1,7 @@
 //! Points picked by hand, as comma-separated values, mm.
 //!
-//! `scan_x_mm,scan_y_mm,scan_z_mm,space_x_mm,space_y_mm,space_z_mm`, and where wanted `name` and `sigma_mm` (standard
-//! deviation of the pair per axis). How tables are written: [`super::table`].
+//! `scan_x_mm,scan_y_mm,scan_z_mm,space_x_mm,space_y_mm,space_z_mm`, and where wanted `name` and
+//! `sigma_mm` (standard deviation of the pair per axis). How tables are written: [`super::table`].
 
 use std::path::Path;
 

@@ -5,13 +5,15 @@ use std::path::Path;
 
 use super::atomic::write_atomically;
 
-/// Writes a picture of 8 bits for each of red, green and blue; the file appears whole or not at all.
+/// Writes a picture of 8 bits for each of red, green and blue; the file appears whole or not at
+/// all.
 ///
 /// - `size`: width and height, pixels.
 /// - `pixels`: row by row from the top, three bytes each.
 ///
 /// # Errors
-/// [`io::ErrorKind::InvalidInput`] where `pixels` are not as many as `size` says; whatever the disk reports.
+/// [`io::ErrorKind::InvalidInput`] where `pixels` are not as many as `size` says; whatever the disk
+/// reports.
 pub fn write_png(path: &Path, size: [u32; 2], pixels: &[u8]) -> io::Result<()> {
     write_atomically(path, |out| encode(out, size, pixels))
 }

@@ -1,7 +1,7 @@
 //! `probed_touches.jsonl`: all that was seen of each touch of an arm, a line of JSON each.
 //!
-//! Each line is on the disk before the arm makes the next touch, so that whatever ends the program loses none of them. What a
-//! crash leaves of a line is no touch.
+//! Each line is on the disk before the arm makes the next touch, so that whatever ends the program
+//! loses none of them. What a crash leaves of a line is no touch.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -26,7 +26,8 @@ reported! {
         pub begun_ns?: i64 = touch.record.as_ref().map(|record| record.stamps_ns[0] + offset_ns),
         /// by the clock of the recording
         pub ended_ns?: i64 = touch.record.as_ref().map(|record| record.stamps_ns[1] + offset_ns),
-        /// `clean`, `slip`, `edge`, `bounce`, `impact`, `miss`, `unclear`, or `held_back` where it was not made
+        /// `clean`, `slip`, `edge`, `bounce`, `impact`, `miss`, `unclear`, or `held_back` where it
+        /// was not made
         pub verdict: String = verdict(touch).to_owned(),
         /// whether the feature is measured by it
         pub accepted: bool = touch.refused.is_none(),
@@ -50,7 +51,8 @@ reported! {
         pub tip_radius_mm: f64 = ball_radius * 1e3,
         /// of the whole touch
         pub largest_force_n?: f64 = touch.record.as_ref().map(|record| record.peak_force),
-        /// seconds, travel in mm, force against the approach and across it in N; going in and coming out
+        /// seconds, travel in mm, force against the approach and across it in N; going in and
+        /// coming out
         pub curve: Vec<[f64; 4]> = touch.record.iter().flat_map(|record| &record.curve).map(moment).collect(),
     }
 }
@@ -123,7 +125,8 @@ impl TouchLog {
         })
     }
 
-    /// Goes on behind the touches of a file, which are counted on; what a crash left of a line is removed.
+    /// Goes on behind the touches of a file, which are counted on; what a crash left of a line is
+    /// removed.
     ///
     /// - `ball_radius`: of the tip, m.
     ///

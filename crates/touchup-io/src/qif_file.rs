@@ -1,7 +1,9 @@
-//! Results of an inspection as QIF 3.0 (ANSI/DMSC QIF 3.0, ISO 23952:2020), which programs of metrology read.
+//! Results of an inspection as QIF 3.0 (ANSI/DMSC QIF 3.0, ISO 23952:2020), which programs of
+//! metrology read.
 //!
-//! Written are the characteristics in their four aspects, definition, nominal, item and measurement, each measured value with its standard
-//! uncertainty, and the status of the part. Features, datum reference frames and touches are not written.
+//! Written are the characteristics in their four aspects, definition, nominal, item and
+//! measurement, each measured value with its standard uncertainty, and the status of the part.
+//! Features, datum reference frames and touches are not written.
 
 use std::fmt::Write as _;
 use std::io::Write;
@@ -302,7 +304,8 @@ fn escaped(text: &str) -> String {
     xml
 }
 
-/// The same results have the same identifier: FNV-1a of 128 bits [Fowler, Noll and Vo] over them, as a UUID of version 8 (RFC 9562).
+/// The same results have the same identifier: FNV-1a of 128 bits [Fowler, Noll and Vo] over them,
+/// as a UUID of version 8 (RFC 9562).
 fn document_id(record: &InspectionRecord) -> String {
     const BASIS: u128 = 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d;
     const PRIME: u128 = 0x0000_0000_0100_0000_0000_0000_0000_013b;

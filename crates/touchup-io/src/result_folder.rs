@@ -1,8 +1,9 @@
 //! Folders that are there whole or not at all, whoever else makes the same one at the same time.
 //!
-//! A folder is made under a temporary name beside its place, while a lock of its name is held, and renamed once all of it is on the disk.
-//! The system lets go of the lock of a process that is killed, on another machine too where the file system is shared; who gets it next
-//! removes what that process left.
+//! A folder is made under a temporary name beside its place, while a lock of its name is held, and
+//! renamed once all of it is on the disk. The system lets go of the lock of a process that is
+//! killed, on another machine too where the file system is shared; who gets it next removes what
+//! that process left.
 
 use std::fs::{self, File, TryLockError};
 use std::io;
@@ -32,8 +33,9 @@ pub struct ClaimedFolder {
     _lock: Option<NameLock>,
 }
 
-/// Bytes as a file, for readers of files, in a folder of its own beside the one that is made. It vanishes when this is dropped; what a killed
-/// process leaves of it goes with the next claim of the name.
+/// Bytes as a file, for readers of files, in a folder of its own beside the one that is made. It
+/// vanishes when this is dropped; what a killed process leaves of it goes with the next claim of
+/// the name.
 #[derive(Debug)]
 pub struct FileBeside {
     path: PathBuf,
@@ -54,7 +56,8 @@ struct NameLock {
     _file: File,
 }
 
-/// Claims the folder `name` in `folder`, which is made where it is not there. Waits while another process makes it.
+/// Claims the folder `name` in `folder`, which is made where it is not there. Waits while another
+/// process makes it.
 ///
 /// - `again`: also where it is there; the new one takes its place.
 ///
@@ -120,7 +123,8 @@ impl ClaimedFolder {
         })
     }
 
-    /// Gives the folder its name. Another one that has come there meanwhile stays, unless it is to be replaced.
+    /// Gives the folder its name. Another one that has come there meanwhile stays, unless it is to
+    /// be replaced.
     ///
     /// - `again`: as of [`claim`].
     ///
@@ -137,7 +141,8 @@ impl ClaimedFolder {
             let folder = place.parent().unwrap_or(Path::new("."));
             sync(temporary.path());
             if again && place.is_dir() {
-                // a folder cannot be replaced by renaming: the old one steps aside, and vanishes with this
+                // a folder cannot be replaced by renaming: the old one steps aside, and vanishes
+                // with this
                 let aside = temporary_in(folder, &prefix)?;
                 fs::rename(&place, aside.path().join("old"))?;
                 fs::rename(temporary.path(), &place)?;
@@ -185,7 +190,8 @@ impl NameLock {
                 Err(TryLockError::Error(error)) => return Err(error),
                 Ok(()) => {}
             }
-            // who had it before may have removed the file: then another one has the name, and others lock that
+            // who had it before may have removed the file: then another one has the name, and
+            // others lock that
             if is_at(&file, &path) {
                 return Ok(Some(Self { path, _file: file }));
             }

@@ -1,4 +1,5 @@
-//! Features and touches as a table of columns: CSV, or Parquet, which pandas, Polars, DuckDB and Ray read with its types.
+//! Features and touches as a table of columns: CSV, or Parquet, which pandas, Polars, DuckDB and
+//! Ray read with its types.
 
 use std::io::Write;
 use std::path::Path;
@@ -54,7 +55,8 @@ pub struct ResultTable {
 }
 
 impl ResultTable {
-    /// No rows yet, and the columns of this one, which are there whether or not any row has a value for them: those of `Null` too.
+    /// No rows yet, and the columns of this one, which are there whether or not any row has a value
+    /// for them: those of `Null` too.
     pub fn with_columns_of(row: &[(String, Value)]) -> Self {
         let mut cells = Vec::new();
         for (name, value) in row {
@@ -74,7 +76,8 @@ impl ResultTable {
         }
     }
 
-    /// A row for each feature; what is nested has its name behind that of what it is in, with `.` between, coordinates `_x`, `_y`, `_z`.
+    /// A row for each feature; what is nested has its name behind that of what it is in, with `.`
+    /// between, coordinates `_x`, `_y`, `_z`.
     pub fn of_features(features: &[FeatureRecord]) -> Self {
         let mut table = Self::default();
         for feature in features {
@@ -119,7 +122,8 @@ impl ResultTable {
         );
     }
 
-    /// A row of values by their names, each name once; what is nested is named as of features, and `Null` is no value.
+    /// A row of values by their names, each name once; what is nested is named as of features, and
+    /// `Null` is no value.
     pub fn add_json(&mut self, row: &[(String, Value)]) {
         let mut cells = Vec::new();
         row.iter()
@@ -207,7 +211,8 @@ fn has_ending(path: &Path, ending: &str) -> bool {
         .is_some_and(|found| found.eq_ignore_ascii_case(ending))
 }
 
-/// Writes features in the form that the ending names, as a whole or not at all: a table where it [is one](is_table), else JSON.
+/// Writes features in the form that the ending names, as a whole or not at all: a table where it
+/// [is one](is_table), else JSON.
 ///
 /// # Errors
 /// [`ResultTableError`]
@@ -218,7 +223,8 @@ pub fn write_features_as_named(path: &Path, file: &FeatureFile) -> Result<(), Re
     }
 }
 
-/// Writes touches in the form that the ending names, as a whole or not at all: Parquet, else a [file of touches](touches_file).
+/// Writes touches in the form that the ending names, as a whole or not at all: Parquet, else a
+/// [file of touches](touches_file).
 ///
 /// # Errors
 /// [`ResultTableError`]

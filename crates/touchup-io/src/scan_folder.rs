@@ -1,5 +1,6 @@
-//! A folder from which somebody else chooses scans, recordings and tables of points, and to which they are added: nothing outside of it is
-//! listed, read or written, and nothing in it is written over.
+//! A folder from which somebody else chooses scans, recordings and tables of points, and to which
+//! they are added: nothing outside of it is listed, read or written, and nothing in it is written
+//! over.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -63,7 +64,8 @@ pub struct FolderFile {
     pub name: String,
     /// its length, or that of all files in the folder
     pub bytes: u64,
-    /// when it was changed, or a file was added to the folder or taken away, s since 1970 UTC; `None` where the system does not say
+    /// when it was changed, or a file was added to the folder or taken away, s since 1970 UTC;
+    /// `None` where the system does not say
     pub modified_s: Option<u64>,
 }
 
@@ -128,7 +130,8 @@ impl ScanFolder {
         &self.path
     }
 
-    /// The plain files of a kind that lie in it, the newest first, and of recordings the folders too; links are left out.
+    /// The plain files of a kind that lie in it, the newest first, and of recordings the folders
+    /// too; links are left out.
     ///
     /// # Errors
     /// Whatever the system reports of the folder.

@@ -97,7 +97,8 @@ impl SessionFolder {
     /// The place of a file that somebody else named.
     ///
     /// # Errors
-    /// [`PlaceError`] for whatever could lead out of the folder, and for a file that is there unless it may be replaced.
+    /// [`PlaceError`] for whatever could lead out of the folder, and for a file that is there
+    /// unless it may be replaced.
     pub fn place(&self, name: &str, may_replace: bool) -> Result<PathBuf, PlaceError> {
         if !is_plain_name(name) {
             return Err(PlaceError::NotAPlainName(name.to_owned()));
@@ -132,10 +133,12 @@ impl SessionFolder {
     }
 }
 
-/// What the folders of files that are handed in begin with: hidden, so that nobody lists or reads them.
+/// What the folders of files that are handed in begin with: hidden, so that nobody lists or reads
+/// them.
 const HANDED_IN: &str = ".upload-";
 
-/// A file that somebody hands in piece by piece: in a hidden folder of a session, for as long as this is.
+/// A file that somebody hands in piece by piece: in a hidden folder of a session, for as long as
+/// this is.
 #[derive(Debug)]
 pub struct HandedIn {
     file: File,
@@ -210,7 +213,8 @@ pub struct ListedSession {
 /// Sessions in a list at most: the last by name, which are the newest.
 const MOST_LISTED: usize = 1000;
 
-/// The sessions in a folder, the newest first; links and what has a name of another form are left out.
+/// The sessions in a folder, the newest first; links and what has a name of another form are left
+/// out.
 ///
 /// # Errors
 /// Whatever the system reports.
@@ -233,7 +237,8 @@ pub fn list_sessions(parent: &Path) -> io::Result<Vec<ListedSession>> {
     listed.collect()
 }
 
-/// `None` for what went while it was looked at, as a file that is written beside another and then takes its place.
+/// `None` for what went while it was looked at, as a file that is written beside another and then
+/// takes its place.
 fn still_there<T>(found: io::Result<T>) -> io::Result<Option<T>> {
     match found {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),

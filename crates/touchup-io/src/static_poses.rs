@@ -1,7 +1,8 @@
 //! Static poses of a force sensor, as comma-separated values.
 //!
-//! `qx,qy,qz,qw,fx_n,fy_n,fz_n,tx_nm,ty_nm,tz_nm`: orientation of the stylus in the frame of the poses, and the wrench
-//! as measured. Each line is one pose at rest. How tables are written: [`super::table`].
+//! `qx,qy,qz,qw,fx_n,fy_n,fz_n,tx_nm,ty_nm,tz_nm`: orientation of the stylus in the frame of the
+//! poses, and the wrench as measured. Each line is one pose at rest. How tables are written:
+//! [`super::table`].
 
 use std::fs::File;
 use std::io::{self, Write};

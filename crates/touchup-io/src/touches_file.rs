@@ -10,9 +10,10 @@ use touchup_core::stylus::ProbedPoint;
 
 /// The first line of a file of touches.
 ///
-/// `touch`: its number, from 0 on, which features name; `stamp_ns`: of the sample it came from; `stroke`; the centre of the
-/// ball and its radius (0 where the tip is none); the point of the surface and its outward normal; the standard deviations
-/// along the normal of what averages out, of what radius and stiffness leave and of the place of the scan; what it counts; whether it was
+/// `touch`: its number, from 0 on, which features name; `stamp_ns`: of the sample it came from;
+/// `stroke`; the centre of the ball and its radius (0 where the tip is none); the point of the
+/// surface and its outward normal; the standard deviations along the normal of what averages out,
+/// of what radius and stiffness leave and of the place of the scan; what it counts; whether it was
 /// rejected as an outlier.
 pub const HEADER: &str = "touch,stamp_ns,stroke,center_x_mm,center_y_mm,center_z_mm,tip_radius_mm,point_x_mm,point_y_mm,\
                           point_z_mm,normal_x,normal_y,normal_z,sigma_mm,calibration_mm,place_mm,weight,\
@@ -56,8 +57,8 @@ pub fn write_touches(path: &Path, touches: &[ProbedPoint]) -> Result<(), FileErr
     })
 }
 
-/// Touches as [`read_touches`] has them after [`write_touches`]: to the digits written. What is measured by them can be
-/// measured again from the file.
+/// Touches as [`read_touches`] has them after [`write_touches`]: to the digits written. What is
+/// measured by them can be measured again from the file.
 pub fn as_written(touches: &[ProbedPoint]) -> Vec<ProbedPoint> {
     let rounded = |(number, touch)| touch_of(&line_of(touch, number), number).unwrap_or(*touch);
     touches.iter().enumerate().map(rounded).collect()
@@ -88,7 +89,8 @@ pub(crate) fn line_of(touch: &ProbedPoint, number: usize) -> String {
     )
 }
 
-/// Reads what [`write_touches`] wrote, also as spreadsheets save it: with a byte order mark, CRLF, empty lines.
+/// Reads what [`write_touches`] wrote, also as spreadsheets save it: with a byte order mark, CRLF,
+/// empty lines.
 ///
 /// # Errors
 /// [`TouchesFileError`], with the line.

@@ -1,7 +1,8 @@
 //! The joints and links of an arm, from the URDF that describes it.
 //!
-//! Read are joints (origin, axis, limits) from a base to a flange, and of links the shapes that they collide with. Poses are
-//! T = (xyz, Rz(yaw) Ry(pitch) Rx(roll)), in m and rad, of a joint in the frame of its parent link.
+//! Read are joints (origin, axis, limits) from a base to a flange, and of links the shapes that
+//! they collide with. Poses are T = (xyz, Rz(yaw) Ry(pitch) Rx(roll)), in m and rad, of a joint in
+//! the frame of its parent link.
 
 use std::fs::File;
 use std::io::Read;
@@ -294,7 +295,8 @@ fn turning(
     }))
 }
 
-/// The capsule around the shape that a link collides with, in its frame, where it has a single one that is no mesh.
+/// The capsule around the shape that a link collides with, in its frame, where it has a single one
+/// that is no mesh.
 fn body(link: Node<'_, '_>) -> Option<Capsule> {
     let mut shapes = link
         .children()
@@ -333,7 +335,8 @@ mod tests {
     use super::*;
     use touchup_core::probing::arm::UrGeometry;
 
-    /// A UR5e as its driver describes it, in ROS's frames: joints about z, each where the one before ends.
+    /// A UR5e as its driver describes it, in ROS's frames: joints about z, each where the one
+    /// before ends.
     const UR5E: &str = r#"<robot name="ur5e">
         <link name="base_link"/><link name="base"/><link name="l1"/><link name="l2"><collision>
           <origin xyz="-0.2 0 0.138" rpy="0 1.5707963267948966 0"/><geometry><cylinder radius="0.06" length="0.4"/></geometry>

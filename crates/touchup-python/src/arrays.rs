@@ -36,7 +36,8 @@ pub type WrenchArrays<'py> = (
 /// Vertices and faces as they are worked on.
 pub type MeshVecs = (Vec<Point3<f64>>, Vec<[u32; 3]>);
 
-/// The rows of an array of `N` columns: as they lie in memory where they follow each other there, else a copy.
+/// The rows of an array of `N` columns: as they lie in memory where they follow each other there,
+/// else a copy.
 ///
 /// # Errors
 /// Where it has another shape.
@@ -105,7 +106,8 @@ pub fn mesh_of(arrays: &MeshArrays<'_>, name: &str) -> Result<TriMesh, CliError>
     Ok(mesh)
 }
 
-/// A mesh without what was removed, as it would be in a file, and a number of each vertex beside it.
+/// A mesh without what was removed, as it would be in a file, and a number of each vertex beside
+/// it.
 pub struct Compact {
     vertices: Vec<[f64; 3]>,
     faces: Vec<[u32; 3]>,

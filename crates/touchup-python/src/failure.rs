@@ -1,4 +1,5 @@
-//! Errors as exceptions in the words of the command line, and warnings of the log as warnings of Python.
+//! Errors as exceptions in the words of the command line, and warnings of the log as warnings of
+//! Python.
 
 use std::ffi::CString;
 use std::fmt::Write;
@@ -58,7 +59,8 @@ pub fn usage(message: String) -> CliError {
     }
 }
 
-/// Does `work` while other threads may have the interpreter; what it warns of comes as warnings after it.
+/// Does `work` while other threads may have the interpreter; what it warns of comes as warnings
+/// after it.
 ///
 /// # Errors
 /// Its error as an exception; a warning that the user has turned into one.

@@ -42,7 +42,8 @@ pub fn recorded_as(json: &str) -> Result<(RecordedAs, StampSource), CliError> {
 
 /// Reads a mesh, or a point cloud as one, and repairs it.
 ///
-/// Returns `vertices` (V, 3) m, `faces` (F, 3), `sigma` (V,) m and `support` (V,) where the file has them, and what was repaired.
+/// Returns `vertices` (V, 3) m, `faces` (F, 3), `sigma` (V,) m and `support` (V,) where the file
+/// has them, and what was repaired.
 #[pyfunction]
 pub fn read_mesh<'py>(py: Python<'py>, path: PathBuf, unit: &str) -> PyResult<Bound<'py, PyDict>> {
     let (mesh, repair, columns) = at_work(py, || {
@@ -176,7 +177,8 @@ pub fn read_recording<'py>(
     Ok(into)
 }
 
-/// Writes poses and wrenches as MCAP, on the topics that the command line reads unless flags name others.
+/// Writes poses and wrenches as MCAP, on the topics that the command line reads unless flags name
+/// others.
 #[pyfunction]
 pub fn write_recording(
     py: Python<'_>,

@@ -1,7 +1,8 @@
 //! The native half of the Python package `touchup`: arrays in, arrays out.
 //!
-//! The package around it (`python/touchup`) has the names, types and documentation that users meet; this half checks shapes, lets go of the
-//! interpreter while it works, and turns each error into an exception with the words of the command line.
+//! The package around it (`python/touchup`) has the names, types and documentation that users meet;
+//! this half checks shapes, lets go of the interpreter while it works, and turns each error into an
+//! exception with the words of the command line.
 //!
 //! | module | what it does |
 //! |---|---|

@@ -75,7 +75,8 @@ impl Indexed {
     }
 }
 
-/// How far a mesh is from the true part: `report` as JSON in mm, and `deviation` (V,) of each vertex, m, + outside.
+/// How far a mesh is from the true part: `report` as JSON in mm, and `deviation` (V,) of each
+/// vertex, m, + outside.
 #[pyfunction]
 #[pyo3(signature = (mesh, support, truth, samples, seed, range_mm, tolerance_mm))]
 #[expect(clippy::too_many_arguments, reason = "what the package passes on")]
@@ -162,7 +163,8 @@ fn spread(mesh: &TriMesh, count: f64, seed: u64) -> Vec<OrientedSample> {
         .collect()
 }
 
-/// The rigid motion that brings `source` onto `target`: by point to plane from about the right place, or by features from anywhere.
+/// The rigid motion that brings `source` onto `target`: by point to plane from about the right
+/// place, or by features from anywhere.
 #[pyfunction]
 #[pyo3(signature = (source, target, method, alternative, seed))]
 pub fn align<'py>(

@@ -20,7 +20,8 @@ use crate::failure::{at_work, exception, usage};
 use crate::refining::{ScanSource, finish_refinement, refinement};
 use crate::scenes::source;
 
-/// Samples between two looks at whether the user has interrupted; as many as stay in the caches of a core.
+/// Samples between two looks at whether the user has interrupted; as many as stay in the caches of
+/// a core.
 const CHUNK: usize = 1024;
 /// The number of a sample that was refused, where the others have that of their case.
 const REFUSED: u8 = 255;
@@ -121,7 +122,8 @@ fn numbers<const N: usize>(given: &Bound<'_, PyAny>, name: &str) -> PyResult<[f6
     given.extract().map_err(what)
 }
 
-/// Samples as arrays: stamps N, ns; positions N × 3, m; orientations N × 4, x y z w; forces and torques N × 3, N and N·m.
+/// Samples as arrays: stamps N, ns; positions N × 3, m; orientations N × 4, x y z w; forces and
+/// torques N × 3, N and N·m.
 type SampleArrays<'py> = (
     PyReadonlyArray1<'py, i64>,
     PyReadonlyArray2<'py, f64>,
@@ -336,11 +338,13 @@ impl Refiner {
 
     /// Takes the next sample and moves the mesh by it.
     ///
-    /// - `stamp_ns`: ns, after that of the sample before. `position`: (3,) m, centre of the ball in the frame of the scan.
-    /// - `orientation_xyzw`: (4,) unit quaternion of the tip. `force`: (3,) N. `torque`: (3,) N·m, zeros where it is left out.
+    /// - `stamp_ns`: ns, after that of the sample before. `position`: (3,) m, centre of the ball in
+    ///   the frame of the scan.
+    /// - `orientation_xyzw`: (4,) unit quaternion of the tip. `force`: (3,) N. `torque`: (3,) N·m,
+    ///   zeros where it is left out.
     ///
-    /// Each may be an array, a tuple or a list. Raises `TouchupError` for a sample that is not finite, absurd or not in order of time;
-    /// it changes nothing.
+    /// Each may be an array, a tuple or a list. Raises `TouchupError` for a sample that is not
+    /// finite, absurd or not in order of time; it changes nothing.
     #[pyo3(signature = (stamp_ns, position, orientation_xyzw, force, torque = None))]
     fn push(
         &self,

@@ -243,7 +243,8 @@ fn warned(refined: RefinedScan) -> Reported {
 
 /// Refines a scan by a recording: of both either arrays or files.
 ///
-/// Returns `vertices` (V, 3) m, `faces` (F, 3), `sigma` (V,) m, `support` (V,), `touches` and `summary`.
+/// Returns `vertices` (V, 3) m, `faces` (F, 3), `sigma` (V,) m, `support` (V,), `touches` and
+/// `summary`.
 #[pyfunction]
 #[pyo3(signature = (scene_text, scene_path, scan, scan_file, poses, wrenches, frame, recording_file, force))]
 #[expect(

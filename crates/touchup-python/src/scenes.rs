@@ -56,7 +56,8 @@ impl SceneSource {
     }
 }
 
-/// Every key of the scene as JSON: section, key, unit, range, words, an example of its value, what it does, and what is in it.
+/// Every key of the scene as JSON: section, key, unit, range, words, an example of its value, what
+/// it does, and what is in it.
 #[pyfunction]
 pub fn scene_parameters(py: Python<'_>) -> PyResult<String> {
     let all: Vec<Value> = Scene::parameters().iter().map(declared).collect();

@@ -29,9 +29,11 @@ pub fn sweep_plan(
 
 /// Runs one job as `touchup sweep run --job` does; one that has its result returns at once.
 ///
-/// - `scan`, `recording`: content of their files, where the caller has it already: then they are not read.
+/// - `scan`, `recording`: content of their files, where the caller has it already: then they are
+///   not read.
 ///
-/// Returns `job`, `id`, `result` (its folder), `was_there`, `failed` (why, or None) and `summary`, a text of JSON.
+/// Returns `job`, `id`, `result` (its folder), `was_there`, `failed` (why, or None) and `summary`,
+/// a text of JSON.
 #[pyfunction]
 pub fn run_job<'py>(
     py: Python<'py>,
@@ -70,7 +72,8 @@ pub fn run_job<'py>(
     Ok(into)
 }
 
-/// What came of all jobs, as JSON: a row for each job, one for each feature, and the number of those without a result.
+/// What came of all jobs, as JSON: a row for each job, one for each feature, and the number of
+/// those without a result.
 #[pyfunction]
 #[pyo3(signature = (jobs, results, with_features))]
 pub fn sweep_tables(
@@ -93,7 +96,8 @@ pub fn sweep_tables(
     })
 }
 
-/// What moved between the results in two folders: `report` as JSON, and of each mesh its arrays with `displacement` and `plus_minus` (V,) m.
+/// What moved between the results in two folders: `report` as JSON, and of each mesh its arrays
+/// with `displacement` and `plus_minus` (V,) m.
 #[pyfunction]
 pub fn what_if<'py>(py: Python<'py>, a: PathBuf, b: PathBuf) -> PyResult<Bound<'py, PyDict>> {
     let (results, found, report) = at_work(py, || {

@@ -16,8 +16,9 @@ pub struct AllocationCounts {
     pub bytes: u64,
 }
 
-/// The system's allocator, which also counts. A program that wants the counts names it as its global allocator; an
-/// allocation costs an addition more then, and a program that does not allocate nothing.
+/// The system's allocator, which also counts. A program that wants the counts names it as its
+/// global allocator; an allocation costs an addition more then, and a program that does not
+/// allocate nothing.
 #[derive(Clone, Copy, Debug)]
 pub struct CountingAllocator;
 

@@ -1,4 +1,5 @@
-//! The command line of `touchup-report`: measures error against run time, stability and cost on this machine, and writes page, plots and tables.
+//! The command line of `touchup-report`: measures error against run time, stability and cost on
+//! this machine, and writes page, plots and tables.
 
 use std::io::{Write, stderr, stdout};
 use std::ops::RangeInclusive;
@@ -70,7 +71,8 @@ impl CommandError {
 const EXIT_CODES: &str =
     "Exit codes: 0 done, 1 result not written, 2 wrong usage, 3 bad input file";
 
-/// Measures error against run time, stability and cost on this machine, and writes page, plots and tables
+/// Measures error against run time, stability and cost on this machine, and writes page, plots and
+/// tables
 #[derive(Debug, Parser)]
 #[command(name = "touchup-report", version = VERSION, after_help = EXIT_CODES)]
 pub struct ReportArguments {
@@ -83,13 +85,16 @@ pub struct ReportArguments {
     /// Prints report.json instead of the verdict
     #[arg(long)]
     json: bool,
-    /// Measures against Open3D, libigl, SciPy, trimesh and scikit-learn too, which are installed from PyPI; takes some minutes
+    /// Measures against Open3D, libigl, SciPy, trimesh and scikit-learn too, which are installed
+    /// from PyPI; takes some minutes
     #[arg(long)]
     peers: bool,
-    /// Virtual environment for them; made where it is not there [default: peers-env in the folder of --out]
+    /// Virtual environment for them; made where it is not there [default: peers-env in the folder
+    /// of --out]
     #[arg(long, value_name = "DIR", requires = "peers")]
     peers_env: Option<PathBuf>,
-    /// A scan to measure on beside the simulated ones: PLY, STL or OBJ, or a point cloud: PLY, PCD, XYZ or E57
+    /// A scan to measure on beside the simulated ones: PLY, STL or OBJ, or a point cloud: PLY, PCD,
+    /// XYZ or E57
     #[arg(long, value_name = "MESH", requires_all = ["truth", "bag"])]
     scan: Option<PathBuf>,
     /// Its true part, in the frame of the scan
@@ -104,7 +109,8 @@ pub struct ReportArguments {
     /// Tip, sensor and frames of the recording
     #[arg(long, value_name = "YAML", requires = "scan")]
     scene: Option<PathBuf>,
-    /// Seeds of the worlds of the coverage and mistakes chapters, first and last [default: 1-20 and 1-5, with --quick 1-1]
+    /// Seeds of the worlds of the coverage and mistakes chapters, first and last [default: 1-20 and
+    /// 1-5, with --quick 1-1]
     #[arg(long, value_name = "A-B")]
     seeds: Option<Seeds>,
     /// Only these chapters

@@ -1,4 +1,5 @@
-//! The numbers behind figures and tables as comma-separated values: every number to its last digit, nothing where there is none.
+//! The numbers behind figures and tables as comma-separated values: every number to its last digit,
+//! nothing where there is none.
 
 use super::figure::{Drawing, Figure, Table, TableCell};
 
@@ -61,7 +62,8 @@ pub fn of_table(table: &Table) -> String {
 
 /// Heads, and a line for each row.
 ///
-/// - `heads`: each with how many columns it has; those of a spread are named after it and `separator`.
+/// - `heads`: each with how many columns it has; those of a spread are named after it and
+///   `separator`.
 fn lines(
     heads: &[(&str, usize)],
     separator: &str,

@@ -16,7 +16,8 @@ pub struct Report {
     pub command: String,
     /// day and time in UTC
     pub date: String,
-    /// what a practitioner should take from it: use this, because, cost; `None` where too little was measured to say
+    /// what a practitioner should take from it: use this, because, cost; `None` where too little
+    /// was measured to say
     pub advice: Option<Table>,
     /// what each part found, a paragraph each
     pub verdict: Vec<String>,

@@ -1,5 +1,5 @@
-//! Numbers of 32 digits as a sum of two doubles \[Dekker 1971\], with what the closed forms need: an independent method for the
-//! same answer.
+//! Numbers of 32 digits as a sum of two doubles \[Dekker 1971\], with what the closed forms need:
+//! an independent method for the same answer.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

@@ -1,4 +1,5 @@
-//! What a report shows: figures and tables, as data. How they look is the matter of [`super::plot`] and [`super::page`].
+//! What a report shows: figures and tables, as data. How they look is the matter of [`super::plot`]
+//! and [`super::page`].
 
 use serde::{Deserialize, Serialize};
 
@@ -43,8 +44,8 @@ impl Axis {
     }
 }
 
-/// A value with its spread over repeats: the median, and a tenth of the repeats on either side. One that was not repeated has
-/// none.
+/// A value with its spread over repeats: the median, and a tenth of the repeats on either side. One
+/// that was not repeated has none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     /// median, or the only value

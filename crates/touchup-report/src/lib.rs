@@ -1,6 +1,8 @@
-//! Error against run time, stability, what each part costs, and whether stated uncertainties hold: everything that `touchup-report` measures and shows.
+//! Error against run time, stability, what each part costs, and whether stated uncertainties hold:
+//! everything that `touchup-report` measures and shows.
 //!
-//! Each part measures into a type of its own, writes it as a [`Chapter`], and returns what the verdict needs.
+//! Each part measures into a type of its own, writes it as a [`Chapter`], and returns what the
+//! verdict needs.
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 pub mod allocations;

@@ -1,4 +1,5 @@
-//! `touchup-report`: error against run time, stability and cost on this machine, as a page with plots, tables and numbers.
+//! `touchup-report`: error against run time, stability and cost on this machine, as a page with
+//! plots, tables and numbers.
 
 mod arguments;
 mod environment;

@@ -5,7 +5,8 @@ const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷',
 /// Between them a number is written out; beyond, as a multiple of a power of ten.
 const WRITTEN_OUT: std::ops::Range<f64> = 1e-4..1e6;
 
-/// A number with three significant digits: 0.0123, 12300, 1.23·10⁻⁷; without the zeros that say nothing.
+/// A number with three significant digits: 0.0123, 12300, 1.23·10⁻⁷; without the zeros that say
+/// nothing.
 pub fn three_digits(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();

@@ -1,5 +1,5 @@
-//! One held sample solved in numbers of 32 digits, by an independent method: what each step of the face dynamics is compared
-//! with.
+//! One held sample solved in numbers of 32 digits, by an independent method: what each step of the
+//! face dynamics is compared with.
 //!
 //! In the plane of normal and force, with the exponent x = β|F| ∫ f dt for the second unknown,
 //!
@@ -7,8 +7,8 @@
 //! ds/dt = α (|F| cos θ − f)      dx/dt = β |F| f      tan(θ/2) = tan(θ₀/2) e^−x      n = cos θ F̂ + sin θ ê
 //! ```
 //!
-//! by collocation at the seven points of Radau IIA, of order 13 \[Hairer Wanner 1999\], each stretch of time halved until one
-//! step and two half steps agree.
+//! by collocation at the seven points of Radau IIA, of order 13 \[Hairer Wanner 1999\], each
+//! stretch of time halved until one step and two half steps agree.
 
 use std::sync::LazyLock;
 
@@ -416,8 +416,8 @@ fn nodes() -> [Double2; STAGES] {
 mod tests {
     use super::*;
 
-    /// Of three digits only the known first and last: the points for s = 7 are those of the table, their weights those of a
-    /// quadrature that is exact for polynomials up to order 12.
+    /// Of three digits only the known first and last: the points for s = 7 are those of the table,
+    /// their weights those of a quadrature that is exact for polynomials up to order 12.
     #[test]
     fn the_last_row_integrates_polynomials_of_degree_twelve() {
         let nodes = nodes();

@@ -1,5 +1,5 @@
-//! The practitioner's questions, answered by the measurements: which mode, step and region, at which rate, what it costs, and
-//! where it fails.
+//! The practitioner's questions, answered by the measurements: which mode, step and region, at
+//! which rate, what it costs, and where it fails.
 
 use super::convergence::{Convergence, Rule};
 use super::cost::{Cost, RecordingCost};
@@ -12,7 +12,8 @@ use super::peers::{Peers, PeersAtSize};
 use super::stability::{Integrator, Stability};
 use super::whole_scan::{CaseResult, MethodResult, RefineMethod, ScanResult, WholeScan};
 
-/// Method and region, step, rate and limits, each with its reason and its cost; `None` where no method made any scan better.
+/// Method and region, step, rate and limits, each with its reason and its cost; `None` where no
+/// method made any scan better.
 pub fn advice(
     scans: &WholeScan,
     stability: Option<&Stability>,

@@ -1,8 +1,9 @@
 //! Steady time, of this machine or of a test that moves it by hand.
 //!
-//! All deadlines come from a [`Clock`]. With [`Clock::manual`] time stands still until [`ManualClock::advance`], so a
-//! deadline passes when a test says so, however busy the machine is. Threads that say so by [`Clock::begin_work`] are waited for:
-//! time then passes only while all of them wait, so none of them is late, however slow it is.
+//! All deadlines come from a [`Clock`]. With [`Clock::manual`] time stands still until
+//! [`ManualClock::advance`], so a deadline passes when a test says so, however busy the machine is.
+//! Threads that say so by [`Clock::begin_work`] are waited for: time then passes only while all of
+//! them wait, so none of them is late, however slow it is.
 
 use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
@@ -15,9 +16,11 @@ pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// How long a wait on a manual clock sleeps before it looks at its channel or condition again. No result depends on it.
+/// How long a wait on a manual clock sleeps before it looks at its channel or condition again. No
+/// result depends on it.
 const LOOK: Duration = Duration::from_micros(500);
-/// A thread that does not wait again within this time hangs: a test fails then. No result depends on it.
+/// A thread that does not wait again within this time hangs: a test fails then. No result depends
+/// on it.
 const HUNG: Duration = Duration::from_secs(120);
 
 /// Where time comes from. Clones show the same time.
@@ -64,8 +67,8 @@ impl Clock {
         Self::moved_by_hand(false)
     }
 
-    /// A clock that a sleeping thread moves too, by as long as it sleeps: what a simulated device does in its time is done as
-    /// fast as the others keep up. One thread may sleep.
+    /// A clock that a sleeping thread moves too, by as long as it sleeps: what a simulated device
+    /// does in its time is done as fast as the others keep up. One thread may sleep.
     pub fn lock_step() -> (Self, ManualClock) {
         Self::moved_by_hand(true)
     }
@@ -86,8 +89,8 @@ impl Clock {
         )
     }
 
-    /// From here on time waits for the thread, or the piece of work, that this is handed to. A thread that waits on the clock
-    /// has to have one.
+    /// From here on time waits for the thread, or the piece of work, that this is handed to. A
+    /// thread that waits on the clock has to have one.
     pub fn begin_work(&self) -> Working {
         if let Some(manual) = &self.manual {
             manual.waits().workers += 1;
@@ -152,7 +155,8 @@ impl Clock {
         }
     }
 
-    /// As [`Condvar::wait_timeout_while`], but does not return whether the time ran out: the caller checks the value.
+    /// As [`Condvar::wait_timeout_while`], but does not return whether the time ran out: the caller
+    /// checks the value.
     pub fn wait_while<'a, T>(
         &self,
         condvar: &Condvar,
@@ -182,8 +186,8 @@ impl Clock {
 }
 
 impl ManualClock {
-    /// Moves time on as soon as all workers wait, and returns when no wait of before is left whose deadline has passed, and all
-    /// workers wait again.
+    /// Moves time on as soon as all workers wait, and returns when no wait of before is left whose
+    /// deadline has passed, and all workers wait again.
     ///
     /// # Panics
     /// When somebody hangs.
@@ -361,7 +365,8 @@ mod tests {
         });
     }
 
-    /// However slow it is, a thread that works is not late: both loops do what they do in the same order every time.
+    /// However slow it is, a thread that works is not late: both loops do what they do in the same
+    /// order every time.
     #[test]
     fn time_waits_for_workers_and_passes_while_they_wait() {
         let (clock, hand) = Clock::manual();

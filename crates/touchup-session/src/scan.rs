@@ -37,8 +37,8 @@ pub struct Scan {
     pub cloud: Option<CloudSummary>,
 }
 
-/// Reads a mesh (PLY, STL, OBJ) and repairs it; of a point cloud (PLY without faces, PCD, text, E57) a surface is made, which a warning
-/// says. Same file, same mesh, on any number of threads.
+/// Reads a mesh (PLY, STL, OBJ) and repairs it; of a point cloud (PLY without faces, PCD, text,
+/// E57) a surface is made, which a warning says. Same file, same mesh, on any number of threads.
 ///
 /// - `unit`: the unit of the coordinates in the file; the mesh comes out in m.
 ///
@@ -86,7 +86,8 @@ pub fn warn_of_left_out(path: &Path, repair: &RepairReport) {
     }
 }
 
-/// Colours and texture of a scan on the mesh that was refined of it; nothing where the file has none.
+/// Colours and texture of a scan on the mesh that was refined of it; nothing where the file has
+/// none.
 ///
 /// - `path`, `unit`: of the scan.
 /// - `places`: for each vertex of `mesh` where it is, or was, on the scan, m in O.

@@ -1,9 +1,10 @@
 //! An arm with a probe that bends, against a known surface, in its own time.
 //!
-//! The arm follows its command with a limited acceleration, some milliseconds late. Its encoders say where its tip would be
-//! if nothing bent: x_c. The ball is at x, where the part lets it be, and arm and probe pull it back with K (x_c − x), so the
-//! part pushes with K (x − x_c). While that is inside the cone of friction the ball stays where it is; else it slides until
-//! the force lies on the cone.
+//! The arm follows its command with a limited acceleration, some milliseconds late. Its encoders
+//! say where its tip would be if nothing bent: x_c. The ball is at x, where the part lets it be,
+//! and arm and probe pull it back with K (x_c − x), so the part pushes with K (x − x_c). While that
+//! is inside the cone of friction the ball stays where it is; else it slides until the force lies
+//! on the cone.
 
 use std::collections::VecDeque;
 
@@ -138,7 +139,8 @@ const HARD_STOP: f64 = 8.0;
 const SPIKE: u32 = 3;
 /// The time that a force needs to settle is this many times its latencies.
 const CALM: f64 = 4.0;
-/// Farther than this from its last contact the ball comes anew, with another error of place, m: a second search begins nearer.
+/// Farther than this from its last contact the ball comes anew, with another error of place, m: a
+/// second search begins nearer.
 const NEW_APPROACH: f64 = 1e-3;
 /// A line has ended when what is left is less than this, m.
 const ARRIVED: f64 = 1e-9;
@@ -193,7 +195,8 @@ impl<'a> SimArm<'a> {
     /// An arm at rest with its tip at a pose in B.
     ///
     /// # Errors
-    /// [`SimError::BadParameter`]; [`SimError::OutOfReach`]; [`SimError::StartsInside`] when the ball would be in the part.
+    /// [`SimError::BadParameter`]; [`SimError::OutOfReach`]; [`SimError::StartsInside`] when the
+    /// ball would be in the part.
     pub fn new(
         surface: &'a dyn Surface,
         params: ArmParams,
@@ -293,8 +296,9 @@ impl<'a> SimArm<'a> {
         (0..(seconds / PERIOD).round() as usize).for_each(|_| self.tick());
     }
 
-    /// Has its joints turn to others within one period, as the drives of somebody else's controller do, whatever it was commanded;
-    /// returns the state that this ends in, without the noise of its place.
+    /// Has its joints turn to others within one period, as the drives of somebody else's controller
+    /// do, whatever it was commanded; returns the state that this ends in, without the noise of its
+    /// place.
     ///
     /// - `joints`: near those of now.
     ///
@@ -445,7 +449,8 @@ impl<'a> SimArm<'a> {
         }
     }
 
-    /// Where the ball would be if nothing bent, in O: by the true kinematics, the play and the error of this approach.
+    /// Where the ball would be if nothing bent, in O: by the true kinematics, the play and the
+    /// error of this approach.
     fn unbent(&mut self) -> Point3<f64> {
         let ArmParams {
             ball_offset,
@@ -509,7 +514,8 @@ impl<'a> SimArm<'a> {
         self.nominal.rotation * self.params.pose_ft.rotation.inverse()
     }
 
-    /// Reading of the sensor: contact, weight, bias and noise, in the axes of the flange about its origin.
+    /// Reading of the sensor: contact, weight, bias and noise, in the axes of the flange about its
+    /// origin.
     fn read(&mut self) -> Wrench {
         let noise = gauss_vector(&mut self.rng) * self.params.force_noise;
         let shaft = self.nominal.rotation * Vector3::z();
@@ -571,7 +577,8 @@ impl<'a> SimArm<'a> {
         }
     }
 
-    /// The joints that belong to the pose; the arm stops where there are none, or where they would have to jump.
+    /// The joints that belong to the pose; the arm stops where there are none, or where they would
+    /// have to jump.
     fn follow_joints(&mut self) {
         let flange = self.nominal * self.params.pose_ft.inverse();
         let most = self.params.top_joint_speed * PERIOD;

@@ -9,8 +9,9 @@ use touchup_core::probing::arm::{ArmGeometry, MOST_JOINTS, UrGeometry};
 
 /// True less told, and what no two touches have in common. Zero: the arm is what is told of it.
 ///
-/// Encoder offsets and link lengths make an error of place that varies smoothly over the workspace: the pose that the arm reports is by the
-/// kinematics as told, the place of its ball by the true ones.
+/// Encoder offsets and link lengths make an error of place that varies smoothly over the workspace:
+/// the pose that the arm reports is by the kinematics as told, the place of its ball by the true
+/// ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArmErrors {
     /// share by which the stiffness is larger along each axis of the base
@@ -59,8 +60,9 @@ pub struct ArmErrorSigmas {
 }
 
 impl ArmErrorSigmas {
-    /// A UR whose probe and part were calibrated by its own touches: a ball known to 2 µm, its place and that of the part to some
-    /// hundredths of a millimetre, repeatability 0.03 mm as its maker states it.
+    /// A UR whose probe and part were calibrated by its own touches: a ball known to 2 µm, its
+    /// place and that of the part to some hundredths of a millimetre, repeatability 0.03 mm as its
+    /// maker states it.
     pub const CALIBRATED: Self = Self {
         stiffness: 0.1,
         radius: 2e-6,
@@ -108,7 +110,8 @@ impl ArmErrors {
         }
     }
 
-    /// Where the part really is, from where it is told to be; maps O as told to O, in coordinates of O.
+    /// Where the part really is, from where it is told to be; maps O as told to O, in coordinates
+    /// of O.
     pub fn displacement(&self) -> Isometry3<f64> {
         let about = self.turned_about.coords;
         let turned = Isometry3::from_parts(

@@ -4,15 +4,18 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::surface::{Surface, SurfacePoint};
 
-/// Rounds of linearising the surface around the ball. Each gains a factor of about radius / step, so ten are usual.
+/// Rounds of linearising the surface around the ball. Each gains a factor of about radius / step,
+/// so ten are usual.
 const ROUNDS: usize = 40;
 /// Planes that may join in one round.
 const JOINS: usize = 40;
 /// A plane is broken by more than this, m.
 const BROKEN: f64 = REST / 4.0;
-/// Planes whose normals span less than this (determinant of their Gram matrix) count as parallel: one represents all.
+/// Planes whose normals span less than this (determinant of their Gram matrix) count as parallel:
+/// one represents all.
 const PARALLEL: f64 = 1e-10;
-/// The ball has come to rest when a round moves it by less than this, m; and it may enter the surface by as much.
+/// The ball has come to rest when a round moves it by less than this, m; and it may enter the
+/// surface by as much.
 const REST: f64 = 1e-12;
 /// Contacts that push less than this share of the hardest are none.
 const IDLE: f64 = 1e-6;
@@ -22,7 +25,8 @@ const IDLE: f64 = 1e-6;
 pub struct BallContact {
     /// Point of the surface, m, in O.
     pub point: Point3<f64>,
-    /// From there to the centre of the ball, or out of the tip, unit vector in O: the contact normal, also on edges and corners.
+    /// From there to the centre of the ball, or out of the tip, unit vector in O: the contact
+    /// normal, also on edges and corners.
     pub normal: Vector3<f64>,
     /// Distance along `normal` by which the ball is held back from the guide, m.
     pub held_back: f64,
@@ -48,11 +52,13 @@ struct ContactPlane {
 /// Equilibrium of the ball, and penetration of the planes that hold it, m.
 type BallRest = (Point3<f64>, Vec<(usize, f64)>);
 
-/// Moves a ball from `from`, where it is free, towards `to`, and returns where it comes to rest: the point nearest to
-/// `to`, near `from`, at which it does not enter the surface; with its contacts there.
+/// Moves a ball from `from`, where it is free, towards `to`, and returns where it comes to rest:
+/// the point nearest to `to`, near `from`, at which it does not enter the surface; with its
+/// contacts there.
 ///
-/// It solves min |x − to|² under n_i·(x − q_i) ≥ radius, for the points q_i of the surface around the ball and the
-/// directions n_i from them to its centre, again and again until x rests. to − x is then a positive combination of −n_i.
+/// It solves min |x − to|² under n_i·(x − q_i) ≥ radius, for the points q_i of the surface around
+/// the ball and the directions n_i from them to its centre, again and again until x rests. to − x
+/// is then a positive combination of −n_i.
 ///
 /// - `radius`: m; the step should be a small share of it.
 pub fn push_ball(
@@ -72,7 +78,8 @@ pub fn push_ball(
     )
 }
 
-/// As [`push_ball`], for balls that are fixed to each other: `from`, `to` and the result are their common origin.
+/// As [`push_ball`], for balls that are fixed to each other: `from`, `to` and the result are their
+/// common origin.
 pub(super) fn push_balls(
     surface: &dyn Surface,
     from: &Point3<f64>,
@@ -114,9 +121,11 @@ fn plane(middle: &Point3<f64>, s: &SurfacePoint, ball: &TipBall) -> Option<Conta
     })
 }
 
-/// The point nearest to `to` in front of all planes, and in each plane's `held_back` how much it takes part.
+/// The point nearest to `to` in front of all planes, and in each plane's `held_back` how much it
+/// takes part.
 ///
-/// Active set: the plane that is broken worst joins, those that no longer push leave, until none is broken.
+/// Active set: the plane that is broken worst joins, those that no longer push leave, until none is
+/// broken.
 fn nearest_in_front(planes: &mut [ContactPlane], to: &Point3<f64>) -> Point3<f64> {
     let (mut x, mut active) = (*to, Vec::new());
     for _ in 0..JOINS {
@@ -141,7 +150,8 @@ fn nearest_in_front(planes: &mut [ContactPlane], to: &Point3<f64>) -> Point3<f64
     x
 }
 
-/// The same for at most four planes, by trying every three, two and one of them; with the shares of those that push.
+/// The same for at most four planes, by trying every three, two and one of them; with the shares of
+/// those that push.
 fn nearest_in_front_of_few(
     planes: &[ContactPlane],
     few: &[usize],

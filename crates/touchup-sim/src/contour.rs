@@ -27,8 +27,8 @@ pub(super) struct MeshDraft {
     pub(super) faces: Vec<[u32; 3]>,
 }
 
-/// The zero level of `field` by surface nets with cells of `side` (m): every cell that the level passes gets a vertex,
-/// every lattice edge that crosses it two triangles [Gibson 1998].
+/// The zero level of `field` by surface nets with cells of `side` (m): every cell that the level
+/// passes gets a vertex, every lattice edge that crosses it two triangles [Gibson 1998].
 pub(super) fn contour(field: &Field, side: f64) -> MeshDraft {
     let count = field
         .nodes
@@ -101,7 +101,8 @@ fn on_level(field: &Field, mut p: Point3<f64>, side: f64) -> Point3<f64> {
 }
 
 impl MeshDraft {
-    /// Turns the lattice's triangles into nearly equilateral ones with all vertices on the field's zero level.
+    /// Turns the lattice's triangles into nearly equilateral ones with all vertices on the field's
+    /// zero level.
     pub(super) fn even_out_mut(&mut self, field: &Field, side: f64) {
         for _ in 0..ROUNDS {
             let stars = self.stars();
@@ -112,7 +113,8 @@ impl MeshDraft {
         }
     }
 
-    /// Moves a vertex onto the level, and along it towards the middle of its neighbours if no face turns over by that.
+    /// Moves a vertex onto the level, and along it towards the middle of its neighbours if no face
+    /// turns over by that.
     fn relax_mut(&mut self, vertex: u32, star: &[usize], field: &Field, side: f64) {
         let old = on_level(field, self.positions[vertex as usize], side);
         self.positions[vertex as usize] = old;
@@ -171,8 +173,8 @@ impl MeshDraft {
         (at(b) - at(a)).cross(&(at(c) - at(a)))
     }
 
-    /// Flips every edge whose opposite angles sum to more than half a turn, if neither side turns over; each face takes
-    /// part once.
+    /// Flips every edge whose opposite angles sum to more than half a turn, if neither side turns
+    /// over; each face takes part once.
     fn flip_mut(&mut self) {
         let edges = self.edges();
         let mut touched = vec![false; self.faces.len()];
@@ -210,8 +212,8 @@ impl MeshDraft {
             && upright([d, c, a])
     }
 
-    /// Keeps the faces that are seen, with unseen patches of fewer than `fewest` faces between them, and without seen
-    /// patches as small; pieces as small go in any case.
+    /// Keeps the faces that are seen, with unseen patches of fewer than `fewest` faces between
+    /// them, and without seen patches as small; pieces as small go in any case.
     pub(super) fn retain_mut(
         &mut self,
         fewest: usize,
@@ -234,7 +236,8 @@ impl MeshDraft {
         self.faces.retain(|_| kept.next().unwrap_or(false));
     }
 
-    /// For each face, how many faces its patch has: those connected to it over edges that are marked alike.
+    /// For each face, how many faces its patch has: those connected to it over edges that are
+    /// marked alike.
     fn patch_sizes(&self, marked: &[bool]) -> Vec<usize> {
         let edges = self.edges();
         let mut patch = vec![usize::MAX; self.faces.len()];
@@ -295,8 +298,8 @@ impl MeshDraft {
         Ok(())
     }
 
-    /// Drops, until none is left: faces at edges that more than two share, faces that hang on by one edge or less, and
-    /// all faces around vertices where the mesh only meets in a point.
+    /// Drops, until none is left: faces at edges that more than two share, faces that hang on by
+    /// one edge or less, and all faces around vertices where the mesh only meets in a point.
     pub(super) fn tidy_mut(&mut self) {
         loop {
             let edges = self.edges();
@@ -339,8 +342,8 @@ impl MeshDraft {
         fan.take(star.len()).count() < star.len()
     }
 
-    /// Closes rims of at most `longest` edges with a fan around a new vertex in their middle; the mesh must be tidy, so
-    /// that one rim at most goes through a vertex.
+    /// Closes rims of at most `longest` edges with a fan around a new vertex in their middle; the
+    /// mesh must be tidy, so that one rim at most goes through a vertex.
     pub(super) fn fill_mut(&mut self, longest: usize) {
         let edges = self.edges();
         let open = edges.keys().filter(|(a, b)| !edges.contains_key(&(*b, *a)));

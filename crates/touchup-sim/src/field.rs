@@ -63,7 +63,8 @@ impl Field {
         self.origin + Vector3::from(node.map(|i| i as f64)) * self.pitch
     }
 
-    /// The values in runs of at most `length` nodes along x, each with the position of its first node, m, in V.
+    /// The values in runs of at most `length` nodes along x, each with the position of its first
+    /// node, m, in V.
     pub(super) fn runs_mut(
         &mut self,
         length: usize,
@@ -82,10 +83,11 @@ impl Field {
             })
     }
 
-    /// Closes what is narrower than 2 `radius` (m) across z: in every layer a disc takes the smallest, then the largest.
+    /// Closes what is narrower than 2 `radius` (m) across z: in every layer a disc takes the
+    /// smallest, then the largest.
     ///
-    /// A flat disc fills holes level with what surrounds them and leaves straight walls where they are. Costs as many
-    /// steps for each node as the disc has rows.
+    /// A flat disc fills holes level with what surrounds them and leaves straight walls where they
+    /// are. Costs as many steps for each node as the disc has rows.
     pub(super) fn close_mut(&mut self, radius: f64) {
         let disc = Disc::new(radius / self.pitch, self.nodes);
         let [width, height, _] = self.nodes;
@@ -101,7 +103,8 @@ impl Field {
         }
     }
 
-    /// Blurs with a Gaussian of standard deviation `sigma` (m), which rounds edges and leaves planes where they are.
+    /// Blurs with a Gaussian of standard deviation `sigma` (m), which rounds edges and leaves
+    /// planes where they are.
     pub(super) fn blur_mut(&mut self, sigma: f64) {
         let reach = (3.0 * sigma / self.pitch).ceil() as isize;
         let bell = |i: isize| (-0.5 * (i as f64 * self.pitch / sigma).powi(2)).exp();
@@ -126,7 +129,8 @@ impl Field {
         }
     }
 
-    /// Value at a point (m, in V) between the nodes, by linear interpolation; beyond the grid the outermost goes on.
+    /// Value at a point (m, in V) between the nodes, by linear interpolation; beyond the grid the
+    /// outermost goes on.
     pub(super) fn at(&self, p: &Point3<f64>) -> f64 {
         let q = (p - self.origin) / self.pitch;
         let cell = [0, 1, 2].map(|i| (q[i].max(0.0) as usize).min(self.nodes[i] - 2));
@@ -197,7 +201,8 @@ impl Disc {
     }
 }
 
-/// Smallest values of all runs of 1, 2, 4, … nodes of one row: two of them that overlap make up any window.
+/// Smallest values of all runs of 1, 2, 4, … nodes of one row: two of them that overlap make up any
+/// window.
 struct Runs {
     /// by the power of two; the row has `margin` infinite values at both ends
     levels: Vec<Vec<f64>>,
@@ -245,7 +250,8 @@ fn take_smaller_mut(values: &mut [f64], others: &[f64]) {
 mod tests {
     use super::*;
 
-    /// Closing by its definition: the smallest, then the largest over all nodes of the layer within the radius.
+    /// Closing by its definition: the smallest, then the largest over all nodes of the layer within
+    /// the radius.
     fn closed(field: &Field, radius: f64) -> Vec<f64> {
         let over_disc = |values: &[f64], worst: f64, pick: fn(f64, f64) -> f64| -> Vec<f64> {
             let near = |[i, j, k]: [usize; 3], [a, b, c]: [usize; 3]| {

@@ -26,8 +26,8 @@ const LIFT: f64 = 2e-3;
 const INTO: f64 = 0.5e-3;
 
 impl Habit {
-    /// The strokes as this hand makes them: free moves stay, what is pressed changes. A tap needs lines at the depth at which the ball
-    /// touches, as [`plan_mesh`](super::plan_mesh) has them.
+    /// The strokes as this hand makes them: free moves stay, what is pressed changes. A tap needs
+    /// lines at the depth at which the ball touches, as [`plan_mesh`](super::plan_mesh) has them.
     pub fn led(self, strokes: Vec<Stroke>) -> Vec<Stroke> {
         let pressed = |stroke: Stroke| match (self, stroke.press) {
             (Self::Slide, _) | (_, None) => vec![stroke],

@@ -1,7 +1,8 @@
 //! Known surfaces, a scanner and a stylus to test against.
 //!
-//! A [`Surface`] has a signed distance at every point. The scanner makes a bad mesh of one, the stylus slides a ball
-//! over it and records its contacts ([`touch`]). All randomness comes from a seed.
+//! A [`Surface`] has a signed distance at every point. The scanner makes a bad mesh of one, the
+//! stylus slides a ball over it and records its contacts ([`touch`]). All randomness comes from a
+//! seed.
 #![cfg_attr(not(test), warn(clippy::unwrap_used))]
 
 #[macro_use]

@@ -1,4 +1,5 @@
-//! What a camera sees of the LED markers on a simulated stylus: noise, occlusion, swapped labels, reflections.
+//! What a camera sees of the LED markers on a simulated stylus: noise, occlusion, swapped labels,
+//! reflections.
 
 use nalgebra::{Isometry3, Vector3};
 use rand::SeedableRng;
@@ -64,7 +65,8 @@ impl Spell {
 
 /// The frames of a camera that watches a simulated touch.
 ///
-/// The markers sit on the handle, so that they give the pose of a stylus that does not bend, as the poses do.
+/// The markers sit on the handle, so that they give the pose of a stylus that does not bend, as the
+/// poses do.
 ///
 /// - `stiffness`: of the tip, N/m.
 ///
@@ -82,7 +84,8 @@ pub fn see_markers(
     let mut rng = Pcg64::seed_from_u64(seed ^ 0x3a11_c0de_77f0_1ed5);
     let (mut hidden, mut blackout, mut swap) = (vec![Spell::NONE; count], Spell::NONE, Spell::NONE);
     let mut swapped = [0, 1];
-    // a share s of the time in spells of mean length l: they begin s / (l (1 − s)) times per free second
+    // a share s of the time in spells of mean length l: they begin s / (l (1 − s)) times per free
+    // second
     let hiding = camera.hidden / ((1.0 - camera.hidden) * (SPELL[0] + SPELL[1]) / 2.0);
     let every = (1.0 / (camera.rate * TICK)).round().max(1.0) as usize;
     let dt = every as f64 * TICK;

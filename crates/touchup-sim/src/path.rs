@@ -14,8 +14,9 @@ pub struct Stroke {
     pub points: Vec<Point3<f64>>,
     /// m/s
     pub speed: f64,
-    /// Direction in which the hand presses, in O. With it the line says how deep the ball may sink at most, and the
-    /// hand follows the line only sideways; without it the hand follows the line as well as the part allows.
+    /// Direction in which the hand presses, in O. With it the line says how deep the ball may sink
+    /// at most, and the hand follows the line only sideways; without it the hand follows the line
+    /// as well as the part allows.
     pub press: Option<Unit<Vector3<f64>>>,
 }
 
@@ -47,7 +48,8 @@ settings! {
     /// How fast and how densely the hand works.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct PathParams,
-    /// A hand with a 1.5 mm ball: lines closer than the ball is wide, as fast as people rub a surface.
+    /// A hand with a 1.5 mm ball: lines closer than the ball is wide, as fast as people rub a
+    /// surface.
     default {
         /// Ball radius, m.
         radius: f64 = 1.5e-3, positive("the ball's radius", *radius, "m");
@@ -59,7 +61,8 @@ settings! {
         wall_speed: f64 = 0.025, positive("the speed along walls", *wall_speed, "m/s");
         /// Distance of the guide beyond the wall along which it runs, m.
         lean: f64 = 0.4e-3, not_negative("the size of the lean", lean.abs(), "m");
-        /// Share of a turn that a run around a wall goes; at 1 it goes a little farther, so that no gap is left at its start.
+        /// Share of a turn that a run around a wall goes; at 1 it goes a little farther, so that no
+        /// gap is left at its start.
         turn: f64 = 1.0, share_of_turn(*turn);
         /// Longest time for the rasters of [`plan_mesh`], s; the pitch grows to keep it.
         longest: f64 = 90.0, positive("the longest time", *longest, "s");
@@ -79,7 +82,8 @@ const FREE_SPEED: f64 = 0.08;
 const CLEARANCE: f64 = 3e-3;
 /// Share of a turn that a run around a wall repeats, so that no gap is left at its start.
 const OVERLAP: f64 = 0.1;
-/// Radii of the ball by which a raster over a whole part goes beyond it: the ball leaves the edge and sinks beside it.
+/// Radii of the ball by which a raster over a whole part goes beyond it: the ball leaves the edge
+/// and sinks beside it.
 const OVERRUN: f64 = 2.5;
 /// Length of the pieces in which a planned line follows the surface, m.
 const PIECE: f64 = 1e-3;
@@ -106,7 +110,8 @@ pub(super) fn free(points: Vec<Point3<f64>>) -> Stroke {
     }
 }
 
-/// Goes over a region in lines to and fro, pressing; begins and ends with a free move at the region's clear height.
+/// Goes over a region in lines to and fro, pressing; begins and ends with a free move at the
+/// region's clear height.
 ///
 /// # Errors
 /// [`SimError::BadParameter`], also for more than 100,000 lines.
@@ -166,7 +171,8 @@ pub fn raster(
     ])
 }
 
-/// Runs around the wall along z over an outline, by [`PathParams::turn`] of a turn, at each of the given heights of the ball's centre.
+/// Runs around the wall along z over an outline, by [`PathParams::turn`] of a turn, at each of the
+/// given heights of the ball's centre.
 ///
 /// - `inside`: along a hole or slot from within, else around a boss from without.
 /// - `heights`: z, m, in O; `clear`: z at which the ball is free, m, in O.
@@ -218,8 +224,8 @@ pub fn around_wall(
     strokes
 }
 
-/// About a minute over the plate's features: rasters in both directions, walls of the holes, slot and boss, and the
-/// step's edge. The far end of the plate and its rim stay untouched.
+/// About a minute over the plate's features: rasters in both directions, walls of the holes, slot
+/// and boss, and the step's edge. The far end of the plate and its rim stay untouched.
 ///
 /// # Errors
 /// [`SimError::BadParameter`].
@@ -252,7 +258,8 @@ pub fn plan_demo(plate: &Plate, params: &PathParams) -> Result<Vec<Stroke>, SimE
     Ok(strokes)
 }
 
-/// Runs along the walls of the plate's holes, slot and boss, for a ball that goes in; a hole that is too narrow for it is left out.
+/// Runs along the walls of the plate's holes, slot and boss, for a ball that goes in; a hole that
+/// is too narrow for it is left out.
 ///
 /// # Errors
 /// [`SimError::BadParameter`].
@@ -269,7 +276,8 @@ pub fn plan_walls(plate: &Plate, params: &PathParams) -> Result<Vec<Stroke>, Sim
         .into_iter()
         .filter(|(e, inside)| !inside || e.outline.radius + params.lean > params.radius + ROOM);
     let around = |(e, inside): (&Extrusion, bool)| {
-        // near the floor (the ball touches floor and wall at once), halfway up, and just below the rim
+        // near the floor (the ball touches floor and wall at once), halfway up, and just below the
+        // rim
         let heights = [
             e.low + 0.9 * params.radius,
             (e.low + e.high) / 2.0,
@@ -282,9 +290,11 @@ pub fn plan_walls(plate: &Plate, params: &PathParams) -> Result<Vec<Stroke>, Sim
 
 /// Rasters in both directions over all of a surface that can be reached from one side.
 ///
-/// - `bounds`: the part of it to go over, in O; `view`: direction in which the hand looks and presses, in O.
-/// - The ball drops into whatever it fits and a little way down the outer walls, but not behind overhangs. The pitch
-///   grows beyond [`PathParams::pitch`] where the rasters would last longer than [`PathParams::longest`].
+/// - `bounds`: the part of it to go over, in O; `view`: direction in which the hand looks and
+///   presses, in O.
+/// - The ball drops into whatever it fits and a little way down the outer walls, but not behind
+///   overhangs. The pitch grows beyond [`PathParams::pitch`] where the rasters would last longer
+///   than [`PathParams::longest`].
 ///
 /// # Errors
 /// [`SimError::BadParameter`].
@@ -310,7 +320,8 @@ pub fn plan_mesh(
     Ok(strokes)
 }
 
-/// A region over all of a box, seen along `view` (in O), and as far beyond it as a ball of `radius` (m) needs.
+/// A region over all of a box, seen along `view` (in O), and as far beyond it as a ball of `radius`
+/// (m) needs.
 pub(super) fn region_over(bounds: &Bounds, view: &Unit<Vector3<f64>>, radius: f64) -> RasterRegion {
     let frame_ov = looking_along(view, bounds);
     let seen = bounds.seen_from(&frame_ov);
@@ -324,7 +335,8 @@ pub(super) fn region_over(bounds: &Bounds, view: &Unit<Vector3<f64>>, radius: f6
     }
 }
 
-/// The line in short pieces, as deep as a ball that comes from above goes at each of its points, and a little deeper.
+/// The line in short pieces, as deep as a ball that comes from above goes at each of its points,
+/// and a little deeper.
 fn follow_heights(
     surface: &dyn Surface,
     region: &RasterRegion,
@@ -366,7 +378,8 @@ pub(super) fn first_contact(
     None
 }
 
-/// A frame in the middle of a box whose z axis points against the direction of view; any turn about it does.
+/// A frame in the middle of a box whose z axis points against the direction of view; any turn about
+/// it does.
 pub(super) fn looking_along(view: &Unit<Vector3<f64>>, bounds: &Bounds) -> Isometry3<f64> {
     Isometry3::from_parts(
         bounds.centre().coords.into(),

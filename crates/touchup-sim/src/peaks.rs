@@ -1,4 +1,5 @@
-//! MATLAB's `peaks` as a height field of 50 × 50 × 20 mm, the smooth surface of the paper's simulations (Sec 4.3).
+//! MATLAB's `peaks` as a height field of 50 × 50 × 20 mm, the smooth surface of the paper's
+//! simulations (Sec 4.3).
 //!
 //! With x, y in units of 50/6 mm,
 //! z ∝ 3(1−x)² e^(−x²−(y+1)²) − 10(x/5 − x³ − y⁵) e^(−x²−y²) − ⅓ e^(−(x+1)²−y²).
@@ -21,7 +22,8 @@ const HEIGHT: f64 = 0.020;
 const UNIT: f64 = SIDE / 6.0;
 /// Extremes of the formula, in its own unit.
 const RANGE: [f64; 2] = [-6.551_133_332_835_84, 8.106_213_589_442_332];
-/// Pitch of the grid on which the search starts, m: a quarter of the smallest radius of curvature (1.57 mm).
+/// Pitch of the grid on which the search starts, m: a quarter of the smallest radius of curvature
+/// (1.57 mm).
 const PITCH: f64 = 0.4e-3;
 /// The grid reaches so far beyond the square, m; there the formula is below 1e-6 of its height.
 const MARGIN: f64 = 0.015;
@@ -30,7 +32,8 @@ const MAX_CELLS: f64 = 2000.0;
 /// Newton steps at most; ten are usual, with damping a few more.
 const MAX_STEPS: usize = 60;
 
-/// The surface z = f(x, y), material below it; the square is centred on the origin and z = 0 is its middle height.
+/// The surface z = f(x, y), material below it; the square is centred on the origin and z = 0 is its
+/// middle height.
 ///
 /// Beyond the square the formula simply goes on, so the distance has no rim.
 #[derive(Clone, Debug)]
@@ -64,10 +67,12 @@ impl Peaks {
         jet(&Point2::new(x, y)).z
     }
 
-    /// The square as a grid of right triangles whose legs are `edge` long or a little shorter (m), outward up.
+    /// The square as a grid of right triangles whose legs are `edge` long or a little shorter (m),
+    /// outward up.
     ///
     /// # Errors
-    /// [`SimError::BadParameter`] for an `edge` that is no length, or so short that it makes more than eight million faces.
+    /// [`SimError::BadParameter`] for an `edge` that is no length, or so short that it makes more
+    /// than eight million faces.
     pub fn mesh(&self, edge: f64) -> Result<TriMesh, SimError> {
         positive("the edge length", edge, "m")?;
         let cells = (SIDE / edge).ceil();
@@ -85,7 +90,8 @@ impl Peaks {
         )?)
     }
 
-    /// Nodes of the starting grid that none of their neighbours beats in closeness to `p`, within `reach` (m) sideways.
+    /// Nodes of the starting grid that none of their neighbours beats in closeness to `p`, within
+    /// `reach` (m) sideways.
     fn starts(&self, p: &Point3<f64>, reach: f64) -> Vec<Point2<f64>> {
         let last = self.nodes - 1;
         let index = |x: f64| (((x + SIDE / 2.0 + MARGIN) / PITCH).max(0.0) as usize).min(last);
@@ -238,7 +244,8 @@ impl Surface for Peaks {
     }
 
     fn closest(&self, p: &Point3<f64>) -> SurfacePoint {
-        // straight above or below there is a point of the surface: none farther sideways can be closer
+        // straight above or below there is a point of the surface: none farther sideways can be
+        // closer
         let reach = (p.z - self.height(p.x, p.y)).abs();
         self.dips(p, reach)
             .into_iter()

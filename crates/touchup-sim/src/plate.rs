@@ -1,8 +1,9 @@
 //! A machined plate made by code, with an exact signed distance and its features as plain numbers.
 //!
-//! The plate lies on z = 0 with one corner in the origin. Every wall is parallel to z, so the boundary consists of three
-//! kinds of patch: rectangles with holes, lids, and walls above the outline of a [`PlateStadium`]. The distance is the
-//! smallest over all patches, each of which has a closed form; the sign comes from the cross-section at the height asked.
+//! The plate lies on z = 0 with one corner in the origin. Every wall is parallel to z, so the
+//! boundary consists of three kinds of patch: rectangles with holes, lids, and walls above the
+//! outline of a [`PlateStadium`]. The distance is the smallest over all patches, each of which has
+//! a closed form; the sign comes from the cross-section at the height asked.
 
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 
@@ -306,8 +307,9 @@ impl Plate {
 /// One smooth piece of the boundary.
 #[derive(Clone, Debug, PartialEq)]
 enum BoundaryPatch {
-    /// A rectangle in the plane coordinate `axis` = `level`, without the discs and stadiums cut out of it; the two
-    /// coordinates in it are those after `axis`, cyclically. `side`: +1 when the normal points along the axis.
+    /// A rectangle in the plane coordinate `axis` = `level`, without the discs and stadiums cut out
+    /// of it; the two coordinates in it are those after `axis`, cyclically. `side`: +1 when the
+    /// normal points along the axis.
     Flat {
         axis: usize,
         side: f64,
@@ -341,7 +343,8 @@ impl BoundaryPatch {
             } => {
                 let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
                 let inside = Point2::new(p[u], p[v]).sup(low).inf(high);
-                // the cut-outs stay clear of the rim and of each other, so at most one holds the point
+                // the cut-outs stay clear of the rim and of each other, so at most one holds the
+                // point
                 let free = holes
                     .iter()
                     .find(|hole| hole.contains(&inside))

@@ -15,7 +15,8 @@ const MIN_CORNERS: f64 = 4.0;
 const MAX_CORNERS: f64 = 512.0;
 
 impl PlateStadium {
-    /// The outline as a counter-clockwise polygon whose corners lie on it; `chord_error`: largest distance from it, m.
+    /// The outline as a counter-clockwise polygon whose corners lie on it; `chord_error`: largest
+    /// distance from it, m.
     pub fn polygon(&self, chord_error: f64) -> Vec<Point2<f64>> {
         let corners = PI / (1.0 - (chord_error / self.radius).clamp(0.0, 1.0)).acos();
         // an even count, so that both ends of a slot get the same half circle

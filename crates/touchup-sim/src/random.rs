@@ -1,4 +1,5 @@
-//! Random numbers, and drift: slow, smooth random change, of a hand-held stylus or of a sensor's bias.
+//! Random numbers, and drift: slow, smooth random change, of a hand-held stylus or of a sensor's
+//! bias.
 
 use nalgebra::{Point3, Vector3};
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
@@ -9,7 +10,8 @@ const WAVES: usize = 5;
 /// Waves in one [`SmoothField`].
 const FIELD_WAVES: usize = 32;
 
-/// A smooth random function of time with mean 0 and root mean square 1: a few waves of random frequency and phase.
+/// A smooth random function of time with mean 0 and root mean square 1: a few waves of random
+/// frequency and phase.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Drift {
     /// rad/s and rad
@@ -38,8 +40,8 @@ impl Drift {
     }
 }
 
-/// A smooth random function of place with mean 0 and root mean square 1: waves with random directions, so that values correlate as
-/// exp(−r²/2ℓ²).
+/// A smooth random function of place with mean 0 and root mean square 1: waves with random
+/// directions, so that values correlate as exp(−r²/2ℓ²).
 #[derive(Clone, Debug)]
 pub(super) struct SmoothField {
     /// 1/m and rad

@@ -1,9 +1,9 @@
 //! A scanner that makes a bad mesh of a good surface.
 //!
-//! What it loses is lost on the signed distance, on a grid: a flat closing across the view fills holes that are too
-//! narrow, a blur rounds the edges, an offset makes the part too large, a smooth random field makes it wavy. The level of
-//! such a field cannot cross itself, and its triangles keep to that. Then what cannot be seen goes, and the rest is
-//! rigidly offset.
+//! What it loses is lost on the signed distance, on a grid: a flat closing across the view fills
+//! holes that are too narrow, a blur rounds the edges, an offset makes the part too large, a smooth
+//! random field makes it wavy. The level of such a field cannot cross itself, and its triangles
+//! keep to that. Then what cannot be seen goes, and the rest is rigidly offset.
 
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, Vector3};
 use rand::SeedableRng;
@@ -38,7 +38,8 @@ settings! {
         bias: f64 = 0.3e-3;
         /// Standard deviation of the blur that rounds the edges, m.
         rounding: f64 = 0.8e-3, not_negative("the rounding", *rounding, "m");
-        /// Holes and slots narrower than this are closed over, m; where only a little narrower the noise may open them.
+        /// Holes and slots narrower than this are closed over, m; where only a little narrower the
+        /// noise may open them.
         closes_holes_below: f64 = 11e-3, not_negative("the width of closed holes", *closes_holes_below, "m");
         /// By which share all lengths are too large, from the middle of the part.
         scale_error: f64 = 0.0, not_negative("the size of the scale error", scale_error.abs(), ""),
@@ -54,11 +55,12 @@ settings! {
             not_negative("the rigid turn", *rigid_turn, "rad"), not_negative("the size of the bias", bias.abs(), "m");
         /// Direction in which the scanner looks, in O.
         view: Unit<Vector3<f64>> = -Vector3::z_axis();
-        /// Angle between the two lines of sight that a triangulation needs, rad: what only one of them reaches, such as the floor of a deep
-        /// hole, is missing. 0: one line is enough.
+        /// Angle between the two lines of sight that a triangulation needs, rad: what only one of
+        /// them reaches, such as the floor of a deep hole, is missing. 0: one line is enough.
         baseline: f64 = 0.0, not_negative("the angle between the lines of sight", *baseline, "rad"),
             up_to("the angle between the lines of sight", *baseline, "rad", 1.0, "1 rad or less");
-        /// Whether what cannot be seen from the view direction is missing; otherwise the scan is closed.
+        /// Whether what cannot be seen from the view direction is missing; otherwise the scan is
+        /// closed.
         open_back: bool = true;
         /// Of all randomness.
         seed: u64 = 1;
@@ -77,14 +79,15 @@ const WAVES: usize = 96;
 const RUN: usize = 64;
 /// Where the edges are longer than this share of the part, a scan without a face comes of them.
 const COARSE: f64 = 0.1;
-/// Faces that look away from the scanner by more than this (cosine of the angle to the view) are not seen. Walls that
-/// stand along the view are: the scanner is moved about.
+/// Faces that look away from the scanner by more than this (cosine of the angle to the view) are
+/// not seen. Walls that stand along the view are: the scanner is moved about.
 const SEEN: f64 = -0.35;
 /// So often the scanner is turned about the view …
 const SIGHT_TURNS: usize = 12;
 /// … and leaned aside by these angles, rad.
 const SIGHT_LEANS: [f64; 3] = [0.0, 0.35, 0.7];
-/// Patches of fewer faces are removed where isolated: seen ones are dirt, unseen ones in between are filled in.
+/// Patches of fewer faces are removed where isolated: seen ones are dirt, unseen ones in between
+/// are filled in.
 const FEWEST_FACES: usize = 30;
 
 /// Rounds of repair and evening out; the second finds little, the third next to nothing.
@@ -93,7 +96,8 @@ const REPAIRS: usize = 2;
 const LONGEST_FILLED: usize = 20;
 
 impl ScannerParams {
-    /// A stationary scanner with striped light: fine and exact, but it sees no floor of a deep hole.
+    /// A stationary scanner with striped light: fine and exact, but it sees no floor of a deep
+    /// hole.
     pub fn good() -> Self {
         Self {
             edge: 0.8e-3,
@@ -109,7 +113,8 @@ impl ScannerParams {
         }
     }
 
-    /// Distance (m) from the surface beyond which the field need not be known: blur, bias, noise and the gradient stay within.
+    /// Distance (m) from the surface beyond which the field need not be known: blur, bias, noise
+    /// and the gradient stay within.
     fn band(&self) -> f64 {
         3.0 * self.rounding + self.bias.abs() + 4.0 * self.noise + self.edge
     }
@@ -118,8 +123,8 @@ impl ScannerParams {
 /// Scans a surface with the errors of `params`; same parameters, same mesh.
 ///
 /// # Errors
-/// [`SimError::BadParameter`]; [`SimError::TooFine`] when the grid would not fit; [`SimError::TooCoarse`] and
-/// [`SimError::NothingSeen`] when no face is left.
+/// [`SimError::BadParameter`]; [`SimError::TooFine`] when the grid would not fit;
+/// [`SimError::TooCoarse`] and [`SimError::NothingSeen`] when no face is left.
 pub fn scan(surface: &dyn Surface, params: &ScannerParams) -> Result<TriMesh, SimError> {
     params.check()?;
     let mut rng = Pcg64::seed_from_u64(params.seed);
@@ -227,8 +232,8 @@ fn scanned_field(
 
 /// A smooth random field: waves with random directions, so that values correlate as exp(−r²/2ℓ²).
 ///
-/// Along x of the grid a wave turns by the same steps in every run of nodes: cos(α + β) = cos α cos β − sin α sin β,
-/// with α for the step, known beforehand, and β for the run's first node.
+/// Along x of the grid a wave turns by the same steps in every run of nodes: cos(α + β) = cos α cos
+/// β − sin α sin β, with α for the step, known beforehand, and β for the run's first node.
 struct Waves {
     /// vector (1/m, in V) and phase
     waves: Vec<(Vector3<f64>, f64)>,
@@ -264,8 +269,8 @@ impl Waves {
         sums
     }
 
-    /// Mean and standard deviation over the nodes at the field's zero level: with them the noise of every seed is as
-    /// strong as asked, and the bias is the bias.
+    /// Mean and standard deviation over the nodes at the field's zero level: with them the noise of
+    /// every seed is as strong as asked, and the bias is the bias.
     fn spread(&self, field: &mut Field) -> (f64, f64) {
         let mut found = Vec::new();
         let pitch = field.pitch;
@@ -276,7 +281,8 @@ impl Waves {
         (mean, variance.sqrt().max(f64::MIN_POSITIVE))
     }
 
-    /// Calls `f(value of the field, sum of the waves)` for every node whose value is less than `level` from zero.
+    /// Calls `f(value of the field, sum of the waves)` for every node whose value is less than
+    /// `level` from zero.
     fn for_each_near(&self, field: &mut Field, level: f64, mut f: impl FnMut(&mut f64, f64)) {
         for (first, values) in field.runs_mut(RUN) {
             if values.iter().any(|value| value.abs() < level) {
@@ -291,8 +297,8 @@ impl Waves {
     }
 }
 
-/// Pairs of lines of sight, each `baseline` (rad) apart, as unit vectors in V towards the scanner: it is turned about the view and leaned
-/// aside as it is moved.
+/// Pairs of lines of sight, each `baseline` (rad) apart, as unit vectors in V towards the scanner:
+/// it is turned about the view and leaned aside as it is moved.
 fn sight_pairs(baseline: f64) -> Vec<[Vector3<f64>; 2]> {
     if baseline == 0.0 {
         return Vec::new();
@@ -370,7 +376,8 @@ pub struct ScanQuality {
     pub bias: f64,
 }
 
-/// Points measured on each face: its middle and three points around it, each standing for a quarter of its area.
+/// Points measured on each face: its middle and three points around it, each standing for a quarter
+/// of its area.
 const SAMPLES: [[f64; 3]; 4] = [
     [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0],
     [2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0],
@@ -378,9 +385,11 @@ const SAMPLES: [[f64; 3]; 4] = [
     [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0],
 ];
 
-/// Measures a mesh against the surface it should show; every point counts by the area it represents.
+/// Measures a mesh against the surface it should show; every point counts by the area it
+/// represents.
 ///
-/// - `within`: which points count, e.g. those of a touched region; the edges are those of all faces.
+/// - `within`: which points count, e.g. those of a touched region; the edges are those of all
+///   faces.
 /// - returns `None` when no point counts.
 pub fn measure_quality(
     mesh: &TriMesh,

@@ -43,12 +43,14 @@ settings! {
         torque_noise: f64 = 1e-3, up_to("the torque noise", *torque_noise, "N m", 1e3, "from zero to 1 kN m");
         /// Slowly drifting, per axis, N.
         force_bias: f64 = 0.05, up_to("the force bias", *force_bias, "N", 1e3, "from zero to 1 kN");
-        /// What the sensor reads when nothing touches, in T, N; the drift of the bias is on top of it.
+        /// What the sensor reads when nothing touches, in T, N; the drift of the bias is on top of
+        /// it.
         tare: Vector3<f64> = Vector3::zeros(),
             up_to("the size of the tare", tare.norm(), "N", 1e3, "from zero to 1 kN");
         /// Smallest difference between two readings of the force, per axis, N; zero: none.
         force_step: f64 = 0.0, up_to("the step of the force", *force_step, "N", 1e3, "from zero to 1 kN");
-        /// Half the width of the sensor's play, per axis, N: a reading follows the force only once it differs by more.
+        /// Half the width of the sensor's play, per axis, N: a reading follows the force only once
+        /// it differs by more.
         force_play: f64 = 0.0, up_to("the play of the force", *force_play, "N", 1e3, "from zero to 1 kN");
         /// Slow wander of the pose beside its noise, per axis, m.
         pose_wander: f64 = 0.0, up_to("the wander of the pose", *pose_wander, "m", 1.0, "from zero to 1 m");
@@ -239,7 +241,8 @@ impl<'a> Sensor<'a> {
         Isometry3::from_parts((origin + shake).into(), pose_wt.rotation * turn)
     }
 
-    /// The wrench as reported: in T, about the ball's centre, through which every contact force goes.
+    /// The wrench as reported: in T, about the ball's centre, through which every contact force
+    /// goes.
     fn wrench(&mut self, moment: &Moment) -> Wrench {
         let p = self.params;
         let bias = Vector3::from_fn(|i, _| self.bias[i].at(moment.t)) * p.force_bias + p.tare;
@@ -290,7 +293,8 @@ fn nanoseconds(count: u64, rate: f64) -> u64 {
     (count as f64 * 1e9 / rate).round() as u64
 }
 
-/// What was at a time after the start: between two moments all but the contacts is interpolated. `None` past the last.
+/// What was at a time after the start: between two moments all but the contacts is interpolated.
+/// `None` past the last.
 fn moment_at(moments: &[Moment], at_ns: u64) -> Option<Moment> {
     let before = moments.get((at_ns / TICK_NS) as usize)?;
     let share = (at_ns % TICK_NS) as f64 / TICK_NS as f64;

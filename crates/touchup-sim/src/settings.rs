@@ -1,7 +1,8 @@
 //! The settings of the simulation, each declared once.
 
-/// Declares a struct of settings, a line for each: its name, its type, its default and, where it has a range, the check that refuses
-/// what lies outside, in which every setting is there by its name.
+/// Declares a struct of settings, a line for each: its name, its type, its default and, where it
+/// has a range, the check that refuses what lies outside, in which every setting is there by its
+/// name.
 macro_rules! settings {
     (
         $(#[$meta:meta])* pub struct $Name:ident, $(#[$of_default:meta])* default {

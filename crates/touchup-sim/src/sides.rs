@@ -14,8 +14,9 @@ const AWAY: f64 = 4.0;
 /// The other sides get this share of the time of the first.
 const ASIDE: f64 = 0.5;
 
-/// Rasters from each side with a habit, and runs along all walls that the ball reaches from there. On the first side each of the two takes
-/// [`PathParams::longest`] at most, on the others half of it.
+/// Rasters from each side with a habit, and runs along all walls that the ball reaches from there.
+/// On the first side each of the two takes [`PathParams::longest`] at most, on the others half of
+/// it.
 ///
 /// - `sides`: unit vectors from the part towards the hand, in O.
 ///
@@ -44,7 +45,8 @@ pub fn plan_sides(
     Ok(path)
 }
 
-/// A free move from above one side of the part to above another, outside of the ball around the part.
+/// A free move from above one side of the part to above another, outside of the ball around the
+/// part.
 fn around(
     bounds: &Bounds,
     from: &Unit<Vector3<f64>>,

@@ -1,9 +1,10 @@
 //! A hand-held stylus: a tip led over a rigid surface, and its sensor readings.
 //!
-//! The hand pulls the tip, a ball unless said otherwise, along [`Stroke`]s, presses, slows where it is blocked and climbs
-//! out of what it fell into. The tip does not enter the part ([`super::push_ball`]); what holds it back gives the direction of the force, the hand gives
-//! its size, friction is added against the motion: F = N Σ w_i (n_i − μ t_i), Σ w_i = 1. The reported pose is that of a
-//! rigid stylus, so a tip of compliance C makes it read centre − C F
+//! The hand pulls the tip, a ball unless said otherwise, along [`Stroke`]s, presses, slows where it
+//! is blocked and climbs out of what it fell into. The tip does not enter the part
+//! ([`super::push_ball`]); what holds it back gives the direction of the force, the hand gives its
+//! size, friction is added against the motion: F = N Σ w_i (n_i − μ t_i), Σ w_i = 1. The reported
+//! pose is that of a rigid stylus, so a tip of compliance C makes it read centre − C F
 //! ([`TipBending`]).
 
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
@@ -30,7 +31,8 @@ settings! {
         /// Radius of the ball, of the flat end, or of the nose of the cone, m.
         radius: f64 = 1.5e-3,
             positive("the ball's radius", *radius, "m"), up_to("the ball's radius", *radius, "m", 1.0, "1 m or less");
-        /// Which tip it is; its z points along the shaft. A sharp edge or nose is rounded by 0.05 mm.
+        /// Which tip it is; its z points along the shaft. A sharp edge or nose is rounded by 0.05
+        /// mm.
         shape: TipShape = TipShape::Ball;
         /// Stiffness of the tip, N/m.
         stiffness: f64 = 20e3, positive("the tip's stiffness", *stiffness, "N/m");
@@ -125,10 +127,12 @@ const BLOCKED: f64 = 1.2e-3;
 const FIRM: f64 = 0.01;
 /// Sliding slower than this leaves friction undecided, m/s.
 const CREEP: f64 = 1e-3;
-/// The hand gives up a line when it takes longer than this, s, beyond [`PATIENCE_FACTOR`] times what it should take.
+/// The hand gives up a line when it takes longer than this, s, beyond [`PATIENCE_FACTOR`] times
+/// what it should take.
 const PATIENCE: f64 = 0.5;
 const PATIENCE_FACTOR: f64 = 2.0;
-/// A ball is caught when it does not reach so many points in a row in time: led freely, and pressed, when it climbs over what is in its way.
+/// A ball is caught when it does not reach so many points in a row in time: led freely, and
+/// pressed, when it climbs over what is in its way.
 const CAUGHT: usize = 3;
 const CAUGHT_PRESSED: usize = 8;
 /// A way out of where the ball is caught is looked at in steps of this share of its radius …
@@ -177,8 +181,9 @@ struct Leading<'a> {
 
 /// Leads a ball along `path` over `surface` and records what the stylus reports.
 ///
-/// Starts at the path's first point. The shaft is opposite to the first direction of pressing (along z when there is
-/// none), give or take the tilt. Same surface, path, parameters and seed give the same messages.
+/// Starts at the path's first point. The shaft is opposite to the first direction of pressing
+/// (along z when there is none), give or take the tilt. Same surface, path, parameters and seed
+/// give the same messages.
 ///
 /// # Errors
 /// [`SimError::BadParameter`], [`SimError::EmptyPath`], [`SimError::StartsInside`].
@@ -266,7 +271,8 @@ impl Leading<'_> {
         self.follow(&free(points));
     }
 
-    /// A direction in which the ball can leave straight for `away` (m); along the shaft where there is none.
+    /// A direction in which the ball can leave straight for `away` (m); along the shaft where there
+    /// is none.
     fn way_out(&self, away: f64) -> Vector3<f64> {
         let shaft = self.upright * Vector3::z();
         let pushed = self
@@ -296,7 +302,8 @@ impl Leading<'_> {
         directions.clone().find(is_free).unwrap_or(shaft)
     }
 
-    /// Goes along one stroke, starting wherever the ball is. Returns whether it got through: it may be caught where the part is in its way.
+    /// Goes along one stroke, starting wherever the ball is. Returns whether it got through: it may
+    /// be caught where the part is in its way.
     fn follow(&mut self, stroke: &Stroke) -> bool {
         // points in a row that were not reached, and how many may be
         let mut missed = 0;

@@ -7,7 +7,8 @@ use nalgebra::{Isometry3, Point3, Vector3};
 pub struct SurfacePoint {
     /// m, in O
     pub point: Point3<f64>,
-    /// Unit normal of the surface there, out of the material; on an edge that of one of the pieces that meet.
+    /// Unit normal of the surface there, out of the material; on an edge that of one of the pieces
+    /// that meet.
     pub normal: Vector3<f64>,
 }
 
@@ -76,11 +77,13 @@ pub trait Surface: Sync {
     /// Box around the part that is of interest.
     fn bounds(&self) -> Bounds;
 
-    /// Appends, for each smooth piece of the surface that comes within `reach` (m) of `p`, the point of it closest to
-    /// `p`: where a ball around `p` may touch. The closest of all is among them.
+    /// Appends, for each smooth piece of the surface that comes within `reach` (m) of `p`, the
+    /// point of it closest to `p`: where a ball around `p` may touch. The closest of all is among
+    /// them.
     fn near(&self, p: &Point3<f64>, reach: f64, found: &mut Vec<SurfacePoint>);
 
-    /// Unit vector along which the signed distance grows fastest: out of the material, also beside edges.
+    /// Unit vector along which the signed distance grows fastest: out of the material, also beside
+    /// edges.
     fn outward(&self, p: &Point3<f64>) -> Vector3<f64> {
         let closest = self.closest(p);
         let offset = (p - closest.point) * self.signed_distance(p).signum();
@@ -88,5 +91,6 @@ pub trait Surface: Sync {
     }
 }
 
-/// Below this distance (m) two points do not give a direction any more: a thousand roundings of a coordinate of 1 m.
+/// Below this distance (m) two points do not give a direction any more: a thousand roundings of a
+/// coordinate of 1 m.
 const COINCIDENT: f64 = 1e3 * f64::EPSILON;

@@ -1,8 +1,10 @@
-//! A tip of any shape as balls fixed to each other, so that what holds for a ball against a surface holds for it.
+//! A tip of any shape as balls fixed to each other, so that what holds for a ball against a surface
+//! holds for it.
 //!
-//! A cone is the balls that fit into it along its axis; a flat end rings of balls that touch both its face and its side,
-//! from those of its edge to those as wide as the cylinder, and more of these along the shaft. Distances to a surface change no faster than the balls move, so that only those that could touch
-//! are looked at.
+//! A cone is the balls that fit into it along its axis; a flat end rings of balls that touch both
+//! its face and its side, from those of its edge to those as wide as the cylinder, and more of
+//! these along the shaft. Distances to a surface change no faster than the balls move, so that only
+//! those that could touch are looked at.
 
 use std::f64::consts::TAU;
 
@@ -65,8 +67,8 @@ impl SimTip {
         })
     }
 
-    /// Moves the tip, in its new orientation, from `from` towards `to`; returns where its origin comes to rest and the
-    /// contacts there.
+    /// Moves the tip, in its new orientation, from `from` towards `to`; returns where its origin
+    /// comes to rest and the contacts there.
     pub fn push(
         &mut self,
         surface: &dyn Surface,
@@ -143,7 +145,8 @@ fn apart(radius: f64) -> f64 {
     (8.0 * radius * SCALLOP).sqrt()
 }
 
-/// Balls of one radius on a circle, resting on the face, as close to each other as those on the rim.
+/// Balls of one radius on a circle, resting on the face, as close to each other as those on the
+/// rim.
 fn ring(from_axis: f64, radius: f64, rim: f64) -> impl Iterator<Item = TipBall> {
     let count = (AROUND as f64 * from_axis / rim.max(f64::MIN_POSITIVE))
         .ceil()

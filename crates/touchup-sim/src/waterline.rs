@@ -1,7 +1,9 @@
-//! Runs of the ball along walls at constant heights, as a mill cuts steep walls: into every hole, slot and pocket that lets it in.
+//! Runs of the ball along walls at constant heights, as a mill cuts steep walls: into every hole,
+//! slot and pocket that lets it in.
 //!
-//! At a height the ball's centre may be where the surface is at least a radius away. Of that plane region the parts count that the ball
-//! reaches from above and sideways; their outlines are the runs. Loops that repeat the one above are thinned out.
+//! At a height the ball's centre may be where the surface is at least a radius away. Of that plane
+//! region the parts count that the ball reaches from above and sideways; their outlines are the
+//! runs. Loops that repeat the one above are thinned out.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +23,8 @@ const MOST_NODES: f64 = 250_000.0;
 const MOST_HEIGHTS: usize = 400;
 /// Loops around the whole part are this much farther apart.
 const OUTER_SPARSER: f64 = 4.0;
-/// Loops are alike when their middles are no farther apart than this, m, and their lengths agree within this share.
+/// Loops are alike when their middles are no farther apart than this, m, and their lengths agree
+/// within this share.
 const SAME_MIDDLE: f64 = 0.5e-3;
 const SAME_LENGTH: f64 = 0.08;
 /// From one try to thin the loops out to the next, and how often.
@@ -65,10 +68,13 @@ struct Grid<'a> {
     known: Vec<[f64; 2]>,
 }
 
-/// Runs along all walls that the ball reaches from one side: around holes, slots, pockets and bosses, and around the part.
+/// Runs along all walls that the ball reaches from one side: around holes, slots, pockets and
+/// bosses, and around the part.
 ///
-/// - `bounds`: the part of the surface to go over, in O; `view`: direction in which the hand looks, in O.
-/// - The distance of the loops grows beyond [`PathParams::pitch`] where they would last longer than [`PathParams::longest`].
+/// - `bounds`: the part of the surface to go over, in O; `view`: direction in which the hand looks,
+///   in O.
+/// - The distance of the loops grows beyond [`PathParams::pitch`] where they would last longer than
+///   [`PathParams::longest`].
 ///
 /// # Errors
 /// [`SimError::BadParameter`].
@@ -95,8 +101,8 @@ pub fn plan_waterlines(
         .collect())
 }
 
-/// The loops that are run in [`PathParams::longest`]: no closer than the pitch, wider apart where that takes too long; the longest are left
-/// out where the last of each kind alone do.
+/// The loops that are run in [`PathParams::longest`]: no closer than the pitch, wider apart where
+/// that takes too long; the longest are left out where the last of each kind alone do.
 fn within<'a>(loops: &'a [Vec<Loop>], step: f64, params: &PathParams) -> Vec<&'a Loop> {
     let time = |run: &Loop| run.length * (1.0 + OVERLAP) / params.wall_speed;
     let is_short =
@@ -263,7 +269,8 @@ impl<'a> Grid<'a> {
         ]
     }
 
-    /// From each crossing of the outline to the next, the free side on the left; a crossing is named by its free node and the other.
+    /// From each crossing of the outline to the next, the free side on the left; a crossing is
+    /// named by its free node and the other.
     fn segments(&self, values: &[f64], part: &[u32]) -> BTreeMap<[usize; 2], [usize; 2]> {
         let mut next = BTreeMap::new();
         let is_free = |node: usize| values[node] > 0.0 && part[node] != 0;
@@ -272,7 +279,8 @@ impl<'a> Grid<'a> {
                 let low = j * self.count[0] + i;
                 // counter-clockwise
                 let corners = [low, low + 1, low + 1 + self.count[0], low + self.count[0]];
-                // an outline comes in where free turns into not free, and goes out where it turns back
+                // an outline comes in where free turns into not free, and goes out where it turns
+                // back
                 let sides = (0..4).map(|k| [corners[k], corners[(k + 1) % 4]]);
                 let (mut ins, mut outs) = (Vec::new(), Vec::new());
                 for (k, [from, to]) in sides.enumerate() {

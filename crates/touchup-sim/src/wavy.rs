@@ -1,5 +1,5 @@
-//! A wavy plate as a structured grid, smooth, open, of any number of faces, and a ball that slides over it: what a push costs
-//! is measured on it.
+//! A wavy plate as a structured grid, smooth, open, of any number of faces, and a ball that slides
+//! over it: what a push costs is measured on it.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -48,7 +48,8 @@ pub fn plate(faces: usize, side: f64) -> Result<TriMesh, MeshError> {
     height_field(n, |i| side * f64::from(i) / f64::from(n), height)
 }
 
-/// The surface z = `height`(x, y) over a square grid of `n` by `n` cells, two triangles each, outward up.
+/// The surface z = `height`(x, y) over a square grid of `n` by `n` cells, two triangles each,
+/// outward up.
 ///
 /// - `at`: x or y of line `i` of the grid, m.
 pub(super) fn height_field(

@@ -1,8 +1,9 @@
 //! Named worlds: from a seed each draws its own truth, and what a calibration tells of it.
 //!
-//! What is told differs from what is true by Gaussian errors whose standard deviations are known ([`Told`]). The recorded poses are in a
-//! frame of their own, those of the origin of a tracked body, so that place of the part, offset of the tip, delay of the clocks and tare all
-//! have to be told. Nothing of a world is shared with the defaults of scanner and stylus.
+//! What is told differs from what is true by Gaussian errors whose standard deviations are known
+//! ([`Told`]). The recorded poses are in a frame of their own, those of the origin of a tracked
+//! body, so that place of the part, offset of the tip, delay of the clocks and tare all have to be
+//! told. Nothing of a world is shared with the defaults of scanner and stylus.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
@@ -34,7 +35,8 @@ pub enum SimWorld {
     CarelessOperator,
 }
 
-/// What a world draws from. Each pair is the smallest and the largest value, all equally likely; SI.
+/// What a world draws from. Each pair is the smallest and the largest value, all equally likely;
+/// SI.
 struct WorldRanges {
     radius: [f64; 2],
     stiffness: [f64; 2],
@@ -149,7 +151,8 @@ pub struct Told {
 }
 
 impl Told {
-    /// Standard deviation along an axis of what the offset of the tip and the place of the scan leave, m.
+    /// Standard deviation along an axis of what the offset of the tip and the place of the scan
+    /// leave, m.
     ///
     /// - `lever`: root mean square distance of the surface from O's origin, m.
     pub fn place_std(&self, lever: f64) -> f64 {
@@ -159,7 +162,8 @@ impl Told {
             turn,
             ..
         } = self.stds;
-        // of the turn's axis and the lever, two of three directions move a point, one of three along the normal
+        // of the turn's axis and the lever, two of three directions move a point, one of three
+        // along the normal
         let turned = turn * lever * (2.0f64 / 3.0).sqrt();
         tip_offset.hypot(shift).hypot(turned)
     }
@@ -301,10 +305,12 @@ impl SimWorld {
         self.draw_told_off(seed, &ToldOff::all(1.0))
     }
 
-    /// As [`SimWorld::draw`], with the errors of what is told made larger by `off`. The truth is the same whatever that is.
+    /// As [`SimWorld::draw`], with the errors of what is told made larger by `off`. The truth is
+    /// the same whatever that is.
     ///
     /// # Errors
-    /// [`SimError::BadParameter`] for factors that are negative, not finite, or so large that what is told cannot be.
+    /// [`SimError::BadParameter`] for factors that are negative, not finite, or so large that what
+    /// is told cannot be.
     pub fn draw_told_off(self, seed: u64, off: &ToldOff) -> Result<DrawnWorld, SimError> {
         let ToldOff {
             radius,
@@ -472,9 +478,11 @@ impl Draw {
 }
 
 impl DrawnWorld {
-    /// Gives a number another truth; what is told of it errs by as much as before, or, for a stiffness or a noise, by the same share.
+    /// Gives a number another truth; what is told of it errs by as much as before, or, for a
+    /// stiffness or a noise, by the same share.
     ///
-    /// - `name`: `tip_radius`, `stiffness`, `friction`, `scan_edge`, `scan_noise`; others stay as they are.
+    /// - `name`: `tip_radius`, `stiffness`, `friction`, `scan_edge`, `scan_noise`; others stay as
+    ///   they are.
     pub fn set_truth(&mut self, name: &str, truth: f64) {
         let Self {
             scanner,
@@ -518,7 +526,8 @@ impl DrawnWorld {
         scan(surface, &self.scanner)
     }
 
-    /// The hand's strokes over all of a part that is reached from where the scanner looks, `longest` seconds at most.
+    /// The hand's strokes over all of a part that is reached from where the scanner looks,
+    /// `longest` seconds at most.
     ///
     /// # Errors
     /// As [`plan_mesh`].
@@ -544,7 +553,8 @@ impl DrawnWorld {
         touch(surface, strokes, &self.stylus, self.seed)
     }
 
-    /// The hand's strokes over the plate: as [`DrawnWorld::strokes`], and along the walls of its features.
+    /// The hand's strokes over the plate: as [`DrawnWorld::strokes`], and along the walls of its
+    /// features.
     ///
     /// - `turn`: share of a turn that the runs along walls go; `None`: the hand goes into no hole.
     ///
@@ -568,8 +578,9 @@ impl DrawnWorld {
         Ok(strokes)
     }
 
-    /// Standard deviation of the one stiffness that is told, as a share of it: what a calibration leaves of the mean compliance C̄ = tr C / 3,
-    /// and by how much those of the three axes differ from that, √(Σ (Cᵢ − C̄)² / 3) / C̄, which one that presses along each of them sees.
+    /// Standard deviation of the one stiffness that is told, as a share of it: what a calibration
+    /// leaves of the mean compliance C̄ = tr C / 3, and by how much those of the three axes differ
+    /// from that, √(Σ (Cᵢ − C̄)² / 3) / C̄, which one that presses along each of them sees.
     pub fn stiffness_std(&self) -> f64 {
         // their reciprocals have the mean 1
         let uneven = self
@@ -629,7 +640,8 @@ impl DrawnWorld {
         )
     }
 
-    /// Root mean square distance of the corners of a part's box from O's origin, m: the lever of [`Told::place_std`].
+    /// Root mean square distance of the corners of a part's box from O's origin, m: the lever of
+    /// [`Told::place_std`].
     pub fn lever(surface: &dyn Surface) -> f64 {
         let bounds = surface.bounds();
         let corner = |i: usize| {

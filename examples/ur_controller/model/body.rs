@@ -1,8 +1,10 @@
-//! The arm itself: it follows a velocity with a limited acceleration, bends against the part, and measures the contact force.
+//! The arm itself: it follows a velocity with a limited acceleration, bends against the part, and
+//! measures the contact force.
 //!
-//! The encoders say where the tip would be if nothing bent, x_c; the ball is at x, where the part lets it be, and the part
-//! pushes with K (x − x_c). Across the normal friction holds the ball back. In force mode the velocity along one axis comes
-//! from the force: v = (F − f) / (4 K τ), which settles without ringing for a delay τ.
+//! The encoders say where the tip would be if nothing bent, x_c; the ball is at x, where the part
+//! lets it be, and the part pushes with K (x − x_c). Across the normal friction holds the ball
+//! back. In force mode the velocity along one axis comes from the force: v = (F − f) / (4 K τ),
+//! which settles without ringing for a delay τ.
 
 use std::collections::VecDeque;
 
@@ -23,7 +25,8 @@ const STEP: f64 = PERIOD / STEPS as f64;
 const TURN_ACCELERATION: f64 = 10.0;
 /// With which it stops when it has to, m/s².
 pub const HARD_STOP: f64 = 8.0;
-/// A part that rises does so with this speed, m/s: one that jumped over the ball would hold it inside.
+/// A part that rises does so with this speed, m/s: one that jumped over the ball would hold it
+/// inside.
 const RISING: f64 = 30e-3;
 /// States that a spike lasts.
 const SPIKE: u32 = 3;
@@ -166,8 +169,8 @@ impl<'a> Body<'a> {
         self.tare = self.unweighed();
     }
 
-    /// Force without the configured payload's weight, N in the flange: contact, bias, and the weight beyond the configured
-    /// payload.
+    /// Force without the configured payload's weight, N in the flange: contact, bias, and the
+    /// weight beyond the configured payload.
     fn unweighed(&self) -> Vector3<f64> {
         let r_bf = self.flange().rotation;
         let weight = |payload: &Payload| payload.weight_o(&r_bf).force;

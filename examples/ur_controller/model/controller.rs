@@ -1,4 +1,5 @@
-//! What of a UR's controller the client sees: registers, the program that it uploads, the safety system, and what goes wrong.
+//! What of a UR's controller the client sees: registers, the program that it uploads, the safety
+//! system, and what goes wrong.
 
 use std::collections::VecDeque;
 
@@ -12,12 +13,14 @@ use super::states::States;
 
 /// From the end of an upload to the first cycle of the program, s.
 const START: f64 = 20e-3;
-/// While a program plays and the client says nothing, the clock is asked this often for a period that it may not give.
+/// While a program plays and the client says nothing, the clock is asked this often for a period
+/// that it may not give.
 const QUIET_LOOKS: u32 = 40;
 /// The same while the arm moves, where its next order may be late.
 const QUIET_LOOKS_MOVING: u32 = 200;
-/// The clock goes at most this far beyond the last word of the client, s: farther than to where the client brakes because it hears no
-/// order, and not as far as to where the watchdog stops the program.
+/// The clock goes at most this far beyond the last word of the client, s: farther than to where the
+/// client brakes because it hears no order, and not as far as to where the watchdog stops the
+/// program.
 const AHEAD: f64 = 80e-3;
 
 /// Status of the safety system.
@@ -41,9 +44,11 @@ pub struct Faults {
     pub is_unplugged: bool,
     /// the program hangs
     pub is_stuck: bool,
-    /// its main loop hangs as soon as it is ready for the next command: each is taken and none is read, and its threads live
+    /// its main loop hangs as soon as it is ready for the next command: each is taken and none is
+    /// read, and its threads live
     pub is_hung: bool,
-    /// the thread of its motion has ended, and its main loop lives: commands are read, and none is followed
+    /// the thread of its motion has ended, and its main loop lives: commands are read, and none is
+    /// followed
     pub is_tired: bool,
     /// the dashboard does not answer
     pub is_mute: bool,
@@ -71,8 +76,8 @@ struct Program {
     /// a motion that has to end before its command has: m/s² of braking
     braking: Option<f64>,
     velocity: Option<Motion>,
-    /// what the thread of `speedL` is at: the velocity, and when it takes the next, s; without a time it does so when it has
-    /// reached that
+    /// what the thread of `speedL` is at: the velocity, and when it takes the next, s; without a
+    /// time it does so when it has reached that
     speeding: Option<(Motion, Option<f64>)>,
     /// how long it stays at one, s
     speed_time: f64,
@@ -207,8 +212,9 @@ impl<'a> Controller<'a> {
         self.granted_until = self.granted_until.max(self.body.time) + seconds;
     }
 
-    /// Whether another period may pass. While a program of the client plays, one passes when the client has answered the last.
-    /// While a command is run it says nothing, and now and then it waits for another state before it does.
+    /// Whether another period may pass. While a program of the client plays, one passes when the
+    /// client has answered the last. While a command is run it says nothing, and now and then it
+    /// waits for another state before it does.
     pub fn may_tick(&mut self) -> bool {
         let id = self.ints_in[0];
         let is_at_work =
@@ -355,7 +361,8 @@ impl<'a> Controller<'a> {
         }
     }
 
-    /// The thread that `speedL` starts: it takes a new velocity only when it is done with the one before.
+    /// The thread that `speedL` starts: it takes a new velocity only when it is done with the one
+    /// before.
     fn speed(&mut self) {
         if self.faults.is_tired {
             return self.body.follow(Motion::rest(HARD_STOP), None);

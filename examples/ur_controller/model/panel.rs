@@ -1,10 +1,12 @@
-//! What somebody at the panel, at the cable or at the part does, a line each; and the answers of the dashboard.
+//! What somebody at the panel, at the cable or at the part does, a line each; and the answers of
+//! the dashboard.
 
 use touchup::stylus::Payload;
 
 use super::controller::{Controller, Safety};
 
-/// What a line asks for. Connections are ended by whoever has them: `drop`, `undash` and `die` only say so here.
+/// What a line asks for. Connections are ended by whoever has them: `drop`, `undash` and `die` only
+/// say so here.
 pub fn happen(controller: &mut Controller, line: &str) {
     controller.record.event(line);
     let number = |word: &str| word.parse::<f64>().unwrap_or(0.0);

@@ -17,9 +17,11 @@ use super::{CliError, Losses};
 pub(super) enum CalibrateArguments {
     /// Where the scan lies in the frame of the recorded poses, from points picked on both
     Scan(scan::ScanArguments),
-    /// Weight, centre of mass and bias of the sensor, from static segments in free air: of a recording, or of an arm
+    /// Weight, centre of mass and bias of the sensor, from static segments in free air: of a
+    /// recording, or of an arm
     Payload(payload::PayloadArguments),
-    /// The centre of the ball: in the tracked stylus, from a swing about it; in the flange of an arm, from touches of one spot
+    /// The centre of the ball: in the tracked stylus, from a swing about it; in the flange of an
+    /// arm, from touches of one spot
     Tip(tip::TipArguments),
     /// Compliance of arm and probe, from presses of an arm on one spot
     Stiffness(stiffness::StiffnessArguments),

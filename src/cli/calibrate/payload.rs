@@ -1,4 +1,5 @@
-//! `touchup calibrate payload`: payload identification, from static segments: of a recording, or of an arm that turns by itself.
+//! `touchup calibrate payload`: payload identification, from static segments: of a recording, or of
+//! an arm that turns by itself.
 
 use std::path::PathBuf;
 
@@ -32,8 +33,8 @@ pub(in crate::cli) struct PayloadArguments {
     cell: CellArguments,
     #[command(flatten)]
     truth_payload: TruePayload,
-    /// Output, with --robot: each static segment as it is measured, a line of CSV each as --samples reads them, so that none is lost
-    /// whatever ends the measurement
+    /// Output, with --robot: each static segment as it is measured, a line of CSV each as --samples
+    /// reads them, so that none is lost whatever ends the measurement
     #[arg(long, value_name = "CSV", requires = "robot")]
     segments_out: Option<PathBuf>,
     /// Axes of the wrench; default: those of the recording, or the sensor's for --samples

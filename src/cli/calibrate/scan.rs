@@ -10,12 +10,12 @@ use crate::calibration::calibrate_scan;
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct ScanArguments {
-    /// Pairs of points, CSV: scan_x_mm,scan_y_mm,scan_z_mm,space_x_mm,space_y_mm,space_z_mm, where wanted name,
-    /// sigma_mm
+    /// Pairs of points, CSV: scan_x_mm,scan_y_mm,scan_z_mm,space_x_mm,space_y_mm,space_z_mm, where
+    /// wanted name, sigma_mm
     #[arg(long, value_name = "CSV")]
     pairs: PathBuf,
-    /// A recording in which the stylus dwells on each point for a second, in the order of the file, which then needs no
-    /// columns of space
+    /// A recording in which the stylus dwells on each point for a second, in the order of the file,
+    /// which then needs no columns of space
     #[arg(long, value_name = "RECORDING")]
     bag: Option<PathBuf>,
     /// Standard deviation of a pair per axis, mm; default: from the residuals

@@ -19,8 +19,8 @@ const NO_SCENE: &str =
 /// Where the result goes, and how it is printed.
 #[derive(Debug, Args)]
 pub(super) struct CalibrationTarget {
-    /// The scene to put the result into: all else in it stays as written. Default, and where --out is the same and no file yet: a whole
-    /// scene with every key explained
+    /// The scene to put the result into: all else in it stays as written. Default, and where --out
+    /// is the same and no file yet: a whole scene with every key explained
     #[arg(long, value_name = "YAML")]
     scene: Option<PathBuf>,
     /// Where the scene goes; may be the one that --scene names

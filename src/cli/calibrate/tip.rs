@@ -1,5 +1,5 @@
-//! `touchup calibrate tip`: where the ball is: in the tracked stylus, from a swing about it; in the flange of an arm, from touches of
-//! one flat spot with a probe that leans.
+//! `touchup calibrate tip`: where the ball is: in the tracked stylus, from a swing about it; in the
+//! flange of an arm, from touches of one flat spot with a probe that leans.
 
 use std::path::PathBuf;
 
@@ -25,10 +25,12 @@ pub(in crate::cli) struct TipArguments {
     robot: Option<RobotName>,
     #[command(flatten)]
     cell: CellArguments,
-    /// With --robot: a flat place of the part with nothing within 20 mm, in the frame of the scan, mm
+    /// With --robot: a flat place of the part with nothing within 20 mm, in the frame of the scan,
+    /// mm
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     spot: Option<String>,
-    /// True position of the ball of a simulated arm in the flange, mm; default: robot.tip_position_mm of the scene
+    /// True position of the ball of a simulated arm in the flange, mm; default:
+    /// robot.tip_position_mm of the scene
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     truth_tip_mm: Option<String>,
     #[command(flatten)]

@@ -1,4 +1,5 @@
-//! `touchup check`: whether an arm measures one spot and spheres of known diameter as they are, before it is trusted with a part.
+//! `touchup check`: whether an arm measures one spot and spheres of known diameter as they are,
+//! before it is trusted with a part.
 
 mod report;
 
@@ -19,7 +20,8 @@ pub(super) use report::{CheckReport, Gates};
 
 /// Allowed number of touches; with three each side is approached, and the repeatability is known.
 const TOUCHES: std::ops::RangeInclusive<usize> = 3..=100;
-/// Diameters of spheres, m: smaller ones a ball slips off, larger ones an arm does not reach around.
+/// Diameters of spheres, m: smaller ones a ball slips off, larger ones an arm does not reach
+/// around.
 const DIAMETERS: std::ops::RangeInclusive<f64> = 3e-3..=100e-3;
 /// What a check touches a spot with, unless it is told.
 pub(super) const SPOT_TOUCHES: usize = 10;
@@ -38,7 +40,8 @@ pub(super) struct CheckArguments {
     /// Number of touches of the spot, every second one from the other side
     #[arg(long, value_name = "N", default_value_t = SPOT_TOUCHES, requires = "spot")]
     touches: usize,
-    /// A sphere of known diameter within 2 mm of a place in the frame of the scan, mm; free from above, its post below; repeat for each place
+    /// A sphere of known diameter within 2 mm of a place in the frame of the scan, mm; free from
+    /// above, its post below; repeat for each place
     #[arg(
         long = "sphere",
         value_name = "X,Y,Z,DIAMETER",
@@ -51,7 +54,8 @@ pub(super) struct CheckArguments {
     /// Gate: largest distance between two touches of the spot, µm
     #[arg(long, value_name = "G", default_value_t = Gates::default().spot_um)]
     gate_um: f64,
-    /// Gate: largest error of a sphere over the workspace, and largest scatter of its centre from one orientation of the probe to the next, µm
+    /// Gate: largest error of a sphere over the workspace, and largest scatter of its centre from
+    /// one orientation of the probe to the next, µm
     #[arg(long, value_name = "G", default_value_t = Gates::default().sphere_um)]
     sphere_gate_um: f64,
     /// Temperature of the cell, °C; default: robot.temperature_c of the scene
@@ -214,7 +218,8 @@ pub(super) fn repeated(
 }
 
 impl CheckReport {
-    /// - `scene`: that the arm was checked by; `temperature_c`: of the cell, where it is not as the scene has it.
+    /// - `scene`: that the arm was checked by; `temperature_c`: of the cell, where it is not as the
+    ///   scene has it.
     pub(super) fn of(
         touches: &CheckedTouches,
         spheres: &[ReferenceSphere],

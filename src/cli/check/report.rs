@@ -16,14 +16,16 @@ use crate::scene::CheckRecord;
 pub(in crate::cli) struct Gates {
     /// largest distance between two touches of the spot
     pub spot_um: f64,
-    /// largest error of a centre over the workspace, and largest scatter of one over the orientations
+    /// largest error of a centre over the workspace, and largest scatter of one over the
+    /// orientations
     pub sphere_um: f64,
     /// standard uncertainty of the diameters
     pub diameter_sigma_um: f64,
 }
 
 impl Default for Gates {
-    /// Of a UR, whose maker states ±0.03 mm: ten touches of 0.03 mm are within 0.15 mm in 98 of 100 checks.
+    /// Of a UR, whose maker states ±0.03 mm: ten touches of 0.03 mm are within 0.15 mm in 98 of 100
+    /// checks.
     fn default() -> Self {
         Self {
             spot_um: 150.0,
@@ -33,7 +35,8 @@ impl Default for Gates {
     }
 }
 
-/// A radius that differs from another by more than so many standard uncertainties of the difference has jumped.
+/// A radius that differs from another by more than so many standard uncertainties of the difference
+/// has jumped.
 const JUMPS: f64 = 3.0;
 
 /// The record, and all that it comes from.
@@ -49,7 +52,8 @@ pub(in crate::cli) struct CheckReport {
 }
 
 impl CheckReport {
-    /// - `record`: when, and of which arm; `radii`: whose, the radius and its standard uncertainty, mm.
+    /// - `record`: when, and of which arm; `radii`: whose, the radius and its standard uncertainty,
+    ///   mm.
     pub(super) fn judged(
         record: CheckRecord,
         spot: Option<&Repeatability>,

@@ -194,7 +194,8 @@ impl CompareReport {
     }
 }
 
-/// The verdict: deviation of the mesh, of the touched part where known, and of the mesh before. Then the alignment.
+/// The verdict: deviation of the mesh, of the touched part where known, and of the mesh before.
+/// Then the alignment.
 impl fmt::Display for CompareReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let places = [("touched", "where touched"), ("all", "over all")];

@@ -19,7 +19,8 @@ pub(in crate::cli) struct InspectArguments {
     /// The features, as refine, features and probe write them, or the folder of a session
     #[arg(value_name = "FEATURES|SESSION")]
     pub features: PathBuf,
-    /// Nominal values and tolerances, CSV or JSON (docs/inspect.md), or a CAD mesh whose features are the nominal ones: PLY, STL, OBJ
+    /// Nominal values and tolerances, CSV or JSON (docs/inspect.md), or a CAD mesh whose features
+    /// are the nominal ones: PLY, STL, OBJ
     #[arg(long, value_name = "FILE", required_unless_present = "write_nominal")]
     pub nominal: Option<PathBuf>,
     /// Unit of the coordinates in the CAD mesh of --nominal
@@ -31,17 +32,21 @@ pub(in crate::cli) struct InspectArguments {
     /// … or the same tolerance ± for all of them, mm
     #[arg(long, value_name = "T")]
     pub tolerance_mm: Option<f64>,
-    /// With a CAD mesh: also the position of each hole, slot, pocket and boss, within a zone of this diameter, mm
+    /// With a CAD mesh: also the position of each hole, slot, pocket and boss, within a zone of
+    /// this diameter, mm
     #[arg(long, value_name = "D")]
     pub position_mm: Option<f64>,
-    /// A feature is the nominal one where its centre is no farther off than this across its axis, mm
+    /// A feature is the nominal one where its centre is no farther off than this across its axis,
+    /// mm
     #[arg(long, value_name = "R", default_value_t = InspectionParams::default().match_mm)]
     pub match_mm: f64,
-    /// Brings drawing and part into one frame: best-fit, over all features that both have; or datums=NAME,NAME,NAME with names of
-    /// characteristics, primary to tertiary. Positions are then about the frame of the drawing
+    /// Brings drawing and part into one frame: best-fit, over all features that both have; or
+    /// datums=NAME,NAME,NAME with names of characteristics, primary to tertiary. Positions are then
+    /// about the frame of the drawing
     #[arg(long, value_name = "HOW")]
     pub align: Option<AlignmentMethod>,
-    /// Writes nominal values to be edited, CSV or JSON, from the CAD mesh of --nominal or else from FEATURES; inspects nothing
+    /// Writes nominal values to be edited, CSV or JSON, from the CAD mesh of --nominal or else from
+    /// FEATURES; inspects nothing
     #[arg(long, value_name = "FILE")]
     pub write_nominal: Option<PathBuf>,
     /// The touches behind the features; by default touches.csv beside them
@@ -53,7 +58,8 @@ pub(in crate::cli) struct InspectArguments {
     /// Unit of its coordinates
     #[arg(long, value_name = "U", default_value = "mm")]
     pub mesh_unit: MeshUnit,
-    /// The scene that was touched with, for the state of its calibration; by default that of the session
+    /// The scene that was touched with, for the state of its calibration; by default that of the
+    /// session
     #[arg(long, value_name = "YAML")]
     pub scene: Option<PathBuf>,
     /// How it is decided: guard bands, or the measured value alone

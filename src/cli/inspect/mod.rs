@@ -1,4 +1,5 @@
-//! `touchup inspect`: measured features against a drawing, and a report that says pass, fail or undecided.
+//! `touchup inspect`: measured features against a drawing, and a report that says pass, fail or
+//! undecided.
 
 mod arguments;
 mod errors;

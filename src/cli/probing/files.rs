@@ -19,7 +19,8 @@ pub(super) const RECORDING: &str = "recording";
 const BASE_FRAME: &str = "base";
 /// Frame of the wrenches: the probe's own.
 const PROBE_FRAME: &str = "probe";
-/// Between two touches samples wait no longer than this before they are written, ns of the arm's clock.
+/// Between two touches samples wait no longer than this before they are written, ns of the arm's
+/// clock.
 const FLUSH_EVERY_NS: i64 = 1_000_000_000;
 /// An arm whose clock began anew goes on so long after its last sample, ns.
 const PAUSE_NS: i64 = 1_000_000_000;
@@ -93,8 +94,9 @@ impl ProbeFiles {
         })
     }
 
-    /// Writes a state as the messages of a probe: the pose in the base of the arm, as the scene says where the part is, and the wrench in
-    /// the axes of the probe, as its sensor would have it. `None` for one that is not later than the last.
+    /// Writes a state as the messages of a probe: the pose in the base of the arm, as the scene
+    /// says where the part is, and the wrench in the axes of the probe, as its sensor would have
+    /// it. `None` for one that is not later than the last.
     pub fn record(&mut self, state: &ArmState) -> Result<Option<[Message; 2]>, CliError> {
         let last_ns = self.last_ns;
         let offset_ns = *self.offset_ns.get_or_insert(match last_ns {

@@ -1,5 +1,5 @@
-//! What follows the states of an arm beside its loop: on a thread of its own while the arm moves, so that neither a disk nor the
-//! reconstruction ever holds up an order.
+//! What follows the states of an arm beside its loop: on a thread of its own while the arm moves,
+//! so that neither a disk nor the reconstruction ever holds up an order.
 
 use std::cell::OnceCell;
 use std::io;
@@ -19,7 +19,8 @@ pub(super) trait TakeStates: Send + 'static {
     fn take_state(&mut self, state: &ArmState) -> bool;
 }
 
-/// Passes states to a [`TakeStates`] and returns before they are taken; who asks for it waits until all of them are.
+/// Passes states to a [`TakeStates`] and returns before they are taken; who asks for it waits until
+/// all of them are.
 pub(super) struct Follower<F> {
     /// while it is not with the thread
     here: OnceCell<Box<F>>,
@@ -75,7 +76,8 @@ impl<F: TakeStates> Follower<F> {
         }
     }
 
-    /// Whether the arm has to stop: it has failed, or a state found the queue full and was not taken.
+    /// Whether the arm has to stop: it has failed, or a state found the queue full and was not
+    /// taken.
     pub fn has_failed(&self) -> bool {
         self.is_behind || self.has_failed.load(Ordering::Acquire)
     }

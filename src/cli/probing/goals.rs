@@ -19,8 +19,9 @@ use crate::probing::plan::{DecisionGoal, SoughtCharacteristic};
 /// The surface at a flag is looked for within this, m.
 const NEAR: f64 = 20e-3;
 
-/// Reads a file of nominal values, and finds the characteristics of each flag: of its kind, with their centre no farther from it across the
-/// normal of the scan there than its radius; or by its number.
+/// Reads a file of nominal values, and finds the characteristics of each flag: of its kind, with
+/// their centre no farther from it across the normal of the scan there than its radius; or by its
+/// number.
 ///
 /// - `world`: the scan.
 pub(in crate::cli) fn goals_of(

@@ -1,5 +1,5 @@
-//! What `touchup probe` and `touchup demo --robot sim` share: features are probed while the mesh follows, and all results are
-//! written.
+//! What `touchup probe` and `touchup demo --robot sim` share: features are probed while the mesh
+//! follows, and all results are written.
 
 mod files;
 mod folder;
@@ -88,8 +88,9 @@ impl Probing<'_> {
         ProbingFolder { path: self.out }.check_free()
     }
 
-    /// Probes all flags, in their order; each touch and each feature is written as soon as it is there. A stop of the arm ends
-    /// it, and a signal. Where what was measured is surely wrong no mesh is written, unless that is forced.
+    /// Probes all flags, in their order; each touch and each feature is written as soon as it is
+    /// there. A stop of the arm ends it, and a signal. Where what was measured is surely wrong no
+    /// mesh is written, unless that is forced.
     ///
     /// - `is_resumed`: what is finished in the folder is not probed again.
     pub fn done(
@@ -167,7 +168,8 @@ impl Probing<'_> {
         let bag = self.out.join(RECORDING);
         let mut arguments =
             RefineArguments::in_folder(scan, self.unit, bag, self.out, scene, probe_topics());
-        // an arm that met no surface has measured nothing that could be wrong: each feature says why
+        // an arm that met no surface has measured nothing that could be wrong: each feature says
+        // why
         arguments.force = self.is_forced || touched.iter().all(|touch| touch.centre_mm.is_none());
         // all but a plane is probed where the scan may lack it
         arguments.touches_flaws = self.flags.iter().any(|flag| flag.kind != Some(Kind::Plane));

@@ -109,9 +109,11 @@ impl Ready {
         Ok(beside_spheres(part, &self.spheres)?)
     }
 
-    /// Where a plan without an arm begins: the pose of the tip in B, and the centre of the ball in O.
+    /// Where a plan without an arm begins: the pose of the tip in B, and the centre of the ball in
+    /// O.
     ///
-    /// - `place`: of the ball in O, m; `None`: above the scan, as a simulated arm begins above its part.
+    /// - `place`: of the ball in O, m; `None`: above the scan, as a simulated arm begins above its
+    ///   part.
     pub fn start(&self, place: Option<Point3<f64>>) -> (Isometry3<f64>, Point3<f64>) {
         let above = self.cell.above(&self.mesh);
         match place {

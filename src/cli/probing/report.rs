@@ -24,8 +24,9 @@ reported! {
         kind: String = kind_of(flagged).to_owned(),
         flagged_mm: [f64; 3] = (flagged.place * 1e3).coords.into(),
         search_radius_mm: f64 = flagged.radius * 1e3,
-        /// how it ended: `tolerance_reached`, `touches_spent`, `calibration_limits`, `decided`, `undecided`, `undecidable`, `time_spent`,
-        /// `nothing_found`, `cancelled`, `out_of_limits`, `no_clear_path`, `stopped`
+        /// how it ended: `tolerance_reached`, `touches_spent`, `calibration_limits`, `decided`,
+        /// `undecided`, `undecidable`, `time_spent`, `nothing_found`, `cancelled`, `out_of_limits`,
+        /// `no_clear_path`, `stopped`
         code: String = code(&probed.ending).to_owned(),
         /// the same in words
         ending: String = probed.ending.to_string(),

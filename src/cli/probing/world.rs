@@ -1,4 +1,5 @@
-//! What is around an arm while it works: the mesh, which follows a probing, the files that are written, and the signals that stop it.
+//! What is around an arm while it works: the mesh, which follows a probing, the files that are
+//! written, and the signals that stop it.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -44,7 +45,8 @@ impl FollowingMesh {
             .scene
             .refine_params(WrenchFrame::Sensor)
             .ok_or_else(nothing)?;
-        // what a simulated arm does next does not depend on how fast this computer is; a real one goes on in that time
+        // what a simulated arm does next does not depend on how fast this computer is; a real one
+        // goes on in that time
         let pace = Pace {
             is_patient: is_simulated,
             every_ns: EVERY_NS,
@@ -112,8 +114,8 @@ impl TakeStates for Followed {
     }
 }
 
-/// What is around an arm that probes features. Files and mesh follow its states beside the loop; between its motions it waits for
-/// them.
+/// What is around an arm that probes features. Files and mesh follow its states beside the loop;
+/// between its motions it waits for them.
 pub(super) struct LiveWorld<'a> {
     followed: Follower<Followed>,
     signals: &'a StopSignals,
@@ -298,7 +300,8 @@ impl<'a> SpotWorld<'a> {
         })
     }
 
-    /// What was measured; where that was broken off what was measured until then is printed, unless a file has it.
+    /// What was measured; where that was broken off what was measured until then is printed, unless
+    /// a file has it.
     pub fn finish<T>(self, measured: Result<T, CliError>) -> Result<T, CliError> {
         let measured = self.failed.map_or(measured, Err);
         let [what, flag] = self.log.names();

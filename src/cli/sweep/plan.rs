@@ -12,13 +12,15 @@ use crate::sweep::{JobsFile, SweepPlan};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct PlanArguments {
-    /// What is swept, YAML: scan, scene, recordings, the keys with their values, and how they are sampled (docs/sweep.md)
+    /// What is swept, YAML: scan, scene, recordings, the keys with their values, and how they are
+    /// sampled (docs/sweep.md)
     #[arg(value_name = "GRID.yaml")]
     grid: PathBuf,
     /// Recordings beside those that the file names: of any kind that `touchup refine` reads
     #[arg(value_name = "RECORDING")]
     recordings: Vec<PathBuf>,
-    /// Output: the jobs, a line of JSON for each; by default they are printed. Paths in them are relative to its folder
+    /// Output: the jobs, a line of JSON for each; by default they are printed. Paths in them are
+    /// relative to its folder
     #[arg(long, value_name = "JSONL")]
     out: Option<PathBuf>,
 }
@@ -50,7 +52,8 @@ pub(in crate::cli) fn plan(arguments: &PlanArguments) -> Result<Losses, CliError
     Ok(Losses::new())
 }
 
-/// Writes the jobs of a sweep into a file, as a whole or not at all, and returns how many there are.
+/// Writes the jobs of a sweep into a file, as a whole or not at all, and returns how many there
+/// are.
 ///
 /// - `grid`: what is swept; `recordings`: more of them, relative to the present folder.
 ///

@@ -1,4 +1,5 @@
-//! `touchup whatif`: what moved from one result of a sweep to another by more than either is uncertain.
+//! `touchup whatif`: what moved from one result of a sweep to another by more than either is
+//! uncertain.
 
 mod page;
 mod report;
@@ -40,7 +41,8 @@ pub(super) struct WhatIfArguments {
     /// Output: a row for each number of each feature, .csv or .parquet
     #[arg(long, value_name = "TABLE")]
     features_out: Option<PathBuf>,
-    /// Output: the mesh of B, coloured, with the columns displacement_mm, plus_minus_mm and moved, in mm
+    /// Output: the mesh of B, coloured, with the columns displacement_mm, plus_minus_mm and moved,
+    /// in mm
     #[arg(long, value_name = "PLY")]
     mesh_out: Option<PathBuf>,
     /// Prints one JSON object

@@ -13,7 +13,8 @@ use crate::sweep::{COVERAGE as K, FeatureChange, JobResult, NumberChange, WhatIf
 const WIDTH: u32 = 1000;
 /// What did not move.
 const STILL: Rgb = [222, 225, 230];
-/// Where the colours change, in ±; each with that of what went inwards and of what came outwards. The colour-blind tell them apart.
+/// Where the colours change, in ±; each with that of what went inwards and of what came outwards.
+/// The colour-blind tell them apart.
 const STEPS: [(f64, Rgb, Rgb); 3] = [
     (1.0, [146, 190, 224], [247, 186, 142]),
     (2.0, [64, 122, 188], [224, 112, 70]),

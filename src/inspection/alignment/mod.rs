@@ -1,5 +1,5 @@
-//! The measured features in the frame of the drawing: the rigid motion that takes the part there, by a best fit or by datums, and what it
-//! adds to the uncertainty of places.
+//! The measured features in the frame of the drawing: the rigid motion that takes the part there,
+//! by a best fit or by datums, and what it adds to the uncertainty of places.
 
 mod error;
 mod method;
@@ -113,8 +113,8 @@ pub fn aligned(
     })
 }
 
-/// From where the search begins: by the features that the drawing names, where all that are to be used are named, else by the pattern of
-/// all.
+/// From where the search begins: by the features that the drawing names, where all that are to be
+/// used are named, else by the pattern of all.
 fn start(
     drawn: &[DrawnFeature],
     measured: &[Feature],
@@ -145,7 +145,8 @@ fn start(
     })
 }
 
-/// Each feature of the drawing with the measured one that it is after a motion, or why none can be used.
+/// Each feature of the drawing with the measured one that it is after a motion, or why none can be
+/// used.
 fn matched(
     drawn: &[DrawnFeature],
     measured: &[Feature],

@@ -43,7 +43,8 @@ pub(super) fn start_of_pattern(
         .map_err(AlignmentError::NotFound)
 }
 
-/// By features that the drawing names: from every turn by quarters the fit is tried, and what fits is taken.
+/// By features that the drawing names: from every turn by quarters the fit is tried, and what fits
+/// is taken.
 ///
 /// - `reach`: how far a feature may be off, m.
 ///

@@ -16,7 +16,8 @@ pub(super) struct DecisionLook {
     pub sign: &'static str,
 }
 
-/// Bluish green, vermillion and yellow: told apart without red or green as well, and each has its sign and its word.
+/// Bluish green, vermillion and yellow: told apart without red or green as well, and each has its
+/// sign and its word.
 pub(super) fn look_of(decision: &str) -> DecisionLook {
     match decision {
         "pass" => DecisionLook {

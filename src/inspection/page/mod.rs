@@ -1,4 +1,5 @@
-//! The report: one file of HTML without scripts, which asks for nothing outside of it and prints on A4.
+//! The report: one file of HTML without scripts, which asks for nothing outside of it and prints on
+//! A4.
 
 mod alignment;
 mod decisions;

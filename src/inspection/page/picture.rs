@@ -156,7 +156,8 @@ const OUTLINE_POINTS: usize = 720;
 /// Balloons are so far apart along it, in radii, where there is room.
 const APART: f64 = 2.8;
 
-/// Places of the balloons around the part, each in the direction of its feature, apart from one another.
+/// Places of the balloons around the part, each in the direction of its feature, apart from one
+/// another.
 ///
 /// - `size`: of the picture, pixels.
 fn balloon_seats(places: &[[f64; 2]], [width, height]: [f64; 2]) -> Vec<[f64; 2]> {
@@ -199,11 +200,11 @@ fn balloon_seats(places: &[[f64; 2]], [width, height]: [f64; 2]) -> Vec<[f64; 2]
     placed
 }
 
-/// The places along a closed line of this length that are nearest to the wanted ones by least squares, and this far apart, or all around
-/// where there is no room for that.
+/// The places along a closed line of this length that are nearest to the wanted ones by least
+/// squares, and this far apart, or all around where there is no room for that.
 ///
-/// - `wanted`: ascending. Less what the others before each need, they are to be ascending too: by pooling those that are not
-///   \[Barlow et al. 1972\].
+/// - `wanted`: ascending. Less what the others before each need, they are to be ascending too: by
+///   pooling those that are not \[Barlow et al. 1972\].
 fn spread(wanted: &[f64], length: f64, apart: f64) -> Vec<f64> {
     let count = wanted.len();
     let apart = apart.min(length / count.max(1) as f64);

@@ -136,7 +136,8 @@ pub(super) fn residual_plot(evidence: &TouchEvidence) -> String {
     svg + "</svg>"
 }
 
-/// Force against the approach over the travel, of touches that count; `None` where no curve is there.
+/// Force against the approach over the travel, of touches that count; `None` where no curve is
+/// there.
 pub(super) fn force_plot(touches: &[&TouchLine]) -> Option<String> {
     let with_curve: Vec<_> = touches
         .iter()

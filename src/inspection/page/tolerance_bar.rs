@@ -1,4 +1,5 @@
-//! A characteristic drawn: tolerance zone, acceptance zone, measured value with its expanded uncertainty.
+//! A characteristic drawn: tolerance zone, acceptance zone, measured value with its expanded
+//! uncertainty.
 
 use std::fmt::Write;
 

@@ -16,7 +16,8 @@ enum YamlPiece {
 
 const INNER: &str = "ros__parameters";
 
-/// Pattern of the nodes, name and value of every parameter in a file. Names of nested parameters are joined by dots.
+/// Pattern of the nodes, name and value of every parameter in a file. Names of nested parameters
+/// are joined by dots.
 pub(super) fn entries(text: &str) -> Result<Vec<(String, String, ParameterValue)>, String> {
     // an empty file says nothing
     let piece: Option<YamlPiece> =
@@ -76,7 +77,8 @@ fn parameters_below(
             }
         }
         YamlPiece::Value(value) => found.push((nodes.to_owned(), prefix.to_owned(), value)),
-        // no parameter of this node is a list: it is refused as a wrong word, or is for another node
+        // no parameter of this node is a list: it is refused as a wrong word, or is for another
+        // node
         YamlPiece::List => found.push((
             nodes.to_owned(),
             prefix.to_owned(),

@@ -279,7 +279,8 @@ fn report(service: &str, sent: Result<(), WriteError<()>>) {
     }
 }
 
-/// What a request to cancel names: the goal (zeros: none), and the moment up to which goals are meant (0: none), ns.
+/// What a request to cancel names: the goal (zeros: none), and the moment up to which goals are
+/// meant (0: none), ns.
 ///
 /// The fields of that message are closed to us; its bytes are not.
 fn wanted(request: &CancelGoalRequest) -> ([u8; 16], i64) {

@@ -1,10 +1,12 @@
 //! Answers that go out whole.
 //!
-//! RustDDS 0.15.1 writes the inline QoS of a fragment so that nobody can read it, and ros2-client names the request of an answer
-//! there: one that goes out in fragments is lost. So where ros2-client answers, which is the enhanced mapping (Fast DDS) and the
-//! action in either, an answer is made to fit into one packet: our own do by design but for long texts, and of parameters the caller
-//! asks for fewer at a time. What does not fit goes out as the same message with less in it, and the log says so. The services in the
-//! mapping of CycloneDDS are our own ([`super::services`]) and have no such limit.
+//! RustDDS 0.15.1 writes the inline QoS of a fragment so that nobody can read it, and ros2-client
+//! names the request of an answer there: one that goes out in fragments is lost. So where
+//! ros2-client answers, which is the enhanced mapping (Fast DDS) and the action in either, an
+//! answer is made to fit into one packet: our own do by design but for long texts, and of
+//! parameters the caller asks for fewer at a time. What does not fit goes out as the same message
+//! with less in it, and the log says so. The services in the mapping of CycloneDDS are our own
+//! ([`super::services`]) and have no such limit.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -17,18 +19,21 @@ use ros2_client::action::GetResultResponse;
 use crate::ros::locked;
 use crate::ros::messages::*;
 
-/// Largest packet of a network, in bytes: that of Ethernet, which RustDDS too assumes where it knows no smaller one.
+/// Largest packet of a network, in bytes: that of Ethernet, which RustDDS too assumes where it
+/// knows no smaller one.
 pub(super) const ETHERNET: usize = 1500;
-/// Of a packet not the answer: headers of IP (20), UDP (8) and RTPS (20), INFO_DST (16), INFO_TS (12), DATA (24), the two
-/// parameters that name the request and the end of their list (60), HEARTBEAT (32). RustDDS counts 128 of them and makes fragments
-/// of what is larger; with all of them a packet is not parted by IP either.
+/// Of a packet not the answer: headers of IP (20), UDP (8) and RTPS (20), INFO_DST (16), INFO_TS
+/// (12), DATA (24), the two parameters that name the request and the end of their list (60),
+/// HEARTBEAT (32). RustDDS counts 128 of them and makes fragments of what is larger; with all of
+/// them a packet is not parted by IP either.
 const HEADERS: usize = 192;
 /// The four bytes before a message that say how it is written.
 const ENCAPSULATION: usize = 4;
 
 /// An answer that can be made smaller.
 pub(super) trait Shrinkable: ros2_client::Message {
-    /// Leaves out what does not fit into so many bytes, what matters least first. The rest stays true.
+    /// Leaves out what does not fit into so many bytes, what matters least first. The rest stays
+    /// true.
     fn reduce(&mut self, most: usize);
 }
 
@@ -131,7 +136,8 @@ fn excess(answer: &impl ros2_client::Message, most: usize) -> usize {
     if too_many > 0 { too_many + 8 } else { 0 }
 }
 
-/// Answers of which the texts alone have no limit: `texts!(Answer: text, text)`, what matters least first.
+/// Answers of which the texts alone have no limit: `texts!(Answer: text, text)`, what matters least
+/// first.
 macro_rules! texts {
     ($($answer:ty: $($($field:ident).+),+;)+) => {
         $(impl Shrinkable for $answer {
@@ -159,7 +165,8 @@ texts! {
     SetParametersAtomicallyResponse: result.reason;
 }
 
-/// Answers with a list: `lists!(Answer: list of what, [what is left out of each of it first, and next])`; then all of it goes.
+/// Answers with a list: `lists!(Answer: list of what, [what is left out of each of it first, and
+/// next])`; then all of it goes.
 macro_rules! lists {
     ($($answer:ty: $($list:ident).+ of $item:ty, $steps:expr;)+) => {
         $(impl Shrinkable for $answer {
@@ -572,7 +579,8 @@ mod tests {
             println!("{bytes:5} bytes of {} {service}", room(ETHERNET));
             assert!(bytes <= room(ETHERNET), "{service}: {bytes} bytes");
         }
-        // beside a network of smaller packets, as of machines in a cloud, names, types and ranges still are there
+        // beside a network of smaller packets, as of machines in a cloud, names, types and ranges
+        // still are there
         let mut without_words = described(names());
         without_words.reduce(room(1400));
         assert_eq!(without_words.descriptors.len(), PARAMETERS.len());

@@ -23,7 +23,8 @@ use crate::ros::port::{ArmPort, ArmReport};
 
 /// Messages of a topic that DDS keeps until they are taken: a tenth of a second at 1 kHz.
 const DEPTH: usize = 100;
-/// Messages that wait for the arm's driver; who does not take them for a second finds the oldest, and sees that they are late.
+/// Messages that wait for the arm's driver; who does not take them for a second finds the oldest,
+/// and sees that they are late.
 const WAITING: usize = 2048;
 
 struct DdsArm {

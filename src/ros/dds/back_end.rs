@@ -71,7 +71,8 @@ pub(super) fn join(config: &NodeConfig, options: NodeOptions) -> Result<(Context
     Ok((context, node))
 }
 
-/// A node that others must not reach does not run where they do; without a filter for what is too large it does.
+/// A node that others must not reach does not run where they do; without a filter for what is too
+/// large it does.
 fn guard(before: std::io::Result<OpenSockets>, localhost_only: bool) -> Result<(), RosError> {
     let range = if localhost_only {
         Range::Computer

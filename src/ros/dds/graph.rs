@@ -57,7 +57,8 @@ pub(super) struct DdsGraph {
     pub services: Vec<String>,
     /// our readers and writers: ROS name of the topic, and who is matched
     matched: BTreeMap<GUID, (String, BTreeSet<GUID>)>,
-    /// what others call services with: the service in ROS, and what is so once both sides know each other
+    /// what others call services with: the service in ROS, and what is so once both sides know each
+    /// other
     callers: BTreeMap<GUID, (String, &'static str)>,
     /// of the other participants
     vendors: BTreeMap<GUID, [u8; 2]>,

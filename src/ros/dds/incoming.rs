@@ -16,7 +16,8 @@ use crate::ros::port::Arrival;
 
 /// Something that messages come from.
 pub(super) trait Listener: Send {
-    /// Gives out what wakes the thread, once for all that came since it was last read empty. Asked for once, before anything is taken.
+    /// Gives out what wakes the thread, once for all that came since it was last read empty. Asked
+    /// for once, before anything is taken.
     fn sources(
         &mut self,
         each: &mut dyn FnMut(&mut dyn Source) -> io::Result<()>,
@@ -25,7 +26,8 @@ pub(super) trait Listener: Send {
     /// Takes all that is there.
     fn take(&mut self);
 
-    /// Whether other sources are to wake the thread from now on, as what others publish has changed.
+    /// Whether other sources are to wake the thread from now on, as what others publish has
+    /// changed.
     fn has_changed(&mut self) -> bool {
         false
     }
@@ -36,7 +38,8 @@ const WAKE: Token = Token(usize::MAX);
 
 /// Starts the thread; the waker lets it look whether all is over.
 ///
-/// - `look_every`: how long listeners may go without being asked for what is there; `None` where only what comes counts.
+/// - `look_every`: how long listeners may go without being asked for what is there; `None` where
+///   only what comes counts.
 pub(super) fn listen(
     mut listeners: Vec<Box<dyn Listener>>,
     look_every: Option<Duration>,
@@ -91,7 +94,8 @@ pub(super) fn listen(
     Ok((waker, thread))
 }
 
-/// Takes all that is there of what has this name; what cannot be read is reported with a remark behind the reason.
+/// Takes all that is there of what has this name; what cannot be read is reported with a remark
+/// behind the reason.
 pub(super) fn drain<T>(
     (name, exchange, remark): (&'static str, &Arc<Exchange>, &str),
     mut receive: impl FnMut() -> ReadResult<Option<T>>,

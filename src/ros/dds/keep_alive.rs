@@ -1,10 +1,12 @@
-//! Waits longer for participants that are silent than RustDDS does: a cable was out, a computer was busy, a packet was lost.
+//! Waits longer for participants that are silent than RustDDS does: a cable was out, a computer was
+//! busy, a packet was lost.
 //!
-//! A participant says that it is alive by announcing itself every few seconds (RTPS 2.5, 8.5.3), and whoever hears nothing of it
-//! for the time that it asks for forgets it: CycloneDDS asks for 10 s and announces itself every 8 s, so one lost packet is
-//! enough. RustDDS 0.15 then never meets it again, as it takes what the participant says of itself once more for what it knows
-//! already. So it hears the last announcement again from here until the participant has been silent for [`PATIENCE`], unless
-//! its computer says that the program has ended.
+//! A participant says that it is alive by announcing itself every few seconds (RTPS 2.5, 8.5.3),
+//! and whoever hears nothing of it for the time that it asks for forgets it: CycloneDDS asks for 10
+//! s and announces itself every 8 s, so one lost packet is enough. RustDDS 0.15 then never meets it
+//! again, as it takes what the participant says of itself once more for what it knows already. So
+//! it hears the last announcement again from here until the participant has been silent for
+//! [`PATIENCE`], unless its computer says that the program has ended.
 
 use std::collections::BTreeMap;
 use std::io::{Error, ErrorKind, Result};
@@ -14,14 +16,15 @@ use std::time::{Duration, Instant};
 use ros2_client::dds::rustdds::mio1::net::UdpSocket as MioSocket;
 use socket2::{Domain, Protocol, Socket, Type};
 
-/// So long a participant may be silent. RustDDS asks the others for 50 s and announces itself every 10 s: beyond 40 s of
-/// silence they may have forgotten us, and both sides must begin anew.
+/// So long a participant may be silent. RustDDS asks the others for 50 s and announces itself every
+/// 10 s: beyond 40 s of silence they may have forgotten us, and both sides must begin anew.
 const PATIENCE: Duration = Duration::from_secs(40);
 /// How often it is looked for who is silent.
 pub(super) const LOOK_EVERY: Duration = Duration::from_millis(500);
 /// Where participants announce themselves (RTPS 2.5, 9.6.2.4.1).
 const GROUP: Ipv4Addr = Ipv4Addr::new(239, 255, 0, 1);
-/// Ports of the first domain, and from one domain and one participant to the next (RTPS 2.5, 9.6.2.3).
+/// Ports of the first domain, and from one domain and one participant to the next (RTPS 2.5,
+/// 9.6.2.3).
 const MULTICAST_PORT: u32 = 7400;
 const UNICAST_PORT: u32 = 7410;
 const PORTS_OF_A_DOMAIN: u32 = 250;
@@ -60,7 +63,8 @@ struct KnownParticipant {
 
 enum PeerState {
     Heard,
-    /// silent for long: its computer was asked whether the program still has its port, where there is a way to it
+    /// silent for long: its computer was asked whether the program still has its port, where there
+    /// is a way to it
     Asked(Option<UdpSocket>),
     /// it has not
     Ended,
@@ -99,7 +103,8 @@ impl KeepAlive {
         socket.set_reuse_port(true)?;
         socket.bind(&SocketAddr::from((Ipv4Addr::UNSPECIFIED, port)).into())?;
         socket.set_nonblocking(true)?;
-        // on Linux a socket hears every group that any other has joined, as RustDDS has on each interface
+        // on Linux a socket hears every group that any other has joined, as RustDDS has on each
+        // interface
         if let Err(error) = socket.join_multicast_v4(&GROUP, &Ipv4Addr::UNSPECIFIED) {
             tracing::debug!(%error, "no route for multicast yet");
         }
@@ -196,8 +201,9 @@ impl KeepAlive {
     }
 }
 
-/// A message without content, for the port that a participant sends from. Where the program has ended its computer answers that
-/// nobody is there (ICMP, RFC 792); nobody answers where the way is cut.
+/// A message without content, for the port that a participant sends from. Where the program has
+/// ended its computer answers that nobody is there (ICMP, RFC 792); nobody answers where the way is
+/// cut.
 fn ask(port: SocketAddr) -> Result<UdpSocket> {
     let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0))?;
     socket.set_nonblocking(true)?;
@@ -210,8 +216,9 @@ fn is_refused(asked: &UdpSocket) -> bool {
     matches!(asked.take_error(), Ok(Some(error)) if error.kind() == ErrorKind::ConnectionRefused)
 }
 
-/// Sends a datagram to our own participant, from an address of ours that reaches whom it is from: a loopback address would
-/// make RustDDS believe that he is on this computer. It is taken where there is no way to him at all.
+/// Sends a datagram to our own participant, from an address of ours that reaches whom it is from: a
+/// loopback address would make RustDDS believe that he is on this computer. It is taken where there
+/// is no way to him at all.
 fn hand_over(datagram: &[u8], from: SocketAddr, port: u16) -> Result<()> {
     let way = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0))?;
     let own: IpAddr = match way.connect(from) {
@@ -230,7 +237,8 @@ const PAD: u8 = 0x01;
 const INFO_TS: u8 = 0x09;
 const INFO_SOURCE: u8 = 0x0c;
 const DATA: u8 = 0x15;
-/// Flags of a submessage DATA: byte order, whether there are parameters before the data, and whether there is data.
+/// Flags of a submessage DATA: byte order, whether there are parameters before the data, and
+/// whether there is data.
 const LITTLE_ENDIAN: u8 = 0x01;
 const HAS_PARAMETERS: u8 = 0x02;
 const HAS_DATA: u8 = 0x04;
@@ -467,7 +475,8 @@ mod tests {
     fn who_is_silent_is_spoken_for_before_each_end_of_its_lease_until_patience_ends() {
         let mut watched = WatchedPeer::new();
         watched.hear(10, 0.0);
-        // asked 1.5 s before the end, handed over 0.5 s later; what begins at 27 s ends at 37 s, and 46 s would be too late
+        // asked 1.5 s before the end, handed over 0.5 s later; what begins at 27 s ends at 37 s,
+        // and 46 s would be too late
         assert_eq!(watched.handed_over(0.0, 100.0), [9.0, 18.0, 27.0]);
         watched.hear(10, 100.0);
         assert_eq!(watched.handed_over(100.0, 110.0), [109.0]);

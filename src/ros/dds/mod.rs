@@ -1,7 +1,8 @@
 //! The port on its own DDS: ros2-client over RustDDS, no ROS installation needed.
 //!
-//! Three threads of ours stand beside those of DDS. One takes what comes and puts it into the inbox of the node. Two
-//! send: one what is small and urgent, answers among it; one the mesh, where a slow listener may hold things up.
+//! Three threads of ours stand beside those of DDS. One takes what comes and puts it into the inbox
+//! of the node. Two send: one what is small and urgent, answers among it; one the mesh, where a
+//! slow listener may hold things up.
 
 mod action;
 mod answers;
@@ -48,7 +49,8 @@ struct DdsConnection {
     node: Option<Arc<Mutex<Node>>>,
 }
 
-/// The network is left within this time, or as it is: RustDDS that is busy with what it received keeps no node from its end.
+/// The network is left within this time, or as it is: RustDDS that is busy with what it received
+/// keeps no node from its end.
 const LEAVES_WITHIN: Duration = Duration::from_secs(20);
 
 impl Drop for DdsConnection {

@@ -1,7 +1,8 @@
 //! Services, in the mapping of either RMW.
 //!
-//! In the enhanced mapping a server is that of ros2-client. In the mapping of CycloneDDS it is our own: that of ros2-client puts the
-//! identity of the request into the inline QoS there too, which nobody reads, and which RustDDS 0.15.1 writes wrongly in fragments.
+//! In the enhanced mapping a server is that of ros2-client. In the mapping of CycloneDDS it is our
+//! own: that of ros2-client puts the identity of the request into the inline QoS there too, which
+//! nobody reads, and which RustDDS 0.15.1 writes wrongly in fragments.
 
 use std::io;
 use std::sync::Arc;
@@ -105,7 +106,8 @@ where
 pub(super) const SERVICE: QosProfile =
     QosProfile::publisher_default().history(History::KeepLast { depth: 10 });
 
-/// A request or an answer as rmw_cyclonedds has it: whose call it is, and its number, stand before the message.
+/// A request or an answer as rmw_cyclonedds has it: whose call it is, and its number, stand before
+/// the message.
 #[derive(Clone, Serialize, Deserialize)]
 struct Headed<M> {
     caller: u64,

@@ -1,8 +1,10 @@
-//! What RustDDS leaves open on its sockets is closed from here: it listens on every interface whatever networks it was given, and of a
-//! message in fragments it takes the memory that the first fragment claims, up to 4 GB.
+//! What RustDDS leaves open on its sockets is closed from here: it listens on every interface
+//! whatever networks it was given, and of a message in fragments it takes the memory that the first
+//! fragment claims, up to 4 GB.
 //!
-//! Its sockets are known by having come while it joined. The kernel then drops fragments of what is larger than any message to a node
-//! of ours, and with [`Range::Computer`] all that does not come over the loopback interface.
+//! Its sockets are known by having come while it joined. The kernel then drops fragments of what is
+//! larger than any message to a node of ours, and with [`Range::Computer`] all that does not come
+//! over the loopback interface.
 
 use std::collections::BTreeSet;
 use std::fs::{self, DirEntry};
@@ -13,7 +15,8 @@ use std::path::PathBuf;
 
 use socket2::{SockFilter, SockRef, Type};
 
-/// Messages in fragments up to so many bytes are taken; what a node of ours listens to has a hundredth of it.
+/// Messages in fragments up to so many bytes are taken; what a node of ours listens to has a
+/// hundredth of it.
 const LARGEST_MESSAGE: u32 = 1 << 20;
 /// Submessages of a datagram that are looked at; participants put a few into one.
 const MOST_SUBMESSAGES: usize = 24;
@@ -27,7 +30,8 @@ pub(super) enum Range {
     Networks,
 }
 
-/// The open sockets of this process: the number of the file, and what the system calls the socket, as numbers are given again.
+/// The open sockets of this process: the number of the file, and what the system calls the socket,
+/// as numbers are given again.
 #[derive(Debug)]
 pub(super) struct OpenSockets(BTreeSet<(RawFd, PathBuf)>);
 
@@ -58,8 +62,9 @@ impl OpenSockets {
         let filter = filter();
         let mut guarded = 0;
         for &(number, _) in Self::now()?.0.difference(&self.0) {
-            // SAFETY: it was open a moment ago, and is borrowed for a few system calls, each of which refuses what is no socket; a file
-            // that another thread has opened under this number meanwhile is no UDP socket, or is one that may be guarded as well
+            // SAFETY: it was open a moment ago, and is borrowed for a few system calls, each of
+            // which refuses what is no socket; a file that another thread has opened under this
+            // number meanwhile is no UDP socket, or is one that may be guarded as well
             let file = unsafe { BorrowedFd::borrow_raw(number) };
             let socket = SockRef::from(&file);
             let address = socket
@@ -94,10 +99,11 @@ const DATA_SIZE: u32 = 32;
 const TAKEN: SockFilter = SockFilter::new(0x06, 0, 0, u32::MAX);
 const DROPPED: SockFilter = SockFilter::new(0x06, 0, 0, 0);
 
-/// Passes all but fragments of messages of [`LARGEST_MESSAGE`] and more: walks along the submessages of a datagram, X at the header of
-/// one after the other.
+/// Passes all but fragments of messages of [`LARGEST_MESSAGE`] and more: walks along the
+/// submessages of a datagram, X at the header of one after the other.
 fn filter() -> Vec<SockFilter> {
-    // a jump names how many instructions it skips, where what is asked for is so and where it is not
+    // a jump names how many instructions it skips, where what is asked for is so and where it is
+    // not
     let op = SockFilter::new;
     let length = || op(0x80, 0, 0, 0);
     let byte = |at| op(0x50, 0, 0, at);

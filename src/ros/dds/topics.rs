@@ -29,7 +29,8 @@ pub(super) const fn keep(profile: QosProfile, depth: usize) -> QosProfile {
     profile.history(History::KeepLast { depth })
 }
 
-/// Touches on their way at most, of 33 kB each: together they fit into the buffer that Linux gives a socket (212 kB).
+/// Touches on their way at most, of 33 kB each: together they fit into the buffer that Linux gives
+/// a socket (212 kB).
 const TOUCHES_SENT: usize = 4;
 
 pub(super) fn profile(topic: Topic) -> QosProfile {
@@ -46,8 +47,8 @@ pub(super) fn profile(topic: Topic) -> QosProfile {
     keep(profile, limit(topic).unwrap_or(topic.depth))
 }
 
-/// Of large messages no more are on their way than this: RustDDS keeps each until everybody has it, and who listens slowly or is
-/// silent would see what was long ago, or lose some of many at once.
+/// Of large messages no more are on their way than this: RustDDS keeps each until everybody has it,
+/// and who listens slowly or is silent would see what was long ago, or lose some of many at once.
 fn limit(topic: Topic) -> Option<usize> {
     [(MESH, TILES_KEPT), (PROBE_TOUCHES, TOUCHES_SENT)]
         .into_iter()

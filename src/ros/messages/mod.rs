@@ -1,9 +1,10 @@
 //! Messages as ROS 2 has them: plain structs, fields in the order in which they are on the wire.
 //!
-//! Units are m, rad, N, N·m and s. What has a header is in the frame that it names; what has none is in that of the message
-//! around it.
+//! Units are m, rad, N, N·m and s. What has a header is in the frame that it names; what has none
+//! is in that of the message around it.
 //!
-//! `generate/` makes them from the definitions in `msg/` and, of the packages that every ROS 2 has, in `standard/`.
+//! `generate/` makes them from the definitions in `msg/` and, of the packages that every ROS 2 has,
+//! in `standard/`.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;

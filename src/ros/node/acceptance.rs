@@ -12,7 +12,8 @@ const SETTLES: Duration = Duration::from_secs(1);
 /// Refusals that mean nothing for poses and wrenches.
 const OF_OTHERS: [&str; 2] = ["bad_transform", "clicked_point"];
 
-/// What is one in so many of all that is refused may be the cause of the others: ten wrenches miss each pose, and more.
+/// What is one in so many of all that is refused may be the cause of the others: ten wrenches miss
+/// each pose, and more.
 const FEWEST_OF_A_CAUSE: u64 = 50;
 
 /// Counts since the session began.
@@ -186,7 +187,8 @@ mod tests {
 
     const MS: Duration = Duration::from_millis(1);
 
-    /// Judges every 5 ms for so many ms; in each ms `each` adds to accepted and to the refused, by reason.
+    /// Judges every 5 ms for so many ms; in each ms `each` adds to accepted and to the refused, by
+    /// reason.
     fn after(ms: u32, each: impl Fn(u32, &mut u64, &mut BTreeMap<String, u64>)) -> Verdict {
         let (begun, mut acceptance) = (Instant::now(), Acceptance::default());
         let (mut accepted, mut refused, mut verdict) = (0, BTreeMap::new(), Verdict::Begins);

@@ -49,7 +49,8 @@ pub struct LastTip {
     pub centre: Point3<f64>,
     /// radius of the ball, m
     pub radius: f64,
-    /// the closest point of the mesh, and how far the ball's surface is from it, m; `None` beyond the reach
+    /// the closest point of the mesh, and how far the ball's surface is from it, m; `None` beyond
+    /// the reach
     pub closest: Option<(Point3<f64>, f64)>,
 }
 

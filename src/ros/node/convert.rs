@@ -22,7 +22,8 @@ pub fn header(stamp_ns: i64, frame: &str) -> Header {
     }
 }
 
-/// A pose as it was measured; `None` when its orientation is no rotation. The position may be anything.
+/// A pose as it was measured; `None` when its orientation is no rotation. The position may be
+/// anything.
 pub fn isometry(pose: &Pose) -> Option<Isometry3<f64>> {
     let (p, q) = (&pose.position, &pose.orientation);
     let rotation = measured_rotation(Quaternion::new(q.w, q.x, q.y, q.z))?;

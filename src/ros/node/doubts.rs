@@ -13,7 +13,8 @@ use crate::ros::locked;
 
 /// The input is looked at so often.
 const LOOKED_EVERY: Duration = Duration::from_secs(5);
-/// What is no doubt while somebody may still come to touch something, or what the state of the streams says itself.
+/// What is no doubt while somebody may still come to touch something, or what the state of the
+/// streams says itself.
 const OF_OTHERS: [InputCause; 3] = [
     InputCause::NoContact,
     InputCause::NoSample,

@@ -1,6 +1,8 @@
-//! The variance of what was touched, for `MeshPatch`: evaluated on a thread of its own once the mesh rests, where somebody follows it.
+//! The variance of what was touched, for `MeshPatch`: evaluated on a thread of its own once the
+//! mesh rests, where somebody follows it.
 //!
-//! The mesh with it is the next version, so that a follower takes it up as any other change; no vertex moves by it.
+//! The mesh with it is the next version, so that a follower takes it up as any other change; no
+//! vertex moves by it.
 
 use std::sync::Arc;
 use std::sync::mpsc::{TryRecvError, sync_channel};
@@ -12,13 +14,15 @@ use super::channels::ViewInput;
 use super::refinement::RefinementWorker;
 use super::variances::{VarianceState, Variances, VertexVariance, evaluated};
 
-/// Without a sample for so long the variance is evaluated: longer than the node takes to settle the mesh.
+/// Without a sample for so long the variance is evaluated: longer than the node takes to settle the
+/// mesh.
 const KNOWN_AFTER: Duration = Duration::from_millis(1000);
 /// How long the copies of mesh and evidence may take.
 const COPY_WAIT: Duration = Duration::from_secs(30);
 
 impl RefinementWorker {
-    /// Begins to evaluate the variances when they are due, and passes on what was evaluated; never waits.
+    /// Begins to evaluate the variances when they are due, and passes on what was evaluated; never
+    /// waits.
     pub(super) fn go_on_with_variance(&mut self, now: Instant) {
         let is_done = self
             .variance

@@ -315,8 +315,8 @@ fn has_label(feature: &FeatureMsg) -> bool {
     ) || feature.status == FeatureMsg::STATUS_FLAGGED
 }
 
-/// Red, green, blue of what is flagged, fitted to touches, and found on the mesh. None of them is a colour of the mesh, in front
-/// of which they are.
+/// Red, green, blue of what is flagged, fitted to touches, and found on the mesh. None of them is a
+/// colour of the mesh, in front of which they are.
 pub(super) const COLOURS: [[f32; 3]; 3] = [[0.64, 0.01, 0.52], [0.1, 0.3, 1.0], [0.2, 0.95, 1.0]];
 
 fn colour(feature: &FeatureMsg) -> ColorRGBA {
@@ -384,7 +384,8 @@ fn cylinder(feature: &FeatureMsg, base: &Marker) -> Marker {
     } else {
         feature.depth
     };
-    // a hole goes down from its opening and is seen inside of it, a boss up from its foot and is seen around it
+    // a hole goes down from its opening and is seen inside of it, a boss up from its foot and is
+    // seen around it
     let (side, up) = if feature.kind == FeatureMsg::KIND_BOSS {
         (1.0, 0.5)
     } else {

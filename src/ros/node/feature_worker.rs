@@ -218,8 +218,8 @@ impl FeatureWorker {
         self.names.get(&id).copied().unwrap_or(id)
     }
 
-    /// The nearest feature where somebody pointed, of the kind that is meant. A region to be explored stays one: a plane in it is
-    /// no answer.
+    /// The nearest feature where somebody pointed, of the kind that is meant. A region to be
+    /// explored stays one: a plane in it is no answer.
     fn nearest(&self, flag: &Flag, may_be: impl Fn(&Feature) -> bool) -> Option<&Feature> {
         let far = |feature: &&Feature| (feature.centre.value - flag.place).norm();
         let is_meant = |feature: &&Feature| {

@@ -1,8 +1,10 @@
-//! From the frames that headers name to those of a recording that `touchup refine` reads with the scene.
+//! From the frames that headers name to those of a recording that `touchup refine` reads with the
+//! scene.
 //!
-//! Poses come into the frame in which the scene has them: `cell` where it says where the scan lies in that
-//! (`scan_to_space`), else that of the object. A wrench comes into the sensor's own axes, or into those of the poses. So what
-//! is recorded of a session is, with its scene, all that it takes to get the same result.
+//! Poses come into the frame in which the scene has them: `cell` where it says where the scan lies
+//! in that (`scan_to_space`), else that of the object. A wrench comes into the sensor's own axes,
+//! or into those of the poses. So what is recorded of a session is, with its scene, all that it
+//! takes to get the same result.
 
 use nalgebra::{Isometry3, UnitQuaternion};
 
@@ -33,7 +35,8 @@ pub enum Refusal {
     /// The frames are not connected at its stamp.
     #[error(transparent)]
     Frame(#[from] FrameError),
-    /// Wrenches came in the sensor's axes before and come in the object's now, or the other way round.
+    /// Wrenches came in the sensor's axes before and come in the object's now, or the other way
+    /// round.
     #[error("its axes are others than those of the wrenches before: reset begins anew")]
     AxesChanged,
 }

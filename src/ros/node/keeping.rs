@@ -1,4 +1,5 @@
-//! Whether the samples of a session are recorded as they come, or come from what was recorded of it.
+//! Whether the samples of a session are recorded as they come, or come from what was recorded of
+//! it.
 
 use std::path::{Path, PathBuf};
 
@@ -97,8 +98,8 @@ impl ReplayedSession {
         self.history.next_before(stamp_ns)
     }
 
-    /// The next change of strokes that was made after the last sample that has come. What was recorded later, of a session that goes on, is
-    /// of strokes that have not come.
+    /// The next change of strokes that was made after the last sample that has come. What was
+    /// recorded later, of a session that goes on, is of strokes that have not come.
     pub fn next_change_at_end(&mut self) -> Option<StrokeChange> {
         let seen_ns = self.seen_ns?;
         self.next_change_before(seen_ns.saturating_add(1))

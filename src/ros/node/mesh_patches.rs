@@ -96,7 +96,8 @@ impl MeshPatches {
             .for_each(|vertex| self.vertices.changed.insert(vertex));
     }
 
-    /// The change from what followers have to what the replica has, in parts; none when it is the same.
+    /// The change from what followers have to what the replica has, in parts; none when it is the
+    /// same.
     pub fn change(&mut self, replica: &MeshVersion, frame: &str) -> Vec<MeshPatch> {
         let is_same = self.vertices.changed.is_empty() && self.faces.changed.is_empty();
         if self.version == replica.version || is_same {
@@ -172,8 +173,8 @@ impl DraftPatch {
             .max(1)
     }
 
-    /// The four lists one after the other, cut into parts: so a face comes after its corners, and a vertex goes after all
-    /// faces that used it.
+    /// The four lists one after the other, cut into parts: so a face comes after its corners, and a
+    /// vertex goes after all faces that used it.
     fn part(
         &self,
         part: u32,

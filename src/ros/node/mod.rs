@@ -1,8 +1,9 @@
 //! The node: wrench and pose in, the refined mesh and its features out.
 //!
-//! Five threads. `haptic` has the refiner and takes samples, `view` publishes the mesh, `features` finds and fits features,
-//! `recorder` writes down what was accepted, `arm` moves an arm where there is one. Between them are bounded queues; where one is
-//! full, what is only for viewing is dropped first, and it is counted.
+//! Five threads. `haptic` has the refiner and takes samples, `view` publishes the mesh, `features`
+//! finds and fits features, `recorder` writes down what was accepted, `arm` moves an arm where
+//! there is one. Between them are bounded queues; where one is full, what is only for viewing is
+//! dropped first, and it is counted.
 
 mod acceptance;
 mod arm;

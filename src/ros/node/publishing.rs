@@ -1,4 +1,5 @@
-//! What the thread of the samples sends to the others: each mismatch, the place of the tip, changes of the mesh, touches.
+//! What the thread of the samples sends to the others: each mismatch, the place of the tip, changes
+//! of the mesh, touches.
 
 use std::sync::mpsc::TrySendError;
 use std::time::Duration;
@@ -16,7 +17,8 @@ use crate::ros::messages::HapticMismatch;
 const TIP_EVERY: Duration = Duration::from_millis(25);
 /// … up to here, m.
 const TIP_REACH: f64 = 0.02;
-/// A mesh torn by a change that goes on with the next sample is shown all the same when none has come for so long.
+/// A mesh torn by a change that goes on with the next sample is shown all the same when none has
+/// come for so long.
 const TORN_AFTER: Duration = Duration::from_millis(200);
 
 impl RefinementWorker {

@@ -1,5 +1,5 @@
-//! The thread of the samples: frames, pairing, haptic update. It alone has the refiner, and does little else; what it
-//! sends to the other threads is in `publishing.rs`.
+//! The thread of the samples: frames, pairing, haptic update. It alone has the refiner, and does
+//! little else; what it sends to the other threads is in `publishing.rs`.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::ControlFlow;
@@ -38,13 +38,15 @@ const IDLE: Duration = Duration::from_millis(10);
 const EDITS_EVERY: Duration = Duration::from_millis(5);
 /// Diagnostics come so often.
 const DIAGNOSTICS_EVERY: Duration = Duration::from_secs(1);
-/// Without a sample for so long the streams rest: longer than a renewal is given, and than usual gaps between poses.
+/// Without a sample for so long the streams rest: longer than a renewal is given, and than usual
+/// gaps between poses.
 const RESTS_AFTER: Duration = Duration::from_millis(50);
 /// What cannot be read is said so often for each topic, and counted meanwhile.
 const UNREADABLE_EVERY: Duration = Duration::from_secs(10);
 /// From here on a stamp does not fit the seconds of a message, ns: 2038.
 const END_OF_TIME_NS: i64 = (1 << 31) * 1_000_000_000;
-/// … and after so long, and while none comes, the mesh becomes what would be saved. A hand lifts the stylus for less.
+/// … and after so long, and while none comes, the mesh becomes what would be saved. A hand lifts
+/// the stylus for less.
 const SETTLES_AFTER: Duration = Duration::from_millis(500);
 /// Messages of a stream that wait for a transform at most.
 const MOST_WAITING: usize = 4096;
@@ -341,9 +343,11 @@ impl RefinementWorker {
         None
     }
 
-    /// A message in its frame goes to the synchroniser and to the recording, and what the first lets out to the refiner.
+    /// A message in its frame goes to the synchroniser and to the recording, and what the first
+    /// lets out to the refiner.
     fn pair(&mut self, message: Message, stream: usize, at: Instant) {
-        // the first wrench says that its axes are those of the object: nothing was pushed yet, so all is begun anew
+        // the first wrench says that its axes are those of the object: nothing was pushed yet, so
+        // all is begun anew
         if self.resolver.axes == Some(WrenchFrame::Object)
             && self.session.axes == WrenchFrame::Sensor
             && let Err(error) = self.session.turn_axes(&self.setup, WrenchFrame::Object)
@@ -379,7 +383,8 @@ impl RefinementWorker {
         }
     }
 
-    /// Moves the mesh and says what was found, then follows the patch and sends what changed to the others.
+    /// Moves the mesh and says what was found, then follows the patch and sends what changed to the
+    /// others.
     ///
     /// - `at`: when the message came that completed the sample, where one did.
     pub(super) fn sample(&mut self, sample: &Sample, at: Option<Instant>) {
@@ -450,7 +455,8 @@ impl RefinementWorker {
             self.edits_sent = now;
             let rested = now.saturating_duration_since(self.sampled);
             if self.fault.is_none() && rested >= RESTS_AFTER {
-                // the mesh goes on to what the patch knows by then: what is shown is not left behind
+                // the mesh goes on to what the patch knows by then: what is shown is not left
+                // behind
                 let engine = &mut self.session.engine;
                 match if rested >= SETTLES_AFTER {
                     engine.settle().map(drop)
@@ -504,7 +510,8 @@ fn shifted(mut message: Message, shift_ns: i64) -> Message {
     message
 }
 
-/// The synchroniser lets only checked samples out, in order of time: what is left is a step whose result is no number.
+/// The synchroniser lets only checked samples out, in order of time: what is left is a step whose
+/// result is no number.
 fn reason_of(error: &RefineError) -> &'static str {
     match error {
         RefineError::Sample(_) => "sample",

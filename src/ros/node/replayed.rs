@@ -1,5 +1,5 @@
-//! A session that was recorded, replayed: strokes are taken back, done again, taken out and put back where they were, and nothing
-//! else acts on it.
+//! A session that was recorded, replayed: strokes are taken back, done again, taken out and put
+//! back where they were, and nothing else acts on it.
 
 use super::keeping::{Keeping, ReplayedSession};
 use super::refinement::RefinementWorker;
@@ -75,7 +75,8 @@ impl RefinementWorker {
         }
     }
 
-    /// Makes the evidence again with or without a stroke, as the changes until then have it. Samples wait meanwhile.
+    /// Makes the evidence again with or without a stroke, as the changes until then have it.
+    /// Samples wait meanwhile.
     fn remake_as_recorded(&mut self, removal: Removal) -> Result<(), String> {
         let Keeping::Replayed(replayed) = &self.session.keeping else {
             return Ok(());

@@ -1,8 +1,8 @@
-//! The replica of the mesh: plain arrays by id, which one worker keeps up to date and all of them read; and the changes on their
-//! way to it.
+//! The replica of the mesh: plain arrays by id, which one worker keeps up to date and all of them
+//! read; and the changes on their way to it.
 //!
-//! Two lists of changes go round, each bounded. When both are on their way, what changes stays in the mesh's journal, which is
-//! bounded by the mesh: the view can be as slow as it likes.
+//! Two lists of changes go round, each bounded. When both are on their way, what changes stays in
+//! the mesh's journal, which is bounded by the mesh: the view can be as slow as it likes.
 
 use std::ops::Deref;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -21,7 +21,8 @@ use crate::ros::locked;
 /// Vertices, and faces, that go at once: some 50 µs.
 const AT_ONCE: usize = 1000;
 
-/// Faces of a tile, by number: 1500 points are 60 kB with their colours, below the 64 kB of a datagram.
+/// Faces of a tile, by number: 1500 points are 60 kB with their colours, below the 64 kB of a
+/// datagram.
 pub const FACES_OF_A_TILE: u32 = 500;
 /// Where a vertex is, m, in O, and what it rests on.
 pub type VertexPlace = (Point3<f64>, Support);
@@ -280,10 +281,11 @@ impl MeshVersion {
 /// A state of the mesh: which session, counted from 0 on, and which version in it.
 type Revision = (u64, u64);
 
-/// The mesh as it was sent so far. The publishing worker writes, and it, the feature worker, the arm and who saves the mesh read.
+/// The mesh as it was sent so far. The publishing worker writes, and it, the feature worker, the
+/// arm and who saves the mesh read.
 ///
-/// Who reads holds a state that no longer changes. The writer copies it only where somebody still reads it when the next change
-/// comes.
+/// Who reads holds a state that no longer changes. The writer copies it only where somebody still
+/// reads it when the next change comes.
 #[derive(Debug)]
 pub struct MeshReplica {
     clock: Clock,
@@ -330,7 +332,8 @@ impl MeshReplica {
         name.clone_into(&mut Arc::make_mut(&mut locked(&self.state).mesh).session);
     }
 
-    /// Changes up to this version are on their way to the writer: who reads from now on gets it or a later one.
+    /// Changes up to this version are on their way to the writer: who reads from now on gets it or
+    /// a later one.
     pub fn announce(&self, version: u64) {
         locked(&self.announced).1 = version;
     }
@@ -389,7 +392,8 @@ impl MeshReplica {
         (Arc::clone(&state.mesh), state.is_complete)
     }
 
-    /// As it is when all that was announced is in it, and it is complete: mostly at once. Nothing comes after [`Self::close`].
+    /// As it is when all that was announced is in it, and it is complete: mostly at once. Nothing
+    /// comes after [`Self::close`].
     pub fn complete(&self) -> Receiver<Snapshot> {
         let wanted = *locked(&self.announced);
         let (reply, snapshot) = sync_channel(1);

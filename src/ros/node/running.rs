@@ -44,8 +44,8 @@ pub struct Node {
     folder: PathBuf,
 }
 
-/// A node that has read scene and scan and begun a session, and hears nothing yet: loading a large scan takes seconds, in
-/// which nothing that is sent to the node may be lost.
+/// A node that has read scene and scan and begun a session, and hears nothing yet: loading a large
+/// scan takes seconds, in which nothing that is sent to the node may be lost.
 pub struct Prepared {
     setup: Arc<Setup>,
     session: NodeSession,
@@ -71,8 +71,9 @@ impl Prepared {
         Ok(Self { setup, session })
     }
 
-    /// Reads scene and scan of a session that was recorded, to replay it: what arrives has to be its messages, with
-    /// [`ReplayStep`](crate::ros::port::ReplayStep)s between. Nothing is kept, calls are refused, and nothing is said of streams.
+    /// Reads scene and scan of a session that was recorded, to replay it: what arrives has to be
+    /// its messages, with [`ReplayStep`](crate::ros::port::ReplayStep)s between. Nothing is kept,
+    /// calls are refused, and nothing is said of streams.
     ///
     /// - `parameters`: its scene, scan, unit and source.
     /// - `replayed`: before its first message.
@@ -105,7 +106,8 @@ impl Prepared {
         self.setup.mesh_unit
     }
 
-    /// The mesh before anything was touched, in parts: what a follower has that is there from the beginning.
+    /// The mesh before anything was touched, in parts: what a follower has that is there from the
+    /// beginning.
     pub fn whole_mesh(&self) -> impl Iterator<Item = MeshPatch> + Send + 'static + use<> {
         let shared = &self.setup.shared;
         let (replica, _) = shared.mesh.now();
@@ -161,8 +163,8 @@ impl Prepared {
     /// Starts the threads.
     ///
     /// - `arm`: that probes what is flagged; without one orders are answered so.
-    /// - `arrivals`: what the port puts in; the node ends with [`Shutdown`](crate::ros::port::Arrival::Shutdown), or when nothing can arrive any
-    ///   more.
+    /// - `arrivals`: what the port puts in; the node ends with
+    ///   [`Shutdown`](crate::ros::port::Arrival::Shutdown), or when nothing can arrive any more.
     ///
     /// # Errors
     /// [`NodeError`]

@@ -242,8 +242,8 @@ impl NodeSession {
         Ok(())
     }
 
-    /// Ends the session: writes the result into its folder, as `touchup refine` does, and a report beside it. Of one that is replayed
-    /// nothing is written.
+    /// Ends the session: writes the result into its folder, as `touchup refine` does, and a report
+    /// beside it. Of one that is replayed nothing is written.
     ///
     /// # Errors
     /// [`NodeError`] when the result could not be written; the recording is ended all the same.
@@ -353,7 +353,8 @@ impl NodeSession {
 /// Room for new faces that is made ahead.
 const ROOM: usize = 1 << 18;
 
-/// What moves the mesh: the haptic update, with the patch beside it where the scene has one. Nothing touched yet.
+/// What moves the mesh: the haptic update, with the patch beside it where the scene has one.
+/// Nothing touched yet.
 ///
 /// - `axes`: those of the wrenches.
 fn engine_of(setup: &Setup, axes: WrenchFrame) -> Result<Engine, NodeError> {
@@ -377,7 +378,8 @@ fn engine_of(setup: &Setup, axes: WrenchFrame) -> Result<Engine, NodeError> {
     let mut engine = Engine::new(scan.0.clone(), refine, patch, renewal)?;
     engine.watch();
     engine.keep_strokes();
-    // bounds of the scan, which the first renewal looks up, take some ms on a large one: no sample is to wait for that
+    // bounds of the scan, which the first renewal looks up, take some ms on a large one: no sample
+    // is to wait for that
     engine.catch_up()?;
     Ok(engine)
 }

@@ -51,7 +51,8 @@ impl Shared {
         *locked(&self.parameters) = Arc::new(parameters);
     }
 
-    /// Sends the view something that it can do without: where it has no time, that is dropped and counted.
+    /// Sends the view something that it can do without: where it has no time, that is dropped and
+    /// counted.
     pub fn offer(&self, view: &SyncSender<ViewInput>, input: ViewInput) {
         if let Err(TrySendError::Full(_)) = view.try_send(input) {
             self.dropped_frames.fetch_add(1, Ordering::Relaxed);

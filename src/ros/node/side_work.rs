@@ -1,4 +1,5 @@
-//! Threads of the node, and those beside that write sessions and files: counted, and none is left behind.
+//! Threads of the node, and those beside that write sessions and files: counted, and none is left
+//! behind.
 
 use std::io;
 use std::thread::{Builder, JoinHandle};

@@ -67,7 +67,8 @@ impl StreamWatch {
         self.stamped.is_some_and(|(stamp_ns, _)| stamp_ns == 0)
     }
 
-    /// How far the stamps of this stream are beyond those that come on the other at the same time, s; `None` before both have come.
+    /// How far the stamps of this stream are beyond those that come on the other at the same time,
+    /// s; `None` before both have come.
     pub fn stamped_beyond(&self, other: &Self) -> Option<f64> {
         let ((ours_ns, ours), (theirs_ns, theirs)) = (self.stamped?, other.stamped?);
         let between = ours.saturating_duration_since(theirs).as_secs_f64()
@@ -81,9 +82,11 @@ impl StreamWatch {
     }
 }
 
-/// A clock that was set back: both streams come with stamps before those that came already, one message after the other.
+/// A clock that was set back: both streams come with stamps before those that came already, one
+/// message after the other.
 ///
-/// Time in a session only goes forward: from then on a second is added beyond what had come, so that nothing pairs across.
+/// Time in a session only goes forward: from then on a second is added beyond what had come, so
+/// that nothing pairs across.
 #[derive(Clone, Debug, Default)]
 pub struct Epoch {
     /// what is added to stamps, ns
@@ -100,10 +103,11 @@ const MOST_LATE: u32 = 50;
 const BETWEEN_NS: i64 = 61_000_000_000;
 
 impl Epoch {
-    /// What became of a message of stream 0 or 1 with this stamp, as shifted. Returns whether a new epoch begins: then the
-    /// message after it is to be shifted by another amount.
+    /// What became of a message of stream 0 or 1 with this stamp, as shifted. Returns whether a new
+    /// epoch begins: then the message after it is to be shifted by another amount.
     ///
-    /// - `newest_ns`: of both streams, as kept for good: a stamp that leaps and is given up again is none.
+    /// - `newest_ns`: of both streams, as kept for good: a stamp that leaps and is given up again
+    ///   is none.
     pub fn note(
         &mut self,
         stream: usize,

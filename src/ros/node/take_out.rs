@@ -77,7 +77,8 @@ pub(super) fn named(request: &TakeOutTouchRequest) -> Result<Option<i64>, String
 /// The stroke that is asked for, and its contacts.
 ///
 /// - `patcher`: a copy.
-/// - `last_ns`: stamp of the last sample; of a stroke that still goes on it is what came until then.
+/// - `last_ns`: stamp of the last sample; of a stroke that still goes on it is what came until
+///   then.
 pub(super) fn touch_of(
     mut patcher: Patcher,
     wanted: Option<&WantedTouch>,

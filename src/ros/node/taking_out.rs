@@ -1,7 +1,8 @@
 //! Taking one touch out, wherever it is in their order, and putting it back.
 //!
-//! The evidence is made again from the recording of the session on a thread of its own, without the samples of that stroke, while samples
-//! go on. Then it takes the place of the one before, and the mesh follows.
+//! The evidence is made again from the recording of the session on a thread of its own, without the
+//! samples of that stroke, while samples go on. Then it takes the place of the one before, and the
+//! mesh follows.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
@@ -19,7 +20,8 @@ use crate::ros::messages::{TakeOutTouchRequest, TakeOutTouchResponse};
 use crate::ros::port::Reply;
 use crate::session::{EvidenceSource, Removal, StrokeChange, StrokeChanges};
 
-/// Why a touch stays where it is: without the samples that came meanwhile the others would not be what they are.
+/// Why a touch stays where it is: without the samples that came meanwhile the others would not be
+/// what they are.
 fn too_many(dropped: u64) -> String {
     format!(
         "{dropped} samples came while the touches were made again, more than are kept meanwhile, so nothing was changed: pause the samples \

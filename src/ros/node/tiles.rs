@@ -10,7 +10,8 @@ use super::replica::{FACES_OF_A_TILE, MeshVersion};
 use crate::reconstruct::Support;
 use crate::ros::messages::{ColorRGBA, Marker, Vector3 as Vector3Msg};
 
-/// A tile is sent once more when it has not changed for so long: a network that was away for less has kept nothing from anybody.
+/// A tile is sent once more when it has not changed for so long: a network that was away for less
+/// has kept nothing from anybody.
 const ONCE_MORE_AFTER: Duration = Duration::from_secs(10);
 /// Namespace of the markers.
 const NAMESPACE: &str = "mesh";
@@ -67,7 +68,8 @@ pub struct Tiles {
     /// … and which it was, in the order in which all were sent
     sent_as: Vec<u64>,
     sent: u64,
-    /// tiles that are to be sent once more, if they are not sent before for a change: when they were sent, and as which
+    /// tiles that are to be sent once more, if they are not sent before for a change: when they
+    /// were sent, and as which
     once_more: VecDeque<(Instant, u32, u64)>,
     /// for each face, the last signed distance at which it was touched, m; NaN where it was not
     mismatch: Vec<f32>,

@@ -155,7 +155,8 @@ fn nearest<'a>(tip: &LastTip, features: &'a FeatureArray) -> Option<&'a Feature>
         .filter(|feature| far(feature) < NEAR)
 }
 
-/// "0.12 mm; hole Ø8.02 ± 0.04; next: green arrow": RViz puts lines 10 mm apart, however small the letters.
+/// "0.12 mm; hole Ø8.02 ± 0.04; next: green arrow": RViz puts lines 10 mm apart, however small the
+/// letters.
 fn text(tip: &LastTip, nearest: Option<&Feature>, has_next: bool) -> String {
     let distance = match tip.closest {
         Some((_, distance)) => format!("{:.2} mm", distance * 1e3),

@@ -1,4 +1,5 @@
-//! The thread that shows: it follows the mesh, and sends tiles, changes, markers and diagnostics at its own pace.
+//! The thread that shows: it follows the mesh, and sends tiles, changes, markers and diagnostics at
+//! its own pace.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -16,7 +17,8 @@ use crate::clock::Clock;
 use crate::ros::messages::{FeatureArray, MeshPatch};
 use crate::ros::port::{Port, Publication, TILES_KEPT};
 
-/// Tiles that wait in the port at most: what waits here is sent as it is then, and what has changed goes first.
+/// Tiles that wait in the port at most: what waits here is sent as it is then, and what has changed
+/// goes first.
 const TILES_AHEAD: usize = 32;
 /// Parts of the whole state that are sent at once: 2.4 MB.
 const PARTS_AT_ONCE: usize = 64;
@@ -116,7 +118,8 @@ impl View {
                 self.tiles.restart(&replica);
                 self.patches = MeshPatches::of(&replica, self.shared.scan_sigma);
                 self.shared.mesh.begin_session(*replica);
-                // who follows sees another session and asks; it would see that only at the next change
+                // who follows sees another session and asks; it would see that only at the next
+                // change
                 (self.whole, self.asked_whole) = (None, true);
             }
             ViewInput::Mismatch(mismatch) => {

@@ -65,7 +65,8 @@ pub(super) fn server(
     Ok([goals, Box::new(move || take_cancels(&mut locked(&cancels)))])
 }
 
-/// What the node answers with: it goes out from the thread that sends, so the answers keep their order.
+/// What the node answers with: it goes out from the thread that sends, so the answers keep their
+/// order.
 fn goal(
     request: ActionServerGoalRequest<Action>,
     exchange: &Arc<Exchange>,
@@ -127,7 +128,8 @@ fn finish(handle: &GoalHandle, end: GoalEnd, response: ProbeResponse) -> r2r::Re
     };
     handle.is_over.store(true, Ordering::Relaxed);
     let cancelled = response.clone().theirs();
-    // r2r lets go of a goal once its cancelling is confirmed: from then on no other end reaches who waits
+    // r2r lets go of a goal once its cancelling is confirmed: from then on no other end reaches who
+    // waits
     match end {
         GoalEnd::Canceled => goal.cancel(cancelled),
         GoalEnd::Succeeded => goal
@@ -139,7 +141,8 @@ fn finish(handle: &GoalHandle, end: GoalEnd, response: ProbeResponse) -> r2r::Re
     }
 }
 
-/// Confirms what is asked for and sets the node's flag, which stops when it can; forgets goals that are over.
+/// Confirms what is asked for and sets the node's flag, which stops when it can; forgets goals that
+/// are over.
 fn take_cancels(running: &mut Vec<Cancels>) -> bool {
     let mut has_come = false;
     for cancels in running.iter_mut() {

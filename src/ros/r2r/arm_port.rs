@@ -23,7 +23,8 @@ use crate::ros::topics::Topic;
 
 /// Messages of a topic that are kept until they are taken.
 const DEPTH: usize = 100;
-/// Messages that wait for the arm's driver; who does not take them for a second finds the oldest, and sees that they are late.
+/// Messages that wait for the arm's driver; who does not take them for a second finds the oldest,
+/// and sees that they are late.
 const WAITING: usize = 2048;
 /// So long it takes to notice that all is over when nothing comes; what comes wakes it at once.
 const NOTHING_CAME: Duration = Duration::from_millis(20);

@@ -24,10 +24,12 @@ impl<T> During<T> for r2r::Result<T> {
     }
 }
 
-/// Takes all that has come from one topic, service or action since it was called last; whether anything had.
+/// Takes all that has come from one topic, service or action since it was called last; whether
+/// anything had.
 pub(super) type PollSource = Box<dyn FnMut() -> bool + Send>;
 
-/// A stream of r2r as a source. r2r reads one message of each at a time and keeps ten, so none is lost between two spins.
+/// A stream of r2r as a source. r2r reads one message of each at a time and keeps ten, so none is
+/// lost between two spins.
 pub(super) fn source<S>(mut stream: S, mut take: impl FnMut(S::Item) + Send + 'static) -> PollSource
 where
     S: Stream + Unpin + Send + 'static,

@@ -1,6 +1,7 @@
 //! Messages of the node into those of r2r and back, field by field.
 //!
-//! The two differ in nothing but the type; `generate/` lists the fields, and the compiler sees when one is missing on either side.
+//! The two differ in nothing but the type; `generate/` lists the fields, and the compiler sees when
+//! one is missing on either side.
 
 use r2r::WrappedServiceTypeSupport;
 
@@ -72,7 +73,8 @@ impl<A: Convert> Convert for Vec<A> {
     }
 }
 
-/// A message, the field of ours first: `message!(Marker = r2r::visualization_msgs::msg::Marker { r#type: type_ })`.
+/// A message, the field of ours first: `message!(Marker = r2r::visualization_msgs::msg::Marker {
+/// r#type: type_ })`.
 macro_rules! message {
     ($ours:ident = $($theirs:ident)::+ {}) => {
         impl Convert for ours::$ours {
@@ -119,8 +121,8 @@ mod tests {
 
     use super::*;
 
-    /// The same text from both sides: names, order and values of all fields, by the code that serde made for each. And the
-    /// message itself comes back. Its fields are those that rosbags filled.
+    /// The same text from both sides: names, order and values of all fields, by the code that serde
+    /// made for each. And the message itself comes back. Its fields are those that rosbags filled.
     fn both_agree<M: ours::RosMessage + Convert<Theirs: Clone + Serialize>>() {
         let all = include_str!(concat!(
             env!("CARGO_MANIFEST_DIR"),

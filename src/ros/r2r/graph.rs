@@ -1,5 +1,5 @@
-//! Who else is on our topics, and why somebody who is does not fit. r2r reports nothing by itself, so it is asked once in a
-//! second; of those who listen it knows the number alone.
+//! Who else is on our topics, and why somebody who is does not fit. r2r reports nothing by itself,
+//! so it is asked once in a second; of those who listen it knows the number alone.
 
 use std::time::{Duration, Instant};
 

@@ -1,8 +1,9 @@
 //! The port on a sourced ROS 2: r2r over rcl, with whichever RMW is chosen there.
 //!
-//! Three threads of ours stand beside those of the RMW. One spins: it takes what comes and puts it into the inbox of the
-//! node. Two send: one what is small and urgent, answers among it; one the mesh, where a slow listener may hold things up. rcl
-//! reads the command line and the environment by itself, so names go to it as the node has them, not yet remapped.
+//! Three threads of ours stand beside those of the RMW. One spins: it takes what comes and puts it
+//! into the inbox of the node. Two send: one what is small and urgent, answers among it; one the
+//! mesh, where a slow listener may hold things up. rcl reads the command line and the environment
+//! by itself, so names go to it as the node has them, not yet remapped.
 
 mod action;
 mod arm_port;
@@ -56,7 +57,8 @@ impl Drop for R2rConnection {
     }
 }
 
-/// Joins ROS as a node: what comes goes to `inbox` from now on. Once in a process: rcl reads the command line.
+/// Joins ROS as a node: what comes goes to `inbox` from now on. Once in a process: rcl reads the
+/// command line.
 ///
 /// # Errors
 /// [`RosError`]: a name that is none, ROS does not start, no thread.
@@ -163,7 +165,8 @@ const MOST_IN_VAIN: u32 = 160;
 /// The first sample after a rest waits at most so long.
 const PAUSE: Duration = Duration::from_millis(2);
 
-/// The thread that takes what comes. There is always a subscription, or rcl would not wait at all (r2r issue 93).
+/// The thread that takes what comes. There is always a subscription, or rcl would not wait at all
+/// (r2r issue 93).
 fn spin(
     mut node: r2r::Node,
     mut sources: Vec<PollSource>,

@@ -22,7 +22,8 @@ struct R2rSamples {
     _node: r2r::Node,
 }
 
-/// Joins ROS as a stylus or probe: the topics are those of the parameter `source`. Once in a process.
+/// Joins ROS as a stylus or probe: the topics are those of the parameter `source`. Once in a
+/// process.
 ///
 /// # Errors
 /// [`RosError`]: ROS does not start.

@@ -1,5 +1,6 @@
-//! What r2r generates of `touchup_msgs` and `std_srvs` where ROS is sourced, as far as the compiler looks: the fields, which
-//! `generate/` lists, and nothing behind them. For feature `r2r-check` alone; nothing here can run.
+//! What r2r generates of `touchup_msgs` and `std_srvs` where ROS is sourced, as far as the compiler
+//! looks: the fields, which `generate/` lists, and nothing behind them. For feature `r2r-check`
+//! alone; nothing here can run.
 #![expect(
     non_snake_case,
     reason = "services and actions are modules there, with the names of their files"

@@ -1,4 +1,5 @@
-//! Who may see and who may do what: one-time links, cookies, roles, and the addresses by which the page is called.
+//! Who may see and who may do what: one-time links, cookies, roles, and the addresses by which the
+//! page is called.
 
 use std::collections::VecDeque;
 use std::net::{IpAddr, SocketAddr};
@@ -95,8 +96,8 @@ impl Access {
         }
     }
 
-    /// Whether the page is called by one of its own names: a name that somebody else's server answers for is none, whatever address it
-    /// leads to.
+    /// Whether the page is called by one of its own names: a name that somebody else's server
+    /// answers for is none, whatever address it leads to.
     pub fn is_host(&self, host: &str) -> bool {
         self.hosts.contains(&host.to_lowercase())
     }

@@ -1,4 +1,5 @@
-//! What operators say of features: names, accepted or rejected, and numbers that are kept as they were. A file of the session.
+//! What operators say of features: names, accepted or rejected, and numbers that are kept as they
+//! were. A file of the session.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

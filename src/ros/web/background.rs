@@ -5,8 +5,8 @@ use std::thread::Builder;
 
 use tokio::sync::oneshot::{Receiver, channel};
 
-/// Steps by which such a thread stands behind others (setpriority(2)): with a third of their share it still comes to an end where the
-/// machine is busy.
+/// Steps by which such a thread stands behind others (setpriority(2)): with a third of their share
+/// it still comes to an end where the machine is busy.
 const STEPS_BEHIND: i32 = 5;
 
 /// Begins the work; its result comes, unless it panics.
@@ -29,8 +29,8 @@ pub(super) fn begin<T: Send + 'static>(
 
 /// Puts this thread, and those that it begins, behind the one that began it.
 fn step_behind() {
-    // SAFETY: both take numbers and no memory; who = 0 is the calling thread, as Linux has it, which ends at the last step. Where it is
-    // refused the work is done all the same
+    // SAFETY: both take numbers and no memory; who = 0 is the calling thread, as Linux has it,
+    // which ends at the last step. Where it is refused the work is done all the same
     unsafe {
         libc::setpriority(
             libc::PRIO_PROCESS,

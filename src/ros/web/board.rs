@@ -1,4 +1,5 @@
-//! What the pages are shown: the newest of each topic, and the mesh. The node writes, and each page reads at its own pace.
+//! What the pages are shown: the newest of each topic, and the mesh. The node writes, and each page
+//! reads at its own pace.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};

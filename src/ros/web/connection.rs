@@ -25,7 +25,8 @@ use crate::ros::port::Reply;
 const FRAME: Duration = Duration::from_millis(33);
 /// So often a page hears something; it takes a silence of twice that for a lost connection.
 const SIGN_OF_LIFE: Duration = Duration::from_secs(5);
-/// A page that takes nothing, or from which nothing comes, for so long has gone: it answers each sign of life.
+/// A page that takes nothing, or from which nothing comes, for so long has gone: it answers each
+/// sign of life.
 const GONE_AFTER: Duration = Duration::from_secs(20);
 /// Answers that wait for a page at most.
 const MOST_ANSWERS: usize = 64;

@@ -1,5 +1,5 @@
-//! How everything on the page is reached, whatever is served behind it: the checks of each request, links that let pages in, and the
-//! files of the page.
+//! How everything on the page is reached, whatever is served behind it: the checks of each request,
+//! links that let pages in, and the files of the page.
 
 use std::io;
 use std::sync::Arc;
@@ -58,7 +58,8 @@ impl Entrance {
         format!("{}/pair?token={token}", self.base)
     }
 
-    /// A link that lets another page in where one needs it, and its QR code, row by row: 1 where it is dark.
+    /// A link that lets another page in where one needs it, and its QR code, row by row: 1 where it
+    /// is dark.
     pub fn invite(&self, role: Role) -> io::Result<(String, Vec<String>)> {
         let link = match self.access.needs_cookie() {
             true => self.link(self.access.invite(role)?.text()),

@@ -1,5 +1,5 @@
-//! What the page's address answers while a node runs: the page itself, the socket, and files of sessions. Each request is checked before
-//! anything is looked at.
+//! What the page's address answers while a node runs: the page itself, the socket, and files of
+//! sessions. Each request is checked before anything is looked at.
 
 use std::sync::Arc;
 

@@ -1,5 +1,5 @@
-//! How well the mesh is known where it was touched, for the colours of the page: evaluated while nothing changes, and only where somebody
-//! looks.
+//! How well the mesh is known where it was touched, for the colours of the page: evaluated while
+//! nothing changes, and only where somebody looks.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -21,7 +21,8 @@ use crate::ros::port::{Arrival, Reply};
 
 /// Period of the look at the mesh.
 const LOOK: Duration = Duration::from_millis(250);
-/// The mesh is at rest when it has not changed for so long: somewhat longer than the node takes to settle it.
+/// The mesh is at rest when it has not changed for so long: somewhat longer than the node takes to
+/// settle it.
 const QUIET: Duration = Duration::from_millis(1000);
 /// How long the copy of the evidence may take.
 const COPY_WAIT: Duration = Duration::from_secs(30);

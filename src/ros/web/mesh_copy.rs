@@ -1,6 +1,8 @@
-//! The mesh as the pages of browsers have it: a copy in the numbers of `MeshPatch`, and for each page what it still lacks.
+//! The mesh as the pages of browsers have it: a copy in the numbers of `MeshPatch`, and for each
+//! page what it still lacks.
 //!
-//! A page that is slow lacks more, and gets it as it is then: what waits for it is a set of numbers, bounded by the mesh.
+//! A page that is slow lacks more, and gets it as it is then: what waits for it is a set of
+//! numbers, bounded by the mesh.
 
 use std::collections::BTreeMap;
 
@@ -115,7 +117,8 @@ impl MeshCopy {
         }
     }
 
-    /// A change is taken up as a whole, so that the mesh is that of a version whenever somebody reads it.
+    /// A change is taken up as a whole, so that the mesh is that of a version whenever somebody
+    /// reads it.
     fn part_of_change(&mut self, patch: MeshPatch) {
         let is_last = patch.part + 1 == patch.part_count;
         self.begun.push(patch);
@@ -226,9 +229,11 @@ impl MeshCopy {
         &self.session
     }
 
-    /// More of what a page lacks, as it is now, vertices before faces; `None` when it lacks nothing.
+    /// More of what a page lacks, as it is now, vertices before faces; `None` when it lacks
+    /// nothing.
     ///
-    /// In parts, a state may change between them: a face may name a vertex that comes with the next.
+    /// In parts, a state may change between them: a face may name a vertex that comes with the
+    /// next.
     pub fn next_for(&mut self, page: PageId) -> Option<MeshPatch> {
         // there is none yet
         if self.is_coming || self.version == 0 {
@@ -436,7 +441,8 @@ mod tests {
         assert_eq!(page.faces.len(), 1);
     }
 
-    /// What was touched is known when the mesh rests: nothing of its shape is to be evaluated again for that.
+    /// What was touched is known when the mesh rests: nothing of its shape is to be evaluated again
+    /// for that.
     #[test]
     fn a_variance_comes_to_the_pages_and_is_no_other_shape() {
         let mut copy = MeshCopy::default();

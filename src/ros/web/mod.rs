@@ -1,8 +1,9 @@
-//! The operator's page: a port beside that of the network. What the node publishes goes to both, and what a page asks comes into the
-//! same inbox.
+//! The operator's page: a port beside that of the network. What the node publishes goes to both,
+//! and what a page asks comes into the same inbox.
 //!
-//! One thread of its own, with all pages on it. The node only notes what is new, under a lock that is held for as long as a message is
-//! copied: a page that is slow has less to show, and nobody waits for it.
+//! One thread of its own, with all pages on it. The node only notes what is new, under a lock that
+//! is held for as long as a message is copied: a page that is slow has less to show, and nobody
+//! waits for it.
 
 mod access;
 mod annotations;
@@ -259,7 +260,8 @@ impl Drop for WebServer {
     }
 }
 
-/// The address by which others reach a machine that listens to all of its own, as far as it is known: nothing is sent.
+/// The address by which others reach a machine that listens to all of its own, as far as it is
+/// known: nothing is sent.
 fn own_address(address: SocketAddr) -> Option<String> {
     if !address.ip().is_unspecified() {
         return None;

@@ -25,8 +25,8 @@ impl Nominal {
         }
     }
 
-    /// Deviations of the vertices that a patch sets, positive outside of the nominal part; NaN beyond the reach. `None` where it
-    /// sets none.
+    /// Deviations of the vertices that a patch sets, positive outside of the nominal part; NaN
+    /// beyond the reach. `None` where it sets none.
     pub fn frame(&self, patch: &MeshPatch) -> Option<Vec<u8>> {
         if patch.vertices.is_empty() {
             return None;

@@ -1,4 +1,5 @@
-//! What a page asks of a report: where nominal values are from, and what the flags of `touchup inspect` would say.
+//! What a page asks of a report: where nominal values are from, and what the flags of `touchup
+//! inspect` would say.
 
 use std::path::{Path, PathBuf};
 

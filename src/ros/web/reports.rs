@@ -50,7 +50,8 @@ impl Refused {
     }
 }
 
-/// Makes a report: `POST /api/reports/SESSION?…`, with the nominal values in its body where they are handed in.
+/// Makes a report: `POST /api/reports/SESSION?…`, with the nominal values in its body where they
+/// are handed in.
 pub(super) async fn make(
     State(site): State<Arc<Site>>,
     headers: HeaderMap,

@@ -1,4 +1,5 @@
-//! What all pages share: what they are shown, who may ask what, and what the page answers by itself.
+//! What all pages share: what they are shown, who may ask what, and what the page answers by
+//! itself.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -46,7 +47,8 @@ pub(super) struct Site {
 pub(super) struct ScanShown {
     pub file: String,
     pub faces: usize,
-    /// whether the page need not ask how large it is: an operator has just said so, or the session was touched at this size
+    /// whether the page need not ask how large it is: an operator has just said so, or the session
+    /// was touched at this size
     pub is_size_confirmed: bool,
 }
 

@@ -1,4 +1,5 @@
-//! A number for each of some vertices, as a binary message: what the page colours by, beside what is in a `MeshPatch`.
+//! A number for each of some vertices, as a binary message: what the page colours by, beside what
+//! is in a `MeshPatch`.
 
 /// Kind of the message.
 const VERTEX_NUMBERS: u8 = 2;
@@ -14,7 +15,8 @@ pub(super) enum VertexNumber {
     Outlier = 3,
 }
 
-/// The kind, which number, two zeros; how many, their vertices as u32, their numbers as f32; little endian.
+/// The kind, which number, two zeros; how many, their vertices as u32, their numbers as f32; little
+/// endian.
 pub(super) fn frame(which: VertexNumber, numbers: impl Iterator<Item = (u32, f32)>) -> Vec<u8> {
     let (vertices, numbers): (Vec<u32>, Vec<f32>) = numbers.unzip();
     let mut frame = Vec::with_capacity(8 + 8 * vertices.len());

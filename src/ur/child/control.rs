@@ -1,9 +1,10 @@
 //! The one thread that commands the arm.
 //!
-//! It moves only while orders come: when they stay away it brakes, and so it does when a call fails. That the arm is at rest it takes
-//! from the states, and only then it feeds the watchdog of the controller, for as long as it lives and sees the arm stand. A thread
-//! that hangs in a call feeds nothing, and the arm is stopped by that watchdog. Once something has stopped the arm or its program, no
-//! order moves it any more: that takes a new client.
+//! It moves only while orders come: when they stay away it brakes, and so it does when a call
+//! fails. That the arm is at rest it takes from the states, and only then it feeds the watchdog of
+//! the controller, for as long as it lives and sees the arm stand. A thread that hangs in a call
+//! feeds nothing, and the arm is stopped by that watchdog. Once something has stopped the arm or
+//! its program, no order moves it any more: that takes a new client.
 
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
@@ -37,15 +38,18 @@ const REST_TIME: Duration = Duration::from_millis(20);
 const HARD: f64 = 10.0;
 /// The program of the controller starts within this time of its upload.
 const UPLOAD: Duration = Duration::from_secs(5);
-/// A call that was refused because the program has just ended: the state that says so comes within this time.
+/// A call that was refused because the program has just ended: the state that says so comes within
+/// this time.
 const EXCUSE: Duration = Duration::from_millis(40);
 /// Force mode with a frame that stays as it is given.
 const FIXED_FRAME: i32 = 2;
-/// Two cycles of the controller: its program reads one command in each, and what comes sooner takes the place of the one before.
+/// Two cycles of the controller: its program reads one command in each, and what comes sooner takes
+/// the place of the one before.
 const CYCLES: Duration = Duration::from_millis(4);
 /// Period in which a press is repeated, in case it was lost.
 const REPEAT: Duration = Duration::from_millis(100);
-/// Across the axis of a press the tip may be this far from where it should be, m and rad: what the feed and the friction make.
+/// Across the axis of a press the tip may be this far from where it should be, m and rad: what the
+/// feed and the friction make.
 const ASIDE: [f64; 2] = [0.05, 0.2];
 /// The tool that is read back may differ by this rounding, m and rad.
 const SAME_TOOL: f64 = 1e-6;
@@ -117,7 +121,8 @@ impl<'a, C: Control> Driver<'a, C> {
         self.shared.report(&ClientReport::Ready);
         loop {
             self.check_connection()?;
-            // how often it looks is no deadline: it looks in real time also where its clock waits for it
+            // how often it looks is no deadline: it looks in real time also where its clock waits
+            // for it
             match orders.recv_timeout(TURN) {
                 Ok(order) => self.turn(Some(newest(order, orders)))?,
                 Err(RecvTimeoutError::Timeout) => self.turn(None)?,
@@ -277,8 +282,8 @@ impl<'a, C: Control> Driver<'a, C> {
         self.control.feed()
     }
 
-    /// One turn of braking: the velocity goes to zero with the deceleration, and what is left by a hard stop. At rest the controller
-    /// hears that there was an order.
+    /// One turn of braking: the velocity goes to zero with the deceleration, and what is left by a
+    /// hard stop. At rest the controller hears that there was an order.
     fn brake(&mut self, deceleration: f64) -> Result<(), ChildError> {
         if self.doing == Doing::Resting && self.force_mode.is_none() {
             return self.feed();
@@ -338,8 +343,9 @@ impl<'a, C: Control> Driver<'a, C> {
         }
     }
 
-    /// A call was refused. When the program has ended or the arm is not allowed to move, the states say so; and the arm may still do
-    /// what it was ordered before, so it is braked until it is seen at rest.
+    /// A call was refused. When the program has ended or the arm is not allowed to move, the states
+    /// say so; and the arm may still do what it was ordered before, so it is braked until it is
+    /// seen at rest.
     fn failed(&mut self, error: &ChildError) -> Result<(), DriverEnd> {
         let begun = self.clock.now();
         if self.doing == Doing::Moving {
@@ -371,7 +377,8 @@ impl<'a, C: Control> Driver<'a, C> {
     }
 }
 
-/// The last of the orders that wait, or the first of them that is to be done whatever comes after it.
+/// The last of the orders that wait, or the first of them that is to be done whatever comes after
+/// it.
 fn newest(mut order: Order, orders: &Receiver<Order>) -> Order {
     while order.what != Action::Zero {
         match orders.try_recv() {

@@ -1,7 +1,7 @@
 //! The calls of ur-rtde that are used, and nothing of Python beyond this file.
 //!
-//! Each call returns `true` or it failed; the library has no other words. Lengths of vectors are those of arrays here, for the
-//! library does not look at them.
+//! Each call returns `true` or it failed; the library has no other words. Lengths of vectors are
+//! those of arrays here, for the library does not look at them.
 
 use std::path::Path;
 use std::time::Duration;
@@ -15,7 +15,8 @@ use crate::ur::protocol::{ProgramState, UrState, WHEEL};
 
 /// Rate of the states and of the control, Hz.
 const RATE_HZ: f64 = 500.0;
-/// Uploads its program, and takes the force from the arm's own sensor: no upper registers, no cap, no external sensor.
+/// Uploads its program, and takes the force from the arm's own sensor: no upper registers, no cap,
+/// no external sensor.
 const FLAGS: u32 = 0x01 | 0x40;
 const CAP_PORT: u16 = 50002;
 /// The requested states: the default are 58 of 1180 bytes.
@@ -76,7 +77,8 @@ pub fn load(site_packages: &Path) -> Result<(), ChildError> {
     })
 }
 
-/// Ends the process at once: the destructors of the library take a second, and after a lost link they crash.
+/// Ends the process at once: the destructors of the library take a second, and after a lost link
+/// they crash.
 pub fn leave(code: i32) -> ! {
     // a Python that cannot even do that is killed
     let _ = Python::attach(|py| {
@@ -153,9 +155,11 @@ pub trait Control {
     fn is_connected(&self) -> bool;
     /// Whether the uploaded program runs; an old answer when the connection is lost.
     fn is_running(&self) -> bool;
-    /// Goes with a velocity, m/s and rad/s in B, reached with an acceleration, m/s², until the next command.
+    /// Goes with a velocity, m/s and rad/s in B, reached with an acceleration, m/s², until the next
+    /// command.
     fn speed(&self, twist: [f64; 6], acceleration: f64) -> Result<(), ChildError>;
-    /// Presses along z of a frame of B with a force, N; `limits`: speed along z, m/s, how far off across, m and rad.
+    /// Presses along z of a frame of B with a force, N; `limits`: speed along z, m/s, how far off
+    /// across, m and rad.
     fn press(
         &self,
         frame: [f64; 6],
@@ -240,8 +244,8 @@ impl Control for RtdeControl {
     }
 
     fn speed(&self, twist: [f64; 6], acceleration: f64) -> Result<(), ChildError> {
-        // the time does not end the motion: it is how soon the program on the controller looks for the next velocity, and without
-        // one it first reaches this
+        // the time does not end the motion: it is how soon the program on the controller looks for
+        // the next velocity, and without one it first reaches this
         self.done("speedL", (twist.to_vec(), acceleration, 1.0 / RATE_HZ))
     }
 

@@ -1,8 +1,9 @@
 //! The process that speaks to the arm, from the inside: the only place with Python.
 //!
-//! One thread owns `rtde_control` and executes the orders ([`control`]); a second one passes on the states of
-//! `rtde_receive` ([`states`]); a third reads the orders. When a connection of the library is lost the process says so and ends at
-//! once, for the library would connect again by itself, start its program unasked, and crash.
+//! One thread owns `rtde_control` and executes the orders ([`control`]); a second one passes on the
+//! states of `rtde_receive` ([`states`]); a third reads the orders. When a connection of the
+//! library is lost the process says so and ends at once, for the library would connect again by
+//! itself, start its program unasked, and crash.
 
 mod control;
 mod error;
@@ -36,7 +37,8 @@ pub fn run() -> Result<(), ChildError> {
     let begin: Begin =
         serde_json::from_str(&first).map_err(|error| ChildError::NoOrders(error.to_string()))?;
     if !begin.is_lock_step {
-        // for all threads, those of the library too; who started this process says where it is refused
+        // for all threads, those of the library too; who started this process says where it is
+        // refused
         let _ = priority::raise(priority::CLIENT, true);
     }
     let reports = stdout()

@@ -36,7 +36,8 @@ impl GuardBench {
         self.known.take(report, self.clock.now())
     }
 
-    /// Has the same line come each millisecond; returns after how many of them something is wrong, and what.
+    /// Has the same line come each millisecond; returns after how many of them something is wrong,
+    /// and what.
     fn until_broken(&mut self, line: &ClientReport) -> (u64, ClientLoss) {
         for ms in 1..10_000 {
             self.hand.advance(MS);
@@ -179,7 +180,8 @@ fn untaken_states_are_the_newest_64() {
     assert_eq!(served, (36..100).collect::<Vec<_>>());
 }
 
-/// A dashboard that answers `stop`, with what it was asked, and a guard of a client that says what the test sends.
+/// A dashboard that answers `stop`, with what it was asked, and a guard of a client that says what
+/// the test sends.
 struct Watch {
     hand: ManualClock,
     shared: Arc<SharedGuard>,
@@ -190,7 +192,8 @@ struct Watch {
 }
 
 impl Watch {
-    /// - `connections`: to the dashboard, each of which it serves; but the first it closes when there are two.
+    /// - `connections`: to the dashboard, each of which it serves; but the first it closes when
+    ///   there are two.
     fn begin(connections: usize) -> Self {
         let (host, listener) = listen();
         let (ask, asked) = channel();

@@ -1,4 +1,5 @@
-//! Registration by features: known motions of real parts are found from anywhere, and what is not determined is reported.
+//! Registration by features: known motions of real parts are found from anywhere, and what is not
+//! determined is reported.
 
 use std::path::{Path, PathBuf};
 
@@ -238,9 +239,9 @@ fn moving_either_side_moves_the_answer() {
     assert!(source.apart(&found.source_to_target, &expected) < 1e-6);
 }
 
-// The flange crs_ee3 looks the same after half a turn about its axis but for one dowel hole in its lower side, at x = 25 mm:
-// four counterbored holes on a square, two on a line, and one in the middle. After a quarter of a turn the two on the line
-// lie where there is no hole.
+// The flange crs_ee3 looks the same after half a turn about its axis but for one dowel hole in its
+// lower side, at x = 25 mm: four counterbored holes on a square, two on a line, and one in the
+// middle. After a quarter of a turn the two on the line lie where there is no hole.
 #[test]
 fn a_flange_is_ambiguous_without_the_one_hole_that_breaks_its_symmetry() {
     let Some(part) = Part::read("crs_ee3.stl", MeshUnit::Metre) else {
@@ -312,7 +313,8 @@ fn block(size: [f64; 3]) -> TriMesh {
     TriMesh::new((0..8).map(corner).collect(), faces).unwrap()
 }
 
-// The rotations of a body onto itself: 24 of a cube, 8 of a square prism, 4 of a box with three different sides.
+// The rotations of a body onto itself: 24 of a cube, 8 of a square prism, 4 of a box with three
+// different sides.
 #[test]
 fn every_rotation_of_a_box_onto_itself_is_reported() {
     let motion = anywhere(&mut Pcg64::new(3, 3));
@@ -402,8 +404,8 @@ fn failed_alignments_say_what_to_do() {
     );
 }
 
-/// A body of revolution about z, of so many sides: corners of its outline as radius and height, m, from the axis outside and
-/// up; where it begins and ends at the same radius above 0 it has a bore.
+/// A body of revolution about z, of so many sides: corners of its outline as radius and height, m,
+/// from the axis outside and up; where it begins and ends at the same radius above 0 it has a bore.
 fn turned_part(outline: &[[f64; 2]], sides: u32) -> TriMesh {
     let is_open = outline[0][0] == 0.0;
     let ring = |[radius, height]: [f64; 2]| {
@@ -452,7 +454,8 @@ fn mm(outline: &[[f64; 2]]) -> Vec<[f64; 2]> {
         .collect()
 }
 
-// A continuum of motions, of which any one would be as good: the axis is that of the body, z before it was moved.
+// A continuum of motions, of which any one would be as good: the axis is that of the body, z before
+// it was moved.
 #[test]
 fn a_part_of_revolution_is_reported_free_to_turn() {
     let bar = mm(&[
@@ -518,7 +521,8 @@ fn a_flange_with_more_than_its_middle_hole_is_not_free() {
     };
     let answer = align(&part, &part.features, &part);
     assert!(answer.is_ok(), "{answer:?}");
-    // its middle hole and the planes square to it alone determine no turn, and the surface says that there is one
+    // its middle hole and the planes square to it alone determine no turn, and the surface says
+    // that there is one
     let middle = |f: &Feature| match f.kind {
         Kind::Hole => f.centre.value.coords.xz().norm() < 1e-3,
         Kind::Plane => f
@@ -544,7 +548,8 @@ fn a_flange_with_more_than_its_middle_hole_is_not_free() {
     );
 }
 
-// ---- at the boundary of the process -------------------------------------------------------------------------------
+// ---- at the boundary of the process
+// -------------------------------------------------------------------------------
 
 fn touchup(arguments: &[&str]) -> std::process::Output {
     let program = env!("CARGO_BIN_EXE_touchup");
@@ -585,8 +590,9 @@ fn refined_case(name: &str, folder: &Path) -> Option<[PathBuf; 2]> {
     Some([out, case.join("truth.ply")])
 }
 
-// A third to a half of these meshes is the bare scan, 0.6 mm noisy and 0.3 mm too large, so the fit is as good as that. From
-// above the flange has a half turn that the touches do not break: the dowel hole is on the other side.
+// A third to a half of these meshes is the bare scan, 0.6 mm noisy and 0.3 mm too large, so the fit
+// is as good as that. From above the flange has a half turn that the touches do not break: the
+// dowel hole is on the other side.
 #[test]
 fn refined_meshes_come_onto_their_truth_from_anywhere() {
     let mut rng = Pcg64::new(77, 7);

@@ -86,8 +86,8 @@ proptest! {
     }
 }
 
-/// Each component of the error over its stated uncertainty has an rms of 1, over 200 seeds; the uncertainty comes from
-/// the residuals.
+/// Each component of the error over its stated uncertainty has an rms of 1, over 200 seeds; the
+/// uncertainty comes from the residuals.
 #[test]
 fn the_stated_uncertainty_holds() {
     let truth = motion();
@@ -108,7 +108,8 @@ fn the_stated_uncertainty_holds() {
             "normalised error, sigma given: {}: {normalised:.2?}",
             given.is_some()
         );
-        // of 200: ±3 standard errors of an rms are 15 %; t distributed with 15 degrees of freedom it is 7 % more
+        // of 200: ±3 standard errors of an rms are 15 %; t distributed with 15 degrees of freedom
+        // it is 7 % more
         assert!(
             normalised.iter().all(|x| (0.85..1.25).contains(x)),
             "{normalised}"

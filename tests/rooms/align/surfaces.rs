@@ -1,4 +1,5 @@
-//! Registration of points to a mesh: known motions are found, and unconstrained directions are reported.
+//! Registration of points to a mesh: known motions are found, and unconstrained directions are
+//! reported.
 
 use std::f64::consts::TAU;
 
@@ -56,7 +57,8 @@ fn apart(mesh: &TriMesh, a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// A square in the plane z = 0 about the origin, of `cells` × `cells` cells of an edge (m), normals up.
+/// A square in the plane z = 0 about the origin, of `cells` × `cells` cells of an edge (m), normals
+/// up.
 fn square(cells: u32, edge: f64) -> TriMesh {
     let row = cells + 1;
     let at = |i: u32| (f64::from(i) - f64::from(cells) / 2.0) * edge;
@@ -86,7 +88,8 @@ fn a_known_motion_of_a_real_part_is_found_through_noise() {
         .collect();
     let fit = fitted(&points, &part).unwrap();
     let off = apart(&part, &fit.source_to_target, &known);
-    // 0.05 mm over the root of 40 000 is 0.25 µm; a corner takes shift and turn, and round edges a bias
+    // 0.05 mm over the root of 40 000 is 0.25 µm; a corner takes shift and turn, and round edges a
+    // bias
     assert!(off < 5e-6, "{off} m off, {fit:?}");
     assert_eq!(fit.undetermined().count(), 0, "{:?}", fit.motions);
     assert!((fit.rms - 0.05e-3).abs() < 0.01e-3, "rms {}", fit.rms);

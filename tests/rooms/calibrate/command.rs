@@ -1,5 +1,6 @@
-//! `touchup calibrate` at the boundary of the process: a recording in another frame, with another tip and a heavy
-//! sensor, gives the mesh that the plain recording gives, once the scene is calibrated.
+//! `touchup calibrate` at the boundary of the process: a recording in another frame, with another
+//! tip and a heavy sensor, gives the mesh that the plain recording gives, once the scene is
+//! calibrated.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -140,7 +141,8 @@ impl Case {
     }
 }
 
-/// The recording as a tracker in space sees it: the pose of H, the wrench in the axes of the stylus.
+/// The recording as a tracker in space sees it: the pose of H, the wrench in the axes of the
+/// stylus.
 fn in_space(messages: &[Message], offset: Vector3<f64>) -> Vec<Message> {
     let moved = |message: &Message| match *message {
         Message::Pose(StampedPose { stamp_ns, pose_ot }) => Message::Pose(StampedPose {
@@ -170,7 +172,8 @@ fn turns(messages: &[Message]) -> BTreeMap<i64, UnitQuaternion<f64>> {
     turns
 }
 
-/// Each wrench that becomes a sample changed, by what `change` makes of the orientation at its stamp.
+/// Each wrench that becomes a sample changed, by what `change` makes of the orientation at its
+/// stamp.
 fn changed(
     messages: &[Message],
     change: impl Fn(&UnitQuaternion<f64>, Wrench) -> Wrench,
@@ -323,7 +326,8 @@ fn a_calibrated_scene_gives_the_mesh_of_the_plain_recording() {
         "{report}"
     );
     assert_eq!(report["static_segments"], 12);
-    // all three, the payload first: its gravity is in the axes of space and turns with the scan that comes after it
+    // all three, the payload first: its gravity is in the axes of space and turns with the scan
+    // that comes after it
     done(&case.calibrate(&["scan", "--pairs", &pairs], "payload.yaml", "all.yaml"));
     done(&case.calibrate(&["tip", "--bag", &swing], "all.yaml", "all.yaml"));
     let all = fs::read_to_string(case.path("all.yaml")).unwrap();
@@ -503,8 +507,8 @@ fn results_are_printed_and_written_and_bad_data_is_3() {
     );
 }
 
-/// The stylus goes from point to point and dwells on each for 0.8 s, pressing with 2 N along the normal; the poses are
-/// of H.
+/// The stylus goes from point to point and dwells on each for 0.8 s, pressing with 2 N along the
+/// normal; the poses are of H.
 fn resting_on(points: &[(Point3<f64>, Vector3<f64>)]) -> Vec<Message> {
     let (radius, stiffness) = (1.5e-3, 20e3);
     let mut messages = Vec::new();

@@ -1,4 +1,5 @@
-//! Payload and tip: against simulated truth over many seeds, and against real static poses of a force sensor.
+//! Payload and tip: against simulated truth over many seeds, and against real static poses of a
+//! force sensor.
 
 use std::fs;
 
@@ -24,7 +25,8 @@ fn any_turn(rng: &mut Pcg64Mcg) -> UnitQuaternion<f64> {
     })))
 }
 
-// ---- payload ----------------------------------------------------------------------------------------------------
+// ---- payload
+// ----------------------------------------------------------------------------------------------------
 
 const WEIGHT: Vector3<f64> = Vector3::new(0.4, -0.7, -3.9);
 const CENTRE: Vector3<f64> = Vector3::new(0.004, -0.011, 0.052);
@@ -239,8 +241,8 @@ fn poses_that_do_not_determine_the_payload_are_refused() {
     ));
 }
 
-/// A robot that turns to eight orientations and dwells in each for a second: the segments are found, the turning between
-/// them and the settling after it are not in them.
+/// A robot that turns to eight orientations and dwells in each for a second: the segments are
+/// found, the turning between them and the settling after it are not in them.
 #[test]
 fn static_segments_of_a_recording_are_found() {
     let mut rng = Pcg64Mcg::seed_from_u64(9);
@@ -279,7 +281,8 @@ fn static_segments_of_a_recording_are_found() {
     }
 }
 
-/// Rows of numbers of a text file, below `../shared/data/force/gravity_ati`; `None`, said aloud, when that is not there.
+/// Rows of numbers of a text file, below `../shared/data/force/gravity_ati`; `None`, said aloud,
+/// when that is not there.
 fn real(name: &str) -> Option<Vec<Vec<f64>>> {
     let text =
         fs::read_to_string(crate::shared::shared(&format!("force/gravity_ati/{name}"))?).unwrap();
@@ -294,8 +297,9 @@ fn turn_of(xyzw: &[f64]) -> UnitQuaternion<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(xyzw[3], xyzw[0], xyzw[1], xyzw[2]))
 }
 
-/// Seven static poses of an ATI Axia80, the wrench in the axes of the poses: the authors found 10.80 N. An independent
-/// least squares (numpy) gives 10.807 N, residuals of 0.147 N rms per axis, and gravity along −z of the robot's base.
+/// Seven static poses of an ATI Axia80, the wrench in the axes of the poses: the authors found
+/// 10.80 N. An independent least squares (numpy) gives 10.807 N, residuals of 0.147 N rms per axis,
+/// and gravity along −z of the robot's base.
 #[test]
 fn seven_real_poses_give_the_payload_of_their_authors() {
     let (Some(poses), Some(wrenches)) = (real("pose_7.txt"), real("wrench_7.txt")) else {
@@ -341,9 +345,9 @@ fn seven_real_poses_give_the_payload_of_their_authors() {
     );
 }
 
-/// Three minutes of the same set-up, the wrench in the sensor's own axes, settling slowly after each turn. Over all
-/// rows an independent least squares (numpy) gives 11.413 N: 5.7 % more than the authors' result from their other
-/// poses.
+/// Three minutes of the same set-up, the wrench in the sensor's own axes, settling slowly after
+/// each turn. Over all rows an independent least squares (numpy) gives 11.413 N: 5.7 % more than
+/// the authors' result from their other poses.
 #[test]
 fn a_real_stream_gives_the_same_payload_within_its_settling() {
     let Some(rows) = real("GP2025.txt") else {
@@ -408,12 +412,14 @@ fn a_real_stream_gives_the_same_payload_within_its_settling() {
     );
 }
 
-// ---- tip --------------------------------------------------------------------------------------------------------
+// ---- tip
+// --------------------------------------------------------------------------------------------------------
 
 const OFFSET: Vector3<f64> = Vector3::new(0.0021, -0.0013, -0.1418);
 const REST: Vector3<f64> = Vector3::new(0.31, 0.12, 0.05);
 
-/// A swing about the ball: to `tilt` rad about x and `share` of that about y, with white noise or noise that goes on.
+/// A swing about the ball: to `tilt` rad about x and `share` of that about y, with white noise or
+/// noise that goes on.
 fn swing(
     count: u32,
     tilt: f64,
@@ -450,7 +456,8 @@ fn an_exact_swing_gives_the_tip() {
     assert_eq!(found.rejected, 0);
 }
 
-/// Offset and resting point over their stated uncertainties, 100 seeds, for white and for correlated noise.
+/// Offset and resting point over their stated uncertainties, 100 seeds, for white and for
+/// correlated noise.
 #[test]
 fn uncertainties_of_the_tip_hold() {
     for memory in [0.0, 0.9] {
@@ -529,7 +536,8 @@ fn swings_that_do_not_determine_the_tip_are_refused() {
         panic!("{error}")
     };
     assert!(swing_deg < 1e-3 && axis[0].abs() > 0.999_999, "{error}");
-    // to all sides, but by 4°: what lies across the shaft is seen least, since each of its axes tilts in one direction only
+    // to all sides, but by 4°: what lies across the shaft is seen least, since each of its axes
+    // tilts in one direction only
     let error = fitted(&swing(3000, 0.07, 1.0, 0.05e-3, 0.0, 1));
     let TipError::TooSmall {
         swing_deg, axis, ..

@@ -104,7 +104,8 @@ fn compared(mesh: &TriMesh, truth: &TriMesh, params: &CompareParams) -> Comparis
     compare(shapes[0], shapes[1], Regions::Unknown, params, &Alone).unwrap()
 }
 
-/// A tetrahedron is so sharp that a place beside an edge or a corner may be behind one of its faces: it is outside all the same.
+/// A tetrahedron is so sharp that a place beside an edge or a corner may be behind one of its
+/// faces: it is outside all the same.
 #[test]
 fn beside_sharp_edges_and_corners_outside_is_outside() {
     let corners = [
@@ -257,8 +258,9 @@ fn a_shifted_cube_is_off_where_it_sticks_out() {
     }
     let summary = found.regions[0].mesh_to_truth.clone().unwrap();
     assert!((summary.max - 1e-3).abs() < 1e-15, "{summary:?}");
-    // integrals over the faces, mm²·mm: the one in front 100 · 1; the four at its sides ∫₀¹ x dx · 10 each; behind, at a
-    // depth of 1, a pyramid's frustum ∫ min(1, distance to the rim) = (100 + 10 · 8 + 64) / 3 · 1 below zero
+    // integrals over the faces, mm²·mm: the one in front 100 · 1; the four at its sides ∫₀¹ x dx ·
+    // 10 each; behind, at a depth of 1, a pyramid's frustum ∫ min(1, distance to the rim) = (100 +
+    // 10 · 8 + 64) / 3 · 1 below zero
     let [front, sides, behind] = [100.0, 4.0 * 5.0, -(100.0 + 80.0 + 64.0) / 3.0];
     let expected = (front + sides + behind) / 600.0 * 1e-3;
     assert!(

@@ -1,4 +1,5 @@
-//! Where touch and scan disagree, of parts that are known: `touchup disagree` blames the scanner, the part or the touch.
+//! Where touch and scan disagree, of parts that are known: `touchup disagree` blames the scanner,
+//! the part or the touch.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -288,7 +289,8 @@ fn a_part_that_was_not_changed_is_not_called_changed() {
             assert_eq!(regions(report, "changed part").len(), 0, "{seed}: {report}");
             assert_eq!(area(report, "changed part"), 0.0);
             let touched = area(report, "agrees") + area(report, "scanner error");
-            // noise at an edge cannot be distinguished from a small change, least of all that of a poor scanner
+            // noise at an edge cannot be distinguished from a small change, least of all that of a
+            // poor scanner
             let share = if scanner.noise > 0.3e-3 { 0.06 } else { 0.04 };
             let small = |class| area(report, class) < share * touched;
             assert!(
@@ -434,8 +436,9 @@ fn a_mesh_without_marks_of_touch_is_refused() {
     );
 }
 
-// The scan is turned by 0.15° and shifted by 0.2 mm, of which noise of 0.6 mm hides most: the reported offset is no more than
-// that, as far as the stated deviation goes. Turned by 3°, it is reported in most.
+// The scan is turned by 0.15° and shifted by 0.2 mm, of which noise of 0.6 mm hides most: the
+// reported offset is no more than that, as far as the stated deviation goes. Turned by 3°, it is
+// reported in most.
 #[test]
 fn a_turned_scan_is_reported_only_as_far_as_the_turn_is_known() {
     let mut turned_found = 0;

@@ -121,9 +121,10 @@ fn sound_input_raises_no_alarm_and_each_mistake_is_named() {
     }
 }
 
-/// A ball as wide as the holes of the plate (seeds 2, 6, 10, …) rests on their rims: there neither its free motion nor its stop is clear.
-// The plate's scan is open below, and a hand that reaches it from its sides touches mostly where the scan has ended: beyond a rim a signed
-// distance says nothing.
+/// A ball as wide as the holes of the plate (seeds 2, 6, 10, …) rests on their rims: there neither
+/// its free motion nor its stop is clear.
+// The plate's scan is open below, and a hand that reaches it from its sides touches mostly where
+// the scan has ended: beyond a rim a signed distance says nothing.
 #[test]
 fn a_part_touched_on_all_sides_of_an_open_scan_raises_no_alarm() {
     let plate = Plate::default();

@@ -1,4 +1,5 @@
-//! `touchup features`, and features of `touchup refine`, at the boundary of the process: exit codes, files, stdout.
+//! `touchup features`, and features of `touchup refine`, at the boundary of the process: exit
+//! codes, files, stdout.
 
 use std::fs;
 use std::path::PathBuf;
@@ -234,7 +235,8 @@ fn json_has_the_documented_fields() {
             .filter(|feature| feature["kind"] == kind)
             .count()
     };
-    // a block with a step is a prism over a hexagon: 18 edges, 12 corners; the slot lies between y = 10 and 18 mm
+    // a block with a step is a prism over a hexagon: 18 edges, 12 corners; the slot lies between y
+    // = 10 and 18 mm
     assert_eq!(
         ["hole", "pocket", "boss", "corner"].map(count),
         [2, 0, 1, 12]

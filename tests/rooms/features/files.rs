@@ -87,7 +87,8 @@ proptest! {
         prop_assert_eq!(read, as_written(&touches));
     }
 
-    /// Whatever some fields hold of a good line: it is a touch of finite numbers, or the line is named with its error.
+    /// Whatever some fields hold of a good line: it is a touch of finite numbers, or the line is
+    /// named with its error.
     #[test]
     fn a_line_is_a_touch_or_its_error_is_named(
         changed in prop::collection::vec((0..17usize, "-?[0-9]{1,4}|[-+0-9.eE,naif ]{0,9}"), 1..4),

@@ -1,4 +1,5 @@
-//! Form and relations of the simulated plate with known errors in it, by touches: what was put in is found within its uncertainty.
+//! Form and relations of the simulated plate with known errors in it, by touches: what was put in
+//! is found within its uncertainty.
 //!
 //! `TOUCHUP_FULL=1` runs all seeds; `--nocapture` shows the numbers.
 
@@ -20,13 +21,15 @@ const BLIND: [f64; 2] = [32e-3, 34e-3];
 const TOP: f64 = 12e-3;
 /// The through-hole is out of round by twice this, m, in three lobes.
 const LOBE: f64 = 25e-6;
-/// The blind hole leans by these, rad: 0.1°, which the touches of the demo show no better than to itself, and 0.6°.
+/// The blind hole leans by these, rad: 0.1°, which the touches of the demo show no better than to
+/// itself, and 0.6°.
 const LEANS: [f64; 2] = [
     0.1 * std::f64::consts::PI / 180.0,
     0.6 * std::f64::consts::PI / 180.0,
 ];
 
-/// The plate with a through-hole out of round and a blind hole out of square: each point is moved by a small, smooth displacement.
+/// The plate with a through-hole out of round and a blind hole out of square: each point is moved
+/// by a small, smooth displacement.
 struct Worn {
     plate: Plate,
     /// of the blind hole, rad
@@ -43,7 +46,8 @@ fn window(rho: f64, [none_in, all_in, all_out, none_out]: [f64; 4]) -> f64 {
         * (1.0 - step((rho - all_out) / (none_out - all_out)))
 }
 
-/// Displacement of a place, m. It is the same for the centre of a ball and the wall that it touches, for both are at one angle and height.
+/// Displacement of a place, m. It is the same for the centre of a ball and the wall that it
+/// touches, for both are at one angle and height.
 fn displacement(p: &Point3<f64>, lean: f64) -> Vector3<f64> {
     let from = |axis: [f64; 2]| Vector3::new(p.x - axis[0], p.y - axis[1], 0.0);
     let (through, blind) = (from(THROUGH), from(BLIND));
@@ -96,8 +100,8 @@ impl Surface for Worn {
     }
 }
 
-/// Features of a part that is almost the plate, touched as in the demo, and whether the blind hole was felt all around: the hand that is
-/// caught at its rim goes on elsewhere.
+/// Features of a part that is almost the plate, touched as in the demo, and whether the blind hole
+/// was felt all around: the hand that is caught at its rim goes on elsewhere.
 fn found(part: &dyn Surface, seed: u64) -> (Vec<Feature>, bool) {
     let stylus = StylusParams::default();
     let (

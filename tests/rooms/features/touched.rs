@@ -19,7 +19,8 @@ fn seeds() -> u64 {
     either(4, 50)
 }
 
-/// Error of the configured stylus: radius, m, and stiffness, as a share. The calibration says 2 µm and 2 %.
+/// Error of the configured stylus: radius, m, and stiffness, as a share. The calibration says 2 µm
+/// and 2 %.
 #[derive(Clone, Copy, Debug, Default)]
 struct CalibrationOffset {
     radius: f64,
@@ -61,7 +62,8 @@ fn found(seed: u64, off: CalibrationOffset) -> Vec<Feature> {
     detect(&mesh, &FaceTree::new(&mesh), patcher.probed()).features
 }
 
-/// Errors of one dimension of one feature, and its standard uncertainty, seed by seed; mm or degrees.
+/// Errors of one dimension of one feature, and its standard uncertainty, seed by seed; mm or
+/// degrees.
 struct Row {
     name: String,
     /// at most, by the issue
@@ -262,8 +264,9 @@ fn of_truth<'a>(truth: &TruthFeature, kind: Kind, features: &'a [Feature]) -> &'
         .unwrap_or_else(|| panic!("the {} was not found", truth.name))
 }
 
-/// Interval of the root mean square of `count` normalised errors of standard deviation 1 in 99.8 % of cases: quantiles of
-/// χ² by Wilson and Hilferty's cube (six have 0.05 and 3.78 as mean squares; Abramowitz & Stegun, table 26.8, 0.06 and 3.74).
+/// Interval of the root mean square of `count` normalised errors of standard deviation 1 in 99.8 %
+/// of cases: quantiles of χ² by Wilson and Hilferty's cube (six have 0.05 and 3.78 as mean squares;
+/// Abramowitz & Stegun, table 26.8, 0.06 and 3.74).
 fn stated_over(count: usize) -> [f64; 2] {
     let spread = 2.0 / (9.0 * count as f64);
     [-3.09, 3.09].map(|z| (1.0 - spread + z * spread.sqrt()).max(0.0).powf(1.5))
@@ -276,7 +279,8 @@ fn touched_features_are_found_within_their_stated_uncertainty() {
     let mut others = Vec::new();
     for seed in 1..=seeds() {
         println!("seed {seed}");
-        // by one and a half of what the calibration says, each sign in turn: no draws of the model under test
+        // by one and a half of what the calibration says, each sign in turn: no draws of the model
+        // under test
         let sign = |bit: u64| if seed >> bit & 1 == 0 { 1.5 } else { -1.5 };
         let features = found(
             seed,
@@ -317,7 +321,8 @@ fn touched_features_are_found_within_their_stated_uncertainty() {
             "{name} is off by {}",
             row.worst()
         );
-        // few errors determine a standard deviation no better than χ² allows; the floor was touched in few seeds
+        // few errors determine a standard deviation no better than χ² allows; the floor was touched
+        // in few seeds
         let count = row.errors.len();
         // widths in every seed, a depth where the floor was touched
         assert!(
@@ -348,8 +353,9 @@ fn touched_features_are_found_within_their_stated_uncertainty() {
     assert_eq!(table.wrongly_through, 0);
 }
 
-/// The centre of the ball is where it is, for any stated radius: a ball stated 20 µm too large, ten times what the
-/// calibration says, makes bores and slots 40 µm wider and bosses 40 µm thinner, and their stated uncertainties do not show it.
+/// The centre of the ball is where it is, for any stated radius: a ball stated 20 µm too large, ten
+/// times what the calibration says, makes bores and slots 40 µm wider and bosses 40 µm thinner, and
+/// their stated uncertainties do not show it.
 #[test]
 fn a_wrong_radius_goes_twice_into_every_width_and_is_not_in_its_uncertainty() {
     let off = 20e-6;
@@ -419,8 +425,9 @@ fn a_wrong_radius_goes_twice_into_every_width_and_is_not_in_its_uncertainty() {
     );
 }
 
-/// The plate as drawn, with its surface around the blind hole and the upper 3 mm of its wall touched: how deep it is nobody felt,
-/// and what was not touched has no uncertainty beside what was. Without touches the drawing is known to its rounding.
+/// The plate as drawn, with its surface around the blind hole and the upper 3 mm of its wall
+/// touched: how deep it is nobody felt, and what was not touched has no uncertainty beside what
+/// was. Without touches the drawing is known to its rounding.
 #[test]
 fn what_was_not_felt_is_a_bound_or_has_no_uncertainty() {
     let plate = Plate::default();

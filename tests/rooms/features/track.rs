@@ -81,7 +81,8 @@ fn new_touches_are_in_the_numbers_at_once() {
         }
     }
     assert_eq!(before.len(), after.len());
-    // a search of the whole mesh agrees within the error of the subsampled fit, and keeps the numbers
+    // a search of the whole mesh agrees within the error of the subsampled fit, and keeps the
+    // numbers
     let whole = sizes(tracker.renew(&mesh, &tree, &touches));
     assert_eq!(whole.len(), after.len());
     for ((id, kind, size), (other_id, other_kind, other)) in whole.iter().zip(&after) {

@@ -18,7 +18,8 @@ const HEIGHT: f64 = 8e-3;
 const SHARED: f64 = 8e-6;
 const OWN: f64 = 6e-6;
 
-/// Turns around a wall at `rings` heights, 30 groups of ten points each, with noise; the fitted cylinder is off and leans.
+/// Turns around a wall at `rings` heights, 30 groups of ten points each, with noise; the fitted
+/// cylinder is off and leans.
 fn touched(
     seed: u64,
     rings: u32,
@@ -96,7 +97,8 @@ fn section(radius: impl Fn(f64) -> f64, turn: f64) -> [f64; 2] {
 
 const HONEST: std::ops::RangeInclusive<f64> = 0.8..=1.25;
 
-/// 150 seeds determine a root mean square to 6 %. A groove is of many undulations, of which the smallest are lost in noise.
+/// 150 seeds determine a root mean square to 6 %. A groove is of many undulations, of which the
+/// smallest are lost in noise.
 #[test]
 fn roundness_is_off_by_its_uncertainty() {
     let three = |t: f64| RADIUS + 25e-6 * (3.0 * t + 0.4).cos();
@@ -166,8 +168,9 @@ fn a_cone_and_a_bent_axis_are_off_by_their_uncertainty() {
     let found = |seed| touched(seed, 5, TAU, cone).unwrap().cylindricity.unwrap();
     let rms = errors_over_stds("cone", wall(&cone), seeds, found);
     assert!(rms.iter().all(|rms| HONEST.contains(rms)), "{rms:?}");
-    // middles on a parabola from 0 to 40 µm: a cylinder of that diameter holds them; that of least squares about five heights, 0, ±½, ±1,
-    // has its axis at half of 40 µm, from which the ends are off by the same
+    // middles on a parabola from 0 to 40 µm: a cylinder of that diameter holds them; that of least
+    // squares about five heights, 0, ±½, ±1, has its axis at half of 40 µm, from which the ends are
+    // off by the same
     let bent = |t: f64, z: f64| RADIUS + 40e-6 * (2.0 * z / HEIGHT).powi(2) * t.cos();
     let found = |seed| touched(seed, 5, TAU, bent).unwrap().straightness.unwrap();
     let rms = errors_over_stds("bent axis", [40e-6, 40e-6], seeds, found);

@@ -10,7 +10,8 @@ use proptest::test_runner::TestRunner;
 pub enum Shown {
     /// a number that another one would not pass for
     Value,
-    /// nothing but that it is no nonsense: what happens is below a rounding of what it happens to, or beyond the largest number
+    /// nothing but that it is no nonsense: what happens is below a rounding of what it happens to,
+    /// or beyond the largest number
     Little,
     /// it was refused, and a predicate of the test allowed that
     Refused,
@@ -35,7 +36,8 @@ impl Counts {
     }
 }
 
-/// Tries a property, which panics where it does not hold, on `cases` cases; prints and returns what they showed.
+/// Tries a property, which panics where it does not hold, on `cases` cases; prints and returns what
+/// they showed.
 #[track_caller]
 pub fn tried<S: Strategy>(
     name: &str,

@@ -59,7 +59,8 @@ fn samples() -> impl Iterator<Item = Sample> {
     })
 }
 
-/// The mesh that the haptic update alone makes of a scan, and how many vertices it moved at most at one sample.
+/// The mesh that the haptic update alone makes of a scan, and how many vertices it moved at most at
+/// one sample.
 fn touched(scan: &TriMesh) -> (TriMesh, usize) {
     let mut engine = Engine::new(
         scan.clone(),
@@ -77,7 +78,8 @@ fn touched(scan: &TriMesh) -> (TriMesh, usize) {
     (ended.mesh().into_owned(), most)
 }
 
-/// Root mean square of how far the scan is off the part where it was touched, its texture taken off, m.
+/// Root mean square of how far the scan is off the part where it was touched, its texture taken
+/// off, m.
 fn left(before: &TriMesh, after: &TriMesh, texture: fn(f64, f64) -> f64) -> f64 {
     let pairs = before.positions().iter().zip(after.positions());
     let inside = pairs.filter(|(p, _)| p.x.abs().max(p.y.abs()) < TOUCHED - 1e-3);
@@ -91,7 +93,8 @@ fn a_dense_scan_goes_where_it_was_touched_and_keeps_its_texture() {
     let (mesh, most) = touched(&scan);
     // the region of the tip has 700 vertices of this scan
     assert!(most < 60, "{most} vertices in one update");
-    // a smooth scan of edges about as long as those that the update works on, and the root mean square of the texture
+    // a smooth scan of edges about as long as those that the update works on, and the root mean
+    // square of the texture
     let coarse = grid(21, 0.76e-3, |_, _| ABOVE);
     let of_coarse = left(&coarse, &touched(&coarse).0, |_, _| 0.0);
     let of_dense = left(&scan, &mesh, texture);
@@ -128,7 +131,8 @@ fn the_paper_takes_every_face_as_it_is() {
     assert_eq!(engine.refiner().mesh().face_count(), scan.face_count());
 }
 
-/// The largest distance of a vertex that a face uses from another mesh, m, where it is within `TOUCHED` of the middle.
+/// The largest distance of a vertex that a face uses from another mesh, m, where it is within
+/// `TOUCHED` of the middle.
 fn farthest(from: &TriMesh, to: &TriMesh) -> f64 {
     let tree = FaceTree::new(to);
     let used = (0..from.vertex_slots() as u32)

@@ -1,5 +1,5 @@
-//! The face dynamics against closed forms, laws and the paper's one-face experiment. Numbers to 50 digits are compared
-//! in `tests/python/test_step.py`.
+//! The face dynamics against closed forms, laws and the paper's one-face experiment. Numbers to 50
+//! digits are compared in `tests/python/test_step.py`.
 
 use std::f64::consts::PI;
 
@@ -282,7 +282,8 @@ fn the_explicit_solver_gives_up_on_stiff_steps() {
     );
 }
 
-/// Distance in units of h_min plus angle after 40 ms in `steps` steps, against the tight explicit solver.
+/// Distance in units of h_min plus angle after 40 ms in `steps` steps, against the tight explicit
+/// solver.
 fn error_after(rule: StepRule, along: Along, offset: bool, steps: u32) -> f64 {
     let params = DynamicsParams {
         rule,
@@ -306,7 +307,8 @@ fn error_after(rule: StepRule, along: Along, offset: bool, steps: u32) -> f64 {
     );
     assert_eq!(reference, UP);
     let mut face = UP;
-    // the direction a must stay that of the first step for the comparison: only `Force` is the same ODE throughout
+    // the direction a must stay that of the first step for the comparison: only `Force` is the same
+    // ODE throughout
     for _ in 0..steps {
         face = step(params, &face, p, force, 0.04 / f64::from(steps));
     }
@@ -411,7 +413,8 @@ proptest! {
         let after = step(params, &face, p, size * f, 5e-3);
         let turned = FaceState { b: turn * face.b, n: turn * n };
         let turned_after = step(params, &turned, turn * p, turn * (size * f), 5e-3);
-        // where the flow amplifies (f·n < 0) by at most e^(slope t) = e^5; coordinates of millimetres, forces of 10 N
+        // where the flow amplifies (f·n < 0) by at most e^(slope t) = e^5; coordinates of
+        // millimetres, forces of 10 N
         prop_assert!((turn * after.b - turned_after.b).norm() < 1e-15);
         prop_assert!((turn * after.n - turned_after.n).norm() < 1e-12);
     }
@@ -445,7 +448,8 @@ proptest! {
         let face = FaceState { b: Point3::origin(), n };
         let p = Point3::from(SIGMOID.distance(force_n) * n);
         let after = step(params, &face, p, force_n * n, dt);
-        // h and δ meet at the size of δ (five roundings of h_min δ), and u is ln(1/c − 1) of a rounded c (four)
+        // h and δ meet at the size of δ (five roundings of h_min δ), and u is ln(1/c − 1) of a
+        // rounded c (four)
         let c = force_n / F_MAX;
         prop_assert!(after.b.coords.norm() <= (5.0 * 5.0 + 4.0 / (c * (1.0 - c))) * H_MIN * f64::EPSILON);
         prop_assert!((after.n - n).norm() <= 4.0 * f64::EPSILON);
@@ -471,8 +475,8 @@ fn sizes(reach: f64) -> impl Strategy<Value = Sizes> {
     })
 }
 
-/// Finite and of length 1, turned in the plane of n and F, and no farther than α (|F| + f_max) t where a sigmoid expects f_max at the
-/// most.
+/// Finite and of length 1, turned in the plane of n and F, and no farther than α (|F| + f_max) t
+/// where a sigmoid expects f_max at the most.
 fn check_extremes(
     sizes: &Sizes,
     [n, f, side]: [Vector3<f64>; 3],
@@ -527,7 +531,8 @@ fn check_extremes(
                 .unwrap()
                 .step(&face, &p, &force, dt)
             else {
-                // a spring that is drawn away from its rest goes there as e^αkt: only that is beyond the largest number
+                // a spring that is drawn away from its rest goes there as e^αkt: only that is
+                // beyond the largest number
                 let is_away = spring && alpha_m_per_n_s * h_min_m * dt > 300.0;
                 assert!(
                     is_away || may_overflow,
@@ -570,7 +575,8 @@ fn extremes_give_a_unit_normal_or_an_error() {
         |(sizes, directions, params)| check_extremes(&sizes, directions, params, false),
     );
     assert!(counts.values > 1500, "{counts:?}");
-    // as far as numbers go: a product of four sizes may be as far from 1 as 10^100, and what is refused is one of those
+    // as far as numbers go: a product of four sizes may be as far from 1 as 10^100, and what is
+    // refused is one of those
     let counts = tried(
         "sizes of 1e-300 to 1e300",
         2048,
@@ -589,8 +595,9 @@ fn extremes_give_a_unit_normal_or_an_error() {
     assert!(counts.values > 200, "{counts:?}");
 }
 
-/// A face in a saturated model goes at one of two speeds, −c where nothing is expected (u > 0) and 1 − c where f_max is (u < 0),
-/// until it is at u = 0, or for ever: by as much as the bend is wide, |ln| of the smallest number of c and 1 − c, it is not there.
+/// A face in a saturated model goes at one of two speeds, −c where nothing is expected (u > 0) and
+/// 1 − c where f_max is (u < 0), until it is at u = 0, or for ever: by as much as the bend is wide,
+/// |ln| of the smallest number of c and 1 − c, it is not there.
 fn check_saturated(u: f64, c: f64, scaled: f64, rule: StepRule) -> Shown {
     let params = DynamicsParams {
         rule,
@@ -618,7 +625,8 @@ fn check_saturated(u: f64, c: f64, scaled: f64, rule: StepRule) -> Shown {
         }
     };
     let width = 40.0 + c.abs().min((1.0 - c).abs()).ln().abs();
-    // where it goes on, the bend also costs time: as much as it is wide at the slower of both speeds
+    // where it goes on, the bend also costs time: as much as it is wide at the slower of both
+    // speeds
     let delay =
         width * (1.0 + speed(-u).abs().max(speed(u).abs()) / speed(-u).abs().min(speed(u).abs()));
     let tolerance = delay + 1e-12 * (u.abs() + moved.abs());
@@ -659,8 +667,9 @@ fn shares() -> impl Strategy<Value = f64> {
     ]
 }
 
-/// Two flows of a share of the time each are the one of all of it; and each travel lies between the rates of its ends, f by
-/// f_max e^(−u/2) / (2 cosh(u/2)), as h moves monotonically and f falls with h.
+/// Two flows of a share of the time each are the one of all of it; and each travel lies between the
+/// rates of its ends, f by f_max e^(−u/2) / (2 cosh(u/2)), as h moves monotonically and f falls
+/// with h.
 fn check_sum(u: f64, c: f64, t: f64, first: f64, tilted: bool) -> Shown {
     let model = ContactModel::Sigmoid {
         f_max_n: 1.0,
@@ -738,7 +747,8 @@ fn position_flows_add_up_in_every_regime() {
     assert!(counts.values > 8_000, "{counts:?}");
 }
 
-/// Distance of the planes at the true barycentre, m, and angle between the normals, rad, before each millisecond.
+/// Distance of the planes at the true barycentre, m, and angle between the normals, rad, before
+/// each millisecond.
 fn one_face(
     params: DynamicsParams,
     face: FaceState,
@@ -769,7 +779,8 @@ fn tilted(b_mm: [f64; 3], tilt_deg: f64, azimuth: f64) -> FaceState {
 
 #[test]
 fn one_face_comes_to_the_true_plane_distance_first_then_normal() {
-    // at rest a tilted face draws the tip F_c sin(tilt)/K aside: with larger tilts the distance waits for the normal
+    // at rest a tilted face draws the tip F_c sin(tilt)/K aside: with larger tilts the distance
+    // waits for the normal
     let starts = [
         ([3.0, -2.0, 2.5], 20.0, 0.3),
         ([-1.0, 4.0, -3.0], 10.0, 2.0),
@@ -804,7 +815,8 @@ fn one_face_comes_to_the_true_plane_distance_first_then_normal() {
                 distance_s < 0.7 * normal_s,
                 "the distance is corrected first"
             );
-            // the surface is as soft as the model says, so nothing remains but what 40 s have not yet turned
+            // the surface is as soft as the model says, so nothing remains but what 40 s have not
+            // yet turned
             assert!(distance < 1e-9 && normal < 1e-5);
         }
     }

@@ -1,6 +1,7 @@
-//! A property for each formula of the method, over the whole range of numbers: denormals, overflow and cancellation are included
-//! on purpose. What was the worst in long runs is a case of its own. Where a case can show little it is counted, and
-//! a predicate of the test decides what may be refused.
+//! A property for each formula of the method, over the whole range of numbers: denormals, overflow
+//! and cancellation are included on purpose. What was the worst in long runs is a case of its own.
+//! Where a case can show little it is counted, and a predicate of the test decides what may be
+//! refused.
 
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -123,7 +124,8 @@ fn check_turn(n: &Vector3<f64>, to: &Vector3<f64>, exponent: f64) -> Shown {
         turned.norm()
     );
     let angle = |a: &Vector3<f64>, b: &Vector3<f64>| (a - b).norm().atan2((a + b).norm());
-    // half angles: tan falls by e^−exponent; the sum of nearly opposite vectors is off by a rounding
+    // half angles: tan falls by e^−exponent; the sum of nearly opposite vectors is off by a
+    // rounding
     let (before, after) = (angle(n, to), angle(&turned, to));
     let left = (before.tan() * (-exponent).exp()).atan();
     // turning away makes more of a rounding
@@ -153,13 +155,14 @@ fn check_turn(n: &Vector3<f64>, to: &Vector3<f64>, exponent: f64) -> Shown {
     }
 }
 
-/// Whether a product is beyond the largest number, or so near that a factor of two might be: by its factors' powers of ten.
+/// Whether a product is beyond the largest number, or so near that a factor of two might be: by its
+/// factors' powers of ten.
 fn is_huge(factors: &[f64]) -> bool {
     factors.iter().map(|x| x.abs().log10()).sum::<f64>() > 307.0
 }
 
-/// A spring falls to e^−αkt of its distance to rest. It is refused only where a product is huge that its travel h + F/k, its
-/// impulse k ∫ h dt or their terms consist of.
+/// A spring falls to e^−αkt of its distance to rest. It is refused only where a product is huge
+/// that its travel h + F/k, its impulse k ∫ h dt or their terms consist of.
 fn check_spring(stiffness: f64, alpha: f64, dt: f64, h: f64, force: f64) -> Shown {
     let model = ContactModel::Spring {
         stiffness_n_per_m: stiffness,
@@ -194,7 +197,8 @@ fn check_spring(stiffness: f64, alpha: f64, dt: f64, h: f64, force: f64) -> Show
     } else {
         left * -(-z).exp_m1()
     };
-    // both terms of the sum are rounded before they meet; what underflows in between is below the smallest normal number
+    // both terms of the sum are rounded before they meet; what underflows in between is below the
+    // smallest normal number
     let terms = (h.abs() + (force / stiffness).abs()) * z.min(1.0);
     let underflow = f64::MIN_POSITIVE * (1.0 + alpha * dt) * (1.0 + stiffness.recip().min(1e300));
     let tolerance = 16.0 * EPSILON * terms + underflow;
@@ -202,7 +206,8 @@ fn check_spring(stiffness: f64, alpha: f64, dt: f64, h: f64, force: f64) -> Show
         .iter()
         .all(|x| x.is_finite())
         && z.is_normal();
-    // with few digits left in αk or αt there are no more in what comes of it: less than a rounding of h
+    // with few digits left in αk or αt there are no more in what comes of it: less than a rounding
+    // of h
     let is_meaningful =
         is_meaningful && (alpha * stiffness).is_normal() && (alpha * dt).is_normal();
     assert!(
@@ -217,9 +222,10 @@ fn check_spring(stiffness: f64, alpha: f64, dt: f64, h: f64, force: f64) -> Show
     }
 }
 
-/// Towards rest, not over it, and as far as the rate allows. With F inside (0, f_max) the rate only falls, and the distance g
-/// to rest obeys s′(u) g with a slope s′ = s (1 − s) between that of both ends and 1/4: so the travel lies between the last rate
-/// and the first times t, and between g (1 − e^−mT) and g (1 − e^−T/4).
+/// Towards rest, not over it, and as far as the rate allows. With F inside (0, f_max) the rate only
+/// falls, and the distance g to rest obeys s′(u) g with a slope s′ = s (1 − s) between that of both
+/// ends and 1/4: so the travel lies between the last rate and the first times t, and between g (1 −
+/// e^−mT) and g (1 − e^−T/4).
 ///
 /// It is refused only where the scaled time α f_max t / h_min or the travel α F t is huge.
 fn check_position(h_min: f64, f_max: f64, alpha: f64, share: f64, u: f64, dt: f64) -> Shown {
@@ -296,7 +302,8 @@ fn check_position(h_min: f64, f_max: f64, alpha: f64, share: f64, u: f64, dt: f6
     }
 }
 
-/// du/dT = 1/(1 + eᵘ) − c by the classical Runge–Kutta method in so many even steps that its error is 1e-8 at the most.
+/// du/dT = 1/(1 + eᵘ) − c by the classical Runge–Kutta method in so many even steps that its error
+/// is 1e-8 at the most.
 fn flowed(u: f64, c: f64, scaled: f64) -> f64 {
     let (steps, rate) = (4000, |u: f64| force_by_cosh(1.0, u) - c);
     let step = scaled / f64::from(steps);
@@ -356,7 +363,8 @@ fn lattice(shake: &[f64], centre: &Vector3<f64>) -> TriMesh {
     TriMesh::new(positions.collect(), faces.collect()).unwrap()
 }
 
-/// Three quarters of a 25th of the mean edge of [`lattice`], m: a step of the refiner below it is not shortened.
+/// Three quarters of a 25th of the mean edge of [`lattice`], m: a step of the refiner below it is
+/// not shortened.
 const LONGEST_STEP: f64 = 0.75 * 0.04e-3;
 
 fn refiner(mesh: &TriMesh) -> Refiner {
@@ -439,7 +447,8 @@ fn check_push(shake: &[f64], centre: &Vector3<f64>, force: &Vector3<f64>, depth:
             .fold(0.0, f64::max);
         for vertex in (0..mesh.vertex_count() as u32).map(VertexId) {
             if update.fit.is_some() && refiner.moved_vertices().contains(&vertex) {
-                // weights are not negative and sum to 1 at most: nothing moves farther than the handle
+                // weights are not negative and sum to 1 at most: nothing moves farther than the
+                // handle
                 assert!(
                     travel(vertex) <= handle * (1.0 + 1e-12) + rounding,
                     "{:e} {handle:e}",
@@ -454,8 +463,9 @@ fn check_push(shake: &[f64], centre: &Vector3<f64>, force: &Vector3<f64>, depth:
                 / 3.0
         };
         let step = barycentre(&|v| refiner.mesh().position(v) - before[v.0 as usize]).dot(&normal);
-        // in a millisecond the handle goes e^−0.025 a·n of its distance to rest along the force, or as far as no corner goes
-        // farther than a step may; a turn about the barycentre does not move that
+        // in a millisecond the handle goes e^−0.025 a·n of its distance to rest along the force, or
+        // as far as no corner goes farther than a step may; a turn about the barycentre does not
+        // move that
         let cosine = normal.dot(&n);
         let free = (h + measured.dot(&n) / 2e4) / cosine * -(-0.025 * cosine).exp_m1();
         let is_free = handle < LONGEST_STEP && refiner.counts().cut_back == 0 && tick > 1;
@@ -746,7 +756,8 @@ fn a_denormal_force_is_reached_at_a_finite_distance() {
     assert!((h - (10f64.ln() + 1074.0 * 2f64.ln())).abs() < 1e-12, "{h}");
 }
 
-/// h/h_min beyond the largest number on either side; a denormal h_min; cancellation of h/h_min with δ.
+/// h/h_min beyond the largest number on either side; a denormal h_min; cancellation of h/h_min with
+/// δ.
 #[test]
 fn the_worst_depths_of_eq_3() {
     for (f_max, h_min, delta, h) in [
@@ -761,7 +772,9 @@ fn the_worst_depths_of_eq_3() {
     }
 }
 
-/// So nearly opposite that the square of the difference underflows (the normal was NaN then), opposite to rounding, equal to rounding, and an exponent whose exponential is denormal or nothing.
+/// So nearly opposite that the square of the difference underflows (the normal was NaN then),
+/// opposite to rounding, equal to rounding, and an exponent whose exponential is denormal or
+/// nothing.
 #[test]
 fn the_worst_turns_of_eq_7() {
     let n = Vector3::z();
@@ -819,7 +832,8 @@ fn the_worst_springs() {
     }
 }
 
-/// α f_max underflowed though α f_max dt does not, and the face went 1e118 times as far as its rest point.
+/// α f_max underflowed though α f_max dt does not, and the face went 1e118 times as far as its rest
+/// point.
 #[test]
 fn an_underflowing_product_does_not_pass_for_no_time() {
     check_position(
@@ -842,7 +856,8 @@ fn an_underflowing_product_does_not_pass_for_no_time() {
     assert!((face.b.z - 1e-200).abs() < 1e-214, "{:e}", face.b.z);
 }
 
-/// At 1e299 scaled times overflowed from u = −700, and the face was 1e299 m away: that is refused now.
+/// At 1e299 scaled times overflowed from u = −700, and the face was 1e299 m away: that is refused
+/// now.
 #[test]
 fn the_worst_positions_of_eq_6() {
     for u in [-700.0, -40.0, -1e-16, 0.0, 1e-16, 36.7, 40.0, 700.0] {

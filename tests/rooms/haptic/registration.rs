@@ -1,4 +1,5 @@
-//! The offset between scan and part: recovered from contacts, refused where they do not determine it, and honest about noise.
+//! The offset between scan and part: recovered from contacts, refused where they do not determine
+//! it, and honest about noise.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3, vector};
 use rand::SeedableRng;
@@ -116,7 +117,8 @@ fn a_fat_scan_is_distinguished_from_a_shift_when_it_was_touched_from_all_sides()
     assert!(found.twist.norm() < 1e-5, "{}", found.twist);
 }
 
-/// From one side the surface offset is a shift as far as touches can determine: its own uncertainty must show.
+/// From one side the surface offset is a shift as far as touches can determine: its own uncertainty
+/// must show.
 #[test]
 fn touched_from_one_side_of_each_axis_the_shift_is_as_uncertain_as_the_surface_offset() {
     let three = [sides()[0], sides()[2], sides()[4]];
@@ -197,8 +199,9 @@ fn too_little_and_nonsense_are_refused() {
     );
 }
 
-/// Independent numbers at the corners of a lattice of 8 mm, linear between them. Along an axis the mean variance is 2/3 of a corner's,
-/// and the area under the correlation is that of a corner over 8 mm: it counts as one value over 8 · 3/2 = 12 mm.
+/// Independent numbers at the corners of a lattice of 8 mm, linear between them. Along an axis the
+/// mean variance is 2/3 of a corner's, and the area under the correlation is that of a corner over
+/// 8 mm: it counts as one value over 8 · 3/2 = 12 mm.
 fn random_field(seed: u64, rms: f64) -> impl FnMut(&Point3<f64>) -> f64 {
     let mut rng = Pcg64::seed_from_u64(seed);
     let corners: Vec<f64> = (0..1000)

@@ -26,10 +26,11 @@ enum Gives {
     Error(&'static str),
 }
 
-/// Meshes: read by trimesh without processing, vertices equal to 9 decimals merged, non-finite, zero-area and repeated
-/// faces left out, edges counted with numpy, loops with scipy's connected components. `made_huge_offset_utm.stl`: in
-/// exact fractions, since its triangles are near rounding. Files that trimesh could not read there (`*quadknot*`,
-/// `*singlevn*`, `*blender_uv*`): counted by hand from their headers (closed quads cut in two).
+/// Meshes: read by trimesh without processing, vertices equal to 9 decimals merged, non-finite,
+/// zero-area and repeated faces left out, edges counted with numpy, loops with scipy's connected
+/// components. `made_huge_offset_utm.stl`: in exact fractions, since its triangles are near
+/// rounding. Files that trimesh could not read there (`*quadknot*`, `*singlevn*`, `*blender_uv*`):
+/// counted by hand from their headers (closed quads cut in two).
 #[rustfmt::skip]
 const NASTY: [(&str, Gives); 54] = {
     use Gives::{Error, Mesh};
@@ -235,7 +236,8 @@ fn corners_of(mesh: &TriMesh) -> Vec<[Point3<f64>; 3]> {
 fn what_is_written_is_read_back() {
     let folder = tempfile::tempdir().unwrap();
     let ball = ball();
-    // roundings of half a unit in the last place: none in metres, two in other units, one to f32 (and its unit)
+    // roundings of half a unit in the last place: none in metres, two in other units, one to f32
+    // (and its unit)
     let bounds = [
         ("ply", 0.0, 2.0 * f64::EPSILON),
         ("obj", 0.0, 2.0 * f64::EPSILON),
@@ -312,7 +314,8 @@ fn ply_keeps_the_order_and_leaves_out_what_was_removed() {
     );
 }
 
-/// By hand: 4 vertices of three doubles and one float each follow the header; the one without a face is left out.
+/// By hand: 4 vertices of three doubles and one float each follow the header; the one without a
+/// face is left out.
 #[test]
 fn columns_are_properties_of_the_vertices_in_ply() {
     let p = [[0.0, 0.0], [1.0, 0.0], [9.0, 9.0], [0.0, 1.0], [1.0, 1.0]]
@@ -342,7 +345,8 @@ fn columns_are_properties_of_the_vertices_in_ply() {
     );
 }
 
-/// A square of two triangles, the second one with an image of its own, as text of both kinds; colours by hand.
+/// A square of two triangles, the second one with an image of its own, as text of both kinds;
+/// colours by hand.
 #[test]
 fn colours_and_textures_come_back_from_either_kind_of_file() {
     let folder = tempfile::tempdir().unwrap();
@@ -540,7 +544,8 @@ fn obj_variants_are_read() {
             )
         })
     };
-    // colours on some vertices only, with alpha, a weight, a comment in Latin-1, indices of normals that are not there
+    // colours on some vertices only, with alpha, a weight, a comment in Latin-1, indices of normals
+    // that are not there
     let odd = b"# \xe9t\xe9\no a\nv 0 0 0 1 0 0\nv 1 0 0\n v 2 2 0 2\r\ng b\nv 0 1 0 1 0 0 1\nv 9 9 9\nusemtl x\nf 1//7 2//7 3//7 4//7";
     assert_eq!(read(odd).unwrap(), (4, 2, 1));
     let MeshFile { mesh, .. } = read_text("a.obj", odd).unwrap();
@@ -661,7 +666,8 @@ proptest! {
         }
         std::fs::write(&path, &bytes).unwrap();
         let (outcome, largest) = largest_request(|| read_mesh(&path, Metre));
-        // 24 bytes of position for the 3 bytes of the shortest row, and what the tables need at least
+        // 24 bytes of position for the 3 bytes of the shortest row, and what the tables need at
+        // least
         prop_assert!(largest <= 16 * bytes.len() + 4096, "{largest} bytes at once");
         match outcome {
             Ok(MeshFile { mesh, .. }) => prop_assert!(mesh.face_count() > 0),

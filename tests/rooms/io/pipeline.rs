@@ -76,7 +76,8 @@ fn number(summary: &Value, key: &str) -> u64 {
     summary[key].as_u64().unwrap()
 }
 
-// ---- a real recording -------------------------------------------------------------------------------------------
+// ---- a real recording
+// -------------------------------------------------------------------------------------------
 
 /// Radius of the ball of the real recording, m.
 const PROBE_RADIUS: f64 = 3.15e-3;
@@ -128,7 +129,8 @@ fn contact_points(bag: &Path) -> (Vec<Point3<f64>>, Vec<Vector3<f64>>) {
         .unzip()
 }
 
-/// A flat patch of triangles of 2 mm, fitted to points, its normals towards `up`, 4 mm larger than they reach.
+/// A flat patch of triangles of 2 mm, fitted to points, its normals towards `up`, 4 mm larger than
+/// they reach.
 fn patch_under(points: &[Point3<f64>], up: &Vector3<f64>) -> TriMesh {
     let middle: Vector3<f64> =
         points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / points.len() as f64;
@@ -178,7 +180,8 @@ fn mean_distance(points: &[Point3<f64>], mesh: &TriMesh) -> f64 {
     sum / points.len() as f64
 }
 
-/// The real probing of a phantom with a ball, into a flat patch under it; from both containers, twice.
+/// The real probing of a phantom with a ball, into a flat patch under it; from both containers,
+/// twice.
 #[test]
 fn a_real_recording_shapes_a_flat_patch_the_same_from_both_containers() {
     let (Some(mcap), Some(db3)) = (
@@ -255,7 +258,8 @@ fn a_real_recording_shapes_a_flat_patch_the_same_from_both_containers() {
     assert!(refined < 0.5 * flat, "{refined:e} m, {flat:e} m");
 }
 
-// ---- a made plate -----------------------------------------------------------------------------------------------
+// ---- a made plate
+// -----------------------------------------------------------------------------------------------
 
 /// A noisy plate in mm, and a ball of 1.5 mm that slides over the true plane.
 struct Plate {
@@ -312,7 +316,8 @@ impl Plate {
     }
 }
 
-/// Four seconds: 21 lines of 20 mm, poses at 500 Hz and wrenches at 1 kHz, 2 N, friction 0.2, lifted between lines.
+/// Four seconds: 21 lines of 20 mm, poses at 500 Hz and wrenches at 1 kHz, 2 N, friction 0.2,
+/// lifted between lines.
 fn plate_touches() -> Vec<Message> {
     let mut messages = vec![];
     for tick in 0..4_200_i64 {
@@ -407,7 +412,8 @@ fn a_replay_equals_the_first_run_byte_for_byte() {
     let output = plate.refine("beside.ply", &["--live"]);
     assert_eq!((code(&output), stderr(&output)), (0, String::new()));
     let live = &summary(&output)["live"];
-    // 4.2 s in steps of 8 ms, and what is left at the end; those that come after a late one take more in and are fewer
+    // 4.2 s in steps of 8 ms, and what is left at the end; those that come after a late one take
+    // more in and are fewer
     let least = if number(live, "late") == 0 { 520 } else { 1 };
     assert!((least..=530).contains(&number(live, "renewals")), "{live}");
     let behind = &live["behind_ns"];
@@ -554,7 +560,8 @@ fn other_parameters_give_another_mesh() {
     assert_eq!(meshes.len(), what_ifs.len());
 }
 
-// ---- damage -----------------------------------------------------------------------------------------------------
+// ---- damage
+// -----------------------------------------------------------------------------------------------------
 
 /// What any run may do: finish, with a whole mesh; or refuse with one line, and leave no file.
 fn check_outcome(

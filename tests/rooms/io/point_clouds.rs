@@ -109,8 +109,8 @@ impl Workers for InParts {
     }
 }
 
-/// Of points that lie by chance none is within 1.8 spacings of a place with a probability of exp(−1.8²π) = 4e-5, which is more than once
-/// among 100,000; yet there is no hole in a ball.
+/// Of points that lie by chance none is within 1.8 spacings of a place with a probability of
+/// exp(−1.8²π) = 4e-5, which is more than once among 100,000; yet there is no hole in a ball.
 #[test]
 fn the_surface_of_a_closed_part_is_closed_however_the_points_fall() {
     let points = ball_points(100_000);
@@ -199,7 +199,8 @@ fn a_ply_without_faces_goes_by_its_normals_and_an_organised_pcd_by_its_scanner()
         [3002, 1, 1]
     );
 
-    // a plate 1 m below the scanner, which is at the origin: its outside is up, though no point says so
+    // a plate 1 m below the scanner, which is at the origin: its outside is up, though no point
+    // says so
     let plate: Vec<_> = plate_points()
         .iter()
         .map(|p| p - Vector3::new(0.0, 0.0, 1.0))
@@ -235,8 +236,8 @@ fn what_makes_no_scan_is_refused_in_one_line_that_says_what_to_do() {
     );
 }
 
-/// Sums of the coordinates of the finite points, m, as NumPy has them of an LZF decoder of twenty lines of Python; counts as
-/// `data/INDEX.md` has them.
+/// Sums of the coordinates of the finite points, m, as NumPy has them of an LZF decoder of twenty
+/// lines of Python; counts as `data/INDEX.md` has them.
 #[test]
 fn real_clouds_of_depth_cameras_are_read() {
     let Some(folder) = shared("scans") else {

@@ -10,7 +10,8 @@ use touchup::mesh::{BoxQuery, FaceId, FaceTree, Nearby, RefitPlan, TriMesh, Vert
 
 use crate::common::{grid, within};
 
-// ---- expected content of the mesh ----------------------------------------------------------------------------------
+// ---- expected content of the mesh
+// ----------------------------------------------------------------------------------
 
 /// The same mesh as plain lists, edited beside the one under test.
 #[derive(Default)]
@@ -83,9 +84,11 @@ impl Ledger {
     }
 }
 
-// ---- the mesh alone ---------------------------------------------------------------------------------------------
+// ---- the mesh alone
+// ---------------------------------------------------------------------------------------------
 
-/// Splits a face in three about a new vertex, or takes out a vertex with its faces and closes the gap as a fan.
+/// Splits a face in three about a new vertex, or takes out a vertex with its faces and closes the
+/// gap as a fan.
 fn replace_some(mesh: &mut TriMesh, ledger: &mut Ledger, rng: &mut Pcg64, most: usize) {
     let remove = |mesh: &mut TriMesh, ledger: &mut Ledger, face: u32| {
         assert!(mesh.remove_face(FaceId(face)) && ledger.faces.remove(&face).is_some());
@@ -153,9 +156,11 @@ fn a_million_replacements_leave_storage_bounded_and_stars_exact() {
         }
     }
     ledger.check(&mesh);
-    // 700 faces and 400 vertices would take 36 kB: 12 bytes for a face, 24 + 12 for a vertex, 16 for a face in a star
+    // 700 faces and 400 vertices would take 36 kB: 12 bytes for a face, 24 + 12 for a vertex, 16
+    // for a face in a star
     assert!(mesh.bytes() < 100_000, "{} bytes", mesh.bytes());
-    // an array that doubles once more may, as the largest number of faces ever is a matter of chance
+    // an array that doubles once more may, as the largest number of faces ever is a matter of
+    // chance
     assert!(
         mesh.bytes() <= 2 * early,
         "{} bytes, after a tenth of the edits {early}",
@@ -163,9 +168,11 @@ fn a_million_replacements_leave_storage_bounded_and_stars_exact() {
     );
 }
 
-// ---- the tree ---------------------------------------------------------------------------------------------------
+// ---- the tree
+// ---------------------------------------------------------------------------------------------------
 
-/// Squared distance from `p` to each face, by the closest point of one triangle (which has tests of its own).
+/// Squared distance from `p` to each face, by the closest point of one triangle (which has tests of
+/// its own).
 fn distances(mesh: &TriMesh, p: &Point3<f64>) -> Vec<(f64, FaceId)> {
     let far = |face| (triangle::closest_point(p, &mesh.triangle(face)).0 - p).norm_squared();
     mesh.faces().map(|(face, _)| (far(face), face)).collect()
@@ -399,7 +406,8 @@ impl Edited {
         }
     }
 
-    /// Uses the plan of an earlier call where the star of its vertex is still the same, and makes the next one.
+    /// Uses the plan of an earlier call where the star of its vertex is still the same, and makes
+    /// the next one.
     fn move_planned(&mut self, rng: &mut Pcg64) {
         if let Some((vertex, faces)) = self.planned.take()
             && self.mesh.star(vertex) == faces
@@ -524,7 +532,8 @@ impl Pushed {
     }
 }
 
-/// Cached neighbours must stay valid while the mesh moves below the point and beside it, and faces come and go.
+/// Cached neighbours must stay valid while the mesh moves below the point and beside it, and faces
+/// come and go.
 #[test]
 fn a_walk_over_a_mesh_that_moves_finds_what_a_search_from_the_root_finds() {
     const EDGE: f64 = 1e-3;
@@ -576,13 +585,14 @@ fn a_walk_over_a_mesh_that_moves_finds_what_a_search_from_the_root_finds() {
     }
 }
 
-/// Largest depth over this many faces: a side holds a fifth or more of the faces of a node, and five are the fewest over
-/// two leaves.
+/// Largest depth over this many faces: a side holds a fifth or more of the faces of a node, and
+/// five are the fewest over two leaves.
 fn most_levels(faces: usize) -> usize {
     (faces as f64 / 5.0).log(1.25).max(0.0) as usize + 2
 }
 
-/// Spots that move over the mesh: faces are cut in two there and put together again, some of it stays.
+/// Spots that move over the mesh: faces are cut in two there and put together again, some of it
+/// stays.
 #[test]
 fn a_long_session_leaves_the_tree_shallow_small_and_exact() {
     let mut rng = Pcg64::seed_from_u64(8);
@@ -636,8 +646,9 @@ fn a_long_session_leaves_the_tree_shallow_small_and_exact() {
         "the session stays small: {most:?}"
     );
     let last = bytes[bytes.len() - 1];
-    // at a vertex 36 bytes and a block of 8 faces; in the mesh 12 bytes for a face, in the tree 4; 68 for a pair of nodes
-    // and 16 for a leaf, of which there are at most half as many as faces; all arrays grow by doubling
+    // at a vertex 36 bytes and a block of 8 faces; in the mesh 12 bytes for a face, in the tree 4;
+    // 68 for a pair of nodes and 16 for a leaf, of which there are at most half as many as faces;
+    // all arrays grow by doubling
     assert!(
         last < 2 * (vertices * (36 + 32) + faces * (12 + 4 + (68 + 16) / 2)),
         "{last} bytes for {most:?}"

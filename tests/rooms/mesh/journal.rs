@@ -122,7 +122,8 @@ fn without_watching_nothing_is_recorded() {
     assert!(mesh.take_changes(usize::MAX, &mut changes) && changes == Changes::default());
 }
 
-/// As many vertices as are taken at once, and more faces than that: it is not complete until those are reported, too.
+/// As many vertices as are taken at once, and more faces than that: it is not complete until those
+/// are reported, too.
 #[test]
 fn it_is_not_all_while_faces_are_left() {
     let mut mesh = square();

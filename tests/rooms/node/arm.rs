@@ -59,7 +59,8 @@ fn what_was_found_is_slid_over_where_that_is_asked_for() {
     cell.end();
 }
 
-/// The through hole of the plate, Ø 8 mm at (16, 36, 12), of which the scan shows nothing; the mesh follows by the topics.
+/// The through hole of the plate, Ø 8 mm at (16, 36, 12), of which the scan shows nothing; the mesh
+/// follows by the topics.
 #[test]
 fn a_flagged_hole_is_probed_and_shown() {
     let cell = Cell::start(true);
@@ -282,7 +283,8 @@ fn orders_that_must_not_be_are_refused_and_nothing_moves() {
     cell.end();
 }
 
-/// A pause, and motion that is no longer allowed, keep it from moving; only a pause ends while the node runs.
+/// A pause, and motion that is no longer allowed, keep it from moving; only a pause ends while the
+/// node runs.
 #[test]
 fn a_paused_arm_moves_again_and_one_that_may_not_move_needs_a_start() {
     let cell = Cell::start(true);
@@ -337,7 +339,8 @@ fn a_paused_arm_moves_again_and_one_that_may_not_move_needs_a_start() {
     cell.end();
 }
 
-/// An arm that stops by itself, also when nobody moved it, stands until somebody has looked and says so.
+/// An arm that stops by itself, also when nobody moved it, stands until somebody has looked and
+/// says so.
 #[test]
 fn a_stop_stands_until_it_is_recovered() {
     let (says, said) = sync_channel(1);

@@ -159,7 +159,8 @@ impl Cell {
             .result
     }
 
-    /// Sends a goal, and does something at its third touch, while the arm waits for that; how it ended.
+    /// Sends a goal, and does something at its third touch, while the arm waits for that; how it
+    /// ended.
     ///
     /// - `at_third`: gets what cancels the goal
     pub fn goal(

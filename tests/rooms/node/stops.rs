@@ -1,7 +1,8 @@
-//! The table of stops in docs/ros.md, line by line: whatever the node is busy with, a stop reaches a moving arm within one of its
-//! periods.
+//! The table of stops in docs/ros.md, line by line: whatever the node is busy with, a stop reaches
+//! a moving arm within one of its periods.
 //!
-//! In all of them the thread of the samples takes nothing, and no sample more finds room, when the arm is asked to stop.
+//! In all of them the thread of the samples takes nothing, and no sample more finds room, when the
+//! arm is asked to stop.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -36,7 +37,8 @@ const BACK: f64 = 5e-3;
 /// Six times the noise of a place, m.
 const NOISE: f64 = 60e-6;
 
-/// An event, as others in the graph, or a signal, bring it about; whether it was answered at once, where it has an answer.
+/// An event, as others in the graph, or a signal, bring it about; whether it was answered at once,
+/// where it has an answer.
 type Event = fn(&OtherParticipants, &AtomicBool) -> bool;
 
 fn pause(world: &OtherParticipants, _: &AtomicBool) -> bool {
@@ -179,7 +181,8 @@ impl Arm for NotedArm {
     }
 }
 
-/// Keeps the thread of the samples busy until the sender is used or dropped, and fills the queue of samples.
+/// Keeps the thread of the samples busy until the sender is used or dropped, and fills the queue of
+/// samples.
 fn block(world: &OtherParticipants, clock: &Clock) -> SyncSender<()> {
     let (release, released): (_, Receiver<()>) = sync_channel(1);
     let (enters, entered) = sync_channel(1);
@@ -202,7 +205,8 @@ struct Ended {
     notes: Vec<Note>,
 }
 
-/// A goal; the first event comes when the ball is on its way to the surface, the second when it is on its way back.
+/// A goal; the first event comes when the ball is on its way to the surface, the second when it is
+/// on its way back.
 fn probe_with(events: &[Event]) -> Ended {
     let notes = Arc::new(Mutex::new(Vec::new()));
     let is_cancelled = Arc::new(AtomicBool::new(false));
@@ -265,7 +269,8 @@ impl Ended {
         &self.notes[at + 1..]
     }
 
-    /// The arm is told to stop before it has given another state, and goes no farther than it needs to brake.
+    /// The arm is told to stop before it has given another state, and goes no farther than it needs
+    /// to brake.
     fn assert_it_stops(&self, event: usize) {
         let since = self.since(event);
         let first = since

@@ -1,4 +1,5 @@
-//! Taking one touch out and putting it back, beside what `touchup refine` makes of a recording without its samples.
+//! Taking one touch out and putting it back, beside what `touchup refine` makes of a recording
+//! without its samples.
 
 use std::path::Path;
 
@@ -247,7 +248,8 @@ fn what_is_put_back_is_as_if_it_had_never_been_out_also_beside_strokes_that_are_
         "all are in again"
     );
 
-    // one more is taken out beside one that is undone; what is left of both is in the session's record
+    // one more is taken out beside one that is undone; what is left of both is in the session's
+    // record
     assert!(undo(&bench).success);
     done(&bench, second.clone());
     let (end, _) = bench.end();

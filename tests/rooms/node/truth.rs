@@ -1,4 +1,5 @@
-//! What the node says of itself is so: of samples that it does not use, of single stamps, of the mesh that it shows.
+//! What the node says of itself is so: of samples that it does not use, of single stamps, of the
+//! mesh that it shows.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -50,7 +51,8 @@ fn empty_frame(mut arrival: Arrival) -> Arrival {
     arrival
 }
 
-/// Each way in which two streams come at full rate and no sample is of use, with what the node has to say of it.
+/// Each way in which two streams come at full rate and no sample is of use, with what the node has
+/// to say of it.
 #[test]
 fn a_stream_that_is_not_used_is_a_warning_with_its_cause() {
     let cases: [(&str, Fault, &[&str]); 10] = [
@@ -325,8 +327,9 @@ fn written(mesh: &TriMesh, path: &Path) -> Vec<u8> {
     std::fs::read(path).unwrap()
 }
 
-/// One of ten patches is lost while the stream comes; after it has rested for some seconds the mesh of the follower and the mesh in
-/// the file have the same bytes, and the answer of the service names the version that the follower has.
+/// One of ten patches is lost while the stream comes; after it has rested for some seconds the mesh
+/// of the follower and the mesh in the file have the same bytes, and the answer of the service
+/// names the version that the follower has.
 #[test]
 fn what_is_shown_becomes_what_is_saved_at_a_follower_that_loses_patches() {
     let plate = Plate::touched(0.15);

@@ -1,5 +1,6 @@
-//! Probing until a characteristic is decided, against a fixed uncertainty and a fixed pattern. The contacts are simulated, and scatter as they
-//! are stated to: it shows that decisions and stated risk agree, and not what a real arm reaches.
+//! Probing until a characteristic is decided, against a fixed uncertainty and a fixed pattern. The
+//! contacts are simulated, and scatter as they are stated to: it shows that decisions and stated
+//! risk agree, and not what a real arm reaches.
 
 use std::fmt::Write as _;
 
@@ -23,7 +24,8 @@ use touchup::sim::{Plate, Surface as _};
 use super::plan::{SIGMA, TOP, flat, normal_of, on, probe};
 use crate::full::{either, is_full};
 
-/// Repeatability of a touch beside that of its curve, m; standard uncertainty of the radius of the ball, m.
+/// Repeatability of a touch beside that of its curve, m; standard uncertainty of the radius of the
+/// ball, m.
 const TOUCH: f64 = 30e-6;
 const RADIUS: f64 = 1e-6;
 
@@ -96,7 +98,8 @@ fn params(budget: usize) -> PatternParams {
     }
 }
 
-/// Explores with noise of each touch, and a ball that differs from what is told; after each touch `look` sees what is known.
+/// Explores with noise of each touch, and a ball that differs from what is told; after each touch
+/// `look` sees what is known.
 fn explored(
     case: &Case,
     params: PatternParams,
@@ -162,7 +165,8 @@ fn decision(number: &MeasuredNumber, limits: ToleranceLimits) -> Decision {
     .decision
 }
 
-/// Until the number has an uncertainty that decides a value as near to a limit as `distance` in 95 of 100 cases: two guard bands.
+/// Until the number has an uncertainty that decides a value as near to a limit as `distance` in 95
+/// of 100 cases: two guard bands.
 fn with_fixed_uncertainty(
     case: &Case,
     distance: f64,
@@ -322,8 +326,9 @@ impl Tally {
     }
 }
 
-/// Far from its limits a number is decided with the touches that fix the shape; near them with no more than the fixed uncertainty needs
-/// which decides these; and of the decisions of all hardly any is wrong.
+/// Far from its limits a number is decided with the touches that fix the shape; near them with no
+/// more than the fixed uncertainty needs which decides these; and of the decisions of all hardly
+/// any is wrong.
 #[test]
 fn deciding_takes_the_touches_that_the_distance_from_the_limit_asks_for() {
     let (seeds, budget) = (either(4, 20), 100);
@@ -386,9 +391,10 @@ fn deciding_takes_the_touches_that_the_distance_from_the_limit_asks_for() {
     assert!(wrong * 20 <= decided, "{wrong} of {decided}");
 }
 
-/// On a limit a decision in either direction is a matter of chance alone, so it comes out as often as it may be wrong at the most: no more
-/// than 5 %. Who looks after each touch with the guard band of a single look decides more often than that. Of n cases with 5 % each fewer than
-/// 5 % + 2.33 √(0.05 · 0.95 / n) come out in 99 of 100 runs.
+/// On a limit a decision in either direction is a matter of chance alone, so it comes out as often
+/// as it may be wrong at the most: no more than 5 %. Who looks after each touch with the guard band
+/// of a single look decides more often than that. Of n cases with 5 % each fewer than 5 % + 2.33
+/// √(0.05 · 0.95 / n) come out in 99 of 100 runs.
 #[test]
 fn looking_after_each_touch_keeps_the_stated_risk() {
     let seeds = either(40, 500);
@@ -449,7 +455,8 @@ fn looking_after_each_touch_keeps_the_stated_risk() {
     }
 }
 
-/// Of a hole on its limit nothing is said as long as touches alone are uncertain; where the radius of the ball is, that is said at once.
+/// Of a hole on its limit nothing is said as long as touches alone are uncertain; where the radius
+/// of the ball is, that is said at once.
 #[test]
 fn a_value_on_its_limit_stays_undecided_and_says_why() {
     let limits = limits(&HOLE, 1.0);

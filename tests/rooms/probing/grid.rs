@@ -16,7 +16,8 @@ use touchup::sim::{Plate, Surface as _};
 use super::plan::{SIGMA, TOP, normal_of, on, probe};
 use crate::plate_stream::plate_scan;
 
-/// As high as a wall is touched at the least, and as deep in the hole and in the slot (whose floor is 5 mm below its opening), m.
+/// As high as a wall is touched at the least, and as deep in the hole and in the slot (whose floor
+/// is 5 mm below its opening), m.
 const HIGHEST: f64 = 1.05e-3;
 const IN_HOLE: f64 = 5e-3;
 const IN_SLOT: f64 = 3.2e-3;
@@ -25,12 +26,14 @@ const AROUND: f64 = 3e-3;
 /// That walls are perpendicular to their surface is believed within this, by both, rad.
 const SQUARE: f64 = 2.27e-3;
 
-/// Shares of two lengths, evenly in the rectangle of both for any number of places: R2 of Roberts, the plastic number's powers.
+/// Shares of two lengths, evenly in the rectangle of both for any number of places: R2 of Roberts,
+/// the plastic number's powers.
 fn even(at: usize) -> [f64; 2] {
     [0.754_877_666_246_692_8, 0.569_840_290_998_053_2].map(|step| (0.5 + step * at as f64).fract())
 }
 
-/// Outline of a stadium, or of a circle of no length, after a share of it; with the unit vector out of it.
+/// Outline of a stadium, or of a circle of no length, after a share of it; with the unit vector out
+/// of it.
 fn outline(half: f64, radius: f64, share: f64) -> (Point3<f64>, Vector3<f64>) {
     let (straight, round) = (2.0 * half, PI * radius);
     let gone = share * 2.0 * (straight + round);
@@ -100,8 +103,8 @@ impl Opening {
         [walls.collect(), top.collect()]
     }
 
-    /// Errors of as many touches spread evenly, where the scan has the opening 0.2 mm and 0.01 rad off (standard deviations); `None` where
-    /// they leave an end of a slot open.
+    /// Errors of as many touches spread evenly, where the scan has the opening 0.2 mm and 0.01 rad
+    /// off (standard deviations); `None` where they leave an end of a slot open.
     fn grid_errors(&self, count: usize, rng: &mut Pcg64) -> Option<Errors> {
         let mut draw = |sigma: f64| sigma * rng.sample::<f64, _>(StandardNormal);
         let shift = Vector3::new(draw(0.2e-3), draw(0.2e-3), 0.0);
@@ -227,11 +230,13 @@ fn rms(errors: &[Errors]) -> Errors {
     })
 }
 
-/// The place where an axis meets the surface is extrapolated from the wall between depths a and b. With touches of variance σ² in n places
-/// evenly around and evenly over the depths its variance along each direction is 2σ²/n (1 + m²/v), with m = (a + b)/2 and v = (b − a)²/12;
-/// the best n touches, at a and b alone, leave 2σ²/n ((b + a)/(b − a))² \[Elfving 1952\]. With r = (b + a)/(b − a) the ratio of errors is
-/// r/√(1 + 3r²): one half where the wall can be touched up to its opening, 0.577 for a thin strip; no plan can do better against
-/// a grid on the same wall. The sums below are those of two and of many depths.
+/// The place where an axis meets the surface is extrapolated from the wall between depths a and b.
+/// With touches of variance σ² in n places evenly around and evenly over the depths its variance
+/// along each direction is 2σ²/n (1 + m²/v), with m = (a + b)/2 and v = (b − a)²/12; the best n
+/// touches, at a and b alone, leave 2σ²/n ((b + a)/(b − a))² \[Elfving 1952\]. With r = (b + a)/(b
+/// − a) the ratio of errors is r/√(1 + 3r²): one half where the wall can be touched up to its
+/// opening, 0.577 for a thin strip; no plan can do better against a grid on the same wall. The sums
+/// below are those of two and of many depths.
 #[test]
 fn no_plan_halves_the_error_of_a_grid_on_the_same_wall() {
     for (low, high) in [(0.0f64, 5.0), (1.05, 5.0), (1.05, 3.2), (3.0, 3.5)] {
@@ -269,9 +274,11 @@ fn no_plan_halves_the_error_of_a_grid_on_the_same_wall() {
     }
 }
 
-/// With as many touches as the plan made, misses and the search for the opening included, against touches spread evenly over wall and
-/// surface around it as a scan has them, which is spared that search, and with the same belief in square walls: the place is better by a
-/// third at the least, and no number that is asked for is worse. Half the error of the place is what is wanted; 0.51 to 0.59 are reached.
+/// With as many touches as the plan made, misses and the search for the opening included, against
+/// touches spread evenly over wall and surface around it as a scan has them, which is spared that
+/// search, and with the same belief in square walls: the place is better by a third at the least,
+/// and no number that is asked for is worse. Half the error of the place is what is wanted; 0.51 to
+/// 0.59 are reached.
 #[test]
 fn planned_touches_are_better_than_a_grid_over_the_region() {
     let seeds = if crate::full::is_full() { 200 } else { 20 };

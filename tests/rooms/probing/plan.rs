@@ -46,7 +46,8 @@ fn wall() -> Vec<Candidate> {
         .collect()
 }
 
-/// Up to `count` touches, each as if those before had been made, until all is known as it is asked for.
+/// Up to `count` touches, each as if those before had been made, until all is known as it is asked
+/// for.
 fn plan<M: Surface>(
     mut known: Knowledge,
     surface: &M,
@@ -139,7 +140,8 @@ fn the_tilt_of_a_plane_is_asked_at_its_corners() {
     }
 }
 
-/// It ends at the requested accuracy, and predicts the uncertainty that the fit of real touches then has.
+/// It ends at the requested accuracy, and predicts the uncertainty that the fit of real touches
+/// then has.
 #[test]
 fn touches_are_as_many_as_the_goal_asks_for() {
     let (surface, wall) = (hole(), wall());
@@ -227,8 +229,8 @@ pub(super) fn on<M: Surface>(surface: &M, p: &Point3<f64>) -> Point3<f64> {
     (0..4).fold(*p, |p, _| p - normal_of(surface, &p) * surface.distance(&p))
 }
 
-/// Deviation of the numbers together, by the inverse of the information of all touches at once, with derivatives from differences of
-/// the distance of surfaces that are moved.
+/// Deviation of the numbers together, by the inverse of the information of all touches at once,
+/// with derivatives from differences of the distance of surfaces that are moved.
 fn sigma_by_differences<M: Surface>(
     truth: &M,
     touches: &[Point3<f64>],
@@ -263,12 +265,13 @@ fn sigma_by_differences<M: Surface>(
     asked.iter().map(variance).sum::<f64>().sqrt()
 }
 
-/// Touches of a planned pattern and of a grid of as many, where the surface is known as badly as after the first touches: it is
-/// planned for one that lies and leans elsewhere and has other sizes, and the true one is touched. Root mean square error of
-/// the number over 20 such surfaces with 10 draws of noise each, and the ratio of both.
+/// Touches of a planned pattern and of a grid of as many, where the surface is known as badly as
+/// after the first touches: it is planned for one that lies and leans elsewhere and has other
+/// sizes, and the true one is touched. Root mean square error of the number over 20 such surfaces
+/// with 10 draws of noise each, and the ratio of both.
 ///
-/// Both are those of the information matrix of the touches, and the best of 300 patterns of random places is no better than the
-/// plan.
+/// Both are those of the information matrix of the touches, and the best of 300 patterns of random
+/// places is no better than the plan.
 fn planned_over_grid<M: Surface>(case: &Case<M>) -> f64 {
     let count = case.grid.len();
     let (mut squares, mut variances, mut random) = ([0.0; 2], [0.0; 2], 0.0);
@@ -365,7 +368,8 @@ fn planned_over_grid<M: Surface>(case: &Case<M>) -> f64 {
         stated[1] * 1e6,
         rms[0] / rms[1]
     );
-    // 200 errors determine a deviation within a twentieth; χ² of 200 (or 400) leaves a fifth to chance once in 10,000
+    // 200 errors determine a deviation within a twentieth; χ² of 200 (or 400) leaves a fifth to
+    // chance once in 10,000
     for (rms, stated) in rms.iter().zip(stated) {
         assert!(
             (rms / stated - 1.0).abs() < 0.2,
@@ -435,9 +439,10 @@ fn opening(hole: &Cylinder) -> Point3<f64> {
     c - axis * (c.z / axis.z)
 }
 
-/// Planned touches beat a grid of as many over the feature itself by about half where some of the feature is little informative
-/// about the number: the walls of a slot of its length, touches near the axis' own plane of a lean. Where all touches are equally
-/// informative, as of a diameter, no plan can be better, and it must not be worse.
+/// Planned touches beat a grid of as many over the feature itself by about half where some of the
+/// feature is little informative about the number: the walls of a slot of its length, touches near
+/// the axis' own plane of a lean. Where all touches are equally informative, as of a diameter, no
+/// plan can be better, and it must not be worse.
 #[test]
 fn planned_touches_beat_a_uniform_grid() {
     let depths = evenly(1e-3, 5e-3, 4);
@@ -525,8 +530,8 @@ fn planned_touches_beat_a_uniform_grid() {
     }
 }
 
-/// Contact of a ball that is let down and then moved in a straight line until it meets the material, exactly, with noise along
-/// its path; a path that is blocked before measures nothing.
+/// Contact of a ball that is let down and then moved in a straight line until it meets the
+/// material, exactly, with noise along its path; a path that is blocked before measures nothing.
 pub(super) fn probe(
     distance: &dyn Fn(&Point3<f64>) -> f64,
     planned: &TouchPlan,
@@ -557,7 +562,8 @@ pub(super) fn probe(
     })
 }
 
-/// Explores from a flag, on what lies as far as is said, with noise of a touch; the flag's normal leans by up to 3°.
+/// Explores from a flag, on what lies as far as is said, with noise of a touch; the flag's normal
+/// leans by up to 3°.
 fn explored(
     kind: Kind,
     flag: Point3<f64>,
@@ -590,7 +596,8 @@ pub(super) const TOP: f64 = 12e-3;
 /// Middle of its slot: 20 × 6 mm along x, 5 mm deep.
 const SLOT: Point3<f64> = Point3::new(25e-3, 14e-3, TOP);
 
-/// Wherever in it a slot is flagged: claimed dimensions agree with the drawing, and most are claimed.
+/// Wherever in it a slot is flagged: claimed dimensions agree with the drawing, and most are
+/// claimed.
 #[test]
 fn a_slot_that_is_claimed_is_the_one_of_the_drawing() {
     let (plate, mut rng) = (Plate::default(), Pcg64::seed_from_u64(21));
@@ -688,7 +695,8 @@ fn a_slot_without_ends_is_reported_as_such() {
     }
 }
 
-/// A touch that met something else does not make a hole of it: one in six of its walls is met 0.3 to 1 mm before it.
+/// A touch that met something else does not make a hole of it: one in six of its walls is met 0.3
+/// to 1 mm before it.
 #[test]
 fn a_hole_is_not_claimed_from_touches_of_something_else() {
     let (plate, mut rng) = (Plate::default(), Pcg64::seed_from_u64(24));
@@ -750,7 +758,8 @@ fn a_hole_is_not_claimed_from_touches_of_something_else() {
     );
 }
 
-/// A boss of which one of the first three directions met nothing is touched in more of them, or not measured at all.
+/// A boss of which one of the first three directions met nothing is touched in more of them, or not
+/// measured at all.
 #[test]
 fn a_boss_is_measured_from_three_walls_at_the_least() {
     let (plate, mut rng) = (Plate::default(), Pcg64::seed_from_u64(25));
@@ -809,7 +818,8 @@ pub(super) fn flat(x: [f64; 2], y: [f64; 2]) -> TriMesh {
     TriMesh::new(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]]).unwrap()
 }
 
-/// A block of 40 × 30 × 12 mm, from O on, with one feature near its edges: how far a place is from it, m.
+/// A block of 40 × 30 × 12 mm, from O on, with one feature near its edges: how far a place is from
+/// it, m.
 fn near_edges(kind: Option<Kind>, p: &Point3<f64>) -> f64 {
     let (half, middle) = (
         Vector3::new(20e-3, 15e-3, 6e-3),
@@ -836,9 +846,10 @@ fn near_edges(kind: Option<Kind>, p: &Point3<f64>) -> f64 {
     }
 }
 
-/// Features 2 to 3 mm from the edges of a part, and an edge and a plane that end near their flags: all are measured, and no touch goes down
-/// beside the part. The scan is 0.3 mm too large on all sides, and knows of no opening. Without its outline, as if the part went on on
-/// all sides, touches go there.
+/// Features 2 to 3 mm from the edges of a part, and an edge and a plane that end near their flags:
+/// all are measured, and no touch goes down beside the part. The scan is 0.3 mm too large on all
+/// sides, and knows of no opening. Without its outline, as if the part went on on all sides,
+/// touches go there.
 #[test]
 fn no_touch_is_planned_beside_the_part() {
     let scan = flat([-0.3, 40.3], [-0.3, 30.3]);

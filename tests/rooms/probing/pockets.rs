@@ -11,7 +11,8 @@ use touchup::probing::plan::{Explorer, PatternParams};
 
 use super::plan::{SIGMA, TOP, flat, probe};
 
-/// A pocket in the plane z = 12 mm about a place, of which corners are rounded, turned; 6 mm deep. In m and rad.
+/// A pocket in the plane z = 12 mm about a place, of which corners are rounded, turned; 6 mm deep.
+/// In m and rad.
 struct Pocket {
     middle: [f64; 2],
     length: f64,
@@ -38,7 +39,8 @@ impl Pocket {
     }
 }
 
-/// Probes a pocket; what it is off, in place, direction over half its length, width and length, m, or why not.
+/// Probes a pocket; what it is off, in place, direction over half its length, width and length, m,
+/// or why not.
 fn measured(
     pocket: &Pocket,
     kind: Kind,
@@ -93,8 +95,8 @@ fn measured(
     ))
 }
 
-/// Every 15°, with `--full` every 5°, with sharp corners and with corners up to half of half the width: within 25 µm of the drawing with touches of 5 µm and a
-/// tolerance of 10 µm.
+/// Every 15°, with `--full` every 5°, with sharp corners and with corners up to half of half the
+/// width: within 25 µm of the drawing with touches of 5 µm and a tolerance of 10 µm.
 #[test]
 fn pockets_with_straight_ends_are_found_at_every_angle() {
     let scan = flat([-100.0, 100.0], [-100.0, 100.0]);

@@ -92,7 +92,8 @@ impl Case {
         [forth * 1e3, back * 1e3]
     }
 
-    /// How many of the points along the axis of a hole or slot, 1 mm below its opening, are under a face.
+    /// How many of the points along the axis of a hole or slot, 1 mm below its opening, are under a
+    /// face.
     fn is_covered(&self, centre: &Point3<f64>) -> bool {
         let mesh = &self.patched.mesh;
         let below = centre - Vector3::z() * 1e-3;
@@ -113,7 +114,8 @@ impl Case {
     }
 }
 
-/// A lattice cuts a circle into steps along its axes and across its cells: no longer than along the axes alone, 8 r for 2 π r.
+/// A lattice cuts a circle into steps along its axes and across its cells: no longer than along the
+/// axes alone, 8 r for 2 π r.
 const ZIGZAG: f64 = 4.0 / std::f64::consts::PI;
 
 /// New rims of a patched plate, m: rims of the scan are where they were.
@@ -148,8 +150,8 @@ impl Rims {
     }
 }
 
-/// The hole or slot over or in which a place is, or within 1 mm of its wall, and the longest rim that a quarter of a millimetre
-/// beside its wall can have.
+/// The hole or slot over or in which a place is, or within 1 mm of its wall, and the longest rim
+/// that a quarter of a millimetre beside its wall can have.
 fn opening_at(truth: &TruthFeature, p: &Point3<f64>) -> Option<(&'static str, f64)> {
     const NEAR: f64 = 1e-3;
     const BESIDE: f64 = 0.25e-3;
@@ -249,9 +251,9 @@ pub fn sample(at: usize, p_mm: [f64; 3], newtons: f64) -> Sample {
     }
 }
 
-/// A ball goes round and round in a moat of 12 mm across, down to its floor at z = -9.5 mm, which it touches from
-/// `inner_mm` off the middle on. The middle is a post where the floor below it was not reached, and else
-/// floats.
+/// A ball goes round and round in a moat of 12 mm across, down to its floor at z = -9.5 mm, which
+/// it touches from `inner_mm` off the middle on. The middle is a post where the floor below it was
+/// not reached, and else floats.
 #[test]
 fn what_the_ball_went_all_around_is_no_part() {
     const MOAT_MM: f64 = 6.0;
@@ -307,7 +309,8 @@ fn height_over([a, b, c]: &[Point3<f64>; 3], x: f64, y: f64) -> Option<f64> {
     is_inside.then(|| (shares[0] * a.z + shares[1] * b.z + shares[2] * c.z) / whole)
 }
 
-/// A ball slides over a sheet at x = 0 to 10 mm, and goes to and fro through it at x = 20 to 30 mm, without contact.
+/// A ball slides over a sheet at x = 0 to 10 mm, and goes to and fro through it at x = 20 to 30 mm,
+/// without contact.
 #[test]
 fn where_free_space_is_no_evidence_lids_stay() {
     let scan = sheet();
@@ -430,7 +433,8 @@ const OF_A_BALL: Expected = Expected {
     back_mm: 0.05,
 };
 
-/// The first stylus, and with the slow proofs the others too: all of them are measured before one of them fails.
+/// The first stylus, and with the slow proofs the others too: all of them are measured before one
+/// of them fails.
 fn are_right(styli: &[(&str, StylusParams, Expected)]) {
     println!("mean distances, mm, from the part to the mesh and back; rims, m");
     let mut wrong = Vec::new();
@@ -465,7 +469,8 @@ fn are_right(styli: &[(&str, StylusParams, Expected)]) {
 fn other_tips_balls_hands_and_friction() {
     let usual = StylusParams::default;
     are_right(&[
-        // the lines of the hand are as far apart as this ball is wide: its rim has teeth, and is half longer than it may be
+        // the lines of the hand are as far apart as this ball is wide: its rim has teeth, and is
+        // half longer than it may be
         (
             "1 mm",
             StylusParams {
@@ -550,7 +555,8 @@ fn other_tips_flat_ends() {
     ]);
 }
 
-/// A cone gets through no hole, and leaves the slot open, whose floor it does not reach; its rim goes up and down the walls.
+/// A cone gets through no hole, and leaves the slot open, whose floor it does not reach; its rim
+/// goes up and down the walls.
 #[test]
 #[ignore = "full"]
 fn other_tips_a_cone() {

@@ -37,8 +37,8 @@ pub fn cube() -> TriMesh {
     (0..3).fold(cube, |mesh, _| subdivided(&mesh, |p| p))
 }
 
-/// A walk of the ball in and around a part, which turns back `far` (m) from its middle: mostly without force, now and then pressed
-/// against anything, and at its end.
+/// A walk of the ball in and around a part, which turns back `far` (m) from its middle: mostly
+/// without force, now and then pressed against anything, and at its end.
 fn walk(seed: u64, start: Point3<f64>, far: f64) -> Vec<Sample> {
     let rng = &mut Pcg64::seed_from_u64(seed);
     let mut any = |size: f64| Vector3::from_fn(|_, _| within(rng, -size, size));

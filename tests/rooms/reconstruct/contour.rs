@@ -1,4 +1,5 @@
-//! The patch as a mesh: closed, without intersections, on the surface, and one with the scan around it.
+//! The patch as a mesh: closed, without intersections, on the surface, and one with the scan around
+//! it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -120,7 +121,8 @@ fn turn() -> UnitQuaternion<f64> {
     UnitQuaternion::from_axis_angle(&Unit::new_normalize(vector![0.3, -0.5, 0.8]), 0.7)
 }
 
-// ---- known surfaces ---------------------------------------------------------------------------------------------
+// ---- known surfaces
+// ---------------------------------------------------------------------------------------------
 
 #[test]
 fn a_sphere_is_a_sphere() {
@@ -169,7 +171,8 @@ fn a_box_keeps_its_edges_and_corners() {
             sum += distance / 123.0;
         }
     }
-    // a cell that the edge passes without a crossing on either side of it cannot know of it: there a corner is cut off
+    // a cell that the edge passes without a crossing on either side of it cannot know of it: there
+    // a corner is cut off
     assert!(
         worst < 0.3 * PITCH && sum < 0.05 * PITCH,
         "worst {}, mean {} pitches",
@@ -183,7 +186,8 @@ fn a_box_keeps_its_edges_and_corners() {
 fn two_thin_sheets_stay_apart() {
     let turn = turn();
     for gap in [1.0, 0.7, 1.3] {
-        // two plates, each a little over a cell thick, with a gap of about a cell, within a rounded rim
+        // two plates, each a little over a cell thick, with a gap of about a cell, within a rounded
+        // rim
         let field = |p: &Point3<f64>| {
             let x = turn.inverse() * p.coords / PITCH;
             let plate = |middle: f64| {
@@ -258,7 +262,8 @@ fn random_waves_give_closed_skins_without_intersections() {
     }
 }
 
-// ---- in a scan --------------------------------------------------------------------------------------------------
+// ---- in a scan
+// --------------------------------------------------------------------------------------------------
 
 /// Cells that come within `radius` of one of `points`, none within `margin` of a rim of the scan.
 fn region_around(
@@ -290,7 +295,8 @@ fn region_around(
     region
 }
 
-/// Adds what is beyond open squares that the scan crosses, until there are none: no region grows by more rounds than this.
+/// Adds what is beyond open squares that the scan crosses, until there are none: no region grows by
+/// more rounds than this.
 fn close_region(
     lattice: &Lattice,
     region: &mut LatticeRegion,
@@ -333,8 +339,8 @@ fn area(mesh: &TriMesh) -> f64 {
         .sum()
 }
 
-/// The spliced mesh against the scan: one skin with the same rims, nothing else touched. Where squares stayed open, rims are
-/// there and nowhere else.
+/// The spliced mesh against the scan: one skin with the same rims, nothing else touched. Where
+/// squares stayed open, rims are there and nowhere else.
 fn spliced(scan: &TriMesh, patch: &Patch, pitch: f64) -> TriMesh {
     let mesh = patch.applied_to(scan.clone()).unwrap().0;
     let (before, after) = (soundness(scan), soundness(&mesh));
@@ -490,7 +496,8 @@ fn a_dent_is_pressed_into_a_scan() {
     }
 }
 
-/// Random cells at the surface of a scan, in clumps: single ones, rows, and cells that meet at an edge or a corner only.
+/// Random cells at the surface of a scan, in clumps: single ones, rows, and cells that meet at an
+/// edge or a corner only.
 fn crumbs(lattice: &Lattice, scan: &TriMesh, seed: u64, count: usize) -> LatticeRegion {
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut region = LatticeRegion::default();
@@ -649,14 +656,15 @@ proptest! {
         let scan = thin_sheet(edge, noise * edge, thickness * share * edge, seed);
         let lattice = lattice(share * edge);
         let (patch, mesh) = splice_own(&lattice, &mut crumbs(&lattice, &scan, seed, 12), &scan);
-        // both sides on one edge cannot be distinguished by signs; with smaller cells all is closed, and no hole is made
+        // both sides on one edge cannot be distinguished by signs; with smaller cells all is
+        // closed, and no hole is made
         prop_assert!(thickness < 1.5 || (patch.open.is_empty() && soundness(&mesh).rims.is_empty()));
         prop_assert!(thickness < 2.2 || soundness(&mesh).euler == 2);
     }
 }
 
-/// Crossings and normals at random; signs at random as well, so that every ambiguous case comes up, or from waves, so that
-/// cells have one loop and their vertices lie anywhere.
+/// Crossings and normals at random; signs at random as well, so that every ambiguous case comes up,
+/// or from waves, so that cells have one loop and their vertices lie anywhere.
 #[test]
 fn random_crossings_give_a_closed_skin_without_intersections() {
     for seed in 0..40 {

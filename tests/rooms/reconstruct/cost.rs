@@ -21,7 +21,8 @@ fn refused(radius: f64, pitch: f64) -> Option<String> {
     Patcher::new(params).err().map(|error| error.to_string())
 }
 
-/// A ball of 2.8 radii of 1.5 mm holds 310 mm³: 39 million nodes 0.02 mm apart, 4 million 0.043 mm apart.
+/// A ball of 2.8 radii of 1.5 mm holds 310 mm³: 39 million nodes 0.02 mm apart, 4 million 0.043 mm
+/// apart.
 #[test]
 fn a_lattice_that_one_contact_would_fill_the_memory_with_is_refused_with_the_figure() {
     for (pitch, nodes) in [(0.02e-3, "3.9e7 nodes"), (0.005e-3, "2.5e9 nodes")] {
@@ -35,8 +36,9 @@ fn a_lattice_that_one_contact_would_fill_the_memory_with_is_refused_with_the_fig
     }
 }
 
-/// Contacts of a ball of 1.5 mm all over a square of 30 mm: within 2.8 radii of them, 4.2 mm, are the square times 8.4 mm, half a cylinder
-/// along each side and a quarter of a ball at each corner, 11,196 mm³ in all: 11 million nodes 0.1 mm apart.
+/// Contacts of a ball of 1.5 mm all over a square of 30 mm: within 2.8 radii of them, 4.2 mm, are
+/// the square times 8.4 mm, half a cylinder along each side and a quarter of a ball at each corner,
+/// 11,196 mm³ in all: 11 million nodes 0.1 mm apart.
 #[test]
 fn a_lattice_around_all_that_was_touched_is_refused_with_the_figure_before_it_is_made() {
     const SIDE: f64 = 30e-3;

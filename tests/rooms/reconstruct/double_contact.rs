@@ -1,4 +1,5 @@
-//! A ball in an inner corner and in a slot barely wider than itself: no normal is invented between those of the walls.
+//! A ball in an inner corner and in a slot barely wider than itself: no normal is invented between
+//! those of the walls.
 
 use nalgebra::{Point3, UnitVector3, Vector3};
 use touchup::mesh::{FaceTree, TriMesh};
@@ -251,7 +252,8 @@ fn no_normal_is_invented_between_two_walls() {
                 "{name}, friction {friction}: {:.1} % farther than 5 degrees",
                 share * 1e2
             );
-            // what stays is from before both walls were known, and from where the ball changes from one to the other
+            // what stays is from before both walls were known, and from where the ball changes from
+            // one to the other
             assert!(share < most, "{name}, friction {friction}: {share}");
         }
     }
@@ -264,7 +266,8 @@ fn what_the_ball_cannot_reach_is_marked() {
     for (_, corners) in patched.mesh.faces() {
         for v in corners {
             let (p, support) = (patched.mesh.position(v), patched.support[v.0 as usize]);
-            // a ball in the corner touches both walls its radius away from it; the ends of the strokes are left out
+            // a ball in the corner touches both walls its radius away from it; the ends of the
+            // strokes are left out
             let along = p.x.max(p.z);
             if p.y.abs() > 4e-3 || p.x.min(p.z) > 0.3e-3 || support == Support::Scan {
                 continue;
@@ -306,7 +309,8 @@ fn an_inner_corner_is_a_crease() {
             off.len()
         );
         assert!(off.len() > 25 && guessed == off.len());
-        // a ball that fills the corner is off by 0.2 mm on average over this stretch, and by 0.44 mm in the middle
+        // a ball that fills the corner is off by 0.2 mm on average over this stretch, and by 0.44
+        // mm in the middle
         assert!(mean < 0.1e-3, "{mean}");
     }
 }

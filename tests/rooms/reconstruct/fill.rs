@@ -10,7 +10,8 @@ use crate::reconstruct::accuracy::{sample, sheet};
 
 const RADIUS_MM: f64 = 1.5;
 
-/// A ball slides over the square from 15 to 25 mm of the plane z = `height_mm`, in lines 1 mm apart, from above (1) or from below (-1).
+/// A ball slides over the square from 15 to 25 mm of the plane z = `height_mm`, in lines 1 mm
+/// apart, from above (1) or from below (-1).
 fn raster(height_mm: f64, side: f64) -> Vec<Sample> {
     let at = |i: usize| {
         let (line, along) = ((i / 400) as f64, (i % 400) as f64 / 40.0);

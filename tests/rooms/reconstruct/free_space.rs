@@ -10,14 +10,16 @@ use crate::reconstruct::accuracy::sheet;
 use crate::reconstruct::closed::cube;
 
 const RADIUS: f64 = 1.5e-3;
-/// The mesh is made of chords: of a circle of that radius, across a cell of half a radius, they are this far inside.
+/// The mesh is made of chords: of a circle of that radius, across a cell of half a radius, they are
+/// this far inside.
 const CHORD: f64 = 0.1 * RADIUS;
 /// Samples between two renewals on the way: a third of a millimetre.
 const RENEWED_EVERY: usize = 33;
 /// How deep the ball may seem to be in the part by noise alone.
 const NOISE: f64 = 0.027 * RADIUS;
 
-/// The patch of a ball that goes along a straight line, without force; made at once, and renewed on the way.
+/// The patch of a ball that goes along a straight line, without force; made at once, and renewed on
+/// the way.
 fn after_free_motion(scan: &TriMesh, from: &Point3<f64>, to: &Point3<f64>) -> [TriMesh; 2] {
     const TICKS: i64 = 4000;
     let at = |tick: i64| {
@@ -59,7 +61,8 @@ fn after_free_motion(scan: &TriMesh, from: &Point3<f64>, to: &Point3<f64>) -> [T
     [patcher.patched(scan, &tree).unwrap().mesh, mesh]
 }
 
-/// The least distance of a vertex, or the middle of a face, from the line through two points, between these.
+/// The least distance of a vertex, or the middle of a face, from the line through two points,
+/// between these.
 fn nearest_to_line(mesh: &TriMesh, from: &Point3<f64>, to: &Point3<f64>) -> f64 {
     let along = to - from;
     let distance = |p: Point3<f64>| {
@@ -110,7 +113,8 @@ fn the_rim_of_a_scan_gives_way_to_the_ball() {
             after_free_motion(&scan, &from, &to).map(|mesh| nearest_to_line(&mesh, &from, &to))
         {
             println!("{y:e} m from the rim: {:.3} radii", nearest / RADIUS);
-            // of the scan there stays what reaches into the ball between two nodes of the lattice that it did not reach
+            // of the scan there stays what reaches into the ball between two nodes of the lattice
+            // that it did not reach
             assert!(
                 nearest > RADIUS - NOISE - 2.0 * CHORD,
                 "{y:e} m from the rim: {nearest:e} m"

@@ -1,4 +1,5 @@
-//! Scans finer than the tip: where a scan has the shape that was touched, it is moved and its detail kept; elsewhere it is replaced.
+//! Scans finer than the tip: where a scan has the shape that was touched, it is moved and its
+//! detail kept; elsewhere it is replaced.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use touchup::mesh::{FaceTree, TriMesh, VertexId};
@@ -41,7 +42,8 @@ fn scan(noise: f64) -> TriMesh {
     })
 }
 
-/// A ball slides over z = 0 in lines 0.8 mm apart, over a hole in the middle it goes down by `sinks` (m) and up again.
+/// A ball slides over z = 0 in lines 0.8 mm apart, over a hole in the middle it goes down by
+/// `sinks` (m) and up again.
 fn patched(scan: &TriMesh, sinks: f64) -> Patched {
     let mut contacts = ContactEstimator::new(ContactEstimatorParams::new(TipParams {
         radius: RADIUS,

@@ -1,4 +1,5 @@
-//! A scan of which only a region is touched: the result equals that of the whole scan, and the rest is unchanged.
+//! A scan of which only a region is touched: the result equals that of the whole scan, and the rest
+//! is unchanged.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use touchup::haptic::Refiner;
@@ -33,8 +34,8 @@ fn whole_scene() -> Scene {
     ))
 }
 
-/// A ball pressed onto a surface 0.1 mm below the plate, in lines from `from` (m) to 20 mm farther along x and y; lifted off
-/// between the lines.
+/// A ball pressed onto a surface 0.1 mm below the plate, in lines from `from` (m) to 20 mm farther
+/// along x and y; lifted off between the lines.
 fn touches(from: f64) -> Vec<Sample> {
     let mut samples = Vec::new();
     for line in 0..14 {
@@ -102,7 +103,8 @@ fn a_part_that_was_not_touched_is_sewn_back_bit_by_bit() {
         high: Point3::new(0.2, 0.1, 1.0),
     };
     let (part, outside) = scan.cut(&region);
-    // 2 · 50² faces: a box of 100 × 50 mm meets 18 × 10 of the cells of 6 mm at most, and 17 × 9 at least
+    // 2 · 50² faces: a box of 100 × 50 mm meets 18 × 10 of the cells of 6 mm at most, and 17 × 9 at
+    // least
     assert!(
         (2 * 17 * 9..=2 * 18 * 10).contains(&part.face_count()),
         "{}",

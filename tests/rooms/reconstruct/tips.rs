@@ -1,4 +1,5 @@
-//! Flat and cone tips led over the plate that the simulator knows: estimated contacts against true ones.
+//! Flat and cone tips led over the plate that the simulator knows: estimated contacts against true
+//! ones.
 
 use std::borrow::Cow;
 use std::sync::LazyLock;
@@ -24,7 +25,8 @@ const CONE: TipShape = TipShape::Cone {
     length: 6e-3,
 };
 
-/// A ball or a flat end goes over the plate as in the demo; a cone only so deep into holes that it does not get stuck.
+/// A ball or a flat end goes over the plate as in the demo; a cone only so deep into holes that it
+/// does not get stuck.
 fn path(stylus: &StylusParams, hand: &PathParams) -> Vec<Stroke> {
     let plate = Plate::default();
     if !matches!(stylus.shape, TipShape::Cone { .. }) {
@@ -102,8 +104,9 @@ fn tips() -> [(&'static str, StylusParams); 6] {
     ]
 }
 
-/// Share of the samples in contact with an estimated place, and median and 90th percentile of the distance of their points from
-/// the part, mm, and of the error of their normals, degrees, where one place alone touched.
+/// Share of the samples in contact with an estimated place, and median and 90th percentile of the
+/// distance of their points from the part, mm, and of the error of their normals, degrees, where
+/// one place alone touched.
 fn quality(contacts: &[(TipTouch, Moment)]) -> [f64; 5] {
     let plate = Plate::default();
     let (mut distances, mut angles, mut touching) = (Vec::new(), Vec::new(), 0);
@@ -191,7 +194,8 @@ fn contacts_of_a_tip_are_located() {
     for ((name, _), contacts) in tips.iter().zip(all) {
         let [share, median, p90, angle_median, angle_p90] = quality(&contacts);
         println!("{name:24} {share:6.2} {median:6.3} {p90:7.3} {angle_median:6.1} {angle_p90:7.1}");
-        // noise of 0.05 mm at 500 Hz, averaged over 16 ms and more, and a tenth of the samples at edges and turns
+        // noise of 0.05 mm at 500 Hz, averaged over 16 ms and more, and a tenth of the samples at
+        // edges and turns
         assert!(share > 0.8 && median < 0.03 && angle_median < 3.0, "{name}");
         // the side of a leaning cylinder on the edge of a hole is taken for its end
         let worst = if *name == "flat, tilt 15°" {

@@ -1,5 +1,6 @@
-//! Stated uncertainty of the patched mesh against the simulator's part: where the errors are those of its
-//! model, which shows that it is consistent, and where they are not, which shows its limits; outliers, and places that move.
+//! Stated uncertainty of the patched mesh against the simulator's part: where the errors are those
+//! of its model, which shows that it is consistent, and where they are not, which shows its limits;
+//! outliers, and places that move.
 
 use std::collections::BTreeSet;
 
@@ -26,8 +27,8 @@ fn normal(rng: &mut Pcg64) -> f64 {
     StandardNormal.sample(rng)
 }
 
-/// A plate as scanned and as touched by `stylus`, whose radius and stiffness are those of `stated` give or take what the
-/// calibration leaves.
+/// A plate as scanned and as touched by `stylus`, whose radius and stiffness are those of `stated`
+/// give or take what the calibration leaves.
 fn touched_plate(stated: &StylusParams, seed: u64) -> (TriMesh, Touch, PatcherParams) {
     let scan_noise = ScannerParams::default().noise;
     let params = PatcherParams::new(stated.radius, Some(stated.stiffness), scan_noise);
@@ -72,7 +73,8 @@ fn patched(patcher: &mut Patcher, scan: &TriMesh) -> Patched {
     patcher.patched(scan, &FaceTree::new(scan)).unwrap()
 }
 
-/// The area that each vertex stands for, m²: on a plane, where faces are merged, few stand for much.
+/// The area that each vertex stands for, m²: on a plane, where faces are merged, few stand for
+/// much.
 fn areas(mesh: &TriMesh) -> Vec<f64> {
     let mut areas = vec![0.0; mesh.vertex_slots()];
     for (face, corners) in mesh.faces() {
@@ -133,7 +135,8 @@ impl Normalised {
     }
 }
 
-/// Consistency, not truth: noise, friction and residual calibration errors are drawn from the model.
+/// Consistency, not truth: noise, friction and residual calibration errors are drawn from the
+/// model.
 #[test]
 fn what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_has_them() {
     // one draw of the stiffness says nothing about its coverage
@@ -154,8 +157,8 @@ fn what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_ha
             },
             0.93,
         ),
-        // 2 % of its bend of half a millimetre is more than all noise, and one draw for each seed: 20 draws leave the share
-        // uncertain by a few per cent
+        // 2 % of its bend of half a millimetre is more than all noise, and one draw for each seed:
+        // 20 draws leave the share uncertain by a few per cent
         (
             "soft, 5 N/mm",
             StylusParams {
@@ -164,7 +167,8 @@ fn what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_ha
             },
             0.9,
         ),
-        // the lines of the hand are as far apart as this ball is wide: more of the surface lies between contacts
+        // the lines of the hand are as far apart as this ball is wide: more of the surface lies
+        // between contacts
         (
             "1 mm ball",
             StylusParams {
@@ -241,8 +245,8 @@ fn disturbed(messages: &[Message], foreign: Foreign, seed: u64) -> Vec<Message> 
     messages
 }
 
-/// Touched vertices of a plate whose stated parameters and noise differ from those of the model: normalised errors, errors in
-/// m, and standard deviations.
+/// Touched vertices of a plate whose stated parameters and noise differ from those of the model:
+/// normalised errors, errors in m, and standard deviations.
 fn foreign(stated: [f64; 2], noise: Foreign, seed: u64) -> (Normalised, ByArea, ByArea) {
     let own = if matches!(noise, Foreign::Nothing) {
         SensorParams::default().pose_noise
@@ -323,8 +327,8 @@ fn errors_outside_of_the_model_are_not_in_the_stated_uncertainty() {
         "{off} {rms} {within}"
     );
 
-    // the centre is where it is: a ball stated 20 µm too small leaves the surface 20 µm too high, and the mean square of what
-    // is normalised grows by that of the shift
+    // the centre is where it is: a ball stated 20 µm too small leaves the surface 20 µm too high,
+    // and the mean square of what is normalised grows by that of the shift
     let small = report("radius 20 µm small", [1.48 / 1.5, 1.0], Foreign::Nothing);
     assert!((small.0 - off - 20e-6).abs() < 2e-6, "{}", small.0);
     assert!(
@@ -350,9 +354,9 @@ fn errors_outside_of_the_model_are_not_in_the_stated_uncertainty() {
         (0.8..=1.25).contains(&tails.1) && tails.2 > 0.93,
         "{tails:?}"
     );
-    // … and what does not average out in a window is not in the stated uncertainty: of its 50 ms a smoothing of some milliseconds
-    // leaves all of the 50 µm, and 20 times as many errors are beyond two deviations as ought to be, if this is half of the
-    // stated deviation
+    // … and what does not average out in a window is not in the stated uncertainty: of its 50 ms a
+    // smoothing of some milliseconds leaves all of the 50 µm, and 20 times as many errors are
+    // beyond two deviations as ought to be, if this is half of the stated deviation
     let drift = report("drifting poses", [1.0, 1.0], Foreign::Drifting);
     assert!(
         (1.5..=3.5).contains(&drift.1) && (0.5..0.85).contains(&drift.2),
@@ -360,8 +364,9 @@ fn errors_outside_of_the_model_are_not_in_the_stated_uncertainty() {
     );
 }
 
-/// What a calibration leaves does not average out: 12 µm of the radius and 16 µm of the place (20 µm together), or 16 % of the 125 µm that 2.5 N bend the stylus, stand beside
-/// all else in every touched vertex.
+/// What a calibration leaves does not average out: 12 µm of the radius and 16 µm of the place (20
+/// µm together), or 16 % of the 125 µm that 2.5 N bend the stylus, stand beside all else in every
+/// touched vertex.
 #[test]
 fn what_the_calibration_leaves_is_in_every_vertex() {
     let (scan, touch, params) = touched_plate(&StylusParams::default(), 1);
@@ -442,8 +447,8 @@ fn only_new_vertices_are_better_known_than_the_scan_and_uncertainty_is_optional(
 /// Time between two disturbances, ns.
 const PERIOD_NS: i64 = 1_000_000_000;
 
-/// Disturbs `messages` every second: by turns a spike of force, which a shaken handle makes, and a step of the pose, as when
-/// the stylus slips off, and its shaft still touches.
+/// Disturbs `messages` every second: by turns a spike of force, which a shaken handle makes, and a
+/// step of the pose, as when the stylus slips off, and its shaft still touches.
 fn shaken_and_slipped(messages: &[Message]) -> Vec<Message> {
     let (spike_ns, slip_ns) = (8_000_000, 40_000_000);
     let is_in = |stamp_ns: i64, turn: i64, length_ns: i64| {
@@ -587,7 +592,8 @@ fn outliers_are_counted_and_do_not_dent_the_mesh() {
     assert!(gated[1] < 1.5 * calm[1] && gated[2] < 0.06, "{gated:?}");
 }
 
-/// Goes over the square from −4 to 4 mm in lines 1 mm apart at height `z` (m), from `start_ns` on; returns the time after.
+/// Goes over the square from −4 to 4 mm in lines 1 mm apart at height `z` (m), from `start_ns` on;
+/// returns the time after.
 fn pass(
     (patcher, contacts): (&mut Patcher, &mut ContactEstimator),
     z: f64,
@@ -675,8 +681,9 @@ fn a_place_moves_when_a_second_pass_confirms_it() {
     }
 }
 
-/// A ball slides over the plane z = 0, its poses come with white noise at half of the rate of the force and are interpolated: the
-/// touched points lie about the plane as far as their stated noise. Other rates are not covered.
+/// A ball slides over the plane z = 0, its poses come with white noise at half of the rate of the
+/// force and are interpolated: the touched points lie about the plane as far as their stated noise.
+/// Other rates are not covered.
 #[test]
 fn contacts_scatter_about_the_plane_by_their_stated_noise() {
     let (radius, pose_noise) = (1.5e-3, 20e-6);

@@ -1,5 +1,5 @@
-//! The table of parameters in the code against the one in docs/ros.md and the file config/node.yaml: three times the same,
-//! written three times.
+//! The table of parameters in the code against the one in docs/ros.md and the file
+//! config/node.yaml: three times the same, written three times.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -19,7 +19,8 @@ const HOLE: Flag = Flag {
     radius: 3e-3,
 };
 
-/// How far the centre of the hole is off, and its diameter, m; number of touches. Truth: Ø 8 mm at (16, 36).
+/// How far the centre of the hole is off, and its diameter, m; number of touches. Truth: Ø 8 mm at
+/// (16, 36).
 fn probed(simulated: &ArmParams, arm: &mut dyn Arm) -> [f64; 3] {
     let ArmParams {
         geometry,
@@ -69,7 +70,8 @@ fn probed(simulated: &ArmParams, arm: &mut dyn Arm) -> [f64; 3] {
     ]
 }
 
-/// The bounds are those of the same hole by the simulated arm itself (`probing::execute::planning`).
+/// The bounds are those of the same hole by the simulated arm itself
+/// (`probing::execute::planning`).
 #[test]
 fn a_hole_is_probed_as_by_the_simulated_arm_itself() {
     for (name, simulated) in [("7 joints", seven()), ("UR5e", ArmParams::default())] {
@@ -107,7 +109,8 @@ fn a_hole_is_probed_as_by_the_simulated_arm_itself() {
     }
 }
 
-/// 36 mm/s for 400 ms from rest with 0.5 m/s²: 36 (0.4 − 0.072/2) = 13.1 mm, less what the arm is late by.
+/// 36 mm/s for 400 ms from rest with 0.5 m/s²: 36 (0.4 − 0.072/2) = 13.1 mm, less what the arm is
+/// late by.
 #[test]
 fn a_velocity_is_gone_with_and_a_stop_ends_it() {
     let mut bench = bench(seven());
@@ -126,7 +129,8 @@ fn a_velocity_is_gone_with_and_a_stop_ends_it() {
     assert!(took_ms < 120.0, "{took_ms} ms");
 }
 
-/// It loses one period of 2 ms at each order, which come each 8 ms: slower, but it moves, and a line ends where it is to.
+/// It loses one period of 2 ms at each order, which come each 8 ms: slower, but it moves, and a
+/// line ends where it is to.
 #[test]
 fn a_controller_that_repeats_its_set_point_at_each_order_is_slower_and_still_moves() {
     let mut bench = bench(seven());
@@ -214,7 +218,8 @@ fn a_press_comes_to_its_force_and_does_not_swing() {
     assert!(bench.world().arm.peak_force() < 4.0);
 }
 
-/// 0.5 kg are 4.9 N, and with the centre 80 mm before the flange 0.39 N·m when the flange lies; here it stands: no torque but by the tilt.
+/// 0.5 kg are 4.9 N, and with the centre 80 mm before the flange 0.39 N·m when the flange lies;
+/// here it stands: no torque but by the tilt.
 #[test]
 fn weight_and_bias_are_off_the_force_after_zeroing_in_every_orientation() {
     let payload = Payload {

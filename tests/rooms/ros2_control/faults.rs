@@ -1,4 +1,5 @@
-//! Whatever goes wrong while it moves with 36 mm/s: it stands within a bound, for a true reason, and stays.
+//! Whatever goes wrong while it moves with 36 mm/s: it stands within a bound, for a true reason,
+//! and stays.
 
 use std::time::Duration;
 
@@ -6,11 +7,13 @@ use touchup::probing::arm::{Arm, ArmError};
 
 use super::{Bench, Fault, STOP, bench, seven, sideways};
 
-/// Of the order in force: reached in 10 ms, kept for 60 ms, then v/a = 36/2000 s = 18 ms; network, controller and drives take 7 ms.
+/// Of the order in force: reached in 10 ms, kept for 60 ms, then v/a = 36/2000 s = 18 ms; network,
+/// controller and drives take 7 ms.
 const ENDS_BY_ITSELF_MS: f64 = 10.0 + 60.0 + 18.0 + 7.0;
 /// A silence, or a lateness, that is a fault.
 const SILENT_MS: f64 = 60.0;
-/// The least time for a change of velocity is 10 ms, sent anew with each state: what is left falls by e in that time, by 36 in 36 ms.
+/// The least time for a change of velocity is 10 ms, sent anew with each state: what is left falls
+/// by e in that time, by 36 in 36 ms.
 const BRAKED_MS: f64 = 18.0 + 36.0 + 7.0;
 
 /// The fault after half a second of motion: from it until the arm stood, ms, and the reason.
@@ -26,7 +29,8 @@ fn after(fault: Fault) -> (Bench, f64, ArmError) {
     (bench, stood_ms, reason)
 }
 
-/// It takes no order but a stop, and moves no more, until it is recovered; then only by a new order.
+/// It takes no order but a stop, and moves no more, until it is recovered; then only by a new
+/// order.
 fn stays_until_recovered(mut bench: Bench, reason: &ArmError) {
     let before = bench.world().arm.ball();
     assert_eq!(bench.arm.command(&sideways(36e-3)).as_ref(), Err(reason));
@@ -102,7 +106,8 @@ fn a_controller_that_says_the_same_again_is_stuck() {
     stays_until_recovered(bench, &reason);
 }
 
-/// At 36 mm/s about half a metre from its axes the joints are ordered to go 1.1° within some 300 ms.
+/// At 36 mm/s about half a metre from its axes the joints are ordered to go 1.1° within some 300
+/// ms.
 #[test]
 fn a_controller_that_takes_no_orders_is_named() {
     let (_, stood_ms, reason) = after(Fault::Inactive);
@@ -162,7 +167,8 @@ fn an_arm_whose_client_has_died_stands_by_itself() {
     }
 }
 
-/// Held up for 40 ms, the caller finds 20 states: it orders nothing by them, and goes on once it has caught up.
+/// Held up for 40 ms, the caller finds 20 states: it orders nothing by them, and goes on once it
+/// has caught up.
 #[test]
 fn a_caller_that_was_held_up_orders_nothing_by_old_states() {
     let mut bench = bench(seven());

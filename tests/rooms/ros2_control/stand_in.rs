@@ -1,8 +1,11 @@
-//! Broadcasters, joint_trajectory_controller and drives of an arm, in the test's process and time: messages in, messages out.
+//! Broadcasters, joint_trajectory_controller and drives of an arm, in the test's process and time:
+//! messages in, messages out.
 //!
-//! The controller is written from its documentation and by what its set point is said to do: a trajectory without places and with stamp zero
-//! begins as it comes, from the set point of the period before, its velocity is linear between points, and the last point is held. It refuses
-//! one that does not end at rest. An old one ([`World::repeats`]) begins from the set point as if it were that of now, and so repeats it.
+//! The controller is written from its documentation and by what its set point is said to do: a
+//! trajectory without places and with stamp zero begins as it comes, from the set point of the
+//! period before, its velocity is linear between points, and the last point is held. It refuses one
+//! that does not end at rest. An old one ([`World::repeats`]) begins from the set point as if it
+//! were that of now, and so repeats it.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard};

@@ -1,4 +1,5 @@
-//! The definition of the parameters against a table that was written by hand, and what is made of the definition against its files.
+//! The definition of the parameters against a table that was written by hand, and what is made of
+//! the definition against its files.
 
 use std::fs;
 use std::path::Path;

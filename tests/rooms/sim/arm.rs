@@ -25,8 +25,8 @@ fn quiet(height: f64) -> (ArmParams, Isometry3<f64>) {
     )
 }
 
-/// Pressed into the top and drawn along it, the tip is pulled back by μ times the normal force (Coulomb), and it presses with
-/// the stiffness times the penetration (Hooke).
+/// Pressed into the top and drawn along it, the tip is pulled back by μ times the normal force
+/// (Coulomb), and it presses with the stiffness times the penetration (Hooke).
 #[test]
 fn a_ball_that_slides_is_held_back_by_friction_and_presses_by_stiffness() {
     for friction in [0.0, 0.15, 0.4] {
@@ -68,8 +68,8 @@ fn a_ball_that_slides_is_held_back_by_friction_and_presses_by_stiffness() {
     }
 }
 
-/// An encoder of the base that is off by δ turns the arm by δ about the axis of the base; a part that lies off by t and is turned by ω
-/// sees the ball at the inverse of that.
+/// An encoder of the base that is off by δ turns the arm by δ about the axis of the base; a part
+/// that lies off by t and is turned by ω sees the ball at the inverse of that.
 #[test]
 fn an_arm_with_errors_is_where_they_put_it() {
     let plate = Plate::default();

@@ -18,7 +18,8 @@ fn triangles(mesh: &TriMesh) -> Vec<[Point3<f64>; 3]> {
     mesh.faces().map(|(face, _)| mesh.triangle(face)).collect()
 }
 
-/// Distance from a point to a triangle, from the plane when the foot is inside and else from the three sides.
+/// Distance from a point to a triangle, from the plane when the foot is inside and else from the
+/// three sides.
 fn distance_to_triangle(p: &Point3<f64>, t: &[Point3<f64>; 3]) -> f64 {
     let normal = (t[1] - t[0]).cross(&(t[2] - t[0])).normalize();
     let sides = [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];

@@ -31,7 +31,8 @@ fn scan_is_as_bad_as_those_of_an_independent_simulator() {
         })
         .collect();
     let mean = |f: &dyn Fn(usize) -> f64| (0..runs.len()).map(f).sum::<f64>() / runs.len() as f64;
-    // the cases' scans: edges 2.43 to 2.45 mm, mean distance 0.53 to 0.66, rms 0.65 to 0.92, p95 1.2 to 1.9, bias 0.33 to 0.45
+    // the cases' scans: edges 2.43 to 2.45 mm, mean distance 0.53 to 0.66, rms 0.65 to 0.92, p95
+    // 1.2 to 1.9, bias 0.33 to 0.45
     for (found, low, high) in [
         (mean(&|i| runs[i].edge_median), 2.2e-3, 2.6e-3),
         (mean(&|i| runs[i].mean), 0.5e-3, 0.62e-3),
@@ -57,7 +58,8 @@ fn scan_closes_the_small_holes_and_is_open_at_the_back() {
         .iter()
         .filter(|f| matches!(f.shape, TruthShape::Hole { .. } | TruthShape::Slot { .. }))
     {
-        // the axis meets a face near the opening: one whose three corners, seen along the axis, surround it
+        // the axis meets a face near the opening: one whose three corners, seen along the axis,
+        // surround it
         let covers = |t: &[Point3<f64>; 3]| {
             let side = |a: &Point3<f64>, b: &Point3<f64>| {
                 (b - a).xy().perp(&(feature.centre - a).xy()) > 0.0

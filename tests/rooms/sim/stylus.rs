@@ -142,7 +142,8 @@ fn stream_has_the_stated_rates_noise_and_faults() {
         .filter(|w| w[1].stamp_ns < w[0].stamp_ns)
         .count() as f64
         / wrenches.len() as f64;
-    // an exponential delay of 0.4 ms overtakes the next of 1 ms later in e^(−2.5)/2 = 4 % of cases, late ones on top
+    // an exponential delay of 0.4 ms overtakes the next of 1 ms later in e^(−2.5)/2 = 4 % of cases,
+    // late ones on top
     assert!((0.03..0.06).contains(&swapped), "{swapped}");
     poses.sort_by_key(|p| p.stamp_ns);
     wrenches.sort_by_key(|w| w.stamp_ns);
@@ -448,7 +449,8 @@ fn ball_slides_over_any_mesh_from_any_side() {
     }
 }
 
-// The ball's centre runs where the wall is a radius less the lean away: at R − (r − lean) of the axis of a hole of radius R.
+// The ball's centre runs where the wall is a radius less the lean away: at R − (r − lean) of the
+// axis of a hole of radius R.
 #[test]
 fn waterlines_go_around_every_hole_that_lets_the_ball_in() {
     let plate = Plate::default();
@@ -544,7 +546,8 @@ fn from_several_sides_the_ball_never_goes_through_the_part() {
     }
 }
 
-/// In a slot that has a floor the hand wants to go on through its wall, then to a place below the plate.
+/// In a slot that has a floor the hand wants to go on through its wall, then to a place below the
+/// plate.
 #[test]
 fn a_ball_that_is_caught_is_taken_out_and_around_the_part() {
     let plate = Plate::default();

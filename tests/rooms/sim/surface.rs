@@ -47,7 +47,8 @@ fn plate_volume_converges_to_the_closed_form() {
     // by hand, mm³: 60·50·12 + 20·50·9, + π 5² 4 − π 4² 12 − π 3² 8 − (π 3² + 14·6) 5
     let by_hand = (60. * 50. * 12. + 20. * 50. * 9. + PI * (100. - 192. - 72. - 45.) - 420.) * 1e-9;
     let error = |chord: f64| (volume(&plate.mesh(chord).unwrap()) - by_hand).abs();
-    // curved walls of 2π (3·8 + 4·12 + 5·4 + 3·5) mm²; the area between chord and arc is less than chord error · arc
+    // curved walls of 2π (3·8 + 4·12 + 5·4 + 3·5) mm²; the area between chord and arc is less than
+    // chord error · arc
     let walls = 2.0 * PI * 107e-6;
     assert!(
         error(40e-6) < walls * 40e-6 && error(10e-6) < error(40e-6) / 3.0,

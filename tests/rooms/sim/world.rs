@@ -82,7 +82,8 @@ fn force_at(moments: &[Moment], t: f64) -> f64 {
         + moments[at as usize + 1].force_o.norm() * share
 }
 
-/// By how much the stamps of the wrenches are late, s: where their forces fit best to the true ones.
+/// By how much the stamps of the wrenches are late, s: where their forces fit best to the true
+/// ones.
 fn delay(moments: &[Moment], wrenches: &[StampedWrench]) -> f64 {
     let misfit = |delay: f64| {
         rms(wrenches
@@ -336,7 +337,8 @@ fn messages_have_the_rates_delay_and_drift_of_the_clocks() {
         let found = delay(&touched.moments, &wrenches);
         assert!((found - 12e-3).abs() <= 0.05e-3, "{found}");
     }
-    // a clock that gains 0.1 %: later by a thousandth of the time between the middles of both halves
+    // a clock that gains 0.1 %: later by a thousandth of the time between the middles of both
+    // halves
     let sensor = SensorParams {
         clock_rate: 1e-3,
         wrench_clock: -4e-3,
@@ -455,7 +457,8 @@ fn poses_have_the_drawn_noise_and_a_slow_wander() {
         (found / 0.1e-3 - 1.0).abs() < 4.0 / (2.0 * n).sqrt(),
         "{found}"
     );
-    // five waves of 8 s within a factor of two: in the 2 ms between two poses no more than √(2/5) · 5 · 2π/4 s · 2 ms of its size
+    // five waves of 8 s within a factor of two: in the 2 ms between two poses no more than √(2/5) ·
+    // 5 · 2π/4 s · 2 ms of its size
     let slow = error(SensorParams {
         pose_wander: 0.1e-3,
         ..SensorParams::ideal()
@@ -486,7 +489,8 @@ fn friction_varies_over_the_part_and_is_the_same_at_the_same_place() {
             let along = moved - contact.normal * moved.dot(&contact.normal);
             let normal = w[1].force_o.dot(&contact.normal);
             let across = (w[1].force_o - contact.normal * normal).norm();
-            // far faster than the speed below which friction is undecided, 1 mm/s: (v + 1 mm/s) / v takes that out
+            // far faster than the speed below which friction is undecided, 1 mm/s: (v + 1 mm/s) / v
+            // takes that out
             (along.norm() > 20e-3).then(|| {
                 (
                     contact.point,

@@ -129,7 +129,8 @@ fn offset_of(samples: impl IntoIterator<Item = Sample>) -> Option<ClockOffset> {
     clock.offset()
 }
 
-/// Down at 50 mm/s, stopped where the force begins: worked out by hand, the delay is the shift of the stamps.
+/// Down at 50 mm/s, stopped where the force begins: worked out by hand, the delay is the shift of
+/// the stamps.
 #[test]
 fn a_clean_stop_gives_the_delay_that_was_put_in() {
     for late_ms in [-100.0, -40.0, -3.0, 0.0, 2.5, 80.0, 100.0] {
@@ -159,7 +160,8 @@ fn a_clean_stop_gives_the_delay_that_was_put_in() {
 
 #[test]
 fn where_there_is_nothing_to_see_nothing_is_found() {
-    // never in contact; always in contact; the ball comes to rest long before it is pressed; two onsets alone
+    // never in contact; always in contact; the ball comes to rest long before it is pressed; two
+    // onsets alone
     assert_eq!(offset_of((0..5000).map(|ms| sample(ms, 0.01, 0.05))), None);
     assert_eq!(
         offset_of((0..5000).map(|ms| sample(ms, 0.01 * (ms as f64 * 0.01).sin(), 2.0))),
@@ -179,7 +181,8 @@ fn where_there_is_nothing_to_see_nothing_is_found() {
     assert_eq!(offset_of((0..400).map(stop)), None);
 }
 
-/// To and fro at 40 mm/s over a plane, held back by a fifth of 2 N: no onset of contact, and the force turns with the motion.
+/// To and fro at 40 mm/s over a plane, held back by a fifth of 2 N: no onset of contact, and the
+/// force turns with the motion.
 #[test]
 fn friction_that_turns_with_the_motion_gives_the_delay_where_contact_never_ends() {
     for late_ms in [-100, -30, 0, 7, 60, 100] {
@@ -210,8 +213,8 @@ fn friction_that_turns_with_the_motion_gives_the_delay_where_contact_never_ends(
     }
 }
 
-/// The same motion for ten minutes, by a clock of the wrench that runs faster or slower: worked out by hand, it reads `late_ms` at first and
-/// gains `ppm`.
+/// The same motion for ten minutes, by a clock of the wrench that runs faster or slower: worked out
+/// by hand, it reads `late_ms` at first and gains `ppm`.
 #[test]
 fn a_clock_that_drifts_is_told_by_its_rate_and_its_offset_at_first() {
     const LASTS_MS: i64 = 600_000;
@@ -263,7 +266,8 @@ fn a_clock_that_drifts_is_told_by_its_rate_and_its_offset_at_first() {
     }
 }
 
-/// Two short pieces far apart, as a full disk leaves them: a drift would show between them, and each alone says little.
+/// Two short pieces far apart, as a full disk leaves them: a drift would show between them, and
+/// each alone says little.
 #[test]
 fn a_recording_with_a_hole_in_it_shows_no_drift_where_there_is_none() {
     for seed in 1..=2 {

@@ -1,4 +1,5 @@
-//! The marker filter from outside: closed forms, occlusion, swapped labels, outliers, and springs too stiff for the frames.
+//! The marker filter from outside: closed forms, occlusion, swapped labels, outliers, and springs
+//! too stiff for the frames.
 
 use std::f64::consts::TAU;
 
@@ -122,7 +123,8 @@ fn the_first_pose_is_exact_for_every_set_of_markers() {
     }
 }
 
-/// A body in free flight needs no pull: once the filter knows its motion it is exact, and there is a pose every 1 ms.
+/// A body in free flight needs no pull: once the filter knows its motion it is exact, and there is
+/// a pose every 1 ms.
 #[test]
 fn a_steady_motion_is_followed_without_lag() {
     let body = body();
@@ -139,12 +141,14 @@ fn a_steady_motion_is_followed_without_lag() {
     }
     for pose in &poses[2000..] {
         let (place, angle) = off(&pose.pose_ot, &truth(pose.stamp_ns as f64 * 1e-9));
-        // between two frames 3.5 mrad apart the ball goes straight, not along its arc: (7e-3)²/8 of 150 mm
+        // between two frames 3.5 mrad apart the ball goes straight, not along its arc: (7e-3)²/8 of
+        // 150 mm
         assert!(place < 1e-6 && angle < 1e-6, "{place} m, {angle} rad");
     }
 }
 
-/// e″ + 2 ω e′ + ω² e = 0 with e(0) = s, e′(0) = −2 ω s: e = s e^(−ωt) (1 − ωt), at frames much closer than 1/ω.
+/// e″ + 2 ω e′ + ω² e = 0 with e(0) = s, e′(0) = −2 ω s: e = s e^(−ωt) (1 − ωt), at frames much
+/// closer than 1/ω.
 #[test]
 fn a_step_is_followed_as_by_a_critically_damped_spring() {
     let step = 2e-3;
@@ -163,7 +167,8 @@ fn a_step_is_followed_as_by_a_critically_damped_spring() {
     }
 }
 
-/// Springs from far too soft to far too stiff, frames at random times with random markers: the noise stays noise.
+/// Springs from far too soft to far too stiff, frames at random times with random markers: the
+/// noise stays noise.
 #[test]
 fn no_spring_and_no_set_of_markers_blows_up() {
     for frequency in [0.1, 1.0, 12.0, 200.0, 1e6] {
@@ -194,8 +199,8 @@ fn no_spring_and_no_set_of_markers_blows_up() {
             for pose in poses {
                 pose.check().unwrap();
                 let centroid = pose.pose_ot * body().centroid_t() - body().centroid_t();
-                // the stiffest take 0.2 mm of noise within 1 ms for a speed, and fly on with it for up to 30 ms;
-                // what blows up would be metres off, or no number
+                // the stiffest take 0.2 mm of noise within 1 ms for a speed, and fly on with it for
+                // up to 30 ms; what blows up would be metres off, or no number
                 assert!(
                     centroid.norm() < bound,
                     "{frequency} Hz, {damping}: {centroid}"
@@ -335,7 +340,8 @@ fn an_outlier_within_the_gate_counts_little_and_one_beyond_it_nothing() {
     }
 }
 
-/// What a search over all labels would take for the pose: four markers where they are and two reflections.
+/// What a search over all labels would take for the pose: four markers where they are and two
+/// reflections.
 #[test]
 fn a_first_frame_with_reflections_and_a_swap_is_seen_through() {
     let truth = pose(1.0);
@@ -398,7 +404,8 @@ fn the_order_of_arrival_does_not_matter() {
     );
 }
 
-/// After the pose of the first frame, ten milliseconds up to the last nanosecond that there is hold ten multiples of the period.
+/// After the pose of the first frame, ten milliseconds up to the last nanosecond that there is hold
+/// ten multiples of the period.
 #[test]
 fn at_the_end_of_time_the_poses_end() {
     let frames: Vec<_> = (0..3)

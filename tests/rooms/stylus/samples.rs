@@ -1,4 +1,5 @@
-//! The touch room from outside: samples of the synchroniser, residuals of the compensator, states of the gate.
+//! The touch room from outside: samples of the synchroniser, residuals of the compensator, states
+//! of the gate.
 
 use nalgebra::{
     Isometry3, Matrix3, Quaternion, SMatrix, SVector, Translation3, UnitQuaternion, Vector3, vector,
@@ -77,7 +78,8 @@ fn default_synchronised(messages: &[Message]) -> (Vec<Sample>, SyncCounts) {
     synchronised(SyncParams::default(), messages)
 }
 
-// ---- interpolation ----------------------------------------------------------------------------------------------
+// ---- interpolation
+// ----------------------------------------------------------------------------------------------
 
 #[test]
 fn position_between_two_poses_is_the_straight_line() {
@@ -95,7 +97,8 @@ fn position_between_two_poses_is_the_straight_line() {
     assert_eq!(counts, SyncCounts::default());
 }
 
-/// Angles by hand: a rotation by θ about one axis is (cos θ/2, sin θ/2 · axis); a third of the rotation is θ/3.
+/// Angles by hand: a rotation by θ about one axis is (cos θ/2, sin θ/2 · axis); a third of the
+/// rotation is θ/3.
 #[test]
 fn orientation_turns_at_constant_speed_by_the_shorter_rotation() {
     for (theta, sign) in [
@@ -148,7 +151,8 @@ proptest! {
     #[test]
     fn orientation_is_the_slerp_of_the_books(a in unit_quaternion(), b in unit_quaternion(), at in 1..8_i64) {
         let dot: f64 = a.iter().zip(b).map(|(x, y)| x * y).sum();
-        // where sin Ω is small the books' form has no digits; where the two rotations are equally long either is right
+        // where sin Ω is small the books' form has no digits; where the two rotations are equally
+        // long either is right
         prop_assume!(dot.abs() < 0.999 && dot.abs() > 1e-6);
         let (samples, _) = default_synchronised(&[turned_pose(0, a), turned_pose(8 * MS, b), wrench(at * MS, 0.0)]);
         let q = samples[0].pose_ot.rotation;
@@ -161,7 +165,8 @@ proptest! {
     }
 }
 
-// ---- which samples come out -------------------------------------------------------------------------------------
+// ---- which samples come out
+// -------------------------------------------------------------------------------------
 
 #[test]
 fn a_sample_goes_out_once_no_message_in_the_window_can_change_it() {
@@ -402,7 +407,8 @@ fn settings_without_meaning_are_refused() {
     }
 }
 
-/// Two streams of different rate with stamps that never repeat, and for each message how late it arrives, ms.
+/// Two streams of different rate with stamps that never repeat, and for each message how late it
+/// arrives, ms.
 fn streams() -> impl Strategy<Value = Vec<(Message, i64)>> {
     let stream = |period: i64, make: fn(i64, f64) -> Message| {
         prop::collection::vec((0..period, 0..20_i64, -1.0..1.0_f64), 1..200).prop_map(
@@ -502,7 +508,8 @@ proptest! {
     }
 }
 
-// ---- samples ----------------------------------------------------------------------------------------------------
+// ---- samples
+// ----------------------------------------------------------------------------------------------------
 
 #[test]
 fn a_sample_is_refused_when_not_finite_or_not_in_order() {
@@ -557,7 +564,8 @@ fn a_sample_is_refused_when_not_finite_or_not_in_order() {
     );
 }
 
-// ---- compensation -----------------------------------------------------------------------------------------------
+// ---- compensation
+// -----------------------------------------------------------------------------------------------
 
 /// Rotation matrix about `axis` by `angle`, written out by hand (Rodrigues).
 fn rodrigues(axis: Vector3<f64>, angle: f64) -> Matrix3<f64> {
@@ -737,8 +745,8 @@ fn weight_and_bias(rows: &[(UnitQuaternion<f64>, Vector3<f64>)]) -> (Vector3<f64
     (x.fixed_rows::<3>(0).into(), x.fixed_rows::<3>(3).into())
 }
 
-/// A real sensor held still in many orientations measures nothing once weight and bias are off. The weight of 11.4 N and
-/// the rms of 0.17 N per axis are those found by others in the same file.
+/// A real sensor held still in many orientations measures nothing once weight and bias are off. The
+/// weight of 11.4 N and the rms of 0.17 N per axis are those found by others in the same file.
 #[test]
 fn a_real_sensor_at_rest_measures_nothing() {
     let Some(path) = crate::shared::shared("force/gravity_ati/GP2025.txt") else {
@@ -791,7 +799,8 @@ fn a_real_sensor_at_rest_measures_nothing() {
     assert!(left(&compensator) <= 0.2 && raw > 5.0);
 }
 
-// ---- contact gate -----------------------------------------------------------------------------------------------
+// ---- contact gate
+// -----------------------------------------------------------------------------------------------
 
 #[test]
 fn the_gate_holds_between_its_thresholds_and_remembers_the_onset() {

@@ -1,9 +1,10 @@
 //! Rigid registration of points to a mesh, point to plane.
 //!
-//! A point x with the closest place q of the target and the normal n there meets the target when n·(x − q) vanishes; for a
-//! small twist (t, θ) about c that is n·t + ((x − c) × n)·θ = −n·(x − q) \[Chen Medioni 1992\]. Each round solves it by
-//! least squares with Tukey's weights, whose width begins at the distances found and shrinks to the scatter of the
-//! residuals: what alone holds a direction, such as the walls of a few holes, would else count as outliers before it has
+//! A point x with the closest place q of the target and the normal n there meets the target when
+//! n·(x − q) vanishes; for a small twist (t, θ) about c that is n·t + ((x − c) × n)·θ = −n·(x − q)
+//! \[Chen Medioni 1992\]. Each round solves it by least squares with Tukey's weights, whose width
+//! begins at the distances found and shrinks to the scatter of the residuals: what alone holds a
+//! direction, such as the walls of a few holes, would else count as outliers before it has
 //! converge. A direction without constraint stays as it was and is reported.
 
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
@@ -17,7 +18,8 @@ use crate::numeric::{
 /// Settings of [`icp`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IcpParams {
-    /// Points farther from the target than this have no part in it, m. Default: none is too far at first.
+    /// Points farther from the target than this have no part in it, m. Default: none is too far at
+    /// first.
     pub reach: f64,
     /// Rounds after which it is given up. Default 100; from a start within reach it takes 10 to 20.
     pub most_rounds: usize,
@@ -39,8 +41,8 @@ pub struct Motion {
     pub shift: Vector3<f64>,
     /// rotation vector, counted by the shift that it gives on average: times [`IcpFit::lever`]
     pub turn: Vector3<f64>,
-    /// mean square of how much the motion changes the distances, relative to a motion along all normals: 0 to 1 or a little
-    /// more
+    /// mean square of how much the motion changes the distances, relative to a motion along all
+    /// normals: 0 to 1 or a little more
     pub share: f64,
 }
 
@@ -73,8 +75,8 @@ pub struct IcpFit {
 }
 
 impl IcpFit {
-    /// The motions that leave the fit as it is: a sphere turns, a plane slides. The pose is where the start had it in
-    /// these.
+    /// The motions that leave the fit as it is: a sphere turns, a plane slides. The pose is where
+    /// the start had it in these.
     pub fn undetermined(&self) -> impl Iterator<Item = &Motion> {
         self.motions.iter().filter(|motion| !motion.is_determined())
     }
@@ -116,25 +118,29 @@ const LOOK_AT: &str = "are both in the same unit, and roughly in place?";
 
 /// Six unknowns, each held by two points.
 const LEAST_POINTS: usize = 12;
-/// A motion is undetermined below this share: facets make a cylinder of 32 sides hold its turn by 0.003, while the walls
-/// of one hole of 6 mm hold a plate of 100 mm × 60 mm by 0.009.
+/// A motion is undetermined below this share: facets make a cylinder of 32 sides hold its turn by
+/// 0.003, while the walls of one hole of 6 mm hold a plate of 100 mm × 60 mm by 0.009.
 const LEAST_SHARE: f64 = 0.004;
-/// Points of the first rounds, and of those before all take part; each is every n-th along the curve.
+/// Points of the first rounds, and of those before all take part; each is every n-th along the
+/// curve.
 const LEVELS: [usize; 2] = [1_500, 12_000];
 /// The width is at most halved in a round.
 const SHRINK: f64 = 0.5;
 /// The first width, over the distance within which nine of ten points are.
 const FIRST_WIDTH: f64 = 2.0;
-/// A round that moves less than this ends a level, in scatters: partners then stay where they are to the second order.
+/// A round that moves less than this ends a level, in scatters: partners then stay where they are
+/// to the second order.
 const REST: f64 = 0.3;
 /// How often the weights are updated before the next partners.
 const REWEIGHTINGS: usize = 4;
-/// Lengths below this are rounding, over the size of the target and its distance from the origin: 1 pm for 100 mm.
+/// Lengths below this are rounding, over the size of the target and its distance from the origin: 1
+/// pm for 100 mm.
 const ROUNDING: f64 = 1e-11;
 
 /// The rigid motion at which `points` fit `target`, from a start that is roughly right.
 ///
-/// - `points`: m, in their own frame, in any order; a subset of them is used far from the minimum, all of them at the end.
+/// - `points`: m, in their own frame, in any order; a subset of them is used far from the minimum,
+///   all of them at the end.
 /// - `tree`: over the faces of `target`.
 /// - `start`: moves the points to about where they belong.
 /// - `workers`: threads that search for the closest places; the motion is the same to the last bit.
@@ -214,8 +220,8 @@ struct Search<'a> {
     rounding: f64,
     rounds: usize,
     most_rounds: usize,
-    /// of points with the tangent planes of their closest places: how their distances change with shift and turn, turns counted by the lever,
-    /// and by how much they have to, m
+    /// of points with the tangent planes of their closest places: how their distances change with
+    /// shift and turn, turns counted by the lever, and by how much they have to, m
     partners: Vec<(Vector6<f64>, f64)>,
     /// sizes of the residuals of a round
     sizes: Vec<f64>,
@@ -355,8 +361,8 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Brings the width of the weights towards the scatter that is left: at once where the pose has converged, else in
-    /// steps.
+    /// Brings the width of the weights towards the scatter that is left: at once where the pose has
+    /// converged, else in steps.
     fn narrow(&mut self, round: &mut Round, step: &Vector6<f64>) {
         self.sizes.clear();
         self.sizes.extend(

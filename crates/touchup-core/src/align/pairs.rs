@@ -1,11 +1,13 @@
 //! The rigid motion that takes picked points onto the same points picked elsewhere.
 //!
-//! R, t minimise Σ wᵢ |bᵢ − (R aᵢ + t)|²: with the weighted centroids taken off, R = U diag(1, 1, det U Vᵀ) Vᵀ of the
-//! singular value decomposition Σ wᵢ b′ᵢ a′ᵢᵀ = U S Vᵀ [Kabsch 1976, Umeyama 1991]. About the centroid shift and turn
-//! are independent: cov = σ² diag(I / Σ wᵢ, (Σ wᵢ (|qᵢ|² I − qᵢ qᵢᵀ))⁻¹), qᵢ = R a′ᵢ.
+//! R, t minimise Σ wᵢ |bᵢ − (R aᵢ + t)|²: with the weighted centroids taken off, R = U diag(1, 1,
+//! det U Vᵀ) Vᵀ of the singular value decomposition Σ wᵢ b′ᵢ a′ᵢᵀ = U S Vᵀ [Kabsch 1976, Umeyama
+//! 1991]. About the centroid shift and turn are independent: cov = σ² diag(I / Σ wᵢ, (Σ wᵢ (|qᵢ|² I
+//! − qᵢ qᵢᵀ))⁻¹), qᵢ = R a′ᵢ.
 //!
-//! People pick wrong points, in wrong units and wrong axes. What the pairs alone reveal: one pair against all the
-//! others (leave one out, with an F test), distances that differ by a known factor, a mirror image that fits better.
+//! People pick wrong points, in wrong units and wrong axes. What the pairs alone reveal: one pair
+//! against all the others (leave one out, with an F test), distances that differ by a known factor,
+//! a mirror image that fits better.
 
 mod error;
 mod misfit;
@@ -24,9 +26,11 @@ use crate::numeric::{median, spreads};
 const LARGEST_COORDINATE: f64 = 1e6;
 /// Standard deviations of a pick that are believed, m: far outside, their squares are no numbers.
 const BELIEVABLE_SIGMA: RangeInclusive<f64> = 1e-12..=1e3;
-/// Points count as on one line when they scatter across it by less than this share of their scatter along it: 1°.
+/// Points count as on one line when they scatter across it by less than this share of their scatter
+/// along it: 1°.
 const LINE_SHARE: f64 = 0.02;
-/// … or by less than so many standard deviations of a pick: the turn about the line is then undetermined.
+/// … or by less than so many standard deviations of a pick: the turn about the line is then
+/// undetermined.
 const LINE_SIGMAS: f64 = 3.0;
 /// Picks closer together than this share of their scatter are one point.
 const SAME_SHARE: f64 = 1e-6;
@@ -34,8 +38,9 @@ const SAME_SHARE: f64 = 1e-6;
 /// The motion, or why there is none.
 ///
 /// # Errors
-/// [`PairsError`]: too few, coincident or collinear points, points that are no numbers, another unit, a mirror image, a
-/// pair that does not fit the others (named with 5 pairs or more), pairs that disagree.
+/// [`PairsError`]: too few, coincident or collinear points, points that are no numbers, another
+/// unit, a mirror image, a pair that does not fit the others (named with 5 pairs or more), pairs
+/// that disagree.
 ///
 /// # Example
 /// ```
@@ -66,8 +71,9 @@ pub fn fit_pairs(pairs: &[PointPair], params: &PairsParams) -> Result<PairsFit, 
     Ok(fit)
 }
 
-/// The motion of least squares between pairs that are known to belong together, all of the same weight; where they lie on one line, one of
-/// the motions that fit equally well. `None` for no pairs, or where one is no number.
+/// The motion of least squares between pairs that are known to belong together, all of the same
+/// weight; where they lie on one line, one of the motions that fit equally well. `None` for no
+/// pairs, or where one is no number.
 pub(crate) fn closest_motion(pairs: &[PointPair]) -> Option<Isometry3<f64>> {
     SolvedMotion::of(pairs, &vec![1.0; pairs.len()], None).map(|solved| solved.motion)
 }
@@ -83,7 +89,8 @@ fn given_sigma(pairs: &[PointPair], params: &PairsParams) -> Option<f64> {
     })
 }
 
-/// (σ₀ / σᵢ)², so that a pair of σ₀ has weight 1. A pair without a sigma has the median weight of those that have one.
+/// (σ₀ / σᵢ)², so that a pair of σ₀ has weight 1. A pair without a sigma has the median weight of
+/// those that have one.
 fn weights(pairs: &[PointPair], params: &PairsParams) -> Vec<f64> {
     let mut named: Vec<f64> = pairs.iter().filter_map(|pair| pair.sigma).collect();
     let usual = params.sigma.or(median(&mut named)).unwrap_or(1.0);

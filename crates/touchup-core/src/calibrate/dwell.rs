@@ -1,8 +1,8 @@
 //! Points picked with the stylus itself: where it dwells on the part.
 //!
-//! While it presses and stays where it is, the mean of its ball and of the force make one point: c + F / k − r n, with
-//! the stiffness k of the stylus and n along the force. Friction lets a resting force lean: on a slope of the pressing
-//! hand by φ the point is off by r sin φ along the surface.
+//! While it presses and stays where it is, the mean of its ball and of the force make one point: c
+//! + F / k − r n, with the stiffness k of the stylus and n along the force. Friction lets a resting
+//! force lean: on a slope of the pressing hand by φ the point is off by r sin φ along the surface.
 
 use nalgebra::{Point3, Vector3};
 
@@ -13,7 +13,8 @@ use crate::stylus::ContactSample;
 pub struct DwellParams {
     /// Shortest dwell, ns. Default 0.5 s: longer than a turning point of a stroke.
     pub dwell_ns: i64,
-    /// … and the ball stays within this of where it began, m. Default 0.5 mm: a hand trembles by a tenth of that.
+    /// … and the ball stays within this of where it began, m. Default 0.5 mm: a hand trembles by a
+    /// tenth of that.
     pub largest_drift: f64,
     /// Of the ball, m.
     pub radius: f64,

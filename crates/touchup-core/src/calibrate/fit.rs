@@ -1,10 +1,12 @@
-//! Robust least squares of zᵢ = Aᵢ x + y for vectors x and y of three, with Aᵢ a known 3 × 3 matrix.
+//! Robust least squares of zᵢ = Aᵢ x + y for vectors x and y of three, with Aᵢ a known 3 × 3
+//! matrix.
 //!
-//! With the means taken off, N = Σ (Aᵢ − Ā)ᵀ (Aᵢ − Ā) and N x = Σ (Aᵢ − Ā)ᵀ (zᵢ − z̄), y = z̄ − Ā x; cov x = σ² N⁻¹,
-//! cov y = σ² (I / n + Ā N⁻¹ Āᵀ), σ² = Σ |r|² / (3 n − 6). What N does not determine is a direction along which Aᵢ x is
-//! the same for all i.
+//! With the means taken off, N = Σ (Aᵢ − Ā)ᵀ (Aᵢ − Ā) and N x = Σ (Aᵢ − Ā)ᵀ (zᵢ − z̄), y = z̄ − Ā
+//! x; cov x = σ² N⁻¹, cov y = σ² (I / n + Ā N⁻¹ Āᵀ), σ² = Σ |r|² / (3 n − 6). What N does not
+//! determine is a direction along which Aᵢ x is the same for all i.
 //!
-//! Observations that do not belong are found from the fit of least Σ |r| (by reweighting), whose scale is the median of
+//! Observations that do not belong are found from the fit of least Σ |r| (by reweighting), whose
+//! scale is the median of
 //! |r|, and left out; what is left is fitted by least squares, until the choice no longer changes.
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
@@ -51,7 +53,8 @@ const GATE_SIGMAS: f64 = 5.0;
 const MEDIAN_NORM: f64 = 1.5382;
 /// A reweighted fit has converged by then; more would not change which observations are kept.
 const ROBUST_ROUNDS: usize = 30;
-/// Choices that still change after so many rounds go back and forth between two that are equally good.
+/// Choices that still change after so many rounds go back and forth between two that are equally
+/// good.
 const CHOICE_ROUNDS: usize = 30;
 /// Residuals below this share of the largest z are rounding, and no reason to leave anything out.
 const ROUNDING: f64 = 1e-12;

@@ -1,8 +1,8 @@
 //! Payload identification: weight, centre of mass and bias, from static poses.
 //!
-//! At rest and in free air the sensor measures f_S = R_WSᵀ w + b_f and τ_S = p_SC × R_WSᵀ w + b_τ with the weight w = m g
-//! in the frame of the poses. The first is linear in w and b_f: the direction of gravity is found, not assumed. With w
-//! known the second is linear in p_SC and b_τ.
+//! At rest and in free air the sensor measures f_S = R_WSᵀ w + b_f and τ_S = p_SC × R_WSᵀ w + b_τ
+//! with the weight w = m g in the frame of the poses. The first is linear in w and b_f: the
+//! direction of gravity is found, not assumed. With w known the second is linear in p_SC and b_τ.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -68,8 +68,9 @@ pub struct PayloadFit {
     pub rms_force: f64,
     /// … of the torque, N·m.
     pub rms_torque: f64,
-    /// What the noise of the sensor lets expect for `rms_force`, N; `None` when no noise is known. Much less than
-    /// `rms_force` means that something else pulls: a cable, a contact, a sensor that is turned otherwise.
+    /// What the noise of the sensor lets expect for `rms_force`, N; `None` when no noise is known.
+    /// Much less than `rms_force` means that something else pulls: a cable, a contact, a sensor
+    /// that is turned otherwise.
     pub expected_force: Option<f64>,
     /// Static poses.
     pub poses: usize,
@@ -175,7 +176,8 @@ pub enum PayloadError {
 
 /// Six unknowns of the force, three equations for each pose, and redundancy for the residuals.
 const FEWEST_POSES: usize = 4;
-/// sin² of the smallest tilt to either side: 5°. The uncertainty is then ten times that of a wide tilt.
+/// sin² of the smallest tilt to either side: 5°. The uncertainty is then ten times that of a wide
+/// tilt.
 const SMALLEST_SPREAD: f64 = 0.0076;
 /// The same for the centre of mass, by how much gravity turns in the sensor: 2°. A worse condition
 /// shows in its uncertainty, and harms little: the force does not need it.
@@ -190,8 +192,8 @@ const LARGEST_REJECTED: f64 = 0.4;
 /// Weight, centre of mass and bias.
 ///
 /// # Errors
-/// [`PayloadError`]: too few poses or too alike (which direction is not determined), no weight, wrong axes, too many
-/// poses that do not fit.
+/// [`PayloadError`]: too few poses or too alike (which direction is not determined), no weight,
+/// wrong axes, too many poses that do not fit.
 pub fn fit_payload(
     poses: &[StaticPose],
     params: &PayloadParams,
@@ -270,7 +272,8 @@ fn in_sensor(
     }
 }
 
-/// −[R_WSᵀ w]× p + b = τ over the poses that the force kept, with covariances that count how well w is known.
+/// −[R_WSᵀ w]× p + b = τ over the poses that the force kept, with covariances that count how well w
+/// is known.
 fn fit_torque(
     poses: &[StaticPose],
     params: &PayloadParams,

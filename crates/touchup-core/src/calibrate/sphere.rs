@@ -23,7 +23,8 @@ pub struct SphereFit {
     pub centre: Point3<f64>,
     /// radius of the touched sphere plus that of the ball, m
     pub radius: f64,
-    /// covariance of centre and radius for touches with a standard deviation of 1 along their radius
+    /// covariance of centre and radius for touches with a standard deviation of 1 along their
+    /// radius
     pub cofactors: Matrix4<f64>,
     /// Σ of the squared distances of the centres of the ball from the sphere, m²
     pub residual_square: f64,
@@ -40,7 +41,8 @@ const SEGMENTS: u32 = 48;
 
 /// Minimises Σ (|pᵢ − c| − ρ)² over centre c and radius ρ.
 ///
-/// - `points`: centres of the ball, m. `None` for fewer than five, or where they do not determine a sphere.
+/// - `points`: centres of the ball, m. `None` for fewer than five, or where they do not determine a
+///   sphere.
 ///
 /// # Example
 /// ```
@@ -85,7 +87,8 @@ fn equations(points: &[Point3<f64>], centre: &Point3<f64>, radius: f64) -> Norma
     }))
 }
 
-/// Of |p|² = 2 p·c + (ρ² − |c|²), which is linear in c and ρ² − |c|²; p from the mean of the points, in units of their extent.
+/// Of |p|² = 2 p·c + (ρ² − |c|²), which is linear in c and ρ² − |c|²; p from the mean of the
+/// points, in units of their extent.
 fn linear_centre(points: &[Point3<f64>]) -> Option<Point3<f64>> {
     let mean =
         Point3::from(points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / points.len() as f64);
@@ -172,8 +175,9 @@ pub fn beside_spheres(part: &TriMesh, spheres: &[ReferenceSphere]) -> Result<Tri
 mod tests {
     use super::*;
 
-    /// Five touches of a sphere, one of them too far out by 20 µm: with a pole and four at the equator the pole alone determines the height,
-    /// so an error of the pole is one of the centre; an error of one of the equator has the residuals of a hand count.
+    /// Five touches of a sphere, one of them too far out by 20 µm: with a pole and four at the
+    /// equator the pole alone determines the height, so an error of the pole is one of the centre;
+    /// an error of one of the equator has the residuals of a hand count.
     #[test]
     fn a_fit_has_the_residuals_of_a_hand_count() {
         let out = [
@@ -186,7 +190,8 @@ mod tests {
         let mut points = out.map(|out| Point3::from(Vector3::from(out) * 0.015));
         points[0].x += 20e-6;
         let fit = fit_sphere(&points).unwrap();
-        // the radii of the x pair grow by 10 µm on average, which the common radius takes half of: residuals ±5 µm on four touches
+        // the radii of the x pair grow by 10 µm on average, which the common radius takes half of:
+        // residuals ±5 µm on four touches
         assert!(
             (fit.residual_square - 4.0 * 5e-6f64.powi(2)).abs() < 1e-13,
             "{}",

@@ -1,7 +1,8 @@
 //! Static segments of a recording: where neither the stylus turns nor the wrench changes.
 //!
-//! Samples are averaged over blocks of a fifth of a second, which takes the noise out of the rates; blocks between
-//! which pose and wrench change slowly make a segment, and a segment that lasts is one static pose.
+//! Samples are averaged over blocks of a fifth of a second, which takes the noise out of the rates;
+//! blocks between which pose and wrench change slowly make a segment, and a segment that lasts is
+//! one static pose.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
@@ -27,11 +28,11 @@ pub struct StaticSegmentParams {
     pub block_ns: i64,
     /// Shortest segment, ns. Default 0.6 s: three blocks.
     pub least_ns: i64,
-    /// Turning slower than this is static, rad/s. Default 0.02: a robot's settling oscillation, less than the tremor of a
-    /// hand over a block.
+    /// Turning slower than this is static, rad/s. Default 0.02: a robot's settling oscillation,
+    /// less than the tremor of a hand over a block.
     pub turning: f64,
-    /// The force changes more slowly than this at rest, N/s. Default 0.3: a sensor with 0.05 N of noise at 200 Hz
-    /// reaches a third of it by chance.
+    /// The force changes more slowly than this at rest, N/s. Default 0.3: a sensor with 0.05 N of
+    /// noise at 200 Hz reaches a third of it by chance.
     pub force_rate: f64,
     /// … and the torque, N·m/s. Default 0.03.
     pub torque_rate: f64,
@@ -170,7 +171,8 @@ impl StaticSegmentFinder {
         }
     }
 
-    /// Takes one sample; those that cannot be a measurement, or are not after the one before, are left out.
+    /// Takes one sample; those that cannot be a measurement, or are not after the one before, are
+    /// left out.
     pub fn push(&mut self, sample: &Sample) {
         if sample.check().is_err()
             || self

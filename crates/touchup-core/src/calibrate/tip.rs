@@ -1,8 +1,8 @@
 //! Tip calibration by a pivot: the centre of the ball in the tracked stylus, from a swing about it.
 //!
-//! The ball rests in a cone or a divot while the stylus is swung: p_WH + R_WH d = c for all poses, with the offset d of
-//! the ball and the resting point c. Linear in both; where the stylus turned about one axis alone, d along it is not
-//! determined.
+//! The ball rests in a cone or a divot while the stylus is swung: p_WH + R_WH d = c for all poses,
+//! with the offset d of the ball and the resting point c. Linear in both; where the stylus turned
+//! about one axis alone, d along it is not determined.
 
 use nalgebra::{Isometry3, Vector3};
 
@@ -17,8 +17,8 @@ pub type SwingPose = Isometry3<f64>;
 pub struct TipFitParams {
     /// A ball that rests strays by less than this, rms, m. Default 1 mm.
     pub largest_rms: f64,
-    /// Smallest swing to either side across any axis, rms, rad. Default 8°, that is ±12° each way: below it the noise
-    /// of the tracker is amplified sevenfold in the offset.
+    /// Smallest swing to either side across any axis, rms, rad. Default 8°, that is ±12° each way:
+    /// below it the noise of the tracker is amplified sevenfold in the offset.
     pub smallest_swing: f64,
 }
 
@@ -46,7 +46,8 @@ pub struct TipFit {
     pub rejected: usize,
     /// Swing to either side across the axis across which it was smallest, rms, rad.
     pub swing: f64,
-    /// How many poses carry as much information as one independent pose: 1 when the noise is not correlated.
+    /// How many poses carry as much information as one independent pose: 1 when the noise is not
+    /// correlated.
     pub correlation: f64,
 }
 
@@ -102,7 +103,8 @@ const LARGEST_REJECTED: f64 = 0.4;
 /// - `poses`: in order of time; NaN is left out.
 ///
 /// # Errors
-/// [`TipError`]: too few poses, too small a swing (and across which axis), a ball that did not rest.
+/// [`TipError`]: too few poses, too small a swing (and across which axis), a ball that did not
+/// rest.
 pub fn fit_tip(poses: &[SwingPose], params: &TipFitParams) -> Result<TipFit, TipError> {
     let is_number = |pose: &&SwingPose| {
         pose.translation
@@ -148,8 +150,8 @@ pub fn fit_tip(poses: &[SwingPose], params: &TipFitParams) -> Result<TipFit, Tip
     })
 }
 
-/// (1 + ρ) / (1 − ρ) with ρ the correlation of neighbouring residuals: a tracker's noise is not independent from pose to
-/// pose.
+/// (1 + ρ) / (1 − ρ) with ρ the correlation of neighbouring residuals: a tracker's noise is not
+/// independent from pose to pose.
 fn correlation(found: &CalibrationFit, equations: &[Equation]) -> f64 {
     let residuals: Vec<Vector3<f64>> = equations
         .iter()

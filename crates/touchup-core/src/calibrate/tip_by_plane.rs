@@ -1,9 +1,11 @@
-//! Tip (TCP) calibration by a plane: the centre of the ball in the flange, from touches of one plane with the tip in several orientations.
+//! Tip (TCP) calibration by a plane: the centre of the ball in the flange, from touches of one
+//! plane with the tip in several orientations.
 //!
-//! A ball that touches a plane has its centre at a height h over the plane, whatever the orientation: n · (p + R d) = h, with the
-//! place p of the nominal centre, the axes R of the flange, and the offset d of the true centre from there, in these axes.
-//! Unknown are d, n and h. The radius of the ball is in h: it is not determined, nor is it needed. Where Rᵀ n stays in a plane, d across
-//! that is not determined.
+//! A ball that touches a plane has its centre at a height h over the plane, whatever the
+//! orientation: n · (p + R d) = h, with the place p of the nominal centre, the axes R of the
+//! flange, and the offset d of the true centre from there, in these axes. Unknown are d, n and h.
+//! The radius of the ball is in h: it is not determined, nor is it needed. Where Rᵀ n stays in a
+//! plane, d across that is not determined.
 
 use nalgebra::{Isometry3, Matrix3, SVector, SymmetricEigen, Unit, Vector3};
 
@@ -58,7 +60,8 @@ pub enum PlaneTipError {
 
 /// Six unknowns, and redundancy for their residuals.
 const FEWEST: usize = 9;
-/// Least spread of Rᵀ n along any axis, rms: the uncertainty of one touch is amplified at most tenfold in the offset.
+/// Least spread of Rᵀ n along any axis, rms: the uncertainty of one touch is amplified at most
+/// tenfold in the offset.
 const LEAST_SPREAD: f64 = 0.03;
 /// A plane that is touched is flat within this, rms, m.
 const FLAT: f64 = 0.1e-3;
@@ -69,8 +72,8 @@ type Six = SVector<f64, 6>;
 
 /// Offset of the ball.
 ///
-/// - `poses`: with the axes of the flange, about the nominal centre of the ball, where the plane was touched; `normal`: out of
-///   the plane, about; both in the base.
+/// - `poses`: with the axes of the flange, about the nominal centre of the ball, where the plane
+///   was touched; `normal`: out of the plane, about; both in the base.
 ///
 /// # Errors
 /// [`PlaneTipError`]
@@ -122,8 +125,8 @@ pub fn fit_tip_by_plane(
     if rms.is_nan() || rms > FLAT {
         return Err(PlaneTipError::NotFlat { rms_mm: rms * 1e3 });
     }
-    // the residuals of few touches know their own scale badly: the error is Student's t of n − 6, whose variance is larger by
-    // (n − 6)/(n − 8) (JCGM 101:2008, 6.4.9.4)
+    // the residuals of few touches know their own scale badly: the error is Student's t of n − 6,
+    // whose variance is larger by (n − 6)/(n − 8) (JCGM 101:2008, 6.4.9.4)
     let covariance =
         information.try_inverse().ok_or(PlaneTipError::OnOneLine)? * (square / (n - 8.0));
     let covariance: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into_owned();
@@ -159,8 +162,8 @@ mod tests {
 
     use super::*;
 
-    /// Touches of the plane n · p = 1.5 mm with a ball that is off by `offset` in the axes of a flange that leans by these angles, °, and
-    /// towards these; on a square, m.
+    /// Touches of the plane n · p = 1.5 mm with a ball that is off by `offset` in the axes of a
+    /// flange that leans by these angles, °, and towards these; on a square, m.
     fn poses(
         leans: &[(f64, f64)],
         offset: Vector3<f64>,

@@ -1,12 +1,17 @@
-//! How far an arm is off over its workspace, from touches of spheres of known diameter at known places.
+//! How far an arm is off over its workspace, from touches of spheres of known diameter at known
+//! places.
 //!
-//! - Repeatability s of a touch along its direction: s² = Σ r² / Σ (n − 4) over the residuals r of all sphere fits.
-//! - Tip radius: the fitted radius less that of the sphere, the mean of all fits. Its uncertainty is the larger of what the residuals lead to and
-//!   what the fits scatter by, with half of the uncertainty of the diameter.
-//! - Errors over the workspace: eₖ = what remains of found less told centres after the rigid motion of least squares, so that the place of the
-//!   scan in the base is in none of them. With n spheres f = 3n − 6 numbers remain (3n − 5 on one line: with two spheres their distance).
-//! - Growth g with the distance d from where the part was registered: a place has the standard deviation g d along each axis, so
-//!   g² = Σ |eₖ|² / (f Σ dₖ² / n). The noise of the centres stays in it: with few spheres close together it comes out too large rather than too small.
+//! - Repeatability s of a touch along its direction: s² = Σ r² / Σ (n − 4) over the residuals r of
+//!   all sphere fits.
+//! - Tip radius: the fitted radius less that of the sphere, the mean of all fits. Its uncertainty
+//!   is the larger of what the residuals lead to and what the fits scatter by, with half of the
+//!   uncertainty of the diameter.
+//! - Errors over the workspace: eₖ = what remains of found less told centres after the rigid motion
+//!   of least squares, so that the place of the scan in the base is in none of them. With n spheres
+//!   f = 3n − 6 numbers remain (3n − 5 on one line: with two spheres their distance).
+//! - Growth g with the distance d from where the part was registered: a place has the standard
+//!   deviation g d along each axis, so g² = Σ |eₖ|² / (f Σ dₖ² / n). The noise of the centres stays
+//!   in it: with few spheres close together it comes out too large rather than too small.
 
 use nalgebra::{Point3, Vector3};
 
@@ -30,7 +35,8 @@ pub struct CheckedPlace {
     pub sphere: usize,
     /// mean of its centres over the orientations, m in O
     pub found: Point3<f64>,
-    /// found less told, after the rigid motion that fits all spheres best, m; 0 for a sphere by itself
+    /// found less told, after the rigid motion that fits all spheres best, m; 0 for a sphere by
+    /// itself
     pub error: Vector3<f64>,
 }
 
@@ -43,7 +49,8 @@ pub struct WorkspaceCheck {
     pub repeatability: f64,
     /// numbers that it is known by
     pub degrees_of_freedom: usize,
-    /// standard deviation of a centre along each axis from one orientation to the next, m; `None` where each was touched in one alone
+    /// standard deviation of a centre along each axis from one orientation to the next, m; `None`
+    /// where each was touched in one alone
     pub orientation_scatter: Option<f64>,
     /// effective radius of the ball, m
     pub tip_radius: f64,
@@ -51,7 +58,8 @@ pub struct WorkspaceCheck {
     pub tip_radius_sigma: f64,
     /// each sphere that was touched
     pub places: Vec<CheckedPlace>,
-    /// standard deviation of a place along each axis over its distance from where the part was registered, m per m; `None` for a sphere by itself
+    /// standard deviation of a place along each axis over its distance from where the part was
+    /// registered, m per m; `None` for a sphere by itself
     pub growth: Option<f64>,
     /// numbers that it is known by
     pub growth_degrees_of_freedom: usize,
@@ -80,7 +88,8 @@ const LINE_SHARE: f64 = 0.02;
 
 /// Evaluates the touches of spheres.
 ///
-/// - `registered_at`: where the place of the scan is known best, m in O; `diameter_sigma`: standard uncertainty of the diameters, m.
+/// - `registered_at`: where the place of the scan is known best, m in O; `diameter_sigma`: standard
+///   uncertainty of the diameters, m.
 ///
 /// # Errors
 /// [`WorkspaceError`]
@@ -265,8 +274,9 @@ mod tests {
         assert_eq!(found.orientation_scatter, None);
     }
 
-    /// An arm whose lengths are 1 mm per m too long: no motion takes that off. About the middle of the spheres the squared distances are
-    /// 3/4 · 0.2² · 3 = 0.09 m², from the first one on 0.12 m².
+    /// An arm whose lengths are 1 mm per m too long: no motion takes that off. About the middle of
+    /// the spheres the squared distances are 3/4 · 0.2² · 3 = 0.09 m², from the first one on 0.12
+    /// m².
     #[test]
     fn a_scale_is_found_as_the_growth_of_its_closed_form() {
         let scaled = readings(|p| Point3::from(p.coords * 1.001));
@@ -277,7 +287,8 @@ mod tests {
             "{:?} {expected}",
             found.growth
         );
-        // two of them: their distance is 0.2 mm too long, half of it at each; nearer to the first, d² = 0.2² over two
+        // two of them: their distance is 0.2 mm too long, half of it at each; nearer to the first,
+        // d² = 0.2² over two
         let found = check_workspace(&spheres(), &scaled[..2], &Vector3::zeros(), 0.0).unwrap();
         assert!(
             (found.places[1].error - Vector3::x() * 0.1e-3).norm() < 1e-10,
@@ -292,7 +303,8 @@ mod tests {
         assert_eq!((alone.growth, alone.growth_degrees_of_freedom), (None, 0));
     }
 
-    /// Two orientations whose tip is 10 µm apart along x: ±5 µm, one degree of freedom of three axes.
+    /// Two orientations whose tip is 10 µm apart along x: ±5 µm, one degree of freedom of three
+    /// axes.
     #[test]
     fn what_turning_the_probe_moves_is_its_scatter() {
         let mut both = readings(|p| *p)[..1].to_vec();

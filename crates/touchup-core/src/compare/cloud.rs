@@ -15,12 +15,14 @@ const WIDENED: f64 = 1.0 + 1e-9;
 
 /// Distance from each of `points` to the nearest point of `cloud`, m.
 ///
-/// It is the distance of the surfaces only where the cloud is dense against it: half the spacing is in it.
+/// It is the distance of the surfaces only where the cloud is dense against it: half the spacing is
+/// in it.
 ///
 /// - `workers`: threads that search; the distances are the same to the last bit.
 ///
 /// # Errors
-/// [`CompareError::NotFinite`] of either; [`CompareError::NoPoints`], [`CompareError::TooManyPoints`].
+/// [`CompareError::NotFinite`] of either; [`CompareError::NoPoints`],
+/// [`CompareError::TooManyPoints`].
 pub fn cloud_distances(
     points: &[Point3<f64>],
     cloud: &[Point3<f64>],
@@ -51,8 +53,9 @@ pub fn cloud_distances(
     Ok(distances)
 }
 
-/// Those of a run of neighbours, in its order. The nearest point of one is no farther from the next than its own nearest: from far away, where
-/// many points of a cloud are about equally near, that leaves fewer to be looked at.
+/// Those of a run of neighbours, in its order. The nearest point of one is no farther from the next
+/// than its own nearest: from far away, where many points of a cloud are about equally near, that
+/// leaves fewer to be looked at.
 fn run_distances(
     points: &[Point3<f64>],
     run: &[u32],

@@ -1,5 +1,5 @@
-//! Colours of signed deviations: blue lacks material, white fits, red has too much. The colour-blind can distinguish them. And of
-//! classes of disagreement.
+//! Colours of signed deviations: blue lacks material, white fits, red has too much. The
+//! colour-blind can distinguish them. And of classes of disagreement.
 
 use super::disagreement::Class;
 
@@ -19,8 +19,8 @@ const STOPS: [[f64; 3]; 9] = [
     [122.0, 12.0, 32.0],
 ];
 
-/// The colour of `deviation` on a scale from −`range` to `range` (m, more than 0); what is beyond has the colour of its
-/// end.
+/// The colour of `deviation` on a scale from −`range` to `range` (m, more than 0); what is beyond
+/// has the colour of its end.
 pub fn colour_of(deviation: f64, range: f64) -> Rgb {
     let last = STOPS.len() - 1;
     let at = ((deviation / range).clamp(-1.0, 1.0) + 1.0) / 2.0 * last as f64;

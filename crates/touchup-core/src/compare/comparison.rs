@@ -37,21 +37,23 @@ pub enum Regions<'a> {
     Unknown,
     /// one for each vertex slot of the mesh itself
     Own(&'a [SupportRegion]),
-    /// those of another mesh of the same part, looked up through the truth: where that mesh is closest to the true place
+    /// those of another mesh of the same part, looked up through the truth: where that mesh is
+    /// closest to the true place
     Of(IndexedMesh<'a>, &'a [SupportRegion]),
 }
 
 /// Settings of [`compare`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CompareParams {
-    /// Points on the true surface, about; as dense on the mesh. Default 200 000: percentiles to a few tenths of a per cent.
+    /// Points on the true surface, about; as dense on the mesh. Default 200 000: percentiles to a
+    /// few tenths of a per cent.
     pub samples: usize,
     /// Another seed gives another sample.
     pub seed: u64,
     /// Half the range of the histogram, m. Default: from the 95th percentile.
     pub range: Option<f64>,
-    /// How far a true place may be from the mesh and yet be one that it shows, m. Default 2 mm: three times the noise of a
-    /// poor scan.
+    /// How far a true place may be from the mesh and yet be one that it shows, m. Default 2 mm:
+    /// three times the noise of a poor scan.
     pub reach: f64,
     /// Deviations of at most so much are within tolerance, m. Default: none.
     pub tolerance: Option<f64>,
@@ -69,7 +71,8 @@ impl Default for CompareParams {
     }
 }
 
-/// A mesh of more than so many times the area of the truth is sampled less densely: its unit is probably wrong.
+/// A mesh of more than so many times the area of the truth is sampled less densely: its unit is
+/// probably wrong.
 const MOST_AREA: f64 = 10.0;
 
 /// Narrowest range chosen, m: no scan or touch is more accurate.
@@ -86,12 +89,13 @@ pub struct RegionComparison {
     pub histogram: Histogram,
     /// share of them within [`CompareParams::tolerance`]; `None` where there is none, or no point
     pub within_tolerance: Option<f64>,
-    /// points spread over the true surface, to the mesh: what is missing. A region has those that the mesh shows; all of it
-    /// has also what was never scanned.
+    /// points spread over the true surface, to the mesh: what is missing. A region has those that
+    /// the mesh shows; all of it has also what was never scanned.
     pub truth_to_mesh: Option<Summary>,
     /// the mesh's vertices, to the true surface
     pub vertices_to_truth: Option<Summary>,
-    /// points spread over the mesh, to the nearest of those spread over the truth; without sign, `bias` is the mean
+    /// points spread over the mesh, to the nearest of those spread over the truth; without sign,
+    /// `bias` is the mean
     pub cloud_to_truth: Option<Summary>,
     /// and the reverse
     pub truth_to_cloud: Option<Summary>,
@@ -106,7 +110,8 @@ pub struct Comparison {
     pub density: f64,
     /// half the range of the histograms, m
     pub range: f64,
-    /// share of the true surface that the mesh, or the one that has the regions, does not show: never scanned, or missing
+    /// share of the true surface that the mesh, or the one that has the regions, does not show:
+    /// never scanned, or missing
     pub unseen: f64,
     /// all of it, then the regions that there are
     pub regions: Vec<RegionComparison>,
@@ -366,8 +371,9 @@ fn regions_of(
     })
 }
 
-/// The region of each point of the truth: that of the closest place of the mesh that has the regions, where this is within
-/// `reach` (m) and has a normal alike. A scan from above carries no information on the underside.
+/// The region of each point of the truth: that of the closest place of the mesh that has the
+/// regions, where this is within `reach` (m) and has a normal alike. A scan from above carries no
+/// information on the underside.
 ///
 /// - `feet`: of the points on `mesh`.
 fn regions_of_truth(
@@ -411,7 +417,8 @@ fn most_common(corners: [VertexId; 3], of_vertex: &[SupportRegion]) -> SupportRe
     regions[1]
 }
 
-/// A round number just above the 95th percentile of the sizes: 1, 1.5, 2, 3, 5 or 7 times a power of ten, m.
+/// A round number just above the 95th percentile of the sizes: 1, 1.5, 2, 3, 5 or 7 times a power
+/// of ten, m.
 fn fitting_range(deviations: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = deviations.iter().map(|d| d.abs()).collect();
     sizes.sort_unstable_by(f64::total_cmp);

@@ -5,8 +5,9 @@ use nalgebra::Point3;
 use super::CompareError;
 use crate::mesh::{FaceHit, FaceTree, TriMesh, Workers, coherent_order, map_by, pseudo_normal};
 
-/// Finds the place of `mesh` closest to each of `points` and hands it to `take` with the number of the point: each point
-/// once, in an order in which neighbours follow each other, so that what one query has read is cached for the next.
+/// Finds the place of `mesh` closest to each of `points` and hands it to `take` with the number of
+/// the point: each point once, in an order in which neighbours follow each other, so that what one
+/// query has read is cached for the next.
 ///
 /// - `points`: m, in the frame of `mesh`.
 ///
@@ -30,7 +31,8 @@ pub fn closest_places(
     Ok(())
 }
 
-/// What `evaluate` returns for each of `points` and its closest place, in their order; the same for any `workers`.
+/// What `evaluate` returns for each of `points` and its closest place, in their order; the same for
+/// any `workers`.
 ///
 /// # Errors
 /// As [`closest_places`].
@@ -57,8 +59,8 @@ pub(super) fn at_closest_places<T: Send>(
         .collect()
 }
 
-/// Numbers of the points so that neighbours follow each other, and the points in this order: read one by one they would
-/// each be waited for.
+/// Numbers of the points so that neighbours follow each other, and the points in this order: read
+/// one by one they would each be waited for.
 fn in_order(points: &[Point3<f64>]) -> Result<(Vec<u32>, Vec<Point3<f64>>), CompareError> {
     check_finite(points)?;
     let order = coherent_order(points);
@@ -66,10 +68,12 @@ fn in_order(points: &[Point3<f64>]) -> Result<(Vec<u32>, Vec<Point3<f64>>), Comp
     Ok((order, ordered))
 }
 
-/// Signed distance of each point from a surface, m: positive outside of it, negative in the material.
+/// Signed distance of each point from a surface, m: positive outside of it, negative in the
+/// material.
 ///
 /// - `points`: m, in the frame of `truth`.
-/// - `workers`: threads that search for the closest places; the distances are the same to the last bit.
+/// - `workers`: threads that search for the closest places; the distances are the same to the last
+///   bit.
 ///
 /// # Errors
 /// As [`closest_places`].

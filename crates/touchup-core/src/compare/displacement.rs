@@ -1,4 +1,5 @@
-//! How far a surface moved from one refinement of a scan to another, and whether that is more than either of them knows.
+//! How far a surface moved from one refinement of a scan to another, and whether that is more than
+//! either of them knows.
 
 use nalgebra::{Point3, Vector3};
 
@@ -17,7 +18,8 @@ pub struct Displacement {
 }
 
 impl Displacement {
-    /// What it must exceed to be more than the surfaces are uncertain, m: `k` standard deviations; 0 where none is known.
+    /// What it must exceed to be more than the surfaces are uncertain, m: `k` standard deviations;
+    /// 0 where none is known.
     pub fn plus_minus(&self, k: f64) -> f64 {
         self.sigma.map_or(0.0, |sigma| k * sigma)
     }
@@ -37,8 +39,8 @@ pub enum DisplacedFrom {
     After,
 }
 
-/// Displacement of each vertex slot of a mesh whose vertices and faces are those of the other: along the normal of the first. `None` where
-/// they are not.
+/// Displacement of each vertex slot of a mesh whose vertices and faces are those of the other:
+/// along the normal of the first. `None` where they are not.
 ///
 /// - `sigmas`: standard deviation of each vertex slot, m, of both.
 pub fn displacements_by_vertex(
@@ -76,10 +78,12 @@ pub fn displacements_by_vertex(
     Some(displaced.collect())
 }
 
-/// Displacement at each vertex slot of one of two meshes, to the nearest place of the other surface.
+/// Displacement at each vertex slot of one of two meshes, to the nearest place of the other
+/// surface.
 ///
 /// - `shape`: whose vertices these are; `sigma`: standard deviation of each, m.
-/// - `other`: the other surface; `other_sigma`: of its vertices, m; between them it is interpolated.
+/// - `other`: the other surface; `other_sigma`: of its vertices, m; between them it is
+///   interpolated.
 ///
 /// # Errors
 /// [`CompareError::NoFaces`] where the other one has none.
@@ -151,7 +155,8 @@ mod tests {
         TriMesh::new(vertices, faces.collect()).unwrap()
     }
 
-    /// A sheet that rises by 0.01 mm for each column, known to ± 0.02 mm (k = 2): by hand, the columns 3 and 4 rise by more.
+    /// A sheet that rises by 0.01 mm for each column, known to ± 0.02 mm (k = 2): by hand, the
+    /// columns 3 and 4 rise by more.
     #[test]
     fn vertices_that_rise_by_more_than_their_plus_minus_are_counted() {
         let flat = sheet(|_, _| 0.0, false);
@@ -177,7 +182,8 @@ mod tests {
         );
     }
 
-    /// The same by the nearest place of a sheet with other faces: parallel to it all rise by as much.
+    /// The same by the nearest place of a sheet with other faces: parallel to it all rise by as
+    /// much.
     #[test]
     fn where_the_faces_differ_the_nearest_surface_counts_and_outwards_is_outwards_from_both() {
         let (low, high) = (sheet(|_, _| 0.0, false), sheet(|_, _| 3e-5, true));

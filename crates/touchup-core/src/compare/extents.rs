@@ -7,7 +7,8 @@ use crate::mesh::TriMesh;
 /// A scan may show a part of the part: diagonals whose ratio is within are plausible.
 const PLAUSIBLE: std::ops::Range<f64> = 0.125..8.0;
 
-/// Boxes that are farther apart than this share of the diagonal of the truth are not of one place: a thin scan may lie above it.
+/// Boxes that are farther apart than this share of the diagonal of the truth are not of one place:
+/// a thin scan may lie above it.
 const BESIDE: f64 = 0.1;
 
 /// What speaks against two meshes being of one part, in one unit and one frame.

@@ -1,5 +1,5 @@
-//! Lines and places as small solids among the faces of a mesh, so that a picture shows them where they are, and hides them where
-//! they are hidden.
+//! Lines and places as small solids among the faces of a mesh, so that a picture shows them where
+//! they are, and hides them where they are hidden.
 
 use nalgebra::{Point3, Vector3};
 

@@ -1,7 +1,8 @@
-//! How far a mesh is from the part as it is: deviation point to surface and cloud to cloud, normals, and pictures of them.
+//! How far a mesh is from the part as it is: deviation point to surface and cloud to cloud,
+//! normals, and pictures of them.
 //!
-//! All distances are in m. A deviation is positive where the mesh lies above the true part and negative where it lies
-//! in its material, whichever of the two the points were taken from.
+//! All distances are in m. A deviation is positive where the mesh lies above the true part and
+//! negative where it lies in its material, whichever of the two the points were taken from.
 
 mod cloud;
 mod colour;

@@ -28,8 +28,8 @@ pub fn surface_area(mesh: &TriMesh) -> f64 {
         .sum()
 }
 
-/// Points spread over a surface by area: one at random in each piece of 1/`density` that the faces, laid end to end in
-/// order of id, are cut into. Same mesh, density and seed, same points.
+/// Points spread over a surface by area: one at random in each piece of 1/`density` that the faces,
+/// laid end to end in order of id, are cut into. Same mesh, density and seed, same points.
 ///
 /// - `density`: points for each m², more than 0.
 pub fn sample_surface(mesh: &TriMesh, density: f64, seed: u64) -> Vec<SampledPoint> {
@@ -52,8 +52,8 @@ pub fn sample_surface(mesh: &TriMesh, density: f64, seed: u64) -> Vec<SampledPoi
     samples
 }
 
-/// The point at the share `u` of the segment from the first corner to the point at the share `v` of the opposite side; evenly
-/// spread when `u`² and `v` are.
+/// The point at the share `u` of the segment from the first corner to the point at the share `v` of
+/// the opposite side; evenly spread when `u`² and `v` are.
 fn on_face(mesh: &TriMesh, face: FaceId, corners: [VertexId; 3], u: f64, v: f64) -> SampledPoint {
     let shares = [1.0 - u, u * (1.0 - v), u * v];
     let [a, b, c] = mesh.triangle(face).map(|p| p.coords);

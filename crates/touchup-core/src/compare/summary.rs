@@ -62,7 +62,8 @@ pub struct Histogram {
 pub(crate) const BINS: usize = 40;
 
 impl Histogram {
-    /// Of deviations in m, in 40 bins from −`range` to `range` (m, more than 0); a bin has its lower end in it.
+    /// Of deviations in m, in 40 bins from −`range` to `range` (m, more than 0); a bin has its
+    /// lower end in it.
     pub fn of(deviations: &[f64], range: f64) -> Self {
         let width = 2.0 * range / BINS as f64;
         let mut histogram = Self {

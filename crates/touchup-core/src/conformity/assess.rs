@@ -61,7 +61,8 @@ pub struct MeasuredNumber {
 pub struct DecisionParams {
     /// Default: guard bands, as ISO 14253-1 has it where nothing else was agreed
     pub rule: DecisionRule,
-    /// Least probability of conformity for a pass, and of nonconformity for a fail. Default 0.95, that of ISO 14253-1.
+    /// Least probability of conformity for a pass, and of nonconformity for a fail. Default 0.95,
+    /// that of ISO 14253-1.
     pub confidence: f64,
 }
 
@@ -103,10 +104,11 @@ impl Assessment {
 
 /// Decides whether a characteristic conforms.
 ///
-/// Guard bands: it passes where p_c is at least the confidence; so each guard band inside of the tolerance is z u with Φ(z) the
-/// confidence, 1.645 u for 95 %, and a little more where the tolerance is not large against u [JCGM 106:2012, 8.3; ISO 14253-1:2017]. It
-/// fails beyond z u outside of the tolerance, where p_c is at most 1 less the confidence. A lower bound fails beyond the upper limit, and
-/// passes only where there is none.
+/// Guard bands: it passes where p_c is at least the confidence; so each guard band inside of the
+/// tolerance is z u with Φ(z) the confidence, 1.645 u for 95 %, and a little more where the
+/// tolerance is not large against u [JCGM 106:2012, 8.3; ISO 14253-1:2017]. It fails beyond z u
+/// outside of the tolerance, where p_c is at most 1 less the confidence. A lower bound fails beyond
+/// the upper limit, and passes only where there is none.
 ///
 /// - `limits`: lower below upper.
 pub fn assess(
@@ -187,7 +189,8 @@ fn decision_on_bound(bound: &MeasuredNumber, limits: ToleranceLimits, z: f64) ->
     }
 }
 
-/// Measured values of which the probability of conformity is at least the confidence; `None`: there are none.
+/// Measured values of which the probability of conformity is at least the confidence; `None`: there
+/// are none.
 fn acceptance_zone(
     limits: ToleranceLimits,
     distribution: Distribution,

@@ -19,7 +19,8 @@ names! {
 
 /// Lower end of the first range, mm: below it the drawing has to say a tolerance.
 const LEAST_MM: f64 = 0.5;
-/// Upper ends of the ranges, mm, each included, and the deviations ± mm of f, m, c and v; NaN where the standard has none.
+/// Upper ends of the ranges, mm, each included, and the deviations ± mm of f, m, c and v; NaN where
+/// the standard has none.
 const LINEAR_MM: [(f64, [f64; 4]); 8] = [
     (3.0, [0.05, 0.1, 0.2, f64::NAN]),
     (6.0, [0.05, 0.1, 0.3, 0.5]),
@@ -32,7 +33,8 @@ const LINEAR_MM: [(f64, [f64; 4]); 8] = [
 ];
 
 impl GeneralTolerance {
-    /// Permissible deviation ± of a linear dimension, mm; `None` where the class has none for that size.
+    /// Permissible deviation ± of a linear dimension, mm; `None` where the class has none for that
+    /// size.
     pub fn linear_mm(self, nominal_mm: f64) -> Option<f64> {
         let class = Self::ALL.iter().position(|class| *class == self)?;
         let range = LINEAR_MM

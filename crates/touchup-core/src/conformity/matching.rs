@@ -45,11 +45,12 @@ pub enum FeatureMatch {
     Shared(u32),
 }
 
-/// Finds each feature of a drawing among those that were found: by its number, else by kind and place, and where several are on one axis by
-/// their places along it and sizes. What two of the drawing would share, neither gets; nothing is guessed.
+/// Finds each feature of a drawing among those that were found: by its number, else by kind and
+/// place, and where several are on one axis by their places along it and sizes. What two of the
+/// drawing would share, neither gets; nothing is guessed.
 ///
-/// - `reach`: how far off a centre may be across its axis, of a plane along its normal, m. Two that are less than that apart in place and
-///   size are not told apart.
+/// - `reach`: how far off a centre may be across its axis, of a plane along its normal, m. Two that
+///   are less than that apart in place and size are not told apart.
 pub fn match_features(
     sought: &[SoughtFeature],
     found: &[FeaturePlace],

@@ -7,8 +7,8 @@ use super::place::{coordinate_std, position};
 use super::quantity::InspectedQuantity;
 use crate::features::{Feature, Measured};
 
-/// What a feature says of a quantity of its own, m; `None` where it has none. The quantities that are not of its sizes and its place are
-/// none of these.
+/// What a feature says of a quantity of its own, m; `None` where it has none. The quantities that
+/// are not of its sizes and its place are none of these.
 ///
 /// - `nominal`: its centre in the drawing, m in O.
 pub fn measured_number(

@@ -5,15 +5,17 @@ use nalgebra::{Point3, Vector3};
 use super::assess::MeasuredNumber;
 use crate::features::Kind;
 
-/// Cosine of 5°: within that a direction counts as along or square to an axis, as in relations of features.
+/// Cosine of 5°: within that a direction counts as along or square to an axis, as in relations of
+/// features.
 const ALONG: f64 = 0.996_194_698_091_745_5;
 /// Sine of 5°.
 const SQUARE: f64 = 0.087_155_742_747_658_17;
 
 /// Standard uncertainty of the coordinate of a centre along a direction.
 ///
-/// The uncertainty of a centre is the root mean square distance across the axis, which two coordinates share; of a plane that along its
-/// normal; of a corner the distance in space, which three share.
+/// The uncertainty of a centre is the root mean square distance across the axis, which two
+/// coordinates share; of a plane that along its normal; of a corner the distance in space, which
+/// three share.
 ///
 /// - `std`: of the centre.
 /// - `direction`: unit vector.
@@ -33,8 +35,9 @@ pub fn coordinate_std(
     }
 }
 
-/// Position of a centre: twice its distance from the nominal one across the axis [ISO 1101:2017, cylindrical zone]; of a plane along its
-/// normal, of a corner in space. Its standard uncertainty is twice that of one coordinate.
+/// Position of a centre: twice its distance from the nominal one across the axis [ISO 1101:2017,
+/// cylindrical zone]; of a plane along its normal, of a corner in space. Its standard uncertainty
+/// is twice that of one coordinate.
 ///
 /// - `centre`, `nominal`: in one unit, which the result has too; `std` of the centre as well.
 /// - returns: `None` where there is no axis to measure across.

@@ -27,8 +27,9 @@ pub enum Distribution {
     Normal,
     /// normal without what is below 0: the width of a zone of form or direction
     NonNegative,
-    /// the value is twice the distance of a point from its nominal place, and the point is distributed round and normal in the plane:
-    /// the diameter of a zone of position. The standard uncertainty is twice that of one coordinate.
+    /// the value is twice the distance of a point from its nominal place, and the point is
+    /// distributed round and normal in the plane: the diameter of a zone of position. The standard
+    /// uncertainty is twice that of one coordinate.
     Position,
 }
 
@@ -90,13 +91,15 @@ mod tests {
         conformance_probability(value, std, limits, Distribution::Normal)
     }
 
-    /// The example of JCGM 106:2012, 7.3: a Zener voltage of at most −5.40 V, measured as −5.47 V ± 0.05 V: 92 %.
+    /// The example of JCGM 106:2012, 7.3: a Zener voltage of at most −5.40 V, measured as −5.47 V ±
+    /// 0.05 V: 92 %.
     #[test]
     fn a_single_upper_limit_gives_the_example_of_the_guide() {
         assert!((normal(-5.47, 0.05, limits(None, -5.40)) - 0.919).abs() < 5e-4);
     }
 
-    /// A tolerance of ±2 u about the value: erf(√2); a value on a limit that is far from the other: a half.
+    /// A tolerance of ±2 u about the value: erf(√2); a value on a limit that is far from the other:
+    /// a half.
     #[test]
     fn closed_forms_of_two_limits_hold() {
         assert!((normal(5.0, 0.5, limits(4.0, 6.0)) - 0.954_499_736_103_641_6).abs() < 1e-14);
@@ -124,7 +127,8 @@ mod tests {
         );
     }
 
-    /// On the nominal place the distance has Rayleigh's distribution: P(2 r ≤ T) = 1 − exp(−T² / 2 U²), U twice the uncertainty.
+    /// On the nominal place the distance has Rayleigh's distribution: P(2 r ≤ T) = 1 − exp(−T² / 2
+    /// U²), U twice the uncertainty.
     #[test]
     fn a_position_on_its_nominal_place_conforms_as_rayleigh_says() {
         let found = conformance_probability(0.0, 0.02, limits(None, 0.05), Distribution::Position);

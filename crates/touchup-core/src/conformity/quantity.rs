@@ -24,7 +24,8 @@ names! {
         Y = "y_mm",
         /// coordinate of the centre
         Z = "z_mm",
-        /// diameter of the cylinder about the nominal axis that holds the centre, twice its distance (ISO 1101)
+        /// diameter of the cylinder about the nominal axis that holds the centre, twice its
+        /// distance (ISO 1101)
         Position = "position_mm",
         /// width of a zone
         Roundness = "roundness_mm",
@@ -60,7 +61,8 @@ impl InspectedQuantity {
         self.parts().1
     }
 
-    /// Whether it is a width that is 0 at best: its tolerance is an upper limit alone, and its nominal value is 0.
+    /// Whether it is a width that is 0 at best: its tolerance is an upper limit alone, and its
+    /// nominal value is 0.
     pub fn is_zone(self) -> bool {
         self.distribution() != Distribution::Normal
     }

@@ -1,13 +1,15 @@
 //! A decision that is looked for after every touch.
 //!
-//! Whoever tests again after every touch and stops at the first decision errs more often than each test by itself: with a value on its
-//! limit, the mean of the touches crosses a guard band of z u at some time with a higher probability than at a given one [Armitage,
-//! McPherson, Rowe 1969]. The guard band that is the same at every look and is crossed by chance at any of them with the stated probability
-//! alone is that of Pocock [Pocock 1977]; here for one side, as each limit is.
+//! Whoever tests again after every touch and stops at the first decision errs more often than each
+//! test by itself: with a value on its limit, the mean of the touches crosses a guard band of z u
+//! at some time with a higher probability than at a given one [Armitage, McPherson, Rowe 1969]. The
+//! guard band that is the same at every look and is crossed by chance at any of them with the
+//! stated probability alone is that of Pocock [Pocock 1977]; here for one side, as each limit is.
 //!
-//! Looks are at n, n + 1, … touches, each of the same weight. The mean of n of them over its standard deviation is Z_n, and
-//! Z_m = √(n/m) Z_n + √(1 − n/m) ξ with ξ normal. Its density without what was stopped is followed from look to look, by the trapezoid rule.
-//! What all touches have in common ties the looks together more closely, so they cross less often than that.
+//! Looks are at n, n + 1, … touches, each of the same weight. The mean of n of them over its
+//! standard deviation is Z_n, and Z_m = √(n/m) Z_n + √(1 − n/m) ξ with ξ normal. Its density
+//! without what was stopped is followed from look to look, by the trapezoid rule. What all touches
+//! have in common ties the looks together more closely, so they cross less often than that.
 
 use crate::numeric::{normal_cdf, normal_quantile};
 
@@ -22,7 +24,8 @@ const TAIL: f64 = 6.0;
 /// Halves the range of quantiles to a thousandth of a standard deviation.
 const BISECTIONS: usize = 12;
 
-/// Probability of conformity that each look has to ask for, so that the decisions of all together have `confidence`.
+/// Probability of conformity that each look has to ask for, so that the decisions of all together
+/// have `confidence`.
 ///
 /// - `confidence`: above 0.5 and below 1.
 /// - `first`, `last`: touches at the first look and at the last, from 1 on.
@@ -86,7 +89,8 @@ fn crossing(bound: f64, first: usize, last: usize) -> f64 {
 mod tests {
     use super::*;
 
-    /// Table 1 of Pocock 1977, of both sides at 5 %: that of one side at 2.5 % is less than 0.005 below.
+    /// Table 1 of Pocock 1977, of both sides at 5 %: that of one side at 2.5 % is less than 0.005
+    /// below.
     #[test]
     fn looks_at_equal_groups_need_the_constants_of_pocock() {
         for (looks, expected) in [
@@ -105,7 +109,8 @@ mod tests {
         }
     }
 
-    /// Armitage, McPherson and Rowe 1969, table 2: of both sides at 5 % each, ten looks err in 19.3 % of the cases.
+    /// Armitage, McPherson and Rowe 1969, table 2: of both sides at 5 % each, ten looks err in 19.3
+    /// % of the cases.
     #[test]
     fn looking_ten_times_nearly_quadruples_the_risk() {
         let both = 2.0 * crossing(1.959_964, 1, 10);

@@ -1,4 +1,5 @@
-//! Axes of the wrench: a force points out of the surface that is pressed and, where the ball slides, against its motion.
+//! Axes of the wrench: a force points out of the surface that is pressed and, where the ball
+//! slides, against its motion.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -7,13 +8,15 @@ use super::forces::{ForceLevels, axes_in_words, signed_permutations};
 use super::input_record::InputRecord;
 use crate::numeric::jackknife_variance;
 
-/// Of the way that the ball slid, m: so short that it is straight, so long that no noise of the pose turns it.
+/// Of the way that the ball slid, m: so short that it is straight, so long that no noise of the
+/// pose turns it.
 const COURSE: std::ops::RangeInclusive<f64> = 0.3e-3..=10e-3;
 /// Records that are looked back for it.
 const MOST_BACK: usize = 16;
 /// It slides when its course is no steeper, as cosine to the normal.
 const STEEP: f64 = 0.5;
-/// Other axes explain the forces better when these lean less, as mean cosine to the scan's normal, by this at least …
+/// Other axes explain the forces better when these lean less, as mean cosine to the scan's normal,
+/// by this at least …
 const LEAST_GAIN: f64 = 0.02;
 /// … and the difference is so many standard errors; surely with so many.
 const DOUBTED_ERRORS: f64 = 4.0;
@@ -32,7 +35,8 @@ struct Slide {
     course: Vector3<f64>,
 }
 
-/// Axes with which the forces of sliding lie better against the scan and against the motion than as they were read.
+/// Axes with which the forces of sliding lie better against the scan and against the motion than as
+/// they were read.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OtherAxes {
     axes: Matrix3<f64>,
@@ -47,7 +51,8 @@ pub(super) struct OtherAxes {
 impl OtherAxes {
     /// The best of the 47 others; `None` where none is better.
     ///
-    /// - `normals`: of the scan under each centre. `axes`: turns O into those in which the wrench was read.
+    /// - `normals`: of the scan under each centre. `axes`: turns O into those in which the wrench
+    ///   was read.
     pub fn of(
         records: &[InputRecord],
         levels: &ForceLevels,
@@ -135,7 +140,8 @@ impl OtherAxes {
     }
 }
 
-/// Records that press and have slid there from another one that presses, all between them too, and the unit vector of that way, in O.
+/// Records that press and have slid there from another one that presses, all between them too, and
+/// the unit vector of that way, in O.
 fn courses<'a>(
     records: &'a [InputRecord],
     levels: &'a ForceLevels,

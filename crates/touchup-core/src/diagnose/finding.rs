@@ -7,7 +7,8 @@ use serde::Serialize;
 use crate::names;
 
 names! {
-    /// What would explain the recording, in the order in which it is to be mended: each may be what the later ones come of.
+    /// What would explain the recording, in the order in which it is to be mended: each may be what
+    /// the later ones come of.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
     #[serde(rename_all = "snake_case")]
     pub enum InputCause {
@@ -55,7 +56,8 @@ names! {
 }
 
 impl InputCause {
-    /// Whether it is read off how the contacts lie on the scan: no certainty where the scan lacks what was touched.
+    /// Whether it is read off how the contacts lie on the scan: no certainty where the scan lacks
+    /// what was touched.
     pub fn is_read_off_the_scan(self) -> bool {
         match self {
             Self::LengthUnit

@@ -82,7 +82,8 @@ impl ForceLevels {
     }
 }
 
-/// The 47 axes that a right one can be taken for, and itself first: permutations of the three with signs.
+/// The 47 axes that a right one can be taken for, and itself first: permutations of the three with
+/// signs.
 pub(super) fn signed_permutations() -> impl Iterator<Item = nalgebra::Matrix3<f64>> {
     const ORDERS: [[usize; 3]; 6] = [
         [0, 1, 2],

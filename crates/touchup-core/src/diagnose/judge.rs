@@ -18,7 +18,8 @@ use crate::stylus::{ClockDrift, ClockOffset, TipParams, TipShape, WrenchFrame};
 pub(super) const FEWEST_PRESSES: usize = 20;
 /// Presses that are compared with the scan.
 const MOST_PRESSES: usize = 400;
-/// The sign and axes of a wrench are right when the force leans from the normal by less than this on average, as cosine.
+/// The sign and axes of a wrench are right when the force leans from the normal by less than this
+/// on average, as cosine.
 const LEANS: f64 = 0.5;
 /// A delay moves each touch along the path by this at most, m; a half of it is said.
 const LARGEST_PATH: f64 = 0.32e-3;
@@ -30,7 +31,8 @@ const LEAST_LIFT: f64 = 0.3e-3;
 const LIFT_NOISES: f64 = 1.5;
 /// Half of what presses is beyond the median; of what is free, more than this is.
 const SHARE_OF_FREE: f64 = 0.55;
-/// Contacts are on the scan when this share of them is: where the scan lacks a wall or a hole, they are not.
+/// Contacts are on the scan when this share of them is: where the scan lacks a wall or a hole, they
+/// are not.
 const SHARE_ON_SCAN: f64 = 0.5;
 /// What mends an input brings so many more onto the scan.
 const MENDED_SHARE: f64 = 0.3;
@@ -75,7 +77,8 @@ const OTHER_COMPLIANCE: f64 = 0.4;
 const LEAST_SUNK: f64 = 0.15e-3;
 /// A force presses straight when the cosine to the scan's normal is larger.
 const STRAIGHT: f64 = 0.8;
-/// The ball is another one when its centre is so many deviations of the scan from where it should be, and surely with so many.
+/// The ball is another one when its centre is so many deviations of the scan from where it should
+/// be, and surely with so many.
 const DOUBTED_NOISES: f64 = 1.0;
 const SURE_NOISES: f64 = 1.5;
 /// … beyond this share of what the stylus bends by: so far its stiffness may be off.
@@ -323,7 +326,8 @@ impl InputJudge<'_> {
         let is_on_scan = reported.share >= SHARE_ON_SCAN
             && (reported.distance - radius).abs() <= tolerance + sunk;
         if is_on_scan && is_ball {
-            // a scan's own offset is within the tolerance; a radius in another unit is not a matter of tolerance
+            // a scan's own offset is within the tolerance; a radius in another unit is not a matter
+            // of tolerance
             let is_other =
                 reported.distance > LEAST_RATIO * radius && reported.distance > 3.0 * error;
             // a tip of radius 0 is a point
@@ -386,7 +390,8 @@ impl InputJudge<'_> {
         ))
     }
 
-    /// Another unit, other axes or another order of the quaternion, with which the contacts are on the scan.
+    /// Another unit, other axes or another order of the quaternion, with which the contacts are on
+    /// the scan.
     fn mend(&self, presses: &Presses, reported: &BallFit) -> Option<InputFinding> {
         let Presses {
             records,
@@ -439,7 +444,8 @@ impl InputJudge<'_> {
         is_mended.then(|| InputFinding::new(mend.cause, true, measured, remedy))
     }
 
-    /// The shift of all contacts that brings many more of them onto the scan; `None` where none does.
+    /// The shift of all contacts that brings many more of them onto the scan; `None` where none
+    /// does.
     fn shift(&self, presses: &Presses, reported: &BallFit) -> Option<ContactShift> {
         let Presses {
             records,
@@ -559,8 +565,9 @@ impl InputJudge<'_> {
         ))
     }
 
-    /// How far the reported centre sinks with the force: the slope of its distance from the scan over |F|, by least squares, with the
-    /// jackknife's uncertainty over stretches of the recording.
+    /// How far the reported centre sinks with the force: the slope of its distance from the scan
+    /// over |F|, by least squares, with the jackknife's uncertainty over stretches of the
+    /// recording.
     fn judge_stiffness(&self, presses: &Presses) -> Option<InputFinding> {
         let Presses {
             levels,
@@ -617,7 +624,8 @@ impl InputJudge<'_> {
         is_doubted.then(|| InputFinding::new(InputCause::Stiffness, is_sure, measured, remedy))
     }
 
-    /// Whether other axes explain the forces better, where they lean from the scan no more than others do.
+    /// Whether other axes explain the forces better, where they lean from the scan no more than
+    /// others do.
     fn judge_axes(&self, presses: &Presses) -> Option<InputFinding> {
         let Presses {
             levels, tolerance, ..
@@ -636,8 +644,8 @@ impl InputJudge<'_> {
         OtherAxes::of(self.records, levels, normals, axes)?.finding()
     }
 
-    /// Whether the ball is as far from the scan as its radius where it presses straight on it; what leans is at edges and in holes, of
-    /// which the scan knows little.
+    /// Whether the ball is as far from the scan as its radius where it presses straight on it; what
+    /// leans is at edges and in holes, of which the scan knows little.
     fn judge_radius(&self, presses: &Presses) -> Option<InputFinding> {
         let Presses {
             records,

@@ -20,7 +20,8 @@ const MOST_RECORDS: usize = 4096;
 const MOST_STEPS: usize = 4096;
 /// Median length of a vector of three standard normal components.
 const MEDIAN_OF_THREE: f64 = 1.538;
-/// Doubts the input while it is replayed or measured. Memory is bounded, and a sample costs a rotation.
+/// Doubts the input while it is replayed or measured. Memory is bounded, and a sample costs a
+/// rotation.
 #[derive(Clone, Debug)]
 pub struct InputMonitor {
     params: InputMonitorParams,
@@ -112,8 +113,9 @@ impl InputMonitor {
         self.clock.push(sample);
     }
 
-    /// How late the wrench reads; `None` where the contacts do not determine it. Where the ball stops between two poses is not seen: that is
-    /// part of the uncertainty of onsets. Sliding and lifting are not shifted by it.
+    /// How late the wrench reads; `None` where the contacts do not determine it. Where the ball
+    /// stops between two poses is not seen: that is part of the uncertainty of onsets. Sliding and
+    /// lifting are not shifted by it.
     pub fn clock_offset(&self) -> Option<ClockOffset> {
         let found = self.clock.offset()?;
         let unseen = match found.evidence {

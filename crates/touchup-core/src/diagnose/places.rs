@@ -24,7 +24,8 @@ pub(super) struct ScanScale {
 }
 
 impl ScanScale {
-    /// Noise: how far a vertex is off the mean of its neighbours along its normal; for n independent neighbours that is σ √(1 + 1/n).
+    /// Noise: how far a vertex is off the mean of its neighbours along its normal; for n
+    /// independent neighbours that is σ √(1 + 1/n).
     pub fn of(scan: &TriMesh) -> Self {
         let step = (scan.vertex_slots() / NOISE_VERTICES).max(1);
         let (mut off, mut edges) = (Vec::new(), Vec::new());
@@ -85,8 +86,9 @@ pub(super) fn extent_of(points: impl Iterator<Item = Point3<f64>>) -> f64 {
 /// How a set of ball centres lies on the scan.
 #[derive(Clone, Debug)]
 pub(super) struct BallFit {
-    /// median signed distance of the centre from the surface, m, of those that the scan says something of: neither below it, where it has
-    /// a lid over a hole, nor beyond its rims, where it has no inside
+    /// median signed distance of the centre from the surface, m, of those that the scan says
+    /// something of: neither below it, where it has a lid over a hole, nor beyond its rims, where
+    /// it has no inside
     pub distance: f64,
     /// median deviation from that, m
     pub scatter: f64,
@@ -165,8 +167,8 @@ impl BallFit {
         }
     }
 
-    /// Share of the centres that are farther off the surface than `distance`, m, on whichever side: beside the part, and where the
-    /// scan has holes, the side is not known.
+    /// Share of the centres that are farther off the surface than `distance`, m, on whichever side:
+    /// beside the part, and where the scan has holes, the side is not known.
     pub fn share_beyond(&self, distance: f64) -> f64 {
         self.distances.iter().filter(|x| x.abs() > distance).count() as f64
             / self.distances.len().max(1) as f64

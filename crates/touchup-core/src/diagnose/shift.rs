@@ -25,7 +25,8 @@ pub(super) struct ContactShift {
     pub share: f64,
 }
 
-/// The shift with which most contacts are on the scan: each of some contacts is laid on each of some vertices, and the best are refined.
+/// The shift with which most contacts are on the scan: each of some contacts is laid on each of
+/// some vertices, and the best are refined.
 pub(super) fn best_shift(
     scan: &TriMesh,
     tree: &FaceTree,

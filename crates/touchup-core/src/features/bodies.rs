@@ -1,7 +1,8 @@
 //! Bodies of a mesh of several: a screw in a hole does not close the hole.
 //!
-//! A body is a piece of the mesh without a border. What is asked about the surroundings of one is answered from its own
-//! faces alone. Pieces with a border are parts of one another, as in a scan: they see the whole mesh.
+//! A body is a piece of the mesh without a border. What is asked about the surroundings of one is
+//! answered from its own faces alone. Pieces with a border are parts of one another, as in a scan:
+//! they see the whole mesh.
 
 use nalgebra::Point3;
 
@@ -98,7 +99,8 @@ impl<'a> Surroundings<'a> {
     }
 }
 
-/// The piece of each face, and the faces of each piece: those that hang together over edges of two faces.
+/// The piece of each face, and the faces of each piece: those that hang together over edges of two
+/// faces.
 fn pieces(facets: &Facets) -> (Vec<u32>, Vec<Vec<u32>>) {
     let mut sets = DisjointSets::of(facets.slots());
     for (FaceId(face), _) in facets.mesh.faces() {

@@ -1,8 +1,8 @@
 //! Where segments meet: straight edges between planes.
 //!
-//! Between two planes of a measured mesh there is often a seam of faces that belong to neither. Each segment first grows
-//! over the faces around it that no strong segment has; where the grown ones meet near the line in which both planes
-//! intersect, there is the edge.
+//! Between two planes of a measured mesh there is often a seam of faces that belong to neither.
+//! Each segment first grows over the faces around it that no strong segment has; where the grown
+//! ones meet near the line in which both planes intersect, there is the edge.
 
 use std::collections::BTreeMap;
 
@@ -29,7 +29,8 @@ pub(super) struct StraightEdge {
 const SEAM: usize = 3;
 /// Planes meet in an edge from this angle on: sine of 15°.
 const SHARP: f64 = 0.26;
-/// A border is at the edge when it is within so many tolerances of the planes, or within this share of the median edge.
+/// A border is at the edge when it is within so many tolerances of the planes, or within this share
+/// of the median edge.
 const NEAR_TOLERANCES: f64 = 4.0;
 const NEAR_EDGES: f64 = 1.5;
 /// Pieces of an edge closer together than this are one, in median edges …

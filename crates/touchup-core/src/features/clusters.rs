@@ -1,6 +1,7 @@
 //! Clusters of high curvature: candidate features, before they are classified.
 //!
-//! [`paper_clusters`] is the method of the paper this crate follows; [`clusters`] finds their number itself.
+//! [`paper_clusters`] is the method of the paper this crate follows; [`clusters`] finds their
+//! number itself.
 
 use nalgebra::{Point3, Vector3};
 
@@ -14,7 +15,8 @@ use crate::numeric::distinct;
 /// Vertices that belong together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cluster {
-    /// Mean of the vertices ([`paper_clusters`]) or of the creases by their length ([`clusters`]), m, in O.
+    /// Mean of the vertices ([`paper_clusters`]) or of the creases by their length ([`clusters`]),
+    /// m, in O.
     pub center: Point3<f64>,
     /// In rising order.
     pub vertices: Vec<VertexId>,
@@ -34,9 +36,9 @@ pub struct PaperParams {
 }
 
 impl Default for PaperParams {
-    /// 0.3 and 5, as printed. The paper gives no unit; its parts are in mm, so it is taken for 0.3/mm². It leaves open
-    /// the area that a defect is divided by, whether depressions with K < 0 count (here they do: |K|), and the start of
-    /// k-means.
+    /// 0.3 and 5, as printed. The paper gives no unit; its parts are in mm, so it is taken for
+    /// 0.3/mm². It leaves open the area that a defect is divided by, whether depressions with K < 0
+    /// count (here they do: |K|), and the start of k-means.
     fn default() -> Self {
         Self {
             threshold: 0.3e6,
@@ -46,8 +48,8 @@ impl Default for PaperParams {
     }
 }
 
-/// k-means of the vertices above a threshold of Gaussian curvature; largest clusters first. Depends on the density of the
-/// mesh, since at an edge or corner the curvature grows as the faces shrink.
+/// k-means of the vertices above a threshold of Gaussian curvature; largest clusters first. Depends
+/// on the density of the mesh, since at an edge or corner the curvature grows as the faces shrink.
 ///
 /// - `curvature`: of `mesh`, from [`super::curvature::curvature`]
 pub fn paper_clusters(
@@ -82,14 +84,15 @@ pub fn paper_clusters(
 /// Settings of [`clusters`]; none has a unit of length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClusterParams {
-    /// An edge is a crease when its faces turn by more than this, rad: more than the facets of a round hole of 12 sides
-    /// (30°) and the noise of a scan, less than a chamfer (45°).
+    /// An edge is a crease when its faces turn by more than this, rad: more than the facets of a
+    /// round hole of 12 sides (30°) and the noise of a scan, less than a chamfer (45°).
     pub sharp_angle: f64,
-    /// A vertex without a crease counts when its angle defect is above this in size, rad: the tip of a cone, a pit. Noise
-    /// of a tenth of the edges makes defects of 0.3 rad.
+    /// A vertex without a crease counts when its angle defect is above this in size, rad: the tip
+    /// of a cone, a pit. Noise of a tenth of the edges makes defects of 0.3 rad.
     pub sharp_defect: f64,
-    /// Creases of one kind whose distance is below this share of the diagonal of the box around the mesh are one cluster,
-    /// and creases shorter than that are dropped: gaps and specks that noise makes.
+    /// Creases of one kind whose distance is below this share of the diagonal of the box around the
+    /// mesh are one cluster, and creases shorter than that are dropped: gaps and specks that noise
+    /// makes.
     pub merge_share: f64,
 }
 
@@ -105,9 +108,10 @@ impl Default for ClusterParams {
 
 /// Connected creases of one kind, and single sharp vertices; in order of their lowest vertex.
 ///
-/// A crease keeps its angle and a sharp vertex its defect when the faces are split, so the number of clusters depends on
-/// neither the density of the mesh nor the unit. Connected means along creases: two rims of a hole are joined by the
-/// edges of its wall, which carry no information. Rims of an open mesh are left out.
+/// A crease keeps its angle and a sharp vertex its defect when the faces are split, so the number
+/// of clusters depends on neither the density of the mesh nor the unit. Connected means along
+/// creases: two rims of a hole are joined by the edges of its wall, which carry no information.
+/// Rims of an open mesh are left out.
 ///
 /// - `curvature`: of `mesh`, from [`super::curvature::curvature`]
 pub fn clusters(
@@ -132,7 +136,8 @@ pub fn clusters(
     clusters
 }
 
-/// The cluster of some creases; `None` if they are no longer than `least`. A single sharp vertex always counts.
+/// The cluster of some creases; `None` if they are no longer than `least`. A single sharp vertex
+/// always counts.
 fn cluster_of(
     mesh: &TriMesh,
     creases: &Creases,

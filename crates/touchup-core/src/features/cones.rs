@@ -1,6 +1,7 @@
 //! Cones that begin where the wall of a hole ends: countersinks, chamfers, tips of drills.
 //!
-//! A short cone hardly determines its axis, that of its hole is known: so cones are searched around the ends of holes.
+//! A short cone hardly determines its axis, that of its hole is known: so cones are searched around
+//! the ends of holes.
 
 use std::collections::BTreeSet;
 
@@ -16,11 +17,13 @@ use crate::numeric::{distinct, flood, median, tangent_basis};
 
 /// Directions in which the ring beyond an end is examined.
 const AROUND: usize = 36;
-/// Rings are this much wider and narrower than the hole, as a share of the radius, and that far beyond its end.
+/// Rings are this much wider and narrower than the hole, as a share of the radius, and that far
+/// beyond its end.
 const BESIDE: f64 = 0.08;
 /// A face belongs to a ring when it is within this many radii.
 const NEAR: f64 = 0.15;
-/// Sines of the sharpest and of the flattest half angle, 20° and 75°: drills and countersinks have 30° to 70°.
+/// Sines of the sharpest and of the flattest half angle, 20° and 75°: drills and countersinks have
+/// 30° to 70°.
 const SINES: [f64; 2] = [0.34, 0.966];
 /// A cone widens by at least this share of the radius.
 const LEAST_WIDTH: f64 = 0.1;
@@ -151,7 +154,8 @@ fn cone_from(apex: Point3<f64>, axis: &Vector3<f64>, half_angle: f64, wall: &Wal
     ))
 }
 
-/// The cone about the axis of the wall through the corners of faces: those of a coarse one lie on it, its facets do not.
+/// The cone about the axis of the wall through the corners of faces: those of a coarse one lie on
+/// it, its facets do not.
 fn through_corners(
     parted: &Parted,
     wall: &Wall,

@@ -1,8 +1,10 @@
 //! Heads of counterbored holes by contacts: a wall around a bore, with a floor between both.
 //!
-//! A ball of radius r in a head rests on its floor and against its wall at once, and where the head is shallower than r against its edge:
-//! the force is the sum of two, and its direction is that of none of them. The place of its centre is enough: with its centre below the land
-//! around the opening the ball is r away from the wall, and h above the land it is √(r² − h²) away from the edge.
+//! A ball of radius r in a head rests on its floor and against its wall at once, and where the head
+//! is shallower than r against its edge: the force is the sum of two, and its direction is that of
+//! none of them. The place of its centre is enough: with its centre below the land around the
+//! opening the ball is r away from the wall, and h above the land it is √(r² − h²) away from the
+//! edge.
 
 use nalgebra::{Point3, Vector3};
 
@@ -14,7 +16,8 @@ use crate::numeric::{median, tangent_basis};
 
 /// Heads are so many bores wide.
 const HEADS: std::ops::Range<f64> = 1.15..3.5;
-/// A contact is of a wall or an edge when its normal leans towards the axis by more than this share …
+/// A contact is of a wall or an edge when its normal leans towards the axis by more than this share
+/// …
 const LEAN: f64 = 0.2;
 /// … and of the floor when it leans off it by less than 25°.
 const LEVEL: f64 = 0.906;
@@ -142,7 +145,8 @@ fn turn_of<'a>(of: impl Iterator<Item = &'a Seen>) -> f64 {
 
 /// The head under a land.
 ///
-/// - `narrow`, `level`, `land`: radius of the bore, m; how far along `out` the land is, m; its number
+/// - `narrow`, `level`, `land`: radius of the bore, m; how far along `out` the land is, m; its
+///   number
 fn head_under(
     observed: &Observed,
     seen: &[Seen],

@@ -1,7 +1,9 @@
-//! Slots and pockets that contacts show: two straight walls that face each other over a void, whatever the mesh has between them.
+//! Slots and pockets that contacts show: two straight walls that face each other over a void,
+//! whatever the mesh has between them.
 //!
-//! Seen along the axis of its opening, a ball of radius r that runs along a straight wall keeps its centre on a line; beside the half-round
-//! end of a slot of width w it keeps it on a circle of radius w/2 − r about the axis of the end, beside a flat end on a line across.
+//! Seen along the axis of its opening, a ball of radius r that runs along a straight wall keeps its
+//! centre on a line; beside the half-round end of a slot of width w it keeps it on a circle of
+//! radius w/2 − r about the axis of the end, beside a flat end on a line across.
 
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -21,7 +23,8 @@ const LEAST: usize = 8;
 /// … over so many radii of the ball, without a gap of more than so many.
 const LEAST_RADII: f64 = 1.5;
 const GAP_RADII: f64 = 6.0;
-/// Contacts from which a wall is tried in one group, with so many others each, and those that are counted.
+/// Contacts from which a wall is tried in one group, with so many others each, and those that are
+/// counted.
 const STARTS: usize = 48;
 const PARTNERS: usize = 12;
 const COUNTED: usize = 1500;
@@ -37,7 +40,8 @@ const PARALLEL: f64 = 0.9945;
 const FACING: f64 = 0.4;
 /// Contacts of one wall have no gap along the axis of more than so many radii.
 const LAYER_RADII: f64 = 2.5;
-/// Share of a wall's contacts above and below which its height is not counted: they may be outliers.
+/// Share of a wall's contacts above and below which its height is not counted: they may be
+/// outliers.
 const OUTER: f64 = 0.05;
 /// So many contacts on something between the walls make it two voids.
 const ISLAND: usize = 6;
@@ -45,24 +49,28 @@ const ISLAND_LEAN: f64 = 0.7;
 /// An end was felt when so many contacts lean along the slot by more than this.
 const END_CONTACTS: usize = 2;
 const END_LEAN: f64 = 0.5;
-/// A contact is off the outline at an end by this share of the ball's radius, typically, and by this much in direction.
+/// A contact is off the outline at an end by this share of the ball's radius, typically, and by
+/// this much in direction.
 const END_OFF: f64 = 0.15;
 const END_TURNED: f64 = 0.3;
 /// One contact speaks against a shape by no more than this.
 const MOST_MISFIT: f64 = 9.0;
 /// It is not deeper than so many of its lengths.
 const DEEPEST: f64 = 2.0;
-/// A plane around the opening is square to the walls within 9°, and is there at this share of places beside them.
+/// A plane around the opening is square to the walls within 9°, and is there at this share of
+/// places beside them.
 const LAND: f64 = 0.988;
 const LAND_SHARE: f64 = 0.3;
-/// It is beside a wall when the mesh is there within this share of the ball's radius, at one of these distances, in radii.
+/// It is beside a wall when the mesh is there within this share of the ball's radius, at one of
+/// these distances, in radii.
 const LAND_OFF: f64 = 0.3;
 const LAND_RADII: [f64; 3] = [0.5, 1.0, 2.0];
 /// Places along each wall where the surface beside it is asked for.
 const PLACES: usize = 9;
 /// So many contacts make a floor.
 const FLOOR_CONTACTS: usize = 6;
-/// A floor's contacts lean less than 25°, and are no farther off its level than this share of the ball's radius.
+/// A floor's contacts lean less than 25°, and are no farther off its level than this share of the
+/// ball's radius.
 const FLOOR_LEAN: f64 = 0.906;
 const FLOOR_OFF: f64 = 0.2;
 /// It is below the walls' contacts by no more than so many radii: the ball rests on it beside them.
@@ -214,7 +222,8 @@ impl AxisView<'_> {
         (one.at - at).dot(normal).abs() < SEARCHED * self.radius && one.normal.dot(normal) > ALIKE
     }
 
-    /// The line through contacts near one: those that hang together along it; `None` where they are too few.
+    /// The line through contacts near one: those that hang together along it; `None` where they are
+    /// too few.
     fn fitted_line(
         &self,
         all: &[Projected],

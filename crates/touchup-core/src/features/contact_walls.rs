@@ -1,10 +1,12 @@
 //! Walls that the contacts show, round and flat ones, however coarse the mesh is there.
 //!
-//! A ball that runs along a round wall keeps its centre at one distance ρ from the axis: ρ = R − r in a bore, R + r around a boss. Seen along
-//! the axis, two contacts with centres p, q and normals m, n (into the air) determine it: the axis goes through p + ρ m = q + ρ n, where ρ
-//! is positive in a bore and negative around a boss. Where a wall is large, what the normals are off by says little of its radius: there the
-//! circle goes through three centres. Directions of axes come of the planes of the part, on which holes stand square, and of
-//! the normals of contacts that no plane explains.
+//! A ball that runs along a round wall keeps its centre at one distance ρ from the axis: ρ = R − r
+//! in a bore, R + r around a boss. Seen along the axis, two contacts with centres p, q and normals
+//! m, n (into the air) determine it: the axis goes through p + ρ m = q + ρ n, where ρ is positive
+//! in a bore and negative around a boss. Where a wall is large, what the normals are off by says
+//! little of its radius: there the circle goes through three centres. Directions of axes come of
+//! the planes of the part, on which holes stand square, and of the normals of contacts that no
+//! plane explains.
 
 use nalgebra::{Matrix2, Point2, Point3, Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -29,7 +31,8 @@ use crate::stylus::ProbedPoint;
 const PAIRS: usize = 400;
 /// Of the draws.
 const SEED: u64 = 1;
-/// The normals of a pair differ by more than this, squared: 31°; and the sides from one of three to the others meet at more than 15°.
+/// The normals of a pair differ by more than this, squared: 31°; and the sides from one of three to
+/// the others meet at more than 15°.
 const TURNED: f64 = 0.3;
 const BENT: f64 = 0.26;
 /// A contact is on a circle within this share of the ball's radius while it is searched …
@@ -42,7 +45,8 @@ const PARTS: usize = 24;
 const TURN: f64 = 0.42;
 /// Contacts from which a flat wall is tried, of one group.
 const STARTS: usize = 40;
-/// A flat wall is at least so many radii of the ball long, and its contacts determine a tilt when they are this wide, in radii.
+/// A flat wall is at least so many radii of the ball long, and its contacts determine a tilt when
+/// they are this wide, in radii.
 const FLAT_RADII: f64 = 1.5;
 const WIDE_RADII: f64 = 0.25;
 /// No more of a flat wall than this share is round in the mesh.
@@ -51,20 +55,24 @@ const MOST_ROUND: f64 = 0.3;
 const MOST_IN_GROUP: usize = 6;
 /// Radii between these many radii of the ball.
 const RADII: [f64; 2] = [1.02, 40.0];
-/// Faces of the mesh are of the cylinder within this share of the ball's radius, and as far beyond its ends.
+/// Faces of the mesh are of the cylinder within this share of the ball's radius, and as far beyond
+/// its ends.
 const MESH_OFF: f64 = 0.25;
 const MESH_BEYOND: f64 = 0.6;
 /// Two cylinders are one when radii and places agree within this share of the radius.
 const SAME: f64 = 0.12;
-/// A round piece of the mesh is of the same wall when radii and places agree within this share of the radius, and of that of the ball: a scan
-/// is blurred, and steps of a hole or shaft differ by more.
+/// A round piece of the mesh is of the same wall when radii and places agree within this share of
+/// the radius, and of that of the ball: a scan is blurred, and steps of a hole or shaft differ by
+/// more.
 const SAME_WALL: f64 = 0.15;
 const SAME_WALL_OF_BALL: f64 = 0.35;
-/// Contacts among which a shaft is sought, at most, its radius in radii of the ball, and the share of a turn over which it was touched.
+/// Contacts among which a shaft is sought, at most, its radius in radii of the ball, and the share
+/// of a turn over which it was touched.
 const MOST_ON_SHAFT: usize = 800;
 const LARGE: f64 = 4.0;
 const SHAFT_TURN: f64 = 0.6;
-/// Pieces of one wall are about one axis within 6°, and no farther apart along it than this many of its radii.
+/// Pieces of one wall are about one axis within 6°, and no farther apart along it than this many of
+/// its radii.
 const ONE_AXIS: f64 = 0.9945;
 const APART: f64 = 1.0;
 /// Tolerance of the segment of such a wall, as a share of the ball's radius.
@@ -95,8 +103,8 @@ struct ContactWalls {
     planes: Vec<ContactPlane>,
 }
 
-/// Adds the walls that contacts show to the segmentation: each takes the faces of the mesh that lie on it. Returns for each contact whether
-/// it is on a wall that is round all around.
+/// Adds the walls that contacts show to the segmentation: each takes the faces of the mesh that lie
+/// on it. Returns for each contact whether it is on a wall that is round all around.
 pub(super) fn add_contact_walls(parted: &mut Parted, touches: &[ProbedPoint]) -> Vec<bool> {
     let radius = touches.iter().map(|touch| touch.radius).fold(0.0, f64::max);
     let ContactWalls { cylinders, planes } = contact_walls(parted, touches);
@@ -142,7 +150,8 @@ pub(super) fn add_contact_walls(parted: &mut Parted, touches: &[ProbedPoint]) ->
     is_round
 }
 
-/// Faces of the round pieces of the mesh that are the same wall, or the rest of it that nobody touched: one wall is one feature.
+/// Faces of the round pieces of the mesh that are the same wall, or the rest of it that nobody
+/// touched: one wall is one feature.
 fn faces_of_same(parted: &Parted, found: &ContactCylinder, of_ball: f64) -> Vec<u32> {
     let Cylinder {
         radius, concave, ..
@@ -408,8 +417,8 @@ fn flat_walls(touches: &[ProbedPoint], mut left: Vec<usize>) -> Vec<ContactPlane
     found
 }
 
-/// Whether contacts that lie on a plane are those of an edge: rolling around it moves the centre and hardly the contact, and in a corner
-/// the normal turns while the centre stays.
+/// Whether contacts that lie on a plane are those of an edge: rolling around it moves the centre
+/// and hardly the contact, and in a corner the normal turns while the centre stays.
 fn is_edge(touches: &[ProbedPoint], members: &[usize], plane: &Plane) -> bool {
     let radius = touches[members[0]].radius;
     let basis = tangent_basis(&plane.normal());
@@ -437,8 +446,9 @@ fn is_edge(touches: &[ProbedPoint], members: &[usize], plane: &Plane) -> bool {
     is_rolled || is_corner
 }
 
-/// Contacts of an edge: the centre moves by more than this many radii across it, the contact by less than this share of that. Contacts of
-/// a corner: the centre moves by less than this many radii across it while the normals turn by more, rad.
+/// Contacts of an edge: the centre moves by more than this many radii across it, the contact by
+/// less than this share of that. Contacts of a corner: the centre moves by less than this many
+/// radii across it while the normals turn by more, rad.
 const ROLLED: f64 = 0.05;
 const ROLLED_SHARE: f64 = 0.6;
 const CORNER: f64 = 0.1;
@@ -528,8 +538,8 @@ fn is_on_circle(one: &Projected, centre: &Point2<f64>, rho: f64, radius: f64) ->
         && v.dot(&one.normal) * rho.signum() > RADIAL * distance
 }
 
-/// The circle of ball centres on which most of a turn was touched: its centre and ρ, m, and the share of the turn; `None` where none was
-/// over enough of it.
+/// The circle of ball centres on which most of a turn was touched: its centre and ρ, m, and the
+/// share of the turn; `None` where none was over enough of it.
 fn best_circle(all: &[Projected], radius: f64) -> Option<(Point2<f64>, f64, f64)> {
     let mut best: Option<(usize, usize, Point2<f64>, f64)> = None;
     // the same contacts give the same circles

@@ -1,4 +1,5 @@
-//! Contacts seen as evidence of walls: thinned out, parted into those that hang together, seen along the axes that walls may stand along.
+//! Contacts seen as evidence of walls: thinned out, parted into those that hang together, seen
+//! along the axes that walls may stand along.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,7 +12,8 @@ use crate::stylus::ProbedPoint;
 
 /// Of contacts closer together than this share of the ball's radius one is enough.
 const THIN: f64 = 0.25;
-/// A contact is on a plane when it is off it by no more than so many standard deviations, or this share of the radius, m …
+/// A contact is on a plane when it is off it by no more than so many standard deviations, or this
+/// share of the radius, m …
 const ON_PLANE_SIGMAS: f64 = 4.0;
 const ON_PLANE: f64 = 0.06;
 /// … and its normal is off by less than 25°.
@@ -130,8 +132,8 @@ pub(super) fn together(touches: &[ProbedPoint], numbers: &[usize], reach: f64) -
     hanging(numbers, |at| touches[at].point, reach, |_, _| true)
 }
 
-/// Contacts of walls along an axis that hang together, seen along it: one wall, whether it was felt from above, from below or from both.
-/// The normals of those that hang together directly are alike.
+/// Contacts of walls along an axis that hang together, seen along it: one wall, whether it was felt
+/// from above, from below or from both. The normals of those that hang together directly are alike.
 pub(super) fn together_along(
     touches: &[ProbedPoint],
     numbers: &[usize],

@@ -7,7 +7,8 @@ use super::facets::Facets;
 use crate::mesh::{TriMesh, VertexId};
 use crate::numeric::{DisjointSets, voxel_neighbourhood, voxel_of};
 
-/// Points put on all creases together at most, beside one for each: bounds the work on meshes that are all noise.
+/// Points put on all creases together at most, beside one for each: bounds the work on meshes that
+/// are all noise.
 const MOST_POINTS: f64 = 1e6;
 
 /// Sign of the bend: convex or concave.
@@ -94,8 +95,9 @@ impl Creases {
         regions
     }
 
-    /// Joins creases of one kind of which points are in one cell of a grid of size `near`, or in cells that touch: all that are
-    /// closer than `near`, none that are farther than 2√3 times that.
+    /// Joins creases of one kind of which points are in one cell of a grid of size `near`, or in
+    /// cells that touch: all that are closer than `near`, none that are farther than 2√3 times
+    /// that.
     pub fn merge(&self, regions: &mut DisjointSets, mesh: &TriMesh, near: f64) {
         let lengths = |crease: &Crease| {
             (mesh.position(crease.ends[1]) - mesh.position(crease.ends[0])).norm()

@@ -1,12 +1,14 @@
 //! Curvature at the vertices of a mesh.
 //!
-//! Gaussian: the angle defect 2π − Σθ over the angles θ at the vertex is its integral over the part of the surface that
-//! belongs to the vertex; over a closed mesh the defects sum to 2πχ (Gauss and Bonnet), whatever the density. Mean: half
-//! the gradient of the area when the vertex moves along its normal is the integral of H; it is positive on bumps and
-//! negative in depressions, which the Gaussian curvature does not distinguish.
+//! Gaussian: the angle defect 2π − Σθ over the angles θ at the vertex is its integral over the part
+//! of the surface that belongs to the vertex; over a closed mesh the defects sum to 2πχ (Gauss and
+//! Bonnet), whatever the density. Mean: half the gradient of the area when the vertex moves along
+//! its normal is the integral of H; it is positive on bumps and negative in depressions, which the
+//! Gaussian curvature does not distinguish.
 //!
-//! The area is the mixed Voronoi area of \[Meyer et al. 2003\]: with it a ring of acute triangles inscribed in a sphere has
-//! K = 1/r² to second order in its edges, whatever its shape. (Barycentric areas have that only for regular rings.)
+//! The area is the mixed Voronoi area of \[Meyer et al. 2003\]: with it a ring of acute triangles
+//! inscribed in a sphere has K = 1/r² to second order in its edges, whatever its shape.
+//! (Barycentric areas have that only for regular rings.)
 
 use std::f64::consts::{PI, TAU};
 
@@ -19,9 +21,11 @@ use crate::mesh::{TriMesh, VertexId};
 pub enum VertexKind {
     /// One closed fan, all faces with the same orientation.
     Inner,
-    /// One open fan: the vertex is on the rim. Its defect π − Σθ is the turn of the rim, no curvature of the surface.
+    /// One open fan: the vertex is on the rim. Its defect π − Σθ is the turn of the rim, no
+    /// curvature of the surface.
     Rim,
-    /// Several fans, an edge with more than two faces, or a face turned over: the curvature is undefined.
+    /// Several fans, an edge with more than two faces, or a face turned over: the curvature is
+    /// undefined.
     Irregular,
     /// No face.
     #[default]
@@ -33,9 +37,11 @@ pub enum VertexKind {
 pub struct VertexCurvature {
     /// How its faces meet.
     pub kind: VertexKind,
-    /// Integral of the Gaussian curvature, rad: 2π − Σθ; on the rim π − Σθ (turn of the rim); 0 where irregular.
+    /// Integral of the Gaussian curvature, rad: 2π − Σθ; on the rim π − Σθ (turn of the rim); 0
+    /// where irregular.
     pub defect: f64,
-    /// Integral of the mean curvature, m; positive on bumps, negative in depressions; 0 on the rim and where irregular.
+    /// Integral of the mean curvature, m; positive on bumps, negative in depressions; 0 on the rim
+    /// and where irregular.
     pub integrated_mean: f64,
     /// Mixed Voronoi area, m².
     pub area: f64,
@@ -130,7 +136,8 @@ impl Fan {
         if !self.link_up() {
             return self.kind_of_open();
         }
-        // one round must come past all faces, and is back at the first no later; where two faces end alike it never is
+        // one round must come past all faces, and is back at the first no later; where two faces
+        // end alike it never is
         let (mut at, mut steps) = (self.next[0], 1);
         while at != 0 && steps < count {
             (at, steps) = (self.next[at as usize], steps + 1);
@@ -149,7 +156,8 @@ impl Fan {
         if self.links.len() > SMALL_FAN {
             return self.link_up_large();
         }
-        // always all places, so that the loop is a few wide instructions; no vertex has the number u32::MAX
+        // always all places, so that the loop is a few wide instructions; no vertex has the number
+        // u32::MAX
         let mut starts = [u32::MAX; SMALL_FAN];
         for (start, link) in starts.iter_mut().zip(&self.links) {
             *start = link[0];
@@ -233,7 +241,8 @@ struct CornerSums {
 
 /// Products outside this range are brought back to 1, long before they overflow.
 const MAGNITUDES: std::ops::Range<f64> = 1e-100..1e100;
-/// Up to this tangent the series of the arc tangent to the 17th power is exact: the next term is below 2⁻⁶¹ of the angle.
+/// Up to this tangent the series of the arc tangent to the 17th power is exact: the next term is
+/// below 2⁻⁶¹ of the angle.
 const SMALL_TANGENT: f64 = 0.125;
 
 impl CornerSums {
@@ -283,8 +292,9 @@ impl CornerSums {
         self.area_gradient -= vector(&corners.gradient);
     }
 
-    /// Turns the product by an angle of 0 to π of any length. It comes round where it passes the negative half of the real
-    /// axis. Each corner adds a rounding or two to the angle, and no arc tangent is needed.
+    /// Turns the product by an angle of 0 to π of any length. It comes round where it passes the
+    /// negative half of the real axis. Each corner adds a rounding or two to the angle, and no arc
+    /// tangent is needed.
     #[inline]
     fn turn(&mut self, cos: f64, sin: f64) {
         let (re, im) = (self.re * cos - self.im * sin, self.re * sin + self.im * cos);
@@ -347,7 +357,8 @@ fn two(of: impl Fn(usize) -> f64) -> Two {
     [of(0), of(1)]
 }
 
-/// What two faces have at one of their corners each, at once: one wide instruction does the same sum for both.
+/// What two faces have at one of their corners each, at once: one wide instruction does the same
+/// sum for both.
 struct Corners {
     cos: Two,
     sin: Two,
@@ -389,8 +400,9 @@ impl Corners {
     }
 }
 
-/// What a corner has of its triangle: the part nearest to it, or of an obtuse triangle half (the obtuse corner) or a
-/// quarter (the others) of all. `sin` is twice the area of the triangle, the cosines those at the three corners.
+/// What a corner has of its triangle: the part nearest to it, or of an obtuse triangle half (the
+/// obtuse corner) or a quarter (the others) of all. `sin` is twice the area of the triangle, the
+/// cosines those at the three corners.
 #[inline]
 fn mixed_area(nearest: f64, sin: f64, [cos, at_e, at_f]: [f64; 3]) -> f64 {
     let of_obtuse = if cos < 0.0 { sin / 4.0 } else { sin / 8.0 };

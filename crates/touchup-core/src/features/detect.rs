@@ -39,7 +39,8 @@ const OF_BALL: std::ops::Range<f64> = 0.97..1.12;
 
 /// Finds the features of a mesh, measured by touches where there are any.
 ///
-/// - `touches`: as [`crate::reconstruct::Patcher::probed`] has them; features name them by their place in it.
+/// - `touches`: as [`crate::reconstruct::Patcher::probed`] has them; features name them by their
+///   place in it.
 pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detection {
     let mut parted = Parted::of(mesh, tree);
     join_planes(&mut parted);
@@ -82,7 +83,8 @@ pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detec
     let observed = Observed::of(&parted, &of_face, touches);
     let measure = Measure::new(&observed);
 
-    // a wall of the ball's own width that nothing touched is the way that it took through what was not scanned
+    // a wall of the ball's own width that nothing touched is the way that it took through what was
+    // not scanned
     let of_ball = touches
         .iter()
         .map(|touch| 2.0 * touch.radius)
@@ -183,7 +185,8 @@ fn join_planes(parted: &mut Parted) {
         .join_planes(&parted.facets, beside.into_iter());
 }
 
-/// A cylinder is reported when it covers more than this share of a turn: less is the rounding of an edge, which looks wider in a measured mesh …
+/// A cylinder is reported when it covers more than this share of a turn: less is the rounding of an
+/// edge, which looks wider in a measured mesh …
 const ROUNDED_EDGE: f64 = 0.3;
 const ROUNDED_EDGE_MEASURED: f64 = 0.45;
 /// … and when it is there between its ends: what lies on it of four walls of a block is not.
@@ -262,13 +265,14 @@ fn head_feature(measure: &Measure, head: &Head) -> Feature {
     }
 }
 
-/// Holes, or bosses, are one wall when their axes are within 11°, no farther apart than this share of the diameter where they overlap, and as wide
-/// within that share.
+/// Holes, or bosses, are one wall when their axes are within 11°, no farther apart than this share
+/// of the diameter where they overlap, and as wide within that share.
 const ONE_AXIS: f64 = 0.98;
 const ONE_WALL: f64 = 0.15;
 
-/// Without those of holes, or of bosses, that are another one again: seen from its other end, or in what the mesh has of a wall beside what was
-/// felt of it. Of two that with the most touches is kept, and the deeper one where both have none.
+/// Without those of holes, or of bosses, that are another one again: seen from its other end, or in
+/// what the mesh has of a wall beside what was felt of it. Of two that with the most touches is
+/// kept, and the deeper one where both have none.
 fn without_second_walls(mut features: Vec<Feature>) -> Vec<Feature> {
     let depth = |feature: &Feature| feature.depth.as_ref().map_or(0.0, |depth| depth.value);
     let touches = |feature: &Feature| {
@@ -292,7 +296,8 @@ fn without_second_walls(mut features: Vec<Feature>) -> Vec<Feature> {
         .collect()
 }
 
-/// Whether two holes, or two bosses, overlap along one axis over more than half of the shorter one, and are as wide.
+/// Whether two holes, or two bosses, overlap along one axis over more than half of the shorter one,
+/// and are as wide.
 fn is_one_wall(one: &Feature, other: &Feature) -> bool {
     // from its bottom to its opening, or from its foot to its top, and how wide
     let wall = |feature: &Feature| {
@@ -331,7 +336,8 @@ fn with_felt(felt: Vec<Slot>, (slots, pockets): (Vec<Slot>, Vec<Slot>)) -> (Vec<
     )
 }
 
-/// Whether a wall is the half-round end of a slot: with its corners it may look like more than half a turn.
+/// Whether a wall is the half-round end of a slot: with its corners it may look like more than half
+/// a turn.
 fn is_slot_end(wall: &Wall, slots: &[Slot]) -> bool {
     slots.iter().any(|slot| {
         let is_wide = (2.0 * wall.radius() - slot.width).abs() < ALIKE * slot.width;
@@ -379,11 +385,12 @@ fn between(from: &AxisEnd, to: &AxisEnd, direction: &Vector3<f64>) -> Measured<f
     }
 }
 
-/// A lower bound leaves out so many standard deviations of the leans of the touches on its wall, in radii of the ball.
+/// A lower bound leaves out so many standard deviations of the leans of the touches on its wall, in
+/// radii of the ball.
 const LEAN_SIGMAS: f64 = 3.0;
 
-/// From one end of a wall to the other. Where the wall was felt and an end was not, that may be a guess: then it is as far as the
-/// wall was felt, and a lower bound.
+/// From one end of a wall to the other. Where the wall was felt and an end was not, that may be a
+/// guess: then it is as far as the wall was felt, and a lower bound.
 fn extent<S>(
     measure: &Measure,
     fitted: &Fitted<S>,
@@ -408,7 +415,8 @@ fn extent<S>(
     let (lowest, highest) = heights.fold((f64::MAX, f64::MIN), |(low, high), [a, b]| {
         (low.min(a.max(b)), high.max(a.min(b)))
     });
-    // what rolled over the edge leans as others lean by friction and noise, and is farther than it seems
+    // what rolled over the edge leans as others lean by friction and noise, and is farther than it
+    // seems
     let leans: f64 = of_wall().map(|touch| touch.normal.dot(out).powi(2)).sum();
     let radius = of_wall().map(|touch| touch.radius).fold(0.0, f64::max);
     let beyond = LEAN_SIGMAS * (leans / fitted.touches.len().max(1) as f64).sqrt() * radius;
@@ -735,7 +743,8 @@ fn fitted_to(planes: &[&Fitted<Plane>]) -> FittedTo {
     }
 }
 
-/// A place of a concave edge is touched when a touch is within a radius of where this share of it stands off both its walls.
+/// A place of a concave edge is touched when a touch is within a radius of where this share of it
+/// stands off both its walls.
 const IN_CORNER: f64 = 0.5;
 
 fn edge_feature(measure: &Measure, edge: &StraightEdge) -> Option<Feature> {
@@ -768,7 +777,8 @@ fn edge_feature(measure: &Measure, edge: &StraightEdge) -> Option<Feature> {
     })
 }
 
-/// Ends of edges closer together than this are one corner, in diagonals; of exact planes: what is farther off is round.
+/// Ends of edges closer together than this are one corner, in diagonals; of exact planes: what is
+/// farther off is round.
 const SAME_CORNER: f64 = 0.02;
 const SAME_EXACT_CORNER: f64 = 1e-4;
 

@@ -12,7 +12,8 @@ use crate::numeric::{distinct, tangent_basis};
 /// Directions in which the outermost touches of a plane are taken.
 const CORNERS: usize = 16;
 
-/// Covariance in O of what a fit says of point and direction, m and rad: without what all touches have in common.
+/// Covariance in O of what a fit says of point and direction, m and rad: without what all touches
+/// have in common.
 fn own_covariance<S: Surface>(fit: &Fit<S>) -> Matrix6<f64> {
     let rotation = fit.surface.pose_of().rotation.to_rotation_matrix();
     // the freedoms in their order: shifts along x, y, z of F, z leans towards x and y

@@ -4,10 +4,12 @@ use nalgebra::{Point3, Vector3};
 
 use crate::mesh::{FaceId, TriMesh, VertexId};
 
-/// No face lies across this edge: the mesh ends, more than two faces meet, or the one there is turned over. Of a face: no segment, no piece.
+/// No face lies across this edge: the mesh ends, more than two faces meet, or the one there is
+/// turned over. Of a face: no segment, no piece.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// All faces of a mesh, by id; each question has an array of its own, so that asking one does not load the others.
+/// All faces of a mesh, by id; each question has an array of its own, so that asking one does not
+/// load the others.
 #[derive(Clone, Debug)]
 pub(super) struct Facets<'a> {
     pub mesh: &'a TriMesh,
@@ -104,7 +106,8 @@ impl<'a> Facets<'a> {
     }
 }
 
-/// The faces around a vertex: the vertices before and after it in each, the face, and the number of its edge to the next.
+/// The faces around a vertex: the vertices before and after it in each, the face, and the number of
+/// its edge to the next.
 #[derive(Default)]
 struct VertexFan {
     before: Vec<u32>,
@@ -138,8 +141,8 @@ impl VertexFan {
             }));
     }
 
-    /// The place of the face across the edge to vertex `next`, when there is that one and no third, and it runs along it
-    /// in the opposite direction.
+    /// The place of the face across the edge to vertex `next`, when there is that one and no third,
+    /// and it runs along it in the opposite direction.
     fn across(&self, next: u32) -> Option<usize> {
         let (mut faces, mut place) = (0, 0);
         let (before, after) = (

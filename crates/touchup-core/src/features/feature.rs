@@ -64,11 +64,12 @@ pub struct Feature {
     pub id: u32,
     /// what it is
     pub kind: Kind,
-    /// where the axis goes through the opening, the middle of a boss' foot, of a shaft's shoulder or else of its length, of an edge, of a
-    /// plane; the corner. Its
-    /// uncertainty is the root mean square distance across the axis, of a plane along its normal.
+    /// where the axis goes through the opening, the middle of a boss' foot, of a shaft's shoulder
+    /// or else of its length, of an edge, of a plane; the corner. Its uncertainty is the root mean
+    /// square distance across the axis, of a plane along its normal.
     pub centre: Measured<Point3<f64>>,
-    /// out of the opening, along an edge, the outward normal of a plane; unit vector. Its uncertainty is an angle, rad.
+    /// out of the opening, along an edge, the outward normal of a plane; unit vector. Its
+    /// uncertainty is an angle, rad.
     pub axis: Option<Measured<Vector3<f64>>>,
     /// along a slot, unit vector
     pub direction: Option<Vector3<f64>>,
@@ -78,9 +79,11 @@ pub struct Feature {
     pub length: Option<Measured<f64>>,
     /// of a slot or pocket, m
     pub width: Option<Measured<f64>>,
-    /// from opening to floor, or the height of a boss, or of a step of a shaft above its shoulder, m
+    /// from opening to floor, or the height of a boss, or of a step of a shaft above its shoulder,
+    /// m
     pub depth: Option<Measured<f64>>,
-    /// whether a hole or slot goes through; `None` where the mesh ends before the hole does, or its floor was not touched
+    /// whether a hole or slot goes through; `None` where the mesh ends before the hole does, or its
+    /// floor was not touched
     pub through: Option<bool>,
     /// full angle of the countersink, rad
     pub cone_angle: Option<Measured<f64>>,

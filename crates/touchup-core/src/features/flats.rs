@@ -3,7 +3,8 @@
 use super::facets::{Facets, NONE};
 use crate::numeric::flood;
 
-/// Across a sharper edge than this no region grows, and a normal may be off by no more: half of a polygon of 9 sides. 40°.
+/// Across a sharper edge than this no region grows, and a normal may be off by no more: half of a
+/// polygon of 9 sides. 40°.
 pub(super) const SMOOTH: f64 = 0.766;
 /// A mesh is a drawing when this share of its faces lies in one plane with a neighbour …
 const DRAWN_SHARE: f64 = 0.2;

@@ -21,7 +21,8 @@ pub struct End {
 impl Feature {
     /// A hole, or a boss when the wall is convex.
     ///
-    /// - `top`: around the opening, or the foot of the boss; `end`: of the floor, or the boss' top, where it was touched.
+    /// - `top`: around the opening, or the foot of the boss; `end`: of the floor, or the boss' top,
+    ///   where it was touched.
     /// - `touches`: those used.
     pub fn round(
         wall: &Fit<Cylinder>,
@@ -84,7 +85,8 @@ impl Feature {
         }
     }
 
-    /// The edge between two planes, as far as from one place on it to another; `None` when they are parallel.
+    /// The edge between two planes, as far as from one place on it to another; `None` when they are
+    /// parallel.
     ///
     /// - `ends`: near the edge, m in O.
     pub fn edge(
@@ -108,8 +110,8 @@ impl Feature {
         })
     }
 
-    /// The edge in which two planes meet, as far as from one place near it to another: its axis, the sine between the planes, and the rest;
-    /// `None` when they are parallel.
+    /// The edge in which two planes meet, as far as from one place near it to another: its axis,
+    /// the sine between the planes, and the rest; `None` when they are parallel.
     ///
     /// - `std_at`: of a plane along its normal at a point of it, m.
     pub(super) fn crossing(
@@ -124,7 +126,8 @@ impl Feature {
         let value = direction.try_normalize(0.0)? * (ends[1] - ends[0]).dot(&direction).signum();
         let ends = ends.map(|end| on_both(planes, &end));
         let middle = nalgebra::center(&ends[0], &ends[1]);
-        // two planes that may be shifted by s and t displace their line of intersection by √(s² + t²) / sin of the angle between them
+        // two planes that may be shifted by s and t displace their line of intersection by √(s² +
+        // t²) / sin of the angle between them
         let std = std_at(0, &middle)
             .zip(std_at(1, &middle))
             .map(|(s, t)| s.hypot(t) / sine);

@@ -1,8 +1,9 @@
 //! Parts a mesh into planes and cylinders; cones are found beside holes, once those are known.
 //!
-//! From the flattest faces on, each free face is the seed of a region: a plane or a cylinder is fitted to the faces around
-//! it and grows over neighbours whose corners lie on it and which face as it does. Where a plane ends without an edge it may
-//! be a strip of something round: then whatever explains more of the surface is taken.
+//! From the flattest faces on, each free face is the seed of a region: a plane or a cylinder is
+//! fitted to the faces around it and grows over neighbours whose corners lie on it and which face
+//! as it does. Where a plane ends without an edge it may be a strip of something round: then
+//! whatever explains more of the surface is taken.
 
 use super::facets::{Facets, NONE};
 use super::flats::{FlatPiece, Flats, SMOOTH};
@@ -228,7 +229,8 @@ impl<'a> Growing<'a> {
         self.tolerance <= self.scale.exact()
     }
 
-    /// A flat piece of a drawing, where it continues in round ones, of facets much smaller than it is.
+    /// A flat piece of a drawing, where it continues in round ones, of facets much smaller than it
+    /// is.
     fn flat_from(&mut self, flat: &FlatPiece) -> Option<Segment> {
         let (facets, seed) = (self.facets, flat.faces[0]);
         let largest = flat
@@ -242,8 +244,8 @@ impl<'a> Growing<'a> {
         self.grown(seed, start, flat.faces.len())
     }
 
-    /// Takes the flat pieces of a drawing that are left between its round ones: what is beside may have kept a seed from
-    /// being tried.
+    /// Takes the flat pieces of a drawing that are left between its round ones: what is beside may
+    /// have kept a seed from being tried.
     fn take_flat(&mut self, seeds: &[u32], flats: &mut Flats) {
         for &seed in seeds {
             if !self.is_free(seed) {
@@ -319,7 +321,8 @@ impl<'a> Growing<'a> {
         best
     }
 
-    /// Whether corners of `near` are as near as the tolerance wants them; else returns what they need.
+    /// Whether corners of `near` are as near as the tolerance wants them; else returns what they
+    /// need.
     fn is_close(&self, primitive: &Primitive, near: &[u32], needs: &mut f64) -> bool {
         let squares = near
             .iter()
@@ -363,10 +366,11 @@ impl<'a> Growing<'a> {
         })
     }
 
-    /// Goes from the faces of `found` over all that belong to the primitive, which follows them each time their number has
-    /// doubled.
+    /// Goes from the faces of `found` over all that belong to the primitive, which follows them
+    /// each time their number has doubled.
     ///
-    /// - `fitted`: how many faces already determine the primitive; fewer of them may be flat by themselves.
+    /// - `fitted`: how many faces already determine the primitive; fewer of them may be flat by
+    ///   themselves.
     fn flood(&mut self, mut found: Vec<u32>, primitive: &mut Primitive, fitted: usize) -> Vec<u32> {
         self.round += 1;
         found
@@ -445,7 +449,8 @@ impl<'a> Growing<'a> {
         smooth / all
     }
 
-    /// Parts the mesh once more: tight and large segments take what they explain of loose and small ones.
+    /// Parts the mesh once more: tight and large segments take what they explain of loose and small
+    /// ones.
     fn claim(&mut self) {
         let mut order = std::mem::take(&mut self.segments);
         order.sort_by(|a, b| {
@@ -530,8 +535,8 @@ impl MeshScale {
         }
     }
 
-    /// How near the faces around a seed have to be, and how near the others. Tight ones first: what they explain is not left
-    /// to loose ones.
+    /// How near the faces around a seed have to be, and how near the others. Tight ones first: what
+    /// they explain is not left to loose ones.
     ///
     /// - `is_drawn`: whether neighbours lie in one plane as they do in a drawing.
     fn tolerances(&self, is_drawn: bool) -> Vec<(f64, f64)> {
@@ -550,7 +555,8 @@ impl MeshScale {
         ROUNDING * self.diagonal
     }
 
-    /// How far facets of a drawing are off a round surface where they have corners on its chords, m.
+    /// How far facets of a drawing are off a round surface where they have corners on its chords,
+    /// m.
     pub(super) fn chords(&self) -> f64 {
         WAVES_OF_ALL * self.diagonal
     }

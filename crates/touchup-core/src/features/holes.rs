@@ -48,7 +48,8 @@ pub(super) struct Boss {
     pub is_turned: bool,
 }
 
-/// A wall around a hole covers at least this share of a turn: a hole with a keyway or a slit still counts.
+/// A wall around a hole covers at least this share of a turn: a hole with a keyway or a slit still
+/// counts.
 const HOLE_COVERAGE: f64 = 0.56;
 /// That of a boss.
 const BOSS_COVERAGE: f64 = 0.75;
@@ -64,14 +65,16 @@ const REST: f64 = 0.3;
 const STRAIGHT: f64 = 0.9945;
 /// Least height of a wall, in radii: a rim rounded by noise is lower.
 const LEAST_HEIGHT: f64 = 0.08;
-/// So much of the radius around the axis is free in a hole, and so much beyond the wall a line to it goes.
+/// So much of the radius around the axis is free in a hole, and so much beyond the wall a line to
+/// it goes.
 const FREE: f64 = 0.5;
 /// Points of the axis from which lines to the wall are examined, and lines from each.
 const PROBES: usize = 5;
 const PROBE_RAYS: usize = 8;
 /// What closes a hole is no farther from the end of its wall than this many radii.
 const CLOSED: f64 = 1.0;
-/// Where no plane is around an end and something is met within this many radii, the wall may go on to there unseen.
+/// Where no plane is around an end and something is met within this many radii, the wall may go on
+/// to there unseen.
 const MAYBE_CLOSED: f64 = 3.0;
 /// Rays that search for what closes a hole start this share of the radius beside its axis.
 const ASIDE: f64 = 0.05;
@@ -85,7 +88,8 @@ const NEAR_END: f64 = 0.4;
 const RIM: f64 = 0.2;
 /// A floor is square to the axis within 20°.
 const SQUARE: f64 = 0.94;
-/// An end is torn by borders of the mesh from so many radii before it to so many behind it, and as far around it.
+/// An end is torn by borders of the mesh from so many radii before it to so many behind it, and as
+/// far around it.
 const TORN: [f64; 2] = [0.5, 1.5];
 /// Directions in which an end is examined.
 const AROUND: usize = 24;
@@ -97,7 +101,8 @@ const OPEN: f64 = 3.0;
 const SAME_HOLE: f64 = 0.5;
 /// Axes of one stepped hole are no farther apart than this share of the radius.
 const SAME_AXIS: f64 = 0.15;
-/// Heads of countersunk screws are 1.8 to 2 times as wide as their holes, broken edges seldom more than 1.1 times.
+/// Heads of countersunk screws are 1.8 to 2 times as wide as their holes, broken edges seldom more
+/// than 1.1 times.
 const HEAD: f64 = 1.25;
 
 /// One end of a wall.
@@ -160,7 +165,8 @@ fn is_fragment_of(parted: &Parted, wall: &Wall, better: &Wall) -> bool {
 fn hole(parted: &Parted, walls: &[Wall], at: usize) -> Option<Hole> {
     let wall = &walls[at];
     let radius = wall.radius();
-    // a ball that went around a wall was inside of it: what the mesh has there is a plug that nobody felt, and what it has not a gap
+    // a ball that went around a wall was inside of it: what the mesh has there is a plug that
+    // nobody felt, and what it has not a gap
     let is_felt = wall.felt_turn > 0.0;
     let is_whole = wall.coverage >= HOLE_COVERAGE && (is_felt || wall.filled >= FILLED);
     if !is_whole || wall.height() < LEAST_HEIGHT * radius || !is_felt && !is_free(parted, wall) {
@@ -244,7 +250,8 @@ fn shoulder(parted: &Parted, walls: &[Wall], at: usize, end: &WallEnd) -> Option
         .map(|(number, _)| number)
 }
 
-/// Whether a wall is a cut at the rim of the part: beside where it is open neither a wall nor what is around the opening goes on.
+/// Whether a wall is a cut at the rim of the part: beside where it is open neither a wall nor what
+/// is around the opening goes on.
 fn is_notch(parted: &Parted, wall: &Wall, end: &WallEnd) -> bool {
     let (radius, around) = (wall.radius(), parted.around(wall.segments[0]));
     let [e, g] = tangent_basis(&wall.axis);
@@ -276,7 +283,8 @@ fn is_notch(parted: &Parted, wall: &Wall, end: &WallEnd) -> bool {
     widest(0) > 0 && widest(1) >= NOTCH
 }
 
-/// Whether most lines from the axis to the wall meet nothing on the way. What closes the hole, however shallow it is, is not asked.
+/// Whether most lines from the axis to the wall meet nothing on the way. What closes the hole,
+/// however shallow it is, is not asked.
 fn is_free(parted: &Parted, wall: &Wall) -> bool {
     let radius = wall.radius();
     let [e, g] = tangent_basis(&wall.axis);
@@ -315,7 +323,8 @@ fn end(parted: &Parted, wall: &Wall, which: usize) -> WallEnd {
     );
     let rim = rim.filter(|&(_, share)| share > RIM);
     let reach = [CLOSED, MAYBE_CLOSED].map(|radii| wall.height() / 2.0 + radii * radius);
-    // beside the axis: on it lie the tips of cones and the edges of floors, which a line may slip through
+    // beside the axis: on it lie the tips of cones and the edges of floors, which a line may slip
+    // through
     let [e, g] = tangent_basis(&wall.axis);
     let mut rays = around.rays(radius);
     let mut met = [0.4f64, 2.5, 4.6].map(|turn| {
@@ -335,8 +344,8 @@ fn end(parted: &Parted, wall: &Wall, which: usize) -> WallEnd {
     }
 }
 
-/// Whether the mesh ends there: the continuation of the wall was neither scanned nor touched. Where a plane is around the end, the
-/// border has to be as long as half of the turn.
+/// Whether the mesh ends there: the continuation of the wall was neither scanned nor touched. Where
+/// a plane is around the end, the border has to be as long as half of the turn.
 fn is_torn(parted: &Parted, wall: &Wall, end: &WallEnd) -> bool {
     let (middle, [e, g]) = (wall.at(end.t), tangent_basis(&wall.axis));
     let near = TORN.map(|radii| radii * wall.radius());
@@ -387,7 +396,8 @@ fn cone_beside(walls: &[Wall], at: usize, end: &WallEnd) -> Option<usize> {
     walls.iter().position(|cone| is_next(cone) && is_near(cone))
 }
 
-/// Whether a cone at the opening of a hole is wide enough for the head of a screw, not the edge of the hole broken.
+/// Whether a cone at the opening of a hole is wide enough for the head of a screw, not the edge of
+/// the hole broken.
 fn is_countersink(cone: &Wall, wall: &Wall, out: f64) -> bool {
     cone.axis.dot(&wall.axis) * out > 0.0 && cone.radius_at(cone.ends[1]) > HEAD * wall.radius()
 }
@@ -427,7 +437,8 @@ pub(super) fn bosses(parted: &Parted, walls: &[Wall]) -> Vec<Boss> {
         .collect()
 }
 
-/// Whether a wall is what carries the shoulder on which another stands at `foot`, `out` being ±1 times its axis.
+/// Whether a wall is what carries the shoulder on which another stands at `foot`, `out` being ±1
+/// times its axis.
 fn is_shaft_below(wider: &Wall, wall: &Wall, foot: f64, out: f64) -> bool {
     let is_round = !wider.is_concave && wider.coverage >= SHAFT_COVERAGE * wall.coverage;
     let is_round = is_round && wider.radius() > wall.radius();
@@ -438,8 +449,8 @@ fn is_shaft_below(wider: &Wall, wall: &Wall, foot: f64, out: f64) -> bool {
         && wider.gap(wall) < SAME_HOLE * wall.radius()
 }
 
-/// Whether the part is round about the axis of a wall below the shoulder at `foot` that it stands on, whatever of that was segmented: a shaft that
-/// was scanned badly, and touched in strips.
+/// Whether the part is round about the axis of a wall below the shoulder at `foot` that it stands
+/// on, whatever of that was segmented: a shaft that was scanned badly, and touched in strips.
 fn is_round_below(parted: &Parted, wall: &Wall, foot: f64, out: f64) -> bool {
     let (radius, axis, middle) = (wall.radius(), wall.axis, wall.at(foot));
     let reach = Vector3::repeat(BELOW_RADII[1] * radius);
@@ -471,8 +482,9 @@ fn is_round_below(parted: &Parted, wall: &Wall, foot: f64, out: f64) -> bool {
     of_parts.len() as f64 >= BELOW_SHARE * BELOW_PARTS as f64
 }
 
-/// Below a shoulder a part is round when in this share of so many parts of a turn there are faces this far below it and this far from the axis,
-/// all in radii of what stands on it, whose normals are radial within 20°, all as far from the axis within this share.
+/// Below a shoulder a part is round when in this share of so many parts of a turn there are faces
+/// this far below it and this far from the axis, all in radii of what stands on it, whose normals
+/// are radial within 20°, all as far from the axis within this share.
 const BELOW_PARTS: usize = 24;
 const BELOW_SHARE: f64 = 0.75;
 const BELOW: std::ops::Range<f64> = 0.1..1.0;

@@ -18,10 +18,12 @@ pub struct KMeans {
     pub labels: Vec<u32>,
 }
 
-/// Parts points into `k` groups, each about its mean, from a start by k-means++ \[Arthur and Vassilvitskii 2007\].
+/// Parts points into `k` groups, each about its mean, from a start by k-means++ \[Arthur and
+/// Vassilvitskii 2007\].
 ///
-/// Ends when no point changes its group: at a least sum of squares among near partitions, not among all. Returns fewer
-/// groups where fewer than `k` points are distinct. Own code: the kept crates for it bring threads and arrays of their own.
+/// Ends when no point changes its group: at a least sum of squares among near partitions, not among
+/// all. Returns fewer groups where fewer than `k` points are distinct. Own code: the kept crates
+/// for it bring threads and arrays of their own.
 pub fn k_means(points: &[Point3<f64>], k: usize, seed: u64) -> KMeans {
     let mut centers = seeds(points, k, seed);
     let mut labels = vec![u32::MAX; if centers.is_empty() { 0 } else { points.len() }];
@@ -61,8 +63,9 @@ fn nearest(p: &Point3<f64>, centers: &[Point3<f64>]) -> u32 {
     best
 }
 
-/// The first at random; then each time the best of a few that are drawn with a chance as the square of their distance
-/// from those before: the one that leaves the least sum of squares. One draw alone often puts two into one group.
+/// The first at random; then each time the best of a few that are drawn with a chance as the square
+/// of their distance from those before: the one that leaves the least sum of squares. One draw
+/// alone often puts two into one group.
 fn seeds(points: &[Point3<f64>], k: usize, seed: u64) -> Vec<Point3<f64>> {
     if points.is_empty() || k == 0 {
         return Vec::new();
@@ -102,7 +105,8 @@ fn seeds(points: &[Point3<f64>], k: usize, seed: u64) -> Vec<Point3<f64>> {
     centers
 }
 
-/// The place at which the running sum passes `rest`, or the last one that adds to it; `None` where none does.
+/// The place at which the running sum passes `rest`, or the last one that adds to it; `None` where
+/// none does.
 fn drawn(squares: &[f64], mut rest: f64) -> Option<usize> {
     let passes = |square: &f64| {
         rest -= square;

@@ -25,8 +25,9 @@ pub(super) struct Fitted<S> {
     /// numbers of the touches that were used
     pub touches: Vec<u32>,
     pub to: FittedTo,
-    /// whether the residuals say how far the surface is off: those of touches do, and those of a mesh that nothing touched; beside
-    /// touches they are of a surface that nobody felt, which may be off as a whole
+    /// whether the residuals say how far the surface is off: those of touches do, and those of a
+    /// mesh that nothing touched; beside touches they are of a surface that nobody felt, which may
+    /// be off as a whole
     pub is_confirmed: bool,
 }
 
@@ -40,17 +41,19 @@ pub(super) struct Measure<'a> {
 const LEAST_TOUCHES: usize = 12;
 /// Touches around less of a turn than this are left to the mesh.
 const LEAST_TURN: f64 = 0.4;
-/// Touches on a plane that spread less than this share across their longest direction are left to the mesh; beside an edge they are enough when
-/// they spread over this share of what the mesh has.
+/// Touches on a plane that spread less than this share across their longest direction are left to
+/// the mesh; beside an edge they are enough when they spread over this share of what the mesh has.
 const LEAST_SPREAD: f64 = 0.1;
 const LEAST_STRIP: f64 = 0.4;
 /// Into so many parts a turn is divided.
 const PARTS: usize = 24;
-/// A wall touched over less than this many diameters of its height has its axis from the plane around it.
+/// A wall touched over less than this many diameters of its height has its axis from the plane
+/// around it.
 const SHORT: f64 = 0.35;
 /// A touch beside the outline of a slot by less than this share of its width is of it.
 const BESIDE: f64 = 0.15;
-/// A touch is of the edge at an end of a wall when it is nearer to it than this, in radii of the ball …
+/// A touch is of the edge at an end of a wall when it is nearer to it than this, in radii of the
+/// ball …
 const OVER_END: f64 = 0.3;
 /// … and its normal leans towards it by more than this, rad: 15°.
 const OVER_END_LEAN: f64 = 0.26;
@@ -59,7 +62,8 @@ const LEANS: [f64; 2] = [0.15, 0.2];
 /// Perpendicularity of a drilled hole or milled slot to the plane around it, rad: 0.5°.
 const DRILLED: f64 = 0.0087;
 
-/// Whether the ball touched the edge at an end of a wall: there it is nearer to the axis, or farther from it, than beside the wall.
+/// Whether the ball touched the edge at an end of a wall: there it is nearer to the axis, or
+/// farther from it, than beside the wall.
 fn is_over_end(touch: &ProbedPoint, wall: &Wall) -> bool {
     let along = (touch.point - wall.origin).dot(&wall.axis);
     let lean = touch.normal.dot(&wall.axis);
@@ -93,8 +97,8 @@ impl<'a> Measure<'a> {
         Some(fitted)
     }
 
-    /// The plane of a segment beside an edge: a strip of touches along the edge places it, where it is wide beside what the mesh has of the
-    /// plane. `None` where the segment is none.
+    /// The plane of a segment beside an edge: a strip of touches along the edge places it, where it
+    /// is wide beside what the mesh has of the plane. `None` where the segment is none.
     pub fn plane_beside_edge(&self, number: usize) -> Option<Fitted<Plane>> {
         let plane = self.plane(number)?;
         if plane.to == FittedTo::Touches {
@@ -109,7 +113,8 @@ impl<'a> Measure<'a> {
         );
         let is_wide = |[_, second, _]: [f64; 3]| second > LEAST_STRIP * of_mesh;
         let first = self.plane_by(number, guess, is_wide);
-        // a mesh rounds the corner between two walls and leans there: touches by the first plane are others than by the mesh
+        // a mesh rounds the corner between two walls and leans there: touches by the first plane
+        // are others than by the mesh
         let is_felt = first.to == FittedTo::Touches;
         Some(if is_felt {
             self.plane_by(number, &first.surface, is_wide)
@@ -118,7 +123,8 @@ impl<'a> Measure<'a> {
         })
     }
 
-    /// - `is_wide`: whether touches that spread so far in three directions, m, the least first, are enough.
+    /// - `is_wide`: whether touches that spread so far in three directions, m, the least first, are
+    ///   enough.
     fn plane_by(
         &self,
         number: usize,
@@ -243,8 +249,9 @@ impl<'a> Measure<'a> {
         )
     }
 
-    /// The touches whose normals lean least off that of their surface, where they are enough; none where all are not. A ball that rolls over
-    /// an edge leans more and more, and its centre comes nearer to the surface than its radius.
+    /// The touches whose normals lean least off that of their surface, where they are enough; none
+    /// where all are not. A ball that rolls over an edge leans more and more, and its centre comes
+    /// nearer to the surface than its radius.
     ///
     /// - `lean`: sine of the angle between the normal of a touch and the normals of the surface.
     fn squarest(

@@ -28,9 +28,11 @@ pub(super) struct Observed<'a> {
     reach: f64,
 }
 
-/// Touches of one stroke within this time share their error: the window in which they are smoothed, and half of it again.
+/// Touches of one stroke within this time share their error: the window in which they are smoothed,
+/// and half of it again.
 const SHARED_NS: i64 = 100_000_000;
-/// Share of what the touches of one plane have in common that those of another have not: poses wander slowly, and the stylus leans otherwise.
+/// Share of what the touches of one plane have in common that those of another have not: poses
+/// wander slowly, and the stylus leans otherwise.
 pub(super) const NOT_ALIKE: f64 = 0.33;
 /// A touch is of a segment when it is off it by no more than so many tolerances …
 const NEAR_TOLERANCES: f64 = 3.0;
@@ -137,8 +139,8 @@ impl<'a> Observed<'a> {
         numbers.iter().map(observation).collect()
     }
 
-    /// What all touches have in common along their normals, and by how much they are displaced together, m: standard deviations of what
-    /// does not average out.
+    /// What all touches have in common along their normals, and by how much they are displaced
+    /// together, m: standard deviations of what does not average out.
     pub fn systematic(&self, numbers: &[u32]) -> [f64; 2] {
         systematic(numbers.iter().map(|&number| &self.touches[number as usize]))
     }
@@ -193,8 +195,8 @@ impl<'a> Observed<'a> {
             .collect()
     }
 
-    /// Observations of a segment for a fit: its vertices, or points all over it where it is flat in a drawing, whose few corners may all lie at its
-    /// ends.
+    /// Observations of a segment for a fit: its vertices, or points all over it where it is flat in
+    /// a drawing, whose few corners may all lie at its ends.
     pub fn of_mesh_surface(&self, number: usize) -> Vec<Observation> {
         match self
             .parted
@@ -214,8 +216,9 @@ impl<'a> Observed<'a> {
         }
     }
 
-    /// The vertices of some segments, in ascending order; of round ones in a drawing without those on chords: a tessellation
-    /// has them where a neighbour needed a corner, and they are not on the surface.
+    /// The vertices of some segments, in ascending order; of round ones in a drawing without those
+    /// on chords: a tessellation has them where a neighbour needed a corner, and they are not on
+    /// the surface.
     fn vertices_of(&self, segments: &[usize]) -> Vec<VertexId> {
         let Parted {
             facets,
@@ -317,7 +320,8 @@ pub(super) fn systematic<'a>(touches: impl Iterator<Item = &'a ProbedPoint>) -> 
     sum.map(|sum| sum / count.max(1.0))
 }
 
-/// Whether a vertex is between two others of its faces on a line that is not one of the straight lines of the surface.
+/// Whether a vertex is between two others of its faces on a line that is not one of the straight
+/// lines of the surface.
 fn is_on_chord(
     mesh: &TriMesh,
     vertex: VertexId,

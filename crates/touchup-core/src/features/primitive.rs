@@ -1,5 +1,5 @@
-//! The surfaces that machined parts are made of, and how each is found from faces: by their normals first, then by least
-//! squares over their corners.
+//! The surfaces that machined parts are made of, and how each is found from faces: by their normals
+//! first, then by least squares over their corners.
 
 use nalgebra::{Matrix2, Matrix3, Point3, SVector, Vector2, Vector3};
 
@@ -83,7 +83,8 @@ pub(super) fn belongs(facets: &Facets, face: u32, primitive: &Primitive, toleran
     })
 }
 
-/// The normal of a surface beneath the middle of a face, in O; `None` where a corner is farther from it than `tolerance`, m.
+/// The normal of a surface beneath the middle of a face, in O; `None` where a corner is farther
+/// from it than `tolerance`, m.
 fn normal_beneath(
     facets: &Facets,
     face: u32,
@@ -107,8 +108,8 @@ fn normal_beneath(
 /// Rows and columns of the lower triangle of a symmetric matrix.
 const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
 
-/// The plane through the middle of the area of faces, square to its thinnest direction, by exact moments of the area; `None` without
-/// area.
+/// The plane through the middle of the area of faces, square to its thinnest direction, by exact
+/// moments of the area; `None` without area.
 ///
 /// - `origin`: near the faces, so that squares stay small.
 pub(super) fn plane_of(
@@ -191,7 +192,8 @@ impl NormalSpread {
         Some(Self { spread, second })
     }
 
-    /// Axis of the cylinder whose normals these could be: the direction along which there is least of them.
+    /// Axis of the cylinder whose normals these could be: the direction along which there is least
+    /// of them.
     pub fn cylinder_axis(&self) -> Option<Vector3<f64>> {
         let eigen = self.second.symmetric_eigen();
         let mut pairs = [0, 1, 2].map(|i| {
@@ -263,8 +265,8 @@ const FEW: usize = 40;
 /// So many faces are enough while a region grows.
 const MOST_ROWS: usize = 500;
 
-/// The curved surface moved to the least squares over the corners of the faces, and of a cylinder over their normals; planes stay as they
-/// are.
+/// The curved surface moved to the least squares over the corners of the faces, and of a cylinder
+/// over their normals; planes stay as they are.
 pub(super) fn refined(primitive: &Primitive, facets: &Facets, faces: &[u32]) -> Option<Primitive> {
     match primitive {
         _ if faces.is_empty() => None,
@@ -283,7 +285,8 @@ pub(super) fn refined(primitive: &Primitive, facets: &Facets, faces: &[u32]) -> 
 
 /// By least squares over the N freedoms that the surface has.
 ///
-/// - `are_square`: whether the normals of the surface are square to its axis; then those of the faces count.
+/// - `are_square`: whether the normals of the surface are square to its axis; then those of the
+///   faces count.
 fn moved_to<S: Surface, const N: usize>(
     start: &S,
     facets: &Facets,

@@ -4,17 +4,20 @@ use nalgebra::{Point3, Vector3};
 
 use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh};
 
-/// A line is followed in so many pieces at most: a void may be narrower than any number of pieces can be.
+/// A line is followed in so many pieces at most: a void may be narrower than any number of pieces
+/// can be.
 const MOST_PIECES: f64 = 1000.0;
 
-/// Rounding of barycentric coordinates: a line through an edge slips through between its triangles in no frame.
+/// Rounding of barycentric coordinates: a line through an edge slips through between its triangles
+/// in no frame.
 const ON_EDGE: f64 = 1e-9;
 
 /// Casts rays through one mesh.
 pub(super) struct Rays<'a> {
     mesh: &'a TriMesh,
     tree: &'a FaceTree,
-    /// length of the pieces in which a line is followed, m: a box around a long one holds too many faces
+    /// length of the pieces in which a line is followed, m: a box around a long one holds too many
+    /// faces
     piece: f64,
     /// what the faces are called, where the mesh is a part of another
     names: Option<&'a [u32]>,
@@ -45,7 +48,8 @@ impl<'a> Rays<'a> {
         }
     }
 
-    /// The first face between `from` and the point `reach` (m) away along the unit vector `direction`.
+    /// The first face between `from` and the point `reach` (m) away along the unit vector
+    /// `direction`.
     pub fn first(
         &mut self,
         from: &Point3<f64>,
@@ -65,7 +69,8 @@ impl<'a> Rays<'a> {
                 let distance = crossing(&self.mesh.triangle(face), from, direction)?;
                 (distance >= 0.0 && distance <= reach).then_some(RayHit { distance, face })
             });
-            // a face of this box may be crossed in a later one, behind a nearer face that is not here
+            // a face of this box may be crossed in a later one, behind a nearer face that is not
+            // here
             let nearest =
                 found.min_by(|a, b| a.distance.total_cmp(&b.distance).then(a.face.cmp(&b.face)));
             if let Some(nearest) =

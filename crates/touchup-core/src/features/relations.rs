@@ -10,11 +10,13 @@ names! {
     /// What a relation is.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
     pub enum RelationKind {
-        /// width of the zone or diameter of the cylinder, over the extent of the first feature; the angle between both
+        /// width of the zone or diameter of the cylinder, over the extent of the first feature; the
+        /// angle between both
         Perpendicularity = "perpendicularity",
         /// the same, and the distance of two planes, or of an axis and a plane
         Parallelism = "parallelism",
-        /// diameter of the cylinder about the axis of the second feature that holds that of the first
+        /// diameter of the cylinder about the axis of the second feature that holds that of the
+        /// first
         Coaxiality = "coaxiality",
         /// of two axes across them
         Distance = "distance",
@@ -36,7 +38,8 @@ pub struct Relation {
     pub angle: Option<Estimate>,
     /// of the middle of the toleranced feature from the datum, m
     pub distance: Option<Estimate>,
-    /// of coaxial features: diameter of the circle about the datum in which the middle of the toleranced axis lies, m
+    /// of coaxial features: diameter of the circle about the datum in which the middle of the
+    /// toleranced axis lies, m
     pub concentricity: Option<Estimate>,
 }
 
@@ -49,8 +52,10 @@ const MOST_RELATED: usize = 24;
 
 /// Relations of features that were measured by touch, in the order of the features.
 ///
-/// - Of two planes, each to the one that reaches farther: parallelism and distance, or perpendicularity.
-/// - Of an axis and the plane that it is square to and nearest: perpendicularity; of an axis along a plane: parallelism and distance.
+/// - Of two planes, each to the one that reaches farther: parallelism and distance, or
+///   perpendicularity.
+/// - Of an axis and the plane that it is square to and nearest: perpendicularity; of an axis along
+///   a plane: parallelism and distance.
 /// - Of two parallel axes, each to the longer: coaxiality, or their distance.
 pub fn relations(features: &[Feature]) -> Vec<Relation> {
     let of_shape = |shape: Shape| -> Vec<(&Feature, &Element)> {
@@ -108,7 +113,8 @@ fn reach(element: &Element) -> f64 {
 type Related<'a> = (&'a Feature, &'a Element);
 
 impl Relation {
-    /// Of two planes or two axes; `None` where they are neither parallel nor square, and of axes that are not parallel.
+    /// Of two planes or two axes; `None` where they are neither parallel nor square, and of axes
+    /// that are not parallel.
     fn of_alike<'a>(one: &Related<'a>, other: &Related<'a>) -> Option<Self> {
         let (toleranced, datum) = if reach(one.1) > reach(other.1) {
             (other, one)

@@ -1,4 +1,5 @@
-//! Round openings of an open mesh: where a sheet ends in a circle there is a hole, though it has no wall.
+//! Round openings of an open mesh: where a sheet ends in a circle there is a hole, though it has no
+//! wall.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
@@ -31,16 +32,19 @@ struct Loop {
     faces: Vec<u32>,
 }
 
-/// A round opening has at least so many corners: a missing face or the faces around a missing vertex have fewer.
+/// A round opening has at least so many corners: a missing face or the faces around a missing
+/// vertex have fewer.
 const LEAST_CORNERS: usize = 12;
-/// Its corners are off the circle by at most this share of the radius, and by this in root mean square.
+/// Its corners are off the circle by at most this share of the radius, and by this in root mean
+/// square.
 const OFF: f64 = 0.05;
 const OFF_ROOT_MEAN_SQUARE: f64 = 0.025;
 /// Seen from the middle no edge spans more than this, rad: 45°.
 const WIDEST: f64 = PI / 4.0;
 /// The edges go around once, without going back by more than this share of it.
 const BACK: f64 = 0.05;
-/// The part around an opening faces out of it: cosine of 66°. That of a wall which ends there does not.
+/// The part around an opening faces out of it: cosine of 66°. That of a wall which ends there does
+/// not.
 const FACING: f64 = 0.4;
 /// So much of the edges has to.
 const FACING_SHARE: f64 = 0.9;
@@ -49,7 +53,8 @@ const FLAT: f64 = 0.03;
 /// … to this, rad; otherwise its shape decides.
 const AXIS: f64 = 0.0087;
 
-/// All round openings, in order of their first faces. The longest border of each piece is where the piece ends.
+/// All round openings, in order of their first faces. The longest border of each piece is where the
+/// piece ends.
 pub(super) fn rims(parted: &Parted) -> Vec<RoundOpening> {
     let loops = loops(&parted.facets);
     let mut longest: BTreeMap<u32, (f64, usize)> = BTreeMap::new();

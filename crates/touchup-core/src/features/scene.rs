@@ -96,7 +96,8 @@ impl<'a> Parted<'a> {
         (number != NONE).then_some(number as usize)
     }
 
-    /// How far along the unit vector `direction` from `from` a segment's surface is left, m; `None` where it is not met, and for cones.
+    /// How far along the unit vector `direction` from `from` a segment's surface is left, m; `None`
+    /// where it is not met, and for cones.
     pub fn exit(&self, number: usize, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<f64> {
         match &self.segment(number).primitive {
             Primitive::Plane(plane) => plane.along(from, direction),
@@ -110,8 +111,8 @@ impl<'a> Parted<'a> {
         matches!(self.segment(number).primitive, Primitive::Cylinder(cylinder) if !cylinder.concave)
     }
 
-    /// The plane, or the cylinder with the material inside, that most of some rings lie on which faces along `direction`, and its share of
-    /// them.
+    /// The plane, or the cylinder with the material inside, that most of some rings lie on which
+    /// faces along `direction`, and its share of them.
     ///
     /// - as [`Self::plane_around`]
     pub fn land_around(
@@ -130,7 +131,8 @@ impl<'a> Parted<'a> {
         self.surface_around(around, middle, direction, radii, reach, is_land)
     }
 
-    /// The plane that most of some rings lie on which faces along `direction`, and its share of them.
+    /// The plane that most of some rings lie on which faces along `direction`, and its share of
+    /// them.
     ///
     /// - `middle`, `radii`: of the rings, square to `direction`, m
     /// - `reach`: how far the plane may be, m

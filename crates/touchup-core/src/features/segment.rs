@@ -56,8 +56,9 @@ impl Segmentation {
         number as usize
     }
 
-    /// Lets each round surface of a drawing take the pieces beside it that lie on its chords as a whole: a tessellation puts corners there
-    /// where a neighbour needs one, and its facets may then look like planes of their own.
+    /// Lets each round surface of a drawing take the pieces beside it that lie on its chords as a
+    /// whole: a tessellation puts corners there where a neighbour needs one, and its facets may
+    /// then look like planes of their own.
     ///
     /// - `tolerance`: how far chords are off the surface, m.
     pub(super) fn join_chords(&mut self, facets: &Facets, tolerance: f64) {

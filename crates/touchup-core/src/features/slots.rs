@@ -18,7 +18,8 @@ use crate::numeric::{mean, without_repeats};
 pub(super) struct Slot {
     /// numbers of the walls; none where contacts alone show them
     pub walls: Vec<usize>,
-    /// numbers of the segments that end it, `None` where it is open or ends at nothing that has a name
+    /// numbers of the segments that end it, `None` where it is open or ends at nothing that has a
+    /// name
     pub ends: [Option<usize>; 2],
     /// of its ends
     pub shape: Ends,
@@ -71,7 +72,8 @@ const SQUARE: f64 = 0.15;
 const SAMPLES: usize = 60;
 /// Share of the smaller wall that faces the other.
 const LEAST_SHARE: f64 = 0.2;
-/// A half-round end covers these shares of a turn, and is this much on its side of the slot (cosine).
+/// A half-round end covers these shares of a turn, and is this much on its side of the slot
+/// (cosine).
 const END_TURN: std::ops::Range<f64> = 0.42..0.75;
 const AWAY: f64 = 0.7;
 /// Axes of both ends are parallel within 12°: short, they hardly have one.
@@ -85,7 +87,8 @@ pub(super) const LONG: f64 = 1.2;
 pub(super) const LONG_BOX: f64 = 2.0;
 /// A slot that is open at an end or has no floor is not wider than this many depths.
 pub(super) const WIDE: f64 = 3.0;
-/// A pocket or a closed slot is not wider than this many depths: shallower is a step that an uneven surface has too.
+/// A pocket or a closed slot is not wider than this many depths: shallower is a step that an uneven
+/// surface has too.
 pub(super) const SHALLOW: f64 = 12.0;
 /// A pocket is at least as long as wide, but for what the sides of a square one differ by.
 pub(super) const SQUARISH: f64 = 0.95;
@@ -151,7 +154,8 @@ pub(super) fn slots(
     )
 }
 
-/// Slots of which both half-round ends are there: what is between them may be in pieces, or hardly there.
+/// Slots of which both half-round ends are there: what is between them may be in pieces, or hardly
+/// there.
 fn between_round_ends(parted: &Parted, of_face: &[u32], walls: &[Wall]) -> Vec<Slot> {
     let is_end =
         |wall: &&Wall| wall.is_concave && !wall.is_cone() && END_TURN.contains(&wall.coverage);
@@ -291,8 +295,8 @@ fn is_same_slot(one: &Slot, other: &Slot) -> bool {
 /// What lies across from a point of a wall.
 struct View {
     from: Point3<f64>,
-    /// faces on the line along the normal: how far, m, and of which segment; up to the first that is no part of the wall itself,
-    /// however wide the void
+    /// faces on the line along the normal: how far, m, and of which segment; up to the first that
+    /// is no part of the wall itself, however wide the void
     met: Vec<(f64, u32)>,
 }
 
@@ -417,8 +421,8 @@ pub(super) fn samples(parted: &Parted, number: usize) -> Vec<Point3<f64>> {
     points
 }
 
-/// Planes and cylinders that fall away from one of the walls, square to both: around an opening. With the outward direction at the
-/// middle of the void.
+/// Planes and cylinders that fall away from one of the walls, square to both: around an opening.
+/// With the outward direction at the middle of the void.
 fn lands(
     parted: &Parted,
     borders: &Borders,
@@ -571,7 +575,8 @@ fn is_wall_aslant(
     ASLANT.contains(&-normal.dot(along)) && normal.dot(out).abs() < SQUARE
 }
 
-/// The half-round end about a point: where the wall has few touches it may be in pieces, and the line meet another.
+/// The half-round end about a point: where the wall has few touches it may be in pieces, and the
+/// line meet another.
 fn round_end_about(
     parted: &Parted,
     middle: &Point3<f64>,

@@ -1,7 +1,8 @@
-//! Features followed while they are touched: the same number for the same feature, and new touches in its numbers at once.
+//! Features followed while they are touched: the same number for the same feature, and new touches
+//! in its numbers at once.
 //!
-//! [`Tracker::renew`] detects in the whole mesh; between two detections [`Tracker::update`] takes new touches into the features
-//! that they are on, and leaves all others as they are.
+//! [`Tracker::renew`] detects in the whole mesh; between two detections [`Tracker::update`] takes
+//! new touches into the features that they are on, and leaves all others as they are.
 
 use nalgebra::Vector3;
 
@@ -31,7 +32,8 @@ pub struct Tracker {
 const SAME_PLACE: f64 = 0.5;
 /// … and their axes within 30°.
 const SAME_AXIS: f64 = 0.866;
-/// A touch is of a feature when it is off its surface by no more than this share of the ball's radius …
+/// A touch is of a feature when it is off its surface by no more than this share of the ball's
+/// radius …
 const NEAR_RADII: f64 = 0.15;
 /// … and its normal by no more than 40°.
 const ALIKE: f64 = 0.77;
@@ -86,7 +88,8 @@ impl Tracker {
         self.until_ns = touches.last().map(|last| last.stamp_ns);
     }
 
-    /// Share of the mesh's area left out of the last detection on the whole mesh; `None` before the first.
+    /// Share of the mesh's area left out of the last detection on the whole mesh; `None` before the
+    /// first.
     pub fn unexplained(&self) -> Option<f64> {
         self.unexplained
     }
@@ -97,11 +100,12 @@ impl Tracker {
         self.next_id - 1
     }
 
-    /// Takes the touches that came since into the holes, bosses, slots and pockets that they are on; returns the ids of
-    /// those.
+    /// Takes the touches that came since into the holes, bosses, slots and pockets that they are
+    /// on; returns the ids of those.
     ///
-    /// - `touches`: all of them, as for [`Self::renew`]. When some that were there are gone, as after an undone stroke,
-    ///   nothing changes until the next detection in the whole mesh: features name touches by number.
+    /// - `touches`: all of them, as for [`Self::renew`]. When some that were there are gone, as
+    ///   after an undone stroke, nothing changes until the next detection in the whole mesh:
+    ///   features name touches by number.
     pub fn update(&mut self, touches: &[ProbedPoint]) -> Vec<u32> {
         let last = self
             .seen
@@ -298,5 +302,6 @@ impl Feature {
     }
 }
 
-/// How well the axis is known from the last detection, rad: 1°, so that touches at one height are enough.
+/// How well the axis is known from the last detection, rad: 1°, so that touches at one height are
+/// enough.
 const AXIS_KNOWN: f64 = 0.0175;

@@ -33,13 +33,15 @@ pub(super) struct Wall {
     pub felt_turn: f64,
     /// share of what it is between its ends that its faces cover
     pub filled: f64,
-    /// unit vector from the axis to the middle of the parts of the turn that it covers; 0 where there is none
+    /// unit vector from the axis to the middle of the parts of the turn that it covers; 0 where
+    /// there is none
     pub towards: Vector3<f64>,
 }
 
 /// Into so many parts a turn is divided.
 const PARTS: usize = 72;
-/// Contacts over this share of a turn are all around: those on the end of a slot, or in a notch, are not.
+/// Contacts over this share of a turn are all around: those on the end of a slot, or in a notch,
+/// are not.
 pub(super) const ALL_AROUND: f64 = 0.75;
 /// Axes of one wall differ by less: 6°.
 const SAME_AXIS: f64 = 0.9945;
@@ -243,7 +245,8 @@ fn span_of(angles: [f64; 3]) -> [f64; 2] {
     ]
 }
 
-/// The share of a turn that spans cover together, but for gaps of less than a part: the same however the turn is counted.
+/// The share of a turn that spans cover together, but for gaps of less than a part: the same
+/// however the turn is counted.
 fn covered_share(spans: Vec<[f64; 2]>) -> f64 {
     let begun = spans
         .into_iter()

@@ -1,7 +1,8 @@
 //! The least largest residual of linear equations, exactly.
 //!
-//! Of rows a and values r it finds the x with the least t such that |r − a·x| ≤ t. That is a linear programme; its dual has a basis of as many
-//! rows as there are unknowns, t included, and one row is exchanged for another until no residual is above t \[Stiefel 1960\].
+//! Of rows a and values r it finds the x with the least t such that |r − a·x| ≤ t. That is a linear
+//! programme; its dual has a basis of as many rows as there are unknowns, t included, and one row
+//! is exchanged for another until no residual is above t \[Stiefel 1960\].
 
 use nalgebra::{SMatrix, SVector};
 
@@ -9,14 +10,16 @@ use nalgebra::{SMatrix, SVector};
 const MOST_EXCHANGES: usize = 60;
 /// A residual is above t when it is so by this share of the largest value: some thousand roundings.
 const ABOVE: f64 = 1e-12;
-/// Where rounding ends the exchange, its result is no farther from the best than this share of the largest value.
+/// Where rounding ends the exchange, its result is no farther from the best than this share of the
+/// largest value.
 const NEAR: f64 = 1e-6;
-/// Bound of each unknown, in units of the largest value over the largest entry of its column: beyond it the rows do not determine it.
+/// Bound of each unknown, in units of the largest value over the largest entry of its column:
+/// beyond it the rows do not determine it.
 const BOUND: f64 = 1e5;
 /// A direction is exchanged against no row that it moves by less than this: below is rounding.
 const LEAST_PIVOT: f64 = 1e-11;
-/// By so little, scaled, the aim is turned, so that no two rows leave the basis at once: rows of regular grids would, and the exchange might
-/// go in a circle. It costs the same share of t.
+/// By so little, scaled, the aim is turned, so that no two rows leave the basis at once: rows of
+/// regular grids would, and the exchange might go in a circle. It costs the same share of t.
 const TURN: f64 = 1e-10;
 
 /// One inequality g·y ≥ h of the basis.
@@ -26,9 +29,11 @@ struct Bounded<const N: usize> {
     least: f64,
 }
 
-/// The x of the least largest |value − row·x|, and that residual; `None` where the exchange does not end.
+/// The x of the least largest |value − row·x|, and that residual; `None` where the exchange does
+/// not end.
 ///
-/// - `rows`: each with a last entry that is not looked at, in the place of the residual itself; x has 0 there.
+/// - `rows`: each with a last entry that is not looked at, in the place of the residual itself; x
+///   has 0 there.
 pub(super) fn chebyshev<const N: usize>(
     rows: &[SVector<f64, N>],
     values: &[f64],
@@ -171,7 +176,8 @@ mod tests {
         );
     }
 
-    /// No small step in any direction makes the largest residual less: the problem is convex, so it is the least.
+    /// No small step in any direction makes the largest residual less: the problem is convex, so it
+    /// is the least.
     #[test]
     fn no_step_makes_the_largest_residual_less() {
         let mut rng = rand_pcg::Pcg64::seed_from_u64(7);

@@ -7,11 +7,14 @@ use super::element::{Element, Shape};
 /// A direction is across another when its sine is above this, and along it below: 10°.
 const APART: f64 = 0.17;
 
-/// The frame of a datum system, as its pose in O, by the rule of 3-2-1; `None` where the datums do not determine one.
+/// The frame of a datum system, as its pose in O, by the rule of 3-2-1; `None` where the datums do
+/// not determine one.
 ///
-/// A gives z: its normal, or its axis. x is across z: the normal of B, or its axis; of an axis B along z it comes from C, from B to another axis
-/// along z or along the normal of C. Each coordinate of the origin comes from the first datum that fixes it: a plane that along its
-/// normal, through the middle of what was touched, an axis both across itself, where it meets the plane A.
+/// A gives z: its normal, or its axis. x is across z: the normal of B, or its axis; of an axis B
+/// along z it comes from C, from B to another axis along z or along the normal of C. Each
+/// coordinate of the origin comes from the first datum that fixes it: a plane that along its
+/// normal, through the middle of what was touched, an axis both across itself, where it meets the
+/// plane A.
 pub fn datum_frame([a, b, c]: [&Element; 3]) -> Option<Isometry3<f64>> {
     let z = a.direction;
     let across = |v: Vector3<f64>| v - z * v.dot(&z);

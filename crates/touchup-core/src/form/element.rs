@@ -1,4 +1,5 @@
-//! Fitted axes and planes as the elements of relations: how well they are known, and how far they were touched.
+//! Fitted axes and planes as the elements of relations: how well they are known, and how far they
+//! were touched.
 
 use nalgebra::{Matrix6, Point3, SymmetricEigen, Vector3, Vector6};
 
@@ -20,9 +21,11 @@ pub struct Element {
     pub point: Point3<f64>,
     /// along an axis; the outward normal of a plane; unit vector
     pub direction: Vector3<f64>,
-    /// covariance of small changes of point and direction, m and rad: without what the touches of all elements have in common
+    /// covariance of small changes of point and direction, m and rad: without what the touches of
+    /// all elements have in common
     pub covariance: Matrix6<f64>,
-    /// standard deviation of what all planes have in common along their normals, m: the calibration of the ball's radius
+    /// standard deviation of what all planes have in common along their normals, m: the calibration
+    /// of the ball's radius
     pub calibration: f64,
     /// how far it was touched: both ends of an axis, corners of what was touched of a plane; m
     pub extent: Vec<Point3<f64>>,

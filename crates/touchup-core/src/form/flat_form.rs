@@ -89,7 +89,8 @@ pub fn flat_form(
     let blocks: Vec<Range<usize>> = (REFERENCE..count).map(|term| term..term + 1).collect();
     let profile = Profile::of(&rows, REFERENCE, blocks)?;
 
-    // within a quarter of the shortest undulation of a touch: a polynomial of degree n has n/2 of them over a length of 2
+    // within a quarter of the shortest undulation of a touch: a polynomial of degree n has n/2 of
+    // them over a length of 2
     let shortest = profile
         .sought
         .iter()
@@ -123,7 +124,8 @@ pub fn flat_form(
     })
 }
 
-/// Unit vectors in a plane along the sides of the rectangle that its points fill: along their principal axes.
+/// Unit vectors in a plane along the sides of the rectangle that its points fill: along their
+/// principal axes.
 fn long_sides(
     points: &[FormPoint],
     on_plane: &Point3<f64>,

@@ -1,9 +1,10 @@
 //! The longest undulations of noisy points, by weighted least squares.
 //!
-//! Raw points are as far apart as the noise of the outermost ones: the more points, the wider. So the deviation is a sum of few terms, long
-//! undulations as a filter of ISO 12181 or 12781 leaves them, and only terms that stand out of the noise are part of it: they are taken up one
-//! after another, each time the one that explains most. Points of one group share their error and weigh as one; how large the errors are the
-//! residuals of all terms together say.
+//! Raw points are as far apart as the noise of the outermost ones: the more points, the wider. So
+//! the deviation is a sum of few terms, long undulations as a filter of ISO 12181 or 12781 leaves
+//! them, and only terms that stand out of the noise are part of it: they are taken up one after
+//! another, each time the one that explains most. Points of one group share their error and weigh
+//! as one; how large the errors are the residuals of all terms together say.
 
 use std::ops::Range;
 
@@ -53,7 +54,8 @@ const LEAST_SHARE: f64 = 0.1;
 const LEAST_REFERENCE: f64 = 1e-7;
 /// Groups for each term, at least.
 const GROUPS_PER_TERM: usize = 3;
-/// From so many spare groups on the residuals say how large the errors are; with fewer these are no less than stated.
+/// From so many spare groups on the residuals say how large the errors are; with fewer these are no
+/// less than stated.
 const SPARE_GROUPS: usize = 20;
 /// Draws of the errors, in pairs of opposite sign: their spread is known to 7 %.
 const PAIRS: usize = 50;
@@ -69,9 +71,11 @@ pub(super) struct Profile {
     blocks: Vec<Range<usize>>,
     /// of all terms; 0 where not found
     coefficients: DVector<f64>,
-    /// of terms found: columns whose products with independent normal numbers are errors of the coefficients
+    /// of terms found: columns whose products with independent normal numbers are errors of the
+    /// coefficients
     root: DMatrix<f64>,
-    /// least length of the first term of each block at which it is found, m; 0 where it was not sought
+    /// least length of the first term of each block at which it is found, m; 0 where it was not
+    /// sought
     least_found: Vec<f64>,
     /// root mean square of what the terms that are not found hold together beyond noise, m
     hidden: f64,
@@ -259,7 +263,8 @@ impl Sums {
         Some(choice)
     }
 
-    /// Numbers of the blocks that are no reference and that so many groups carry, and all terms that the points can tell apart.
+    /// Numbers of the blocks that are no reference and that so many groups carry, and all terms
+    /// that the points can tell apart.
     fn sought(
         &self,
         blocks: &[Range<usize>],
@@ -286,7 +291,8 @@ impl Sums {
         Some((sought, all))
     }
 
-    /// Numbers of the blocks that stand out of the noise, and their terms with those of the reference.
+    /// Numbers of the blocks that stand out of the noise, and their terms with those of the
+    /// reference.
     fn found(
         &self,
         blocks: &[Range<usize>],
@@ -321,14 +327,16 @@ impl Sums {
     }
 }
 
-/// So much two squares of normal numbers have together by chance in one of so many trials: more than x with probability exp(−x/2).
+/// So much two squares of normal numbers have together by chance in one of so many trials: more
+/// than x with probability exp(−x/2).
 fn limit(trials: usize, chance: f64) -> f64 {
     2.0 * (trials.max(1) as f64 / chance).ln()
 }
 
 impl Profile {
     /// - `reference`: how many of the first terms are the reference, which is no deviation.
-    /// - `blocks`: terms that are found together or not at all, behind the reference, the longest undulations first.
+    /// - `blocks`: terms that are found together or not at all, behind the reference, the longest
+    ///   undulations first.
     /// - returns: `None` where the points do not determine the reference.
     pub fn of(rows: &[Row], reference: usize, blocks: Vec<Range<usize>>) -> Option<Self> {
         let count = blocks.last().map_or(reference, |last| last.end);
@@ -347,7 +355,8 @@ impl Profile {
         }
         let left = (sums.explained(&all) - sums.explained(&choice)).max(0.0) / excess;
         let rest = all.terms.len().saturating_sub(choice.terms.len()) as f64;
-        // noise alone has its mean there and scatters by √(2 rest) about it: a quarter of that goes without saying
+        // noise alone has its mean there and scatters by √(2 rest) about it: a quarter of that goes
+        // without saying
         let beyond = (left - rest - (rest / 8.0).sqrt()).max(0.0);
         let (mut coefficients, solution) = (DVector::zeros(count), sums.solution(&choice));
         let lower = (&choice.inverse * excess).cholesky()?.unpack();
@@ -370,11 +379,14 @@ impl Profile {
 
     /// Sizes of the deviation that some blocks make, each without the bias of noise.
     ///
-    /// Noise makes any size larger. What it adds is found by adding errors, as large as those of the coefficients, once more \[Efron and
-    /// Tibshirani 1993, ch. 10\], and taken off; their spread is the uncertainty. Where no block was found the size is 0, and its
-    /// uncertainty the root mean square of a size that is equally likely anything up to the least that would have been found.
+    /// Noise makes any size larger. What it adds is found by adding errors, as large as those of
+    /// the coefficients, once more \[Efron and Tibshirani 1993, ch. 10\], and taken off; their
+    /// spread is the uncertainty. Where no block was found the size is 0, and its uncertainty the
+    /// root mean square of a size that is equally likely anything up to the least that would have
+    /// been found.
     ///
-    /// - `places`: terms at the places at which the deviation is taken, all that was touched and nothing else.
+    /// - `places`: terms at the places at which the deviation is taken, all that was touched and
+    ///   nothing else.
     /// - `sizes`: of deviations at these, m.
     /// - returns: `None` where no block was sought.
     pub fn sizes<const S: usize>(

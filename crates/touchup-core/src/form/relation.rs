@@ -1,11 +1,13 @@
 //! Orientation, location and distance of features, by their fitted axes and planes (ISO 1101).
 //!
-//! The first element of each function is the toleranced one, whose extent counts; the second is the datum. A value changes with the changes of
-//! all elements, taken one standard deviation at a time in each independent direction, ± √n of it for n directions: mean and spread over these
-//! places are exact for linear and square functions. What all touches have in common is changed once, for all elements together.
+//! The first element of each function is the toleranced one, whose extent counts; the second is the
+//! datum. A value changes with the changes of all elements, taken one standard deviation at a time
+//! in each independent direction, ± √n of it for n directions: mean and spread over these places
+//! are exact for linear and square functions. What all touches have in common is changed once, for
+//! all elements together.
 //!
-//! Widths and diameters cannot be negative, so noise makes them larger: w² by its variance, which is taken off. A perfect one so has 0 within its
-//! uncertainty.
+//! Widths and diameters cannot be negative, so noise makes them larger: w² by its variance, which
+//! is taken off. A perfect one so has 0 within its uncertainty.
 
 use nalgebra::{Point3, Vector3, Vector6};
 
@@ -13,8 +15,9 @@ use super::datum::datum_frame;
 use super::element::{Element, Shape};
 use super::profile::Estimate;
 
-/// Spread of the values of some elements about that of the elements themselves: the value, mean square of all, and mean square of their
-/// differences from the value. `None` where one is not finite.
+/// Spread of the values of some elements about that of the elements themselves: the value, mean
+/// square of all, and mean square of their differences from the value. `None` where one is not
+/// finite.
 fn spread(elements: &[&Element], value: impl Fn(&[Element]) -> Option<f64>) -> Option<[f64; 3]> {
     let own: Vec<Element> = elements.iter().map(|&element| element.clone()).collect();
     let here = value(&own).filter(|x| x.is_finite())?;
@@ -73,7 +76,8 @@ pub fn angle(a: &Element, b: &Element) -> Option<Estimate> {
     size(&[a, b], between)
 }
 
-/// Whether directions that are to be alike (axis and axis, normal and normal, axis and normal of a square plane) belong to parallelism.
+/// Whether directions that are to be alike (axis and axis, normal and normal, axis and normal of a
+/// square plane) belong to parallelism.
 fn is_parallelism(a: Shape, b: Shape, is_aligned: bool) -> bool {
     (a == b) == is_aligned
 }
@@ -83,7 +87,8 @@ fn is_parallelism(a: Shape, b: Shape, is_aligned: bool) -> bool {
 pub struct Orientation {
     /// whether the features are to be parallel, and not perpendicular
     pub is_parallel: bool,
-    /// width of the zone between parallel planes, or diameter of the cylinder, that holds the toleranced feature over its extent, m
+    /// width of the zone between parallel planes, or diameter of the cylinder, that holds the
+    /// toleranced feature over its extent, m
     pub zone: Estimate,
     /// by which the angle is off 0° or 90°, rad
     pub off: Estimate,
@@ -91,8 +96,9 @@ pub struct Orientation {
 
 /// Parallelism or perpendicularity to a datum, whichever is nearer.
 ///
-/// Directions that are to be alike deviate in two components, and the zone is as wide as the extent along the worse (of a toleranced axis: a
-/// cylinder). Those that are to be square deviate in one, and may turn about the other.
+/// Directions that are to be alike deviate in two components, and the zone is as wide as the extent
+/// along the worse (of a toleranced axis: a cylinder). Those that are to be square deviate in one,
+/// and may turn about the other.
 pub fn orientation(toleranced: &Element, datum: &Element) -> Option<Orientation> {
     let is_aligned =
         toleranced.direction.dot(&datum.direction).abs() > std::f64::consts::FRAC_1_SQRT_2;
@@ -133,7 +139,8 @@ fn from_axis(p: &Point3<f64>, axis: &Element) -> Vector3<f64> {
     v - axis.direction * v.dot(&axis.direction)
 }
 
-/// Coaxiality, m: diameter of the cylinder about the axis of the datum that holds the toleranced axis over its extent. `None` for planes.
+/// Coaxiality, m: diameter of the cylinder about the axis of the datum that holds the toleranced
+/// axis over its extent. `None` for planes.
 pub fn coaxiality(toleranced: &Element, datum: &Element) -> Option<Estimate> {
     let is_round = [toleranced, datum].iter().all(|e| e.shape == Shape::Axis);
     let diameter = |e: &[Element]| {
@@ -145,7 +152,8 @@ pub fn coaxiality(toleranced: &Element, datum: &Element) -> Option<Estimate> {
     size(&[toleranced, datum], diameter).filter(|_| is_round)
 }
 
-/// Concentricity, m: diameter of the circle about the axis of the datum that holds the middle of the toleranced axis. `None` for planes.
+/// Concentricity, m: diameter of the circle about the axis of the datum that holds the middle of
+/// the toleranced axis. `None` for planes.
 pub fn concentricity(toleranced: &Element, datum: &Element) -> Option<Estimate> {
     let is_round = [toleranced, datum].iter().all(|e| e.shape == Shape::Axis);
     size(&[toleranced, datum], |e| {
@@ -154,7 +162,8 @@ pub fn concentricity(toleranced: &Element, datum: &Element) -> Option<Estimate> 
     .filter(|_| is_round)
 }
 
-/// Distance of the middle of what was touched from the datum, m: from a plane along its normal, from an axis across it.
+/// Distance of the middle of what was touched from the datum, m: from a plane along its normal,
+/// from an axis across it.
 pub fn distance(a: &Element, datum: &Element) -> Option<Estimate> {
     let apart = |e: &[Element]| match (e[0].shape, e[1].shape) {
         (_, Shape::Plane) => Some((e[0].point - e[1].point).dot(&e[1].direction).abs()),
@@ -164,10 +173,11 @@ pub fn distance(a: &Element, datum: &Element) -> Option<Estimate> {
     number(&[a, datum], apart)
 }
 
-/// Position, m: diameter of the cylinder about the true axis that holds the toleranced axis over its extent, or twice the farthest place of a
-/// toleranced plane from the true one (ISO 5458).
+/// Position, m: diameter of the cylinder about the true axis that holds the toleranced axis over
+/// its extent, or twice the farthest place of a toleranced plane from the true one (ISO 5458).
 ///
-/// - `system`: the datums A, B and C, see [`datum_frame`]; `true_place`, `true_direction`: in their frame, m and a unit vector.
+/// - `system`: the datums A, B and C, see [`datum_frame`]; `true_place`, `true_direction`: in their
+///   frame, m and a unit vector.
 pub fn position(
     toleranced: &Element,
     system: [&Element; 3],
@@ -347,7 +357,8 @@ mod tests {
         );
     }
 
-    /// Calibrated alike, two faces that look to the same side are displaced alike; two that look away from one another are not.
+    /// Calibrated alike, two faces that look to the same side are displaced alike; two that look
+    /// away from one another are not.
     #[test]
     fn a_calibration_goes_twice_into_a_thickness_and_not_into_a_step() {
         let with = |element: Element| Element {
@@ -367,8 +378,8 @@ mod tests {
         );
     }
 
-    /// Elements with errors as large as they state: of each relation the root mean square of error over uncertainty, both where
-    /// it is perfect and where it is not.
+    /// Elements with errors as large as they state: of each relation the root mean square of error
+    /// over uncertainty, both where it is perfect and where it is not.
     #[test]
     fn relations_are_off_by_their_uncertainty() {
         let plane =

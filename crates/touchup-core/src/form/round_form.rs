@@ -176,7 +176,8 @@ fn rows_of(
     (rows, places, is_high)
 }
 
-/// Angles all around that are no farther from a touch than touches are from one another, and within a quarter of the shortest undulation.
+/// Angles all around that are no farther from a touch than touches are from one another, and within
+/// a quarter of the shortest undulation.
 fn touched_angles(places: &[[f64; 2]], undulations: u32) -> Option<Vec<f64>> {
     let mut angles: Vec<f64> = places
         .iter()
@@ -268,7 +269,8 @@ fn part_of([angle, height]: &[f64; 2]) -> [usize; 2] {
     [part(turn, PARTS[0]), part((height + 1.0) / 2.0, PARTS[1])]
 }
 
-/// Of all terms, in the middle of the turn of each part of the wall, at its touched height that is farthest from half the height.
+/// Of all terms, in the middle of the turn of each part of the wall, at its touched height that is
+/// farthest from half the height.
 fn cylindricity(profile: &Profile, all: &[Term], places: &[[f64; 2]]) -> Option<Deviation> {
     let mut of_part: Vec<Option<[f64; 2]>> = vec![None; PARTS[0] * PARTS[1]];
     for place in places {

@@ -1,8 +1,11 @@
-//! Form of points as they are: the zone about the reference of least squares, and the narrowest zone of all.
+//! Form of points as they are: the zone about the reference of least squares, and the narrowest
+//! zone of all.
 //!
-//! ISO 1101 asks for the narrowest zone that holds the feature (minimum zone); ISO 12181, 12780, 12781 and 12180 also name the reference of
-//! least squares, about which the deviation is from the lowest to the highest point. Both are iterated from linear equations about the last
-//! reference. Points are taken without error: noise widens either zone, see [`super::round_form()`] for points that have some.
+//! ISO 1101 asks for the narrowest zone that holds the feature (minimum zone); ISO 12181, 12780,
+//! 12781 and 12180 also name the reference of least squares, about which the deviation is from the
+//! lowest to the highest point. Both are iterated from linear equations about the last reference.
+//! Points are taken without error: noise widens either zone, see [`super::round_form()`] for points
+//! that have some.
 
 use nalgebra::{Point2, Point3, SVector, SymmetricEigen, Vector2, Vector3};
 
@@ -22,12 +25,14 @@ pub struct Zone {
 const MOST_STEPS: usize = 40;
 /// Halvings of a step that makes the zone wider.
 const MOST_HALVINGS: usize = 30;
-/// A zone that a step makes narrower by less than this share is the narrowest: some thousand roundings of a coordinate.
+/// A zone that a step makes narrower by less than this share is the narrowest: some thousand
+/// roundings of a coordinate.
 const SETTLED: f64 = 1e-10;
 /// Directions in which each point of an axis is first held inside of a cylinder.
 const FIRST_DIRECTIONS: usize = 8;
 
-/// Deviations from a reference, m, with their derivatives by its freedoms; the last entry is not used.
+/// Deviations from a reference, m, with their derivatives by its freedoms; the last entry is not
+/// used.
 type Linear<const N: usize> = (Vec<SVector<f64, N>>, Vec<f64>);
 
 /// Width of a zone, m.
@@ -74,7 +79,8 @@ fn least_squares<const N: usize>(
     }))
 }
 
-/// Both zones of values from which a linear reference is taken: deviations from a reference near to both.
+/// Both zones of values from which a linear reference is taken: deviations from a reference near to
+/// both.
 ///
 /// - `rows`: of the reference, one of them constant; the last entry is not used.
 pub(super) fn linear_zone<const N: usize>(
@@ -160,7 +166,8 @@ fn principal(points: &[Point3<f64>]) -> Option<(Point3<f64>, [Vector3<f64>; 3])>
     ))
 }
 
-/// Flatness of points, m (ISO 12781): distance of the two parallel planes that hold them. `None` for fewer than 4 points.
+/// Flatness of points, m (ISO 12781): distance of the two parallel planes that hold them. `None`
+/// for fewer than 4 points.
 pub fn flatness(points: &[Point3<f64>]) -> Option<Zone> {
     let (middle, [normal, ..]) = principal(points).filter(|_| points.len() > 3)?;
     let linear = |(from, normal): &(Point3<f64>, Vector3<f64>)| {
@@ -184,8 +191,8 @@ pub fn flatness(points: &[Point3<f64>]) -> Option<Zone> {
     zone((middle, normal), linear, moved)
 }
 
-/// Straightness of points of a profile in a plane, m (ISO 12780): distance of the two parallel lines that hold them. `None` for fewer
-/// than 3 points.
+/// Straightness of points of a profile in a plane, m (ISO 12780): distance of the two parallel
+/// lines that hold them. `None` for fewer than 3 points.
 pub fn straightness(points: &[Point2<f64>]) -> Option<Zone> {
     let spatial: Vec<Point3<f64>> = points.iter().map(|p| Point3::new(p.x, p.y, 0.0)).collect();
     let (middle, [_, _, along]) = principal(&spatial).filter(|_| points.len() > 2)?;
@@ -209,8 +216,8 @@ pub fn straightness(points: &[Point2<f64>]) -> Option<Zone> {
     zone((middle.xy(), along.y.atan2(along.x)), linear, moved)
 }
 
-/// Roundness of points of a section, m (ISO 12181): difference of the radii of the two concentric circles that hold them. `None` for
-/// fewer than 4 points, or those of no circle.
+/// Roundness of points of a section, m (ISO 12181): difference of the radii of the two concentric
+/// circles that hold them. `None` for fewer than 4 points, or those of no circle.
 pub fn roundness(points: &[Point2<f64>]) -> Option<Zone> {
     let middle = mean(points.iter().map(|p| Vector3::new(p.x, p.y, 0.0))).xy();
     // x² + y² = 2 a x + 2 b y + c, about the middle [Kåsa 1976]
@@ -244,8 +251,8 @@ pub fn roundness(points: &[Point2<f64>]) -> Option<Zone> {
     )
 }
 
-/// Cylindricity of points, m (ISO 12180): difference of the radii of the two coaxial cylinders that hold them. `None` for fewer than 6
-/// points, or those of no cylinder.
+/// Cylindricity of points, m (ISO 12180): difference of the radii of the two coaxial cylinders that
+/// hold them. `None` for fewer than 6 points, or those of no cylinder.
 ///
 /// - `on_axis`, `axis`: of a cylinder near them; a unit vector.
 pub fn cylindricity(
@@ -286,7 +293,8 @@ pub fn cylindricity(
     zone((foot, *axis, radius), linear, moved)
 }
 
-/// Straightness of an axis, m (ISO 1101): diameter of the cylinder that holds the middles of its sections. `None` for fewer than 3.
+/// Straightness of an axis, m (ISO 1101): diameter of the cylinder that holds the middles of its
+/// sections. `None` for fewer than 3.
 pub fn axis_straightness(middles: &[Point3<f64>]) -> Option<Zone> {
     let (from, [_, _, along]) = principal(middles).filter(|_| middles.len() > 2)?;
     let [u, v] = tangent_basis(&along);
@@ -300,7 +308,8 @@ pub fn axis_straightness(middles: &[Point3<f64>]) -> Option<Zone> {
         })
         .collect();
     let least_squares = 2.0 * local.iter().map(|(q, _)| q.norm()).fold(0.0, f64::max);
-    // each point inside of tangents to the cylinder: first some all around, then those that face the point
+    // each point inside of tangents to the cylinder: first some all around, then those that face
+    // the point
     let row = |(q, z): &(Vector2<f64>, f64), w: &Vector2<f64>| {
         (SVector::from([w.x, w.y, w.x * z, w.y * z, 0.0]), w.dot(q))
     };
@@ -362,8 +371,8 @@ mod tests {
         (found - expected).abs() <= by
     }
 
-    /// Both circles about the centre of an ellipse touch it twice each, by turns: no narrower ring holds it. By symmetry the circle of least
-    /// squares has the same centre.
+    /// Both circles about the centre of an ellipse touch it twice each, by turns: no narrower ring
+    /// holds it. By symmetry the circle of least squares has the same centre.
     #[test]
     fn an_ellipse_is_out_of_round_by_the_difference_of_its_semi_axes() {
         let (a, b) = (5e-3, 4.95e-3);
@@ -385,7 +394,8 @@ mod tests {
             is_near(zone.minimum_zone, 50e-6, 1e-12) && is_near(zone.least_squares, 50e-6, 1e-12),
             "{zone:?}"
         );
-        // one flat of depth h beside a round rest: the narrowest zone is narrower than the one about least squares
+        // one flat of depth h beside a round rest: the narrowest zone is narrower than the one
+        // about least squares
         let flat = |t: f64| {
             4e-3 - if t < 1.0 {
                 20e-6 * (TAU * t / 2.0).sin()
@@ -402,8 +412,8 @@ mod tests {
         assert_eq!(roundness(&[Point2::new(f64::NAN, 0.0); 9]), None);
     }
 
-    /// Of z = c x y over a square of half side h the corners are ± c h², and no tilted pair of planes is closer: two opposite corners are up
-    /// and the other two down.
+    /// Of z = c x y over a square of half side h the corners are ± c h², and no tilted pair of
+    /// planes is closer: two opposite corners are up and the other two down.
     #[test]
     fn a_saddle_is_off_flat_by_its_corners_in_any_position() {
         let (c, h, turn) = (0.5, 0.01, Rotation3::from_euler_angles(0.4, 1.1, -2.0));
@@ -424,7 +434,8 @@ mod tests {
         assert_eq!(flatness(&points[..3]), None);
     }
 
-    /// The parabola y = c x² over [−h, h]: parallel lines through its ends and its vertex, c h² apart.
+    /// The parabola y = c x² over [−h, h]: parallel lines through its ends and its vertex, c h²
+    /// apart.
     #[test]
     fn a_bowed_line_is_off_straight_by_its_sagitta() {
         let (c, h) = (2.0, 5e-3);
@@ -446,7 +457,8 @@ mod tests {
         }
     }
 
-    /// A cone of slope k over a height: its radii differ by k times that, and no tilted pair of cylinders is closer together.
+    /// A cone of slope k over a height: its radii differ by k times that, and no tilted pair of
+    /// cylinders is closer together.
     #[test]
     fn a_cone_is_off_a_cylinder_by_the_difference_of_its_end_radii() {
         let (slope, height, turn) = (0.002, 8e-3, Rotation3::from_euler_angles(1.0, 0.2, 0.3));
@@ -472,7 +484,8 @@ mod tests {
         );
     }
 
-    /// Middles on a circle of radius r that climbs: the cylinder about the mean axis has the diameter 2 r. On a parabola: its sagitta.
+    /// Middles on a circle of radius r that climbs: the cylinder about the mean axis has the
+    /// diameter 2 r. On a parabola: its sagitta.
     #[test]
     fn an_axis_is_as_straight_as_the_cylinder_that_holds_it_is_thin() {
         let bow: Vec<_> = (-4..=4)

@@ -1,7 +1,8 @@
 //! Carving (case 2): what the tip passes through is not there.
 //!
-//! All faces inside the tip are displaced at once, the deepest first: the closest one along the arm from it to the centre of the
-//! ball, the others, of which only those count that the tip comes to from the front, out of the tip along the shortest path.
+//! All faces inside the tip are displaced at once, the deepest first: the closest one along the arm
+//! from it to the centre of the ball, the others, of which only those count that the tip comes to
+//! from the front, out of the tip along the shortest path.
 
 use nalgebra::{Point3, Vector3};
 
@@ -10,7 +11,8 @@ use crate::mesh::{FaceHit, FaceId, triangle};
 use crate::numeric::length_and_direction;
 use crate::stylus::{Ball, TipBody, TipPlace, TouchState};
 
-/// Faces beside the closest one that move in one update, at most: those of a ball on a scan as coarse as itself.
+/// Faces beside the closest one that move in one update, at most: those of a ball on a scan as
+/// coarse as itself.
 const MOST_OTHERS: usize = 6;
 /// An arm whose sine to the face is below this lies sideways.
 const SIDEWAYS: f64 = 0.2;
@@ -116,7 +118,8 @@ impl Refiner {
         fit
     }
 
-    /// Finds the faces deeper in the tip than `tolerance` (m), the deepest first; not the `first`, when the tip is a ball.
+    /// Finds the faces deeper in the tip than `tolerance` (m), the deepest first; not the `first`,
+    /// when the tip is a ball.
     fn gather(&mut self, place: &TipPlace, tolerance: f64, first: FaceId) {
         let (height, bound) = self.body.bound();
         let (middle, half) = (
@@ -150,7 +153,8 @@ impl Refiner {
         self.inside_faces = found;
     }
 
-    /// The deepest point of a face that the tip comes to from the front, of those that are looked at.
+    /// The deepest point of a face that the tip comes to from the front, of those that are looked
+    /// at.
     fn inside(&self, place: &TipPlace, face: FaceId) -> Option<Inside> {
         if self.deformable.is_stiff(face) {
             return None;
@@ -193,8 +197,8 @@ impl Refiner {
     }
 }
 
-/// The point of a triangle deepest in the tip, with its barycentric coordinates; of a body that is no ball, the best of the
-/// points closest to some balls along its axis.
+/// The point of a triangle deepest in the tip, with its barycentric coordinates; of a body that is
+/// no ball, the best of the points closest to some balls along its axis.
 fn deepest_point(
     body: &TipBody,
     place: &TipPlace,

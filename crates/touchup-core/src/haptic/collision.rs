@@ -1,4 +1,5 @@
-//! Self-collision: each pair of faces that could meet is tested exactly, and then left alone for as long as it cannot.
+//! Self-collision: each pair of faces that could meet is tested exactly, and then left alone for as
+//! long as it cannot.
 
 use nalgebra::{Point3, Vector3};
 
@@ -39,8 +40,8 @@ impl Pairs {
         self.travel = 0.0;
     }
 
-    /// Finds the pairs of `face` and each of `others` that are no farther apart than `margin` (m) and that `is_wanted`,
-    /// unless they share an edge: neighbours fold, they do not pierce.
+    /// Finds the pairs of `face` and each of `others` that are no farther apart than `margin` (m)
+    /// and that `is_wanted`, unless they share an edge: neighbours fold, they do not pierce.
     ///
     /// - `is_smooth`: whether two faces in a fan around this vertex cannot meet.
     pub fn add_near(
@@ -74,7 +75,8 @@ impl Pairs {
         }
     }
 
-    /// Makes room for the pairs of `faces` moving faces: a dozen neighbours over a corner each, and some more.
+    /// Makes room for the pairs of `faces` moving faces: a dozen neighbours over a corner each, and
+    /// some more.
     pub fn reserve(&mut self, faces: usize) {
         self.list.reserve(PAIRS_PER_FACE * faces);
     }
@@ -100,13 +102,15 @@ impl Pairs {
                 let [t, u] = pair.faces.map(|face| mesh.corners(face).map(&before));
                 return meet(&t, &u, pair.common, gap);
             }
-            // should the update be taken back after all, the pair is `displacement` away from where it was looked at
+            // should the update be taken back after all, the pair is `displacement` away from where
+            // it was looked at
             pair.safe_until = travel + margin(&t, &u, pair.common, gap) - displacement;
             true
         })
     }
 
-    /// Finds how far each pair can go before it could meet, where it does not now: until then no update needs to look at it.
+    /// Finds how far each pair can go before it could meet, where it does not now: until then no
+    /// update needs to look at it.
     ///
     /// - `gap`: as in [`Self::are_clear`].
     pub fn measure(&mut self, mesh: &TriMesh, gap: f64) {
@@ -147,7 +151,8 @@ fn margin(t: &TrianglePoints, u: &TrianglePoints, common: Option<[u8; 2]>, gap: 
     }
 }
 
-/// How far all of `u` lies beyond an edge of `t`, along its plane and across that edge, m; negative when it does not.
+/// How far all of `u` lies beyond an edge of `t`, along its plane and across that edge, m; negative
+/// when it does not.
 fn beside(t: &TrianglePoints, u: &TrianglePoints) -> f64 {
     let normal = (t[1] - t[0]).cross(&(t[2] - t[0]));
     let beyond = |i: usize| {
@@ -162,10 +167,12 @@ fn beside(t: &TrianglePoints, u: &TrianglePoints) -> f64 {
     (0..3).filter_map(beyond).fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// How far every vertex may move before two faces with a common corner, `i` of `t` and `j` of `u`, can meet beside it, m: while a plane
-/// through the corner has one face on either side. Tried are the planes halfway between an edge of one and an edge of the other.
+/// How far every vertex may move before two faces with a common corner, `i` of `t` and `j` of `u`,
+/// can meet beside it, m: while a plane through the corner has one face on either side. Tried are
+/// the planes halfway between an edge of one and an edge of the other.
 ///
-/// The height of a point above a plane through the corner, of a direction that stays, changes by no more than 2 m when both move by m.
+/// The height of a point above a plane through the corner, of a direction that stays, changes by no
+/// more than 2 m when both move by m.
 fn margin_between_arms(t: &TrianglePoints, i: usize, u: &TrianglePoints, j: usize) -> f64 {
     let arms_of = |triangle: &TrianglePoints, at: usize| {
         [1, 2].map(|next| triangle[(at + next) % 3] - triangle[at])
@@ -205,11 +212,11 @@ fn height_above(t: &TrianglePoints, u: &TrianglePoints) -> f64 {
     low.max(-high)
 }
 
-/// How far every vertex may move before the edge of `u` across its corner `j`, the same as corner `i` of `t`, can reach
-/// the plane of `t`, m.
+/// How far every vertex may move before the edge of `u` across its corner `j`, the same as corner
+/// `i` of `t`, can reach the plane of `t`, m.
 ///
-/// The height of a point at distance r from the corner changes by no more than 2 m + r |Δn| when all vertices move by
-/// m, and |Δn| ≤ 3 m / altitude while m is small.
+/// The height of a point at distance r from the corner changes by no more than 2 m + r |Δn| when
+/// all vertices move by m, and |Δn| ≤ 3 m / altitude while m is small.
 fn margin_at_corner(t: &TrianglePoints, i: usize, u: &TrianglePoints, j: usize) -> f64 {
     let double = (t[1] - t[0]).cross(&(t[2] - t[0]));
     let (area, normal) = length_and_direction(&double);
@@ -258,7 +265,8 @@ mod tests {
         }
     }
 
-    /// 2,000 pairs without a common corner, nearly in one plane or anywhere, moved by the margin in random directions.
+    /// 2,000 pairs without a common corner, nearly in one plane or anywhere, moved by the margin in
+    /// random directions.
     #[test]
     fn no_motion_within_the_margin_makes_faces_meet() {
         let (mut next, mut tried) = (random(), 0);

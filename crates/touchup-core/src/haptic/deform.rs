@@ -18,8 +18,8 @@ const CUT: f64 = 0.35;
 const TRIES: usize = 3;
 /// Faces within this many mean edges of a region are what it could run into.
 const MARGIN_EDGES: f64 = 0.2;
-/// By how much of the mean edge the boxes of what moves are made wider: a touch moves vertices by less while it stays on a
-/// face.
+/// By how much of the mean edge the boxes of what moves are made wider: a touch moves vertices by
+/// less while it stays on a face.
 const BOX_MARGIN_EDGES: f64 = 0.05;
 
 /// How an update ended.
@@ -27,7 +27,8 @@ const BOX_MARGIN_EDGES: f64 = 0.05;
 pub enum RegionFit {
     /// As computed.
     Whole,
-    /// Shortened, or not made at all, because the mesh would have folded, flipped, starved or met itself.
+    /// Shortened, or not made at all, because the mesh would have folded, flipped, starved or met
+    /// itself.
     CutBack,
 }
 
@@ -42,7 +43,8 @@ pub struct Footprint {
     pub patch: usize,
 }
 
-/// A mesh under refinement: the triangles, the tree over them, and what was scanned or measured where.
+/// A mesh under refinement: the triangles, the tree over them, and what was scanned or measured
+/// where.
 #[derive(Clone, Debug)]
 pub(super) struct DeformableMesh {
     pub mesh: TriMesh,
@@ -116,7 +118,8 @@ impl DeformableMesh {
         }
     }
 
-    /// The closest face nearer than `reach` (m), sooner if it is near `hint`, and `p` near what was asked for last with `nearby`.
+    /// The closest face nearer than `reach` (m), sooner if it is near `hint`, and `p` near what was
+    /// asked for last with `nearby`.
     pub fn closest(
         &self,
         p: &Point3<f64>,
@@ -152,7 +155,8 @@ impl DeformableMesh {
         }
     }
 
-    /// Makes the region that of `handle`, and looks at it again where the mesh was changed elsewhere.
+    /// Makes the region that of `handle`, and looks at it again where the mesh was changed
+    /// elsewhere.
     pub fn prepare(&mut self, region: &mut HandleRegion, handle: FaceId) {
         if region.roi.handle != Some(handle) {
             region
@@ -225,7 +229,8 @@ impl DeformableMesh {
         }
     }
 
-    /// Takes the last stroke back, or does again what was undone last; returns whether there was any.
+    /// Takes the last stroke back, or does again what was undone last; returns whether there was
+    /// any.
     pub fn change_strokes(&mut self, is_undo: bool) -> bool {
         let Self {
             strokes,
@@ -272,8 +277,8 @@ impl DeformableMesh {
         })
     }
 
-    /// Begins to take up what changed in the patch: puts vertices that moved last before that back to where they were scanned,
-    /// or are in the patch; returns whether there was any.
+    /// Begins to take up what changed in the patch: puts vertices that moved last before that back
+    /// to where they were scanned, or are in the patch; returns whether there was any.
     pub fn begin_delta(&mut self, delta: &PatchDelta) -> bool {
         let Self {
             patch: Some(patch),
@@ -310,7 +315,8 @@ impl DeformableMesh {
         !refit.is_empty()
     }
 
-    /// Takes up to `most` parts more of it, as [`crate::reconstruct::Splice::go_on`]; whether that was all.
+    /// Takes up to `most` parts more of it, as [`crate::reconstruct::Splice::go_on`]; whether that
+    /// was all.
     pub fn go_on(&mut self, delta: &PatchDelta, most: usize) -> Result<bool, MeshError> {
         let Self {
             patch: Some(patch),
@@ -440,7 +446,8 @@ impl DeformableMesh {
             let (moved, next) = (here - scanned, here + step - scanned);
             let is_far = next.norm_squared() > self.largest_move * self.largest_move
                 && next.norm() > moved.norm();
-            // the last look at what all formulas before came to: a vertex never goes where there is no place
+            // the last look at what all formulas before came to: a vertex never goes where there is
+            // no place
             if is_stiff || is_far || !is_place(&(here + step)) {
                 step = Vector3::zeros();
             }

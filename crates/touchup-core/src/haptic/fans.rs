@@ -1,4 +1,5 @@
-//! Closed fans of faces around a vertex: as long as one is a height field, its faces meet in their common corner alone.
+//! Closed fans of faces around a vertex: as long as one is a height field, its faces meet in their
+//! common corner alone.
 
 use nalgebra::{Point3, Vector3};
 
@@ -9,8 +10,8 @@ use crate::numeric::direction;
 
 /// The smooth fans around the corners of a region that moves.
 ///
-/// The faces of a closed fan whose normals are all on one side of a plane, and that go around its vertex once, have projections on
-/// that plane that lie beside each other.
+/// The faces of a closed fan whose normals are all on one side of a plane, and that go around its
+/// vertex once, have projections on that plane that lie beside each other.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Fans {
     list: Vec<CornerFan>,
@@ -92,7 +93,8 @@ impl Fans {
 
     /// Whether no two faces of a fan have come to meet.
     ///
-    /// - `normal`: after the update, of a moving face by its number, unit; within `smallest_cosine` of the mean a fan is smooth.
+    /// - `normal`: after the update, of a moving face by its number, unit; within `smallest_cosine`
+    ///   of the mean a fan is smooth.
     /// - `gap`, `before`: as in [`super::collision::Pairs::are_clear`].
     pub fn are_clear(
         &self,
@@ -113,7 +115,8 @@ impl Fans {
         })
     }
 
-    /// The mean normal of the faces around a vertex, where they are a closed fan that goes around once, all within the cosine of it.
+    /// The mean normal of the faces around a vertex, where they are a closed fan that goes around
+    /// once, all within the cosine of it.
     fn smooth_mean(
         &mut self,
         mesh: &TriMesh,
@@ -156,7 +159,8 @@ impl Fans {
     }
 }
 
-/// Whether faces between spokes follow each other all around, once as seen along `mean`, on whose side all of them are.
+/// Whether faces between spokes follow each other all around, once as seen along `mean`, on whose
+/// side all of them are.
 fn goes_around_once(spokes: &[[Spoke; 2]], mean: &Vector3<f64>) -> bool {
     let Some([(first, from), (second, to)]) = spokes.first() else {
         return false;
@@ -216,7 +220,8 @@ fn is_fan_clear(
 mod tests {
     use super::*;
 
-    /// Vertex 0 with so many others around it, from the first turn to the last one of `turns` by `height` (of a turn) above it; closed.
+    /// Vertex 0 with so many others around it, from the first turn to the last one of `turns` by
+    /// `height` (of a turn) above it; closed.
     fn fan(around: u32, turns: f64, height: impl Fn(f64) -> f64) -> TriMesh {
         let rim = |k: u32| {
             let turn = turns * f64::from(k) / f64::from(around);

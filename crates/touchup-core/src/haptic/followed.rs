@@ -1,7 +1,8 @@
 //! The patch in the mesh that the haptic update works on.
 //!
-//! What the patch knows from touches is stiff. What the update moves elsewhere, scan and guesses, is there at once, and
-//! for the moment: when the patch has caught up with that touch it is put back, and the patch has the contact.
+//! What the patch knows from touches is stiff. What the update moves elsewhere, scan and guesses,
+//! is there at once, and for the moment: when the patch has caught up with that touch it is put
+//! back, and the patch has the contact.
 
 use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::reconstruct::{Splice, Support};

@@ -17,8 +17,8 @@ parameters! {
     /// Limits that keep a mesh sound.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct GuardParams in "guard" {
-        /// Smallest twice area over longest edge squared: 0.15 is a triangle stretched sixfold; of a triangle that was scanned thin
-        /// nine tenths of what it had.
+        /// Smallest twice area over longest edge squared: 0.15 is a triangle stretched sixfold; of
+        /// a triangle that was scanned thin nine tenths of what it had.
         ///
         /// [`Self::SCANNED_SHARE`] of it, where that is less: it must not hold all around it.
         smallest_quality: f64 = 0.15, "smallest_quality" [ONE, 0, 0.87];
@@ -40,21 +40,24 @@ parameters! {
 }
 
 impl GuardParams {
-    /// See [`Self::smallest_quality`]. To follow a touch a thin triangle needs to lose little. With a share of 0.8 a vertex of a
-    /// crumpled scan strayed, with 0.3 one more face was inverted on another.
+    /// See [`Self::smallest_quality`]. To follow a touch a thin triangle needs to lose little. With
+    /// a share of 0.8 a vertex of a crumpled scan strayed, with 0.3 one more face was inverted on
+    /// another.
     pub const SCANNED_SHARE: f64 = 0.9;
 }
 
-/// Normals of a smooth region are within this cosine of their mean: 70°. Such a region is a height field over the plane
-/// across its mean normal and cannot meet itself.
+/// Normals of a smooth region are within this cosine of their mean: 70°. Such a region is a height
+/// field over the plane across its mean normal and cannot meet itself.
 const SMOOTH_COSINE: f64 = 0.35;
 /// While each normal stays within this cosine (75°), the region remains a height field.
 const STILL_SMOOTH_COSINE: f64 = 0.25;
-/// Vertices of a smooth region that each moved by less than this share of the smallest altitude since the last look turn
-/// a normal by less than 0.04 rad and change a quality by less than 12 %, so that what passed with the margins below
-/// need not be looked at again. Proof: a normal turns by at most the sum of two corner motions over the altitude.
+/// Vertices of a smooth region that each moved by less than this share of the smallest altitude
+/// since the last look turn a normal by less than 0.04 rad and change a quality by less than 12 %,
+/// so that what passed with the margins below need not be looked at again. Proof: a normal turns by
+/// at most the sum of two corner motions over the altitude.
 const UNSEEN_SHARE: f64 = 0.02;
-/// Margin on the cosine of a normal with a fixed direction; 0.04 rad change it by no more than 0.04.
+/// Margin on the cosine of a normal with a fixed direction; 0.04 rad change it by no more than
+/// 0.04.
 const COSINE_MARGIN: f64 = 0.05;
 /// Margin on the cosine between two normals, both of which turn.
 const FOLD_MARGIN: f64 = 0.1;
@@ -69,8 +72,8 @@ pub(super) struct GuardEvidence<'a> {
     pub gap: f64,
     /// positions as scanned, m
     pub scanned: &'a [Point3<f64>],
-    /// for each face the last normal scanned or measured there; zero where it was scanned without area and never touched: it has no
-    /// side to keep then, and must not hold the others
+    /// for each face the last normal scanned or measured there; zero where it was scanned without
+    /// area and never touched: it has no side to keep then, and must not hold the others
     pub normals: &'a [[f32; 3]],
 }
 
@@ -117,7 +120,8 @@ pub(super) struct Neighbourhood {
     before: Vec<FaceShape>,
     /// state after the update, for the moving ones
     after: Vec<FaceShape>,
-    /// mean normal of a smooth region; without one, the fans and the pairs in `suspects` are looked at
+    /// mean normal of a smooth region; without one, the fans and the pairs in `suspects` are looked
+    /// at
     smooth: Option<Vector3<f64>>,
     fans: Fans,
     suspects: Pairs,
@@ -148,7 +152,8 @@ fn shape_of(mesh: &TriMesh, face: FaceId) -> FaceShape {
 }
 
 impl Neighbourhood {
-    /// Makes room for a region of so many vertices: two to three faces each, three edges for two faces.
+    /// Makes room for a region of so many vertices: two to three faces each, three edges for two
+    /// faces.
     pub fn reserve(&mut self, vertices: usize) {
         let faces = 3 * vertices;
         self.before.reserve(faces);
@@ -161,7 +166,8 @@ impl Neighbourhood {
         self.reached.reserve(4 * faces);
     }
 
-    /// Collects the region again after the mesh was changed elsewhere. No vertex may move unseen then, before [`Self::bound_unseen`].
+    /// Collects the region again after the mesh was changed elsewhere. No vertex may move unseen
+    /// then, before [`Self::bound_unseen`].
     ///
     /// - `gap`: as in [`GuardEvidence`].
     pub fn refresh(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64, gap: f64) {
@@ -175,7 +181,8 @@ impl Neighbourhood {
         self.unseen = 0.0;
     }
 
-    /// Finds how far the vertices of a refreshed region may move unseen; `evidence` as in [`Self::judge`].
+    /// Finds how far the vertices of a refreshed region may move unseen; `evidence` as in
+    /// [`Self::judge`].
     pub fn bound_unseen(&mut self, mesh: &TriMesh, evidence: &GuardEvidence) {
         if let Some(mean) = self.smooth {
             self.after.clear();
@@ -267,7 +274,8 @@ impl Neighbourhood {
         if !self.near.faces.iter().all(within) {
             return None;
         }
-        // nearly always the rim's other corners reach all; at a border some are reached from the moving faces
+        // nearly always the rim's other corners reach all; at a border some are reached from the
+        // moving faces
         self.reached.clear();
         let (moving, rim) = self.ring.faces.split_at(self.ring.moving);
         for faces in [rim, moving] {
@@ -282,7 +290,8 @@ impl Neighbourhood {
         None
     }
 
-    /// Takes a motion of the vertices by `displacement` (m) if it needs no look; whether it does not.
+    /// Takes a motion of the vertices by `displacement` (m) if it needs no look; whether it does
+    /// not.
     #[inline]
     pub fn pass_unseen(&mut self, displacement: f64) -> bool {
         let passes = displacement <= self.unseen;
@@ -337,7 +346,8 @@ impl Neighbourhood {
             && self.suspects.are_clear(mesh, gap, displacement, &before)
     }
 
-    /// Whether a region that was smooth is still; sets how far its vertices may move without a look, where all of it `is_safe`.
+    /// Whether a region that was smooth is still; sets how far its vertices may move without a
+    /// look, where all of it `is_safe`.
     fn stays_smooth(&mut self, mean: &Vector3<f64>, is_safe: bool) -> bool {
         let lowest = self
             .after
@@ -409,7 +419,8 @@ impl Neighbourhood {
         Some(is_safe)
     }
 
-    /// Takes the state just looked at as the new state before; `displacement` is the largest of a vertex, m.
+    /// Takes the state just looked at as the new state before; `displacement` is the largest of a
+    /// vertex, m.
     pub fn accept(&mut self, displacement: f64) {
         self.before[..self.ring.moving].copy_from_slice(&self.after);
         self.suspects.accept(displacement);
@@ -423,7 +434,8 @@ impl Neighbourhood {
     }
 }
 
-/// Whether `faces` reach the corners already `reached`, over common corners among themselves; takes out those that do.
+/// Whether `faces` reach the corners already `reached`, over common corners among themselves; takes
+/// out those that do.
 fn reach_all(mesh: &TriMesh, faces: &mut Vec<FaceId>, reached: &mut ScratchMap) -> bool {
     loop {
         let before = faces.len();

@@ -1,7 +1,8 @@
 //! The haptic update: one sample of pose and force moves the mesh.
 //!
-//! [`Refiner::push`] does all of it: contact, closest face, face dynamics, deformation of the region around it, update of the tree. [`RefineParams::robust`] is what works on real scans, [`RefineParams::paper`]
-//! the published rule.
+//! [`Refiner::push`] does all of it: contact, closest face, face dynamics, deformation of the
+//! region around it, update of the tree. [`RefineParams::robust`] is what works on real scans,
+//! [`RefineParams::paper`] the published rule.
 
 mod carve;
 mod collision;
@@ -42,9 +43,11 @@ use crate::stylus::{
 use deform::{DeformableMesh, HandleRegion};
 use dynamics::turn;
 
-/// The measured normal of one sample is uncertain by this, rad: a flat tip that may lie on its face does.
+/// The measured normal of one sample is uncertain by this, rad: a flat tip that may lie on its face
+/// does.
 const FLUSH: f64 = 0.05;
-/// Faces looked at for those inside the tip, at most: on a scan finer than a tenth of the ball they are a sample.
+/// Faces looked at for those inside the tip, at most: on a scan finer than a tenth of the ball they
+/// are a sample.
 const MOST_LOOKED_AT: usize = 128;
 
 /// Why a sample was refused, or a refiner not built. A refused sample does not change the mesh.
@@ -103,8 +106,8 @@ pub struct Mismatch {
 pub struct Update {
     /// which of the four cases
     pub case: Case,
-    /// at the face that is touched or that the tip has entered; `None` where no face is within its reach: F* is zero there, and
-    /// ε_L the measured force
+    /// at the face that is touched or that the tip has entered; `None` where no face is within its
+    /// reach: F* is zero there, and ε_L the measured force
     pub mismatch: Option<Mismatch>,
     /// how the deformation ended; `None` when nothing was to be moved
     pub fit: Option<RegionFit>,
@@ -141,7 +144,8 @@ pub struct RefineCounts {
     pub out_of_reach: u64,
     /// contacts outside the region that may be touched
     pub outside_region: u64,
-    /// contacts with a force beyond what the contact model can answer; clamped where the rigid offset is taken out
+    /// contacts with a force beyond what the contact model can answer; clamped where the rigid
+    /// offset is taken out
     pub clamped: u64,
 }
 
@@ -252,14 +256,15 @@ impl Refiner {
     /// Takes the next sample and moves the mesh accordingly.
     ///
     /// # Errors
-    /// [`RefineError::Sample`] for one that is not finite, absurd or not after the last; nothing is changed then.
-    /// [`RefineError::Dynamics`] for a step that overflows or is too stiff for its rule; the mesh is not changed then.
+    /// [`RefineError::Sample`] for one that is not finite, absurd or not after the last; nothing is
+    /// changed then. [`RefineError::Dynamics`] for a step that overflows or is too stiff for its
+    /// rule; the mesh is not changed then.
     pub fn push(&mut self, sample: &Sample) -> Result<Update, RefineError> {
         self.take(sample, None)
     }
 
-    /// As [`Self::push`], but a contact acts on `handle` instead of the closest face: for a stylus that is kept on one
-    /// face after the other \[paper, Sec 4.3\].
+    /// As [`Self::push`], but a contact acts on `handle` instead of the closest face: for a stylus
+    /// that is kept on one face after the other \[paper, Sec 4.3\].
     ///
     /// # Errors
     /// Those of [`Self::push`], and [`RefineError::NoSuchFace`]; nothing is changed then.
@@ -341,7 +346,8 @@ impl Refiner {
             fit: None,
         });
         let face = &pressing.face;
-        // without area a face has no normal; turned away from the measured normal it is another surface
+        // without area a face has no normal; turned away from the measured normal it is another
+        // surface
         let is_apart = face.n == Vector3::zeros()
             || face.n.dot(&pressing.normal) < self.params.smallest_contact_cosine;
         if is_apart || self.deformable.is_stiff(pressing.handle) {
@@ -458,7 +464,8 @@ impl Refiner {
         hit
     }
 
-    /// The region of the contact becomes the one that was made ready for this handle, if there is one.
+    /// The region of the contact becomes the one that was made ready for this handle, if there is
+    /// one.
     fn take_region(&mut self, handle: FaceId) {
         if self.contact_region.roi.handle != Some(handle)
             && self.deformable.is_prepared(&self.next_region, handle)
@@ -468,8 +475,9 @@ impl Refiner {
         }
     }
 
-    /// Makes ready what the next sample needs if the tip goes on as it did, so that this does not wait for it: the closest face, and
-    /// the region around it. To be called between samples; it changes no result.
+    /// Makes ready what the next sample needs if the tip goes on as it did, so that this does not
+    /// wait for it: the closest face, and the region around it. To be called between samples; it
+    /// changes no result.
     pub fn look_ahead(&mut self) {
         let Some(TouchTrack { next, .. }) = self.track else {
             return;
@@ -539,7 +547,8 @@ impl Refiner {
 
     /// The rigid motion of the handle to its next state, as steps of its corners, m.
     ///
-    /// Along the force a corner only goes along it: the turn's sideways part would make the triangles creep.
+    /// Along the force a corner only goes along it: the turn's sideways part would make the
+    /// triangles creep.
     fn rigid_steps(
         &self,
         Pressing {
@@ -574,20 +583,21 @@ impl Refiner {
         }
     }
 
-    /// Keeps what it takes to undo strokes from here on; with a patch that is followed, it is the patch's strokes that are
-    /// undone ([`crate::reconstruct::Patcher::undo`]).
+    /// Keeps what it takes to undo strokes from here on; with a patch that is followed, it is the
+    /// patch's strokes that are undone ([`crate::reconstruct::Patcher::undo`]).
     pub fn keep_strokes(&mut self) {
         self.deformable.keep_strokes();
     }
 
-    /// Takes the last stroke back, bit by bit: what was touched without a pause of a tenth of a second, and what the tip moved
-    /// after it. Returns whether there was one: 64 at most are kept. Estimates of friction and bias stay.
+    /// Takes the last stroke back, bit by bit: what was touched without a pause of a tenth of a
+    /// second, and what the tip moved after it. Returns whether there was one: 64 at most are kept.
+    /// Estimates of friction and bias stay.
     pub fn undo(&mut self) -> bool {
         self.change_strokes(true)
     }
 
-    /// Does the stroke again that was undone last, bit by bit, unless something was touched since. Returns whether there was
-    /// one.
+    /// Does the stroke again that was undone last, bit by bit, unless something was touched since.
+    /// Returns whether there was one.
     pub fn redo(&mut self) -> bool {
         self.change_strokes(false)
     }
@@ -600,7 +610,8 @@ impl Refiner {
         has_changed
     }
 
-    /// Makes ready to follow a patch, with room for so many new faces: more are taken in all the same, with a pause.
+    /// Makes ready to follow a patch, with room for so many new faces: more are taken in all the
+    /// same, with a pause.
     ///
     /// # Errors
     /// [`MeshError::TooMany`] where memory is short.
@@ -608,21 +619,24 @@ impl Refiner {
         Ok(self.deformable.expect_patch(faces)?)
     }
 
-    /// Takes up what changed in the patch of this scan, bit by bit, so that no sample has to wait for long:
-    /// [`Self::go_on_following`] is to be called with the same delta until it is done. What this moved up to the patch's last touch
-    /// goes back to where scan and patch have it; what was touched is in the patch now, which alone moves it from then on. Does
-    /// nothing before [`Self::expect_patch`].
+    /// Takes up what changed in the patch of this scan, bit by bit, so that no sample has to wait
+    /// for long: [`Self::go_on_following`] is to be called with the same delta until it is done.
+    /// What this moved up to the patch's last touch goes back to where scan and patch have it; what
+    /// was touched is in the patch now, which alone moves it from then on. Does nothing before
+    /// [`Self::expect_patch`].
     pub fn begin_to_follow(&mut self, delta: &PatchDelta) {
         if self.deformable.begin_delta(delta) {
             self.forget_regions();
         }
     }
 
-    /// Takes up to `most` parts more of the change of the patch, as [`crate::reconstruct::Splice::go_on`]; returns whether that was
-    /// all. In between the mesh has gaps and overlaps where old faces meet new ones.
+    /// Takes up to `most` parts more of the change of the patch, as
+    /// [`crate::reconstruct::Splice::go_on`]; returns whether that was all. In between the mesh has
+    /// gaps and overlaps where old faces meet new ones.
     ///
     /// # Errors
-    /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`]; the mesh is inconsistent then.
+    /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`]; the mesh is
+    /// inconsistent then.
     pub fn go_on_following(
         &mut self,
         delta: &PatchDelta,
@@ -697,7 +711,8 @@ impl Refiner {
         &self.counts
     }
 
-    /// Kinetic friction as measured so far; `None` until the ball has slid far enough, or where friction is not estimated.
+    /// Kinetic friction as measured so far; `None` until the ball has slid far enough, or where
+    /// friction is not estimated.
     pub fn friction(&self) -> Option<FrictionCoefficient> {
         self.contacts.friction()
     }
@@ -710,7 +725,8 @@ impl Refiner {
         Ok(ContactEstimator::new(self.params.contact())?)
     }
 
-    /// Lets another estimator decide about contacts from here on, as if it had from the first sample on. The mesh stays.
+    /// Lets another estimator decide about contacts from here on, as if it had from the first
+    /// sample on. The mesh stays.
     pub fn set_contacts(&mut self, contacts: ContactEstimator) {
         self.counts.contacts = contacts.contacts();
         self.contacts = contacts;

@@ -23,10 +23,11 @@ parameters! {
 /// Which point of the ball touches, and which face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TouchPoint {
-    /// The face with the closest barycentre \[paper, Eq 12\], at the point under its normal; the force only gives the magnitude
-    /// \[paper\].
+    /// The face with the closest barycentre \[paper, Eq 12\], at the point under its normal; the
+    /// force only gives the magnitude \[paper\].
     FaceNormal,
-    /// The point that the measured force points away from, at the face with the least true distance to it.
+    /// The point that the measured force points away from, at the face with the least true distance
+    /// to it.
     MeasuredNormal,
 }
 
@@ -42,7 +43,8 @@ parameters! {
         ///
         /// In m.
         tolerance: f64 = 0.05, "tolerance_mm" [MM, 0, 1000];
-        /// While in contact only what is deeper than this is taken away: what is shallower may be the measured surface itself.
+        /// While in contact only what is deeper than this is taken away: what is shallower may be
+        /// the measured surface itself.
         ///
         /// In m.
         contact_tolerance: f64 = 0.2, "contact_tolerance_mm" [MM, 0, 1000];
@@ -79,21 +81,25 @@ pub struct RefineParams {
     pub touch_point: TouchPoint,
     /// Eq 1–7.
     pub dynamics: DynamicsParams,
-    /// Rate at which a touched face turns to the measured normal, 1/s: tan(θ/2) falls as e^(−rate t), which is Eq 7 with
-    /// both forces at unit size (on a rigid part F* is F). `None`: Eq 7 as printed, in `dynamics`.
+    /// Rate at which a touched face turns to the measured normal, 1/s: tan(θ/2) falls as e^(−rate
+    /// t), which is Eq 7 with both forces at unit size (on a rigid part F* is F). `None`: Eq 7 as
+    /// printed, in `dynamics`.
     pub turning: Option<f64>,
     /// Carving by free motion; `None` leaves it to the dynamics \[paper\].
     pub carve: Option<CarveParams>,
     /// Size of the region that follows the handle.
     pub roi: RoiSize,
-    /// What an update may not do; `None`: anything \[paper\], which on a noisy scan ends in a blow-up.
+    /// What an update may not do; `None`: anything \[paper\], which on a noisy scan ends in a
+    /// blow-up.
     pub guard: Option<GuardParams>,
-    /// A face turned away from the measured normal by more than this cosine is another surface. Default 0.2: 78°.
+    /// A face turned away from the measured normal by more than this cosine is another surface.
+    /// Default 0.2: 78°.
     pub smallest_contact_cosine: f64,
-    /// Longest step of a vertex in one update, in mean edges. Default 1/25, far below any feature the mesh can show.
+    /// Longest step of a vertex in one update, in mean edges. Default 1/25, far below any feature
+    /// the mesh can show.
     pub longest_step_edges: f64,
-    /// A vertex stays within this many mean edges of where it was scanned: beyond that a triangle is too stretched to
-    /// show anything. Default 2.6.
+    /// A vertex stays within this many mean edges of where it was scanned: beyond that a triangle
+    /// is too stretched to show anything. Default 2.6.
     pub largest_move_edges: f64,
     /// … or within this many times the scan's noise, whichever is more. Default 5.
     pub largest_move_noises: f64,
@@ -101,25 +107,30 @@ pub struct RefineParams {
     pub scan_noise: f64,
     /// `None`: the mesh is all there is, and may be touched anywhere.
     pub region: Option<ScanRegion>,
-    /// Edges that the haptic update needs, m: a scan with much shorter ones is simplified to this for it, so that the cost of a touch
-    /// follows from the tip and not from the scan. Default 0.6 of the radius of the tip. `None`: every face of the scan \[paper\].
+    /// Edges that the haptic update needs, m: a scan with much shorter ones is simplified to this
+    /// for it, so that the cost of a touch follows from the tip and not from the scan. Default 0.6
+    /// of the radius of the tip. `None`: every face of the scan \[paper\].
     pub working_edge: Option<f64>,
 }
 
-/// Relaxation of a touched face in [`RefineParams::robust`], 1/s: within 40 ms, twenty poses at 500 Hz, so that their
-/// noise is averaged, while a hand at 25 mm/s stays on a face of 2.4 mm for 100 ms.
+/// Relaxation of a touched face in [`RefineParams::robust`], 1/s: within 40 ms, twenty poses at 500
+/// Hz, so that their noise is averaged, while a hand at 25 mm/s stays on a face of 2.4 mm for 100
+/// ms.
 const RELAXATION: f64 = 25.0;
 /// Contact force at which [`relaxing_alpha`] holds, N.
 const USUAL_FORCE: f64 = 2.5;
-/// Edges of what the haptic update works on, in radii of the tip. With 0.6 a dense scan 0.3 mm too high ends 0.014 mm off the part
-/// (`cargo test --test rooms haptic::dense -- --nocapture`); with 0.5, where a region has more vertices, it ended 0.038 mm off.
+/// Edges of what the haptic update works on, in radii of the tip. With 0.6 a dense scan 0.3 mm too
+/// high ends 0.014 mm off the part (`cargo test --test rooms haptic::dense -- --nocapture`); with
+/// 0.5, where a region has more vertices, it ended 0.038 mm off.
 const WORKING_EDGE: f64 = 0.6;
-/// A scan whose edges are at least this share of that is left as it is: simplified it would have hardly fewer faces.
+/// A scan whose edges are at least this share of that is left as it is: simplified it would have
+/// hardly fewer faces.
 const COARSE_ENOUGH: f64 = 0.6;
 /// Turning of a touched face in [`RefineParams::robust`], 1/s: about as fast as its motion.
 const TURNING: f64 = 30.0;
 
-/// The α, m/(N·s), by which a face relaxes within 40 ms at the usual force of a hand: rate over −df/dh.
+/// The α, m/(N·s), by which a face relaxes within 40 ms at the usual force of a hand: rate over
+/// −df/dh.
 pub fn relaxing_alpha(model: &ContactModel) -> f64 {
     let slope = match *model {
         ContactModel::Spring { stiffness_n_per_m } => stiffness_n_per_m,
@@ -140,10 +151,11 @@ fn working_edge(scale: f64) -> Option<f64> {
 }
 
 impl RefineParams {
-    /// What works on real scans: contact gate, friction, motion along the force, carving by free motion.
+    /// What works on real scans: contact gate, friction, motion along the force, carving by free
+    /// motion.
     ///
-    /// With a known stiffness the contact model is the linear spring of the real tip, which has no bias; without one it
-    /// is the paper's sigmoid with the rigid-contact offset taken out.
+    /// With a known stiffness the contact model is the linear spring of the real tip, which has no
+    /// bias; without one it is the paper's sigmoid with the rigid-contact offset taken out.
     pub fn robust(tip: TipParams) -> Self {
         let model = match tip.stiffness {
             Some(stiffness_n_per_m) => ContactModel::Spring { stiffness_n_per_m },
@@ -179,8 +191,8 @@ impl RefineParams {
         }
     }
 
-    /// The published rule, taken literally: Eq 6 and 7 solved together, Eq 12 and a one-ring region; no gate, no correction, no
-    /// guard, no limit.
+    /// The published rule, taken literally: Eq 6 and 7 solved together, Eq 12 and a one-ring
+    /// region; no gate, no correction, no guard, no limit.
     pub fn paper(tip: TipParams) -> Self {
         Self {
             gate: None,
@@ -210,7 +222,8 @@ impl RefineParams {
         self.working_edge = self.working_edge.and(working_edge(scale));
     }
 
-    /// The edges to which a scan of this mean edge (m) is to be simplified for the haptic update; `None`: it is coarse enough.
+    /// The edges to which a scan of this mean edge (m) is to be simplified for the haptic update;
+    /// `None`: it is coarse enough.
     pub fn simplified_edge(&self, mean_edge: f64) -> Option<f64> {
         self.working_edge
             .filter(|edge| mean_edge < COARSE_ENOUGH * edge)

@@ -1,9 +1,10 @@
 //! The small rigid offset between scan and touched part, from contacts against the untouched scan.
 //!
-//! Point to plane: a scan point q with normal n that is moved by a small twist (t, θ) about the centre c meets the
-//! contact p when n · (p − q) = n · t + ((q − c) × n) · θ + b. A scan may also be too fat or too thin all over, b; touches
-//! from one side cannot distinguish that from a shift, so b takes part with what is known of it beforehand. The noise of a scan
-//! is correlated: all contacts in one cell of the correlation length count as one.
+//! Point to plane: a scan point q with normal n that is moved by a small twist (t, θ) about the
+//! centre c meets the contact p when n · (p − q) = n · t + ((q − c) × n) · θ + b. A scan may also
+//! be too fat or too thin all over, b; touches from one side cannot distinguish that from a shift,
+//! so b takes part with what is known of it beforehand. The noise of a scan is correlated: all
+//! contacts in one cell of the correlation length count as one.
 
 use std::collections::BTreeMap;
 
@@ -23,8 +24,8 @@ use crate::stylus::SettingError;
 pub struct RegistrationParams {
     /// Standard deviation of the scan from the true surface, m.
     pub scan_noise: f64,
-    /// Edge of the square over which the noise of the scan counts as one value, m: the root of the area under its
-    /// correlation. Default 9 mm, for waves smoothed by 3.5 mm.
+    /// Edge of the square over which the noise of the scan counts as one value, m: the root of the
+    /// area under its correlation. Default 9 mm, for waves smoothed by 3.5 mm.
     pub correlation: f64,
     /// How fat or thin a scan usually is, standard deviation, m. Default 0.3 mm.
     pub surface_offset: f64,
@@ -79,7 +80,8 @@ pub enum RegistrationError {
         list(directions)
     )]
     Undetermined {
-        /// shift and turn about the middle of the contacts; unit, a turn counting as the shift that it gives on average
+        /// shift and turn about the middle of the contacts; unit, a turn counting as the shift that
+        /// it gives on average
         directions: Vec<Vector6<f64>>,
     },
     /// The iterations do not converge, or end outside of what can be a small offset.
@@ -124,11 +126,13 @@ const MOST_MEANS: usize = 50_000;
 const LEAST_CELLS: usize = 20;
 /// Contacts count as of a face when their normals are no farther apart than 37°.
 const SMALLEST_COSINE: f64 = 0.8;
-/// A direction is undetermined when the normals have less than this part in it: 6° of noise is 0.01.
+/// A direction is undetermined when the normals have less than this part in it: 6° of noise is
+/// 0.01.
 const LEAST_SHARE: f64 = 0.02;
 /// Rounds of closest points.
 const ROUNDS: usize = 30;
-/// A round that moves less than this ends them, in scan noises: below it contacts go to and fro between faces.
+/// A round that moves less than this ends them, in scan noises: below it contacts go to and fro
+/// between faces.
 const REST: f64 = 0.02;
 /// Late iterations that alternate by less than this many standard uncertainties count as converged.
 const SMALL_STEP: f64 = 0.3;
@@ -349,8 +353,8 @@ impl RegistrationRound {
     }
 }
 
-/// How many independent values of the scan's noise `points` amount to: n² / Σ ρ(p − q) with a correlation ρ that falls
-/// linearly to 0 over `correlation` on each axis.
+/// How many independent values of the scan's noise `points` amount to: n² / Σ ρ(p − q) with a
+/// correlation ρ that falls linearly to 0 over `correlation` on each axis.
 fn independent<'a>(points: impl Iterator<Item = &'a Point3<f64>>, correlation: f64) -> f64 {
     let mut cells: BTreeMap<VoxelKey, f64> = BTreeMap::new();
     points.for_each(|p| *cells.entry(voxel_of(p, correlation / 2.0)).or_insert(0.0) += 1.0);

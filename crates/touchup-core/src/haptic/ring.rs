@@ -1,4 +1,5 @@
-//! The ring: the faces around the vertices that move, and their connectivity. Found once, then used by number.
+//! The ring: the faces around the vertices that move, and their connectivity. Found once, then used
+//! by number.
 
 use std::hint::select_unpredictable;
 use std::ops::Range;
@@ -13,7 +14,8 @@ const STAR_FACES: usize = 8;
 /// Not a number of a vertex.
 const NONE: u32 = u32::MAX;
 
-/// Faces and vertices have numbers here: their order in `faces`, and in the scratch map of the region.
+/// Faces and vertices have numbers here: their order in `faces`, and in the scratch map of the
+/// region.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ring {
     /// faces with a moving vertex, then the faces that share an edge with one of these
@@ -90,8 +92,8 @@ impl Ring {
         self.moving = self.faces.len();
     }
 
-    /// Finds their connectivity, for the same vertices, which have the first numbers in `scratch_map`; their neighbours get the
-    /// next.
+    /// Finds their connectivity, for the same vertices, which have the first numbers in
+    /// `scratch_map`; their neighbours get the next.
     pub fn link(&mut self, mesh: &TriMesh, vertices: &[VertexId], scratch_map: &mut ScratchMap) {
         self.corners.clear();
         self.corners.extend(

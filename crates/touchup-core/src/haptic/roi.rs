@@ -1,9 +1,11 @@
-//! The region of interest around a touched face: handle, free vertices, fixed rim \[paper, Sec 4.3\].
+//! The region of interest around a touched face: handle, free vertices, fixed rim \[paper, Sec
+//! 4.3\].
 //!
-//! The handle is the touched face. Free vertices follow it by Laplacian surface editing with uniform weights
-//! \[Sorkine 2004\]: the displacement of each free vertex is the mean of its neighbours' displacements, the handle's is
-//! given, the rim's is zero. The solution is linear in the displacements of the three handle vertices, so it is solved
-//! once for each handle, as three weights for each free vertex.
+//! The handle is the touched face. Free vertices follow it by Laplacian surface editing with
+//! uniform weights \[Sorkine 2004\]: the displacement of each free vertex is the mean of its
+//! neighbours' displacements, the handle's is given, the rim's is zero. The solution is linear in
+//! the displacements of the three handle vertices, so it is solved once for each handle, as three
+//! weights for each free vertex.
 
 use nalgebra::Point3;
 
@@ -19,13 +21,15 @@ pub enum RoiSize {
     Handle,
     /// All neighbours of the handle are free \[paper\].
     OneRing,
-    /// Vertices within this distance (m) of the handle's barycentre are free, as far as they are connected.
+    /// Vertices within this distance (m) of the handle's barycentre are free, as far as they are
+    /// connected.
     Radius(f64),
 }
 
 /// Room for more vertices is not made ahead.
 const LARGEST_ROOM: f64 = 1e4;
-/// Entries of a row of the skyline; twelve in a ring around a face, some thirty for a few hundred vertices.
+/// Entries of a row of the skyline; twelve in a ring around a face, some thirty for a few hundred
+/// vertices.
 const ROW_ENTRIES: usize = 32;
 
 /// One handle and what moves with it.
@@ -45,8 +49,8 @@ pub(super) struct Roi {
 }
 
 impl RoiSize {
-    /// How many vertices to make room for, where edges are `mean_edge` (m) long: several times what a regular mesh
-    /// needs, so that a sample allocates nothing.
+    /// How many vertices to make room for, where edges are `mean_edge` (m) long: several times what
+    /// a regular mesh needs, so that a sample allocates nothing.
     pub(super) fn room(self, mean_edge: f64) -> usize {
         let rings = match self {
             Self::Handle => 0.0,
@@ -70,7 +74,8 @@ impl Roi {
         roi
     }
 
-    /// Makes the region of `handle`; the connectivity of its faces is looked up only for free vertices or a guard.
+    /// Makes the region of `handle`; the connectivity of its faces is looked up only for free
+    /// vertices or a guard.
     pub fn rebuild(&mut self, mesh: &TriMesh, handle: FaceId, size: RoiSize, is_guarded: bool) {
         self.handle = Some(handle);
         self.numbers.clear();
@@ -117,12 +122,15 @@ impl Roi {
     }
 }
 
-/// Solves the Laplace equation on the free vertices by L D Lᵀ in skyline storage; its arrays are kept.
+/// Solves the Laplace equation on the free vertices by L D Lᵀ in skyline storage; its arrays are
+/// kept.
 ///
-/// Vertices come ring by ring, so that the neighbours of one are not far from it in the order and the skyline is low.
+/// Vertices come ring by ring, so that the neighbours of one are not far from it in the order and
+/// the skyline is low.
 #[derive(Clone, Debug, Default)]
 struct Solver {
-    /// row i of the matrix is `rows[starts[i]..starts[i + 1]]`: from its first entry to the diagonal
+    /// row i of the matrix is `rows[starts[i]..starts[i + 1]]`: from its first entry to the
+    /// diagonal
     rows: Vec<f64>,
     starts: Vec<usize>,
 }
@@ -143,7 +151,8 @@ impl Solver {
         self.substitute(free);
     }
 
-    /// degree · w − Σ w of the neighbours = 0: the handle's neighbours go to the right side, the rim's are zero.
+    /// degree · w − Σ w of the neighbours = 0: the handle's neighbours go to the right side, the
+    /// rim's are zero.
     fn assemble(&mut self, ring: &Ring, right: &mut [[f64; 3]]) {
         self.rows.clear();
         self.starts.clear();
@@ -176,7 +185,8 @@ impl Solver {
         row + 1 - (self.starts[row + 1] - self.starts[row])
     }
 
-    /// Puts L below the diagonal and D on it. The matrix is positive definite: every free vertex is connected to the handle.
+    /// Puts L below the diagonal and D on it. The matrix is positive definite: every free vertex is
+    /// connected to the handle.
     fn factorise(&mut self) {
         for row in 0..self.starts.len() - 1 {
             let (first, start) = (self.first(row), self.starts[row]);

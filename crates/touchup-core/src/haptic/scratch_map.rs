@@ -1,4 +1,5 @@
-//! A scratch map that numbers ids in order of insertion, is cleared in no time and stays in the nearest cache.
+//! A scratch map that numbers ids in order of insertion, is cleared in no time and stays in the
+//! nearest cache.
 
 use std::hint::select_unpredictable;
 
@@ -40,13 +41,14 @@ impl ScratchMap {
         u64::from(self.stamp) << 32 | u64::from(key)
     }
 
-    /// Where `key` is, or where it would go. Fibonacci hashing: the high bits of a product are well mixed.
+    /// Where `key` is, or where it would go. Fibonacci hashing: the high bits of a product are well
+    /// mixed.
     #[inline]
     fn slot(&self, key: u32) -> usize {
         let (tag, mask) = (self.tag(key), self.entries.len() - 1);
         let mut at = (u64::from(key).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize & mask;
-        // another key of this stamp: tags that differ, but in the lower half alone. One branch, seldom taken: whether
-        // the key itself is there cannot be foretold
+        // another key of this stamp: tags that differ, but in the lower half alone. One branch,
+        // seldom taken: whether the key itself is there cannot be foretold
         while (self.entries[at].tag ^ tag).wrapping_sub(1) < u64::from(u32::MAX) {
             at = (at + 1) & mask;
         }

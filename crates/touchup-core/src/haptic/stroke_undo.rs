@@ -52,8 +52,8 @@ impl StrokeUndo {
         self.evidence.note(face.0, || before);
     }
 
-    /// Exchanges what the last stroke changed with what was there before it, or what was so undone last with what is there;
-    /// returns the vertices that moved, `None` where there was no stroke.
+    /// Exchanges what the last stroke changed with what was there before it, or what was so undone
+    /// last with what is there; returns the vertices that moved, `None` where there was no stroke.
     pub fn change(
         &mut self,
         is_undo: bool,

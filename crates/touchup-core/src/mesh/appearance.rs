@@ -8,7 +8,8 @@ use super::{FaceHit, FaceId, FaceTree, TriMesh, VertexId, Workers};
 /// What is drawn on the faces of a mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Texture {
-    /// for each face slot the texture coordinates (u, v) of its corners, in the order of [`TriMesh::corners`]
+    /// for each face slot the texture coordinates (u, v) of its corners, in the order of
+    /// [`TriMesh::corners`]
     pub corners: Vec<[[f32; 2]; 3]>,
     /// for each face slot which of `images` it shows
     pub shown: Vec<u32>,
@@ -34,8 +35,9 @@ pub struct Appearance {
     texture: Option<Texture>,
 }
 
-/// A corner may lie on another face than the middle of its face where the texture coordinates there are those that the face in the
-/// middle would have, to this share of how far they are from the middle: else there is a seam between the two.
+/// A corner may lie on another face than the middle of its face where the texture coordinates there
+/// are those that the face in the middle would have, to this share of how far they are from the
+/// middle: else there is a seam between the two.
 const ON_ONE_CHART: f32 = 0.5;
 
 impl Appearance {
@@ -51,7 +53,8 @@ impl Appearance {
         }
     }
 
-    /// The colours of vertices at `places` (m, in O): those of the nearest vertex of the nearest face.
+    /// The colours of vertices at `places` (m, in O): those of the nearest vertex of the nearest
+    /// face.
     pub fn colours_at(
         &self,
         places: &[Point3<f64>],
@@ -71,8 +74,8 @@ impl Appearance {
         })
     }
 
-    /// The texture of `mesh`: of each face that of the face nearest to its middle, which also says where the corners are in it unless they
-    /// lie on faces beside it, without a seam between them.
+    /// The texture of `mesh`: of each face that of the face nearest to its middle, which also says
+    /// where the corners are in it unless they lie on faces beside it, without a seam between them.
     ///
     /// - `places`: for each vertex where it is on this mesh, m in O.
     pub fn texture_on(
@@ -169,7 +172,8 @@ mod tests {
     use super::super::Alone;
     use super::*;
 
-    /// A roof over x = 0 … 4 with its ridge at x = 2, two triangles a side; the second side is in another corner of the image.
+    /// A roof over x = 0 … 4 with its ridge at x = 2, two triangles a side; the second side is in
+    /// another corner of the image.
     fn roof() -> (Vec<Point3<f64>>, Vec<[u32; 3]>, Texture) {
         let heights = [(0.0, 0.0), (2.0, 1.0), (4.0, 0.0)];
         let positions = heights
@@ -254,8 +258,8 @@ mod tests {
                 "{found:?} {expected:?}"
             );
         }
-        // the middle of the second face is on the first side, its second corner on the other: it goes straight on there, 0.3 along x and
-        // 0.15 down on a slope of 1 in 2
+        // the middle of the second face is on the first side, its second corner on the other: it
+        // goes straight on there, 0.3 along x and 0.15 down on a slope of 1 in 2
         let along = 2.0 + (2.0 * 0.3 - 0.15) / 5.0 * 2.0;
         let [u, v] = texture.corners[1][1];
         assert!(

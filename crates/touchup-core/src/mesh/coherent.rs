@@ -1,11 +1,13 @@
-//! An order of points in which neighbours in space follow each other, so that what a query has read is still in the cache for the next.
+//! An order of points in which neighbours in space follow each other, so that what a query has read
+//! is still in the cache for the next.
 
 use nalgebra::Point3;
 
 /// Cells of the curve on each axis: 2 to this power.
 const BITS: u32 = 10;
 
-/// The indices of `points` along a Z-order curve through cells of 1/1024 of their box; within a cell as they come.
+/// The indices of `points` along a Z-order curve through cells of 1/1024 of their box; within a
+/// cell as they come.
 ///
 /// - `points`: finite, fewer than 2³².
 pub(crate) fn coherent_order(points: &[Point3<f64>]) -> Vec<u32> {

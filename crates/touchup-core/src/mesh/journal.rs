@@ -2,7 +2,8 @@
 
 use super::{FaceId, VertexId};
 
-/// What changed in a [`super::TriMesh`] that is watched; each thing is named once, in no particular order.
+/// What changed in a [`super::TriMesh`] that is watched; each thing is named once, in no particular
+/// order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Changes {
     /// moved, added or removed: see [`super::TriMesh::has_vertex`]
@@ -71,7 +72,8 @@ impl Journal {
     }
 }
 
-/// A set of ids that is filled and emptied again and again: a bit for each, and a list of those that are in it.
+/// A set of ids that is filled and emptied again and again: a bit for each, and a list of those
+/// that are in it.
 #[derive(Clone, Debug, Default)]
 pub struct IdSet {
     /// bit `id % 64` of word `id / 64`: it is in the list

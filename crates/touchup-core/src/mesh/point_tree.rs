@@ -3,8 +3,8 @@
 use nabo::{CandidateContainer, KDTree, NotNan, Parameters, Point};
 use nalgebra::Point3;
 
-/// Steps into which the larger side of the cloud is divided for the search, 1e-13 m in 100 mm: whole numbers of them can
-/// always be halved, so no two points are too near for the tree.
+/// Steps into which the larger side of the cloud is divided for the search, 1e-13 m in 100 mm:
+/// whole numbers of them can always be halved, so no two points are too near for the tree.
 const STEPS: f64 = (1u64 << 40) as f64;
 
 /// A point of the tree, in steps.
@@ -59,12 +59,14 @@ impl PointTree {
         }
     }
 
-    /// By how much the distance of a point may be off in the tree, m: each of both points by a step along each axis.
+    /// By how much the distance of a point may be off in the tree, m: each of both points by a step
+    /// along each axis.
     pub fn resolution(&self) -> f64 {
         2.0 * 3.0_f64.sqrt() / self.steps
     }
 
-    /// The nearest `count` points within `radius` of `p`, nearest first: the index of each and its distance, m.
+    /// The nearest `count` points within `radius` of `p`, nearest first: the index of each and its
+    /// distance, m.
     ///
     /// - `p`: finite; `radius`: m, may be infinite.
     pub fn nearest(

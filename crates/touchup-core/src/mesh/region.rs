@@ -38,7 +38,8 @@ impl Region {
     }
 }
 
-/// What is left of a mesh when a part of it was cut out: faces without adjacency. It is bit by bit what it was.
+/// What is left of a mesh when a part of it was cut out: faces without adjacency. It is bit by bit
+/// what it was.
 #[derive(Clone, Debug)]
 pub struct Outside {
     /// of the vertices that the part does not have, m, in order of id
@@ -81,10 +82,11 @@ impl Sewn {
 const NOT_IN: u32 = u32::MAX;
 
 impl TriMesh {
-    /// The faces that reach into `region`, as a mesh of their own with all corners they have, and the rest.
+    /// The faces that reach into `region`, as a mesh of their own with all corners they have, and
+    /// the rest.
     ///
-    /// All faces around a vertex that lies in `region` are in the part. Vertices on its rim do not lie in `region`: they are
-    /// not to be moved, or [`Outside::sew_to`] refuses.
+    /// All faces around a vertex that lies in `region` are in the part. Vertices on its rim do not
+    /// lie in `region`: they are not to be moved, or [`Outside::sew_to`] refuses.
     pub fn cut(&self, region: &Region) -> (TriMesh, Outside) {
         let mut ids = vec![NOT_IN; self.vertex_slots()];
         let (mut inside, mut places, mut faces) = (Vec::new(), Vec::new(), Vec::new());

@@ -1,16 +1,17 @@
 //! Signed distance of a point from a mesh.
 //!
-//! The sign is that of (p − c)·ñ, where c is the closest point of the mesh and ñ the *pseudo-normal* there: the normal of
-//! the face, the sum of the normals of the faces at the edge, or the sum of the normals at the corner weighted by the
-//! angle each face has there. On a closed mesh this sign is right for every point \[Bærentzen Aanæs 2005\]; on an open one
-//! it goes on past the rims as the nearest face does.
+//! The sign is that of (p − c)·ñ, where c is the closest point of the mesh and ñ the
+//! *pseudo-normal* there: the normal of the face, the sum of the normals of the faces at the edge,
+//! or the sum of the normals at the corner weighted by the angle each face has there. On a closed
+//! mesh this sign is right for every point \[Bærentzen Aanæs 2005\]; on an open one it goes on past
+//! the rims as the nearest face does.
 
 use nalgebra::{Point3, Vector3};
 
 use super::{FaceHit, FaceTree, TriMesh, VertexId};
 
-/// Signed distance from `p` to the mesh, m: positive outside, negative in the material; `None` when no face is nearer than
-/// `reach` (m).
+/// Signed distance from `p` to the mesh, m: positive outside, negative in the material; `None` when
+/// no face is nearer than `reach` (m).
 pub fn signed_distance(
     mesh: &TriMesh,
     tree: &FaceTree,
@@ -22,9 +23,11 @@ pub fn signed_distance(
     Some(hit.distance_squared.sqrt() * if is_behind { -1.0 } else { 1.0 })
 }
 
-/// Outward unit pseudo-normal of the mesh at a closest point; zero where the faces there have no area.
+/// Outward unit pseudo-normal of the mesh at a closest point; zero where the faces there have no
+/// area.
 ///
-/// - `hit`: from [`FaceTree::closest`], whose barycentric coordinates are exactly 0 on edges and corners.
+/// - `hit`: from [`FaceTree::closest`], whose barycentric coordinates are exactly 0 on edges and
+///   corners.
 pub fn pseudo_normal(mesh: &TriMesh, hit: &FaceHit) -> Vector3<f64> {
     let corners = mesh.corners(hit.face);
     let mut on = (0..3)
@@ -75,7 +78,8 @@ pub fn is_on_rim(mesh: &TriMesh, hit: &FaceHit) -> bool {
 mod tests {
     use super::*;
 
-    /// A needle on its side: the apex at the origin, the other end a triangle at x = 1, normals outward.
+    /// A needle on its side: the apex at the origin, the other end a triangle at x = 1, normals
+    /// outward.
     fn needle() -> TriMesh {
         let end = [(0.2, 0.0), (-0.1, 0.1), (-0.1, -0.1)].map(|(y, z)| Point3::new(1.0, y, z));
         let positions = [vec![Point3::origin()], end.into()].concat();
@@ -107,7 +111,8 @@ mod tests {
 
     #[test]
     fn a_corner_weights_its_faces_by_angle() {
-        // the corner of a cube at the origin, its faces cut into one, one and two triangles: x, y and z have the same weight
+        // the corner of a cube at the origin, its faces cut into one, one and two triangles: x, y
+        // and z have the same weight
         let p = [
             [0., 0., 0.],
             [-1., 0., 0.],

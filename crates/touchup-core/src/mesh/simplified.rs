@@ -1,8 +1,9 @@
 //! A simplified mesh, and how its motion is carried over to the mesh that it stands for.
 //!
-//! The vertices are parted into cells around seeds (a Poisson-disk sampling with its Voronoi cells), so that thin sheets and what lies
-//! near without being connected stays apart. Each cell becomes one vertex, where the planes of its faces meet best \[Garland Heckbert
-//! 1997\]; three cells that meet in a face become a face \[Valette Chassery 2004\].
+//! The vertices are parted into cells around seeds (a Poisson-disk sampling with its Voronoi
+//! cells), so that thin sheets and what lies near without being connected stays apart. Each cell
+//! becomes one vertex, where the planes of its faces meet best \[Garland Heckbert 1997\]; three
+//! cells that meet in a face become a face \[Valette Chassery 2004\].
 
 use std::collections::HashSet;
 
@@ -15,8 +16,8 @@ use crate::numeric::direction;
 const NONE: u32 = u32::MAX;
 /// Edges of the simplified mesh are longer than the distance between seeds by this, in the mean.
 const EDGE_OF_SPACING: f64 = 1.2;
-/// Share of the largest curvature of a quadric below which a direction is left to the mean of the cell: planes 8° from a common one do
-/// not say where along it they meet.
+/// Share of the largest curvature of a quadric below which a direction is left to the mean of the
+/// cell: planes 8° from a common one do not say where along it they meet.
 const FLAT: f64 = 0.02;
 
 /// A mesh with few faces in place of one with many.
@@ -42,7 +43,8 @@ struct Cell {
 }
 
 impl Simplified {
-    /// Simplifies `mesh` to edges of about `edge` (m), wherever it has shorter ones. O(V edge² / (its own edges)² + F).
+    /// Simplifies `mesh` to edges of about `edge` (m), wherever it has shorter ones. O(V edge² /
+    /// (its own edges)² + F).
     ///
     /// # Errors
     /// None is expected: those of [`TriMesh::new`].
@@ -103,8 +105,9 @@ impl Simplified {
             .map(|&cell| VertexId(cell))
     }
 
-    /// The original, moved as the simplified mesh was: a vertex keeps its place beside the face that it is nearest to, turned as the
-    /// corners of that face are. What is near unmoved faces alone stays, bit by bit.
+    /// The original, moved as the simplified mesh was: a vertex keeps its place beside the face
+    /// that it is nearest to, turned as the corners of that face are. What is near unmoved faces
+    /// alone stays, bit by bit.
     ///
     /// - `original`: that it was made of.
     /// - `moved`: the simplified mesh, with other positions.
@@ -167,7 +170,8 @@ impl Simplified {
         }
     }
 
-    /// How a vertex of the simplified mesh has turned: from its normal as scanned to that as moved; `None` where it has not moved.
+    /// How a vertex of the simplified mesh has turned: from its normal as scanned to that as moved;
+    /// `None` where it has not moved.
     fn turn(&self, vertex: VertexId, moved: &TriMesh) -> Option<UnitQuaternion<f64>> {
         if self.mesh.position(vertex) == moved.position(vertex) {
             return None;
@@ -229,8 +233,8 @@ impl Simplified {
 }
 
 impl Cell {
-    /// Where its vertex is, relative to the seed, m: at the rim the mean of the rim, else where the planes of its faces meet best,
-    /// and the mean where they leave that open.
+    /// Where its vertex is, relative to the seed, m: at the rim the mean of the rim, else where the
+    /// planes of its faces meet best, and the mean where they leave that open.
     fn place(&self, spacing: f64) -> Vector3<f64> {
         if self.rim_count > 0.0 {
             return self.rim_sum / self.rim_count;
@@ -269,7 +273,8 @@ fn cells_of(mesh: &TriMesh, spacing: f64) -> (Vec<u32>, Vec<Point3<f64>>) {
         if mesh.star(VertexId(vertex)).is_empty() {
             continue;
         }
-        // takes what is nearer to it than to any seed before, as far as it is connected within the spacing
+        // takes what is nearer to it than to any seed before, as far as it is connected within the
+        // spacing
         let (seed, number) = (mesh.position(VertexId(vertex)), seeds.len() as u32);
         seeds.push(seed);
         (

@@ -1,9 +1,10 @@
 //! The faces around each vertex, in one array that gives back what it took.
 //!
-//! The stars of a mesh as it was loaded are stored one after another, without gaps. A star that outgrows its place moves to a
-//! block of twice the size, one of which little is left to a block of half the size. Blocks that are left are kept by
-//! size (powers of two) and used again first, so that replacing faces without end takes no more than the largest number
-//! of blocks of each size that was ever needed at once.
+//! The stars of a mesh as it was loaded are stored one after another, without gaps. A star that
+//! outgrows its place moves to a block of twice the size, one of which little is left to a block of
+//! half the size. Blocks that are left are kept by size (powers of two) and used again first, so
+//! that replacing faces without end takes no more than the largest number of blocks of each size
+//! that was ever needed at once.
 
 use super::FaceId;
 
@@ -11,8 +12,8 @@ use super::FaceId;
 const NONE: u32 = u32::MAX;
 /// Faces in the smallest block.
 const SMALLEST_BLOCK: u32 = 4;
-/// A star moves to a smaller block when it fills less than this share (1/4) of its own, so that many faces come or go
-/// between two moves.
+/// A star moves to a smaller block when it fills less than this share (1/4) of its own, so that
+/// many faces come or go between two moves.
 const SMALLEST_FILL: u32 = 4;
 /// Largest number of entries: each is named by 32 bits, the last of which means none.
 const LARGEST: usize = NONE as usize;
@@ -39,7 +40,8 @@ const REMOVED: StarSlot = StarSlot {
 pub(super) struct Stars {
     slots: Vec<StarSlot>,
     entries: Vec<FaceId>,
-    /// for each power of two: the first free block of that size, whose first entry names the next one
+    /// for each power of two: the first free block of that size, whose first entry names the next
+    /// one
     free: [u32; 32],
 }
 
@@ -178,7 +180,8 @@ fn block_for(faces: u32) -> u32 {
     faces.max(SMALLEST_BLOCK).next_power_of_two()
 }
 
-/// How many faces each vertex has: the first half of the counting sort that finds the stars, in the place of its result.
+/// How many faces each vertex has: the first half of the counting sort that finds the stars, in the
+/// place of its result.
 pub(super) struct Valences(Vec<StarSlot>);
 
 impl Valences {
@@ -205,7 +208,8 @@ impl Valences {
         self.0.retain(|slot| slot.capacity > 0);
     }
 
-    /// The faces around each vertex, in rising order; `faces`: those that were counted, [`MOST_FACES`] at most.
+    /// The faces around each vertex, in rising order; `faces`: those that were counted,
+    /// [`MOST_FACES`] at most.
     pub fn stars_of(self, faces: &[[u32; 3]]) -> Stars {
         let mut slots = self.0;
         let mut end = 0;

@@ -11,7 +11,8 @@ use crate::numeric::direction;
 const EDGE_SAMPLE: usize = 20_000;
 /// Marks the slot of a removed face; no id.
 const REMOVED: u32 = u32::MAX;
-/// A coordinate beyond it is a fault and not a place, m: products of six such lengths are still far from overflow.
+/// A coordinate beyond it is a fault and not a place, m: products of six such lengths are still far
+/// from overflow.
 pub const FARTHEST: f64 = 1e9;
 /// Vertices that ids can name.
 const MOST_VERTICES: usize = REMOVED as usize - 1;
@@ -76,9 +77,9 @@ pub enum MeshError {
 ///
 /// `positions`: V × 3, m, in O; `faces`: F × 3, counter-clockwise seen from outside.
 ///
-/// Invariants: every coordinate is within [`FARTHEST`]; every index is in range; no face uses a vertex twice. Faces may have any
-/// shape, edges may be shared by any number of faces (scans are like that): what a scan lacks is in
-/// [`crate::mesh::RepairReport`], not refused here.
+/// Invariants: every coordinate is within [`FARTHEST`]; every index is in range; no face uses a
+/// vertex twice. Faces may have any shape, edges may be shared by any number of faces (scans are
+/// like that): what a scan lacks is in [`crate::mesh::RepairReport`], not refused here.
 #[derive(Clone, Debug)]
 pub struct TriMesh {
     positions: Vec<Point3<f64>>,
@@ -115,7 +116,8 @@ impl TriMesh {
         Ok(Self::of_sound(positions, faces, valences))
     }
 
-    /// Builds the adjacency of arrays that keep the invariants above, and whose faces have been counted.
+    /// Builds the adjacency of arrays that keep the invariants above, and whose faces have been
+    /// counted.
     pub(super) fn of_sound(
         positions: Vec<Point3<f64>>,
         faces: Vec<[u32; 3]>,
@@ -142,7 +144,8 @@ impl TriMesh {
         self.positions.len() - self.free_vertices.len()
     }
 
-    /// One more than the largest vertex id ever given out: the size of an array indexed by [`VertexId`].
+    /// One more than the largest vertex id ever given out: the size of an array indexed by
+    /// [`VertexId`].
     pub fn vertex_slots(&self) -> usize {
         self.positions.len()
     }
@@ -152,7 +155,8 @@ impl TriMesh {
         self.faces.len() - self.free_faces.len()
     }
 
-    /// One more than the largest face id ever given out: the size of an array indexed by [`FaceId`].
+    /// One more than the largest face id ever given out: the size of an array indexed by
+    /// [`FaceId`].
     pub fn face_slots(&self) -> usize {
         self.faces.len()
     }
@@ -162,7 +166,8 @@ impl TriMesh {
         &self.positions
     }
 
-    /// The lowest and the highest corner of the box around all vertices, m, in O; inverted where there is none.
+    /// The lowest and the highest corner of the box around all vertices, m, in O; inverted where
+    /// there is none.
     pub fn bounds(&self) -> [Point3<f64>; 2] {
         let empty = [f64::INFINITY, f64::NEG_INFINITY].map(|x| Point3::new(x, x, x));
         self.positions
@@ -274,7 +279,8 @@ impl TriMesh {
             .all(|(_, [a, b, c])| !is_rim(a, b) && !is_rim(b, c) && !is_rim(c, a))
     }
 
-    /// Moves one vertex; an index over the faces must be refitted ([`crate::mesh::FaceTree::refit`]).
+    /// Moves one vertex; an index over the faces must be refitted
+    /// ([`crate::mesh::FaceTree::refit`]).
     #[inline]
     pub fn set_position(&mut self, vertex: VertexId, position: Point3<f64>) {
         debug_assert!(is_place(&position));
@@ -290,8 +296,8 @@ impl TriMesh {
         )));
     }
 
-    /// Lists what changed since the last call, up to `most` vertices and as many faces, and adds it to `into`; returns
-    /// whether that was all. Nothing before [`Self::watch`].
+    /// Lists what changed since the last call, up to `most` vertices and as many faces, and adds it
+    /// to `into`; returns whether that was all. Nothing before [`Self::watch`].
     pub fn take_changes(&mut self, most: usize, into: &mut Changes) -> bool {
         self.journal
             .as_mut()
@@ -329,7 +335,8 @@ impl TriMesh {
         }
     }
 
-    /// Makes room for so many vertices and faces more: adding them in the shape of a regular mesh allocates nothing.
+    /// Makes room for so many vertices and faces more: adding them in the shape of a regular mesh
+    /// allocates nothing.
     ///
     /// # Errors
     /// [`MeshError::TooMany`] where memory is short.
@@ -384,7 +391,8 @@ impl TriMesh {
         Ok(VertexId(vertex as u32))
     }
 
-    /// Removes a vertex that no face uses; the ids of the others stay. Returns whether there was such a vertex.
+    /// Removes a vertex that no face uses; the ids of the others stay. Returns whether there was
+    /// such a vertex.
     pub fn remove_vertex(&mut self, vertex: VertexId) -> bool {
         if !self.has_vertex(vertex) || !self.star(vertex).is_empty() {
             return false;
@@ -395,11 +403,12 @@ impl TriMesh {
         true
     }
 
-    /// Adds a face, counter-clockwise seen from outside; the slot of a removed face is used again first.
+    /// Adds a face, counter-clockwise seen from outside; the slot of a removed face is used again
+    /// first.
     ///
     /// # Errors
-    /// [`MeshError::VertexOutOfRange`], [`MeshError::RemovedVertex`], [`MeshError::RepeatedVertex`],
-    /// [`MeshError::TooMany`].
+    /// [`MeshError::VertexOutOfRange`], [`MeshError::RemovedVertex`],
+    /// [`MeshError::RepeatedVertex`], [`MeshError::TooMany`].
     pub fn add_face(&mut self, corners: [VertexId; 3]) -> Result<FaceId, MeshError> {
         let corners = corners.map(|v| v.0);
         let next = self.faces.len();

@@ -4,16 +4,19 @@ use nalgebra::{Point3, Vector3};
 
 use crate::numeric::{direction, length_and_direction};
 
-/// Twice the area over the longest edge squared, itself squared, below which the foot inside a triangle is found by
-/// another formula: the quotient of areas loses ε/0.01 of the edge there, and everything where there is no area.
+/// Twice the area over the longest edge squared, itself squared, below which the foot inside a
+/// triangle is found by another formula: the quotient of areas loses ε/0.01 of the edge there, and
+/// everything where there is no area.
 const THIN: f64 = 0.01;
-/// A product of four lengths, m⁴, below which its parts have lost digits or are gone: edges of some 1e-73 m.
+/// A product of four lengths, m⁴, below which its parts have lost digits or are gone: edges of some
+/// 1e-73 m.
 const SMALLEST_PRODUCT: f64 = f64::MIN_POSITIVE / f64::EPSILON;
 
 /// The point of triangle `abc` that is closest to `p`, with its barycentric coordinates.
 ///
-/// The Voronoi region of `p` (corner, edge or inside) is found from signed areas \[Ericson 2005, sec. 5.1.5\]. A triangle
-/// without area is treated as its sides: the result is always a point of the triangle.
+/// The Voronoi region of `p` (corner, edge or inside) is found from signed areas \[Ericson 2005,
+/// sec. 5.1.5\]. A triangle without area is treated as its sides: the result is always a point of
+/// the triangle.
 #[inline]
 pub fn closest_point(p: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> (Point3<f64>, [f64; 3]) {
     let (ab, ac, ap) = (b - a, c - a, p - a);
@@ -57,8 +60,8 @@ pub fn closest_point(p: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> (Point3<f
     (a + ab * v + ac * w, [1.0 - v - w, v, w])
 }
 
-/// [`closest_point`] of a triangle with little or no area: the nearest of the points on its sides, and of the foot on its
-/// plane where that is inside.
+/// [`closest_point`] of a triangle with little or no area: the nearest of the points on its sides,
+/// and of the foot on its plane where that is inside.
 #[cold]
 fn closest_point_of_thin(p: &Point3<f64>, corners: [&Point3<f64>; 3]) -> (Point3<f64>, [f64; 3]) {
     let mut best = (*corners[0], [1.0, 0.0, 0.0]);
@@ -95,9 +98,11 @@ fn closest_point_of_thin(p: &Point3<f64>, corners: [&Point3<f64>; 3]) -> (Point3
     best
 }
 
-/// Whether the segment from `p` to `q` passes through triangle `abc` or comes within `gap` (m) of doing so at its rim.
+/// Whether the segment from `p` to `q` passes through triangle `abc` or comes within `gap` (m) of
+/// doing so at its rim.
 ///
-/// `gap` widens the triangle in its plane and lengthens the segment; pass a small share of the edge length.
+/// `gap` widens the triangle in its plane and lengthens the segment; pass a small share of the edge
+/// length.
 #[inline]
 pub fn segment_crosses(
     p: &Point3<f64>,
@@ -125,7 +130,8 @@ pub fn segment_crosses(
     })
 }
 
-/// Whether a segment close to the plane of a triangle overlaps the triangle, seen along its unit normal.
+/// Whether a segment close to the plane of a triangle overlaps the triangle, seen along its unit
+/// normal.
 fn coplanar_overlap(
     p: &Point3<f64>,
     q: &Point3<f64>,
@@ -152,7 +158,8 @@ fn coplanar_overlap(
     from <= to
 }
 
-/// Whether two triangles without a common corner meet, or come within `gap` (m) as in [`segment_crosses`].
+/// Whether two triangles without a common corner meet, or come within `gap` (m) as in
+/// [`segment_crosses`].
 pub fn intersect(t: &[Point3<f64>; 3], u: &[Point3<f64>; 3], gap: f64) -> bool {
     (0..3).any(|i| {
         segment_crosses(&t[i], &t[(i + 1) % 3], u, gap)
@@ -178,7 +185,8 @@ pub(crate) fn are_apart(a: &Extent, b: &Extent, gap: f64) -> bool {
     (0..3).any(|i| a.0[i] > b.1[i] + gap || b.0[i] > a.1[i] + gap)
 }
 
-/// Whether two triangles that share no edge meet, other than in their common corner, or come within `gap` (m) as in [`intersect`].
+/// Whether two triangles that share no edge meet, other than in their common corner, or come within
+/// `gap` (m) as in [`intersect`].
 ///
 /// - `common`: index of the common corner in either.
 pub(crate) fn meet(
@@ -206,7 +214,8 @@ pub(crate) fn longest_edge_squared(t: &[Point3<f64>; 3]) -> f64 {
         .max((t[0] - t[2]).norm_squared())
 }
 
-/// Twice the area over the square of the longest edge: 0.87 for an equilateral triangle, 0 for one without area.
+/// Twice the area over the square of the longest edge: 0.87 for an equilateral triangle, 0 for one
+/// without area.
 #[inline]
 pub fn shape_quality(t: &[Point3<f64>; 3], double_area: f64) -> f64 {
     let longest = longest_edge_squared(t);

@@ -3,8 +3,8 @@
 /// A piece of work.
 pub type Job<'a> = Box<dyn FnOnce() + Send + 'a>;
 
-/// Runs pieces of work that do not depend on each other. Their results are the same however they are run, and in
-/// whatever order.
+/// Runs pieces of work that do not depend on each other. Their results are the same however they
+/// are run, and in whatever order.
 pub trait Workers: Sync {
     /// How many pieces are done at the same time, about.
     fn count(&self) -> usize;

@@ -2,11 +2,12 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// An axis is far enough from x where its share along x is below this: the cross product is then at least 0.8 long.
+/// An axis is far enough from x where its share along x is below this: the cross product is then at
+/// least 0.8 long.
 const FAR_FROM_X: f64 = 0.6;
 
-/// Two unit vectors u and v across `axis`, a unit vector: (u, v, axis) is right-handed. No continuous choice exists: where
-/// they are discontinuous as the axis turns is not defined.
+/// Two unit vectors u and v across `axis`, a unit vector: (u, v, axis) is right-handed. No
+/// continuous choice exists: where they are discontinuous as the axis turns is not defined.
 pub(crate) fn tangent_basis(axis: &Vector3<f64>) -> [Vector3<f64>; 2] {
     let aside = if axis.x.abs() < FAR_FROM_X {
         Vector3::x()

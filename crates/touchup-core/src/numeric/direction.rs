@@ -7,8 +7,8 @@ const SMALLEST_SQUARE: f64 = f64::MIN_POSITIVE / f64::EPSILON;
 
 /// |v| and v/|v|, also where |v|² would underflow or overflow; the direction is zero where `v` is.
 ///
-/// The components are divided by the largest of them first, where their squares lose digits. Finite for every finite `v`, but for a
-/// length beyond the largest number.
+/// The components are divided by the largest of them first, where their squares lose digits. Finite
+/// for every finite `v`, but for a length beyond the largest number.
 #[inline]
 pub(crate) fn length_and_direction(v: &Vector3<f64>) -> (f64, Vector3<f64>) {
     let squared = v.norm_squared();

@@ -4,7 +4,8 @@ use nalgebra::{SMatrix, SVector};
 
 /// Sums over rows a, values z and weights w that determine the x of least Σ w (a·x − z)².
 ///
-/// That is Σ w z² − 2 `right`·x + x·`information` x, and its least is where `information` x = `right`.
+/// That is Σ w z² − 2 `right`·x + x·`information` x, and its least is where `information` x =
+/// `right`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct NormalEquations<const N: usize> {
     /// Σ w a aᵀ: symmetric to rounding, positive semi-definite
@@ -42,7 +43,8 @@ impl<const N: usize> NormalEquations<N> {
         self.square += weight * value * value;
     }
 
-    /// Takes in rows and values with weights that follow how far `x` leaves them off; returns the sum of the weights.
+    /// Takes in rows and values with weights that follow how far `x` leaves them off; returns the
+    /// sum of the weights.
     ///
     /// - `weight`: of the number of a row, and of what `x` leaves of its value.
     pub fn add_reweighted(
@@ -59,7 +61,8 @@ impl<const N: usize> NormalEquations<N> {
         rows.into_iter().enumerate().map(add).sum()
     }
 
-    /// The same with a share of its diagonal added to the information: a solution is the shorter the more.
+    /// The same with a share of its diagonal added to the information: a solution is the shorter
+    /// the more.
     pub fn damped(mut self, share: f64) -> Self {
         self.information += SMatrix::from_diagonal(&(self.information.diagonal() * share));
         self
@@ -76,7 +79,8 @@ impl<const N: usize> NormalEquations<N> {
     }
 }
 
-/// Damped least squares \[Levenberg 1944, Marquardt 1963\]: how the damping changes, and when to stop.
+/// Damped least squares \[Levenberg 1944, Marquardt 1963\]: how the damping changes, and when to
+/// stop.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DampedSearch {
     /// damping of the first step
@@ -179,7 +183,8 @@ mod tests {
         );
     }
 
-    /// The bent valley of Rosenbrock, as two residuals 1 − x and 10 (y − x²): its least is 0 at (1, 1).
+    /// The bent valley of Rosenbrock, as two residuals 1 − x and 10 (y − x²): its least is 0 at (1,
+    /// 1).
     #[test]
     fn damped_steps_follow_a_bent_valley_to_its_end() {
         let residuals = |p: &Vector2<f64>| [1.0 - p.x, 10.0 * (p.y - p.x * p.x)];

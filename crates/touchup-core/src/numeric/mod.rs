@@ -1,5 +1,5 @@
-//! Numbers and vectors of no room of their own: order statistics, means, bases, voxels, sets, robust weights, least squares, small rigid
-//! motions.
+//! Numbers and vectors of no room of their own: order statistics, means, bases, voxels, sets,
+//! robust weights, least squares, small rigid motions.
 
 mod basis;
 mod counted;

@@ -10,13 +10,15 @@ pub(crate) fn mean(vectors: impl Iterator<Item = Vector3<f64>>) -> Vector3<f64> 
     sum / count.max(1) as f64
 }
 
-/// Scatter of some vectors about their mean m, Σ (v − m)(v − m)ᵀ: symmetric, positive semi-definite.
+/// Scatter of some vectors about their mean m, Σ (v − m)(v − m)ᵀ: symmetric, positive
+/// semi-definite.
 pub(crate) fn scatter(vectors: impl Iterator<Item = Vector3<f64>> + Clone) -> Matrix3<f64> {
     let mean = mean(vectors.clone());
     vectors.map(|v| (v - mean) * (v - mean).transpose()).sum()
 }
 
-/// Root mean square distances of some vectors from their mean along their principal axes, in rising order.
+/// Root mean square distances of some vectors from their mean along their principal axes, in rising
+/// order.
 pub(crate) fn spreads(vectors: impl Iterator<Item = Vector3<f64>> + Clone) -> [f64; 3] {
     let count = vectors.clone().count() as f64;
     let mut spreads: [f64; 3] = (scatter(vectors) / count)

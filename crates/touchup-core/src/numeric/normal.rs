@@ -1,8 +1,10 @@
-//! The normal distribution: its distribution function, its quantile, and the share of a round one inside of a circle.
+//! The normal distribution: its distribution function, its quantile, and the share of a round one
+//! inside of a circle.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
-/// From here on the continued fraction of the tail is taken: its 60 terms are exact to the last digit there, and the series still is.
+/// From here on the continued fraction of the tail is taken: its 60 terms are exact to the last
+/// digit there, and the series still is.
 const TAIL: f64 = 3.5;
 
 /// Density of the standard normal distribution.
@@ -10,8 +12,9 @@ fn normal_density(z: f64) -> f64 {
     (-0.5 * z * z).exp() * FRAC_1_SQRT_2 / PI.sqrt()
 }
 
-/// Distribution function Φ of the standard normal distribution: a series about 0, the continued fraction of the tail beyond
-/// [Abramowitz and Stegun 1964, 26.2.11 and 26.2.14]. Absolute error below 1e-15; in the tails as many digits.
+/// Distribution function Φ of the standard normal distribution: a series about 0, the continued
+/// fraction of the tail beyond [Abramowitz and Stegun 1964, 26.2.11 and 26.2.14]. Absolute error
+/// below 1e-15; in the tails as many digits.
 pub fn normal_cdf(z: f64) -> f64 {
     if z.is_nan() {
         return f64::NAN;
@@ -62,13 +65,15 @@ pub fn normal_quantile(share: f64) -> f64 {
     f64::midpoint(low, high)
 }
 
-/// Probability that a point of a round normal distribution lies within a circle, by Simpson's rule across the circle.
+/// Probability that a point of a round normal distribution lies within a circle, by Simpson's rule
+/// across the circle.
 ///
 /// - `off`: of the middle of the distribution from that of the circle, 0 or more.
 /// - `std`: of one coordinate, more than 0.
 /// - `radius`: of the circle, in the same unit.
 pub fn circle_probability(off: f64, std: f64, radius: f64) -> f64 {
-    /// Standard deviations on either side that are integrated: what is beyond is less than a rounding.
+    /// Standard deviations on either side that are integrated: what is beyond is less than a
+    /// rounding.
     const REACH: f64 = 9.0;
     /// Steps, even: 0.02 standard deviations each.
     const STEPS: u32 = 1000;
@@ -98,7 +103,8 @@ pub fn circle_probability(off: f64, std: f64, radius: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Tables: NIST/SEMATECH e-Handbook 1.3.6.7.1 to its digits, and 50 digits of the error function rounded.
+    /// Tables: NIST/SEMATECH e-Handbook 1.3.6.7.1 to its digits, and 50 digits of the error
+    /// function rounded.
     #[test]
     fn the_distribution_function_has_the_digits_of_tables() {
         let table = [
@@ -144,7 +150,8 @@ mod tests {
         );
     }
 
-    /// About the middle it is Rayleigh's distribution, and of a circle much larger than the spread a half-plane.
+    /// About the middle it is Rayleigh's distribution, and of a circle much larger than the spread
+    /// a half-plane.
     #[test]
     fn a_circle_holds_what_closed_forms_say() {
         for ratio in [0.01, 0.5, 1.0, 3.0, 7.0] {

@@ -1,4 +1,5 @@
-/// The median of a stream of lengths, followed in constant memory: a step up for each longer one, a step down for each shorter one.
+/// The median of a stream of lengths, followed in constant memory: a step up for each longer one, a
+/// step down for each shorter one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RunningMedian {
     /// as followed so far

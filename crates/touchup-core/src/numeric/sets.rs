@@ -38,7 +38,8 @@ pub(crate) fn flood<T: Copy, Beside: IntoIterator<Item = T>>(
     found
 }
 
-/// Sets of the numbers below a limit, each number at first alone. The lowest number of a set is its root.
+/// Sets of the numbers below a limit, each number at first alone. The lowest number of a set is its
+/// root.
 #[derive(Clone, Debug)]
 pub(crate) struct DisjointSets(Vec<u32>);
 

@@ -2,7 +2,8 @@
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3, Vector6};
 
-/// `pose`, then the turn about `centre` by a rotation vector (rad), then the shift (m): x ↦ c + R (x − c) + t.
+/// `pose`, then the turn about `centre` by a rotation vector (rad), then the shift (m): x ↦ c + R
+/// (x − c) + t.
 pub(crate) fn moved_by_twist(
     pose: &Isometry3<f64>,
     centre: &Point3<f64>,
@@ -13,10 +14,12 @@ pub(crate) fn moved_by_twist(
     Isometry3::from_parts((shift + centre.coords - turn * centre.coords).into(), turn) * pose
 }
 
-/// How the distance of a point from a plane changes with a small motion of the point \[Chen Medioni 1992\]: (n, arm × n / lever), by shift
-/// and by turn, a turn counted by the shift that it gives at the lever.
+/// How the distance of a point from a plane changes with a small motion of the point \[Chen Medioni
+/// 1992\]: (n, arm × n / lever), by shift and by turn, a turn counted by the shift that it gives at
+/// the lever.
 ///
-/// - `arm`: of the point from the centre of the turn, m; `normal`: unit, of the plane; `lever`: m, 1 where turns are counted in rad.
+/// - `arm`: of the point from the centre of the turn, m; `normal`: unit, of the plane; `lever`: m,
+///   1 where turns are counted in rad.
 pub(crate) fn point_to_plane_row(
     arm: &Vector3<f64>,
     normal: &Vector3<f64>,

@@ -1,5 +1,5 @@
-//! A small map that keeps the order of insertion, as long as no key is removed, so that walking it never depends on
-//! hashing.
+//! A small map that keeps the order of insertion, as long as no key is removed, so that walking it
+//! never depends on hashing.
 
 /// What a [`CellTable`] can look up.
 pub trait Key: Copy + Eq {

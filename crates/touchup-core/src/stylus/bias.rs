@@ -1,8 +1,9 @@
 //! Slow drift of a force sensor, followed while nothing is touched.
 //!
-//! In free air a sensor whose weight and bias were taken off reads its drift alone: d b/dt = (f − b) / T. A light contact
-//! looks the same, so only lasting free motion counts, and the start of a contact is taken back: when free motion ends, the
-//! bias returns to what it was before the last settling time.
+//! In free air a sensor whose weight and bias were taken off reads its drift alone: d b/dt = (f −
+//! b) / T. A light contact looks the same, so only lasting free motion counts, and the start of a
+//! contact is taken back: when free motion ends, the bias returns to what it was before the last
+//! settling time.
 
 use nalgebra::Vector3;
 
@@ -13,20 +14,22 @@ parameters! {
     /// Settings of a [`BiasTracker`].
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct BiasParams in "bias_tracking" {
-        /// It is free air once the motion has been free for this time (contact.free_n); what was learnt in this time before a contact is
-        /// dropped.
+        /// It is free air once the motion has been free for this time (contact.free_n); what was
+        /// learnt in this time before a contact is dropped.
         ///
         /// In ns. A hand rises to 0.3 N and falls from it within 10 ms.
         settle_ns: i64 = 60.0, "settle_ms" [MS, 0.001, 60000];
         /// Time constant of the running mean.
         ///
-        /// In s. A noise of 0.05 N at 1 kHz becomes 2 mN, and a drift of 10 mN/s is followed 3 mN behind.
+        /// In s. A noise of 0.05 N at 1 kHz becomes 2 mN, and a drift of 10 mN/s is followed 3 mN
+        /// behind.
         time: f64 = 0.3, "time_s" [S, 1e-6, 1e6];
     }
 }
 
-/// Follows the bias of the force in the axes of the stylus, in which a sensor that is fixed to it drifts. A bias that is larger from the
-/// start than what counts as free motion is never found: take it off by [`super::CompensatorParams::bias_s`].
+/// Follows the bias of the force in the axes of the stylus, in which a sensor that is fixed to it
+/// drifts. A bias that is larger from the start than what counts as free motion is never found:
+/// take it off by [`super::CompensatorParams::bias_s`].
 ///
 /// # Example
 /// ```
@@ -147,7 +150,8 @@ mod tests {
         BiasTracker::new(BiasParams::default()).unwrap()
     }
 
-    /// A constant force in free air: b(t) = f (1 − e^(−(t − 59 ms)/T)); the step at 60 ms already holds 1 ms.
+    /// A constant force in free air: b(t) = f (1 − e^(−(t − 59 ms)/T)); the step at 60 ms already
+    /// holds 1 ms.
     #[test]
     fn a_constant_drift_is_approached_exponentially() {
         let drift = Vector3::new(0.1, -0.05, 0.2);
@@ -182,7 +186,8 @@ mod tests {
         }
     }
 
-    /// Presses of 2 N that rise and fall in 10 to 40 ms. In 14 s there are 6 s of free air that count: e^(−20).
+    /// Presses of 2 N that rise and fall in 10 to 40 ms. In 14 s there are 6 s of free air that
+    /// count: e^(−20).
     #[test]
     fn contacts_leave_no_trace() {
         let drift = Vector3::new(0.03, -0.02, 0.04);

@@ -1,11 +1,13 @@
 //! Clock offset: how late the clock of the wrench reads, from the samples themselves.
 //!
-//! A ball that comes down onto a surface is stopped at the instant at which the force leaves zero. Along the force, its
-//! centre p + F/k goes as c + v₋ min(t − t₀, 0) + v₊ max(t − t₀, 0), and the force rises as A (1 − e^(−(t − t₁)/T)). The
-//! delay is δ = t₁ − t₀. Within ± 120 ms, the δ is searched at which the ball loses most speed along the force, on the mean
-//! of all onsets; around that, each onset gives the profile of its least squares over δ. All of them together give δ, and
-//! how much they differ gives its uncertainty. Where another stop, apart from the first, is as strong, they say nothing. The course of
-//! motion and force between the onsets ([`CourseClock`]) speaks where they do not, and against them where they are wrong.
+//! A ball that comes down onto a surface is stopped at the instant at which the force leaves zero.
+//! Along the force, its centre p + F/k goes as c + v₋ min(t − t₀, 0) + v₊ max(t − t₀, 0), and the
+//! force rises as A (1 − e^(−(t − t₁)/T)). The delay is δ = t₁ − t₀. Within ± 120 ms, the δ is
+//! searched at which the ball loses most speed along the force, on the mean of all onsets; around
+//! that, each onset gives the profile of its least squares over δ. All of them together give δ, and
+//! how much they differ gives its uncertainty. Where another stop, apart from the first, is as
+//! strong, they say nothing. The course of motion and force between the onsets ([`CourseClock`])
+//! speaks where they do not, and against them where they are wrong.
 
 use std::collections::VecDeque;
 
@@ -50,8 +52,9 @@ const LEAST_STOP: f64 = 15e-3;
 const MOST_ONSETS: usize = 128;
 /// Fewer do not determine their spread.
 const LEAST_ONSETS: usize = 8;
-/// A force that does not rise exponentially is taken to begin too early or too late by about this, s. Half a period of
-/// the wrench is added: over which part of it a sensor takes its mean is unknown.
+/// A force that does not rise exponentially is taken to begin too early or too late by about this,
+/// s. Half a period of the wrench is added: over which part of it a sensor takes its mean is
+/// unknown.
 const SHAPE: f64 = 0.3e-3;
 /// A wider uncertainty is no estimate, s.
 const LARGEST_SIGMA: f64 = 3e-3;
@@ -148,8 +151,8 @@ impl ClockEstimator {
         }
     }
 
-    /// The delay by all onsets so far; where they do not determine it, or the course of motion and force contradicts them or shows a drift, by that; `None`
-    /// when neither does.
+    /// The delay by all onsets so far; where they do not determine it, or the course of motion and
+    /// force contradicts them or shows a drift, by that; `None` when neither does.
     pub fn offset(&self) -> Option<ClockOffset> {
         let (onsets, course) = (self.by_onsets(), self.course.offset());
         match (onsets, course) {
@@ -205,7 +208,8 @@ impl ClockEstimator {
         })
     }
 
-    /// The delay at which the ball loses most speed on the mean of all onsets; `None` where it stops at two of them.
+    /// The delay at which the ball loses most speed on the mean of all onsets; `None` where it
+    /// stops at two of them.
     fn searched(&self) -> Option<f64> {
         let at_step = |step: usize| (step as f64 - (SEARCHED_STEPS / 2) as f64) * SEARCH_STEP;
         let stops: Vec<f64> = (0..SEARCHED_STEPS)
@@ -346,7 +350,8 @@ fn force_begins(samples: &[OnsetSample]) -> Option<f64> {
     best.map(|(_, begun)| begun)
 }
 
-/// The residual of the centre's path after a bent line is subtracted, and the speeds before and after the bend.
+/// The residual of the centre's path after a bent line is subtracted, and the speeds before and
+/// after the bend.
 ///
 /// - `around`: those of the stop, out of `samples`.
 fn kink(

@@ -7,7 +7,8 @@ use serde::Serialize;
 /// What the clock of the wrench reads beyond that of the pose.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ClockOffset {
-    /// in the middle of what it is estimated from, s; to be added to [`super::SyncParams::wrench_offset_ns`] where there is no drift
+    /// in the middle of what it is estimated from, s; to be added to
+    /// [`super::SyncParams::wrench_offset_ns`] where there is no drift
     pub offset: f64,
     /// standard uncertainty, s
     pub sigma: f64,
@@ -24,15 +25,17 @@ pub struct ClockDrift {
     pub rate: f64,
     /// standard uncertainty
     pub rate_sigma: f64,
-    /// what it reads beyond the other at the first sample, s; to be added to [`super::SyncParams::wrench_offset_ns`]
+    /// what it reads beyond the other at the first sample, s; to be added to
+    /// [`super::SyncParams::wrench_offset_ns`]
     pub offset_at_first: f64,
     /// … and at the last, s
     pub offset_at_last: f64,
 }
 
 impl ClockDrift {
-    /// Standard uncertainty of [`Self::offset_at_first`] and [`Self::offset_at_last`], s: of an offset in the middle between them, and of a rate
-    /// over half the time, which are independent there: u² = σ² + (σ_rate T/2)².
+    /// Standard uncertainty of [`Self::offset_at_first`] and [`Self::offset_at_last`], s: of an
+    /// offset in the middle between them, and of a rate over half the time, which are independent
+    /// there: u² = σ² + (σ_rate T/2)².
     ///
     /// - `sigma`: that of the offset in the middle, s.
     ///

@@ -4,15 +4,16 @@
 //!
 //! f_S = R_OSᵀ · (F + m g) + b_S,   τ_S likewise, about So
 //!
-//! The contact force is therefore F = R_OS · (f_S − b_S) − m g (paper, Eq 14, with weight and bias), and about the
-//! centre of the ball To the torque is τ_T = τ_S + p_TS × F.
+//! The contact force is therefore F = R_OS · (f_S − b_S) − m g (paper, Eq 14, with weight and
+//! bias), and about the centre of the ball To the torque is τ_T = τ_S + p_TS × F.
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use super::{Sample, SettingError, Wrench};
 use crate::parameters;
 
-/// The axes in which the measured wrench is expressed. Its torque is about the sensor's origin So in both.
+/// The axes in which the measured wrench is expressed. Its torque is about the sensor's origin So
+/// in both.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum WrenchFrame {
     /// The sensor's own axes: the force turns with the stylus (Eq 14).
@@ -45,11 +46,13 @@ parameters! {
     /// Where the sensor sits on the stylus.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct SensorMount in "compensation" {
-        /// Origin of the sensor from the centre of the ball, in the axes of the tip (z: along the shaft, tip to handle).
+        /// Origin of the sensor from the centre of the ball, in the axes of the tip (z: along the
+        /// shaft, tip to handle).
         ///
         /// So from To, expressed in T, m.
         position: Vector3<f64> = [0.0; 3], "sensor_position_mm" [MM, -1e5, 1e5];
-        /// Orientation of the sensor in the frame of the tip, as a quaternion x, y, z, w; left out: the same axes.
+        /// Orientation of the sensor in the frame of the tip, as a quaternion x, y, z, w; left out:
+        /// the same axes.
         orientation_xyzw: Option<[f64; 4]> = None, "sensor_orientation_xyzw" [QUATERNION, 0.999, 1.001] like "[0, 0, 0, 1]";
     }
 }
@@ -85,7 +88,8 @@ impl Payload {
     }
 }
 
-/// How the sensor is mounted and what it carries. The default is a sensor in the tip's axes without payload.
+/// How the sensor is mounted and what it carries. The default is a sensor in the tip's axes without
+/// payload.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CompensatorParams {
     /// In which axes the wrench arrives.

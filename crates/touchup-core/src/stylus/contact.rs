@@ -5,7 +5,8 @@ use nalgebra::Vector3;
 use super::SettingError;
 use crate::parameters;
 
-/// A pause in contact longer than this parts two strokes, ns: a hand that lifts the stylus, not one that bounces.
+/// A pause in contact longer than this parts two strokes, ns: a hand that lifts the stylus, not one
+/// that bounces.
 pub(crate) const STROKE_PAUSE_NS: i64 = 100_000_000;
 /// A sample acts for no longer than this, s: what happens in a longer pause is unknown.
 pub(crate) const LONGEST_HOLD: f64 = 0.03;
@@ -16,15 +17,16 @@ parameters! {
     pub struct ContactGateParams in "contact" {
         /// A force above this begins a contact; no less than off_n.
         ///
-        /// In N. Eight times the 0.05 N by which both noise and bias of a usual sensor vary, and far below the 2–4 N of a hand that
-        /// presses.
+        /// In N. Eight times the 0.05 N by which both noise and bias of a usual sensor vary, and
+        /// far below the 2–4 N of a hand that presses.
         on: f64 = 0.4, "on_n" [N, 0, 1000];
         /// A force below this ends it.
         ///
-        /// In N. Above noise and bias together, and so far below `on` that the noise at the threshold does not chatter.
+        /// In N. Above noise and bias together, and so far below `on` that the noise at the
+        /// threshold does not chatter.
         off: f64 = 0.22, "off_n" [N, 0, 1000];
-        /// Below on_n, what the zero of the sensor may be off by: a force above this that its noise does not explain may be a light touch,
-        /// which neither moves the mesh nor frees space.
+        /// Below on_n, what the zero of the sensor may be off by: a force above this that its noise
+        /// does not explain may be a light touch, which neither moves the mesh nor frees space.
         ///
         /// In N. Three times the 0.05 N by which the bias of a usual sensor varies.
         free: f64 = 0.15, "free_n" [N, 0, 1000];
@@ -81,7 +83,8 @@ impl ContactGate {
         })
     }
 
-    /// Takes the next force, N, in any frame; returns the contact that it begins or continues, if any.
+    /// Takes the next force, N, in any frame; returns the contact that it begins or continues, if
+    /// any.
     #[inline]
     pub fn update(&mut self, stamp_ns: i64, force: &Vector3<f64>) -> Option<Contact> {
         let magnitude = force.norm();

@@ -1,14 +1,18 @@
 //! The state of the contact at one sample, decided once for all its users.
 //!
-//! [`ContactEstimator::observe`] turns a raw [`Sample`] into a [`ContactSample`]: weight, lever arm and bias off the wrench, the real
-//! centre of the ball, in contact or not and since when, and the normal of the surface within the friction cone. The haptic update, the
-//! reconstruction, the registration of the scan, the clock estimate and the node all read this one value.
+//! [`ContactEstimator::observe`] turns a raw [`Sample`] into a [`ContactSample`]: weight, lever arm
+//! and bias off the wrench, the real centre of the ball, in contact or not and since when, and the
+//! normal of the surface within the friction cone. The haptic update, the reconstruction, the
+//! registration of the scan, the clock estimate and the node all read this one value.
 //!
-//! Two uses differ on purpose, and in this alone. The evidence of the reconstruction may wait: it takes [`ContactSample::contact`], which the
-//! unsmoothed force decides, and smooths [`ContactSample::centre`] and the force over a window that looks as far ahead as back. The haptic
-//! update and the registration answer at once, by position and force smoothed by the past ([`ContactSample::ball`]): for them it is
-//! [`ContactSample::ball_contact`], the same thresholds on the smoothed force, so that a ball whose filter still holds free motion is not
-//! taken for one that touches. Bias, thresholds and [`WIDEST_CONE_COSINE`](super::WIDEST_CONE_COSINE) are the same for both.
+//! Two uses differ on purpose, and in this alone. The evidence of the reconstruction may wait: it
+//! takes [`ContactSample::contact`], which the unsmoothed force decides, and smooths
+//! [`ContactSample::centre`] and the force over a window that looks as far ahead as back. The
+//! haptic update and the registration answer at once, by position and force smoothed by the past
+//! ([`ContactSample::ball`]): for them it is [`ContactSample::ball_contact`], the same thresholds
+//! on the smoothed force, so that a ball whose filter still holds free motion is not taken for one
+//! that touches. Bias, thresholds and [`WIDEST_CONE_COSINE`](super::WIDEST_CONE_COSINE) are the
+//! same for both.
 
 use nalgebra::{Point3, Vector3};
 
@@ -35,7 +39,8 @@ pub struct ContactEstimatorParams {
 }
 
 impl ContactEstimatorParams {
-    /// All of it with its defaults, for a sensor that carries nothing: what evidence for the reconstruction needs.
+    /// All of it with its defaults, for a sensor that carries nothing: what evidence for the
+    /// reconstruction needs.
     pub fn new(tip: TipParams) -> Self {
         let gate = ContactGateParams::default();
         Self {
@@ -47,8 +52,8 @@ impl ContactEstimatorParams {
         }
     }
 
-    /// With default thresholds and smoothing where the haptic update does without one of them; `None` where it has both, so that its
-    /// own contacts do.
+    /// With default thresholds and smoothing where the haptic update does without one of them;
+    /// `None` where it has both, so that its own contacts do.
     pub fn completed(self) -> Option<Self> {
         let is_complete = self.gate.is_some() && self.sliding.is_some();
         let (gate, sliding) = (
@@ -76,13 +81,15 @@ pub struct ContactSample {
     pub centre: Point3<f64>,
     /// by the unsmoothed force; `None` in free motion, and for a touch too light for the thresholds
     pub contact: Option<Contact>,
-    /// whether nothing is touched: noise and zero of the sensor explain the force. Neither this nor in contact: perhaps a light touch
+    /// whether nothing is touched: noise and zero of the sensor explain the force. Neither this nor
+    /// in contact: perhaps a light touch
     pub is_free: bool,
     /// the ball smoothed by the past
     pub ball: Ball,
     /// … and its contact, by the force smoothed alike; `None` in free motion
     pub ball_contact: Option<Contact>,
-    /// the surface under [`Self::ball`], within the friction cone; `None` without [`Self::ball_contact`] or force
+    /// the surface under [`Self::ball`], within the friction cone; `None` without
+    /// [`Self::ball_contact`] or force
     pub surface: Option<NormalEstimate>,
 }
 
@@ -167,7 +174,8 @@ impl ContactEstimator {
     /// Takes the next raw sample.
     ///
     /// # Errors
-    /// [`SampleError`] for one that is not finite, absurd or not after the last; nothing is changed then.
+    /// [`SampleError`] for one that is not finite, absurd or not after the last; nothing is changed
+    /// then.
     #[inline]
     pub fn observe(&mut self, sample: &Sample) -> Result<&ContactSample, SampleError> {
         sample.check()?;
@@ -239,7 +247,8 @@ impl ContactEstimator {
         self.ball_gate.as_ref().map_or(0, ContactGate::contacts)
     }
 
-    /// Kinetic friction as measured so far; `None` until the ball has slid far enough, or without `sliding`.
+    /// Kinetic friction as measured so far; `None` until the ball has slid far enough, or without
+    /// `sliding`.
     pub fn friction(&self) -> Option<FrictionCoefficient> {
         self.motion.friction()
     }

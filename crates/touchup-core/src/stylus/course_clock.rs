@@ -1,15 +1,19 @@
 //! How late the clock of the wrench reads, from the whole course of motion and force.
 //!
-//! **Sliding**: friction turns with the motion. A ball that slides is held back by the force along its way, F · v̂ = −|F| sin φ, with the
-//! angle of friction φ. Where the stylus turns back, and where it rolls around an edge, F and v turn at one instant. Read with a delay δ,
-//! the cosine s = F(t + δ) · v(t) / |F| |v| leaves its level there: over all sliding, its variance is least at the delay.
+//! **Sliding**: friction turns with the motion. A ball that slides is held back by the force along
+//! its way, F · v̂ = −|F| sin φ, with the angle of friction φ. Where the stylus turns back, and
+//! where it rolls around an edge, F and v turn at one instant. Read with a delay δ, the cosine s =
+//! F(t + δ) · v(t) / |F| |v| leaves its level there: over all sliding, its variance is least at the
+//! delay.
 //!
-//! **Lifting**: where there is a gap between ball and part there is no force (Signorini's condition, F ≥ 0, g ≥ 0, F g = 0). Read with a
-//! delay, the force is still there when the ball has left, and there before it comes: the mean of F(t + δ) g(t) is least at the delay. The gap is
+//! **Lifting**: where there is a gap between ball and part there is no force (Signorini's
+//! condition, F ≥ 0, g ≥ 0, F g = 0). Read with a delay, the force is still there when the ball has
+//! left, and there before it comes: the mean of F(t + δ) g(t) is least at the delay. The gap is
 //! measured from where the ball was lowest along the force shortly before and after.
 //!
-//! **Drift**: two clocks of their own run at rates that differ by up to some 100 ppm, which is 30 ms after five minutes. The delay is
-//! then δ + ε (t − t̄), and the sums over all blocks are least at both.
+//! **Drift**: two clocks of their own run at rates that differ by up to some 100 ppm, which is 30
+//! ms after five minutes. The delay is then δ + ε (t − t̄), and the sums over all blocks are least
+//! at both.
 
 use std::collections::VecDeque;
 
@@ -41,17 +45,21 @@ const BLOCK: usize = 100;
 const MOST_BLOCKS: usize = 64;
 /// Fewer do not determine their spread.
 const LEAST_BLOCKS: usize = 8;
-/// What is least at the delay is this share at most of its mean over all delays: else nothing turned, or lifted.
+/// What is least at the delay is this share at most of its mean over all delays: else nothing
+/// turned, or lifted.
 const LEAST_SHARE: f64 = 0.7;
-/// Another delay whose sum is lower than the mean by all but this share may be it as well: what repeats itself within the span.
+/// Another delay whose sum is lower than the mean by all but this share may be it as well: what
+/// repeats itself within the span.
 const OTHER_DEPTH: f64 = 0.1;
 /// … when it is so many steps away.
 const OTHER_STEPS: usize = 10;
-/// Rates of drift that are tried on each side: up to this one, in steps of this one or finer, so many.
+/// Rates of drift that are tried on each side: up to this one, in steps of this one or finer, so
+/// many.
 const LARGEST_RATE: f64 = 400e-6;
 const RATE_STEP: f64 = 5e-6;
 const MOST_RATES: i64 = 400;
-/// A drift is sure when it is so many of its standard uncertainties, and worth taking off when it gains this much, s.
+/// A drift is sure when it is so many of its standard uncertainties, and worth taking off when it
+/// gains this much, s.
 const SURE_SIGMAS: f64 = 5.0;
 const LEAST_GAIN: f64 = 8e-3;
 /// A wider uncertainty is no estimate, s.
@@ -128,8 +136,8 @@ impl DelayBlocks {
         }
     }
 
-    /// Where the sum of what `of_block` gives is least, with the jackknife's uncertainty over the blocks: one delay, or one that grows steadily
-    /// where that is sure.
+    /// Where the sum of what `of_block` gives is least, with the jackknife's uncertainty over the
+    /// blocks: one delay, or one that grows steadily where that is sure.
     ///
     /// - `period`: between two samples, s.
     /// - `ends`: first and last sample, s.
@@ -234,8 +242,9 @@ impl Parts {
         })
     }
 
-    /// The rate at which the least of the sum is least, and its standard uncertainty: by the jackknife over all rates, since without a
-    /// block it may be another one altogether. `None` at an end of what is tried.
+    /// The rate at which the least of the sum is least, and its standard uncertainty: by the
+    /// jackknife over all rates, since without a block it may be another one altogether. `None` at
+    /// an end of what is tried.
     fn drift(&self) -> Option<[f64; 2]> {
         // one step of the rate is one of the delay from end to end
         let rate_step = (STEP_NS as f64 * 1e-9 / self.span().max(f64::MIN_POSITIVE)).min(RATE_STEP);

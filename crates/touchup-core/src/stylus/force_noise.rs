@@ -1,10 +1,12 @@
-//! The noise of a force sensor, from the steps of its own readings: what changes from one sample to the next is noise, what lasts is not.
+//! The noise of a force sensor, from the steps of its own readings: what changes from one sample to
+//! the next is noise, what lasts is not.
 
 use nalgebra::Vector3;
 
 use crate::numeric::RunningMedian;
 
-/// Median of |F₁ − F₀| of two readings of unit noise per axis: √2 times that of χ with three degrees.
+/// Median of |F₁ − F₀| of two readings of unit noise per axis: √2 times that of χ with three
+/// degrees.
 const STEP_PER_SIGMA: f64 = 2.175;
 /// Lower bound of the steps, N.
 const LEAST_STEP: f64 = 1e-4;

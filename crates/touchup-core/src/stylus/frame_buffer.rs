@@ -128,7 +128,8 @@ impl FrameBuffer {
         Ok(self.bridged_pose(in_frame, of, stamp_ns, i64::MAX)?.0)
     }
 
-    /// The same where no link lacks transforms for longer than `longest_gap_ns`; and whether a link is between two of them.
+    /// The same where no link lacks transforms for longer than `longest_gap_ns`; and whether a link
+    /// is between two of them.
     pub(super) fn bridged_pose(
         &self,
         in_frame: &str,
@@ -230,7 +231,8 @@ fn keep(poses: &mut VecDeque<(i64, Isometry3<f64>)>, stamp: i64, pose: Isometry3
 }
 
 impl FrameMotion {
-    /// Straight between two poses, at constant angular velocity the shorter way; and whether it is between two.
+    /// Straight between two poses, at constant angular velocity the shorter way; and whether it is
+    /// between two.
     fn at(
         &self,
         name: &str,
@@ -285,7 +287,8 @@ mod tests {
         }
     }
 
-    /// Worked by hand: the arm goes from 0 to 2 m in two seconds and turns by 90° about z; the tool is 1 m along its x.
+    /// Worked by hand: the arm goes from 0 to 2 m in two seconds and turns by 90° about z; the tool
+    /// is 1 m along its x.
     #[test]
     fn a_moving_frame_is_between_its_poses() {
         let mut frames = FrameBuffer::default();

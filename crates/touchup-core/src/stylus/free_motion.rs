@@ -1,7 +1,8 @@
 //! Free motion, told from a light touch.
 //!
-//! Below the threshold of contact a stylus may be free, or press lightly. Only a force that noise and zero of the sensor explain is free
-//! motion: |F| itself, and |F| smoothed over a short time, in which noise averages out and a touch does not.
+//! Below the threshold of contact a stylus may be free, or press lightly. Only a force that noise
+//! and zero of the sensor explain is free motion: |F| itself, and |F| smoothed over a short time,
+//! in which noise averages out and a touch does not.
 
 use nalgebra::Vector3;
 
@@ -13,7 +14,8 @@ const SMOOTHING: f64 = 0.02;
 /// |F| of noise alone is below so many standard deviations of one axis in 999 of 1000 samples: χ with three degrees.
 const NOISE_SIGMAS: f64 = 4.03;
 
-/// After a start or a gap nothing is free until the variance of the smoothed force is so many times that which it ends at: 44 ms at 1 kHz.
+/// After a start or a gap nothing is free until the variance of the smoothed force is so many times
+/// that which it ends at: 44 ms at 1 kHz.
 const SETTLED: f64 = 1.5;
 
 /// Decides whether the stylus is free, sample by sample.
@@ -39,7 +41,8 @@ impl FreeMotion {
         }
     }
 
-    /// Takes the next force without weight and bias, N, `dt` (s) after the one before; returns whether nothing is touched.
+    /// Takes the next force without weight and bias, N, `dt` (s) after the one before; returns
+    /// whether nothing is touched.
     pub(super) fn update(&mut self, force: &Vector3<f64>, dt: f64) -> bool {
         let gain = match self.last {
             Some(last) if dt > 0.0 && dt <= LONGEST_HOLD => {

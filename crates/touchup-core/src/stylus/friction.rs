@@ -1,20 +1,24 @@
 //! The normal of the touched surface, when friction tilts the force.
 //!
-//! The contact force of a sliding ball is F = N (n − μ t), t the direction of sliding: F lies at φ = atan μ from the
-//! normal n, in the plane of the two, behind. Two methods measure that angle. From this instant alone: t is at right
-//! angles to n, so that sin φ = −F̂·t; this needs no μ, but an error of t out of the surface is one of n, degree for
-//! degree. And from all earlier samples: over a stretch of sliding, ∫ −F·dx / ∫ |F| |dx|, the share of the force that did
-//! work, is sin φ, and the noise of the positions hardly enters it. With φ known, t only has to give the direction *along* the surface, and its
-//! error enters by the factor φ. [`Friction::normal`] weights the two by their variances.
+//! The contact force of a sliding ball is F = N (n − μ t), t the direction of sliding: F lies at φ
+//! = atan μ from the normal n, in the plane of the two, behind. Two methods measure that angle.
+//! From this instant alone: t is at right angles to n, so that sin φ = −F̂·t; this needs no μ, but
+//! an error of t out of the surface is one of n, degree for degree. And from all earlier samples:
+//! over a stretch of sliding, ∫ −F·dx / ∫ |F| |dx|, the share of the force that did work, is sin φ,
+//! and the noise of the positions hardly enters it. With φ known, t only has to give the direction
+//! *along* the surface, and its error enters by the factor φ. [`Friction::normal`] weights the two
+//! by their variances.
 //!
-//! Slower than the noise of the velocity, t is not known either; the force is then all there is, within the cone.
+//! Slower than the noise of the velocity, t is not known either; the force is then all there is,
+//! within the cone.
 
 use nalgebra::Vector3;
 
 use crate::numeric::direction;
 
-/// Cosine of the widest friction cone accepted by default: cos 24° (μ = 0.45, dry metal on metal). The normal of a surface is nowhere
-/// farther from the force, neither for the haptic update nor for the evidence of the reconstruction.
+/// Cosine of the widest friction cone accepted by default: cos 24° (μ = 0.45, dry metal on metal).
+/// The normal of a surface is nowhere farther from the force, neither for the haptic update nor for
+/// the evidence of the reconstruction.
 pub const WIDEST_CONE_COSINE: f64 = 0.9135;
 
 /// Velocity and contact force of the ball at one instant, averaged over a short time.
@@ -123,11 +127,13 @@ impl SlidingStretch {
 const BIN: f64 = 0.001;
 /// Bins from 0 to 1.
 const BINS: usize = 1000;
-/// Length of a stretch, m: 0.2 s of a calm hand, long enough for the noise of the positions to vanish.
+/// Length of a stretch, m: 0.2 s of a calm hand, long enough for the noise of the positions to
+/// vanish.
 const STRETCH: f64 = 5e-3;
 /// So many make a coefficient.
 const FEWEST: u32 = 4;
-/// Before that the path so far determines φ with this standard deviation, rad: place and direction change friction …
+/// Before that the path so far determines φ with this standard deviation, rad: place and direction
+/// change friction …
 const EARLY_SIGMA: f64 = 0.03;
 /// … and the ends of the path are off by this, m: 0.2 mm of pose noise after smoothing.
 const EARLY_PATH: f64 = 0.1e-3;
@@ -137,9 +143,11 @@ const CREEP: f64 = 1e-3;
 const CLEAR: f64 = 3.0;
 /// φ before anything is known, and its standard deviation, rad: μ from 0.05 to 0.3.
 const USUAL_ANGLE: [f64; 2] = [0.17, 0.12];
-/// Friction and force are never known better than this, rad: bias and noise of a usual force sensor, 0.05 N of 2.5 N.
+/// Friction and force are never known better than this, rad: bias and noise of a usual force
+/// sensor, 0.05 N of 2.5 N.
 const LEAST_SIGMA: f64 = 0.015;
-/// The two methods for φ contradict each other when they differ by more standard deviations than this.
+/// The two methods for φ contradict each other when they differ by more standard deviations than
+/// this.
 const CONTRADICTION: f64 = 3.0;
 
 impl Friction {
@@ -255,8 +263,8 @@ impl Friction {
         if stretches >= FEWEST {
             let [low, mu, high] =
                 [0.25, 0.5, 0.75].map(|share| self.quantile(share * f64::from(stretches)));
-            // of a normal distribution: the quartiles are 1.349 standard deviations apart, and the median varies by
-            // √(π/2) times as much as the mean
+            // of a normal distribution: the quartiles are 1.349 standard deviations apart, and the
+            // median varies by √(π/2) times as much as the mean
             let spread = (high - low) / 1.349;
             let sigma = 1.2533 * spread / f64::from(stretches).sqrt();
             self.known = Some(FrictionCoefficient {

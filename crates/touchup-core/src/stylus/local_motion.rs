@@ -1,11 +1,13 @@
 //! Position and velocity of the ball, from the positions around one instant.
 //!
-//! A parabola in time through the positions of a window, by least squares: unlike a mean it does not cut corners. Its
-//! window is as long as the path looks like a parabola, give or take the noise of the positions.
+//! A parabola in time through the positions of a window, by least squares: unlike a mean it does
+//! not cut corners. Its window is as long as the path looks like a parabola, give or take the noise
+//! of the positions.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-/// Sums over a window, about an instant: all that the parabola needs. A longer window goes on where a shorter one ended.
+/// Sums over a window, about an instant: all that the parabola needs. A longer window goes on where
+/// a shorter one ended.
 #[derive(Clone, Debug)]
 pub struct LocalMotion {
     /// unit of time of the sums, s
@@ -65,7 +67,8 @@ impl LocalMotion {
         self.squares += arm.norm_squared();
     }
 
-    /// The parabola at the instant; the mean, at rest and with no bound on its error, of too few positions.
+    /// The parabola at the instant; the mean, at rest and with no bound on its error, of too few
+    /// positions.
     pub fn motion(&self) -> SmoothedMotion {
         let [n, u, u2, u3, u4] = self.powers;
         let parabola = (n > 3.0)

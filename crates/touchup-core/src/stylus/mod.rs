@@ -1,12 +1,14 @@
 //! From raw pose and wrench messages to samples the refiner can use.
 //!
-//! [`MarkerFilter`] makes the pose of the markers on the stylus, [`Placement`] brings it to the ball and into the frame of
-//! the scan, [`Synchroniser`] brings the two streams to one instant,
-//! [`ContactEstimator`] makes of each sample, once for all its users, one [`ContactSample`]: [`Compensator`] takes weight and bias off and
-//! turns the force into the frame of the object, [`BiasTracker`] follows what drifts, [`ContactGate`] decides whether the stylus touches,
-//! [`TipMotion`] and [`Friction`] how the ball slides and how the surface under it is oriented. [`TipBody`] finds the point of the tip that
-//! touches, [`LocalMotion`] the motion around one instant. Where the pose is not published as such, [`MovingFrame`] takes it from the transforms of a
-//! [`FrameBuffer`].
+//! [`MarkerFilter`] makes the pose of the markers on the stylus, [`Placement`] brings it to the
+//! ball and into the frame of the scan, [`Synchroniser`] brings the two streams to one instant,
+//! [`ContactEstimator`] makes of each sample, once for all its users, one [`ContactSample`]:
+//! [`Compensator`] takes weight and bias off and turns the force into the frame of the object,
+//! [`BiasTracker`] follows what drifts, [`ContactGate`] decides whether the stylus touches,
+//! [`TipMotion`] and [`Friction`] how the ball slides and how the surface under it is oriented.
+//! [`TipBody`] finds the point of the tip that touches, [`LocalMotion`] the motion around one
+//! instant. Where the pose is not published as such, [`MovingFrame`] takes it from the transforms
+//! of a [`FrameBuffer`].
 
 mod bias;
 mod clock;
@@ -64,10 +66,12 @@ use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 /// Parts and cells are a few metres large; a corrupted exponent is off by far more than that.
 pub const LARGEST_POSITION: f64 = 1e3;
 
-/// A greater force is a fault and not a measurement, N: a hundred times what a hand-held stylus or a small arm can exert.
+/// A greater force is a fault and not a measurement, N: a hundred times what a hand-held stylus or
+/// a small arm can exert.
 pub const LARGEST_FORCE: f64 = 1e5;
 
-/// A greater torque is a fault and not a measurement, N·m: [`LARGEST_FORCE`] at a lever of one metre.
+/// A greater torque is a fault and not a measurement, N·m: [`LARGEST_FORCE`] at a lever of one
+/// metre.
 pub(crate) const LARGEST_TORQUE: f64 = 1e5;
 
 /// A unit quaternion as it arrives may be off by this: components printed with six digits.
@@ -124,11 +128,12 @@ pub enum SampleError {
 
 /// A measured quaternion is rounded, not wrong, this close to norm 1.
 const QUATERNION_NORM_SLACK: f64 = 0.01;
-/// Roundings of a product of three rotations: such a quaternion is kept bit by bit, so that writing and reading again
-/// changes nothing.
+/// Roundings of a product of three rotations: such a quaternion is kept bit by bit, so that writing
+/// and reading again changes nothing.
 const QUATERNION_ROUNDING: f64 = 8.0 * f64::EPSILON;
 
-/// The rotation that a message means, as its source rounded it; `None` for what is none, NaN among it.
+/// The rotation that a message means, as its source rounded it; `None` for what is none, NaN among
+/// it.
 pub fn measured_rotation(q: Quaternion<f64>) -> Option<UnitQuaternion<f64>> {
     let off = (q.norm() - 1.0).abs();
     if off <= QUATERNION_ROUNDING {

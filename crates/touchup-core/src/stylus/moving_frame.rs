@@ -1,19 +1,22 @@
-//! The pose of one frame in another, as transforms of the links between them come, each at the rate of its own publisher.
+//! The pose of one frame in another, as transforms of the links between them come, each at the rate
+//! of its own publisher.
 
 use std::collections::BTreeSet;
 
 use super::StampedPose;
 use super::frame_buffer::{FrameBuffer, FrameError, FrameTransform, KEPT_NS, plain_name};
 
-/// Transforms of a link that are farther apart are not bridged, ns: what publishes at 10 Hz, not quite regularly. A link that accelerates
-/// by 1 m/s² is within 2 mm of the straight line in between, one of 100 Hz within 15 µm.
+/// Transforms of a link that are farther apart are not bridged, ns: what publishes at 10 Hz, not
+/// quite regularly. A link that accelerates by 1 m/s² is within 2 mm of the straight line in
+/// between, one of 100 Hz within 15 µm.
 const LONGEST_GAP_NS: i64 = 120_000_000;
 /// Stamps that wait for transforms of slower links at most: 10 s at 1 kHz.
 const MOST_PENDING: usize = 10_000;
 
-/// Gives a pose at each stamp that a moving link between the two frames has: where others have another one at that stamp, or are between
-/// two, they are interpolated, straight for the position and at constant angular velocity for the orientation. Never beyond the first and
-/// the last transform of a link, and not over more than 0.12 s.
+/// Gives a pose at each stamp that a moving link between the two frames has: where others have
+/// another one at that stamp, or are between two, they are interpolated, straight for the position
+/// and at constant angular velocity for the orientation. Never beyond the first and the last
+/// transform of a link, and not over more than 0.12 s.
 ///
 /// ```
 /// use nalgebra::Isometry3;
@@ -62,8 +65,8 @@ impl MovingFrame {
         &self.base
     }
 
-    /// Puts the transforms of one message into the buffer, and notes the stamps of those that move between the two frames; how many the buffer
-    /// refused.
+    /// Puts the transforms of one message into the buffer, and notes the stamps of those that move
+    /// between the two frames; how many the buffer refused.
     pub fn push(
         &mut self,
         frames: &mut FrameBuffer,
@@ -125,7 +128,8 @@ impl MovingFrame {
         )
     }
 
-    /// The next pose, in order of their stamps; `None` as long as a link may still come to the stamp.
+    /// The next pose, in order of their stamps; `None` as long as a link may still come to the
+    /// stamp.
     pub fn next_pose(&mut self, frames: &FrameBuffer) -> Option<StampedPose> {
         while let Some(stamp_ns) = self.pending.first().copied() {
             match frames.bridged_pose(&self.base, &self.moving, stamp_ns, LONGEST_GAP_NS) {
@@ -167,7 +171,8 @@ impl MovingFrame {
         }
     }
 
-    /// How many stamps there are, since this was asked last, of which there is no pose, as a link lacks transforms around them.
+    /// How many stamps there are, since this was asked last, of which there is no pose, as a link
+    /// lacks transforms around them.
     pub fn take_apart(&mut self) -> u64 {
         std::mem::take(&mut self.apart)
     }
@@ -209,7 +214,8 @@ mod tests {
             .collect()
     }
 
-    /// base → arm turns by a quarter in 100 ms at 10 Hz, arm → tool goes along x by 1 m in that time at 50 Hz.
+    /// base → arm turns by a quarter in 100 ms at 10 Hz, arm → tool goes along x by 1 m in that
+    /// time at 50 Hz.
     #[test]
     fn a_slow_link_is_interpolated_at_the_stamps_of_a_fast_one_by_hand() {
         let (mut frames, mut tool) = (FrameBuffer::default(), MovingFrame::new("tool0", "/base"));

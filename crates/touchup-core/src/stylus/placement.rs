@@ -1,8 +1,9 @@
 //! Frames of the recorded poses: from the tracked stylus to the ball, and from space to the scan.
 //!
-//! A tracker gives the pose of its own point H on the stylus, in its own frame W. The centre of the ball is d from H,
-//! in the axes of H, and the scan lies at `pose_wo`: pose_OT = pose_WO⁻¹ · pose_WH · d. A wrench in the stylus' own
-//! axes is as it was; one in the axes of W is turned into those of O.
+//! A tracker gives the pose of its own point H on the stylus, in its own frame W. The centre of the
+//! ball is d from H, in the axes of H, and the scan lies at `pose_wo`: pose_OT = pose_WO⁻¹ ·
+//! pose_WH · d. A wrench in the stylus' own axes is as it was; one in the axes of W is turned into
+//! those of O.
 
 use nalgebra::{Isometry3, Translation3, Vector3};
 
@@ -13,7 +14,8 @@ use super::{Message, SettingError, StampedPose, StampedWrench, WrenchFrame};
 pub struct Placement {
     /// Pose of the scan's frame O in the frame W of the recorded poses; `None`: they are in O.
     pub pose_wo: Option<Isometry3<f64>>,
-    /// Centre of the ball from the origin of the recorded pose, in its axes, m; `None`: it is that origin.
+    /// Centre of the ball from the origin of the recorded pose, in its axes, m; `None`: it is that
+    /// origin.
     pub p_ht: Option<Vector3<f64>>,
 }
 
@@ -87,7 +89,8 @@ mod tests {
     use super::*;
     use crate::stylus::Wrench;
 
-    /// Worked by hand: the scan lies 1 m along x of space, turned by 90° about z; the ball hangs 0.1 m below H.
+    /// Worked by hand: the scan lies 1 m along x of space, turned by 90° about z; the ball hangs
+    /// 0.1 m below H.
     #[test]
     fn a_pose_and_a_wrench_in_space_come_into_the_frame_of_the_scan() {
         let quarter =

@@ -4,7 +4,8 @@ use nalgebra::{Point3, Vector3};
 
 /// One touch of the part.
 ///
-/// Its surface lies at `radius` from `centre`, whatever the measured normal; `point` and `normal` identify that surface.
+/// Its surface lies at `radius` from `centre`, whatever the measured normal; `point` and `normal`
+/// identify that surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProbedPoint {
     /// stamp of the sample, ns
@@ -19,7 +20,8 @@ pub struct ProbedPoint {
     pub point: Point3<f64>,
     /// measured outward unit normal of the surface there, in O
     pub normal: Vector3<f64>,
-    /// standard deviation of the centre along the normal by what averages out, m; 0 where that is not estimated
+    /// standard deviation of the centre along the normal by what averages out, m; 0 where that is
+    /// not estimated
     pub sigma: f64,
     /// … by what the calibration of radius and stiffness leaves, the same in each touch, m
     pub calibration: f64,

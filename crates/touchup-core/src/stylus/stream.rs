@@ -4,7 +4,8 @@ use std::collections::VecDeque;
 
 use super::{StampedPose, StampedWrench, SyncCounts, SyncParams};
 
-/// Messages one after the other that show together that time has leapt: four wrong ones in a row are seen in practice.
+/// Messages one after the other that show together that time has leapt: four wrong ones in a row
+/// are seen in practice.
 const AGREEING: usize = 5;
 /// … and that show where a stream begins: before it nothing can become late.
 const AGREEING_AT_FIRST: usize = 2;
@@ -42,7 +43,8 @@ impl<T: Stamped + Copy> Stream<T> {
 
     /// Takes a message, or counts why not; whether it is kept, for now at least.
     ///
-    /// What leaps ahead waits for others that agree: one wrong stamp would make all that is right late until its time has come.
+    /// What leaps ahead waits for others that agree: one wrong stamp would make all that is right
+    /// late until its time has come.
     pub fn push(&mut self, message: T, params: &SyncParams) -> bool {
         let stamp = message.stamp_ns();
         let leap_ns = params.largest_jump_ns.max(params.reorder_ns);
@@ -155,7 +157,8 @@ impl<T: Stamped + Copy> Stream<T> {
 }
 
 pub(super) trait Stamped {
-    /// Whether dropping one is a loss in itself; a pose is missed only by a wrench that would have needed it.
+    /// Whether dropping one is a loss in itself; a pose is missed only by a wrench that would have
+    /// needed it.
     const IS_LOST_ALONE: bool;
 
     fn stamp_ns(&self) -> i64;

@@ -1,8 +1,8 @@
 //! Pose and wrench brought to one instant: the pose is interpolated at the stamp of each wrench.
 //!
-//! The two streams have their own rates and clocks, and their messages arrive late, twice, out of order or not at all.
-//! Which samples come out depends on the messages alone: any order of arrival that moves no message by more than the
-//! reorder window gives the same samples, bit for bit.
+//! The two streams have their own rates and clocks, and their messages arrive late, twice, out of
+//! order or not at all. Which samples come out depends on the messages alone: any order of arrival
+//! that moves no message by more than the reorder window gives the same samples, bit for bit.
 
 use nalgebra::Isometry3;
 
@@ -36,7 +36,8 @@ pub struct Synchroniser {
     params: SyncParams,
     poses: Stream<StampedPose>,
     wrenches: Stream<StampedWrench>,
-    /// stamp of the wrench from which its clock drifts: the first that the next one confirms; and of the one before
+    /// stamp of the wrench from which its clock drifts: the first that the next one confirms; and
+    /// of the one before
     drifts_from_ns: Option<i64>,
     last_wrench_ns: Option<i64>,
     finished: bool,
@@ -51,9 +52,9 @@ impl Synchroniser {
         Self::waiting(params, params.reorder_ns.saturating_add(1))
     }
 
-    /// As [`Self::new`], for streams each of which comes in order of its stamps, however the two interleave: a sample goes
-    /// out with the later of its wrench and the pose after it, and what is out of order is late. As long as nothing is, the
-    /// samples are those of any reorder window.
+    /// As [`Self::new`], for streams each of which comes in order of its stamps, however the two
+    /// interleave: a sample goes out with the later of its wrench and the pose after it, and what
+    /// is out of order is late. As long as nothing is, the samples are those of any reorder window.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -77,8 +78,9 @@ impl Synchroniser {
         })
     }
 
-    /// Takes one message; draw samples with [`Self::next_sample`] before the next one. What comes after
-    /// [`Self::finish`] is late. Returns whether it was taken: what was not is counted and changes nothing else.
+    /// Takes one message; draw samples with [`Self::next_sample`] before the next one. What comes
+    /// after [`Self::finish`] is late. Returns whether it was taken: what was not is counted and
+    /// changes nothing else.
     pub fn push(&mut self, message: Message) -> bool {
         let (checked, counts) = match &message {
             Message::Pose(pose) => (pose.check(), &mut self.poses.counts),
@@ -127,7 +129,8 @@ impl Synchroniser {
         self.wrenches.finish(&self.params);
     }
 
-    /// The next sample that no message still allowed to arrive could change; `None` when more messages are needed.
+    /// The next sample that no message still allowed to arrive could change; `None` when more
+    /// messages are needed.
     pub fn next_sample(&mut self) -> Option<Sample> {
         loop {
             let wrench = *self.wrenches.held.front()?;
@@ -161,7 +164,8 @@ impl Synchroniser {
         &self.poses.counts
     }
 
-    /// Newest stamp of either stream that is kept for good, ns; `None` before the first. The offset of the wrench is taken off.
+    /// Newest stamp of either stream that is kept for good, ns; `None` before the first. The offset
+    /// of the wrench is taken off.
     pub fn newest_ns(&self) -> Option<i64> {
         self.poses.newest_ns().max(self.wrenches.newest_ns())
     }
@@ -175,7 +179,8 @@ impl Synchroniser {
         }
     }
 
-    /// The pose at `stamp_ns`, or the counter to raise when there is none; `None` while that is still open.
+    /// The pose at `stamp_ns`, or the counter to raise when there is none; `None` while that is
+    /// still open.
     fn pose_at(&self, stamp_ns: i64, watermark: i64) -> Option<Result<Isometry3<f64>, Counter>> {
         let mut held = self.poses.held.iter();
         let missing: Counter = if self.poses.overflown {
@@ -212,14 +217,16 @@ impl Synchroniser {
 /// Which counter of [`SyncCounts`] to raise.
 type Counter = fn(&mut SyncCounts) -> &mut u64;
 
-/// Between two poses: straight for the position, at constant angular velocity along the shorter arc for the orientation.
+/// Between two poses: straight for the position, at constant angular velocity along the shorter arc
+/// for the orientation.
 pub(super) fn interpolated(
     before: &Isometry3<f64>,
     after: &Isometry3<f64>,
     t: f64,
 ) -> Isometry3<f64> {
     let position = before.translation.vector.lerp(&after.translation.vector, t);
-    // the power of the relative rotation keeps its digits at angles where a slerp by sines loses them
+    // the power of the relative rotation keeps its digits at angles where a slerp by sines loses
+    // them
     let mut rotation = before.rotation * (before.rotation.inverse() * after.rotation).powf(t);
     rotation.renormalize();
     Isometry3::from_parts(position.into(), rotation)

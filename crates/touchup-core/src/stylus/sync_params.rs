@@ -8,21 +8,25 @@ parameters! {
     /// Settings of a [`super::Synchroniser`]; times in ns.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct SyncParams in "sync" {
-        /// How far a message may lag behind the newest stamp of its stream; also how long a sample is held back.
+        /// How far a message may lag behind the newest stamp of its stream; also how long a sample
+        /// is held back.
         ///
         /// Real transports swap and delay by up to 16 ms.
         reorder_ns: i64 = 20.0, "reorder_ms" [MS, 0, 60000];
-        /// Largest distance between the two poses around a wrench; over a longer one a path would be invented.
+        /// Largest distance between the two poses around a wrench; over a longer one a path would
+        /// be invented.
         ///
         /// A hand at 50 mm/s goes 1.5 mm, the radius of a usual ball, in 30 ms.
         largest_gap_ns: i64 = 30.0, "largest_gap_ms" [MS, 0, 60000];
-        /// A stamp this far ahead of its stream is accepted only when the next four agree; it costs only itself when they do not.
+        /// A stamp this far ahead of its stream is accepted only when the next four agree; it costs
+        /// only itself when they do not.
         ///
         /// A stream slower than 10 Hz comes five messages at a time, late and whole.
         largest_jump_ns: i64 = 0.1, "largest_jump_s" [S, 0, 1e6];
         /// What the clock of the wrench reads beyond the clock of the pose; taken off its stamps.
         wrench_offset_ns: i64 = 0.0, "wrench_offset_ms" [MS, -60000, 60000];
-        /// What the clock of the wrench gains on the clock of the pose, from the first wrench on; taken off its stamps beside the offset.
+        /// What the clock of the wrench gains on the clock of the pose, from the first wrench on;
+        /// taken off its stamps beside the offset.
         ///
         /// Two computers without a common clock differ by 100 ppm: after five minutes 30 ms.
         wrench_drift: f64 = 0.0, "wrench_drift_ppm" [PPM, -1000, 1000];
@@ -33,7 +37,8 @@ parameters! {
     }
 }
 
-/// Messages of one stream that became no sample, by reason. Every wrench is in a sample, held, or counted once.
+/// Messages of one stream that became no sample, by reason. Every wrench is in a sample, held, or
+/// counted once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct SyncCounts {
     /// Wrenches whose poses before and after are too far apart.

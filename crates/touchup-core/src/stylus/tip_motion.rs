@@ -1,4 +1,5 @@
-//! Centre of the ball, direction of sliding and normal of the surface under it, from the past alone.
+//! Centre of the ball, direction of sliding and normal of the surface under it, from the past
+//! alone.
 
 use nalgebra::{Point3, Vector3};
 
@@ -22,7 +23,8 @@ parameters! {
 }
 
 impl TipParams {
-    /// Where the ball really is, m: the pose is that of a rigid stylus, and the force F bends it back by F/k.
+    /// Where the ball really is, m: the pose is that of a rigid stylus, and the force F bends it
+    /// back by F/k.
     pub fn centre(&self, reported: &Point3<f64>, force_o: &Vector3<f64>) -> Point3<f64> {
         self.stiffness
             .map_or(*reported, |stiffness| reported + force_o / stiffness)
@@ -35,15 +37,16 @@ parameters! {
     pub struct SlidingParams in "sliding" {
         /// Time constant of the filter on position and force.
         ///
-        /// In s; 0 filters nothing. 6 ms are three poses at 500 Hz, so that 0.2 mm of pose noise becomes 0.1 mm, while a hand at
-        /// 50 mm/s lags 0.3 mm behind, along the surface.
+        /// In s; 0 filters nothing. 6 ms are three poses at 500 Hz, so that 0.2 mm of pose noise
+        /// becomes 0.1 mm, while a hand at 50 mm/s lags 0.3 mm behind, along the surface.
         smoothing: f64 = 6.0, "smoothing_ms" [MS, 0, 10000];
         /// Time constant of the velocity.
         ///
-        /// In s. With 0.2 mm of pose noise and μ = 0.4 half of the normals are then within 3° (12 ms: 4°), while that of a hand that
-        /// turns by 5 rad/s lags 6° behind, along the surface.
+        /// In s. With 0.2 mm of pose noise and μ = 0.4 half of the normals are then within 3° (12
+        /// ms: 4°), while that of a hand that turns by 5 rad/s lags 6° behind, along the surface.
         velocity_smoothing: f64 = 20.0, "velocity_smoothing_ms" [MS, 0, 10000];
-        /// Uncertainty of the velocity: slower than this the sliding direction hardly determines the normal.
+        /// Uncertainty of the velocity: slower than this the sliding direction hardly determines
+        /// the normal.
         ///
         /// In m/s: 2.5 times the noise of the velocity for 0.2 mm of pose noise.
         slowest: f64 = 8.0, "slowest_mm_per_s" [MM_PER_S, 0, 1e6];
@@ -65,11 +68,13 @@ pub struct Ball {
     pub force_o: Vector3<f64>,
     /// Force smoothed once more, as the velocity is, so that the two are of one time, N, in O.
     pub force_with_velocity: Vector3<f64>,
-    /// Velocity of the real centre, m/s, in O: that of the reported one would take a change of force for motion.
+    /// Velocity of the real centre, m/s, in O: that of the reported one would take a change of
+    /// force for motion.
     pub velocity: Vector3<f64>,
 }
 
-/// Smooths position and force with one time constant, so that they stay in step, and differentiates the position.
+/// Smooths position and force with one time constant, so that they stay in step, and differentiates
+/// the position.
 #[derive(Clone, Debug)]
 pub struct TipMotion {
     params: SlidingParams,
@@ -99,7 +104,8 @@ impl TipMotion {
         }
     }
 
-    /// Takes the next tip, `dt` (s) after the one before; a longer pause than `largest_gap` (s) restarts the filter.
+    /// Takes the next tip, `dt` (s) after the one before; a longer pause than `largest_gap` (s)
+    /// restarts the filter.
     pub fn update(&mut self, tip: &Tip, dt: f64, largest_gap: f64) -> Ball {
         let (here, force) = (Point3::from(tip.pose_ot.translation.vector), tip.force_o);
         let ball = match self.last {
@@ -127,7 +133,8 @@ impl TipMotion {
         ball
     }
 
-    /// The ball of a tip by itself, where its velocity is not needed: nothing is smoothed and nothing kept.
+    /// The ball of a tip by itself, where its velocity is not needed: nothing is smoothed and
+    /// nothing kept.
     pub fn unfiltered(&self, tip: &Tip) -> Ball {
         let (reported, force_o) = (Point3::from(tip.pose_ot.translation.vector), tip.force_o);
         let centre = self.tip.centre(&reported, &force_o);
@@ -140,7 +147,8 @@ impl TipMotion {
         }
     }
 
-    /// Outward normal of the surface under the ball, which has been in contact for the last `dt` (s); `None` without a force.
+    /// Outward normal of the surface under the ball, which has been in contact for the last `dt`
+    /// (s); `None` without a force.
     pub fn surface_normal(&mut self, ball: &Ball, dt: f64) -> Option<NormalEstimate> {
         let velocity_sigma = VELOCITY_NOISE * self.params.slowest;
         let sliding = Sliding {

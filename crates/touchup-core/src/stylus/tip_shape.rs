@@ -1,9 +1,10 @@
 //! The tip that touches: a ball, the flat end of a cylinder, or a cone with a small nose.
 //!
-//! All three are bodies of revolution about z of the tip frame T, which points from the tip to the handle, and all are a
-//! *core* grown by a radius: a ball is a point, a flat end a cylinder, a cone a cone. The core is bounded by the half
-//! profile (0, z₀)–(a₀, z₀)–(a₁, z₁)–(0, z₁), so that one closed form serves all: the point farthest along a direction is
-//! that of the core and the radius on top, the distance is that from the core less the radius.
+//! All three are bodies of revolution about z of the tip frame T, which points from the tip to the
+//! handle, and all are a *core* grown by a radius: a ball is a point, a flat end a cylinder, a cone
+//! a cone. The core is bounded by the half profile (0, z₀)–(a₀, z₀)–(a₁, z₁)–(0, z₁), so that one
+//! closed form serves all: the point farthest along a direction is that of the core and the radius
+//! on top, the distance is that from the core less the radius.
 
 use nalgebra::{Isometry3, Point3, Vector2, Vector3, vector};
 
@@ -58,7 +59,8 @@ pub struct TipContact {
     pub point: Point3<f64>,
     /// outward normal of the surface, unit, in O
     pub normal: Vector3<f64>,
-    /// a whole line or face of the tip may touch, and this is the point of it nearest to the end of the tip
+    /// a whole line or face of the tip may touch, and this is the point of it nearest to the end of
+    /// the tip
     pub is_vague: bool,
 }
 
@@ -72,8 +74,8 @@ parameters! {
         ///
         /// A blunter cone is a flat tip, a more pointed one a needle, which bends.
         half_angle: Option<f64> = None, "half_angle_deg" [DEG, 1, 80, "take shape: flat for a blunter one"] like "20";
-        /// Flat and cone: how far from the origin the tip is known to reach, more than edge_radius_mm; left out: two diameters, no
-        /// less than 5 mm.
+        /// Flat and cone: how far from the origin the tip is known to reach, more than
+        /// edge_radius_mm; left out: two diameters, no less than 5 mm.
         length: Option<f64> = None, "length_mm" [MM, 0.001, 1000] like "6";
     }
 }
@@ -95,12 +97,14 @@ pub struct TipBody {
 
 /// The resolution of a sharp tip is limited by how closely spaced a hand moves its strokes, m.
 const HAND: f64 = 1e-3;
-/// A face or a line of the tip may touch as a whole when the normal is within so many standard deviations of it …
+/// A face or a line of the tip may touch as a whole when the normal is within so many standard
+/// deviations of it …
 const FLUSH_SIGMAS: f64 = 1.5;
 /// … but no less than this, rad: a degree, what an optical tracker leaves of the axis.
 const LEAST_FLUSH: f64 = 0.0175;
 
-/// What is off the axis by less than this share of its length is on it: below, rounding is all there is.
+/// What is off the axis by less than this share of its length is on it: below, rounding is all
+/// there is.
 const ON_AXIS: f64 = 1e-9;
 
 impl TipBody {
@@ -117,7 +121,8 @@ impl TipBody {
         }
     }
 
-    /// A tip of `shape` with `radius` (m): of the ball, of the flat end, or of the nose of the cone.
+    /// A tip of `shape` with `radius` (m): of the ball, of the flat end, or of the nose of the
+    /// cone.
     ///
     /// # Errors
     /// [`SettingError`] for sizes of which no tip can be made.
@@ -199,7 +204,8 @@ impl TipBody {
         self.shape == TipShape::Ball
     }
 
-    /// Its resolution, m: its radius, but for a cone with a sharp nose no less than the spacing of strokes by hand.
+    /// Its resolution, m: its radius, but for a cone with a sharp nose no less than the spacing of
+    /// strokes by hand.
     pub fn scale(&self) -> f64 {
         match self.shape {
             TipShape::Cone { .. } => self.radius.max(HAND),
@@ -232,7 +238,8 @@ impl TipBody {
         }
     }
 
-    /// Signed distance of `x` (m, in O), and the direction in which it grows, unit, in O; zero where there is none.
+    /// Signed distance of `x` (m, in O), and the direction in which it grows, unit, in O; zero
+    /// where there is none.
     pub(crate) fn shortest_exit(&self, place: &TipPlace, x: &Point3<f64>) -> (f64, Vector3<f64>) {
         let arm = x - place.centre;
         let height = arm.dot(&place.axis);
@@ -286,11 +293,12 @@ impl TipBody {
         (distance, arm / distance)
     }
 
-    /// Where the tip touches a surface that faces `normal` (unit, in O), which is uncertain by `sigma` (rad).
+    /// Where the tip touches a surface that faces `normal` (unit, in O), which is uncertain by
+    /// `sigma` (rad).
     ///
-    /// A flat end touches with its whole face where its axis may be the normal, else with the point of its rim; the side
-    /// of a cylinder may lie on a wall or lean on an edge. `None` where the flank of a cone or what is behind it touches:
-    /// the force does not determine where along it.
+    /// A flat end touches with its whole face where its axis may be the normal, else with the point
+    /// of its rim; the side of a cylinder may lie on a wall or lean on an edge. `None` where the
+    /// flank of a cone or what is behind it touches: the force does not determine where along it.
     pub fn touched(
         &self,
         place: &TipPlace,
@@ -356,7 +364,8 @@ impl TipBody {
     }
 }
 
-/// A direction as its part along the axis, the size of that across it, and the direction of the latter.
+/// A direction as its part along the axis, the size of that across it, and the direction of the
+/// latter.
 fn split(axis: &Vector3<f64>, direction: &Vector3<f64>) -> (f64, f64, Vector3<f64>) {
     let along = direction.dot(axis);
     let across = direction - axis * along;
@@ -427,7 +436,8 @@ mod tests {
                         body.signed_distance(&place, &farthest).abs() < 1e-12,
                         "{body:?}"
                     );
-                    // all of the tip is behind the plane there: a point in front of it is at least so far away
+                    // all of the tip is behind the plane there: a point in front of it is at least
+                    // so far away
                     let beyond = farthest + direction * 1e-3;
                     assert!((body.signed_distance(&place, &beyond) - 1e-3).abs() < 1e-12);
                     for other in directions() {
@@ -483,7 +493,8 @@ mod tests {
         assert!(
             (sharp.signed_distance(&up, &Point3::new(2.3e-3, 0.0, -0.4e-3)) - 0.5e-3).abs() < 1e-15
         );
-        // 3 mm up, the flank is 0.4 mm away from a cone of 0.5 rad: tan 0.5 · 3 mm + 0.4 mm / cos 0.5
+        // 3 mm up, the flank is 0.4 mm away from a cone of 0.5 rad: tan 0.5 · 3 mm + 0.4 mm / cos
+        // 0.5
         let flank = Point3::new(0.5f64.tan() * 3e-3 + 0.4e-3 / 0.5f64.cos(), 0.0, 3e-3);
         assert!(cone.signed_distance(&up, &flank).abs() < 1e-15);
         assert!(

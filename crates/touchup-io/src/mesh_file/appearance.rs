@@ -1,4 +1,5 @@
-//! How the mesh in a file looks: colours of its vertices, texture coordinates of the corners of its faces.
+//! How the mesh in a file looks: colours of its vertices, texture coordinates of the corners of its
+//! faces.
 
 use std::path::{Path, PathBuf};
 
@@ -27,7 +28,8 @@ pub(super) struct SoupTexture {
 }
 
 impl PaintedSoup {
-    /// Of a file in `folder`. Faces without a place or an area, and vertices that no other face uses, show nothing.
+    /// Of a file in `folder`. Faces without a place or an area, and vertices that no other face
+    /// uses, show nothing.
     pub fn appearance(self, folder: &Path) -> Result<Appearance, MeshError> {
         let soup = self;
         let corners = |face: &[u32; 3]| {
@@ -75,8 +77,8 @@ impl PaintedSoup {
 }
 
 impl SoupTexture {
-    /// Of the faces that `mesh` has, in their order, for a file in `folder`: an image in or below it is named by the way from there, any
-    /// other from the root.
+    /// Of the faces that `mesh` has, in their order, for a file in `folder`: an image in or below
+    /// it is named by the way from there, any other from the root.
     pub fn of(texture: &Texture, mesh: &TriMesh, folder: &Path) -> Self {
         let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         let folder = absolute(folder);

@@ -1,4 +1,5 @@
-//! Triangle mesh files: PLY, STL and OBJ in, repaired on reading; the same three out. Point clouds in.
+//! Triangle mesh files: PLY, STL and OBJ in, repaired on reading; the same three out. Point clouds
+//! in.
 
 mod appearance;
 mod column;
@@ -149,7 +150,8 @@ pub enum MeshOrPoints {
 /// - `unit`: the unit of the coordinates in the file; the mesh comes out in m.
 ///
 /// # Errors
-/// [`MeshFileError`]: one line that names the file, the place in it, and what to do; a point cloud is one.
+/// [`MeshFileError`]: one line that names the file, the place in it, and what to do; a point cloud
+/// is one.
 pub fn read_mesh(path: &Path, unit: MeshUnit) -> Result<MeshFile, MeshFileError> {
     match read_mesh_or_points(path, unit)? {
         MeshOrPoints::Mesh(file) => Ok(*file),
@@ -221,7 +223,8 @@ pub fn read_mesh_or_points(path: &Path, unit: MeshUnit) -> Result<MeshOrPoints, 
     Ok(MeshOrPoints::Mesh(Box::new(file)))
 }
 
-/// How the mesh in a PLY or OBJ file looks; `None` where nothing is said of it, and for files of other kinds.
+/// How the mesh in a PLY or OBJ file looks; `None` where nothing is said of it, and for files of
+/// other kinds.
 ///
 /// - `unit`: of the coordinates in the file.
 ///
@@ -288,8 +291,8 @@ fn cloud_format(bytes: &[u8], path: &Path) -> Option<CloudFormat> {
     }
 }
 
-/// The scalar properties `names` of the vertices of a PLY file, as far as it has them, for each vertex of the `mesh` that
-/// [`read_mesh`] makes of it; nothing of a file of another kind.
+/// The scalar properties `names` of the vertices of a PLY file, as far as it has them, for each
+/// vertex of the `mesh` that [`read_mesh`] makes of it; nothing of a file of another kind.
 ///
 /// - `mesh`: of that file, in `unit`.
 /// - returns: for each name the numbers by vertex id, or `None`.
@@ -320,7 +323,8 @@ pub fn read_vertex_columns<const N: usize>(
     Ok(columns.map(|column| column.map(|values| rows.iter().map(|&row| values[row]).collect())))
 }
 
-/// For each vertex the row of the file that it comes from: repair keeps the order, and of equal positions the first.
+/// For each vertex the row of the file that it comes from: repair keeps the order, and of equal
+/// positions the first.
 fn rows_of(mesh: &TriMesh, positions: &[Point3<f64>]) -> Vec<usize> {
     let mut rows = positions.iter().enumerate();
     let mut row_of = |wanted: &Point3<f64>| {
@@ -344,12 +348,14 @@ pub fn check_target(path: &Path) -> Result<(), MeshFileError> {
         })?)
 }
 
-/// Writes a mesh as PLY (binary, double), STL (binary, which is single) or OBJ, by the extension of `path`.
+/// Writes a mesh as PLY (binary, double), STL (binary, which is single) or OBJ, by the extension of
+/// `path`.
 ///
-/// Removed faces and vertices without a face are left out; the rest keeps its order. Same mesh, same bytes. The file
-/// appears whole or not at all ([`super::atomic`]).
+/// Removed faces and vertices without a face are left out; the rest keeps its order. Same mesh,
+/// same bytes. The file appears whole or not at all ([`super::atomic`]).
 ///
-/// - `unit`: the unit of the coordinates in the file; PLY and OBJ in m give back the mesh bit for bit.
+/// - `unit`: the unit of the coordinates in the file; PLY and OBJ in m give back the mesh bit for
+///   bit.
 ///
 /// # Errors
 /// [`MeshFileError::UnknownFormat`], [`MeshFileError::NoPlace`], [`MeshFileError::File`].
@@ -357,8 +363,9 @@ pub fn write_mesh(path: &Path, mesh: &TriMesh, unit: MeshUnit) -> Result<(), Mes
     write_mesh_with(path, mesh, &[], None, unit)
 }
 
-/// [`write_mesh`] with `columns` and `texture`: PLY has a place for all of it, OBJ for the texture and colours (`red`, `green`, `blue`),
-/// STL for nothing. Images stay where they are; those of an OBJ are named in a file of the same name that ends in `.mtl`.
+/// [`write_mesh`] with `columns` and `texture`: PLY has a place for all of it, OBJ for the texture
+/// and colours (`red`, `green`, `blue`), STL for nothing. Images stay where they are; those of an
+/// OBJ are named in a file of the same name that ends in `.mtl`.
 ///
 /// # Errors
 /// As [`write_mesh`].

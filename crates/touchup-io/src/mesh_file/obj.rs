@@ -18,8 +18,9 @@ use super::soup::Soup;
 use super::text::NumberedLines;
 use crate::file_error::FilePlace;
 
-/// Reads all objects and groups as one mesh; coordinates are multiplied by `scale`. Lines, points, normals, texture
-/// and materials are passed over. Vertices come in the order in which faces first name them.
+/// Reads all objects and groups as one mesh; coordinates are multiplied by `scale`. Lines, points,
+/// normals, texture and materials are passed over. Vertices come in the order in which faces first
+/// name them.
 pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     let bytes = as_utf8(bytes)?;
     let mut lines = Lines::new(&bytes, false);
@@ -35,8 +36,8 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
 
 /// The triangles as [`read`] has them, and how they look; what materials say is read from `folder`.
 ///
-/// Colours count where each vertex has one: three numbers from 0 to 1 after its coordinates. A file with neither colours nor texture
-/// coordinates is not parsed: nothing comes of it.
+/// Colours count where each vertex has one: three numbers from 0 to 1 after its coordinates. A file
+/// with neither colours nor texture coordinates is not parsed: nothing comes of it.
 pub(super) fn read_painted(bytes: &[u8], scale: f64, folder: &Path) -> Result<PaintedSoup, Syntax> {
     let bytes = as_utf8(bytes)?;
     let mut lines = Lines::new(&bytes, true);
@@ -135,7 +136,8 @@ fn take(model: &Model, scale: f64, positions: &mut Vec<Point3<f64>>, faces: &mut
     );
 }
 
-/// The text as UTF-8: UTF-16 with a byte order mark is turned into it. Comments may be in any encoding.
+/// The text as UTF-8: UTF-16 with a byte order mark is turned into it. Comments may be in any
+/// encoding.
 fn as_utf8(bytes: &[u8]) -> Result<Cow<'_, [u8]>, Syntax> {
     let pair: fn([u8; 2]) -> u16 = match bytes {
         [0xfe, 0xff, ..] => u16::from_be_bytes,
@@ -158,7 +160,8 @@ fn as_utf8(bytes: &[u8]) -> Result<Cow<'_, [u8]>, Syntax> {
     Ok(Cow::Owned(text.map_err(broken)?.into_bytes()))
 }
 
-/// Passes on the lines that make the mesh, `v` without colours and `f`, or also what says how it looks, and counts.
+/// Passes on the lines that make the mesh, `v` without colours and `f`, or also what says how it
+/// looks, and counts.
 struct Lines<'a> {
     rest: &'a [u8],
     /// `vt`, `mtllib` and `usemtl` too
@@ -254,8 +257,8 @@ fn has_texture_coordinates(bytes: &[u8]) -> bool {
         .any(|line| matches!(line.trim_ascii_start(), [b'v', b't', b' ' | b'\t', ..]))
 }
 
-/// The line up to the third coordinate when more than a weight follows: files in which only some vertices have a colour
-/// would be refused.
+/// The line up to the third coordinate when more than a weight follows: files in which only some
+/// vertices have a colour would be refused.
 fn without_colour(line: &[u8]) -> &[u8] {
     let (mut words, mut end, mut in_word) = (0, line.len(), false);
     for (at, byte) in line.iter().enumerate() {
@@ -269,7 +272,8 @@ fn without_colour(line: &[u8]) -> &[u8] {
     if words > 5 { &line[..end] } else { line }
 }
 
-/// Where and what: errors in the use of vertices are found only at the end, when `tobj` has lost the line.
+/// Where and what: errors in the use of vertices are found only at the end, when `tobj` has lost
+/// the line.
 fn place_of(error: LoadError, bytes: &[u8], number: usize) -> Syntax {
     let of_faces = matches!(
         error,
@@ -329,7 +333,8 @@ fn first_bad_face(bytes: &[u8]) -> Option<Syntax> {
     None
 }
 
-/// OBJ with the fewest digits that read back as the same number, at most 17; with the colours among `columns`, by `ids` of the vertices.
+/// OBJ with the fewest digits that read back as the same number, at most 17; with the colours among
+/// `columns`, by `ids` of the vertices.
 ///
 /// - `materials`: name of the file of materials, where images are known.
 pub(super) fn write(

@@ -26,7 +26,8 @@ impl Soup {
         }
     }
 
-    /// Faces that are there and the vertices they use, coordinates divided by `scale`; and the ids of these vertices.
+    /// Faces that are there and the vertices they use, coordinates divided by `scale`; and the ids
+    /// of these vertices.
     pub fn used_part(mesh: &TriMesh, scale: f64) -> (Self, Vec<usize>) {
         let mut renamed = vec![u32::MAX; mesh.vertex_slots()];
         mesh.faces()

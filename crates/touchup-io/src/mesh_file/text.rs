@@ -14,7 +14,8 @@ pub(super) struct NumberedLines<'a> {
 }
 
 impl<'a> NumberedLines<'a> {
-    /// `end_of_line`: the byte that ends a line; blanks and carriage returns at both ends of a line are cut off.
+    /// `end_of_line`: the byte that ends a line; blanks and carriage returns at both ends of a line
+    /// are cut off.
     pub fn new(bytes: &'a [u8], end_of_line: u8) -> Self {
         Self {
             bytes,

@@ -7,14 +7,17 @@ use serde::Serialize;
 
 use touchup_core::words;
 
-/// Smallest diagonal of the bounding box: below it lies nothing that a ball tip of about a millimetre could touch.
+/// Smallest diagonal of the bounding box: below it lies nothing that a ball tip of about a
+/// millimetre could touch.
 pub const SMALLEST_M: f64 = 1e-3;
 
-/// Largest diagonal of the bounding box: beyond the reach of any arm, while a car body or an aircraft panel is below.
+/// Largest diagonal of the bounding box: beyond the reach of any arm, while a car body or an
+/// aircraft panel is below.
 pub const LARGEST_M: f64 = 20.0;
 
 words! {
-    /// The unit in which a mesh file gives its coordinates; the commonest first, as they are suggested.
+    /// The unit in which a mesh file gives its coordinates; the commonest first, as they are
+    /// suggested.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, Serialize)]
     pub enum MeshUnit {
         /// 1 m

@@ -1,4 +1,5 @@
-//! Nominal values and tolerances of a part, as a drawing has them: CSV or JSON; lengths in mm, angles in degrees, in the frame of the mesh.
+//! Nominal values and tolerances of a part, as a drawing has them: CSV or JSON; lengths in mm,
+//! angles in degrees, in the frame of the mesh.
 
 mod error;
 mod json;

@@ -5,13 +5,15 @@ use serde::{Deserialize, Serialize};
 use touchup_core::conformity::{InspectedQuantity, ToleranceLimits};
 use touchup_core::features::Kind;
 
-/// A nominal value and its tolerance; lengths in mm, angles in degrees, in the frame of the mesh. What is not said is left out.
+/// A nominal value and its tolerance; lengths in mm, angles in degrees, in the frame of the mesh.
+/// What is not said is left out.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NominalRecord {
     /// as the report has it; no two alike
     pub name: String,
-    /// of the feature: `hole`, `slot`, `pocket`, `boss`, `edge`, `corner`, `plane`, `cylinder`, `notch`
+    /// of the feature: `hole`, `slot`, `pocket`, `boss`, `edge`, `corner`, `plane`, `cylinder`,
+    /// `notch`
     pub kind: String,
     /// what of it, with its unit: `diameter_mm`, …
     pub quantity: String,
@@ -27,7 +29,8 @@ pub struct NominalRecord {
     /// … of an angle
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tolerance_deg: Option<f64>,
-    /// lower limit deviation from the nominal value, mostly negative, in place of a tolerance ±; without the upper one a single limit
+    /// lower limit deviation from the nominal value, mostly negative, in place of a tolerance ±;
+    /// without the upper one a single limit
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lower_deviation_mm: Option<f64>,
     /// upper limit deviation
@@ -42,7 +45,8 @@ pub struct NominalRecord {
     /// nominal centre of the feature, by which it is found
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub center_mm: Option<[f64; 3]>,
-    /// nominal axis, of a plane its outward normal: by it and the centre drawing and part are aligned. Of any length
+    /// nominal axis, of a plane its outward normal: by it and the centre drawing and part are
+    /// aligned. Of any length
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axis: Option<[f64; 3]>,
     /// its `id` in the file of features, in place of the centre

@@ -1,7 +1,8 @@
 //! Reads ROS 1 bags, version 2.0, from the front, record by record [wiki.ros.org/Bags/Format/2.0].
 //!
-//! The framing is read here, not by the `rosbag` crate (0.6): that one maps the file into memory, so that a file cut meanwhile ends
-//! the program, and takes the memory that a chunk announces. Here each length is compared with what is there and with a limit first.
+//! The framing is read here, not by the `rosbag` crate (0.6): that one maps the file into memory,
+//! so that a file cut meanwhile ends the program, and takes the memory that a chunk announces. Here
+//! each length is compared with what is there and with a limit first.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -41,8 +42,9 @@ pub(super) struct BagReader {
 }
 
 impl BagReader {
-    /// Opens a bag and learns which of the topics it has: from its index, or, where it has none, by reading until all of them are
-    /// described. Damage met on that search is returned beside the reader.
+    /// Opens a bag and learns which of the topics it has: from its index, or, where it has none, by
+    /// reading until all of them are described. Damage met on that search is returned beside the
+    /// reader.
     pub fn open(
         path: &Path,
         layout: &RecordingLayout,
@@ -86,7 +88,8 @@ impl BagReader {
         Ok(reader)
     }
 
-    /// Takes over what is described elsewhere; a topic of a wrong type is an error of those who ask for the topics.
+    /// Takes over what is described elsewhere; a topic of a wrong type is an error of those who ask
+    /// for the topics.
     fn knows(&mut self, connections: Connections) {
         let read = connections.topics.iter();
         let read = read.filter_map(|(id, info)| {
@@ -122,7 +125,8 @@ impl BagReader {
         }
     }
 
-    /// Takes one record of the current chunk; a message of the topics of a touch gives its payload's place in `records`.
+    /// Takes one record of the current chunk; a message of the topics of a touch gives its
+    /// payload's place in `records`.
     fn next_record(&mut self) -> Result<Option<FoundMessage>, RecordingError> {
         let damaged = |damage| RecordingError::Damaged {
             path: self.path.clone(),

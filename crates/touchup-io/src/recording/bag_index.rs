@@ -138,7 +138,8 @@ pub(super) struct Index {
 }
 
 impl Index {
-    /// `None` when there is none, as in a bag whose recorder was killed: then the data are searched instead.
+    /// `None` when there is none, as in a bag whose recorder was killed: then the data are searched
+    /// instead.
     pub fn read(path: &Path) -> Option<Self> {
         let mut file = File::open(path).ok()?;
         let size = file.metadata().ok()?.len();

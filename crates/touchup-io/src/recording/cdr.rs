@@ -1,5 +1,5 @@
-//! Poses, wrenches and clouds written as CDR (XCDR version 1), fields in the order of the `.msg` files, quaternions x, y, z, w; clouds
-//! are read by the same definitions.
+//! Poses, wrenches and clouds written as CDR (XCDR version 1), fields in the order of the `.msg`
+//! files, quaternions x, y, z, w; clouds are read by the same definitions.
 
 use std::borrow::Cow;
 
@@ -10,7 +10,8 @@ use super::wire::MAX_MESSAGE_BYTES;
 use super::{BadMessage, RecordingError, ZSTD_MAGIC};
 use touchup_core::stylus::{StampedPose, StampedWrench};
 
-/// Serialized payloads are padded to four bytes by some middlewares; more left over is another type.
+/// Serialized payloads are padded to four bytes by some middlewares; more left over is another
+/// type.
 const MAX_PADDING_BYTES: usize = 3;
 const NS_PER_S: i64 = 1_000_000_000;
 

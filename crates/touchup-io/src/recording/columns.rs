@@ -1,7 +1,8 @@
 //! Which columns of a table are time, pose and wrench, and in what units.
 //!
-//! A column's unit is in its header, as in `px_mm`, `px [mm]` or `px (mm)`; where the header has none the scene may name the column with
-//! it. Without names in the scene the usual ones are looked for, those of the RTDE logs of a UR first, whose units are known.
+//! A column's unit is in its header, as in `px_mm`, `px [mm]` or `px (mm)`; where the header has
+//! none the scene may name the column with it. Without names in the scene the usual ones are looked
+//! for, those of the RTDE logs of a UR first, whose units are known.
 
 use touchup_core::{parameters, words};
 
@@ -27,14 +28,16 @@ parameters! {
         time: Option<String> = None, "time" like "t_s";
         /// Position of the tip, three columns: m, mm, um or inch.
         position: Option<Vec<String>> = None, "position" like "[x_mm, y_mm, z_mm]";
-        /// Its orientation: a quaternion x, y, z, w, or a rotation vector of three columns in rad or deg; left out and not found: none,
-        /// which a ball needs none of when the wrench is in the axes of the positions.
+        /// Its orientation: a quaternion x, y, z, w, or a rotation vector of three columns in rad
+        /// or deg; left out and not found: none, which a ball needs none of when the wrench is in
+        /// the axes of the positions.
         orientation: Option<Vec<String>> = None, "orientation" like "[qx, qy, qz, qw]";
         /// Force of the part on the stylus, three columns: N or kN.
         force: Option<Vec<String>> = None, "force" like "[fx_n, fy_n, fz_n]";
         /// Its torque: Nm or Nmm; left out and not found: 0.
         torque: Option<Vec<String>> = None, "torque" like "[tx_nm, ty_nm, tz_nm]";
-        /// In whose axes force and torque are: those of the positions, or those of the tip, which the orientation turns.
+        /// In whose axes force and torque are: those of the positions, or those of the tip, which
+        /// the orientation turns.
         wrench_axes: WrenchAxes = WrenchAxes::Pose, "wrench_axes";
     }
 }
@@ -66,8 +69,8 @@ pub(super) struct FoundColumns {
     pub wrench_axes: WrenchAxes,
 }
 
-/// Usual names, without unit and in lower case; the first group that is all there counts. Those of RTDE come with their unit, `{}` for
-/// their number.
+/// Usual names, without unit and in lower case; the first group that is all there counts. Those of
+/// RTDE come with their unit, `{}` for their number.
 struct UsualNames {
     of_rtde: &'static str,
     rtde_unit: &'static str,

@@ -6,7 +6,8 @@ use super::{Record, RecordingError, RecordingReader, RecordingWriter, Topics};
 use crate::atomic::AtomicFile;
 use touchup_core::stylus::Message;
 
-/// The frame of messages that name none; one for poses and wrenches, as those that name none are in the same axes.
+/// The frame of messages that name none; one for poses and wrenches, as those that name none are in
+/// the same axes.
 const UNNAMED: &str = "unnamed";
 
 /// What was written.
@@ -30,8 +31,8 @@ pub struct CopiedRecording {
 /// - `at_each`: called after each record, to show the progress.
 ///
 /// # Errors
-/// As [`super::write_recording`]; [`RecordingError::NotARecording`] where it holds no pose or no wrench that can be used, and its
-/// damage where that comes before both.
+/// As [`super::write_recording`]; [`RecordingError::NotARecording`] where it holds no pose or no
+/// wrench that can be used, and its damage where that comes before both.
 pub fn copy_recording(
     reader: &mut RecordingReader,
     path: &Path,

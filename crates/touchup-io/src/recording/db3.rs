@@ -1,7 +1,8 @@
 //! Reads rosbag2's SQLite files (`.db3`): tables `topics` and `messages`.
 //!
-//! The file is opened read-only and as immutable, so nothing is created beside it, not even when it was left in
-//! write-ahead mode; then its last part may sit in a `-wal` file that is not read, and the file counts as truncated.
+//! The file is opened read-only and as immutable, so nothing is created beside it, not even when it
+//! was left in write-ahead mode; then its last part may sit in a `-wal` file that is not read, and
+//! the file counts as truncated.
 
 use std::collections::VecDeque;
 use std::ffi::OsString;
@@ -27,8 +28,9 @@ const BATCH_ROWS: usize = 1024;
 /// Largest file that a `.db3.zstd` may unpack to, so that a small file cannot fill the disk.
 const MAX_UNPACKED_BYTES: u64 = 16 << 30;
 
-/// No text or blob of the file, nor anything that its schema computes of them, may be longer: a column may be generated, and then
-/// the file is short and the value is not. SQLite itself refuses it, before it takes the memory.
+/// No text or blob of the file, nor anything that its schema computes of them, may be longer: a
+/// column may be generated, and then the file is short and the value is not. SQLite itself refuses
+/// it, before it takes the memory.
 const MAX_VALUE_BYTES: i32 = 1 << 20;
 /// Rows of the table of topics.
 const MAX_TOPICS: usize = 65_536;
@@ -137,7 +139,8 @@ impl Db3Reader {
             let Some(&(_, kind, format)) = self.read.iter().find(|(id, ..)| *id == topic) else {
                 continue;
             };
-            // text, a number or NULL in place of the blob: an empty payload, which counts as malformed
+            // text, a number or NULL in place of the blob: an empty payload, which counts as
+            // malformed
             let payload = row.get_ref(3)?.as_blob().unwrap_or_default().to_vec();
             let (id, time) = (row.get(0)?, row.get(1)?);
             if (time, id) <= self.last {
@@ -204,7 +207,8 @@ fn connect(path: &Path) -> rusqlite::Result<Connection> {
         | OpenFlags::SQLITE_OPEN_URI
         | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let db = Connection::open_with_flags(immutable_uri(path), flags)?;
-    // the file is not trusted: no functions from its schema, no cells that leave their page, no value without end
+    // the file is not trusted: no functions from its schema, no cells that leave their page, no
+    // value without end
     db.set_limit(Limit::SQLITE_LIMIT_LENGTH, MAX_VALUE_BYTES)?;
     db.pragma_update(None, "trusted_schema", false)?;
     db.pragma_update(None, "cell_size_check", true)?;
@@ -250,7 +254,8 @@ fn read_topics(db: &Connection) -> Result<Vec<(i64, TopicInfo)>, Damage> {
     Ok(topics)
 }
 
-/// SQLite reads a last page that is cut as if it ended in zeros (whole missing pages it refuses itself).
+/// SQLite reads a last page that is cut as if it ended in zeros (whole missing pages it refuses
+/// itself).
 fn find_cut(db: &Connection, path: &Path) -> Result<(), Damage> {
     let page_bytes = db.pragma_query_value(None, "page_size", |row| row.get::<_, u32>(0))?;
     match fs::metadata(path)?.len() % u64::from(page_bytes) {

@@ -154,7 +154,8 @@ pub enum Damage {
         /// its number
         id: u16,
     },
-    /// The index at the end of the file promises another number of messages on the topics that are read.
+    /// The index at the end of the file promises another number of messages on the topics that are
+    /// read.
     #[error(
         "the file's index promises {promised} messages on the topics of the touch, {found} were found"
     )]

@@ -21,7 +21,8 @@ pub(crate) fn is_of_recording(name: &str) -> bool {
             .is_some_and(|ending| ending == "mcap")
 }
 
-/// The files of a folder of rosbag2, each in the folder itself and none a link; `None`: it is no recording, or leads out of itself.
+/// The files of a folder of rosbag2, each in the folder itself and none a link; `None`: it is no
+/// recording, or leads out of itself.
 pub(crate) fn own_files(folder: &Path) -> Option<Vec<PathBuf>> {
     let is_plain = |path: &Path| fs::symlink_metadata(path).is_ok_and(|about| about.is_file());
     let metadata = folder.join(METADATA);

@@ -1,4 +1,5 @@
-//! MCAP's framing: records of opcode and length, fields in little endian, every length checked before it is used.
+//! MCAP's framing: records of opcode and length, fields in little endian, every length checked
+//! before it is used.
 
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -6,9 +7,11 @@ use std::path::Path;
 
 use super::Damage;
 
-/// Longest record, packed or unpacked: far above the 1 MiB chunks of recorders, a small part of a machine's memory.
+/// Longest record, packed or unpacked: far above the 1 MiB chunks of recorders, a small part of a
+/// machine's memory.
 const MAX_RECORD_BYTES: u64 = 256 << 20;
-/// Longest name of a topic or type: the names of all channels are kept, and packed bytes can pretend to be long ones.
+/// Longest name of a topic or type: the names of all channels are kept, and packed bytes can
+/// pretend to be long ones.
 const MAX_TEXT_BYTES: u64 = 64 << 10;
 /// All names of topics and types of a recording together: many long ones would fill the memory.
 const MAX_NAMES_BYTES: u64 = 16 << 20;

@@ -1,4 +1,5 @@
-//! The states of a Franka arm, which hold the pose of its tool and the wrench on it beside much else.
+//! The states of a Franka arm, which hold the pose of its tool and the wrench on it beside much
+//! else.
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion};
 
@@ -15,7 +16,8 @@ pub(super) struct ArmState {
     pub wrench: StampedWrench,
 }
 
-/// Numbers of a `franka_msgs/FrankaState` before `O_F_ext_hat_K`, from there to `O_T_EE`, and behind that.
+/// Numbers of a `franka_msgs/FrankaState` before `O_F_ext_hat_K`, from there to `O_T_EE`, and
+/// behind that.
 const fn franka_numbers(wire: Wire) -> [usize; 3] {
     match wire {
         Wire::Ros1 => [2 * 6 + 9 * 7 + 6 + 2 * 2 + 2 * 7, 7 + 3 * 13, 3 * 16 + 2],
@@ -27,7 +29,8 @@ const fn franka_numbers(wire: Wire) -> [usize; 3] {
     }
 }
 
-/// Bytes behind the last number of a `FrankaState`: the mode, and twice the flags of errors, of which releases have more and more.
+/// Bytes behind the last number of a `FrankaState`: the mode, and twice the flags of errors, of
+/// which releases have more and more.
 const FRANKA_FLAGS: std::ops::RangeInclusive<usize> = 1 + 2 * 30..=1 + 2 * 64;
 
 /// `O_T_EE` and `O_F_ext_hat_K`, both in the axes of the base.
@@ -65,8 +68,8 @@ fn flags(fields: &mut impl MessageFields) -> Result<(), BadMessage> {
     }
 }
 
-/// `o_t_ee` and `o_f_ext_hat_k` of a `franka_msgs/FrankaRobotState`, as franka_ros2 has it up to 1.0: stamped as the whole, in the frames
-/// that they name, or else in that of the whole.
+/// `o_t_ee` and `o_f_ext_hat_k` of a `franka_msgs/FrankaRobotState`, as franka_ros2 has it up to
+/// 1.0: stamped as the whole, in the frames that they name, or else in that of the whole.
 pub(super) fn franka_robot_state(fields: &mut impl MessageFields) -> Result<ArmState, BadMessage> {
     let whole = fields.header()?;
     // contacts and collisions in space and of the joints

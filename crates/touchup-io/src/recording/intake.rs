@@ -59,7 +59,8 @@ impl Intake {
         self.chain.iter_mut().for_each(|chain| chain.poses.finish());
     }
 
-    /// Poses for which transforms were interpolated, and stamps outside of what the transforms cover.
+    /// Poses for which transforms were interpolated, and stamps outside of what the transforms
+    /// cover.
     pub fn transform_counts(&self) -> Option<[u64; 2]> {
         self.chain
             .as_ref()

@@ -5,12 +5,14 @@ use super::columns::TableColumns;
 /// Names of the topics that make a touch.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Topics {
-    /// `geometry_msgs/msg/PoseStamped`, or another type that holds a pose: tip T in the object frame O, m.
+    /// `geometry_msgs/msg/PoseStamped`, or another type that holds a pose: tip T in the object
+    /// frame O, m.
     pub pose: String,
-    /// `geometry_msgs/msg/WrenchStamped`, or another type that holds a wrench: of the object on the stylus, N and N·m.
+    /// `geometry_msgs/msg/WrenchStamped`, or another type that holds a wrench: of the object on the
+    /// stylus, N and N·m.
     pub wrench: String,
-    /// `sensor_msgs/msg/PointCloud2`: the markers on the stylus in O, m. When it is named it is read in place of the
-    /// pose, and written beside it.
+    /// `sensor_msgs/msg/PointCloud2`: the markers on the stylus in O, m. When it is named it is
+    /// read in place of the pose, and written beside it.
     pub markers: Option<String>,
 }
 
@@ -39,8 +41,8 @@ pub struct TransformFrames {
 pub struct RecordingLayout {
     /// Topics of a recording of ROS.
     pub topics: Topics,
-    /// When it is there, the topic of the pose holds `tf2_msgs/msg/TFMessage`; transforms that stay are on the topic of the same name
-    /// with `_static` behind it.
+    /// When it is there, the topic of the pose holds `tf2_msgs/msg/TFMessage`; transforms that stay
+    /// are on the topic of the same name with `_static` behind it.
     pub frames: Option<TransformFrames>,
     /// Columns of a table.
     pub columns: TableColumns,

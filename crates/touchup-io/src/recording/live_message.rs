@@ -46,7 +46,8 @@ pub struct LiveMessage {
 }
 
 impl LiveType {
-    /// The type of that name, as ROS 2 has it (`nav_msgs/msg/Odometry`); empty: PoseStamped or WrenchStamped.
+    /// The type of that name, as ROS 2 has it (`nav_msgs/msg/Odometry`); empty: PoseStamped or
+    /// WrenchStamped.
     ///
     /// # Errors
     /// In words, what it is instead and what can be read.
@@ -134,7 +135,8 @@ impl<'de> DeserializeSeed<'de> for LiveSeed {
     type Value = Result<LiveMessage, BadMessage>;
 
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Self::Value, D::Error> {
-        // its fields follow one another as those of a tuple do; how many there are is seen on the way
+        // its fields follow one another as those of a tuple do; how many there are is seen on the
+        // way
         deserializer.deserialize_tuple(MAX_MESSAGE_BYTES, self)
     }
 }

@@ -1,9 +1,10 @@
 //! Reads MCAP from the front, record by record [MCAP specification, mcap.dev/spec].
 //!
-//! Framing and checks are done here, not by the `mcap` crate: that one (0.26) reserves memory for any string length it
-//! meets and overflows on an unchecked chunk whose records overrun it. Here a length is compared with what the file
-//! still holds and with a limit of 256 MiB first, buffers grow only with bytes that are really there, and a chunk is
-//! verified before its first message is handed out.
+//! Framing and checks are done here, not by the `mcap` crate: that one (0.26) reserves memory for
+//! any string length it meets and overflows on an unchecked chunk whose records overrun it. Here a
+//! length is compared with what the file still holds and with a limit of 256 MiB first, buffers
+//! grow only with bytes that are really there, and a chunk is verified before its first message is
+//! handed out.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -51,10 +52,11 @@ pub(super) struct McapReader {
 }
 
 impl McapReader {
-    /// Opens a file, or a stream that unpacks one, and learns which of the topics of a touch it has.
+    /// Opens a file, or a stream that unpacks one, and learns which of the topics of a touch it
+    /// has.
     ///
-    /// With a usable index at the end of the file that is one seek; without, records are read until all of them are
-    /// described. Damage met on that search is returned beside the reader.
+    /// With a usable index at the end of the file that is one seek; without, records are read until
+    /// all of them are described. Damage met on that search is returned beside the reader.
     pub fn open(
         path: &Path,
         layout: &RecordingLayout,
@@ -101,7 +103,8 @@ impl McapReader {
         Ok(reader)
     }
 
-    /// Takes over what is described elsewhere; a topic of a wrong type is an error of those who ask for the topics.
+    /// Takes over what is described elsewhere; a topic of a wrong type is an error of those who ask
+    /// for the topics.
     fn knows(&mut self, described: Described) {
         let read = described.channels.iter();
         let read = read.filter_map(|(id, info)| {
@@ -138,7 +141,8 @@ impl McapReader {
         }
     }
 
-    /// Takes one record of the current chunk; a message of the topics of a touch gives its payload's place in `records`.
+    /// Takes one record of the current chunk; a message of the topics of a touch gives its
+    /// payload's place in `records`.
     fn next_record(&mut self) -> Result<Option<FoundMessage>, RecordingError> {
         let (opcode, body) =
             split_record(&self.records[self.next..]).map_err(|damage| self.damaged(damage))?;

@@ -103,7 +103,8 @@ impl MessageType {
         }
     }
 
-    /// The type of a topic that is to give what `kind` says; the error is what the topic is instead, and what to do.
+    /// The type of a topic that is to give what `kind` says; the error is what the topic is
+    /// instead, and what to do.
     ///
     /// - `frame`, `topic`: what names the frame of the stylus, and what chooses another topic.
     pub fn giving(
@@ -133,7 +134,8 @@ pub(super) struct MessageFormat {
 }
 
 impl MessageFormat {
-    /// That of a topic which is to give what `kind` says; the error is what the topic is instead, and what to do.
+    /// That of a topic which is to give what `kind` says; the error is what the topic is instead,
+    /// and what to do.
     pub fn of(info: &TopicInfo, kind: TopicKind) -> Result<Self, String> {
         let type_name = &info.type_name;
         let message_type = MessageType::giving(kind, type_name, "--pose-frame", kind.flag())?;

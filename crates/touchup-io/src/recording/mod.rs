@@ -1,11 +1,13 @@
-//! ROS 2 recordings of a touch: poses (`geometry_msgs/msg/PoseStamped` and other types that hold one, or a tree of transforms) and
-//! wrenches (`geometry_msgs/msg/WrenchStamped` and others), or in place of the poses the markers on the stylus
-//! (`sensor_msgs/msg/PointCloud2`), read from MCAP, rosbag2 SQLite files, ROS 1 bags and tables of numbers, written as MCAP.
+//! ROS 2 recordings of a touch: poses (`geometry_msgs/msg/PoseStamped` and other types that hold
+//! one, or a tree of transforms) and wrenches (`geometry_msgs/msg/WrenchStamped` and others), or in
+//! place of the poses the markers on the stylus (`sensor_msgs/msg/PointCloud2`), read from MCAP,
+//! rosbag2 SQLite files, ROS 1 bags and tables of numbers, written as MCAP.
 //!
-//! Both deal in [`touchup_core::stylus::Message`]s, stamped as the message headers are. [`RecordingReader`] streams: its memory
-//! does not grow with the recording, and no length found in a file is believed before it is checked.
-//! [`RecordingWriter`] makes a file that rosbag2, Foxglove and the Python readers open; [`write_recording`] puts one
-//! under its final name only when it is whole, [`SegmentedWriter`] writes one that grows, in pieces that a crash leaves whole.
+//! Both deal in [`touchup_core::stylus::Message`]s, stamped as the message headers are.
+//! [`RecordingReader`] streams: its memory does not grow with the recording, and no length found in
+//! a file is believed before it is checked. [`RecordingWriter`] makes a file that rosbag2, Foxglove
+//! and the Python readers open; [`write_recording`] puts one under its final name only when it is
+//! whole, [`SegmentedWriter`] writes one that grows, in pieces that a crash leaves whole.
 
 mod bag;
 mod bag_index;
@@ -95,8 +97,8 @@ touchup_core::names! {
         /// The stamp of its header.
         #[default]
         Header = "header",
-        /// When the recorder took it: for headers without a stamp, or of clocks that have nothing in common. Both streams are as late then
-        /// as their way to the recorder was long.
+        /// When the recorder took it: for headers without a stamp, or of clocks that have nothing
+        /// in common. Both streams are as late then as their way to the recorder was long.
         Log = "log",
     }
 }

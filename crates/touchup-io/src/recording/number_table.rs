@@ -1,9 +1,10 @@
 //! A recording that is a table: comma-separated values and their kin, a line for each instant.
 //!
-//! Values are separated by commas, semicolons, tabs or blanks, whichever the first line has; decimals have a point. Empty lines and lines
-//! that begin with `#` are passed over. An empty place, or NaN, in all columns of the position or of the force means that none was measured
-//! at that instant. The lines are read here and not by the csv crate, whose memory grows with a quotation mark that is never closed; no
-//! value of a recording holds a separator.
+//! Values are separated by commas, semicolons, tabs or blanks, whichever the first line has;
+//! decimals have a point. Empty lines and lines that begin with `#` are passed over. An empty
+//! place, or NaN, in all columns of the position or of the force means that none was measured at
+//! that instant. The lines are read here and not by the csv crate, whose memory grows with a
+//! quotation mark that is never closed; no value of a recording holds a separator.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -20,7 +21,8 @@ const ENDINGS: [&str; 4] = ["csv", "tsv", "txt", "log"];
 /// Longest line: hundreds of columns.
 const MAX_LINE_BYTES: u64 = 64 << 10;
 
-/// A table of which none of the first lines can be used is refused; what comes after that many is counted.
+/// A table of which none of the first lines can be used is refused; what comes after that many is
+/// counted.
 const LOOKED_AT: usize = 16;
 
 /// The rows of a table, one after another.
@@ -107,7 +109,8 @@ impl NumberTable {
     /// Opens a table and finds its columns.
     ///
     /// # Errors
-    /// [`RecordingError::Io`]; [`RecordingError::Columns`] with the columns that are there, when they do not say what is what.
+    /// [`RecordingError::Io`]; [`RecordingError::Columns`] with the columns that are there, when
+    /// they do not say what is what.
     pub fn open(path: &Path, columns: &TableColumns) -> Result<Self, RecordingError> {
         let mut lines = TableLines::open(path)?;
         let bad = |what: &str| RecordingError::Columns {
@@ -146,7 +149,8 @@ impl NumberTable {
         }
     }
 
-    /// Why none of the first lines can be used, by the first of them; `None` where one can. Reads them.
+    /// Why none of the first lines can be used, by the first of them; `None` where one can. Reads
+    /// them.
     fn why_unusable(&mut self) -> Result<Option<String>, RecordingError> {
         self.lines.advance()?;
         let mut why = None;
@@ -288,7 +292,8 @@ fn rotation(
 
 const NS_PER_S: f64 = 1e9;
 
-/// A time in ns, rounded; whole units and their fraction apart, as a time since 1970 in s has more digits than a float.
+/// A time in ns, rounded; whole units and their fraction apart, as a time since 1970 in s has more
+/// digits than a float.
 fn nanoseconds(value: &str, factor: f64) -> Option<i64> {
     let unit_ns = (factor * NS_PER_S).round();
     let (sign, digits) = value

@@ -1,8 +1,8 @@
-//! Markers as `sensor_msgs/msg/PointCloud2`: one point for each, with fields x, y, z and, where the camera identifies markers
-//! apart, `id`.
+//! Markers as `sensor_msgs/msg/PointCloud2`: one point for each, with fields x, y, z and, where the
+//! camera identifies markers apart, `id`.
 //!
-//! Without `id` a point's place in the cloud is its label. A point that is not finite was not seen. Sizes in a message
-//! are compared with the data that are there before anything is read by them.
+//! Without `id` a point's place in the cloud is its label. A point that is not finite was not seen.
+//! Sizes in a message are compared with the data that are there before anything is read by them.
 
 use std::borrow::Cow;
 
@@ -77,7 +77,8 @@ impl CloudField {
     }
 }
 
-/// Reads a cloud of markers: frame and markers, of which the first [`touchup_core::stylus::MOST_MARKERS`] that are there count.
+/// Reads a cloud of markers: frame and markers, of which the first
+/// [`touchup_core::stylus::MOST_MARKERS`] that are there count.
 pub(super) fn decode_markers(payload: &[u8]) -> Result<(Cow<'_, str>, MarkerFrame), BadMessage> {
     let msg: PointCloud2Msg = decode(payload)?;
     let mut frame = MarkerFrame::new(msg.header.stamp_ns()?);
@@ -159,8 +160,9 @@ pub(super) fn encode_markers(
 mod tests {
     use super::*;
 
-    /// Assembled by hand from the CDR rules, little endian: each number at a multiple of its size behind the 4 bytes of the
-    /// encapsulation, strings with length and final zero, sequences with their count.
+    /// Assembled by hand from the CDR rules, little endian: each number at a multiple of its size
+    /// behind the 4 bytes of the encapsulation, strings with length and final zero, sequences with
+    /// their count.
     struct Cloud {
         names: Vec<(&'static str, u32, u8)>,
         width: u32,

@@ -21,13 +21,15 @@ const TABLE_FRAMES: [&str; 2] = ["object", "stylus"];
 
 /// Poses and wrenches of a recording, one after another.
 ///
-/// The order is that of the recording: MCAP files as written (rosbag2 writes as it receives), SQLite files by time of
-/// reception and row. It is not the order of the header stamps: sort by stamp to pair the two topics, within a
-/// bounded buffer.
+/// The order is that of the recording: MCAP files as written (rosbag2 writes as it receives),
+/// SQLite files by time of reception and row. It is not the order of the header stamps: sort by
+/// stamp to pair the two topics, within a bounded buffer.
 ///
-/// Positions, forces and torques may be NaN or absurd; rotations are unit quaternions. A message that cannot be used is
-/// left out and counted in [`Self::bad_messages`]. A file that is damaged is read up to the damage; then comes one last
-/// item, the error. The iterator gives poses and wrenches; [`Self::next_record`] also markers. Memory is bounded by the largest chunk, at most 256 MiB packed and as much unpacked.
+/// Positions, forces and torques may be NaN or absurd; rotations are unit quaternions. A message
+/// that cannot be used is left out and counted in [`Self::bad_messages`]. A file that is damaged is
+/// read up to the damage; then comes one last item, the error. The iterator gives poses and
+/// wrenches; [`Self::next_record`] also markers. Memory is bounded by the largest chunk, at most
+/// 256 MiB packed and as much unpacked.
 ///
 /// ```no_run
 /// use touchup_io::recording::{RecordingReader, Topics};
@@ -51,13 +53,16 @@ pub struct RecordingReader {
 }
 
 impl RecordingReader {
-    /// Opens a recording, whose topics a [`RecordingLayout`] or [`super::Topics`] name: a table by its ending, else an `.mcap` or `.db3` file, either of them compressed by zstd as a whole, a `.bag` of ROS 1, or a rosbag2 folder
-    /// with its `metadata.yaml`, whose files are read in the order named there; without it the .mcap files of the folder, in
-    /// the order of their names. Their content decides the format.
+    /// Opens a recording, whose topics a [`RecordingLayout`] or [`super::Topics`] name: a table by
+    /// its ending, else an `.mcap` or `.db3` file, either of them compressed by zstd as a whole, a
+    /// `.bag` of ROS 1, or a rosbag2 folder with its `metadata.yaml`, whose files are read in the
+    /// order named there; without it the .mcap files of the folder, in the order of their names.
+    /// Their content decides the format.
     ///
     /// # Errors
     /// [`RecordingError::Frames`] when a pose is wanted from transforms and they do not have it;
-    /// [`RecordingError::MissingTopic`] and [`RecordingError::WrongTopic`] when the recording does not have the topics; [`RecordingError::Damaged`] when damage hides whether it has them;
+    /// [`RecordingError::MissingTopic`] and [`RecordingError::WrongTopic`] when the recording does
+    /// not have the topics; [`RecordingError::Damaged`] when damage hides whether it has them;
     /// [`RecordingError::NotARecording`], [`RecordingError::Metadata`], [`RecordingError::Io`].
     pub fn open(path: &Path, layout: impl Into<RecordingLayout>) -> Result<Self, RecordingError> {
         let layout = layout.into();
@@ -119,7 +124,8 @@ impl RecordingReader {
         Self { stamps, ..self }
     }
 
-    /// Messages on the topics of a touch, for a progress bar; `None` when a file does not say (MCAP without its end).
+    /// Messages on the topics of a touch, for a progress bar; `None` when a file does not say (MCAP
+    /// without its end).
     pub fn message_count(&self) -> Option<u64> {
         self.message_count
     }
@@ -139,8 +145,8 @@ impl RecordingReader {
         &self.intake.bad
     }
 
-    /// Where the pose is taken from transforms: poses so far for which a link was interpolated, and stamps without a pose before the first or
-    /// behind the last transform of a link.
+    /// Where the pose is taken from transforms: poses so far for which a link was interpolated, and
+    /// stamps without a pose before the first or behind the last transform of a link.
     pub fn transform_counts(&self) -> Option<[u64; 2]> {
         self.intake.transform_counts()
     }
@@ -164,7 +170,8 @@ impl RecordingReader {
         &self.path
     }
 
-    /// A file has lost its end (the recorder was killed, or a copy was cut); what is there is read all the same.
+    /// A file has lost its end (the recorder was killed, or a copy was cut); what is there is read
+    /// all the same.
     pub fn truncated(&self) -> bool {
         self.truncated
     }

@@ -9,7 +9,8 @@ use super::{RecordingError, RecordingReader, SegmentedWriter, Topics, write_reco
 use touchup_core::stylus::Message;
 
 impl SegmentedWriter {
-    /// Begins a recording in a folder, which is made where it is not there, in place of an older one.
+    /// Begins a recording in a folder, which is made where it is not there, in place of an older
+    /// one.
     ///
     /// # Errors
     /// [`RecordingError::Io`].
@@ -28,8 +29,8 @@ impl SegmentedWriter {
 
     /// Goes on behind the recording in a folder.
     ///
-    /// A segment that a crash left without its end is written anew as far as it can be read; where nothing of the last one
-    /// can be read it is removed.
+    /// A segment that a crash left without its end is written anew as far as it can be read; where
+    /// nothing of the last one can be read it is removed.
     ///
     /// - `frames`: of the poses, and of the wrenches.
     /// - `each`: receives the messages that are there, in their order.

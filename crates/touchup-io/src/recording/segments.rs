@@ -15,9 +15,10 @@ pub(super) const METADATA: &str = "metadata.yaml";
 /// Messages of one file: a quarter of an hour of a stylus, 60 MB.
 const MOST_IN_A_SEGMENT: u64 = 1_000_000;
 
-/// Writes poses and wrenches into files `touch_0000.mcap`, `touch_0001.mcap`, … of one folder, each of which is opened by
-/// what opens MCAP. What was written before [`Self::flush`] is with the system after it, whatever becomes of the process.
-/// [`Self::finish`] makes the folder a recording of rosbag2.
+/// Writes poses and wrenches into files `touch_0000.mcap`, `touch_0001.mcap`, … of one folder, each
+/// of which is opened by what opens MCAP. What was written before [`Self::flush`] is with the
+/// system after it, whatever becomes of the process. [`Self::finish`] makes the folder a recording
+/// of rosbag2.
 pub struct SegmentedWriter {
     folder: PathBuf,
     topics: Topics,
@@ -110,7 +111,8 @@ impl SegmentedWriter {
             source,
         })?;
         let begun = RecordingWriter::new(BufWriter::new(file), &self.topics);
-        // a full disk takes a file and not its first bytes: an empty one would be in the way of the next for ever
+        // a full disk takes a file and not its first bytes: an empty one would be in the way of the
+        // next for ever
         self.current = Some(begun.inspect_err(|_| drop(std::fs::remove_file(&path)))?);
         self.segments.push(segment);
         Ok(())
@@ -174,8 +176,8 @@ impl SegmentedWriter {
         synced.map_err(|source| RecordingError::Io { path, source })
     }
 
-    /// After an error: leaves of the file what was flushed, and nothing of one that was not. What is written next begins
-    /// another. Returns how many messages are lost.
+    /// After an error: leaves of the file what was flushed, and nothing of one that was not. What
+    /// is written next begins another. Returns how many messages are lost.
     pub fn give_up_segment(&mut self) -> u64 {
         // where none was begun, those before it stay
         let Some(writer) = self.current.take() else {
@@ -202,8 +204,9 @@ impl SegmentedWriter {
         std::mem::take(&mut self.unflushed)
     }
 
-    /// Ends the last file and writes `metadata.yaml`; nothing when nothing was written. A recording of which a file has no
-    /// proper end gets none: touchup reads it by its files, as after a crash.
+    /// Ends the last file and writes `metadata.yaml`; nothing when nothing was written. A recording
+    /// of which a file has no proper end gets none: touchup reads it by its files, as after a
+    /// crash.
     ///
     /// # Errors
     /// [`RecordingError::Write`], [`RecordingError::Io`].
@@ -270,8 +273,8 @@ impl SegmentedWriter {
     }
 }
 
-/// The segments of a folder that has no `metadata.yaml`, as a crash leaves it, in their order; one in which nothing stands
-/// is left out.
+/// The segments of a folder that has no `metadata.yaml`, as a crash leaves it, in their order; one
+/// in which nothing stands is left out.
 pub(super) fn segments_of(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     for entry in folder.read_dir()? {

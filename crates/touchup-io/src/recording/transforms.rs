@@ -1,7 +1,8 @@
-//! The pose of one frame in another, from a tree of transforms as `/tf` and `/tf_static` publish it.
+//! The pose of one frame in another, from a tree of transforms as `/tf` and `/tf_static` publish
+//! it.
 //!
-//! pose_base_moving = pose_base_a · pose_ab · … · pose_z_moving; links that stay count at any time, those that move are brought to one
-//! instant by [`MovingFrame`].
+//! pose_base_moving = pose_base_a · pose_ab · … · pose_z_moving; links that stay count at any time,
+//! those that move are brought to one instant by [`MovingFrame`].
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,7 +14,8 @@ use touchup_core::stylus::{FrameBuffer, FrameTransform, MovingFrame, StampedPose
 
 /// Frames of a tree: an arm has ten, a plant some hundred.
 const MOST_FRAMES: usize = 10_000;
-/// Transforms with which every publisher has been heard; until then the root of the tree may not be known.
+/// Transforms with which every publisher has been heard; until then the root of the tree may not be
+/// known.
 const MESSAGES_OF_A_TREE: u64 = 200;
 /// Frames that an error names.
 const MOST_NAMED: usize = 40;

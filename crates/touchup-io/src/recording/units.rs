@@ -13,7 +13,8 @@ pub(super) enum Quantity {
 }
 
 impl Quantity {
-    /// Units by the names that a header gives them in lower case, and how many of SI they are; the first is the usual one.
+    /// Units by the names that a header gives them in lower case, and how many of SI they are; the
+    /// first is the usual one.
     fn known(self) -> &'static [(&'static str, f64)] {
         match self {
             Self::Time => &[
@@ -66,7 +67,8 @@ impl Quantity {
     }
 }
 
-/// A name without its unit, and how many of SI the unit is; `None` where there is none that is known.
+/// A name without its unit, and how many of SI the unit is; `None` where there is none that is
+/// known.
 pub(super) fn split_unit(name: &str, quantity: Quantity) -> (&str, Option<f64>) {
     let name = name.trim();
     if quantity == Quantity::None {

@@ -1,7 +1,9 @@
-//! The numbers, names and poses of a ROS message, one after another, in either of the two ways in which ROS lays them out.
+//! The numbers, names and poses of a ROS message, one after another, in either of the two ways in
+//! which ROS lays them out.
 //!
-//! ROS 2: CDR, XCDR version 1, in either byte order, each number at a multiple of its size, strings with a final zero. ROS 1: little
-//! endian, nothing between the fields. No length is believed before it is compared with the bytes that are there.
+//! ROS 2: CDR, XCDR version 1, in either byte order, each number at a multiple of its size, strings
+//! with a final zero. ROS 1: little endian, nothing between the fields. No length is believed
+//! before it is compared with the bytes that are there.
 
 use nalgebra::{Isometry3, Quaternion};
 use serde::Deserialize;
@@ -10,7 +12,8 @@ use serde::de::SeqAccess;
 use super::error::BadMessage;
 use touchup_core::stylus::{Wrench, measured_rotation};
 
-/// Longest payload of a message: 84 bytes of numbers and a frame name for a pose, some hundred transforms for a tree of frames.
+/// Longest payload of a message: 84 bytes of numbers and a frame name for a pose, some hundred
+/// transforms for a tree of frames.
 pub(super) const MAX_MESSAGE_BYTES: usize = 64 * 1024;
 /// CDR payloads are padded to four bytes by some middlewares; more left over is another type.
 const MAX_PADDING_BYTES: usize = 3;
@@ -130,7 +133,8 @@ pub(super) struct WireReader<'a> {
 
 impl<'a> WireReader<'a> {
     /// # Errors
-    /// [`BadMessage::Malformed`] for a payload that is too long, or whose encapsulation is not that of XCDR version 1.
+    /// [`BadMessage::Malformed`] for a payload that is too long, or whose encapsulation is not that
+    /// of XCDR version 1.
     pub fn new(wire: Wire, payload: &'a [u8]) -> Result<Self, BadMessage> {
         let (is_big, body) = match (wire, payload.split_first_chunk()) {
             (Wire::Ros1, _) => (false, payload),

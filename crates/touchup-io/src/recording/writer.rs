@@ -14,7 +14,8 @@ use super::{Record, RecordingError, TopicKind, Topics};
 use crate::atomic::AtomicFile;
 use touchup_core::stylus::Message;
 
-/// Message definitions in the form rosbag2 stores: the type, then each type it uses behind a line of 80 equals signs.
+/// Message definitions in the form rosbag2 stores: the type, then each type it uses behind a line
+/// of 80 equals signs.
 const RULE: &str =
     "================================================================================";
 const POSE_STAMPED: &str = "std_msgs/Header header\ngeometry_msgs/Pose pose\n";
@@ -39,8 +40,8 @@ const WRENCH: (&str, &str) = (
 );
 const VECTOR3: (&str, &str) = ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n");
 
-/// rosbag2 keeps the publishers' quality of service as YAML whose words changed between releases; the empty list
-/// reads in all of them and means that players use their default.
+/// rosbag2 keeps the publishers' quality of service as YAML whose words changed between releases;
+/// the empty list reads in all of them and means that players use their default.
 const NO_QOS_PROFILES: &str = "[]";
 
 fn definition(kind: TopicKind) -> String {
@@ -65,10 +66,11 @@ fn definition(kind: TopicKind) -> String {
     text
 }
 
-/// Writes poses, wrenches and, when [`Topics::markers`] is named, markers into an MCAP file: zstd chunks, CDR messages, index at the end.
+/// Writes poses, wrenches and, when [`Topics::markers`] is named, markers into an MCAP file: zstd
+/// chunks, CDR messages, index at the end.
 ///
-/// Log and publish time are the stamp of the message, so messages should come in the order of their stamps. The same
-/// messages give the same bytes.
+/// Log and publish time are the stamp of the message, so messages should come in the order of their
+/// stamps. The same messages give the same bytes.
 pub struct RecordingWriter<W: Write + Seek> {
     mcap: Writer<W>,
     pose: Channel,
@@ -110,10 +112,12 @@ impl<W: Write + Seek> RecordingWriter<W> {
 
     /// Appends one message or frame of markers; markers without a topic are left out.
     ///
-    /// - `frame`: for its header; of poses and markers the object frame O, of a wrench that in which it is expressed.
+    /// - `frame`: for its header; of poses and markers the object frame O, of a wrench that in
+    ///   which it is expressed.
     ///
     /// # Errors
-    /// [`RecordingError::Stamp`] when its stamp does not fit a ROS 2 message; [`RecordingError::Write`].
+    /// [`RecordingError::Stamp`] when its stamp does not fit a ROS 2 message;
+    /// [`RecordingError::Write`].
     pub fn write(&mut self, record: impl Into<Record>, frame: &str) -> Result<(), RecordingError> {
         let record = record.into();
         let (payload, channel) = match &record {
@@ -175,10 +179,12 @@ fn add_channel<W: Write + Seek>(
 
 /// Writes a whole recording to `path`, which is never half a file ([`AtomicFile`]).
 ///
-/// - `pose_frame`: name of the object frame O, which poses and markers are in; `wrench_frame`: name of the frame the wrenches are expressed in.
+/// - `pose_frame`: name of the object frame O, which poses and markers are in; `wrench_frame`: name
+///   of the frame the wrenches are expressed in.
 ///
 /// # Errors
-/// As [`RecordingWriter`], and [`RecordingError::Io`] with the path for whatever the system refuses.
+/// As [`RecordingWriter`], and [`RecordingError::Io`] with the path for whatever the system
+/// refuses.
 pub fn write_recording(
     path: &Path,
     topics: &Topics,

@@ -59,7 +59,8 @@ enum Kind {
     Text,
 }
 
-/// That of all its values; whole numbers among others are numbers, what is mixed otherwise is text, and so is a column without a value.
+/// That of all its values; whole numbers among others are numbers, what is mixed otherwise is text,
+/// and so is a column without a value.
 fn kind_of(column: &[Option<Cell>]) -> Kind {
     let is_all = |is: fn(&Cell) -> bool| column.iter().flatten().all(is);
     if column.iter().all(Option::is_none) {

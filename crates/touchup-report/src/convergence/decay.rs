@@ -1,4 +1,5 @@
-//! The two laws by which an error may fall from sweep to sweep, fitted by least squares to its logarithm.
+//! The two laws by which an error may fall from sweep to sweep, fitted by least squares to its
+//! logarithm.
 
 /// A line through points by least squares.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,7 +47,8 @@ pub struct Decay {
     pub power: Line,
 }
 
-/// Fits both laws to the errors after sweep 1, 2, 3, …; `None` for less than two, and for one that is not above 0.
+/// Fits both laws to the errors after sweep 1, 2, 3, …; `None` for less than two, and for one that
+/// is not above 0.
 pub fn fit_decay(errors: &[f64]) -> Option<Decay> {
     let fit = |x: fn(f64) -> f64| {
         let points = errors

@@ -20,8 +20,8 @@ pub struct MeshErrors {
 }
 
 impl MeshErrors {
-    /// The paper's metrics: face by face, |(b* − b)·n| and the angle between n* and n; `mesh` and `truth` have the same
-    /// faces.
+    /// The paper's metrics: face by face, |(b* − b)·n| and the angle between n* and n; `mesh` and
+    /// `truth` have the same faces.
     pub fn by_index(mesh: &TriMesh, truth: &TriMesh) -> Self {
         let pairs = truth
             .faces()
@@ -39,7 +39,8 @@ impl MeshErrors {
         Self::of(&pairs, pairs.iter().map(|pair| pair.0).fold(0.0, f64::max))
     }
 
-    /// Distance of the faces' barycentres and of the vertices from the true surface, angle to its normal there.
+    /// Distance of the faces' barycentres and of the vertices from the true surface, angle to its
+    /// normal there.
     pub fn by_surface(mesh: &TriMesh, truth: &dyn Surface) -> Self {
         let pairs = mesh.faces().map(|(face, _)| {
             let (b, n) = (mesh.barycentre(face), mesh.normal(face));

@@ -1,5 +1,6 @@
-//! How the error falls from sweep to sweep \[paper, Sec 4.3 and Fig 11\]: the published rule on a guided stylus, and the
-//! robust mode on a raster, each with an exponential and a power law fitted to it.
+//! How the error falls from sweep to sweep \[paper, Sec 4.3 and Fig 11\]: the published rule on a
+//! guided stylus, and the robust mode on a raster, each with an exponential and a power law fitted
+//! to it.
 
 mod decay;
 mod errors;
@@ -185,8 +186,8 @@ impl Convergence {
         self.runs.iter().filter(move |run| run.rule == rule)
     }
 
-    /// Among the runs of a rule that have fits: in how many the power law explains more than the exponential, and how many
-    /// there are.
+    /// Among the runs of a rule that have fits: in how many the power law explains more than the
+    /// exponential, and how many there are.
     pub fn power_wins(&self, rule: Rule) -> (usize, usize) {
         let fits: Vec<&Decay> = self.of(rule).filter_map(|run| run.decay.as_ref()).collect();
         (

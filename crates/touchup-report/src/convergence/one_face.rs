@@ -1,5 +1,5 @@
-//! One face against one true plane \[paper, Fig 6 and 7\]: the paper's coupled dynamics (Eq 6, 7, 10), from a state that is off in
-//! position and direction to rest.
+//! One face against one true plane \[paper, Fig 6 and 7\]: the paper's coupled dynamics (Eq 6, 7,
+//! 10), from a state that is off in position and direction to rest.
 
 use nalgebra::{Point3, Vector3};
 

@@ -1,4 +1,5 @@
-//! The paper's sweep experiment (Sec 4.3) on `peaks`, and a raster of the robust mode over the same square.
+//! The paper's sweep experiment (Sec 4.3) on `peaks`, and a raster of the robust mode over the same
+//! square.
 
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
@@ -68,8 +69,8 @@ impl PaperSweeps {
         })
     }
 
-    /// Sets the stylus to each face in turn and lets both go where Eq 8–11 and Eq 6–7 take them. The true face acts as
-    /// its plane does in the paper's contact model.
+    /// Sets the stylus to each face in turn and lets both go where Eq 8–11 and Eq 6–7 take them.
+    /// The true face acts as its plane does in the paper's contact model.
     ///
     /// Stops when the mean distance error is beyond [`BLOWN_UP`] times `start_mm`.
     ///

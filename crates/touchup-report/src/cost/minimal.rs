@@ -1,4 +1,5 @@
-//! The least that any refiner must do, written by hand: closest face, move its corners, update the tree.
+//! The least that any refiner must do, written by hand: closest face, move its corners, update the
+//! tree.
 
 use nalgebra::Point3;
 
@@ -52,7 +53,8 @@ impl MinimalLoop {
         }
     }
 
-    /// As [`Self::new`], and keeps what it looked up, as the refiner does: which boxes to bring up to date, and what is near.
+    /// As [`Self::new`], and keeps what it looked up, as the refiner does: which boxes to bring up
+    /// to date, and what is near.
     pub fn keeping(mesh: TriMesh) -> Self {
         Self {
             plan: Some(StaleBoxes::default()),

@@ -1,4 +1,5 @@
-//! The index that a user could take instead: the tree of boxes of `parry3d`, in double precision, kept true leaf by leaf.
+//! The index that a user could take instead: the tree of boxes of `parry3d`, in double precision,
+//! kept true leaf by leaf.
 
 use std::time::{Duration, Instant};
 
@@ -14,7 +15,8 @@ use touchup_core::mesh::{FaceId, TriMesh, VertexId, triangle};
 use touchup_core::stylus::Sample;
 use touchup_sim::wavy::{FORCE, RADIUS};
 
-/// A mesh that follows the ball of [`touchup_sim::wavy`] within one radius of the tip, with the index of a peer.
+/// A mesh that follows the ball of [`touchup_sim::wavy`] within one radius of the tip, with the
+/// index of a peer.
 pub struct ParryLoop {
     /// as it is now
     pub mesh: TriMesh,
@@ -40,7 +42,8 @@ impl TouchedRegion {
         }
     }
 
-    /// The corners of a face, all that is joined to them within one radius of the tip, and the faces around.
+    /// The corners of a face, all that is joined to them within one radius of the tip, and the
+    /// faces around.
     fn find(&mut self, mesh: &TriMesh, (face, touched): (FaceId, Point3<f64>)) {
         let Self {
             vertices,
@@ -116,7 +119,8 @@ impl ParryLoop {
         Some((FaceId(face), Point3::new(point.x, point.y, point.z)))
     }
 
-    /// Takes one sample; returns how long the closest face and the tree took, without what finds and moves the vertices.
+    /// Takes one sample; returns how long the closest face and the tree took, without what finds
+    /// and moves the vertices.
     pub fn push(&mut self, sample: &Sample) -> Option<Duration> {
         let p = touching(sample);
         let normal: Vector3<f64> = sample.wrench.force / FORCE;

@@ -1,5 +1,5 @@
-//! What a push of the haptic update costs: on scans of different size for the hand-written loop and the cheapest scene, and with and
-//! without each optional part of the default one.
+//! What a push of the haptic update costs: on scans of different size for the hand-written loop and
+//! the cheapest scene, and with and without each optional part of the default one.
 
 use std::ops::{Div, Sub};
 
@@ -137,7 +137,8 @@ pub struct PartCost {
     pub cost_ns: Spread,
 }
 
-/// Zero mass and zero bias: it costs what any other payload and bias cost, and the touches stay the same.
+/// Zero mass and zero bias: it costs what any other payload and bias cost, and the touches stay the
+/// same.
 const COMPENSATION: &str = "compensation: { payload: { mass_kg: 0, centre_mm: [0, 0, 40] }, \
                             bias: { force_n: [0, 0, 0], torque_nm: [0, 0, 0] } }";
 

@@ -1,5 +1,6 @@
-//! A recording of a ball that slides, on scans of any edge length and size: each push of the default scene, and all from the scan in
-//! memory to the mesh with its patch, as the program refines a recording; beside it the index of a peer over the same samples.
+//! A recording of a ball that slides, on scans of any edge length and size: each push of the
+//! default scene, and all from the scan in memory to the mesh with its patch, as the program
+//! refines a recording; beside it the index of a peer over the same samples.
 
 use std::time::Instant;
 

@@ -174,8 +174,9 @@ struct Moving {
 }
 
 impl Moving {
-    /// Brings the boxes around the face under the tip up to date, and returns that. Which face that is, and which boxes, is looked up
-    /// once for a millimetre of travel, as the refiner does it once for each face.
+    /// Brings the boxes around the face under the tip up to date, and returns that. Which face that
+    /// is, and which boxes, is looked up once for a millimetre of travel, as the refiner does it
+    /// once for each face.
     fn follow(&mut self, p: &Point3<f64>) -> Option<FaceId> {
         let Self {
             mesh,

@@ -1,4 +1,5 @@
-//! Cases of the same work, timed in turns, so that a disturbance of the machine affects all of them.
+//! Cases of the same work, timed in turns, so that a disturbance of the machine affects all of
+//! them.
 
 use std::hint::black_box;
 use std::ops::Range;
@@ -103,7 +104,8 @@ impl Timed {
     }
 }
 
-/// Runs all cases over the same samples: first to warm up, then block by block, another one first each time.
+/// Runs all cases over the same samples: first to warm up, then block by block, another one first
+/// each time.
 pub(super) fn in_turns(cases: &mut [TimedCase], timing: Timing) -> Measured<Vec<Timed>> {
     let counts = asked().is_some();
     let mut timed: Vec<_> = cases

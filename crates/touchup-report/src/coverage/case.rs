@@ -13,7 +13,8 @@ use touchup_session::scene::Scene;
 use touchup_session::session::found;
 use touchup_sim::{DrawnWorld, Plate, SimWorld, Surface};
 
-/// Shares of a turn that the hand goes along walls, by seed: it goes into no hole, goes around, goes half and a third of the way.
+/// Shares of a turn that the hand goes along walls, by seed: it goes into no hole, goes around,
+/// goes half and a third of the way.
 const TURNS: [Option<f64>; 4] = [Some(1.0), None, Some(0.5), Some(1.0 / 3.0)];
 
 /// All numbers that are stated of a plate.

@@ -52,7 +52,8 @@ impl CoverageKind {
         )
     }
 
-    /// Demanded share of numbers within 1.96 standard deviations; `None`: their root mean square is what counts.
+    /// Demanded share of numbers within 1.96 standard deviations; `None`: their root mean square is
+    /// what counts.
     pub fn least_within(self) -> Option<f64> {
         match self {
             Self::EdgeVertex | Self::RimVertex => Some(0.90),

@@ -1,8 +1,9 @@
-//! Whether stated uncertainties hold: parts of known truth, touched in named worlds, and the error of each number over its stated
-//! standard deviation.
+//! Whether stated uncertainties hold: parts of known truth, touched in named worlds, and the error
+//! of each number over its stated standard deviation.
 //!
-//! A world draws its truth from a seed, and the program is told what a calibration leaves of it ([`SimWorld`]). Scan and recording are made
-//! in memory, and go through the engine and the search for features of `touchup refine`.
+//! A world draws its truth from a seed, and the program is told what a calibration leaves of it
+//! ([`SimWorld`]). Scan and recording are made in memory, and go through the engine and the search
+//! for features of `touchup refine`.
 
 mod case;
 mod kind;

@@ -172,7 +172,8 @@ impl Coverage {
     }
 }
 
-/// Share of a normal distribution within ± x standard deviations: its density summed up by Simpson's rule.
+/// Share of a normal distribution within ± x standard deviations: its density summed up by
+/// Simpson's rule.
 fn normal_within(x: f64) -> f64 {
     let parts = 2 * PARTS * (1 + x as usize);
     let density = |t: f64| (-t * t / 2.0).exp() * (2.0 / std::f64::consts::PI).sqrt();

@@ -72,7 +72,8 @@ fn is_at_opening(feature: &TruthFeature, p: &Point3<f64>) -> bool {
     ((off - spine).xy().norm() - radius).hypot(off.z) <= NEAR_EDGE
 }
 
-/// The numbers of a found feature beside those of the true one; none where it is no feature of the plate.
+/// The numbers of a found feature beside those of the true one; none where it is no feature of the
+/// plate.
 pub(super) fn feature_numbers(
     feature: &Feature,
     plate: &Plate,

@@ -68,8 +68,9 @@ fn over(z: f64) -> Point3<f64> {
     Point3::new(PLACE[0], PLACE[1], z)
 }
 
-/// Presses for one second where the true surface is `depth` below the scan: how far down the surface is then, m, and whether
-/// the mesh is sound (all finite, no face turned over) and down to it within a fifth of the depth.
+/// Presses for one second where the true surface is `depth` below the scan: how far down the
+/// surface is then, m, and whether the mesh is sound (all finite, no face turned over) and down to
+/// it within a fifth of the depth.
 fn press(
     refiner: &mut Refiner,
     point: Point3<f64>,

@@ -1,4 +1,5 @@
-//! One seed of one world: scan and recording in memory, sound and with mistakes, checked as `touchup doctor` does.
+//! One seed of one world: scan and recording in memory, sound and with mistakes, checked as
+//! `touchup doctor` does.
 
 use super::checked::CheckedRecording;
 use crate::error::Measured;

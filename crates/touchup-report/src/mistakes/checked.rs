@@ -17,7 +17,8 @@ pub struct CheckedRecording {
 }
 
 impl CheckedRecording {
-    /// Whether the mistake is what is said first, and surely; of a sound recording, that nothing is said.
+    /// Whether the mistake is what is said first, and surely; of a sound recording, that nothing is
+    /// said.
     pub fn is_right(&self) -> bool {
         match (self.mistake, self.findings.first()) {
             (None, first) => first.is_none(),

@@ -1,7 +1,8 @@
-//! What is said of wrong input: recordings of named worlds, sound and with one mistake each, through the checks of `touchup doctor`.
+//! What is said of wrong input: recordings of named worlds, sound and with one mistake each,
+//! through the checks of `touchup doctor`.
 //!
-//! A world draws its truth from a seed, and the program is told what a calibration leaves of it ([`SimWorld`]): its scene is what
-//! `touchup simulate --world` writes.
+//! A world draws its truth from a seed, and the program is told what a calibration leaves of it
+//! ([`SimWorld`]): its scene is what `touchup simulate --world` writes.
 
 mod case;
 mod checked;

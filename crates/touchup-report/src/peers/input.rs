@@ -48,7 +48,8 @@ impl PeersInput {
         })
     }
 
-    /// What the script reads, with the names of the files: V × 3 and Q × 3 doubles in m, F × 3 integers, all little-endian.
+    /// What the script reads, with the names of the files: V × 3 and Q × 3 doubles in m, F × 3
+    /// integers, all little-endian.
     pub fn files(&self) -> [(&'static str, Vec<u8>); 3] {
         let corners = self.mesh.faces().flat_map(|(_, corners)| corners);
         [

@@ -1,7 +1,8 @@
-//! Against what a user would take instead: libraries from PyPI, on the same mesh, with the same queries, on one thread.
+//! Against what a user would take instead: libraries from PyPI, on the same mesh, with the same
+//! queries, on one thread.
 //!
-//! Here are the input, touchup's own times, the script that measures the peers, and the comparison. Files and processes
-//! are the matter of the command line.
+//! Here are the input, touchup's own times, the script that measures the peers, and the comparison.
+//! Files and processes are the matter of the command line.
 
 mod input;
 mod text;
@@ -43,12 +44,13 @@ pub struct PeerTimes {
     pub query_us: Spread,
     /// the same in one call for all, µs for each; where it can. Of touchup one near the last
     pub batched_query_us: Option<Spread>,
-    /// closest face, ring moved, index true again, µs. Of touchup a whole push: filter, gate, closest face, dynamics,
-    /// deformation, guard, tree
+    /// closest face, ring moved, index true again, µs. Of touchup a whole push: filter, gate,
+    /// closest face, dynamics, deformation, guard, tree
     pub pipeline_us: Spread,
     /// distances, m; none where it has no closest-face query
     distances_m: Vec<Option<f64>>,
-    /// largest difference from touchup's distance, relative; `None` where it does not look for the closest face
+    /// largest difference from touchup's distance, relative; `None` where it does not look for the
+    /// closest face
     #[serde(skip)]
     pub largest_difference: Option<f64>,
 }
@@ -143,8 +145,8 @@ impl PeersAtSize {
             .fold(0.0, f64::max)
     }
 
-    /// The fastest pipeline whose index is exact. Of Open3D single precision is taken for exact, and so is the nearest barycentre for
-    /// what it asks: the strictest comparison.
+    /// The fastest pipeline whose index is exact. Of Open3D single precision is taken for exact,
+    /// and so is the nearest barycentre for what it asks: the strictest comparison.
     pub fn fastest_pipeline(&self) -> Option<&PeerTimes> {
         let is_sound = |times: &&PeerTimes| {
             times
@@ -174,7 +176,8 @@ impl PeersAtSize {
 }
 
 impl Peers {
-    /// Whether both promises hold at every size: [`WANTED_FACTOR`] per sample, and a push faster than a query alone.
+    /// Whether both promises hold at every size: [`WANTED_FACTOR`] per sample, and a push faster
+    /// than a query alone.
     pub fn holds(&self) -> bool {
         let beyond = |factor: Option<f64>, wanted| factor.is_some_and(|factor| factor >= wanted);
         self.sizes.iter().all(|size| {
@@ -239,8 +242,9 @@ mod tests {
         assert!(PeersAtSize::read(&input, [times(1.0), times(1.0)], "Segmentation fault").is_err());
     }
 
-    /// The queries lie 0.05 mm below the wavy plate along its normal, and a chord of it is off by d² κ / 8 at most: edges of
-    /// 1.342 mm make diagonals d of 1.90 mm, and waves of 2 mm over 40 mm curve by 49.3 /m at most.
+    /// The queries lie 0.05 mm below the wavy plate along its normal, and a chord of it is off by
+    /// d² κ / 8 at most: edges of 1.342 mm make diagonals d of 1.90 mm, and waves of 2 mm over 40
+    /// mm curve by 49.3 /m at most.
     #[test]
     fn distances_are_those_of_the_plate() {
         let input = PeersInput::new(100_000, Effort { is_quick: true }).unwrap();

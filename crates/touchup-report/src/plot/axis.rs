@@ -12,7 +12,8 @@ const ABOUT: f64 = 6.0;
 /// Powers of ten that are written out: 0.01 to 10000.
 const WRITTEN_OUT: std::ops::RangeInclusive<i32> = -2..=4;
 
-/// A stretch of an axis, in the coordinate that is laid out evenly: the value, or its decimal logarithm.
+/// A stretch of an axis, in the coordinate that is laid out evenly: the value, or its decimal
+/// logarithm.
 #[derive(Clone, Debug)]
 pub(super) struct Extent {
     scale: Scale,

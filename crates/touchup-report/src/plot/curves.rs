@@ -126,7 +126,8 @@ fn place(frame: &Frame, [x, y]: [&Extent; 2], mark: &Mark) -> Option<[f64; 2]> {
     Some(frame.pixel([x.place(mark.x.median)?, y.place(mark.y.median)?]))
 }
 
-/// From the 10th to the 90th percentile, where they are apart: a line with a short stroke across each end.
+/// From the 10th to the 90th percentile, where they are apart: a line with a short stroke across
+/// each end.
 fn draw_bars(
     svg: &mut Svg,
     frame: &Frame,

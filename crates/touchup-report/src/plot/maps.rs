@@ -7,7 +7,8 @@ use super::frame::{Frame, TOP, WIDTH};
 use super::style::text_width;
 use super::writer::Svg;
 
-/// Room for the numbers and the name of the axis on the left, between grids, for the bar on the right, and below.
+/// Room for the numbers and the name of the axis on the left, between grids, for the bar on the
+/// right, and below.
 const LEFT: f64 = 82.0;
 const GAP: f64 = 32.0;
 const BAR: f64 = 110.0;
@@ -18,7 +19,8 @@ const NAME: f64 = 22.0;
 const ACROSS: usize = 4;
 /// Smallest and largest height of a grid.
 const HEIGHTS: (f64, f64) = (150.0, 330.0);
-/// From none to all: dark blue to light yellow, rising in brightness, so that it reads in grey too (viridis).
+/// From none to all: dark blue to light yellow, rising in brightness, so that it reads in grey too
+/// (viridis).
 const COLOURS: [[f64; 3]; 6] = [
     [68.0, 1.0, 84.0],
     [65.0, 68.0, 135.0],

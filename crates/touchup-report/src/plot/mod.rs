@@ -17,7 +17,8 @@ use super::figure::{Drawing, Figure};
 
 /// Size of the letters that say where it was measured.
 const SMALL: f64 = 10.5;
-/// The figure as a picture of its own. `provenance`, in small letters below it: where and by what it was measured.
+/// The figure as a picture of its own. `provenance`, in small letters below it: where and by what
+/// it was measured.
 ///
 /// - `looks`: of its series.
 pub(super) fn svg(figure: &Figure, looks: &Looks, provenance: &str) -> String {

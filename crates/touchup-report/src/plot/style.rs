@@ -20,7 +20,8 @@ const HALF: f64 = 4.5;
 pub struct Looks(BTreeMap<String, usize>);
 
 impl Looks {
-    /// Names keep the look of their first figure; a new one gets the first look that none beside it has, in any figure.
+    /// Names keep the look of their first figure; a new one gets the first look that none beside it
+    /// has, in any figure.
     ///
     /// - `figures`: the names in each.
     pub fn of<'a>(figures: impl Iterator<Item = Vec<&'a str>>) -> Self {

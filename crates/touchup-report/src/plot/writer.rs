@@ -38,7 +38,8 @@ impl Svg {
         ));
     }
 
-    /// A rectangle from its upper left corner; `title` shows when it is pointed at, unless it is empty.
+    /// A rectangle from its upper left corner; `title` shows when it is pointed at, unless it is
+    /// empty.
     pub fn rectangle(&mut self, corner: [f64; 2], size: [f64; 2], style: &str, title: &str) {
         let ([x, y], [width, height]) = (
             corner.map(number),

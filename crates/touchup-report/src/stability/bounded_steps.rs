@@ -106,8 +106,8 @@ fn group(
     found
 }
 
-/// A stiff sample: time constants of the position down to a billionth of it, of the normal down to a millionth, the force at
-/// any angle.
+/// A stiff sample: time constants of the position down to a billionth of it, of the normal down to
+/// a millionth, the force at any angle.
 fn draw(rng: &mut Pcg64, is_spring: bool, along: Along) -> HeldFace {
     let (h_min, f_max) = (log_uniform(rng, -9.0..-3.0), log_uniform(rng, -2.0..3.0));
     let dt = log_uniform(rng, -4.0..0.0);
@@ -177,7 +177,8 @@ fn errors(face: &FaceState, reference: &Reference, allowed: [f64; 2]) -> [f64; 2
     ]
 }
 
-/// The same, where the bound and what roundings of |F| and of the tip's place do to the reference are allowed.
+/// The same, where the bound and what roundings of |F| and of the tip's place do to the reference
+/// are allowed.
 fn errors_beside_roundings(held: &HeldFace, face: &FaceState, reference: &Reference) -> [f64; 2] {
     let away = held.normal * (held.arm.norm() + 5.0 * length_scale(&held.params.model)) * ROUNDINGS;
     let moved = [

@@ -14,7 +14,8 @@ const STEPS: usize = 6;
 const SMALLEST_COSINE: f64 = 0.2;
 /// |n| may be off by this.
 const UNIT_TOLERANCE: f64 = 1e-9;
-/// What counts as crossing, relative to the lengths of the run: far above roundings, far below what is seen.
+/// What counts as crossing, relative to the lengths of the run: far above roundings, far below what
+/// is seen.
 const CROSSING: f64 = 1e-9;
 
 /// Decades of a parameter: its logarithms.
@@ -67,9 +68,10 @@ pub(super) fn log_uniform(rng: &mut Pcg64, decades: Decades) -> f64 {
 }
 
 impl FaceRun {
-    /// Draws the parameters of a run; `is_spring`: of the two contact models the linear one. A spring pulls a tip outside the
-    /// face, and Eq 7 would turn the face away from the force there: with a spring the normal turns at a rate of its own, as
-    /// in [`touchup_core::haptic::RefineParams::robust`].
+    /// Draws the parameters of a run; `is_spring`: of the two contact models the linear one. A
+    /// spring pulls a tip outside the face, and Eq 7 would turn the face away from the force there:
+    /// with a spring the normal turns at a rate of its own, as in
+    /// [`touchup_core::haptic::RefineParams::robust`].
     pub fn draw(rng: &mut Pcg64, is_spring: bool) -> Self {
         let (h_min, f_max) = (log_uniform(rng, H_MIN), log_uniform(rng, F_MAX));
         let model = if is_spring {
@@ -142,8 +144,8 @@ impl FaceRun {
         }
     }
 
-    /// How it ends, and whether the integrator itself kept |n| = 1: a normal whose length is off is set to 1 after each step, as
-    /// anybody would do.
+    /// How it ends, and whether the integrator itself kept |n| = 1: a normal whose length is off is
+    /// set to 1 after each step, as anybody would do.
     pub fn judge(&self, integrator: Integrator) -> (RunEnding, bool) {
         let mut kept_unit = true;
         (self.run(integrator, &mut kept_unit), kept_unit)
@@ -182,8 +184,8 @@ impl FaceRun {
         RunEnding::Stable
     }
 
-    /// Whether h goes over its rest point. That lies elsewhere for the normal before and after: it counts only where it is
-    /// crossed for both.
+    /// Whether h goes over its rest point. That lies elsewhere for the normal before and after: it
+    /// counts only where it is crossed for both.
     fn crosses(
         &self,
         n: &Vector3<f64>,
@@ -196,7 +198,8 @@ impl FaceRun {
     }
 }
 
-/// Whether a distance to the rest point changes its sign, for the normal before and for that after, and by more than `tolerance`.
+/// Whether a distance to the rest point changes its sign, for the normal before and for that after,
+/// and by more than `tolerance`.
 pub(super) fn goes_over(from: [f64; 2], to: [f64; 2], tolerance: f64) -> bool {
     let over = |sign: f64| {
         from.iter().all(|x| sign * x >= 0.0) && to.iter().all(|x| sign * x < -tolerance)
@@ -241,7 +244,8 @@ mod tests {
         }
     }
 
-    /// Explicit Euler on dh/dt = −h/τ overshoots from dt = τ on; RK4 keeps the sign, since its polynomial has no real root.
+    /// Explicit Euler on dh/dt = −h/τ overshoots from dt = τ on; RK4 keeps the sign, since its
+    /// polynomial has no real root.
     #[test]
     fn explicit_euler_overshoots_from_one_time_constant_on() {
         assert_eq!(

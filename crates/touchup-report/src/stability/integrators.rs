@@ -150,7 +150,8 @@ fn scale(params: &DynamicsParams, held: &HeldSample) -> f64 {
     held.arm.norm() + of_model
 }
 
-/// y = y₀ + dt · rate(y) by Newton's method with a Jacobian of differences; a step that makes it worse is halved.
+/// y = y₀ + dt · rate(y) by Newton's method with a Jacobian of differences; a step that makes it
+/// worse is halved.
 fn implicit_euler(
     start: &Unknowns,
     dt: f64,
@@ -198,7 +199,8 @@ mod tests {
     use super::*;
     use touchup_core::haptic::Along;
 
-    /// A spring from h = 1 mm to rest at 0 without force along n: dh/dt = −h/τ, whose solution and whose discrete steps are known.
+    /// A spring from h = 1 mm to rest at 0 without force along n: dh/dt = −h/τ, whose solution and
+    /// whose discrete steps are known.
     #[test]
     fn each_step_is_its_own_rule_on_a_linear_decay() {
         let model = ContactModel::Spring {

@@ -1,4 +1,5 @@
-//! Runs of a whole refiner: a ball presses on a face of a sheet, from equilateral triangles to needles and slivers.
+//! Runs of a whole refiner: a ball presses on a face of a sheet, from equilateral triangles to
+//! needles and slivers.
 
 use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3};
 use rand::RngExt;
@@ -75,7 +76,8 @@ impl MeshRun {
         }
     }
 
-    /// A flat sheet of equal triangles with sides of `edge` at most, curled a little: no two normals are the same.
+    /// A flat sheet of equal triangles with sides of `edge` at most, curled a little: no two
+    /// normals are the same.
     fn sheet(&self) -> TriMesh {
         let height = self.quality * self.edge;
         let is_sliver = self.shape == BadShape::Sliver;
@@ -168,7 +170,8 @@ impl MeshRun {
 /// The face that is pressed, as one sample left it: its barycentre and its normal.
 type PressedFace = (FaceId, Point3<f64>, Vector3<f64>);
 
-/// Whether the face went over its rest point from one sample to the `next`: for the normal before and for that after.
+/// Whether the face went over its rest point from one sample to the `next`: for the normal before
+/// and for that after.
 fn crosses(
     last: PressedFace,
     next: PressedFace,

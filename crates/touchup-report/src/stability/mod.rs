@@ -1,4 +1,5 @@
-//! Numerical stability: maps over twelve decades of every parameter, and the exact sub-flows against 32 digits.
+//! Numerical stability: maps over twelve decades of every parameter, and the exact sub-flows
+//! against 32 digits.
 
 mod bounded_steps;
 mod face_runs;
@@ -39,7 +40,8 @@ pub struct FaceShares {
     pub endings: EndingCounts,
     /// share in which the integrator itself kept |n| = 1, before it was set to 1
     pub unit_share: f64,
-    /// largest α f_max dt / h_min below which all runs are stable, in the columns of the map; `None` where not even the first is
+    /// largest α f_max dt / h_min below which all runs are stable, in the columns of the map;
+    /// `None` where not even the first is
     pub stable_up_to: Option<f64>,
     /// x: α f_max dt / h_min, y: β f_max² dt; for the sigmoid and for the spring
     pub by_stiffness: [Panel; 2],
@@ -47,16 +49,16 @@ pub struct FaceShares {
     pub by_step: Panel,
 }
 
-/// How the runs of the default, Lie in the robust mode, on whole meshes ended. The mode turns the normal by itself, so that the
-/// drift-corrected step is the same there.
+/// How the runs of the default, Lie in the robust mode, on whole meshes ended. The mode turns the
+/// normal by itself, so that the drift-corrected step is the same there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshShares {
     /// of the triangles
     pub shape: BadShape,
     /// of all runs
     pub endings: EndingCounts,
-    /// smallest altitude over longest side from which on all runs are stable, in the rows of the map; `None` where not even the
-    /// last is
+    /// smallest altitude over longest side from which on all runs are stable, in the rows of the
+    /// map; `None` where not even the last is
     pub stable_from_quality: Option<f64>,
     /// x: α k dt, y: altitude over longest side
     pub by_quality: Panel,
@@ -172,7 +174,8 @@ impl Stability {
         of_default.all(|shares| shares.endings.stable_share() == 1.0)
     }
 
-    /// The smallest altitude over longest side from which on no press of the default was at fault; `None` where all shapes are.
+    /// The smallest altitude over longest side from which on no press of the default was at fault;
+    /// `None` where all shapes are.
     pub fn default_stable_from_quality(&self) -> Option<f64> {
         self.meshes
             .iter()

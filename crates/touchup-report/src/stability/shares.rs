@@ -8,7 +8,8 @@ use crate::Panel;
 /// Columns and rows of a map.
 const CELLS: usize = 12;
 
-/// Share of stable runs over two quantities between powers of ten; what lies beyond the rim counts in its cells.
+/// Share of stable runs over two quantities between powers of ten; what lies beyond the rim counts
+/// in its cells.
 ///
 /// - `runs`: both quantities of each, and how it ended.
 pub(super) fn share_map(

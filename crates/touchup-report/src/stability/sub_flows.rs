@@ -1,4 +1,5 @@
-//! The exact sub-flows against an independent method: the implicit closed form, solved by bisection in numbers of 32 digits.
+//! The exact sub-flows against an independent method: the implicit closed form, solved by bisection
+//! in numbers of 32 digits.
 
 use nalgebra::{Point3, Vector3};
 use rand::RngExt;
@@ -12,10 +13,11 @@ use touchup_core::haptic::{Along, ContactModel, DynamicsParams, FaceDynamics, Fa
 const BISECTIONS: usize = 140;
 /// Exponentials of more are too near to the largest number.
 const LARGEST_EXPONENT: f64 = 690.0;
-/// Nearer to the opposite of the force than this a normal is not compared, rad: the force as it was given is off by a rounding,
-/// and turning away from it makes 1e-11 of that.
+/// Nearer to the opposite of the force than this a normal is not compared, rad: the force as it was
+/// given is off by a rounding, and turning away from it makes 1e-11 of that.
 const NEAREST_OPPOSITE: std::ops::Range<f64> = -5.0..-1.0;
-/// Without rounding of the input: lengths in units of h_min, forces of f_max, times of h_min/(α f_max).
+/// Without rounding of the input: lengths in units of h_min, forces of f_max, times of h_min/(α
+/// f_max).
 const UNIT_MODEL: ContactModel = ContactModel::Sigmoid {
     f_max_n: 1.0,
     h_min_m: 1.0,
@@ -72,7 +74,8 @@ pub(super) fn sub_flows(rng: &mut Pcg64, cases: usize) -> Vec<SubFlowError> {
     errors
 }
 
-/// The worst of `cases`: the error of each, and where it was; `None` where there is nothing to compare with.
+/// The worst of `cases`: the error of each, and where it was; `None` where there is nothing to
+/// compare with.
 fn worst_of(
     name: &str,
     cases: usize,
@@ -153,14 +156,16 @@ fn of_sigmoid(rng: &mut Pcg64, name: &str, share: ForceShare, cases: usize) -> S
     })
 }
 
-/// −Δu of du/dT = 1/(1+eᵘ) − c after T: the root of ∫ du / (1/(1+eᵘ) − c) = T between the start and the farthest it can be.
-/// `None` where it ends beyond the largest exponential without having been beyond the bend from the start.
+/// −Δu of du/dT = 1/(1+eᵘ) − c after T: the root of ∫ du / (1/(1+eᵘ) − c) = T between the start and
+/// the farthest it can be. `None` where it ends beyond the largest exponential without having been
+/// beyond the bend from the start.
 fn exact_travel(u: f64, c: f64, t: f64) -> Option<f64> {
     let rate = share(u.into()) - c.into();
     if rate.high == 0.0 {
         return Some(0.0);
     }
-    // u moves monotonically, towards the rest point where there is one, and no faster than the larger of the rates at both ends
+    // u moves monotonically, towards the rest point where there is one, and no faster than the
+    // larger of the rates at both ends
     let up = rate.high > 0.0;
     let fastest = if up { (1.0 - c).abs() } else { c.abs() }.max(rate.high.abs());
     let farthest = u + if up { fastest * t } else { -fastest * t };
@@ -193,7 +198,8 @@ fn exact_travel(u: f64, c: f64, t: f64) -> Option<f64> {
     Some((Double2::from(u) - near).value())
 }
 
-/// Where u runs so far that the exponential has no say: the rate is −c or 1 − c throughout but for the tail of the bend.
+/// Where u runs so far that the exponential has no say: the rate is −c or 1 − c throughout but for
+/// the tail of the bend.
 fn straight(u: f64, c: f64, t: f64, far: f64) -> Option<f64> {
     let is_flat = |low: f64, high: f64| low > 60.0 || high < -60.0;
     let (low, high) = (u.min(far), u.max(far));

@@ -1,12 +1,13 @@
 //! Baselines: what the paper names as alternatives.
 //!
-//! Contact points alone: the mesh is moved so that it passes through the point where the ball touches; no force, no measured
-//! normal, no guard on what an update may do.
+//! Contact points alone: the mesh is moved so that it passes through the point where the ball
+//! touches; no force, no measured normal, no guard on what an update may do.
 //!
-//! An exact Gaussian-process implicit surface, refitted at each touch:
-//! f(x) = d(x) + g(x), where d is the signed distance from the scan and g a Gaussian process of mean 0 and covariance
-//! k(x, y) = s² exp(−|x − y|² / 2ℓ²). Each contact p says f(p) = 0 up to noise σ, that is g(p) = −d(p). The mean of g is
-//! Σ k(x, pᵢ) wᵢ with (K + σ² I) w = −d(p), solved by Cholesky: n³/3 operations for n touches, refitted each time.
+//! An exact Gaussian-process implicit surface, refitted at each touch: f(x) = d(x) + g(x), where d
+//! is the signed distance from the scan and g a Gaussian process of mean 0 and covariance k(x, y) =
+//! s² exp(−|x − y|² / 2ℓ²). Each contact p says f(p) = 0 up to noise σ, that is g(p) = −d(p). The
+//! mean of g is Σ k(x, pᵢ) wᵢ with (K + σ² I) w = −d(p), solved by Cholesky: n³/3 operations for n
+//! touches, refitted each time.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Point3, Vector3};
 
@@ -21,10 +22,11 @@ const FAR: f64 = 4.5;
 
 /// A mesh that is pulled through contact points.
 ///
-/// Which point of the ball touches is not known without a force: the one under the normal of the unrefined scan is taken,
-/// in the place that is closest to the centre. The corners of the face closest to that point make the least moves along that
-/// normal that bring it as far, wᵢ / Σ w² of the displacement by its barycentric coordinates w; the vertices around it make (1 −
-/// (d/R)²)² of the displacement, d their distance from the place that is moved.
+/// Which point of the ball touches is not known without a force: the one under the normal of the
+/// unrefined scan is taken, in the place that is closest to the centre. The corners of the face
+/// closest to that point make the least moves along that normal that bring it as far, wᵢ / Σ w² of
+/// the displacement by its barycentric coordinates w; the vertices around it make (1 − (d/R)²)² of
+/// the displacement, d their distance from the place that is moved.
 #[derive(Clone, Debug)]
 pub struct ContactSculptor<'a> {
     scan: &'a TriMesh,
@@ -56,8 +58,8 @@ impl<'a> ContactSculptor<'a> {
         }
     }
 
-    /// Takes the centre (m, in O) of a ball in contact; returns the point of contact through which the mesh passes now, or
-    /// `None` where the scan has no normal.
+    /// Takes the centre (m, in O) of a ball in contact; returns the point of contact through which
+    /// the mesh passes now, or `None` where the scan has no normal.
     pub fn push(&mut self, centre: &Point3<f64>) -> Option<Point3<f64>> {
         let scanned = self.scan_tree.closest(self.scan, centre, f64::INFINITY)?;
         let normal = pseudo_normal(self.scan, &scanned);
@@ -83,7 +85,8 @@ impl<'a> ContactSculptor<'a> {
         Some(contact)
     }
 
-    /// Finds the corners of the handle, and from there on the vertices within reach, as far as they hang together.
+    /// Finds the corners of the handle, and from there on the vertices within reach, as far as they
+    /// hang together.
     fn gather(&mut self, hit: &FaceHit) {
         let squares: f64 = hit.barycentric.iter().map(|weight| weight * weight).sum();
         let corners = self.mesh.corners(hit.face).into_iter().zip(hit.barycentric);
@@ -135,7 +138,8 @@ pub struct GaussianProcess {
 }
 
 impl GaussianProcess {
-    /// Fits exactly; `None` where K + σ² I is not positive definite to rounding: two points in one place without noise.
+    /// Fits exactly; `None` where K + σ² I is not positive definite to rounding: two points in one
+    /// place without noise.
     ///
     /// - `points`: m; `values`: as many, in any unit.
     pub fn fit(params: GaussianParams, points: &[Point3<f64>], values: &[f64]) -> Option<Self> {
@@ -194,8 +198,8 @@ impl<'a> GaussianSurface<'a> {
         }
     }
 
-    /// Takes a contact point (m, in O) and refits; whether that was possible. A touch that makes it impossible is
-    /// forgotten.
+    /// Takes a contact point (m, in O) and refits; whether that was possible. A touch that makes it
+    /// impossible is forgotten.
     pub fn push(&mut self, contact: Point3<f64>) -> bool {
         let Some(distance) = signed_distance(self.scan, &self.tree, &contact, f64::INFINITY) else {
             return false;

@@ -80,7 +80,8 @@ impl WholeScan {
         )
     }
 
-    /// One mark for each method on the main scan, and a dashed line at the error of the scan, as wide as the marks.
+    /// One mark for each method on the main scan, and a dashed line at the error of the scan, as
+    /// wide as the marks.
     fn by_method(
         &self,
         case: &CaseResult,

@@ -12,7 +12,8 @@ use touchup_core::mesh::{FaceTree, TriMesh};
 use touchup_core::reconstruct::PatcherParams;
 use touchup_session::live::{Engine, Renewal};
 
-/// Standard deviation of a contact point for the Gaussian process, m: that of a good tracking system.
+/// Standard deviation of a contact point for the Gaussian process, m: that of a good tracking
+/// system.
 const CONTACT_NOISE: f64 = 0.05e-3;
 /// Why a baseline refuses a contact.
 const NO_CONTACT: &str = "the place has no normal, or is another touch's";

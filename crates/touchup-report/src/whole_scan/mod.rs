@@ -1,8 +1,8 @@
-//! Error against run time on whole scans: each method to refine a scan by touch, on the same scans and samples, with the
-//! alternatives that the paper names as baselines.
+//! Error against run time on whole scans: each method to refine a scan by touch, on the same scans
+//! and samples, with the alternatives that the paper names as baselines.
 //!
-//! The surface error is measured where the part was touched, in both directions; the worse of the two counts. Runs are made
-//! in turns, so that a machine that becomes slower does so for all.
+//! The surface error is measured where the part was touched, in both directions; the worse of the
+//! two counts. Runs are made in turns, so that a machine that becomes slower does so for all.
 
 mod baselines;
 mod figures;
@@ -253,7 +253,8 @@ impl Trial<'_> {
 /// Measures every method on peaks, on the plate, and on given parts.
 ///
 /// # Errors
-/// [`MeasureError`](crate::error::MeasureError), mostly of given parts: a method that fails on its own says so in its result.
+/// [`MeasureError`](crate::error::MeasureError), mostly of given parts: a method that fails on its
+/// own says so in its result.
 pub fn whole_scan(
     effort: Effort,
     given: Option<&GivenPart>,

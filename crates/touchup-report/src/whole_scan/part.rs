@@ -148,7 +148,8 @@ fn touched_peaks(effort: Effort) -> Measured<Part> {
     simulated("peaks", (&peaks, peaks.mesh(TRUE_EDGE)?), &path, scans)
 }
 
-/// The plate of the demo, scanned and touched as there; a quick one in one raster over its features.
+/// The plate of the demo, scanned and touched as there; a quick one in one raster over its
+/// features.
 fn touched_plate(effort: Effort) -> Measured<Part> {
     let (plate, usual) = (Plate::default(), ScannerParams::default());
     let mut path = plan_demo(&plate, &PathParams::default())?;

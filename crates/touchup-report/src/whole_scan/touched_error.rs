@@ -21,11 +21,13 @@ pub struct TouchedError {
     pub part_to_mesh_mean_mm: f64,
     /// its 95th percentile, mm
     pub part_to_mesh_p95_mm: f64,
-    /// mean distance from the mesh to the part, where the closest place of the part was touched (accuracy), mm
+    /// mean distance from the mesh to the part, where the closest place of the part was touched
+    /// (accuracy), mm
     pub mesh_to_part_mean_mm: f64,
     /// its 95th percentile, mm
     pub mesh_to_part_p95_mm: f64,
-    /// mean angle between the mesh's normal and the part's in the same places, by area, 0 to 180 deg
+    /// mean angle between the mesh's normal and the part's in the same places, by area, 0 to 180
+    /// deg
     pub normal_mean_deg: f64,
     /// its 95th percentile, deg
     pub normal_p95_deg: f64,
@@ -35,8 +37,8 @@ impl TouchedError {
     /// Of `mesh` against `truth` with its tree, where it was touched.
     ///
     /// # Errors
-    /// [`CompareError::NoPoints`] where no part of the mesh is near what was touched, or nothing was touched;
-    /// [`CompareError::NoFaces`]; [`CompareError::NotFinite`].
+    /// [`CompareError::NoPoints`] where no part of the mesh is near what was touched, or nothing
+    /// was touched; [`CompareError::NoFaces`]; [`CompareError::NotFinite`].
     pub fn of(
         mesh: &TriMesh,
         truth: &TriMesh,

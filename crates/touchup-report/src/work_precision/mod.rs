@@ -1,5 +1,6 @@
-//! Work-precision of one face held against one sample: error at the end against run time and against evaluations of the
-//! right-hand side, for explicit, implicit and exact integrators, from the paper's stiffness to h_min = 1 nm.
+//! Work-precision of one face held against one sample: error at the end against run time and
+//! against evaluations of the right-hand side, for explicit, implicit and exact integrators, from
+//! the paper's stiffness to h_min = 1 nm.
 
 mod method;
 mod problem;

@@ -1,4 +1,5 @@
-//! One face held against one sample, as every integrator gets it: four unknowns, the travel along n*(0) and the normal.
+//! One face held against one sample, as every integrator gets it: four unknowns, the travel along
+//! n*(0) and the normal.
 //!
 //! ```text
 //! ds/dt = α ((F − f n)·n)      dn/dt = β f (n × F) × n      h = (p − b₀ − s n(0))·n      f = f_max / (1 + exp(h/h_min + δ))
@@ -37,8 +38,8 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// A face that looks up, 2 N for 5 ms, the tip 0.5 mm above the plane of the face and 0.5 mm beside its barycentre; the
-    /// force leans away from the normal by `tilt`, rad.
+    /// A face that looks up, 2 N for 5 ms, the tip 0.5 mm above the plane of the face and 0.5 mm
+    /// beside its barycentre; the force leans away from the normal by `tilt`, rad.
     pub fn of(h_min_m: f64, tilt: f64) -> Self {
         Self {
             h_min_m,
@@ -116,7 +117,8 @@ impl Problem {
         )
     }
 
-    /// dy/dt as the paper prints it: n is taken as it comes, also where an integrator has let it drift from length 1.
+    /// dy/dt as the paper prints it: n is taken as it comes, also where an integrator has let it
+    /// drift from length 1.
     pub fn rate(&self, y: &State) -> State {
         let n = Vector3::new(y[1], y[2], y[3]);
         let f = self.expected((self.arm - y[0] * self.normal).dot(&n)).0;

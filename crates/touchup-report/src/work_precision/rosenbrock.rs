@@ -1,11 +1,13 @@
-//! RODAS, an implicit stiff solver: a Rosenbrock method of order 4(3) with six stages, stiffly accurate and L-stable
-//! \[Hairer Wanner 1996, IV.7\]. One Jacobian and one factorisation a step, and no iteration.
+//! RODAS, an implicit stiff solver: a Rosenbrock method of order 4(3) with six stages, stiffly
+//! accurate and L-stable \[Hairer Wanner 1996, IV.7\]. One Jacobian and one factorisation a step,
+//! and no iteration.
 
 use nalgebra::{Matrix4, Vector4};
 
 use super::problem::State;
 
-/// Coefficients for the form without products of matrix and stage: those of the arguments, of the right-hand sides, and γ.
+/// Coefficients for the form without products of matrix and stage: those of the arguments, of the
+/// right-hand sides, and γ.
 const A: [[f64; 5]; 6] = [
     [0.0; 5],
     [1.544, 0.0, 0.0, 0.0, 0.0],
@@ -77,8 +79,9 @@ const MAX_STEPS: usize = 20_000;
 const CHANGE: (f64, f64) = (0.2, 6.0);
 const SAFETY: f64 = 0.9;
 
-/// Integrates dy/dt = `rate`(y), which does not depend on time, from 0 to `end`; `scale` and `relative` as in
-/// [`touchup_core::haptic::dynamics::dormand_prince::integrate`]. `None`: it gave up.
+/// Integrates dy/dt = `rate`(y), which does not depend on time, from 0 to `end`; `scale` and
+/// `relative` as in [`touchup_core::haptic::dynamics::dormand_prince::integrate`]. `None`: it gave
+/// up.
 pub fn integrate(
     start: State,
     end: f64,

@@ -1,4 +1,5 @@
-//! The cost of a push in the report: the text from the numbers, and that both sides of the ratio do the same work.
+//! The cost of a push in the report: the text from the numbers, and that both sides of the ratio do
+//! the same work.
 
 use touchup_core::haptic::Refiner;
 use touchup_core::mesh::{FaceTree, TriMesh};
@@ -243,7 +244,8 @@ fn the_index_of_the_peer_stays_exact() {
     for i in 0..1_000 {
         let sample = slide(i, 0.2);
         assert!(peer.push(&sample).is_some());
-        // a vertex less than 1.5 mm from the touch in edges of 1.9 mm, beside the corners of the face
+        // a vertex less than 1.5 mm from the touch in edges of 1.9 mm, beside the corners of the
+        // face
         assert!(
             (3..=6).contains(&peer.moved_vertices().len()),
             "{:?}",
@@ -265,7 +267,8 @@ fn the_index_of_the_peer_stays_exact() {
     }
 }
 
-/// The ratio of two that do different work would say nothing: both move three corners with each sample, and about as far.
+/// The ratio of two that do different work would say nothing: both move three corners with each
+/// sample, and about as far.
 #[test]
 fn the_cheapest_scene_moves_the_mesh_as_the_hand_written_loop_does() {
     let scan = wavy_plate(20_000).unwrap();

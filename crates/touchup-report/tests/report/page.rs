@@ -1,4 +1,5 @@
-//! The files of a report: well formed, without a number that is none, and with every digit in the CSV.
+//! The files of a report: well formed, without a number that is none, and with every digit in the
+//! CSV.
 
 use serde_json::Value;
 use touchup_report::document::Report;

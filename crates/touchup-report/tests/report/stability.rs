@@ -1,4 +1,5 @@
-//! The stability part of the report: what is promised of the default integrator holds, and what is known to fail is seen to.
+//! The stability part of the report: what is promised of the default integrator holds, and what is
+//! known to fail is seen to.
 
 use touchup_report::Effort;
 use touchup_report::stability::{Integrator, RunEnding, bounded_steps, stability};
@@ -54,7 +55,8 @@ fn the_default_is_stable_everywhere_and_explicit_euler_is_not() {
         lie.count(RunEnding::Stable) == lie.runs() && lie.runs() > 0,
         "{lie:?}"
     );
-    // one step of explicit Euler goes over the rest point from dt > 1/(alpha slope) on: about half of the runs are stiffer
+    // one step of explicit Euler goes over the rest point from dt > 1/(alpha slope) on: about half
+    // of the runs are stiffer
     let euler = of(Integrator::ExplicitEuler);
     assert!((0.2..0.8).contains(&euler.stable_share()), "{euler:?}");
     assert!(of(Integrator::DormandPrince).count(RunEnding::GaveUp) > 0);

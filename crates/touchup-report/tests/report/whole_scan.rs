@@ -1,5 +1,5 @@
-//! Parts 2 and 3 of the report: the baselines against closed forms, the fits against known laws, errors against cases worked
-//! by hand, and one quick run from end to end.
+//! Parts 2 and 3 of the report: the baselines against closed forms, the fits against known laws,
+//! errors against cases worked by hand, and one quick run from end to end.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use touchup_core::compare::TouchedRegion;
@@ -92,7 +92,8 @@ fn two_exact_values_in_one_place_have_no_gaussian_process() {
     assert_eq!(surface.mesh().positions(), before);
 }
 
-/// One touch at height h above a vertex: the vertex goes to where t = h exp(−(t − h)²/2ℓ²), and far ones stay.
+/// One touch at height h above a vertex: the vertex goes to where t = h exp(−(t − h)²/2ℓ²), and far
+/// ones stay.
 #[test]
 fn the_implicit_surface_goes_through_a_touch() {
     let scan = sheet(40, 0.0);
@@ -109,7 +110,8 @@ fn the_implicit_surface_goes_through_a_touch() {
     let mesh = surface.mesh();
     let z = |i: u32, j: u32| mesh.position(VertexId(i + 41 * j)).z;
     assert!((z(20, 20) - height).abs() < 1e-9, "{}", z(20, 20));
-    // 2 mm aside: one length, so about exp(−1/2) of it; the height changes that by less than h²/2ℓ² = 0.5 %
+    // 2 mm aside: one length, so about exp(−1/2) of it; the height changes that by less than h²/2ℓ²
+    // = 0.5 %
     assert!(
         (z(22, 20) / height - (-0.5f64).exp()).abs() < 0.005,
         "{}",
@@ -163,7 +165,8 @@ fn an_even_offset_is_the_error_in_both_directions() {
     assert!(error.normal_mean_deg < 1e-6 && error.normal_p95_deg < 1e-6);
 }
 
-/// Each raised line of vertices makes two of fifty strips lean: 4 % of the area are no part of the 95th percentile, 8 % are.
+/// Each raised line of vertices makes two of fifty strips lean: 4 % of the area are no part of the
+/// 95th percentile, 8 % are.
 #[test]
 fn the_95th_percentile_of_the_normals_is_that_of_the_area() {
     let (cells, edge, slope) = (50, 1e-3, 0.05f64);
@@ -197,7 +200,8 @@ fn the_95th_percentile_of_the_normals_is_that_of_the_area() {
     }
 }
 
-/// z = 0.01 x over the truth z = 0: from mesh to part the distance at x is 0.01 x, the tilt is atan 0.01 everywhere.
+/// z = 0.01 x over the truth z = 0: from mesh to part the distance at x is 0.01 x, the tilt is atan
+/// 0.01 everywhere.
 #[test]
 fn a_tilt_is_measured_where_it_was_touched() {
     let truth = sheet(20, 0.0);
@@ -209,7 +213,8 @@ fn a_tilt_is_measured_where_it_was_touched() {
     let region =
         TouchedRegion::of((0..=100).map(|i| Point3::new(10e-3, 5e-3 + 0.1e-3 * f64::from(i), 0.0)));
     let error = TouchedError::of(&mesh, &truth, &FaceTree::new(&truth), &region).unwrap();
-    // touched is x = 10 ± 1 mm; points of the mesh are spread at random over it, so that their mean is known to a few %
+    // touched is x = 10 ± 1 mm; points of the mesh are spread at random over it, so that their mean
+    // is known to a few %
     assert!((error.mesh_to_part_mean_mm - 0.1).abs() < 2e-3, "{error:?}");
     // perpendicular to the tilted mesh: 0.1 cos(atan 0.01)
     assert!(
@@ -427,7 +432,8 @@ fn convergence_is_measured_and_reported() {
     assert_eq!(chapter.tables[0].rows.len(), found.runs.len());
 }
 
-/// Fig 6 and 7: b* stays on the line of n*(0), the distance falls before the angle, and both come to zero.
+/// Fig 6 and 7: b* stays on the line of n*(0), the distance falls before the angle, and both come
+/// to zero.
 #[test]
 fn one_face_goes_along_its_first_normal_and_corrects_the_distance_before_the_angle() {
     let found = convergence(QUICK, &mut |_| {});
@@ -435,7 +441,8 @@ fn one_face_goes_along_its_first_normal_and_corrects_the_distance_before_the_ang
     for run in &found.one_face {
         let [first, last] = [&run.samples[0], &run.samples[run.samples.len() - 1]];
         let tenth = |error: fn(&OneFaceSample) -> f64| run.time_to_share(0.1, error).unwrap();
-        // a face that leans more draws the tip farther aside, so that the distance waits longer for the angle
+        // a face that leans more draws the tip farther aside, so that the distance waits longer for
+        // the angle
         assert!(
             tenth(|sample| sample.distance_mm) < 0.9 * tenth(|sample| sample.normal_deg),
             "{}",

@@ -1,5 +1,5 @@
-//! The integrators that the report compares: their orders, their counts, and the reference they are measured by, against closed
-//! forms.
+//! The integrators that the report compares: their orders, their counts, and the reference they are
+//! measured by, against closed forms.
 
 use nalgebra::Vector3;
 use touchup_core::haptic::FaceState;
@@ -13,7 +13,8 @@ fn reference(problem: &Problem) -> Option<FaceState> {
     problem.held().reference().map(|found| found.face)
 }
 
-/// A sample without friction at about half of f_max, so that u = h/h_min + δ has an elementary solution at exactly half.
+/// A sample without friction at about half of f_max, so that u = h/h_min + δ has an elementary
+/// solution at exactly half.
 fn at_half_of_f_max(h_min_m: f64, from: f64) -> Problem {
     Problem {
         h_min_m,
@@ -49,7 +50,8 @@ fn the_reference_agrees_with_the_closed_form_however_stiff() {
 
 #[test]
 fn the_reference_turns_the_normal_by_the_impulse_applied() {
-    // tan(θ/2) falls by e^(−β|F|J), J = F·n t − s/α while n hardly turns; here it is held fast by a tiny dt of a deep tip
+    // tan(θ/2) falls by e^(−β|F|J), J = F·n t − s/α while n hardly turns; here it is held fast by a
+    // tiny dt of a deep tip
     let tilt: f64 = 0.6;
     let problem = Problem {
         h_min_m: PAPER_H_MIN_M,
@@ -97,7 +99,8 @@ fn each_integrator_has_its_order() {
 
 #[test]
 fn an_adaptive_solver_gets_a_digit_for_its_evaluations() {
-    // with order p the error falls as evaluations^−p: over six decades of tolerance the slope is near that of the higher result
+    // with order p the error falls as evaluations^−p: over six decades of tolerance the slope is
+    // near that of the higher result
     let mild = Problem {
         dt_s: 20e-3,
         ..Problem::of(1e-3, 0.35)
@@ -190,8 +193,8 @@ fn evaluations_are_counted_as_by_hand() {
             "{method:?}"
         );
     }
-    // a tolerance that everything meets: one step. Dormand–Prince has seven stages, the first of them from before; RODAS six and
-    // one Jacobian of four columns
+    // a tolerance that everything meets: one step. Dormand–Prince has seven stages, the first of
+    // them from before; RODAS six and one Jacobian of four columns
     for (method, count) in [(Method::DormandPrince, 7), (Method::Rodas, 10)] {
         let solved = method
             .solve(&tilted, SolverSetting::RelativeTolerance(1e9))

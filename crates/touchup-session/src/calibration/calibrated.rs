@@ -33,7 +33,8 @@ impl CalibrationKind {
 
 /// The result of a calibration, as it is printed, and what it changes in a scene.
 pub trait Calibrated: Serialize + Display {
-    /// Sets it in `scene`; returns the settings for the text of one, and in one line where they come from.
+    /// Sets it in `scene`; returns the settings for the text of one, and in one line where they
+    /// come from.
     fn set_in(&self, scene: &mut Scene) -> (Vec<Setting>, String);
 }
 
@@ -90,7 +91,8 @@ pub fn calibrated_scene(
     )
 }
 
-/// The day on which a calibration was put into the text of a scene, UTC; `None` where it does not say so.
+/// The day on which a calibration was put into the text of a scene, UTC; `None` where it does not
+/// say so.
 pub fn calibrated_on(yaml: &str, kind: CalibrationKind) -> Option<NaiveDate> {
     let key = match kind {
         CalibrationKind::Tip => "offset_mm",
@@ -147,7 +149,8 @@ mod tests {
             NaiveDate::from_ymd_opt(2026, 2, 28)
         );
         assert_eq!(calibrated_on(&made, CalibrationKind::Scan), None);
-        // one of an older version says no day, a comment of somebody else is none of ours, and the tip of an arm is another one
+        // one of an older version says no day, a comment of somebody else is none of ours, and the
+        // tip of an arm is another one
         let others = [
             ("; 2026-02-28", ""),
             ("touchup calibrate tip", "by hand"),

@@ -1,7 +1,9 @@
-//! Payload identification: weight, centre of mass and bias of the sensor, from static segments of a recording, of a table, or of an arm.
+//! Payload identification: weight, centre of mass and bias of the sensor, from static segments of a
+//! recording, of a table, or of an arm.
 //!
-//! The controller of an arm compensates the weight of the payload set there. So the result goes to its parameters:
-//! `robot.payload_kg` and `robot.payload_centre_mm`. The bias is only shown: a sensor is zeroed before each touch.
+//! The controller of an arm compensates the weight of the payload set there. So the result goes to
+//! its parameters: `robot.payload_kg` and `robot.payload_centre_mm`. The bias is only shown: a
+//! sensor is zeroed before each touch.
 
 use std::fmt;
 use std::path::Path;
@@ -30,7 +32,8 @@ const UNEXPLAINED: f64 = 5.0;
 pub struct PayloadCalibrationParams {
     /// Acceleration of gravity, by which the weight is divided, m/s². Default 9.81.
     pub gravity: f64,
-    /// In which axes the wrench is. Default: those that the recording names, and of a table the sensor's own.
+    /// In which axes the wrench is. Default: those that the recording names, and of a table the
+    /// sensor's own.
     pub wrench_frame: Option<WrenchFrame>,
 }
 
@@ -162,7 +165,8 @@ fn doubt_of_residuals(fit: &PayloadFit, besides: &str) -> Option<String> {
 }
 
 reported! {
-    /// Weight, centre of mass and bias; `named`: whose axes are those of the sensor, and whose those of the poses.
+    /// Weight, centre of mass and bias; `named`: whose axes are those of the sensor, and whose
+    /// those of the poses.
     #[derive(Clone)]
     pub struct PayloadFound, fn of(fit: &PayloadFit, named: [&'static str; 2]) {
         #[serde(skip)]

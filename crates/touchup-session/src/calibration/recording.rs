@@ -46,8 +46,8 @@ impl CalibrationRecording {
         self.recording.wrench_frame
     }
 
-    /// Gives each sample to `each`, its pose in the frame of the recording: of the ball where the scene says where it
-    /// is.
+    /// Gives each sample to `each`, its pose in the frame of the recording: of the ball where the
+    /// scene says where it is.
     ///
     /// - `at_each`: called after each record, to show the progress.
     pub(super) fn replay(

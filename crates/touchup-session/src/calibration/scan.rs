@@ -18,8 +18,9 @@ use crate::scene::{GravityAxes, ScanToSpaceSection, Scene, Setting};
 
 /// From a table of pairs ([`touchup_io::pairs_file`]).
 ///
-/// - `recording`: one in which the stylus dwells on each point for a second, in the order of the table, whose columns of space then do not
-///   count; the scene then has to say the radius of the ball.
+/// - `recording`: one in which the stylus dwells on each point for a second, in the order of the
+///   table, whose columns of space then do not count; the scene then has to say the radius of the
+///   ball.
 /// - `sigma`: standard deviation of a pair per axis, m; `None`: from the residuals.
 /// - `at_each`: called after each record, to show the progress.
 ///
@@ -56,7 +57,8 @@ pub fn calibrate_scan(
     })
 }
 
-/// The points of the table, each with the place where the stylus dwelled, and what the recording lacks.
+/// The points of the table, each with the place where the stylus dwelled, and what the recording
+/// lacks.
 fn touched_pairs(
     table: &Path,
     recording: CalibrationRecording,
@@ -102,7 +104,8 @@ fn touched_pairs(
     Ok((file, replayed.losses))
 }
 
-/// A weight whose direction was named in the axes of the scan may not have been meant for the scan as it lies now.
+/// A weight whose direction was named in the axes of the scan may not have been meant for the scan
+/// as it lies now.
 fn doubt_of_gravity(scene: &Scene) -> Option<String> {
     let payload = scene.compensation.as_ref()?.payload.as_ref()?;
     let is_of_scan = payload.gravity_axes == GravityAxes::Object && payload.payload.mass > 0.0;

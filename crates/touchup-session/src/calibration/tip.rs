@@ -1,5 +1,5 @@
-//! Tip calibration: where the ball is: in the tracked stylus, from a swing about it; in the flange of an arm, from touches of one flat
-//! spot with a probe that leans.
+//! Tip calibration: where the ball is: in the tracked stylus, from a swing about it; in the flange
+//! of an arm, from touches of one flat spot with a probe that leans.
 
 use std::fmt;
 
@@ -17,7 +17,8 @@ use super::vector::{Vector, rounded};
 use crate::reported;
 use crate::scene::{Scene, Setting};
 
-/// Poses that are held at most: three minutes at 1 kHz. Of a longer swing every second one is dropped.
+/// Poses that are held at most: three minutes at 1 kHz. Of a longer swing every second one is
+/// dropped.
 const MOST_POSES: usize = 200_000;
 
 /// Every so many-th pose of a swing.
@@ -44,7 +45,8 @@ impl Swing {
     }
 }
 
-/// From a recording in which the ball rests in a cone or divot while the stylus is swung to all sides.
+/// From a recording in which the ball rests in a cone or divot while the stylus is swung to all
+/// sides.
 ///
 /// - `at_each`: called after each record, to show the progress.
 ///

@@ -7,7 +7,8 @@ use touchup_core::calibrate::VectorEstimate;
 use crate::reported;
 
 reported! {
-    /// A value of three components as JSON has it, and its standard uncertainty; `unit`: how many of it are one of SI.
+    /// A value of three components as JSON has it, and its standard uncertainty; `unit`: how many
+    /// of it are one of SI.
     #[derive(Clone, Copy)]
     pub(super) struct Vector, pub(super) fn of(known: &VectorEstimate, unit: f64) {
         pub value: [f64; 3] = (known.value * unit).into(),

@@ -1,4 +1,5 @@
-//! A scan finer than the tip, and the simplified one that haptic update and live patch work on in its place.
+//! A scan finer than the tip, and the simplified one that haptic update and live patch work on in
+//! its place.
 
 use std::sync::Arc;
 
@@ -26,7 +27,8 @@ enum OriginalScan {
 }
 
 impl Detail {
-    /// What the haptic update is to work on, and the detail that it leaves out; a scan that is coarse enough is taken as it is.
+    /// What the haptic update is to work on, and the detail that it leaves out; a scan that is
+    /// coarse enough is taken as it is.
     ///
     /// - `scan`: a copy of `shared`, where that is there.
     /// - `refine`: the mean edge of its region becomes that of what it works on.
@@ -86,12 +88,14 @@ impl Detail {
         self.shown = Some(Shown::new(self.scans()));
     }
 
-    /// The mesh to look at, as far as it has followed the working mesh; `None` before [`Self::watch`].
+    /// The mesh to look at, as far as it has followed the working mesh; `None` before
+    /// [`Self::watch`].
     pub fn shown(&self) -> Option<&TriMesh> {
         self.shown.as_ref().map(Shown::mesh)
     }
 
-    /// Changes of the mesh to look at, as [`TriMesh::take_changes`], after up to `most` of the working mesh were taken over.
+    /// Changes of the mesh to look at, as [`TriMesh::take_changes`], after up to `most` of the
+    /// working mesh were taken over.
     ///
     /// # Errors
     /// [`MeshError::TooMany`].
@@ -121,7 +125,8 @@ impl Detail {
         Ok(shown.take_changes(most, into) && has_followed)
     }
 
-    /// The mesh to look at becomes the scan with this patch of all touches so far, as [`Self::take_changes`] goes on.
+    /// The mesh to look at becomes the scan with this patch of all touches so far, as
+    /// [`Self::take_changes`] goes on.
     pub fn rest(&mut self, patch: PatchDelta, refiner: &Refiner) {
         if let Some(shown) = &mut self.shown {
             shown.rest(patch, refiner.mesh());

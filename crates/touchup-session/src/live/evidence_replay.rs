@@ -39,7 +39,8 @@ impl EvidenceReplay {
         undo(&mut self.patcher)
     }
 
-    /// Does the stroke again that was taken back last; returns its touch-down, ns, `None` where there was none.
+    /// Does the stroke again that was taken back last; returns its touch-down, ns, `None` where
+    /// there was none.
     pub fn redo(&mut self) -> Option<i64> {
         redo(&mut self.patcher)
     }

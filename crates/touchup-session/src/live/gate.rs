@@ -4,7 +4,8 @@ use std::sync::{Arc, Condvar, Mutex, PoisonError};
 
 use crate::clock::{Clock, Working, locked};
 
-/// Where each renewal of the patch needs a permit, and whose time waits for the patch. The default lets everything through.
+/// Where each renewal of the patch needs a permit, and whose time waits for the patch. The default
+/// lets everything through.
 #[derive(Clone, Debug, Default)]
 pub struct Gate {
     permits: Option<Arc<Permits>>,
@@ -78,7 +79,8 @@ impl Gate {
 }
 
 impl GateKeeper {
-    /// Lets one renewal through, and returns when its change can be taken up: one has to be asked for.
+    /// Lets one renewal through, and returns when its change can be taken up: one has to be asked
+    /// for.
     pub fn let_one_through(&self) {
         let mut state = locked(&self.0.state);
         state.given = state.done + 1;

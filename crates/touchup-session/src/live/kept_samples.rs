@@ -25,7 +25,8 @@ impl Default for KeptSamples {
 }
 
 impl KeptSamples {
-    /// Keeps a sample. Evidence without some of them would be that of another touch: with one too many all are dropped.
+    /// Keeps a sample. Evidence without some of them would be that of another touch: with one too
+    /// many all are dropped.
     pub fn push(&mut self, sample: &Sample) {
         if self.dropped > 0 {
             self.dropped += 1;

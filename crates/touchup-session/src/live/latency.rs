@@ -56,7 +56,8 @@ impl Latencies {
         self.max_ns = self.max_ns.max(ns);
     }
 
-    /// Median and tails: the longest duration of the bucket in which each falls; 0 when there is none.
+    /// Median and tails: the longest duration of the bucket in which each falls; 0 when there is
+    /// none.
     pub fn quantiles(&self) -> Quantiles {
         Quantiles {
             median: self.at(500),

@@ -1,11 +1,13 @@
-//! The engine of a session: the haptic update answers every sample at once, the reconstruction (the patch) follows at its own rate.
+//! The engine of a session: the haptic update answers every sample at once, the reconstruction (the
+//! patch) follows at its own rate.
 //!
-//! [`Engine`] is all of it, for the node, the command line and the report alike; [`Renewal`] says when the patch is made: once at the end,
-//! or again and again on a thread of its own. Then the stamps alone decide when it is renewed and at which sample its change is taken up,
-//! as long as the thread keeps up. Where the thread is late the samples go on, and the next renewal takes in all samples since:
-//! the mesh shows a touch later, and the result at the end is the same, as it is made of all touches at once. With
-//! [`Pace::is_patient`]
-//! [`Engine::push`] waits instead, and the mesh at each sample is the same on every machine.
+//! [`Engine`] is all of it, for the node, the command line and the report alike; [`Renewal`] says
+//! when the patch is made: once at the end, or again and again on a thread of its own. Then the
+//! stamps alone decide when it is renewed and at which sample its change is taken up, as long as
+//! the thread keeps up. Where the thread is late the samples go on, and the next renewal takes in
+//! all samples since: the mesh shows a touch later, and the result at the end is the same, as it is
+//! made of all touches at once. With [`Pace::is_patient`] [`Engine::push`] waits instead, and the
+//! mesh at each sample is the same on every machine.
 
 mod detail;
 mod error;
@@ -100,14 +102,15 @@ enum Reconstruction {
 }
 
 impl Engine {
-    /// Nothing touched yet. Where a patch needs the slow drift of the sensor and `refine` names no settings for it, it is followed by
-    /// the default ones, for patch and haptic update alike.
+    /// Nothing touched yet. Where a patch needs the slow drift of the sensor and `refine` names no
+    /// settings for it, it is followed by the default ones, for patch and haptic update alike.
     ///
     /// - `mesh`: the scan.
     /// - `patch`: `None`: the haptic update alone; `renewal` is of no use then.
     ///
     /// # Errors
-    /// [`LiveError::Setting`], [`LiveError::Refine`] for settings and where memory is short, [`LiveError::NoThread`].
+    /// [`LiveError::Setting`], [`LiveError::Refine`] for settings and where memory is short,
+    /// [`LiveError::NoThread`].
     pub fn new(
         mesh: TriMesh,
         mut refine: RefineParams,
@@ -162,8 +165,8 @@ impl Engine {
         })
     }
 
-    /// Takes the next sample and moves the mesh by it, then by the change of the patch that is due: [`Self::answer`], then
-    /// [`Self::follow`].
+    /// Takes the next sample and moves the mesh by it, then by the change of the patch that is due:
+    /// [`Self::answer`], then [`Self::follow`].
     ///
     /// # Errors
     /// Those of [`Refiner::push`], by which nothing is changed, and [`LiveError::Stopped`].
@@ -173,8 +176,8 @@ impl Engine {
         Ok(update)
     }
 
-    /// Takes the next sample and moves the mesh by it. What is not due at once is left to [`Self::follow`], which is called first where the
-    /// sample before still needs it.
+    /// Takes the next sample and moves the mesh by it. What is not due at once is left to
+    /// [`Self::follow`], which is called first where the sample before still needs it.
     ///
     /// # Errors
     /// As [`Self::push`].
@@ -188,8 +191,9 @@ impl Engine {
         Ok(update)
     }
 
-    /// Does what [`Self::answer`] has left for the time until the next sample: passes the sample to the patch, moves the mesh by the change
-    /// of the patch that is due, and makes ready what the next sample is likely to need.
+    /// Does what [`Self::answer`] has left for the time until the next sample: passes the sample to
+    /// the patch, moves the mesh by the change of the patch that is due, and makes ready what the
+    /// next sample is likely to need.
     ///
     /// # Errors
     /// [`LiveError::Stopped`], [`LiveError::Refine`].
@@ -208,8 +212,8 @@ impl Engine {
         Ok(())
     }
 
-    /// To be called now and then while no sample comes: applies more of the changes of the patch, and passes it the samples
-    /// that it does not know yet. Never waits.
+    /// To be called now and then while no sample comes: applies more of the changes of the patch,
+    /// and passes it the samples that it does not know yet. Never waits.
     ///
     /// # Errors
     /// [`LiveError::Stopped`], [`LiveError::Refine`].
@@ -222,10 +226,12 @@ impl Engine {
         }
     }
 
-    /// As [`Self::rest`], where the stream has rested for longer: the mesh becomes, bit by bit, what [`Patcher::patched`] makes of all
-    /// samples so far, as a file of the result shows it. Returns whether it is that. The next sample may come at any time, and what it
-    /// changes is as if nothing had been settled. Never waits; without a patch beside the samples there is nothing to do. Where the haptic
-    /// update works on a simplified scan, the mesh becomes that by [`Self::take_changes`].
+    /// As [`Self::rest`], where the stream has rested for longer: the mesh becomes, bit by bit,
+    /// what [`Patcher::patched`] makes of all samples so far, as a file of the result shows it.
+    /// Returns whether it is that. The next sample may come at any time, and what it changes is as
+    /// if nothing had been settled. Never waits; without a patch beside the samples there is
+    /// nothing to do. Where the haptic update works on a simplified scan, the mesh becomes that by
+    /// [`Self::take_changes`].
     ///
     /// # Errors
     /// As [`Self::rest`].
@@ -241,7 +247,8 @@ impl Engine {
         Ok(is_settled)
     }
 
-    /// Whether the mesh is what a file of all samples so far shows, or becomes so by [`Self::take_changes`].
+    /// Whether the mesh is what a file of all samples so far shows, or becomes so by
+    /// [`Self::take_changes`].
     pub fn is_settled(&self) -> bool {
         match (&self.patch, &self.detail) {
             (Reconstruction::Without, _) => true,
@@ -255,7 +262,8 @@ impl Engine {
         }
     }
 
-    /// Waits until the mesh shows a patch of all samples so far, as after a pause; does nothing where the patch is made at the end.
+    /// Waits until the mesh shows a patch of all samples so far, as after a pause; does nothing
+    /// where the patch is made at the end.
     ///
     /// # Errors
     /// [`LiveError::Stopped`], [`LiveError::Refine`].
@@ -275,8 +283,8 @@ impl Engine {
         }
     }
 
-    /// Takes the last stroke back, as [`Patcher::undo`], and waits until the mesh is that of the patch before it. Returns
-    /// whether there was one.
+    /// Takes the last stroke back, as [`Patcher::undo`], and waits until the mesh is that of the
+    /// patch before it. Returns whether there was one.
     ///
     /// # Errors
     /// As [`Self::catch_up`].
@@ -311,15 +319,16 @@ impl Engine {
         Ok(self.changed_stroke_ns.is_some())
     }
 
-    /// Touch-down of the stroke that the last call of [`Self::undo`] or [`Self::redo`] took back or did again, ns; `None` where it did
-    /// nothing, and without a patch.
+    /// Touch-down of the stroke that the last call of [`Self::undo`] or [`Self::redo`] took back or
+    /// did again, ns; `None` where it did nothing, and without a patch.
     pub fn changed_stroke_ns(&self) -> Option<i64> {
         self.changed_stroke_ns
     }
 
-    /// Begins to make the evidence again beside the samples: what is returned takes all samples so far but those to be left out, on any
-    /// thread, and comes back with [`Self::end_replay`]. Until then the samples are kept, as far as there is room for
-    /// them. `None` without a patch beside them.
+    /// Begins to make the evidence again beside the samples: what is returned takes all samples so
+    /// far but those to be left out, on any thread, and comes back with [`Self::end_replay`]. Until
+    /// then the samples are kept, as far as there is room for them. `None` without a patch beside
+    /// them.
     ///
     /// # Errors
     /// [`LiveError::Stopped`], [`LiveError::Refine`], [`LiveError::Setting`].
@@ -333,10 +342,12 @@ impl Engine {
         Ok(Some(replay))
     }
 
-    /// Evidence and estimates become those of `replay` and of the samples since it was begun, as if there had never been others; `None`
-    /// leaves them. The mesh follows with the next calls, see [`Self::is_replacing`]. Never waits for the patch.
+    /// Evidence and estimates become those of `replay` and of the samples since it was begun, as if
+    /// there had never been others; `None` leaves them. The mesh follows with the next calls, see
+    /// [`Self::is_replacing`]. Never waits for the patch.
     ///
-    /// Returns how many samples came since it was begun where they were too many to be kept: they are left as well then. Else 0.
+    /// Returns how many samples came since it was begun where they were too many to be kept: they
+    /// are left as well then. Else 0.
     ///
     /// # Errors
     /// [`LiveError::Stopped`].
@@ -365,9 +376,9 @@ impl Engine {
             .is_some_and(|renewals| renewals.is_replacing)
     }
 
-    /// A copy of the evidence of the patch from all samples so far, without its results: it comes when the thread
-    /// has made it. [`Patcher::flush`] and [`Patcher::patched`] make of it what they would make at the end. `None` without a patch,
-    /// or where nothing was touched.
+    /// A copy of the evidence of the patch from all samples so far, without its results: it comes
+    /// when the thread has made it. [`Patcher::flush`] and [`Patcher::patched`] make of it what
+    /// they would make at the end. `None` without a patch, or where nothing was touched.
     ///
     /// # Errors
     /// [`LiveError::Stopped`].
@@ -400,8 +411,8 @@ impl Engine {
         self.detail.iter_mut().for_each(Detail::watch);
     }
 
-    /// Changes of [`Self::mesh`] since the last call, as [`TriMesh::take_changes`]. Where the haptic update works on a simplified scan,
-    /// the mesh follows it by this.
+    /// Changes of [`Self::mesh`] since the last call, as [`TriMesh::take_changes`]. Where the
+    /// haptic update works on a simplified scan, the mesh follows it by this.
     ///
     /// # Errors
     /// [`LiveError::Refine`] where memory is short.
@@ -414,8 +425,8 @@ impl Engine {
         }
     }
 
-    /// The mesh to look at: that of the haptic update, and where this works on a simplified scan and [`Self::watch`] was called, the scan
-    /// itself as far as it has followed.
+    /// The mesh to look at: that of the haptic update, and where this works on a simplified scan
+    /// and [`Self::watch`] was called, the scan itself as far as it has followed.
     pub fn mesh(&self) -> &TriMesh {
         self.detail
             .as_ref()
@@ -423,12 +434,14 @@ impl Engine {
             .unwrap_or_else(|| self.refiner.mesh())
     }
 
-    /// How often [`Self::mesh`] was changed since [`Self::watch`], at least: it grows with each change to be taken.
+    /// How often [`Self::mesh`] was changed since [`Self::watch`], at least: it grows with each
+    /// change to be taken.
     pub fn edits(&self) -> u64 {
         self.refiner.mesh().edits() + self.detail.as_ref().map_or(0, Detail::rests)
     }
 
-    /// A face of [`Self::mesh`] that shows a face of the haptic update; `None`: it is not shown yet.
+    /// A face of [`Self::mesh`] that shows a face of the haptic update; `None`: it is not shown
+    /// yet.
     pub fn shown_face(&self, face: FaceId) -> Option<FaceId> {
         self.detail
             .as_ref()
@@ -445,8 +458,8 @@ impl Engine {
         self.renewals().is_none_or(|renewals| renewals.is_done)
     }
 
-    /// Support of a vertex. Where there is no patch, or it does not know yet, a vertex that is not where the scan has it
-    /// counts as touched, or as guessed from touches.
+    /// Support of a vertex. Where there is no patch, or it does not know yet, a vertex that is not
+    /// where the scan has it counts as touched, or as guessed from touches.
     ///
     /// - `scan`: unrefined.
     pub fn support(&self, scan: &TriMesh, vertex: VertexId) -> Support {
@@ -466,8 +479,8 @@ impl Engine {
         }
     }
 
-    /// Stamp up to which the mesh shows all that the patch knows, ns; `None` before the patch has seen a touch, and where it is made at the
-    /// end.
+    /// Stamp up to which the mesh shows all that the patch knows, ns; `None` before the patch has
+    /// seen a touch, and where it is made at the end.
     pub fn patched_until_ns(&self) -> Option<i64> {
         self.renewals()?.patched_until_ns()
     }

@@ -11,11 +11,12 @@ use touchup_core::haptic::Refiner;
 use touchup_core::reconstruct::{PatchDelta, Patcher};
 use touchup_core::stylus::{ContactSample, SettingError};
 
-/// Parts of a change of the patch that are taken up after one sample: some 100 µs on a mesh of a million faces.
+/// Parts of a change of the patch that are taken up after one sample: some 100 µs on a mesh of a
+/// million faces.
 const AT_ONCE: usize = 80;
 
-/// Renewals that are asked for and not taken up at most, where samples do not wait: one that the thread works at, and one for
-/// it to go on with.
+/// Renewals that are asked for and not taken up at most, where samples do not wait: one that the
+/// thread works at, and one for it to go on with.
 const MOST_OPEN: usize = 2;
 
 /// When the patch is renewed, in time of the samples.
@@ -23,15 +24,16 @@ const MOST_OPEN: usize = 2;
 pub struct Pace {
     /// time from one renewal to the next, ns
     pub every_ns: i64,
-    /// … and from a renewal until its change is taken up, ns: what the thread of the patch has for it
+    /// … and from a renewal until its change is taken up, ns: what the thread of the patch has for
+    /// it
     pub after_ns: i64,
     /// whether samples wait for a change that is late
     pub is_patient: bool,
 }
 
 impl Default for Pace {
-    /// 8 ms and 10 ms: with a smoothing window of 32 ms to either side, a touch is in the mesh after 50 ms, and the time that it takes to take
-    /// the change up. No sample waits.
+    /// 8 ms and 10 ms: with a smoothing window of 32 ms to either side, a touch is in the mesh
+    /// after 50 ms, and the time that it takes to take the change up. No sample waits.
     fn default() -> Self {
         Self {
             every_ns: 8_000_000,
@@ -91,7 +93,8 @@ pub(super) struct Renewals {
     patched_until_ns: i64,
     /// whether the change that is due is known to be late
     is_late: bool,
-    /// whether the mesh is, or becomes with what is open, what the patch of all samples so far shows at once
+    /// whether the mesh is, or becomes with what is open, what the patch of all samples so far
+    /// shows at once
     is_settled: bool,
     /// the patch of all touches on the scan that is shown, where that is another, when it has come
     at_rest: Option<PatchDelta>,
@@ -128,7 +131,8 @@ impl Renewals {
         })
     }
 
-    /// Takes a sample that the haptic update has taken; moves the mesh by what the patch has found that is due by now.
+    /// Takes a sample that the haptic update has taken; moves the mesh by what the patch has found
+    /// that is due by now.
     pub fn push(&mut self, refiner: &mut Refiner, contact: ContactSample) -> Result<(), LiveError> {
         self.is_settled = false;
         let stamp_ns = contact.tip.stamp_ns;
@@ -208,7 +212,8 @@ impl Renewals {
         Ok(true)
     }
 
-    /// The patch of all touches on the scan that is shown, once, when it has come and nothing was touched since.
+    /// The patch of all touches on the scan that is shown, once, when it has come and nothing was
+    /// touched since.
     pub fn take_at_rest(&mut self) -> Option<PatchDelta> {
         self.is_settled().then(|| self.at_rest.take())?
     }
@@ -229,7 +234,8 @@ impl Renewals {
         self.take_up_all(refiner).map(drop)
     }
 
-    /// Takes the last stroke back, or does it again, as [`super::Engine::undo`] and [`super::Engine::redo`].
+    /// Takes the last stroke back, or does it again, as [`super::Engine::undo`] and
+    /// [`super::Engine::redo`].
     pub fn change_strokes(
         &mut self,
         refiner: &mut Refiner,
@@ -242,7 +248,8 @@ impl Renewals {
         self.take_up_all(refiner)
     }
 
-    /// Goes on with another patcher, which has all samples so far; as [`super::Engine::end_replay`].
+    /// Goes on with another patcher, which has all samples so far; as
+    /// [`super::Engine::end_replay`].
     ///
     /// - `last_ns`: stamp of the last of them, whether or not that is left out.
     pub fn replace(&mut self, patcher: Patcher, last_ns: i64) -> Result<(), LiveError> {
@@ -262,7 +269,8 @@ impl Renewals {
         Ok(())
     }
 
-    /// Takes up all requested changes as a whole; returns the touch-down of the stroke that the last one was of.
+    /// Takes up all requested changes as a whole; returns the touch-down of the stroke that the
+    /// last one was of.
     fn take_up_all(&mut self, refiner: &mut Refiner) -> Result<Option<i64>, LiveError> {
         self.go_on(refiner, usize::MAX)?;
         let mut changed_stroke_ns = None;

@@ -18,14 +18,15 @@ pub(super) enum Question {
     Renew(Vec<ContactSample>),
     /// take in what is still in the smoothing window, and answer what changed
     Flush,
-    /// answer what changes where all that was touched so far is reconstructed at once, what is in the smoothing window among it;
-    /// where there is another scan to show, by what this becomes
+    /// answer what changes where all that was touched so far is reconstructed at once, what is in
+    /// the smoothing window among it; where there is another scan to show, by what this becomes
     Settle,
     /// copy the evidence, with these further samples
     Copy(Vec<ContactSample>, SyncSender<Patcher>),
     /// take the last stroke back, or do it again, and answer what changed
     ChangeStrokes(fn(&mut Patcher) -> Option<i64>),
-    /// go on with another patcher, and answer what changed; the last sample of the one before has this stamp, ns
+    /// go on with another patcher, and answer what changed; the last sample of the one before has
+    /// this stamp, ns
     Replace(Box<Patcher>, i64),
 }
 
@@ -52,7 +53,8 @@ pub(super) struct PatchedScans {
     pub shown: Option<Arc<(TriMesh, FaceTree)>>,
 }
 
-/// A patcher on a thread of its own. Each request except for a copy has one answer, in the same order.
+/// A patcher on a thread of its own. Each request except for a copy has one answer, in the same
+/// order.
 #[derive(Debug)]
 pub(super) struct Worker {
     gate: Gate,

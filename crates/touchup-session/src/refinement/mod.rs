@@ -1,5 +1,6 @@
-//! A scan refined by a recording from its first message to the result: the same steps for `touchup refine`, the Python package and
-//! sweeps. [`refine`] does them all; who changes something in between, as strokes or the rate of the samples, takes them one by one.
+//! A scan refined by a recording from its first message to the result: the same steps for `touchup
+//! refine`, the Python package and sweeps. [`refine`] does them all; who changes something in
+//! between, as strokes or the rate of the samples, takes them one by one.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -302,8 +303,8 @@ impl SampleTaker for CountingTaker<'_> {
     }
 }
 
-/// Why a sample was not taken, in one word. The synchroniser lets only checked samples out, in order of time, so that what
-/// is left of a recording is a step whose result is no number.
+/// Why a sample was not taken, in one word. The synchroniser lets only checked samples out, in
+/// order of time, so that what is left of a recording is a step whose result is no number.
 pub fn reason_of_refusal(error: &LiveError) -> &'static str {
     match error {
         LiveError::Refine(RefineError::Sample(_)) => "sample",

@@ -48,20 +48,23 @@ pub struct Replayed {
     pub markers: Option<MarkerCounts>,
 }
 
-/// Messages that are kept at most during the search for the frames: a minute of both topics, 20 MB; 60 MB with markers.
+/// Messages that are kept at most during the search for the frames: a minute of both topics, 20 MB;
+/// 60 MB with markers.
 const MOST_AHEAD: usize = 100_000;
 
-/// A recording that has been read until the frames of both topics are known, and keeps what it has read.
+/// A recording that has been read until the frames of both topics are known, and keeps what it has
+/// read.
 pub struct Recording {
     reader: RecordingReader,
     ahead: VecDeque<Result<Record, RecordingError>>,
-    /// In which axes the wrenches are: a header that names the frame of the pose means O, any other the stylus' own.
+    /// In which axes the wrenches are: a header that names the frame of the pose means O, any other
+    /// the stylus' own.
     pub wrench_frame: WrenchFrame,
 }
 
 impl Recording {
-    /// Opens a recording and reads up to the first message of both topics; one that has only one of them fails in the
-    /// replay.
+    /// Opens a recording and reads up to the first message of both topics; one that has only one of
+    /// them fails in the replay.
     ///
     /// # Errors
     /// [`RecordingError`] of opening it.
@@ -96,7 +99,8 @@ impl Recording {
         self.reader.message_count()
     }
 
-    /// The next pose or wrench; frames of markers are passed over. After damage the error, then `None`.
+    /// The next pose or wrench; frames of markers are passed over. After damage the error, then
+    /// `None`.
     pub fn next_message(&mut self) -> Option<Result<Message, RecordingError>> {
         loop {
             match self.next()? {
@@ -159,7 +163,8 @@ pub fn marker_filter(
 /// - `at_each`: called after each record, to show the progress.
 ///
 /// # Errors
-/// [`ReplayError::Read`] when the recording is damaged before its first message; later damage is a loss.
+/// [`ReplayError::Read`] when the recording is damaged before its first message; later damage is a
+/// loss.
 pub fn each_message(
     mut recording: Recording,
     mut markers: Option<MarkerFilter>,

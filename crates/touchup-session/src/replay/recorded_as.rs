@@ -1,4 +1,5 @@
-//! Where in a recording poses and wrenches are, by the names that every verb, plan and call has for it.
+//! Where in a recording poses and wrenches are, by the names that every verb, plan and call has for
+//! it.
 
 use serde::{Deserialize, Serialize};
 

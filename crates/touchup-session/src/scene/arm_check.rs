@@ -253,7 +253,8 @@ pub struct CheckStanding {
 }
 
 impl CheckStanding {
-    /// - `file`: that the scene names, `record`: what is in it; `most_days`: for which it counts; `temperature_c`: of the cell now.
+    /// - `file`: that the scene names, `record`: what is in it; `most_days`: for which it counts;
+    ///   `temperature_c`: of the cell now.
     pub(super) fn of(
         (file, record): (Option<&Path>, Option<&CheckRecord>),
         robot_model: &str,
@@ -336,7 +337,8 @@ mod tests {
 
     const DAY: Duration = Duration::from_secs(86_400);
 
-    /// 2026-03-01T00:00:00Z, by hand: 20 454 days after 1970-01-01 (56 years of 365 days, 14 leap days, 31 + 28).
+    /// 2026-03-01T00:00:00Z, by hand: 20 454 days after 1970-01-01 (56 years of 365 days, 14 leap
+    /// days, 31 + 28).
     fn made() -> SystemTime {
         SystemTime::UNIX_EPOCH + DAY * (56 * 365 + 14 + 31 + 28)
     }

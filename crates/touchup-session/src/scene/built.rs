@@ -1,4 +1,5 @@
-//! What a scene costs: the parts that are built of it, those that are left out and why, and the memory that is taken at start.
+//! What a scene costs: the parts that are built of it, those that are left out and why, and the
+//! memory that is taken at start.
 
 use std::fmt;
 
@@ -8,7 +9,8 @@ use super::{Mode, Scene};
 use crate::reported;
 use touchup_core::haptic::Footprint;
 
-/// Parts by their names in the YAML, in its order; then what the program was built with, by feature.
+/// Parts by their names in the YAML, in its order; then what the program was built with, by
+/// feature.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Built {
     /// there, and paid for
@@ -34,11 +36,12 @@ const NO_PATCH: &str = "of the patch, which is left out";
 const NOT_COMPILED: &str = "not in this build of touchup";
 
 reported! {
-    /// Memory at start, MB of 10⁶ bytes, of what was just built; `scan_bytes`: of the unrefined scan, with the trees over it. What was
-    /// touched comes to it.
+    /// Memory at start, MB of 10⁶ bytes, of what was just built; `scan_bytes`: of the unrefined
+    /// scan, with the trees over it. What was touched comes to it.
     #[derive(Clone, Copy, PartialEq)]
     pub struct Memory, pub fn of(refiner: Footprint, scan_bytes: usize) {
-        /// the mesh that is moved: positions, faces, adjacency, where each vertex was scanned, the normal measured on each face
+        /// the mesh that is moved: positions, faces, adjacency, where each vertex was scanned, the
+        /// normal measured on each face
         pub mesh_mb: f64 = refiner.mesh as f64 / 1e6,
         /// the tree over its faces
         pub tree_mb: f64 = refiner.tree as f64 / 1e6,

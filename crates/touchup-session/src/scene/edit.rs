@@ -1,4 +1,5 @@
-//! Settings put into the text of a scene; comments, order and everything else stay as they were written.
+//! Settings put into the text of a scene; comments, order and everything else stay as they were
+//! written.
 //!
 //! Only the lines of the keys that are set are touched. The result is verified: the new text must
 //! parse to exactly the scene that is expected, or it is refused.
@@ -40,7 +41,8 @@ impl Scene {
     /// The text of a scene with `settings` in it.
     ///
     /// - `yaml`: the scene as it was; empty for a new one.
-    /// - `remark`: goes behind the first key that is set, where no comment of the user does; one line.
+    /// - `remark`: goes behind the first key that is set, where no comment of the user does; one
+    ///   line.
     /// - `expected`: what the new text must parse to.
     ///
     /// # Errors
@@ -80,8 +82,8 @@ impl Scene {
         }
     }
 
-    /// The remark that [`Self::edited`] left behind a key in the text of a scene, without `first`, which it begins with; of whichever
-    /// section has it first.
+    /// The remark that [`Self::edited`] left behind a key in the text of a scene, without `first`,
+    /// which it begins with; of whichever section has it first.
     pub fn remark<'a>(yaml: &'a str, key: &str, first: &str) -> Option<&'a str> {
         let (key, begin) = (format!("{key}:"), format!("{} {first}", block::MARK));
         let mut of_key = yaml

@@ -99,7 +99,8 @@ pub(crate) fn yaml_error(error: &serde_saphyr::Error) -> SceneError {
     }
 }
 
-/// The known word that fewest insertions, deletions, replacements and swaps turn `word` into, when that is at most half of it.
+/// The known word that fewest insertions, deletions, replacements and swaps turn `word` into, when
+/// that is at most half of it.
 pub fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
     // such a name is no typing mistake, and the distance costs the product of both lengths
     const LONGEST: usize = 64;

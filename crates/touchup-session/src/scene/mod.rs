@@ -1,8 +1,10 @@
-//! The YAML that names the parts of a scene and their parameters, turned into the modules' own settings.
+//! The YAML that names the parts of a scene and their parameters, turned into the modules' own
+//! settings.
 //!
-//! A scene says what differs: what a right result needs is built unless the scene says `off`, as in `patch: off`; what only some sensors
-//! need is built where it is named. A part without keys takes its defaults. Each parameter is declared once, by
-//! [`touchup_core::parameters!`], in the module that it belongs to; `config/default.yaml` is [`Scene::template`] and docs/scene.md is
+//! A scene says what differs: what a right result needs is built unless the scene says `off`, as in
+//! `patch: off`; what only some sensors need is built where it is named. A part without keys takes
+//! its defaults. Each parameter is declared once, by [`touchup_core::parameters!`], in the module
+//! that it belongs to; `config/default.yaml` is [`Scene::template`] and docs/scene.md is
 //! [`Scene::table`].
 
 mod arm_check;
@@ -37,58 +39,67 @@ use touchup_io::mesh_file::MeshUnit;
 use touchup_io::recording::TableColumns;
 
 parameters! {
-    /// The parts of a scene. `None`: not built. Those with a default are built unless the scene says `off`.
+    /// The parts of a scene. `None`: not built. Those with a default are built unless the scene
+    /// says `off`.
     ///
-    /// By default all but compensation, which depends on the sensor, and the parts that only some sensors need.
+    /// By default all but compensation, which depends on the sensor, and the parts that only some
+    /// sensors need.
     #[derive(Clone, Debug, PartialEq)]
     pub struct Scene in "" {
-        /// Pairs poses with wrenches: the pose is interpolated at the stamp of each wrench. Off: only messages of equal stamp
-        /// pair.
+        /// Pairs poses with wrenches: the pose is interpolated at the stamp of each wrench. Off:
+        /// only messages of equal stamp pair.
         sync: Option<SyncParams> = Some(Default::default()), "sync";
-        /// The columns of a recording that is a table (CSV, or the log of a UR's RTDE): by their names in its first line, each with its
-        /// unit, as in x_mm or `x [mm]`. Not named: the usual names are looked for, and those of RTDE.
+        /// The columns of a recording that is a table (CSV, or the log of a UR's RTDE): by their
+        /// names in its first line, each with its unit, as in x_mm or `x [mm]`. Not named: the
+        /// usual names are looked for, and those of RTDE.
         columns: Option<TableColumns> = None, "columns";
-        /// Estimates how late the clock of the wrench reads, from the moments at which contact begins; reported, and never applied
-        /// unasked. It has no keys. Off: it is not estimated.
+        /// Estimates how late the clock of the wrench reads, from the moments at which contact
+        /// begins; reported, and never applied unasked. It has no keys. Off: it is not estimated.
         clock: Option<ClockSection> = Some(Default::default()), "clock";
-        /// The markers on the stylus, for recordings that hold them in place of its pose (--markers-topic): a rigid body is pulled to
-        /// the markers that are seen by springs and dampers. The values are those of the simulated stylus.
+        /// The markers on the stylus, for recordings that hold them in place of its pose
+        /// (--markers-topic): a rigid body is pulled to the markers that are seen by springs and
+        /// dampers. The values are those of the simulated stylus.
         markers: Option<MarkersSection> = None, "markers";
-        /// Where the scan lies in the frame of the recorded poses: p_space = R p_scan + t (`touchup calibrate scan`). Not named: the
-        /// poses are in the frame of the scan.
+        /// Where the scan lies in the frame of the recorded poses: p_space = R p_scan + t (`touchup
+        /// calibrate scan`). Not named: the poses are in the frame of the scan.
         scan_to_space: Option<ScanToSpaceSection> = None, "scan_to_space";
-        /// Takes weight and bias off the wrench (`touchup calibrate payload`). Not named: the sensor has the axes of the tip and its
-        /// driver does it.
+        /// Takes weight and bias off the wrench (`touchup calibrate payload`). Not named: the
+        /// sensor has the axes of the tip and its driver does it.
         compensation: Option<CompensationSection> = None, "compensation";
-        /// Follows the slow drift of the sensor while nothing is touched. Not named: the bias stays as it is named.
+        /// Follows the slow drift of the sensor while nothing is touched. Not named: the bias stays
+        /// as it is named.
         bias_tracking: Option<BiasParams> = None, "bias_tracking";
-        /// Separates contact from free motion by the measured force. Off: every sample counts as contact.
+        /// Separates contact from free motion by the measured force. Off: every sample counts as
+        /// contact.
         contact: Option<ContactGateParams> = Some(Default::default()), "contact";
-        /// The tip that touches: a ball, the flat end of a cylinder, or a cone with a round nose. The origin of the pose is the centre
-        /// of the ball or nose, or the middle of the flat end; its z runs along the shaft, from the tip to the handle. Off: a
-        /// rigid point.
+        /// The tip that touches: a ball, the flat end of a cylinder, or a cone with a round nose.
+        /// The origin of the pose is the centre of the ball or nose, or the middle of the flat end;
+        /// its z runs along the shaft, from the tip to the handle. Off: a rigid point.
         tip: Option<TipSection> = Some(Default::default()), "tip";
         /// The scan, and how good it is. Off: it counts as free of noise.
         scan: Option<ScanSection> = Some(Default::default()), "scan";
-        /// Takes friction out of the measured normal while the ball slides, in the haptic update and in the patch. Off: the force
-        /// is the normal. All but the cone is for the haptic update, which knows the past alone; the patch looks ahead and finds its
-        /// own.
+        /// Takes friction out of the measured normal while the ball slides, in the haptic update
+        /// and in the patch. Off: the force is the normal. All but the cone is for the haptic
+        /// update, which knows the past alone; the patch looks ahead and finds its own.
         sliding: Option<SlidingParams> = Some(Default::default()), "sliding";
-        /// Free space: what the tip passes through without a force is not there, in the haptic update and in the patch. Off: lids
-        /// over holes stay. The keys are for the haptic update; in the patch free space counts as touches do.
+        /// Free space: what the tip passes through without a force is not there, in the haptic
+        /// update and in the patch. Off: lids over holes stay. The keys are for the haptic update;
+        /// in the patch free space counts as touches do.
         carve: Option<CarveParams> = Some(Default::default()), "carve";
-        /// Keeps the mesh sound: an update that would break one of these limits is cut back. Off: anything goes, as in the paper,
-        /// and a noisy scan may blow up.
+        /// Keeps the mesh sound: an update that would break one of these limits is cut back. Off:
+        /// anything goes, as in the paper, and a noisy scan may blow up.
         guard: Option<GuardParams> = Some(Default::default()), "guard";
-        /// Reconstructs the surface where it was touched, finer than the scan: edges are sharp, closed holes open, and what was not
-        /// touched stays as it was. Off: the triangles of the scan stay and are only moved.
+        /// Reconstructs the surface where it was touched, finer than the scan: edges are sharp,
+        /// closed holes open, and what was not touched stays as it was. Off: the triangles of the
+        /// scan stay and are only moved.
         patch: Option<PatchParams> = Some(Default::default()), "patch";
-        /// Reports how well each vertex is known (sigma_mm in the PLY), and rejects touches that contradict their place as outliers. A
-        /// second pass that confirms the contradiction moves the place. Needs patch. Off: every touch counts, and nothing is
-        /// reported.
+        /// Reports how well each vertex is known (sigma_mm in the PLY), and rejects touches that
+        /// contradict their place as outliers. A second pass that confirms the contradiction moves
+        /// the place. Needs patch. Off: every touch counts, and nothing is reported.
         uncertainty: Option<UncertaintyParams> = Some(Default::default()), "uncertainty";
-        /// The arm that holds a probe (`touchup probe`, docs/probing.md). Not named: nothing is probed. A request can ask for less than
-        /// these limits, never for more. It needs a ball for a tip, and scan_to_space says where the scan lies in its base.
+        /// The arm that holds a probe (`touchup probe`, docs/probing.md). Not named: nothing is
+        /// probed. A request can ask for less than these limits, never for more. It needs a ball
+        /// for a tip, and scan_to_space says where the scan lies in its base.
         robot: Option<RobotSection> = None, "robot";
         /// Moves the mesh until measured and expected force agree. Off: nothing moves it.
         refine: Option<RefineSection> = Some(Default::default()), "refine";
@@ -131,7 +142,8 @@ impl Scene {
         Ok((scene, yaml))
     }
 
-    /// Whether the text of a scene gives a value to the key of a section; of a text that is no scene, `false`.
+    /// Whether the text of a scene gives a value to the key of a section; of a text that is no
+    /// scene, `false`.
     pub fn names(yaml: &str, section: &str, key: &str) -> bool {
         let Ok(scene) = serde_saphyr::from_str::<serde_json::Value>(yaml) else {
             return false;
@@ -142,7 +154,8 @@ impl Scene {
             .is_some_and(|value| !value.is_null())
     }
 
-    /// Takes the radius of the ball from who told it: a flag, or else the text of the scene. The default is nobody's word.
+    /// Takes the radius of the ball from who told it: a flag, or else the text of the scene. The
+    /// default is nobody's word.
     ///
     /// - `yaml`: text of the scene; empty for none.
     ///
@@ -187,7 +200,8 @@ impl Scene {
         Ok(scene)
     }
 
-    /// Checks every range, and what one part asks of another; to be called again after a flag changed a value.
+    /// Checks every range, and what one part asks of another; to be called again after a flag
+    /// changed a value.
     ///
     /// # Errors
     /// [`SceneError::Setting`], [`SceneError::Incomplete`].

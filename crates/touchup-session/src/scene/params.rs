@@ -174,7 +174,8 @@ impl Scene {
         self.scan.as_ref().map_or(0.0, |scan| scan.quality.noise)
     }
 
-    /// Settings of the refiner for a wrench that arrives in the axes of `wrench_frame`; `None` without `refine`.
+    /// Settings of the refiner for a wrench that arrives in the axes of `wrench_frame`; `None`
+    /// without `refine`.
     pub fn refine_params(&self, wrench_frame: WrenchFrame) -> Option<RefineParams> {
         let section = self.refine.as_ref()?;
         let mut params = match section.mode {

@@ -1,4 +1,5 @@
-//! A scene in which only a region of the scan is ever touched: the rest gets no adjacency and no tree.
+//! A scene in which only a region of the scan is ever touched: the rest gets no adjacency and no
+//! tree.
 
 use super::{Scene, SceneError};
 use touchup_core::haptic::{RefineParams, RoiSize, ScanRegion};
@@ -6,7 +7,8 @@ use touchup_core::mesh::{Outside, Region, TriMesh};
 use touchup_core::reconstruct::PatcherParams;
 use touchup_core::stylus::WrenchFrame;
 
-/// A touch changes the patch within so many sizes of the tip: the fit of the touches reaches two, free space another one …
+/// A touch changes the patch within so many sizes of the tip: the fit of the touches reaches two,
+/// free space another one …
 const TIPS: f64 = 4.0;
 /// … and so many cells of its lattice more, in which the surface is filled in.
 const CELLS: f64 = 6.0;
@@ -16,7 +18,8 @@ const EDGES: f64 = 4.0;
 /// The scan as it is worked on.
 #[derive(Clone, Debug)]
 pub struct CutScan {
-    /// what can be touched, and what that needs around it; the scan itself where the scene names no region
+    /// what can be touched, and what that needs around it; the scan itself where the scene names no
+    /// region
     pub mesh: TriMesh,
     /// what was cut off
     pub cut: RegionCut,
@@ -41,7 +44,8 @@ impl Scene {
         })
     }
 
-    /// Takes out of the scan what is touched, with what the haptic update and the patch need around it.
+    /// Takes out of the scan what is touched, with what the haptic update and the patch need around
+    /// it.
     ///
     /// # Errors
     /// [`SceneError::EmptyRegion`] where no face is near.

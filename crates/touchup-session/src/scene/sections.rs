@@ -1,4 +1,5 @@
-//! The sections of the YAML that are no struct of one module of the method: each is what a scene says of one thing.
+//! The sections of the YAML that are no struct of one module of the method: each is what a scene
+//! says of one thing.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -28,8 +29,8 @@ parameters! {
     /// `markers`: by default the stylus of the simulation.
     #[derive(Clone, Debug, PartialEq)]
     pub struct MarkersSection in "markers" {
-        /// Each marker from the centre of the ball, in the axes of the tip (z: along the shaft, tip to handle), by label from 0 on; 3
-        /// to 16, not on one line.
+        /// Each marker from the centre of the ball, in the axes of the tip (z: along the shaft, tip
+        /// to handle), by label from 0 on; 3 to 16, not on one line.
         ///
         /// m, in T.
         positions: Vec<Vector3<f64>> = MarkerBody::STYLUS_MM.into(), "positions_mm" [MM, -10000, 10000];
@@ -56,7 +57,8 @@ impl MarkersSection {
 }
 
 parameters! {
-    /// `scan_to_space`: p_space = R p_scan + t. By default the recorded poses are in the frame of the scan.
+    /// `scan_to_space`: p_space = R p_scan + t. By default the recorded poses are in the frame of
+    /// the scan.
     #[derive(Clone, Debug, PartialEq)]
     pub struct ScanToSpaceSection in "scan_to_space" {
         /// Origin of the scan in the frame of the poses.
@@ -108,7 +110,8 @@ parameters! {
     /// `compensation.payload`
     #[derive(Clone, Debug, PartialEq)]
     pub struct PayloadSection in "compensation.payload" {
-        /// In whose axes gravity is: the scan's own, or those of the recorded poses, which scan_to_space turns.
+        /// In whose axes gravity is: the scan's own, or those of the recorded poses, which
+        /// scan_to_space turns.
         gravity_axes: GravityAxes = GravityAxes::Object, "gravity_axes";
     }
     with {
@@ -137,8 +140,8 @@ parameters! {
     pub struct TipSection in "tip" {
         /// Shape of the tip.
         shape: ShapeName = ShapeName::Ball, "shape";
-        /// Centre of the ball from the origin of the recorded pose, in its axes (`touchup calibrate tip`); left out: it is that
-        /// origin. The positions of markers are from that origin too.
+        /// Centre of the ball from the origin of the recorded pose, in its axes (`touchup calibrate
+        /// tip`); left out: it is that origin. The positions of markers are from that origin too.
         ///
         /// m.
         offset: Option<Vector3<f64>> = None, "offset_mm" [MM, -10000, 10000] like "[0, 0, 0]";
@@ -151,7 +154,8 @@ parameters! {
     }
 }
 
-/// Length of a tip that the scene does not name, in diameters, and for a sharp cone no less than this, m.
+/// Length of a tip that the scene does not name, in diameters, and for a sharp cone no less than
+/// this, m.
 const USUAL_LENGTH: (f64, f64) = (2.0, 5e-3);
 
 impl TipSection {
@@ -182,13 +186,16 @@ parameters! {
     /// `scan`
     #[derive(Clone, Debug, PartialEq)]
     pub struct ScanSection in "scan" {
-        /// The scan itself, where none is named otherwise: PLY, STL or OBJ, or a point cloud (PLY, PCD, XYZ or E57), relative to the folder of this scene.
+        /// The scan itself, where none is named otherwise: PLY, STL or OBJ, or a point cloud (PLY,
+        /// PCD, XYZ or E57), relative to the folder of this scene.
         file: Option<PathBuf> = None, "file" like "scan.ply";
         /// Unit of the coordinates in that file.
         unit: MeshUnit = MeshUnit::Millimetre, "unit";
-        /// Lowest corner of the box that the centre of the ball is in whenever it touches, in the frame of the scan: only what is
-        /// near it gets adjacency and a tree, the rest of the scan is kept as it is and written with the result; touches elsewhere
-        /// are refused. Not with an arm, and the node shows the part near the box alone. Name both corners; left out: anywhere.
+        /// Lowest corner of the box that the centre of the ball is in whenever it touches, in the
+        /// frame of the scan: only what is near it gets adjacency and a tree, the rest of the scan
+        /// is kept as it is and written with the result; touches elsewhere are refused. Not with an
+        /// arm, and the node shows the part near the box alone. Name both corners; left out:
+        /// anywhere.
         ///
         /// m, in O.
         region_low: Option<Point3<f64>> = None, "region_low_mm" [MM, -1e6, 1e6] like "[-20, -20, -10]";
@@ -225,7 +232,8 @@ words! {
         /// What works on real scans.
         #[default]
         Robust = "robust",
-        /// The published rule, taken literally: no gate, no friction, no carving, no guard, whatever the scene names.
+        /// The published rule, taken literally: no gate, no friction, no carving, no guard,
+        /// whatever the scene names.
         Paper = "paper",
     }
 }
@@ -245,24 +253,29 @@ parameters! {
     /// `refine`; a key that is left out is as the mode has it.
     #[derive(Clone, Debug, PartialEq)]
     pub struct RefineSection in "refine" {
-        /// Which rule moves the mesh; paper: the published one taken literally, without contact, sliding, carve, guard and patch
-        /// whatever is named.
+        /// Which rule moves the mesh; paper: the published one taken literally, without contact,
+        /// sliding, carve, guard and patch whatever is named.
         mode: Mode = Mode::Robust, "mode";
-        /// Expected force over depth: the sigmoid of Eq 3, or the spring of the tip; left out: the spring where its stiffness is
-        /// known.
+        /// Expected force over depth: the sigmoid of Eq 3, or the spring of the tip; left out: the
+        /// spring where its stiffness is known.
         contact_model: Option<ModelName> = None, "contact_model" like "spring";
         /// Speed of a face for each newton of mismatch (Eq 6); left out: as the mode has it.
         alpha: Option<f64> = None, "alpha_m_per_n_s" [M_PER_N_S, 0, 1e6] like "0.00125";
-        /// Turning speed of a face for each square newton of mismatch (Eq 7); left out: as the mode has it.
+        /// Turning speed of a face for each square newton of mismatch (Eq 7); left out: as the mode
+        /// has it.
         beta: Option<f64> = None, "beta_per_n2_s" [PER_N2_S, 0, 1e9] like "0.1";
-        /// Robust: rate at which a face turns to the measured normal, whatever the force; takes the place of beta.
+        /// Robust: rate at which a face turns to the measured normal, whatever the force; takes the
+        /// place of beta.
         turning: Option<f64> = None, "turning_per_s" [PER_S, 0, 1e6] like "30";
-        /// How position and normal are put together: one after the other (lie), with a correction (corrected), solved together to
-        /// 1e-9 (bounded, as with mode paper), or by adaptive Runge–Kutta (dp5).
+        /// How position and normal are put together: one after the other (lie), with a correction
+        /// (corrected), solved together to 1e-9 (bounded, as with mode paper), or by adaptive
+        /// Runge–Kutta (dp5).
         step: Option<StepRule> = None, "step" like "lie";
-        /// In which direction a face moves: along the normal at the start of the sample (Eq 6), or along the force.
+        /// In which direction a face moves: along the normal at the start of the sample (Eq 6), or
+        /// along the force.
         along: Option<Along> = None, "along" like "force";
-        /// Vertices within this distance of the touched face follow it; left out: the radius of the ball.
+        /// Vertices within this distance of the touched face follow it; left out: the radius of the
+        /// ball.
         ///
         /// m.
         roi: Option<f64> = None, "roi_mm" [MM, 0, 1000] like "1.5";
@@ -327,25 +340,29 @@ parameters! {
     pub struct RobotSection in "robot" {
         /// Model of the arm.
         model: ArmModel = ArmModel::Ur5e, "model";
-        /// With model: urdf, the description of the arm, its macros expanded, relative to the folder of this scene.
+        /// With model: urdf, the description of the arm, its macros expanded, relative to the
+        /// folder of this scene.
         urdf: Option<PathBuf> = None, "urdf" like "arm.urdf";
         /// The link of the URDF whose frame is the base of the arm.
         base_link: String = "base_link".to_owned(), "base_link";
         /// The link of the URDF whose frame is the flange.
         flange_link: String = "tool0".to_owned(), "flange_link";
-        /// How thick links are that the URDF gives no simple shape: the radius of a capsule from joint to joint.
+        /// How thick links are that the URDF gives no simple shape: the radius of a capsule from
+        /// joint to joint.
         ///
         /// m.
         link_radius: f64 = 60.0, "link_radius_mm" [MM, 1, 1000];
         /// Not in the scene: what the URDF describes.
         chain: Option<Arc<SerialChain>> = None;
-        /// The record that `touchup check --out` wrote, relative to the folder of this scene; what it found is in each ±.
+        /// The record that `touchup check --out` wrote, relative to the folder of this scene; what
+        /// it found is in each ±.
         check: Option<PathBuf> = None, "check" like "check.json";
         /// For how long a check counts: an older one stands in each result.
         ///
         /// days.
         check_days: f64 = 30.0, "check_days" [DAYS, 0.01, 3650];
-        /// Temperature of the cell: where a check was made at one that differs by more than 5 K, that stands in each result.
+        /// Temperature of the cell: where a check was made at one that differs by more than 5 K,
+        /// that stands in each result.
         ///
         /// °C.
         temperature_c: Option<f64> = None, "temperature_c" [CELSIUS, -50, 100] like "21.5";
@@ -369,9 +386,11 @@ parameters! {
         ///
         /// m. 150 mm before the flange, the handle towards it.
         tip_position: Vector3<f64> = [0.0, 0.0, 150.0], "tip_position_mm" [MM, -2000, 2000];
-        /// Axes of the tip in the flange (z: along the shaft, tip to handle), as a quaternion x, y, z, w.
+        /// Axes of the tip in the flange (z: along the shaft, tip to handle), as a quaternion x, y,
+        /// z, w.
         tip_orientation_xyzw: [f64; 4] = [1.0, 0.0, 0.0, 0.0], "tip_orientation_xyzw" [QUATERNION, 0.999, 1.001];
-        /// The numbers of a feature are to be known within ± this, with the probability `confidence`.
+        /// The numbers of a feature are to be known within ± this, with the probability
+        /// `confidence`.
         ///
         /// m.
         tolerance: f64 = 0.05, "tolerance_mm" [MM, 0.0001, 10];
@@ -454,8 +473,9 @@ impl RobotSection {
             .filter(|record| record.is_of(&self.model_name()))
     }
 
-    /// What is wanted of a feature, with what a check of the arm has found: of repeatability and growth the larger of measured and told, for a
-    /// check of few touches can be lucky, and what a maker states can be.
+    /// What is wanted of a feature, with what a check of the arm has found: of repeatability and
+    /// growth the larger of measured and told, for a check of few touches can be lucky, and what a
+    /// maker states can be.
     pub(super) fn checked_pattern(&self) -> PatternParams {
         let Some(record) = self.own_check() else {
             return self.pattern;

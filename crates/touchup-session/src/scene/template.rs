@@ -1,4 +1,5 @@
-//! What is written from the definition of the parameters: the scene with every key explained, and the table of them.
+//! What is written from the definition of the parameters: the scene with every key explained, and
+//! the table of them.
 
 use touchup_core::parameters::{Parameter, Section};
 
@@ -26,7 +27,8 @@ const WIDTH: usize = 118;
 const STEP: usize = 2;
 
 impl Scene {
-    /// [`Scene::default`] as YAML, with every key explained; what is left out is there as a comment.
+    /// [`Scene::default`] as YAML, with every key explained; what is left out is there as a
+    /// comment.
     pub fn template() -> String {
         Self::parameters()
             .iter()

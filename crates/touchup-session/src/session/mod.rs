@@ -1,7 +1,8 @@
 //! One run of touching a part: its result and its files.
 //!
-//! [`Outcome`] is what `touchup refine` and the node write alike: the refined mesh, the features on it, the touches they rest
-//! on. [`SessionRecord`] keeps in a folder all that it takes to get the same again, up to the last moment before a crash.
+//! [`Outcome`] is what `touchup refine` and the node write alike: the refined mesh, the features on
+//! it, the touches they rest on. [`SessionRecord`] keeps in a folder all that it takes to get the
+//! same again, up to the last moment before a crash.
 
 mod outcome;
 mod outliers;

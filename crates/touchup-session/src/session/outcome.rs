@@ -55,13 +55,15 @@ pub struct OutcomePlaces<'a> {
     pub unit: MeshUnit,
     /// the file of the scan: its colours and texture coordinates are carried over
     pub scan: &'a Path,
-    /// features of the refined mesh, measured by the touches: a table where the name ends in `.csv` or `.parquet`, else JSON
+    /// features of the refined mesh, measured by the touches: a table where the name ends in `.csv`
+    /// or `.parquet`, else JSON
     pub features: Option<&'a Path>,
     /// the touches that features name: Parquet where the name ends so, else CSV
     pub touches: Option<&'a Path>,
     /// the rest of a scan of which a part was refined
     pub outside: Option<&'a Outside>,
-    /// whether a result in which no face of the scan is moved or replaced, or whose contacts contradict each other, is refused
+    /// whether a result in which no face of the scan is moved or replaced, or whose contacts
+    /// contradict each other, is refused
     pub must_change: bool,
 }
 
@@ -89,7 +91,8 @@ reported! {
         removed_faces: usize = patched.removed_faces,
         /// faces that came
         added_faces: usize = patched.added_faces,
-        /// vertices of the scan that were moved to where they were touched, with the detail between them
+        /// vertices of the scan that were moved to where they were touched, with the detail between
+        /// them
         moved_vertices: usize = patched.moved_vertices,
         /// share of the new vertices that rest on contacts nearby, not there
         guessed_share: f64 = guessed_share(&patched.support),
@@ -395,8 +398,8 @@ impl OutcomePlaces<'_> {
             .map_err(OutcomeError::WriteMesh)
     }
 
-    /// Writes the touches and the features of the result, where requested: of the mesh and by the touches as
-    /// they are written, so that `touchup features` finds the same to the last bit.
+    /// Writes the touches and the features of the result, where requested: of the mesh and by the
+    /// touches as they are written, so that `touchup features` finds the same to the last bit.
     fn write_features(&self, touches: &[ProbedPoint]) -> Result<(), OutcomeError> {
         if let Some(out) = self.touches {
             write_touches_as_named(out, touches)?;

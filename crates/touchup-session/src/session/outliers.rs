@@ -52,7 +52,8 @@ reported! {
 
 /// Number of listed outliers.
 const MOST_LISTED: usize = 8;
-/// Of sound recordings less than two thousandths of the contacts were rejected; what more of them is lost is worth a word, …
+/// Of sound recordings less than two thousandths of the contacts were rejected; what more of them
+/// is lost is worth a word, …
 const WORTH_A_WORD: f64 = 0.1;
 /// … and where so many contradict the others, nobody knows which of them are right.
 const MOST_REJECTED: f64 = 0.4;

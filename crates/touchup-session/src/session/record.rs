@@ -1,4 +1,5 @@
-//! The record of a session, which reproduces its result: scene, scan, recording, and the changes of strokes.
+//! The record of a session, which reproduces its result: scene, scan, recording, and the changes of
+//! strokes.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -273,7 +274,8 @@ impl SessionRecorder {
         })
     }
 
-    /// Takes a message down whose header names `frame`; never waits. What finds no room is lost, and counted.
+    /// Takes a message down whose header names `frame`; never waits. What finds no room is lost,
+    /// and counted.
     pub fn write(&self, message: Message, frame: &'static str) {
         if self.sender.try_send(Note::Message(message, frame)).is_err() {
             locked(&self.unrecorded).messages += 1;
@@ -285,8 +287,8 @@ impl SessionRecorder {
         self.folder.path().join(RECORDING)
     }
 
-    /// Something comes once all is on the disk that was written until now; nothing ever where the disk refuses it, or where there is no
-    /// room to wait.
+    /// Something comes once all is on the disk that was written until now; nothing ever where the
+    /// disk refuses it, or where there is no room to wait.
     pub fn flushed(&self) -> Receiver<()> {
         let (to, flushed) = sync_channel(1);
         // dropped where there is no room, which the receiver sees
@@ -527,7 +529,8 @@ mod tests {
         assert_eq!(on_disk(&folder), written);
     }
 
-    /// The disk stalls for as long as the queue holds, and nothing is lost; later messages are counted as lost.
+    /// The disk stalls for as long as the queue holds, and nothing is lost; later messages are
+    /// counted as lost.
     #[test]
     fn what_waits_for_the_disk_is_not_lost_and_what_finds_no_room_is_counted() {
         let ((_parent, folder), (clock, hand)) = (folder(), Clock::manual());

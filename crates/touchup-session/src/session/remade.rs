@@ -47,8 +47,9 @@ pub struct EvidenceSource<'a> {
 }
 
 impl EvidenceSource<'_> {
-    /// Gives all samples to `replay` but those of strokes that are taken out; takes back and does again what was. It is bit by bit what
-    /// `touchup refine` makes of a recording that has never had those samples.
+    /// Gives all samples to `replay` but those of strokes that are taken out; takes back and does
+    /// again what was. It is bit by bit what `touchup refine` makes of a recording that has never
+    /// had those samples.
     ///
     /// # Errors
     /// [`RemakeError`].
@@ -90,7 +91,8 @@ impl EvidenceSource<'_> {
     }
 }
 
-/// Takes strokes back or does them again before a sample; returns whether they are those that it was then.
+/// Takes strokes back or does them again before a sample; returns whether they are those that it
+/// was then.
 fn exchanged(replay: &mut EvidenceReplay, strokes: &mut StrokeReplay, before_ns: i64) -> bool {
     let mut are_same = true;
     while let Some((Exchange { stroke_ns, .. }, is_undo)) = strokes.next_before(before_ns) {

@@ -1,4 +1,5 @@
-//! Strokes that were taken back, done again, taken out and put back in a session, and what is left of its samples.
+//! Strokes that were taken back, done again, taken out and put back in a session, and what is left
+//! of its samples.
 
 use std::iter::Peekable;
 use std::vec::IntoIter;
@@ -91,7 +92,8 @@ impl StrokeChanges {
             .any(|change| matches!(change, StrokeChange::Undo(_) | StrokeChange::Redo(_)))
     }
 
-    /// What is to be done along the samples of the session for its end: strokes that are taken out never come.
+    /// What is to be done along the samples of the session for its end: strokes that are taken out
+    /// never come.
     pub fn replay(&self) -> StrokeReplay {
         let taken_out = self.taken_out();
         let is_left = |exchange: &Exchange| {
@@ -132,8 +134,8 @@ impl StrokeReplay {
         !self.taken_out.iter().any(|span| span.contains(stamp_ns))
     }
 
-    /// The next stroke that was taken back (true) or done again (false) before the sample of this stamp; strokes that are taken out are
-    /// not among them.
+    /// The next stroke that was taken back (true) or done again (false) before the sample of this
+    /// stamp; strokes that are taken out are not among them.
     pub fn next_before(&mut self, stamp_ns: i64) -> Option<(Exchange, bool)> {
         self.exchanges
             .next_if(|(exchange, _)| exchange.after_ns < stamp_ns)

@@ -41,7 +41,8 @@ pub struct SweepPlan {
 }
 
 impl SweepPlan {
-    /// Reads and checks all that is swept. Simulated scans and recordings are written below `folder`.
+    /// Reads and checks all that is swept. Simulated scans and recordings are written below
+    /// `folder`.
     ///
     /// - `grid`: the file that says what is swept.
     /// - `recordings`: more of them, relative to the present folder.

@@ -78,13 +78,15 @@ impl JobRunner {
         }
     }
 
-    /// Runs a job; one whose result is there returns at once. A refinement that fails by its input is a result as well.
+    /// Runs a job; one whose result is there returns at once. A refinement that fails by its input
+    /// is a result as well.
     ///
     /// - `again`: also where its result is there, which is replaced.
     /// - `at_each`: called after each record, to show the progress.
     ///
     /// # Errors
-    /// [`SweepError`] for a job that cannot be run, or its result not be written: then there is none.
+    /// [`SweepError`] for a job that cannot be run, or its result not be written: then there is
+    /// none.
     pub fn run(
         &self,
         job: &Job,

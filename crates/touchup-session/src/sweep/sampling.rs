@@ -297,7 +297,8 @@ mod tests {
         assert_eq!(distinct.len(), 40);
     }
 
-    /// What makes the sequence worth its name: of 16 points each square of a grid of 4 × 4 holds one, and each sixteenth of an axis.
+    /// What makes the sequence worth its name: of 16 points each square of a grid of 4 × 4 holds
+    /// one, and each sixteenth of an axis.
     #[test]
     fn sobol_points_fill_the_square_evenly_whatever_the_seed() {
         let keys = keys("{ a: { from: 0, to: 16 }, b: { from: 0, to: 16 } }");

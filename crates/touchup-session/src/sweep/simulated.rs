@@ -35,7 +35,8 @@ enum TruePart {
 }
 
 impl PartToTouch {
-    /// - `part`: `plate`, that of `touchup demo`, or a closed mesh, that is touched as `touchup simulate` does it.
+    /// - `part`: `plate`, that of `touchup demo`, or a closed mesh, that is touched as `touchup
+    ///   simulate` does it.
     pub fn new(part: &Path, unit: MeshUnit) -> Result<Self, SweepError> {
         if part.as_os_str() == "plate" {
             let plate = Plate::default();

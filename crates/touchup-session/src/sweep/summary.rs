@@ -22,7 +22,8 @@ reported! {
         contacts: u64 = refined.contacts,
         /// updates made smaller because a face would have folded
         cut_back: u64 = refined.cut_back,
-        /// coefficient of friction of the ball on the part, and its standard error; left out when it never slid far enough
+        /// coefficient of friction of the ball on the part, and its standard error; left out when
+        /// it never slid far enough
         friction?: f64 = refined.friction.map(|[mu, _]| mu),
         /// … its standard error
         friction_sigma?: f64 = refined.friction.map(|[_, sigma]| sigma),
@@ -34,7 +35,8 @@ reported! {
         faces: usize = outcome.counts[1],
         /// of features.json
         features: usize = features,
-        /// what was remeshed, and how well it is known, as in `patch` and `uncertainty` of `touchup refine --json`
+        /// what was remeshed, and how well it is known, as in `patch` and `uncertainty` of `touchup
+        /// refine --json`
         #[serde(flatten)]
         reconstruction: BTreeMap<String, Value> = reconstruction(outcome),
         /// what is doubtful about the recording, the surest first

@@ -93,7 +93,8 @@ impl JobResult {
     }
 }
 
-/// The keys that two records differ in, by path, with the value of each; what is not there is `Null`.
+/// The keys that two records differ in, by path, with the value of each; what is not there is
+/// `Null`.
 pub fn changed_keys(a: &JobRecord, b: &JobRecord) -> BTreeMap<String, [Value; 2]> {
     let [of_a, of_b] = [a, b].map(|record| {
         let mut keys = BTreeMap::new();
@@ -235,7 +236,8 @@ impl FeatureChange {
     }
 }
 
-/// Two features are one when they are of a kind and nearer than this, mm, and no other one is nearer.
+/// Two features are one when they are of a kind and nearer than this, mm, and no other one is
+/// nearer.
 const NEAR_MM: f64 = 1.5;
 /// … and their axes are within 30°.
 const SAME_AXIS: f64 = 0.866;
@@ -332,7 +334,8 @@ fn numbers(a: &FeatureRecord, b: &FeatureRecord, k: f64) -> Vec<NumberChange> {
     };
     let place = a.center_mm.zip(b.center_mm).map(|(p, q)| {
         let apart = nalgebra::Vector3::from(q) - nalgebra::Vector3::from(p);
-        // its standard uncertainty is across the axis, of a plane along its normal, of a corner in space
+        // its standard uncertainty is across the axis, of a plane along its normal, of a corner in
+        // space
         let axis = a.axis.map(nalgebra::Vector3::from);
         let off = match (axis, &*a.kind) {
             (Some(axis), "plane") => apart.dot(&axis).abs(),
@@ -368,7 +371,8 @@ mod tests {
         .unwrap()
     }
 
-    /// By hand: 6.00 and 6.05 with ± 2 · 0.02 moved, with ± 2 · 0.03 not; 0.3 mm along the axis is no change of place.
+    /// By hand: 6.00 and 6.05 with ± 2 · 0.02 moved, with ± 2 · 0.03 not; 0.3 mm along the axis is
+    /// no change of place.
     #[test]
     fn a_number_moves_when_it_changes_by_more_than_the_larger_plus_minus() {
         let a = [

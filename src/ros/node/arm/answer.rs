@@ -185,8 +185,8 @@ pub fn touches_of(
     made.collect()
 }
 
-/// A message above 64 kB goes out in fragments, of which readers with default buffers lose some: a curve has no more rows, 16 bytes
-/// each.
+/// A message above 64 kB goes out in fragments, of which readers with default buffers lose some: a
+/// curve has no more rows, 16 bytes each.
 const MOST_ROWS: usize = 2000;
 
 /// Every so many rows where there are more, the first and the last among them.

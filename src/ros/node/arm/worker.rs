@@ -41,7 +41,8 @@ const QUEUE: usize = 1;
 const LOST: Duration = Duration::from_millis(200);
 /// How long the other threads may take to answer what is flagged, and until the mesh is complete.
 const WAIT: Duration = Duration::from_secs(15);
-/// The clock of an arm is followed by this share of how far it is off, with each state: latency comes and goes, drift stays.
+/// The clock of an arm is followed by this share of how far it is off, with each state: latency
+/// comes and goes, drift stays.
 const FOLLOW: i64 = 1024;
 /// Farther off it is another clock, ns.
 const OTHER_CLOCK_NS: i64 = 200_000_000;
@@ -253,7 +254,8 @@ impl ArmWorker {
         let now_ns = self.port.now_ns();
         let off = now_ns - state.stamp_ns;
         let followed = match self.link.offset_ns {
-            // a simulated time that has not come yet, or stands still, says nothing of the arm's clock
+            // a simulated time that has not come yet, or stands still, says nothing of the arm's
+            // clock
             Some(offset) if now_ns == self.ros_ns => offset,
             Some(offset) if (off - offset).abs() < OTHER_CLOCK_NS => {
                 offset + (off - offset) / FOLLOW

@@ -24,8 +24,8 @@ const FEEDBACK_EVERY: Duration = Duration::from_millis(100);
 /// How long a change of the mesh may take until it is complete.
 const COPY_WAIT: Duration = Duration::from_secs(15);
 
-/// Has something made of the mesh as it is now, beside the loop of the arm, which must not wait for it. Nothing comes where the
-/// mesh is not complete in time, or the memory has no room.
+/// Has something made of the mesh as it is now, beside the loop of the arm, which must not wait for
+/// it. Nothing comes where the mesh is not complete in time, or the memory has no room.
 pub fn ask_mesh<T: Send + 'static>(
     Setup { clock, shared, .. }: &Setup,
     make_of: impl FnOnce(StaticWorld) -> T + Send + 'static,
@@ -62,7 +62,8 @@ pub struct ArmLink {
 }
 
 impl ArmLink {
-    /// Publishes a state as a probe does: the pose in the frame in which the scene has poses, the wrench in the axes of the probe.
+    /// Publishes a state as a probe does: the pose in the frame in which the scene has poses, the
+    /// wrench in the axes of the probe.
     pub fn publish(&self, state: &ArmState) {
         let Setup {
             scene,
@@ -130,7 +131,8 @@ impl<'a> ArmWorld<'a> {
         }
     }
 
-    /// Takes the mesh that has become ready, and asks for the next: it is behind by a touch, or by as long as it takes to make.
+    /// Takes the mesh that has become ready, and asks for the next: it is behind by a touch, or by
+    /// as long as it takes to make.
     fn renew(&mut self) {
         match self.next.as_ref().map(Receiver::try_recv) {
             Some(Ok(still)) => self.still = still,

@@ -1,7 +1,9 @@
-//! A session that was recorded, touched again before the eyes of who looks: a node of its own, without a network, takes its messages as they
-//! came, and pages see it as they see the one that runs.
+//! A session that was recorded, touched again before the eyes of who looks: a node of its own,
+//! without a network, takes its messages as they came, and pages see it as they see the one that
+//! runs.
 //!
-//! Pages of one session share its replay, which goes with the last of them. Its threads yield to those of the node that runs.
+//! Pages of one session share its replay, which goes with the last of them. Its threads yield to
+//! those of the node that runs.
 
 mod control;
 mod follow;

@@ -1,4 +1,5 @@
-//! Plays a session: reads it, begins a node for it, gives that its messages, and ends both when nobody looks any more.
+//! Plays a session: reads it, begins a node for it, gives that its messages, and ends both when
+//! nobody looks any more.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -116,7 +117,8 @@ impl Player {
         });
         let readable =
             read.map_err(|error| format!("the recording cannot be replayed: {error}"))?;
-        // of a session that goes on: after its messages, so that what was undone before one of them is not missing
+        // of a session that goes on: after its messages, so that what was undone before one of them
+        // is not missing
         let changes =
             SessionRecord::strokes_of(folder.path()).map_err(|error| error.to_string())?;
         let parameters = [

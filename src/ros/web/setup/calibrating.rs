@@ -1,4 +1,5 @@
-//! Calibrations from recordings of the folder: made beside, shown, and put into the scene when an operator says so.
+//! Calibrations from recordings of the folder: made beside, shown, and put into the scene when an
+//! operator says so.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -12,8 +12,8 @@ use crate::ros::locked;
 use crate::scene::Scene;
 
 impl NodeSetup {
-    /// Has a recording of the folder looked at beside, on the scan and with the tip that were chosen; `None`: somebody has seen what was
-    /// found, or does without it.
+    /// Has a recording of the folder looked at beside, on the scan and with the tip that were
+    /// chosen; `None`: somebody has seen what was found, or does without it.
     ///
     /// # Errors
     /// [`NodeSetupError`]

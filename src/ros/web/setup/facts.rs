@@ -8,9 +8,11 @@ use crate::io::mesh_file::{LARGEST_M, MeshFileError, MeshUnit, SMALLEST_M};
 use crate::mesh::RepairReport;
 use crate::scan::{Scan, ScanError, read_scan};
 
-/// Longest side of a usual work-piece, m: the first unit in which the scan is of such a size is suggested.
+/// Longest side of a usual work-piece, m: the first unit in which the scan is of such a size is
+/// suggested.
 const USUAL: std::ops::RangeInclusive<f64> = 10e-3..=2.0;
-/// The order in which a unit is suggested: scanners write mm, others m, and inches where neither makes sense.
+/// The order in which a unit is suggested: scanners write mm, others m, and inches where neither
+/// makes sense.
 const SUGGESTED: [MeshUnit; 3] = [MeshUnit::Millimetre, MeshUnit::Metre, MeshUnit::Inch];
 
 /// A scan as it is in its file.

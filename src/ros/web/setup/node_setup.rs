@@ -1,4 +1,5 @@
-//! The steps before a node: what was chosen so far, by whomever operates, and what the node began with or why it did not.
+//! The steps before a node: what was chosen so far, by whomever operates, and what the node began
+//! with or why it did not.
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -26,7 +27,8 @@ const SCENE: &str = "scene";
 pub struct SetupParams {
     /// where scans lie, and where the scene and what is uploaded goes
     pub folder: PathBuf,
-    /// the scene to begin with; `None`: `scene.yaml` of the folder where there is one, else the usual one
+    /// the scene to begin with; `None`: `scene.yaml` of the folder where there is one, else the
+    /// usual one
     pub scene: Option<PathBuf>,
     /// of the ball, as somebody stated it, mm
     pub radius_mm: Option<f64>,
@@ -98,7 +100,8 @@ impl NodeSetup {
         })
     }
 
-    /// Waits until somebody starts the node: the scene to start it with, which names the scan and its unit.
+    /// Waits until somebody starts the node: the scene to start it with, which names the scan and
+    /// its unit.
     pub fn wait(&self) -> PathBuf {
         let mut state = locked(&self.state);
         while state.stage != Stage::Starting {
@@ -164,7 +167,8 @@ impl NodeSetup {
         })
     }
 
-    /// Takes up what somebody else has put into the scene since it was read or written here, as `touchup calibrate` does.
+    /// Takes up what somebody else has put into the scene since it was read or written here, as
+    /// `touchup calibrate` does.
     pub(super) fn take_edits(&self, state: &mut SetupState) -> Result<(), NodeSetupError> {
         let bad = |error: &dyn Display| {
             NodeSetupError::Refused(format!("{}: {error}", self.target.display()))
@@ -204,7 +208,8 @@ impl NodeSetup {
         state.require_idle().map(|()| state)
     }
 
-    /// For what a check and a calibration depend on, of which nothing is left then but what is in the scene.
+    /// For what a check and a calibration depend on, of which nothing is left then but what is in
+    /// the scene.
     pub(super) fn changing(&self) -> Result<MutexGuard<'_, SetupState>, NodeSetupError> {
         let mut state = self.idle()?;
         state.forget_check();

@@ -1,4 +1,5 @@
-//! The scene as it is being made: its text, into which the chosen scan, unit and tip are put; everything else in it stays as it was.
+//! The scene as it is being made: its text, into which the chosen scan, unit and tip are put;
+//! everything else in it stays as it was.
 
 use std::path::Path;
 use std::time::SystemTime;
@@ -40,7 +41,8 @@ pub(super) struct NamedCalibrations {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub(super) struct NamedCalibration {
     is_there: bool,
-    /// the day on which it was put there, UTC, as 2026-11-27; `None` where the scene does not say it
+    /// the day on which it was put there, UTC, as 2026-11-27; `None` where the scene does not say
+    /// it
     date: Option<String>,
 }
 

@@ -84,7 +84,8 @@ pub(super) async fn take(
 }
 
 impl NodeSetup {
-    /// Takes the place of the one upload at a time; it is free again when what comes back is dropped.
+    /// Takes the place of the one upload at a time; it is free again when what comes back is
+    /// dropped.
     ///
     /// # Errors
     /// [`NodeSetupError::NotNow`]

@@ -500,7 +500,8 @@ fn of_orders_that_wait_the_newest_counts_and_no_zero_is_left_out() {
     assert_eq!(newest(orders.recv().unwrap(), &orders).number, 5);
 }
 
-/// Somebody pauses the program in mid-move, and resumes it: the thread of the motion still has the old velocity.
+/// Somebody pauses the program in mid-move, and resumes it: the thread of the motion still has the
+/// old velocity.
 #[test]
 fn an_order_that_fails_leaves_it_braking_until_it_is_seen_at_rest() {
     for (fails, braked) in [

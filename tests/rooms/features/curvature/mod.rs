@@ -1,4 +1,5 @@
-//! Curvature against Gauss and Bonnet and against surfaces whose curvature is known; clusters against the true features.
+//! Curvature against Gauss and Bonnet and against surfaces whose curvature is known; clusters
+//! against the true features.
 
 #[path = "clusters.rs"]
 mod clusters_of;

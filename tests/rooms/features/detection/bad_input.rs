@@ -18,7 +18,8 @@ const PARTS: [(&str, MeshUnit, usize); 4] = [
     ("crs_ee3.stl", Metre, 14),
 ];
 
-/// Diameter, depth (m), through, and cone angle of each hole, with its centre: in an order of their own.
+/// Diameter, depth (m), through, and cone angle of each hole, with its centre: in an order of their
+/// own.
 fn holes(features: &[Feature]) -> Vec<(Point3<f64>, [f64; 3], Option<bool>)> {
     let value = |number: &Option<touchup::features::Measured<f64>>| {
         number.as_ref().map_or(0.0, |number| number.value)

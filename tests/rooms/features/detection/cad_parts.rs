@@ -1,9 +1,10 @@
 //! Round holes of CAD meshes, counted and measured by other means.
 //!
-//! Each part was rendered from six sides by casting rays (Open3D) and its holes were counted in the pictures. Sizes come
-//! from a program of its own (trimesh, numpy): the mesh parted at edges sharper than 30° (35° where circles have twelve
-//! sides), a circle of least squares through the corners that bound each round patch, heights of those corners. Of
-//! closed parts the genus is the number of through-openings; it was computed too and agrees.
+//! Each part was rendered from six sides by casting rays (Open3D) and its holes were counted in the
+//! pictures. Sizes come from a program of its own (trimesh, numpy): the mesh parted at edges
+//! sharper than 30° (35° where circles have twelve sides), a circle of least squares through the
+//! corners that bound each round patch, heights of those corners. Of closed parts the genus is the
+//! number of through-openings; it was computed too and agrees.
 
 use touchup::features::Kind;
 use touchup::io::mesh_file::MeshUnit::{Inch, Metre, Millimetre};
@@ -16,9 +17,10 @@ const DOWN: [f64; 3] = [0.0, 0.0, -1.0];
 const FRONT: [f64; 3] = [0.0, -1.0, 0.0];
 const BACK: [f64; 3] = [0.0, 1.0, 0.0];
 
-/// The picture from above shows eight counterbored holes in two rows, that from the front one hole across the whole
-/// width. In the STEP file the radii of CYLINDRICAL_SURFACE are 0.133 in (16 half cylinders: Ø 6.7564 mm), 0.21875 in
-/// (16: Ø 11.1125 mm), 0.19472 in (2: Ø 9.8917 mm), and fillets of 0.1, 0.125 and 0.5 in, which are no holes. Genus 9.
+/// The picture from above shows eight counterbored holes in two rows, that from the front one hole
+/// across the whole width. In the STEP file the radii of CYLINDRICAL_SURFACE are 0.133 in (16 half
+/// cylinders: Ø 6.7564 mm), 0.21875 in (16: Ø 11.1125 mm), 0.19472 in (2: Ø 9.8917 mm), and fillets
+/// of 0.1, 0.125 and 0.5 in, which are no holes. Genus 9.
 #[test]
 fn featuretype_has_eight_counterbored_holes_and_one_across() {
     let Some(mesh) = part("trimesh_featuretype.STL", Inch) else {
@@ -37,9 +39,10 @@ fn featuretype_has_eight_counterbored_holes_and_one_across() {
     check_holes(&found(&mesh), &expected, &steps);
 }
 
-/// Sections at z = 32 and 23 mm: between the pad's rounded recess (x −4.105 to 17.558, y ±9.015) and the square island in
-/// it (x 3.404 to 10.094, y ±3.349) run four arms, floor at 29.845, land at 34.925. Beside it a recess of 13.573 × 16.818
-/// with rounded corners, same depth; and on the land at 25.4 a square of 12.7, floor at 22.225.
+/// Sections at z = 32 and 23 mm: between the pad's rounded recess (x −4.105 to 17.558, y ±9.015)
+/// and the square island in it (x 3.404 to 10.094, y ±3.349) run four arms, floor at 29.845, land
+/// at 34.925. Beside it a recess of 13.573 × 16.818 with rounded corners, same depth; and on the
+/// land at 25.4 a square of 12.7, floor at 22.225.
 #[test]
 fn featuretype_has_a_ring_groove_of_four_arms_and_two_pockets() {
     let Some(mesh) = part("trimesh_featuretype.STL", Inch) else {
@@ -81,8 +84,8 @@ fn featuretype_has_a_ring_groove_of_four_arms_and_two_pockets() {
     assert_eq!(of_kind(&features, Kind::Boss).len(), 0, "the pad is square");
 }
 
-/// From above: four countersunk holes and one counterbored in the middle. Genus 5. The cones go from r 3.3782 at z 9.179
-/// to r 6.4389 at z 12.7: 2 atan(3.0607 / 3.521) = 82.0°.
+/// From above: four countersunk holes and one counterbored in the middle. Genus 5. The cones go
+/// from r 3.3782 at z 9.179 to r 6.4389 at z 12.7: 2 atan(3.0607 / 3.521) = 82.0°.
 #[test]
 fn plate_holes_has_four_countersunk_holes_and_a_counterbored_one() {
     let Some(mesh) = part("trimesh_plate_holes.STL", Millimetre) else {
@@ -99,10 +102,11 @@ fn plate_holes_has_four_countersunk_holes_and_a_counterbored_one() {
     check_holes(&found(&mesh), &expected, &[[0, 1]]);
 }
 
-/// From above one large bore, in the front face two small holes. Genus 3. The bore has 50 corners on r 22.225 and 49 more
-/// on the chords between them, so that a circle through all is 0.03 mm too small; both its edges are broken by 0.79 mm at
-/// 45°, which is no countersink. The small holes run out of the front wall (5.08 mm thick) into the top of the plate: they
-/// go through, their walls end aslant.
+/// From above one large bore, in the front face two small holes. Genus 3. The bore has 50 corners
+/// on r 22.225 and 49 more on the chords between them, so that a circle through all is 0.03 mm too
+/// small; both its edges are broken by 0.79 mm at 45°, which is no countersink. The small holes run
+/// out of the front wall (5.08 mm thick) into the top of the plate: they go through, their walls
+/// end aslant.
 #[test]
 fn idler_riser_has_a_bore_and_two_screw_holes() {
     let Some(mesh) = part("trimesh_idler_riser.STL", Inch) else {
@@ -130,9 +134,10 @@ fn idler_riser_has_a_bore_and_two_screw_holes() {
     );
 }
 
-/// The slanted plate shows six holes, four with light through them; the front face three, one with light at its end (the
-/// picture from behind). Genus 5. The blind ones have tips of 118°, which their depth leaves out: walls of 6.0 and 19.05
-/// mm. The one with light leaves through a face at 45°: no depth is stated.
+/// The slanted plate shows six holes, four with light through them; the front face three, one with
+/// light at its end (the picture from behind). Genus 5. The blind ones have tips of 118°, which
+/// their depth leaves out: walls of 6.0 and 19.05 mm. The one with light leaves through a face at
+/// 45°: no depth is stated.
 #[test]
 fn ee2_has_five_through_and_four_blind_holes() {
     let Some(mesh) = part("crs_ee2.stl", Metre) else {
@@ -161,8 +166,9 @@ fn ee2_has_five_through_and_four_blind_holes() {
     check_holes(&found(&mesh), &expected, &[]);
 }
 
-/// From behind four counterbored and two plain holes with light, and one without; from the front those two are
-/// counterbored, and there is another without light. Genus 6. Blind ones: walls of 6.0 mm before tips of 118°.
+/// From behind four counterbored and two plain holes with light, and one without; from the front
+/// those two are counterbored, and there is another without light. Genus 6. Blind ones: walls of
+/// 6.0 mm before tips of 118°.
 #[test]
 fn ee3_has_six_counterbored_and_two_blind_holes() {
     let Some(mesh) = part("crs_ee3.stl", Metre) else {
@@ -193,9 +199,10 @@ fn ee3_has_six_counterbored_and_two_blind_holes() {
     check_holes(&found(&mesh), &expected, &steps);
 }
 
-/// Seven bodies: the plate, four press-fit studs and two pins. The pictures show 15 holes with light and six with a stud
-/// or pin in them; the plate alone has genus 21. A reader who asks for the holes of the plate wants all 21, and each goes
-/// through, whatever is in it. Circles of the plate alone, z 63.5 to 73.025.
+/// Seven bodies: the plate, four press-fit studs and two pins. The pictures show 15 holes with
+/// light and six with a stud or pin in them; the plate alone has genus 21. A reader who asks for
+/// the holes of the plate wants all 21, and each goes through, whatever is in it. Circles of the
+/// plate alone, z 63.5 to 73.025.
 #[test]
 fn tool_mounting_plate_has_21_holes_with_and_without_studs() {
     let Some(mesh) = part("godel_Tool_Mounting_Plate.STL", Metre) else {
@@ -253,10 +260,11 @@ fn tool_mounting_plate_has_21_holes_with_and_without_studs() {
     check_holes(&found(&mesh), &expected.concat(), &[]);
 }
 
-/// Six bodies: the lid and five countersunk screws in it. From above: ten counterbored holes, five countersunk ones with
-/// light, five with a screw, five pin holes. Genus of the lid 25. Cones: r 4.2164 to 8.0645 over 3.229 mm, 100.0°, and
-/// r 3.3782 to 6.4389 over 3.521 mm, 82.0°. Five of the counterbores have edges broken by 0.635 mm at 45°, no countersinks;
-/// the ring groove of Ø 241.3 to 254 on the lower side is no hole. Threads and cross recesses of the screws are none.
+/// Six bodies: the lid and five countersunk screws in it. From above: ten counterbored holes, five
+/// countersunk ones with light, five with a screw, five pin holes. Genus of the lid 25. Cones: r
+/// 4.2164 to 8.0645 over 3.229 mm, 100.0°, and r 3.3782 to 6.4389 over 3.521 mm, 82.0°. Five of the
+/// counterbores have edges broken by 0.635 mm at 45°, no countersinks; the ring groove of Ø 241.3
+/// to 254 on the lower side is no hole. Threads and cross recesses of the screws are none.
 #[test]
 fn counter_has_25_holes_with_and_without_screws() {
     let Some(mesh) = part("trimesh_counter.unitsmm.STL", Millimetre) else {
@@ -307,8 +315,8 @@ fn counter_has_25_holes_with_and_without_screws() {
     check_holes(&found(&mesh), &expected, &steps);
 }
 
-/// Circles through corners: 21 of Ø 9.525 end in tips of 118° below walls of 35.001 mm; at the four corners Ø 6.7564
-/// goes through below counterbores of Ø 11.1125. Genus 4.
+/// Circles through corners: 21 of Ø 9.525 end in tips of 118° below walls of 35.001 mm; at the four
+/// corners Ø 6.7564 goes through below counterbores of Ø 11.1125. Genus 4.
 #[test]
 fn mold_has_21_blind_and_four_counterbored_holes() {
     let Some(mesh) = part("crs_mold_transformed.stl", Metre) else {
@@ -336,8 +344,9 @@ fn mold_has_21_blind_and_four_counterbored_holes() {
     assert_eq!(counts, [21, 4, 4, 29]);
 }
 
-/// One bore, Ø 38.1 mm (a circle through its corners), among recesses of six sides with rounded corners: none of them is
-/// round, and none of them is a slot, though some have two walls that face each other.
+/// One bore, Ø 38.1 mm (a circle through its corners), among recesses of six sides with rounded
+/// corners: none of them is round, and none of them is a slot, though some have two walls that face
+/// each other.
 #[test]
 fn octagonal_pocket_has_one_hole_and_no_slot() {
     let Some(mesh) = part("trimesh_octagonal_pocket.stl", Metre) else {

@@ -19,7 +19,8 @@ fn text(bytes: &[u8]) -> &str {
     std::str::from_utf8(bytes).unwrap()
 }
 
-/// Field by field as in docs/features.md, on one blind, one through, one countersunk hole, a slot, an edge and a plane.
+/// Field by field as in docs/features.md, on one blind, one through, one countersunk hole, a slot,
+/// an edge and a plane.
 #[test]
 fn json_has_the_fields_that_are_promised() {
     let Some(folder) = shared("parts/permissive") else {

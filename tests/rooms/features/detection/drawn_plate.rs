@@ -1,5 +1,5 @@
-//! The simulated plate as its drawing has it, its arcs divided coarsely and finely, and a hole of which the edge is broken.
-//! Sizes and places are those they are made from.
+//! The simulated plate as its drawing has it, its arcs divided coarsely and finely, and a hole of
+//! which the edge is broken. Sizes and places are those they are made from.
 
 use nalgebra::Point3;
 use touchup::features::{Feature, Kind};
@@ -64,7 +64,8 @@ fn everything_on_the_plate_is_found_however_finely_it_is_divided() {
     }
 }
 
-/// An edge is broken by another shape than a countersink: the hole begins at the plane all the same, and not where its wall does.
+/// An edge is broken by another shape than a countersink: the hole begins at the plane all the
+/// same, and not where its wall does.
 #[test]
 fn a_hole_with_a_broken_edge_is_as_deep_as_from_its_plane() {
     // with a flat floor, and with the tip of a drill of 118°

@@ -1,4 +1,5 @@
-//! What detection must not depend on: where the part lies, how it is turned, and in which unit it was drawn.
+//! What detection must not depend on: where the part lies, how it is turned, and in which unit it
+//! was drawn.
 
 use std::collections::BTreeMap;
 
@@ -75,7 +76,8 @@ fn check(
     let (before, after) = (holes_slots_pockets(&here), holes_slots_pockets(&there));
     prop_assert_eq!(before.len(), after.len(), "{}", name);
     let [lo, hi] = mesh.bounds();
-    // files are rounded to a millionth of the part: fits that end a step earlier or later differ by less
+    // files are rounded to a millionth of the part: fits that end a step earlier or later differ by
+    // less
     let limit = 2e-6 * scale * (hi - lo).norm();
     for one in before {
         let images = after
@@ -110,8 +112,8 @@ fn divided(mesh: &TriMesh) -> TriMesh {
     TriMesh::new(positions, faces).unwrap()
 }
 
-/// Dividing the faces of a drawing leaves the part as it is, where circles have many sides: a hole of twelve flat sides,
-/// each of several faces, is not taken for a round one.
+/// Dividing the faces of a drawing leaves the part as it is, where circles have many sides: a hole
+/// of twelve flat sides, each of several faces, is not taken for a round one.
 #[test]
 fn finer_faces_change_nothing() {
     for (name, unit) in FINE {

@@ -40,8 +40,9 @@ fn holes(mesh: &TriMesh) -> Vec<Feature> {
         .collect()
 }
 
-/// An open wavy sheet of unknown unit. Its borders, by the edges that occur once: 107 vertices around it, and 60 whose x and
-/// y are within 1.979 and 2.001 of (6.00, 6.00); the circle of least squares through them has r 1.996.
+/// An open wavy sheet of unknown unit. Its borders, by the edges that occur once: 107 vertices
+/// around it, and 60 whose x and y are within 1.979 and 2.001 of (6.00, 6.00); the circle of least
+/// squares through them has r 1.996.
 #[test]
 fn the_wavy_sheet_has_one_hole_without_depth() {
     let Some(mesh) = part("noether_wavy_mesh_with_hole.ply", Millimetre) else {
@@ -86,8 +87,8 @@ fn a_flat_ring_and_a_dome_have_a_hole_in_the_middle() {
     }
 }
 
-/// The upper side of a plate and the wall of its hole, open below: the lower end of the wall is the same hole, and its
-/// bottom is unknown.
+/// The upper side of a plate and the wall of its hole, open below: the lower end of the wall is the
+/// same hole, and its bottom is unknown.
 #[test]
 fn the_open_end_of_a_wall_is_no_second_hole() {
     for depth in [0.002, 0.006, 0.02] {
@@ -121,7 +122,8 @@ fn ends_of_a_pipe_are_no_holes() {
     );
 }
 
-/// A sheet without the faces within a blob about its middle, whose outline `radius` gives by the angle, m.
+/// A sheet without the faces within a blob about its middle, whose outline `radius` gives by the
+/// angle, m.
 fn torn(radius: impl Fn(f64) -> f64) -> TriMesh {
     let sheet = grid(60, 1e-3, |x, y| 2e-3 * (x * 40.0).sin() * (y * 40.0).cos());
     let is_left = |corners: &[Point3<f64>; 3]| {

@@ -1,4 +1,5 @@
-//! Fits of surfaces against surfaces that are known: bias, stated uncertainty, outliers, few and lopsided points.
+//! Fits of surfaces against surfaces that are known: bias, stated uncertainty, outliers, few and
+//! lopsided points.
 
 mod laws;
 mod monte_carlo;
@@ -31,7 +32,8 @@ fn shaken(rng: &mut Pcg64, sigma: f64) -> Vector3<f64> {
     Vector3::from_fn(|_, _| normal(rng)) * sigma
 }
 
-/// Points on a cylinder of radius `r` about z, over an arc (rad) and a height, each a group of its own, without errors.
+/// Points on a cylinder of radius `r` about z, over an arc (rad) and a height, each a group of its
+/// own, without errors.
 fn on_cylinder(rng: &mut Pcg64, r: f64, arc: f64, height: f64, count: u32) -> Vec<Observation> {
     (0..count)
         .map(|i| {

@@ -6,7 +6,8 @@ use touchup::features::fit::{Cone, Fit, FitParams, Freedom, Plane, Surface, fit}
 
 use super::*;
 
-/// Noisy copies of exact points, whose shared errors are of size `shared` and whose own of size `own`.
+/// Noisy copies of exact points, whose shared errors are of size `shared` and whose own of size
+/// `own`.
 fn noisy(exact: &[Observation], rng: &mut Pcg64, shared: f64, own: f64) -> Vec<Observation> {
     let groups = exact.iter().map(|o| o.group).max().unwrap() as usize + 1;
     let errors: Vec<_> = (0..groups).map(|_| shaken(rng, shared)).collect();
@@ -146,7 +147,8 @@ fn stated_uncertainty_holds_for_errors_shared_in_passes() {
             })
             .collect();
         println!("{name}: {:.3}", rms(&z));
-        // errors that are the contacts' own, and only said to be shared, leave the fit better than it says: by √20
+        // errors that are the contacts' own, and only said to be shared, leave the fit better than
+        // it says: by √20
         let range = if shared > 0.0 { 0.5..2.0 } else { 0.15..1.0 };
         assert!(range.contains(&rms(&z)), "{name}: {}", rms(&z));
     }
@@ -235,7 +237,8 @@ fn planes_and_cones_are_right_in_the_mean_and_say_how_well() {
     assert!(mean.abs() < 3.0 * error, "{mean} ± {error}");
 }
 
-/// Arcs of a turn, a half and a sixth, each displaced as a whole by a drawn vector, with hardly any noise of their own.
+/// Arcs of a turn, a half and a sixth, each displaced as a whole by a drawn vector, with hardly any
+/// noise of their own.
 #[test]
 fn a_common_displacement_goes_into_the_place_whatever_arc_was_felt() {
     let (mut rng, shift_sigma) = (generator(11), 0.02);

@@ -14,7 +14,8 @@ enum Place {
     End(f64),
 }
 
-/// Centres of a ball of 1 mm that touches a slot about z, along x, at its middle; each a group of its own.
+/// Centres of a ball of 1 mm that touches a slot about z, along x, at its middle; each a group of
+/// its own.
 fn touches(rng: &mut Pcg64, ends: Ends, places: &[(Place, u32)]) -> Vec<Observation> {
     let ball = 1.0 * MM;
     let (half_width, half_length) = (WIDTH / 2.0 - ball, LENGTH / 2.0 - ball);

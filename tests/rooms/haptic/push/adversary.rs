@@ -36,7 +36,8 @@ fn pierces(p: &Point3<f64>, q: &Point3<f64>, [a, b, c]: &Triangle) -> bool {
     around.iter().all(|&x| x > 0.0) || around.iter().all(|&x| x < 0.0)
 }
 
-/// All pairs of faces that go through each other, by brute force; faces may share a corner, or an edge that is folded flat.
+/// All pairs of faces that go through each other, by brute force; faces may share a corner, or an
+/// edge that is folded flat.
 fn intersections(mesh: &TriMesh) -> Vec<(FaceId, FaceId)> {
     let faces: Vec<_> = mesh.faces().collect();
     let triangles: Vec<Triangle> = faces.iter().map(|&(face, _)| mesh.triangle(face)).collect();
@@ -93,7 +94,8 @@ fn hinges(mesh: &TriMesh) -> Vec<(FaceId, FaceId)> {
     hinges
 }
 
-/// A box without a floor: a lid with a step in it, walls, sharp edges; 1.2 mm triangles under a 1.5 mm ball.
+/// A box without a floor: a lid with a step in it, walls, sharp edges; 1.2 mm triangles under a 1.5
+/// mm ball.
 fn stepped_block() -> TriMesh {
     let edge = 1.2e-3;
     let lid = grid(14, edge, |x, _| if x > 0.5 * edge { 2e-3 } else { 0.0 });
@@ -204,7 +206,8 @@ impl Adversary {
 /// Quality and normal of each face.
 type Shapes = Vec<(f64, Vector3<f64>)>;
 
-/// The guarantees of every update, checked face by face: shapes as scanned, and before and after the push.
+/// The guarantees of every update, checked face by face: shapes as scanned, and before and after
+/// the push.
 fn check_update(
     scanned: &Shapes,
     before: &Shapes,
@@ -382,8 +385,8 @@ fn no_sample_makes_the_mesh_unsound_with_other_regions_and_rules() {
     }
 }
 
-/// A ball sinks on one spot, with and without a force: the lid before it comes down onto a floor 2 mm below, that was out
-/// of sight at first.
+/// A ball sinks on one spot, with and without a force: the lid before it comes down onto a floor 2
+/// mm below, that was out of sight at first.
 #[test]
 fn a_lid_pushed_onto_a_floor_does_not_pierce_it() {
     let lid = grid(15, EDGE, |_, _| 0.0);

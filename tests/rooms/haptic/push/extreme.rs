@@ -38,7 +38,8 @@ fn any_vector(rng: &mut Pcg64) -> Vector3<f64> {
     Vector3::from_fn(|_, _| any_size(rng))
 }
 
-/// Triangles in a fan, each corner a number of any size off another: needles, points that coincide, faces without area.
+/// Triangles in a fan, each corner a number of any size off another: needles, points that coincide,
+/// faces without area.
 fn needles(rng: &mut Pcg64) -> TriMesh {
     let mut positions = vec![
         Point3::origin(),
@@ -76,7 +77,8 @@ fn all_settings() -> Vec<RefineParams> {
     ]
 }
 
-/// Balls whose centre, and points of contact that, are a number of any size off a vertex, an edge or a face, pressed by any force.
+/// Balls whose centre, and points of contact that, are a number of any size off a vertex, an edge
+/// or a face, pressed by any force.
 #[test]
 fn no_float_brings_a_vertex_to_nowhere() {
     let runs = either(400, 20_000);

@@ -45,9 +45,11 @@ fn sample(tick: i64, centre: Point3<f64>, force: Vector3<f64>) -> Sample {
     }
 }
 
-/// A ball that slides over the true plane z = 0 in a raster of `lines` per direction, there and across.
+/// A ball that slides over the true plane z = 0 in a raster of `lines` per direction, there and
+/// across.
 ///
-/// `force` gives N over the path length (m); friction `mu` pulls against the motion; the tip deflects by F/k as a real one.
+/// `force` gives N over the path length (m); friction `mu` pulls against the motion; the tip
+/// deflects by F/k as a real one.
 fn raster(
     half: f64,
     lines: usize,
@@ -123,8 +125,8 @@ fn rigid() -> impl Strategy<Value = Isometry3<f64>> {
         .prop_map(|(shift, turn)| Isometry3::new(Vector3::from(shift), Vector3::from(turn)))
 }
 
-/// A push rounds coordinates below 0.5 m a few dozen times; bumps and normals hand a rounding on by at most the size of
-/// the region over an edge. 2,000 pushes × 100 roundings.
+/// A push rounds coordinates below 0.5 m a few dozen times; bumps and normals hand a rounding on by
+/// at most the size of the region over an edge. 2,000 pushes × 100 roundings.
 const RIGID_TOL: f64 = 2_000.0 * 100.0 * 0.5 * f64::EPSILON;
 
 proptest! {
@@ -208,7 +210,8 @@ fn a_hovering_stylus_without_force_changes_nothing_for_ever() {
     }
 }
 
-// ---- carving ----------------------------------------------------------------------------------------------------
+// ---- carving
+// ----------------------------------------------------------------------------------------------------
 
 /// How deep the ball is in the mesh, m.
 fn depth(mesh: &Refiner, centre: &Point3<f64>) -> f64 {
@@ -220,10 +223,11 @@ fn depth(mesh: &Refiner, centre: &Point3<f64>) -> f64 {
             .sqrt()
 }
 
-/// A ball without a force sinks through a thin lid, down to 4 mm, and stays there: the remaining depth is the
-/// tolerance, and what goes with the exponential after a second. While moving at v = 20 mm/s, the depth is where carving
-/// by 300 per second keeps up, tolerance + v/300 = 0.12 mm, for a face that lies square to it; for one that yields at
-/// a slant the path is up to three times as long.
+/// A ball without a force sinks through a thin lid, down to 4 mm, and stays there: the remaining
+/// depth is the tolerance, and what goes with the exponential after a second. While moving at v =
+/// 20 mm/s, the depth is where carving by 300 per second keeps up, tolerance + v/300 = 0.12 mm, for
+/// a face that lies square to it; for one that yields at a slant the path is up to three times as
+/// long.
 #[test]
 fn nothing_of_a_lid_stays_inside_the_ball_deeper_than_the_tolerance() {
     let CarveParams {
@@ -259,7 +263,8 @@ fn nothing_of_a_lid_stays_inside_the_ball_deeper_than_the_tolerance() {
     }
 }
 
-/// One update moves all faces inside the tip and not the closest alone, and none that it does not enter.
+/// One update moves all faces inside the tip and not the closest alone, and none that it does not
+/// enter.
 #[test]
 fn all_faces_inside_the_tip_move_at_once() {
     let flat = TipShape::Flat {

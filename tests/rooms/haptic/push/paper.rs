@@ -28,7 +28,8 @@ fn one_face() -> Refiner {
     .unwrap()
 }
 
-/// Height of the face after holding the tip at `tip_z` with `force` along z for `ticks`; it stays level.
+/// Height of the face after holding the tip at `tip_z` with `force` along z for `ticks`; it stays
+/// level.
 fn height(tip_z: f64, force: f64, ticks: i64) -> f64 {
     let mut refiner = one_face();
     for tick in 0..=ticks {
@@ -48,7 +49,8 @@ fn height(tip_z: f64, force: f64, ticks: i64) -> f64 {
     heights[0]
 }
 
-/// METHOD 2.2: f(h) = F at h = −h_min (δ − ln(f_max/F − 1)); the face floats that far above the tip.
+/// METHOD 2.2: f(h) = F at h = −h_min (δ − ln(f_max/F − 1)); the face floats that far above the
+/// tip.
 #[test]
 fn one_face_rests_off_the_surface_by_the_rigid_contact_bias() {
     let figures = [(1.0, 1.401), (2.0, 1.807), (4.0, 2.297)];
@@ -67,8 +69,8 @@ fn one_face_rests_off_the_surface_by_the_rigid_contact_bias() {
     }
 }
 
-/// METHOD 2.3: hovering 1 mm above a face with no force pushes it away, 0.52 mm in the first second. With F = 0,
-/// du/dt = α f(h) / h_min and u + e^u = u₀ + e^u₀ + α f_max t / h_min.
+/// METHOD 2.3: hovering 1 mm above a face with no force pushes it away, 0.52 mm in the first
+/// second. With F = 0, du/dt = α f(h) / h_min and u + e^u = u₀ + e^u₀ + α f_max t / h_min.
 #[test]
 fn one_face_flees_from_a_stylus_that_hovers() {
     let start = 1e-3 / H_MIN + DELTA;
@@ -93,8 +95,9 @@ fn one_face_flees_from_a_stylus_that_hovers() {
     assert!((found * 1e3 - 0.52).abs() < 0.01, "the figure of METHOD");
 }
 
-/// At F ≥ f_max the printed rule has no equilibrium: the face rises by α (F − f_max) and more, which a count reports.
-/// Just below it there is one, far away: h_min (δ + ln 199) = 5.15 mm at 9.95 N.
+/// At F ≥ f_max the printed rule has no equilibrium: the face rises by α (F − f_max) and more,
+/// which a count reports. Just below it there is one, far away: h_min (δ + ln 199) = 5.15 mm at
+/// 9.95 N.
 #[test]
 fn beyond_f_max_the_printed_rule_runs_away_and_is_counted() {
     let bias = H_MIN * (DELTA + 199f64.ln());
@@ -115,8 +118,8 @@ fn beyond_f_max_the_printed_rule_runs_away_and_is_counted() {
     assert_eq!(refiner.counts().clamped, 2_001);
 }
 
-/// Fig 5: what is felt is more than f(0), what is expected is more than f(0) where the tip is in the face. F* and both mismatches
-/// are those of Eq 2, 4 and 5 in each case.
+/// Fig 5: what is felt is more than f(0), what is expected is more than f(0) where the tip is in
+/// the face. F* and both mismatches are those of Eq 2, 4 and 5 in each case.
 #[test]
 fn all_four_cases_have_an_expected_force_and_both_mismatches() {
     let at_face = F_MAX / (1.0 + DELTA.exp());

@@ -20,8 +20,9 @@ fn mean_error(mesh: &TriMesh) -> f64 {
     sum / count
 }
 
-/// Each face is pressed for 0.1 s in each of several passes: at a rate of 25 per second more than e⁻² of the noise goes
-/// in one, and what its neighbours undo goes with the next. A twentieth of the noise is what three passes leave.
+/// Each face is pressed for 0.1 s in each of several passes: at a rate of 25 per second more than
+/// e⁻² of the noise goes in one, and what its neighbours undo goes with the next. A twentieth of
+/// the noise is what three passes leave.
 #[test]
 fn a_noisy_plate_ends_on_the_true_plane_with_and_without_friction() {
     for (mu, tip) in [
@@ -52,9 +53,9 @@ fn a_noisy_plate_ends_on_the_true_plane_with_and_without_friction() {
     }
 }
 
-/// The same with a noisy stylus: 0.05 mm on each axis of the pose, 0.05 N on the force, as the judge's cases have them.
-/// First-order motion at 25 per second leaves √(0.025/2) = 0.11 of the noise; turning the face, about as much again at
-/// its corners.
+/// The same with a noisy stylus: 0.05 mm on each axis of the pose, 0.05 N on the force, as the
+/// judge's cases have them. First-order motion at 25 per second leaves √(0.025/2) = 0.11 of the
+/// noise; turning the face, about as much again at its corners.
 #[test]
 fn a_noisy_stylus_leaves_less_than_a_third_of_its_noise() {
     let noise = 0.05e-3;
@@ -76,7 +77,8 @@ fn a_noisy_stylus_leaves_less_than_a_third_of_its_noise() {
     }
 }
 
-/// Lowest, mean and highest vertex of a true plate after it was touched with 1 to 4 N in waves of 6 mm, m.
+/// Lowest, mean and highest vertex of a true plate after it was touched with 1 to 4 N in waves of 6
+/// mm, m.
 fn after_waves(tip: TipParams, params: RefineParams) -> [f64; 3] {
     let force = |travel: f64| 2.5 + 1.5 * (travel / 6e-3 * std::f64::consts::TAU).sin();
     let mut refiner = Refiner::new(grid(15, EDGE, |_, _| 0.0), params).unwrap();
@@ -95,7 +97,8 @@ fn after_waves(tip: TipParams, params: RefineParams) -> [f64; 3] {
     found
 }
 
-/// METHOD 2.2: the paper's fixed point moves with the force, by h_min (δ − ln(f_max/F − 1)): from 1 to 4 N by 0.90 mm.
+/// METHOD 2.2: the paper's fixed point moves with the force, by h_min (δ − ln(f_max/F − 1)): from 1
+/// to 4 N by 0.90 mm.
 #[test]
 fn a_varying_force_draws_no_ripples_but_does_in_paper_mode() {
     // a point, so that both modes press on the same face; rigid, as METHOD 2.2 supposes
@@ -111,14 +114,16 @@ fn a_varying_force_draws_no_ripples_but_does_in_paper_mode() {
         },
     ] {
         let [lo, _, hi] = after_waves(tip, RefineParams::robust(tip));
-        // friction is reported in steps of a thousandth: half of one is 1.2 µm at the corner of a face
+        // friction is reported in steps of a thousandth: half of one is 1.2 µm at the corner of a
+        // face
         assert!(
             lo.abs() < 1.2e-6 && hi.abs() < 1.2e-6,
             "the plate is true and stays so: {lo:e} {hi:e} m"
         );
     }
     let [lo, mean, hi] = after_waves(point, RefineParams::paper(point));
-    // a face floats by 1.40 mm where 1 N was measured last and by 2.30 mm where it was 4 N; then lower neighbours are nearer
+    // a face floats by 1.40 mm where 1 N was measured last and by 2.30 mm where it was 4 N; then
+    // lower neighbours are nearer
     assert!(mean > 0.7e-3 && mean < 2.3e-3, "the bias: {mean:e} m");
     assert!(
         hi - lo > 0.45e-3,
@@ -126,19 +131,21 @@ fn a_varying_force_draws_no_ripples_but_does_in_paper_mode() {
     );
 }
 
-/// A compliant tip: the reported pose goes up and down with the force by up to 0.2 mm, the ball does not.
+/// A compliant tip: the reported pose goes up and down with the force by up to 0.2 mm, the ball
+/// does not.
 #[test]
 fn a_varying_force_on_a_compliant_tip_draws_no_ripples() {
     let [lo, _, hi] = after_waves(BALL, RefineParams::robust(BALL));
-    // force and position are smoothed alike, so that nothing of the 0.15 mm by which the tip deflects should be left; half
-    // a step of friction as above
+    // force and position are smoothed alike, so that nothing of the 0.15 mm by which the tip
+    // deflects should be left; half a step of friction as above
     assert!(
         lo.abs() < 1.2e-6 && hi.abs() < 1.2e-6,
         "the plate is true and stays so: {lo:e} {hi:e} m"
     );
 }
 
-/// Beyond f_max there is no equilibrium: the force is clamped and counted, and the plate stays at the tip.
+/// Beyond f_max there is no equilibrium: the force is clamped and counted, and the plate stays at
+/// the tip.
 #[test]
 fn force_beyond_the_model_does_not_run_away() {
     let tip = TipParams {
@@ -171,7 +178,8 @@ fn force_beyond_the_model_does_not_run_away() {
     }
 }
 
-/// METHOD 2.4: a face turned farther than 100° from the measured normal runs away with the printed rule.
+/// METHOD 2.4: a face turned farther than 100° from the measured normal runs away with the printed
+/// rule.
 #[test]
 fn a_face_turned_away_from_the_measured_normal_never_blows_up() {
     for degrees in [95f64, 101.0, 120.0, 150.0, 179.0, 180.0] {

@@ -113,7 +113,8 @@ fn stamps_at_the_ends_of_time_are_taken() {
     );
 }
 
-/// By the reconstruction too: ten samples, a millisecond apart up to the last nanosecond, are one stroke.
+/// By the reconstruction too: ten samples, a millisecond apart up to the last nanosecond, are one
+/// stroke.
 #[test]
 fn touches_at_the_end_of_time_are_taken() {
     let mut refiner = Refiner::new(bumpy(2), RefineParams::robust(BALL)).unwrap();

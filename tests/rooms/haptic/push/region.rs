@@ -110,7 +110,8 @@ fn carving_moves_the_corners_of_one_face() {
         assert!(is_one_face, "{moved:?}");
         if !moved.is_empty() {
             assert_eq!(update.case, Case::MeshOnly);
-            // what the spring of 20 N/mm lets expect at the plane of the face that the tip is in, and nothing is felt
+            // what the spring of 20 N/mm lets expect at the plane of the face that the tip is in,
+            // and nothing is felt
             let mismatch = update.mismatch.unwrap();
             let [a, b, c] = before.triangle(mismatch.face);
             let n = (b - a).cross(&(c - a)).normalize();
@@ -226,7 +227,8 @@ fn a_free_vertex_at_a_border_moves_by_the_mean_displacement_of_its_neighbours() 
     }
 }
 
-/// The handle goes as a rigid body along the measured normal: up, by a step that the tip's distance sets.
+/// The handle goes as a rigid body along the measured normal: up, by a step that the tip's distance
+/// sets.
 #[test]
 fn the_handle_rises_to_the_ball() {
     let above = 0.2e-3;
@@ -241,7 +243,8 @@ fn the_handle_rises_to_the_ball() {
             .iter()
             .all(|step| (step - steps[0]).norm() < 1e-15 && step.x == 0.0 && step.y == 0.0)
     );
-    // dz/dt = α (F − f), f = k · (z − tip): towards tip + F/k at the rate α k = 25 per second, over 1 ms
+    // dz/dt = α (F − f), f = k · (z − tip): towards tip + F/k at the rate α k = 25 per second, over
+    // 1 ms
     let expected = (above + 2.0 / STIFFNESS) * -(-0.025f64).exp_m1();
     assert!(
         (steps[0].z - expected).abs() < 1e-12,
@@ -250,7 +253,8 @@ fn the_handle_rises_to_the_ball() {
     );
 }
 
-/// Scans as they come: a face that is there twice, three faces at an edge, a rim, a face without area, a lone one.
+/// Scans as they come: a face that is there twice, three faces at an edge, a rim, a face without
+/// area, a lone one.
 #[test]
 fn scans_that_are_no_surfaces_are_refined_all_the_same() {
     let sound = bumpy(6);

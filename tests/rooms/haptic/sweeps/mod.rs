@@ -1,4 +1,5 @@
-//! The paper's sweep experiment (Sec 4.3, Fig 11) on `peaks`, and the robust mode where the paper's rule gives up.
+//! The paper's sweep experiment (Sec 4.3, Fig 11) on `peaks`, and the robust mode where the paper's
+//! rule gives up.
 //!
 //! `TOUCHUP_FULL=1` runs all seeds and sweeps; `--nocapture` or `--show-output` shows the numbers.
 
@@ -97,15 +98,16 @@ const POINT: TipParams = TipParams {
     stiffness: None,
 };
 
-/// A face that leans by less than the first comes back, by more than the second it runs away (METHOD, 2.4), rad.
+/// A face that leans by less than the first comes back, by more than the second it runs away
+/// (METHOD, 2.4), rad.
 const BASIN: [f64; 2] = [
     80.0 / 180.0 * std::f64::consts::PI,
     100.0 / 180.0 * std::f64::consts::PI,
 ];
 
-/// Every scan of a row of seeds, whatever becomes of it. The force on a face is that of its true plane, so 20 s leave it there if
-/// it leaned by less than the basin is wide; a scan converges if none leans farther when its turn comes, and does not if one
-/// leans by more than comes back.
+/// Every scan of a row of seeds, whatever becomes of it. The force on a face is that of its true
+/// plane, so 20 s leave it there if it leaned by less than the basin is wide; a scan converges if
+/// none leans farther when its turn comes, and does not if one leans by more than comes back.
 #[test]
 fn the_published_rule_converges_where_no_face_leans_out_of_its_basin_and_only_there() {
     let seeds = if is_full() { 1..=20 } else { 1..=7 };
@@ -159,7 +161,8 @@ fn the_published_rule_converges_where_no_face_leans_out_of_its_basin_and_only_th
                 distances[1] < 0.5 * start && distances[10] < 0.1 * start,
                 "{distances:?}"
             );
-            // METHOD 2.8 measured 0.6 to 0.9; the slope of the logarithms between the second and the tenth sweep
+            // METHOD 2.8 measured 0.6 to 0.9; the slope of the logarithms between the second and
+            // the tenth sweep
             let rate = (distances[2] / distances[10]).ln() / 5f64.ln();
             assert!((0.3..1.2).contains(&rate), "{rate}");
             converged.push((seed, distances));
@@ -229,7 +232,8 @@ fn the_guard_lets_the_published_rule_starve_no_face() {
 fn assert_no_face_starved(before: &[f64], mesh: &TriMesh) {
     let limit = GuardParams::default().smallest_quality;
     for (face, (before, now)) in before.iter().zip(qualities(mesh)).enumerate() {
-        // a rounding for each of the ten operations behind a quality, and for each of 10⁶ updates at most
+        // a rounding for each of the ten operations behind a quality, and for each of 10⁶ updates
+        // at most
         assert!(
             now >= limit.min(0.9 * before) * (1.0 - 1e-9),
             "face {face}: from {before} to {now}"
@@ -285,13 +289,15 @@ fn check_robust(peaks: &Peaks, samples: &[Sample], seed: u64, sweeps: usize) {
             now.row()
         );
         assert!(now.distance_mm <= start.distance_mm && now.normal_deg <= start.normal_deg);
-        // flipped faces are printed: a scan this noisy brings some 40 of 200, and one more is no blow-up
+        // flipped faces are printed: a scan this noisy brings some 40 of 200, and one more is no
+        // blow-up
         assert!(now.farthest_mm <= start.farthest_mm + STRAY_MM);
         assert_no_face_starved(&before, run.refiner.mesh());
     }
 }
 
-/// A vertex may come to be this much farther from the surface than the worst of the scan, mm: a sixth of its noise.
+/// A vertex may come to be this much farther from the surface than the worst of the scan, mm: a
+/// sixth of its noise.
 const STRAY_MM: f64 = 0.5;
 
 #[test]

@@ -1,4 +1,5 @@
-//! Cut, flipped and crafted files: no panic, no memory taken on trust, an error that names the file.
+//! Cut, flipped and crafted files: no panic, no memory taken on trust, an error that names the
+//! file.
 
 use std::path::Path;
 
@@ -10,7 +11,8 @@ use touchup::stylus::Message;
 use crate::allocations::largest_request;
 use crate::io::recordings::made::{Outcome, db3_of, mcap_bytes, put, read, touch};
 
-/// The files here are below 1 MiB and unpack to less than 4; buffers grow by doubling, and readers have their own.
+/// The files here are below 1 MiB and unpack to less than 4; buffers grow by doubling, and readers
+/// have their own.
 const MAX_REQUEST_BYTES: usize = 16 << 20;
 
 fn read_metered(path: &Path) -> Outcome {
@@ -95,7 +97,8 @@ fn every_bit_flip_of_an_mcap_is_found_or_harmless() {
 fn lengths_that_lie_are_refused_before_memory_is_taken() {
     let folder = tempfile::tempdir().unwrap();
     let (_, bytes) = whole();
-    // magic 8, header record 9 + n; the chunk: head 9, times 16, size 8, checksum 4, compression 4 + "zstd", packed 8
+    // magic 8, header record 9 + n; the chunk: head 9, times 16, size 8, checksum 4, compression 4
+    // + "zstd", packed 8
     let header_len = u64::from_le_bytes(bytes[9..17].try_into().unwrap()) as usize;
     let chunk = 8 + 9 + header_len;
     assert_eq!(bytes[chunk], 6, "a chunk");

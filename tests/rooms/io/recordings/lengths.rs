@@ -20,7 +20,8 @@ fn made(path: &Path, schema: &str) {
         .unwrap();
 }
 
-/// A column that computes 400 MB of a row of a few bytes: SQLite refuses it by the limit, before it makes it.
+/// A column that computes 400 MB of a row of a few bytes: SQLite refuses it by the limit, before it
+/// makes it.
 #[test]
 fn a_generated_column_is_refused_by_its_length() {
     let folder = tempfile::tempdir().unwrap();

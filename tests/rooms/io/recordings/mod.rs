@@ -1,7 +1,7 @@
 //! Recordings from outside: real ones, damaged ones, our own.
 //!
-//! Numbers of real recordings were taken with the Python package `rosbags` 0.11.9 (AnyReader, `math.fsum` of each
-//! field), which shares no code with this crate.
+//! Numbers of real recordings were taken with the Python package `rosbags` 0.11.9 (AnyReader,
+//! `math.fsum` of each field), which shares no code with this crate.
 
 use std::fs;
 use std::io::Cursor;
@@ -176,7 +176,8 @@ fn plate_gives_the_sums_that_rosbags_reads() {
             .sum::<i128>(),
         133_038_402_874_237_911_713_631
     );
-    // the file holds multiples of 2^-22 m and 2^-12 N or coarser, so these sums are exact in any order
+    // the file holds multiples of 2^-22 m and 2^-12 N or coarser, so these sums are exact in any
+    // order
     let position: Vector3<f64> = poses.iter().map(|p| p.pose_ot.translation.vector).sum();
     assert_eq!(
         position,
@@ -411,7 +412,8 @@ fn a_folder_is_read_in_the_order_of_its_metadata() {
     for name in ["b.mcap", "c.mcap"] {
         fs::remove_file(folder.path().join(name)).unwrap();
     }
-    // of a session that was ended before the first message nothing is left, or a file that has not begun
+    // of a session that was ended before the first message nothing is left, or a file that has not
+    // begun
     for begun in [None, Some("0.mcap")] {
         begun.map(|name| put(folder.path(), name, b"\x89MCAP0\r\n"));
         let empty = RecordingReader::open(folder.path(), &Topics::default())
@@ -435,7 +437,8 @@ fn messages_that_cannot_be_used_are_counted_and_reading_goes_on() {
     let messages = touch(9); // poses at rows 1, 4, 7
     db3_of(&path, &mcap_bytes(&messages), <[u8]>::to_vec);
     let db = rusqlite::Connection::open(&path).unwrap();
-    // payload: 4 encapsulation, 8 stamp, 4 length, "O\0" and 2 bytes of padding, 24 position, 32 quaternion
+    // payload: 4 encapsulation, 8 stamp, 4 length, "O\0" and 2 bytes of padding, 24 position, 32
+    // quaternion
     let zeros = "substr(data, 1, 44) || zeroblob(32)";
     db.execute(
         &format!("UPDATE messages SET data = CAST({zeros} AS BLOB) WHERE id = 4"),

@@ -19,7 +19,8 @@ fn write(writer: &mut SegmentedWriter, messages: &[Message]) {
     }
 }
 
-/// Wherever it is cut, all that was flushed before is there, and what comes then follows it; the result has its end.
+/// Wherever it is cut, all that was flushed before is there, and what comes then follows it; the
+/// result has its end.
 #[test]
 fn a_recording_that_was_cut_goes_on_behind_what_was_flushed() {
     let folder = tempfile::tempdir().unwrap();
@@ -71,7 +72,8 @@ fn a_recording_that_was_cut_goes_on_behind_what_was_flushed() {
     }
 }
 
-/// A file that could not be begun, as on a full disk, takes none of those before it along: what comes when there is room goes behind them.
+/// A file that could not be begun, as on a full disk, takes none of those before it along: what
+/// comes when there is room goes behind them.
 #[test]
 fn a_file_that_could_not_be_begun_takes_no_other_along() {
     let folder = tempfile::tempdir().unwrap();

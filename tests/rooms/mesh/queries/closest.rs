@@ -1,4 +1,5 @@
-//! The closest face against brute force, also while the mesh changes, and its side against known solids.
+//! The closest face against brute force, also while the mesh changes, and its side against known
+//! solids.
 
 use super::*;
 use nalgebra::Isometry3;
@@ -18,17 +19,22 @@ fn brute_barycentre_distance(mesh: &TriMesh, p: &Point3<f64>) -> f64 {
 
 /// Error bound of a distance computed in doubles, and the face named from the nearest.
 ///
-/// Let M be the largest coordinate, D the diagonal of the mesh, d the distance; ε/2 is one rounding.
+/// Let M be the largest coordinate, D the diagonal of the mesh, d the distance; ε/2 is one
+/// rounding.
 ///
-/// - A point of a face, a corner and two shares of edges, is rounded twice by ε/2 · M along each axis and by ε D for the
-///   products; its distance to `p` by 5/4 ε d. So one distance is off by e = √3 ε M + ε D + 5/4 ε d. Two faces nearer to
-///   each other than 2e cannot be distinguished and count as equal, so the distance of the face named is off by
-///   that and by e for each of the two: 4e < 8 ε M + 4 ε D + 5 ε d.
-/// - The shares are quotients of products of edges with `p` − corner: each moves the point along an edge by up to
-///   9 ε (D + d), the quotient of dots of three terms. That counts in full only where d is as small, once for either face.
-/// - The brute force works relative to a corner, so M does not enter: 7 ε (D + d), from the same products.
-/// - For each face the error of deciding inside from side: the normal of a face of quality q (height over longest edge L)
-///   is off by 3 ε/2 / q, and the foot by 16 ε L/q at most; but a mistake between two sides is never more than the height.
+/// - A point of a face, a corner and two shares of edges, is rounded twice by ε/2 · M along each
+///   axis and by ε D for the products; its distance to `p` by 5/4 ε d. So one distance is off by e
+///   = √3 ε M + ε D + 5/4 ε d. Two faces nearer to each other than 2e cannot be distinguished and
+///   count as equal, so the distance of the face named is off by that and by e for each of the two:
+///   4e < 8 ε M + 4 ε D + 5 ε d.
+/// - The shares are quotients of products of edges with `p` − corner: each moves the point along an
+///   edge by up to 9 ε (D + d), the quotient of dots of three terms. That counts in full only where
+///   d is as small, once for either face.
+/// - The brute force works relative to a corner, so M does not enter: 7 ε (D + d), from the same
+///   products.
+/// - For each face the error of deciding inside from side: the normal of a face of quality q
+///   (height over longest edge L) is off by 3 ε/2 / q, and the foot by 16 ε L/q at most; but a
+///   mistake between two sides is never more than the height.
 fn rounding(mesh: &TriMesh, p: &Point3<f64>, distance: f64) -> f64 {
     let coordinate = mesh
         .positions()
@@ -225,9 +231,11 @@ fn twenty_thousand_faces_after_five_thousand_edits() {
     }
 }
 
-// ---- inside and outside -----------------------------------------------------------------------------------------
+// ---- inside and outside
+// -----------------------------------------------------------------------------------------
 
-/// A prism over the polygon `outline` (convex, counter-clockwise seen from above) from z = −1 to z = 1, normals outside.
+/// A prism over the polygon `outline` (convex, counter-clockwise seen from above) from z = −1 to z
+/// = 1, normals outside.
 fn prism(outline: &[[f64; 2]]) -> TriMesh {
     let count = outline.len() as u32;
     let positions = [-1.0, 1.0]
@@ -255,8 +263,9 @@ fn outside(outline: &[[f64; 2]], p: &Point3<f64>) -> f64 {
     most
 }
 
-/// Points straight off every edge and corner in all directions, where two to six faces are equally near; also far from
-/// the origin and askew, where the closest point of each is rounded differently.
+/// Points straight off every edge and corner in all directions, where two to six faces are equally
+/// near; also far from the origin and askew, where the closest point of each is rounded
+/// differently.
 #[test]
 fn at_edges_and_corners_the_sign_separates_inside_from_outside() {
     let cube = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
@@ -317,7 +326,8 @@ fn at_edges_and_corners_the_sign_separates_inside_from_outside() {
     }
 }
 
-/// By hand: the ball over a ridge of 90° whose sides have their normals along +x and +z; the edge is the y axis.
+/// By hand: the ball over a ridge of 90° whose sides have their normals along +x and +z; the edge
+/// is the y axis.
 #[test]
 fn off_an_edge_the_face_that_the_point_is_most_squarely_above_is_named() {
     let p = Point3::new;
@@ -338,9 +348,9 @@ fn off_an_edge_the_face_that_the_point_is_most_squarely_above_is_named() {
     assert_eq!(face(0.2, 0.2), 0, "among equals the smallest id");
 }
 
-/// By hand: a point in the plane of a flat face, 0.6 off its open edge, 7e-5 from the end of that. A face that has only
-/// this corner in common is (7e-5)² / (2 · 0.6) = 4.1e-9 farther and lies squarely: more than rounding makes up for at
-/// 1e6 (4 √3 ε · 1e6 = 1.5e-9), so it is not named.
+/// By hand: a point in the plane of a flat face, 0.6 off its open edge, 7e-5 from the end of that.
+/// A face that has only this corner in common is (7e-5)² / (2 · 0.6) = 4.1e-9 farther and lies
+/// squarely: more than rounding makes up for at 1e6 (4 √3 ε · 1e6 = 1.5e-9), so it is not named.
 #[test]
 fn a_face_that_is_nearly_as_near_is_not_named() {
     for far in [0.0, 1e6] {
@@ -420,7 +430,8 @@ fn faces_at_one_place_are_all_searched() {
     check_query(&mesh, &tree, &Point3::new(0.0, 0.0, 2.5));
 }
 
-/// Where the hint leaves no distance at all, rounding of a needle's normal must not lose its own corner.
+/// Where the hint leaves no distance at all, rounding of a needle's normal must not lose its own
+/// corner.
 #[test]
 fn a_corner_of_a_needle_is_found_from_its_own_face() {
     let mut rng = Pcg64::seed_from_u64(11);

@@ -1,5 +1,5 @@
-//! The mesh from outside: closest face against brute force, triangles against exact arithmetic, inside and outside
-//! against winding numbers, adjacency against a rebuilt mesh.
+//! The mesh from outside: closest face against brute force, triangles against exact arithmetic,
+//! inside and outside against winding numbers, adjacency against a rebuilt mesh.
 
 mod adjacency;
 mod closest;
@@ -18,8 +18,8 @@ use crate::common::{grid, within};
 
 type Triangle = [Point3<f64>; 3];
 
-/// The point of a triangle nearest to `p`: the foot on its plane where that is inside, else the nearest of the feet on
-/// its three sides. The code under test goes by Voronoi regions instead.
+/// The point of a triangle nearest to `p`: the foot on its plane where that is inside, else the
+/// nearest of the feet on its three sides. The code under test goes by Voronoi regions instead.
 fn nearest(p: &Point3<f64>, t: &Triangle) -> Point3<f64> {
     let (p, t) = (p - t[0], t.map(|x| x - t[0]));
     let on_side = |a: Vector3<f64>, b: Vector3<f64>| {

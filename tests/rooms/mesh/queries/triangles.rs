@@ -23,8 +23,9 @@ proptest! {
         }
     }
 
-    /// Corners on a small lattice, where half of all pairs touch, overlap in a plane or share a point; the expected
-    /// answer is in exact integers. Parts that do not meet are at least 1e-3 apart there, far more than the gap.
+    /// Corners on a small lattice, where half of all pairs touch, overlap in a plane or share a
+    /// point; the expected answer is in exact integers. Parts that do not meet are at least 1e-3
+    /// apart there, far more than the gap.
     #[test]
     fn crossings_are_those_of_exact_arithmetic(cells in prop::array::uniform6(prop::array::uniform3(0i64..4))) {
         let real = cells.map(|[x, y, z]| Point3::new(x as f64, y as f64, z as f64));

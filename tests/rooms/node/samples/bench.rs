@@ -214,10 +214,12 @@ pub fn transform(
 
 /// Time passes in steps of this.
 const STEP: Duration = Duration::from_millis(5);
-/// What has not come by then never comes. It is time of the clock, which waits for all threads of the node.
+/// What has not come by then never comes. It is time of the clock, which waits for all threads of
+/// the node.
 const NEVER: Duration = Duration::from_secs(60);
 
-/// A node that runs, and the world around it. Its time stands still but for [`Self::pass`], and while somebody waits here.
+/// A node that runs, and the world around it. Its time stands still but for [`Self::pass`], and
+/// while somebody waits here.
 pub struct Bench {
     pub node: Node,
     pub world: OtherParticipants,
@@ -262,7 +264,8 @@ impl Bench {
         }
     }
 
-    /// All at once; none is dropped. Of many some time passes in between, in which they are taken down.
+    /// All at once; none is dropped. Of many some time passes in between, in which they are taken
+    /// down.
     pub fn feed<'a>(&self, messages: impl IntoIterator<Item = &'a Message>) {
         for (number, message) in (1..).zip(messages) {
             assert!(self.world.arrive_patiently(self.arrival(message)));

@@ -1,4 +1,5 @@
-//! A program that follows the mesh as docs/ros.md says, written from that and from MeshPatch.msg alone.
+//! A program that follows the mesh as docs/ros.md says, written from that and from MeshPatch.msg
+//! alone.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,5 @@
-//! The node without any network: what it makes of what arrives, in whatever order, and what others see of it.
+//! The node without any network: what it makes of what arrives, in whatever order, and what others
+//! see of it.
 
 pub mod bench;
 pub mod follower;
@@ -27,7 +28,8 @@ const FLUSH: Duration = Duration::from_millis(50);
 /// The parameter `stale_ms` where nobody sets it.
 const STALE: Duration = Duration::from_millis(100);
 
-/// Poses and wrenches each in their order, mixed at random: one stream can be far ahead of the other.
+/// Poses and wrenches each in their order, mixed at random: one stream can be far ahead of the
+/// other.
 fn interleaved(messages: &[Message], seed: u64) -> Vec<Message> {
     let is_pose = |message: &&Message| matches!(message, Message::Pose(_));
     let (poses, wrenches): (Vec<&Message>, Vec<&Message>) = messages.iter().partition(is_pose);
@@ -297,7 +299,8 @@ fn what_cannot_be_is_refused_and_counted_and_the_rest_goes_on() {
     );
 }
 
-/// A rig that carries the tracker moves while it looks: its transforms come after the poses that need them.
+/// A rig that carries the tracker moves while it looks: its transforms come after the poses that
+/// need them.
 #[test]
 fn poses_wait_for_the_transform_of_a_moving_frame_and_not_for_ever() {
     let plate = Plate::touched(0.05);
@@ -531,7 +534,8 @@ fn no_more_than_a_few_meshes_are_saved_at_a_time() {
         })
         .collect();
     let answers: Vec<_> = calls.iter().map(|call| bench.answer(call)).collect();
-    // how many are refused depends on how fast files are written: the bound itself is tested where the threads are
+    // how many are refused depends on how fast files are written: the bound itself is tested where
+    // the threads are
     let (saved, refused): (Vec<_>, Vec<_>) = answers.iter().partition(|answer| answer.success);
     println!("{} saved, {} refused", saved.len(), refused.len());
     assert!(!saved.is_empty());
@@ -547,7 +551,8 @@ fn no_more_than_a_few_meshes_are_saved_at_a_time() {
     );
 }
 
-/// The arrow goes from outside onto the place; onto a flag, of which nobody knows more, from the tip.
+/// The arrow goes from outside onto the place; onto a flag, of which nobody knows more, from the
+/// tip.
 #[test]
 fn the_tip_shows_where_to_touch_next() {
     let plate = Plate::touched(0.1);

@@ -400,7 +400,8 @@ proptest! {
     }
 }
 
-/// Arms that cannot move in some direction: stretched, the hand above the shoulder, axes 4 and 6 parallel.
+/// Arms that cannot move in some direction: stretched, the hand above the shoulder, axes 4 and 6
+/// parallel.
 #[test]
 fn where_an_arm_is_stuck_it_has_no_dexterity() {
     let arm = UrGeometry::UR5E;
@@ -422,7 +423,8 @@ fn where_an_arm_is_stuck_it_has_no_dexterity() {
     assert!(most < 2.0, "lengths are in units of the arm: {most}");
 }
 
-/// Force that a simulated arm reports, N in B, after it was zeroed upright and then turned by 60° about x.
+/// Force that a simulated arm reports, N in B, after it was zeroed upright and then turned by 60°
+/// about x.
 fn force_after_a_turn(configured_payload: Payload) -> Vector3<f64> {
     let payload = Payload {
         mass: 1.2,
@@ -459,8 +461,9 @@ fn force_after_a_turn(configured_payload: Payload) -> Vector3<f64> {
     sum / f64::from(states)
 }
 
-/// After zeroing, an uncompensated weight acts as a force once the sensor turns: Δw − R Δw with Δw of 1 kg; a correct
-/// payload leaves none. The noise of the zero (64 readings of 0.15 N) is 0.02 N on each axis.
+/// After zeroing, an uncompensated weight acts as a force once the sensor turns: Δw − R Δw with Δw
+/// of 1 kg; a correct payload leaves none. The noise of the zero (64 readings of 0.15 N) is 0.02 N
+/// on each axis.
 #[test]
 fn a_wrong_payload_shows_as_a_force_when_the_sensor_turns() {
     let weight = Vector3::new(0.0, 0.0, -9.81);

@@ -94,7 +94,8 @@ proptest! {
         prop_assert!(far < 1e-9, "{by_search:?} {in_closed_form:?}");
     }
 
-    /// The shortest of all turnings that move the flange so: any other has a part that moves nothing, at a right angle to it.
+    /// The shortest of all turnings that move the flange so: any other has a part that moves
+    /// nothing, at a right angle to it.
     #[test]
     fn the_joints_turn_no_more_than_a_velocity_needs(
         shares in prop::array::uniform7(0.1..0.9f64), velocity in prop::array::uniform6(-0.1..0.1f64)
@@ -119,7 +120,8 @@ proptest! {
     }
 }
 
-/// A square of 200 mm before the arm, a millimetre at a time: no joint turns by more than the fastest that the least dexterity allows.
+/// A square of 200 mm before the arm, a millimetre at a time: no joint turns by more than the
+/// fastest that the least dexterity allows.
 #[test]
 fn joints_go_on_smoothly_along_straight_ways() {
     let arm = ArmGeometry::from(seven_joints());
@@ -160,7 +162,8 @@ fn joints_go_on_smoothly_along_straight_ways() {
 #[test]
 fn an_arm_at_the_end_of_a_range_goes_round_it_or_names_the_joint() {
     let arm = ArmGeometry::from(seven_joints());
-    // about the vertical through the base: 150° by the first joint, and no more than 166° are in its range
+    // about the vertical through the base: 150° by the first joint, and no more than 166° are in
+    // its range
     let pose = |degrees: f64| {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), degrees.to_radians());
         let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
@@ -175,7 +178,8 @@ fn an_arm_at_the_end_of_a_range_goes_round_it_or_names_the_joint() {
         joints[0] <= 2.8973 && joints[2].abs() > 0.1,
         "the third joint does what the first cannot: {joints:?}"
     );
-    // six joints have no other way: a chain whose second joint goes no farther than 10° beyond where it is
+    // six joints have no other way: a chain whose second joint goes no farther than 10° beyond
+    // where it is
     let ur = UrGeometry::UR5E;
     let whole = ur_chain(&ur, 0.05);
     let now = Joints::from([0.3, -1.2, 1.4, -0.9, 1.1, 0.4]);

@@ -66,7 +66,8 @@ fn down(params: &ArmParams, place: [f64; 3]) -> TouchTarget {
     }
 }
 
-/// Where the ball is when it just touches is known: a radius above the top, a radius inside the wall of the hole.
+/// Where the ball is when it just touches is known: a radius above the top, a radius inside the
+/// wall of the hole.
 #[test]
 fn the_contact_is_where_the_ball_touches_and_not_where_the_arm_rests() {
     let plate = Plate::default();
@@ -261,7 +262,8 @@ fn hole_search(flag: &Point3<f64>) -> Explorer {
     .unwrap()
 }
 
-/// From a click up to 3 mm off and no size: place and diameter of both holes of the plate, which are known in closed form.
+/// From a click up to 3 mm off and no size: place and diameter of both holes of the plate, which
+/// are known in closed form.
 #[test]
 fn a_hole_is_found_from_one_click_and_measured() {
     let plate = Plate::default();
@@ -382,8 +384,8 @@ fn an_obstacle_stops_it() {
     assert!(arm.time() - arm.at_rest_since() > 0.1);
 }
 
-/// However fast a link is asked for, and whether it leads to or from the part: what it meets is pressed with no more than the limit,
-/// and not pressed any more in the end.
+/// However fast a link is asked for, and whether it leads to or from the part: what it meets is
+/// pressed with no more than the limit, and not pressed any more in the end.
 #[test]
 fn a_link_that_meets_something_rigid_keeps_the_limit_of_force_and_comes_free() {
     let plate = Plate::default();
@@ -448,8 +450,8 @@ fn a_link_that_meets_something_rigid_keeps_the_limit_of_force_and_comes_free() {
     }
 }
 
-/// The way out of the hole leans into its wall, by 0.25 mm at the rim: pressed in by that the ball would feel 3.75 N. It goes off the wall and
-/// on.
+/// The way out of the hole leans into its wall, by 0.25 mm at the rim: pressed in by that the ball
+/// would feel 3.75 N. It goes off the wall and on.
 #[test]
 fn a_wall_beside_the_way_out_is_no_obstacle() {
     let (plate, params) = (Plate::default(), ArmParams::default());
@@ -591,7 +593,8 @@ fn a_sensor_that_feels_something_is_not_zeroed() {
     }
 }
 
-/// Whatever happens in the middle of a search, the arm is at rest within 200 ms, and the reported cause is the true one.
+/// Whatever happens in the middle of a search, the arm is at rest within 200 ms, and the reported
+/// cause is the true one.
 #[test]
 fn after_each_fault_the_arm_is_at_rest_and_the_reported_reason_is_true() {
     let (plate, params) = (Plate::default(), ArmParams::default());
@@ -678,7 +681,8 @@ fn after_each_fault_the_arm_is_at_rest_and_the_reported_reason_is_true() {
     }
 }
 
-/// From its 500th state on the arm says that it moves ten times as fast, that a joint turns by itself, or that its clock was set back.
+/// From its 500th state on the arm says that it moves ten times as fast, that a joint turns by
+/// itself, or that its clock was set back.
 #[test]
 fn an_arm_that_is_too_fast_or_whose_clock_goes_back_is_stopped() {
     let (plate, params) = (Plate::default(), ArmParams::default());
@@ -807,8 +811,8 @@ impl Arm for Creeping {
     }
 }
 
-/// 10 mm/s is no rest, and it is not waited for without end: three times the 0.2 s that a stop from 0.1 m/s with 0.5 m/s² takes,
-/// and two seconds.
+/// 10 mm/s is no rest, and it is not waited for without end: three times the 0.2 s that a stop from
+/// 0.1 m/s with 0.5 m/s² takes, and two seconds.
 #[test]
 fn an_arm_that_creeps_is_not_at_rest() {
     let (mut arm, mut onlooker) = (Creeping { stamp_ns: 0 }, Onlooker);
@@ -822,7 +826,8 @@ fn an_arm_that_creeps_is_not_at_rest() {
     assert!((arm.stamp_ns as f64 * 1e-9 - 2.6).abs() < 0.01);
 }
 
-/// It turns on the spot no faster than it can, and ends where it should: 0.7 rad at 0.5 rad/s take 1.4 s.
+/// It turns on the spot no faster than it can, and ends where it should: 0.7 rad at 0.5 rad/s take
+/// 1.4 s.
 #[test]
 fn an_arm_turns_on_the_spot_with_limited_speed() {
     let (plate, params) = (Plate::default(), ArmParams::default());
@@ -969,7 +974,8 @@ fn places_that_cannot_be_are_refused_before_anything_moves() {
     ));
 }
 
-/// One feature of the plate, from a click up to 3 mm off: the result, the touches and the largest force.
+/// One feature of the plate, from a click up to 3 mm off: the result, the touches and the largest
+/// force.
 fn explored_from(
     kind: Kind,
     near: Point3<f64>,

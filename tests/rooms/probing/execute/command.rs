@@ -61,11 +61,13 @@ fn probe(folder: &Path, change: impl Fn(String) -> String, more: &[&str]) -> Out
     touchup(&[&arguments, more].concat())
 }
 
-/// The features of the plate are known by its drawing: each is found from one click up to 3 mm off by an arm that differs from what is told of
-/// it, its numbers within three of their uncertainties with fewer than 40 touches each, and no force is above 1.5 times the 3 N that are set.
+/// The features of the plate are known by its drawing: each is found from one click up to 3 mm off
+/// by an arm that differs from what is told of it, its numbers within three of their uncertainties
+/// with fewer than 40 touches each, and no force is above 1.5 times the 3 N that are set.
 #[test]
 fn the_arm_of_the_demo_finds_every_feature() {
-    // with seed 8, one of the slow proofs, the ball slides over a rim first, and one touch alone measures an end of the slot
+    // with seed 8, one of the slow proofs, the ball slides over a rim first, and one touch alone
+    // measures an end of the slot
     for seed in &["1", "8"][..either(1, 2)] {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().to_str().unwrap();
@@ -81,7 +83,8 @@ fn the_arm_of_the_demo_finds_every_feature() {
             for number in error["numbers"].as_array().unwrap() {
                 let [off, expanded] =
                     ["error_mm", "expanded_mm"].map(|key| number[key].as_f64().unwrap());
-                // three standard uncertainties, and no more than the tolerance of the scene leads to
+                // three standard uncertainties, and no more than the tolerance of the scene leads
+                // to
                 assert!(
                     off.abs() < 1.5 * expanded && expanded < 0.25,
                     "{name}: {number}"
@@ -136,8 +139,8 @@ fn is_written(folder: &Path) {
     assert!(fs::read(&again).unwrap() == fs::read(path("refined.ply")).unwrap());
 }
 
-/// The part of the demo is as round as its drawing: a hole that is probed on its triangles has the drawing's diameter of 8 mm and
-/// its place within three of the reported standard deviations.
+/// The part of the demo is as round as its drawing: a hole that is probed on its triangles has the
+/// drawing's diameter of 8 mm and its place within three of the reported standard deviations.
 fn errors_match_the_stated_uncertainty(folder: &Path) {
     let path = |name: &str| folder.join(name).to_str().unwrap().to_owned();
     let (scene, truth, out) = (path("scene.yaml"), path("truth.ply"), path("again"));
@@ -168,7 +171,8 @@ fn errors_match_the_stated_uncertainty(folder: &Path) {
 #[test]
 fn slides_bring_the_mesh_to_the_part() {
     let plate = Plate::default();
-    // mean distance from the drawing of the vertices around the hole, above the bottom of the plate, mm
+    // mean distance from the drawing of the vertices around the hole, above the bottom of the
+    // plate, mm
     let off = |folder: &Path| {
         let MeshFile { mesh, .. } =
             read_mesh(&folder.join("out/refined.ply"), MeshUnit::Millimetre).unwrap();
@@ -297,8 +301,8 @@ fn a_dry_run_connects_to_no_arm() {
     );
 }
 
-/// The part lies 2 mm below its scan, farther than the scan's noise explains: `refine` and `probe` refuse that by the same words, and what was
-/// touched is kept.
+/// The part lies 2 mm below its scan, farther than the scan's noise explains: `refine` and `probe`
+/// refuse that by the same words, and what was touched is kept.
 #[test]
 fn what_is_surely_wrong_becomes_a_mesh_only_when_forced() {
     let folder = tempfile::tempdir().unwrap();
@@ -389,7 +393,8 @@ fn what_is_surely_wrong_becomes_a_mesh_only_when_forced() {
     );
 }
 
-/// The scan has closed the slot: four of five contacts are off it. That is what an arm is sent for, and no mistake.
+/// The scan has closed the slot: four of five contacts are off it. That is what an arm is sent for,
+/// and no mistake.
 #[test]
 fn what_the_scan_has_lost_is_probed_without_force() {
     let folder = tempfile::tempdir().unwrap();
@@ -595,8 +600,9 @@ const SPHERES: [&str; 8] = [
     "30,150,60,25",
 ];
 
-/// The errors are drawn by the simulator from the seed: a ball that is larger by so much, a repeatability of 0.03 mm, and no error of joints and
-/// lengths, so that the spheres are where they are told but for the scatter of touches.
+/// The errors are drawn by the simulator from the seed: a ball that is larger by so much, a
+/// repeatability of 0.03 mm, and no error of joints and lengths, so that the spheres are where they
+/// are told but for the scatter of touches.
 #[test]
 fn spheres_say_how_well_an_arm_repeats_and_how_large_its_ball_is_and_the_record_is_in_each_result()
 {
@@ -845,8 +851,8 @@ fn identify_payload(folder: &Path, change: impl Fn(String) -> String, more: &[&s
     touchup(&[&["calibrate", "payload"], &with[..], more].concat())
 }
 
-/// The scene says 0.25 kg in the middle; the true payload is four times as heavy and off the axis. The biases are those that
-/// `ArmParams` has.
+/// The scene says 0.25 kg in the middle; the true payload is four times as heavy and off the axis.
+/// The biases are those that `ArmParams` has.
 #[test]
 fn the_payload_is_identified_within_its_stated_uncertainty() {
     for seed in ["1", "2", "3"] {
@@ -1010,7 +1016,8 @@ fn a_tip_that_cannot_be_found_is_refused_and_nothing_is_written() {
     }
 }
 
-/// Where the wrist would come too near to a singularity an orientation is left out and listed; the others suffice.
+/// Where the wrist would come too near to a singularity an orientation is left out and listed; the
+/// others suffice.
 #[test]
 fn orientations_out_of_reach_are_left_out_and_listed() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! A probing that is ended from outside: what was measured is there, the reason is told, and `--resume` goes on.
+//! A probing that is ended from outside: what was measured is there, the reason is told, and
+//! `--resume` goes on.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -65,7 +66,8 @@ impl Case {
         self.command(out, more).output().unwrap()
     }
 
-    /// Starts a probing of [`FEATURES`], and freezes it in the middle of the second one: the first is finished then.
+    /// Starts a probing of [`FEATURES`], and freezes it in the middle of the second one: the first
+    /// is finished then.
     fn frozen_in_second(&self, out: &str) -> Child {
         let mut child = self.command(out, &FEATURES).spawn().unwrap();
         let begun = Instant::now();
@@ -152,8 +154,8 @@ fn recording_holds(touches: &[TouchLine], stamps: &[i64]) {
     }
 }
 
-/// The features are those of a probing that nobody interrupted: sizes and places agree within three standard deviations of their
-/// difference.
+/// The features are those of a probing that nobody interrupted: sizes and places agree within three
+/// standard deviations of their difference.
 fn found_as_by(whole: &[Value], resumed: &[Value]) {
     assert_eq!(whole.len(), resumed.len());
     for (one, other) in whole.iter().zip(resumed) {
@@ -398,14 +400,16 @@ fn a_payload_identification_that_is_interrupted_keeps_its_static_segments() {
     assert!(stderr.contains(&words), "{stderr}");
     assert!(!out.exists(), "nothing is concluded from a part of them");
 
-    // what is kept of a whole one is what the payload was identified from: its weight is that of 1.17 kg
+    // what is kept of a whole one is what the payload was identified from: its weight is that of
+    // 1.17 kg
     assert_eq!(identify(&kept).output().unwrap().status.code(), Some(0));
     let all = read_static_poses(&path).unwrap();
     let forces: Vec<_> = all
         .iter()
         .map(|(r_bf, wrench)| r_bf * wrench.force)
         .collect();
-    // the bias turns with the flange, the weight does not: the mean over a cone has little of what lies across it
+    // the bias turns with the flange, the weight does not: the mean over a cone has little of what
+    // lies across it
     let mean = forces.iter().sum::<nalgebra::Vector3<f64>>() / forces.len() as f64;
     assert!(
         (mean.norm() - 1.17 * 9.81).abs() < 1.3,

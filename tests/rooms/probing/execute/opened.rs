@@ -1,4 +1,5 @@
-//! A hole that was touched already is open in the mesh: its flag is on the surface around it, not on a wall or floor of it.
+//! A hole that was touched already is open in the mesh: its flag is on the surface around it, not
+//! on a wall or floor of it.
 
 use std::sync::Arc;
 
@@ -16,7 +17,8 @@ use super::static_scan::StaticScan;
 use super::{cell, params};
 use crate::plate_stream::plate_scan;
 
-/// The mesh that follows what the arm feels, as the node has it; it has the arm stay after some states.
+/// The mesh that follows what the arm feels, as the node has it; it has the arm stay after some
+/// states.
 struct RefinedScan {
     engine: Engine,
     cell: Cell,
@@ -86,7 +88,8 @@ impl World for RefinedScan {
     fn publish(&mut self, _: &Progress) {}
 }
 
-/// The through hole of the plate, Ø 8 mm at (16, 36) mm in its top at 12 mm, flagged at a height (m).
+/// The through hole of the plate, Ø 8 mm at (16, 36) mm in its top at 12 mm, flagged at a height
+/// (m).
 fn hole(height: f64) -> Flag {
     Flag {
         id: 7,
@@ -117,7 +120,8 @@ fn diameter(probed: &Probed) -> Option<f64> {
     )
 }
 
-/// After 25 s in it the mesh has walls, and a floor where the ball has not been; a tap into the hole flags it there.
+/// After 25 s in it the mesh has walls, and a floor where the ball has not been; a tap into the
+/// hole flags it there.
 #[test]
 fn a_hole_in_which_the_arm_was_stopped_is_probed_to_the_end_when_it_is_flagged_in_its_opening() {
     let (plate, cell, params) = (Plate::default(), cell(), params());
@@ -150,7 +154,8 @@ fn planned(mesh: TriMesh, flag: &Flag) -> Plan {
     plan(&cell(), &params(), &StaticScan::new(mesh), flag, &now, None).unwrap()
 }
 
-/// The drawing of the plate has its openings open: of the floors of slot and blind hole nothing of the plan may depend.
+/// The drawing of the plate has its openings open: of the floors of slot and blind hole nothing of
+/// the plan may depend.
 #[test]
 fn a_plan_for_what_is_open_begins_above_the_surface_around_it_wherever_the_flag_is() {
     // through hole, blind hole with its floor at 4 mm, slot with its floor at 7 mm
@@ -186,8 +191,8 @@ fn a_plan_for_what_is_open_begins_above_the_surface_around_it_wherever_the_flag_
     }
 }
 
-/// What is no opening lies on what is nearest to its flag: on top of the boss, 4 mm above the plate around it, and at the edge of
-/// the step.
+/// What is no opening lies on what is nearest to its flag: on top of the boss, 4 mm above the plate
+/// around it, and at the edge of the step.
 #[test]
 fn flags_of_what_is_no_opening_are_on_what_is_nearest() {
     let mesh = || Plate::default().mesh(1e-5).unwrap();

@@ -1,4 +1,5 @@
-//! From a flag to a feature: paths that keep clear, limits that hold, and a true reason for every ending.
+//! From a flag to a feature: paths that keep clear, limits that hold, and a true reason for every
+//! ending.
 
 use std::path::PathBuf;
 
@@ -96,7 +97,8 @@ fn a_flag_becomes_a_feature() {
     );
 }
 
-/// The same with an arm that is no UR: the planner's ways, the joints of the states and the checks are those of seven joints.
+/// The same with an arm that is no UR: the planner's ways, the joints of the states and the checks
+/// are those of seven joints.
 #[test]
 fn a_flag_becomes_a_feature_with_seven_joints_as_with_a_ur() {
     let chain = seven_joints();
@@ -204,7 +206,8 @@ fn a_cancelled_probing_stops_and_retracts() {
     assert!(end[2] > 14e-3, "{end:?}");
 }
 
-/// Wherever it is when it is cancelled, the retreat does not lead deeper: from 50 mm/s a stop takes 2.5 mm.
+/// Wherever it is when it is cancelled, the retreat does not lead deeper: from 50 mm/s a stop takes
+/// 2.5 mm.
 #[test]
 fn a_cancelled_probing_goes_no_deeper() {
     // every segment of its path, also between the places of the retreat
@@ -344,7 +347,8 @@ fn a_stop_keeps_the_force_and_the_time_of_the_touch_that_it_ended() {
     assert!((lost.seconds - 20.0).abs() < 0.3, "{}", lost.seconds);
 }
 
-/// The scan lies 0.3 mm below the part, and follows as soon as the part is touched: the first touch measures the offset.
+/// The scan lies 0.3 mm below the part, and follows as soon as the part is touched: the first touch
+/// measures the offset.
 #[test]
 fn the_deviation_of_a_touch_is_from_the_mesh_before_it() {
     let (plate, cell) = (Plate::default(), cell());
@@ -438,8 +442,8 @@ impl World for Turning {
     }
 }
 
-/// A probe that leans by 50° low over the part is turned upright: its shaft stays clear of the part by its closed form, and no
-/// state turns faster than the arm can.
+/// A probe that leans by 50° low over the part is turned upright: its shaft stays clear of the part
+/// by its closed form, and no state turns faster than the arm can.
 #[test]
 fn a_leaning_probe_is_turned_slowly_and_clear_of_the_part() {
     let (plate, cell) = (Plate::default(), cell());
@@ -514,7 +518,8 @@ fn a_turn_that_would_meet_a_wall_is_made_above_it() {
 }
 
 proptest! {
-    /// The room of a ball and a shaft among places of a mesh in closed form: the distance of a place from a segment.
+    /// The room of a ball and a shaft among places of a mesh in closed form: the distance of a
+    /// place from a segment.
     #[test]
     fn room_is_never_more_than_there_is(
         places in prop::collection::vec([-30e-3..30e-3f64, -30e-3..30e-3f64, -10e-3..80e-3f64], 1..6),
@@ -659,7 +664,8 @@ struct Moves {
     around: usize,
 }
 
-/// Ball and shaft keep their radii and the margin all along a move; `shaft`: where its direction is known.
+/// Ball and shaft keep their radii and the margin all along a move; `shaft`: where its direction is
+/// known.
 fn check_move(
     triangles: &Triangles,
     tool: &Tool,
@@ -693,8 +699,9 @@ fn check_move(
     least
 }
 
-/// For any part: no plan leaves the box, and no move through free air brings ball or shaft nearer to the mesh than their radii and the
-/// margin. Distances come from another method than the tree's: all triangles, one after the other.
+/// For any part: no plan leaves the box, and no move through free air brings ball or shaft nearer
+/// to the mesh than their radii and the margin. Distances come from another method than the tree's:
+/// all triangles, one after the other.
 #[test]
 fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
     let is_full = crate::full::is_full();

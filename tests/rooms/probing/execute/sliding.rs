@@ -1,4 +1,5 @@
-//! The ball slides over what touches have found, with constant force: on a plate whose distance from every place is exact.
+//! The ball slides over what touches have found, with constant force: on a plate whose distance
+//! from every place is exact.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use touchup::features::Kind;
@@ -56,8 +57,8 @@ fn probed(flag: &Flag, world: &mut dyn World) -> (Probed, Point3<f64>) {
     (probed, arm.ball())
 }
 
-/// The ball just touches at each station, and its normal leads away from where it does; lifted, and on the whole path up, it is
-/// clear.
+/// The ball just touches at each station, and its normal leads away from where it does; lifted, and
+/// on the whole path up, it is clear.
 fn lies_on(plate: &Plate, slide: &Slide) {
     for (number, station) in slide.stations.iter().enumerate() {
         let off = plate.signed_distance(&station.centre) - BALL;

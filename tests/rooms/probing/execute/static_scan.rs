@@ -1,4 +1,5 @@
-//! A scan that no touch changes, as the world of an arm: it can have the arm stop, and keeps what it saw.
+//! A scan that no touch changes, as the world of an arm: it can have the arm stop, and keeps what
+//! it saw.
 
 use nalgebra::Point3;
 use touchup::mesh::{FaceHit, FaceTree, TriMesh};

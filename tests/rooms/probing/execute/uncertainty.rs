@@ -1,4 +1,5 @@
-//! An arm that differs from what is told of it: the errors of the numbers are as large as their stated uncertainties.
+//! An arm that differs from what is told of it: the errors of the numbers are as large as their
+//! stated uncertainties.
 
 use std::fmt::Write as _;
 
@@ -21,11 +22,13 @@ struct World {
     sigmas: ArmErrorSigmas,
     /// standard deviation, m
     wanted: f64,
-    /// whether directions are off by more than what walls are believed to lean by, which those of the plate do not
+    /// whether directions are off by more than what walls are believed to lean by, which those of
+    /// the plate do not
     turns: bool,
 }
 
-/// Sizes of the first are off by the radius, which all touches share; of the second by what they scatter.
+/// Sizes of the first are off by the radius, which all touches share; of the second by what they
+/// scatter.
 const WORLDS: [World; 2] = [
     World {
         name: "rough",
@@ -41,7 +44,8 @@ const WORLDS: [World; 2] = [
     },
 ];
 
-/// 10 % of the stiffness, 0.05 mm of the radius, 0.2 mm and 0.2° of the place, 0.05 mm of repeatability.
+/// 10 % of the stiffness, 0.05 mm of the radius, 0.2 mm and 0.2° of the place, 0.05 mm of
+/// repeatability.
 const ROUGH: ArmErrorSigmas = ArmErrorSigmas {
     stiffness: 0.1,
     radius: 50e-6,
@@ -56,7 +60,8 @@ const ROUGH: ArmErrorSigmas = ArmErrorSigmas {
 /// The middle of the plate.
 const ABOUT: Point3<f64> = Point3::new(30e-3, 25e-3, 12e-3);
 
-/// A feature of the plate by its drawing: where it is, its axis, across which directions its place counts, and its sizes, m.
+/// A feature of the plate by its drawing: where it is, its axis, across which directions its place
+/// counts, and its sizes, m.
 struct Drawn {
     name: &'static str,
     kind: Kind,
@@ -114,8 +119,8 @@ const DRAWN: [Drawn; 5] = [
 type Normalised = (f64, f64, Vec<f64>);
 
 impl Drawn {
-    /// The numbers are in the frame of the scan, which is that of the drawing: that the part lies elsewhere in the base than is told is an
-    /// error of each place and direction.
+    /// The numbers are in the frame of the scan, which is that of the drawing: that the part lies
+    /// elsewhere in the base than is told is an error of each place and direction.
     fn normalised(&self, found: &Feature) -> Normalised {
         let (place, axis) = (Point3::from(self.place), self.axis);
         let off = found.centre.value - place;
@@ -225,9 +230,10 @@ fn rms(errors: &[f64]) -> f64 {
     (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt()
 }
 
-/// Of χ² with 6 degrees of freedom 0.0001 lies below 0.1 and as much above 27.9, so that the rms of 6 errors of one dimension over their
-/// deviation is 0.13 to 2.16; more dimensions scatter less. With `--full` it is 200 errors, within what is asked of 50, 0.8 to 1.25: of 50 the
-/// rms of a size scatters by 0.1. All are found. The errors of each feature are drawn apart.
+/// Of χ² with 6 degrees of freedom 0.0001 lies below 0.1 and as much above 27.9, so that the rms of
+/// 6 errors of one dimension over their deviation is 0.13 to 2.16; more dimensions scatter less.
+/// With `--full` it is 200 errors, within what is asked of 50, 0.8 to 1.25: of 50 the rms of a size
+/// scatters by 0.1. All are found. The errors of each feature are drawn apart.
 #[test]
 fn errors_are_as_large_as_stated_where_told_values_are_wrong() {
     let (seeds, [least, most]) = (either(6, 200), either([0.13, 2.16], [0.8, 1.25]));

@@ -1,4 +1,5 @@
-//! An arm that was stopped inside of a feature goes on from there once it is recovered, by the way that it came.
+//! An arm that was stopped inside of a feature goes on from there once it is recovered, by the way
+//! that it came.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use touchup::features::Kind;
@@ -38,7 +39,8 @@ fn arm(plate: &Plate) -> SimArm<'_> {
     SimArm::new(plate, ArmParams::default(), &start).unwrap()
 }
 
-/// Probes until it is stopped after some states; where the ball stands then, and the way out of there.
+/// Probes until it is stopped after some states; where the ball stands then, and the way out of
+/// there.
 fn stopped(arm: &mut SimArm, stays_after: usize) -> (Point3<f64>, Option<WayOut>) {
     let (cell, params, mut world) = (cell(), params(), stopping(Some(stays_after)));
     let mut prober = Prober::new(arm, &cell, &params, &mut world);

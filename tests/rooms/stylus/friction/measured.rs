@@ -1,7 +1,9 @@
-//! Real streams: a robot's ball sliding over phantoms under force control, with nothing known of them.
+//! Real streams: a robot's ball sliding over phantoms under force control, with nothing known of
+//! them.
 //!
-//! The reference is a quadratic surface through the ball's centres within 4 mm, of all passes but the one in question: the
-//! centres lie on an offset of the surface, which has the same normals. No force enters it but for its sign.
+//! The reference is a quadratic surface through the ball's centres within 4 mm, of all passes but
+//! the one in question: the centres lie on an offset of the surface, which has the same normals. No
+//! force enters it but for its sign.
 
 use std::fs;
 use std::path::Path;
@@ -26,9 +28,10 @@ const GAP_NS: i64 = 200_000_000;
 
 /// Each recording, and the largest share of the raw force's error that may be left.
 ///
-/// More than half is left in zone2. A constant 0.10 N beside 0.21 N of contact explains it: a bias of the sensor, which the
-/// stream never shows in free air. The mean force of passes to and fro, which has no friction, is as wrong there (22°), and
-/// with that constant taken out 5° are left of 20°.
+/// More than half is left in zone2. A constant 0.10 N beside 0.21 N of contact explains it: a bias
+/// of the sensor, which the stream never shows in free air. The mean force of passes to and fro,
+/// which has no friction, is as wrong there (22°), and with that constant taken out 5° are left of
+/// 20°.
 const FILES: [(&str, f64); 6] = [
     ("KidneyZ1-21Oct.csv", 0.5),
     ("KidneyZ2-21Oct.csv", 0.5),
@@ -60,8 +63,8 @@ fn tips(path: &Path) -> Vec<Tip> {
     tips
 }
 
-/// Normal at `at` of the surface through the centres around it, on the side of `force`; `None` where other passes are too
-/// few or all in line.
+/// Normal at `at` of the surface through the centres around it, on the side of `force`; `None`
+/// where other passes are too few or all in line.
 fn reference(touches: &[TipTouch], at: usize, force: &Vector3<f64>) -> Option<Vector3<f64>> {
     let here = touches[at];
     let near = |touch: &&TipTouch| {

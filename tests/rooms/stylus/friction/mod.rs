@@ -1,7 +1,7 @@
 //! The estimated normal and friction, against simulated touches of surfaces known in closed form.
 //!
-//! The stylus of the simulator adds friction, noise and clock errors; the truth is the surface's own normal under the
-//! true centre. `--nocapture` or `--show-output` shows the tables.
+//! The stylus of the simulator adds friction, noise and clock errors; the truth is the surface's
+//! own normal under the true centre. `--nocapture` or `--show-output` shows the tables.
 
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use touchup::reconstruct::{TouchFinder, TouchFinderParams};
@@ -148,7 +148,8 @@ impl Stream {
 }
 
 impl Stream {
-    /// Median of what friction really was, force along over force across: in the simulator it rises with the speed.
+    /// Median of what friction really was, force along over force across: in the simulator it rises
+    /// with the speed.
     fn true_friction(&self) -> f64 {
         let of = |moment: &Moment| {
             let normal = moment.contacts.first()?.normal;
@@ -260,8 +261,9 @@ fn the_median_normal_of_a_sliding_ball_is_within_three_degrees_whatever_the_fric
                 "the raw force errs by atan mu: {} {expected}",
                 raw[0]
             );
-            // with the most noise a tenth is worse, at less than 20 mm/s: the path along the surface is off by φ σᵥ / v, which
-            // is 2.8° for μ = 0.4 at 15 mm/s, one standard deviation
+            // with the most noise a tenth is worse, at less than 20 mm/s: the path along the
+            // surface is off by φ σᵥ / v, which is 2.8° for μ = 0.4 at 15 mm/s, one standard
+            // deviation
             let [[median, worse], [past_median, past_worse]] = if pose_noise > 0.1e-3 {
                 [[2.0, 4.5], [3.0, 7.0]]
             } else {

@@ -8,11 +8,11 @@ use crate::mesh::{FaceTree, TriMesh};
 /// Settings of [`super::align_features`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FeaturesParams {
-    /// By how much features may be out of place beyond three standard uncertainties, over the size of the target. Default
-    /// 0.01: 1 mm on a part of 100 mm, as a poor scan has them.
+    /// By how much features may be out of place beyond three standard uncertainties, over the size
+    /// of the target. Default 0.01: 1 mm on a part of 100 mm, as a poor scan has them.
     pub tolerance: f64,
-    /// By how much diameters and widths may differ beyond three standard uncertainties, over their size. Default 0.05:
-    /// the flats of a hole of 12 sides lie 3.4 % inside.
+    /// By how much diameters and widths may differ beyond three standard uncertainties, over their
+    /// size. Default 0.05: the flats of a hole of 12 sides lie 3.4 % inside.
     pub size_tolerance: f64,
 }
 
@@ -52,13 +52,13 @@ pub struct Alternative {
     pub source_to_target: Isometry3<f64>,
     /// Matched features: numbers in the lists of source and target.
     pub explained: Vec<[usize; 2]>,
-    /// Share of the points that lie on the target, within three times the tolerance, with normals alike; `None` without
-    /// surfaces.
+    /// Share of the points that lie on the target, within three times the tolerance, with normals
+    /// alike; `None` without surfaces.
     pub agreeing: Option<f64>,
     /// How the surfaces fit; `None` without surfaces, or where the fit did not converge.
     pub icp: Option<IcpFit>,
-    /// Against the first alternative: rotation vector, rad, and shift of the middle of the features, m; in the frame of the
-    /// target.
+    /// Against the first alternative: rotation vector, rad, and shift of the middle of the
+    /// features, m; in the frame of the target.
     pub differs: [Vector3<f64>; 2],
 }
 

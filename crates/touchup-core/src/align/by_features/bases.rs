@@ -1,4 +1,5 @@
-//! Small sets of features that determine a motion: for each a frame and its invariants under rigid motions.
+//! Small sets of features that determine a motion: for each a frame and its invariants under rigid
+//! motions.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
@@ -38,7 +39,8 @@ pub(super) struct Base {
 const LEAST_SINE: f64 = 0.26;
 /// Cosines of the same set differ by no more than this: 4° where it is most sensitive.
 const COSINES: f64 = 0.07;
-/// Features with a place and an axis that make pairs, at most; the first of the list, which are the largest of their kind.
+/// Features with a place and an axis that make pairs, at most; the first of the list, which are the
+/// largest of their kind.
 const MOST_LOCATED: usize = 150;
 
 fn frame(first: &Vector3<f64>, second: &Vector3<f64>) -> Option<Matrix3<f64>> {
@@ -52,7 +54,8 @@ fn frame(first: &Vector3<f64>, second: &Vector3<f64>) -> Option<Matrix3<f64>> {
 
 /// All sets.
 ///
-/// - `all_frames`: also from the other end of what goes through, and each turn of a corner: of one side of a match alone.
+/// - `all_frames`: also from the other end of what goes through, and each turn of a corner: of one
+///   side of a match alone.
 pub(super) fn bases(landmarks: &[Landmark], all_frames: bool) -> Vec<Base> {
     let located = landmarks
         .iter()

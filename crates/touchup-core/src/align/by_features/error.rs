@@ -72,7 +72,8 @@ pub enum FeaturesError {
     FreeTurn {
         /// about which axis
         turn: FreeTurn,
-        /// one motion for each orientation of the axis on the other, the best first, each with one turn of all
+        /// one motion for each orientation of the axis on the other, the best first, each with one
+        /// turn of all
         alternatives: Vec<Alternative>,
     },
     /// Several motions are about as good: a symmetric part, or too little of it was seen.

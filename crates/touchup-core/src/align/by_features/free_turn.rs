@@ -17,14 +17,15 @@ pub struct FreeTurn {
     pub through: Point3<f64>,
 }
 
-/// Turns that are tried, each by [`STEP`] more: 16 do not meet the symmetry of any part of fewer holes.
+/// Turns that are tried, each by [`STEP`] more: 16 do not meet the symmetry of any part of fewer
+/// holes.
 const TURNS: u32 = 16;
 /// The golden angle, rad: no multiple of it comes near one before.
 const STEP: f64 = 2.399_963_229_728_653;
 
 impl Judge<'_> {
-    /// The axis about which a motion may be turned and explains as much: all features that it explains lie about it, and so
-    /// does the surface where it is given.
+    /// The axis about which a motion may be turned and explains as much: all features that it
+    /// explains lie about it, and so does the surface where it is given.
     pub(super) fn free_turn(&self, best: &Judged) -> Option<FreeTurn> {
         let explained: Vec<&Landmark> = best
             .explained()

@@ -18,21 +18,23 @@ const SCATTERS: f64 = 4.0;
 const LEAST_NEAR: f64 = 0.05;
 /// Cosine between normals that count as alike: 45°, as noise turns the small faces of a scan.
 const FACING: f64 = 0.7;
-/// A point belongs to the target at all within so many tolerances: a noisy scan that is offset outward does too.
+/// A point belongs to the target at all within so many tolerances: a noisy scan that is offset
+/// outward does too.
 const COARSE: f64 = 1.5;
 /// What a motion explains alone outweighs so many times what the other explains alone.
 const CLEARLY: f64 = 3.0;
 /// Points that decide, at least …
 const POINTS: f64 = 8.0;
-/// … and over the points that the better motion leaves over: where it fits all but the noise, noise decides nothing.
+/// … and over the points that the better motion leaves over: where it fits all but the noise, noise
+/// decides nothing.
 const LEFT_OVER: f64 = 0.05;
-/// Share of the points that a part of revolution may lose when it is turned: at the rim of its ends, where facets of one turn
-/// lie above those of another.
+/// Share of the points that a part of revolution may lose when it is turned: at the rim of its
+/// ends, where facets of one turn lie above those of another.
 const AT_RIMS: f64 = 0.003;
 /// Weight of features that decides: one opening, or what else is as much.
 const FEATURES: f64 = 1.0;
-/// A feature that one motion has in its place is missing by another when it is off by more: by so many times what half of those that are in
-/// their places are off …
+/// A feature that one motion has in its place is missing by another when it is off by more: by so
+/// many times what half of those that are in their places are off …
 const ABSENT: f64 = 3.0;
 /// … but at least, and at most, by so much of what it may be.
 const ABSENT_BETWEEN: [f64; 2] = [0.3, 2.0];
@@ -44,8 +46,8 @@ pub(super) struct Judged {
     fit: Option<IcpFit>,
     /// of each feature of the source: its best partner, and how far that is off over what it may be
     partners: Vec<Option<(usize, f64)>>,
-    /// of each point: how far it is from the target with a normal alike, m; infinite beyond the coarse bound. Empty
-    /// without surfaces
+    /// of each point: how far it is from the target with a normal alike, m; infinite beyond the
+    /// coarse bound. Empty without surfaces
     distances: Vec<f64>,
 }
 
@@ -180,8 +182,8 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Whether the evidence decides for `a` against `b`: the surface, and where that does not decide, the features, which were
-    /// found on it.
+    /// Whether the evidence decides for `a` against `b`: the surface, and where that does not
+    /// decide, the features, which were found on it.
     fn rules_out(&self, a: &Judged, b: &Judged) -> bool {
         match (self.by_surface(a, b), self.by_surface(b, a)) {
             (true, false) => true,
@@ -206,7 +208,8 @@ impl<'a> Judge<'a> {
         self.by_features(a, b) && (self.surfaces.is_none() || self.by_surface(a, b))
     }
 
-    /// Among all points that belong to the target at all, or among those that lie on it within the scatter of the best fit.
+    /// Among all points that belong to the target at all, or among those that lie on it within the
+    /// scatter of the best fit.
     fn by_surface(&self, a: &Judged, b: &Judged) -> bool {
         let alone = |a: &Judged, b: &Judged, near: f64| {
             a.distances
@@ -249,7 +252,8 @@ impl<'a> Judge<'a> {
         own >= FEATURES && own > CLEARLY * other
     }
 
-    /// Whether the surface is as much on the target after `turn`, facets of a round part taken for round.
+    /// Whether the surface is as much on the target after `turn`, facets of a round part taken for
+    /// round.
     pub fn stays(&self, best: &Judged, turn: &Isometry3<f64>) -> bool {
         let turned = self.judged(turn * best.motion, None);
         let is_lost = |(own, turned): &(&f64, &f64)| own.is_finite() && !turned.is_finite();

@@ -143,8 +143,8 @@ impl Landmark {
         tolerance + (SIGMAS * self.sigma.hypot(other.sigma)).min(3.0 * tolerance)
     }
 
-    /// How far it is from `other` after `motion`, over what it may be; infinite where its direction differs. An edge or what
-    /// goes through may be anywhere along the other.
+    /// How far it is from `other` after `motion`, over what it may be; infinite where its direction
+    /// differs. An edge or what goes through may be anywhere along the other.
     ///
     /// - `tolerance`: m
     pub fn misfit(&self, motion: &Isometry3<f64>, other: &Self, tolerance: f64) -> f64 {
@@ -201,7 +201,8 @@ impl Landmark {
     }
 }
 
-/// Normals of three planes that meet in `place`; `None` where there are not just three such directions.
+/// Normals of three planes that meet in `place`; `None` where there are not just three such
+/// directions.
 fn normals_at(
     place: &Point3<f64>,
     planes: &[(Point3<f64>, Vector3<f64>)],

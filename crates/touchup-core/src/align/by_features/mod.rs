@@ -1,11 +1,14 @@
-//! Global registration: the rigid motion that maps the features of one shape onto those of another, from any start.
+//! Global registration: the rigid motion that maps the features of one shape onto those of another,
+//! from any start.
 //!
-//! Pairs of features, slots, corners and features beside a plane are frames; each frame of the one that is like a frame of
-//! the other in what a motion leaves alone (kinds, sizes, distances, angles, handedness) is a hypothesis. It counts what it
-//! explains of all features, so some may be missing or false on either side; the best are refined by least squares
-//! and point to plane, and judged by how much of the surface then agrees. Two that the evidence does not distinguish are both
-//! returned. Features about one axis alone leave the turn about it open: where the surface does not fix it either, an error says so.
-//! The search is exhaustive and deterministic, without random samples.
+//! Pairs of features, slots, corners and features beside a plane are frames; each frame of the one
+//! that is like a frame of the other in what a motion leaves alone (kinds, sizes, distances,
+//! angles, handedness) is a hypothesis. It counts what it explains of all features, so some may be
+//! missing or false on either side; the best are refined by least squares and point to plane, and
+//! judged by how much of the surface then agrees. Two that the evidence does not distinguish are
+//! both returned. Features about one axis alone leave the turn about it open: where the surface
+//! does not fix it either, an error says so. The search is exhaustive and deterministic, without
+//! random samples.
 
 mod alternative;
 mod bases;
@@ -32,30 +35,34 @@ use crate::numeric::mean;
 const MOST_BASES: usize = 3_000;
 /// Hypotheses that are counted out, at most.
 const MOST_HYPOTHESES: usize = 30_000;
-/// Comparisons of two features, at most: where features are very many, fewer hypotheses are counted out.
+/// Comparisons of two features, at most: where features are very many, fewer hypotheses are counted
+/// out.
 const MOST_COMPARISONS: usize = 60_000_000;
 /// Motions that go on to the surfaces, at most.
 const MOST_CANDIDATES: usize = 64;
-/// They explain at least this share of what the best does: without it a feature that is false could not hide the truth.
+/// They explain at least this share of what the best does: without it a feature that is false could
+/// not hide the truth.
 const CANDIDATE: f64 = 0.5;
 /// Mirror images that are examined.
 const MOST_MIRRORED: usize = 8;
 /// Share of the surface that must agree.
 const LEAST_AGREEING: f64 = 0.5;
-/// Where there are no surfaces, what must be explained: two openings, the planes about them, and more.
+/// Where there are no surfaces, what must be explained: two openings, the planes about them, and
+/// more.
 const LEAST_EXPLAINED: f64 = 2.5;
 
 /// The one motion that maps `source` onto `target`, or why there is none or more than one.
 ///
-/// Work is bounded: at most 30 000 hypotheses, of 3 000 frames of the source (among its 150 largest openings), 64 of which
-/// are tried on the surfaces.
+/// Work is bounded: at most 30 000 hypotheses, of 3 000 frames of the source (among its 150 largest
+/// openings), 64 of which are tried on the surfaces.
 ///
 /// - `source`, `target`: as [`crate::features::detect`] finds them, each in its own frame.
 /// - `surfaces`: where they are given they decide, and make the motion as exact as they are.
 ///
 /// # Errors
-/// [`FeaturesError`]; [`FeaturesError::Ambiguous`] has all motions among which the evidence does not decide,
-/// [`FeaturesError::FreeTurn`] those of a part of revolution, each with one turn of many.
+/// [`FeaturesError`]; [`FeaturesError::Ambiguous`] has all motions among which the evidence does
+/// not decide, [`FeaturesError::FreeTurn`] those of a part of revolution, each with one turn of
+/// many.
 pub fn align_features(
     source: &[Feature],
     target: &[Feature],

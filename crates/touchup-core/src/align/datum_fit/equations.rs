@@ -12,7 +12,8 @@ use crate::numeric::{point_to_plane_row, tangent_basis};
 /// Standard uncertainties are no smaller, m.
 const LEAST_STD: f64 = 1e-9;
 
-/// Equations of all pairs: misfit + rows · step = 0, in m; turns are counted by the shift at the lever.
+/// Equations of all pairs: misfit + rows · step = 0, in m; turns are counted by the shift at the
+/// lever.
 pub(super) struct Equations {
     /// A
     pub rows: DMatrix<f64>,
@@ -47,7 +48,8 @@ fn place_directions(kind: Kind, axis: &Vector3<f64>) -> Vec<Vector3<f64>> {
     }
 }
 
-/// The rotation vector that turns one unit vector onto another the shortest way: it says at any angle how far there is to go.
+/// The rotation vector that turns one unit vector onto another the shortest way: it says at any
+/// angle how far there is to go.
 fn turn_between(from: &Vector3<f64>, to: &Vector3<f64>) -> Vector3<f64> {
     let half_a_turn = || tangent_basis(from)[0] * PI;
     UnitQuaternion::rotation_between(from, to).map_or_else(half_a_turn, |turn| turn.scaled_axis())

@@ -1,14 +1,17 @@
-//! The rigid motion that takes measured features into the frame of a drawing: as a best fit of all of them, or step by step by datums.
+//! The rigid motion that takes measured features into the frame of a drawing: as a best fit of all
+//! of them, or step by step by datums.
 //!
-//! Each pair of a measured feature and its nominal one gives equations: the place of an axis two across it, that of a plane one along its
-//! normal; the direction of either two more, where the drawing has it. With small motions (shift t, turn ω about the middle c)
+//! Each pair of a measured feature and its nominal one gives equations: the place of an axis two
+//! across it, that of a plane one along its normal; the direction of either two more, where the
+//! drawing has it. With small motions (shift t, turn ω about the middle c)
 //!
 //! y + A x = 0,  x = (t, L ω)
 //!
-//! by least squares, weighted by the standard uncertainties of the measurement. A best fit solves all at once. Datums are solved one after
-//! the other, each within the freedoms that those before it leave, as the datum system of ISO 5459 does: 3-2-1 for three planes. With x = −G y
-//! the uncertainty of the motion is G Σ Gᵀ, and that of the places of the features in the fit (I − A G) Σ (I − A G)ᵀ: what a feature says
-//! of the frame it does not say of itself.
+//! by least squares, weighted by the standard uncertainties of the measurement. A best fit solves
+//! all at once. Datums are solved one after the other, each within the freedoms that those before
+//! it leave, as the datum system of ISO 5459 does: 3-2-1 for three planes. With x = −G y the
+//! uncertainty of the motion is G Σ Gᵀ, and that of the places of the features in the fit (I − A G)
+//! Σ (I − A G)ᵀ: what a feature says of the frame it does not say of itself.
 
 mod equations;
 mod error;
@@ -31,11 +34,13 @@ pub struct DatumFit {
     pub motion: Isometry3<f64>,
     /// Middle of the measured features, in the frame of the drawing, m.
     pub centre: Point3<f64>,
-    /// Of (shift of the centre, rotation vector about it), in the frame of the drawing; m², m·rad, rad².
+    /// Of (shift of the centre, rotation vector about it), in the frame of the drawing; m², m·rad,
+    /// rad².
     pub covariance: Matrix6<f64>,
     /// How far each pair is off its nominal place across its axis, of a plane along its normal, m.
     pub residuals: Vec<f64>,
-    /// Standard uncertainty of the place of each pair about the frame of the drawing, as [`DatumPair::place_std`], m.
+    /// Standard uncertainty of the place of each pair about the frame of the drawing, as
+    /// [`DatumPair::place_std`], m.
     pub place_stds: Vec<f64>,
 }
 
@@ -49,7 +54,8 @@ const STILL: f64 = 1e-10;
 /// The motion.
 ///
 /// - `start`: from O into the frame of the drawing, good to some degrees.
-/// - `stages`: numbers of the pairs that are fitted together, in the order of the datums; of a best fit one stage of all.
+/// - `stages`: numbers of the pairs that are fitted together, in the order of the datums; of a best
+///   fit one stage of all.
 ///
 /// # Errors
 /// [`DatumFitError`]
@@ -155,8 +161,9 @@ fn fit_of(
 }
 
 impl DatumFit {
-    /// Standard uncertainty of the place of a feature that is not in the fit, about the frame of the drawing: its own, and what the frame
-    /// is uncertain by there. As [`DatumPair::place_std`], m.
+    /// Standard uncertainty of the place of a feature that is not in the fit, about the frame of
+    /// the drawing: its own, and what the frame is uncertain by there. As [`DatumPair::place_std`],
+    /// m.
     ///
     /// - `place`, `axis`: in the frame of the drawing; the place in m.
     /// - `std`: of its own.

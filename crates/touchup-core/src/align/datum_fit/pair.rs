@@ -17,7 +17,8 @@ pub struct DatumPair {
     pub measured: Point3<f64>,
     /// measured axis or outward normal, unit vector
     pub measured_axis: Vector3<f64>,
-    /// standard uncertainty of the measured centre, root mean square distance across the axis, of a plane along its normal, m
+    /// standard uncertainty of the measured centre, root mean square distance across the axis, of a
+    /// plane along its normal, m
     pub place_std: f64,
     /// … of the measured axis, rad; `None`: its direction is not used
     pub axis_std: Option<f64>,

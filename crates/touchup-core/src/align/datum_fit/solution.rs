@@ -5,8 +5,9 @@ use nalgebra::{DMatrix, DVector, SVD, Vector3, Vector6};
 use super::equations::Equations;
 use super::error::DatumFitError;
 
-/// A freedom is fixed where a step of it moves the equations by this share of the step: a direction that a feature says by chance alone,
-/// as an axis that leans by a degree says of the turn about itself, fixes none.
+/// A freedom is fixed where a step of it moves the equations by this share of the step: a direction
+/// that a feature says by chance alone, as an axis that leans by a degree says of the turn about
+/// itself, fixes none.
 const LEAST_SHARE: f64 = 0.05;
 
 /// The solution of the equations: step = −gain · misfits; what is open stays.

@@ -71,7 +71,8 @@ fn the_motion_of_a_part_as_drawn_is_found_by_best_fit_and_by_datums() {
     }
 }
 
-/// Three planes of which two are out of square: the first is met whole, the second in the turn that is left, the third in the shift.
+/// Three planes of which two are out of square: the first is met whole, the second in the turn that
+/// is left, the third in the shift.
 #[test]
 fn datums_count_in_their_order() {
     let lean: f64 = 0.01;

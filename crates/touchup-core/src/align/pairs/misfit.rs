@@ -1,8 +1,8 @@
 //! What is wrong with pairs that no motion fits.
 //!
-//! Leave one out: with S the weighted squares of all pairs and Sᵢ without pair i, Sᵢ / S is Beta((3 n − 9) / 2, 3 / 2)
-//! distributed when pair i is as good as the others (the F test of a shifted point). A smaller value than chance allows
-//! names the pair.
+//! Leave one out: with S the weighted squares of all pairs and Sᵢ without pair i, Sᵢ / S is Beta((3
+//! n − 9) / 2, 3 / 2) distributed when pair i is as good as the others (the F test of a shifted
+//! point). A smaller value than chance allows names the pair.
 
 use super::error::PairsError;
 use super::solved::{PairsParams, PointPair, SolvedMotion};
@@ -11,8 +11,8 @@ use super::solved::{PairsParams, PointPair, SolvedMotion};
 const FALSE_ALARM: f64 = 1e-4;
 /// Fewer pairs cannot say which one is wrong.
 const FEWEST_TO_BLAME: usize = 5;
-/// Only so many pairs are left out in turn, those of the largest residuals: among more than that no single one has the
-/// power to draw the motion to itself.
+/// Only so many pairs are left out in turn, those of the largest residuals: among more than that no
+/// single one has the power to draw the motion to itself.
 const MOST_TO_BLAME: usize = 32;
 /// A factor between the distances is reported when it is off by more than this: picks scatter less.
 const SCALE_TOLERANCE: f64 = 0.05;
@@ -158,8 +158,8 @@ fn check_each(
     worst.map_or(Ok(()), |(_, outlier)| Err(outlier))
 }
 
-/// Chance that a Beta(a, 3/2) variable is below `x`, a ≥ 3: ∫₀ˣ tᵃ⁻¹ √(1 − t) dt over the same to 1, by the midpoint
-/// rule.
+/// Chance that a Beta(a, 3/2) variable is below `x`, a ≥ 3: ∫₀ˣ tᵃ⁻¹ √(1 − t) dt over the same to
+/// 1, by the midpoint rule.
 fn beta_below(x: f64, a: f64) -> f64 {
     const STEPS: u32 = 512;
     let x = x.clamp(0.0, 1.0);

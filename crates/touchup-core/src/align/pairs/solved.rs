@@ -2,7 +2,8 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Rotation3, SVD, UnitQuaternion, Vector3};
 
-/// A given standard deviation is believed unless the residuals say so many times more: with three pairs once in 130.
+/// A given standard deviation is believed unless the residuals say so many times more: with three
+/// pairs once in 130.
 const LARGEST_SIGMA_RATIO: f64 = 2.0;
 
 /// One point seen twice, m.
@@ -21,11 +22,11 @@ pub struct PointPair {
 pub struct PairsParams {
     /// Standard deviation of a pair that names none, per axis, m; `None`: found from the residuals.
     pub sigma: Option<f64>,
-    /// Largest rms residual that is believed, m; never more than a tenth of the points' scatter. Default 3 mm: a pick
-    /// on a scan of a consumer camera is good to one or two.
+    /// Largest rms residual that is believed, m; never more than a tenth of the points' scatter.
+    /// Default 3 mm: a pick on a scan of a consumer camera is good to one or two.
     pub largest_rms: f64,
-    /// A pair that is off by less than this is kept, however well the others agree, m. Default 0.2 mm: no one picks
-    /// better. Where a sigma is known, four times that is taken instead.
+    /// A pair that is off by less than this is kept, however well the others agree, m. Default 0.2
+    /// mm: no one picks better. Where a sigma is known, four times that is taken instead.
     pub least_misfit: f64,
 }
 
@@ -48,12 +49,13 @@ pub struct PairsFit {
     pub residuals: Vec<Vector3<f64>>,
     /// √(mean |residual|²), m.
     pub rms: f64,
-    /// Standard deviation of a pair of unit weight, per axis, m: as given, or from the residuals with 3 n − 6 degrees
-    /// of freedom where none is given or they say more than twice as much.
+    /// Standard deviation of a pair of unit weight, per axis, m: as given, or from the residuals
+    /// with 3 n − 6 degrees of freedom where none is given or they say more than twice as much.
     pub sigma: f64,
     /// Middle of the pairs, in the frame of `to`, m.
     pub centroid: Point3<f64>,
-    /// Of (shift of the centroid, rotation vector about it), both in the frame of `to`; m², m·rad, rad².
+    /// Of (shift of the centroid, rotation vector about it), both in the frame of `to`; m², m·rad,
+    /// rad².
     pub covariance: Matrix6<f64>,
 }
 

@@ -16,7 +16,8 @@ pub struct BadTouches {
     pub touches: Vec<u32>,
     /// mean place, m
     pub centre: Point3<f64>,
-    /// the largest distance from the surface that the other touches make, m, with its sign: positive outside
+    /// the largest distance from the surface that the other touches make, m, with its sign:
+    /// positive outside
     pub off: f64,
     /// … in standard deviations
     pub sigmas: f64,
@@ -99,7 +100,8 @@ fn against<'a>(
     })
 }
 
-/// How far a touch is from the planes that others measured there, the middle of them, m; `None` where they are too few.
+/// How far a touch is from the planes that others measured there, the middle of them, m; `None`
+/// where they are too few.
 fn contradiction(
     touches: &[ProbedPoint],
     at: usize,
@@ -146,8 +148,8 @@ fn bad_touches_of(
     }
 }
 
-/// How far the surface that each touch says is from the refined one, m: of a ball by its centre, which the measured normal
-/// does not move; and the closest place there.
+/// How far the surface that each touch says is from the refined one, m: of a ball by its centre,
+/// which the measured normal does not move; and the closest place there.
 fn distances(
     refined: &RefinedShape<'_>,
     touches: &[ProbedPoint],

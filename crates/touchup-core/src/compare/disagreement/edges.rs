@@ -6,15 +6,18 @@ use crate::compare::IndexedMesh;
 use crate::mesh::TriMesh;
 use crate::numeric::{PointGrid, median};
 
-/// What is so many edges of the scan's triangles wide is seen: a facet on each wall, one on the floor, and one in between.
+/// What is so many edges of the scan's triangles wide is seen: a facet on each wall, one on the
+/// floor, and one in between.
 const NARROW: f64 = 5.0;
 /// Edges are rounded within so many edges of the triangles.
 const ROUNDED: f64 = 1.5;
-/// An edge is one of the surface that a place lies on when it is within so many edges of its tangent plane.
+/// An edge is one of the surface that a place lies on when it is within so many edges of its
+/// tangent plane.
 const LEVEL: f64 = 0.2;
 /// An edge of the refined mesh turns by more than this, as a cosine: 35°.
 pub(super) const SHARP: f64 = 0.82;
-/// A ball of the least seen width touches nothing but its contact point within this share of its radius.
+/// A ball of the least seen width touches nothing but its contact point within this share of its
+/// radius.
 const FITS: f64 = 0.85;
 
 /// Median length of the edges, m.
@@ -27,7 +30,8 @@ fn median_edge(mesh: &TriMesh) -> f64 {
     median(&mut lengths).unwrap_or(0.0)
 }
 
-/// Vertices at sharp edges between touched faces, by slot: whether one is convex there, and whether one is concave.
+/// Vertices at sharp edges between touched faces, by slot: whether one is convex there, and whether
+/// one is concave.
 fn sharp_vertices(mesh: &TriMesh, is_seen: &[bool]) -> Vec<[bool; 2]> {
     let mut is_sharp = vec![[false; 2]; mesh.vertex_slots()];
     for (face, corners) in mesh.faces() {
@@ -93,8 +97,8 @@ impl SharpEdges {
         self.near(p).next().is_some()
     }
 
-    /// Whether an edge of the surface that a place lies on, near it, is convex, so that a scan may be too low there, and whether one turns
-    /// in, so that it may be too high.
+    /// Whether an edge of the surface that a place lies on, near it, is convex, so that a scan may
+    /// be too low there, and whether one turns in, so that it may be too high.
     pub fn may_be(&self, mesh: &TriMesh, p: &Point3<f64>, normal: &Vector3<f64>) -> [bool; 2] {
         let is_own = |&other: &usize| {
             (mesh.positions()[other] - p).dot(normal).abs() <= LEVEL * self.resolution

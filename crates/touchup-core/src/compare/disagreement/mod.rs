@@ -1,12 +1,14 @@
-//! Where touch and scan disagree, without a true part: what of it looks like this scanner, what like a part that is no longer
-//! what was scanned, and what like a bad touch.
+//! Where touch and scan disagree, without a true part: what of it looks like this scanner, what
+//! like a part that is no longer what was scanned, and what like a bad touch.
 //!
-//! The rigid offset of the scan, where it is more than noise, is removed first. How the scanner errs is then found
-//! where it should see well, on touched places away from edges: its offset b, its noise σ and the distance ℓ over which that
-//! stays alike, Cov = σ² exp(−r²/2ℓ²). The mean over a region of area A then has the variance σ²/(1 + A/2πℓ²), and a region
-//! that is off by many times its root was changed. In what is narrower than a few edges of the scan's triangles the scan lacks
-//! what it could not see, and it rounds edges: it takes off convex ones and fills concave ones. Near an
-//! edge a disagreement of the other sign is not the scanner's rounding, but too near to be sure of.
+//! The rigid offset of the scan, where it is more than noise, is removed first. How the scanner
+//! errs is then found where it should see well, on touched places away from edges: its offset b,
+//! its noise σ and the distance ℓ over which that stays alike, Cov = σ² exp(−r²/2ℓ²). The mean over
+//! a region of area A then has the variance σ²/(1 + A/2πℓ²), and a region that is off by many times
+//! its root was changed. In what is narrower than a few edges of the scan's triangles the scan
+//! lacks what it could not see, and it rounds edges: it takes off convex ones and fills concave
+//! ones. Near an edge a disagreement of the other sign is not the scanner's rounding, but too near
+//! to be sure of.
 
 mod bad_touches;
 mod edges;
@@ -33,7 +35,8 @@ use crate::stylus::ProbedPoint;
 /// A mesh with its classes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClassMap {
-    /// by vertex slot, m: how far the touched surface lies outside of the scan; 0 where nothing was touched
+    /// by vertex slot, m: how far the touched surface lies outside of the scan; 0 where nothing was
+    /// touched
     pub disagreement: Vec<f64>,
     /// by vertex slot
     pub classes: Vec<Class>,
@@ -44,10 +47,11 @@ pub struct ClassMap {
 /// Where touch and scan disagree.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Disagreement {
-    /// offset of the whole scan, removed before the remainder is examined; `None` where it is no more than the
-    /// noise of the scan explains
+    /// offset of the whole scan, removed before the remainder is examined; `None` where it is no
+    /// more than the noise of the scan explains
     pub rigid_offset: Option<RigidOffset>,
-    /// how the scanner errs; `None` where too little was touched for an estimate, and then nothing is called changed
+    /// how the scanner errs; `None` where too little was touched for an estimate, and then nothing
+    /// is called changed
     pub scanner: Option<Scanner>,
     /// the refined mesh
     pub refined: ClassMap,

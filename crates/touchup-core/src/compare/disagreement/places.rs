@@ -58,7 +58,8 @@ impl Class {
 pub(super) struct Places {
     /// m, by slot
     pub positions: Vec<Point3<f64>>,
-    /// how far it lies outside of the scan, m, by slot; without the rigid offset, once that is known
+    /// how far it lies outside of the scan, m, by slot; without the rigid offset, once that is
+    /// known
     pub off: Vec<f64>,
     /// whether it was touched, and the scan is there at all
     pub is_seen: Vec<bool>,

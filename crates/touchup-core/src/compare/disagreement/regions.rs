@@ -11,7 +11,8 @@ use crate::stylus::ProbedPoint;
 /// The evidence for the class of a region.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RegionEvidence {
-    /// how far its mean is from what the scanner is off everywhere, in standard deviations of such a mean
+    /// how far its mean is from what the scanner is off everywhere, in standard deviations of such
+    /// a mean
     pub sigmas: f64,
     /// area that the scanner should have seen well, m²
     pub open_area: f64,
@@ -48,7 +49,8 @@ pub(super) struct RegionInput<'a> {
 
 /// A region is of places whose surroundings are off by so many standard deviations.
 const OFF: f64 = 1.5;
-/// A mean that is off by more than this is no error of the scanner: with 50 independent places by chance once in 35 000.
+/// A mean that is off by more than this is no error of the scanner: with 50 independent places by
+/// chance once in 35 000.
 const CHANGED: f64 = 5.0;
 /// From here on it may be either.
 const UNSURE: f64 = 3.5;
@@ -89,12 +91,14 @@ pub(super) fn find(seen: &RegionInput<'_>, classes: &mut [Class]) -> Vec<Disagre
     regions
 }
 
-/// Whether a disagreement is evidence of a change, and not of what the scanner cannot see: the scan too low, `side` 0, or too high, 1.
+/// Whether a disagreement is evidence of a change, and not of what the scanner cannot see: the scan
+/// too low, `side` 0, or too high, 1.
 fn is_evidence(places: &Places, at: usize, side: usize) -> bool {
     places.is_open[at] || (places.is_wide[at] && !places.may_be[at][side])
 }
 
-/// Means over the surroundings, m, by slot: of open places over open ones, of others over all that are wide.
+/// Means over the surroundings, m, by slot: of open places over open ones, of others over all that
+/// are wide.
 fn smoothed(mesh: &TriMesh, places: &Places, scanner: &Scanner) -> Vec<f64> {
     let reach = scanner.correlation / 2.0;
     let cells = |is_own: &[bool]| {

@@ -1,8 +1,9 @@
 //! How far the scan as a whole lies off the touches: a small rigid motion, and a surface offset.
 //!
-//! At a place x with the normal n touch − scan is b + n·s + ((x − c) × n)·θ; b, s and θ by least squares with Tukey's
-//! weights, s and θ slightly regularised, so that what no touch determines goes to b. Noise that stays alike over a distance tilts a
-//! scan too: of n independent places the motion is reported when it explains more than that does once in a thousand times.
+//! At a place x with the normal n touch − scan is b + n·s + ((x − c) × n)·θ; b, s and θ by least
+//! squares with Tukey's weights, s and θ slightly regularised, so that what no touch determines
+//! goes to b. Noise that stays alike over a distance tilts a scan too: of n independent places the
+//! motion is reported when it explains more than that does once in a thousand times.
 
 use std::f64::consts::TAU;
 
@@ -34,14 +35,16 @@ pub struct RigidOffset {
 const ROUNDS: usize = 10;
 /// By which share of the weight of all places shift and turn are held back.
 const HELD_BACK: f64 = 0.03;
-/// Squares of normal numbers, one to six of them, sum up to more than this once in a thousand times.
+/// Squares of normal numbers, one to six of them, sum up to more than this once in a thousand
+/// times.
 const ONCE_IN_1000: [f64; 6] = [10.83, 13.82, 16.27, 18.47, 20.52, 22.46];
-/// Where the noise is known from m places more than there are unknowns, the bound is 1 + 12/m times as high: within 3 % of the
-/// F distribution from 13 on.
+/// Where the noise is known from m places more than there are unknowns, the bound is 1 + 12/m times
+/// as high: within 3 % of the F distribution from 13 on.
 const FEW_PLACES: f64 = 12.0;
 /// Unknowns: an offset, a shift, a turn.
 const UNKNOWNS: f64 = 7.0;
-/// A direction in which the motion is known so much better than in the best one is held back, not known.
+/// A direction in which the motion is known so much better than in the best one is held back, not
+/// known.
 const HELD: f64 = 1e-9;
 
 /// A motion that fits, which noise alone may have made.
@@ -50,7 +53,8 @@ pub(super) struct OffsetFit {
     turn: Vector3<f64>,
     centre: Point3<f64>,
     lever: f64,
-    /// covariance of shift and turn times `lever` for noise of 1 m that is independent from m² to m², m²·m²
+    /// covariance of shift and turn times `lever` for noise of 1 m that is independent from m² to
+    /// m², m²·m²
     spread: Matrix6<f64>,
     /// m²
     area: f64,

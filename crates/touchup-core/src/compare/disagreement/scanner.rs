@@ -79,8 +79,8 @@ impl Scanner {
     }
 }
 
-/// Distance over which disagreements stay alike, m: half the mean square of their differences grows to 1 − 1/e of the
-/// variance within √2 ℓ.
+/// Distance over which disagreements stay alike, m: half the mean square of their differences grows
+/// to 1 − 1/e of the variance within √2 ℓ.
 fn correlation(places: &Places, open: &[usize], noise: f64, edge: f64) -> f64 {
     let some: Vec<usize> = open
         .iter()

@@ -117,8 +117,8 @@ pub(super) fn draw_scale(
     picture.write([left + length + 24, bar], NOTE, INK, &text);
 }
 
-/// How much of the surface lies in each bin of deviations: bars for the last panel, a line for the others. The height is the root of
-/// the share, so that what is rare is seen.
+/// How much of the surface lies in each bin of deviations: bars for the last panel, a line for the
+/// others. The height is the root of the share, so that what is rare is seen.
 pub(super) fn draw_histograms(
     picture: &mut Picture,
     bar: i32,
@@ -186,8 +186,8 @@ pub(super) fn draw_histograms(
     }
 }
 
-/// Names of places with a line to each. A name keeps clear of the places and of the names before it as far as
-/// there is room.
+/// Names of places with a line to each. A name keeps clear of the places and of the names before it
+/// as far as there is room.
 pub(super) fn draw_labels(
     picture: &mut Picture,
     labels: &[PictureLabel],

@@ -4,7 +4,8 @@ use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 
 use crate::mesh::{FaceId, TriMesh, VertexId};
 
-/// How much the view leaves the direction in which the part is touched: about 37°, so that walls and steps are seen too.
+/// How much the view leaves the direction in which the part is touched: about 37°, so that walls
+/// and steps are seen too.
 const TILT: f64 = 0.7;
 /// And to the side.
 const YAW: f64 = 0.25;
@@ -44,7 +45,8 @@ impl Camera {
         }
     }
 
-    /// Views obliquely the side that `weight` is on, with the longest extent of the part across the picture.
+    /// Views obliquely the side that `weight` is on, with the longest extent of the part across the
+    /// picture.
     ///
     /// - `weight`: of each vertex slot, 0 or more.
     pub fn towards(mesh: &TriMesh, weight: impl Fn(VertexId) -> f64) -> Self {
@@ -65,7 +67,8 @@ impl Camera {
         Self::new(&(facing - along * TILT + across * YAW), &facing)
     }
 
-    /// Direction across the view in which the vertices are spread most; its largest coordinate is positive.
+    /// Direction across the view in which the vertices are spread most; its largest coordinate is
+    /// positive.
     fn longest(&self, mesh: &TriMesh) -> Vector3<f64> {
         let flat =
             |p: &Point3<f64>| Vector2::new(self.right.dot(&p.coords), self.up.dot(&p.coords));

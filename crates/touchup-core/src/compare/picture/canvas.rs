@@ -73,7 +73,8 @@ impl Picture {
         }
     }
 
-    /// Writes one line from its upper left corner; letters that the font lacks become question marks.
+    /// Writes one line from its upper left corner; letters that the font lacks become question
+    /// marks.
     pub(super) fn write(&mut self, [x, y]: [i32; 2], font: Font, colour: Rgb, text: &str) {
         let advance = font.width(" ");
         for (letter, left) in text.chars().zip((0..).map(|i| x + i * advance)) {

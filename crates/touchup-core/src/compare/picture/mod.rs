@@ -1,4 +1,5 @@
-//! A picture of a mesh in the colours of its deviations: what was before beside what is now, in the same scale.
+//! A picture of a mesh in the colours of its deviations: what was before beside what is now, in the
+//! same scale.
 
 mod annotations;
 mod camera;
@@ -38,7 +39,8 @@ pub struct PictureParams<'a> {
     pub from: Option<Vector3<f64>>,
     /// how much each vertex of the last panel matters, by slot; without: by its deviation
     pub weights: Option<&'a [f64]>,
-    /// colours and what they mean, Latin-1: instead of the bar of deviations where panels are painted
+    /// colours and what they mean, Latin-1: instead of the bar of deviations where panels are
+    /// painted
     pub legend: &'a [(Rgb, &'a str)],
     /// names of places
     pub labels: &'a [PictureLabel],

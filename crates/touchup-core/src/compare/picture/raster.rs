@@ -1,4 +1,5 @@
-//! Triangles to pixels: a depth buffer, several samples for each pixel, light from over the shoulder.
+//! Triangles to pixels: a depth buffer, several samples for each pixel, light from over the
+//! shoulder.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -21,7 +22,8 @@ pub struct PicturePanel<'a> {
     pub classes: Option<&'a [Class]>,
     /// of each vertex slot, instead of all that; what it means is said in the legend
     pub paint: Option<&'a [Rgb]>,
-    /// of its deviations, drawn over the bar of colours: bars for the last panel, a line for the others
+    /// of its deviations, drawn over the bar of colours: bars for the last panel, a line for the
+    /// others
     pub histogram: Option<&'a Histogram>,
     /// printed above it; Latin-1
     pub title: &'a str,

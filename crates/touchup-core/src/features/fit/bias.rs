@@ -1,17 +1,19 @@
 //! What curvature does to the mean of a fit, and its removal.
 //!
-//! Expand the residual of one point to second order in its error ε (isotropic, variance σ²) and in the error δ of the
-//! fitted freedoms: f = n·ε + J·δ + ½ εᵀHε + εᵀMδ + ½ δᵀGδ. To first order δ is linear in the n·ε alone, with covariance
-//! C. Taking the mean of the normal equations Σ w (∂f/∂δ) f = 0 to second order: nᵀM = 0, since the derivative of a
-//! distance is constant along the normal, and tangential errors do not reach δ, so all terms with M vanish; the terms
-//! with Gδ times the residual cancel, since residuals and estimates of least squares are uncorrelated. There remains
+//! Expand the residual of one point to second order in its error ε (isotropic, variance σ²) and in
+//! the error δ of the fitted freedoms: f = n·ε + J·δ + ½ εᵀHε + εᵀMδ + ½ δᵀGδ. To first order δ is
+//! linear in the n·ε alone, with covariance C. Taking the mean of the normal equations Σ w (∂f/∂δ)
+//! f = 0 to second order: nᵀM = 0, since the derivative of a distance is constant along the normal,
+//! and tangential errors do not reach δ, so all terms with M vanish; the terms with Gδ times the
+//! residual cancel, since residuals and estimates of least squares are uncorrelated. There remains
 //!
 //! E δ = −(Σ w JᵀJ)⁻¹ Σ w Jᵀ b,   b = ½ (σ² tr H + tr G C):
 //!
-//! the same as if every distance were too large by b. So b is taken off. For a circle of radius r, σ² tr H / 2 is
-//! σ²/(2r): the essential bias of the geometric fit \[Al-Sharadqah and Chernov 2009\], which does not fall with the number
-//! of points; the second term falls with it and matters on short arcs. Both are taken as second differences over one
-//! standard deviation, so no second derivatives are needed.
+//! the same as if every distance were too large by b. So b is taken off. For a circle of radius r,
+//! σ² tr H / 2 is σ²/(2r): the essential bias of the geometric fit \[Al-Sharadqah and Chernov
+//! 2009\], which does not fall with the number of points; the second term falls with it and matters
+//! on short arcs. Both are taken as second differences over one standard deviation, so no second
+//! derivatives are needed.
 
 use nalgebra::Vector3;
 

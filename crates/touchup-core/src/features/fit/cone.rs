@@ -10,8 +10,9 @@ use crate::numeric::mean;
 
 /// A cone, by one of its circles and the angle between its lines and its axis.
 ///
-/// Its freedoms are a shift along its normal and the angle, turned about the circle: both stay well conditioned from a
-/// cylinder (angle 0) to a flat cone (angle near 90°), where apex and radius are not.
+/// Its freedoms are a shift along its normal and the angle, turned about the circle: both stay well
+/// conditioned from a cylinder (angle 0) to a flat cone (angle near 90°), where apex and radius are
+/// not.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone {
     /// Frame F in O: the origin is the centre of the circle, z the axis.

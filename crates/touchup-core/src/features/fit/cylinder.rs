@@ -79,7 +79,8 @@ impl Cylinder {
 }
 
 impl Cylinder {
-    /// How far along the unit vector `direction` from `from` (in O) the cylinder is left, m; `None` where it is not met, or along its axis.
+    /// How far along the unit vector `direction` from `from` (in O) the cylinder is left, m; `None`
+    /// where it is not met, or along its axis.
     pub(crate) fn exit(&self, from: &Point3<f64>, direction: &Vector3<f64>) -> Option<f64> {
         let axis = self.axis();
         let across = |v: Vector3<f64>| v - axis * v.dot(&axis);
@@ -110,7 +111,8 @@ mod tests {
 
     #[test]
     fn a_line_leaves_a_cylinder_on_its_far_side() {
-        // about z, 5 across: a line along (3, 4, 0)/5 from (−1, 0, 2) leaves where (−1 + 0.6 t)² + (0.8 t)² = 25
+        // about z, 5 across: a line along (3, 4, 0)/5 from (−1, 0, 2) leaves where (−1 + 0.6 t)² +
+        // (0.8 t)² = 25
         let cylinder = Cylinder::new(Point3::new(0.0, 0.0, 7.0), &Vector3::z(), 5.0, false);
         let from = Point3::new(-1.0, 0.0, 2.0);
         let t = cylinder.exit(&from, &Vector3::new(0.6, 0.8, 0.0)).unwrap();

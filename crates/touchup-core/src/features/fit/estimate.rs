@@ -5,8 +5,8 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use super::solver::FreedomMatrix;
 use super::{Freedom, Steps, Surface};
 
-/// A direction is free of what is unknown when less than this share of it lies there; roundings of the eigenvectors stay
-/// far below.
+/// A direction is free of what is unknown when less than this share of it lies there; roundings of
+/// the eigenvectors stay far below.
 const KNOWN: f64 = 1e-6;
 
 /// A fitted surface.
@@ -14,11 +14,13 @@ const KNOWN: f64 = 1e-6;
 pub struct Fit<M> {
     /// The surface of least squares, without the bias of curvature.
     pub surface: M,
-    /// Covariance of its freedoms in their order, m and rad; without those that are undetermined. By the residuals in the
-    /// directions in which they are larger than the stated deviations explain; where there are too few groups to ask them, by
-    /// the stated ones, stretched by √(χ²/degrees) where that is above 1.
+    /// Covariance of its freedoms in their order, m and rad; without those that are undetermined.
+    /// By the residuals in the directions in which they are larger than the stated deviations
+    /// explain; where there are too few groups to ask them, by the stated ones, stretched by
+    /// √(χ²/degrees) where that is above 1.
     pub covariance: FreedomMatrix,
-    /// … of it without what all observations have in common: two surfaces touched alike differ by this alone.
+    /// … of it without what all observations have in common: two surfaces touched alike differ by
+    /// this alone.
     pub own_covariance: FreedomMatrix,
     /// For each observation whether it was kept.
     pub used: Vec<bool>,
@@ -32,7 +34,8 @@ pub struct Fit<M> {
     pub(super) unknown: FreedomMatrix,
     /// the step of each freedom that changes the residuals by one standard deviation if taken alone
     pub(super) alone: Steps,
-    /// columns: one standard deviation in each fixed direction, as steps; zero columns for what is not fixed
+    /// columns: one standard deviation in each fixed direction, as steps; zero columns for what is
+    /// not fixed
     pub(super) deviations: FreedomMatrix,
 }
 
@@ -42,7 +45,8 @@ impl<M: Surface> Fit<M> {
         self.std_of(&Steps::ith(freedom as usize, 1.0))
     }
 
-    /// Standard deviation of a number that changes with the freedoms as `by` says; `None` where it is not fixed.
+    /// Standard deviation of a number that changes with the freedoms as `by` says; `None` where it
+    /// is not fixed.
     pub(crate) fn std_of(&self, by: &Steps) -> Option<f64> {
         self.std_in(&self.covariance, by)
     }
@@ -52,7 +56,8 @@ impl<M: Surface> Fit<M> {
         self.std_in(&self.own_covariance, by)
     }
 
-    /// Standard deviation of the surface along its normal at a point of it given in O, m; `None` where it is not fixed.
+    /// Standard deviation of the surface along its normal at a point of it given in O, m; `None`
+    /// where it is not fixed.
     pub fn std_at(&self, point: &Point3<f64>) -> Option<f64> {
         let (_, by) = self.surface.derivatives(point);
         self.std_of(&by)
@@ -71,7 +76,8 @@ impl<M: Surface> Fit<M> {
         (has_all && is_fixed).then(|| by.dot(&(covariance * by)).max(0.0).sqrt())
     }
 
-    /// Standard deviation of a number, from its derivatives by some freedoms; `None` where it is not fixed.
+    /// Standard deviation of a number, from its derivatives by some freedoms; `None` where it is
+    /// not fixed.
     pub fn std_by(&self, by: &[(Freedom, f64)]) -> Option<f64> {
         let mut steps = Steps::zeros();
         by.iter()
@@ -84,8 +90,8 @@ impl<M: Surface> Fit<M> {
         Some(self.std(Freedom::TiltX)?.hypot(self.std(Freedom::TiltY)?))
     }
 
-    /// Covariance in O of the place where the axis is `height` above the origin of F, m²; none along the axis. `None` where
-    /// it is not fixed.
+    /// Covariance in O of the place where the axis is `height` above the origin of F, m²; none
+    /// along the axis. `None` where it is not fixed.
     pub fn center_covariance(&self, height: f64) -> Option<Matrix3<f64>> {
         let lever = |shift: Freedom, tilt: Freedom| {
             let mut by = Steps::ith(shift as usize, 1.0);

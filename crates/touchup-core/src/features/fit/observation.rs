@@ -9,28 +9,32 @@ use super::FitError;
 pub struct Observation {
     /// The point in O, m: the centre of the ball that touches, or a vertex of the mesh.
     pub point: Point3<f64>,
-    /// Signed distance it should have from the surface, m, positive in the air: the ball's radius, or 0 for a vertex.
+    /// Signed distance it should have from the surface, m, positive in the air: the ball's radius,
+    /// or 0 for a vertex.
     pub offset: f64,
     /// Standard deviation along the normal, m, > 0; across the normal it is taken to be the same.
     pub sigma: f64,
-    /// Observations of one group share their error, those of different groups do not: one pass of the stylus over about
-    /// 0.1 s.
+    /// Observations of one group share their error, those of different groups do not: one pass of
+    /// the stylus over about 0.1 s.
     pub group: u32,
 }
 
 /// Input of a fit beside its observations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FitParams {
-    /// Standard deviation of an error that all observations have in common along their normals, m: the calibration of
-    /// the ball's radius. It goes into radii and widths in full, into a diameter twice, and not into an axis.
+    /// Standard deviation of an error that all observations have in common along their normals, m:
+    /// the calibration of the ball's radius. It goes into radii and widths in full, into a diameter
+    /// twice, and not into an axis.
     pub common_sigma: f64,
-    /// Standard deviation of a displacement that all observations have in common, along each axis, m: the place of the scan. It goes into
-    /// the place of what is fitted in full, into no size and no direction.
+    /// Standard deviation of a displacement that all observations have in common, along each axis,
+    /// m: the place of the scan. It goes into the place of what is fitted in full, into no size and
+    /// no direction.
     pub shift_sigma: f64,
-    /// How well the axis of the first guess is known before, rad in each of two directions; `None`: not at all. A hole in
-    /// thin metal has its axis from the plane around it.
+    /// How well the axis of the first guess is known before, rad in each of two directions; `None`:
+    /// not at all. A hole in thin metal has its axis from the plane around it.
     pub axis_sigma: Option<f64>,
-    /// What lies farther from the surface than this many standard deviations is an outlier. 4: one in 16000 good ones.
+    /// What lies farther from the surface than this many standard deviations is an outlier. 4: one
+    /// in 16000 good ones.
     pub rejection: f64,
 }
 

@@ -1,4 +1,5 @@
-//! The fit itself: three rounds of robust regression that reject what does not belong to the surface.
+//! The fit itself: three rounds of robust regression that reject what does not belong to the
+//! surface.
 
 use super::solver::FitProblem;
 use super::{Fit, FitError, FitParams, Observation, Surface};
@@ -17,10 +18,11 @@ const DEBIASINGS: usize = 2;
 
 /// Fits a surface to observations, from a first guess.
 ///
-/// Huber's weights bring the guess near without being held by outliers, Tukey's biweights drop them; then what lies
-/// beyond `rejection` scaled standard deviations is taken out and the remainder is fitted by plain least squares, corrected
-/// for the bias that curvature brings. The scale is the median of the normalised residuals, and never below 1: groups
-/// share errors, so residuals may look smaller than the errors are.
+/// Huber's weights bring the guess near without being held by outliers, Tukey's biweights drop
+/// them; then what lies beyond `rejection` scaled standard deviations is taken out and the
+/// remainder is fitted by plain least squares, corrected for the bias that curvature brings. The
+/// scale is the median of the normalised residuals, and never below 1: groups share errors, so
+/// residuals may look smaller than the errors are.
 ///
 /// # Errors
 /// [`FitError`]; on NaN, too few observations, and where a needed number is not fixed by them.
@@ -90,7 +92,8 @@ fn scale<M: Surface>(z: &[f64]) -> f64 {
     (SIGMA_OF_MEDIAN * median(&mut sizes).unwrap_or(0.0) * freedom.sqrt()).max(1.0)
 }
 
-/// Steps and weights by turns until both converge. A round that does not is no error: the next one goes on from there.
+/// Steps and weights by turns until both converge. A round that does not is no error: the next one
+/// goes on from there.
 fn reweighted<M: Surface>(problem: &FitProblem, mut surface: M, weight: fn(f64) -> f64) -> M {
     let mut before = vec![0.0; problem.observations.len()];
     for _ in 0..MOST_UPDATES {
@@ -111,7 +114,8 @@ fn reweighted<M: Surface>(problem: &FitProblem, mut surface: M, weight: fn(f64) 
     surface
 }
 
-/// Least squares without what lies too far, until the same are kept twice; and which those are (1, others 0).
+/// Least squares without what lies too far, until the same are kept twice; and which those are (1,
+/// others 0).
 fn rejected<M: Surface>(
     problem: &FitProblem,
     mut surface: M,

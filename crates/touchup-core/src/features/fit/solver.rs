@@ -20,8 +20,8 @@ const SEARCH: DampedSearch = DampedSearch {
 };
 /// A step below this many standard deviations is the last.
 const SETTLED: f64 = 1e-6;
-/// Longest step, in sizes of what was touched and in rad: a longer one may leap into the valley in which a circle fitted to
-/// a short arc grows without end.
+/// Longest step, in sizes of what was touched and in rad: a longer one may leap into the valley in
+/// which a circle fitted to a short arc grows without end.
 const LONGEST_STEP: f64 = 0.3;
 /// Keeps the matrix definite in directions that nothing fixes; as a share of its largest entry.
 const RIDGE: f64 = 1e-13;
@@ -32,7 +32,8 @@ pub(super) struct FitProblem<'a> {
     /// group of each observation, counted from 0
     pub group: Vec<usize>,
     pub groups: usize,
-    /// root mean square distance of the points from their centre, m: makes all unknowns of order one
+    /// root mean square distance of the points from their centre, m: makes all unknowns of order
+    /// one
     pub size: f64,
     /// axis known before, in O, and its standard deviation, rad
     pub known_axis: Option<(Vector3<f64>, f64)>,
@@ -78,7 +79,8 @@ impl<'a> FitProblem<'a> {
             .collect()
     }
 
-    /// Weights of the squares, 1/m²: what is `kept` (0 to 1) of each, over σ² and over how many are kept of its group.
+    /// Weights of the squares, 1/m²: what is `kept` (0 to 1) of each, over σ² and over how many are
+    /// kept of its group.
     pub fn weights(&self, kept: &[f64]) -> Vec<f64> {
         let mut in_group = vec![0.0; self.groups];
         self.group
@@ -91,7 +93,8 @@ impl<'a> FitProblem<'a> {
         (0..kept.len()).map(weight).collect()
     }
 
-    /// Of the residuals around a surface, which a scaled step is to take off: the step is minus their solution.
+    /// Of the residuals around a surface, which a scaled step is to take off: the step is minus
+    /// their solution.
     pub fn equations<M: Surface>(&self, surface: &M, weights: &[f64]) -> NormalEquations<FREEDOMS> {
         let units = self.units::<M>();
         let mut sum = self.prior(surface);

@@ -6,13 +6,14 @@ use super::surface::{AXIS, check_size, pose_along, side};
 use super::{Distance, FREEDOMS, Fit, FitError, Freedom, Surface};
 use crate::numeric::mean;
 
-/// A touch determines an end when its normal has at least this share along the slot: 30° from the wall.
+/// A touch determines an end when its normal has at least this share along the slot: 30° from the
+/// wall.
 const LEAST_ALONG: f64 = 0.5;
 /// An end is touched when so many touches determine it; one may be an outlier.
 const LEAST_TOUCHES: usize = 2;
 
-/// Distance of (x, y) from the segment from (−half, 0) to (half, 0), m, and the unit vector away from it; y on the segment itself, where
-/// both sides will do.
+/// Distance of (x, y) from the segment from (−half, 0) to (half, 0), m, and the unit vector away
+/// from it; y on the segment itself, where both sides will do.
 pub(crate) fn from_segment(x: f64, y: f64, half: f64) -> (f64, [f64; 2]) {
     let beyond = (x.abs() - half).max(0.0).copysign(x);
     let rho = beyond.hypot(y);
@@ -38,12 +39,14 @@ pub enum Ends {
 /// A prism over a stadium or a rectangle, without top and bottom.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stadium {
-    /// Frame F in O: the origin is the centre, z the direction of the walls' lines (out of the part), x along the slot.
+    /// Frame F in O: the origin is the centre, z the direction of the walls' lines (out of the
+    /// part), x along the slot.
     pub pose_of: Isometry3<f64>,
     /// From wall to wall, m.
     pub width: f64,
-    /// From end to end, over all, m; not less than the width where the ends are round. After a fit that leaves it
-    /// undetermined it only says how far no end is, and [`super::Fit::std`] has no figure of it.
+    /// From end to end, over all, m; not less than the width where the ends are round. After a fit
+    /// that leaves it undetermined it only says how far no end is, and [`super::Fit::std`] has no
+    /// figure of it.
     pub length: f64,
     /// What closes it.
     pub ends: Ends,
@@ -52,7 +55,8 @@ pub struct Stadium {
 }
 
 impl Stadium {
-    /// From its centre, axis (any length but 0), direction along the slot (not parallel to the axis) and sizes.
+    /// From its centre, axis (any length but 0), direction along the slot (not parallel to the
+    /// axis) and sizes.
     pub fn new(
         center: Point3<f64>,
         axis: &Vector3<f64>,
@@ -78,8 +82,9 @@ impl Stadium {
         self.pose_of.rotation * Vector3::x()
     }
 
-    /// Where the end in direction `sign` is along x; an end that was not touched is put where no point constrains it, for
-    /// otherwise the last touches of the walls, with their noise, would decide how near it is.
+    /// Where the end in direction `sign` is along x; an end that was not touched is put where no
+    /// point constrains it, for otherwise the last touches of the walls, with their noise, would
+    /// decide how near it is.
     fn end_beyond(&self, points: &[Vector3<f64>], sign: f64) -> f64 {
         let faces_end = |q: &&Vector3<f64>| {
             q.x * sign > 0.0 && self.distance_at(q).normal.x.abs() > LEAST_ALONG
@@ -181,7 +186,8 @@ impl Surface for Stadium {
 }
 
 impl Fit<Stadium> {
-    /// By how much the middle may be off across it and along it, m; `None` where its ends do not determine where it is along.
+    /// By how much the middle may be off across it and along it, m; `None` where its ends do not
+    /// determine where it is along.
     pub(crate) fn middle_std(&self) -> Option<f64> {
         Some(self.std(Freedom::Y)?.hypot(self.std(Freedom::X)?))
     }

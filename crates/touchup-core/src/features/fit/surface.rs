@@ -10,7 +10,8 @@ pub const FREEDOMS: usize = 8;
 /// A small change of each freedom, m or rad, indexed by [`Freedom`].
 pub type Steps = SVector<f64, FREEDOMS>;
 
-/// One degree of freedom of a surface. Directions are those of its own frame F, whose z is its axis or normal.
+/// One degree of freedom of a surface. Directions are those of its own frame F, whose z is its axis
+/// or normal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Freedom {
     /// Shift along x of F, m.
@@ -62,7 +63,8 @@ pub trait Surface: Clone {
     const NAMES: [Option<&'static str>; FREEDOMS];
     /// The freedoms it has.
     const FREE: [bool; FREEDOMS] = are_named(Self::NAMES);
-    /// The freedoms without which a fit of it is worth nothing; the others may come out undetermined.
+    /// The freedoms without which a fit of it is worth nothing; the others may come out
+    /// undetermined.
     const NEEDED: [bool; FREEDOMS] = Self::FREE;
     /// Whether its second size is a length.
     const SECOND_IS_LENGTH: bool = false;
@@ -76,7 +78,8 @@ pub trait Surface: Clone {
     /// The same shape with another pose, and its sizes changed by so much.
     fn with(&self, pose_of: Isometry3<f64>, by: [f64; 2]) -> Self;
 
-    /// The same surface, described from its place amid points given in F, of which there is at least one.
+    /// The same surface, described from its place amid points given in F, of which there is at
+    /// least one.
     fn described_from(&self, points: &[Vector3<f64>]) -> Self;
 
     /// Refuses sizes that no such surface has.
@@ -91,7 +94,8 @@ pub trait Surface: Clone {
         move |point| turn.inverse_transform_vector(&(point - center))
     }
 
-    /// Origin of F, m, in O: a point of a plane or of the axis of a cylinder, the centre of the circle of a cone, that of a slot.
+    /// Origin of F, m, in O: a point of a plane or of the axis of a cylinder, the centre of the
+    /// circle of a cone, that of a slot.
     fn center(&self) -> Point3<f64> {
         self.pose_of().translation.vector.into()
     }
@@ -118,7 +122,8 @@ pub trait Surface: Clone {
             .value
     }
 
-    /// Signed distance of a point in O, m, and the unit normal into the air at the nearest place, in O.
+    /// Signed distance of a point in O, m, and the unit normal into the air at the nearest place,
+    /// in O.
     #[inline]
     fn distance_and_normal(&self, point: &Point3<f64>) -> (f64, Vector3<f64>) {
         let Distance { value, normal, .. } =
@@ -134,8 +139,9 @@ pub trait Surface: Clone {
 
     /// [`Self::derivatives`] at a point given in F.
     ///
-    /// Shifting F by t and turning it by ω (both in F) takes a fixed point from q to q − t − ω × q, so with the normal n
-    /// the derivatives are −n by t and −q × n by ω; a tilt towards x is ω = (0, 1, 0), towards y (−1, 0, 0).
+    /// Shifting F by t and turning it by ω (both in F) takes a fixed point from q to q − t − ω × q,
+    /// so with the normal n the derivatives are −n by t and −q × n by ω; a tilt towards x is ω =
+    /// (0, 1, 0), towards y (−1, 0, 0).
     #[inline]
     fn derivatives_at(&self, q: &Vector3<f64>) -> (f64, Steps) {
         let Distance {
@@ -183,7 +189,8 @@ pub(super) const AXIS: Option<&str> = Some("direction of the axis");
 pub(super) const CENTRE: Option<&str> = Some("centre");
 pub(super) const RADIUS: Option<&str> = Some("radius");
 
-/// Distance of a point from the z axis and the unit vector away from it; x on the axis itself, where every one will do.
+/// Distance of a point from the z axis and the unit vector away from it; x on the axis itself,
+/// where every one will do.
 #[inline]
 pub(super) fn radial(q: &Vector3<f64>) -> (f64, Vector3<f64>) {
     let rho = q.xy().norm();

@@ -5,10 +5,11 @@ use nalgebra::SymmetricEigen;
 use super::solver::{FitProblem, FreedomMatrix};
 use super::{Fit, FitError, FitParams, Freedom, Steps, Surface};
 
-/// A direction is undetermined when the observations leave it uncertain by more than the size of what was touched, or by
-/// more than 1 rad (both are 1 in scaled steps) …
+/// A direction is undetermined when the observations leave it uncertain by more than the size of
+/// what was touched, or by more than 1 rad (both are 1 in scaled steps) …
 const LARGEST_DEVIATION: f64 = 1.0;
-/// … or when the freedoms in it make up for each other to this share of the information of each: below lies rounding.
+/// … or when the freedoms in it make up for each other to this share of the information of each:
+/// below lies rounding.
 const LEAST_SHARE: f64 = 1e-12;
 /// Groups beyond the unknowns from which on the residuals can say how large the errors are.
 pub(super) const SPARE_GROUPS: usize = 3;
@@ -16,10 +17,11 @@ pub(super) const SPARE_GROUPS: usize = 3;
 impl<M: Surface> Fit<M> {
     /// Around a surface of least squares over what is kept.
     ///
-    /// In steps y of one stated standard deviation along the fixed directions the stated covariance is I. The residuals
-    /// say S = g/(g − k) Σ s sᵀ over the groups, s = Σ wᵢ rᵢ ∂dᵢ/∂y over one of them (g groups, k unknowns): the sandwich
-    /// whose filling knows nothing of how errors are correlated inside a group \[Liang and Zeger 1986\]. Eigenvalues of S
-    /// below 1 are raised to 1, so neither of the two is ever undercut.
+    /// In steps y of one stated standard deviation along the fixed directions the stated covariance
+    /// is I. The residuals say S = g/(g − k) Σ s sᵀ over the groups, s = Σ wᵢ rᵢ ∂dᵢ/∂y over one of
+    /// them (g groups, k unknowns): the sandwich whose filling knows nothing of how errors are
+    /// correlated inside a group \[Liang and Zeger 1986\]. Eigenvalues of S below 1 are raised to
+    /// 1, so neither of the two is ever undercut.
     pub(super) fn around(
         problem: &FitProblem,
         surface: M,
@@ -59,7 +61,8 @@ impl<M: Surface> Fit<M> {
         };
         let deviations = FreedomMatrix::from_diagonal(&units) * scaled;
         let common = deviations * common * params.common_sigma;
-        // displaced together, observations displace what is fitted to them, whichever part of it they cover
+        // displaced together, observations displace what is fitted to them, whichever part of it
+        // they cover
         let shift = Steps::from_fn(|i, _| {
             let is_place = i <= Freedom::Z as usize;
             if is_place && M::FREE[i] {
@@ -101,8 +104,9 @@ impl<M: Surface> Fit<M> {
     }
 }
 
-/// In scaled steps: columns of one standard deviation along the fixed directions; and, in steps that each change the
-/// residuals by one standard deviation if taken alone, the projector onto the other directions, and these steps.
+/// In scaled steps: columns of one standard deviation along the fixed directions; and, in steps
+/// that each change the residuals by one standard deviation if taken alone, the projector onto the
+/// other directions, and these steps.
 fn directions(information: &FreedomMatrix) -> (FreedomMatrix, FreedomMatrix, Steps) {
     let alone = information
         .diagonal()

@@ -1,25 +1,26 @@
 //! The coupled equations of one held sample with a bound on the error, however stiff they are.
 //!
-//! The turned angle follows from the impulse alone, tan(θ/2) = tan(θ₀/2) e^(−β|F|J), so two unknowns are left: the travel s
-//! along a and the impulse J of the expected force,
+//! The turned angle follows from the impulse alone, tan(θ/2) = tan(θ₀/2) e^(−β|F|J), so two
+//! unknowns are left: the travel s along a and the impulse J of the expected force,
 //!
 //! ```text
 //! ds/dt = α (F·n(J) − f(h))      dJ/dt = f(h)      h = (p − b₀ − s a)·n(J)
 //! ```
 //!
-//! They are integrated by Radau IIA of order 5 (L-stable, stiffly accurate) \[Hairer Wanner 1996, IV.5\], whose stages
-//! Newton's method solves with the exact Jacobian. Each step is compared with its two halves, which go on, and is made
-//! shorter until both agree.
+//! They are integrated by Radau IIA of order 5 (L-stable, stiffly accurate) \[Hairer Wanner 1996,
+//! IV.5\], whose stages Newton's method solves with the exact Jacobian. Each step is compared with
+//! its two halves, which go on, and is made shorter until both agree.
 //!
-//! Where the face turns beyond a right angle from a, h leaves its rest point as fast as it was drawn to it before, and what
-//! starts that are roundings: they are followed through the path, and a result that they decide is refused.
+//! Where the face turns beyond a right angle from a, h leaves its rest point as fast as it was
+//! drawn to it before, and what starts that are roundings: they are followed through the path, and
+//! a result that they decide is refused.
 
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2};
 
 use super::error::DynamicsError;
 
-/// A step and its halves agree to this share of the size of each unknown: the halves are 31 times nearer, and a few hundred
-/// steps together stay below [`super::RELATIVE_ERROR`].
+/// A step and its halves agree to this share of the size of each unknown: the halves are 31 times
+/// nearer, and a few hundred steps together stay below [`super::RELATIVE_ERROR`].
 const AGREEMENT: f64 = 1e-11;
 /// Newton's method stops at this share of what is asked for.
 const NEWTON: f64 = 1e-2;
@@ -28,7 +29,8 @@ const MOST_ITERATIONS: usize = 14;
 const MOST_STEPS: usize = 100_000;
 /// Share of the shortest time constant that the first step takes.
 const FIRST: f64 = 0.1;
-/// A step may not be longer than this over the rate at which the solution grows: an implicit method would damp it.
+/// A step may not be longer than this over the rate at which the solution grows: an implicit method
+/// would damp it.
 const LONGEST_GROWTH: f64 = 1.0;
 /// A step may shrink to a tenth and grow eightfold.
 const CHANGE: (f64, f64) = (0.1, 8.0);
@@ -58,8 +60,9 @@ pub(super) struct Sizes {
 /// Integrates from zero over `end` (s).
 ///
 /// # Errors
-/// [`DynamicsError::Stiff`] when [`MOST_STEPS`] do not suffice, [`DynamicsError::NotFinite`] where the solution is not,
-/// [`DynamicsError::Undetermined`] where roundings grow beyond `relative` of the travel.
+/// [`DynamicsError::Stiff`] when [`MOST_STEPS`] do not suffice, [`DynamicsError::NotFinite`] where
+/// the solution is not, [`DynamicsError::Undetermined`] where roundings grow beyond `relative` of
+/// the travel.
 pub(super) fn integrate(
     end: f64,
     sizes: Sizes,
@@ -135,7 +138,8 @@ pub(super) fn integrate(
     })
 }
 
-/// Half of the trace, and the squared half distance of both eigenvalues, negative where they are complex.
+/// Half of the trace, and the squared half distance of both eigenvalues, negative where they are
+/// complex.
 fn eigenvalues(jacobian: &Matrix2<f64>) -> (f64, f64) {
     let [[a, c], [b, d]] = jacobian.data.0;
     let across = 0.5 * (a - d);

@@ -5,13 +5,16 @@
 use super::error::DynamicsError;
 use super::sigmoid_flow::{advance, share};
 
-/// Share of f_max up to which a sigmoid is trusted: beyond it the depth runs off to infinity, and with it the offset.
+/// Share of f_max up to which a sigmoid is trusted: beyond it the depth runs off to infinity, and
+/// with it the offset.
 pub const LARGEST_SHARE: f64 = 0.99;
 /// Below this scaled time one rounding of u is more than what happens.
 const NO_TIME: f64 = 1e-200;
-/// Scaled times beyond it leave too little room below the largest number: they are divided by e^u, at u = −40 at least.
+/// Scaled times beyond it leave too little room below the largest number: they are divided by e^u,
+/// at u = −40 at least.
 const LONGEST: f64 = 1e280;
-/// Of a spring: below it the series is taken, above it the closed form (which there loses no more than four roundings).
+/// Of a spring: below it the series is taken, above it the closed form (which there loses no more
+/// than four roundings).
 const SERIES_UP_TO: f64 = 1.0;
 /// 1/k! for k = 2 … 19; the next one is below a rounding of 1/2.
 const INVERSE_FACTORIALS: [f64; 18] = {
@@ -71,7 +74,8 @@ pub enum ContactModel {
 
 impl ContactModel {
     /// # Errors
-    /// [`DynamicsError::BadParameter`] for a value that is not finite, or not positive where it must be.
+    /// [`DynamicsError::BadParameter`] for a value that is not finite, or not positive where it
+    /// must be.
     pub fn check(&self) -> Result<(), DynamicsError> {
         let positive = |name, value| DynamicsError::check(name, value, value > 0.0);
         match *self {
@@ -149,14 +153,15 @@ impl ContactModel {
         }
     }
 
-    /// Whether F·n is more than the model can answer: [`Self::rigid_offset`], and a step that takes the offset out,
-    /// then use [`LARGEST_SHARE`] · f_max instead; a step that does not lets the face escape.
+    /// Whether F·n is more than the model can answer: [`Self::rigid_offset`], and a step that takes
+    /// the offset out, then use [`LARGEST_SHARE`] · f_max instead; a step that does not lets the
+    /// face escape.
     pub fn clamps(&self, force_n: f64) -> bool {
         matches!(*self, Self::Sigmoid { f_max_n, .. } if force_n > LARGEST_SHARE * f_max_n)
     }
 
-    /// The force a rigid contact is compared with: F·n between f(0), below which the model cannot distinguish contact from
-    /// none, and [`LARGEST_SHARE`] · f_max.
+    /// The force a rigid contact is compared with: F·n between f(0), below which the model cannot
+    /// distinguish contact from none, and [`LARGEST_SHARE`] · f_max.
     pub(super) fn comparable(&self, force_n: f64, at_zero_n: f64) -> f64 {
         match *self {
             Self::Sigmoid { f_max_n, .. } => force_n.max(at_zero_n).min(LARGEST_SHARE * f_max_n),
@@ -164,14 +169,16 @@ impl ContactModel {
         }
     }
 
-    /// Where a face on a rigid surface comes to rest under the force F·n, seen from the tip: f⁻¹(F·n), m, ≤ 0.
+    /// Where a face on a rigid surface comes to rest under the force F·n, seen from the tip:
+    /// f⁻¹(F·n), m, ≤ 0.
     ///
     /// Zero below f(0), clamped above [`LARGEST_SHARE`] · f_max: always finite.
     pub fn rigid_offset(&self, force_n: f64) -> f64 {
         self.distance(self.comparable(force_n, self.force(0.0)))
     }
 
-    /// Exact solution of ds/dt = α (F·n − f(h₀ + v t − (a·n) s)), s(0) = 0; not finite where it overflows.
+    /// Exact solution of ds/dt = α (F·n − f(h₀ + v t − (a·n) s)), s(0) = 0; not finite where it
+    /// overflows.
     #[inline]
     pub(super) fn flow(&self, hold: &Hold) -> Shift {
         match *self {

@@ -11,7 +11,8 @@ const CHANGE: (f64, f64) = (0.2, 5.0);
 /// Aim below the tolerance, so that most steps are accepted.
 const SAFETY: f64 = 0.9;
 
-/// Stages: nodes of the tableau of Dormand and Prince (1980), the right-hand side does not depend on time.
+/// Stages: nodes of the tableau of Dormand and Prince (1980), the right-hand side does not depend
+/// on time.
 const A: [[f64; 6]; 6] = [
     [1.0 / 5.0, 0.0, 0.0, 0.0, 0.0, 0.0],
     [3.0 / 40.0, 9.0 / 40.0, 0.0, 0.0, 0.0, 0.0],
@@ -55,11 +56,12 @@ const E: [f64; 7] = [
 /// Displacement along a, m, and the normal.
 pub(crate) type OdeState = [f64; 4];
 
-/// Integrates dy/dt = `rate`(y) from 0 to `end`, s; `scale` is the size of each component that counts, and `relative` the error
-/// per step in units of it.
+/// Integrates dy/dt = `rate`(y) from 0 to `end`, s; `scale` is the size of each component that
+/// counts, and `relative` the error per step in units of it.
 ///
 /// # Errors
-/// [`DynamicsError::Stiff`] when [`MAX_STEPS`] do not suffice, [`DynamicsError::NotFinite`] when the rate is not.
+/// [`DynamicsError::Stiff`] when [`MAX_STEPS`] do not suffice, [`DynamicsError::NotFinite`] when
+/// the rate is not.
 pub fn integrate(
     start: OdeState,
     end: f64,

@@ -4,15 +4,17 @@
 //! h = (p − b)·n      F* = f(h) n      db/dt = α ((F − F*)·n) a      dn/dt = β (F* × F) × n
 //! ```
 //!
-//! p and F are held over the step; a is n(0), or F/|F| ([`Along`]). Two sub-flows are solved exactly:
+//! p and F are held over the step; a is n(0), or F/|F| ([`Along`]). Two sub-flows are solved
+//! exactly:
 //!
-//! - **position**, n frozen: b = b₀ + s a, ds/dt = α (F·n − f(h₀ − (a·n) s)). Since a·n is frozen with n, h obeys
-//!   dh/dt = −α (a·n) (F·n − f(h)): the equation for a = n with α (a·n) in the place of α. A moving tip or a turning
-//!   face adds a drift v to dh/dt, frozen as well.
-//! - **rotation**, the impulse J = ∫ f dt given: n turns towards F by tan(θ/2) → tan(θ/2) e^(−β|F|J).
+//! - **position**, n frozen: b = b₀ + s a, ds/dt = α (F·n − f(h₀ − (a·n) s)). Since a·n is frozen
+//!   with n, h obeys dh/dt = −α (a·n) (F·n − f(h)): the equation for a = n with α (a·n) in the
+//!   place of α. A moving tip or a turning face adds a drift v to dh/dt, frozen as well.
+//! - **rotation**, the impulse J = ∫ f dt given: n turns towards F by tan(θ/2) → tan(θ/2)
+//!   e^(−β|F|J).
 //!
-//! [`StepRule::Lie`] does one after the other. Where F is parallel to n that is the exact solution, whatever dt; elsewhere
-//! [`StepRule::Bounded`] solves both together to [`RELATIVE_ERROR`].
+//! [`StepRule::Lie`] does one after the other. Where F is parallel to n that is the exact solution,
+//! whatever dt; elsewhere [`StepRule::Bounded`] solves both together to [`RELATIVE_ERROR`].
 
 mod bounded;
 mod contact_model;
@@ -33,8 +35,8 @@ pub use rotation::turn;
 
 /// How far |n| may be from 1 on input: six digits in a file are enough.
 pub const UNIT_TOLERANCE: f64 = 1e-6;
-/// Largest error of [`StepRule::Bounded`]: of the position over the farthest travel, of the normal over 1. Where the roundings of
-/// the input do more than that, they decide.
+/// Largest error of [`StepRule::Bounded`]: of the position over the farthest travel, of the normal
+/// over 1. Where the roundings of the input do more than that, they decide.
 pub const RELATIVE_ERROR: f64 = 1e-9;
 /// An impulse (times α) that turns a face by one is no larger, m: beyond it the face does not turn.
 const NO_TURNING: f64 = 1e100;
@@ -57,9 +59,11 @@ words! {
         /// Position, then rotation: first order, exact where F is parallel to n.
         #[default]
         Lie = "lie",
-        /// The position flow again with the drift and the mean normal that the rotation causes: second order.
+        /// The position flow again with the drift and the mean normal that the rotation causes:
+        /// second order.
         DriftCorrected = "corrected",
-        /// The coupled equations to [`RELATIVE_ERROR`], however stiff: adaptive and implicit, and far slower (`cargo bench --bench dynamics`).
+        /// The coupled equations to [`RELATIVE_ERROR`], however stiff: adaptive and implicit, and
+        /// far slower (`cargo bench --bench dynamics`).
         Bounded = "bounded",
         /// Adaptive Runge–Kutta on the coupled equations: for comparison, refuses stiff steps.
         DormandPrince = "dp5",
@@ -70,7 +74,8 @@ words! {
     /// The direction a in which b* moves.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum Along {
-        /// n*(0) \[paper, Eq 6\]: n* when the face was first touched, or at the start of the step if no other is given.
+        /// n*(0) \[paper, Eq 6\]: n* when the face was first touched, or at the start of the step
+        /// if no other is given.
         InitialNormal = "normal0",
         /// F/|F|, which stays bounded where n* is far off; n* at the start where F = 0.
         #[default]
@@ -119,13 +124,15 @@ pub struct DynamicsParams {
     pub rule: StepRule,
     /// Direction of motion.
     pub along: Along,
-    /// Compares h with f⁻¹(F·n) ([`ContactModel::rigid_offset`]) instead of 0, so that a face at rest lies at the tip
-    /// whatever the force. F·n is taken between f(0) and [`LARGEST_SHARE`] · f_max then.
+    /// Compares h with f⁻¹(F·n) ([`ContactModel::rigid_offset`]) instead of 0, so that a face at
+    /// rest lies at the tip whatever the force. F·n is taken between f(0) and [`LARGEST_SHARE`] ·
+    /// f_max then.
     pub take_out_rigid_offset: bool,
 }
 
 impl Default for DynamicsParams {
-    /// The paper's α, β, h_min, δ, with the f_max of 10 N that the paper leaves open; the robust choice elsewhere.
+    /// The paper's α, β, h_min, δ, with the f_max of 10 N that the paper leaves open; the robust
+    /// choice elsewhere.
     fn default() -> Self {
         Self {
             model: SigmoidParams::default().model(),
@@ -194,11 +201,13 @@ impl FaceDynamics {
         })
     }
 
-    /// The face after holding the tip `p` (m, in O) and the force on the stylus `force` (N, in O) for `dt` (s).
+    /// The face after holding the tip `p` (m, in O) and the force on the stylus `force` (N, in O)
+    /// for `dt` (s).
     ///
     /// # Errors
-    /// Input that is not finite, a normal that is not of length 1, a negative `dt`, a result that overflows, and
-    /// [`DynamicsError::Stiff`] from [`StepRule::DormandPrince`] and [`StepRule::Bounded`], and [`DynamicsError::Undetermined`] from the latter.
+    /// Input that is not finite, a normal that is not of length 1, a negative `dt`, a result that
+    /// overflows, and [`DynamicsError::Stiff`] from [`StepRule::DormandPrince`] and
+    /// [`StepRule::Bounded`], and [`DynamicsError::Undetermined`] from the latter.
     pub fn step(
         &self,
         face: &FaceState,
@@ -209,8 +218,8 @@ impl FaceDynamics {
         self.step_from(&face.n, face, p, force, dt)
     }
 
-    /// As [`Self::step`], with the n*(0) of an earlier step: [`Along::InitialNormal`] keeps b* on the line on which it
-    /// was then. n*(0) is taken as it is, |n*(0)| = 1.
+    /// As [`Self::step`], with the n*(0) of an earlier step: [`Along::InitialNormal`] keeps b* on
+    /// the line on which it was then. n*(0) is taken as it is, |n*(0)| = 1.
     ///
     /// # Errors
     /// Those of [`Self::step`].
@@ -308,9 +317,10 @@ impl FaceDynamics {
         (displacement, self.turned(touch, impulse))
     }
 
-    /// The position flow with h₀ + v t from the arm held and n turning evenly from its start to its predicted end;
-    /// twice, so that b* fits the n* that is returned. F·n and a·n, which change during the step, enter by a mean
-    /// that weights the end the more the faster h forgets: 1/2 when slow (second order), 1 when stiff.
+    /// The position flow with h₀ + v t from the arm held and n turning evenly from its start to its
+    /// predicted end; twice, so that b* fits the n* that is returned. F·n and a·n, which change
+    /// during the step, enter by a mean that weights the end the more the faster h forgets: 1/2
+    /// when slow (second order), 1 when stiff.
     fn drift_corrected(&self, touch: &FaceSample) -> (f64, Vector3<f64>) {
         let (displacement, end) = self.lie(touch);
         if touch.dt == 0.0 || end == touch.n {

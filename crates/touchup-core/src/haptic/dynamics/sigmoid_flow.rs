@@ -6,15 +6,17 @@
 //! D + L = (1 − c) T,     L = ∫ 1/(1 + e⁻ᵘ) dT = −ln(1 − c y)/c,     y = ρ (e^D − 1)
 //! ```
 //!
-//! The reflection u → −u, c → 1 − c maps the equation to itself, so only a right-hand side that is positive at u₀ is
-//! solved. Then D and L have the sign of T, nothing cancels in the sum, and D keeps its relative precision however
-//! small it is. Where eᵘ is small D is nearly linear in T and the root of the sum is sought; where it is not, L is, and
-//! the root of D = ln(1 + y(L)/ρ), L = (1 − c) T − D is sought. Both are so straight there that two or three steps of
-//! Halley's method suffice.
+//! The reflection u → −u, c → 1 − c maps the equation to itself, so only a right-hand side that is
+//! positive at u₀ is solved. Then D and L have the sign of T, nothing cancels in the sum, and D
+//! keeps its relative precision however small it is. Where eᵘ is small D is nearly linear in T and
+//! the root of the sum is sought; where it is not, L is, and the root of D = ln(1 + y(L)/ρ), L = (1
+//! − c) T − D is sought. Both are so straight there that two or three steps of Halley's method
+//! suffice.
 
 /// Beyond ±40 the logistic function is 0 or 1 to 4e-18, less than a rounding.
 const SATURATED: f64 = 40.0;
-/// A force below this share of f_max is none: what it moves in a step of T = 1e200 is still below a rounding.
+/// A force below this share of f_max is none: what it moves in a step of T = 1e200 is still below a
+/// rounding.
 const NO_FORCE: f64 = 1e-280;
 /// Largest u whose exponential, times e, is finite with room to spare.
 const LARGEST_EXPONENT: f64 = 700.0;
@@ -22,16 +24,20 @@ const LARGEST_EXPONENT: f64 = 700.0;
 const LARGE: f64 = 38.0;
 /// Beyond it the logarithm of a product is taken as the sum of logarithms.
 const LARGEST_PRODUCT: f64 = 1e300;
-/// Halley's method leaves at most the cube of its step (in u): stop where that is below a rounding of D.
+/// Halley's method leaves at most the cube of its step (in u): stop where that is below a rounding
+/// of D.
 const CUBE_BELOW_ROUNDING: f64 = 1e-17;
-/// A difference smaller than this share of its terms is taken from another formula: three digits are lost at most.
+/// A difference smaller than this share of its terms is taken from another formula: three digits
+/// are lost at most.
 const CANCELLED: f64 = 1e-3;
-/// A rise (in u) so short that the sum serves on both sides of the bend, and (e^SHORT − 1)/SHORT, rounded up.
+/// A rise (in u) so short that the sum serves on both sides of the bend, and (e^SHORT − 1)/SHORT,
+/// rounded up.
 const SHORT: f64 = 1.5;
 const SHORT_GROWTH: f64 = 2.33;
 /// No progress is possible below two roundings.
 const ROUNDING: f64 = 2.0 * f64::EPSILON;
-/// Each step that Halley's method does not shorten halves the bracket: this many pin down any double.
+/// Each step that Halley's method does not shorten halves the bracket: this many pin down any
+/// double.
 const MAX_ITERATIONS: usize = 120;
 
 /// What happens while the scaled time T passes.
@@ -137,7 +143,8 @@ impl Arc {
         self.curved(span, down)
     }
 
-    /// u moves at the constant `slope`, at most to the `edge`; what is left of the time goes on from there.
+    /// u moves at the constant `slope`, at most to the `edge`; what is left of the time goes on
+    /// from there.
     fn straight(self, span: f64, down: bool, slope: f64, edge: Option<f64>) -> Passed {
         let sign = if down { -1.0 } else { 1.0 };
         let free = self.u + sign * slope * span;
@@ -204,14 +211,16 @@ impl Arc {
         self.passed(displacement, total, span, sign)
     }
 
-    /// D of a short or straight rise: (2, 1) Padé approximation of the decaying rate; at most `high`.
+    /// D of a short or straight rise: (2, 1) Padé approximation of the decaying rate; at most
+    /// `high`.
     #[inline]
     fn guess(&self, span: f64, high: f64) -> f64 {
         let decay = self.e / ((1.0 + self.e) * (1.0 + self.e)) * span;
         (self.rate * span / (1.0 + 0.5 * decay)).min(high)
     }
 
-    /// The value of eᵘ up to which D, and from which on L, is nearly linear in T; `None`: D always is.
+    /// The value of eᵘ up to which D, and from which on L, is nearly linear in T; `None`: D always
+    /// is.
     #[inline]
     fn bend(&self) -> Option<f64> {
         if self.c <= -1.0 {
@@ -291,7 +300,8 @@ impl Arc {
         (high, e)
     }
 
-    /// Both integrals: from the sums D + L = (1 − c) T and ∫ 1/(1 + eᵘ) d|T| = |D| + c |T| unless they cancel.
+    /// Both integrals: from the sums D + L = (1 − c) T and ∫ 1/(1 + eᵘ) d|T| = |D| + c |T| unless
+    /// they cancel.
     #[inline]
     fn passed(&self, displacement: f64, total: f64, span: f64, sign: f64) -> Passed {
         let (low, high) = (displacement + self.c * span, total - displacement);
@@ -308,7 +318,8 @@ impl Arc {
         (displacement, low, high)
     }
 
-    /// ∫ 1/(1 + eᵘ) d|T| = (|D| + ln((1−c−cE)/(1−c−cE′)))/(1−c) for c ≤ 0, from the lower end E to the upper end E′.
+    /// ∫ 1/(1 + eᵘ) d|T| = (|D| + ln((1−c−cE)/(1−c−cE′)))/(1−c) for c ≤ 0, from the lower end E to
+    /// the upper end E′.
     #[inline]
     fn low(&self, displacement: f64, sign: f64) -> f64 {
         let shrunk = (-displacement).exp();

@@ -45,7 +45,8 @@ impl Aabb {
         }
     }
 
-    /// Takes in the corners of a face, rounded to nearest; [`Self::rounded_outward`] makes up for that.
+    /// Takes in the corners of a face, rounded to nearest; [`Self::rounded_outward`] makes up for
+    /// that.
     #[inline]
     fn take(&mut self, mesh: &TriMesh, face: FaceId, origin: &Point3<f64>) {
         for corner in mesh.triangle(face) {
@@ -60,8 +61,8 @@ impl Aabb {
         }
     }
 
-    /// One unit in the last place wider on each side: rounding is monotone, so all corners are inside, and the union of
-    /// widened boxes is the widened union.
+    /// One unit in the last place wider on each side: rounding is monotone, so all corners are
+    /// inside, and the union of widened boxes is the widened union.
     #[inline]
     pub fn rounded_outward(&self) -> Self {
         let unit = |x: f32| x.abs() * f32::EPSILON + f32::MIN_POSITIVE;
@@ -105,7 +106,8 @@ impl Aabb {
         x * x + y * y + z * z
     }
 
-    /// The largest box of single precision within a box: it overlaps the same boxes of single precision.
+    /// The largest box of single precision within a box: it overlaps the same boxes of single
+    /// precision.
     pub fn within(lo: &Vector3<f64>, hi: &Vector3<f64>) -> Self {
         let up = |x: f64| {
             if f64::from(x as f32) < x {

@@ -1,7 +1,7 @@
 //! Builds the tree over a mesh, or rebuilds it over the few faces below a node.
 //!
-//! First the faces are sorted into the order of the leaves, then the nodes above them are made: once it is known how many there are on
-//! either side, both sides are made at the same time.
+//! First the faces are sorted into the order of the leaves, then the nodes above them are made:
+//! once it is known how many there are on either side, both sides are made at the same time.
 
 use std::slice;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -15,7 +15,8 @@ use crate::numeric::largest;
 
 /// A split at the middle is taken only if it leaves at least this share on either side (1/4).
 const SMALLEST_SHARE: usize = 4;
-/// So few are halved by count, to fill two leaves: 3 bytes less for a face, and queries are no slower.
+/// So few are halved by count, to fill two leaves: 3 bytes less for a face, and queries are no
+/// slower.
 const FULL_LEAVES: usize = 2 * LEAF_FACES;
 /// Fewer faces are not worth a thread.
 const LEAST_FORKED: usize = 20_000;
@@ -89,7 +90,8 @@ impl FaceTree {
         }
     }
 
-    /// Rebuilds the subtree of node `at`, from the faces below `nodes` and one face more if there is one to add.
+    /// Rebuilds the subtree of node `at`, from the faces below `nodes` and one face more if there
+    /// is one to add.
     pub(super) fn rebuild(
         &mut self,
         mesh: &TriMesh,
@@ -358,8 +360,8 @@ impl LeafOrder {
     }
 }
 
-/// Sorts the items into the order of the leaves, and notes how many go to the left of each inner node, from the top down, left before
-/// right.
+/// Sorts the items into the order of the leaves, and notes how many go to the left of each inner
+/// node, from the top down, left before right.
 fn arrange(items: &mut [Item], lefts: &mut Vec<u32>) {
     if items.len() <= LEAF_FACES {
         return;
@@ -402,8 +404,8 @@ fn grow(
     TreeNode::above(&nodes, pair)
 }
 
-/// Sorts the items into two groups and gives the size of the first: at the middle of the longest axis, or by count
-/// where that would be lopsided.
+/// Sorts the items into two groups and gives the size of the first: at the middle of the longest
+/// axis, or by count where that would be lopsided.
 fn split(items: &mut [Item]) -> usize {
     let (mut lo, mut hi) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
     for item in items.iter() {
@@ -431,7 +433,8 @@ fn split(items: &mut [Item]) -> usize {
     half
 }
 
-/// Sorts the items into those below `middle` along an axis and the others; gives the number of the first.
+/// Sorts the items into those below `middle` along an axis and the others; gives the number of the
+/// first.
 fn part(items: &mut [Item], axis: usize, middle: f32) -> usize {
     let mut left = 0;
     for i in 0..items.len() {
@@ -450,7 +453,8 @@ mod tests {
     use super::*;
     use crate::mesh::workers::Backwards;
 
-    /// A wavy sheet whose columns lie closer and closer, so that splits at the middle are lopsided; every seventh face was removed.
+    /// A wavy sheet whose columns lie closer and closer, so that splits at the middle are lopsided;
+    /// every seventh face was removed.
     fn sheet(columns: u32, rows: u32) -> TriMesh {
         let point = |i: u32, j: u32| {
             let (x, y) = (

@@ -1,27 +1,30 @@
-//! Insertion and removal of faces: the tree stays exact, tight and shallow, and no edit costs more than the path to the root.
+//! Insertion and removal of faces: the tree stays exact, tight and shallow, and no edit costs more
+//! than the path to the root.
 //!
-//! A new face goes down where the boxes grow least. On the path back up each box becomes the union of the two below it,
-//! and a node one of whose sides holds too small a share of the faces is mended: where few faces are below it, it is
-//! rebuilt; else one of the two grandchildren on the heavy side goes over to the light side. Faces have no order in
-//! the tree, so that one such step always suffices.
+//! A new face goes down where the boxes grow least. On the path back up each box becomes the union
+//! of the two below it, and a node one of whose sides holds too small a share of the faces is
+//! mended: where few faces are below it, it is rebuilt; else one of the two grandchildren on the
+//! heavy side goes over to the light side. Faces have no order in the tree, so that one such step
+//! always suffices.
 
 use super::aabb::Aabb;
 use super::{FaceTree, NONE, ROOT, TreeNode};
 use crate::mesh::{FaceId, MeshError, TriMesh};
 
-/// Each side of a node holds at least this share of its faces (1/5), less than a split leaves at first (1/4), so that
-/// many edits lie between two repairs; 1/3 at most, or a grandchild would not suffice. The depth is at most
-/// log(2^31 / 5) / log(5 / 4) + 2 = 91 levels.
+/// Each side of a node holds at least this share of its faces (1/5), less than a split leaves at
+/// first (1/4), so that many edits lie between two repairs; 1/3 at most, or a grandchild would not
+/// suffice. The depth is at most log(2^31 / 5) / log(5 / 4) + 2 = 91 levels.
 const SMALLEST_SHARE: u64 = 5;
-/// Faces that are rebuilt at most, one or two µs. Above, both sides of what [`FaceTree::lean`] joins are large enough
-/// for an inner node and differ by little enough; nine faces would do.
+/// Faces that are rebuilt at most, one or two µs. Above, both sides of what [`FaceTree::lean`]
+/// joins are large enough for an inner node and differ by little enough; nine faces would do.
 const MOST_REBUILT: u32 = 16;
 
 impl FaceTree {
     /// Takes in a face of `mesh`: after [`TriMesh::add_face`]. O(log F).
     ///
-    /// Every face in the tree must still be in the mesh. Returns whether there was such a face, and not in the tree yet.
-    /// Arrays that are full are copied once and doubled, a pause of milliseconds on a large mesh: see [`Self::reserve`].
+    /// Every face in the tree must still be in the mesh. Returns whether there was such a face, and
+    /// not in the tree yet. Arrays that are full are copied once and doubled, a pause of
+    /// milliseconds on a large mesh: see [`Self::reserve`].
     pub fn insert(&mut self, mesh: &TriMesh, face: FaceId) -> bool {
         if !mesh.has_face(face) || self.has(face) {
             return false;
@@ -47,9 +50,11 @@ impl FaceTree {
         true
     }
 
-    /// Lets go of a face: before [`TriMesh::remove_face`], for the faces beside it are measured. O(log F).
+    /// Lets go of a face: before [`TriMesh::remove_face`], for the faces beside it are measured.
+    /// O(log F).
     ///
-    /// Every other face in the tree must still be in the mesh. Returns whether the face was in the tree.
+    /// Every other face in the tree must still be in the mesh. Returns whether the face was in the
+    /// tree.
     pub fn remove(&mut self, mesh: &TriMesh, face: FaceId) -> bool {
         if !self.has(face) {
             return false;
@@ -93,8 +98,8 @@ impl FaceTree {
         self.lefts.try_reserve(MOST_REBUILT as usize).map_err(short)
     }
 
-    /// The lowest node that encloses a box and a face beside it: a node where the box makes nothing grow, found sooner
-    /// than from the root.
+    /// The lowest node that encloses a box and a face beside it: a node where the box makes nothing
+    /// grow, found sooner than from the root.
     fn above_neighbour(&self, mesh: &TriMesh, face: FaceId, bounds: &Aabb) -> u32 {
         let beside = mesh
             .corners(face)
@@ -169,7 +174,8 @@ impl FaceTree {
         let grandchildren = self.pairs[inner as usize].0;
         let joined = grandchildren.map(|node| node.bounds.union(&light.bounds));
         let larger = usize::from(grandchildren[1].count > grandchildren[0].count);
-        // the smaller one can always go over; the larger one if enough stays and the light one is enough beside it
+        // the smaller one can always go over; the larger one if enough stays and the light one is
+        // enough beside it
         let (goes, stays) = (grandchildren[larger].count, grandchildren[1 - larger].count);
         let share = |part: u32, whole: u32| u64::from(part) * SMALLEST_SHARE >= u64::from(whole);
         let may_choose =
@@ -212,7 +218,8 @@ mod tests {
     use super::*;
     use crate::mesh::VertexId;
 
-    /// Checks all that a node stores about what is below it; returns the number of levels and of nodes.
+    /// Checks all that a node stores about what is below it; returns the number of levels and of
+    /// nodes.
     fn check(tree: &FaceTree, mesh: &TriMesh, at: u32, seen: &mut Vec<FaceId>) -> (usize, usize) {
         let node = *tree.node(at);
         if node.is_leaf() {

@@ -1,10 +1,13 @@
-//! Closest face of a mesh that changes: a bounding volume tree that is exact after every edit, and never far from tight.
+//! Closest face of a mesh that changes: a bounding volume tree that is exact after every edit, and
+//! never far from tight.
 //!
-//! A binary tree over the faces. Boxes are kept in single precision relative to the middle of the mesh and rounded
-//! outward, so a query that prunes by them never misses a face; distances to faces are computed in double precision.
-//! [`FaceTree::refit`] recomputes the boxes of the leaves that hold moved faces and all boxes above them;
-//! [`FaceTree::insert`] and [`FaceTree::remove`] do the same on one path to the root. [`FaceTree::refit_planned`] may leave a
-//! margin, so that small motions inside of it cost nothing. Boxes never only grow, so nothing is left to be tightened later.
+//! A binary tree over the faces. Boxes are kept in single precision relative to the middle of the
+//! mesh and rounded outward, so a query that prunes by them never misses a face; distances to faces
+//! are computed in double precision. [`FaceTree::refit`] recomputes the boxes of the leaves that
+//! hold moved faces and all boxes above them; [`FaceTree::insert`] and [`FaceTree::remove`] do the
+//! same on one path to the root. [`FaceTree::refit_planned`] may leave a margin, so that small
+//! motions inside of it cost nothing. Boxes never only grow, so nothing is left to be tightened
+//! later.
 
 mod aabb;
 mod build;
@@ -22,7 +25,8 @@ pub use nearby::Nearby;
 pub use query::{BoxQuery, FaceHit};
 pub use refit::RefitPlan;
 
-/// Faces in a leaf at most. Two to four are equally fast within noise; four makes the smallest tree.
+/// Faces in a leaf at most. Two to four are equally fast within noise; four makes the smallest
+/// tree.
 const LEAF_FACES: usize = 4;
 /// Slots of the traversal stack: one for each level, see [`edit`].
 const STACK: usize = 96;
@@ -31,8 +35,8 @@ const NONE: u32 = u32::MAX;
 /// The node above all others, which is in no pair.
 const ROOT: u32 = u32::MAX >> 1;
 
-/// One node over `count` faces: a leaf of the faces in place `first` if these fit there, else an inner node whose
-/// children are the pair `first`.
+/// One node over `count` faces: a leaf of the faces in place `first` if these fit there, else an
+/// inner node whose children are the pair `first`.
 #[derive(Clone, Copy, Debug)]
 struct TreeNode {
     bounds: Aabb,
@@ -82,11 +86,13 @@ pub struct FaceTree {
     origin: Point3<f64>,
     root: TreeNode,
     pairs: Vec<SiblingNodes>,
-    /// for each pair: the node above it (2 · pair + side), or [`ROOT`]; for a free one the next free one
+    /// for each pair: the node above it (2 · pair + side), or [`ROOT`]; for a free one the next
+    /// free one
     parents: Vec<u32>,
     /// faces of the leaves; in a free place the next free one
     leaf_faces: Vec<[FaceId; LEAF_FACES]>,
-    /// leaf (2 · pair + side, or [`ROOT`]) of each face, [`NONE`] for faces that are not in the tree
+    /// leaf (2 · pair + side, or [`ROOT`]) of each face, [`NONE`] for faces that are not in the
+    /// tree
     leaf_of_face: Vec<u32>,
     free_pair: u32,
     free_leaf: u32,
@@ -98,8 +104,8 @@ pub struct FaceTree {
     edits: u64,
     /// counts those and the refits after motions of unknown length …
     changes: u64,
-    /// … and sums by how much boxes became wider at most in the other refits, m, so that leaves that are kept know whether
-    /// they still hold
+    /// … and sums by how much boxes became wider at most in the other refits, m, so that leaves
+    /// that are kept know whether they still hold
     widened: f64,
 }
 

@@ -1,4 +1,5 @@
-//! Queries that follow each other closely: the leaves around the last one are kept, and visited without a descent from the root.
+//! Queries that follow each other closely: the leaves around the last one are kept, and visited
+//! without a descent from the root.
 
 use nalgebra::Point3;
 
@@ -9,7 +10,8 @@ use crate::mesh::{FaceId, TriMesh};
 
 /// The reach of a query with a hint over the distance to the hinted face.
 const HINT_WIDTH: f64 = 1.0 + 1e-6;
-/// Leaves that are kept at most: to look at the boxes of more takes as long as a descent from the root.
+/// Leaves that are kept at most: to look at the boxes of more takes as long as a descent from the
+/// root.
 const MOST_LEAVES: usize = 64;
 /// How far beyond a query leaves are kept, in longest edges of the hinted face.
 const EDGES_BEYOND: f64 = 0.7;
@@ -43,8 +45,8 @@ impl Default for Nearby {
 }
 
 impl FaceTree {
-    /// [`Self::closest`] of a point that is likely near `hint`, and near the point that was asked for last with `nearby`: the
-    /// same answer, sooner.
+    /// [`Self::closest`] of a point that is likely near `hint`, and near the point that was asked
+    /// for last with `nearby`: the same answer, sooner.
     ///
     /// - `nearby`: has always been used with this tree.
     pub fn closest_nearby(
@@ -56,7 +58,8 @@ impl FaceTree {
         nearby: &mut Nearby,
     ) -> Option<FaceHit> {
         let triangle = mesh.triangle(hint);
-        // a little farther, so that the hint itself is found too; a touching point still has some reach
+        // a little farther, so that the hint itself is found too; a touching point still has some
+        // reach
         let known =
             (p - closest_point(p, &triangle).0).norm() * HINT_WIDTH + f64::MIN_POSITIVE.sqrt();
         let reach = reach.min(known);

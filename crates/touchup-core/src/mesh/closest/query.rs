@@ -7,18 +7,21 @@ use super::{FaceTree, LEAF_FACES, STACK};
 use crate::mesh::triangle::closest_point;
 use crate::mesh::{FaceId, TriMesh};
 
-/// Roundings of the largest coordinate M by which the distances of two faces that meet at the closest point may differ.
+/// Roundings of the largest coordinate M by which the distances of two faces that meet at the
+/// closest point may differ.
 ///
-/// The point a + v·ab + w·ac is rounded by ε/2 · M at each sum, which makes ε M along each axis, √3 ε M in length. The
-/// products add ε times the longest edge, at most the diagonal D of the mesh; difference to `p`, squares and their sum
-/// 5/4 ε times the distance d. Two faces: 2√3 ε M + 2 ε D + 5/2 ε d. That v and w are rounded too moves the point along
-/// the face, where the distance is stationary; only for a `p` on the surface to rounding it is not, and that has no side.
+/// The point a + v·ab + w·ac is rounded by ε/2 · M at each sum, which makes ε M along each axis, √3
+/// ε M in length. The products add ε times the longest edge, at most the diagonal D of the mesh;
+/// difference to `p`, squares and their sum 5/4 ε times the distance d. Two faces: 2√3 ε M + 2 ε D
+/// + 5/2 ε d. That v and w are rounded too moves the point along the face, where the distance is
+/// stationary; only for a `p` on the surface to rounding it is not, and that has no side.
 const TIE_COORDINATE: f64 = 4.0 * f64::EPSILON;
 /// The same for the diagonal of the mesh, see [`TIE_COORDINATE`].
 const TIE_DIAGONAL: f64 = 2.0 * f64::EPSILON;
 /// The same for the distance, see [`TIE_COORDINATE`].
 const TIE_DISTANCE: f64 = 3.0 * f64::EPSILON;
-/// What the squared distance to a box is rounded by, as a share of it: differences, squares and sums, 4 ε; 8 ε to be sure.
+/// What the squared distance to a box is rounded by, as a share of it: differences, squares and
+/// sums, 4 ε; 8 ε to be sure.
 const BOX_ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// The face that was asked for, and the point of it.
@@ -129,10 +132,12 @@ impl SearchState {
 }
 
 impl FaceTree {
-    /// The face whose surface is closest to `p`, among those nearer than `reach` (m); `None` when there is none.
+    /// The face whose surface is closest to `p`, among those nearer than `reach` (m); `None` when
+    /// there is none.
     ///
-    /// Where faces meet at the closest point (an edge or a corner), the one that `p` lies most squarely above or below
-    /// is named, so that the sign of (p − point)·n distinguishes inside from outside; among equals the smallest id.
+    /// Where faces meet at the closest point (an edge or a corner), the one that `p` lies most
+    /// squarely above or below is named, so that the sign of (p − point)·n distinguishes inside
+    /// from outside; among equals the smallest id.
     pub fn closest(&self, mesh: &TriMesh, p: &Point3<f64>, reach: f64) -> Option<FaceHit> {
         self.search(
             p,
@@ -165,9 +170,9 @@ impl FaceTree {
         )
     }
 
-    /// Branch and bound over the tree. `measure` gives the hit of one face, whose point must lie in the face's box, or
-    /// nothing where its squared distance is surely above a limit;
-    /// `yields(a, b)` whether `a` steps back behind `b` when both are equally near.
+    /// Branch and bound over the tree. `measure` gives the hit of one face, whose point must lie in
+    /// the face's box, or nothing where its squared distance is surely above a limit; `yields(a,
+    /// b)` whether `a` steps back behind `b` when both are equally near.
     #[inline]
     fn search(
         &self,
@@ -209,8 +214,8 @@ impl FaceTree {
         }
     }
 
-    /// How much a distance between `q` and a box may be off in single precision, m: three roundings of the largest
-    /// coordinate that enters it.
+    /// How much a distance between `q` and a box may be off in single precision, m: three roundings
+    /// of the largest coordinate that enters it.
     fn slack(&self, q: &Vector3<f64>) -> f64 {
         let bounds = &self.root.bounds;
         let largest = (0..3)
@@ -219,7 +224,8 @@ impl FaceTree {
         4.0 * f64::from(f32::EPSILON) * largest
     }
 
-    /// How much the distances of faces that meet at the closest point may differ, without the part of the distance, m.
+    /// How much the distances of faces that meet at the closest point may differ, without the part
+    /// of the distance, m.
     fn tie(&self) -> f64 {
         let Aabb { lo, hi } = self.root.bounds;
         let largest = |i: usize| self.origin[i].abs() + f64::from(hi[i].max(-lo[i]));
@@ -230,7 +236,8 @@ impl FaceTree {
         if tie.is_finite() { tie } else { 0.0 }
     }
 
-    /// Finds every face whose leaf's box meets the box from `lo` to `hi` (m, in O); those of the last query are forgotten.
+    /// Finds every face whose leaf's box meets the box from `lo` to `hi` (m, in O); those of the
+    /// last query are forgotten.
     pub fn faces_in_box(&self, lo: &Point3<f64>, hi: &Point3<f64>, query: &mut BoxQuery) {
         let wanted = Aabb::within(&(lo - self.origin), &(hi - self.origin));
         let BoxQuery {
@@ -271,7 +278,8 @@ impl FaceTree {
         }
     }
 
-    /// The pair below which all leaves that meet a box are found, from the root down as long as one side alone is met.
+    /// The pair below which all leaves that meet a box are found, from the root down as long as one
+    /// side alone is met.
     fn narrow_down(&self, wanted: &Aabb) -> u32 {
         let mut at = self.root.first;
         loop {
@@ -289,7 +297,8 @@ impl FaceTree {
     }
 }
 
-/// How much squared distances about `limit` may differ where the distances may by `tie` and [`TIE_DISTANCE`].
+/// How much squared distances about `limit` may differ where the distances may by `tie` and
+/// [`TIE_DISTANCE`].
 #[inline]
 fn tie_squared(limit: f64, tie: f64) -> f64 {
     let distance = limit.sqrt();
@@ -297,17 +306,19 @@ fn tie_squared(limit: f64, tie: f64) -> f64 {
     (2.0 * distance + tie) * tie
 }
 
-/// The single-precision squared distance to a box beyond which no face of it can be nearer than √`limit`, nor equally
-/// near within the tie that `slack` holds; [`TIE_DISTANCE`] is far below the roundings of single precision.
+/// The single-precision squared distance to a box beyond which no face of it can be nearer than
+/// √`limit`, nor equally near within the tie that `slack` holds; [`TIE_DISTANCE`] is far below the
+/// roundings of single precision.
 #[inline]
 fn beyond(limit: f64, slack: f64) -> f32 {
     let distance = limit.sqrt() + slack;
-    // 8 roundings: the squares, their sum, and this conversion; the smallest normal number for where they underflow
+    // 8 roundings: the squares, their sum, and this conversion; the smallest normal number for
+    // where they underflow
     (distance * distance * (1.0 + 8.0 * f64::from(f32::EPSILON))) as f32 + f32::MIN_POSITIVE
 }
 
-/// Whether the box around a triangle is farther from `p` than √`limit`: cheaper than its closest point, and decides for
-/// most faces that a query meets.
+/// Whether the box around a triangle is farther from `p` than √`limit`: cheaper than its closest
+/// point, and decides for most faces that a query meets.
 #[inline]
 fn is_box_beyond(p: &Point3<f64>, [a, b, c]: [&Point3<f64>; 3], limit: f64) -> bool {
     let outside = |i: usize| {

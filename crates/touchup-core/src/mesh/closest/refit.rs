@@ -6,7 +6,8 @@ use crate::mesh::{FaceId, TriMesh};
 /// Marks a pair that a plan has met; pairs are numbered below it.
 const SEEN: u32 = 1 << 31;
 
-/// The boxes of one tree that depend on certain faces: leaves, and the pairs above them from the root down.
+/// The boxes of one tree that depend on certain faces: leaves, and the pairs above them from the
+/// root down.
 #[derive(Clone, Debug, Default)]
 pub struct RefitPlan {
     faces: Vec<FaceId>,
@@ -40,27 +41,30 @@ impl RefitPlan {
 }
 
 impl FaceTree {
-    /// Makes the tree exact again after the corners of `faces`, each named once or more often, moved.
+    /// Makes the tree exact again after the corners of `faces`, each named once or more often,
+    /// moved.
     pub fn refit(&mut self, mesh: &TriMesh, faces: &[FaceId]) {
         let mut plan = RefitPlan::default();
         self.plan(faces, &mut plan);
         self.refit_planned(mesh, &mut plan, f64::INFINITY, 0.0);
     }
 
-    /// Notes which boxes depend on `faces`, for [`Self::refit_planned`]; faces that the tree does not hold are skipped.
+    /// Notes which boxes depend on `faces`, for [`Self::refit_planned`]; faces that the tree does
+    /// not hold are skipped.
     pub fn plan(&mut self, faces: &[FaceId], plan: &mut RefitPlan) {
         plan.faces.clear();
         plan.faces.extend_from_slice(faces);
         self.renew(plan);
     }
 
-    /// Makes the tree exact again after the corners of the planned faces moved; a plan made before faces were inserted
-    /// or removed is made again.
+    /// Makes the tree exact again after the corners of the planned faces moved; a plan made before
+    /// faces were inserted or removed is made again.
     ///
-    /// - `displacement`: how far a corner moved at most since the last call with this plan, m; infinite where that is not known. Where
-    ///   others moved corners in between, and refitted the tree, [`RefitPlan::spend`] comes before.
-    /// - `margin`: by how much the boxes are made wider than they need be, m. They are left as they are until corners may
-    ///   have left them: a query stays exact and looks at little more.
+    /// - `displacement`: how far a corner moved at most since the last call with this plan, m;
+    ///   infinite where that is not known. Where others moved corners in between, and refitted the
+    ///   tree, [`RefitPlan::spend`] comes before.
+    /// - `margin`: by how much the boxes are made wider than they need be, m. They are left as they
+    ///   are until corners may have left them: a query stays exact and looks at little more.
     #[inline]
     pub fn refit_planned(
         &mut self,
@@ -125,7 +129,8 @@ impl FaceTree {
         }
         pairs.clear();
         for &leaf in leaves.iter() {
-            // the path up ends where it meets that of an earlier leaf, so that parents come before children
+            // the path up ends where it meets that of an earlier leaf, so that parents come before
+            // children
             let (known, mut at) = (pairs.len(), leaf);
             while at != ROOT && self.parents[at as usize / 2] & SEEN == 0 {
                 pairs.push(at / 2);

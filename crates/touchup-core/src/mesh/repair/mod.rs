@@ -15,9 +15,10 @@ use super::tri_mesh::{FARTHEST, MeshError, TriMesh};
 use crate::numeric::counted;
 use orient::{Edges, boundary_loops};
 
-/// Two times the area below which a face counts as having none, relative to its longest edge times its largest
-/// coordinate: each coordinate was rounded at least once (digits of the file, unit), by up to ε/2 of itself, and moves
-/// an edge of the face by as much. 16 leaves room for the roundings of the cross product.
+/// Two times the area below which a face counts as having none, relative to its longest edge times
+/// its largest coordinate: each coordinate was rounded at least once (digits of the file, unit), by
+/// up to ε/2 of itself, and moves an edge of the face by as much. 16 leaves room for the roundings
+/// of the cross product.
 const ZERO_AREA: f64 = 16.0 * f64::EPSILON;
 
 /// What [`repair`] found and did. Numbers only, no lengths.
@@ -70,17 +71,19 @@ impl fmt::Display for RepairReport {
     }
 }
 
-/// Makes a mesh of any triangles: welds vertices at the same position, leaves out faces that are not finite, have no
-/// area or are there twice, turns faces over until they agree, and leaves out vertices that no face uses.
+/// Makes a mesh of any triangles: welds vertices at the same position, leaves out faces that are
+/// not finite, have no area or are there twice, turns faces over until they agree, and leaves out
+/// vertices that no face uses.
 ///
-/// What stays keeps its order, so a clean mesh comes out as it went in. Holes, non-manifold edges and
-/// self-intersections are left as they are: to close or cut is to invent surface.
+/// What stays keeps its order, so a clean mesh comes out as it went in. Holes, non-manifold edges
+/// and self-intersections are left as they are: to close or cut is to invent surface.
 ///
 /// - `positions`: V × 3, m, in O; NaN and infinity are allowed.
 /// - `faces`: F × 3.
 ///
 /// # Errors
-/// [`MeshError::VertexOutOfRange`], [`MeshError::TooMany`]; [`MeshError::Empty`] when no face is left.
+/// [`MeshError::VertexOutOfRange`], [`MeshError::TooMany`]; [`MeshError::Empty`] when no face is
+/// left.
 ///
 /// # Example
 /// ```
@@ -310,7 +313,8 @@ mod tests {
 
     #[test]
     fn an_open_patch_keeps_the_side_of_its_larger_area() {
-        // unit square in two halves of equal area and a flap three times as large, which lies upside down
+        // unit square in two halves of equal area and a flap three times as large, which lies
+        // upside down
         let p = |x, y| Point3::new(x, y, 0.0);
         let positions = vec![
             p(0.0, 0.0),
@@ -385,7 +389,8 @@ mod tests {
 
     #[test]
     fn thin_faces_far_from_the_origin_stay_while_they_differ_from_a_line() {
-        // at 10⁶ m a coordinate is rounded to 1.2e-10 m: a height of 1e-6 m is real, one of 2e-10 m is not
+        // at 10⁶ m a coordinate is rounded to 1.2e-10 m: a height of 1e-6 m is real, one of 2e-10 m
+        // is not
         for (height, kept) in [(1e-6, 1), (2e-10, 0)] {
             let p = |x: f64, y: f64| Point3::new(1e6 + x, 1e6 + y, 1e6);
             let outcome = repair(
@@ -417,7 +422,8 @@ mod tests {
     }
 
     proptest! {
-        /// Any triangles over the 27 points of a small lattice: many shared, folded, flat and repeated ones.
+        /// Any triangles over the 27 points of a small lattice: many shared, folded, flat and
+        /// repeated ones.
         #[test]
         fn tangles_are_counted_right_and_a_second_repair_finds_nothing(
             points in prop::collection::vec((0..3u8, 0..3u8, 0..3u8), 3..40),

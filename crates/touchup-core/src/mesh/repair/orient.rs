@@ -4,7 +4,8 @@ use super::pieces::{FaceSets, Numbered};
 use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::numeric::distinct;
 
-/// A face at an edge: the higher vertex of the edge (upper 32 bits) and the face, one key to sort by.
+/// A face at an edge: the higher vertex of the edge (upper 32 bits) and the face, one key to sort
+/// by.
 #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 struct EdgeSide(u64);
 
@@ -30,8 +31,8 @@ pub(super) struct Edges {
     pub duplicates: Vec<u32>,
     /// number of edges of three faces or more
     pub non_manifold: usize,
-    /// the faces at these, and whether they run along the edge from its lower to its higher vertex, one run after the
-    /// other; every run starts where the first field changes
+    /// the faces at these, and whether they run along the edge from its lower to its higher vertex,
+    /// one run after the other; every run starts where the first field changes
     crowded: Vec<(usize, u32, bool)>,
     pieces: FaceSets,
 }
@@ -60,7 +61,8 @@ impl Edges {
         edges
     }
 
-    /// One edge: the faces that run along it from its lower to its higher vertex, and those that run against it.
+    /// One edge: the faces that run along it from its lower to its higher vertex, and those that
+    /// run against it.
     #[inline]
     fn add(&mut self, mesh: &TriMesh, ends: [u32; 2], along: &[EdgeSide], against: &[EdgeSide]) {
         match (along, against) {
@@ -105,8 +107,9 @@ impl Edges {
 
     /// Turns faces over until neighbours agree and closed pieces have their normals outside.
     ///
-    /// A piece is what hangs together over edges of two faces. A closed piece gets a positive volume; an open one keeps
-    /// the side that the larger part of its area has. A one-sided piece (Möbius) keeps a seam.
+    /// A piece is what hangs together over edges of two faces. A closed piece gets a positive
+    /// volume; an open one keeps the side that the larger part of its area has. A one-sided piece
+    /// (Möbius) keeps a seam.
     ///
     /// Returns the number of faces turned over and the number of pieces.
     pub fn orient(self, mesh: &mut TriMesh) -> (usize, usize) {
@@ -128,7 +131,8 @@ impl Edges {
     }
 }
 
-/// Which pieces have a border: an edge of one face, or a crowded edge at which their own faces do not cancel.
+/// Which pieces have a border: an edge of one face, or a crowded edge at which their own faces do
+/// not cancel.
 fn open_pieces(
     boundary: &[([u32; 2], u32)],
     crowded: &[(usize, u32, bool)],
@@ -170,8 +174,8 @@ fn turned_parities(mesh: &TriMesh, pieces: &Numbered, open: &[bool]) -> Vec<bool
     balance.into_iter().map(|b| b >= 0.0).collect()
 }
 
-/// The sides of all edges from `vertex` to a higher vertex, ordered by that vertex, then by face: first of the faces that
-/// run along the edge upwards, then of the others.
+/// The sides of all edges from `vertex` to a higher vertex, ordered by that vertex, then by face:
+/// first of the faces that run along the edge upwards, then of the others.
 #[inline]
 fn sides_above<'a>(
     mesh: &TriMesh,
@@ -188,7 +192,8 @@ fn sides_above<'a>(
     let (mut ahead, mut behind) = (0, 0);
     for &face in star {
         let [VertexId(next), VertexId(previous)] = mesh.other_corners(face, VertexId(vertex));
-        // written first and counted afterwards: which ones go up is past any guess, so no branch hangs on it
+        // written first and counted afterwards: which ones go up is past any guess, so no branch
+        // hangs on it
         forward[ahead] = EdgeSide::new(next, face);
         ahead += usize::from(next > vertex);
         backward[behind] = EdgeSide::new(previous, face);
@@ -229,7 +234,8 @@ fn split_run(sides: &[EdgeSide], higher: u32) -> (&[EdgeSide], &[EdgeSide]) {
     )
 }
 
-/// How many chains the boundary edges form: one for each hole or outer rim; rims that touch in a vertex count as one.
+/// How many chains the boundary edges form: one for each hole or outer rim; rims that touch in a
+/// vertex count as one.
 pub(super) fn boundary_loops(boundary: &[([u32; 2], u32)]) -> usize {
     let vertices = distinct(boundary.iter().flat_map(|(ends, _)| *ends));
     let index = |v: u32| vertices.partition_point(|&w| w < v) as u32;

@@ -1,6 +1,8 @@
-//! Connected components of faces, and which faces of one are oriented upside down against the others.
+//! Connected components of faces, and which faces of one are oriented upside down against the
+//! others.
 
-/// Disjoint sets of faces; each face stores whether it is oriented as the root of its set (parity false) or upside down.
+/// Disjoint sets of faces; each face stores whether it is oriented as the root of its set (parity
+/// false) or upside down.
 pub(super) struct FaceSets {
     /// parent (31 bits) and parity against it (1 bit)
     parents: Vec<u32>,
@@ -33,7 +35,8 @@ impl FaceSets {
         }
     }
 
-    /// Joins the sets of two neighbours; `against`: one of them is upside down. The lowest face is the root.
+    /// Joins the sets of two neighbours; `against`: one of them is upside down. The lowest face is
+    /// the root.
     #[inline]
     pub fn join(&mut self, a: u32, b: u32, against: bool) {
         self.any_against |= against;

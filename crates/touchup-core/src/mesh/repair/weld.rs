@@ -7,19 +7,21 @@ use crate::numeric::median;
 /// Marks a free place in the table: no vertex has this number.
 const FREE: u32 = u32::MAX;
 
-/// Width of a cell in which positions count as the same one, relative to the spread of the mesh (0.1 nm on 100 mm).
+/// Width of a cell in which positions count as the same one, relative to the spread of the mesh
+/// (0.1 nm on 100 mm).
 ///
-/// CAD programs write the same corner once as 0 and once as 1e-17, so that comparing bits leaves seams in their parts:
-/// of 13 binary STL files of real parts five had such pairs, all closer than 1e-12 of the diagonal, and no other two
-/// vertices were closer than 1e-6 of it. Wider cells would begin to close slots that are really there.
+/// CAD programs write the same corner once as 0 and once as 1e-17, so that comparing bits leaves
+/// seams in their parts: of 13 binary STL files of real parts five had such pairs, all closer than
+/// 1e-12 of the diagonal, and no other two vertices were closer than 1e-6 of it. Wider cells would
+/// begin to close slots that are really there.
 const CELL: f64 = 1e-9;
 
-/// Merges vertices in the same cell of a grid of width [`CELL`], in order of first occurrence, whose position stays;
-/// −0 becomes 0.
+/// Merges vertices in the same cell of a grid of width [`CELL`], in order of first occurrence,
+/// whose position stays; −0 becomes 0.
 ///
-/// Zero lies in the middle of a cell, which is where the difference matters. Two positions that rounding put on two
-/// sides of a border between cells are not merged: it takes 16 digits that agree up to the last and a chance of 1e-6.
-/// In return the result depends on no order.
+/// Zero lies in the middle of a cell, which is where the difference matters. Two positions that
+/// rounding put on two sides of a border between cells are not merged: it takes 16 digits that
+/// agree up to the last and a chance of 1e-6. In return the result depends on no order.
 ///
 /// - `positions`: V × 3, any unit; shortened in place.
 /// - `faces`: F × 3, every index below V; renamed in place.
@@ -58,7 +60,8 @@ pub(super) fn weld(positions: &mut Vec<Point3<f64>>, faces: &mut [[u32; 3]]) -> 
     welded
 }
 
-/// Median distance (largest coordinate) from the median position, over a sample: single wild vertices do not count.
+/// Median distance (largest coordinate) from the median position, over a sample: single wild
+/// vertices do not count.
 fn spread(positions: &[Point3<f64>]) -> f64 {
     /// Every n-th vertex, so that there are at least this many.
     const SAMPLE: usize = 1000;
@@ -128,7 +131,8 @@ impl PositionTable {
         probes
     }
 
-    /// The vertex in the cell of this position, or the next number, `known.len()`, which is then taken.
+    /// The vertex in the cell of this position, or the next number, `known.len()`, which is then
+    /// taken.
     #[inline]
     fn find_or_add(
         &mut self,
@@ -286,7 +290,8 @@ mod tests {
     }
 
     proptest! {
-        /// More vertices than a block and than the table is made for, each position many times: against an ordered map.
+        /// More vertices than a block and than the table is made for, each position many times:
+        /// against an ordered map.
         #[test]
         fn copies_of_lattice_points_get_the_number_of_the_first(
             points in prop::collection::vec((-4..4i8, -4..4i8, -4..4i8), 3..1500)

@@ -50,7 +50,8 @@ const UR_LINKS: [Link; 7] = [
     Link::Probe,
 ];
 
-/// Pairs of them that may collide, by their numbers; those that share a joint, or lie side by side whatever the joints are, cannot.
+/// Pairs of them that may collide, by their numbers; those that share a joint, or lie side by side
+/// whatever the joints are, cannot.
 const UR_MEETING: [(usize, usize); 11] = [
     (0, 2),
     (0, 3),
@@ -74,7 +75,8 @@ pub struct ArmBodies<'a> {
 }
 
 impl<'a> ArmBodies<'a> {
-    /// - `pose_ft`: the tip in the flange. The probe is the line between them: how thick it is the margin of a check has to hold.
+    /// - `pose_ft`: the tip in the flange. The probe is the line between them: how thick it is the
+    ///   margin of a check has to hold.
     pub fn new(geometry: &'a ArmGeometry, joints: &Joints, pose_ft: &Isometry3<f64>) -> Self {
         match geometry {
             ArmGeometry::Ur(ur) => Self {
@@ -152,8 +154,8 @@ fn of_chain(
 mod tests {
     use super::*;
 
-    /// The upper arm is upright. With the forearm at a right angle nothing is near anything; folded down it is in the base's column, as
-    /// forearm and upper arm are nearly as long as each other.
+    /// The upper arm is upright. With the forearm at a right angle nothing is near anything; folded
+    /// down it is in the base's column, as forearm and upper arm are nearly as long as each other.
     #[test]
     fn a_stretched_arm_is_free_and_one_folded_onto_itself_is_not() {
         let probe = Isometry3::translation(0.0, 0.0, 0.15);

@@ -28,8 +28,8 @@ impl Capsule {
 
 /// Smallest distance between two segments, m.
 ///
-/// The squared distance is convex in the two shares of the way along them: its smallest value is inside, where both derivatives are
-/// zero, or on the border, where one share is 0 or 1.
+/// The squared distance is convex in the two shares of the way along them: its smallest value is
+/// inside, where both derivatives are zero, or on the border, where one share is 0 or 1.
 fn segment_distance([a, b]: &[Point3<f64>; 2], [c, d]: &[Point3<f64>; 2]) -> f64 {
     let (u, v, w) = (b - a, d - c, a - c);
     let (uu, uv, vv) = (u.dot(&u), u.dot(&v), v.dot(&v));

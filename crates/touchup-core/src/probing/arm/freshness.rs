@@ -1,7 +1,8 @@
 //! Whether an order follows the newest state of the arm.
 //!
-//! A caller that was held up finds states that waited. What it orders by them would follow a place and a force of the past: such an order
-//! is not sent, and where none is sent the child brakes. Once the caller has taken what waited its orders go out again.
+//! A caller that was held up finds states that waited. What it orders by them would follow a place
+//! and a force of the past: such an order is not sent, and where none is sent the child brakes.
+//! Once the caller has taken what waited its orders go out again.
 
 use super::interface::ArmError;
 
@@ -32,7 +33,8 @@ impl Freshness {
 
     /// Whether an order may go out.
     ///
-    /// - `followed_s`: stamp of the state that it follows; `newest_s`: of the newest that has come, s; `late_s`: how late that came, s.
+    /// - `followed_s`: stamp of the state that it follows; `newest_s`: of the newest that has come,
+    ///   s; `late_s`: how late that came, s.
     ///
     /// # Errors
     /// [`ArmError::Behind`] for a caller that does not catch up.
@@ -59,8 +61,9 @@ impl Freshness {
 mod tests {
     use super::*;
 
-    /// The orders of a caller that takes one state each so many ms from an arm that makes one each 2 ms; it was held up for so long, ms,
-    /// at the beginning. Of each order: when, ms, whether it went out.
+    /// The orders of a caller that takes one state each so many ms from an arm that makes one each
+    /// 2 ms; it was held up for so long, ms, at the beginning. Of each order: when, ms, whether it
+    /// went out.
     fn orders(held_ms: u64, cycle_us: u64) -> (Vec<(f64, bool)>, Option<ArmError>) {
         let (mut freshness, mut orders, mut followed_s) = (Freshness::new(2e-3), Vec::new(), 0.0);
         let mut now_us = held_ms * 1000;
@@ -83,7 +86,8 @@ mod tests {
         assert!(error.is_none() && orders.len() == 500 && orders.iter().all(|(_, went)| *went));
     }
 
-    /// 50 ms are 25 states; at a tenth of a millisecond for each they are taken within 2.5 ms, in which one more comes.
+    /// 50 ms are 25 states; at a tenth of a millisecond for each they are taken within 2.5 ms, in
+    /// which one more comes.
     #[test]
     fn a_caller_that_was_held_for_50_ms_orders_nothing_until_it_has_caught_up() {
         let (orders, error) = orders(50, 100);

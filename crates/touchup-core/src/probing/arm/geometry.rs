@@ -69,7 +69,8 @@ impl ArmGeometry {
         }
     }
 
-    /// Distance of the arm from a singularity: the smallest singular value of its Jacobian, with lengths in units of the arm's own.
+    /// Distance of the arm from a singularity: the smallest singular value of its Jacobian, with
+    /// lengths in units of the arm's own.
     pub fn dexterity(&self, joints: &Joints) -> f64 {
         match self {
             Self::Ur(ur) => ur.dexterity(six(joints)),
@@ -77,7 +78,8 @@ impl ArmGeometry {
         }
     }
 
-    /// The slowest turning of the joints that moves the flange with a velocity, rad/s; `None` where none does.
+    /// The slowest turning of the joints that moves the flange with a velocity, rad/s; `None` where
+    /// none does.
     ///
     /// - `linear`, `angular`: of the flange, m/s and rad/s in B.
     pub fn turning(
@@ -113,8 +115,9 @@ impl ArmGeometry {
         }
     }
 
-    /// The joint angles that bring the flange to a pose in B and leave the arm most room to move: where one begins that exists in a plan
-    /// or a simulation alone. `None` where it does not reach.
+    /// The joint angles that bring the flange to a pose in B and leave the arm most room to move:
+    /// where one begins that exists in a plan or a simulation alone. `None` where it does not
+    /// reach.
     pub fn most_dexterous(&self, pose_bf: &Isometry3<f64>) -> Option<Joints> {
         match self {
             Self::Ur(ur) => {

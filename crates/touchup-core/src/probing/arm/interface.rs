@@ -1,7 +1,9 @@
-//! What probing needs of an arm: its state at a steady rate, and a few motions that can be broken off at any moment.
+//! What probing needs of an arm: its state at a steady rate, and a few motions that can be broken
+//! off at any moment.
 //!
-//! No motion blocks. The caller asks for the next state, checks it, and goes on or stops; so the same loop drives
-//! a simulated arm in its own time and a real one at 500 Hz, and a stop is never behind a motion in a queue.
+//! No motion blocks. The caller asks for the next state, checks it, and goes on or stops; so the
+//! same loop drives a simulated arm in its own time and a real one at 500 Hz, and a stop is never
+//! behind a motion in a queue.
 
 use nalgebra::{Isometry3, Vector3};
 
@@ -13,11 +15,13 @@ use crate::stylus::{StampedPose, StampedWrench, Wrench};
 pub struct ArmState {
     /// of the controller's clock, ns
     pub stamp_ns: i64,
-    /// of the probe's tip, origin in the centre of its ball, in the base B; of an arm that does not bend
+    /// of the probe's tip, origin in the centre of its ball, in the base B; of an arm that does not
+    /// bend
     pub pose_bt: Isometry3<f64>,
     /// what the part does to the tip, in the axes of B about the centre of the ball; weight is off
     pub wrench_b: Wrench,
-    /// what the sensor of the arm has: contact, weight and bias, in the axes of the flange F about its origin
+    /// what the sensor of the arm has: contact, weight and bias, in the axes of the flange F about
+    /// its origin
     pub raw_wrench_f: Wrench,
     /// rad
     pub joints: Joints,
@@ -26,7 +30,8 @@ pub struct ArmState {
 }
 
 impl ArmState {
-    /// What a probe measures at this moment: its pose in B, and the wrench in its own axes, as its sensor would have it.
+    /// What a probe measures at this moment: its pose in B, and the wrench in its own axes, as its
+    /// sensor would have it.
     ///
     /// - `stamp_ns`: of both.
     pub fn as_probe(&self, stamp_ns: i64) -> (StampedPose, StampedWrench) {
@@ -75,7 +80,8 @@ pub enum Command {
         /// m/s²
         acceleration: f64,
     },
-    /// On and on with a velocity of the tip, m/s in B, without turning. It ends with the next command.
+    /// On and on with a velocity of the tip, m/s in B, without turning. It ends with the next
+    /// command.
     Velocity {
         /// m/s in B
         linear: Vector3<f64>,
@@ -175,7 +181,8 @@ pub enum ArmError {
         "the program on the arm's controller has ended, at its panel, by its watchdog or by another client: look, then recover"
     )]
     ProgramEnded,
-    /// What it runs for us was paused; it was ended then, so that nothing goes on when somebody resumes it.
+    /// What it runs for us was paused; it was ended then, so that nothing goes on when somebody
+    /// resumes it.
     #[error(
         "the program on the arm's controller was paused, at its panel or by a safeguard, and ended then, so that nothing goes on by \
          itself: look, then recover"
@@ -294,7 +301,8 @@ pub trait Arm {
     /// As [`Self::command`].
     fn zero_sensor(&mut self) -> Result<(), ArmError>;
 
-    /// Lets it move again after a protective stop, once an operator has looked. Nothing else calls it, and it moves nothing.
+    /// Lets it move again after a protective stop, once an operator has looked. Nothing else calls
+    /// it, and it moves nothing.
     ///
     /// # Errors
     /// [`ArmError::Stopped`] while the cause of the stop persists, [`ArmError::Lost`].

@@ -2,9 +2,9 @@
 //!
 //! T_B6 = Π A_i, A_i = Rz(θ_i) Tz(d_i) Tx(a_i) Rx(α_i), α = (π/2, 0, 0, π/2, −π/2, 0)      \[Denavit Hartenberg 1955\]
 //!
-//! Axes 2, 3 and 4 are parallel and the last three do not meet in a point, so the inverse goes through axis 1 (the wrist
-//! lies on a line at distance d₄ beside it), then 5 and 6, then the triangle of upper arm and forearm
-//! \[Hawkins 2013\].
+//! Axes 2, 3 and 4 are parallel and the last three do not meet in a point, so the inverse goes
+//! through axis 1 (the wrist lies on a line at distance d₄ beside it), then 5 and 6, then the
+//! triangle of upper arm and forearm \[Hawkins 2013\].
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -143,9 +143,9 @@ impl UrGeometry {
         jacobian
     }
 
-    /// Distance of the arm from a singularity: the smallest singular value of its Jacobian, with lengths in
-    /// units of upper arm and forearm together. Zero where it is stretched, where the wrist is above the shoulder, and where
-    /// axes 4 and 6 are parallel.
+    /// Distance of the arm from a singularity: the smallest singular value of its Jacobian, with
+    /// lengths in units of upper arm and forearm together. Zero where it is stretched, where the
+    /// wrist is above the shoulder, and where axes 4 and 6 are parallel.
     pub fn dexterity(&self, joints: &[f64; 6]) -> f64 {
         let mut jacobian = self.jacobian(joints);
         jacobian
@@ -154,9 +154,11 @@ impl UrGeometry {
         jacobian.singular_values().min()
     }
 
-    /// All joint angles in rad, from the base to the wrist, within (−π, π], that bring the flange to a pose in B: eight at most, none out of reach.
+    /// All joint angles in rad, from the base to the wrist, within (−π, π], that bring the flange
+    /// to a pose in B: eight at most, none out of reach.
     ///
-    /// Where axes 4 and 6 are parallel only their sum is determined; there the sixth joint stays where `near` has it.
+    /// Where axes 4 and 6 are parallel only their sum is determined; there the sixth joint stays
+    /// where `near` has it.
     pub fn inverse(&self, pose_bf: &Isometry3<f64>, near: &[f64; 6]) -> Vec<[f64; 6]> {
         let mut found = Vec::with_capacity(8);
         for q1 in self.shoulders(pose_bf) {

@@ -14,13 +14,14 @@ use super::joints::Joints;
 use super::serial_chain::Unreached;
 
 parameters! {
-    /// Bounds of every motion, from the configuration alone. A request may ask for less ([`Self::narrowed`]), never for more.
+    /// Bounds of every motion, from the configuration alone. A request may ask for less
+    /// ([`Self::narrowed`]), never for more.
     ///
     /// By default there is no box: only the installer of the arm knows its workspace.
     #[derive(Clone, Debug, PartialEq)]
     pub struct Limits in "robot" {
-        /// Smallest corner of the box that the centre of the ball stays in, in the base of the arm; with the default the arm can be
-        /// nowhere.
+        /// Smallest corner of the box that the centre of the ball stays in, in the base of the arm;
+        /// with the default the arm can be nowhere.
         ///
         /// m in B.
         lowest: Point3<f64> = [0.0; 3], "workspace_low_mm" [MM, -5000, 5000];
@@ -28,8 +29,8 @@ parameters! {
         ///
         /// m in B.
         highest: Point3<f64> = [0.0; 3], "workspace_high_mm" [MM, -5000, 5000];
-        /// Smallest corner of the box that all of the arm but its base stays in, in the base of the arm: the table, walls; left out:
-        /// nothing is known of them.
+        /// Smallest corner of the box that all of the arm but its base stays in, in the base of the
+        /// arm: the table, walls; left out: nothing is known of them.
         ///
         /// m in B.
         arm_lowest: Option<Point3<f64>> = None, "arm_low_mm" [MM, -5000, 5000] like "[-2000, -2000, 0]";
@@ -37,7 +38,8 @@ parameters! {
         ///
         /// m in B.
         arm_highest: Option<Point3<f64>> = None, "arm_high_mm" [MM, -5000, 5000] like "[2000, 2000, 2000]";
-        /// Force at the tip at which everything stops; well below that of the arm's own safety system.
+        /// Force at the tip at which everything stops; well below that of the arm's own safety
+        /// system.
         ///
         /// In N: that of a UR may be set to 50 N at the least.
         force: f64 = 15.0, "largest_force_n" [N, 0.1, 100];
@@ -53,12 +55,14 @@ parameters! {
         ///
         /// Of the tip, m/s².
         acceleration: f64 = 500.0, "acceleration_mm_per_s2" [MM_PER_S2, 10, 5000];
-        /// Deceleration of a stop at a fault or at an unexpected contact. The largest speed of every motion follows from it and from
-        /// tip.stiffness_n_per_mm, so that the force at such a contact stays below largest_force_n.
+        /// Deceleration of a stop at a fault or at an unexpected contact. The largest speed of
+        /// every motion follows from it and from tip.stiffness_n_per_mm, so that the force at such
+        /// a contact stays below largest_force_n.
         ///
         /// Of the tip, m/s².
         braking: f64 = 5000.0, "fault_stop_mm_per_s2" [MM_PER_S2, 10, 10000];
-        /// Force at rest, before zeroing, above which the sensor is not zeroed: the tip would touch something.
+        /// Force at rest, before zeroing, above which the sensor is not zeroed: the tip would touch
+        /// something.
         ///
         /// In N.
         tare: f64 = 5.0, "largest_tare_n" [N, 0.1, 100];
@@ -70,7 +74,8 @@ parameters! {
         ///
         /// In s.
         time: f64 = 600.0, "time_s" [S, 1, 86400];
-        /// How far the arm stays from singular poses: smallest singular value of its Jacobian, lengths over its reach.
+        /// How far the arm stays from singular poses: smallest singular value of its Jacobian,
+        /// lengths over its reach.
         ///
         /// The least [`ArmGeometry::dexterity`] of any pose.
         dexterity: f64 = 0.02, "least_dexterity" [ONE, 0, 1];
@@ -321,13 +326,15 @@ impl Limits {
         }
     }
 
-    /// Whether the arm may have its tip at a pose in B; returns joints for it, the nearest to those that it has.
+    /// Whether the arm may have its tip at a pose in B; returns joints for it, the nearest to those
+    /// that it has.
     ///
     /// - `pose_ft`: the tip in the flange.
     ///
     /// # Errors
-    /// [`LimitError::Workspace`], [`LimitError::Reach`], [`LimitError::JointRange`], [`LimitError::OtherArm`], [`LimitError::Singular`],
-    /// [`LimitError::OwnLinks`], [`LimitError::ArmBox`].
+    /// [`LimitError::Workspace`], [`LimitError::Reach`], [`LimitError::JointRange`],
+    /// [`LimitError::OtherArm`], [`LimitError::Singular`], [`LimitError::OwnLinks`],
+    /// [`LimitError::ArmBox`].
     pub fn check_pose(
         &self,
         geometry: &ArmGeometry,

@@ -10,7 +10,8 @@ use super::limits::{LimitError, Limits};
 
 /// Speeds are means over this many periods: the noise of a place is 1 mm/s then.
 const WINDOW: usize = 10;
-/// The tip may be faster than its limit by this factor, and by this, m/s: an arm that overshoots, and noise.
+/// The tip may be faster than its limit by this factor, and by this, m/s: an arm that overshoots,
+/// and noise.
 const OVER: (f64, f64) = (1.2, 5e-3);
 
 /// The latest states of an arm.
@@ -71,7 +72,8 @@ mod tests {
     use crate::stylus::Wrench;
     use nalgebra::Isometry3;
 
-    /// The first verdict on states 2 ms apart of a tip and a third joint with these speeds, m/s and rad/s, and how many came.
+    /// The first verdict on states 2 ms apart of a tip and a third joint with these speeds, m/s and
+    /// rad/s, and how many came.
     fn moving(speed: f64, turning: f64) -> (usize, Option<LimitError>) {
         let (mut motion, limits) = (
             MeasuredMotion::default(),

@@ -1,15 +1,17 @@
 //! Compares the velocity of the arm with what was ordered.
 //!
-//! A program that hangs while the thread of its motion lives takes orders that nobody reads: every call returns, the watchdog is fed,
-//! and the arm goes on. Only its velocity tells.
+//! A program that hangs while the thread of its motion lives takes orders that nobody reads: every
+//! call returns, the watchdog is fed, and the arm goes on. Only its velocity tells.
 //!
-//! The ordered velocity is followed by one without mass or delay: towards the target of the newest order with the acceleration that the
-//! order allows. An arm is late, by a time that no two arms share, but goes through the same velocities; so what it does now was
-//! ordered within the last [`WINDOW`], or is slower than that. While it presses, the velocity along the axis is its own, up to
-//! the speed that force mode has.
+//! The ordered velocity is followed by one without mass or delay: towards the target of the newest
+//! order with the acceleration that the order allows. An arm is late, by a time that no two arms
+//! share, but goes through the same velocities; so what it does now was ordered within the last
+//! [`WINDOW`], or is slower than that. While it presses, the velocity along the axis is its own, up
+//! to the speed that force mode has.
 //!
-//! A creep is slower than the noise of a velocity, so at rest the place counts: it may not leave where it was when rest had been ordered
-//! for [`WINDOW`]. Orders that stay away order rest, for the client brakes then.
+//! A creep is slower than the noise of a velocity, so at rest the place counts: it may not leave
+//! where it was when rest had been ordered for [`WINDOW`]. Orders that stay away order rest, for
+//! the client brakes then.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -28,7 +30,8 @@ const SHARE: f64 = 0.2;
 const NOISE: f64 = 5e-3;
 /// It may turn faster than ordered by this, rad/s.
 const TURN_NOISE: f64 = 50e-3;
-/// Turning is braked by whatever the controller has: what was ordered within this time is no disobedience.
+/// Turning is braked by whatever the controller has: what was ordered within this time is no
+/// disobedience.
 const TURN_WINDOW: Duration = Duration::from_millis(300);
 /// Force mode may be faster than it is set by this factor.
 const PRESS: f64 = 1.5;
@@ -293,7 +296,8 @@ mod tests {
 
     const STOP: OrderedMotion = OrderedMotion::Stop { deceleration: 0.5 };
 
-    /// An order and a state each 2 ms; when the first fault is seen, ms. The place does not follow the velocity.
+    /// An order and a state each 2 ms; when the first fault is seen, ms. The place does not follow
+    /// the velocity.
     fn first_fault(
         ms: u32,
         order: impl Fn(u32) -> OrderedMotion,
@@ -323,7 +327,8 @@ mod tests {
         })
     }
 
-    /// Speed of an arm that reaches 50 mm/s with 0.5 m/s² from 0 ms on and brakes from 200 ms on, late by some time, m/s.
+    /// Speed of an arm that reaches 50 mm/s with 0.5 m/s² from 0 ms on and brakes from 200 ms on,
+    /// late by some time, m/s.
     fn late(at: u32, by: u32) -> f64 {
         let at = f64::from(at.saturating_sub(by)) * 1e-3;
         (0.5 * at).min(0.05).min((0.05 - 0.5 * (at - 0.2)).max(0.0))
@@ -350,7 +355,8 @@ mod tests {
         );
     }
 
-    /// From 50 to 35 mm/s, which is as much as it may be off, are 30 ms; then the 80 ms that it may be late, and the 20 ms.
+    /// From 50 to 35 mm/s, which is as much as it may be off, are 30 ms; then the 80 ms that it may
+    /// be late, and the 20 ms.
     #[test]
     fn an_arm_that_goes_on_after_a_stop_is_seen_within_140_ms() {
         let order = |at| if at < 200 { go(0.05) } else { STOP };
@@ -371,8 +377,8 @@ mod tests {
         );
     }
 
-    /// 2 mm/s from the beginning, which is within the noise of the velocity; the place of the first state counts, and more than 0.1 mm
-    /// off it is the 26th after that.
+    /// 2 mm/s from the beginning, which is within the noise of the velocity; the place of the first
+    /// state counts, and more than 0.1 mm off it is the 26th after that.
     #[test]
     fn an_arm_that_creeps_where_rest_is_ordered_is_seen_after_a_tenth_of_a_millimetre() {
         let creeping =
@@ -415,7 +421,8 @@ mod tests {
         );
     }
 
-    /// 25 ms after the last order its client brakes with 2 m/s², so 15 mm/s off is 7 ms later; then the 80 ms and the 20 ms.
+    /// 25 ms after the last order its client brakes with 2 m/s², so 15 mm/s off is 7 ms later; then
+    /// the 80 ms and the 20 ms.
     #[test]
     fn an_arm_that_goes_on_where_orders_stay_away_is_seen_within_140_ms() {
         let order = |at| (at < 200).then(|| go(0.05));

@@ -2,11 +2,12 @@
 //!
 //! f(t) = b + k max(0, s(t − τ) − s₀)
 //!
-//! s is the travel of the arm along its approach as it is reported, f the force against it, b what the sensor reads in free air,
-//! k the stiffness of arm, probe and part in series, τ how much later the force is stamped than the travel. While the arm
-//! presses, it is reported deeper than the tip is, by f/k; at the corner s₀ it is not. The fit takes the whole curve, so
-//! that neither the threshold at which the arm was commanded to stop nor its braking travel is in s₀. τ moves the corner forward
-//! going in and backward coming out: a touch that does both determines it.
+//! s is the travel of the arm along its approach as it is reported, f the force against it, b what
+//! the sensor reads in free air, k the stiffness of arm, probe and part in series, τ how much later
+//! the force is stamped than the travel. While the arm presses, it is reported deeper than the tip
+//! is, by f/k; at the corner s₀ it is not. The fit takes the whole curve, so that neither the
+//! threshold at which the arm was commanded to stop nor its braking travel is in s₀. τ moves the
+//! corner forward going in and backward coming out: a touch that does both determines it.
 
 use nalgebra::{Cholesky, Matrix4, Vector3, Vector4};
 
@@ -32,7 +33,8 @@ parameters! {
     pub struct OnsetParams in "robot" {
         /// What is believed of τ before the touch, s …
         delay: f64 = 0.0;
-        /// … and its standard deviation, s: a cycle or two of a controller at 500 Hz, and its filter.
+        /// … and its standard deviation, s: a cycle or two of a controller at 500 Hz, and its
+        /// filter.
         delay_sigma: f64 = 4e-3;
         /// Standard deviation of the measured force.
         ///
@@ -42,8 +44,8 @@ parameters! {
         contact_force: f64 = 0.5;
         /// Shorter contacts are impacts, s.
         shortest_contact: f64 = 10e-3;
-        /// Largest share of the force across the approach; more is an edge or a slope. Friction of a steel ball on metal is below
-        /// 0.3; a slope of 20 degrees adds as much.
+        /// Largest share of the force across the approach; more is an edge or a slope. Friction of
+        /// a steel ball on metal is below 0.3; a slope of 20 degrees adds as much.
         lateral_share: f64 = 0.65;
     }
 }
@@ -130,7 +132,8 @@ const SEARCH: DampedSearch = DampedSearch {
 const REST: f64 = 1e-9;
 /// Times that the noise is taken from the residuals.
 const WEIGHINGS: usize = 3;
-/// Moments that share one error of the travel after smoothing: one over the middle weight of the parabola, 89/429 for eleven.
+/// Moments that share one error of the travel after smoothing: one over the middle weight of the
+/// parabola, 89/429 for eleven.
 const SMOOTHED: f64 = 429.0 / 89.0;
 /// Neighbours farther away than this share nothing: twice the smoothing.
 const FARTHEST: usize = 2 * BESIDE;
@@ -149,7 +152,8 @@ const CLEARLY: f64 = 4.0;
 
 /// Fits the bent line to a touch.
 ///
-/// - `moments`: the approach through free air, the contact, and, as far as there is one, the retraction.
+/// - `moments`: the approach through free air, the contact, and, as far as there is one, the
+///   retraction.
 ///
 /// # Errors
 /// [`OnsetError`].
@@ -218,8 +222,9 @@ const K: usize = 3;
 
 type LineFit = Vector4<f64>;
 
-/// Travel at each moment by a parabola through those around it \[Savitzky Golay 1964\], speed by a line through more of them. A
-/// speed that is noisy would look like one that changes, and so simulate a delay.
+/// Travel at each moment by a parabola through those around it \[Savitzky Golay 1964\], speed by a
+/// line through more of them. A speed that is noisy would look like one that changes, and so
+/// simulate a delay.
 fn smoothed(moments: &[TouchMoment]) -> Vec<Smooth> {
     let around = |index: usize, beside: usize| {
         &moments[index.saturating_sub(beside)..(index + beside + 1).min(moments.len())]
@@ -270,7 +275,8 @@ struct Smooth {
     speed_variance: f64,
 }
 
-/// How many neighbours on average share one error: 1 + 2 Σ ρ, as long as ρ is above zero \[Geyer 1992\].
+/// How many neighbours on average share one error: 1 + 2 Σ ρ, as long as ρ is above zero \[Geyer
+/// 1992\].
 fn shared(residuals: &[f64]) -> f64 {
     let square: f64 = residuals.iter().map(|r| r * r).sum();
     let with = |lag: usize| {
@@ -350,7 +356,8 @@ impl ForceCurve<'_> {
         self.moments[last].travel
     }
 
-    /// Travel at a time and how fast it grows, between the moments; beyond them it goes on as at the end.
+    /// Travel at a time and how fast it grows, between the moments; beyond them it goes on as at
+    /// the end.
     fn travel(&self, t: f64) -> (f64, f64) {
         let after = self.moments.partition_point(|m| m.t <= t);
         let before = after.saturating_sub(1);
@@ -552,8 +559,9 @@ impl ForceCurve<'_> {
         }
     }
 
-    /// First and last moments of each contact that began going in; between two the force is less than half of what counts as
-    /// one. The mean of five forces is looked at: noise makes no contact out of one that comes slowly.
+    /// First and last moments of each contact that began going in; between two the force is less
+    /// than half of what counts as one. The mean of five forces is looked at: noise makes no
+    /// contact out of one that comes slowly.
     fn contacts(&self, bias: f64) -> Vec<(usize, usize)> {
         let mut contacts: Vec<(usize, usize)> = Vec::new();
         let (mut is_in, deepest) = (false, self.deepest());
@@ -586,7 +594,8 @@ impl ForceCurve<'_> {
         median(&mut shares).unwrap_or(0.0)
     }
 
-    /// Whether the force differs between going in and coming out at the same depth, by itself or as a delay that cannot be.
+    /// Whether the force differs between going in and coming out at the same depth, by itself or as
+    /// a delay that cannot be.
     fn is_hysteretic(&self, line: &LineFit) -> bool {
         if (line[TAU] - self.params.delay).abs() > CLEARLY * self.params.delay_sigma {
             return true;

@@ -1,9 +1,11 @@
 //! An arm of any six to [`MOST_JOINTS`] turning joints one after the other, as a URDF describes it.
 //!
-//! T_Bi = Π_k O_k R(a_k, q_k): the origin of a joint in the frame of the one before, and a turn about its axis. The inverse is searched
-//! from joints near it, by steps Δq = Jᵀ (J Jᵀ + λ 1)⁻¹ e with λ in proportion to e² \[Sugihara 2011\]: far from a solution and near a
-//! singular pose the steps stay short, near a solution they are Newton's, and of the steps that lead there each is the shortest. A joint
-//! that would leave its range stays at the end of it, and the others do what is left.
+//! T_Bi = Π_k O_k R(a_k, q_k): the origin of a joint in the frame of the one before, and a turn
+//! about its axis. The inverse is searched from joints near it, by steps Δq = Jᵀ (J Jᵀ + λ 1)⁻¹ e
+//! with λ in proportion to e² \[Sugihara 2011\]: far from a solution and near a singular pose the
+//! steps stay short, near a solution they are Newton's, and of the steps that lead there each is
+//! the shortest. A joint that would leave its range stays at the end of it, and the others do what
+//! is left.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -13,7 +15,8 @@ use nalgebra::{Isometry3, Matrix6, Point3, SMatrix, UnitQuaternion, UnitVector3,
 use super::capsule::Capsule;
 use super::joints::{Joints, MOST_JOINTS, largest_turn};
 
-/// Velocity of a frame by those of the joints: three rows of m/s, three of rad/s, a column for each joint, then zeros.
+/// Velocity of a frame by those of the joints: three rows of m/s, three of rad/s, a column for each
+/// joint, then zeros.
 pub type Jacobian = SMatrix<f64, 6, MOST_JOINTS>;
 
 /// A joint that turns.
@@ -34,7 +37,8 @@ pub struct ChainJoint {
 pub struct ChainLink {
     /// as its maker has it
     pub name: Arc<str>,
-    /// the room that it takes up, in the frame of its joint; of the first link in B; `None`: from joint to joint
+    /// the room that it takes up, in the frame of its joint; of the first link in B; `None`: from
+    /// joint to joint
     pub body: Option<Capsule>,
 }
 
@@ -89,7 +93,8 @@ pub enum Unreached {
 
 /// An arm.
 ///
-/// Joints have names of their own, ranges with room, and axes of one metre to a relative 10⁻¹²; links take up a capsule each.
+/// Joints have names of their own, ranges with room, and axes of one metre to a relative 10⁻¹²;
+/// links take up a capsule each.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SerialChain {
     joints: Vec<ChainJoint>,
@@ -216,7 +221,8 @@ impl SerialChain {
         Ok(chain)
     }
 
-    /// Pairs of links that share no joint, and are clear of each other in some configuration: what never is lies side by side.
+    /// Pairs of links that share no joint, and are clear of each other in some configuration: what
+    /// never is lies side by side.
     fn meeting(&self) -> Vec<(usize, usize)> {
         let last = self.links.len();
         let pairs = (0..=last).flat_map(|one| (one + 2..=last).map(move |other| (one, other)));
@@ -314,8 +320,8 @@ impl SerialChain {
         jacobian
     }
 
-    /// Distance of the arm from a singularity: the smallest singular value of its Jacobian, lengths in units of the arm from its second
-    /// joint on.
+    /// Distance of the arm from a singularity: the smallest singular value of its Jacobian, lengths
+    /// in units of the arm from its second joint on.
     pub fn dexterity(&self, joints: &Joints) -> f64 {
         let mut jacobian = self.jacobian(joints);
         jacobian.rows_mut(0, 3).scale_mut(1.0 / self.reach);
@@ -357,8 +363,9 @@ impl SerialChain {
 
     /// Joint angles within their ranges that bring the flange to a pose in B, near others.
     ///
-    /// From a pose nearby they are the nearest ones to first order; where a search from there does not lead to it, those of a straight way, and
-    /// then the nearest of some searches from all over the ranges.
+    /// From a pose nearby they are the nearest ones to first order; where a search from there does
+    /// not lead to it, those of a straight way, and then the nearest of some searches from all over
+    /// the ranges.
     ///
     /// # Errors
     /// [`Unreached`]
@@ -391,8 +398,8 @@ impl SerialChain {
         nearest.ok_or(unreached)
     }
 
-    /// The joint angles of a pose in B, of those that searches from all over the ranges find, that leave the arm most room to move, with
-    /// its links clear of each other if there are such.
+    /// The joint angles of a pose in B, of those that searches from all over the ranges find, that
+    /// leave the arm most room to move, with its links clear of each other if there are such.
     pub(super) fn most_dexterous(&self, pose_bf: &Isometry3<f64>) -> Option<Joints> {
         let from_middle = self.search(pose_bf, &self.middle()).ok();
         let room = |joints: &Joints| (self.own_gap(joints) > 0.0, self.dexterity(joints));

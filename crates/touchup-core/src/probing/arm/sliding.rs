@@ -1,7 +1,8 @@
 //! A slide: the ball is pressed on the surface with a constant force and follows a path.
 //!
-//! The arm complies along the normal of the current station alone; along the path it is driven, and beside it it is held. The path
-//! says where to go, the force how deep: a surface that lies elsewhere than was thought by less than a ball is followed.
+//! The arm complies along the normal of the current station alone; along the path it is driven, and
+//! beside it it is held. The path says where to go, the force how deep: a surface that lies
+//! elsewhere than was thought by less than a ball is followed.
 
 use nalgebra::{Isometry3, Unit, UnitQuaternion, Vector3};
 
@@ -112,7 +113,8 @@ struct Slid<'a> {
 }
 
 impl Slid<'_> {
-    /// The direction of the path at the current station, unit vector, and the length to the next one, m.
+    /// The direction of the path at the current station, unit vector, and the length to the next
+    /// one, m.
     fn ahead(&self) -> (Vector3<f64>, f64) {
         let stations = &self.target.stations;
         let direction = stations[self.station + 1].centre - stations[self.station].centre;
@@ -144,8 +146,8 @@ impl Slid<'_> {
         }
     }
 
-    /// On along the path, and back to it where the ball is beside it; no faster than a slide may be, and with no more than the
-    /// acceleration that is allowed.
+    /// On along the path, and back to it where the ball is beside it; no faster than a slide may
+    /// be, and with no more than the acceleration that is allowed.
     fn command(&mut self, place: &Vector3<f64>) -> Command {
         let Station {
             centre,

@@ -2,13 +2,14 @@
 
 use nalgebra::Isometry3;
 
-/// Share of the acceleration that a line counts on when it brakes: the arm follows some milliseconds late.
+/// Share of the acceleration that a line counts on when it brakes: the arm follows some
+/// milliseconds late.
 const BRAKE: f64 = 0.7;
 /// Most that a line turns the tip, rad/s.
 const TURN: f64 = 0.5;
 
-/// Velocity of the tip towards a pose, m/s and rad/s in B: v = min(v_max, √(2 η a d), d/T) with d what is left; the turn comes to its end
-/// together with the way.
+/// Velocity of the tip towards a pose, m/s and rad/s in B: v = min(v_max, √(2 η a d), d/T) with d
+/// what is left; the turn comes to its end together with the way.
 ///
 /// - `speed`, `acceleration`: m/s and m/s².
 /// - `settling`: T, s: some times what passes from a state to the motion that answers it.

@@ -13,7 +13,8 @@ parameters! {
         ///
         /// In N: of the second search.
         force: f64 = 3.0, "touch_force_n" [N, 0.1, 100];
-        /// Force at which a search stops: several deviations of its noise, no more than 0.8 of touch_force_n.
+        /// Force at which a search stops: several deviations of its noise, no more than 0.8 of
+        /// touch_force_n.
         ///
         /// In N: of the first search.
         trigger: f64 = 1.0, "trigger_n" [N, 0.05, 80];
@@ -54,7 +55,8 @@ parameters! {
 const MOST_TRIGGER: f64 = 0.8;
 
 impl TouchParams {
-    /// Refuses a touch that would press harder or move faster than its limits, or whose search would stop too late.
+    /// Refuses a touch that would press harder or move faster than its limits, or whose search
+    /// would stop too late.
     ///
     /// # Errors
     /// [`SettingError`]
@@ -90,15 +92,16 @@ impl TouchParams {
 
     /// Speed at which a search that stops at [`Self::trigger`] ends below [`Self::force`].
     ///
-    /// After the trigger the tip goes on by v τ + v²/2a, and each metre of it is k more: v = a (√(τ² + 2 Δ/(k a)) − τ).
+    /// After the trigger the tip goes on by v τ + v²/2a, and each metre of it is k more: v = a
+    /// (√(τ² + 2 Δ/(k a)) − τ).
     pub(crate) fn safe_speed(&self) -> f64 {
         self.speed_below(self.force - self.trigger, self.acceleration)
             .min(self.search_speed)
             .max(CRAWL)
     }
 
-    /// Speed at which whatever the tip meets is pressed with no more than the largest force, where it stops as hard as it may once it
-    /// feels a contact; m/s.
+    /// Speed at which whatever the tip meets is pressed with no more than the largest force, where
+    /// it stops as hard as it may once it feels a contact; m/s.
     pub(crate) fn bounded_speed(&self, limits: &Limits) -> f64 {
         self.speed_below(
             limits.force - UNEXPECTED * self.trigger,
@@ -115,7 +118,8 @@ impl TouchParams {
     }
 }
 
-/// In a fast move the sensor also measures accelerations: more force than this many triggers is a contact.
+/// In a fast move the sensor also measures accelerations: more force than this many triggers is a
+/// contact.
 pub const UNEXPECTED: f64 = 1.5;
 /// No search is slower, m/s: it would never end.
 pub const CRAWL: f64 = 0.1e-3;

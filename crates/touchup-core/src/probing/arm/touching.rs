@@ -1,7 +1,8 @@
 //! One touch: approach, search, back off, a slower search, retract.
 //!
-//! The first search finds the surface; the second comes from just above it, slowly, presses to the set force,
-//! and goes back through the corner at the same speed. Its curve is the input of [`find_onset`].
+//! The first search finds the surface; the second comes from just above it, slowly, presses to the
+//! set force, and goes back through the corner at the same speed. Its curve is the input of
+//! [`find_onset`].
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
@@ -207,7 +208,8 @@ impl Watched<'_> {
         Ok(is_free)
     }
 
-    /// The measuring search, from just above the surface, in and out; whether it reached the wanted force.
+    /// The measuring search, from just above the surface, in and out; whether it reached the wanted
+    /// force.
     ///
     /// - `room`: so far away the surface is at most, m.
     fn press(
@@ -289,7 +291,8 @@ impl ApproachLine<'_> {
         -state.wrench_b.force.dot(&self.target.direction)
     }
 
-    /// Force that makes a contact, N: against the approach, or aside where a wall is met at a flat angle or a rim is slid down.
+    /// Force that makes a contact, N: against the approach, or aside where a wall is met at a flat
+    /// angle or a rim is slid down.
     fn felt(&self, state: &ArmState) -> f64 {
         self.presses(state).max(state.wrench_b.force.norm() / ASIDE)
     }
@@ -310,8 +313,8 @@ impl ApproachLine<'_> {
         states.iter().map(moment).collect()
     }
 
-    /// Along which the contact pushes, unit vector in B: against the approach; where a wall is met at a flat angle, along the force,
-    /// which bends at the same travel and is the larger.
+    /// Along which the contact pushes, unit vector in B: against the approach; where a wall is met
+    /// at a flat angle, along the force, which bends at the same travel and is the larger.
     fn contact_axis(&self, states: &[ArmState]) -> Vector3<f64> {
         let back = -self.along(1.0);
         let norm = |state: &ArmState| state.wrench_b.force.norm();
@@ -358,8 +361,8 @@ impl ApproachLine<'_> {
     }
 }
 
-/// A ball is stopped as well when its whole force is more than this many times the limit along its direction: a wall that it
-/// meets at 45° pushes √2 times as much.
+/// A ball is stopped as well when its whole force is more than this many times the limit along its
+/// direction: a wall that it meets at 45° pushes √2 times as much.
 const ASIDE: f64 = 1.42;
 /// A wall whose push is more than 33° from the approach is met at a flat angle (cosine).
 const FLAT: f64 = 0.8387;

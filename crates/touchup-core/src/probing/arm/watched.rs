@@ -1,5 +1,5 @@
-//! An arm that is watched while it moves: each state is checked before the next is awaited; a fault stops the arm first
-//! and is reported second.
+//! An arm that is watched while it moves: each state is checked before the next is awaited; a fault
+//! stops the arm first and is reported second.
 
 use std::collections::VecDeque;
 
@@ -111,8 +111,9 @@ pub enum ProbeError {
 const FROZEN: u32 = 5;
 /// States may come this many periods apart.
 const LATE: f64 = 10.0;
-/// An arm is at rest when it is not farther than this from where it was [`REST_STATES`] before, m: above the noise of what is
-/// reported. At 500 Hz that is 3 mm/s, from which 0.5 m/s² stop within 9 µm.
+/// An arm is at rest when it is not farther than this from where it was [`REST_STATES`] before, m:
+/// above the noise of what is reported. At 500 Hz that is 3 mm/s, from which 0.5 m/s² stop within 9
+/// µm.
 const REST: f64 = 60e-6;
 /// States over which rest is tested.
 const REST_STATES: usize = 10;
@@ -126,13 +127,15 @@ const TURN_SPEED: f64 = 0.2;
 const PATIENCE: (f64, f64) = (3.0, 2.0);
 /// Below this the tip is free of what it met, N …
 const FREE_N: f64 = 1.0;
-/// … and where it grows by this on the way back the tip goes no farther, N: several deviations of its noise …
+/// … and where it grows by this on the way back the tip goes no farther, N: several deviations of
+/// its noise …
 const WORSE_N: f64 = 2.0;
 /// … to which it goes back with this speed, m/s …
 const FREEING: f64 = 2e-3;
 /// … by no more than this, m: what an arm goes on while it brakes, and what it bends.
 const FREEING_WAY: f64 = 5e-3;
-/// A force with less than this share along the way comes from a surface beside it: the way back is along that surface as well.
+/// A force with less than this share along the way comes from a surface beside it: the way back is
+/// along that surface as well.
 const BESIDE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// So often on one way the tip is freed of what is beside it, and goes on …
 const GRAZES: u32 = 3;
@@ -178,8 +181,8 @@ pub struct Watched<'a> {
     frozen: u32,
     motion: MeasuredMotion,
     pub(super) peak_force: f64,
-    /// The station that the ball has come to on the current slide, also where that breaks off; of a touch 0 from its stand-off on.
-    /// `None` while it is not at the first.
+    /// The station that the ball has come to on the current slide, also where that breaks off; of a
+    /// touch 0 from its stand-off on. `None` while it is not at the first.
     pub reached: Option<usize>,
     /// the least request that stops it: a retraction goes on unless it has to stay
     pub(crate) heeds: StopRequest,
@@ -206,8 +209,9 @@ impl<'a> Watched<'a> {
         }
     }
 
-    /// The largest force of the current touch, or of all lines where there was none, N; and when the arm was seen last, by its clock, ns:
-    /// `None` where it was not, or not since the sensor was zeroed.
+    /// The largest force of the current touch, or of all lines where there was none, N; and when
+    /// the arm was seen last, by its clock, ns: `None` where it was not, or not since the sensor
+    /// was zeroed.
     pub(crate) fn seen(&self) -> (f64, Option<i64>) {
         (self.peak_force, self.last.map(|state| state.stamp_ns))
     }
@@ -295,7 +299,8 @@ impl<'a> Watched<'a> {
 
     /// Repeats a command, as the watchdog of the arm needs it, until a state gives a result.
     ///
-    /// - `begun_ns`: when the motion began; `None`: with its first state. `limit_s`: it ends within this, or has failed.
+    /// - `begun_ns`: when the motion began; `None`: with its first state. `limit_s`: it ends within
+    ///   this, or has failed.
     pub(super) fn repeat<T>(
         &mut self,
         doing: &'static str,
@@ -328,7 +333,8 @@ impl<'a> Watched<'a> {
         }
     }
 
-    /// Brakes as hard as it may, and goes back the way it came until nothing is felt any more; of a surface beside the way, off that surface.
+    /// Brakes as hard as it may, and goes back the way it came until nothing is felt any more; of a
+    /// surface beside the way, off that surface.
     ///
     /// Returns how far beside the way it is to go on, m in B, where it went aside and is free.
     ///
@@ -386,7 +392,8 @@ impl<'a> Watched<'a> {
     /// Goes straight to a pose through what should be free air.
     ///
     /// # Errors
-    /// [`ProbeError`]; [`ProbeError::Obstacle`] when the force exceeds `trigger` (N): the arm has stopped, and come free of it.
+    /// [`ProbeError`]; [`ProbeError::Obstacle`] when the force exceeds `trigger` (N): the arm has
+    /// stopped, and come free of it.
     ///
     /// - `speed`: m/s, at most; near the part not above `TouchParams::safe_speed`.
     pub fn line(
@@ -403,11 +410,12 @@ impl<'a> Watched<'a> {
         }
     }
 
-    /// As [`Self::line`], from where the tip may be in contact, also with more than the limit: once it is free, what it meets is an
-    /// obstacle, and before that whatever presses more than at the beginning.
+    /// As [`Self::line`], from where the tip may be in contact, also with more than the limit: once
+    /// it is free, what it meets is an obstacle, and before that whatever presses more than at the
+    /// beginning.
     ///
-    /// A surface beside the way, as the wall of a hole that it goes up in, is none: the tip goes off it and on beside the way, and ends as far
-    /// beside `to`.
+    /// A surface beside the way, as the wall of a hole that it goes up in, is none: the tip goes
+    /// off it and on beside the way, and ends as far beside `to`.
     ///
     /// # Errors
     /// As there.
@@ -505,7 +513,8 @@ impl<'a> Watched<'a> {
     /// Stops, waits until the arm is at rest, and zeroes the sensor.
     ///
     /// # Errors
-    /// [`ProbeError`]; [`ProbeError::Loaded`] and [`ProbeError::Unsteady`] where it feels something.
+    /// [`ProbeError`]; [`ProbeError::Loaded`] and [`ProbeError::Unsteady`] where it feels
+    /// something.
     pub fn zero(&mut self) -> Result<(), ProbeError> {
         self.zero_below(self.limits.tare)
     }

@@ -43,7 +43,8 @@ impl Cell {
         Unit::new_normalize(self.pose_bo.rotation.inverse() * (rotation * Vector3::z()))
     }
 
-    /// Orientation of the tip in B that aligns the shaft with the normal of a surface: as it is now where that is near enough.
+    /// Orientation of the tip in B that aligns the shaft with the normal of a surface: as it is now
+    /// where that is near enough.
     pub fn upright(
         &self,
         now: &UnitQuaternion<f64>,
@@ -62,7 +63,8 @@ impl Cell {
         turn * now
     }
 
-    /// The tip well above the middle of a part, the shaft along z of O, in B: where a simulated arm begins.
+    /// The tip well above the middle of a part, the shaft along z of O, in B: where a simulated arm
+    /// begins.
     pub fn above(&self, part: &TriMesh) -> Isometry3<f64> {
         let [low, high] = part.bounds();
         let middle = Point3::new(

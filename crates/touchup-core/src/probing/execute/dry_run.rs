@@ -51,8 +51,8 @@ pub struct Plan {
 }
 
 impl Cell {
-    /// The arm at rest with its tip at a pose in B and nothing on it, in the configuration that leaves it most room to move; for
-    /// a plan without an arm. `None` where it does not reach.
+    /// The arm at rest with its tip at a pose in B and nothing on it, in the configuration that
+    /// leaves it most room to move; for a plan without an arm. `None` where it does not reach.
     pub fn at_rest(&self, pose_bt: &Isometry3<f64>) -> Option<ArmState> {
         let joints = self
             .geometry
@@ -167,7 +167,8 @@ pub fn plan(
     Ok(plan)
 }
 
-/// First contact of a ball with the mesh, by sphere tracing: each step is the distance that is left.
+/// First contact of a ball with the mesh, by sphere tracing: each step is the distance that is
+/// left.
 fn contact_on_mesh(planned: &TouchPlan, pattern: &PatternParams, world: &dyn World) -> TouchResult {
     let (
         PatternParams {

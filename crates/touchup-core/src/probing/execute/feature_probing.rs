@@ -13,7 +13,8 @@ use crate::probing::arm::{
 };
 use crate::probing::plan::{Explorer, TouchPlan, TouchResult};
 
-/// A feature that is being probed: the position of the ball, its path back into free air, and its touches.
+/// A feature that is being probed: the position of the ball, its path back into free air, and its
+/// touches.
 pub(super) struct FeatureProbing<'p, 'a> {
     pub prober: &'p mut Prober<'a>,
     pub flag: u32,
@@ -23,7 +24,8 @@ pub(super) struct FeatureProbing<'p, 'a> {
     pub out: ToolState,
     /// whether it is there now
     pub is_out: bool,
-    /// below that, where the touch is entered from, m in O; `None` where it is the same, or the ball was not there yet
+    /// below that, where the touch is entered from, m in O; `None` where it is the same, or the
+    /// ball was not there yet
     pub entry: Option<Point3<f64>>,
     /// where the last search began, m in O; `None` where the ball was not there yet
     pub from: Option<Point3<f64>>,
@@ -38,12 +40,13 @@ pub(super) struct FeatureProbing<'p, 'a> {
 
 /// A search that ends this much before its planned length has not searched the remainder, m.
 const SHORT: f64 = 0.1e-3;
-/// Touches that begin nearer than this to each other, over the ball's radius, are gone between inside of the feature.
+/// Touches that begin nearer than this to each other, over the ball's radius, are gone between
+/// inside of the feature.
 const INSIDE: f64 = 0.5;
 
 impl<'a> Prober<'a> {
-    /// Probes one flagged feature. Whatever happens, the arm is stopped when this returns; it has retracted wherever it was still
-    /// allowed to move.
+    /// Probes one flagged feature. Whatever happens, the arm is stopped when this returns; it has
+    /// retracted wherever it was still allowed to move.
     pub fn probe(&mut self, flag: &Flag) -> Probed {
         let (mut explorer, mut probing) = match self.begin(flag) {
             Ok(begun) => begun,
@@ -139,7 +142,8 @@ impl<'a> Prober<'a> {
 impl<'p, 'a> FeatureProbing<'p, 'a> {
     /// Nothing is touched yet.
     ///
-    /// - `flag`: its number; `rotation`: that it is touched with, of the tip in B; `state`: of the arm, in free air.
+    /// - `flag`: its number; `rotation`: that it is touched with, of the tip in B; `state`: of the
+    ///   arm, in free air.
     pub fn new(
         prober: &'p mut Prober<'a>,
         flag: u32,
@@ -165,7 +169,8 @@ impl<'p, 'a> FeatureProbing<'p, 'a> {
 }
 
 impl FeatureProbing<'_, '_> {
-    /// Keeps what was seen while the arm moved, also where that was broken off: the largest force, N, and when it was seen last, ns.
+    /// Keeps what was seen while the arm moved, also where that was broken off: the largest force,
+    /// N, and when it was seen last, ns.
     pub fn keep(&mut self, (peak_force, seen_ns): (f64, Option<i64>)) {
         self.peak_force = self.peak_force.max(peak_force);
         self.ended_ns = seen_ns.unwrap_or(self.ended_ns).max(self.ended_ns);
@@ -445,7 +450,8 @@ impl FeatureProbing<'_, '_> {
         })
     }
 
-    /// Back through the places where the ball has been before, none of them twice, whatever breaks off the remaining path.
+    /// Back through the places where the ball has been before, none of them twice, whatever breaks
+    /// off the remaining path.
     fn go_out(&mut self, doing: &'static str, guard: LineGuard) -> Result<(), Ending> {
         while !self.is_out {
             let place = self.from.or(self.entry).unwrap_or(self.out.place);
@@ -457,8 +463,8 @@ impl FeatureProbing<'_, '_> {
     }
 }
 
-/// Distance of a ball from the mesh at each [`SAMPLED`] of the path of a touch, before the touch moves the mesh; m, positive outside,
-/// `None` where no mesh is near.
+/// Distance of a ball from the mesh at each [`SAMPLED`] of the path of a touch, before the touch
+/// moves the mesh; m, positive outside, `None` where no mesh is near.
 fn distances(world: &dyn World, planned: &TouchPlan, ball_radius: f64) -> Vec<Option<f64>> {
     let count = (planned.search / SAMPLED).ceil() as usize + 1;
     let at = |sample: usize| {
@@ -478,7 +484,8 @@ fn deviation(distances: &[Option<f64>], planned: &TouchPlan, centre: &Point3<f64
     Some(here + (next - here) * (at - at.floor()))
 }
 
-/// The distance from the mesh is sampled this often along the path of a touch, m: between two of them a wall with a radius of 1 mm bends by 1 µm.
+/// The distance from the mesh is sampled this often along the path of a touch, m: between two of
+/// them a wall with a radius of 1 mm bends by 1 µm.
 const SAMPLED: f64 = 0.1e-3;
 
 /// How a line is watched.

@@ -1,15 +1,17 @@
 //! Paths through free air that keep clear of the mesh.
 //!
-//! A path goes straight, or up, over and down at the lowest height at which all three keep clear. A straight line is clear when the
-//! ball, and the shaft above it, stay farther from the mesh than their radii and a margin: sphere tracing in steps of the distance that is left, which
-//! misses nothing, as the distance changes no faster than the place.
+//! A path goes straight, or up, over and down at the lowest height at which all three keep clear. A
+//! straight line is clear when the ball, and the shaft above it, stay farther from the mesh than
+//! their radii and a margin: sphere tracing in steps of the distance that is left, which misses
+//! nothing, as the distance changes no faster than the place.
 
 use nalgebra::{Point3, Unit, Vector3};
 
 use crate::parameters;
 
 parameters! {
-    /// What the arm holds, as far as it must keep clear: by default a probe of 3 mm on a shaft of 2 mm.
+    /// What the arm holds, as far as it must keep clear: by default a probe of 3 mm on a shaft of 2
+    /// mm.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct Tool in "robot" {
         /// Of the ball, m.
@@ -84,8 +86,8 @@ pub struct Clearance<'a> {
 }
 
 impl Clearance<'_> {
-    /// At most as much room as there is around the tool at a place, m; negative: it is in the mesh, or nearer than the margin, and
-    /// how deep is not known.
+    /// At most as much room as there is around the tool at a place, m; negative: it is in the mesh,
+    /// or nearer than the margin, and how deep is not known.
     ///
     /// - `reach`: no more room than that matters, m.
     pub fn room(&self, centre: &Point3<f64>, reach: f64) -> f64 {
@@ -149,7 +151,8 @@ impl Clearance<'_> {
         is_clear_along(angle, room, |room| (room / length).max(LEAST_TURN))
     }
 
-    /// The place where the tool can turn about its ball and keeps clear: where it is, or as little as can be out along its shaft.
+    /// The place where the tool can turn about its ball and keeps clear: where it is, or as little
+    /// as can be out along its shaft.
     ///
     /// - `angle`: of the turn, rad; `shaft`: after a share of it, from the ball to the handle.
     ///
@@ -185,7 +188,8 @@ impl Clearance<'_> {
             .ok_or(self.no_path(entry))
     }
 
-    /// The places that the tool goes through from one place to another, without the first; both are in free air.
+    /// The places that the tool goes through from one place to another, without the first; both are
+    /// in free air.
     ///
     /// - `highest`: of the mesh along the shaft, m from the origin of O.
     ///

@@ -1,8 +1,10 @@
-//! An arm probes flagged features by itself: from a flag to links through free air, touches, and a feature with its uncertainty.
+//! An arm probes flagged features by itself: from a flag to links through free air, touches, and a
+//! feature with its uncertainty.
 //!
-//! [`crate::probing::plan`] plans touches, [`crate::probing::arm`] makes each; here a planned touch becomes a path of the arm that is within its limits
-//! and keeps clear of the mesh as it is now, and each outcome becomes an [`Ending`] with its reason. On request the ball then
-//! slides over all of what was found.
+//! [`crate::probing::plan`] plans touches, [`crate::probing::arm`] makes each; here a planned touch
+//! becomes a path of the arm that is within its limits and keeps clear of the mesh as it is now,
+//! and each outcome becomes an [`Ending`] with its reason. On request the ball then slides over all
+//! of what was found.
 
 mod cell;
 mod cone;

@@ -1,5 +1,5 @@
-//! The surface around a flag in which an opening lies. Where the ball was already, the mesh is open, and what is nearest to the flag
-//! is a wall or the floor of the opening.
+//! The surface around a flag in which an opening lies. Where the ball was already, the mesh is
+//! open, and what is nearest to the flag is a wall or the floor of the opening.
 
 use std::f64::consts::TAU;
 
@@ -8,22 +8,27 @@ use nalgebra::{Isometry3, Point2, Point3, Unit, Vector3};
 use crate::mesh::TriMesh;
 use crate::numeric::{mean, scatter, turned_to};
 
-/// Rings around the flag on which the surface is looked at: an opening is searched for its wall no farther than the last, 12 mm …
+/// Rings around the flag on which the surface is looked at: an opening is searched for its wall no
+/// farther than the last, 12 mm …
 const RINGS: usize = 8;
 /// … and so many directions of each.
 const DIRECTIONS: usize = 24;
 /// What is higher above the flag, or deeper below it, is no surface around it, m.
 const NEAR: f64 = 20e-3;
-/// Places within this of a plane are on it, m: a scan is off by that much beside a hole that it has closed.
+/// Places within this of a plane are on it, m: a scan is off by that much beside a hole that it has
+/// closed.
 const ON_PLANE: f64 = 1e-3;
-/// A surface is there where so many places of a ring are on one plane: a hole may lie at the edge of a part.
+/// A surface is there where so many places of a ring are on one plane: a hole may lie at the edge
+/// of a part.
 const ENOUGH: f64 = 0.6;
 /// It leans no more from the expected normal (cosine): 25°.
 const ALIKE: f64 = 0.9;
-/// What is lower below the surface than this is in the opening, m: half of how far above the surface a search begins by default.
+/// What is lower below the surface than this is in the opening, m: half of how far above the
+/// surface a search begins by default.
 const IN_OPENING: f64 = 1.5e-3;
 
-/// Places of a ring, seen from outside along the normal, in the frame of the flag; `None` where nothing is.
+/// Places of a ring, seen from outside along the normal, in the frame of the flag; `None` where
+/// nothing is.
 type Ring = [Option<Point3<f64>>; DIRECTIONS];
 
 /// A plane in the frame of the flag.
@@ -97,13 +102,16 @@ impl LevelPlane {
     }
 }
 
-/// The place of the flag of an opening on the surface around it, m in O, and the outward normal of that.
+/// The place of the flag of an opening on the surface around it, m in O, and the outward normal of
+/// that.
 ///
-/// That is what is nearest to the flag, unless it lies in the opening: lower than the surface around it by more than [`IN_OPENING`].
-/// Of several surfaces, as the floor of a wide pocket and the face that it is in, the one nearest to the flag counts.
+/// That is what is nearest to the flag, unless it lies in the opening: lower than the surface
+/// around it by more than [`IN_OPENING`]. Of several surfaces, as the floor of a wide pocket and
+/// the face that it is in, the one nearest to the flag counts.
 ///
 /// - `flag`, `nearest`: m in O; `normal`: about that of the surface around the flag.
-/// - `radius`: of the innermost ring, m: an opening beside which the flag lies at most is inside of it; `step`: from ring to ring, m.
+/// - `radius`: of the innermost ring, m: an opening beside which the flag lies at most is inside of
+///   it; `step`: from ring to ring, m.
 pub(super) fn on_surface_around(
     mesh: &TriMesh,
     flag: &Point3<f64>,

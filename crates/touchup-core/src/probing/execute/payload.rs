@@ -1,9 +1,10 @@
-//! Measurements for payload identification by the arm itself: in free air it turns its probe about the ball into a cone of
-//! orientations, dwells in each, and keeps the mean wrench of the sensor there.
+//! Measurements for payload identification by the arm itself: in free air it turns its probe about
+//! the ball into a cone of orientations, dwells in each, and keeps the mean wrench of the sensor
+//! there.
 //!
-//! The first orientation of the arm is the middle. All paths are planned before anything moves. The sensor is zeroed in
-//! each orientation, so that a weight that is not known yet is no force to stop for; what is kept is the raw wrench, which no
-//! zero changes.
+//! The first orientation of the arm is the middle. All paths are planned before anything moves. The
+//! sensor is zeroed in each orientation, so that a weight that is not known yet is no force to stop
+//! for; what is kept is the raw wrench, which no zero changes.
 
 use nalgebra::UnitQuaternion;
 
@@ -19,7 +20,8 @@ use crate::stylus::Sample;
 /// The static segments for payload identification.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PayloadReadings {
-    /// in their order: of the flange in the base, the raw wrench in the axes of the flange about its origin
+    /// in their order: of the flange in the base, the raw wrench in the axes of the flange about
+    /// its origin
     pub segments: Vec<StaticPose>,
     /// those that were left out
     pub not_reached: Vec<NotReached>,
@@ -46,9 +48,11 @@ pub enum PayloadProbeError {
     },
 }
 
-/// Leans of the shaft, °, and how many orientations around each: two neighbours are 51° apart at the most.
+/// Leans of the shaft, °, and how many orientations around each: two neighbours are 51° apart at
+/// the most.
 const RINGS: [(f64, usize); 3] = [(0.0, 1), (30.0, 6), (60.0, 6)];
-/// Six unknowns of the force and three equations from each; these leave degrees of freedom for the residuals.
+/// Six unknowns of the force and three equations from each; these leave degrees of freedom for the
+/// residuals.
 const FEWEST: usize = 6;
 /// A sensor and an arm that were just moved come to equilibrium in so long, s.
 const SETTLE: f64 = 0.3;
@@ -56,7 +60,8 @@ const SETTLE: f64 = 0.3;
 const AVERAGED: f64 = 1.0;
 
 impl Prober<'_> {
-    /// Measures the wrench of the payload in free air around the pose of the arm, and goes back there.
+    /// Measures the wrench of the payload in free air around the pose of the arm, and goes back
+    /// there.
     ///
     /// # Errors
     /// [`PayloadProbeError`]; the arm is stopped then.
@@ -119,7 +124,8 @@ impl Prober<'_> {
         Ok(())
     }
 
-    /// Dwells, averages the wrench, and zeroes the sensor; what was measured, and when that ended, ns.
+    /// Dwells, averages the wrench, and zeroes the sensor; what was measured, and when that ended,
+    /// ns.
     fn dwell(&mut self) -> Result<Option<(StaticPose, i64)>, Ending> {
         let r_tf = self.cell.pose_ft.rotation.inverse();
         let mut watched = self.watched();
@@ -151,7 +157,8 @@ impl Prober<'_> {
     }
 }
 
-/// The paths from one orientation to the next, the orientations without a path, and where the last path ends.
+/// The paths from one orientation to the next, the orientations without a path, and where the last
+/// path ends.
 fn routes(space: &FreeSpace, home: &ToolState) -> (Vec<Route>, Vec<NotReached>, ToolState) {
     let (mut routes, mut not_reached, mut at) = (Vec::new(), Vec::new(), *home);
     for orientation in orientations() {

@@ -37,7 +37,8 @@ pub struct ProbeParams {
     pub touch: TouchParams,
     /// what is wanted of a feature; the radius around a flag is the flag's
     pub pattern: PatternParams,
-    /// what ends the probing of a feature, in place of an uncertainty: by the numbers of their flags
+    /// what ends the probing of a feature, in place of an uncertainty: by the numbers of their
+    /// flags
     pub goals: BTreeMap<u32, DecisionGoal>,
     /// whether the ball slides over all of what its touches have found
     pub slides: bool,
@@ -45,7 +46,8 @@ pub struct ProbeParams {
     pub limits: Limits,
 }
 
-/// The limit of force is so much above the force of a touch at least: the force grows a little while the arm brakes.
+/// The limit of force is so much above the force of a touch at least: the force grows a little
+/// while the arm brakes.
 const HEADROOM: f64 = 1.3;
 
 impl ProbeParams {
@@ -138,14 +140,15 @@ impl<'a> Prober<'a> {
         }
     }
 
-    /// Has the next probing begin with the way out of the feature that another one was stopped in, where the arm still stands there.
+    /// Has the next probing begin with the way out of the feature that another one was stopped in,
+    /// where the arm still stands there.
     #[must_use]
     pub fn leaving_by(self, way_out: Option<WayOut>) -> Self {
         Self { way_out, ..self }
     }
 
-    /// The way out of the feature that the last probing was stopped in; `None`: the arm is in free air, or nothing is known of where
-    /// it is.
+    /// The way out of the feature that the last probing was stopped in; `None`: the arm is in free
+    /// air, or nothing is known of where it is.
     pub fn into_way_out(self) -> Option<WayOut> {
         self.way_out
     }

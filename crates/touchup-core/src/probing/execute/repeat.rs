@@ -1,4 +1,5 @@
-//! One spot, touched again and again from both sides: how far the arm can be trusted, and how stiff it is.
+//! One spot, touched again and again from both sides: how far the arm can be trusted, and how stiff
+//! it is.
 
 use nalgebra::{Point3, Unit, Vector3};
 
@@ -60,12 +61,14 @@ const ASIDE: f64 = 10e-3;
 const ABOVE: f64 = 5e-3;
 
 impl Prober<'_> {
-    /// Touches one spot, coming from one side and from the other in turn, so that play of the joints shows.
+    /// Touches one spot, coming from one side and from the other in turn, so that play of the
+    /// joints shows.
     ///
     /// - `spot`: on the mesh or near it, m in O; flat for some 10 mm about.
     ///
     /// # Errors
-    /// [`SpotError`]; the arm is stopped then, and has retracted wherever it was still allowed to move.
+    /// [`SpotError`]; the arm is stopped then, and has retracted wherever it was still allowed to
+    /// move.
     pub fn repeat(&mut self, spot: &Point3<f64>, count: usize) -> Result<Repeatability, SpotError> {
         self.at_spot(spot, |probing, place, normal| {
             let across = tangent_basis(&normal)[0];
@@ -206,8 +209,8 @@ impl Repeatability {
         self.mean(Some(1)) - self.mean(Some(-1))
     }
 
-    /// Stiffness of arm, probe and part together, and its standard uncertainty, N/m: the mean of what the curves say, and how
-    /// far they scatter.
+    /// Stiffness of arm, probe and part together, and its standard uncertainty, N/m: the mean of
+    /// what the curves say, and how far they scatter.
     pub fn stiffness(&self) -> [f64; 2] {
         let (count, all) = (self.touches.len() as f64, || {
             self.touches.iter().map(|touch| touch.stiffness[0])

@@ -1,4 +1,5 @@
-//! How the tool gets from free air to where a touch is entered from; the same for what is planned and for what is done.
+//! How the tool gets from free air to where a touch is entered from; the same for what is planned
+//! and for what is done.
 
 use nalgebra::{Point3, UnitQuaternion};
 
@@ -34,8 +35,8 @@ impl ToolState {
 /// A path through free air.
 #[derive(Clone, Debug)]
 pub(super) struct Route {
-    /// the places of the ball's centre that it goes through, without the first, and the orientation that it has when it is there;
-    /// m in O, of the tip in B
+    /// the places of the ball's centre that it goes through, without the first, and the orientation
+    /// that it has when it is there; m in O, of the tip in B
     pub stops: Vec<(Point3<f64>, UnitQuaternion<f64>)>,
     /// at its end
     pub joints: Joints,
@@ -46,13 +47,15 @@ const TURN_STEP: f64 = 0.1;
 /// A smaller turn is left out, rad.
 const TURNS: f64 = 1e-6;
 
-/// A straight way is checked each so far, m: from one place to the next the distance from a singularity changes by a hundredth.
+/// A straight way is checked each so far, m: from one place to the next the distance from a
+/// singularity changes by a hundredth.
 const WAY_STEP: f64 = 10e-3;
 /// From one to the next no joint turns farther, rad.
 const JUMP: f64 = 0.6;
 /// Every so many stations of a slide the joints are checked: a millimetre or two.
 const CHECKED: usize = 10;
-/// Links of the arm keep so far from the mesh, m: what the scan may lack, and what capsules leave out.
+/// Links of the arm keep so far from the mesh, m: what the scan may lack, and what capsules leave
+/// out.
 const PART_GAP: f64 = 10e-3;
 
 /// Where an arm goes: a cell, within limits, around the mesh.
@@ -97,7 +100,8 @@ impl FreeSpace<'_> {
         }
     }
 
-    /// Whether a link is nearer to the mesh than it may be: balls along its axis, a radius apart, that hide all of it.
+    /// Whether a link is nearer to the mesh than it may be: balls along its axis, a radius apart,
+    /// that hide all of it.
     fn is_at_part(&self, capsule: &Capsule) -> bool {
         let [from, to] = capsule
             .ends
@@ -198,7 +202,8 @@ impl FreeSpace<'_> {
             .map(|_| ())
     }
 
-    /// The path from where the tool is to a place at or above where a touch is entered from: first it turns, then it goes.
+    /// The path from where the tool is to a place at or above where a touch is entered from: first
+    /// it turns, then it goes.
     ///
     /// # Errors
     /// [`Ending::OutOfLimits`], [`Ending::NoClearPath`].
@@ -301,7 +306,8 @@ mod tests {
             .joints
     }
 
-    /// Both ends are half a metre from the base, on either side of it; halfway the tip would be in it.
+    /// Both ends are half a metre from the base, on either side of it; halfway the tip would be in
+    /// it.
     #[test]
     fn a_straight_way_through_the_base_is_refused_though_both_its_ends_are_reached() {
         let (cell, limits, world, upright) =
@@ -352,7 +358,8 @@ mod tests {
             .unwrap()
             .1
             .ends[0];
-        // a corner of the part 50 mm above the axis of the forearm at its elbow: inside of its radius of 58 mm
+        // a corner of the part 50 mm above the axis of the forearm at its elbow: inside of its
+        // radius of 58 mm
         let at_elbow = world([elbow.x, elbow.y, elbow.z + 50e-3]);
         let space = FreeSpace {
             cell: &cell,
@@ -427,8 +434,8 @@ mod tests {
     }
 
     proptest! {
-        /// A way that is allowed is one that joints can follow: between places 1 mm apart no joint turns by more than a tenth of a
-        /// radian.
+        /// A way that is allowed is one that joints can follow: between places 1 mm apart no joint
+        /// turns by more than a tenth of a radian.
         #[test]
         fn an_allowed_way_has_no_place_that_joints_jump_at(
             ends in proptest::array::uniform2((-0.7..0.7f64, -0.7..0.7f64, 0.0..0.4f64))

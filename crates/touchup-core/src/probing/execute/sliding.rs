@@ -11,7 +11,8 @@ use crate::probing::arm::SlideTarget;
 use crate::probing::plan::{Slide, Station};
 
 impl FeatureProbing<'_, '_> {
-    /// Slides along each path in turn, as long as there is time. What cannot be slid over is recorded with its reason.
+    /// Slides along each path in turn, as long as there is time. What cannot be slid over is
+    /// recorded with its reason.
     pub fn slide_over(&mut self, slides: Vec<Slide>) -> Result<(), Ending> {
         for slide in slides {
             let held_back = |why: String| ProbedSlide {

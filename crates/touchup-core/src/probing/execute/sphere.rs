@@ -1,7 +1,9 @@
-//! A sphere of known diameter, touched from its pole down to its upper half, with the probe upright and leaning.
+//! A sphere of known diameter, touched from its pole down to its upper half, with the probe upright
+//! and leaning.
 //!
-//! In each orientation of the shaft s the ball touches the sphere along −s at the pole that faces the shaft, and along six more normals 60°
-//! from s: behind the ball the shaft then leads away from the sphere, and with a lean of 25° no touch is below the equator, where its post may be.
+//! In each orientation of the shaft s the ball touches the sphere along −s at the pole that faces
+//! the shaft, and along six more normals 60° from s: behind the ball the shaft then leads away from
+//! the sphere, and with a lean of 25° no touch is below the equator, where its post may be.
 
 use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 
@@ -40,21 +42,23 @@ const AROUND: usize = 6;
 const POLAR: f64 = std::f64::consts::FRAC_PI_3;
 /// Four unknowns, and one touch more.
 const FEWEST: usize = 5;
-/// The ball begins to search this far from where the sphere is told to be, and searches twice as far, m.
+/// The ball begins to search this far from where the sphere is told to be, and searches twice as
+/// far, m.
 const STANDOFF: f64 = 3e-3;
 /// The tool comes from this far above, along the shaft, m.
 const ABOVE: f64 = 5e-3;
 
 impl Prober<'_> {
-    /// Touches a sphere in several orientations of the probe around that in which it is held; those that it does not get to are left out. It
-    /// goes back to where it began.
+    /// Touches a sphere in several orientations of the probe around that in which it is held; those
+    /// that it does not get to are left out. It goes back to where it began.
     ///
     /// The mesh of the world has to hold the sphere, so that no link leads through it.
     ///
     /// - `sphere`: where it is told to be; within 2 mm.
     ///
     /// # Errors
-    /// [`SpotError`]; the arm is stopped then, and has retracted wherever it was still allowed to move.
+    /// [`SpotError`]; the arm is stopped then, and has retracted wherever it was still allowed to
+    /// move.
     pub fn touch_sphere(&mut self, sphere: &ReferenceSphere) -> Result<SphereTouches, SpotError> {
         let home = ToolState::of(self.cell, &self.in_free_air(self.params.limits.tare)?);
         let mut touched = SphereTouches {
@@ -156,7 +160,8 @@ fn touches(
 mod tests {
     use super::*;
 
-    /// Neither the shaft behind the ball nor the way in comes nearer to the sphere than the ball, and none of the touches is below the equator.
+    /// Neither the shaft behind the ball nor the way in comes nearer to the sphere than the ball,
+    /// and none of the touches is below the equator.
     #[test]
     fn the_shaft_leads_away_from_the_sphere_and_its_post_is_left_alone() {
         let (sphere, ball) = (

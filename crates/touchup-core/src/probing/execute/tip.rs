@@ -1,4 +1,5 @@
-//! One flat spot, touched upright around it and with the probe leaning to all sides: the poses determine the tip (TCP) in the flange.
+//! One flat spot, touched upright around it and with the probe leaning to all sides: the poses
+//! determine the tip (TCP) in the flange.
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 
@@ -12,7 +13,8 @@ use crate::probing::plan::TouchPlan;
 /// The poses of the touches of a spot, for tip (TCP) calibration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TipPoses {
-    /// where the spot was touched: the place that the scene has for the centre of the ball, with the axes of the flange, in B
+    /// where the spot was touched: the place that the scene has for the centre of the ball, with
+    /// the axes of the flange, in B
     pub poses_bf: Vec<Isometry3<f64>>,
     /// out of the spot in B, about
     pub normal_b: Unit<Vector3<f64>>,
@@ -20,7 +22,8 @@ pub struct TipPoses {
     pub not_reached: Vec<NotReached>,
 }
 
-/// The ball begins to search this far above the spot, and searches twice as far, m: the tip may be off by less.
+/// The ball begins to search this far above the spot, and searches twice as far, m: the tip may be
+/// off by less.
 const STANDOFF: f64 = 6e-3;
 /// The tool comes from this far above where it begins to search, m.
 const ABOVE: f64 = 5e-3;
@@ -35,7 +38,8 @@ impl Prober<'_> {
     /// - `spot`: on the mesh or near it, m in O; flat for some 10 mm about.
     ///
     /// # Errors
-    /// [`SpotError`]; the arm is stopped then, and has retracted wherever it was still allowed to move.
+    /// [`SpotError`]; the arm is stopped then, and has retracted wherever it was still allowed to
+    /// move.
     pub fn measure_tip(&mut self, spot: &Point3<f64>) -> Result<TipPoses, SpotError> {
         self.at_spot(spot, |probing, place, normal| {
             let Prober { cell, params, .. } = *probing.prober;

@@ -6,12 +6,14 @@ use super::cell::Cell;
 use super::route::ToolState;
 use crate::probing::arm::ArmState;
 
-/// The way that the ball came, back into free air: no way but that is known to be clear where an arm was stopped inside of a feature.
+/// The way that the ball came, back into free air: no way but that is known to be clear where an
+/// arm was stopped inside of a feature.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WayOut {
     /// the tip where it was stopped, in B
     pub(super) stopped_bt: Isometry3<f64>,
-    /// where the search began, and where the feature was entered, as far as the ball was there; m in O
+    /// where the search began, and where the feature was entered, as far as the ball was there; m
+    /// in O
     pub(super) from: Option<Point3<f64>>,
     pub(super) entry: Option<Point3<f64>>,
     /// its end
@@ -24,7 +26,8 @@ const STANDS: f64 = 0.5e-3;
 const STANDS_TURNED: f64 = 0.01;
 
 impl WayOut {
-    /// Whether the arm still stands where it was stopped; else somebody has moved it, and the way is another.
+    /// Whether the arm still stands where it was stopped; else somebody has moved it, and the way
+    /// is another.
     pub(super) fn begins_at(&self, now: &ArmState) -> bool {
         let (stopped, here) = (&self.stopped_bt, &now.pose_bt);
         let off = (stopped.translation.vector - here.translation.vector).norm();

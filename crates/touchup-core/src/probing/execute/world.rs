@@ -34,12 +34,14 @@ pub trait World: Observer {
     /// Receives the phase that begins.
     fn enter(&mut self, _: Phase) {}
 
-    /// Receives each touch when it is made, before the arm goes on; also one that cannot be made, with the reason.
+    /// Receives each touch when it is made, before the arm goes on; also one that cannot be made,
+    /// with the reason.
     ///
     /// - `flag`: number of the feature; 0 for the touches of a spot.
     fn touched(&mut self, _flag: u32, _touch: &ProbedTouch) {}
 
-    /// Receives each static segment of a payload identification when it is measured, before the arm goes on.
+    /// Receives each static segment of a payload identification when it is measured, before the arm
+    /// goes on.
     fn weighed(&mut self, _segment: &StaticPose) {}
 }
 
@@ -110,8 +112,8 @@ pub(super) fn distance(world: &dyn World) -> impl Fn(&Point3<f64>, f64) -> f64 {
     }
 }
 
-/// Outward normal of the surface around a flag: the mean of the faces there that face the handle of the probe, weighted by
-/// their area; where there are none, the shaft.
+/// Outward normal of the surface around a flag: the mean of the faces there that face the handle of
+/// the probe, weighted by their area; where there are none, the shaft.
 pub(super) fn normal_about(
     world: &dyn World,
     flag: &Point3<f64>,

@@ -21,17 +21,20 @@ pub struct NextTouch {
 /// Places around a round wall; along each side and around each end of a slot.
 const AROUND: usize = 12;
 const ALONG: usize = 5;
-/// Places down a wall, as shares of its depth, and the depth of a wall whose own is not known, of its radius.
+/// Places down a wall, as shares of its depth, and the depth of a wall whose own is not known, of
+/// its radius.
 const DOWN: [f64; 3] = [0.2, 0.5, 0.8];
 const UNKNOWN_DEPTH: f64 = 1.0;
-/// Standard deviation of one place, m, however often it is touched by hand: the error of the calibration is shared.
+/// Standard deviation of one place, m, however often it is touched by hand: the error of the
+/// calibration is shared.
 const PLACE_SIGMA: f64 = 20e-6;
 /// Walls are perpendicular to the surface around them within this, rad.
 const SQUARE: f64 = 0.02;
 /// Enough is known when each number of the feature has this standard deviation, m.
 const ENOUGH: f64 = 10e-6;
 
-/// The touch with the largest gain for the numbers of a feature; `None` when enough is known, or it has no wall.
+/// The touch with the largest gain for the numbers of a feature; `None` when enough is known, or it
+/// has no wall.
 ///
 /// - `touches`: all touches; the feature names its own by their numbers.
 pub fn advise_next_touch(feature: &Feature, touches: &[ProbedPoint]) -> Option<NextTouch> {

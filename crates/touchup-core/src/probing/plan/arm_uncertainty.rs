@@ -1,9 +1,11 @@
-//! What all touches of an arm have in common, and no number of them averages out: it enters each number by its derivatives.
+//! What all touches of an arm have in common, and no number of them averages out: it enters each
+//! number by its derivatives.
 //!
-//! A radius that is off by ρ, a part that lies off by t and is turned by ω (both in O) about the place p₀ at which its registration is known
-//! best shift a feature at p by t + ω × (p − p₀), turn its axis by ω, and change a diameter or a width by 2ρ, a plane by ρ, an edge by both of
-//! its faces. With standard uncertainties u_t and u_ω for each axis the shift has the covariance u_t² I + u_ω² (|l|² I − l lᵀ), l = p − p₀
-//! \[JCGM 100:2008, 5.2\].
+//! A radius that is off by ρ, a part that lies off by t and is turned by ω (both in O) about the
+//! place p₀ at which its registration is known best shift a feature at p by t + ω × (p − p₀), turn
+//! its axis by ω, and change a diameter or a width by 2ρ, a plane by ρ, an edge by both of its
+//! faces. With standard uncertainties u_t and u_ω for each axis the shift has the covariance u_t² I
+//! + u_ω² (|l|² I − l lᵀ), l = p − p₀ \[JCGM 100:2008, 5.2\].
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
@@ -14,24 +16,30 @@ parameters! {
     /// Standard uncertainties of what is told of an arm and of the place of its part.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct ArmUncertainty in "robot" {
-        /// Standard uncertainty of the radius of the ball: twice of it is in each diameter, width and length, once in the place of a plane.
+        /// Standard uncertainty of the radius of the ball: twice of it is in each diameter, width
+        /// and length, once in the place of a plane.
         ///
-        /// In m. A ruby ball is round within 0.2 µm; a gauge block or a ring says its size within 1 µm.
+        /// In m. A ruby ball is round within 0.2 µm; a gauge block or a ring says its size within 1
+        /// µm.
         radius: f64 = 0.001, "radius_sigma_mm" [MM, 0, 10];
-        /// Standard uncertainty of where the scan lies in the base (scan_to_space), along each axis; 0: places are those of the scan as the scene
-        /// puts it.
+        /// Standard uncertainty of where the scan lies in the base (scan_to_space), along each
+        /// axis; 0: places are those of the scan as the scene puts it.
         ///
-        /// In m. 0: a registration that nobody has compared with the part has no figure, and a made-up one would be in each result.
+        /// In m. 0: a registration that nobody has compared with the part has no figure, and a
+        /// made-up one would be in each result.
         place: f64 = 0.0, "place_sigma_mm" [MM, 0, 100];
-        /// … of how it is turned, about each axis; it counts with the distance from registered_at_mm.
+        /// … of how it is turned, about each axis; it counts with the distance from
+        /// registered_at_mm.
         ///
         /// In rad. As for the place.
         turn: f64 = 0.0, "turn_sigma_deg" [DEG, 0, 20];
-        /// By how much places are less certain with each metre from registered_at_mm: the kinematics of the arm, joints and lengths.
+        /// By how much places are less certain with each metre from registered_at_mm: the
+        /// kinematics of the arm, joints and lengths.
         ///
         /// m per m. 0 until it was measured.
         growth: f64 = 0.0, "growth_mm_per_m" [MM_PER_M, 0, 100];
-        /// Where the place of the scan is known best, in the frame of the scan: the middle of the features or spheres that it was found by.
+        /// Where the place of the scan is known best, in the frame of the scan: the middle of the
+        /// features or spheres that it was found by.
         ///
         /// m, in O.
         registered_at: Vector3<f64> = [0.0, 0.0, 0.0], "registered_at_mm" [MM, -1e6, 1e6];
@@ -113,8 +121,8 @@ fn widen<T>(measured: &mut Measured<T>, by: f64) {
 mod tests {
     use super::*;
 
-    /// A hole 30 mm along x from where the part is known best, its axis along z: a turn about z moves it along y, one about y along z, which
-    /// does not count; about x nothing.
+    /// A hole 30 mm along x from where the part is known best, its axis along z: a turn about z
+    /// moves it along y, one about y along z, which does not count; about x nothing.
     #[test]
     fn shared_parts_are_those_reckoned_by_hand() {
         let known = ArmUncertainty {

@@ -1,4 +1,5 @@
-//! A boss from one flag: its top, where the ground begins beside it in three directions, then its wall from outside.
+//! A boss from one flag: its top, where the ground begins beside it in three directions, then its
+//! wall from outside.
 
 use nalgebra::Vector3;
 
@@ -64,7 +65,8 @@ impl BossPattern {
         }
     }
 
-    /// How far below the top the wall is touched: between the edge of the top and the ground, m; at the highest and the deepest.
+    /// How far below the top the wall is touched: between the edge of the top and the ground, m; at
+    /// the highest and the deepest.
     fn depths(&self, context: &SearchContext) -> Result<[f64; 2], ExploreError> {
         context.above_ground("boss", self.ground_z, OFF_GROUND)
     }

@@ -21,7 +21,8 @@ const DIRECTIONS: usize = 24;
 const LEAN: [Freedom; 2] = [Freedom::TiltX, Freedom::TiltY];
 /// Walls lean when they do so by more than this many standard deviations.
 const LEANS: f64 = 4.0;
-/// … by so many touches more than there are unknowns: of fewer a single one that met something else makes a lean.
+/// … by so many touches more than there are unknowns: of fewer a single one that met something else
+/// makes a lean.
 const LEAST_DEGREES: usize = 6;
 /// … and then by no more than this, rad.
 const MOST_LEAN: f64 = 0.3;
@@ -214,7 +215,8 @@ impl RoundWall {
 
     /// Paths along the wall and across its rim.
     ///
-    /// - `back`: how far the surface above the rim is known, m; `depths`: below it, m; `room`: beside the ball at the wall, m.
+    /// - `back`: how far the surface above the rim is known, m; `depths`: below it, m; `room`:
+    ///   beside the ball at the wall, m.
     pub fn slides(
         &self,
         context: &SearchContext,
@@ -240,7 +242,8 @@ impl RoundWall {
 }
 
 impl SearchContext {
-    /// How far walls may lean against the normal of a surface, standard deviation in each of two directions, rad.
+    /// How far walls may lean against the normal of a surface, standard deviation in each of two
+    /// directions, rad.
     ///
     /// - `lean`: of that normal as it was measured, likewise.
     pub fn square(&self, lean: f64) -> f64 {
@@ -248,10 +251,12 @@ impl SearchContext {
     }
 }
 
-/// What is known before of how much walls lean against the axis of a guess, rad in each of two directions, and how they are fitted: within that,
-/// or freely where their touches say that they lean by more.
+/// What is known before of how much walls lean against the axis of a guess, rad in each of two
+/// directions, and how they are fitted: within that, or freely where their touches say that they
+/// lean by more.
 ///
-/// - `known`: of walls that are perpendicular to their surface, rad; `leans`: what may say that they are not.
+/// - `known`: of walls that are perpendicular to their surface, rad; `leans`: what may say that
+///   they are not.
 pub(super) fn squareness<M: Surface>(
     known: f64,
     guess: &M,
@@ -304,7 +309,8 @@ pub(super) fn surface_about(
     )
 }
 
-/// Middle and radius of the circle through points of a plane, by least squares of x² + y² = 2ax + 2by + c \[Kåsa 1976\].
+/// Middle and radius of the circle through points of a plane, by least squares of x² + y² = 2ax +
+/// 2by + c \[Kåsa 1976\].
 fn circle_through(points: &[Point3<f64>]) -> Option<(Point3<f64>, f64)> {
     let mean = mean(points.iter().map(|p| p.coords));
     let row = |p: &Point3<f64>| {
@@ -325,7 +331,8 @@ mod tests {
 
     const BALL: f64 = 1.5e-3;
 
-    /// Centres of a ball that touches a hole of 8 mm, whose axis leans towards x by an angle, at two depths; by hand.
+    /// Centres of a ball that touches a hole of 8 mm, whose axis leans towards x by an angle, at
+    /// two depths; by hand.
     fn touches(lean: f64) -> Vec<Observation> {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), lean);
         let place = |group: u32| {
@@ -344,7 +351,8 @@ mod tests {
         (0..12).map(place).collect()
     }
 
-    /// A hole that is square within what is believed is fitted as one; one that leans by 5° is measured as it is.
+    /// A hole that is square within what is believed is fitted as one; one that leans by 5° is
+    /// measured as it is.
     #[test]
     fn walls_that_lean_are_not_taken_for_square_ones() {
         let guess = Cylinder::new(Point3::origin(), &Vector3::z(), 4e-3, true);

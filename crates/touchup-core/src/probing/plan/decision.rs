@@ -1,8 +1,10 @@
-//! A decision as the goal of a search: touches are made until each characteristic of the feature passes or fails.
+//! A decision as the goal of a search: touches are made until each characteristic of the feature
+//! passes or fails.
 //!
-//! A characteristic with a distance d of its value from the nearest limit is decided where its standard uncertainty u is d/z, z u being the
-//! guard band. So that is what is asked for of an open number; nothing of one that is decided, or that no touch decides. As it is looked at
-//! after each touch, z is that of repeated looks ([`repeated_confidence`]).
+//! A characteristic with a distance d of its value from the nearest limit is decided where its
+//! standard uncertainty u is d/z, z u being the guard band. So that is what is asked for of an open
+//! number; nothing of one that is decided, or that no touch decides. As it is looked at after each
+//! touch, z is that of repeated looks ([`repeated_confidence`]).
 
 use nalgebra::Point3;
 
@@ -51,9 +53,11 @@ pub struct DecidedCharacteristic {
     pub is_limited: bool,
 }
 
-/// Where what touches leave is this share of what all of them have in common, more touches add a twentieth at most.
+/// Where what touches leave is this share of what all of them have in common, more touches add a
+/// twentieth at most.
 const LEAST_SHARE: f64 = 1.0 / 3.0;
-/// More touches move a value by no more than so many of the standard deviations that they have left.
+/// More touches move a value by no more than so many of the standard deviations that they have
+/// left.
 const MOVES: f64 = 3.0;
 /// Values within that which are tried.
 const TRIED: i32 = 12;
@@ -87,8 +91,8 @@ impl DecisionGoal {
 
     /// What the touches say of each.
     ///
-    /// - `feature`: with all that is uncertain of it; `by_touches`: with the uncertainties of its touches alone; `None` where they do not
-    ///   fix its shape, and then nothing is decided.
+    /// - `feature`: with all that is uncertain of it; `by_touches`: with the uncertainties of its
+    ///   touches alone; `None` where they do not fix its shape, and then nothing is decided.
     pub(super) fn standing(
         &self,
         params: &DecisionParams,
@@ -171,7 +175,8 @@ impl DecidedCharacteristic {
     }
 }
 
-/// What is asked of the numbers of a feature; the half of a diameter of position is the place itself.
+/// What is asked of the numbers of a feature; the half of a diameter of position is the place
+/// itself.
 pub(super) fn open_numbers(
     standing: &[DecidedCharacteristic],
     params: &DecisionParams,
@@ -255,7 +260,8 @@ mod tests {
         }
     }
 
-    /// The shared part alone has a guard band of 0.33, and its value is 0.05 from the limit: where its touches say so within 0.09, it stays.
+    /// The shared part alone has a guard band of 0.33, and its value is 0.05 from the limit: where
+    /// its touches say so within 0.09, it stays.
     #[test]
     fn what_the_shared_part_leaves_open_is_limited_and_what_touches_may_move_is_not() {
         assert!(diameter(10.95, 0.08, 0.2).is_limited);

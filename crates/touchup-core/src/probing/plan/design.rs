@@ -1,8 +1,9 @@
 //! Design of experiments: the touch that reduces the uncertainty of the requested number most.
 //!
-//! With the covariance C of a surface's freedoms, a touch with derivatives g of its distance and deviation σ leaves
-//! C' = C − C g gᵀ C / (σ² + gᵀ C g), so a number that changes with the freedoms as c loses (cᵀ C g)² / (σ² + gᵀ C g) of its
-//! variance \[Atkinson Donev 1992, c-optimality\]. Touches are chosen one after the other, each as if those before had been made.
+//! With the covariance C of a surface's freedoms, a touch with derivatives g of its distance and
+//! deviation σ leaves C' = C − C g gᵀ C / (σ² + gᵀ C g), so a number that changes with the freedoms
+//! as c loses (cᵀ C g)² / (σ² + gᵀ C g) of its variance \[Atkinson Donev 1992, c-optimality\].
+//! Touches are chosen one after the other, each as if those before had been made.
 
 use nalgebra::{Point3, SMatrix};
 
@@ -53,8 +54,8 @@ impl Asked {
         self.by.iter().all(|by| fit.std_of(by).is_some())
     }
 
-    /// With all freedoms of a surface to be known roughly: a number comes of a fit, and a fit in which another one is open goes
-    /// astray by its curvature.
+    /// With all freedoms of a surface to be known roughly: a number comes of a fit, and a fit in
+    /// which another one is open goes astray by its curvature.
     ///
     /// - `sigma`: requested of the numbers, m; `size`: of the surface, m, by which a lean counts.
     pub fn and_the_rest<M: Surface>(mut self, sigma: f64, size: f64) -> Self {
@@ -78,7 +79,8 @@ pub struct Knowledge {
 }
 
 impl Knowledge {
-    /// Before any touch: each freedom of the surface is known within `length` (m) or `angle` (rad), standard deviations.
+    /// Before any touch: each freedom of the surface is known within `length` (m) or `angle` (rad),
+    /// standard deviations.
     pub fn before<M: Surface>(length: f64, angle: f64) -> Self {
         let sigma = Freedom::ALL.map(|freedom| match freedom {
             _ if !M::FREE[freedom as usize] => 0.0,
@@ -119,7 +121,8 @@ impl Knowledge {
         shares.fold(0.0, f64::max)
     }
 
-    /// How much a touch would take from the sum over the requested numbers of (deviation / requested deviation)².
+    /// How much a touch would take from the sum over the requested numbers of (deviation /
+    /// requested deviation)².
     pub fn gain<M: Surface>(&self, surface: &M, touch: &Candidate, asked: &Asked) -> f64 {
         let (_, g) = surface.derivatives(&touch.point);
         let cg = self.covariance * g;
@@ -132,7 +135,8 @@ impl Knowledge {
         reduction / (touch.sigma.powi(2) + g.dot(&cg))
     }
 
-    /// The candidate with the largest gain, the first among equals, and its gain; `None` when none has a gain.
+    /// The candidate with the largest gain, the first among equals, and its gain; `None` when none
+    /// has a gain.
     ///
     /// - `touch`: that a candidate stands for.
     pub fn best<M: Surface, T>(

@@ -1,4 +1,5 @@
-//! An edge from one flag: which side of it the ground is on, then both faces beside it, in turn across the edge.
+//! An edge from one flag: which side of it the ground is on, then both faces beside it, in turn
+//! across the edge.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
@@ -17,11 +18,13 @@ use crate::numeric::mean;
 const BEYOND: f64 = 0.8;
 /// Places on the high side, back from the flag and along the edge, over the radius of the ring.
 const MORE: [[f64; 2]; 4] = [[0.5, -0.9], [0.5, 0.9], [1.3, -0.6], [1.3, 0.6]];
-/// Back from the flag where one of these is beside the part; along the edge as many steps to both sides.
+/// Back from the flag where one of these is beside the part; along the edge as many steps to both
+/// sides.
 const ELSEWHERE: [f64; 4] = [0.5, 0.8, 1.1, 1.4];
 /// The ground is what was touched beyond this share of the farthest.
 const CLEAR: f64 = 0.7;
-/// Where that is so high that it may be the rim, the ground is touched this much farther out, over the ball's radius.
+/// Where that is so high that it may be the rim, the ground is touched this much farther out, over
+/// the ball's radius.
 const FARTHER: f64 = 2.0;
 /// Depth of the search for the ground, over the ball's radius.
 const GROUND: f64 = 4.0;
@@ -106,7 +109,8 @@ impl EdgePattern {
         self.tried += 1;
     }
 
-    /// Parts the touches into high and low, and finds the direction over the edge; whether there are both.
+    /// Parts the touches into high and low, and finds the direction over the edge; whether there
+    /// are both.
     fn part(&mut self, context: &mut SearchContext) -> bool {
         let ring = || self.seen.iter().take(RING + 1).map(|(place, _)| place);
         context.height = ring()
@@ -185,7 +189,8 @@ impl EdgePattern {
         };
     }
 
-    /// A ball that hangs on the rim is less than its radius beyond the edge; farther out by more than that is the ground.
+    /// A ball that hangs on the rim is less than its radius beyond the edge; farther out by more
+    /// than that is the ground.
     fn take_ground(&mut self, context: &SearchContext, touch: &Touched) {
         if touch.result != TouchResult::Unclear {
             self.ground_z = context.below(

@@ -30,9 +30,11 @@ pub struct Found {
     pub is_as_asked: bool,
     /// standard uncertainty of the number, m or rad
     pub uncertainty: Option<f64>,
-    /// the part of it that all touches have in common: radius, place of the part, kinematics; m or rad
+    /// the part of it that all touches have in common: radius, place of the part, kinematics; m or
+    /// rad
     pub shared: f64,
-    /// where the touches have done what they can, and that part keeps the number from what was asked for: uncertainty over the requested one
+    /// where the touches have done what they can, and that part keeps the number from what was
+    /// asked for: uncertainty over the requested one
     pub limited: Option<f64>,
     /// the feature with the uncertainties that come from the scatter of its touches alone
     pub by_touches: Option<Feature>,
@@ -40,8 +42,9 @@ pub struct Found {
     pub characteristics: Vec<DecidedCharacteristic>,
 }
 
-/// Explores one flagged feature. It moves nothing: [`Explorer::next_touch`] plans a touch, [`Explorer::take`] takes its
-/// result, from an arm or by hand. Nothing is planned beside the part, as the scan has it.
+/// Explores one flagged feature. It moves nothing: [`Explorer::next_touch`] plans a touch,
+/// [`Explorer::take`] takes its result, from an arm or by hand. Nothing is planned beside the part,
+/// as the scan has it.
 #[derive(Debug)]
 pub struct Explorer {
     context: SearchContext,
@@ -57,7 +60,8 @@ pub struct Explorer {
     goal: Option<(DecisionGoal, DecisionParams)>,
 }
 
-/// Where what touches leave is this share of what all of them have in common, more touches add a twentieth at most.
+/// Where what touches leave is this share of what all of them have in common, more touches add a
+/// twentieth at most.
 const LEAST_SHARE: f64 = 1.0 / 3.0;
 /// Of two roots.
 const ROUNDING: f64 = 1e-9;
@@ -128,7 +132,8 @@ impl Explorer {
         })
     }
 
-    /// Touches until each characteristic of the feature is decided, in place of until a number has an uncertainty.
+    /// Touches until each characteristic of the feature is decided, in place of until a number has
+    /// an uncertainty.
     pub fn until_decided(mut self, goal: DecisionGoal) -> Self {
         let of_one_look = goal.of_one_look(self.context.params.budget);
         self.context.params.quantity = super::search_context::Quantity::All;
@@ -229,7 +234,8 @@ impl Explorer {
         );
     }
 
-    /// Paths on which the ball slides over the whole feature; none where nothing was found, or where a ball has no room.
+    /// Paths on which the ball slides over the whole feature; none where nothing was found, or
+    /// where a ball has no room.
     pub fn slides(&self) -> Vec<Slide> {
         if self.found().is_ok() {
             self.stage.slides(&self.context)

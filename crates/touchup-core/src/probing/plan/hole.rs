@@ -1,7 +1,8 @@
 //! A hole from one flag: found by what is missing, measured by its wall.
 //!
 //! 1. Where the ball falls in ([`OpeningSearch`]).
-//! 2. Sideways from there in three directions: a first circle. Its middle is a better place to touch from.
+//! 2. Sideways from there in three directions: a first circle. Its middle is a better place to
+//!    touch from.
 //! 3. Down in the middle: how deep it is, and how deep the wall may be touched.
 //! 4. Down around the hole: the plane of its opening.
 //! 5. The wall where a touch has the largest gain, at two depths.

@@ -1,4 +1,5 @@
-//! The true pose of the surface around a flag: until it was touched, only the scan gives its normal.
+//! The true pose of the surface around a flag: until it was touched, only the scan gives its
+//! normal.
 
 use std::f64::consts::SQRT_2;
 
@@ -10,10 +11,12 @@ use crate::numeric::{mean, scatter};
 
 /// Touches within this of a plane are of it, m.
 const OF_PLANE: f64 = 60e-6;
-/// Three touches determine a plane when the triangle between them is at least this high, over the ball's radius.
+/// Three touches determine a plane when the triangle between them is at least this high, over the
+/// ball's radius.
 const SPREAD: f64 = 1.0;
 
-/// Standard deviation of the normal of the scan, in each of two directions, rad: near an edge that the scan has rounded it is off by 0.16.
+/// Standard deviation of the normal of the scan, in each of two directions, rad: near an edge that
+/// the scan has rounded it is off by 0.16.
 pub(super) const UNTOUCHED: f64 = 0.1;
 /// What is not of the plane lies off it by this many standard deviations.
 const GATE: f64 = 4.0;
@@ -21,7 +24,8 @@ const GATE: f64 = 4.0;
 const ALIKE: f64 = 0.9;
 
 impl SearchContext {
-    /// Turns and lifts the frame so that its z = 0 is the plane that most touches lie on; whether there is one.
+    /// Turns and lifts the frame so that its z = 0 is the plane that most touches lie on; whether
+    /// there is one.
     ///
     /// - `is_top`: none may lie above it.
     /// - `places`: of the frame as it was, in its plane of the surface: they stay where they are.
@@ -58,8 +62,9 @@ impl SearchContext {
         true
     }
 
-    /// Normal of the plane that most touches lie on, and those touches: of the planes through three of them the one with the least truncated
-    /// squares \[Torr Zisserman 2000, MSAC\], where the normal of the scan counts as one more observation.
+    /// Normal of the plane that most touches lie on, and those touches: of the planes through three
+    /// of them the one with the least truncated squares \[Torr Zisserman 2000, MSAC\], where the
+    /// normal of the scan counts as one more observation.
     fn most_plane(
         &self,
         observations: &[Observation],

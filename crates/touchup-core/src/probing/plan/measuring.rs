@@ -22,7 +22,8 @@ pub(super) struct Possible {
 const BEHIND: f64 = 0.3e-3;
 
 impl SearchContext {
-    /// Those of the candidates that the scan has a part for: all around a touch from above, behind a wall that is touched.
+    /// Those of the candidates that the scan has a part for: all around a touch from above, behind
+    /// a wall that is touched.
     pub fn on_part(&self, possible: impl IntoIterator<Item = Possible>) -> Vec<Possible> {
         let is_part = |p: &Possible| {
             let (behind, radius) = if self.is_down(&p.planned) {
@@ -52,7 +53,8 @@ pub(super) struct Wanted {
 impl Wanted {
     /// What is wanted of a plane.
     ///
-    /// - `leans`: those that count, as far as `reach` from its middle, m; `most`: what leans more is another surface, rad.
+    /// - `leans`: those that count, as far as `reach` from its middle, m; `most`: what leans more
+    ///   is another surface, rad.
     pub fn of_plane(
         params: &PatternParams,
         leans: &[Freedom],
@@ -132,10 +134,12 @@ impl Measuring {
         }
     }
 
-    /// The largest standard uncertainty of the requested numbers, m or rad by the requested one of each, as far as the touches support it:
-    /// of those that lie on one surface, and stretched where they differ from it beyond what they say of themselves.
+    /// The largest standard uncertainty of the requested numbers, m or rad by the requested one of
+    /// each, as far as the touches support it: of those that lie on one surface, and stretched
+    /// where they differ from it beyond what they say of themselves.
     ///
-    /// `None` where there are too few, where they do not fix a number, or where more than [`MOST_REFUSED`] of them lie elsewhere.
+    /// `None` where there are too few, where they do not fix a number, or where more than
+    /// [`MOST_REFUSED`] of them lie elsewhere.
     pub fn uncertainty<M: Surface>(&self, guess: &M, wanted: &Wanted) -> Option<f64> {
         if self.observations.len() < wanted.least {
             return None;

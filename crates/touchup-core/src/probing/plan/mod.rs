@@ -1,8 +1,9 @@
 //! Where to touch next.
 //!
-//! [`Knowledge`] is the covariance of a surface after its touches, and predicts the gain of one more: the next touch
-//! goes where it reduces the uncertainty of the requested number most. [`Explorer`] finds a feature from a flag and measures it so;
-//! a [`Slide`] leads over the whole of what was found, for the mesh.
+//! [`Knowledge`] is the covariance of a surface after its touches, and predicts the gain of one
+//! more: the next touch goes where it reduces the uncertainty of the requested number most.
+//! [`Explorer`] finds a feature from a flag and measures it so; a [`Slide`] leads over the whole of
+//! what was found, for the mesh.
 
 mod advice;
 mod arm_uncertainty;

@@ -1,12 +1,13 @@
-//! Where the scan has a part at all, seen along the normal at a flag: touches are planned nowhere else.
+//! Where the scan has a part at all, seen along the normal at a flag: touches are planned nowhere
+//! else.
 
 use nalgebra::{Isometry3, Point2, Point3, Unit, Vector2, Vector3};
 
 use crate::mesh::TriMesh;
 use crate::numeric::turned_to;
 
-/// The outline of a scan, seen along the normal at a flag. An opening that the part encloses counts as part: a hole is no less
-/// searched where the scan shows it, or has nothing there.
+/// The outline of a scan, seen along the normal at a flag. An opening that the part encloses counts
+/// as part: a hole is no less searched where the scan shows it, or has nothing there.
 ///
 /// Only what lies no deeper below the flag than touches reach counts: not the table under a part.
 #[derive(Clone, Debug)]
@@ -88,7 +89,8 @@ impl Outline {
     }
 }
 
-/// The cells whose middle a triangle covers, seen from above; column and row. The corners are in cells.
+/// The cells whose middle a triangle covers, seen from above; column and row. The corners are in
+/// cells.
 fn cover(corners: [Vector2<f64>; 3], mut found: impl FnMut(usize, usize)) {
     let [a, b, c] = corners;
     let area = (b - a).perp(&(c - a));
@@ -140,7 +142,8 @@ fn reached_from_border(is_part: &[bool], columns: usize) -> Vec<bool> {
 mod tests {
     use super::*;
 
-    /// A frame of 20 × 20 mm around an opening of 8 × 8 mm, in z = 0, that is open towards +x where asked; by hand.
+    /// A frame of 20 × 20 mm around an opening of 8 × 8 mm, in z = 0, that is open towards +x where
+    /// asked; by hand.
     fn frame(is_open: bool) -> TriMesh {
         let (mut positions, mut faces) = (Vec::new(), Vec::new());
         let mut block = |x: [f64; 2], y: [f64; 2]| {

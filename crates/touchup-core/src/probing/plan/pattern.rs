@@ -1,4 +1,5 @@
-//! What all kinds of features have in common when they are explored: a stage plans a touch and takes its result.
+//! What all kinds of features have in common when they are explored: a stage plans a touch and
+//! takes its result.
 
 use std::fmt::Debug;
 

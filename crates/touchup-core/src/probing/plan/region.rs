@@ -19,8 +19,8 @@ pub(super) struct RegionPattern {
     step: f64,
 }
 
-/// From place to place of the spiral the ball slides where they are no farther apart than this, over their step: across the surface, and up
-/// or down.
+/// From place to place of the spiral the ball slides where they are no farther apart than this,
+/// over their step: across the surface, and up or down.
 const NEXT: f64 = 1.5;
 const STEEP: f64 = 0.6;
 

@@ -1,7 +1,7 @@
 //! Where a ball falls in, near a flag that says little more than "about here".
 //!
-//! Down from above at the flag, then around it, next to where the ball sank deepest: a ball on a rim sinks, so the
-//! path leads towards the opening.
+//! Down from above at the flag, then around it, next to where the ball sank deepest: a ball on a
+//! rim sinks, so the path leads towards the opening.
 
 use nalgebra::Point3;
 
@@ -10,7 +10,8 @@ use super::pattern::Touched;
 use super::search_context::{PatternParams, SearchContext, TouchPlan, TouchResult};
 use crate::features::fit::Observation;
 
-/// Distance of the places of the search, over the ball's radius: the ball falls into a hole of 2.2 radii at least.
+/// Distance of the places of the search, over the ball's radius: the ball falls into a hole of 2.2
+/// radii at least.
 const STEP: f64 = 1.0;
 /// So deep below the surface a ball is in, over its radius: the whole ball and a chamfer.
 pub(super) const SHALLOW: f64 = 1.6;
@@ -32,8 +33,9 @@ pub(super) const BESIDE: f64 = 1.3;
 pub(super) const CHAMFER: f64 = 0.5e-3;
 /// The ball stays this far above the floor, m.
 const OFF_FLOOR: f64 = 0.3e-3;
-/// The wall of an opening is touched this deep at the least, over the ball's radius: below a rim that is broken by no more, and as near to the
-/// opening as it may be, as the numbers refer to that place.
+/// The wall of an opening is touched this deep at the least, over the ball's radius: below a rim
+/// that is broken by no more, and as near to the opening as it may be, as the numbers refer to that
+/// place.
 pub(super) const BELOW_RIM: f64 = 0.7;
 /// A wall that may be touched no deeper than this, over the ball's radius, is too low.
 const TOO_LOW: f64 = 0.2;
@@ -41,14 +43,16 @@ const TOO_LOW: f64 = 0.2;
 const HIGH: f64 = 0.6;
 
 impl SearchContext {
-    /// How far below the surface a wall may be touched, with the floor of its opening at a place of the ball's centre, m.
+    /// How far below the surface a wall may be touched, with the floor of its opening at a place of
+    /// the ball's centre, m.
     pub fn above_floor(&self, depth: f64, centre: &Point3<f64>) -> f64 {
         depth
             .min(self.height - centre.z - OFF_FLOOR)
             .max(BELOW_RIM * self.params.ball_radius)
     }
 
-    /// How far below the surface a wall may be touched that stands on the ground, m; at the highest and the deepest.
+    /// How far below the surface a wall may be touched that stands on the ground, m; at the highest
+    /// and the deepest.
     ///
     /// - `off`: the ball stays this far above the ground, m.
     ///
@@ -91,13 +95,15 @@ impl OpeningSearch {
         }
     }
 
-    /// Radius of the search around the flag, m: no farther than all touches lead, each a step from the last.
+    /// Radius of the search around the flag, m: no farther than all touches lead, each a step from
+    /// the last.
     fn farthest(params: &PatternParams) -> f64 {
         let step = STEP * params.ball_radius;
         (params.flag_radius + step).min(step * params.budget as f64)
     }
 
-    /// The next place of the search: the one not tried yet that is nearest to where the ball sank deepest, and to the flag.
+    /// The next place of the search: the one not tried yet that is nearest to where the ball sank
+    /// deepest, and to the flag.
     ///
     /// # Errors
     /// [`ExploreError::NotFound`] when all have been tried.
@@ -164,7 +170,8 @@ impl OpeningSearch {
         None
     }
 
-    /// The ball slid in over a rim, and cannot be let down there again: the search goes on beside it.
+    /// The ball slid in over a rim, and cannot be let down there again: the search goes on beside
+    /// it.
     pub fn slid_in(&mut self, place: Point3<f64>, context: &SearchContext) {
         self.tried.push((place, 2.0 * context.params.ball_radius));
     }
@@ -179,7 +186,8 @@ impl OpeningSearch {
         }
     }
 
-    /// Of the touches from above only those count where the ball lay on the surface, and not on the rim.
+    /// Of the touches from above only those count where the ball lay on the surface, and not on the
+    /// rim.
     pub fn forget(&mut self, is_on_rim: impl Fn(&Point3<f64>) -> bool, context: &SearchContext) {
         self.top.retain(|o| !is_on_rim(&context.in_f(&o.point)));
     }
@@ -203,7 +211,8 @@ pub(super) fn hexagonal(step: f64, radius: f64) -> Vec<Point3<f64>> {
 mod tests {
     use super::*;
 
-    /// A hexagonal grid has 2π/√3 (R/s)² places within R: with 39 touches within 39 steps that is 5518, and 1.6 million within 1 m.
+    /// A hexagonal grid has 2π/√3 (R/s)² places within R: with 39 touches within 39 steps that is
+    /// 5518, and 1.6 million within 1 m.
     #[test]
     fn a_flag_that_may_be_a_metre_off_makes_no_millions_of_places() {
         let params = PatternParams {

@@ -17,7 +17,8 @@ parameters! {
     pub struct PatternParams in "robot" {
         /// Of the ball, m.
         ball_radius: f64 = 1.5e-3;
-        /// The flag is off by no more than this, m; of a plane or an unknown region: so far around the flag is touched.
+        /// The flag is off by no more than this, m; of a plane or an unknown region: so far around
+        /// the flag is touched.
         flag_radius: f64 = 3e-3;
         /// Distance of the ball from the surface where a search begins.
         ///
@@ -33,14 +34,17 @@ parameters! {
         sigma: f64 = 4e-6;
         /// Touches of a feature at most.
         budget: usize = 39, "touches" [TOUCHES, 1, 1e4];
-        /// Standard deviation of one touch beside that of its own curve: the repeatability of arm and probe (`touchup check`).
+        /// Standard deviation of one touch beside that of its own curve: the repeatability of arm
+        /// and probe (`touchup check`).
         ///
         /// In m. The maker of a UR5e states ±0.03 mm.
         touch_sigma: f64 = 0.03, "touch_sigma_mm" [MM, 1e-5, 1];
-        /// Standard uncertainty with which the walls of holes, slots and bosses are perpendicular to the surface around them, in each of two
-        /// directions, unless their touches say otherwise.
+        /// Standard uncertainty with which the walls of holes, slots and bosses are perpendicular
+        /// to the surface around them, in each of two directions, unless their touches say
+        /// otherwise.
         ///
-        /// In rad. 0.13° is 0.4 mm in 100 mm, the general tolerance K of ISO 2768-2, taken as a uniform distribution.
+        /// In rad. 0.13° is 0.4 mm in 100 mm, the general tolerance K of ISO 2768-2, taken as a
+        /// uniform distribution.
         square: f64 = 0.13, "square_sigma_deg" [DEG, 1e-3, 20];
     }
     with {
@@ -81,11 +85,13 @@ impl Quantity {
     }
 }
 
-/// Touches of one surface differ by no more than so many standard deviations: the difference of two by 4 of its own.
+/// Touches of one surface differ by no more than so many standard deviations: the difference of two
+/// by 4 of its own.
 const BEYOND: f64 = 5.7;
 
 impl PatternParams {
-    /// The part of the wanted number of a feature that no touch reduces: the largest of its numbers; m, or rad of an axis.
+    /// The part of the wanted number of a feature that no touch reduces: the largest of its
+    /// numbers; m, or rad of an axis.
     ///
     /// - `out`: of the surface, unit vector.
     pub(super) fn shared_part(
@@ -162,8 +168,8 @@ pub enum TouchResult {
     Unclear,
 }
 
-/// What is asked of the numbers of a feature where a decision is the goal: the standard deviation of each that is open, m; `None`: nothing
-/// is asked of it.
+/// What is asked of the numbers of a feature where a decision is the goal: the standard deviation
+/// of each that is open, m; `None`: nothing is asked of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct OpenNumbers {
     /// of the place, along each axis
@@ -184,7 +190,8 @@ pub(super) struct SearchContext {
     /// of the surface in F
     pub height: f64,
     pub touches: usize,
-    /// what touches are chosen for in place of the wanted number, once a decision is the goal and the shape is known
+    /// what touches are chosen for in place of the wanted number, once a decision is the goal and
+    /// the shape is known
     pub open: Option<OpenNumbers>,
     /// of the scan, seen along the normal at the flag
     pub outline: Arc<Outline>,
@@ -217,8 +224,8 @@ impl SearchContext {
             .is_part(&(self.pose_of * place), self.params.ball_radius)
     }
 
-    /// One of several places of F that are touched from above; where it is beside the part, the place of others that is over it and
-    /// farthest from all that are touched.
+    /// One of several places of F that are touched from above; where it is beside the part, the
+    /// place of others that is over it and farthest from all that are touched.
     pub fn over_part(
         &mut self,
         at: usize,
@@ -252,7 +259,8 @@ impl SearchContext {
         wanted[at]
     }
 
-    /// One of [`AROUND`] places of F around a middle, or elsewhere around it where that one is beside the part.
+    /// One of [`AROUND`] places of F around a middle, or elsewhere around it where that one is
+    /// beside the part.
     ///
     /// - `first`: so many of their steps from x to the first; `away`: from the middle, m.
     pub fn around(

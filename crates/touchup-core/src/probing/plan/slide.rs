@@ -1,7 +1,9 @@
-//! Paths on which the ball slides over a feature that touches have found: along its walls, and across its rims.
+//! Paths on which the ball slides over a feature that touches have found: along its walls, and
+//! across its rims.
 //!
-//! A rim is where a surface above bends down into a wall. The ball's centre stays one radius off both: straight above, around the
-//! rim on a quarter of a circle, straight down along the wall; its normal turns with it.
+//! A rim is where a surface above bends down into a wall. The ball's centre stays one radius off
+//! both: straight above, around the rim on a quarter of a circle, straight down along the wall; its
+//! normal turns with it.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -68,7 +70,8 @@ const PIECES: usize = 8;
 /// With less room the ball cannot be lifted off a wall, over its radius.
 const LEAST_ROOM: f64 = 0.2;
 
-/// A rim, in F: its place and the direction over it, from the surface above into the open, at a share of its length.
+/// A rim, in F: its place and the direction over it, from the surface above into the open, at a
+/// share of its length.
 pub(super) struct RimStation<'a> {
     pub at: &'a dyn Fn(f64) -> (Point3<f64>, Vector3<f64>),
     /// m
@@ -84,7 +87,8 @@ pub(super) struct RimStation<'a> {
 }
 
 impl RimStation<'_> {
-    /// - `path`: length of the path of the ball's centre from above the surface to down at the wall, m; 0 where it begins to turn.
+    /// - `path`: length of the path of the ball's centre from above the surface to down at the
+    ///   wall, m; 0 where it begins to turn.
     fn station(&self, context: &SearchContext, share: f64, path: f64) -> Station {
         let ball = context.params.ball_radius;
         let (rim, over) = (self.at)(share);
@@ -126,7 +130,8 @@ impl RimStation<'_> {
             .collect()
     }
 
-    /// Down over the rim, on along the wall, up over the rim, on along the surface above, and again.
+    /// Down over the rim, on along the wall, up over the rim, on along the surface above, and
+    /// again.
     fn zigzag(&self, context: &SearchContext, deep: f64) -> Slide {
         let ball = context.params.ball_radius;
         let count = ((self.length / (CROSSINGS * ball)) as usize).clamp(2, MOST_CROSSINGS);
@@ -167,7 +172,8 @@ fn steps(length: f64, ball: f64) -> impl Iterator<Item = f64> {
     (0..=count as usize).map(move |step| step as f64 / count)
 }
 
-/// Length of the rim of a slot, m, and the rim in the frame of the slot: x along it, the origin in its middle.
+/// Length of the rim of a slot, m, and the rim in the frame of the slot: x along it, the origin in
+/// its middle.
 pub(super) fn stadium_rim(
     width: f64,
     length: f64,

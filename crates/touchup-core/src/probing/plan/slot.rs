@@ -2,12 +2,14 @@
 //!
 //! 1. Where the ball falls in ([`OpeningSearch`]).
 //! 2. Sideways from there in eight directions: a first slot, whose ends may be open.
-//! 3. Down beside it: the plane of its opening. A long path sideways stays at its depth only from here on.
+//! 3. Down beside it: the plane of its opening. A long path sideways stays at its depth only from
+//!    here on.
 //! 4. Along it to both ends, then down to its floor.
-//! 5. Each end on its middle and to both sides of it, then walls and ends where a touch has the largest gain.
+//! 5. Each end on its middle and to both sides of it, then walls and ends where a touch has the
+//!    largest gain.
 //!
-//! Whether its ends are round or straight is what the contacts agree with. Corners of a slot with straight ends are not touched, and what
-//! was touched there before it was known does not count.
+//! Whether its ends are round or straight is what the contacts agree with. Corners of a slot with
+//! straight ends are not touched, and what was touched there before it was known does not count.
 
 use std::f64::consts::PI;
 
@@ -28,7 +30,8 @@ use super::slot_fit::{CORNER, SlotFit};
 use crate::features::fit::{Ends, FitParams, Freedom, Observation, Stadium, Surface, fit};
 use crate::features::{End, Feature};
 
-/// What may say that walls lean: both of them, across the slot. Along it only its ends would, and what was taken for one may be an obstacle.
+/// What may say that walls lean: both of them, across the slot. Along it only its ends would, and
+/// what was taken for one may be an obstacle.
 const LEAN: [Freedom; 1] = [Freedom::TiltY];
 /// First directions: five numbers are unknown.
 const FIRST: usize = 8;
@@ -44,16 +47,19 @@ const ALONG: usize = 9;
 const LEAST_WALL: usize = 10;
 /// A wall is searched so much farther than expected, m.
 const BEYOND: f64 = 3e-3;
-/// An end is believed when it was touched on its middle and on both sides of it: angles from the slot's direction, rad. One touch
-/// alone may have met anything; three that lie on one half circle as wide as the slot have met its end.
+/// An end is believed when it was touched on its middle and on both sides of it: angles from the
+/// slot's direction, rad. One touch alone may have met anything; three that lie on one half circle
+/// as wide as the slot have met its end.
 const PARTS: [[f64; 2]; 3] = [
     [-PI / 3.0, -PI / 8.0],
     [-PI / 8.0, PI / 8.0],
     [PI / 8.0, PI / 3.0],
 ];
-/// The same parts of a straight end: across the slot, over the distance of the ball's centre from the middle line.
+/// The same parts of a straight end: across the slot, over the distance of the ball's centre from
+/// the middle line.
 const STRAIGHT_PARTS: [[f64; 2]; 3] = [[-0.5, -0.15], [-0.15, 0.15], [0.15, 0.5]];
-/// So far from the middle of a wall candidates go at the most, over where its corners begin: they are met a little elsewhere.
+/// So far from the middle of a wall candidates go at the most, over where its corners begin: they
+/// are met a little elsewhere.
 const OFF_CORNER: f64 = 0.85;
 /// Walls agree with contacts that are this far off, rms, over the standard deviation of a touch.
 const AGREES: f64 = 2.0;
@@ -93,7 +99,8 @@ pub(super) struct SlotPattern {
     tried: usize,
     /// contacts at unknown places among the first touches
     unclear: usize,
-    /// places of the ball's centre at the end of searches without contact: where it fell in, and along the slot; m in O
+    /// places of the ball's centre at the end of searches without contact: where it fell in, and
+    /// along the slot; m in O
     free: Vec<Point3<f64>>,
     /// where the ball lay when it did not fall in, m in O
     on_top: Vec<Point3<f64>>,
@@ -107,7 +114,8 @@ impl SlotPattern {
         }
     }
 
-    /// The walls through the contacts, at the height of the surface, so that depths are coordinates of their frame.
+    /// The walls through the contacts, at the height of the surface, so that depths are coordinates
+    /// of their frame.
     fn renew(&mut self, context: &SearchContext) {
         let corners = std::mem::take(&mut self.corners);
         self.measuring.observations.extend(corners);
@@ -210,8 +218,8 @@ impl SlotPattern {
         }
     }
 
-    /// The part of an end that was not touched yet: the sign of the end along the slot, and its angles. Touches that the fit holds
-    /// for none of these walls do not count.
+    /// The part of an end that was not touched yet: the sign of the end along the slot, and its
+    /// angles. Touches that the fit holds for none of these walls do not count.
     fn open_part(&self, context: &SearchContext, walls: &Stadium) -> Option<(f64, [f64; 2])> {
         let (half, ball) = (
             (walls.length - walls.width).max(0.0) / 2.0,
@@ -254,7 +262,8 @@ impl SlotPattern {
             .find(|(sign, part)| !is_touched(*sign, *part))
     }
 
-    /// Whether the walls agree with the free places of the ball, which lie inside, and with those on top, which do not.
+    /// Whether the walls agree with the free places of the ball, which lie inside, and with those
+    /// on top, which do not.
     fn is_consistent(&self, context: &SearchContext, walls: &Stadium) -> bool {
         let ball = context.params.ball_radius;
         let has_room = |centre: &Point3<f64>| walls.distance(centre) > ball - SLACK;
@@ -264,7 +273,8 @@ impl SlotPattern {
         self.free.iter().all(has_room) && !self.on_top.iter().any(is_over)
     }
 
-    /// Touches of walls and ends, each from the middle line of the slot; of one part of an end alone where that is open.
+    /// Touches of walls and ends, each from the middle line of the slot; of one part of an end
+    /// alone where that is open.
     fn possible(
         &self,
         context: &SearchContext,
@@ -295,7 +305,8 @@ impl SlotPattern {
         self.sideways_from(context, walls, places, radius, travel)
     }
 
-    /// The same with straight ends: across from the middle line, and along it from half a width before the end, away from the corners.
+    /// The same with straight ends: across from the middle line, and along it from half a width
+    /// before the end, away from the corners.
     fn possible_straight(
         &self,
         context: &SearchContext,
@@ -440,8 +451,8 @@ fn spread(at: usize, count: usize) -> f64 {
     at as f64 / (count - 1) as f64 * 2.0 - 1.0
 }
 
-/// Places around the walls of a slot: along each side, then about the middle of each end; x of the middle line that a place is touched
-/// from, and the angle towards it.
+/// Places around the walls of a slot: along each side, then about the middle of each end; x of the
+/// middle line that a place is touched from, and the angle towards it.
 pub(super) fn around_stadium(half: f64, count: usize) -> impl Iterator<Item = (f64, f64)> {
     let spread = move |at: usize| spread(at, count);
     let sides =

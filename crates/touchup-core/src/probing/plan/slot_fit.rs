@@ -1,5 +1,5 @@
-//! The slot through few touches: where the ball's centre was stopped lies at one distance from a segment, or on a rectangle where its ends
-//! are straight.
+//! The slot through few touches: where the ball's centre was stopped lies at one distance from a
+//! segment, or on a rectangle where its ends are straight.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -8,7 +8,8 @@ use nalgebra::{Matrix5, Point2, Vector2, Vector5};
 use crate::features::fit::{Ends, from_segment};
 use crate::numeric::{DampedSearch, NormalEquations};
 
-/// All points at a distance from a segment of a plane; with straight ends the rectangle around them.
+/// All points at a distance from a segment of a plane; with straight ends the rectangle around
+/// them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SlotFit {
     /// of the segment, m
@@ -28,17 +29,21 @@ const ANGLES: usize = 24;
 const HALVES: [f64; 4] = [0.3, 0.6, 0.9, 1.2];
 /// Places that are free may be this much beyond it, m.
 const BESIDE: f64 = 0.2e-3;
-/// Fits whose residuals are below this, rms, agree with the points: noise of a touch, and its sliding at a flat angle, m.
+/// Fits whose residuals are below this, rms, agree with the points: noise of a touch, and its
+/// sliding at a flat angle, m.
 const AGREES: f64 = 20e-6;
 /// Where along it the place is that the ball fell in, over its half length.
 const SHIFTS: [f64; 3] = [-0.9, 0.0, 0.9];
 /// The other ends are believed where they lower the residuals to less than this share.
 const BETTER: f64 = 0.5;
-/// A slot with straight ends may be shorter than wide by this, over half its width: what is nearly square has no long side to choose.
+/// A slot with straight ends may be shorter than wide by this, over half its width: what is nearly
+/// square has no long side to choose.
 const SHORTER: f64 = 0.5;
-/// Slots with straight ends are turned so that they are longer than wide, but for this share of half the width.
+/// Slots with straight ends are turned so that they are longer than wide, but for this share of
+/// half the width.
 const SQUARE: f64 = 0.02;
-/// Corners of straight ends are as large as this at most, over the distance of the ball's centre from the middle line …
+/// Corners of straight ends are as large as this at most, over the distance of the ball's centre
+/// from the middle line …
 pub(super) const CORNER: f64 = 0.5;
 /// … and which points are of them is decided so many times.
 const CORNER_ROUNDS: usize = 3;
@@ -70,7 +75,8 @@ impl SlotFit {
         Vector2::new(self.angle.cos(), self.angle.sin())
     }
 
-    /// How far a point is from where it should be, m, and the derivatives by middle, angle, half length and radius.
+    /// How far a point is from where it should be, m, and the derivatives by middle, angle, half
+    /// length and radius.
     fn residual(&self, p: &Point2<f64>) -> (f64, Vector5<f64>) {
         let (u, v) = (p - self.middle, self.along());
         let w = Vector2::new(-v.y, v.x);
@@ -170,7 +176,8 @@ impl SlotFit {
             .0
     }
 
-    /// The same of a slot with straight ends, without the points of its corners; what is longer than wide.
+    /// The same of a slot with straight ends, without the points of its corners; what is longer
+    /// than wide.
     fn fitted_straight(self, search: &DampedSearch, points: &[Point2<f64>]) -> Self {
         let begun = self.fitted_by(search, points);
         let fitted = (0..CORNER_ROUNDS).fold(begun, |fit, _| {
@@ -207,8 +214,8 @@ impl SlotFit {
             .collect()
     }
 
-    /// How many free places are outside of it, and its residuals but for corners, rms by the degrees of freedom, m; infinite where too few
-    /// points are left.
+    /// How many free places are outside of it, and its residuals but for corners, rms by the
+    /// degrees of freedom, m; infinite where too few points are left.
     fn cost(&self, points: &[Point2<f64>], free: &[Point2<f64>]) -> (usize, f64) {
         let kept = self.off_corners(points);
         let beside = free.iter().filter(|p| self.residual(p).0 > BESIDE).count();
@@ -249,9 +256,10 @@ impl SlotFit {
         other.unwrap_or(near)
     }
 
-    /// The best one through points around a place, in any direction, among those with the free places inside. Where no point is at an
-    /// end many lengths agree: then the shortest of them, whose ends lie no farther than what was touched. Ends are round where the points
-    /// do not say otherwise.
+    /// The best one through points around a place, in any direction, among those with the free
+    /// places inside. Where no point is at an end many lengths agree: then the shortest of them,
+    /// whose ends lie no farther than what was touched. Ends are round where the points do not say
+    /// otherwise.
     ///
     /// - `agrees`: residuals of a fit that agrees with the points, m.
     pub fn through(
@@ -283,7 +291,8 @@ impl SlotFit {
         let distance = |p: &Point2<f64>| (p - place).norm();
         let near = points.iter().map(distance).fold(f64::INFINITY, f64::min);
         let far = points.iter().chain(free).map(distance).fold(0.0, f64::max);
-        // a point beside the segment determines neither end: one of them has to be near where it really is
+        // a point beside the segment determines neither end: one of them has to be near where it
+        // really is
         let guess = |angle: f64, half: f64, shift: f64| {
             let direction = Vector2::new(angle.cos(), angle.sin());
             Self {
@@ -367,7 +376,8 @@ mod tests {
         );
     }
 
-    /// Touched on its straight walls alone, a slot may have any length from that of what was touched on: no more is believed.
+    /// Touched on its straight walls alone, a slot may have any length from that of what was
+    /// touched on: no more is believed.
     #[test]
     fn a_slot_with_open_ends_is_no_longer_than_what_was_touched() {
         let walls = [
@@ -389,7 +399,8 @@ mod tests {
         assert!(found.half > 3.5e-3 && found.half < 7e-3, "{found:?}");
     }
 
-    /// Near one end, seven touches leave the direction of a slot of 20 × 6 open; where the ball moved freely determines it.
+    /// Near one end, seven touches leave the direction of a slot of 20 × 6 open; where the ball
+    /// moved freely determines it.
     #[test]
     fn a_free_place_determines_the_direction_of_a_slot() {
         // the ball's centre 0.35 mm before the centre of the right end, as if by hand

@@ -1,9 +1,10 @@
 //! From a tolerance to a standard deviation.
 
-/// Standard deviation of a normal error that stays within ± `half_width` with a probability of `confidence`, in the unit of the
-/// half width.
+/// Standard deviation of a normal error that stays within ± `half_width` with a probability of
+/// `confidence`, in the unit of the half width.
 ///
-/// σ = w / √2 erf⁻¹(P), with erf⁻¹ by bisection of the error function's series \[Abramowitz Stegun 1964, 7.1.6\].
+/// σ = w / √2 erf⁻¹(P), with erf⁻¹ by bisection of the error function's series \[Abramowitz Stegun
+/// 1964, 7.1.6\].
 pub fn sigma_of(half_width: f64, confidence: f64) -> f64 {
     let (mut low, mut high) = (0.0, HIGHEST);
     for _ in 0..BISECTIONS {

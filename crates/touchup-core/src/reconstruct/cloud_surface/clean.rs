@@ -7,8 +7,8 @@ use nalgebra::{Point3, Vector3};
 use super::summary::CloudSummary;
 use crate::mesh::{PointCloud, ScanStation, coherent_order, is_place};
 
-/// Points that are finite and of which none is there twice, along a curve that fills space: what a search near one has read is in the
-/// cache for the next.
+/// Points that are finite and of which none is there twice, along a curve that fills space: what a
+/// search near one has read is in the cache for the next.
 #[derive(Debug)]
 pub(super) struct UsablePoints {
     /// m

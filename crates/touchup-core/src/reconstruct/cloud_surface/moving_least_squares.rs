@@ -1,4 +1,5 @@
-//! Implicit moving least squares [Kolluri 2005]: the distance from the planes of the points near a place.
+//! Implicit moving least squares [Kolluri 2005]: the distance from the planes of the points near a
+//! place.
 
 use nalgebra::{Point3, Vector3};
 
@@ -14,13 +15,15 @@ use crate::reconstruct::table::CellTable;
 
 /// Points whose planes are averaged at a place at most …
 const AVERAGED: u32 = 24;
-/// … weighted by a normal distribution of this many spacings about it, or of this many standard deviations of the noise.
+/// … weighted by a normal distribution of this many spacings about it, or of this many standard
+/// deviations of the noise.
 const WIDTH: (f64, f64) = (1.2, 2.0);
 /// Points farther than this many widths have no weight that matters.
 const FARTHEST_WIDTHS: f64 = 3.0;
 /// Steps in which a crossing is looked for on an edge of the lattice.
 const STEPS: usize = 3;
-/// … or until f is no more than this many spacings, of which the line through the last two places takes the rest away.
+/// … or until f is no more than this many spacings, of which the line through the last two places
+/// takes the rest away.
 const ENOUGH: f64 = 1e-3;
 /// Points with their normals, and the tree over them.
 pub(super) struct OrientedPoints {
@@ -51,10 +54,12 @@ impl OrientedPoints {
         }
     }
 
-    /// f and its direction of growth at a place, by the points near it that face alike; `None` where there are none.
+    /// f and its direction of growth at a place, by the points near it that face alike; `None`
+    /// where there are none.
     ///
-    /// On a curved surface the planes of the points lie outside of it by d² κ / 2 in the mean and the middle of the points inside by as
-    /// much (d: their distance, κ: curvature), so half the sum of both is free of that.
+    /// On a curved surface the planes of the points lie outside of it by d² κ / 2 in the mean and
+    /// the middle of the points inside by as much (d: their distance, κ: curvature), so half the
+    /// sum of both is free of that.
     fn plane_at(&self, p: &Point3<f64>) -> Option<(f64, Vector3<f64>)> {
         let mut facing = None;
         let (mut weights, mut to_planes, mut arms, mut normal) =

@@ -6,13 +6,15 @@ use super::clean::UsablePoints;
 use super::summary::NormalSource;
 use crate::mesh::{PointTree, Workers, map_by};
 
-/// Neighbours that a plane is laid through: two rings about a point, and enough that noise of one spacing turns it by a tenth alone.
+/// Neighbours that a plane is laid through: two rings about a point, and enough that noise of one
+/// spacing turns it by a tenth alone.
 const PLANE: u32 = 24;
 /// Neighbours along which the normals are turned.
 const TURNED: usize = 8;
 /// The neighbour by which the spacing is measured …
 const RING: usize = 6;
-/// … whose distance on an even surface is this many spacings: the circle of that radius, √(6/π), holds six points.
+/// … whose distance on an even surface is this many spacings: the circle of that radius, √(6/π),
+/// holds six points.
 const RING_SPACINGS: f64 = 1.382;
 
 /// What the neighbours of a point say of it.
@@ -107,8 +109,9 @@ fn is_finite(v: &Vector3<f64>) -> bool {
     v.iter().all(|x| x.is_finite())
 }
 
-/// Turns the normals so that neighbours agree, along a minimum spanning tree of the neighbours whose cost is 1 − |nᵢ·nⱼ| [Hoppe 1992]; and
-/// all of a piece that hangs together so that most look at the scanner or, where it is not known, out of the piece.
+/// Turns the normals so that neighbours agree, along a minimum spanning tree of the neighbours
+/// whose cost is 1 − |nᵢ·nⱼ| [Hoppe 1992]; and all of a piece that hangs together so that most look
+/// at the scanner or, where it is not known, out of the piece.
 fn turn_along_tree(points: &UsablePoints, near: &[Neighbourhood], normals: &mut [Vector3<f64>]) {
     let mut pairs: Vec<(u32, [u32; 2])> = Vec::with_capacity(near.len() * TURNED);
     for (at, found) in (0u32..).zip(near) {
@@ -145,7 +148,8 @@ fn turn_along_tree(points: &UsablePoints, near: &[Neighbourhood], normals: &mut 
 /// Costs are compared as whole numbers, so that their order is the same everywhere.
 const COST_STEPS: f64 = 1e9;
 
-/// Disjoint sets of points, and for each whether it is to be turned against the one that names its set.
+/// Disjoint sets of points, and for each whether it is to be turned against the one that names its
+/// set.
 struct Sides(Vec<(u32, bool)>);
 
 impl Sides {
@@ -153,7 +157,8 @@ impl Sides {
         Self((0..count as u32).map(|at| (at, false)).collect())
     }
 
-    /// What names the set of `at`, and whether `at` is turned against it; halves the path as it goes.
+    /// What names the set of `at`, and whether `at` is turned against it; halves the path as it
+    /// goes.
     fn root(&mut self, mut at: u32) -> (u32, bool) {
         let mut is_opposite = false;
         loop {
@@ -177,8 +182,8 @@ impl Sides {
     }
 }
 
-/// Whether the normals of a piece look more to the scanner than away, or out of the piece: their flux through a closed surface is thrice
-/// its volume.
+/// Whether the normals of a piece look more to the scanner than away, or out of the piece: their
+/// flux through a closed surface is thrice its volume.
 fn looks_outside(piece: &[usize], points: &UsablePoints, normals: &[Vector3<f64>]) -> bool {
     let positions = &points.positions;
     let vote = |&at: &usize| Some(normals[at].dot(&(points.eye(at)? - positions[at])).signum());
@@ -198,7 +203,8 @@ fn looks_outside(piece: &[usize], points: &UsablePoints, normals: &[Vector3<f64>
             reach + from_middle.norm(),
         ]
     });
-    /// Of a flat piece there is no flux but that of noise; then up is outside, as of a part on a table.
+    /// Of a flat piece there is no flux but that of noise; then up is outside, as of a part on a
+    /// table.
     const FLAT: f64 = 0.02;
     if flux.abs() > FLAT * reach {
         return flux > 0.0;

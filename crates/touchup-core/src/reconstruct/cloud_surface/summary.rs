@@ -12,8 +12,8 @@ pub enum NormalSource {
     File,
     /// estimated, and turned towards the place of the scanner
     Scanner,
-    /// estimated, and turned along a minimum spanning tree of the points [Hoppe 1992]: which side is outside is a guess where the
-    /// surface is open
+    /// estimated, and turned along a minimum spanning tree of the points [Hoppe 1992]: which side
+    /// is outside is a guess where the surface is open
     #[default]
     SpanningTree,
 }
@@ -39,7 +39,8 @@ pub struct CloudSummary {
     pub spacing_mm: f64,
     /// median distance of the points from a plane through their neighbours
     pub noise_mm: f64,
-    /// standard deviation of the surface from the part, where that is smooth: its edges are rounded by up to half a cell
+    /// standard deviation of the surface from the part, where that is smooth: its edges are rounded
+    /// by up to half a cell
     pub error_mm: f64,
     /// faces made
     pub faces: usize,

@@ -10,25 +10,32 @@ use crate::mesh::{PointCloud, PointTree, Workers, map_by};
 use crate::numeric::DisjointSets;
 use crate::reconstruct::field::lattice::Lattice;
 
-/// Fewer points make no surface: a plane is laid through as many neighbours, and half of them again are no neighbours.
+/// Fewer points make no surface: a plane is laid through as many neighbours, and half of them again
+/// are no neighbours.
 const FEWEST: usize = 50;
 /// More would take some 10 GB.
 const MOST: usize = 20_000_000;
-/// Points without others within this many spacings are left out, or one stray point would make the cells of all coarse.
+/// Points without others within this many spacings are left out, or one stray point would make the
+/// cells of all coarse.
 const ISOLATED: f64 = 10.0;
-/// Edge of the cells, in spacings: a cell that the surface passes through has points, and there are two to three faces for each of them.
+/// Edge of the cells, in spacings: a cell that the surface passes through has points, and there are
+/// two to three faces for each of them.
 const CELL: f64 = 1.3;
-/// Places the planes of the lattice, in cells, where no coordinate that a scanner rounded to falls on them.
+/// Places the planes of the lattice, in cells, where no coordinate that a scanner rounded to falls
+/// on them.
 const ORIGIN: [f64; 3] = [0.164_607_9, 0.312_756_1, 0.460_895_1];
-/// Error of a smooth surface, in standard deviations of the noise that is averaged: 0.29 on a plate, 0.31 and 0.33 on balls.
+/// Error of a smooth surface, in standard deviations of the noise that is averaged: 0.29 on a
+/// plate, 0.31 and 0.33 on balls.
 const ERROR_SHARE: f64 = 1.0 / 3.0;
 /// A vertex without a point within this many spacings is invented.
 const FARTHEST: f64 = 2.2;
-/// Neighbours of a vertex, within this many spacings, whose middle is farther from it than this part of the farthest: it lies
-/// beyond the rim of what was scanned. On the rim of an even surface the middle is 4/(3π) = 0.42 away, at the corner of a cube 0.49.
+/// Neighbours of a vertex, within this many spacings, whose middle is farther from it than this
+/// part of the farthest: it lies beyond the rim of what was scanned. On the rim of an even surface
+/// the middle is 4/(3π) = 0.42 away, at the corner of a cube 0.49.
 const RIM_NEIGHBOURS: (u32, f64, f64) = (64, 3.0, 0.5);
 
-/// So many vertices side by side or fewer without points come of chance: of a million points at random places some lie like a rim.
+/// So many vertices side by side or fewer without points come of chance: of a million points at
+/// random places some lie like a rim.
 const PINHOLE: usize = 3;
 
 /// Why points make no surface.
@@ -71,10 +78,12 @@ pub struct CloudSurface {
     pub summary: CloudSummary,
 }
 
-/// The surface through the points of a scan, which ends where they end: the zero set of implicit moving least squares of the points
-/// \[Kolluri 2005\], by dual contouring in cells of 1.3 spacings of the points.
+/// The surface through the points of a scan, which ends where they end: the zero set of implicit
+/// moving least squares of the points \[Kolluri 2005\], by dual contouring in cells of 1.3 spacings
+/// of the points.
 ///
-/// Points that are not finite, at the place of another, or alone are left out. The result does not depend on the number of workers.
+/// Points that are not finite, at the place of another, or alone are left out. The result does not
+/// depend on the number of workers.
 ///
 /// # Errors
 /// [`CloudError`]: one line with what to do.

@@ -1,7 +1,8 @@
 //! A face of the scan, cut by planes of the lattice into convex pieces that each lie in one cell.
 //!
-//! Every new point is named by what it lies on and placed by that name alone, so the pieces of two neighbouring faces have
-//! the same points on their common edge. Which cell a piece lies in follows from the cuts, not from its coordinates.
+//! Every new point is named by what it lies on and placed by that name alone, so the pieces of two
+//! neighbouring faces have the same points on their common edge. Which cell a piece lies in follows
+//! from the cuts, not from its coordinates.
 
 use nalgebra::{Point3, Vector3};
 
@@ -27,7 +28,8 @@ pub(in crate::reconstruct) enum PointSupport {
     Corner(u8),
     /// a side of the face and a plane of the lattice
     Trace { side: u8, axis: u8, plane: i32 },
-    /// the inside of the face and a line of the lattice along `axis`, which is at `planes` of the two next axes
+    /// the inside of the face and a line of the lattice along `axis`, which is at `planes` of the
+    /// two next axes
     Pierce { axis: u8, planes: [i32; 2] },
 }
 
@@ -63,8 +65,8 @@ pub(in crate::reconstruct) struct Pieces {
 }
 
 impl Pieces {
-    /// Cuts a face by those planes of the lattice that lie between the cells from `lo` to `hi`; what lies beyond these
-    /// cells is given to the outermost of them.
+    /// Cuts a face by those planes of the lattice that lie between the cells from `lo` to `hi`;
+    /// what lies beyond these cells is given to the outermost of them.
     pub fn cut(
         &mut self,
         mesh: &TriMesh,
@@ -298,8 +300,8 @@ impl Pieces {
     }
 }
 
-/// The point between `a` and `b` at which coordinate `axis` is `height`: exact in that coordinate, in the others never
-/// beyond the ends, and monotone in `height`.
+/// The point between `a` and `b` at which coordinate `axis` is `height`: exact in that coordinate,
+/// in the others never beyond the ends, and monotone in `height`.
 fn between(a: &Point3<f64>, b: &Point3<f64>, axis: usize, height: f64) -> Point3<f64> {
     let rise = b[axis] - a[axis];
     let share = if rise == 0.0 {
@@ -347,8 +349,8 @@ mod tests {
         TriMesh::new(positions, vec![[0, 1, 2], [2, 1, 3]]).unwrap()
     }
 
-    /// Each side between two pieces of a face lies on a plane of the lattice, and is a wall of both: on one square, each beyond
-    /// the other.
+    /// Each side between two pieces of a face lies on a plane of the lattice, and is a wall of
+    /// both: on one square, each beyond the other.
     #[test]
     fn a_wall_between_two_pieces_is_the_same_from_both() {
         let mut rng = rand_pcg::Pcg64::seed_from_u64(5);

@@ -1,7 +1,9 @@
-//! Few faces where the surface is plain: a patch simplified as far as it stays within a tolerance of itself.
+//! Few faces where the surface is plain: a patch simplified as far as it stays within a tolerance
+//! of itself.
 //!
-//! Edges collapse in order of their quadric error \[Garland Heckbert 1997\], block by block of the lattice. What lies on the rim of a block
-//! stays, so what becomes of a block depends on its own faces alone, and no crack arises between blocks.
+//! Edges collapse in order of their quadric error \[Garland Heckbert 1997\], block by block of the
+//! lattice. What lies on the rim of a block stays, so what becomes of a block depends on its own
+//! faces alone, and no crack arises between blocks.
 
 use std::collections::HashSet;
 
@@ -17,9 +19,11 @@ use crate::reconstruct::table::CellTable;
 const BLOCK: i32 = 8;
 /// Faces of a block below which there is nothing to merge.
 const FEW: usize = 4;
-/// Errors that are asked of the simplification, as shares of the tolerance: its own measure of error is a mean over planes.
+/// Errors that are asked of the simplification, as shares of the tolerance: its own measure of
+/// error is a mean over planes.
 const SHARES: [f64; 3] = [1.0, 0.5, 0.25];
-/// Twice the area over the longest side squared below which no merged face is: a triangle stretched thirtyfold.
+/// Twice the area over the longest side squared below which no merged face is: a triangle stretched
+/// thirtyfold.
 const THIN: f64 = 0.03;
 
 fn block_of(node: LatticeNode) -> LatticeNode {
@@ -70,9 +74,10 @@ impl CoarseBlocks {
     }
 }
 
-/// Merges faces of a patch that belong to the lattice, where the two surfaces stay within `tolerance` (m) of each other and vertices of
-/// one support go into vertices of the same. Vertices stay where they are, or go; a block stays as it is where merged faces would meet
-/// others. O(faces).
+/// Merges faces of a patch that belong to the lattice, where the two surfaces stay within
+/// `tolerance` (m) of each other and vertices of one support go into vertices of the same. Vertices
+/// stay where they are, or go; a block stays as it is where merged faces would meet others.
+/// O(faces).
 ///
 /// - `support`: of each vertex of the patch.
 /// - `scan`: that the patch is for, with the tree over its faces.
@@ -152,7 +157,8 @@ impl<P: Fn(u32) -> Point3<f64>> PlacedFaces<'_, P> {
         CellBox { lo, hi }
     }
 
-    /// Takes one of the faces to which those of block number `of` were merged; all of these before any other.
+    /// Takes one of the faces to which those of block number `of` were merged; all of these before
+    /// any other.
     fn take_merged(&mut self, face: PatchFace, of: usize) {
         let number = self.faces.len() as u32;
         self.blocks(&face)
@@ -177,8 +183,8 @@ impl<P: Fn(u32) -> Point3<f64>> PlacedFaces<'_, P> {
             .filter_map(|(number, (face, block))| Some((number, face, (*block)?)))
     }
 
-    /// The blocks with a merged face that has a side as another face has it, or meets another face. Two blocks may join the same two
-    /// corners of the rim between them.
+    /// The blocks with a merged face that has a side as another face has it, or meets another face.
+    /// Two blocks may join the same two corners of the rim between them.
     fn unsound(&self) -> HashSet<usize> {
         let mut sides: Vec<[u32; 2]> = self
             .faces
@@ -239,7 +245,8 @@ impl<P: Fn(u32) -> Point3<f64>> PlacedFaces<'_, P> {
     }
 }
 
-/// Whether two faces meet, other than in a common corner; those that share a side fold, they do not pierce.
+/// Whether two faces meet, other than in a common corner; those that share a side fold, they do not
+/// pierce.
 fn meet_beside(
     t: &[Point3<f64>; 3],
     u: &[Point3<f64>; 3],
@@ -315,8 +322,9 @@ fn merged(
     merged.chunks_exact(3).map(named).collect()
 }
 
-/// Whether `merged` are faces for the same rim as `faces`, and the two surfaces are nowhere farther than `tolerance` (m) from each other, by
-/// the corners of the one and by corners, sides and middles of the other; and no new face is thin.
+/// Whether `merged` are faces for the same rim as `faces`, and the two surfaces are nowhere farther
+/// than `tolerance` (m) from each other, by the corners of the one and by corners, sides and
+/// middles of the other; and no new face is thin.
 fn is_same_surface(faces: &[u32], merged: &[u32], places: &[Point3<f64>], tolerance: f64) -> bool {
     if rim(faces) != rim(merged) {
         return false;
@@ -448,8 +456,8 @@ mod tests {
     fn a_plane_keeps_the_rims_of_its_blocks() {
         let (patch, coarse) = coarsened(sheet(16, |_, _| 0.0), &[Support::Touched; 17 * 17], 1e-6);
         assert_eq!(coarse.0.len(), 4);
-        // a disk of triangles whose rim has 32 vertices has 30 faces, and two more for each vertex inside: some are left where the
-        // collapse of a further edge would turn a face over
+        // a disk of triangles whose rim has 32 vertices has 30 faces, and two more for each vertex
+        // inside: some are left where the collapse of a further edge would turn a face over
         assert!(patch.faces.len() <= 4 * 36, "{} of 512", patch.faces.len());
         assert!((area(&patch) - 256e-6).abs() < 1e-12);
         let mut sides: Vec<_> = patch
@@ -502,7 +510,8 @@ mod tests {
         );
     }
 
-    /// A bump of the scan pierces what the faces of a block would be merged to, and not the faces themselves.
+    /// A bump of the scan pierces what the faces of a block would be merged to, and not the faces
+    /// themselves.
     #[test]
     fn a_block_whose_merged_faces_would_meet_the_scan_stays() {
         let dent = |x: i32, y: i32| if (x, y) == (4, 4) { -0.1e-3 } else { 0.0 };

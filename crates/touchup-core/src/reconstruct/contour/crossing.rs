@@ -9,7 +9,8 @@ use crate::reconstruct::field::lattice::{Edge, LatticeNode, stepped};
 use crate::reconstruct::field::piecewise::FieldScratch;
 use crate::reconstruct::table::CellTable;
 
-/// Steps towards the zero of a field, at most: on a plane one is enough, at an edge it takes some more.
+/// Steps towards the zero of a field, at most: on a plane one is enough, at an edge it takes some
+/// more.
 const STEPS: usize = 8;
 /// A value of less than this share of the step is zero.
 const ENOUGH: f64 = 1e-3;
@@ -32,8 +33,9 @@ pub(in crate::reconstruct) struct Crossings {
 }
 
 impl Crossings {
-    /// The crossing of an edge whose ends differ in sign: by the touched field itself between touched nodes, else between
-    /// the values at the ends, and where the ball was there, on its surface.
+    /// The crossing of an edge whose ends differ in sign: by the touched field itself between
+    /// touched nodes, else between the values at the ends, and where the ball was there, on its
+    /// surface.
     pub fn at(
         &mut self,
         grid: &ReconstructionGrid,
@@ -102,8 +104,8 @@ fn share_of([at_a, at_b]: [f64; 2]) -> f64 {
     }
 }
 
-/// A crossing that lies where the ball was, moved to where the ball ended on the way into the material: the values at the nodes
-/// keep out of free space, a straight line between them does not.
+/// A crossing that lies where the ball was, moved to where the ball ended on the way into the
+/// material: the values at the nodes keep out of free space, a straight line between them does not.
 ///
 /// - `inner`: the end of the edge that is in the material.
 fn out_of_free_space(evidence: &Evidence<'_>, crossing: Crossing, inner: &Point3<f64>) -> Crossing {
@@ -120,8 +122,9 @@ fn out_of_free_space(evidence: &Evidence<'_>, crossing: Crossing, inner: &Point3
     zero_between([&crossing.point, inner], [here, at_inner], field).unwrap_or(crossing)
 }
 
-/// The crossing of the touched field between two points at which its values differ in sign. `None` where the field is
-/// discontinuous between two surfaces: the gradient of neither is that of the step between them.
+/// The crossing of the touched field between two points at which its values differ in sign. `None`
+/// where the field is discontinuous between two surfaces: the gradient of neither is that of the
+/// step between them.
 fn of_touches(
     evidence: &Evidence<'_>,
     [a, b]: [&Point3<f64>; 2],
@@ -136,7 +139,8 @@ fn of_touches(
     (rises == (values[1] > values[0])).then_some(crossing)
 }
 
-/// The zero of a field between two points at which its values differ in sign, by false position (Illinois).
+/// The zero of a field between two points at which its values differ in sign, by false position
+/// (Illinois).
 ///
 /// - `field`: value, m, and unit gradient at a point.
 fn zero_between(
@@ -168,7 +172,8 @@ fn zero_between(
     best.map(|(_, crossing)| crossing)
 }
 
-/// Slope of the values at a node, of any length: by central differences, one-sided where a neighbour is missing.
+/// Slope of the values at a node, of any length: by central differences, one-sided where a
+/// neighbour is missing.
 fn gradient(grid: &ReconstructionGrid, node: &LatticeNode) -> Vector3<f64> {
     let value = |node: LatticeNode| {
         let state = grid.nodes.get(&node)?;

@@ -1,8 +1,9 @@
-//! When two triangles may replace the four around an edge: the tests of intersection-free contouring \[Ju Udeshi 2006\].
+//! When two triangles may replace the four around an edge: the tests of intersection-free
+//! contouring \[Ju Udeshi 2006\].
 //!
-//! Four cells meet at an edge E of the lattice, their vertices are c0 … c3. Where each segment from ci to ci+1 passes
-//! through the square between the two cells, the tetrahedra (E, ci, ci+1) belong to E alone; a triangle inside their union
-//! cannot meet a triangle of another edge.
+//! Four cells meet at an edge E of the lattice, their vertices are c0 … c3. Where each segment from
+//! ci to ci+1 passes through the square between the two cells, the tetrahedra (E, ci, ci+1) belong
+//! to E alone; a triangle inside their union cannot meet a triangle of another edge.
 
 use nalgebra::{Point3, Vector2, Vector3};
 
@@ -14,14 +15,17 @@ use crate::reconstruct::field::lattice::{Lattice, Square, across};
 const INSET: f64 = 1e-3;
 /// The least volume that counts as to one side, as a share of the cube of the lattice's pitch.
 const SLACK: f64 = 1e-9;
-/// Difference of the angles (cosine) at the two diagonals above which the flatter one is taken: a crease runs along it.
+/// Difference of the angles (cosine) at the two diagonals above which the flatter one is taken: a
+/// crease runs along it.
 const CREASE: f64 = 0.06;
 /// Places tried on either side of the middle of a fan that folds over.
 const STEPS: u32 = 8;
-/// Sine of the angle between two normals on a square above which there is a corner between them: 37°.
+/// Sine of the angle between two normals on a square above which there is a corner between them:
+/// 37°.
 const CORNER: f64 = 0.6;
 
-/// Whether the segment from `a` to `b`, which lie on either side, passes through the inside of a square.
+/// Whether the segment from `a` to `b`, which lie on either side, passes through the inside of a
+/// square.
 pub(in crate::reconstruct) fn passes(
     lattice: &Lattice,
     square: &Square,
@@ -39,8 +43,8 @@ pub(in crate::reconstruct) fn passes(
     is_inside(u) && is_inside(v)
 }
 
-/// Where the surface bends on a square: the point of the square in which the planes at the two ends of a segment meet, or
-/// its middle where they hardly differ.
+/// Where the surface bends on a square: the point of the square in which the planes at the two ends
+/// of a segment meet, or its middle where they hardly differ.
 ///
 /// - `ends`: points on two edges of the square, with the unit normals of the surface there.
 pub(in crate::reconstruct) fn bend(
@@ -76,8 +80,8 @@ fn pierces(p: &Point3<f64>, q: &Point3<f64>, [a, b, c]: [&Point3<f64>; 3], slack
         && (below.min(above) < -slack && below.max(above) > slack)
 }
 
-/// The diagonal by which the quadrilateral c0 … c3 around the edge from `e0` to `e1` may be split: 0 for c0–c2, 1 for
-/// c1–c3, `None` where only the fan around a point of the edge is safe.
+/// The diagonal by which the quadrilateral c0 … c3 around the edge from `e0` to `e1` may be split:
+/// 0 for c0–c2, 1 for c1–c3, `None` where only the fan around a point of the edge is safe.
 pub(in crate::reconstruct) fn diagonal(
     e0: &Point3<f64>,
     e1: &Point3<f64>,
@@ -85,7 +89,8 @@ pub(in crate::reconstruct) fn diagonal(
     pitch: f64,
 ) -> Option<usize> {
     let slack = SLACK * pitch * pitch * pitch;
-    // the diagonal passes one of the other two vertices on the side of the edge, the edge passes the other triangle
+    // the diagonal passes one of the other two vertices on the side of the edge, the edge passes
+    // the other triangle
     let is_safe = |i: usize| {
         let (a, b, opposite, d) = (&c[i], &c[i + 1], &c[i + 2], &c[(i + 3) % 4]);
         [(b, d), (d, b)].iter().any(|(near, far)| {
@@ -101,8 +106,8 @@ pub(in crate::reconstruct) fn diagonal(
     }
 }
 
-/// Moves the middle of a fan along its edge where the fan would fold over: there the surface hardly leaves the edge, and
-/// where it crosses it is chance. Any point of the edge is safe.
+/// Moves the middle of a fan along its edge where the fan would fold over: there the surface hardly
+/// leaves the edge, and where it crosses it is chance. Any point of the edge is safe.
 ///
 /// - `middle`: a point of the edge; `normal`: unit normal of the surface there.
 /// - `edge`: the parts of the edge below and above the middle, m, as vectors.

@@ -1,8 +1,9 @@
 //! The surface inside the region, by dual contouring that cannot intersect itself.
 //!
-//! Around each cell the surface runs in closed loops over its squares; each loop has one vertex inside the cell, and the
-//! surface in the cell is the cone from there to the loop. Where a shortcut is safe, the four cones around an edge become
-//! two triangles. On the rim of the region the loops follow the traces of the scan.
+//! Around each cell the surface runs in closed loops over its squares; each loop has one vertex
+//! inside the cell, and the surface in the cell is the cone from there to the loop. Where a
+//! shortcut is safe, the four cones around an edge become two triangles. On the rim of the region
+//! the loops follow the traces of the scan.
 
 use nalgebra::{Point3, Vector3};
 
@@ -21,19 +22,23 @@ use crate::reconstruct::field::lattice::{
 };
 use crate::reconstruct::table::CellTable;
 
-/// Eigenvalues of a cell's planes below this share of their sum count as noise: two planes make an edge when they are at more than
-/// 2 · atan √(share / (1 − share)) to each other, 37°.
+/// Eigenvalues of a cell's planes below this share of their sum count as noise: two planes make an
+/// edge when they are at more than 2 · atan √(share / (1 − share)) to each other, 37°.
 const FLAT_SHARE: f64 = 0.1;
-/// How far inside its cell a vertex stays, as a share of the pitch: what keeps triangles from losing their area.
+/// How far inside its cell a vertex stays, as a share of the pitch: what keeps triangles from
+/// losing their area.
 const MARGIN: f64 = 1e-3;
-/// The middle of a fan may leave the surface by this share of the pitch to keep the fan from folding over.
+/// The middle of a fan may leave the surface by this share of the pitch to keep the fan from
+/// folding over.
 const DRIFT: f64 = 0.05;
 
-/// Meshes the zero set of a field inside `region` and joins it to the scan along the traces of `cut`.
+/// Meshes the zero set of a field inside `region` and joins it to the scan along the traces of
+/// `cut`.
 ///
 /// - `values`: f at all corners of the cells of the region; a cell without is left out.
 /// - `cut`: the scan clipped at this region.
-/// - `crossing`: the crossing of an edge whose ends differ in sign; called once for each, in a fixed order.
+/// - `crossing`: the crossing of an edge whose ends differ in sign; called once for each, in a
+///   fixed order.
 pub fn contour(
     lattice: &Lattice,
     region: &LatticeRegion,
@@ -44,8 +49,8 @@ pub fn contour(
     contour_in(lattice, region, &CellBox::ALL, values, cut, crossing)
 }
 
-/// As [`contour`], but of the new faces those alone that touch a cell in `core`: what else is in the patch, and is stored
-/// around, is not whole.
+/// As [`contour`], but of the new faces those alone that touch a cell in `core`: what else is in
+/// the patch, and is stored around, is not whole.
 ///
 /// - `values`: f at all corners of the cells of the region in `core` and around it.
 /// - `cut`: the scan clipped at least in the cells up to two away from `core`.
@@ -130,8 +135,8 @@ struct Skin<'a, F> {
     shared: CellTable<Square, ()>,
     /// from the cells on the rim to the segments of the traces
     fans: Vec<PatchFace>,
-    /// the traces around the current cell: the number of the square, and a polyline against the loop whose edges are numbered in
-    /// the cell
+    /// the traces around the current cell: the number of the square, and a polyline against the
+    /// loop whose edges are numbered in the cell
     rim: Vec<(u8, Polyline)>,
     planes: Planes,
     /// middles of fans that are to be moved once all faces are made
@@ -182,7 +187,8 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         })
     }
 
-    /// Whether the material in opposite corners of a square is connected: the sign in the middle, the same for both cells.
+    /// Whether the material in opposite corners of a square is connected: the sign in the middle,
+    /// the same for both cells.
     fn is_joined(&self, square: &Square) -> bool {
         square
             .corners()
@@ -192,7 +198,8 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
             < 0.0
     }
 
-    /// The trace on a square on the rim of the region; `None` where patch and scan cannot meet there.
+    /// The trace on a square on the rim of the region; `None` where patch and scan cannot meet
+    /// there.
     fn trace_on(&mut self, square: &Square, beyond: LatticeNode) -> Option<Vec<Polyline>> {
         let lines = self.cut.trace_on(square, self.values);
         match &lines {
@@ -251,8 +258,8 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         }
     }
 
-    /// The planes that the loop from edge `first` meets: one at each crossing, and along each trace those of the scan's
-    /// faces, each with its share of the trace.
+    /// The planes that the loop from edge `first` meets: one at each crossing, and along each trace
+    /// those of the scan's faces, each with its share of the trace.
     fn gather_planes(&mut self, node: LatticeNode, loops: &Loops, first: u8) {
         self.planes.0.clear();
         for (edge, side) in loops.walk(first) {
@@ -286,7 +293,8 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         }
     }
 
-    /// Vertex and normal of the surface on an edge: the scan's where patch and scan agree on it, else the field's.
+    /// Vertex and normal of the surface on an edge: the scan's where patch and scan agree on it,
+    /// else the field's.
     fn crossing(&mut self, edge: &Edge) -> (u32, Vector3<f64>) {
         if let Some(known) = self.crossings.get(edge) {
             return *known;
@@ -377,7 +385,8 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         }
     }
 
-    /// Moves the middle of a fan that goes all around an edge so that it does not fold over; one of the scan stays.
+    /// Moves the middle of a fan that goes all around an edge so that it does not fold over; one of
+    /// the scan stays.
     fn unfold(
         &mut self,
         edge: &Edge,
@@ -422,8 +431,8 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         });
     }
 
-    /// Whether the fan around an edge covers the step from cell `i` to the next: always when it goes all around, else only
-    /// where the row of cells meets the scan at either end.
+    /// Whether the fan around an edge covers the step from cell `i` to the next: always when it
+    /// goes all around, else only where the row of cells meets the scan at either end.
     fn is_fanned(&self, i: usize, vertices: &[Option<u32>; 4], squares: &[Square; 4]) -> bool {
         let Some(gap) = (0..4).find(|&k| vertices[(i + 4 - k) % 4].is_none()) else {
             return true;
@@ -435,8 +444,9 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         self.shared.contains(&before) || after.is_some_and(|square| self.shared.contains(&square))
     }
 
-    /// The vertex on a square between two cells, on the segment that ends at `edge`; `None` where the straight segment from
-    /// one cell's vertex to the other's passes through the square and serves no other segment.
+    /// The vertex on a square between two cells, on the segment that ends at `edge`; `None` where
+    /// the straight segment from one cell's vertex to the other's passes through the square and
+    /// serves no other segment.
     fn middle(
         &mut self,
         edge: &Edge,
@@ -465,7 +475,8 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
             let (vertex, normal) = self.crossing(&edge);
             (self.patch.vertices.entry(vertex).1, normal)
         });
-        // several loops in one cell stay disjoint as long as each keeps to the hull of its crossings
+        // several loops in one cell stay disjoint as long as each keeps to the hull of its
+        // crossings
         let point = if is_plain {
             bend(self.lattice, square, &ends)
         } else {

@@ -1,8 +1,8 @@
 //! How the surface passes through squares and cells, by the signs at their corners.
 //!
-//! Corners of a cell are numbered x + 2y + 4z; its edges 4 · axis + a + 2b, where a and b are the steps along the two axes
-//! that follow; its squares 2 · axis + (1 when above). A segment on a square leads from edge to edge with the material on
-//! its left, seen against the square's axis.
+//! Corners of a cell are numbered x + 2y + 4z; its edges 4 · axis + a + 2b, where a and b are the
+//! steps along the two axes that follow; its squares 2 · axis + (1 when above). A segment on a
+//! square leads from edge to edge with the material on its left, seen against the square's axis.
 
 use crate::reconstruct::field::lattice::{Edge, LatticeNode, Square, across, stepped};
 
@@ -12,8 +12,8 @@ pub(in crate::reconstruct) const NONE: u8 = u8::MAX;
 /// Two directed segments at most, as numbers of edges in [`Square::edges`].
 pub(in crate::reconstruct) type Segments = [Option<[u8; 2]>; 2];
 
-/// The segments on a square from the signs at its corners (true: material). Where all four edges are crossed,
-/// `is_joined`: whether the material in the two opposite corners is connected.
+/// The segments on a square from the signs at its corners (true: material). Where all four edges
+/// are crossed, `is_joined`: whether the material in the two opposite corners is connected.
 #[inline]
 pub(in crate::reconstruct) fn segments(
     is_material: [bool; 4],
@@ -98,7 +98,8 @@ pub(in crate::reconstruct) fn ring_corners(side: u8) -> [u8; 4] {
 /// The closed loops of a cell.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::reconstruct) struct Loops {
-    /// the edge that follows each edge, and the square between them; [`NONE`] where the surface does not pass
+    /// the edge that follows each edge, and the square between them; [`NONE`] where the surface
+    /// does not pass
     next: [[u8; 2]; 12],
 }
 
@@ -111,7 +112,8 @@ impl Loops {
     pub fn add(&mut self, side: u8, [from, to]: [u8; 2]) {
         let ring = ring_edges(side);
         let (from, to) = (ring[from as usize], ring[to as usize]);
-        // the material is on the left of a loop seen from outside the cell: below, that is against the axis
+        // the material is on the left of a loop seen from outside the cell: below, that is against
+        // the axis
         let (from, to) = if side % 2 == 1 {
             (from, to)
         } else {
@@ -120,7 +122,8 @@ impl Loops {
         self.link(from, to, side);
     }
 
-    /// Adds a segment on square number `side` from edge to edge, numbered in the cell and directed as its loop.
+    /// Adds a segment on square number `side` from edge to edge, numbered in the cell and directed
+    /// as its loop.
     pub fn link(&mut self, from: u8, to: u8, side: u8) {
         self.next[from as usize] = [to, side];
     }
@@ -141,7 +144,8 @@ impl Loops {
         })
     }
 
-    /// The number of the loop at each edge, [`NONE`] where there is none, and how many loops there are.
+    /// The number of the loop at each edge, [`NONE`] where there is none, and how many loops there
+    /// are.
     pub fn numbers(&self) -> ([u8; 12], u8) {
         let (mut numbers, mut count) = ([NONE; 12], 0);
         for edge in 0..12 {

@@ -1,4 +1,5 @@
-//! The patch, new faces for a part of a scan; and the scan with them in it, with support and uncertainty of each vertex.
+//! The patch, new faces for a part of a scan; and the scan with them in it, with support and
+//! uncertainty of each vertex.
 
 use nalgebra::Point3;
 
@@ -20,12 +21,12 @@ pub struct Patch {
 }
 
 impl Patch {
-    /// The scan with the patch in it, and the id there of each vertex of the patch that a face uses: vertices and
-    /// untouched faces of the scan keep their ids.
+    /// The scan with the patch in it, and the id there of each vertex of the patch that a face
+    /// uses: vertices and untouched faces of the scan keep their ids.
     ///
     /// # Errors
-    /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`] when the field's crossings were not
-    /// finite.
+    /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`] when the
+    /// field's crossings were not finite.
     pub fn applied_to(
         &self,
         mut mesh: TriMesh,
@@ -49,16 +50,16 @@ impl Patch {
     }
 }
 
-/// A square on the rim of the region on which scan and field disagree: unless the cell beyond is added to the region, both
-/// end there.
+/// A square on the rim of the region on which scan and field disagree: unless the cell beyond is
+/// added to the region, both end there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OpenSquare {
     /// the square
     pub square: Square,
     /// the cell on its other side, not in the region
     pub beyond: LatticeNode,
-    /// whether the scan crosses the square; where it does not, the field goes on past the end of the scan and widening the
-    /// region would go on for ever
+    /// whether the scan crosses the square; where it does not, the field goes on past the end of
+    /// the scan and widening the region would go on for ever
     pub is_scanned: bool,
 }
 
@@ -72,7 +73,8 @@ pub enum Support {
     Touched,
     /// what touches, free space and scan nearby suggest; nothing was touched here
     Guessed,
-    /// as that, and nothing can be touched here: the ball does not go so far into an inner corner, or into what is narrower
+    /// as that, and nothing can be touched here: the ball does not go so far into an inner corner,
+    /// or into what is narrower
     Unreachable,
 }
 
@@ -83,7 +85,8 @@ pub struct Patched {
     pub mesh: TriMesh,
     /// the support of each vertex, by id
     pub support: Vec<Support>,
-    /// standard deviation of each vertex along the normal, m, by id; none without [`crate::reconstruct::PatcherParams::uncertainty`]
+    /// standard deviation of each vertex along the normal, m, by id; none without
+    /// [`crate::reconstruct::PatcherParams::uncertainty`]
     pub sigma: Vec<f64>,
     /// how far the new faces may be from the surface that the touches show, m
     pub tolerance: f64,
@@ -91,7 +94,8 @@ pub struct Patched {
     pub removed_faces: usize,
     /// faces that were added
     pub added_faces: usize,
-    /// vertices of the scan that were moved to where they were touched, with the detail between them
+    /// vertices of the scan that were moved to where they were touched, with the detail between
+    /// them
     pub moved_vertices: usize,
     /// squares on which scan and patch could not be joined
     pub open_squares: usize,
@@ -114,7 +118,8 @@ impl Support {
 }
 
 impl Patched {
-    /// Columns of a file for each vertex beside its position, by id: `touched`, `support`, and `sigma_mm` where that is known.
+    /// Columns of a file for each vertex beside its position, by id: `touched`, `support`, and
+    /// `sigma_mm` where that is known.
     pub fn columns(&self) -> Vec<(&'static str, Vec<f32>)> {
         let of_support = |number: fn(Support) -> f32| {
             self.support

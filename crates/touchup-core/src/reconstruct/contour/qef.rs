@@ -1,4 +1,5 @@
-//! The point that lies best on a set of planes: the quadratic error function of dual contouring \[Ju et al. 2002\].
+//! The point that lies best on a set of planes: the quadratic error function of dual contouring
+//! \[Ju et al. 2002\].
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
@@ -13,7 +14,8 @@ const ON_PLANE: f64 = 0.1;
 /// How strongly the start holds on where nothing else decides, as a share of the trace.
 const PULL: f64 = 1e-3;
 
-/// Planes n·(x − p) = 0 with weights, to be met in the least-squares sense near the mean of their points.
+/// Planes n·(x − p) = 0 with weights, to be met in the least-squares sense near the mean of their
+/// points.
 #[derive(Clone, Debug, Default)]
 pub(in crate::reconstruct) struct Planes(pub Vec<WeightedPlane>);
 
@@ -33,8 +35,10 @@ impl Planes {
         )
     }
 
-    /// The point nearest to `start` at which Σ w (n·(x − p))² is least within the box from `lo` to `hi`, which holds
-    /// `start`, and from which no part of the loop is seen from behind. Directions in which the sum of the w n nᵀ has an eigenvalue below `threshold` times their sum do not count.
+    /// The point nearest to `start` at which Σ w (n·(x − p))² is least within the box from `lo` to
+    /// `hi`, which holds `start`, and from which no part of the loop is seen from behind.
+    /// Directions in which the sum of the w n nᵀ has an eigenvalue below `threshold` times their
+    /// sum do not count.
     pub fn solve(
         &self,
         start: &Point3<f64>,
@@ -64,8 +68,9 @@ impl Planes {
         self.unturned(start, &x)
     }
 
-    /// `start` + `best`, or the first point on the segment back to `start` from which no step of the loop through the planes'
-    /// points, in their order, is seen from behind; where there is none, the one from which that is least.
+    /// `start` + `best`, or the first point on the segment back to `start` from which no step of
+    /// the loop through the planes' points, in their order, is seen from behind; where there is
+    /// none, the one from which that is least.
     fn unturned(&self, start: &Point3<f64>, best: &Vector3<f64>) -> Point3<f64> {
         // on all planes at once it is their edge or corner, however its loop looks from there
         let size = self

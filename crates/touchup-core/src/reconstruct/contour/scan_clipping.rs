@@ -1,4 +1,5 @@
-//! The scan, clipped at the region: which faces go, what is left of those that the region cuts, and where they end.
+//! The scan, clipped at the region: which faces go, what is left of those that the region cuts, and
+//! where they end.
 
 use nalgebra::{Point2, Point3, Vector3};
 
@@ -14,14 +15,15 @@ use crate::reconstruct::table::{CellTable, Key};
 
 /// Side of the blocks of cells for which the faces nearby are looked up at once, in cells.
 const BLOCK: i32 = 8;
-/// How far new points are moved within what they lie on, as a share of the pitch: some tools take collinear sides of
-/// coplanar faces for an intersection, and the cuts through one face leave them by the dozen.
+/// How far new points are moved within what they lie on, as a share of the pitch: some tools take
+/// collinear sides of coplanar faces for an intersection, and the cuts through one face leave them
+/// by the dozen.
 const LOOSENING: f64 = 1e-7;
 /// No vertex.
 const NONE: u32 = u32::MAX;
 
-/// A piece of a trace: where one face of the scan crosses one square that bounds the region. Walking from `from` to `to`
-/// with the face's normal up, the region is on the left.
+/// A piece of a trace: where one face of the scan crosses one square that bounds the region.
+/// Walking from `from` to `to` with the face's normal up, the region is on the left.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::reconstruct) struct TraceSegment {
     pub from: u32,
@@ -44,10 +46,11 @@ pub(in crate::reconstruct) struct Pierced {
 /// Depends on the scan and the region, not on the field.
 #[derive(Clone, Debug, Default)]
 pub struct Cut {
-    /// the patch without new faces inside the region: the faces of the scan that the region holds or cuts, what is left of them, and
-    /// the vertices that the remainders and the traces use
+    /// the patch without new faces inside the region: the faces of the scan that the region holds
+    /// or cuts, what is left of them, and the vertices that the remainders and the traces use
     pub patch: Patch,
-    /// faces that it cuts so close to a corner that rounding hides what is left of them; they go without a remainder
+    /// faces that it cuts so close to a corner that rounding hides what is left of them; they go
+    /// without a remainder
     pub lost: Vec<FaceId>,
     pitch: f64,
     /// the segments on each square on the rim of the region
@@ -234,7 +237,8 @@ impl Cut {
     }
 }
 
-/// A point moved by up to [`LOOSENING`] in the plane, or on the edge, of the lattice it lies on; the same for the same name.
+/// A point moved by up to [`LOOSENING`] in the plane, or on the edge, of the lattice it lies on;
+/// the same for the same name.
 fn loosened(key: VertexKey, mut point: Point3<f64>, pitch: f64) -> Point3<f64> {
     let mut move_along = |axis: usize| {
         let bits = (key.bits() ^ axis as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -337,14 +341,16 @@ fn rims(pieces: &Pieces, region: &LatticeRegion) -> Vec<PieceRim> {
     rims
 }
 
-/// What follows side `i`: a side of the same piece first, so that two parts that meet at a point stay separate.
+/// What follows side `i`: a side of the same piece first, so that two parts that meet at a point
+/// stay separate.
 fn next(rims: &[PieceRim], i: usize) -> Option<usize> {
     let follows = |j: &usize| !rims[*j].is_used && rims[*j].from == rims[i].to;
     let same = (0..rims.len()).find(|j| follows(j) && rims[*j].piece == rims[i].piece);
     same.or_else(|| (0..rims.len()).find(follows))
 }
 
-/// The points of a loop, without those on a side of the face where neither this face nor its neighbour ends.
+/// The points of a loop, without those on a side of the face where neither this face nor its
+/// neighbour ends.
 fn kept_points(pieces: &Pieces, rims: &[PieceRim], corners: &[usize]) -> Vec<u32> {
     let is_kept = |at: usize| {
         let (before, here) = (

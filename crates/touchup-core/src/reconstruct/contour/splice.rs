@@ -28,15 +28,16 @@ impl Splice {
         (self.next_owner, self.next_face) = (0, 0);
     }
 
-    /// Takes up to `most` parts more of the delta that was begun: places its vertices, a few to a part, then replaces the
-    /// faces of its owners; returns whether that was all. In between the mesh has gaps and overlaps where old faces meet new
-    /// ones. Faces and vertices that the delta does not touch keep their ids.
+    /// Takes up to `most` parts more of the delta that was begun: places its vertices, a few to a
+    /// part, then replaces the faces of its owners; returns whether that was all. In between the
+    /// mesh has gaps and overlaps where old faces meet new ones. Faces and vertices that the delta
+    /// does not touch keep their ids.
     ///
     /// - `mesh`, `tree`: the scan with all deltas before this one in it.
     ///
     /// # Errors
-    /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`] for a position that is not finite;
-    /// the mesh is inconsistent then.
+    /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`] for a
+    /// position that is not finite; the mesh is inconsistent then.
     pub fn go_on(
         &mut self,
         delta: &PatchDelta,
@@ -98,7 +99,8 @@ impl Splice {
         }
     }
 
-    /// Adds new vertices and moves those that are elsewhere now, up to `most` parts of them; returns how many those were.
+    /// Adds new vertices and moves those that are elsewhere now, up to `most` parts of them;
+    /// returns how many those were.
     fn place(
         &mut self,
         delta: &PatchDelta,

@@ -8,8 +8,8 @@ use crate::reconstruct::field::lattice::{
     Edge, LatticeNode, NodeValues, Square, VertexKey, across,
 };
 
-/// A polyline in which the scan crosses a square, from one of the square's edges to another, by their numbers; walking along it
-/// with the normal of the scan up, the region is on the left.
+/// A polyline in which the scan crosses a square, from one of the square's edges to another, by
+/// their numbers; walking along it with the normal of the scan up, the region is on the left.
 #[derive(Clone, Debug)]
 pub(in crate::reconstruct) struct Polyline {
     pub from: u8,
@@ -71,7 +71,8 @@ impl Cut {
         lines.filter(|lines| !self.is_crossed(square, lines))
     }
 
-    /// The crossing of an edge by the scan, where it is the only one and has the direction of the field.
+    /// The crossing of an edge by the scan, where it is the only one and has the direction of the
+    /// field.
     pub(in crate::reconstruct) fn shared_crossing(
         &self,
         edge: &Edge,

@@ -1,5 +1,5 @@
-//! Triangles of a plane region with holes, on its own corners: a constrained Delaunay triangulation, so that no triangle is
-//! thinner than it has to be.
+//! Triangles of a plane region with holes, on its own corners: a constrained Delaunay
+//! triangulation, so that no triangle is thinner than it has to be.
 
 use nalgebra::Point2;
 use spade::handles::{FixedFaceHandle, FixedVertexHandle, InnerTag};
@@ -12,10 +12,11 @@ pub(in crate::reconstruct) type Triangle = [u32; 3];
 
 type Delaunay = ConstrainedDelaunayTriangulation<spade::Point2<f64>>;
 
-/// Triangles of the region that `loops` bound: each a list of indices into `points`, the region on its left.
+/// Triangles of the region that `loops` bound: each a list of indices into `points`, the region on
+/// its left.
 ///
-/// Loops may share points, and pass one twice. `None` when rounding has put two points in one place or lets two sides
-/// cross.
+/// Loops may share points, and pass one twice. `None` when rounding has put two points in one place
+/// or lets two sides cross.
 pub(in crate::reconstruct) fn fill(
     points: &[Point2<f64>],
     loops: &[Vec<u32>],
@@ -65,7 +66,8 @@ pub(in crate::reconstruct) fn fill(
     )
 }
 
-/// The faces on the left of the sides, and those that are reached from there without crossing a side.
+/// The faces on the left of the sides, and those that are reached from there without crossing a
+/// side.
 fn faces_inside(
     delaunay: &Delaunay,
     sides: impl Iterator<Item = [FixedVertexHandle; 2]>,

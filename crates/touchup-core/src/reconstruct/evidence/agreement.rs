@@ -12,13 +12,16 @@ const WIDTH: f64 = 1.0;
 const VETO: f64 = 1.0;
 /// … where they have more than this share of the weight.
 const REFUSING: f64 = 0.1;
-/// What is farther off the moved scan than this, in radii, is another surface, unless the ball lay across it.
+/// What is farther off the moved scan than this, in radii, is another surface, unless the ball lay
+/// across it.
 const LARGEST_OFF: f64 = 0.1;
 /// … and where two touched surfaces meet, or one ends, and the scan is deeper, this.
 const EDGE_OFF: f64 = 1.0 / 30.0;
-/// Contacts face alike on one smooth surface, its engraved lines among them: cosine of the widest angle (26°).
+/// Contacts face alike on one smooth surface, its engraved lines among them: cosine of the widest
+/// angle (26°).
 pub(in crate::reconstruct) const BENT: f64 = 0.9;
-/// They are all around where their mean is no farther off than this, in radii of the neighbourhood (of a half disc: 0.42).
+/// They are all around where their mean is no farther off than this, in radii of the neighbourhood
+/// (of a half disc: 0.42).
 const RINGED: f64 = 0.35;
 /// So far from contacts that agree, in radii, the scan moves along with them …
 const MOVES: f64 = 1.0;
@@ -74,8 +77,9 @@ impl Agreement {
         (sum * (share * share * (3.0 - 2.0 * share) / weights), share)
     }
 
-    /// Whether the moved scan is what was touched around its point `foot`: some contacts near it agree, and nearly all that are nearest
-    /// do; and whether these are on one surface that goes on all around.
+    /// Whether the moved scan is what was touched around its point `foot`: some contacts near it
+    /// agree, and nearly all that are nearest do; and whether these are on one surface that goes on
+    /// all around.
     ///
     /// - `normal`: of what was touched there.
     /// - returns: `None` where it is not.
@@ -109,7 +113,8 @@ impl Agreement {
         (is_known && refusing <= REFUSING * weights).then_some(surroundings)
     }
 
-    /// Whether the moved scan may be the surface where it is `deeper` (m) than the touched one, of which that is the `part`.
+    /// Whether the moved scan may be the surface where it is `deeper` (m) than the touched one, of
+    /// which that is the `part`.
     pub fn is_alike(&self, deeper: f64, part: TouchedPart) -> bool {
         let [highest, deepest] = match part {
             TouchedPart::Edge => [EDGE_OFF; 2],
@@ -130,7 +135,8 @@ pub(crate) enum ContactsAround {
     BentOrOpen,
 }
 
-/// Where on a touched surface a point is: what a scan may be there that agrees with the contacts around.
+/// Where on a touched surface a point is: what a scan may be there that agrees with the contacts
+/// around.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum TouchedPart {
     /// felt all around: where the scan is deeper, the ball may have lain across it
@@ -139,6 +145,7 @@ pub(crate) enum TouchedPart {
     Edge,
     /// it ends here, or may, and a scan that is deeper may be a blurred edge
     Border,
-    /// … and no contact is so near that its surface is felt: the moved scan may rise to where it was
+    /// … and no contact is so near that its surface is felt: the moved scan may rise to where it
+    /// was
     Beyond,
 }

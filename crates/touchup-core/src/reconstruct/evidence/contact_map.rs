@@ -2,9 +2,11 @@
 //!
 //! Nothing is ever integrated into a field: the field is evaluated again from what is stored here.
 //!
-//! Contacts are independent from one pass to the next, not from sample to sample: [`ContactStatistics`] counts the passes. With a
-//! gate, a contact that contradicts the mean of its place (or of the place beside it, where it is the first) by more than
-//! both can be off is rejected. A second pass that agrees with it relocates the mean; one that confirms the mean forgets it.
+//! Contacts are independent from one pass to the next, not from sample to sample:
+//! [`ContactStatistics`] counts the passes. With a gate, a contact that contradicts the mean of its
+//! place (or of the place beside it, where it is the first) by more than both can be off is
+//! rejected. A second pass that agrees with it relocates the mean; one that confirms the mean
+//! forgets it.
 
 use nalgebra::{Point3, Vector3};
 
@@ -124,7 +126,8 @@ pub struct ContactMap {
 
 /// Normals whose components differ by less than this share a mean.
 const FACING: f64 = 0.25;
-/// A mean is reported again when it has shifted along its normal by more than this, in cells: 5 µm for a ball of 1.5 mm …
+/// A mean is reported again when it has shifted along its normal by more than this, in cells: 5 µm
+/// for a ball of 1.5 mm …
 const SHIFT: f64 = 0.01;
 /// … or turned by more than this, rad: 0.3°, which are 5 µm a millimetre away.
 const TURN: f64 = 5e-3;
@@ -134,7 +137,8 @@ const MOST_KEPT: usize = 200_000;
 const LEAST_EVIDENCE: f64 = 3.0;
 /// Normals within 25° are those of one surface.
 const ALIKE: f64 = 0.906;
-/// So many cells above and below a contact there is nothing that faces alike, or the ball would not have fitted in.
+/// So many cells above and below a contact there is nothing that faces alike, or the ball would not
+/// have fitted in.
 const DEPTH: i32 = 3;
 /// Share of a cell by which a surface may be off the chord between two of its points.
 const ROUGHNESS: f64 = 0.02;
@@ -222,8 +226,9 @@ impl ContactMap {
             .find(|&index| self.kept[index as usize].bin == *bin)
     }
 
-    /// The mean that a contact contradicts: that of its own cell, or where it is among the first there the nearest around
-    /// that faces alike, or where there is none the one before it on its path.
+    /// The mean that a contact contradicts: that of its own cell, or where it is among the first
+    /// there the nearest around that faces alike, or where there is none the one before it on its
+    /// path.
     fn rival(
         &self,
         contact: &SurfaceContact,
@@ -289,7 +294,8 @@ impl ContactMap {
             .innovation(contact, ROUGHNESS * self.cell)
     }
 
-    /// Rejects a contact, or lets it take the place of the mean that it contradicts in a second pass.
+    /// Rejects a contact, or lets it take the place of the mean that it contradicts in a second
+    /// pass.
     fn contest(
         &mut self,
         rival: &Rival,
@@ -341,7 +347,8 @@ impl ContactMap {
         Verdict::Rejected
     }
 
-    /// Empties the means that a contact contradicts and puts what was rejected in the cell of its contacts.
+    /// Empties the means that a contact contradicts and puts what was rejected in the cell of its
+    /// contacts.
     fn move_to(
         &mut self,
         rival: u32,
@@ -461,7 +468,8 @@ impl ContactMap {
         self.history.len()
     }
 
-    /// Undoes the last stroke, or does the one again that was undone last. Returns whether there was one.
+    /// Undoes the last stroke, or does the one again that was undone last. Returns whether there
+    /// was one.
     pub(in crate::reconstruct) fn exchange(&mut self, direction: Direction) -> bool {
         let mut history = std::mem::replace(&mut self.history, History::new(MOST_KEPT));
         let has_changed = history.exchange(direction, |key, past| self.swap(key, past));
@@ -487,8 +495,8 @@ impl ContactMap {
         }
     }
 
-    /// The numbers of the means that are new since the last call, or are clearly elsewhere than when they were last
-    /// reported, each once.
+    /// The numbers of the means that are new since the last call, or are clearly elsewhere than
+    /// when they were last reported, each once.
     pub(crate) fn take_changed(&mut self) -> CellTable<u32, ()> {
         let changed = std::mem::take(&mut self.changed);
         for (at, ()) in changed.iter() {
@@ -508,7 +516,8 @@ impl ContactMap {
         &self.kept[index as usize].sums
     }
 
-    /// Variance of a mean along its normal by noise and calibration, m²: noise averages out by the number of passes.
+    /// Variance of a mean along its normal by noise and calibration, m²: noise averages out by the
+    /// number of passes.
     pub(in crate::reconstruct) fn variance(&self, index: u32) -> f64 {
         self.noise_variance(index) + self.sums(index).sigma().systematic().powi(2)
     }
@@ -525,21 +534,23 @@ impl ContactMap {
         self.reweigh(at)
     }
 
-    /// Takes a mean of two mixed contacts out of all queries, or back in; returns whether that is new.
+    /// Takes a mean of two mixed contacts out of all queries, or back in; returns whether that is
+    /// new.
     pub(in crate::reconstruct) fn mark_mixed(&mut self, at: u32, is_mixed: bool) -> bool {
         self.kept[at as usize].is_mixed = is_mixed;
         self.reweigh(at)
     }
 
-    /// Lets a mean count what its state allows; returns whether it is new that it counts, or that it does not.
+    /// Lets a mean count what its state allows; returns whether it is new that it counts, or that
+    /// it does not.
     fn reweigh(&mut self, at: u32) -> bool {
         let mean = &mut self.means[at as usize];
         let before = std::mem::replace(&mut mean.weight, self.kept[at as usize].weight());
         (before == 0.0) != (mean.weight == 0.0)
     }
 
-    /// Finds whether normals within `width` (m) of a mean differ by more than the angle of `cosine`; returns whether that
-    /// is new.
+    /// Finds whether normals within `width` (m) of a mean differ by more than the angle of
+    /// `cosine`; returns whether that is new.
     pub(crate) fn mark_fan(&mut self, at: u32, width: f64, cosine: f64) -> bool {
         let MeanContact {
             point,
@@ -560,8 +571,8 @@ impl ContactMap {
         &self.means
     }
 
-    /// Calls `each` with the squared distance (m²) and the number of every mean nearer to `x` than `reach` (m), which is
-    /// cut off at that of the store.
+    /// Calls `each` with the squared distance (m²) and the number of every mean nearer to `x` than
+    /// `reach` (m), which is cut off at that of the store.
     #[inline]
     pub fn near(&self, x: &Point3<f64>, reach: f64, mut each: impl FnMut(f64, u32)) {
         self.near_known(x, reach, |distance_squared, index| {

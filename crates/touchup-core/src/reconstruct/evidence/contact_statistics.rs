@@ -1,4 +1,5 @@
-//! Contact statistics: sums over the contacts of one place, its independent passes, and the innovation of another contact.
+//! Contact statistics: sums over the contacts of one place, its independent passes, and the
+//! innovation of another contact.
 
 use nalgebra::{Point3, Vector3};
 
@@ -20,8 +21,8 @@ pub(in crate::reconstruct) struct Pass {
 /// Passes remembered one by one; further ones are put to those.
 const REMEMBERED: usize = 4;
 
-/// The passes over one place: samples in one smoothing window share their noise. A pass ends after the length of a window: later
-/// contacts are independent.
+/// The passes over one place: samples in one smoothing window share their noise. A pass ends after
+/// the length of a window: later contacts are independent.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(in crate::reconstruct) struct IndependentPasses {
     slots: [Pass; REMEMBERED],
@@ -106,8 +107,9 @@ impl ContactStatistics {
         }
     }
 
-    /// How far a contact is off the chord to the mean, m, and how many standard deviations that is. The chord is at right
-    /// angles to the mean of both normals, unless one is known much better. What calibration leaves is the same in both.
+    /// How far a contact is off the chord to the mean, m, and how many standard deviations that is.
+    /// The chord is at right angles to the mean of both normals, unless one is known much better.
+    /// What calibration leaves is the same in both.
     ///
     /// - `roughness`: by which the surface itself may be off a chord, m.
     pub fn innovation(&self, contact: &SurfaceContact, roughness: f64) -> (f64, f64) {

@@ -1,9 +1,9 @@
 //! Uncertainty of a contact, cause by cause.
 //!
-//! Along the normal a contact is off by noise of the pose and of the force over the stiffness, both after the smoothing
-//! window, and by r (1 − cos σ) where its normal is off by σ: that much the ball reaches over the surface. These average out
-//! from window to window. What the radius, the pose of the scan and the stiffness are off by does not: it is the same in
-//! each.
+//! Along the normal a contact is off by noise of the pose and of the force over the stiffness, both
+//! after the smoothing window, and by r (1 − cos σ) where its normal is off by σ: that much the
+//! ball reaches over the surface. These average out from window to window. What the radius, the
+//! pose of the scan and the stiffness are off by does not: it is the same in each.
 
 use crate::parameters;
 
@@ -11,13 +11,13 @@ parameters! {
     /// What a calibration leaves uncertain; standard deviations.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct CalibrationParams in "uncertainty" {
-        /// What is left after calibrating the radius of the tip; it averages out in no number of touches, and twice of it is in each
-        /// diameter and width.
+        /// What is left after calibrating the radius of the tip; it averages out in no number of
+        /// touches, and twice of it is in each diameter and width.
         ///
         /// In m. A ball of ruby is round within 0.2 µm, and its radius is calibrated within one.
         radius: f64 = 0.001, "radius_sigma_mm" [MM, 0, 1000];
-        /// What is left after calibrating the centre of the tip and the frame of the scan, along each axis; it averages out in no number
-        /// of touches, and is in each place and in no size.
+        /// What is left after calibrating the centre of the tip and the frame of the scan, along
+        /// each axis; it averages out in no number of touches, and is in each place and in no size.
         ///
         /// In m. A gauge block gives the centre within a few µm.
         place: f64 = 0.002, "place_sigma_mm" [MM, 0, 1000];
@@ -34,7 +34,8 @@ parameters! {
     pub struct UncertaintyParams in "uncertainty" {
         /// Standard deviation of a vertex of the scan, m; 0: free of noise.
         scan: f64 = 0.0;
-        /// A contact that contradicts by more than this many standard deviations is rejected as an outlier.
+        /// A contact that contradicts by more than this many standard deviations is rejected as an
+        /// outlier.
         gate_sigmas: f64 = 4.0, "gate_sigmas" [SIGMAS, 0.5, 1e6];
     }
     with {

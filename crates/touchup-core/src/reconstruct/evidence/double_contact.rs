@@ -1,9 +1,10 @@
-//! Double contact: a ball that touches two surfaces at once, as in an inner corner or a slot no wider than itself.
+//! Double contact: a ball that touches two surfaces at once, as in an inner corner or a slot no
+//! wider than itself.
 //!
-//! The force is then the sum of two, and lies anywhere between their normals: taken for one normal it invents a surface
-//! that bridges the corner. Where both surfaces are known from contacts nearby, and the ball lies on both, it is two
-//! contacts and not one. On a convex edge the ball is nearer to the planes on either side than its radius, so that this
-//! does not take it for a corner.
+//! The force is then the sum of two, and lies anywhere between their normals: taken for one normal
+//! it invents a surface that bridges the corner. Where both surfaces are known from contacts
+//! nearby, and the ball lies on both, it is two contacts and not one. On a convex edge the ball is
+//! nearer to the planes on either side than its radius, so that this does not take it for a corner.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
@@ -11,27 +12,31 @@ use crate::numeric::direction;
 use crate::reconstruct::evidence::contact_map::ContactMap;
 use crate::reconstruct::evidence::touches::SurfaceContact;
 
-/// The ball lies on a surface when its centre is its radius away to within this share of it: four times the noise of a usual
-/// tracker, and less than it would be off at 20° beside an edge.
+/// The ball lies on a surface when its centre is its radius away to within this share of it: four
+/// times the noise of a usual tracker, and less than it would be off at 20° beside an edge.
 const ON_SURFACE: f64 = 0.05;
 /// Contacts within this many radii of where the ball would touch their plane support it.
 const NEARBY: f64 = 1.0;
-/// … and within this many radii of where the ball seems to touch: a new contact affects means up to there.
+/// … and within this many radii of where the ball seems to touch: a new contact affects means up to
+/// there.
 const ASKED: f64 = 2.0;
 /// Contacts that face within 20° of each other are of one surface.
 const ALIKE: f64 = 0.94;
-/// Surfaces at less than 45° to each other are one that bends: beside an edge the ball may lie on both to within the noise.
+/// Surfaces at less than 45° to each other are one that bends: beside an edge the ball may lie on
+/// both to within the noise.
 const DISTINCT: f64 = 0.707;
 /// A surface that takes less of the force than this share of the other one, 6°, is not pressed.
 const PRESSED: f64 = 0.1;
-/// Sine of how far the force may be off the plane of both normals: 20°, what friction leaves uncertain.
+/// Sine of how far the force may be off the plane of both normals: 20°, what friction leaves
+/// uncertain.
 const OFF_PLANE: f64 = 0.34;
 /// A surface is known by as much as so many contacts while sliding.
 const LEAST_WEIGHT: f64 = 2.0;
-/// The two take no more together than this many times the measured force: a corner of 75° or wider, and no wedge.
+/// The two take no more together than this many times the measured force: a corner of 75° or wider,
+/// and no wedge.
 const MOST_FORCE: f64 = 1.6;
-/// Standard deviation of the centres of the balls that touched either surface, across the corner, in radii: those of a ball
-/// that bridges it all lie on one line, to within the noise …
+/// Standard deviation of the centres of the balls that touched either surface, across the corner,
+/// in radii: those of a ball that bridges it all lie on one line, to within the noise …
 const SPREAD: f64 = 0.03;
 /// … or of one of both surfaces by as much as this.
 const WIDE_SPREAD: f64 = 0.05;
@@ -48,13 +53,15 @@ struct TouchedWall {
     weight: f64,
     /// how many means
     count: f64,
-    /// Σ d and Σ d dᵀ, d: where the centres of the balls were that touched it, from that of the ball, m and m²
+    /// Σ d and Σ d dᵀ, d: where the centres of the balls were that touched it, from that of the
+    /// ball, m and m²
     offset: Vector3<f64>,
     spread: Matrix3<f64>,
 }
 
 impl TouchedWall {
-    /// Standard deviation of the places from which it was touched, across the corner that it makes with another, m.
+    /// Standard deviation of the places from which it was touched, across the corner that it makes
+    /// with another, m.
     fn width(&self, other: &Self) -> f64 {
         // of two that face the same way there is no corner, and no width
         let across =
@@ -66,8 +73,9 @@ impl TouchedWall {
     }
 }
 
-/// The two contacts of a ball of `radius` (m) with its centre at `centre` (m, in O) that the one measured along `normal`
-/// is the resultant of; `None` when it touches one surface, or the two are not known.
+/// The two contacts of a ball of `radius` (m) with its centre at `centre` (m, in O) that the one
+/// measured along `normal` is the resultant of; `None` when it touches one surface, or the two are
+/// not known.
 pub(in crate::reconstruct) fn double_contact(
     contacts: &ContactMap,
     radius: f64,
@@ -94,7 +102,8 @@ pub(in crate::reconstruct) fn double_contact(
         .min_by(|[a, b], [c, d]| a.dot(b).total_cmp(&c.dot(d)))
 }
 
-/// Whether two surfaces were touched from places so far from each other (m) that none of them is a bridge over their corner.
+/// Whether two surfaces were touched from places so far from each other (m) that none of them is a
+/// bridge over their corner.
 fn is_wide([a, b]: [f64; 2], radius: f64) -> bool {
     a.min(b) > SPREAD * radius || a.max(b) > WIDE_SPREAD * radius
 }
@@ -210,7 +219,8 @@ mod tests {
         }
     }
 
-    /// Contacts each 0.4 mm on the floor z = 0 and on the wall x = 0, as far as a ball in the corner reaches.
+    /// Contacts each 0.4 mm on the floor z = 0 and on the wall x = 0, as far as a ball in the
+    /// corner reaches.
     fn corner(open: bool) -> ContactMap {
         let mut store = ContactMap::new(0.5e-3, 3e-3, None);
         for i in 0..8 {

@@ -11,8 +11,8 @@ use crate::stylus::{TipBody, TipPlace};
 
 /// Cosine of the widest angle between a path and what counts as straight ahead: 45°.
 const STRAIGHT: f64 = 0.7;
-/// A tip that leans by more than this, as the difference of a component of its axis, is kept beside one in the same cell:
-/// 2°, which moves a shaft of two radii by a fourteenth of a radius.
+/// A tip that leans by more than this, as the difference of a component of its axis, is kept beside
+/// one in the same cell: 2°, which moves a shaft of two radii by a fourteenth of a radius.
 const LEAN: f64 = 0.035;
 /// Free space around a body that is no ball is resolved up to this share of its scale around it.
 const AROUND: f64 = 2.0 / 3.0;
@@ -71,7 +71,8 @@ impl Keyed for TipPlace {
 }
 
 impl FreeSpace {
-    /// Empty: one place is kept for each cube of edge `cell` (m); queries of a ball go up to `reach` (m).
+    /// Empty: one place is kept for each cube of edge `cell` (m); queries of a ball go up to
+    /// `reach` (m).
     pub fn new(tip: TipBody, cell: f64, reach: f64) -> Self {
         let body = (!tip.is_ball()).then(|| SweptVolume {
             tip,
@@ -104,8 +105,8 @@ impl FreeSpace {
         }
     }
 
-    /// Forgets where the tip was nearer to `p` with its middle than `distance` (m, up to the reach); of a tip that is no
-    /// ball, as much nearer with its surface as a ball of its scale.
+    /// Forgets where the tip was nearer to `p` with its middle than `distance` (m, up to the
+    /// reach); of a tip that is no ball, as much nearer with its surface as a ball of its scale.
     pub fn forget(&mut self, p: &Point3<f64>, distance: f64) {
         let Self {
             reach,
@@ -147,7 +148,8 @@ impl FreeSpace {
             .min(self.centres.strokes())
     }
 
-    /// Undoes the last stroke, or does the one again that was undone last; returns whether there was one.
+    /// Undoes the last stroke, or does the one again that was undone last; returns whether there
+    /// was one.
     pub fn exchange(&mut self, direction: Direction) -> bool {
         self.changed.clear();
         if let Some(body) = &mut self.body {
@@ -177,7 +179,8 @@ impl FreeSpace {
         }
     }
 
-    /// Whether the path of the ball ended at `centre`, going in `direction` (unit): within `width` (m) all of it is behind.
+    /// Whether the path of the ball ended at `centre`, going in `direction` (unit): within `width`
+    /// (m) all of it is behind.
     pub fn is_end(&self, centre: &Point3<f64>, direction: &Vector3<f64>, width: f64) -> bool {
         let (mut sum, mut count) = (Vector3::zeros(), 0.0f64);
         for other in self
@@ -194,7 +197,8 @@ impl FreeSpace {
 
     /// Distance from `x` to the nearest centre, m, and that centre; `None` beyond the reach.
     ///
-    /// Of a tip that is no ball it is the signed distance from its body plus its scale: like a ball of that radius.
+    /// Of a tip that is no ball it is the signed distance from its body plus its scale: like a ball
+    /// of that radius.
     pub fn nearest(&self, x: &Point3<f64>) -> Option<(f64, Point3<f64>)> {
         if let Some(body) = &self.body {
             return body.nearest(x);

@@ -1,12 +1,15 @@
-//! The detail of a scan that is finer than the tip, where it agrees with the touches: the scan is moved there and not replaced.
+//! The detail of a scan that is finer than the tip, where it agrees with the touches: the scan is
+//! moved there and not replaced.
 //!
-//! For each mean contact j the scan says where the ball would have been stopped: off by δⱼ = |x − c| − r, with the centre of the ball
-//! c = pⱼ + r nⱼ and the closest point x of the scan. Where these mismatches vary smoothly, the scan has the shape that was felt, and
-//! is moved by their weighted mean
+//! For each mean contact j the scan says where the ball would have been stopped: off by δⱼ = |x −
+//! c| − r, with the centre of the ball c = pⱼ + r nⱼ and the closest point x of the scan. Where
+//! these mismatches vary smoothly, the scan has the shape that was felt, and is moved by their
+//! weighted mean
 //!
 //! u(x) = s(d) Σ wⱼ δⱼ nⱼ / Σ wⱼ,   wⱼ = Wⱼ exp(−(|x − pⱼ|² − d²) / max(σ², d²/2)),
 //!
-//! where d is the distance to the nearest contact that agrees; s falls smoothly from 1 within a radius to 0 at two.
+//! where d is the distance to the nearest contact that agrees; s falls smoothly from 1 within a
+//! radius to 0 at two.
 
 use nalgebra::Vector3;
 
@@ -21,7 +24,8 @@ use crate::reconstruct::field::lattice::VertexKey;
 const FINE: f64 = 0.36;
 /// Cosine of the widest angle between the arm to the scan and the normal of the contact.
 const ALONG: f64 = 0.9;
-/// A contact agrees when its mismatch is that around it but for this, in radii: 0.075 mm for a ball of 1.5 mm.
+/// A contact agrees when its mismatch is that around it but for this, in radii: 0.075 mm for a ball
+/// of 1.5 mm.
 const AGREES: f64 = 0.05;
 /// … and for so many standard deviations of its own. What is left of it …
 const SIGMAS: f64 = 2.0;
@@ -32,8 +36,9 @@ const AVERAGED_WITHIN: f64 = 1.2;
 const LIMIT: f64 = 3.0;
 /// … and this ε beside, in radii: 4.5 µm for a ball of 1.5 mm.
 const SLACK: f64 = 0.003;
-/// Vertices may scatter by this across the straightest line through them, in radii (median): more is noise that touches do better, of 8 µm
-/// for a ball of 1.5 mm. Lines that are engraved are straight.
+/// Vertices may scatter by this across the straightest line through them, in radii (median): more
+/// is noise that touches do better, of 8 µm for a ball of 1.5 mm. Lines that are engraved are
+/// straight.
 const SCATTER: f64 = 0.002;
 /// Around a contact the scatter is looked at within this, in radii.
 const AROUND: f64 = 1.0 / 3.0;
@@ -51,7 +56,8 @@ pub(in crate::reconstruct) struct KeptDetail {
 }
 
 impl KeptDetail {
-    /// Finds where the scan agrees, and moves it; `None` where it is no finer than the tip, or agrees nowhere.
+    /// Finds where the scan agrees, and moves it; `None` where it is no finer than the tip, or
+    /// agrees nowhere.
     pub fn of(evidence: &Evidence<'_>) -> Option<Self> {
         let (scan, tree, radius) = (evidence.scan, evidence.tree, evidence.params.radius);
         if !evidence.free_space.is_of_ball() || scan.mean_edge() >= FINE * radius {
@@ -128,9 +134,10 @@ impl KeptDetail {
     }
 }
 
-/// Looks at each contact alone, then beside the others: what is left of their mismatches, ρⱼ = δⱼ − u(pⱼ)·nⱼ, must be no more than the noise
-/// of touches. A ball that is bounced by engraved lines is smoothed by its window, so it is averaged first, ρ̄ = Σ gₖ ρₖ / Σ gₖ with
-/// variance Σ gₖ² σₖ² / (Σ gₖ)², gₖ = wₖ exp(−|pₖ − pⱼ|² / b²); then over the contacts within a radius
+/// Looks at each contact alone, then beside the others: what is left of their mismatches, ρⱼ = δⱼ −
+/// u(pⱼ)·nⱼ, must be no more than the noise of touches. A ball that is bounced by engraved lines is
+/// smoothed by its window, so it is averaged first, ρ̄ = Σ gₖ ρₖ / Σ gₖ with variance Σ gₖ² σₖ² /
+/// (Σ gₖ)², gₖ = wₖ exp(−|pₖ − pⱼ|² / b²); then over the contacts within a radius
 ///
 /// Σ wⱼ ρ̄ⱼ² ≤ Σ wⱼ (l² σ̄ⱼ² + ε²).
 fn agreement_of(evidence: &Evidence<'_>) -> Agreement {
@@ -265,7 +272,8 @@ impl<'a> Fineness<'a> {
     }
 }
 
-/// How far a vertex is off the straightest of the lines through it from one neighbour to the one across, along its normal, m.
+/// How far a vertex is off the straightest of the lines through it from one neighbour to the one
+/// across, along its normal, m.
 fn scatter_of(scan: &TriMesh, vertex: VertexId) -> f64 {
     let star = scan.star(vertex);
     let normal = star

@@ -1,4 +1,5 @@
-//! Outliers: contacts that contradicted earlier ones at their place; counted, and the last of them kept for inspection.
+//! Outliers: contacts that contradicted earlier ones at their place; counted, and the last of them
+//! kept for inspection.
 
 use std::collections::VecDeque;
 

@@ -14,7 +14,8 @@ use crate::reconstruct::field::piecewise::{FieldParams, FieldScratch, FieldValue
 
 /// Values are cut off at ± this many cells: far from the surface only the sign matters.
 const WIDEST: f64 = 2.7;
-/// The scan goes straight on beyond an open rim for this many cells: up to the corners of those that the rim runs through.
+/// The scan goes straight on beyond an open rim for this many cells: up to the corners of those
+/// that the rim runs through.
 const RIM_REACH: f64 = 1.732;
 
 /// How each kind of evidence is weighted.
@@ -38,7 +39,8 @@ const BORDER_SUPPORT: f64 = 0.75;
 const EDGE_SUPPORT: f64 = 1.0;
 /// The tilted plane at an edge that the ball rolled over goes on up to this, in radii.
 const FAN_SUPPORT: f64 = 0.25;
-/// A contact supports what is nearer to its surface than this, in radii: behind it may be another wall.
+/// A contact supports what is nearer to its surface than this, in radii: behind it may be another
+/// wall.
 const TOUCH_DEPTH: f64 = 0.8;
 /// The ball is free when nothing is touched within this distance of its centre, in radii.
 pub(in crate::reconstruct) const FREE_REACH: f64 = 1.5;
@@ -52,7 +54,8 @@ const ALIKE: f64 = 0.6;
 pub(in crate::reconstruct) const SWEPT_REACH: f64 = 0.067;
 
 impl EvidenceParams {
-    /// Settings that hold for a ball of `radius` (m) and a scan whose points are off by `noise` (m).
+    /// Settings that hold for a ball of `radius` (m) and a scan whose points are off by `noise`
+    /// (m).
     pub fn new(radius: f64, noise: f64) -> Self {
         Self {
             radius,
@@ -90,13 +93,15 @@ pub(in crate::reconstruct) struct NodeState {
     pub source: Source,
     /// the scan's own value, m
     pub scan: f64,
-    /// where nothing is known: value of a touched surface going straight on, m, and its weight, 0 to 1
+    /// where nothing is known: value of a touched surface going straight on, m, and its weight, 0
+    /// to 1
     pub straight: (f64, f64),
     /// the ball was here: f is no less than this, m
     pub least: f64,
     /// … and ended its path here without touching anything, deep inside the scan
     pub is_free_end: bool,
-    /// it is out of reach of all evidence, and was looked at because a surface that is filled in goes on there
+    /// it is out of reach of all evidence, and was looked at because a surface that is filled in
+    /// goes on there
     pub is_further: bool,
     /// value of the field of the touches, m; `None` out of their support
     pub touched_value: Option<f64>,
@@ -151,13 +156,14 @@ impl NodeState {
     }
 }
 
-/// The scan is not used where it moves a touch, which is by gate × σₜ² / σₛ at most, by less than this share of what that may be off
-/// anyway.
+/// The scan is not used where it moves a touch, which is by gate × σₜ² / σₛ at most, by less than
+/// this share of what that may be off anyway.
 const NOTICED: f64 = 0.1;
 
 /// Free space ends a touched surface farther than this from its last contact, in radii …
 const ENDS_FROM: f64 = 0.25;
-/// … and where the ball was deeper in it than this, in radii, and so many standard deviations of the contact.
+/// … and where the ball was deeper in it than this, in radii, and so many standard deviations of
+/// the contact.
 const ENDS_MARGIN: f64 = 0.05;
 const ENDS_SIGMAS: f64 = 2.0;
 
@@ -181,14 +187,17 @@ pub(crate) struct Evidence<'a> {
     pub tree: &'a FaceTree,
     /// how well the scan was known before; `None`: where something was touched it does not count
     pub prior: Option<UncertaintyParams>,
-    /// the contacts that the scan agrees with: around them it is the surface, moved to where they are
+    /// the contacts that the scan agrees with: around them it is the surface, moved to where they
+    /// are
     pub agreement: Option<&'a Agreement>,
-    /// whether the scan has no rim, so that what is behind it is known: then the patch has none either
+    /// whether the scan has no rim, so that what is behind it is known: then the patch has none
+    /// either
     pub is_closed: bool,
 }
 
 impl Evidence<'_> {
-    /// The field at `x` (m, in O), a node of a lattice of `pitch` (m), with the scan's part in `scan`.
+    /// The field at `x` (m, in O), a node of a lattice of `pitch` (m), with the scan's part in
+    /// `scan`.
     pub(in crate::reconstruct) fn beside(
         &self,
         scan: &ScanDistance,
@@ -260,8 +269,8 @@ impl Evidence<'_> {
         ScanDistance::at(self.scan, self.tree, x)
     }
 
-    /// The field of the touches at `x` (m, in O), which take the place of the scan by the gain σₛ² / (σₛ² + σₜ²) of the
-    /// nearest one; `None` where none is within reach.
+    /// The field of the touches at `x` (m, in O), which take the place of the scan by the gain σₛ²
+    /// / (σₛ² + σₜ²) of the nearest one; `None` where none is within reach.
     ///
     /// - `scan`: as seen from there, where that is known.
     pub fn touched(
@@ -287,14 +296,16 @@ impl Evidence<'_> {
         Some(found)
     }
 
-    /// Ends a touched surface beyond its last contact where the ball was: it rolled around an edge there, or sank into a hole.
+    /// Ends a touched surface beyond its last contact where the ball was: it rolled around an edge
+    /// there, or sank into a hole.
     pub(in crate::reconstruct) fn end_at_free_space(
         &self,
         found: &mut FieldValue,
         x: &Point3<f64>,
     ) {
         let radius = self.params.radius;
-        // a tip of another shape reaches along its flank, and the nearest place of it says little of its surface
+        // a tip of another shape reaches along its flank, and the nearest place of it says little
+        // of its surface
         if found.lateral() < ENDS_FROM * radius || !self.free_space.is_of_ball() {
             return;
         }
@@ -378,8 +389,9 @@ impl Evidence<'_> {
         agreement.is_alike(scan.value - touched.value, part)
     }
 
-    /// Whether a point out of reach of contacts that is behind the scan is behind the part: a radius nearer to the scan it is in front of a touched
-    /// surface that faces away from there, and farther away from both there is no other scan.
+    /// Whether a point out of reach of contacts that is behind the scan is behind the part: a
+    /// radius nearer to the scan it is in front of a touched surface that faces away from there,
+    /// and farther away from both there is no other scan.
     fn is_behind_part(
         &self,
         scan: &ScanDistance,
@@ -407,8 +419,8 @@ impl Evidence<'_> {
         })
     }
 
-    /// The touched surface beyond its support: it goes straight on, unless the ball rolled over an edge there, and not out
-    /// of the scan.
+    /// The touched surface beyond its support: it goes straight on, unless the ball rolled over an
+    /// edge there, and not out of the scan.
     fn straight_on(&self, touched: &FieldValue, scan: &ScanDistance) -> Option<(f64, f64)> {
         let p = self.params;
         let inside = (1.0 - scan.value / p.scan_reach).clamp(0.0, 1.0);
@@ -418,7 +430,8 @@ impl Evidence<'_> {
         goes_on.then(|| (touched.value, inside * share.clamp(0.0, 1.0).powi(2)))
     }
 
-    /// Whether two touched surfaces go straight on into an inner corner, there where the field was evaluated last.
+    /// Whether two touched surfaces go straight on into an inner corner, there where the field was
+    /// evaluated last.
     fn is_corner(&self, touched: &FieldValue, scratch: &FieldScratch) -> bool {
         let p = self.params;
         touched.value.abs() <= TOUCH_DEPTH * p.radius
@@ -435,7 +448,8 @@ impl Evidence<'_> {
         }
     }
 
-    /// Whether the scan holds at its foot: near, not swept, and no contact beside it contradicts it.
+    /// Whether the scan holds at its foot: near, not swept, and no contact beside it contradicts
+    /// it.
     fn scan_holds(&self, scan: &ScanDistance) -> bool {
         let p = self.params;
         if scan.value.abs() > p.scan_reach || scan.is_on_rim || self.is_swept_away(scan) {
@@ -447,8 +461,8 @@ impl Evidence<'_> {
             .near(&scan.foot, scan_removal, |distance_squared, index| {
                 let contact = &self.contacts.means()[index as usize];
                 let cosine = contact.normal.dot(&scan.normal);
-                // a scan that faces a touched surface and is not clearly behind it leaves its wall no thickness; in front of
-                // it the ball had no room for it
+                // a scan that faces a touched surface and is not clearly behind it leaves its wall
+                // no thickness; in front of it the ball had no room for it
                 let depth = contact.normal.dot(&(contact.point - scan.foot));
                 let is_pierced = cosine < -ALIKE && depth < wall_removal;
                 let limit = if cosine > ALIKE || is_pierced {
@@ -468,13 +482,15 @@ impl Evidence<'_> {
             .is_some_and(|(distance, _)| distance < limit)
     }
 
-    /// How deep `x` lies in the space that the ball went through, m, and where it was then; `None` far from there.
+    /// How deep `x` lies in the space that the ball went through, m, and where it was then; `None`
+    /// far from there.
     pub(in crate::reconstruct) fn free_depth(&self, x: &Point3<f64>) -> Option<(f64, Point3<f64>)> {
         let (distance, centre) = self.free_space.nearest(x)?;
         Some(((1.0 - SWEPT_MARGIN) * self.params.radius - distance, centre))
     }
 
-    /// How deep `x` lies in the space that the ball went through, m, and whether that ball ended its path here freely.
+    /// How deep `x` lies in the space that the ball went through, m, and whether that ball ended
+    /// its path here freely.
     fn swept_depth(&self, x: &Point3<f64>) -> (f64, bool) {
         let p = self.params;
         let Some((depth, centre)) = self.free_depth(x) else {
@@ -499,7 +515,8 @@ mod tests {
     use crate::reconstruct::{ContactSigma, SurfaceContact};
     use crate::stylus::{TipBody, TipPlace, TipShape};
 
-    /// The face z = 0 is touched up to the edge y = 0, and the ball rolls around it by 60°: 0.5 r beyond, the face is 0.26 r deep in it.
+    /// The face z = 0 is touched up to the edge y = 0, and the ball rolls around it by 60°: 0.5 r
+    /// beyond, the face is 0.26 r deep in it.
     #[test]
     fn a_face_ends_where_the_ball_rolled_around_its_edge() {
         let radius = 1.5e-3;
@@ -571,7 +588,8 @@ mod tests {
             value(&nowhere, 0.5 * radius).abs() < 1e-9,
             "it would go straight on"
         );
-        // deepest below the ball at an angle of 60°: r − |(0.5 − sin 60°, cos 60°)| r, less the margin of 0.05 r
+        // deepest below the ball at an angle of 60°: r − |(0.5 − sin 60°, cos 60°)| r, less the
+        // margin of 0.05 r
         let depth = radius * (1.0 - (0.5 - 0.75f64.sqrt()).hypot(0.5) - 0.05);
         assert!(
             (value(&rolled, 0.5 * radius) - depth).abs() < 0.02 * radius,

@@ -10,8 +10,8 @@ use crate::reconstruct::incremental::history::Direction;
 use crate::reconstruct::table::CellTable;
 use crate::stylus::ProbedPoint;
 
-/// Touches in order of time. Their number is bounded by the surface that they are on: when there are more, every second one is
-/// dropped of each cell that has many.
+/// Touches in order of time. Their number is bounded by the surface that they are on: when there
+/// are more, every second one is dropped of each cell that has many.
 #[derive(Clone, Debug)]
 pub(crate) struct ProbedLog {
     /// radius of the tip when it is a ball, m
@@ -25,11 +25,13 @@ pub(crate) struct ProbedLog {
     spacing_ns: i64,
 }
 
-/// Touches closer together in time are redundant: the window in which they are smoothed is eight times as long.
+/// Touches closer together in time are redundant: the window in which they are smoothed is eight
+/// times as long.
 const SPACING_NS: i64 = 4_000_000;
 /// So many touches are kept wherever they are: four minutes of them, 10 MB.
 const ALWAYS_KEPT: usize = 1 << 16;
-/// … and so many more for each cell of the surface: 0.1 mm apart they would be one for each of their places.
+/// … and so many more for each cell of the surface: 0.1 mm apart they would be one for each of
+/// their places.
 const OF_A_CELL: usize = 64;
 /// Edge of a cell, m.
 const CELL: f64 = 1e-3;
@@ -208,8 +210,8 @@ mod tests {
         );
     }
 
-    /// An hour without a pause over 6 mm x 6 mm, 30 mm/s: what is kept has the bound of its cells at any time, and every cell keeps
-    /// many of its touches.
+    /// An hour without a pause over 6 mm x 6 mm, 30 mm/s: what is kept has the bound of its cells
+    /// at any time, and every cell keeps many of its touches.
     #[test]
     fn an_hour_on_a_small_part_keeps_what_its_surface_bounds() {
         let mut log = ProbedLog::new(Some(1.5e-3));

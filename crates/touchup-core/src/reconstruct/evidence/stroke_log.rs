@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 use crate::reconstruct::incremental::history::Direction;
 use crate::stylus::{STROKE_PAUSE_NS, TouchState};
 
-/// The samples of a stroke: from touch-down to the touch-down of the next one, so with them where the tip went after it.
+/// The samples of a stroke: from touch-down to the touch-down of the next one, so with them where
+/// the tip went after it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StrokeSpan {
     /// stamp of the first sample, ns
@@ -20,8 +21,8 @@ impl StrokeSpan {
         (self.from_ns..self.until_ns).contains(&stamp_ns)
     }
 
-    /// Whether this stamp, ns, is that of its touch-down. Where other samples were taken out, the bias that is followed through them may
-    /// move it by some samples.
+    /// Whether this stamp, ns, is that of its touch-down. Where other samples were taken out, the
+    /// bias that is followed through them may move it by some samples.
     pub fn begins_at(&self, stamp_ns: i64) -> bool {
         self.from_ns.abs_diff(stamp_ns) < STROKE_PAUSE_NS.unsigned_abs() / 2
     }
@@ -55,7 +56,8 @@ impl StrokeLog {
     pub fn note_contact(&mut self, stamp_ns: i64, is_first: bool) {
         if is_first {
             let down_ns = self.touched_down_ns.unwrap_or(stamp_ns);
-            // without a free sample in between, as where it was undone while touching, it goes on from there
+            // without a free sample in between, as where it was undone while touching, it goes on
+            // from there
             let from_ns = self
                 .last_contact_ns
                 .map_or(down_ns, |last_ns| down_ns.max(last_ns.saturating_add(1)));

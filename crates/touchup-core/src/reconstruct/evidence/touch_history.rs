@@ -15,11 +15,14 @@ use crate::reconstruct::incremental::history::Direction;
 use crate::reconstruct::table::CellTable;
 use crate::stylus::{STROKE_PAUSE_NS, TipPlace, TouchState};
 
-/// A contact that the ball went into by more than this is none, in radii: four times the noise of a usual tracker.
+/// A contact that the ball went into by more than this is none, in radii: four times the noise of a
+/// usual tracker.
 const REFUTED_DEPTH: f64 = 0.133;
-/// Where a contact is relocated, the ball has been nearer than this to the earlier surface, in radii.
+/// Where a contact is relocated, the ball has been nearer than this to the earlier surface, in
+/// radii.
 const FORGOTTEN: f64 = 1.1;
-/// A contact farther outside of the scan than this belongs to something else, in radii; so does one so far out of the box around it.
+/// A contact farther outside of the scan than this belongs to something else, in radii; so does one
+/// so far out of the box around it.
 const OUTSIDE: f64 = 4.0;
 /// Normals within this many radii …
 const FAN_WIDTH: f64 = 0.4;
@@ -117,7 +120,8 @@ impl TouchHistory {
         self.contacts.strokes().min(self.free_space.strokes())
     }
 
-    /// Takes the last stroke back, or does the one again that was undone last; returns whether there was one.
+    /// Takes the last stroke back, or does the one again that was undone last; returns whether
+    /// there was one.
     pub fn exchange(&mut self, direction: Direction) -> bool {
         self.last_contact_ns = None;
         let is_possible = direction == Direction::Redo || self.strokes() > 0;
@@ -130,8 +134,8 @@ impl TouchHistory {
         has_changed
     }
 
-    /// Decides which contacts count and which are those of an edge, where there is new evidence; returns
-    /// where that is.
+    /// Decides which contacts count and which are those of an edge, where there is new evidence;
+    /// returns where that is.
     pub fn update(&mut self, scan: &TriMesh, tree: &FaceTree) -> GridChanges {
         let Self {
             contacts,
@@ -194,8 +198,9 @@ fn beside(contacts: &ContactMap, means: &CellTable<u32, ()>, reach: f64) -> Cell
     beside
 }
 
-/// Whether a contact is so far outside that the part of the scan cannot have been touched there. Beyond an open rim the scan has no
-/// outside: there it may be on what was not scanned, below a scan without sides or in a hole of it, but not beyond the box around it.
+/// Whether a contact is so far outside that the part of the scan cannot have been touched there.
+/// Beyond an open rim the scan has no outside: there it may be on what was not scanned, below a
+/// scan without sides or in a hole of it, but not beyond the box around it.
 fn is_elsewhere(
     p: &Point3<f64>,
     scan: &TriMesh,

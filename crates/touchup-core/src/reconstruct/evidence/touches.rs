@@ -1,8 +1,8 @@
 //! From samples to touches: the true centre of the ball, and the contact there.
 //!
-//! The patch follows a few tens of milliseconds behind the stream, so position and force are smoothed by a window that
-//! looks as far ahead as back: it does not lag. Its length follows from the noise: as long as the velocity needs, and no
-//! longer than the path is a parabola.
+//! The patch follows a few tens of milliseconds behind the stream, so position and force are
+//! smoothed by a window that looks as far ahead as back: it does not lag. Its length follows from
+//! the noise: as long as the velocity needs, and no longer than the path is a parabola.
 
 use std::collections::VecDeque;
 
@@ -16,7 +16,8 @@ use crate::stylus::{
     WIDEST_CONE_COSINE,
 };
 
-/// A touch whose normal is uncertain by this many degrees has half the weight: what curved pieces take for smooth.
+/// A touch whose normal is uncertain by this many degrees has half the weight: what curved pieces
+/// take for smooth.
 const UNCERTAIN_NORMAL: f64 = 5.0;
 
 /// How touches are found.
@@ -28,13 +29,14 @@ pub struct TouchFinderParams {
     pub shape: TipShape,
     /// stiffness of stylus and probe, N/m; `None`: rigid
     pub stiffness: Option<f64>,
-    /// half of the longest smoothing window, ns. Default 32 ms: 0.2 mm of pose noise at 500 Hz then leaves the direction of
-    /// 25 mm/s uncertain by 6°, which friction known from the stream turns into a normal within 1–2°.
+    /// half of the longest smoothing window, ns. Default 32 ms: 0.2 mm of pose noise at 500 Hz then
+    /// leaves the direction of 25 mm/s uncertain by 6°, which friction known from the stream turns
+    /// into a normal within 1–2°.
     pub half_window_ns: i64,
     /// a pause longer than this parts the stream, ns. Default 30 ms.
     pub largest_gap_ns: i64,
-    /// cosine of the widest friction cone accepted; `None`: friction is not estimated, the normal is the force. Default
-    /// [`WIDEST_CONE_COSINE`].
+    /// cosine of the widest friction cone accepted; `None`: friction is not estimated, the normal
+    /// is the force. Default [`WIDEST_CONE_COSINE`].
     pub cone_cosine: Option<f64>,
     /// what the calibration leaves uncertain; `None`: the uncertainty of a contact is not estimated
     pub calibration: Option<CalibrationParams>,
@@ -136,7 +138,8 @@ impl TouchFinder {
         })
     }
 
-    /// Takes the next sample, which is later than the one before; gives each touch whose window is complete to `each`.
+    /// Takes the next sample, which is later than the one before; gives each touch whose window is
+    /// complete to `each`.
     pub fn push(&mut self, sample: &ContactSample, mut each: impl FnMut(TipTouch)) {
         let tip = &sample.tip;
         if self.held.back().is_some_and(|last| {
@@ -179,7 +182,8 @@ impl TouchFinder {
         self.next = 0;
     }
 
-    /// Kinetic friction as measured so far; `None` until the ball has slid far enough, or where friction is not estimated.
+    /// Kinetic friction as measured so far; `None` until the ball has slid far enough, or where
+    /// friction is not estimated.
     pub fn friction(&self) -> Option<FrictionCoefficient> {
         self.friction.as_ref()?.coefficient()
     }
@@ -237,8 +241,8 @@ impl TouchFinder {
         }
     }
 
-    /// The longest window around a sample over which the path is a parabola and contact does not change; the shortest in
-    /// any case.
+    /// The longest window around a sample over which the path is a parabola and contact does not
+    /// change; the shortest in any case.
     fn window(&mut self, at: usize) -> Window {
         let longest = self.params.half_window_ns;
         let mut best = Window::new(&self.held[at], at, longest);
@@ -258,8 +262,9 @@ impl TouchFinder {
         best
     }
 
-    /// Variance of the centre where even the shortest window is no parabola, as after an outlier: as much as the path is off
-    /// it, in those of its noise. Such errors are alike in all of the window and do not average out in it.
+    /// Variance of the centre where even the shortest window is no parabola, as after an outlier:
+    /// as much as the path is off it, in those of its noise. Such errors are alike in all of the
+    /// window and do not average out in it.
     fn roughness(&self, motion: &SmoothedMotion) -> f64 {
         let noise = self.noise.length.max(LEAST_ROUGH * self.params.radius);
         let residual = motion.residual / noise;
@@ -326,7 +331,8 @@ const WINDOWS: [i64; 4] = [3, 4, 6, 8];
 const ROUGH: f64 = 1.5;
 /// What the path of a calm hand over an edge is off a parabola, in radii.
 const LEAST_ROUGH: f64 = 0.02;
-/// Samples between two poses share their noise, so that it averages out more slowly than that of as many poses: in the velocity …
+/// Samples between two poses share their noise, so that it averages out more slowly than that of as
+/// many poses: in the velocity …
 const SHARED_NOISE: f64 = 1.3;
 /// … and, two of three samples sharing a pose, in the centre.
 const SHARED_POSE: f64 = 1.65;

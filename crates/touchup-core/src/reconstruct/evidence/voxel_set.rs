@@ -98,7 +98,8 @@ impl<T: Keyed> VoxelSet<T> {
         self.history.len()
     }
 
-    /// Undoes the last stroke, or does the one again that was undone last; returns whether there was one.
+    /// Undoes the last stroke, or does the one again that was undone last; returns whether there
+    /// was one.
     pub fn exchange(&mut self, direction: Direction) -> bool {
         let mut history = std::mem::replace(&mut self.history, History::new(MOST_KEPT));
         let has_changed = history.exchange(direction, |bin, past| self.swap(bin, past));

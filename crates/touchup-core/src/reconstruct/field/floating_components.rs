@@ -1,7 +1,9 @@
-//! Floating components: material that the ball went all around and never touched is attached to nothing.
+//! Floating components: material that the ball went all around and never touched is attached to
+//! nothing.
 //!
-//! A scan that closes a hole over leaves its lid, or a plug, in the middle of it, where the ball never was. It is one piece
-//! of material within the space that was swept, and no part of the work-piece.
+//! A scan that closes a hole over leaves its lid, or a plug, in the middle of it, where the ball
+//! never was. It is one piece of material within the space that was swept, and no part of the
+//! work-piece.
 
 use std::collections::VecDeque;
 
@@ -13,7 +15,8 @@ use crate::reconstruct::table::CellTable;
 /// Nodes of a floating component at most: a plug eight radii wide and as high.
 const MOST: usize = 4000;
 
-/// The nodes of all floating components among the nodes `at` and around them, whose signs are final.
+/// The nodes of all floating components among the nodes `at` and around them, whose signs are
+/// final.
 pub(in crate::reconstruct) fn floating_components(
     grid: &mut ReconstructionGrid,
     evidence: &Evidence<'_>,
@@ -43,7 +46,8 @@ fn floating(
     let mut piece: CellTable<LatticeNode, ()> = std::iter::once((start, ())).collect();
     let mut next = VecDeque::from([start]);
     while let Some(node) = next.pop_front() {
-        // what was reached before is attached, or would have been found to float with this component
+        // what was reached before is attached, or would have been found to float with this
+        // component
         let is_known = !seen.insert_with(node, || ()).1;
         let is_attached =
             |state: &NodeState| matches!(state.source, Source::Touch | Source::Beyond);

@@ -15,7 +15,8 @@ use crate::reconstruct::field::lattice::{
 use crate::reconstruct::field::piecewise::FieldScratch;
 use crate::reconstruct::table::CellTable;
 
-/// Changes of the evidence: where the contacts are whose mean is new or moved, and the centres that were kept, m, in O.
+/// Changes of the evidence: where the contacts are whose mean is new or moved, and the centres that
+/// were kept, m, in O.
 #[derive(Clone, Debug, Default)]
 pub(in crate::reconstruct) struct GridChanges {
     pub means: Vec<Point3<f64>>,
@@ -57,7 +58,8 @@ pub(in crate::reconstruct) struct ReconstructionGrid {
     pub open: CellTable<LatticeNode, ()>,
     /// the nodes at which a ball ended its path freely
     pub ends: CellTable<LatticeNode, ()>,
-    /// cells with a contact, and with a ball that went into the scan: what is around them is looked at
+    /// cells with a contact, and with a ball that went into the scan: what is around them is looked
+    /// at
     touched: CellTable<LatticeNode, ()>,
     free_space: CellTable<LatticeNode, ()>,
     /// signed distance of the scan at each of `nodes`: it never changes
@@ -68,7 +70,8 @@ pub(in crate::reconstruct) struct ReconstructionGrid {
     scratch: FieldScratch,
 }
 
-/// A distance field changes by no more than the distance between two points: between neighbours by a pitch, and by noise beyond.
+/// A distance field changes by no more than the distance between two points: between neighbours by
+/// a pitch, and by noise beyond.
 const LARGEST_STEP: f64 = 1.1;
 /// Nodes within this many radii of a contact are looked at.
 const REACH: f64 = 2.8;
@@ -139,7 +142,8 @@ impl ReconstructionGrid {
         self.update(evidence, &area, &look)
     }
 
-    /// Evaluates further nodes that are not known yet in and around `cells`: a surface that is filled in goes on there.
+    /// Evaluates further nodes that are not known yet in and around `cells`: a surface that is
+    /// filled in goes on there.
     pub fn look_further(&mut self, evidence: &Evidence<'_>, cells: &LatticeRegion) -> Changed {
         let (mut look, mut area) = (EarlierStates::default(), CellBox::EMPTY);
         for (cell, ()) in cells.iter() {
@@ -178,7 +182,8 @@ impl ReconstructionGrid {
         (0..8).any(|corner| !self.nodes.contains(&node_at(cell, corner)))
     }
 
-    /// Drops, or restores, the values of the touches at discontinuities: at the nodes looked at and beside them.
+    /// Drops, or restores, the values of the touches at discontinuities: at the nodes looked at and
+    /// beside them.
     fn drop_discontinuities(&mut self, look: &mut EarlierStates, area: &mut CellBox) {
         let beside = |node: LatticeNode| std::iter::once(node).chain(neighbours(node));
         let near: CellTable<LatticeNode, ()> =
@@ -215,9 +220,10 @@ impl ReconstructionGrid {
         }
     }
 
-    /// Whether the field of the touches, `value` (m) at `node`, is discontinuous from outside into the material towards a
-    /// neighbour: the two are values of different surfaces, and which of them is wrong is unknown. What is left around both
-    /// fills the gap. Depends on the touched values one step away alone.
+    /// Whether the field of the touches, `value` (m) at `node`, is discontinuous from outside into
+    /// the material towards a neighbour: the two are values of different surfaces, and which of
+    /// them is wrong is unknown. What is left around both fills the gap. Depends on the touched
+    /// values one step away alone.
     fn is_discontinuous(&self, node: LatticeNode, value: f64) -> bool {
         let is_other = |other: f64| {
             (value < 0.0) != (other < 0.0)
@@ -256,7 +262,8 @@ impl ReconstructionGrid {
         }
     }
 
-    /// Adds the ends of paths near the changes: whether a path ended there depends on the path, and on contacts beside its end.
+    /// Adds the ends of paths near the changes: whether a path ended there depends on the path, and
+    /// on contacts beside its end.
     fn look_at_ends(
         &self,
         evidence: &Evidence<'_>,
@@ -368,13 +375,15 @@ impl ReconstructionGrid {
     }
 }
 
-/// How many nodes of a lattice of `pitch` (m) are looked at around one contact of a tip of `radius` (m).
+/// How many nodes of a lattice of `pitch` (m) are looked at around one contact of a tip of `radius`
+/// (m).
 pub(in crate::reconstruct) fn nodes_around_contact(radius: f64, pitch: f64) -> f64 {
     4.0 / 3.0 * std::f64::consts::PI * (REACH * radius / pitch).powi(3)
 }
 
-/// About as many nodes are looked at around all of `contacts`: those of the cubes of half the reach that are next to one with a contact. Along
-/// a sheet these are three cubes high where what is looked at is four, which is made up for.
+/// About as many nodes are looked at around all of `contacts`: those of the cubes of half the reach
+/// that are next to one with a contact. Along a sheet these are three cubes high where what is
+/// looked at is four, which is made up for.
 pub(in crate::reconstruct) fn nodes_around_contacts(
     contacts: impl Iterator<Item = Point3<f64>>,
     radius: f64,

@@ -1,8 +1,9 @@
 //! Harmonic fill of the field where there is no evidence.
 //!
-//! Between the known values goes the smoothest field: ∇²f = 0. Flat goes on flat, a gap between two touched walls closes,
-//! and no island can arise. Where the ball was, f stays above the depth to which it was there. Deep in the material the
-//! scan's own distance pulls weakly, so that a pocket that was touched down to some depth gets a bottom.
+//! Between the known values goes the smoothest field: ∇²f = 0. Flat goes on flat, a gap between two
+//! touched walls closes, and no island can arise. Where the ball was, f stays above the depth to
+//! which it was there. Deep in the material the scan's own distance pulls weakly, so that a pocket
+//! that was touched down to some depth gets a bottom.
 
 use crate::numeric::flood;
 use crate::reconstruct::evidence::point_evidence::{NodeState, Source};
@@ -12,7 +13,8 @@ use crate::reconstruct::table::CellTable;
 
 /// Over-relaxation that converges fast on domains some ten nodes across.
 const RELAXATION: f64 = 1.6;
-/// Weight, at most, of a touched surface going straight on beside the six neighbours of a node: as much as all of them.
+/// Weight, at most, of a touched surface going straight on beside the six neighbours of a node: as
+/// much as all of them.
 const STRAIGHT: f64 = 6.0;
 /// Weight of the scan out of reach of all evidence: the surface is back at it within a cell or two.
 const FURTHER_PULL: f64 = 1.0;
@@ -26,13 +28,14 @@ const NEARLY: f64 = 0.5;
 const SWEEPS: usize = 200;
 /// Changes below this share of the pitch end the relaxation.
 const ENOUGH: f64 = 1e-6;
-/// Radii around the end of a path within which a hole is opened: as wide as holes that a ball is let through.
+/// Radii around the end of a path within which a hole is opened: as wide as holes that a ball is
+/// let through.
 const END_REACH: f64 = 3.0;
 /// No neighbour.
 const NONE: u32 = u32::MAX;
 
-/// Fills in what is not known among the nodes `at`, then drops what no evidence supports; what is around them
-/// stays as it is.
+/// Fills in what is not known among the nodes `at`, then drops what no evidence supports; what is
+/// around them stays as it is.
 ///
 /// - `numbers`: of the nodes around these.
 /// - `radius`: of the ball, m.
@@ -51,8 +54,8 @@ pub(in crate::reconstruct) fn harmonic_fill(
     blunt(grid, at, numbers);
 }
 
-/// Takes nodes near the surface that differ from nearly all around them back to their side: tips and pits that noise makes
-/// where the surface passes through a node.
+/// Takes nodes near the surface that differ from nearly all around them back to their side: tips
+/// and pits that noise makes where the surface passes through a node.
 fn blunt(grid: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers) {
     let nearly = NEARLY * grid.lattice.pitch;
     for &at in at {
@@ -170,8 +173,9 @@ fn neighbours(grid: &ReconstructionGrid, at: u32, numbers: &Numbers) -> [u32; 6]
     })
 }
 
-/// Drops material and void that no evidence supports: a piece of one sign, within the nodes looked at, that was
-/// neither touched nor swept, or is smaller than a ball can resolve. Returns whether there was any.
+/// Drops material and void that no evidence supports: a piece of one sign, within the nodes looked
+/// at, that was neither touched nor swept, or is smaller than a ball can resolve. Returns whether
+/// there was any.
 fn drop_islands(grid: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers) -> bool {
     let mut seen = vec![Visited::Outside; grid.nodes.len()];
     at.iter()
@@ -204,8 +208,8 @@ enum Visited {
     Yes,
 }
 
-/// Gathers the piece of one sign around its first node; whether what lies beyond those looked at holds it, or evidence and
-/// its size.
+/// Gathers the piece of one sign around its first node; whether what lies beyond those looked at
+/// holds it, or evidence and its size.
 fn is_attached(
     grid: &ReconstructionGrid,
     piece: &mut Vec<u32>,
@@ -236,8 +240,9 @@ pub(in crate::reconstruct) fn end_reach(grid: &ReconstructionGrid, radius: f64) 
     (END_REACH * radius / grid.lattice.pitch).ceil() as i32
 }
 
-/// The cells in which a filled surface depends on a ball that ended its path freely, from there to the nearest evidence within
-/// `reach` cells: a hole that the ball left at its far end has no bottom.
+/// The cells in which a filled surface depends on a ball that ended its path freely, from there to
+/// the nearest evidence within `reach` cells: a hole that the ball left at its far end has no
+/// bottom.
 pub(in crate::reconstruct) fn open_cells(
     grid: &ReconstructionGrid,
     reach: i32,
@@ -289,7 +294,8 @@ mod tests {
         hi: [6; 3],
     };
 
-    /// The signs of nodes that were touched everywhere, filled in: those of `value` (pitches) before, at each node.
+    /// The signs of nodes that were touched everywhere, filled in: those of `value` (pitches)
+    /// before, at each node.
     fn completed(value: impl Fn(LatticeNode) -> f64) -> ReconstructionGrid {
         let mut grid = ReconstructionGrid::new(Lattice {
             pitch: PITCH,

@@ -1,29 +1,31 @@
 //! Where two touched surfaces meet in an inner corner that the ball does not get into.
 //!
-//! A ball that touches one surface at c has its centre at c + r n, and there is room for it before the other one, whose
-//! value is f and whose normal m: f(c) + r n·m ≥ r. Contacts of a hollow that bends from one surface to the other do not
-//! keep this distance; those beside an inner corner do, and the last of them have no more. Between these both surfaces go
-//! straight on to where they meet: nothing else can be measured there, and scans are least accurate in corners.
+//! A ball that touches one surface at c has its centre at c + r n, and there is room for it before
+//! the other one, whose value is f and whose normal m: f(c) + r n·m ≥ r. Contacts of a hollow that
+//! bends from one surface to the other do not keep this distance; those beside an inner corner do,
+//! and the last of them have no more. Between these both surfaces go straight on to where they
+//! meet: nothing else can be measured there, and scans are least accurate in corners.
 
 use crate::reconstruct::evidence::contact_map::ContactMap;
 use crate::reconstruct::field::piecewise::{FieldParams, FieldScratch, Piece};
 
-/// Surfaces at less than 60° to each other let the ball in as far as the last contacts reach anyway, and at more than 120°
-/// they are those of a slot: they meet nowhere near.
+/// Surfaces at less than 60° to each other let the ball in as far as the last contacts reach
+/// anyway, and at more than 120° they are those of a slot: they meet nowhere near.
 const STEEP_COSINE: f64 = 0.5;
-/// Both surfaces were touched within this many radii of the point: for a corner of 90° the last contacts are one away from it
-/// on either side, and the passes of a hand leave gaps.
+/// Both surfaces were touched within this many radii of the point: for a corner of 90° the last
+/// contacts are one away from it on either side, and the passes of a hand leave gaps.
 const TOUCHED_WITHIN: f64 = 1.6;
 /// Contacts within this many radii beyond the nearest mark the end of a surface.
 const BESIDE: f64 = 0.3;
-/// A ball in the corner has just room. There has to be this share of it: what is left is for noise, and walls that bend along the
-/// corner …
+/// A ball in the corner has just room. There has to be this share of it: what is left is for noise,
+/// and walls that bend along the corner …
 const LEAST_ROOM: f64 = 0.8;
-/// … and no more than this: where the last contacts are farther away, the corner may be as round as the ball or more.
+/// … and no more than this: where the last contacts are farther away, the corner may be as round as
+/// the ball or more.
 const MOST_ROOM: f64 = 1.3;
 
-/// Whether the surface that decides at the point last evaluated meets another one there in an inner corner that a ball of
-/// `radius` (m) does not get into.
+/// Whether the surface that decides at the point last evaluated meets another one there in an inner
+/// corner that a ball of `radius` (m) does not get into.
 pub(in crate::reconstruct) fn is_inner_corner(
     contacts: &ContactMap,
     params: &FieldParams,
@@ -52,8 +54,8 @@ pub(in crate::reconstruct) fn is_inner_corner(
     })
 }
 
-/// Whether a ball that touches the piece `at` where it ends near the point has room before `other`, and no more of it than
-/// one that lies in the corner.
+/// Whether a ball that touches the piece `at` where it ends near the point has room before `other`,
+/// and no more of it than one that lies in the corner.
 fn is_beside(
     contacts: &ContactMap,
     radius: f64,
@@ -110,7 +112,8 @@ mod tests {
         store_of(&both.collect::<Vec<_>>())
     }
 
-    /// Whether there is an inner corner, and the value of the field (mm), at a place in x and z, mm.
+    /// Whether there is an inner corner, and the value of the field (mm), at a place in x and z,
+    /// mm.
     fn found(store: &ContactMap, x: f64, z: f64) -> (bool, f64) {
         let (params, mut scratch) = (FieldParams::for_ball(RADIUS), FieldScratch::default());
         let value = params
@@ -149,7 +152,8 @@ mod tests {
 
     #[test]
     fn a_hollow_is_no_corner() {
-        // a groove of radius 2.5 mm around y, touched from wall to wall and evaluated from within the material
+        // a groove of radius 2.5 mm around y, touched from wall to wall and evaluated from within
+        // the material
         let groove = (0..=18).map(|i| f64::from(i) * 10f64.to_radians());
         let places: Vec<_> = groove
             .map(|a| ([-2.5 * a.cos(), -2.5 * a.sin()], [a.cos(), a.sin()]))

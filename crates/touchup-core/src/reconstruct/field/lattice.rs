@@ -61,7 +61,8 @@ pub(in crate::reconstruct) fn across(axis: usize) -> (usize, usize) {
     ((axis + 1) % 3, (axis + 2) % 3)
 }
 
-/// The four nodes around a square across `axis`, counter-clockwise seen against it, from `node` by steps of `step`.
+/// The four nodes around a square across `axis`, counter-clockwise seen against it, from `node` by
+/// steps of `step`.
 #[inline]
 fn ring(node: LatticeNode, axis: u8, step: i32) -> [LatticeNode; 4] {
     let (u, v) = across(axis as usize);
@@ -74,7 +75,8 @@ fn ring(node: LatticeNode, axis: u8, step: i32) -> [LatticeNode; 4] {
     ]
 }
 
-/// What lies between consecutive nodes of a [`ring`], by node and axis: edges where it goes up, squares where it goes down.
+/// What lies between consecutive nodes of a [`ring`], by node and axis: edges where it goes up,
+/// squares where it goes down.
 #[inline]
 fn ring_sides(node: LatticeNode, axis: u8, step: i32) -> [(LatticeNode, u8); 4] {
     let (u, v) = across(axis as usize);
@@ -89,7 +91,8 @@ fn ring_sides(node: LatticeNode, axis: u8, step: i32) -> [(LatticeNode, u8); 4] 
 /// A cubic lattice in the object frame O.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Lattice {
-    /// position of node (0, 0, 0), m, in O; best such that no coordinate of the scan falls on a plane of the lattice
+    /// position of node (0, 0, 0), m, in O; best such that no coordinate of the scan falls on a
+    /// plane of the lattice
     pub origin: Point3<f64>,
     /// edge length of a cell, m, > 0
     pub pitch: f64,
@@ -112,7 +115,8 @@ impl Lattice {
         )
     }
 
-    /// The last plane across `axis` at or below coordinate `x` (m), exactly as [`Self::coordinate`] places it.
+    /// The last plane across `axis` at or below coordinate `x` (m), exactly as [`Self::coordinate`]
+    /// places it.
     #[inline]
     pub(crate) fn index_of(&self, axis: usize, x: f64) -> i32 {
         // the conversion saturates
@@ -150,7 +154,8 @@ impl Lattice {
         ]
     }
 
-    /// `p` brought into the box from node `lo` to node `hi`, `margin` (share of the pitch) inside where the box has any extent.
+    /// `p` brought into the box from node `lo` to node `hi`, `margin` (share of the pitch) inside
+    /// where the box has any extent.
     #[inline]
     pub(crate) fn clamped(
         &self,
@@ -261,7 +266,8 @@ impl CellBox {
         }
     }
 
-    /// Calls `each` with the keys of a table that lie in the box, by whichever loop is shorter; in no particular order.
+    /// Calls `each` with the keys of a table that lie in the box, by whichever loop is shorter; in
+    /// no particular order.
     #[inline]
     pub fn each_in<V>(
         &self,
@@ -283,8 +289,8 @@ impl CellBox {
     }
 }
 
-/// Numbers of the keys of a table, found by place within a box where that is small, else by the table. It holds until a
-/// key is inserted or removed.
+/// Numbers of the keys of a table, found by place within a box where that is small, else by the
+/// table. It holds until a key is inserted or removed.
 pub(in crate::reconstruct) struct Numbers {
     cells: CellBox,
     size: [usize; 3],
@@ -410,7 +416,8 @@ pub enum VertexKey {
     Scan(VertexId),
     /// of a loop of the surface around a cell; loops are numbered from 0
     Cell(LatticeNode, u8),
-    /// on a square between two cells of the region; for each segment of the surface there, numbered from 0
+    /// on a square between two cells of the region; for each segment of the surface there, numbered
+    /// from 0
     Square(Square, u8),
     /// where f changes its sign on an edge
     Edge(Edge),
@@ -445,7 +452,8 @@ impl Key for VertexKey {
     }
 }
 
-/// Which part of the lattice or of the scan a face of the patch belongs to; its faces depend on what is nearby alone.
+/// Which part of the lattice or of the scan a face of the patch belongs to; its faces depend on
+/// what is nearby alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Owner {
     /// the surface around an edge on which f changes its sign
@@ -478,7 +486,8 @@ impl Key for Owner {
     }
 }
 
-/// A new face, counter-clockwise seen from outside; corners are indices into the vertices of its patch.
+/// A new face, counter-clockwise seen from outside; corners are indices into the vertices of its
+/// patch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PatchFace {
     /// indices into the patch's vertices

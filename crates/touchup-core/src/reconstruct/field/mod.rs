@@ -1,4 +1,5 @@
-//! The signed field on the lattice: piecewise fits of the contacts, free space, the smoothest continuation between.
+//! The signed field on the lattice: piecewise fits of the contacts, free space, the smoothest
+//! continuation between.
 
 pub(in crate::reconstruct) mod floating_components;
 pub(in crate::reconstruct) mod grid;

@@ -1,13 +1,15 @@
-//! The touched surface as the zero set of a field: piecewise smooth, evaluated from stored contacts.
+//! The touched surface as the zero set of a field: piecewise smooth, evaluated from stored
+//! contacts.
 //!
-//! Contacts near the point are grouped into smooth pieces; each piece is fitted alone, so that nothing is averaged over
-//! an edge, and the pieces are put together by the larger value at a convex edge, by the smaller one at a concave. Within
-//! a piece a chord is at right angles to the mean of its end normals, which is exact on circles and cylinders:
+//! Contacts near the point are grouped into smooth pieces; each piece is fitted alone, so that
+//! nothing is averaged over an edge, and the pieces are put together by the larger value at a
+//! convex edge, by the smaller one at a concave. Within a piece a chord is at right angles to the
+//! mean of its end normals, which is exact on circles and cylinders:
 //!
 //! f(x) = Σ wⱼ ½(nⱼ + g)·(x − cⱼ) / Σ wⱼ,   g = Σ wⱼ nⱼ / |Σ wⱼ nⱼ|
 //!
-//! wⱼ = Wⱼ exp(−(|x − cⱼ|² − d²) / max(σ², d²/2)), where d is the distance to the nearest contact of the piece: far from
-//! the surface all of its contacts count, near it only the nearest.
+//! wⱼ = Wⱼ exp(−(|x − cⱼ|² − d²) / max(σ², d²/2)), where d is the distance to the nearest contact
+//! of the piece: far from the surface all of its contacts count, near it only the nearest.
 
 use nalgebra::{Point3, Vector3};
 
@@ -30,7 +32,8 @@ pub struct FieldParams {
 }
 
 impl FieldParams {
-    /// Settings that hold for a ball of `radius` (m): two radii are what passes of a hand leave between them.
+    /// Settings that hold for a ball of `radius` (m): two radii are what passes of a hand leave
+    /// between them.
     pub(crate) fn for_ball(radius: f64) -> Self {
         Self {
             reach: 2.0 * radius,
@@ -55,7 +58,8 @@ pub struct FieldValue {
     pub contact: u32,
     /// the nearest contact is one of an edge that the ball rolled over
     pub is_fan: bool,
-    /// the contacts of the piece that decides do not surround the point: it is beyond the last of them
+    /// the contacts of the piece that decides do not surround the point: it is beyond the last of
+    /// them
     pub is_border: bool,
     /// two surfaces, each touched away from edges, meet near the point in a convex edge
     pub is_edge: bool,
@@ -142,7 +146,8 @@ impl FieldScratch {
 const MOST_PIECES: usize = 8;
 /// No piece.
 const NO_PIECE: u32 = u32::MAX;
-/// Pieces at more than this angle to each other (cos 60°) make an edge, or the two sides of a thin wall.
+/// Pieces at more than this angle to each other (cos 60°) make an edge, or the two sides of a thin
+/// wall.
 const EDGE_COSINE: f64 = 0.5;
 /// Share of the reach within which the tilted planes of an edge count as much as others.
 const TILTED_REACH: f64 = 0.5;
@@ -152,7 +157,8 @@ const EDGE_NEAR: f64 = 1.5;
 const OVERLAP: f64 = 0.1;
 /// Share of σ by which noise may make a piece cut off the nearest contact.
 const CUT: f64 = 0.3;
-/// Seen from a point at a border, contacts in the tangent plane leave a gap of 150° or more: its cosine.
+/// Seen from a point at a border, contacts in the tangent plane leave a gap of 150° or more: its
+/// cosine.
 const BORDER_COSINE: f64 = -0.866_025_403_784_438_6;
 /// A contact nearer in the tangent plane than this share of σ is under the point.
 const UNDER: f64 = 0.13;
@@ -207,7 +213,8 @@ impl FieldParams {
         })
     }
 
-    /// Puts each contact, nearest first, to the piece it fits best, or makes it the first of a new one.
+    /// Puts each contact, nearest first, to the piece it fits best, or makes it the first of a new
+    /// one.
     fn group(&self, means: &[MeanContact], near: &mut [Member], pieces: &mut Vec<Piece>) {
         pieces.clear();
         for member in near {
@@ -286,9 +293,10 @@ impl FieldParams {
         }
     }
 
-    /// Puts the pieces together around the nearest one with enough weight. The tilted planes of edges that the ball rolled
-    /// over mean little from afar: such can only cut off. A piece that would cut off the nearest contact itself is refuted.
-    /// Returns the value, the number of the piece that decides, and whether there is an edge.
+    /// Puts the pieces together around the nearest one with enough weight. The tilted planes of
+    /// edges that the ball rolled over mean little from afar: such can only cut off. A piece that
+    /// would cut off the nearest contact itself is refuted. Returns the value, the number of the
+    /// piece that decides, and whether there is an edge.
     ///
     /// - `arm`: from the point to that contact, m.
     fn combine(&self, pieces: &[Piece], arm: &Vector3<f64>) -> Option<(f64, usize, bool)> {
@@ -332,8 +340,8 @@ impl FieldParams {
         Some((value, at, is_edge))
     }
 
-    /// With which of the pieces in the set `taken` another one makes a convex edge: with the others it makes a concave one.
-    /// `None` where it makes neither with some.
+    /// With which of the pieces in the set `taken` another one makes a convex edge: with the others
+    /// it makes a concave one. `None` where it makes neither with some.
     fn convex_among(&self, pieces: &[Piece], taken: u8, piece: &Piece) -> Option<u8> {
         let mut convex = 0;
         for at in members(taken) {
@@ -354,9 +362,10 @@ impl FieldParams {
     }
 }
 
-/// The half-spaces behind the pieces, put together to the solid whose edges are as the pieces meet: pieces that meet in
-/// convex edges are intersected, in concave ones united. Which comes first follows from all pairs: what no convex edge
-/// joins is united, what no concave edge joins is intersected (the cotree of the graph of convex edges).
+/// The half-spaces behind the pieces, put together to the solid whose edges are as the pieces meet:
+/// pieces that meet in convex edges are intersected, in concave ones united. Which comes first
+/// follows from all pairs: what no convex edge joins is united, what no concave edge joins is
+/// intersected (the cotree of the graph of convex edges).
 struct Solid {
     values: [f64; MOST_PIECES],
     /// bit k of entry i: pieces i and k meet in a convex edge
@@ -375,8 +384,8 @@ impl Solid {
         members(convex).for_each(|other| self.is_convex[other] |= 1 << at);
     }
 
-    /// Value of the solid of the pieces in `set`, and the piece that decides; of the part with `first` where the edges
-    /// contradict each other.
+    /// Value of the solid of the pieces in `set`, and the piece that decides; of the part with
+    /// `first` where the edges contradict each other.
     fn evaluate(&self, set: u8, first: usize) -> (f64, usize) {
         if set.is_power_of_two() {
             let at = set.trailing_zeros() as usize;
@@ -410,7 +419,8 @@ impl Solid {
         self.evaluate(set & !(1 << last), first)
     }
 
-    /// The part of `set` that hangs together with its lowest member by convex edges, or by concave ones.
+    /// The part of `set` that hangs together with its lowest member by convex edges, or by concave
+    /// ones.
     fn connected(&self, set: u8, by_convex: bool) -> u8 {
         let mut part = set & set.wrapping_neg();
         loop {
@@ -514,7 +524,8 @@ mod tests {
             * 1e3
     }
 
-    /// A cylinder around z of radius `radius` (m), seen from outside (1) or inside (−1), below z = 0; `a` runs around it.
+    /// A cylinder around z of radius `radius` (m), seen from outside (1) or inside (−1), below z =
+    /// 0; `a` runs around it.
     fn cylinder(
         radius: f64,
         side: f64,
@@ -596,7 +607,8 @@ mod tests {
 
     #[test]
     fn a_tilted_wall_does_not_cut_off_what_was_touched() {
-        // a step along y = 0; the wall was touched 2 mm aside alone, and drag has tilted its normals
+        // a step along y = 0; the wall was touched 2 mm aside alone, and drag has tilted its
+        // normals
         let top = |x: f64, y: f64| (y <= 0.0).then(|| (Point3::new(x, y, 0.0), Vector3::z()));
         let tilted = Vector3::new(0.15, 0.99, 0.0).normalize();
         let wall = |x: f64, z: f64| {

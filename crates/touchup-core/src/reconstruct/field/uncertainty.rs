@@ -1,8 +1,9 @@
 //! Uncertainty of the fit of the contacts at a point, and of the vertices of a patched mesh.
 //!
-//! The fit is a weighted mean of the contacts around, so the noise of each enters by its weight, together with that of the
-//! others in the same smoothing window. That is all on a surface which the pieces describe. Where they do not, the contacts
-//! show it themselves: they scatter around the fit, they end, or another surface is so near that the ball touched both.
+//! The fit is a weighted mean of the contacts around, so the noise of each enters by its weight,
+//! together with that of the others in the same smoothing window. That is all on a surface which
+//! the pieces describe. Where they do not, the contacts show it themselves: they scatter around the
+//! fit, they end, or another surface is so near that the ball touched both.
 
 use nalgebra::Point3;
 
@@ -50,13 +51,16 @@ impl FitSigma {
     }
 }
 
-/// Share of the scatter of the contacts by which the fit is off: ten of them would leave a third if they were independent.
+/// Share of the scatter of the contacts by which the fit is off: ten of them would leave a third if
+/// they were independent.
 const SCATTER: f64 = 0.33;
 /// How much a plane may turn beyond its last contact, rad: 3°.
 const TURN: f64 = 0.053;
-/// Where contacts that face otherwise are near, a surface turns before the next contact by this share of the angle between …
+/// Where contacts that face otherwise are near, a surface turns before the next contact by this
+/// share of the angle between …
 const TURN_SHARE: f64 = 0.45;
-/// … by twice that in a gap of so many σ to the nearest contact, growing with its square: the ball may have bridged a hole …
+/// … by twice that in a gap of so many σ to the nearest contact, growing with its square: the ball
+/// may have bridged a hole …
 const DOUBLING_GAP: f64 = 0.7;
 /// … and by no more than this.
 const TURN_SHARE_IN_GAP: f64 = 1.2;
@@ -72,9 +76,11 @@ const TURN_REACH: f64 = 2.0;
 const MEETING: f64 = 0.15;
 /// … when the other is as near as the one; by less and less up to this many σ.
 const MEETING_REACH: f64 = 1.2;
-/// Both surfaces of an edge count where they are as near as each other, by less and less up to this many σ.
+/// Both surfaces of an edge count where they are as near as each other, by less and less up to this
+/// many σ.
 const EDGE_REACH: f64 = 0.5;
-/// A parabola over a window of length T has the variance that noise of correlation time T / 2.25 has.
+/// A parabola over a window of length T has the variance that noise of correlation time T / 2.25
+/// has.
 const WINDOW_TO_CORRELATION: f64 = 2.25;
 
 impl FieldParams {
@@ -163,8 +169,8 @@ impl FieldParams {
         }
     }
 
-    /// Root mean square angle between the field at `x` and the contacts around the nearest one, of whichever piece, beyond what noise makes of it,
-    /// rad.
+    /// Root mean square angle between the field at `x` and the contacts around the nearest one, of
+    /// whichever piece, beyond what noise makes of it, rad.
     fn turn_around(
         &self,
         found: &FieldValue,
@@ -214,9 +220,11 @@ fn variances(shares: &[PassShare], correlation_ns: i64) -> [f64; 2] {
     sums
 }
 
-/// A vertex is off where it is not on the fit: edges and corners are put together of several pieces.
+/// A vertex is off where it is not on the fit: edges and corners are put together of several
+/// pieces.
 const OFF_FIT: f64 = 1.4;
-/// A guess one radius from the nearest contact is off by this share of the radius; it grows with the square of the distance.
+/// A guess one radius from the nearest contact is off by this share of the radius; it grows with
+/// the square of the distance.
 const GUESS: f64 = 0.25;
 
 /// Standard deviation of a vertex along the normal, m.
@@ -265,8 +273,8 @@ mod tests {
 
     const WINDOW_NS: i64 = 64_000_000;
 
-    /// σ of the fit over the middle of a plane on which each of `passes` passes of 64 contacts ran along x, 1 s apart; all
-    /// passes on one line.
+    /// σ of the fit over the middle of a plane on which each of `passes` passes of 64 contacts ran
+    /// along x, 1 s apart; all passes on one line.
     fn sigma_after(passes: i64, spacing_ns: i64) -> FitSigma {
         let gate = GateParams {
             sigmas: 4.0,
@@ -314,7 +322,8 @@ mod tests {
             );
             assert!((often.calibration - 3e-6).abs() < 1e-12, "{often:?}");
         }
-        // slow enough for each place to be a window of its own, they are independent: five places count
+        // slow enough for each place to be a window of its own, they are independent: five places
+        // count
         let slow = sigma_after(1, 20_000_000);
         assert!(slow.noise < 0.6 * once.noise, "{slow:?}");
     }

@@ -1,14 +1,16 @@
-//! Unreachable surface: in inner corners closer to the other wall than the radius of the ball, and in what is narrower than it.
+//! Unreachable surface: in inner corners closer to the other wall than the radius of the ball, and
+//! in what is narrower than it.
 //!
-//! A ball that touched the surface at a vertex would have its centre a radius above it. Where some other piece of the new
-//! surface obstructs it there, no touch is possible.
+//! A ball that touched the surface at a vertex would have its centre a radius above it. Where some
+//! other piece of the new surface obstructs it there, no touch is possible.
 
 use crate::mesh::{FaceTree, MeshError, TriMesh, VertexId, corner_normal};
 use crate::numeric::direction;
 use crate::reconstruct::Support;
 use crate::reconstruct::evidence::free_space::FreeSpace;
 
-/// The ball may enter the surface by this share of its radius: what the lattice and noise leave of a flat face.
+/// The ball may enter the surface by this share of its radius: what the lattice and noise leave of
+/// a flat face.
 const SLACK: f64 = 0.1;
 
 /// Marks the vertices of the new surface that no ball of `radius` (m) can touch.

@@ -17,8 +17,8 @@ pub struct PatchDelta {
     pub until_ns: i64,
     /// vertices that are new, have moved, or are corners of `faces`
     pub vertices: Vec<PatchVertex>,
-    /// whose faces are others now, and how many of `faces` are theirs, in this order. A face of the scan that the patch
-    /// touches is removed when its remainder is first listed.
+    /// whose faces are others now, and how many of `faces` are theirs, in this order. A face of the
+    /// scan that the patch touches is removed when its remainder is first listed.
     pub owners: Vec<(Owner, u32)>,
     /// corners as indices into `vertices`, counter-clockwise seen from outside
     pub faces: Vec<[u32; 3]>,
@@ -257,7 +257,8 @@ impl PublishedPatch {
     }
 }
 
-/// The faces of a patch by those of their owners that are `wanted`; faces of the scan that go without a remainder have none.
+/// The faces of a patch by those of their owners that are `wanted`; faces of the scan that go
+/// without a remainder have none.
 fn faces_by_owner(
     patch: &Patch,
     wanted: impl Fn(&Owner) -> bool,

@@ -54,8 +54,9 @@ impl<K: Key, V> History<K, V> {
         self.forget();
     }
 
-    /// Keeps the value of `key` as it is before it changes, unless this stroke changed it already. Before the first stroke
-    /// nothing is kept; a stroke too long to be kept can not be undone, nor those before it.
+    /// Keeps the value of `key` as it is before it changes, unless this stroke changed it already.
+    /// Before the first stroke nothing is kept; a stroke too long to be kept can not be undone, nor
+    /// those before it.
     pub fn note(&mut self, key: K, before: impl FnOnce() -> V) {
         let Some(stroke) = self.done.back_mut() else {
             return;
@@ -100,8 +101,8 @@ impl<K: Key, V> History<K, V> {
         }
     }
 
-    /// Undoes the last stroke, the last change first: `swap` exchanges what is kept with what is there. Returns whether
-    /// there was one.
+    /// Undoes the last stroke, the last change first: `swap` exchanges what is kept with what is
+    /// there. Returns whether there was one.
     pub fn undo(&mut self, mut swap: impl FnMut(K, &mut V)) -> bool {
         let Some(mut stroke) = self.done.pop_back() else {
             return false;

@@ -34,7 +34,8 @@ pub struct PatcherParams {
     pub touches: TouchFinderParams,
     /// how they are weighted
     pub evidence: EvidenceParams,
-    /// whether free space is evidence: where the tip went, there is no material. Else the scan stays where nothing was touched
+    /// whether free space is evidence: where the tip went, there is no material. Else the scan
+    /// stays where nothing was touched
     pub free_space: bool,
     /// how far the new faces may be from the surface that the touches show, m
     pub tolerance: f64,
@@ -48,8 +49,9 @@ parameters! {
     /// How fine the reconstructed surface is.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct PatchParams in "patch" {
-        /// How far the new faces may be from the surface that the touches show, on planes and down to holes twice as wide as the tip: a
-        /// smaller one makes finer faces at edges and in holes, and takes longer. Left out: 1/64 of the radius of the tip.
+        /// How far the new faces may be from the surface that the touches show, on planes and down
+        /// to holes twice as wide as the tip: a smaller one makes finer faces at edges and in
+        /// holes, and takes longer. Left out: 1/64 of the radius of the tip.
         ///
         /// In m.
         tolerance: Option<f64> = None, "tolerance_mm" [MM, 1e-6, 100] like "0.02";
@@ -57,8 +59,8 @@ parameters! {
 }
 
 impl PatcherParams {
-    /// Settings that hold for a ball of `radius` (m) at a stylus of `stiffness` (N/m), and a scan whose points are off by
-    /// `noise` (m).
+    /// Settings that hold for a ball of `radius` (m) at a stylus of `stiffness` (N/m), and a scan
+    /// whose points are off by `noise` (m).
     pub fn new(radius: f64, stiffness: Option<f64>, noise: f64) -> Self {
         Self {
             touches: TouchFinderParams::new(radius, stiffness),
@@ -70,8 +72,8 @@ impl PatcherParams {
         }
     }
 
-    /// Edge length of the lattice, m: on a cylinder of twice the tip's radius r, faces between points p apart are off by the sagitta
-    /// p² / (8 · 2 r), which is the tolerance.
+    /// Edge length of the lattice, m: on a cylinder of twice the tip's radius r, faces between
+    /// points p apart are off by the sagitta p² / (8 · 2 r), which is the tolerance.
     pub fn pitch(&self) -> f64 {
         (16.0 * self.evidence.radius * self.tolerance).sqrt()
     }
@@ -94,13 +96,14 @@ impl PatcherParams {
         })
     }
 
-    /// How well the scan is known; a scan free of noise is no better than touches that contradict it.
+    /// How well the scan is known; a scan free of noise is no better than touches that contradict
+    /// it.
     fn scan_prior(&self) -> Option<UncertaintyParams> {
         self.uncertainty.filter(|known| known.scan > 0.0)
     }
 
-    /// Settings for a tip of `shape` whose ball, flat end or nose has `radius` (m), else as [`Self::new`]. How far evidence
-    /// is used depends on the resolution of the tip.
+    /// Settings for a tip of `shape` whose ball, flat end or nose has `radius` (m), else as
+    /// [`Self::new`]. How far evidence is used depends on the resolution of the tip.
     ///
     /// # Errors
     /// [`SettingError`] for sizes of which no tip can be made.
@@ -115,7 +118,8 @@ impl PatcherParams {
         Ok(params)
     }
 
-    /// Refuses a lattice so fine that what a few contacts need does not fit: nothing is built before.
+    /// Refuses a lattice so fine that what a few contacts need does not fit: nothing is built
+    /// before.
     fn check_cost(&self) -> Result<(), SettingError> {
         let around = format!("one contact of a tip of {} mm", self.evidence.radius * 1e3);
         self.check_nodes(
@@ -219,7 +223,8 @@ struct LivePatch {
     is_outdated: bool,
 }
 
-/// Changes are taken in as a whole after each so many renewals, or when there is nothing else to do.
+/// Changes are taken in as a whole after each so many renewals, or when there is nothing else to
+/// do.
 const LATE_EVERY: u32 = 4;
 
 impl LivePatch {
@@ -249,13 +254,15 @@ const SMALLEST_TIP: f64 = 1e-5;
 const MOST_NODES: f64 = 4e6;
 /// Nodes around all that was touched at most: 3.2 GB.
 const MOST_NODES_IN_ALL: f64 = 8e6;
-/// Memory of a node while the field around it is made: its state, the scan's distance, its numbers, tables that are half full.
+/// Memory of a node while the field around it is made: its state, the scan's distance, its numbers,
+/// tables that are half full.
 const NODE_BYTES: f64 = 400.0;
 /// Edge of the cells of one mean contact, in radii.
 const CONTACT_CELL: f64 = 1.0 / 3.0;
 /// Edge of the cells of one centre, in radii.
 const SWEPT_CELL: f64 = 0.1;
-/// Places the planes of the lattice, in pitches, where no coordinate that a person chose falls on them.
+/// Places the planes of the lattice, in pitches, where no coordinate that a person chose falls on
+/// them.
 const ORIGIN: [f64; 3] = [0.164_607_9, 0.312_756_1, 0.460_895_1];
 
 impl Patcher {
@@ -300,7 +307,8 @@ impl Patcher {
         &self.history.contacts.outliers
     }
 
-    /// A copy of the touch history, without the state of a mesh that follows: it may go on with another scan of the part.
+    /// A copy of the touch history, without the state of a mesh that follows: it may go on with
+    /// another scan of the part.
     pub fn copy(&self) -> Self {
         let Self {
             params,
@@ -326,15 +334,16 @@ impl Patcher {
         &self.params
     }
 
-    /// Takes the next sample, which is later than the one before. It counts once the smoothing window around it
-    /// is complete.
+    /// Takes the next sample, which is later than the one before. It counts once the smoothing
+    /// window around it is complete.
     pub fn push(&mut self, sample: &ContactSample) {
         self.finder.push(sample, |touch| {
             keep(&mut self.history, &self.params, &touch)
         });
     }
 
-    /// Refuses to reconstruct what was touched so far by a lattice that would not fit, before any of it is made.
+    /// Refuses to reconstruct what was touched so far by a lattice that would not fit, before any
+    /// of it is made.
     ///
     /// # Errors
     /// [`SettingError`] of `patch.tolerance_mm`, with nodes and memory.
@@ -361,8 +370,8 @@ impl Patcher {
             .flush(|touch| keep(&mut self.history, &self.params, &touch));
     }
 
-    /// How many strokes can be undone. A stroke is what was touched without a pause of a tenth of a second, and where the
-    /// ball went after it.
+    /// How many strokes can be undone. A stroke is what was touched without a pause of a tenth of a
+    /// second, and where the ball went after it.
     pub fn strokes(&self) -> usize {
         self.history.strokes()
     }
@@ -380,22 +389,23 @@ impl Patcher {
         log.span(log.count().checked_sub(1)?)
     }
 
-    /// Takes the last stroke back, up to the last sample: what counts is bit by bit what counted before it. Returns whether
-    /// there was one. Estimates of friction and bias stay.
+    /// Takes the last stroke back, up to the last sample: what counts is bit by bit what counted
+    /// before it. Returns whether there was one. Estimates of friction and bias stay.
     pub fn undo(&mut self) -> bool {
         self.flush();
         self.exchange(Direction::Undo)
     }
 
-    /// Does the stroke again that was undone last, bit by bit, unless something was touched since. Returns whether there was
-    /// one. What is still in the smoothing window is taken in first, as by [`Self::undo`].
+    /// Does the stroke again that was undone last, bit by bit, unless something was touched since.
+    /// Returns whether there was one. What is still in the smoothing window is taken in first, as
+    /// by [`Self::undo`].
     pub fn redo(&mut self) -> bool {
         self.flush();
         self.exchange(Direction::Redo)
     }
 
-    /// Goes on in the place of another patcher of the same scan, whose mesh follows: its next change leads from that mesh to what this
-    /// one has kept.
+    /// Goes on in the place of another patcher of the same scan, whose mesh follows: its next
+    /// change leads from that mesh to what this one has kept.
     ///
     /// - `until_ns`: stamp of the last sample of either: what that mesh shows up to there goes.
     pub fn take_over(&mut self, before: Self, until_ns: i64) {
@@ -424,8 +434,8 @@ impl Patcher {
         has_changed
     }
 
-    /// The scan with its touched part remeshed from all that counts so far; vertices and faces that were not touched
-    /// keep their ids.
+    /// The scan with its touched part remeshed from all that counts so far; vertices and faces that
+    /// were not touched keep their ids.
     ///
     /// - `scan`: the original, with the tree over its faces.
     ///
@@ -472,7 +482,8 @@ impl Patcher {
         })
     }
 
-    /// Standard deviation along the normal at places of the patch, m, by all touches so far; empty where the settings ask for none.
+    /// Standard deviation along the normal at places of the patch, m, by all touches so far; empty
+    /// where the settings ask for none.
     ///
     /// - `scan`, `tree`: as in [`Self::patched`].
     /// - `places`: vertices of the patch, m, in O, and what each rests on.
@@ -515,11 +526,12 @@ impl Patcher {
         places.map(&mut of).collect()
     }
 
-    /// What changed in the patch since the last call. The time depends on how much there is to remesh near the changes. Its faces are
-    /// those of the lattice: they are merged to fewer where the patch has settled, and come again where it changes then.
+    /// What changed in the patch since the last call. The time depends on how much there is to
+    /// remesh near the changes. Its faces are those of the lattice: they are merged to fewer where
+    /// the patch has settled, and come again where it changes then.
     ///
-    /// What [`Self::patched`] shows can differ from the sum of these by some thousandths of an edge of the lattice, and where
-    /// nothing was touched by more.
+    /// What [`Self::patched`] shows can differ from the sum of these by some thousandths of an edge
+    /// of the lattice, and where nothing was touched by more.
     ///
     /// - `scan`, `tree`: as in [`Self::patched`], the same each time.
     pub fn renewed(&mut self, scan: &TriMesh, tree: &FaceTree) -> PatchDelta {
@@ -549,8 +561,9 @@ impl Patcher {
         }
     }
 
-    /// Each fourth time, brings the field up to date where changes count less, farther off than [`Self::renewed`] looks: to be called when
-    /// its result has been passed on. The faces follow with the next.
+    /// Each fourth time, brings the field up to date where changes count less, farther off than
+    /// [`Self::renewed`] looks: to be called when its result has been passed on. The faces follow
+    /// with the next.
     ///
     /// - `scan`, `tree`: as there.
     pub fn renew_far(&mut self, scan: &TriMesh, tree: &FaceTree) {
@@ -566,8 +579,9 @@ impl Patcher {
         self.live = Some(live);
     }
 
-    /// As [`Self::renewed`], when the stream pauses: after it the sum of all changes is what [`Self::patched`] shows of all touches so
-    /// far, those in the smoothing window among them, bit by bit. What counts later is as if this had not been asked for.
+    /// As [`Self::renewed`], when the stream pauses: after it the sum of all changes is what
+    /// [`Self::patched`] shows of all touches so far, those in the smoothing window among them, bit
+    /// by bit. What counts later is as if this had not been asked for.
     ///
     /// It takes the time of a whole reconstruction.
     pub fn settled(&mut self, scan: &TriMesh, tree: &FaceTree) -> PatchDelta {
@@ -582,8 +596,9 @@ impl Patcher {
         PatchDelta { until_ns, ..delta }
     }
 
-    /// What [`Self::patched`] makes of all touches so far, those in the smoothing window among them, as a change of the scan. The mesh
-    /// that follows [`Self::renewed`] has no part in it, and may be one of another scan of the part.
+    /// What [`Self::patched`] makes of all touches so far, those in the smoothing window among
+    /// them, as a change of the scan. The mesh that follows [`Self::renewed`] has no part in it,
+    /// and may be one of another scan of the part.
     ///
     /// It takes the time of a whole reconstruction.
     ///
@@ -702,7 +717,8 @@ impl Patcher {
         (remesh, renewed)
     }
 
-    /// Merges faces of a patch within the tolerance; returns the support of its vertices, and where faces were merged.
+    /// Merges faces of a patch within the tolerance; returns the support of its vertices, and where
+    /// faces were merged.
     ///
     /// - `remesh`, `kept`: by which it was made.
     fn coarsen(

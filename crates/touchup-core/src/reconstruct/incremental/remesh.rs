@@ -14,7 +14,8 @@ use crate::reconstruct::table::CellTable;
 
 /// Rounds in which the region grows over squares where scan and patch cannot be joined.
 const GROWTH: usize = 3;
-/// Rounds in which the field is looked at further, each two cells, where a surface that is filled in goes on.
+/// Rounds in which the field is looked at further, each two cells, where a surface that is filled
+/// in goes on.
 const FURTHER: usize = 4;
 /// Rounds of both on a closed scan, where all that is open can be joined, and is.
 const UNTIL_CLOSED: usize = 64;
@@ -85,7 +86,8 @@ impl Remesh {
         self.grow(evidence, core, &left, coarse)
     }
 
-    /// Brings the field up to date with changes of `evidence` up to where they count at all; the faces follow with [`Self::renew`].
+    /// Brings the field up to date with changes of `evidence` up to where they count at all; the
+    /// faces follow with [`Self::renew`].
     pub fn renew_far(&mut self, evidence: &Evidence<'_>, late: &GridChanges) {
         let changed = self.grid.renew(evidence, &GridChanges::default(), late);
         let (mut core, mut left) = self.take_pending();
@@ -100,7 +102,8 @@ impl Remesh {
         )
     }
 
-    /// The support of a vertex: touched when most of the corners of its cell are near the surface that was; those on the scan are its own.
+    /// The support of a vertex: touched when most of the corners of its cell are near the surface
+    /// that was; those on the scan are its own.
     pub fn support(&self, key: &VertexKey) -> Support {
         let is_of_touch = |state: &NodeState| state.source == Source::Touch && !state.is_corner;
         let is_touched = |node: &LatticeNode| self.grid.nodes.get(node).is_some_and(is_of_touch);
@@ -160,7 +163,8 @@ impl Remesh {
             .for_each(|cell| core.take_around(cell, 1, 1));
     }
 
-    /// Makes the faces around `core`, and takes cells into the region where they cannot be joined to the scan.
+    /// Makes the faces around `core`, and takes cells into the region where they cannot be joined
+    /// to the scan.
     ///
     /// - `left`: cells that are in the region no more.
     fn grow(

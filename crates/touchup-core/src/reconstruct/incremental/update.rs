@@ -12,7 +12,8 @@ const SLACK: f64 = 4e-3;
 const FILL_MARGIN: i32 = 4;
 
 impl ReconstructionGrid {
-    /// Fills in what is not known in and around `area`; finds what differs from `before`, or from its earlier value.
+    /// Fills in what is not known in and around `area`; finds what differs from `before`, or from
+    /// its earlier value.
     pub(in crate::reconstruct) fn update(
         &mut self,
         evidence: &Evidence<'_>,
@@ -71,8 +72,8 @@ impl ReconstructionGrid {
         changed
     }
 
-    /// Whether the surface in the cells around a node depends on its value: one of them is crossed, or an edge from a
-    /// neighbour is, at whose crossing the slope is taken with it.
+    /// Whether the surface in the cells around a node depends on its value: one of them is crossed,
+    /// or an edge from a neighbour is, at whose crossing the slope is taken with it.
     fn is_at_surface(&self, numbers: &Numbers, node: &LatticeNode) -> bool {
         let is_material = |node: LatticeNode| {
             let at = numbers.of(&self.nodes, &node)?;
@@ -107,8 +108,8 @@ impl ReconstructionGrid {
         (at, was)
     }
 
-    /// Drops floating components; returns its nodes and those beside them, with what was known there before:
-    /// nothing beyond what was looked at.
+    /// Drops floating components; returns its nodes and those beside them, with what was known
+    /// there before: nothing beyond what was looked at.
     fn drop_floating_components(&mut self, evidence: &Evidence<'_>, at: &[u32]) -> EarlierStates {
         let floating_components = floating_components(self, evidence, at);
         let mut dropped = EarlierStates::default();
@@ -144,7 +145,8 @@ impl ReconstructionGrid {
         }
     }
 
-    /// Determines again which cells stay open, if a path ends near `area`; returns those for which that is new.
+    /// Determines again which cells stay open, if a path ends near `area`; returns those for which
+    /// that is new.
     fn renew_open(&mut self, area: &CellBox, radius: f64) -> Vec<LatticeNode> {
         let reach = end_reach(self, radius);
         let near = area.widened(reach, reach);

@@ -6,7 +6,8 @@ use super::{MOST_MARKERS, MarkerObservation};
 use crate::numeric::{mean, scatter};
 use crate::stylus::SettingError;
 
-/// Markers that hold fewer than this share of the body's second extent are on a line within the noise.
+/// Markers that hold fewer than this share of the body's second extent are on a line within the
+/// noise.
 const LINE_SHARE: f64 = 0.2;
 /// A body is no line when its second extent is more than this share of the first.
 const FLAT_SHARE: f64 = 0.02;
@@ -51,8 +52,8 @@ impl MarkerBody {
     /// - `markers_t`: by label from 0 on, m, in T.
     ///
     /// # Errors
-    /// [`SettingError`] for fewer than 3 or more than [`MOST_MARKERS`], markers at one place or on one line, and for
-    /// anything not finite.
+    /// [`SettingError`] for fewer than 3 or more than [`MOST_MARKERS`], markers at one place or on
+    /// one line, and for anything not finite.
     pub fn new(markers_t: Vec<Point3<f64>>) -> Result<Self, SettingError> {
         let count = markers_t.len();
         let fits = (3..=MOST_MARKERS).contains(&count);
@@ -116,8 +117,9 @@ impl MarkerBody {
                 > LINE_SHARE * self.second_extent
     }
 
-    /// The pose of T in O with the least squares of distances between markers and their measured places
-    /// \[Umeyama 1991\]: with H = Σ (r − r̄)(m − m̄)ᵀ = U S Vᵀ, R = V diag(1, 1, det V Uᵀ) Uᵀ.
+    /// The pose of T in O with the least squares of distances between markers and their measured
+    /// places \[Umeyama 1991\]: with H = Σ (r − r̄)(m − m̄)ᵀ = U S Vᵀ, R = V diag(1, 1, det V Uᵀ)
+    /// Uᵀ.
     pub(super) fn fit(&self, pairs: &MarkerPairs) -> Option<Isometry3<f64>> {
         let from = centroid(pairs.iter().map(|&(i, _)| self.markers_t[i]));
         let to = centroid(pairs.iter().map(|&(_, m)| m));
@@ -145,11 +147,12 @@ impl MarkerBody {
             .then_some(pose_ot)
     }
 
-    /// The pose at which most of the seen markers, and at least three, are within `gate` of a marker of the body, and
-    /// which markers those are; `None` when not more than half of them agree.
+    /// The pose at which most of the seen markers, and at least three, are within `gate` of a
+    /// marker of the body, and which markers those are; `None` when not more than half of them
+    /// agree.
     ///
-    /// Every three markers are tried in turn, each identified by its label, so that swapped labels and outliers
-    /// are outvoted.
+    /// Every three markers are tried in turn, each identified by its label, so that swapped labels
+    /// and outliers are outvoted.
     pub(super) fn acquire(
         &self,
         seen: &[MarkerObservation],
@@ -188,8 +191,9 @@ impl MarkerBody {
             .then_some(pose_ot)
     }
 
-    /// Which seen marker is which of the body at that pose: the labelled one when it is within `gate`, or else the one
-    /// that is. Nothing else can be, for markers are farther apart than twice the gate.
+    /// Which seen marker is which of the body at that pose: the labelled one when it is within
+    /// `gate`, or else the one that is. Nothing else can be, for markers are farther apart than
+    /// twice the gate.
     pub(super) fn matched(
         &self,
         pose_ot: &Isometry3<f64>,

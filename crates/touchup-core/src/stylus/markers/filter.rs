@@ -38,7 +38,8 @@ pub struct MarkerCounts {
 /// Frames that are held while earlier ones may still arrive: a tenth of a second at 640 Hz.
 const HELD_FRAMES: usize = 64;
 
-/// Follows a rigid body by its markers. Memory is bounded and allocated once, in [`MarkerFilter::new`].
+/// Follows a rigid body by its markers. Memory is bounded and allocated once, in
+/// [`MarkerFilter::new`].
 ///
 /// # Example
 /// ```
@@ -101,7 +102,8 @@ impl MarkerFilter {
         })
     }
 
-    /// Takes the next frame and gives the poses that no later frame can change to `each`, in order of time.
+    /// Takes the next frame and gives the poses that no later frame can change to `each`, in order
+    /// of time.
     pub fn push(&mut self, frame: &MarkerFrame, mut each: impl FnMut(StampedPose)) {
         self.frames.push(*frame, &self.order);
         while self
@@ -179,7 +181,8 @@ impl MarkerFilter {
         })
     }
 
-    /// The body flown on to the frame and pulled by its markers; `None` when too little has held it for too long.
+    /// The body flown on to the frame and pulled by its markers; `None` when too little has held it
+    /// for too long.
     fn follow(&mut self, before: &Tracked, frame: &MarkerFrame) -> Option<Tracked> {
         if frame.stamp_ns.saturating_sub(before.held_ns) > self.params.coast_ns {
             return None;
@@ -192,7 +195,8 @@ impl MarkerFilter {
         self.counts.relabelled += matches.relabelled;
         self.counts.rejected += matches.rejected;
         let is_held = self.body.is_held_by(matches.pairs());
-        // what has gone astray since the speed was last corrected is not taken for the speed of the last moment
+        // what has gone astray since the speed was last corrected is not taken for the speed of the
+        // last moment
         let since_ns = if is_held {
             before.held_ns
         } else {

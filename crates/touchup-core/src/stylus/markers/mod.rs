@@ -1,9 +1,10 @@
 //! The pose of a stylus from the LED markers on it, whichever of them are observed.
 //!
-//! A rigid body with its mass in the markers is pulled by a spring and a damper at each marker that is seen to where it
-//! is measured; between two frames it flies on. Spring k and damper d for a mass m determine how: by the natural frequency
-//! √(k/m) and the damping d/(2 √(k m)). [`MarkerFilter`] finds the first pose in closed form, follows it through
-//! occlusion, swapped labels and outliers, and gives poses at a steady rate.
+//! A rigid body with its mass in the markers is pulled by a spring and a damper at each marker that
+//! is seen to where it is measured; between two frames it flies on. Spring k and damper d for a
+//! mass m determine how: by the natural frequency √(k/m) and the damping d/(2 √(k m)).
+//! [`MarkerFilter`] finds the first pose in closed form, follows it through occlusion, swapped
+//! labels and outliers, and gives poses at a steady rate.
 
 mod body;
 mod filter;
@@ -90,12 +91,14 @@ parameters! {
         ///
         /// In m: what lies much farther from the fit counts little. An active LED system at 2 m.
         noise: f64 = 0.15, "noise_mm" [MM, 1e-6, 1000];
-        /// A marker farther than this from where it is expected is another one, or none; less than half of the smallest distance
-        /// between two markers.
+        /// A marker farther than this from where it is expected is another one, or none; less than
+        /// half of the smallest distance between two markers.
         ///
-        /// In m. A hand that accelerates with 5 m/s² strays by 2 mm in 30 ms, and the distance between markers is more than twice that.
+        /// In m. A hand that accelerates with 5 m/s² strays by 2 mm in 30 ms, and the distance
+        /// between markers is more than twice that.
         gate: f64 = 4.0, "gate_mm" [MM, 1e-6, 1000];
-        /// How long the body flies on when its markers do not determine it; after that there is no pose.
+        /// How long the body flies on when its markers do not determine it; after that there is no
+        /// pose.
         ///
         /// In ns. As long as [`super::SyncParams::largest_gap_ns`] and for the same reason.
         coast_ns: i64 = 30.0, "coast_ms" [MS, 0.001, 10000];
@@ -115,7 +118,8 @@ parameters! {
 }
 
 impl MarkerParams {
-    /// Refuses the first setting that is not in its range, and a gate that could take one marker of `body` for another.
+    /// Refuses the first setting that is not in its range, and a gate that could take one marker of
+    /// `body` for another.
     ///
     /// # Errors
     /// [`SettingError`]

@@ -1,8 +1,9 @@
 //! The motion model of the body: flight, pulled by springs and dampers.
 //!
-//! For one degree of freedom let e be the distance to the measured place. A damper that acts on the speed relative to
-//! the *measured* motion does not lag behind a steady hand; in the observer form x' = v + d e, v' = k e it needs no
-//! derivative of the noise. Sampled at frames Δt apart its exact counterpart is x ← x + α e, v ← v + (β/Δt) e with
+//! For one degree of freedom let e be the distance to the measured place. A damper that acts on the
+//! speed relative to the *measured* motion does not lag behind a steady hand; in the observer form
+//! x' = v + d e, v' = k e it needs no derivative of the noise. Sampled at frames Δt apart its exact
+//! counterpart is x ← x + α e, v ← v + (β/Δt) e with
 //!
 //! α = 1 − z₁z₂,   β = (1 − z₁)(1 − z₂),   z₁,₂ = e^(−ω Δt (ζ ± √(ζ² − 1)))
 //!
@@ -18,9 +19,11 @@ parameters! {
     /// Spring and damper at each marker, for the mass at it.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct SpringParams in "markers" {
-        /// Natural frequency √(k/m) / 2π of the springs between the body and its markers: higher follows faster, lower smooths more.
+        /// Natural frequency √(k/m) / 2π of the springs between the body and its markers: higher
+        /// follows faster, lower smooths more.
         ///
-        /// In Hz. A hand that accelerates by 1 m/s² is followed 0.2 mm behind, and the noise of frames at 200 Hz falls to two thirds.
+        /// In Hz. A hand that accelerates by 1 m/s² is followed 0.2 mm behind, and the noise of
+        /// frames at 200 Hz falls to two thirds.
         frequency: f64 = 12.0, "spring_hz" [HZ, 0.001, 1e6];
         /// Damping d / (2 √(k m)): 1 is the fastest that does not swing.
         damping: f64 = 1.0, "damping" [ONE, 0.5, 100];
@@ -43,8 +46,8 @@ impl SpringParams {
     }
 }
 
-/// Share of the mass that sits in all markers; the remainder sits in those that are observed. It keeps the body from being thrown
-/// about where the seen ones do not hold it: there it flies on.
+/// Share of the mass that sits in all markers; the remainder sits in those that are observed. It
+/// keeps the body from being thrown about where the seen ones do not hold it: there it flies on.
 const LOOSE_MASS: f64 = 0.02;
 /// Frames closer than this give no velocity but noise, s.
 const SHORTEST: f64 = 1e-3;
@@ -110,7 +113,8 @@ impl BodyMotion {
         };
         self.frames = self.frames.saturating_add(1);
         let (alpha, beta) = spring.gains(dt);
-        // a body just found has no past: n frames in a row have the gains of a straight line through them
+        // a body just found has no past: n frames in a row have the gains of a straight line
+        // through them
         let n = f64::from(self.frames);
         let (first_alpha, first_beta) = ((4.0 * n - 2.0) / (n * (n + 1.0)), 6.0 / (n * (n + 1.0)));
         let alpha = alpha.max(first_alpha).min(1.0);
@@ -127,9 +131,9 @@ impl BodyMotion {
         self.spin += turn * rate;
     }
 
-    /// Where the springs pull: M⁻¹ Σ w Jᵀ e with J = \[1, −\[r\]×\], the small motion (shift, turn) that takes the body
-    /// to equilibrium among the observed markers. The eigenvalues of M⁻¹ Σ w JᵀJ lie in \[0, 1\], so no set of markers makes a step
-    /// too long.
+    /// Where the springs pull: M⁻¹ Σ w Jᵀ e with J = \[1, −\[r\]×\], the small motion (shift, turn)
+    /// that takes the body to equilibrium among the observed markers. The eigenvalues of M⁻¹ Σ w
+    /// JᵀJ lie in \[0, 1\], so no set of markers makes a step too long.
     fn twist(&self, body: &MarkerBody, pairs: &MarkerPairs, noise: f64) -> Option<Vector6<f64>> {
         let arm = |i: usize| self.rotation * (body.markers_t()[i] - body.centroid_t());
         let mut loose = Matrix6::zeros();

@@ -37,7 +37,8 @@ impl<'a> Body<'a> {
         }
     }
 
-    /// Refuses an element for whose rows there are not enough bytes: after this its count may be trusted for memory.
+    /// Refuses an element for whose rows there are not enough bytes: after this its count may be
+    /// trusted for memory.
     pub fn check_count(&self, element: &Element) -> Result<(), Syntax> {
         let place = FilePlace::Line(element.line);
         if element.count > 0 && element.properties.is_empty() {
@@ -62,8 +63,9 @@ impl<'a> Body<'a> {
         Err(Syntax { place, defect })
     }
 
-    /// Reads `count` rows. `take` gets the items of the list in column `list`, or else one value for each column (0 for
-    /// a list), and the place of the row. In ASCII a row is a line; empty lines are passed over.
+    /// Reads `count` rows. `take` gets the items of the list in column `list`, or else one value
+    /// for each column (0 for a list), and the place of the row. In ASCII a row is a line; empty
+    /// lines are passed over.
     pub fn rows(
         &mut self,
         element: &Element,
@@ -113,8 +115,8 @@ impl<'a> Body<'a> {
         Ok(())
     }
 
-    /// Three columns, multiplied by `scale`, of all rows of a binary element without lists; `None`, and nothing read, when it has lists, is
-    /// ASCII, or the file ends before its last row.
+    /// Three columns, multiplied by `scale`, of all rows of a binary element without lists; `None`,
+    /// and nothing read, when it has lists, is ASCII, or the file ends before its last row.
     pub fn fixed_rows(
         &mut self,
         element: &Element,
@@ -155,8 +157,9 @@ impl<'a> Body<'a> {
         })
     }
 
-    /// The rows that are triangles in the usual layout (a list of three 32-bit numbers and nothing else, little endian),
-    /// up to the first row that is not. Strips look the same and are left alone.
+    /// The rows that are triangles in the usual layout (a list of three 32-bit numbers and nothing
+    /// else, little endian), up to the first row that is not. Strips look the same and are left
+    /// alone.
     pub fn triangles(&mut self, element: &Element) -> Vec<[u32; 3]> {
         const ROW: usize = 13;
         let usual = |kind| {
@@ -188,7 +191,8 @@ impl<'a> Body<'a> {
     }
 }
 
-/// Fills `row` from `next`: the items of the list in column `list`, or else one value for each column.
+/// Fills `row` from `next`: the items of the list in column `list`, or else one value for each
+/// column.
 fn read_row(
     element: &Element,
     list: Option<usize>,
@@ -206,7 +210,8 @@ fn read_row(
                 if items < 0.0 || items.fract() != 0.0 {
                     return Err(Syntax::unexpected(place, "the length of a list", items));
                 }
-                // a length that is too large runs into the end of the file; nothing is reserved for it
+                // a length that is too large runs into the end of the file; nothing is reserved for
+                // it
                 for _ in 0..items as u64 {
                     let value = next(item)?;
                     if list == Some(column) {

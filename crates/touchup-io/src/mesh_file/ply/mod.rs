@@ -24,7 +24,8 @@ const OF_CORNERS: [&str; 2] = ["texcoord", "texnumber"];
 /// An image is named by a comment that starts so.
 const IMAGE: &str = "comment TextureFile ";
 
-/// Reads `vertex`, and `face` or `tristrips`; coordinates are multiplied by `scale`, polygons are cut into fans.
+/// Reads `vertex`, and `face` or `tristrips`; coordinates are multiplied by `scale`, polygons are
+/// cut into fans.
 pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     let header = PlyHeader::read(bytes)?;
     let mut body = Body::new(bytes, &header);
@@ -44,7 +45,8 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
 /// For each name the numbers of the rows, where the file has them.
 type Columns<const N: usize> = [Option<Vec<f32>>; N];
 
-/// The positions of the vertices, multiplied by `scale`, and the scalar properties `names` of them, where they are there.
+/// The positions of the vertices, multiplied by `scale`, and the scalar properties `names` of them,
+/// where they are there.
 pub(super) fn read_columns<const N: usize>(
     bytes: &[u8],
     scale: f64,
@@ -167,8 +169,8 @@ fn strips(numbers: &[f64], place: FilePlace, faces: &mut Vec<[u32; 3]>) -> Resul
     Ok(())
 }
 
-/// Binary little endian, coordinates as double: nothing is rounded. Each column is a property of the vertices, the texture one of the
-/// faces.
+/// Binary little endian, coordinates as double: nothing is rounded. Each column is a property of
+/// the vertices, the texture one of the faces.
 ///
 /// - `ids`: of the vertices, by which the columns are read.
 pub(super) fn write(

@@ -119,7 +119,8 @@ fn body_of<'a>(bytes: &'a [u8], header: &PlyHeader, name: &str) -> Result<Body<'
     Ok(body)
 }
 
-/// Faces with the texture coordinates of their corners: each row once for either list, and once for the image.
+/// Faces with the texture coordinates of their corners: each row once for either list, and once for
+/// the image.
 fn read_corners(
     bytes: &[u8],
     header: &PlyHeader,

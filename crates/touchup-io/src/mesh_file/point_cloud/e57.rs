@@ -14,8 +14,8 @@ pub(super) fn is_e57(bytes: &[u8]) -> bool {
     bytes.starts_with(b"ASTM-E57")
 }
 
-/// Reads the points of all scans in the frame of the file, each scan by its pose; coordinates are multiplied by `scale`. Points that the
-/// file calls invalid come out as NaN.
+/// Reads the points of all scans in the frame of the file, each scan by its pose; coordinates are
+/// multiplied by `scale`. Points that the file calls invalid come out as NaN.
 pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
     let foreign = |offset: u64| {
         move |why: e57::Error| Syntax {
@@ -56,7 +56,8 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
     }
 }
 
-/// Refuses more points than there are bits for; the least that a real scanner takes is some bytes for each.
+/// Refuses more points than there are bits for; the least that a real scanner takes is some bytes
+/// for each.
 fn check_count(records: u64, offset: u64, len: usize) -> Result<(), Syntax> {
     let needed = u128::from(records).div_ceil(8);
     if needed <= len as u128 {

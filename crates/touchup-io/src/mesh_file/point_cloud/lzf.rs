@@ -1,6 +1,8 @@
-//! LZF, as PCD files are compressed: runs of literal bytes, and copies of what was written up to 8 KiB before.
+//! LZF, as PCD files are compressed: runs of literal bytes, and copies of what was written up to 8
+//! KiB before.
 
-/// The bytes that `packed` stands for; `None` where they are not `len`, or a copy reaches before their start.
+/// The bytes that `packed` stands for; `None` where they are not `len`, or a copy reaches before
+/// their start.
 ///
 /// - `len`: checked against memory by the caller.
 pub(super) fn unpacked(packed: &[u8], len: usize) -> Option<Vec<u8>> {

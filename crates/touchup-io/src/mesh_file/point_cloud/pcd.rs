@@ -295,7 +295,8 @@ impl PcdHeader {
         self.fields.iter().map(Field::bytes).sum()
     }
 
-    /// Refuses more points than there are bytes for: after this their number may be trusted for memory.
+    /// Refuses more points than there are bytes for: after this their number may be trusted for
+    /// memory.
     fn check_length(&self, left: usize, row: usize) -> Result<(), Syntax> {
         let needed = u128::from(self.points) * row as u128;
         if needed <= left as u128 {

@@ -12,9 +12,10 @@ const SHORTEST: usize = 6;
 /// How long a normal may be: its digits are rounded.
 const UNIT_LENGTH: std::ops::RangeInclusive<f64> = 0.98..=1.02;
 
-/// Reads lines of numbers, separated by blanks, tabs, commas or semicolons; coordinates are multiplied by `scale`. Lines that begin with
-/// `#`, `//` or a letter, and the number of the points in the first line, are passed over. Columns 4 to 6, or the last three, are the
-/// normals where they are of length 1 in every line.
+/// Reads lines of numbers, separated by blanks, tabs, commas or semicolons; coordinates are
+/// multiplied by `scale`. Lines that begin with `#`, `//` or a letter, and the number of the points
+/// in the first line, are passed over. Columns 4 to 6, or the last three, are the normals where
+/// they are of length 1 in every line.
 pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
     let end_of_line = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
     let mut lines = NumberedLines::new(

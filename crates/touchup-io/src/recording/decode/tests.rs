@@ -25,8 +25,8 @@ fn decode_pose(payload: &[u8]) -> Result<(String, StampedPose), BadMessage> {
     }
 }
 
-/// Assembled by hand from the CDR rules: 4-byte header, i32, u32, length 2, "O\0", 2 bytes to the next multiple of
-/// eight, doubles.
+/// Assembled by hand from the CDR rules: 4-byte header, i32, u32, length 2, "O\0", 2 bytes to the
+/// next multiple of eight, doubles.
 fn pose_bytes(order: u8, numbers: [f64; 7], nanosec: u32) -> Vec<u8> {
     let u32_bytes = |v: u32| {
         if order == 1 {
@@ -153,7 +153,8 @@ fn stamps_outside_their_range_are_refused() {
     }
 }
 
-/// By the definition in franka_msgs 0.10 for ROS 1: the header, its numbers one after another, then flags.
+/// By the definition in franka_msgs 0.10 for ROS 1: the header, its numbers one after another, then
+/// flags.
 #[test]
 fn a_state_of_a_franka_gives_the_tool_and_the_wrench_in_the_base() {
     let numbers_of = |names: &[(&str, usize)]| {
@@ -278,7 +279,8 @@ fn what_gives_no_pose_is_refused_with_what_does_and_the_flag() {
     assert!(why.contains("--pose-frame"), "{why}");
 }
 
-/// What a library unpacks in either byte order gives what the bytes themselves give, bit by bit, and ends where they end.
+/// What a library unpacks in either byte order gives what the bytes themselves give, bit by bit,
+/// and ends where they end.
 #[test]
 fn fields_that_a_deserializer_hands_out_are_those_of_the_bytes() {
     for order in [0, 1] {
@@ -307,7 +309,8 @@ fn fields_that_a_deserializer_hands_out_are_those_of_the_bytes() {
     }
 }
 
-/// Of every type, whatever the bytes are: drawn at random, and zeros, which are whole messages of some length.
+/// Of every type, whatever the bytes are: drawn at random, and zeros, which are whole messages of
+/// some length.
 #[test]
 fn no_bytes_are_read_otherwise_by_a_deserializer() {
     let mut state = 1_u64;

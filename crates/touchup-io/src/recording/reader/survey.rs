@@ -9,7 +9,8 @@ use super::super::{RecordingError, RecordingFile, TopicInfo, TopicKind, Transfor
 use super::RecordingReader;
 
 impl RecordingReader {
-    /// Looks into every file once: topics, counts, missing ends. Returns the first, still open: it may be a packed one.
+    /// Looks into every file once: topics, counts, missing ends. Returns the first, still open: it
+    /// may be a packed one.
     pub(super) fn survey(&mut self) -> Result<Option<Box<dyn RecordingFile>>, RecordingError> {
         let mut first = None;
         let mut found: Vec<TopicInfo> = Vec::new();

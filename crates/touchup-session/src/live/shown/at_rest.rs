@@ -1,4 +1,5 @@
-//! What is shown while nothing is touched: the scan with the patch of all touches in it, as a file of the result has it.
+//! What is shown while nothing is touched: the scan with the patch of all touches in it, as a file
+//! of the result has it.
 
 use std::collections::HashMap;
 
@@ -83,7 +84,8 @@ impl AtRest {
         self.support.get(&vertex).copied()
     }
 
-    /// The patch of all touches so far is to be shown, from when the working mesh is followed until it changes again.
+    /// The patch of all touches so far is to be shown, from when the working mesh is followed until
+    /// it changes again.
     pub fn want(&mut self, patch: PatchDelta, working: &TriMesh) {
         let Self {
             phase,
@@ -104,7 +106,8 @@ impl AtRest {
         self.wanted.is_some() || self.phase == RestPhase::Resting && self.edits == working.edits()
     }
 
-    /// Where the patch of all touches is wanted, begins with it; returns whether there is anything to do for it.
+    /// Where the patch of all touches is wanted, begins with it; returns whether there is anything
+    /// to do for it.
     pub fn begin(&mut self, followed: &FollowedScan, scans: Scans<'_>, working: &TriMesh) -> bool {
         let Some(patch) = self.wanted.take() else {
             return false;
@@ -145,7 +148,8 @@ impl AtRest {
         true
     }
 
-    /// Goes on from the working mesh to the patch of all touches or back, by up to `most` steps; returns whether that was all.
+    /// Goes on from the working mesh to the patch of all touches or back, by up to `most` steps;
+    /// returns whether that was all.
     ///
     /// # Errors
     /// [`MeshError::TooMany`].

@@ -30,7 +30,8 @@ pub(super) struct FollowedScan {
     /// vertices and faces of the scan by the cell that they (or their first corners) are in
     pub vertices: Groups,
     faces: Groups,
-    /// faces of the scan that each face of the simplified scan stands for, once its cells are parted
+    /// faces of the scan that each face of the simplified scan stands for, once its cells are
+    /// parted
     pub parts: Vec<Vec<FaceId>>,
     is_parted: Vec<bool>,
     /// by face slot of the working mesh
@@ -97,7 +98,8 @@ impl FollowedScan {
         }
     }
 
-    /// Takes up to `most` changes of each kind of the working mesh over; returns whether that was all.
+    /// Takes up to `most` changes of each kind of the working mesh over; returns whether that was
+    /// all.
     ///
     /// # Errors
     /// [`MeshError::TooMany`].
@@ -251,7 +253,8 @@ impl FollowedScan {
         Ok(())
     }
 
-    /// Finds the faces of the scan that the faces around the corners of `detail` stand for: each is given to the nearest.
+    /// Finds the faces of the scan that the faces around the corners of `detail` stand for: each is
+    /// given to the nearest.
     fn part(&mut self, scans: Scans<'_>, detail: FaceId) {
         let (scan, simplified) = (scans.original, &scans.simplified.mesh);
         for cell in simplified.corners(detail) {

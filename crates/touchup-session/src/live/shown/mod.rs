@@ -1,5 +1,6 @@
-//! The mesh that is shown where haptic update and patch work on a simplified scan: the faces of the scan where nothing was replaced,
-//! moved along with the simplified ones, and the faces of the patch. At rest it is the scan with the patch of all touches.
+//! The mesh that is shown where haptic update and patch work on a simplified scan: the faces of the
+//! scan where nothing was replaced, moved along with the simplified ones, and the faces of the
+//! patch. At rest it is the scan with the patch of all touches.
 
 mod at_rest;
 mod followed;
@@ -33,8 +34,8 @@ impl Shown {
         &self.followed.mesh
     }
 
-    /// Takes up to `most` changes of each kind of the working mesh over, or where it rests of the patch of all touches; returns whether
-    /// that was all.
+    /// Takes up to `most` changes of each kind of the working mesh over, or where it rests of the
+    /// patch of all touches; returns whether that was all.
     ///
     /// # Errors
     /// [`MeshError::TooMany`].
@@ -60,7 +61,8 @@ impl Shown {
         self.followed.mesh.take_changes(most, into)
     }
 
-    /// The patch of all touches so far is to be shown, from when the working mesh is followed until it changes again.
+    /// The patch of all touches so far is to be shown, from when the working mesh is followed until
+    /// it changes again.
     pub fn rest(&mut self, patch: PatchDelta, working: &TriMesh) {
         self.at_rest.want(patch, working);
     }

@@ -10,7 +10,8 @@ pub(super) const MARK: &str = "# touchup calibrate";
 /// Spaces that a new level is set in by.
 const STEP: usize = 2;
 
-/// The text with `path` set to `value`; the line of the key ends with `remark` where it has no comment of its own.
+/// The text with `path` set to `value`; the line of the key ends with `remark` where it has no
+/// comment of its own.
 pub(super) fn set(text: &str, path: &[&str], value: &str, remark: &str) -> Option<String> {
     let lines: Vec<&str> = text.split_inclusive('\n').collect();
     let whole = 0..lines
@@ -100,8 +101,8 @@ fn set_in(
     }
 }
 
-/// Where a new key of the mapping in `range` goes: behind its last line, be that a comment that is set in as its keys
-/// are.
+/// Where a new key of the mapping in `range` goes: behind its last line, be that a comment that is
+/// set in as its keys are.
 fn end_of(lines: &[&str], range: Range<usize>, indent: usize) -> usize {
     let is_part = |at: &usize| !lines[*at].trim().is_empty() && indent_of(lines[*at]) >= indent;
     range
@@ -111,8 +112,8 @@ fn end_of(lines: &[&str], range: Range<usize>, indent: usize) -> usize {
         .map_or(range.start, |at| at + 1)
 }
 
-/// Behind the last line of the value of a key: deeper ones, and items of a list at its own depth. Comments and
-/// empty lines at the end belong to the next key, unless they are deeper.
+/// Behind the last line of the value of a key: deeper ones, and items of a list at its own depth.
+/// Comments and empty lines at the end belong to the next key, unless they are deeper.
 fn body_end(lines: &[&str], range: Range<usize>, indent: usize) -> usize {
     let is_item = |line: &str| indent_of(line) == indent && line.trim_start().starts_with('-');
     let is_inside = |line: &str| indent_of(line) > indent || is_item(line);

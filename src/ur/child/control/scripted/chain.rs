@@ -1,4 +1,5 @@
-//! The chain: a watched arm, orders, driver, library, the model of the controller, states, guard and dashboard.
+//! The chain: a watched arm, orders, driver, library, the model of the controller, states, guard
+//! and dashboard.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -305,7 +306,8 @@ impl<'a> World<'a> {
     }
 }
 
-/// The library: it looks at the newest states it has, waits for a program that is ready, and writes registers.
+/// The library: it looks at the newest states it has, waits for a program that is ready, and writes
+/// registers.
 pub struct Library<'a, 'b>(pub &'b World<'a>);
 
 impl Library<'_, '_> {

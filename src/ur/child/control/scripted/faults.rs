@@ -8,10 +8,11 @@ use super::session::{ProbingSession, limits};
 use crate::probing::arm::{Arm, ProbeError, TouchParams};
 use crate::sim::Plate;
 
-/// Without a dashboard the arm stands within this, s: the watchdog of the controller, and its brakes.
+/// Without a dashboard the arm stands within this, s: the watchdog of the controller, and its
+/// brakes.
 const WATCHDOG: f64 = 0.12;
-/// Nobody could end a program that is resumed: its thread speeds up with 0.5 m/s² until the client, which looks each 5 ms, brakes it
-/// 14 ms later, so it goes for some 20 ms, m.
+/// Nobody could end a program that is resumed: its thread speeds up with 0.5 m/s² until the client,
+/// which looks each 5 ms, brakes it 14 ms later, so it goes for some 20 ms, m.
 const RESUMED_WAY: f64 = 0.15e-3;
 /// After a fault nobody orders anything for this long, s.
 const QUIET: f64 = 2.0;
@@ -62,7 +63,8 @@ impl Outcome {
     }
 }
 
-/// Touches until some time (s); after a fault nobody orders anything for two seconds, then it goes on.
+/// Touches until some time (s); after a fault nobody orders anything for two seconds, then it goes
+/// on.
 fn played(script: Vec<(f64, String)>, seed: u64, seconds: f64) -> Outcome {
     let over = script.last().map_or(0.0, |(at, _)| at + 0.1);
     let plate = Plate::default();
@@ -97,7 +99,8 @@ pub struct Kind {
     pub line: &'static str,
     /// what ends it; empty: nothing
     ends: &'static str,
-    /// the arm stands within this time where it lasts as long, s; `None`: it may go on, or is seen by its next order
+    /// the arm stands within this time where it lasts as long, s; `None`: it may go on, or is seen
+    /// by its next order
     stands: Option<f64>,
     /// words of the reasons that are true
     reasons: &'static [&'static str],
@@ -116,7 +119,8 @@ const UNHEARD: &[&str] = &[
 /// Of a press that goes on where the thread of the motion lives.
 const OVER: &str = "over the limit";
 
-/// The same where the thread of the motion lives: a press goes on until its force is over the limit.
+/// The same where the thread of the motion lives: a press goes on until its force is over the
+/// limit.
 const STILL_PRESSING: &[&str] = &[
     "has ended",
     "has not returned",
@@ -338,7 +342,8 @@ fn is_true(words: &str, faults: &Faults, peak: f64) -> bool {
     let reasons = faults
         .iter()
         .flat_map(|(kind, ..)| kind.reasons.iter().map(|reason| (kind.line, *reason)));
-    // of a program that hangs only where the part was pressed with that much; 1 N is what its sensor is off
+    // of a program that hangs only where the part was pressed with that much; 1 N is what its
+    // sensor is off
     let is_felt = |(line, reason): (&str, &str)| {
         line != "hung" || reason != OVER || peak > limits().force - 1.0
     };
@@ -411,7 +416,8 @@ fn judged(faults: &Faults, outcome: &Outcome) -> Option<String> {
         }
         _ => {}
     }
-    // states that never came, that a caller was held up for, or that came at once, of which the library has the newest
+    // states that never came, that a caller was held up for, or that came at once, of which the
+    // library has the newest
     let may_miss = has(&[
         "silent",
         "unplug",
@@ -568,8 +574,9 @@ fn an_arm_that_is_resumed_while_its_dashboard_is_mute_is_braked_by_its_client() 
     );
 }
 
-/// Held up for 300 ms in its fastest link: 20 ms until the client brakes, and as many to see that it looks, to order and to brake.
-/// Its program may hang as well, which nobody but the guard sees then.
+/// Held up for 300 ms in its fastest link: 20 ms until the client brakes, and as many to see that
+/// it looks, to order and to brake. Its program may hang as well, which nobody but the guard sees
+/// then.
 #[test]
 fn an_arm_whose_caller_is_held_up_stands_also_where_its_program_hangs() {
     let free = played(Vec::new(), 1, 8.0).record;

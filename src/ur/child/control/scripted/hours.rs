@@ -12,7 +12,8 @@ use crate::sim::Plate;
 
 /// The last of a script and the recovery are so far apart, s.
 const QUIET: f64 = 0.3;
-/// Memory may differ by this between the first and the last quarter: what a queue has grown to, bytes.
+/// Memory may differ by this between the first and the last quarter: what a queue has grown to,
+/// bytes.
 const FLAT: isize = 64 << 10;
 
 /// Five minutes of the arm's time, with `--full` eight hours.
@@ -36,7 +37,8 @@ fn hours_of_faults_and_recoveries_leave_no_stuck_state_and_no_memory_behind() {
             recent = script_of(&next);
             world.script.borrow_mut().extend(script_of(&next));
         }
-        // one that nobody noticed would be in this zero, and the force off by its weight after the next recovery
+        // one that nobody noticed would be in this zero, and the force off by its weight after the
+        // next recovery
         world
             .script
             .borrow_mut()

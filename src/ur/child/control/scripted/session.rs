@@ -1,4 +1,5 @@
-//! Touches here and there on a plate with links between, until something is wrong; and how it goes on after that.
+//! Touches here and there on a plate with links between, until something is wrong; and how it goes
+//! on after that.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
@@ -75,7 +76,8 @@ impl<'a, 'b> ProbingSession<'a, 'b> {
         Ok(())
     }
 
-    /// Touches the next place; how high the surface is there beside where it should be, m; `None`: nothing was met.
+    /// Touches the next place; how high the surface is there beside where it should be, m; `None`:
+    /// nothing was met.
     fn touch(&mut self) -> Result<Option<f64>, ProbeError> {
         let [x, y] = PLACES[self.touches % PLACES.len()];
         let params = ArmParams::default();
