@@ -1,15 +1,17 @@
-//! What the fuzz targets share: bytes as a file, numbers of any size, small parts, and what must
-//! hold of a mesh.
+//! Targets that take any bytes, the seeds that they begin from, and what they share: bytes as a
+//! file, numbers of any size, small parts, invariants of a mesh.
 //!
-//! `fuzz/run` builds and runs the targets.
+//! The tests run each target on its seeds; `fuzz/run` lets libFuzzer change them, guided by
+//! coverage.
 
 pub mod seeds;
+pub mod targets;
 
 use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use libfuzzer_sys::arbitrary::{Result, Unstructured};
+use arbitrary::{Result, Unstructured};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use touchup_core::haptic::TipParams;
 use touchup_core::mesh::{TriMesh, is_place, repair};

@@ -1,15 +1,12 @@
 //! One held sample of the face dynamics, by every rule: a face somewhere, of unit normal, or an
 //! error.
 
-#![no_main]
-
-use libfuzzer_sys::arbitrary::{Result, Unstructured};
-use libfuzzer_sys::fuzz_target;
+use crate::{number, vector};
+use arbitrary::{Result, Unstructured};
 use nalgebra::{Point3, Vector3};
 use touchup_core::haptic::{
     Along, ContactModel, DynamicsParams, FaceDynamics, FaceState, StepRule,
 };
-use touchup_fuzz::{number, vector};
 
 fn step(bytes: &mut Unstructured) -> Result<()> {
     let model = if bytes.arbitrary()? {
@@ -69,6 +66,10 @@ fn step(bytes: &mut Unstructured) -> Result<()> {
     Ok(())
 }
 
-fuzz_target!(|data: &[u8]| {
+/// One input of this target.
+///
+/// # Panics
+/// If the claim of the module does not hold.
+pub fn run(data: &[u8]) {
     let _ = step(&mut Unstructured::new(data));
-});
+}

@@ -1,16 +1,13 @@
 //! Any samples pushed into a mesh with any vertices: every vertex stays at a place.
 
-#![no_main]
-
-use libfuzzer_sys::arbitrary::{Result, Unstructured};
-use libfuzzer_sys::fuzz_target;
+use crate::{BALL, assert_is_somewhere, closed_box, sample, vector};
+use arbitrary::{Result, Unstructured};
 use nalgebra::Point3;
 use touchup_core::haptic::{
     DynamicsParams, GuardParams, RefineParams, Refiner, StepRule, TipParams,
 };
 use touchup_core::mesh::TriMesh;
 use touchup_core::stylus::TipShape;
-use touchup_fuzz::{BALL, assert_is_somewhere, closed_box, sample, vector};
 
 /// A box, or triangles in a fan: needles, points that coincide, faces without area.
 fn part(bytes: &mut Unstructured) -> Result<Option<TriMesh>> {
@@ -92,6 +89,10 @@ fn push_all(bytes: &mut Unstructured) -> Result<()> {
     Ok(())
 }
 
-fuzz_target!(|data: &[u8]| {
+/// One input of this target.
+///
+/// # Panics
+/// If the claim of the module does not hold.
+pub fn run(data: &[u8]) {
     let _ = push_all(&mut Unstructured::new(data));
-});
+}

@@ -1,9 +1,6 @@
 //! Recordings of other makers: tables of numbers, by usual and by named columns, and ROS 1 bags.
 
-#![no_main]
-
-use libfuzzer_sys::fuzz_target;
-use touchup_fuzz::{file, read_all};
+use crate::{file, read_all};
 use touchup_io::recording::{RecordingLayout, TableColumns, Topics, WrenchAxes};
 
 /// Names of columns, one letter each.
@@ -11,7 +8,11 @@ fn names(letters: &str) -> Option<Vec<String>> {
     Some(letters.chars().map(String::from).collect())
 }
 
-fuzz_target!(|data: &[u8]| {
+/// One input of this target.
+///
+/// # Panics
+/// If the claim of the module does not hold.
+pub fn run(data: &[u8]) {
     let Some((kind, rest)) = data.split_first() else {
         return;
     };
@@ -52,4 +53,4 @@ fuzz_target!(|data: &[u8]| {
         }
         _ => read_all(&file("touch.bag", rest), &Topics::default()),
     }
-});
+}

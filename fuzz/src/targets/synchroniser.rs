@@ -1,10 +1,8 @@
 //! Messages of any stamps and numbers, paired and doubted: samples come finite, in order of time,
 //! and explain themselves.
 
-#![no_main]
-
-use libfuzzer_sys::arbitrary::{Result, Unstructured};
-use libfuzzer_sys::fuzz_target;
+use crate::{BALL, closed_box, number, rotation, vector};
+use arbitrary::{Result, Unstructured};
 use nalgebra::{Isometry3, Translation3};
 use touchup_core::diagnose::{InputMonitor, InputMonitorParams};
 use touchup_core::mesh::FaceTree;
@@ -12,7 +10,6 @@ use touchup_core::stylus::{
     CompensatorParams, ContactEstimator, ContactEstimatorParams, ContactGateParams, Message,
     Placement, StampedPose, StampedWrench, SyncParams, Synchroniser, TipShape, Wrench,
 };
-use touchup_fuzz::{BALL, closed_box, number, rotation, vector};
 
 const MS: i64 = 1_000_000;
 
@@ -104,6 +101,10 @@ fn pair(bytes: &mut Unstructured) -> Result<()> {
     Ok(())
 }
 
-fuzz_target!(|data: &[u8]| {
+/// One input of this target.
+///
+/// # Panics
+/// If the claim of the module does not hold.
+pub fn run(data: &[u8]) {
     let _ = pair(&mut Unstructured::new(data));
-});
+}

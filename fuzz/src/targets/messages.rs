@@ -1,17 +1,18 @@
 //! Messages in CDR: all types of poses and wrenches, transforms and clouds of markers, in a
 //! recording around them that is sound.
 
-#![no_main]
-
-use libfuzzer_sys::fuzz_target;
-use touchup_fuzz::seeds::{MARKERS, TOPICS, mcap_of};
-use touchup_fuzz::{file, read_all};
+use crate::seeds::{MARKERS, TOPICS, mcap_of};
+use crate::{file, read_all};
 use touchup_io::recording::{RecordingLayout, Topics, TransformFrames};
 
 /// A message begins with its topic, and its length in four bytes.
 const HEAD: usize = 5;
 
-fuzz_target!(|data: &[u8]| {
+/// One input of this target.
+///
+/// # Panics
+/// If the claim of the module does not hold.
+pub fn run(data: &[u8]) {
     let (mut messages, mut rest) = (Vec::new(), data);
     while let Some((head, after)) = rest.split_at_checked(HEAD) {
         let length = u32::from_le_bytes([head[1], head[2], head[3], head[4]]) as usize;
@@ -66,4 +67,4 @@ fuzz_target!(|data: &[u8]| {
             },
         );
     }
-});
+}

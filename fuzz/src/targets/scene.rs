@@ -1,15 +1,19 @@
 //! A scene: what is accepted makes settings that the rooms take or refuse by name.
 
-#![no_main]
-
-use libfuzzer_sys::fuzz_target;
+use crate::closed_box;
 use touchup_core::haptic::Refiner;
 use touchup_core::reconstruct::Patcher;
 use touchup_core::stylus::{Synchroniser, WrenchFrame};
-use touchup_fuzz::closed_box;
 use touchup_session::scene::Scene;
 
-fuzz_target!(|yaml: &str| {
+/// One input of this target.
+///
+/// # Panics
+/// If the claim of the module does not hold.
+pub fn run(data: &[u8]) {
+    let Ok(yaml) = std::str::from_utf8(data) else {
+        return;
+    };
     let Ok(scene) = Scene::from_yaml(yaml) else {
         return;
     };
@@ -22,4 +26,4 @@ fuzz_target!(|yaml: &str| {
     if let Some(params) = scene.refine_params(WrenchFrame::Sensor) {
         let _ = Refiner::new(closed_box([0.01; 3], 1), params);
     }
-});
+}

@@ -1,11 +1,12 @@
 //! The record of the check of an arm.
 
-#![no_main]
-
-use libfuzzer_sys::fuzz_target;
-use touchup_fuzz::file;
+use crate::file;
 use touchup_session::scene::CheckRecord;
 
-fuzz_target!(|data: &[u8]| {
+/// One input of this target.
+///
+/// # Panics
+/// If the claim of the module does not hold.
+pub fn run(data: &[u8]) {
     let _ = CheckRecord::read(&file("check.json", data));
-});
+}

@@ -1,12 +1,13 @@
 //! A file of features, which comes back from the one that is written of it.
 
-#![no_main]
-
-use libfuzzer_sys::fuzz_target;
-use touchup_fuzz::file;
+use crate::file;
 use touchup_io::features_file::{read_features, write_features};
 
-fuzz_target!(|data: &[u8]| {
+/// One input of this target.
+///
+/// # Panics
+/// If the claim of the module does not hold.
+pub fn run(data: &[u8]) {
     let path = file("features.json", data);
     let Ok(features) = read_features(&path) else {
         return;
@@ -14,4 +15,4 @@ fuzz_target!(|data: &[u8]| {
     write_features(&path, &features).expect("a file that was read can be written");
     let again = read_features(&path).expect("it was written here");
     assert_eq!(again.features.len(), features.features.len());
-});
+}

@@ -1,13 +1,14 @@
 //! A mesh file of either kind: what is read has places alone, and comes back from the file that is
 //! written of it.
 
-#![no_main]
-
-use libfuzzer_sys::fuzz_target;
-use touchup_fuzz::{assert_is_somewhere, file, place};
+use crate::{assert_is_somewhere, file, place};
 use touchup_io::mesh_file::{MeshUnit, read_mesh, read_vertex_columns, write_mesh};
 
-fuzz_target!(|data: &[u8]| {
+/// One input of this target.
+///
+/// # Panics
+/// If the claim of the module does not hold.
+pub fn run(data: &[u8]) {
     let Some((&kind, bytes)) = data.split_first() else {
         return;
     };
@@ -34,4 +35,4 @@ fuzz_target!(|data: &[u8]| {
         .expect("it was written here")
         .mesh;
     assert_eq!(again.positions(), read.mesh.positions());
-});
+}

@@ -1,16 +1,17 @@
 //! The tables that are read: pairs of points, static poses, touches, and the lines of the touches
 //! of an arm.
 
-#![no_main]
-
-use libfuzzer_sys::fuzz_target;
-use touchup_fuzz::file;
+use crate::file;
 use touchup_io::pairs_file::{read_pairs, read_scan_points};
 use touchup_io::probed_touches_file::read_probed_touches;
 use touchup_io::static_poses::read_static_poses;
 use touchup_io::touches_file::{read_touches, write_touches};
 
-fuzz_target!(|data: &[u8]| {
+/// One input of this target.
+///
+/// # Panics
+/// If the claim of the module does not hold.
+pub fn run(data: &[u8]) {
     let path = file("table", data);
     for pairs in [read_pairs(&path), read_scan_points(&path)]
         .into_iter()
@@ -34,4 +35,4 @@ fuzz_target!(|data: &[u8]| {
             touches.len()
         );
     }
-});
+}

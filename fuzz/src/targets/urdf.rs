@@ -1,12 +1,13 @@
 //! The URDF of an arm.
 
-#![no_main]
-
-use libfuzzer_sys::fuzz_target;
-use touchup_fuzz::file;
+use crate::file;
 use touchup_io::urdf::{ArmLinks, read_urdf};
 
-fuzz_target!(|data: &[u8]| {
+/// One input of this target.
+///
+/// # Panics
+/// If the claim of the module does not hold.
+pub fn run(data: &[u8]) {
     let _ = read_urdf(
         &file("arm.urdf", data),
         &ArmLinks {
@@ -15,4 +16,4 @@ fuzz_target!(|data: &[u8]| {
             radius: 0.05,
         },
     );
-});
+}

@@ -1,15 +1,16 @@
 //! A folder of rosbag2: its metadata beside a file that is whole.
 
-#![no_main]
-
 use std::fs;
 
-use libfuzzer_sys::fuzz_target;
-use touchup_fuzz::seeds::mcap_bytes;
-use touchup_fuzz::{place, read_all};
+use crate::seeds::mcap_bytes;
+use crate::{place, read_all};
 use touchup_io::recording::Topics;
 
-fuzz_target!(|data: &[u8]| {
+/// One input of this target.
+///
+/// # Panics
+/// If the claim of the module does not hold.
+pub fn run(data: &[u8]) {
     let folder = place("bag");
     if !folder.is_dir() {
         fs::create_dir(&folder).expect("the folder for temporary files takes a folder");
@@ -17,4 +18,4 @@ fuzz_target!(|data: &[u8]| {
     }
     fs::write(folder.join("metadata.yaml"), data).expect("it takes a file");
     read_all(&folder, &Topics::default());
-});
+}

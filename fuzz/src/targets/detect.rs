@@ -1,12 +1,9 @@
 //! Features of a small mesh of any vertices: numbers without NaN.
 
-#![no_main]
-
-use libfuzzer_sys::arbitrary::{Result, Unstructured};
-use libfuzzer_sys::fuzz_target;
+use crate::{closed_box, vector};
+use arbitrary::{Result, Unstructured};
 use nalgebra::Point3;
 use touchup_core::mesh::repair;
-use touchup_fuzz::{closed_box, vector};
 use touchup_session::session::found;
 
 fn detect(bytes: &mut Unstructured) -> Result<()> {
@@ -36,6 +33,10 @@ fn detect(bytes: &mut Unstructured) -> Result<()> {
     Ok(())
 }
 
-fuzz_target!(|data: &[u8]| {
+/// One input of this target.
+///
+/// # Panics
+/// If the claim of the module does not hold.
+pub fn run(data: &[u8]) {
     let _ = detect(&mut Unstructured::new(data));
-});
+}

@@ -1,13 +1,14 @@
 //! A recording in one file, MCAP or SQLite by its content, with poses or with markers.
 
-#![no_main]
-
-use libfuzzer_sys::fuzz_target;
-use touchup_fuzz::seeds::MARKERS;
-use touchup_fuzz::{file, read_all};
+use crate::seeds::MARKERS;
+use crate::{file, read_all};
 use touchup_io::recording::Topics;
 
-fuzz_target!(|data: &[u8]| {
+/// One input of this target.
+///
+/// # Panics
+/// If the claim of the module does not hold.
+pub fn run(data: &[u8]) {
     let path = file("recording", data);
     read_all(&path, &Topics::default());
     read_all(
@@ -17,4 +18,4 @@ fuzz_target!(|data: &[u8]| {
             ..Topics::default()
         },
     );
-});
+}

@@ -1,13 +1,14 @@
 //! A point cloud of any kind: what is read has as many points as the bytes can hold. The surface
 //! through them is left out: its grid takes longer than all else.
 
-#![no_main]
-
-use libfuzzer_sys::fuzz_target;
-use touchup_fuzz::file;
+use crate::file;
 use touchup_io::mesh_file::{MeshOrPoints, MeshUnit, read_mesh_or_points};
 
-fuzz_target!(|data: &[u8]| {
+/// One input of this target.
+///
+/// # Panics
+/// If the claim of the module does not hold.
+pub fn run(data: &[u8]) {
     let Some((&kind, bytes)) = data.split_first() else {
         return;
     };
@@ -26,4 +27,4 @@ fuzz_target!(|data: &[u8]| {
         points.len(),
         bytes.len()
     );
-});
+}

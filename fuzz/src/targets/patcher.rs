@@ -1,14 +1,11 @@
 //! Any samples on a closed scan: its patch has places alone, and leaves it closed.
 
-#![no_main]
-
-use libfuzzer_sys::arbitrary::{Result, Unstructured};
-use libfuzzer_sys::fuzz_target;
+use crate::{BALL, assert_is_somewhere, closed_box, open_edges, sample};
+use arbitrary::{Result, Unstructured};
 use nalgebra::Point3;
 use touchup_core::mesh::FaceTree;
 use touchup_core::reconstruct::{Patcher, PatcherParams};
 use touchup_core::stylus::{ContactEstimator, ContactEstimatorParams};
-use touchup_fuzz::{BALL, assert_is_somewhere, closed_box, open_edges, sample};
 
 fn patch(bytes: &mut Unstructured) -> Result<()> {
     let scan = closed_box([4e-3, 3e-3, 2e-3], 3);
@@ -51,6 +48,10 @@ fn patch(bytes: &mut Unstructured) -> Result<()> {
     Ok(())
 }
 
-fuzz_target!(|data: &[u8]| {
+/// One input of this target.
+///
+/// # Panics
+/// If the claim of the module does not hold.
+pub fn run(data: &[u8]) {
     let _ = patch(&mut Unstructured::new(data));
-});
+}
