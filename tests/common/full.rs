@@ -1,5 +1,5 @@
-//! What belongs to the quick checks, and what to `tests/all.sh --full`. What proofs print there is
-//! taken into docs/results.md: the list is in tests/results.sh.
+//! Sizes of a test: one for the quick checks, one for the slow proofs. The shards of
+//! tests/shards.sh run the latter, and name the tests whose output goes into docs/results.md.
 
 /// Whether the slow proofs run too.
 pub fn is_full() -> bool {

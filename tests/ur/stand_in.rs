@@ -1,5 +1,6 @@
 //! Starts the stand-in for a controller, makes its faults, reads its record, and ends it.
 
+use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
@@ -21,18 +22,28 @@ const STANDING: usize = 20;
 
 static NEXT: AtomicU8 = AtomicU8::new(2);
 
-/// The folder of packages with ur-rtde, made once by `touchup ur setup`, or why there is none.
+/// The folder of packages with ur-rtde in it, or why there is none: `touchup ur setup` makes it for
+/// the first process that asks, while others wait.
 pub fn packages() -> Result<&'static Path, &'static str> {
     static PACKAGES: LazyLock<Result<PathBuf, String>> = LazyLock::new(|| {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("ur");
+        let temporary = Path::new(env!("CARGO_TARGET_TMPDIR"));
+        let lock = File::create(temporary.join("ur.lock")).unwrap();
+        lock.lock().unwrap();
+        let made = temporary.join("ur.site_packages");
+        if let Ok(packages) = std::fs::read_to_string(&made) {
+            return Ok(packages.into());
+        }
         let setup = Command::new(env!("CARGO_BIN_EXE_touchup"))
             .args(["ur", "setup"])
-            .arg(folder)
+            .arg(temporary.join("ur"))
             .output()
             .unwrap();
         let output = String::from_utf8(setup.stdout).unwrap();
         match output.trim().strip_prefix("site_packages: ") {
-            Some(packages) if setup.status.success() => Ok(packages.into()),
+            Some(packages) if setup.status.success() => {
+                std::fs::write(made, packages).unwrap();
+                Ok(packages.into())
+            }
             _ => Err(String::from_utf8_lossy(&setup.stderr).trim().to_owned()),
         }
     });

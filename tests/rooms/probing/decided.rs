@@ -22,7 +22,7 @@ use touchup::probing::plan::{
 use touchup::sim::{Plate, Surface as _};
 
 use super::plan::{SIGMA, TOP, flat, normal_of, on, probe};
-use crate::full::{either, is_full};
+use crate::full::either;
 
 /// Repeatability of a touch beside that of its curve, m; standard uncertainty of the radius of the
 /// ball, m.
@@ -381,13 +381,6 @@ fn deciding_takes_the_touches_that_the_distance_from_the_limit_asks_for() {
         );
     }
     println!("touches on average: right, wrong, open of {seeds} seeds\n\n{table}");
-    if let (true, Some(folder)) = (is_full(), std::env::var_os("TOUCHUP_RESULTS")) {
-        std::fs::write(
-            std::path::Path::new(&folder).join("Touches_until_decided.md"),
-            &table,
-        )
-        .unwrap();
-    }
     assert!(wrong * 20 <= decided, "{wrong} of {decided}");
 }
 

@@ -1,12 +1,11 @@
 //! Coverage: what is counted, against cases worked by hand, and a run from end to end.
 
-use std::fmt::Write;
-
 use touchup_report::coverage::{CoverageKind, CoverageParams, KindInWorld, StatedNumber, coverage};
 use touchup_report::{Effort, TableCell};
 use touchup_sim::SimWorld;
 
 use crate::full::is_full;
+use crate::markdown;
 
 fn number(error: f64, std: f64) -> StatedNumber {
     StatedNumber {
@@ -116,26 +115,5 @@ fn coverage_is_measured_and_reported() {
         .filter(|row| row.last() == Some(&TableCell::from("OUTSIDE")))
         .count();
     assert_eq!(verdicts, found.outside().len());
-    if let (true, Some(folder)) = (is_full(), std::env::var_os("TOUCHUP_RESULTS")) {
-        let mut text = format!(
-            "{}\n\n| {} |\n|{}\n",
-            chapter.text[0],
-            table.heads.join(" | "),
-            "---|".repeat(table.heads.len())
-        );
-        for row in &table.rows {
-            let cells: Vec<String> = row.iter().map(in_words).collect();
-            writeln!(text, "| {} |", cells.join(" | ")).unwrap();
-        }
-        std::fs::write(std::path::Path::new(&folder).join("coverage.md"), text).unwrap();
-    }
-}
-
-fn in_words(cell: &TableCell) -> String {
-    match cell {
-        TableCell::Text(text) => text.clone(),
-        TableCell::Number(number) => format!("{number:.3}"),
-        TableCell::Spread(spread) => format!("{:.3}", spread.median),
-        TableCell::Empty => String::new(),
-    }
+    println!("{}\n\n{}", chapter.text[0], markdown(table, 3));
 }

@@ -1,13 +1,12 @@
 //! Mistakes: what is counted, against cases worked by hand, and a run from end to end.
 
-use std::fmt::Write;
-
 use touchup_core::diagnose::{InputCause, InputFinding};
 use touchup_report::mistakes::{CheckedRecording, MistakesParams, RightCount, mistakes};
-use touchup_report::{Effort, TableCell};
+use touchup_report::Effort;
 use touchup_sim::{INPUT_MISTAKES, InputMistake, SimWorld};
 
 use crate::full::is_full;
+use crate::markdown;
 
 fn finding(cause: InputCause, is_sure: bool) -> InputFinding {
     InputFinding {
@@ -90,30 +89,8 @@ fn mistakes_are_named_and_sound_recordings_raise_no_alarm() {
         "{:?}",
         missed.rows
     );
-    if let (true, Some(folder)) = (is_full(), std::env::var_os("TOUCHUP_RESULTS")) {
-        let mut text = format!("{}\n", chapter.text[0]);
-        for table in &chapter.tables {
-            write!(
-                text,
-                "\n| {} |\n|{}\n",
-                table.heads.join(" | "),
-                "---|".repeat(table.heads.len())
-            )
-            .unwrap();
-            for row in &table.rows {
-                let cells: Vec<String> = row.iter().map(in_words).collect();
-                writeln!(text, "| {} |", cells.join(" | ")).unwrap();
-            }
-        }
-        std::fs::write(std::path::Path::new(&folder).join("mistakes.md"), text).unwrap();
-    }
-}
-
-fn in_words(cell: &TableCell) -> String {
-    match cell {
-        TableCell::Text(text) => text.clone(),
-        TableCell::Number(number) => format!("{number:.0}"),
-        TableCell::Spread(spread) => format!("{:.0}", spread.median),
-        TableCell::Empty => String::new(),
+    println!("{}", chapter.text[0]);
+    for table in &chapter.tables {
+        println!("\n{}", markdown(table, 0));
     }
 }

@@ -13,7 +13,7 @@ use touchup::probing::plan::{ArmUncertainty, PatternParams};
 use touchup::sim::{ArmErrorSigmas, ArmErrors, ArmParams, Plate, SimArm};
 
 use super::{cell, params};
-use crate::full::{either, is_full};
+use crate::full::either;
 use crate::plate_stream::plate_scan;
 
 /// By what an arm differs from its scene, and what is wanted of its numbers.
@@ -289,12 +289,5 @@ fn errors_are_as_large_as_stated_where_told_values_are_wrong() {
         }
     }
     println!("{table}");
-    if let (true, Some(folder)) = (is_full(), std::env::var_os("TOUCHUP_RESULTS")) {
-        std::fs::write(
-            std::path::Path::new(&folder).join("Errors_of_an_arm_over_their_uncertainty.md"),
-            &table,
-        )
-        .unwrap();
-    }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
