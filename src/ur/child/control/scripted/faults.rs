@@ -472,21 +472,6 @@ fn a_part_met_at_link_speed_is_pressed_with_no_more_than_the_limit_and_left() {
     assert!(last < 1.0, "{last} N are left");
 }
 
-/// What it was before (`FINDINGS` of the arm, with another stand-in and the real library).
-fn before(line: &str) -> &'static str {
-    match line {
-        "pause" | "open" => "went on by itself when resumed: 2.7 to 56 mm at 40 mm/s",
-        "hung" => "3.2 to 3.6 s, 158 to 177 mm; reason: over the limit while zeroing",
-        "silent" => "84 ms",
-        "unplug" => "110 ms",
-        "drop" => "12 ms",
-        "slider 5" => "did not arrive, the slider not named",
-        "raise 3" => "25.4 N of 15 N with a part 6 mm too high, left at 18.7 N",
-        "hold 300" => "50 ms were not noticed",
-        _ => "-",
-    }
-}
-
 /// In the fastest link, in the search for the surface, and pressed; each as a row of a table.
 #[test]
 fn each_fault_alone_ends_as_it_should() {
@@ -504,9 +489,10 @@ fn each_fault_alone_ends_as_it_should() {
     let pressed = later.iter().find(|moment| moment.force > 2.0).unwrap().time;
     // 50 ms before the ball meets the surface
     let search = later.iter().find(|moment| moment.force > 0.0).unwrap().time - 0.05;
-    let mut table = "| fault | moment | speed, mm/s | stands after, ms | largest force, N | reason | before |\n\
-         |---|---|---|---|---|---|---|\n"
-        .to_owned();
+    let mut table =
+        "| fault | moment | speed, mm/s | stands after, ms | largest force, N | reason |\n\
+         |---|---|---|---|---|---|\n"
+            .to_owned();
     for (name, moment) in [("link", link), ("search", search), ("pressed", pressed)] {
         for kind in KINDS {
             let faults = vec![(kind, moment, 1.5)];
@@ -525,10 +511,9 @@ fn each_fault_alone_ends_as_it_should() {
                 .iter()
                 .find(|seen| seen.time >= moment)
                 .map_or(0.0, |seen| seen.speed * 1e3);
-            let (line, peak, before) = (kind.line, outcome.peak(), before(kind.line));
-            table += &format!(
-                "| {line} | {name} | {speed:.0} | {stands} | {peak:.1} | {reason} | {before} |\n"
-            );
+            let (line, peak) = (kind.line, outcome.peak());
+            table +=
+                &format!("| {line} | {name} | {speed:.0} | {stands} | {peak:.1} | {reason} |\n");
             wrong.extend(
                 judged(&faults, &outcome).map(|why| format!("{} in {name}: {why}", kind.line)),
             );
