@@ -26,7 +26,7 @@ everything=(--workspace --features everything)
 stages=()
 
 # note OUTCOME NAME [REASON]: counts what has no report of its own
-note() { printf '%s\t%s\t%s\n' "$@" >> "$logs/notes.tsv"; }
+note() { printf '%s\t%s\t%s\n' "$1" "$2" "${3-}" >> "$logs/notes.tsv"; }
 
 # stage NAME COMMAND...: runs it, and notes how long it took
 stage() {
@@ -48,6 +48,9 @@ python_environment() {
   echo "$wanted" > "$folder.made"
 }
 
+# those of the quick checks
+python_packages() { python_environment "$venv" tests/python/requirements.txt "$wheel_crate/tests/requirements.txt"; }
+
 # the program, its examples, the Python module and all Rust tests
 build() {
   PYO3_PYTHON=$(command -v python3) && export PYO3_PYTHON
@@ -55,10 +58,10 @@ build() {
   export TOUCHUP_BIN=$target/debug/touchup TOUCHUP_UR_BIN=$target/debug/touchup TOUCHUP_UR_CONTROLLER=$target/debug/examples/ur_controller
 }
 
-# rust_tests NAME [ARGUMENT...]: of nextest, into the report NAME
+# rust_tests NAME ARGUMENT...: of nextest, into the report NAME
 rust_tests() {
   local name=$1 status; shift
-  cargo nextest run "${everything[@]}" --lib --bins --tests "$@" 2>&1 | tee "$logs/$name.log"
+  cargo nextest run "$@" 2>&1 | tee "$logs/$name.log"
   status=${PIPESTATUS[0]}
   mv "$target/nextest/default/junit.xml" "$logs/$name.xml" || { note failed "$name" "nextest ended with $status, see $logs/$name.log"; return; }
   [ "$status" -eq 0 ] || [ "$status" -eq 100 ] || note failed "$name" "nextest ended with $status, see $logs/$name.log"
@@ -67,7 +70,7 @@ rust_tests() {
 documentation_tests() {
   cargo test --no-fail-fast "${everything[@]}" --doc > "$logs/documentation.log" 2>&1
   local status=$?
-  sed -nE 's/^test (.*) \.\.\. ok$/passed\t\1/p; s/^test (.*) \.\.\. FAILED$/failed\t\1/p; s/^test (.*) \.\.\. ignored.*$/skipped\t\1\tignored/p' \
+  sed -nE 's/^test (.*) \.\.\. ok$/passed\t\1\t/p; s/^test (.*) \.\.\. FAILED$/failed\t\1\t/p; s/^test (.*) \.\.\. ignored.*$/skipped\t\1\tignored/p' \
     "$logs/documentation.log" >> "$logs/notes.tsv"
   [ "$status" -eq 0 ] && return
   grep -v '^test .* ok$' "$logs/documentation.log"
@@ -106,10 +109,10 @@ quick_checks() {
   # property tests try the same cases in every run, here; others in the shards
   export PROPTEST_RNG_SEED=1
   # they arrive while the tests are built
-  python_environment "$venv" tests/python/requirements.txt > "$logs/pip.log" 2>&1 &
+  python_packages > "$logs/pip.log" 2>&1 &
   packages=$!
   stage "build" build || return
-  stage "Rust tests" rust_tests rust
+  stage "Rust tests" rust_tests rust "${everything[@]}" --lib --bins --tests
   stage "documentation tests" documentation_tests
   stage "Python packages" wait "$packages" || { tail -n 5 "$logs/pip.log" >&2; note failed "Python packages" "see $logs/pip.log"; return; }
   stage "Python package" install_package || { note failed "Python package"; return; }

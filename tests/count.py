@@ -30,13 +30,18 @@ def cases_of(report):
             yield name, seconds, "passed", ""
 
 
-def main():
-    folder = Path(sys.argv[1])
-    cases = [case for report in sorted(folder.rglob("*.xml")) for case in cases_of(report)]
+def cases_below(folder):
+    """Those of all reports and lists below a folder."""
+    for report in sorted(folder.rglob("*.xml")):
+        yield from cases_of(report)
     for path in sorted(folder.rglob("notes.tsv")):
         with open(path, newline="") as lines:
-            rows = [[*row, "", ""] for row in csv.reader(lines, delimiter="\t")]
-        cases += [(name, 0.0, outcome, reason) for outcome, name, reason, *_ in rows]
+            for outcome, name, reason in csv.reader(lines, delimiter="\t"):
+                yield name, 0.0, outcome, reason
+
+
+def main():
+    cases = list(cases_below(Path(sys.argv[1])))
     slowest = sorted(cases, key=lambda case: -case[1])[:SLOWEST]
     print(f"the {len(slowest)} slowest tests of {len(cases)}, which took {sum(case[1] for case in cases):.0f} s one after another:")
     for name, seconds, *_ in slowest:

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Writes the section of one shard into docs/results.md: tests/results.py K/N FOLDER
 
-FOLDER has the reports of the shard, and `section.tsv`: its title, then for each proof whose output belongs into the section
-(`text`, `markdown`) its test and a heading. The sections of other shards stay as they are.
+FOLDER has the reports of the shard, and `section.tsv`: its title, then for each output that belongs into the section the test that
+printed it (`text`, `markdown`) or its place (`file`), and a heading. The sections of other shards stay as they are.
 """
 
 import csv
@@ -14,7 +14,7 @@ import sys
 import xml.etree.ElementTree as tree
 from pathlib import Path
 
-from count import cases_of
+from count import cases_below
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs/results.md"
@@ -51,19 +51,21 @@ def section(shard, folder):
         commit += ", with changes"
     model = re.search(r"^model name\s*: (.*)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
     cores = lines_of("nproc")
-    outcomes = [outcome for report in reports for _, _, outcome, _ in cases_of(report)]
-    seconds = sum(case[1] for report in reports for case in cases_of(report))
+    cases = list(cases_below(folder))
+    outcomes, seconds = [case[2] for case in cases], sum(case[1] for case in cases)
     text = [
         f"## {title}",
         "",
         f"`tests/all.sh --shard {shard}`, {datetime.date.today()}, commit {commit}, {model[1] if model else platform.machine()} with {cores} processors: "
         f"{outcomes.count('passed')} passed, {outcomes.count('failed')} failed, {outcomes.count('skipped')} skipped, in {seconds:.0f} s one after another.",
     ]
-    for kind, test, heading in proofs:
-        output = printed_by(test, reports)
+    for kind, source, heading in proofs:
+        output = Path(source).read_text().strip() if kind == "file" else printed_by(source, reports)
         if not output:
-            raise SystemExit(f"{test} printed nothing")
-        text += ["", f"### {heading}", "", f"`{test}`", "", *([output] if kind == "markdown" else ["```text", output, "```"])]
+            raise SystemExit(f"{source} printed nothing")
+        text += ["", f"### {heading}", ""]
+        text += [f"`{source}`", ""] if kind != "file" else []
+        text += [output] if kind == "markdown" else ["```text", output, "```"]
     return "\n".join(text) + "\n"
 
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 /// A file or folder below `../shared/data`; `None`, with [`skip`], where it is not there.
 pub fn shared(below: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
         .join("../shared/data")
         .join(below);
     if path.exists() {

@@ -1,8 +1,8 @@
 """Shared by the tests of this folder: the binary, the shared data, the judge.
 
 `tests/all.sh` sets TOUCHUP_BIN; without it the release binary of `target/` is used. A test whose data or system packages are
-missing is skipped with the reason. What is marked `full` belongs to `tests/all.sh --full` (TOUCHUP_FULL), and is not selected
-without; files that need its Python packages are not read then.
+missing is skipped with the reason. What is marked `full` is a slow proof, for the shards of tests/shards.sh (TOUCHUP_FULL), and is
+not selected without; files that need their Python packages are not read then.
 """
 
 import os
@@ -14,11 +14,11 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 IS_FULL = bool(os.environ.get("TOUCHUP_FULL"))
-collect_ignore = [] if IS_FULL else ["test_ros_rviz.py", "test_ros_fastdds_network.py", "test_ros_network.py"]
+collect_ignore = [] if IS_FULL else ["test_ros_rviz.py", "test_ros_fastdds_network.py", "test_ros_network.py", "test_docs_site.py"]
 
 
 def pytest_configure(config):
-    config.addinivalue_line("markers", "full: a slow proof, for tests/all.sh --full")
+    config.addinivalue_line("markers", "full: a slow proof, for tests/shards.sh")
 
 
 def pytest_collection_modifyitems(config, items):

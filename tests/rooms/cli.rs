@@ -12,7 +12,7 @@ use touchup::io::recording::{Topics, write_recording};
 use touchup::stylus::{Message, StampedPose, StampedWrench, Wrench};
 
 pub fn touchup(arguments: &[&str], input: &str) -> Output {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_touchup"))
+    let mut child = Command::new(env!("CARGO_BIN_EXE_touchup-tested"))
         .args(arguments)
         .env_remove("RUST_LOG")
         .stdin(Stdio::piped())
@@ -635,7 +635,7 @@ fn a_scene_that_names_no_radius_has_told_none() {
         ),
         touchup(&["doctor", &path("scan.ply"), &path("touch.mcap")], ""),
         touchup(&probe, ""),
-        #[cfg(any(feature = "ros", feature = "r2r"))]
+        #[cfg(feature = "ros")]
         touchup(
             &[
                 "node",
@@ -647,7 +647,7 @@ fn a_scene_that_names_no_radius_has_told_none() {
             ],
             "",
         ),
-        #[cfg(any(feature = "ros", feature = "r2r"))]
+        #[cfg(feature = "ros")]
         touchup(
             &[
                 "node",
@@ -720,7 +720,7 @@ fn doctor_says_what_was_told_of_tip_and_scan_and_by_what() {
 }
 
 /// What a node prints before it is on the network.
-#[cfg(any(feature = "ros", feature = "r2r"))]
+#[cfg(feature = "ros")]
 #[test]
 fn a_node_says_what_was_told_of_tip_and_scan_and_by_what() {
     use std::io::{BufRead, BufReader};
@@ -737,7 +737,7 @@ fn a_node_says_what_was_told_of_tip_and_scan_and_by_what() {
     .unwrap();
     let scan = format!("scan:={}", path("scan.ply"));
     let told = |arguments: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_touchup"));
+        let mut command = Command::new(env!("CARGO_BIN_EXE_touchup-tested"));
         let mut node = command
             .args(arguments)
             .stdout(Stdio::piped())
@@ -1309,7 +1309,7 @@ fn step_answers_each_line_in_order_and_goes_on_after_a_bad_one() {
 fn report_passes_its_arguments_to_a_program_of_its_own_and_ends_with_its_code() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
-    fs::copy(env!("CARGO_BIN_EXE_touchup"), path("touchup")).unwrap();
+    fs::copy(env!("CARGO_BIN_EXE_touchup-tested"), path("touchup")).unwrap();
     let report = || {
         Command::new(path("touchup"))
             .args(["report", "--quick", "--help"])
@@ -1411,7 +1411,7 @@ fn a_result_that_stdout_does_not_take_is_1() {
     ];
     for arguments in cases {
         let with = |stdout: Stdio| {
-            let command = &mut Command::new(env!("CARGO_BIN_EXE_touchup"));
+            let command = &mut Command::new(env!("CARGO_BIN_EXE_touchup-tested"));
             command
                 .args(arguments)
                 .env_remove("RUST_LOG")

@@ -50,7 +50,7 @@ impl Part {
     }
 
     fn inspect(&self, more: &[&str]) -> Output {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_touchup"));
+        let mut command = Command::new(env!("CARGO_BIN_EXE_touchup-tested"));
         command
             .current_dir(self.folder.path())
             .args(["inspect", "features.json"])
@@ -288,7 +288,7 @@ fn wrong_usage_is_2_before_anything_is_read() {
 #[test]
 fn a_folder_without_features_says_who_writes_them() {
     let empty = tempfile::tempdir().unwrap();
-    let output = Command::new(env!("CARGO_BIN_EXE_touchup"))
+    let output = Command::new(env!("CARGO_BIN_EXE_touchup-tested"))
         .args(["inspect", "--nominal", "n.csv"])
         .arg(empty.path())
         .output()
@@ -448,7 +448,7 @@ fn the_folder_of_a_probing_is_inspected_by_the_features_of_its_flags() {
         &json!({ "features": [{ "flag": 7, "feature": hole }, { "flag": 8 }] }).to_string(),
     );
     part.write("n.csv", &format!("{HEADER}\n{BORE}\n"));
-    let output = Command::new(env!("CARGO_BIN_EXE_touchup"))
+    let output = Command::new(env!("CARGO_BIN_EXE_touchup-tested"))
         .current_dir(part.folder.path())
         .args([
             "inspect",

@@ -31,13 +31,13 @@ mod layers;
 mod light_touch;
 mod live;
 mod mesh;
-#[cfg(any(feature = "ros", feature = "r2r"))]
+#[cfg(feature = "ros")]
 mod node;
 mod probing;
 mod reconstruct;
 #[cfg(feature = "ros")]
 mod ros;
-#[cfg(any(feature = "ros", feature = "r2r"))]
+#[cfg(feature = "ros")]
 mod ros2_control;
 mod scene;
 mod sim;

@@ -62,7 +62,7 @@ fn the_shipped_file_is_the_default() {
 
 #[test]
 fn the_scene_of_the_demo_is_the_default_with_a_scan() {
-    let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/config/demo.yaml"));
+    let path = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../config/demo.yaml"));
     let mut demo = Scene::read(path).unwrap();
     let (scan, unit) = demo.scan_file(path).unwrap();
     assert_eq!(

@@ -88,7 +88,7 @@ impl Sweep {
     }
 
     fn run_in_background(&self, flags: &[&str]) -> std::process::Child {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_touchup"));
+        let mut command = Command::new(env!("CARGO_BIN_EXE_touchup-tested"));
         command
             .args(["sweep", "run", &self.name("jobs.jsonl")])
             .args(flags);

@@ -629,7 +629,7 @@ fn a_stopped_arm_is_recovered_by_a_verb_and_nothing_moves() {
         let mut stand_in = StandIn::start(&["--start-mm", "45,8,40"]);
         let folder = cell(&stand_in, packages);
         let recover = || {
-            let mut verb = std::process::Command::new(env!("CARGO_BIN_EXE_touchup"));
+            let mut verb = std::process::Command::new(env!("CARGO_BIN_EXE_touchup-tested"));
             verb.env("TOUCHUP_UR_LOCK_STEP", "1")
                 .args(["recover", "--json", "--scene"])
                 .arg(folder.path().join("scene.yaml"));

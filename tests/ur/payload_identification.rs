@@ -17,7 +17,7 @@ fn a_ur_identifies_the_payload_on_its_flange() {
         let stand_in = StandIn::start(&["--start-mm", "30,25,60", "--payload", "1.17,3,-2,42"]);
         let folder = cell(&stand_in, packages);
         let path = |name: &str| folder.path().join(name);
-        let done = Command::new(env!("CARGO_BIN_EXE_touchup"))
+        let done = Command::new(env!("CARGO_BIN_EXE_touchup-tested"))
             .env("TOUCHUP_UR_LOCK_STEP", "1")
             .args(["calibrate", "payload", "--robot", "ur", "--json"])
             .arg("--scene")

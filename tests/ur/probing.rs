@@ -39,7 +39,7 @@ fn a_ur_probes_a_hole_from_one_click() {
         let stand_in = StandIn::start(&["--start-mm", "20,30,60"]);
         let folder = cell(&stand_in, packages);
         let out = folder.path().join("out");
-        let done = Command::new(env!("CARGO_BIN_EXE_touchup"))
+        let done = Command::new(env!("CARGO_BIN_EXE_touchup-tested"))
             .env("TOUCHUP_UR_LOCK_STEP", "1")
             .args([
                 "probe",

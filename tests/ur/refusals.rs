@@ -195,7 +195,7 @@ fn a_controller_that_is_not_at_hand_is_reported_at_once() {
 #[test]
 fn a_failed_setup_names_its_step() {
     let folder = tempfile::tempdir().unwrap();
-    let setup = std::process::Command::new(env!("CARGO_BIN_EXE_touchup"))
+    let setup = std::process::Command::new(env!("CARGO_BIN_EXE_touchup-tested"))
         .args(["ur", "setup", "--python", "/bin/false"])
         .arg(folder.path())
         .output()

@@ -33,7 +33,7 @@ pub fn packages() -> Result<&'static Path, &'static str> {
         if let Ok(packages) = std::fs::read_to_string(&made) {
             return Ok(packages.into());
         }
-        let setup = Command::new(env!("CARGO_BIN_EXE_touchup"))
+        let setup = Command::new(env!("CARGO_BIN_EXE_touchup-tested"))
             .args(["ur", "setup"])
             .arg(temporary.join("ur"))
             .output()
@@ -139,7 +139,7 @@ impl StandIn {
 
     pub fn params(&self, packages: &Path) -> UrParams {
         UrParams {
-            program: env!("CARGO_BIN_EXE_touchup").into(),
+            program: env!("CARGO_BIN_EXE_touchup-tested").into(),
             is_lock_step: true,
             ..UrParams::new(&self.address, packages)
         }

@@ -49,7 +49,6 @@ def test_snakemake_makes_the_table_of_one_process(ring, tmp_path):
     assert made == files_of(reference)
 
 
-@pytest.mark.full
 def test_slurm_makes_the_table_of_one_process(ring, tmp_path):
     jobs = planned(tmp_path, ring, seeds=(1,))
     reference = serial(jobs)
@@ -59,7 +58,6 @@ def test_slurm_makes_the_table_of_one_process(ring, tmp_path):
     assert files_of(tmp_path / "slurm") == files_of(reference)
 
 
-@pytest.mark.full
 def test_two_hundred_jobs_have_one_table_whatever_runs_them(ring, tmp_path):
     """Ray on two workers, an array of Slurm and Snakemake."""
     import touchup.ray

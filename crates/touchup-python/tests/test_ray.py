@@ -92,7 +92,6 @@ def test_ten_killed_workers_change_nothing(jobs, serial, cluster):
     assert files_of(jobs.parent / "killed") == files_of(serial)
 
 
-@pytest.mark.full
 def test_the_command_says_how_far_it_is(jobs, serial):
     """As a program of its own, with a cluster of its own."""
     results = jobs.parent / "by_command"

@@ -552,7 +552,7 @@ fn a_flange_with_more_than_its_middle_hole_is_not_free() {
 // -------------------------------------------------------------------------------
 
 fn touchup(arguments: &[&str]) -> std::process::Output {
-    let program = env!("CARGO_BIN_EXE_touchup");
+    let program = env!("CARGO_BIN_EXE_touchup-tested");
     std::process::Command::new(program)
         .args(arguments)
         .env_remove("RUST_LOG")

@@ -20,7 +20,7 @@ use touchup::stylus::{
 const DEFAULT_YAML: &str = include_str!("../../../config/default.yaml");
 
 fn touchup(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_touchup"))
+    Command::new(env!("CARGO_BIN_EXE_touchup-tested"))
         .args(arguments)
         .env_remove("RUST_LOG")
         .output()

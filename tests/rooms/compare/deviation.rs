@@ -624,7 +624,7 @@ fn columns_come_back_by_vertex_through_repair() {
 }
 
 fn touchup(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_touchup"))
+    Command::new(env!("CARGO_BIN_EXE_touchup-tested"))
         .args(arguments)
         .env_remove("RUST_LOG")
         .output()

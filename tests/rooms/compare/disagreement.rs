@@ -124,7 +124,7 @@ impl Case {
 }
 
 fn touchup(arguments: &[&str]) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_touchup"))
+    let output = Command::new(env!("CARGO_BIN_EXE_touchup-tested"))
         .args(arguments)
         .env_remove("RUST_LOG")
         .output()
@@ -262,7 +262,7 @@ fn unchanged(kind: Scanner, seed: u64) -> &'static Unchanged {
             .unwrap()
             .mesh;
         let [scan, csv] = ["scan.ply", "touches.csv"].map(|name| case.text(name));
-        let unmarked = Command::new(env!("CARGO_BIN_EXE_touchup"))
+        let unmarked = Command::new(env!("CARGO_BIN_EXE_touchup-tested"))
             .args(["disagree", &scan, &scan, "--touches", &csv])
             .output()
             .unwrap();

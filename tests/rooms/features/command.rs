@@ -11,7 +11,7 @@ use touchup::io::touches_file::HEADER;
 use touchup::sim::wavy;
 
 fn touchup(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_touchup"))
+    Command::new(env!("CARGO_BIN_EXE_touchup-tested"))
         .args(arguments)
         .env_remove("RUST_LOG")
         .output()

@@ -25,7 +25,7 @@ use crate::shared::shared;
 
 /// `touchup refine` with `flags`.
 fn refine(scan: &Path, bag: &Path, out: &Path, flags: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_touchup"))
+    Command::new(env!("CARGO_BIN_EXE_touchup-tested"))
         .arg("refine")
         .args([
             Path::new("--scan"),

@@ -56,7 +56,7 @@ fn used(name: &str, text: &str, known: &BTreeSet<String>) -> BTreeSet<String> {
 fn no_file_of_the_node_uses_one_that_uses_it() {
     let mut texts = BTreeMap::new();
     files(
-        &Path::new(env!("CARGO_MANIFEST_DIR")).join("src/ros/node"),
+        &Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("src/ros/node"),
         "node",
         &mut texts,
     );

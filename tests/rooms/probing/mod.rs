@@ -7,5 +7,5 @@ mod grid;
 mod plan;
 mod pockets;
 
-#[cfg(any(feature = "ros", feature = "r2r"))]
+#[cfg(feature = "ros")]
 pub use execute::StaticScan;

@@ -93,7 +93,7 @@ fn a_file_speaks_to_the_nodes_that_it_names() {
 
 #[test]
 fn the_file_of_this_repository_is_read() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/config/node.yaml");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/node.yaml");
     let config = NodeConfig::new(&["--params-file".into(), path.into()], |_| None).unwrap();
     assert_eq!(config.parameters, Default::default());
     assert!(config.unused.is_empty());

@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 use touchup::ros::messages::*;
 
 fn golden() -> Map<String, Value> {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/ros_cdr.json");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/data/ros_cdr.json");
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 

@@ -13,7 +13,7 @@ use touchup::ros::parameters::{
 const EVERYWHERE: &str = "use_sim_time";
 
 fn read(file: &str) -> String {
-    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(file)).unwrap()
+    fs::read_to_string(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join(file)).unwrap()
 }
 
 /// A row of the table as docs/ros.md has it: name, type, default, range, live, what.

@@ -440,7 +440,7 @@ fn the_shipped_scene_and_the_page_of_parameters_are_written_from_the_definition(
         ("config/default.yaml", Scene::template()),
         ("docs/scene.md", Scene::table()),
     ] {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
+        let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join(file);
         if std::env::var_os("TOUCHUP_WRITE").is_some() {
             fs::write(&path, &text).unwrap();
         }

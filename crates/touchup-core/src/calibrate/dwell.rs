@@ -1,8 +1,9 @@
 //! Points picked with the stylus itself: where it dwells on the part.
 //!
-//! While it presses and stays where it is, the mean of its ball and of the force make one point: c
-//! + F / k − r n, with the stiffness k of the stylus and n along the force. Friction lets a resting
-//! force lean: on a slope of the pressing hand by φ the point is off by r sin φ along the surface.
+//! While it presses and stays where it is, the mean of its ball and of the force make one point:
+//! c + F / k − r n, with the stiffness k of the stylus and n along the force. Friction lets a
+//! resting force lean: on a slope of the pressing hand by φ the point is off by r sin φ along the
+//! surface.
 
 use nalgebra::{Point3, Vector3};
 

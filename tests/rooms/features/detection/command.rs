@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::shared::shared;
 
 fn features(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_touchup"))
+    Command::new(env!("CARGO_BIN_EXE_touchup-tested"))
         .arg("features")
         .args(arguments)
         .env_remove("RUST_LOG")

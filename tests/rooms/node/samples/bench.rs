@@ -99,7 +99,7 @@ impl Plate {
 
 /// Runs `touchup refine`; a recording that has lost its end is no failure.
 pub fn refine(arguments: &[&std::ffi::OsStr]) {
-    let done = Command::new(env!("CARGO_BIN_EXE_touchup"))
+    let done = Command::new(env!("CARGO_BIN_EXE_touchup-tested"))
         .arg("refine")
         .args(arguments)
         .output()

@@ -14,7 +14,7 @@ use crate::full::either;
 use crate::plate_stream::plate_scan;
 
 fn touchup(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_touchup"))
+    Command::new(env!("CARGO_BIN_EXE_touchup-tested"))
         .args(arguments)
         .output()
         .unwrap()

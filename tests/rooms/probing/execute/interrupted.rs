@@ -41,7 +41,7 @@ impl Case {
 
     fn command(&self, out: &str, more: &[&str]) -> Command {
         let [scene, truth] = &self.files;
-        let mut command = Command::new(env!("CARGO_BIN_EXE_touchup"));
+        let mut command = Command::new(env!("CARGO_BIN_EXE_touchup-tested"));
         let out = self.path(out);
         let arguments = [
             "probe",
@@ -322,7 +322,7 @@ fn a_check_that_is_interrupted_keeps_its_touches() {
         "--touches",
         "100",
     ];
-    let mut command = Command::new(env!("CARGO_BIN_EXE_touchup"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_touchup-tested"));
     command
         .args(arguments)
         .args(["--touches-out", path.to_str().unwrap()]);
@@ -359,7 +359,7 @@ fn a_payload_identification_that_is_interrupted_keeps_its_static_segments() {
     let ([scene, truth], path) = (&case.files, case.path("segments.csv"));
     let out = case.path("weighed.yaml");
     let identify = |more: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_touchup"));
+        let mut command = Command::new(env!("CARGO_BIN_EXE_touchup-tested"));
         command.args([
             "calibrate",
             "payload",

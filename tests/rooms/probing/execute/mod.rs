@@ -7,7 +7,7 @@ mod static_scan;
 mod uncertainty;
 mod way_out;
 
-#[cfg(any(feature = "ros", feature = "r2r"))]
+#[cfg(feature = "ros")]
 pub use static_scan::StaticScan;
 
 use nalgebra::Point3;
