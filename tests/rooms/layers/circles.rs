@@ -1,8 +1,8 @@
-//! Circles of use between files of a crate.
+//! Circles of use: between files of a crate, and between folders.
 
 use super::source::Source;
-use super::uses::{CRATES, Uses, uses};
-use std::collections::BTreeSet;
+use super::uses::{CRATES, Module, Uses, uses};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Modules of one crate that use one another in a circle, each with those that it uses.
 fn circles(mut uses: Uses) -> Vec<String> {
@@ -22,6 +22,41 @@ fn circles(mut uses: Uses) -> Vec<String> {
         .collect()
 }
 
+/// Circles of use between the entries of a folder, which are its files and folders: each as the
+/// folder and its entries in the circle, of which `mod` is the file of the folder itself.
+///
+/// - `tests`: modules that do not count.
+fn folder_circles<'a>(uses: &Uses<'a>, tests: &BTreeSet<Module<'a>>) -> BTreeSet<String> {
+    let mut folders: BTreeMap<&[&str], BTreeMap<&str, BTreeSet<&str>>> = BTreeMap::new();
+    for (user, used) in uses.iter().filter(|(user, _)| !tests.contains(*user)) {
+        // the root stands for other crates
+        for other in used.iter().filter(|other| !other.is_empty()) {
+            let pairs = user.iter().zip(other);
+            let common = pairs.take_while(|(one, other)| one == other).count();
+            let entry = |module: &Module<'a>| module.get(common).copied().unwrap_or("mod");
+            let entries = folders.entry(&user[..common]).or_default();
+            entries.entry(entry(user)).or_default().insert(entry(other));
+        }
+    }
+    let circles = folders.iter().flat_map(|(folder, entries)| {
+        let reached = |one: &'a str| {
+            let (mut reached, mut next) = (BTreeSet::new(), vec![one]);
+            while let Some(entry) = next.pop() {
+                let others = entries.get(entry).into_iter().flatten();
+                next.extend(others.filter(|other| reached.insert(**other)));
+            }
+            reached
+        };
+        entries.keys().filter_map(move |one| {
+            let mut circle = reached(one);
+            circle.retain(|other| reached(other).contains(one));
+            let circle: Vec<_> = circle.into_iter().collect();
+            (!circle.is_empty()).then(|| format!("{}: {}", folder.join("/"), circle.join(" ")))
+        })
+    });
+    circles.collect()
+}
+
 #[test]
 fn files_of_a_crate_use_one_another_one_way() {
     for one in CRATES.iter() {
@@ -33,6 +68,26 @@ fn files_of_a_crate_use_one_another_one_way() {
             found.join("\n")
         );
     }
+}
+
+/// The circles of folders that are still there.
+const FOLDER_CIRCLES: &[&str] = &[
+    "crates/touchup-core/src/reconstruct: contour evidence field incremental",
+    "src/ros/web: connection knowledge page_place page_port replay site",
+];
+
+#[test]
+fn entries_of_a_folder_use_one_another_one_way() {
+    let found = CRATES.iter().flat_map(|one| {
+        let circles = folder_circles(&one.uses, &one.tests).into_iter();
+        circles.map(|circle| format!("{}/{circle}", one.folder))
+    });
+    let found: BTreeSet<_> = found.collect();
+    let known: BTreeSet<_> = FOLDER_CIRCLES.iter().map(|one| one.to_string()).collect();
+    let new: Vec<_> = found.difference(&known).collect();
+    let gone: Vec<_> = known.difference(&found).collect();
+    assert!(new.is_empty(), "new circles: {new:#?}");
+    assert!(gone.is_empty(), "strike off, they are gone: {gone:#?}");
 }
 
 /// How many modules of these files are in circles.
@@ -122,4 +177,58 @@ fn a_circle_is_found_however_it_is_closed() {
         ),
         0
     );
+}
+
+#[test]
+fn a_circle_of_folders_is_found_at_each_level() {
+    let circles = |texts: [&str; 5], tests: &[&[&str]]| {
+        let files = ["a/mod", "a/b/one", "a/b/two", "a/c/three", "a/d"];
+        let files = files.map(|file| format!("src/{file}.rs"));
+        let files = files.iter().map(String::as_str).zip(texts);
+        let sources = sources_of(&files.collect::<Vec<_>>());
+        let sources: Vec<_> = sources.iter().collect();
+        let tests = tests.iter().map(|module| module.to_vec()).collect();
+        Vec::from_iter(folder_circles(&uses(&sources), &tests))
+    };
+    let between = [
+        "",
+        "use crate::a::c::three::A;",
+        "",
+        "fn f() { super::super::b::two::f() }",
+        "",
+    ];
+    assert_eq!(circles(between, &[]), ["a: b c"], "no file is in a circle");
+    assert_eq!(circles(between, &[&["a", "b", "one"]]), [""; 0]);
+    let one_way = [
+        "",
+        "use crate::a::c::three::A;",
+        "use super::one::B;",
+        "",
+        "use super::b::two::C;",
+    ];
+    assert_eq!(circles(one_way, &[]), [""; 0]);
+    let over_a_file = [
+        "",
+        "use super::super::d::A;",
+        "",
+        "",
+        "use crate::a::b::two::B;",
+    ];
+    assert_eq!(circles(over_a_file, &[]), ["a: b d"]);
+    let with_parent = [
+        "use crate::a::b::two::A; struct Own;",
+        "use crate::a::Own;",
+        "",
+        "",
+        "",
+    ];
+    assert_eq!(circles(with_parent, &[]), ["a: b mod"]);
+    let three = [
+        "",
+        "use crate::a::c::three::A;",
+        "use super::super::d::D;",
+        "use super::super::d::C;",
+        "use super::b::two::B;",
+    ];
+    assert_eq!(circles(three, &[]), ["a: b c d"]);
 }

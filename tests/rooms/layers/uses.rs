@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::LazyLock;
 
 /// A module by its path from the root of its crate.
-type Module<'a> = Vec<&'a str>;
+pub type Module<'a> = Vec<&'a str>;
 
 /// Each module of a crate with those that it uses.
 pub type Uses<'a> = BTreeMap<Module<'a>, BTreeSet<Module<'a>>>;
@@ -15,6 +15,8 @@ pub struct Crate {
     /// where its sources are
     pub folder: String,
     pub uses: Uses<'static>,
+    /// the modules of its tests
+    pub tests: BTreeSet<Module<'static>>,
 }
 
 /// All crates whose sources are read.
@@ -27,6 +29,11 @@ pub static CRATES: LazyLock<Vec<Crate>> = LazyLock::new(|| {
     let crates = crates.into_iter().map(|(folder, sources)| Crate {
         folder: format!("{folder}src"),
         uses: uses(&sources),
+        tests: sources
+            .iter()
+            .filter(|source| source.of_tests)
+            .map(|source| module_in(source.file))
+            .collect(),
     });
     crates.collect()
 });
