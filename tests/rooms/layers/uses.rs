@@ -84,7 +84,8 @@ fn paths_of<'a>(module: &[&'a str], modules: &Modules<'a>) -> Paths<'a> {
     let children = modules.range(module.to_vec()..);
     let children: BTreeSet<_> = children
         .take_while(|(name, _)| name.starts_with(module))
-        .filter_map(|(name, _)| (name.len() == module.len() + 1).then(|| name[module.len()]))
+        .filter(|(name, _)| name.len() == module.len() + 1)
+        .map(|(name, _)| name[module.len()])
         .collect();
     let mut paths = Paths::default();
     let (mut at, mut is_public) = (0, false);
