@@ -173,6 +173,7 @@ fn the_default_scene_is_the_preset_of_each_mode() {
 /// What a right result needs is there unless the scene says `off`; what only some sensors need is
 /// there where it is named.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn a_scene_says_what_differs() {
     assert_eq!(Scene::from_yaml("{}").unwrap(), Scene::default());
     // a scene that once had neither gate nor patch, and repaired nothing
@@ -484,6 +485,7 @@ compensation:
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn each_mistake_is_refused_in_one_line_with_place_and_cause() {
     let bad = [
         (

@@ -174,6 +174,7 @@ fn sigmas_are_weights() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn what_determines_no_motion_is_refused() {
     let good = pairs_of(&motion(), 0.1e-3, 1);
     assert_eq!(

@@ -171,6 +171,7 @@ fn poses_in_contact_are_left_out() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn poses_that_do_not_determine_the_payload_are_refused() {
     let all = static_poses(12, [0.02, 0.002], WrenchFrame::Sensor, 2);
     let fitted = |poses: &[StaticPose]| fit_payload(poses, &params(WrenchFrame::Sensor));

@@ -348,6 +348,7 @@ fn columns_are_properties_of_the_vertices_in_ply() {
 /// A square of two triangles, the second one with an image of its own, as text of both kinds;
 /// colours by hand.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn colours_and_textures_come_back_from_either_kind_of_file() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);

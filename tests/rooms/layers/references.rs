@@ -160,68 +160,70 @@ fn path_of(file: &str) -> String {
     }
 }
 
+/// Files, and texts with one breach each.
+const BREACHES: &[(&str, &str)] = &[
+    ("stylus/sync.rs", "use crate::mesh::TriMesh;"),
+    (
+        "stylus/sync.rs",
+        "use crate::{mesh::{TriMesh, FaceId}, stylus::Sample};",
+    ),
+    ("stylus/sync.rs", "fn f() -> crate :: reconstruct::Error {}"),
+    ("stylus/sync.rs", "use super::super::mesh;"),
+    ("stylus/mod.rs", "use super::{stylus, mesh};"),
+    ("mesh.rs", "use super::haptic;"),
+    ("mesh/repair/weld.rs", "use super::super::super::stylus;"),
+    (
+        "crates/touchup-session/src/scene/mod.rs",
+        "use crate::live;",
+    ),
+    ("src/ros/node/mod.rs", "use crate::cli;"),
+    ("haptic/mod.rs", "use std::fs::File;"),
+    ("haptic/mod.rs", "use std::{collections::HashMap, thread};"),
+    ("haptic/mod.rs", "let t = std::time::Instant::now();"),
+    (
+        "crates/touchup-sim/src/lib.rs",
+        "let t = SystemTime::now();",
+    ),
+    (
+        "crates/touchup-sim/src/arm.rs",
+        "let home = std::env::var(\"HOME\");",
+    ),
+    ("mesh/mod.rs", "/* a */ println!(\"{x}\");"),
+    ("mesh/mod.rs", "let c = '\"'; println!(\"{c}\");"),
+    ("mesh/mod.rs", "fn f<'a>(x: &'a str) { dbg!(x) }"),
+    (
+        "mesh/mod.rs",
+        "#[cfg(test)] mod tests { fn f() { { } } } use crate::reconstruct;",
+    ),
+    ("src/cli/demo.rs", "std::fs::write(path, text)"),
+    ("probing/arm/touching.rs", "use std::thread;"),
+    ("src/ur/client.rs", "use pyo3::Python;"),
+    ("src/cli/ur.rs", "pyo3::Python::attach(f)"),
+    ("src/ur/setup.rs", "std::fs::read(path)"),
+    ("src/ur/arm.rs", "use crate::cli::demo;"),
+    ("src/ur/arm.rs", "use crate::sim::Plate;"),
+    (
+        "crates/touchup-sim/src/arm.rs",
+        "use touchup_core::reconstruct::Patcher;",
+    ),
+    (
+        "crates/touchup-sim/src/arm.rs",
+        "use touchup_core::{mesh::TriMesh, features::Kind};",
+    ),
+    (
+        "crates/touchup-session/src/scene/mod.rs",
+        "fn f() -> touchup_core::features::Kind {}",
+    ),
+    (
+        "crates/touchup-session/src/session/mod.rs",
+        "use touchup_sim::Plate;",
+    ),
+    ("cellar/mod.rs", ""),
+];
+
 #[test]
 fn a_breach_is_found_however_it_is_written() {
-    let bad = [
-        ("stylus/sync.rs", "use crate::mesh::TriMesh;"),
-        (
-            "stylus/sync.rs",
-            "use crate::{mesh::{TriMesh, FaceId}, stylus::Sample};",
-        ),
-        ("stylus/sync.rs", "fn f() -> crate :: reconstruct::Error {}"),
-        ("stylus/sync.rs", "use super::super::mesh;"),
-        ("stylus/mod.rs", "use super::{stylus, mesh};"),
-        ("mesh.rs", "use super::haptic;"),
-        ("mesh/repair/weld.rs", "use super::super::super::stylus;"),
-        (
-            "crates/touchup-session/src/scene/mod.rs",
-            "use crate::live;",
-        ),
-        ("src/ros/node/mod.rs", "use crate::cli;"),
-        ("haptic/mod.rs", "use std::fs::File;"),
-        ("haptic/mod.rs", "use std::{collections::HashMap, thread};"),
-        ("haptic/mod.rs", "let t = std::time::Instant::now();"),
-        (
-            "crates/touchup-sim/src/lib.rs",
-            "let t = SystemTime::now();",
-        ),
-        (
-            "crates/touchup-sim/src/arm.rs",
-            "let home = std::env::var(\"HOME\");",
-        ),
-        ("mesh/mod.rs", "/* a */ println!(\"{x}\");"),
-        ("mesh/mod.rs", "let c = '\"'; println!(\"{c}\");"),
-        ("mesh/mod.rs", "fn f<'a>(x: &'a str) { dbg!(x) }"),
-        (
-            "mesh/mod.rs",
-            "#[cfg(test)] mod tests { fn f() { { } } } use crate::reconstruct;",
-        ),
-        ("src/cli/demo.rs", "std::fs::write(path, text)"),
-        ("probing/arm/touching.rs", "use std::thread;"),
-        ("src/ur/client.rs", "use pyo3::Python;"),
-        ("src/cli/ur.rs", "pyo3::Python::attach(f)"),
-        ("src/ur/setup.rs", "std::fs::read(path)"),
-        ("src/ur/arm.rs", "use crate::cli::demo;"),
-        ("src/ur/arm.rs", "use crate::sim::Plate;"),
-        (
-            "crates/touchup-sim/src/arm.rs",
-            "use touchup_core::reconstruct::Patcher;",
-        ),
-        (
-            "crates/touchup-sim/src/arm.rs",
-            "use touchup_core::{mesh::TriMesh, features::Kind};",
-        ),
-        (
-            "crates/touchup-session/src/scene/mod.rs",
-            "fn f() -> touchup_core::features::Kind {}",
-        ),
-        (
-            "crates/touchup-session/src/session/mod.rs",
-            "use touchup_sim::Plate;",
-        ),
-        ("cellar/mod.rs", ""),
-    ];
-    for (file, source) in bad {
+    for (file, source) in BREACHES {
         let found = breaches(&Source::of(&path_of(file), source));
         assert_eq!(found.len(), 1, "{file}: {source}: {found:?}");
     }

@@ -54,6 +54,7 @@ fn empty_frame(mut arrival: Arrival) -> Arrival {
 /// Each way in which two streams come at full rate and no sample is of use, with what the node has
 /// to say of it.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn a_stream_that_is_not_used_is_a_warning_with_its_cause() {
     let cases: [(&str, Fault, &[&str]); 10] = [
         (
@@ -229,6 +230,7 @@ fn an_input_that_is_surely_wrong_is_an_error_with_its_cause() {
 
 /// The result is that of the messages without the wrong ones, byte for byte.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn a_wrong_stamp_costs_itself_alone() {
     let plate = Plate::touched(0.1);
     let messages = &plate.messages;
@@ -331,6 +333,7 @@ fn written(mesh: &TriMesh, path: &Path) -> Vec<u8> {
 /// of the follower and the mesh in the file have the same bytes, and the answer of the service
 /// names the version that the follower has.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn what_is_shown_becomes_what_is_saved_at_a_follower_that_loses_patches() {
     let plate = Plate::touched(0.15);
     let mut bench = Bench::start(&plate);

@@ -266,6 +266,7 @@ fn ball_comes_to_rest_at_the_geometric_equilibrium() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn senseless_stylus_settings_are_refused() {
     let plate = Plate::default();
     let path = |z: f64| {

@@ -38,6 +38,7 @@ fn a_table_says_tolerances_in_three_ways() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn each_mistake_in_a_row_is_said_with_its_line_and_what_to_do() {
     let mistakes = [
         (

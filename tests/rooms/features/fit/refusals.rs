@@ -15,6 +15,7 @@ fn refusal(guess: &Cylinder, observations: &[Observation]) -> FitError {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn input_that_cannot_be_fitted_is_refused() {
     let near = hole_near(&Isometry3::identity(), 5.0 * MM);
     assert_eq!(

@@ -170,6 +170,7 @@ fn a_step_that_fails_is_a_refused_sample() {
 
 /// Each setting with a value that has no meaning, by name.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn settings_without_a_meaning_are_refused() {
     type Change = fn(&mut RefineParams, f64);
     let anywhere_bad = [f64::NAN, f64::INFINITY, -1.0];

@@ -116,6 +116,7 @@ fn columns_are_named_in_the_scene_with_the_unit_that_the_header_lacks() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn what_is_not_understood_is_answered_by_the_columns_and_the_key() {
     let why = |text: &str, columns: &TableColumns| read(text, columns).err().unwrap();
     let usual = TableColumns::default();
