@@ -334,46 +334,47 @@ fn refine_in_words_names_what_it_wrote() {
     );
 }
 
+/// Command lines with an error, its kind and exit code.
+const ERRORS: &[(&[&str], &str, i32)] = &[
+    (&["refine", "--frobnicate"], "usage", 2),
+    (&["compare", "no.ply", "no.stl"], "mesh", 3),
+    (&["features", "no.ply"], "mesh", 3),
+    (
+        &[
+            "refine", "--scene", "no.yaml", "--scan", "no.ply", "--bag", "no.mcap", "--out",
+            "no.ply",
+        ],
+        "scene",
+        3,
+    ),
+    (
+        &["calibrate", "scan", "--pairs", "no.csv", "--out", "no.yaml"],
+        "calibration",
+        3,
+    ),
+    (
+        &["disagree", "no.ply", "no.ply", "--touches", "no.csv"],
+        "mesh",
+        3,
+    ),
+    (
+        &[
+            "probe",
+            "--feature",
+            "hole@1,2",
+            "--scene",
+            "no.yaml",
+            "--out",
+            "no",
+        ],
+        "usage",
+        2,
+    ),
+];
+
 #[test]
-#[expect(clippy::too_many_lines)]
 fn an_error_with_json_is_one_json_object_with_the_same_exit_code() {
-    let cases = [
-        (&["refine", "--frobnicate"][..], "usage", 2),
-        (&["compare", "no.ply", "no.stl"], "mesh", 3),
-        (&["features", "no.ply"], "mesh", 3),
-        (
-            &[
-                "refine", "--scene", "no.yaml", "--scan", "no.ply", "--bag", "no.mcap", "--out",
-                "no.ply",
-            ],
-            "scene",
-            3,
-        ),
-        (
-            &["calibrate", "scan", "--pairs", "no.csv", "--out", "no.yaml"],
-            "calibration",
-            3,
-        ),
-        (
-            &["disagree", "no.ply", "no.ply", "--touches", "no.csv"],
-            "mesh",
-            3,
-        ),
-        (
-            &[
-                "probe",
-                "--feature",
-                "hole@1,2",
-                "--scene",
-                "no.yaml",
-                "--out",
-                "no",
-            ],
-            "usage",
-            2,
-        ),
-    ];
-    for (arguments, kind, exit_code) in cases {
+    for &(arguments, kind, exit_code) in ERRORS {
         let in_words = touchup(arguments, "");
         assert_eq!(
             code(&in_words),
