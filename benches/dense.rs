@@ -38,6 +38,7 @@ fn shown(times: &mut [u64]) -> String {
     format!("median {median:6.2} us p99 {p99:7.2} p99.9 {p999:7.1} max {longest:8.0}")
 }
 
+#[expect(clippy::too_many_lines)]
 fn measure(faces: usize, edge: f64, seconds: usize, is_live: bool) {
     let side = edge * (faces as f64 / 2.0).sqrt();
     if side < SMALLEST_SIDE {

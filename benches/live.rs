@@ -28,6 +28,7 @@ const WIDTH: f64 = 40e-3;
 /// Samples in one line of the table.
 const MINUTE: usize = 60_000;
 
+#[expect(clippy::too_many_lines)]
 fn main() {
     let arguments: Vec<String> = std::env::args()
         .skip(1)

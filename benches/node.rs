@@ -190,6 +190,7 @@ fn slid_over(node: Node, world: &OtherParticipants) -> SessionReport {
 
 /// The same beside pages, by turns, so that what else the machine does falls on all of them.
 #[cfg(feature = "web")]
+#[expect(clippy::too_many_lines)]
 fn beside_pages(faces: usize, turns: usize) {
     use touchup::ros::web::{NodeFacts, WebParams, WebServer};
     let kinds = ["no page", "a page that reads", "a page that never reads"];

@@ -84,6 +84,7 @@ fn touch(id: u32, index: u32) -> ProbeTouch {
     }
 }
 
+#[expect(clippy::too_many_lines)]
 fn main() -> anyhow::Result<()> {
     let filter = Targets::new()
         .with_default(LevelFilter::WARN)

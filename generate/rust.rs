@@ -16,6 +16,7 @@ pub fn structs(messages: &[Message]) -> Result<String, String> {
         .collect()
 }
 
+#[expect(clippy::too_many_lines)]
 fn structure(message: &Message, all: &[Message]) -> Result<String, String> {
     let name = name(message);
     let fields: Result<String, String> = message

@@ -360,6 +360,7 @@ pub fn view(domain: u16) -> Drawn {
 
 /// Sends wrenches at 1 kHz, and poses where the other end is the node, from a whole second on;
 /// measures how long answers take.
+#[expect(clippy::too_many_lines)]
 pub fn touch(domain: u16, seconds: usize, is_node: bool) -> Answers {
     let (context, mut node) = joined(domain, "sensors");
     let mut mismatches = reader::<HapticMismatch>(&mut node, "/mismatch", SAMPLES);

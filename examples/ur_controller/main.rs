@@ -113,6 +113,7 @@ fn arguments() -> anyhow::Result<Arguments> {
     Ok(found)
 }
 
+#[expect(clippy::too_many_lines)]
 fn main() -> anyhow::Result<()> {
     let Arguments {
         address,

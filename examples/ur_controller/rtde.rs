@@ -106,6 +106,7 @@ impl Input {
 }
 
 /// One client, until it goes.
+#[expect(clippy::too_many_lines)]
 pub fn serve(mut socket: TcpStream, number: u64, served: &Mutex<Served>) -> anyhow::Result<()> {
     let (mut names, mut recipes): (Vec<String>, Vec<Vec<Input>>) = (Vec::new(), Vec::new());
     let mut head = [0; 3];

@@ -328,6 +328,7 @@ fn numbers(seed: u8) -> Vec<u8> {
 ///
 /// # Panics
 /// Where SQLite makes no database.
+#[expect(clippy::too_many_lines)]
 pub fn write(folder: &Path) -> std::io::Result<()> {
     let triangle = [[0f32; 3], [20.0, 0.0, 0.0], [0.0, 20.0, 0.0]].concat();
     let coordinates: Vec<u8> = triangle.iter().flat_map(|x| x.to_le_bytes()).collect();

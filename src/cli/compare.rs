@@ -148,6 +148,7 @@ pub(super) fn compare(arguments: &CompareArguments) -> Result<Losses, CliError> 
 }
 
 /// Compares, and writes the requested files.
+#[expect(clippy::too_many_lines)]
 pub(super) fn compared(arguments: &CompareArguments) -> Result<CompareReport, CliError> {
     arguments.check_alignment()?;
     arguments.check_outputs()?;

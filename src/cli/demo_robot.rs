@@ -116,6 +116,7 @@ impl NumberError {
 }
 
 /// - `seed`: of the scan, the clicks and the arm.
+#[expect(clippy::too_many_lines)]
 pub(super) fn demo_robot(out: &Path, seed: u64) -> Result<Losses, CliError> {
     let plate = Plate::default();
     create_folder(out).map_err(not_written(out))?;

@@ -263,6 +263,7 @@ impl DisagreeArguments {
 const MOST_LISTED: usize = 12;
 
 impl fmt::Display for DisagreeReport {
+    #[expect(clippy::too_many_lines)]
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.scanner {
             Some(ScannerReport {

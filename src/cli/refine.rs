@@ -344,6 +344,7 @@ impl RefineArguments {
     /// What is left to be refined when the page was closed: the session that was made on it,
     /// without what was undone there.
     #[cfg(any(feature = "ros", feature = "r2r"))]
+    #[expect(clippy::too_many_lines)]
     fn after_the_page(self) -> Result<Self, CliError> {
         if !self.web.is_wanted() {
             return Ok(self);
@@ -412,6 +413,7 @@ impl RefineArguments {
     }
 
     /// Reads, replays and writes.
+    #[expect(clippy::too_many_lines)]
     pub(super) fn refined(&self) -> Result<Refined, CliError> {
         let (scene, told) = self.scene()?;
         self.check_out()?;

@@ -94,6 +94,7 @@ fn of_touches(touches: &[ProbedPoint]) -> Vec<CalibrationLine> {
     ]
 }
 
+#[expect(clippy::too_many_lines)]
 fn of_scene(path: &Path, scene: &Scene, yaml: &str) -> Vec<CalibrationLine> {
     let named = |section: &str, key: &str| Scene::names(yaml, section, key);
     let in_scene = |is_named: bool| {

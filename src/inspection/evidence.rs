@@ -34,6 +34,7 @@ pub(super) struct TouchEvidence {
 
 /// How far the touches behind a quantity are off the surface that was fitted to them; `None` where
 /// that surface is not in the file.
+#[expect(clippy::too_many_lines)]
 pub(super) fn touch_evidence(
     quantity: InspectedQuantity,
     feature: &FeatureRecord,

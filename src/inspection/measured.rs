@@ -27,6 +27,7 @@ impl CharacteristicMeasurement {
 
 /// - `nominal_mm`: centre of the feature in the drawing.
 /// - `datum`: the feature that the quantity relates to.
+#[expect(clippy::too_many_lines)]
 pub(super) fn measurement(
     file: &FeatureFile,
     feature: &FeatureRecord,

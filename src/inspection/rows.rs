@@ -258,6 +258,7 @@ fn why_not(
     }
 }
 
+#[expect(clippy::too_many_lines)]
 fn characteristic(
     drawn: &Drawn,
     number: String,

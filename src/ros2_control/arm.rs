@@ -362,6 +362,7 @@ impl Ros2ControlArm {
         Ok(())
     }
 
+    #[expect(clippy::too_many_lines)]
     fn obey(&mut self, command: &Command) -> Result<(), ArmError> {
         let refuse = |what, reason: &str| {
             Err(ArmError::Refused {

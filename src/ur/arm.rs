@@ -247,6 +247,7 @@ pub(super) fn seen(state: &UrState) -> ArmState {
 /// The order that a command is.
 ///
 /// - `last`: the state that it follows.
+#[expect(clippy::too_many_lines)]
 pub(super) fn order_of(
     command: &Command,
     last: &UrState,

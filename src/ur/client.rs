@@ -42,6 +42,7 @@ impl Client {
     /// Starts the process; returns when the arm is at its command.
     ///
     /// - `dashboard`: for the guard alone.
+    #[expect(clippy::too_many_lines)]
     pub fn start(params: &UrParams, dashboard: Dashboard) -> Result<Self, UrError> {
         let mut child = Command::new(&params.program)
             .args(["ur", "child"])

@@ -296,6 +296,7 @@ impl GuardState {
     }
 
     /// Takes a line of the client; returns a fault.
+    #[expect(clippy::too_many_lines)]
     pub fn take(&mut self, report: ClientReport, now: Instant) -> Option<ClientLoss> {
         match report {
             ClientReport::Ready => {
@@ -390,6 +391,7 @@ pub(super) struct Guard {
 
 impl Guard {
     /// Until the client ends; returns how the arm was stopped when that was not wanted.
+    #[expect(clippy::too_many_lines)]
     pub fn watch(mut self, reports: &Receiver<ClientReport>) -> Option<Halt> {
         let clock = self.shared.clock.clone();
         let mut stamp_s = f64::INFINITY;

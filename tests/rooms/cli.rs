@@ -234,6 +234,7 @@ fn keys(value: &Value) -> Vec<&str> {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn refine_json_is_one_object_with_the_documented_keys() {
     let case = Case::new();
     let output = case.refine("touch.mcap", "out.ply", &["--json"]);
@@ -333,45 +334,47 @@ fn refine_in_words_names_what_it_wrote() {
     );
 }
 
+/// Command lines with an error, its kind and exit code.
+const ERRORS: &[(&[&str], &str, i32)] = &[
+    (&["refine", "--frobnicate"], "usage", 2),
+    (&["compare", "no.ply", "no.stl"], "mesh", 3),
+    (&["features", "no.ply"], "mesh", 3),
+    (
+        &[
+            "refine", "--scene", "no.yaml", "--scan", "no.ply", "--bag", "no.mcap", "--out",
+            "no.ply",
+        ],
+        "scene",
+        3,
+    ),
+    (
+        &["calibrate", "scan", "--pairs", "no.csv", "--out", "no.yaml"],
+        "calibration",
+        3,
+    ),
+    (
+        &["disagree", "no.ply", "no.ply", "--touches", "no.csv"],
+        "mesh",
+        3,
+    ),
+    (
+        &[
+            "probe",
+            "--feature",
+            "hole@1,2",
+            "--scene",
+            "no.yaml",
+            "--out",
+            "no",
+        ],
+        "usage",
+        2,
+    ),
+];
+
 #[test]
 fn an_error_with_json_is_one_json_object_with_the_same_exit_code() {
-    let cases = [
-        (&["refine", "--frobnicate"][..], "usage", 2),
-        (&["compare", "no.ply", "no.stl"], "mesh", 3),
-        (&["features", "no.ply"], "mesh", 3),
-        (
-            &[
-                "refine", "--scene", "no.yaml", "--scan", "no.ply", "--bag", "no.mcap", "--out",
-                "no.ply",
-            ],
-            "scene",
-            3,
-        ),
-        (
-            &["calibrate", "scan", "--pairs", "no.csv", "--out", "no.yaml"],
-            "calibration",
-            3,
-        ),
-        (
-            &["disagree", "no.ply", "no.ply", "--touches", "no.csv"],
-            "mesh",
-            3,
-        ),
-        (
-            &[
-                "probe",
-                "--feature",
-                "hole@1,2",
-                "--scene",
-                "no.yaml",
-                "--out",
-                "no",
-            ],
-            "usage",
-            2,
-        ),
-    ];
-    for (arguments, kind, exit_code) in cases {
+    for &(arguments, kind, exit_code) in ERRORS {
         let in_words = touchup(arguments, "");
         assert_eq!(
             code(&in_words),
@@ -600,6 +603,7 @@ fn wrong_flags_are_2_before_anything_is_read() {
 /// Nobody has told the radius of a scene that does not name it, whoever asks; refined by a ball of
 /// 1.5 mm, a hole is found too small.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn a_scene_that_names_no_radius_has_told_none() {
     let case = Case::new();
     let path = |name: &str| case.path(name).to_str().unwrap().to_owned();
@@ -722,6 +726,7 @@ fn doctor_says_what_was_told_of_tip_and_scan_and_by_what() {
 /// What a node prints before it is on the network.
 #[cfg(feature = "ros")]
 #[test]
+#[expect(clippy::too_many_lines)]
 fn a_node_says_what_was_told_of_tip_and_scan_and_by_what() {
     use std::io::{BufRead, BufReader};
     let case = Case::new();
@@ -1023,6 +1028,7 @@ fn demo_that_cannot_write_is_1() {
 
 /// A scene that `init` writes is taken as it is, and each of its sources is the scene.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn init_writes_a_scene_that_refine_takes() {
     let case = Case::new();
     let [scene, bag, out] =
@@ -1093,6 +1099,7 @@ fn init_writes_a_scene_that_refine_takes() {
 /// The markers on the stylus in place of its pose, with occlusion, swaps and outliers, lower the
 /// error as poses do.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn simulated_markers_refine_the_scan() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
@@ -1194,6 +1201,7 @@ fn cube_in_mm() -> String {
 
 /// A known part through the whole pipeline: simulated in inches, refined in millimetres.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn simulate_makes_the_input_of_refine() {
     use touchup::io::mesh_file::{MeshUnit, write_mesh};
     let folder = tempfile::tempdir().unwrap();

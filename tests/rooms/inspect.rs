@@ -415,6 +415,7 @@ fn features_of_a_cad_mesh_are_nominal_values() {
 /// A flag whose hole was measured by the second to the fourth of its touches, which are numbered
 /// from 1 on.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn the_folder_of_a_probing_is_inspected_by_the_features_of_its_flags() {
     let part = Part::new();
     let touch = |index: usize, x: f64, y: f64| {

@@ -98,6 +98,7 @@ fn a_light_touch_leaves_the_scan_as_it_was_and_free_motion_does_not() {
 /// A robot's ball that slid over a phantom at some 0.24 N, and as its scan the plane through the
 /// mean of the centres, a radius too high.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn a_real_recording_of_light_touches_does_not_carve() {
     let Some(file) = crate::shared::shared("force/vu_dvrk_exploration/KidneyZ4-21Oct.csv") else {
         return;

@@ -135,6 +135,7 @@ fn distances(from: &TriMesh, to: &TriMesh) -> Vec<f64> {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn renewed_bit_by_bit_it_is_the_skin_of_all_at_once_and_sound_all_along() {
     let stream = stream(1, 0.25);
     let (scan, tree) = (&stream.scan, FaceTree::new(&stream.scan));
@@ -557,6 +558,7 @@ fn without_samples_the_mesh_catches_up_with_the_patch() {
 
 /// A touch counts at once for the haptic update, and within 50 ms for the patch.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn a_touch_moves_the_mesh_at_once_and_is_in_the_patch_within_50_ms() {
     let p = |x: f64, y: f64| Point3::new(x * 2.5e-3, y * 2.5e-3, 0.0);
     let side = 17;

@@ -173,6 +173,7 @@ fn the_default_scene_is_the_preset_of_each_mode() {
 /// What a right result needs is there unless the scene says `off`; what only some sensors need is
 /// there where it is named.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn a_scene_says_what_differs() {
     assert_eq!(Scene::from_yaml("{}").unwrap(), Scene::default());
     // a scene that once had neither gate nor patch, and repaired nothing
@@ -483,100 +484,102 @@ compensation:
     assert_eq!(params.bias_s.unwrap().torque, vector![4.0, 5.0, 6.0]);
 }
 
+/// Scenes with one mistake each, and parts of the message that it gets.
+const MISTAKES: &[(&str, &[&str])] = &[
+    (
+        "sync:\n  reordr_ms: 3\n",
+        &["reordr_ms", "did you mean `reorder_ms`", "line 2"],
+    ),
+    (
+        "contcat: {}",
+        &["contcat", "did you mean `contact`", "line 1"],
+    ),
+    (
+        "refine: { moed: paper }",
+        &["moed", "did you mean `mode`", "line 1"],
+    ),
+    ("contact:\n  on_n: much\n", &["line 2", "column 9"]),
+    (
+        "contact: { on_n: 1 }\ncontact: {}",
+        &["duplicate", "line 2"],
+    ),
+    (
+        "contact: { on_n: 0.1 }",
+        &["contact.on_n is 0.1", "contact.off_n to"],
+    ),
+    (
+        "contact: { off_n: .nan }",
+        &["contact.off_n is NaN", "0 to 1000 N"],
+    ),
+    (
+        "tip: { radius_mm: -1 }",
+        &["tip.radius_mm is -1", "0 to 1000 mm"],
+    ),
+    (
+        "tip: { stiffness_n_per_mm: 0 }",
+        &["tip.stiffness_n_per_mm is 0", "leave it out for rigid"],
+    ),
+    ("tip: { shape: cube }", &["cube", "ball", "flat", "cone"]),
+    (
+        "tip: { shape: cone }",
+        &["tip.shape: cone needs tip.half_angle_deg"],
+    ),
+    (
+        "tip: { shape: cone, half_angle_deg: 85 }",
+        &["tip.half_angle_deg is 85", "1 to 80 degrees", "flat"],
+    ),
+    (
+        "tip: { shape: flat, edge_radius_mm: 2 }",
+        &["tip.edge_radius_mm is 2", "0 mm to tip.radius_mm"],
+    ),
+    (
+        "tip: { shape: flat, radius_mm: 0 }",
+        &["tip.radius_mm is 0", "for a flat tip"],
+    ),
+    (
+        "tip: { shape: flat, length_mm: 0 }",
+        &["tip.length_mm is 0", "1000 mm"],
+    ),
+    ("scan: { noise_mm: .inf }", &["scan.noise_mm is inf"]),
+    (
+        "sync: { largest_gap_ms: -3 }",
+        &["sync.largest_gap_ms is -3", "0 to 60000 ms"],
+    ),
+    ("sync: { capacity: 1 }", &["sync.capacity is 1"]),
+    (
+        "tip: {stiffness_n_per_mm: null}\nrefine: { contact_model: spring }",
+        &["spring needs tip.stiffness_n_per_mm"],
+    ),
+    ("refine: { mode: rough }", &["rough", "robust", "line 1"]),
+    ("refine: { h_min_mm: 0 }", &["refine.h_min_mm is 0"]),
+    (
+        "carve: { contact_tolerance_mm: -1 }",
+        &["carve.contact_tolerance_mm is -1", "0 to 1000"],
+    ),
+    (
+        "sliding: { cone_cosine: -1 }",
+        &["sliding.cone_cosine is -1", "0 to 1"],
+    ),
+    (
+        "compensation: { payload: { mass_kg: -2 } }",
+        &["compensation.payload.mass_kg is -2"],
+    ),
+    (
+        "compensation: { sensor_orientation_xyzw: [0, 0, 0, 0] }",
+        &["sensor_orientation_xyzw is 0", "length"],
+    ),
+    ("compensation: { bias: { force_n: [1, 2] } }", &["line 1"]),
+    (
+        "patch: on",
+        &["expected keys with values, or off", "line 1"],
+    ),
+    ("patch: 3", &["expected keys with values, or off", "line 1"]),
+    ("[", &["line"]),
+];
+
 #[test]
 fn each_mistake_is_refused_in_one_line_with_place_and_cause() {
-    let bad = [
-        (
-            "sync:\n  reordr_ms: 3\n",
-            &["reordr_ms", "did you mean `reorder_ms`", "line 2"][..],
-        ),
-        (
-            "contcat: {}",
-            &["contcat", "did you mean `contact`", "line 1"],
-        ),
-        (
-            "refine: { moed: paper }",
-            &["moed", "did you mean `mode`", "line 1"],
-        ),
-        ("contact:\n  on_n: much\n", &["line 2", "column 9"]),
-        (
-            "contact: { on_n: 1 }\ncontact: {}",
-            &["duplicate", "line 2"],
-        ),
-        (
-            "contact: { on_n: 0.1 }",
-            &["contact.on_n is 0.1", "contact.off_n to"],
-        ),
-        (
-            "contact: { off_n: .nan }",
-            &["contact.off_n is NaN", "0 to 1000 N"],
-        ),
-        (
-            "tip: { radius_mm: -1 }",
-            &["tip.radius_mm is -1", "0 to 1000 mm"],
-        ),
-        (
-            "tip: { stiffness_n_per_mm: 0 }",
-            &["tip.stiffness_n_per_mm is 0", "leave it out for rigid"],
-        ),
-        ("tip: { shape: cube }", &["cube", "ball", "flat", "cone"]),
-        (
-            "tip: { shape: cone }",
-            &["tip.shape: cone needs tip.half_angle_deg"],
-        ),
-        (
-            "tip: { shape: cone, half_angle_deg: 85 }",
-            &["tip.half_angle_deg is 85", "1 to 80 degrees", "flat"],
-        ),
-        (
-            "tip: { shape: flat, edge_radius_mm: 2 }",
-            &["tip.edge_radius_mm is 2", "0 mm to tip.radius_mm"],
-        ),
-        (
-            "tip: { shape: flat, radius_mm: 0 }",
-            &["tip.radius_mm is 0", "for a flat tip"],
-        ),
-        (
-            "tip: { shape: flat, length_mm: 0 }",
-            &["tip.length_mm is 0", "1000 mm"],
-        ),
-        ("scan: { noise_mm: .inf }", &["scan.noise_mm is inf"]),
-        (
-            "sync: { largest_gap_ms: -3 }",
-            &["sync.largest_gap_ms is -3", "0 to 60000 ms"],
-        ),
-        ("sync: { capacity: 1 }", &["sync.capacity is 1"]),
-        (
-            "tip: {stiffness_n_per_mm: null}\nrefine: { contact_model: spring }",
-            &["spring needs tip.stiffness_n_per_mm"],
-        ),
-        ("refine: { mode: rough }", &["rough", "robust", "line 1"]),
-        ("refine: { h_min_mm: 0 }", &["refine.h_min_mm is 0"]),
-        (
-            "carve: { contact_tolerance_mm: -1 }",
-            &["carve.contact_tolerance_mm is -1", "0 to 1000"],
-        ),
-        (
-            "sliding: { cone_cosine: -1 }",
-            &["sliding.cone_cosine is -1", "0 to 1"],
-        ),
-        (
-            "compensation: { payload: { mass_kg: -2 } }",
-            &["compensation.payload.mass_kg is -2"],
-        ),
-        (
-            "compensation: { sensor_orientation_xyzw: [0, 0, 0, 0] }",
-            &["sensor_orientation_xyzw is 0", "length"],
-        ),
-        ("compensation: { bias: { force_n: [1, 2] } }", &["line 1"]),
-        (
-            "patch: on",
-            &["expected keys with values, or off", "line 1"],
-        ),
-        ("patch: 3", &["expected keys with values, or off", "line 1"]),
-        ("[", &["line"]),
-    ];
-    for (yaml, parts) in bad {
+    for &(yaml, parts) in MISTAKES {
         let error = Scene::from_yaml(yaml).unwrap_err().to_string();
         assert!(!error.contains('\n'), "{error}");
         assert!(

@@ -476,6 +476,7 @@ fn a_file_that_is_not_what_was_planned_is_refused_and_nothing_is_written() {
 
 /// The touch presses with 2 N: a threshold of 3 N sees no contact, which refine refuses.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn a_job_that_fails_is_in_the_table_with_its_reason_and_a_missing_one_is_named() {
     let sweep = Sweep::new("keys: { tip.radius_mm: 1.5, contact.on_n: [0.4, 3] }\n");
     let ids = sweep.ids();
@@ -619,6 +620,7 @@ fn sheet_result(
 /// By hand: column c rises by c · 0.01 mm; ± is 2 · 0.05 mm, the larger of both; so columns 11 to
 /// 20 move, 21 vertices each. The hole's diameter grows by 0.05 mm with ± 2 · 0.02 mm.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn vertices_and_features_that_moved_by_more_than_the_larger_plus_minus_are_counted() {
     let folder = tempfile::tempdir().unwrap();
     let hole = |diameter: f64, std: f64| {
@@ -780,6 +782,7 @@ fn a_softer_stylus_lifts_the_touched_place_by_the_difference_of_its_bending() {
 /// the boss grows by twice as much. What does not bend, the axes, stays.
 #[test]
 #[ignore = "full"]
+#[expect(clippy::too_many_lines)]
 fn the_plate_touched_by_a_softer_stylus_grows_everywhere_by_its_bending() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();

@@ -201,6 +201,7 @@ struct Fault {
 
 /// In mid-move at 50 mm/s. The table of docs/ur.md.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn after_each_fault_the_arm_is_at_rest_and_the_reported_reason_is_true() {
     use By::{Client, Controller, Dashboard, Pause, Watchdog};
     let fault = |name, happens, passes, by, is_true| Fault {
@@ -367,6 +368,7 @@ fn after_each_fault_the_arm_is_at_rest_and_the_reported_reason_is_true() {
     }
 }
 
+#[expect(clippy::too_many_lines)]
 fn one_fault(packages: &Path, fault: &Fault) -> Result<(), ProbeError> {
     let Fault {
         name,

@@ -43,6 +43,7 @@ fn ids(at: usize) -> Ids {
     }
 }
 
+#[expect(clippy::too_many_lines)]
 fn document(record: &InspectionRecord) -> String {
     let all = &record.characteristics;
     let each = |aspect: fn(&CharacteristicRecord, &Ids) -> String| {

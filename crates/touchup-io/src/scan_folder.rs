@@ -475,6 +475,7 @@ mod tests {
     }
 
     #[test]
+    #[expect(clippy::too_many_lines)]
     fn a_folder_of_rosbag2_is_a_recording_unless_it_leads_out_of_itself() {
         let place = tempfile::tempdir().unwrap();
         let folder = ScanFolder::open(place.path()).unwrap();

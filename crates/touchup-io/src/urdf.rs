@@ -124,6 +124,7 @@ pub fn read_urdf(path: &Path, links: &ArmLinks<'_>) -> Result<SerialChain, UrdfE
 /// The arm of a text.
 ///
 /// - `name`: of its file.
+#[expect(clippy::too_many_lines)]
 fn chain_of(text: &str, name: &str, links: &ArmLinks<'_>) -> Result<SerialChain, DescriptionError> {
     let document = Document::parse(text)?;
     let robot = document.root_element();

@@ -218,6 +218,7 @@ fn advice_line(row: &[TableCell]) -> String {
 
 impl ReportArguments {
     /// Adds every selected chapter, in the order of the page.
+    #[expect(clippy::too_many_lines)]
     fn measure(
         &self,
         report: &mut Report,

@@ -14,6 +14,7 @@ use super::whole_scan::{CaseResult, MethodResult, RefineMethod, ScanResult, Whol
 
 /// Method and region, step, rate and limits, each with its reason and its cost; `None` where no
 /// method made any scan better.
+#[expect(clippy::too_many_lines)]
 pub fn advice(
     scans: &WholeScan,
     stability: Option<&Stability>,

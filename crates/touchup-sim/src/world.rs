@@ -710,6 +710,7 @@ const WORKSHOP: WorldRanges = WorldRanges {
 };
 
 impl SimWorld {
+    #[expect(clippy::too_many_lines)]
     fn ranges(self) -> WorldRanges {
         let stds = WORKSHOP.stds;
         match self {

@@ -7,6 +7,7 @@ use super::controller::{Controller, Safety};
 
 /// What a line asks for. Connections are ended by whoever has them: `drop`, `undash` and `die` only
 /// say so here.
+#[expect(clippy::too_many_lines)]
 pub fn happen(controller: &mut Controller, line: &str) {
     controller.record.event(line);
     let number = |word: &str| word.parse::<f64>().unwrap_or(0.0);

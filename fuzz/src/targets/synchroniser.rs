@@ -24,6 +24,7 @@ fn stamp(bytes: &mut Unstructured, last: &mut i64) -> Result<i64> {
     })
 }
 
+#[expect(clippy::too_many_lines)]
 fn pair(bytes: &mut Unstructured) -> Result<()> {
     let params = SyncParams {
         reorder_ns: i64::from(bytes.arbitrary::<u8>()?) * MS,

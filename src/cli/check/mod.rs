@@ -220,6 +220,7 @@ pub(super) fn repeated(
 impl CheckReport {
     /// - `scene`: that the arm was checked by; `temperature_c`: of the cell, where it is not as the
     ///   scene has it.
+    #[expect(clippy::too_many_lines)]
     pub(super) fn of(
         touches: &CheckedTouches,
         spheres: &[ReferenceSphere],

@@ -93,6 +93,7 @@ impl Probing<'_> {
     /// mesh is written, unless that is forced.
     ///
     /// - `is_resumed`: what is finished in the folder is not probed again.
+    #[expect(clippy::too_many_lines)]
     pub fn done(
         &self,
         ready: &Ready,

@@ -273,6 +273,7 @@ fn features(report: &WhatIfReport) -> String {
     format!("<h2>Features</h2>\n{first}{rest}")
 }
 
+#[expect(clippy::too_many_lines)]
 fn rows(feature: &FeatureChange) -> Vec<Vec<String>> {
     let id = feature.id_a.or(feature.id_b).unwrap_or_default();
     let name = format!("<strong>{} {id}</strong>", escaped(&feature.kind));

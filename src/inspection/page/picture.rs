@@ -26,6 +26,7 @@ const TOUCHED: Rgb = [150, 184, 214];
 const SCANNED: Rgb = [205, 208, 213];
 
 /// The section; says so where there is no mesh.
+#[expect(clippy::too_many_lines)]
 pub(super) fn picture(input: &ReportInput<'_>) -> Result<String, InspectionError> {
     let Some(path) = &input.source.mesh else {
         return Ok(

@@ -91,6 +91,7 @@ pub(super) fn verdict(record: &InspectionRecord) -> String {
 const MOST_RELATIONS: usize = 24;
 
 /// Form and relations of the features in the drawing, also of what has no tolerance.
+#[expect(clippy::too_many_lines)]
 pub(super) fn form_and_relations(input: &ReportInput<'_>) -> String {
     let (file, k) = (
         &input.source.features,

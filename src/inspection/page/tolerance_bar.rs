@@ -10,6 +10,7 @@ use crate::io::inspection_file::CharacteristicRecord;
 const SIZE: [f64; 2] = [150.0, 22.0];
 
 /// The drawing as SVG; nothing without a limit.
+#[expect(clippy::too_many_lines)]
 pub(super) fn tolerance_bar(one: &CharacteristicRecord) -> String {
     let number = |name: &str| one.number(name);
     let (lower, upper) = (number("lower_limit"), number("upper_limit"));

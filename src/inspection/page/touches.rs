@@ -35,6 +35,7 @@ pub(super) fn touches(input: &ReportInput<'_>) -> String {
     format!("<h2>Touches behind the numbers</h2>\n{note}{missing}{parts}")
 }
 
+#[expect(clippy::too_many_lines)]
 fn feature(input: &ReportInput<'_>, balloon: &Balloon) -> String {
     let of_balloon = balloon.feature.and_then(|id| {
         input

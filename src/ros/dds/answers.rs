@@ -243,6 +243,7 @@ mod tests {
     }
 
     #[test]
+    #[expect(clippy::too_many_lines)]
     fn the_largest_answers_of_our_own_services_fit_into_one_packet() {
         // as long as the node makes a text of its own; a path may be longer
         let message = || {
@@ -325,6 +326,7 @@ mod tests {
     }
 
     #[test]
+    #[expect(clippy::too_many_lines)]
     fn a_text_that_is_too_long_is_cut_and_the_rest_of_the_answer_stays() {
         let answer = fits(TriggerResponse {
             success: true,
@@ -529,6 +531,7 @@ mod tests {
     }
 
     #[test]
+    #[expect(clippy::too_many_lines)]
     fn what_is_asked_of_all_parameters_fits_into_one_packet() {
         let mut described_briefly = described(names());
         described_briefly.reduce(room(ETHERNET));

@@ -149,6 +149,7 @@ impl DdsGraph {
         self.keep_alive.as_ref().map(|_| LOOK_EVERY)
     }
 
+    #[expect(clippy::too_many_lines)]
     fn on(&mut self, event: Event) {
         match event {
             Event::ParticipantDiscovered { dpd } if self.vendors.len() < MOST_PARTICIPANTS => {

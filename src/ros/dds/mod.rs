@@ -84,6 +84,7 @@ impl Drop for DdsConnection {
 ///
 /// # Errors
 /// [`RosError`]: a name that is none, no network, no thread.
+#[expect(clippy::too_many_lines)]
 pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosError> {
     for line in environment::unheeded(|name| std::env::var(name).ok()) {
         tracing::warn!("{line}");

@@ -41,6 +41,7 @@ impl RefinementWorker {
     }
 
     /// What a state means to who watches: a level of [`DiagnosticStatus`], and in words.
+    #[expect(clippy::too_many_lines)]
     fn state(&mut self) -> (u8, String) {
         let now = self.setup.clock.now();
         let stale =
@@ -144,6 +145,7 @@ impl RefinementWorker {
     }
 
     /// What becomes of the samples while both streams come.
+    #[expect(clippy::too_many_lines)]
     fn state_of_samples(&mut self, now: Instant) -> (u8, String) {
         let verdict =
             self.acceptance

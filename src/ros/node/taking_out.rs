@@ -199,6 +199,7 @@ impl RefinementWorker {
     }
 
     /// Makes the evidence again with or without the touch, once it is called.
+    #[expect(clippy::too_many_lines)]
     fn remaking(
         &mut self,
         request: &TakeOutTouchRequest,

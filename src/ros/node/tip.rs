@@ -15,6 +15,7 @@ const NEAR: f64 = 0.05;
 const TEXT_HEIGHT: f64 = 12e-3;
 
 /// Ball, text, the arrow to the mesh, and the one onto where to touch next.
+#[expect(clippy::too_many_lines)]
 pub fn markers(
     tip: &LastTip,
     features: &FeatureArray,

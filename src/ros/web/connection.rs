@@ -117,6 +117,7 @@ fn hear(text: &str, site: &Site, role: Role, answers: &Sender<String>) {
     site.call(role, &call, request, reply);
 }
 
+#[expect(clippy::too_many_lines)]
 async fn send(
     mut to_page: SplitSink<WebSocket, Message>,
     site: Arc<Site>,

@@ -112,6 +112,7 @@ impl WebServer {
     ///
     /// # Errors
     /// [`WebError`]
+    #[expect(clippy::too_many_lines)]
     pub fn open(params: &WebParams, notify: fn(&str)) -> Result<Self, WebError> {
         let tls = params
             .certificate

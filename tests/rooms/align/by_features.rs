@@ -626,6 +626,7 @@ fn refined_meshes_come_onto_their_truth_from_anywhere() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn the_command_line_lists_alternatives_and_takes_one() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
@@ -751,6 +752,7 @@ fn the_command_line_lists_alternatives_and_takes_one() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn the_command_line_reports_the_axis_of_a_free_turn() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();

@@ -174,7 +174,7 @@ fn sigmas_are_weights() {
 }
 
 #[test]
-fn what_determines_no_motion_is_refused() {
+fn bad_pairs_are_refused() {
     let good = pairs_of(&motion(), 0.1e-3, 1);
     assert_eq!(
         fit(&good[..2]).unwrap_err(),
@@ -224,6 +224,10 @@ fn what_determines_no_motion_is_refused() {
             ..
         })
     ));
+}
+
+#[test]
+fn pairs_on_a_line_are_refused() {
     let line: Vec<_> = (0..6)
         .map(|i| {
             let from = Point3::new(0.02 * f64::from(i), 0.0, 0.3e-3 * f64::from(i % 2));

@@ -275,6 +275,7 @@ fn largest_difference(a: &TriMesh, b: &TriMesh) -> f64 {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn a_calibrated_scene_gives_the_mesh_of_the_plain_recording() {
     let case = Case::new();
     fs::write(case.path("plain.yaml"), DEFAULT_YAML).unwrap();
@@ -372,6 +373,7 @@ fn a_calibrated_scene_gives_the_mesh_of_the_plain_recording() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn results_are_printed_and_written_and_bad_data_is_3() {
     let folder = tempfile::tempdir().unwrap();
     let name = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
@@ -541,6 +543,7 @@ fn resting_on(points: &[(Point3<f64>, Vector3<f64>)]) -> Vec<Message> {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn points_can_be_picked_with_the_stylus() {
     let folder = tempfile::tempdir().unwrap();
     let name = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
@@ -609,6 +612,7 @@ fn points_can_be_picked_with_the_stylus() {
 
 /// The markers of a tracker in space, where they are read in place of the pose.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn markers_in_space_refine_as_those_in_the_frame_of_the_scan() {
     let case = Case::new();
     let part = case.name("part.ply");

@@ -215,7 +215,12 @@ fn poses_that_do_not_determine_the_payload_are_refused() {
         })
         .collect();
     assert!(matches!(fitted(&empty), Err(PayloadError::NoWeight { .. })));
+}
+
+#[test]
+fn wrenches_that_no_payload_explains_are_refused() {
     // the other axes
+    let all = static_poses(12, [0.02, 0.002], WrenchFrame::Sensor, 2);
     let error = fit_payload(&all, &params(WrenchFrame::Object)).unwrap_err();
     assert!(
         matches!(
@@ -236,7 +241,7 @@ fn poses_that_do_not_determine_the_payload_are_refused() {
         .take(10)
         .for_each(|pose| pose.wrench.force += normal(&mut rng, 3.0));
     assert!(matches!(
-        fitted(&leaning),
+        fit_payload(&leaning, &params(WrenchFrame::Sensor)),
         Err(PayloadError::Inconsistent { .. } | PayloadError::NoWeight { .. })
     ));
 }

@@ -650,6 +650,7 @@ fn plates(folder: &Path) -> [String; 2] {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn compare_prints_numbers_and_writes_picture_and_colours() {
     let folder = tempfile::tempdir().unwrap();
     let [mesh, truth] = plates(folder.path());

@@ -222,6 +222,7 @@ fn documented(kind: &str) -> &'static [&'static str] {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn json_has_the_documented_fields() {
     let folder = drawn();
     let output = touchup(&["features", &folder.name("plate.ply"), "--json"]);
@@ -291,6 +292,7 @@ fn json_has_the_documented_fields() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn features_of_the_files_are_those_of_refine() {
     let folder = Folder::new();
     done(&touchup(&["demo", "--out", &folder.name("")]));

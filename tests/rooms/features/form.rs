@@ -180,6 +180,7 @@ impl Ratios {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn known_errors_of_form_and_orientation_are_found_within_their_uncertainty() {
     let mut ratios = Ratios::default();
     let seeds = either(1, 15);

@@ -157,6 +157,7 @@ fn kind_of(truth: &TruthFeature) -> Option<Kind> {
 }
 
 /// Compares one feature with the drawing.
+#[expect(clippy::too_many_lines)]
 fn compare(table: &mut Table, truth: &TruthFeature, feature: &Feature) {
     let name = truth.name;
     assert_eq!(feature.fitted_to, FittedTo::Touches, "{name}");
@@ -273,6 +274,7 @@ fn stated_over(count: usize) -> [f64; 2] {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn touched_features_are_found_within_their_stated_uncertainty() {
     let truths = Plate::default().features();
     let mut table = Table::default();
@@ -357,6 +359,7 @@ fn touched_features_are_found_within_their_stated_uncertainty() {
 /// times what the calibration says, makes bores and slots 40 µm wider and bosses 40 µm thinner, and
 /// their stated uncertainties do not show it.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn a_wrong_radius_goes_twice_into_every_width_and_is_not_in_its_uncertainty() {
     let off = 20e-6;
     let [right, wrong] = [0.0, off].map(|radius| {
@@ -429,6 +432,7 @@ fn a_wrong_radius_goes_twice_into_every_width_and_is_not_in_its_uncertainty() {
 /// touched: how deep it is nobody felt, and what was not touched has no uncertainty beside what
 /// was. Without touches the drawing is known to its rounding.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn what_was_not_felt_is_a_bound_or_has_no_uncertainty() {
     let plate = Plate::default();
     let mesh = plate.mesh(5e-6).unwrap();

@@ -477,6 +477,7 @@ fn sizes(reach: f64) -> impl Strategy<Value = Sizes> {
 
 /// Finite and of length 1, turned in the plane of n and F, and no farther than α (|F| + f_max) t
 /// where a sigmoid expects f_max at the most.
+#[expect(clippy::too_many_lines)]
 fn check_extremes(
     sizes: &Sizes,
     [n, f, side]: [Vector3<f64>; 3],

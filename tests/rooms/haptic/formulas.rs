@@ -228,6 +228,7 @@ fn check_spring(stiffness: f64, alpha: f64, dt: f64, h: f64, force: f64) -> Show
 /// e^−mT) and g (1 − e^−T/4).
 ///
 /// It is refused only where the scaled time α f_max t / h_min or the travel α F t is huge.
+#[expect(clippy::too_many_lines)]
 fn check_position(h_min: f64, f_max: f64, alpha: f64, share: f64, u: f64, dt: f64) -> Shown {
     let model = sigmoid(f_max, h_min, 0.0);
     let (h, force) = (u * h_min, share * f_max);
@@ -396,6 +397,7 @@ fn pressed(tick: i64, centre: Point3<f64>, force: Vector3<f64>) -> Sample {
 }
 
 /// Eq 1, 2, 4, 5, 6 and the weights of the region, on three pushes.
+#[expect(clippy::too_many_lines)]
 fn check_push(shake: &[f64], centre: &Vector3<f64>, force: &Vector3<f64>, depth: f64) -> Shown {
     let mesh = lattice(shake, centre);
     let mut refiner = refiner(&mesh);

@@ -345,22 +345,27 @@ fn columns_are_properties_of_the_vertices_in_ply() {
     );
 }
 
-/// A square of two triangles, the second one with an image of its own, as text of both kinds;
-/// colours by hand.
+/// A square of two triangles, the second one with an image of its own.
+const TEXTURED_PLY: &str = "\
+    ply\nformat ascii 1.0\ncomment TextureFile a b.png\ncomment TextureFile sub/c.png\nelement vertex 4\n\
+    property float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\n\
+    property uchar blue\nelement face 2\nproperty list uchar int vertex_indices\n\
+    property list uchar float texcoord\nproperty int texnumber\nend_header\n\
+    0 0 0 1 2 3\n1 0 0 4 5 6\n0 1 0 7 8 9\n1 1 0 255 0 128\n\
+    3 0 1 2 6 0 0 1 0 0 1 0\n3 1 3 2 6 .25 .5 .5 .5 .25 .75 1\n";
+
+/// The same as the other kind of file.
+const TEXTURED_OBJ: &str = "\
+    mtllib m.mtl\nv 0 0 0 .004 .008 .012\nv 1 0 0 .016 .02 .024\nv 0 1 0 .027 .031 .035\nv 1 1 0 1 0 .5\n\
+    vt 0 0\nvt 1 0\nvt 0 1\nvt .25 .5\nvt .5 .5\nvt .25 .75\nusemtl x\nf 1/1 2/2 3/3\nusemtl y\nf 2/4 4/5 3/6\n";
+
+/// Colours and corners by hand.
 #[test]
 fn colours_and_textures_come_back_from_either_kind_of_file() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
-    let ply = "ply\nformat ascii 1.0\ncomment TextureFile a b.png\ncomment TextureFile sub/c.png\nelement vertex 4\n\
-               property float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\n\
-               property uchar blue\nelement face 2\nproperty list uchar int vertex_indices\n\
-               property list uchar float texcoord\nproperty int texnumber\nend_header\n\
-               0 0 0 1 2 3\n1 0 0 4 5 6\n0 1 0 7 8 9\n1 1 0 255 0 128\n\
-               3 0 1 2 6 0 0 1 0 0 1 0\n3 1 3 2 6 .25 .5 .5 .5 .25 .75 1\n";
-    let obj = "mtllib m.mtl\nv 0 0 0 .004 .008 .012\nv 1 0 0 .016 .02 .024\nv 0 1 0 .027 .031 .035\nv 1 1 0 1 0 .5\n\
-               vt 0 0\nvt 1 0\nvt 0 1\nvt .25 .5\nvt .5 .5\nvt .25 .75\nusemtl x\nf 1/1 2/2 3/3\nusemtl y\nf 2/4 4/5 3/6\n";
-    std::fs::write(at("in.ply"), ply).unwrap();
-    std::fs::write(at("in.obj"), obj).unwrap();
+    std::fs::write(at("in.ply"), TEXTURED_PLY).unwrap();
+    std::fs::write(at("in.obj"), TEXTURED_OBJ).unwrap();
     std::fs::write(
         at("m.mtl"),
         "newmtl x\nmap_Kd a b.png\nnewmtl y\nmap_Kd sub/c.png\n",

@@ -183,6 +183,7 @@ fn mean_distance(points: &[Point3<f64>], mesh: &TriMesh) -> f64 {
 /// The real probing of a phantom with a ball, into a flat patch under it; from both containers,
 /// twice.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn a_real_recording_shapes_a_flat_patch_the_same_from_both_containers() {
     let (Some(mcap), Some(db3)) = (
         shared("force/bags/kidneyZ1_mcap"),
@@ -350,6 +351,7 @@ fn plate_touches() -> Vec<Message> {
 
 /// The first run is the library's own, sample by sample as if live; each replay gives its bytes.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn a_replay_equals_the_first_run_byte_for_byte() {
     let plate = Plate::new();
     let scan = read_mesh(&plate.at("scan.ply"), MeshUnit::Millimetre)
@@ -473,6 +475,7 @@ fn the_numbers_add_up_when_a_pose_is_bad() {
 
 /// Each of these once ran for minutes without a word, and took gigabytes.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn a_wrong_unit_and_settings_that_cost_too_much_are_refused_with_the_reason() {
     let plate = Plate::new();
     let in_mm = plate_touches().into_iter().map(|message| match message {
@@ -629,6 +632,7 @@ fn damage(bytes: &mut Vec<u8>, rng: &mut Pcg64) -> String {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn damaged_recordings_are_refused_or_read_as_far_as_they_go() {
     let folder = tempfile::tempdir().unwrap();
     let (scan, out) = (

@@ -62,6 +62,7 @@ fn what_was_found_is_slid_over_where_that_is_asked_for() {
 /// The through hole of the plate, Ø 8 mm at (16, 36, 12), of which the scan shows nothing; the mesh
 /// follows by the topics.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn a_flagged_hole_is_probed_and_shown() {
     let cell = Cell::start(true);
     let id = cell.flag(Feature::KIND_HOLE, [17.5, 34.8, 12.0]);
@@ -197,6 +198,7 @@ fn a_cancelled_goal_stops_and_retracts_and_the_node_goes_on() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn orders_that_must_not_be_are_refused_and_nothing_moves() {
     let cell = Cell::start(false);
     let id = cell.flag(Feature::KIND_HOLE, [16.5, 36.0, 12.0]);

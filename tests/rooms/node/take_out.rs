@@ -153,6 +153,7 @@ fn a_touch_that_is_taken_out_is_as_if_it_had_never_been() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn what_is_put_back_is_as_if_it_had_never_been_out_also_beside_strokes_that_are_undone() {
     let plate = Plate::touched_last(0.1);
     let bench = Bench::start(&plate);

@@ -51,101 +51,103 @@ fn empty_frame(mut arrival: Arrival) -> Arrival {
     arrival
 }
 
+/// Faults of a stream, and words of the warning that each gets.
+const FAULTS: [(&str, Fault, &[&str]); 10] = [
+    (
+        "poses 5 s behind",
+        |bench, m| {
+            stamped(
+                bench.arrival(m),
+                m.stamp_ns() - if is_pose(m) { 5 * SECOND } else { 0 },
+            )
+        },
+        &["poses are stamped", "behind the wrenches"],
+    ),
+    (
+        "poses an hour ahead",
+        |bench, m| {
+            stamped(
+                bench.arrival(m),
+                m.stamp_ns() + if is_pose(m) { 3600 * SECOND } else { 0 },
+            )
+        },
+        &["poses are stamped 3600.", "ahead of the wrenches"],
+    ),
+    (
+        "wrenches an hour ahead",
+        |bench, m| {
+            stamped(
+                bench.arrival(m),
+                m.stamp_ns() + if is_pose(m) { 0 } else { 3600 * SECOND },
+            )
+        },
+        &["poses are stamped 3600.", "behind the wrenches"],
+    ),
+    (
+        "no frames",
+        |bench, m| empty_frame(bench.arrival(m)),
+        &["no_frame", "fill frame_id"],
+    ),
+    (
+        "poses without frame",
+        |bench, m| {
+            if is_pose(m) {
+                empty_frame(bench.arrival(m))
+            } else {
+                bench.arrival(m)
+            }
+        },
+        &["no_frame", "fill frame_id"],
+    ),
+    (
+        "NaN poses",
+        |bench, m| {
+            let mut arrival = bench.arrival(m);
+            if let Arrival::Pose(pose, _) = &mut arrival {
+                pose.pose.position.y = f64::NAN;
+            }
+            arrival
+        },
+        &["pose_not_finite", "NaN"],
+    ),
+    (
+        "NaN forces",
+        |bench, m| {
+            let mut arrival = bench.arrival(m);
+            if let Arrival::Wrench(wrench, _) = &mut arrival {
+                wrench.wrench.force.x = f64::NAN;
+            }
+            arrival
+        },
+        &["not_finite", "NaN"],
+    ),
+    (
+        "no stamps",
+        |bench, m| stamped(bench.arrival(m), 0),
+        &["not stamped", "header.stamp"],
+    ),
+    (
+        "poses without stamps",
+        |bench, m| {
+            if is_pose(m) {
+                stamped(bench.arrival(m), 0)
+            } else {
+                bench.arrival(m)
+            }
+        },
+        &["poses are not stamped"],
+    ),
+    (
+        "stamps of 1969",
+        |bench, m| stamped(bench.arrival(m), m.stamp_ns() - 3_000_000_000 * SECOND),
+        &["stamp", "1970"],
+    ),
+];
+
 /// Each way in which two streams come at full rate and no sample is of use, with what the node has
 /// to say of it.
 #[test]
 fn a_stream_that_is_not_used_is_a_warning_with_its_cause() {
-    let cases: [(&str, Fault, &[&str]); 10] = [
-        (
-            "poses 5 s behind",
-            |bench, m| {
-                stamped(
-                    bench.arrival(m),
-                    m.stamp_ns() - if is_pose(m) { 5 * SECOND } else { 0 },
-                )
-            },
-            &["poses are stamped", "behind the wrenches"],
-        ),
-        (
-            "poses an hour ahead",
-            |bench, m| {
-                stamped(
-                    bench.arrival(m),
-                    m.stamp_ns() + if is_pose(m) { 3600 * SECOND } else { 0 },
-                )
-            },
-            &["poses are stamped 3600.", "ahead of the wrenches"],
-        ),
-        (
-            "wrenches an hour ahead",
-            |bench, m| {
-                stamped(
-                    bench.arrival(m),
-                    m.stamp_ns() + if is_pose(m) { 0 } else { 3600 * SECOND },
-                )
-            },
-            &["poses are stamped 3600.", "behind the wrenches"],
-        ),
-        (
-            "no frames",
-            |bench, m| empty_frame(bench.arrival(m)),
-            &["no_frame", "fill frame_id"],
-        ),
-        (
-            "poses without frame",
-            |bench, m| {
-                if is_pose(m) {
-                    empty_frame(bench.arrival(m))
-                } else {
-                    bench.arrival(m)
-                }
-            },
-            &["no_frame", "fill frame_id"],
-        ),
-        (
-            "NaN poses",
-            |bench, m| {
-                let mut arrival = bench.arrival(m);
-                if let Arrival::Pose(pose, _) = &mut arrival {
-                    pose.pose.position.y = f64::NAN;
-                }
-                arrival
-            },
-            &["pose_not_finite", "NaN"],
-        ),
-        (
-            "NaN forces",
-            |bench, m| {
-                let mut arrival = bench.arrival(m);
-                if let Arrival::Wrench(wrench, _) = &mut arrival {
-                    wrench.wrench.force.x = f64::NAN;
-                }
-                arrival
-            },
-            &["not_finite", "NaN"],
-        ),
-        (
-            "no stamps",
-            |bench, m| stamped(bench.arrival(m), 0),
-            &["not stamped", "header.stamp"],
-        ),
-        (
-            "poses without stamps",
-            |bench, m| {
-                if is_pose(m) {
-                    stamped(bench.arrival(m), 0)
-                } else {
-                    bench.arrival(m)
-                }
-            },
-            &["poses are not stamped"],
-        ),
-        (
-            "stamps of 1969",
-            |bench, m| stamped(bench.arrival(m), m.stamp_ns() - 3_000_000_000 * SECOND),
-            &["stamp", "1970"],
-        ),
-    ];
     let plate = Plate::touched(0.1);
     let messages = &plate.messages;
     let first_ns = messages[0].stamp_ns();
@@ -169,7 +171,7 @@ fn a_stream_that_is_not_used_is_a_warning_with_its_cause() {
         bench.end();
         states.pop().expect("diagnostics come once a second")
     };
-    for (name, fault, words) in cases {
+    for (name, fault, words) in FAULTS {
         let (level, said) = state_of(fault);
         assert_eq!(level, DiagnosticStatus::WARN, "{name}: {said}");
         assert!(
@@ -229,6 +231,7 @@ fn an_input_that_is_surely_wrong_is_an_error_with_its_cause() {
 
 /// The result is that of the messages without the wrong ones, byte for byte.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn a_wrong_stamp_costs_itself_alone() {
     let plate = Plate::touched(0.1);
     let messages = &plate.messages;
@@ -331,6 +334,7 @@ fn written(mesh: &TriMesh, path: &Path) -> Vec<u8> {
 /// of the follower and the mesh in the file have the same bytes, and the answer of the service
 /// names the version that the follower has.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn what_is_shown_becomes_what_is_saved_at_a_follower_that_loses_patches() {
     let plate = Plate::touched(0.15);
     let mut bench = Bench::start(&plate);

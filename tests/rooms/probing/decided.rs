@@ -195,6 +195,7 @@ fn with_fixed_uncertainty(
 /// Touches of a fixed pattern, evenly over the surface itself, with no search for it.
 const GRID: usize = 39;
 
+#[expect(clippy::too_many_lines)]
 fn touched_evenly(case: &Case, seed: u64) -> MeasuredNumber {
     let mut rng = Pcg64::seed_from_u64(seed);
     let off = RADIUS * rng.sample::<f64, _>(StandardNormal);

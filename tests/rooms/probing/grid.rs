@@ -105,6 +105,7 @@ impl Opening {
 
     /// Errors of as many touches spread evenly, where the scan has the opening 0.2 mm and 0.01 rad
     /// off (standard deviations); `None` where they leave an end of a slot open.
+    #[expect(clippy::too_many_lines)]
     fn grid_errors(&self, count: usize, rng: &mut Pcg64) -> Option<Errors> {
         let mut draw = |sigma: f64| sigma * rng.sample::<f64, _>(StandardNormal);
         let shift = Vector3::new(draw(0.2e-3), draw(0.2e-3), 0.0);

@@ -272,6 +272,7 @@ fn sigma_by_differences<M: Surface>(
 ///
 /// Both are those of the information matrix of the touches, and the best of 300 patterns of random
 /// places is no better than the plan.
+#[expect(clippy::too_many_lines)]
 fn planned_over_grid<M: Surface>(case: &Case<M>) -> f64 {
     let count = case.grid.len();
     let (mut squares, mut variances, mut random) = ([0.0; 2], [0.0; 2], 0.0);
@@ -444,6 +445,7 @@ fn opening(hole: &Cylinder) -> Point3<f64> {
 /// the axis' own plane of a lean. Where all touches are equally informative, as of a diameter, no
 /// plan can be better, and it must not be worse.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn planned_touches_beat_a_uniform_grid() {
     let depths = evenly(1e-3, 5e-3, 4);
     let fine: Vec<f64> = (0..9).map(|at| 1e-3 + 0.5e-3 * f64::from(at)).collect();
@@ -851,6 +853,7 @@ fn near_edges(kind: Option<Kind>, p: &Point3<f64>) -> f64 {
 /// sides, and knows of no opening. Without its outline, as if the part went on on all sides,
 /// touches go there.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn no_touch_is_planned_beside_the_part() {
     let scan = flat([-0.3, 40.3], [-0.3, 30.3]);
     let endless = flat([-100.0, 100.0], [-100.0, 100.0]);

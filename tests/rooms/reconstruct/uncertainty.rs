@@ -138,6 +138,7 @@ impl Normalised {
 /// Consistency, not truth: noise, friction and residual calibration errors are drawn from the
 /// model.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_has_them() {
     // one draw of the stiffness says nothing about its coverage
     let seeds = either(3, 20);
@@ -494,6 +495,7 @@ fn disturbed_places(touch: &Touch) -> Vec<Point3<f64>> {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn outliers_are_counted_and_do_not_dent_the_mesh() {
     let (mut places, mut listed, mut errors) = (0, 0, [const { Vec::new() }; 3]);
     for seed in 1..=either(2, 20) {

@@ -265,38 +265,45 @@ fn ball_comes_to_rest_at_the_geometric_equilibrium() {
     assert!(x == mm(5., 5., 19.9) && c.is_empty());
 }
 
+/// A tip that stands still above the plate.
+fn standing(z: f64) -> [Stroke; 1] {
+    [Stroke {
+        points: vec![Point3::new(0.01, 0.01, z)],
+        speed: 0.05,
+        press: None,
+    }]
+}
+
 #[test]
-fn senseless_stylus_settings_are_refused() {
-    let plate = Plate::default();
-    let path = |z: f64| {
-        vec![Stroke {
-            points: vec![Point3::new(0.01, 0.01, z)],
-            speed: 0.05,
-            press: None,
-        }]
-    };
+fn senseless_paths_and_tips_are_refused() {
     let with = |radius: f64| StylusParams {
         radius,
         ..StylusParams::default()
     };
-    let run = |path: &[Stroke], params: &StylusParams| touch(&plate, path, params, 0).unwrap_err();
+    let run = |path: &[Stroke], params: &StylusParams| {
+        touch(&Plate::default(), path, params, 0).unwrap_err()
+    };
     assert!(matches!(
-        run(&path(0.02), &with(f64::NAN)),
+        run(&standing(0.02), &with(f64::NAN)),
         SimError::BadParameter { .. }
     ));
     assert!(matches!(
-        run(&path(0.02), &with(-1.0)),
+        run(&standing(0.02), &with(-1.0)),
         SimError::BadParameter { .. }
     ));
     assert!(matches!(
-        run(&path(0.011), &with(1.5e-3)),
+        run(&standing(0.011), &with(1.5e-3)),
         SimError::StartsInside { .. }
     ));
     assert_eq!(run(&[], &with(1.5e-3)), SimError::EmptyPath);
     assert!(matches!(
-        run(&path(f64::NAN), &with(1.5e-3)),
+        run(&standing(f64::NAN), &with(1.5e-3)),
         SimError::BadParameter { .. }
     ));
+}
+
+#[test]
+fn senseless_stylus_settings_are_refused() {
     let base = StylusParams::default();
     for params in [
         StylusParams {
@@ -331,13 +338,14 @@ fn senseless_stylus_settings_are_refused() {
             ..base
         },
     ] {
-        let message = run(&path(0.02), &params).to_string();
+        let error = touch(&Plate::default(), &standing(0.02), &params, 0).unwrap_err();
+        let message = error.to_string();
         assert!(message.len() < 120, "{message}");
     }
     // 4 N bend this one by 1 m, which is allowed
     touch(
-        &plate,
-        &path(0.02),
+        &Plate::default(),
+        &standing(0.02),
         &StylusParams {
             stiffness: 4.0,
             ..base

@@ -360,6 +360,7 @@ fn messages_have_the_rates_delay_and_drift_of_the_clocks() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn forces_have_the_drawn_tare_noise_steps_and_play() {
     let tare = Vector3::new(0.7, -0.3, 0.2);
     let sensor = SensorParams {

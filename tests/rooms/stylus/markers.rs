@@ -442,7 +442,7 @@ fn the_noise_at_the_ball_is_less_than_that_of_each_frame() {
 }
 
 #[test]
-fn bodies_and_settings_without_a_meaning_are_refused() {
+fn bodies_without_a_meaning_are_refused() {
     let p = |x: f64, y: f64| Point3::new(x, y, 0.1);
     for bad in [
         vec![],
@@ -457,6 +457,10 @@ fn bodies_and_settings_without_a_meaning_are_refused() {
         let refused: Result<_, SettingError> = MarkerBody::new(bad.clone());
         assert!(refused.is_err(), "{bad:?}");
     }
+}
+
+#[test]
+fn settings_without_a_meaning_are_refused() {
     let good = MarkerParams::default();
     for bad in [
         MarkerParams {

@@ -93,6 +93,7 @@ const LINE_SHARE: f64 = 0.02;
 ///
 /// # Errors
 /// [`WorkspaceError`]
+#[expect(clippy::too_many_lines)]
 pub fn check_workspace(
     spheres: &[ReferenceSphere],
     readings: &[SphereReading],

@@ -220,6 +220,7 @@ pub fn compare(
 }
 
 /// - `samples`: of the mesh and of the truth.
+#[expect(clippy::too_many_lines)]
 fn measure(
     mesh: IndexedMesh<'_>,
     truth: IndexedMesh<'_>,

@@ -114,6 +114,7 @@ struct Presses<'a> {
 
 impl InputJudge<'_> {
     /// All doubts.
+    #[expect(clippy::too_many_lines)]
     pub fn findings(&self) -> Vec<InputFinding> {
         let TipParams { radius, stiffness } = self.params.tip;
         let scale = ScanScale::of(self.scan);
@@ -210,6 +211,7 @@ impl InputJudge<'_> {
     }
 
     /// - `resting`: how many free samples the rest is the mean of, where it is one.
+    #[expect(clippy::too_many_lines)]
     fn judge_forces(
         &self,
         presses: &Presses,
@@ -305,6 +307,7 @@ impl InputJudge<'_> {
     }
 
     /// What is wrong with where the presses are, and whether they are on the scan even so.
+    #[expect(clippy::too_many_lines)]
     fn judge_places(&self, presses: &Presses) -> Option<(InputFinding, bool)> {
         let Presses {
             records,
@@ -472,6 +475,7 @@ impl InputJudge<'_> {
     }
 
     /// What is wrong with the direction of the forces.
+    #[expect(clippy::too_many_lines)]
     fn judge_wrench(&self, presses: &Presses) -> Option<InputFinding> {
         let Presses {
             records,

@@ -147,6 +147,7 @@ fn turn_of<'a>(of: impl Iterator<Item = &'a Seen>) -> f64 {
 ///
 /// - `narrow`, `level`, `land`: radius of the bore, m; how far along `out` the land is, m; its
 ///   number
+#[expect(clippy::too_many_lines)]
 fn head_under(
     observed: &Observed,
     seen: &[Seen],

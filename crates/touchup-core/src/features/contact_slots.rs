@@ -441,6 +441,7 @@ impl Void<'_> {
     }
 
     /// The slot or pocket; `None` where it is none.
+    #[expect(clippy::too_many_lines)]
     fn slot(&self) -> Option<Slot> {
         let width = self.width();
         let contacts = self.contacts(self.view.kept.iter().copied());

@@ -41,6 +41,7 @@ const OF_BALL: std::ops::Range<f64> = 0.97..1.12;
 ///
 /// - `touches`: as [`crate::reconstruct::Patcher::probed`] has them; features name them by their
 ///   place in it.
+#[expect(clippy::too_many_lines)]
 pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detection {
     let mut parted = Parted::of(mesh, tree);
     join_planes(&mut parted);
@@ -665,6 +666,7 @@ fn cylinder_feature(measure: &Measure, wall: &Wall) -> Feature {
     }
 }
 
+#[expect(clippy::too_many_lines)]
 fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
     let fitted = measure.stadium(slot);
     let axis = fitted.axis(&slot.out);

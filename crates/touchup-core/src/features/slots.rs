@@ -170,6 +170,7 @@ fn between_round_ends(parted: &Parted, of_face: &[u32], walls: &[Wall]) -> Vec<S
 }
 
 /// The slot that two half-round walls close, when each is open towards the other.
+#[expect(clippy::too_many_lines)]
 fn slot_of_ends(parted: &Parted, of_face: &[u32], ends: [&Wall; 2]) -> Option<Slot> {
     let [one, other] = ends;
     let width = one.radius() + other.radius();
@@ -461,6 +462,7 @@ struct Opened {
     area: f64,
 }
 
+#[expect(clippy::too_many_lines)]
 fn opened(parted: &Parted, of_face: &[u32], seen: &Opened) -> Option<Slot> {
     let Opened {
         walls,

@@ -96,6 +96,7 @@ impl Wall {
     }
 
     /// The wall that these faces are; `None` for a plane.
+    #[expect(clippy::too_many_lines)]
     pub fn of_faces(
         facets: &Facets,
         primitive: &Primitive,

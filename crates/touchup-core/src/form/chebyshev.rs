@@ -34,6 +34,7 @@ struct Bounded<const N: usize> {
 ///
 /// - `rows`: each with a last entry that is not looked at, in the place of the residual itself; x
 ///   has 0 there.
+#[expect(clippy::too_many_lines)]
 pub(super) fn chebyshev<const N: usize>(
     rows: &[SVector<f64, N>],
     values: &[f64],

@@ -381,6 +381,7 @@ mod tests {
     /// Elements with errors as large as they state: of each relation the root mean square of error
     /// over uncertainty, both where it is perfect and where it is not.
     #[test]
+    #[expect(clippy::too_many_lines)]
     fn relations_are_off_by_their_uncertainty() {
         let plane =
             |point: [f64; 3], normal: [f64; 3]| element(Shape::Plane, point, normal, &[point]);

@@ -241,6 +241,7 @@ impl RegistrationRound {
             .map_or(f64::INFINITY, |c| twist.dot(&c.solve(&twist)).sqrt())
     }
 
+    #[expect(clippy::too_many_lines)]
     fn of(
         registrar: &Registrar,
         contacts: &[(Point3<f64>, Vector3<f64>)],

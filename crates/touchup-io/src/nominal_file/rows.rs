@@ -53,6 +53,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<(String, NominalRecord)>, NominalF
     rows.iter().map(record).collect()
 }
 
+#[expect(clippy::too_many_lines)]
 fn record_of(row: &Row) -> Result<NominalRecord, String> {
     let at = |column: &str| {
         COLUMNS

@@ -37,69 +37,71 @@ fn a_table_says_tolerances_in_three_ways() {
     assert_eq!(records[1].center_mm, Some([32.0, 34.0, 12.0]));
 }
 
+/// Rows with one mistake each, and a part of the message that it gets.
+const MISTAKES: &[(&str, &str)] = &[
+    (
+        "a,hole,diameter_mm,NaN,0.1,,,,,",
+        "n.csv, line 3: nominal_mm is \"NaN\" and must be a number",
+    ),
+    (
+        "a,hole,diameter_mm,8,,0.1,-0.1,,,",
+        "a: lower_deviation_mm 0.1 is not below upper_deviation_mm -0.1: exchange them",
+    ),
+    (
+        "a,bore,diameter_mm,8,0.1,,,,,",
+        "there is no kind \"bore\": take one of hole, slot",
+    ),
+    (
+        "a,hole,diameter,8,0.1,,,,,",
+        "there is no quantity \"diameter\": take one of diameter_mm",
+    ),
+    (
+        "a,hole,diameter_mm,,0.1,,,,,",
+        "needs a nominal value: fill in nominal_mm",
+    ),
+    (
+        "a,hole,diameter_mm,8,-0.1,,,,,",
+        "tolerance_mm must be above 0",
+    ),
+    (
+        "a,hole,diameter_mm,8,0.1,-0.1,,,,",
+        "give tolerance_mm, or limit deviations, not both",
+    ),
+    (
+        "a,hole,diameter_mm,8,0.1,,,16,,12",
+        "go together: fill in all three or none",
+    ),
+    (
+        "a,hole,cone_angle_deg,90,1,,,,,",
+        "cone_angle_deg is in deg: put the number into nominal_deg",
+    ),
+    (
+        "a,hole,position_mm,,0.1,,,,,",
+        "position_mm needs the nominal centre",
+    ),
+    (
+        "a,hole,roundness_mm,,,-0.1,0.1,,,",
+        "roundness_mm cannot be below 0",
+    ),
+    (
+        "a,hole,roundness_mm,1,0.1,,,,,",
+        "the nominal value of roundness_mm is 0",
+    ),
+    (
+        "a,hole,distance_mm,10,0.1,,,,,",
+        "distance_mm needs a datum",
+    ),
+    (
+        "a,hole,width_mm,10,0.1,,,,,",
+        "a: a hole has no width_mm: take one of diameter_mm, depth_mm",
+    ),
+    (",hole,diameter_mm,8,0.1,,,,,", "name is empty"),
+    ("a,hole,diameter_mm,8,0,1,,,,,", "11 values for 10 columns"),
+];
+
 #[test]
 fn each_mistake_in_a_row_is_said_with_its_line_and_what_to_do() {
-    let mistakes = [
-        (
-            "a,hole,diameter_mm,NaN,0.1,,,,,",
-            "n.csv, line 3: nominal_mm is \"NaN\" and must be a number",
-        ),
-        (
-            "a,hole,diameter_mm,8,,0.1,-0.1,,,",
-            "a: lower_deviation_mm 0.1 is not below upper_deviation_mm -0.1: exchange them",
-        ),
-        (
-            "a,bore,diameter_mm,8,0.1,,,,,",
-            "there is no kind \"bore\": take one of hole, slot",
-        ),
-        (
-            "a,hole,diameter,8,0.1,,,,,",
-            "there is no quantity \"diameter\": take one of diameter_mm",
-        ),
-        (
-            "a,hole,diameter_mm,,0.1,,,,,",
-            "needs a nominal value: fill in nominal_mm",
-        ),
-        (
-            "a,hole,diameter_mm,8,-0.1,,,,,",
-            "tolerance_mm must be above 0",
-        ),
-        (
-            "a,hole,diameter_mm,8,0.1,-0.1,,,,",
-            "give tolerance_mm, or limit deviations, not both",
-        ),
-        (
-            "a,hole,diameter_mm,8,0.1,,,16,,12",
-            "go together: fill in all three or none",
-        ),
-        (
-            "a,hole,cone_angle_deg,90,1,,,,,",
-            "cone_angle_deg is in deg: put the number into nominal_deg",
-        ),
-        (
-            "a,hole,position_mm,,0.1,,,,,",
-            "position_mm needs the nominal centre",
-        ),
-        (
-            "a,hole,roundness_mm,,,-0.1,0.1,,,",
-            "roundness_mm cannot be below 0",
-        ),
-        (
-            "a,hole,roundness_mm,1,0.1,,,,,",
-            "the nominal value of roundness_mm is 0",
-        ),
-        (
-            "a,hole,distance_mm,10,0.1,,,,,",
-            "distance_mm needs a datum",
-        ),
-        (
-            "a,hole,width_mm,10,0.1,,,,,",
-            "a: a hole has no width_mm: take one of diameter_mm, depth_mm",
-        ),
-        (",hole,diameter_mm,8,0.1,,,,,", "name is empty"),
-        ("a,hole,diameter_mm,8,0,1,,,,,", "11 values for 10 columns"),
-    ];
-    for (row, expected) in mistakes {
+    for &(row, expected) in MISTAKES {
         let found = refused(row);
         assert!(
             found.contains(expected) && found.contains("line 3"),

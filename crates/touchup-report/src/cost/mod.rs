@@ -56,6 +56,7 @@ pub struct Cost {
 ///
 /// # Errors
 /// [`MeasureError`](crate::error::MeasureError).
+#[expect(clippy::too_many_lines)]
 pub fn cost(effort: Effort, progress: &mut dyn FnMut(&str)) -> Measured<Cost> {
     let by_edge = recordings::by_edge(effort, progress)?;
     let by_faces = recordings::by_faces(effort, progress)?;

@@ -62,6 +62,7 @@ fn contacts_of(samples: &[Sample], tip: TipParams) -> Measured<Vec<ContactSample
 }
 
 /// Times every stage that can be called by itself, on a scan of edges of 1 mm.
+#[expect(clippy::too_many_lines)]
 pub(super) fn stage_costs(faces: usize, timing: Timing) -> Measured<Vec<StageCost>> {
     let (mesh, samples) = touched_plate(faces, side_of(faces), timing.samples())?;
     let tree = FaceTree::new(&mesh);

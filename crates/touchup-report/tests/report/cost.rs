@@ -27,6 +27,7 @@ fn ns(median: f64) -> PerSample {
 }
 
 /// 100 ns at 10k faces, 30 ns more for ten times as many, and 20 ns of the caches at a million.
+#[expect(clippy::too_many_lines)]
 fn made_up() -> Cost {
     let size = |faces: usize, push: f64, ratio: f64| SizeCost {
         faces,

@@ -48,6 +48,7 @@ fn series(name: &str, marks: &[(f64, f64)]) -> Series {
 }
 
 /// Everything that a figure or table may hold, sane and not.
+#[expect(clippy::too_many_lines)]
 fn report() -> Report {
     let bad = [
         (0.0, -1.0),

@@ -204,6 +204,7 @@ fn evaluations_are_counted_as_by_hand() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn what_is_measured_becomes_a_chapter_with_the_same_numbers() {
     let mut lines = Vec::new();
     let measured = WorkPrecision::measure(Effort { is_quick: true }, &mut |line| {

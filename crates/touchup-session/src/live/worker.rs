@@ -65,6 +65,7 @@ pub(super) struct Worker {
 }
 
 impl Worker {
+    #[expect(clippy::too_many_lines)]
     pub fn new(scans: PatchedScans, mut patcher: Patcher, gate: Gate) -> Result<Self, LiveError> {
         let (questions, inbox) = channel::<(Question, Working)>();
         let (to_engine, answers) = channel();

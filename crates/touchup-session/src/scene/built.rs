@@ -68,6 +68,7 @@ impl Scene {
     ///
     /// - `unused`: parts that the task at hand has no use for, each with the reason.
     /// - `features`: those that the program can be built with, and whether it was.
+    #[expect(clippy::too_many_lines)]
     pub fn built(&self, unused: &[LeftOut], features: &[(&'static str, bool)]) -> Built {
         let unless = |is_there: bool, reason| if is_there { None } else { Some(reason) };
         let not_robust = match &self.refine {

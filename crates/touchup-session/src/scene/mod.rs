@@ -205,6 +205,7 @@ impl Scene {
     ///
     /// # Errors
     /// [`SceneError::Setting`], [`SceneError::Incomplete`].
+    #[expect(clippy::too_many_lines)]
     pub fn validate(&self) -> Result<(), SceneError> {
         self.check()?;
         let tip = self.tip.as_ref();

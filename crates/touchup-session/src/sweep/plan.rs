@@ -50,6 +50,7 @@ impl SweepPlan {
     ///
     /// # Errors
     /// [`SweepError`]
+    #[expect(clippy::too_many_lines)]
     pub fn read(grid: &Path, recordings: &[PathBuf], folder: &Path) -> Result<Self, SweepError> {
         let mut grid = SweepGrid::read(grid, recordings)?;
         let refused = |why: String| SweepError::Grid {

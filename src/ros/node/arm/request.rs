@@ -22,6 +22,7 @@ impl Wanted {
     ///
     /// # Errors
     /// A code of [`ProbeResult`] and why.
+    #[expect(clippy::too_many_lines)]
     pub fn of(
         settings: &ProbeSettings,
         configured: &ProbeParams,

@@ -481,6 +481,7 @@ impl ArmWorker {
         Ok(wanted)
     }
 
+    #[expect(clippy::too_many_lines)]
     fn probe_one(
         &mut self,
         folder: &Path,

@@ -90,6 +90,7 @@ impl Player {
     }
 
     /// Reads the session, and begins a node that is to take it.
+    #[expect(clippy::too_many_lines)]
     fn open(&self) -> Result<ReplayStage, String> {
         let Self {
             folder,

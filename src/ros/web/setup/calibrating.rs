@@ -51,6 +51,7 @@ impl NodeSetup {
     ///
     /// # Errors
     /// [`NodeSetupError`]
+    #[expect(clippy::too_many_lines)]
     pub(super) fn calibrate(
         self: &Arc<Self>,
         request: &CalibrateRequest,

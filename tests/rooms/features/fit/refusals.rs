@@ -15,7 +15,7 @@ fn refusal(guess: &Cylinder, observations: &[Observation]) -> FitError {
 }
 
 #[test]
-fn input_that_cannot_be_fitted_is_refused() {
+fn observations_that_cannot_be_fitted_are_refused() {
     let near = hole_near(&Isometry3::identity(), 5.0 * MM);
     assert_eq!(
         refusal(&near, &[]),
@@ -52,6 +52,11 @@ fn input_that_cannot_be_fitted_is_refused() {
             sigma: 0.0
         }
     );
+}
+
+#[test]
+fn guesses_and_settings_without_a_meaning_are_refused() {
+    let near = hole_near(&Isometry3::identity(), 5.0 * MM);
     let negative = Cylinder {
         radius: -1.0,
         ..near

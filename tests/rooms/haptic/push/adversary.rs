@@ -256,6 +256,7 @@ fn shapes(mesh: &TriMesh) -> Shapes {
         .collect()
 }
 
+#[expect(clippy::too_many_lines)]
 fn torment(scan: &TriMesh, params: RefineParams, seeds: std::ops::Range<u64>) -> (u64, u64) {
     let hinges = hinges(scan);
     assert_eq!(intersections(scan), [], "the scan itself is sound");

@@ -168,110 +168,113 @@ fn a_step_that_fails_is_a_refused_sample() {
     assert_eq!(*refiner.counts(), counts);
 }
 
+type Change = fn(&mut RefineParams, f64);
+
+/// Settings, by name.
+const CHANGES: [(&str, Change); 25] = [
+    ("tip radius", |p, x| p.tip.radius = x),
+    ("tip stiffness", |p, x| p.tip.stiffness = Some(x)),
+    ("scan noise", |p, x| p.scan_noise = x),
+    ("longest step", |p, x| p.longest_step_edges = x),
+    ("largest move in edges", |p, x| p.largest_move_edges = x),
+    ("largest move in noises", |p, x| p.largest_move_noises = x),
+    ("turning", |p, x| p.turning = Some(x)),
+    ("radius of the region", |p, x| p.roi = RoiSize::Radius(x)),
+    ("contact on", |p, x| {
+        p.gate = Some(ContactGateParams {
+            on: x,
+            ..Default::default()
+        })
+    }),
+    ("contact off", |p, x| {
+        p.gate = Some(ContactGateParams {
+            off: x,
+            ..Default::default()
+        })
+    }),
+    ("smoothing", |p, x| {
+        p.sliding = Some(SlidingParams {
+            smoothing: x,
+            ..Default::default()
+        })
+    }),
+    ("velocity smoothing", |p, x| {
+        p.sliding = Some(SlidingParams {
+            velocity_smoothing: x,
+            ..Default::default()
+        })
+    }),
+    ("slowest", |p, x| {
+        p.sliding = Some(SlidingParams {
+            slowest: x,
+            ..Default::default()
+        })
+    }),
+    ("cone cosine", |p, x| {
+        p.sliding = Some(SlidingParams {
+            cone_cosine: 2.0 * x,
+            ..Default::default()
+        })
+    }),
+    ("carving rate", |p, x| {
+        p.carve = Some(CarveParams {
+            rate: x,
+            ..Default::default()
+        })
+    }),
+    ("carving tolerance", |p, x| {
+        p.carve = Some(CarveParams {
+            tolerance: x,
+            ..Default::default()
+        })
+    }),
+    ("carving in contact", |p, x| {
+        p.carve = Some(CarveParams {
+            contact_tolerance: x,
+            ..Default::default()
+        })
+    }),
+    ("contact cosine", |p, x| p.smallest_contact_cosine = 2.0 * x),
+    ("alpha", |p, x| p.dynamics.alpha_m_per_n_s = x),
+    ("beta", |p, x| p.dynamics.beta_per_n2_s = x),
+    ("quality", |p, x| {
+        p.guard = Some(GuardParams {
+            smallest_quality: x,
+            ..Default::default()
+        })
+    }),
+    ("turn cosine", |p, x| {
+        p.guard = Some(GuardParams {
+            smallest_turn_cosine: 2.0 * x,
+            ..Default::default()
+        })
+    }),
+    ("evidence cosine", |p, x| {
+        p.guard = Some(GuardParams {
+            smallest_evidence_cosine: 2.0 * x,
+            ..Default::default()
+        })
+    }),
+    ("fold cosine", |p, x| {
+        p.guard = Some(GuardParams {
+            smallest_fold_cosine: 2.0 * x,
+            ..Default::default()
+        })
+    }),
+    ("gap", |p, x| {
+        p.guard = Some(GuardParams {
+            gap_share: x,
+            ..Default::default()
+        })
+    }),
+];
+
 /// Each setting with a value that has no meaning, by name.
 #[test]
 fn settings_without_a_meaning_are_refused() {
-    type Change = fn(&mut RefineParams, f64);
     let anywhere_bad = [f64::NAN, f64::INFINITY, -1.0];
-    let changes: [(&str, Change); 25] = [
-        ("tip radius", |p, x| p.tip.radius = x),
-        ("tip stiffness", |p, x| p.tip.stiffness = Some(x)),
-        ("scan noise", |p, x| p.scan_noise = x),
-        ("longest step", |p, x| p.longest_step_edges = x),
-        ("largest move in edges", |p, x| p.largest_move_edges = x),
-        ("largest move in noises", |p, x| p.largest_move_noises = x),
-        ("turning", |p, x| p.turning = Some(x)),
-        ("radius of the region", |p, x| p.roi = RoiSize::Radius(x)),
-        ("contact on", |p, x| {
-            p.gate = Some(ContactGateParams {
-                on: x,
-                ..Default::default()
-            })
-        }),
-        ("contact off", |p, x| {
-            p.gate = Some(ContactGateParams {
-                off: x,
-                ..Default::default()
-            })
-        }),
-        ("smoothing", |p, x| {
-            p.sliding = Some(SlidingParams {
-                smoothing: x,
-                ..Default::default()
-            })
-        }),
-        ("velocity smoothing", |p, x| {
-            p.sliding = Some(SlidingParams {
-                velocity_smoothing: x,
-                ..Default::default()
-            })
-        }),
-        ("slowest", |p, x| {
-            p.sliding = Some(SlidingParams {
-                slowest: x,
-                ..Default::default()
-            })
-        }),
-        ("cone cosine", |p, x| {
-            p.sliding = Some(SlidingParams {
-                cone_cosine: 2.0 * x,
-                ..Default::default()
-            })
-        }),
-        ("carving rate", |p, x| {
-            p.carve = Some(CarveParams {
-                rate: x,
-                ..Default::default()
-            })
-        }),
-        ("carving tolerance", |p, x| {
-            p.carve = Some(CarveParams {
-                tolerance: x,
-                ..Default::default()
-            })
-        }),
-        ("carving in contact", |p, x| {
-            p.carve = Some(CarveParams {
-                contact_tolerance: x,
-                ..Default::default()
-            })
-        }),
-        ("contact cosine", |p, x| p.smallest_contact_cosine = 2.0 * x),
-        ("alpha", |p, x| p.dynamics.alpha_m_per_n_s = x),
-        ("beta", |p, x| p.dynamics.beta_per_n2_s = x),
-        ("quality", |p, x| {
-            p.guard = Some(GuardParams {
-                smallest_quality: x,
-                ..Default::default()
-            })
-        }),
-        ("turn cosine", |p, x| {
-            p.guard = Some(GuardParams {
-                smallest_turn_cosine: 2.0 * x,
-                ..Default::default()
-            })
-        }),
-        ("evidence cosine", |p, x| {
-            p.guard = Some(GuardParams {
-                smallest_evidence_cosine: 2.0 * x,
-                ..Default::default()
-            })
-        }),
-        ("fold cosine", |p, x| {
-            p.guard = Some(GuardParams {
-                smallest_fold_cosine: 2.0 * x,
-                ..Default::default()
-            })
-        }),
-        ("gap", |p, x| {
-            p.guard = Some(GuardParams {
-                gap_share: x,
-                ..Default::default()
-            })
-        }),
-    ];
     let mut taken = vec![];
-    for (name, change) in changes {
+    for (name, change) in CHANGES {
         for value in anywhere_bad {
             let mut params = RefineParams::robust(BALL);
             change(&mut params, value);

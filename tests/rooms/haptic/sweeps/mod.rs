@@ -109,6 +109,7 @@ const BASIN: [f64; 2] = [
 /// plane, so 20 s leave it there if it leaned by less than the basin is wide; a scan converges if
 /// none leans farther when its turn comes, and does not if one leans by more than comes back.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn the_published_rule_converges_where_no_face_leans_out_of_its_basin_and_only_there() {
     let seeds = if is_full() { 1..=20 } else { 1..=7 };
     let truth = Peaks::default().mesh(10e-3).unwrap();

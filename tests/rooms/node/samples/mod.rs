@@ -115,6 +115,7 @@ fn features_and_touches_are_written_beside_it() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn a_follower_that_loses_messages_ends_with_the_mesh() {
     let plate = Plate::touched(0.15);
     let mut bench = Bench::start(&plate);
@@ -215,6 +216,7 @@ fn triangle(points: &[Point]) -> [[f32; 3]; 3] {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn what_cannot_be_is_refused_and_counted_and_the_rest_goes_on() {
     let plate = Plate::touched(0.05);
     let mut bench = Bench::start(&plate);
@@ -302,6 +304,7 @@ fn what_cannot_be_is_refused_and_counted_and_the_rest_goes_on() {
 /// A rig that carries the tracker moves while it looks: its transforms come after the poses that
 /// need them.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn poses_wait_for_the_transform_of_a_moving_frame_and_not_for_ever() {
     let plate = Plate::touched(0.05);
     let bench = Bench::start(&plate);
@@ -617,6 +620,7 @@ fn the_tip_shows_where_to_touch_next() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn features_are_found_flagged_and_labelled() {
     let plate = Plate::touched(0.02);
     let mut bench = Bench::start(&plate);

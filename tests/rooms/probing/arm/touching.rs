@@ -69,6 +69,7 @@ fn down(params: &ArmParams, place: [f64; 3]) -> TouchTarget {
 /// Where the ball is when it just touches is known: a radius above the top, a radius inside the
 /// wall of the hole.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn the_contact_is_where_the_ball_touches_and_not_where_the_arm_rests() {
     let plate = Plate::default();
     let mut rng = Pcg64::seed_from_u64(5);
@@ -169,6 +170,7 @@ fn the_contact_is_where_the_ball_touches_and_not_where_the_arm_rests() {
 }
 
 /// Makes the touches that a search wants, until it wants no more; returns the largest force.
+#[expect(clippy::too_many_lines)]
 pub(super) fn explored(
     arm: &mut SimArm,
     params: &ArmParams,
@@ -596,6 +598,7 @@ fn a_sensor_that_feels_something_is_not_zeroed() {
 /// Whatever happens in the middle of a search, the arm is at rest within 200 ms, and the reported
 /// cause is the true one.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn after_each_fault_the_arm_is_at_rest_and_the_reported_reason_is_true() {
     let (plate, params) = (Plate::default(), ArmParams::default());
     let is_true: [(ArmFault, IsTrue); 5] = [

@@ -120,6 +120,7 @@ fn a_wall_met_at_a_flat_angle_is_a_contact_at_its_place() {
 
 /// Every 15°, with a flag up to 3 mm beside the middle; `--full`: every 5°, three flags each.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn a_slot_is_found_at_every_angle() {
     let (step, seeds) = either((15, 1), (5, 3));
     let mut missed = Vec::new();

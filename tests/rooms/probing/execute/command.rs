@@ -304,6 +304,7 @@ fn a_dry_run_connects_to_no_arm() {
 /// The part lies 2 mm below its scan, farther than the scan's noise explains: `refine` and `probe`
 /// refuse that by the same words, and what was touched is kept.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn what_is_surely_wrong_becomes_a_mesh_only_when_forced() {
     let folder = tempfile::tempdir().unwrap();
     let [scene, truth] = cell(folder.path(), |scene| scene);
@@ -604,6 +605,7 @@ const SPHERES: [&str; 8] = [
 /// repeatability of 0.03 mm, and no error of joints and lengths, so that the spheres are where they
 /// are told but for the scatter of touches.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn spheres_say_how_well_an_arm_repeats_and_how_large_its_ball_is_and_the_record_is_in_each_result()
 {
     let folder = tempfile::tempdir().unwrap();
@@ -1040,6 +1042,7 @@ fn orientations_out_of_reach_are_left_out_and_listed() {
 type NotWeighed<'a> = (&'a [&'a str], fn(String) -> String, i32, &'a str);
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn an_undetermined_payload_is_refused_and_nothing_is_written() {
     let same = |scene: String| scene;
     let refused: [NotWeighed; 8] = [

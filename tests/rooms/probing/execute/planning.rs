@@ -703,6 +703,7 @@ fn check_move(
 /// to the mesh than their radii and the margin. Distances come from another method than the tree's:
 /// all triangles, one after the other.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn no_plan_leaves_the_limits_or_passes_through_the_mesh() {
     let is_full = crate::full::is_full();
     let mut rng = Pcg64::seed_from_u64(3);

@@ -235,6 +235,7 @@ fn rms(errors: &[f64]) -> f64 {
 /// With `--full` it is 200 errors, within what is asked of 50, 0.8 to 1.25: of 50 the rms of a size
 /// scatters by 0.1. All are found. The errors of each feature are drawn apart.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn errors_are_as_large_as_stated_where_told_values_are_wrong() {
     let (seeds, [least, most]) = (either(6, 200), either([0.13, 2.16], [0.8, 1.25]));
     let scan = plate_scan(1);

@@ -65,6 +65,7 @@ fn tips(path: &Path) -> Vec<Tip> {
 
 /// Normal at `at` of the surface through the centres around it, on the side of `force`; `None`
 /// where other passes are too few or all in line.
+#[expect(clippy::too_many_lines)]
 fn reference(touches: &[TipTouch], at: usize, force: &Vector3<f64>) -> Option<Vector3<f64>> {
     let here = touches[at];
     let near = |touch: &&TipTouch| {
@@ -131,6 +132,7 @@ fn reference(touches: &[TipTouch], at: usize, force: &Vector3<f64>) -> Option<Ve
 }
 
 #[test]
+#[expect(clippy::too_many_lines)]
 fn on_real_streams_at_most_half_of_the_raw_forces_error_is_left() {
     let Some(folder) = crate::shared::shared("force/vu_dvrk_exploration") else {
         return;

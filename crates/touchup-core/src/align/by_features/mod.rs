@@ -63,6 +63,7 @@ const LEAST_EXPLAINED: f64 = 2.5;
 /// [`FeaturesError`]; [`FeaturesError::Ambiguous`] has all motions among which the evidence does
 /// not decide, [`FeaturesError::FreeTurn`] those of a part of revolution, each with one turn of
 /// many.
+#[expect(clippy::too_many_lines)]
 pub fn align_features(
     source: &[Feature],
     target: &[Feature],

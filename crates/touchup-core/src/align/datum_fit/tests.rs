@@ -119,6 +119,7 @@ fn datums_count_in_their_order() {
 
 /// What repeated measurements scatter by, against what one of them says.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn uncertainties_are_those_of_repeated_measurements() {
     let exact = plate(&motion());
     let own = [4e-6, 9e-6, 6e-6, 1.2e-5, 5e-6];

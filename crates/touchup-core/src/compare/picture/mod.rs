@@ -73,6 +73,7 @@ const HIGHEST: f64 = 0.62;
 const OF_TRUTH: &str = "deviation, mm:  - too little   + too much material";
 const OF_TOUCHES: &str = "touch - scan, mm:  - inside of the scan   + outside";
 /// Draws the panels side by side, in one scale and one view, with title, bar of colours and length.
+#[expect(clippy::too_many_lines)]
 pub fn draw_picture(panels: &[PicturePanel<'_>], params: &PictureParams<'_>) -> Picture {
     let width = params.width.clamp(WIDTHS[0], WIDTHS[1]) as i32;
     let count = panels.len().max(1) as i32;

@@ -63,6 +63,7 @@ pub(super) struct Sizes {
 /// [`DynamicsError::Stiff`] when [`MOST_STEPS`] do not suffice, [`DynamicsError::NotFinite`] where
 /// the solution is not, [`DynamicsError::Undetermined`] where roundings grow beyond `relative` of
 /// the travel.
+#[expect(clippy::too_many_lines)]
 pub(super) fn integrate(
     end: f64,
     sizes: Sizes,

@@ -140,6 +140,7 @@ impl SerialChain {
     ///
     /// # Errors
     /// [`ChainError`]
+    #[expect(clippy::too_many_lines)]
     pub fn new(
         joints: Vec<ChainJoint>,
         links: Vec<ChainLink>,

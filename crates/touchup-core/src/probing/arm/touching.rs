@@ -72,6 +72,7 @@ impl Watched<'_> {
     ///
     /// # Errors
     /// [`ProbeError`]; a miss is none.
+    #[expect(clippy::too_many_lines)]
     pub fn touch(
         &mut self,
         target: &TouchTarget,

@@ -79,6 +79,7 @@ impl Cell {
 ///
 /// # Errors
 /// [`ExploreError`] where there is no pattern for it.
+#[expect(clippy::too_many_lines)]
 pub fn plan(
     cell: &Cell,
     params: &ProbeParams,

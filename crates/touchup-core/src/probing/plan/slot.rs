@@ -465,6 +465,7 @@ pub(super) fn around_stadium(half: f64, count: usize) -> impl Iterator<Item = (f
 }
 
 impl Stage for SlotPattern {
+    #[expect(clippy::too_many_lines)]
     fn next(&mut self, context: &mut SearchContext) -> Result<Option<TouchPlan>, ExploreError> {
         let ball = context.params.ball_radius;
         let shallow = SHALLOW * ball;

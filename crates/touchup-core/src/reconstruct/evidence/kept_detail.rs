@@ -140,6 +140,7 @@ impl KeptDetail {
 /// (Σ gₖ)², gₖ = wₖ exp(−|pₖ − pⱼ|² / b²); then over the contacts within a radius
 ///
 /// Σ wⱼ ρ̄ⱼ² ≤ Σ wⱼ (l² σ̄ⱼ² + ε²).
+#[expect(clippy::too_many_lines)]
 fn agreement_of(evidence: &Evidence<'_>) -> Agreement {
     let (contacts, radius) = (evidence.contacts, evidence.params.radius);
     let mut fineness = Fineness::new(evidence);

@@ -518,6 +518,7 @@ mod tests {
     /// The face z = 0 is touched up to the edge y = 0, and the ball rolls around it by 60°: 0.5 r
     /// beyond, the face is 0.26 r deep in it.
     #[test]
+    #[expect(clippy::too_many_lines)]
     fn a_face_ends_where_the_ball_rolled_around_its_edge() {
         let radius = 1.5e-3;
         let free_space = || {

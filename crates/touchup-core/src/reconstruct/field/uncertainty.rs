@@ -87,6 +87,7 @@ impl FieldParams {
     /// How well the value is known that was found at `x` last, with the same scratch.
     ///
     /// - `window_ns`: passes within this time share their noise, the nearer the more.
+    #[expect(clippy::too_many_lines)]
     pub fn sigma_of(
         &self,
         found: &FieldValue,

@@ -28,6 +28,7 @@ const COORDINATES: [[&str; 2]; 4] = [
     ["texture_s", "texture_t"],
 ];
 /// The triangles as [`read`] has them, and how they look.
+#[expect(clippy::too_many_lines)]
 pub(in crate::mesh_file) fn read_painted(bytes: &[u8], scale: f64) -> Result<PaintedSoup, Syntax> {
     let header = PlyHeader::read(bytes)?;
     let element = |name: &str| header.elements.iter().find(|element| element.name == name);

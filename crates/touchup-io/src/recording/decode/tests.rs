@@ -156,6 +156,7 @@ fn stamps_outside_their_range_are_refused() {
 /// By the definition in franka_msgs 0.10 for ROS 1: the header, its numbers one after another, then
 /// flags.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn a_state_of_a_franka_gives_the_tool_and_the_wrench_in_the_base() {
     let numbers_of = |names: &[(&str, usize)]| {
         let mut bytes = Vec::new();

@@ -115,9 +115,12 @@ fn columns_are_named_in_the_scene_with_the_unit_that_the_header_lacks() {
     assert_eq!(first.pose.unwrap().stamp_ns, 1_000_000);
 }
 
+fn why(text: &str, columns: &TableColumns) -> String {
+    read(text, columns).err().unwrap()
+}
+
 #[test]
 fn what_is_not_understood_is_answered_by_the_columns_and_the_key() {
-    let why = |text: &str, columns: &TableColumns| read(text, columns).err().unwrap();
     let usual = TableColumns::default();
     let text = why("a,b\n1,2\n", &usual);
     assert!(
@@ -166,6 +169,11 @@ fn what_is_not_understood_is_answered_by_the_columns_and_the_key() {
         why("t_s,x_m,y_m,z_m,fx_n,fy_n,fz_n\n", &wanted)
             .contains("wrench_axes: tip needs an orientation")
     );
+}
+
+#[test]
+fn tables_with_a_bad_line_are_refused_with_its_number() {
+    let usual = TableColumns::default();
     let header = "t_s;x_m;y_m;z_m;qx;qy;qz;qw;fx_n;fy_n;fz_n\n";
     for (line, word) in [
         (

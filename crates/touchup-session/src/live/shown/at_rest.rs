@@ -195,6 +195,7 @@ impl AtRest {
     }
 
     /// Takes a step, and notes the one that takes it back.
+    #[expect(clippy::too_many_lines)]
     fn take_step(
         &mut self,
         step: Step,

@@ -27,6 +27,7 @@ pub(super) fn set(text: &str, path: &[&str], value: &str, remark: &str) -> Optio
 }
 
 /// Sets it in the mapping in the lines of `range`, its keys set in by `indent`.
+#[expect(clippy::too_many_lines)]
 fn set_in(
     lines: &[&str],
     range: Range<usize>,

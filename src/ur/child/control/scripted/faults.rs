@@ -353,6 +353,7 @@ fn is_true(words: &str, faults: &Faults, peak: f64) -> bool {
 }
 
 /// What is wrong with how a script ended.
+#[expect(clippy::too_many_lines)]
 fn judged(faults: &Faults, outcome: &Outcome) -> Option<String> {
     let has = |lines: &[&str]| faults.iter().any(|(kind, ..)| lines.contains(&kind.line));
     if let Some(error) = &outcome.error {

@@ -18,6 +18,7 @@ const FLAT: isize = 64 << 10;
 
 /// Five minutes of the arm's time, with `--full` eight hours.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn hours_of_faults_and_recoveries_leave_no_stuck_state_and_no_memory_behind() {
     let is_full = std::env::var_os("TOUCHUP_FULL").is_some();
     let end = if is_full { 8.0 * 3600.0 } else { 300.0 };

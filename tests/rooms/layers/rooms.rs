@@ -1,0 +1,179 @@
+//! The rooms: where a file belongs, and which other rooms it may use.
+
+/// Each room and the rooms it may use; itself always. A room that is missing here fails the check.
+/// The crates of the simulator, of files and of the report are a room each. Circles between crates
+/// need no check: cargo refuses them.
+pub const MAY_USE: &[(&str, &str)] = &[
+    ("clock", ""),
+    ("log_lines", ""),
+    ("threads", "mesh"),
+    ("numeric", ""),
+    ("parameters", ""),
+    ("stylus", "numeric parameters"),
+    ("mesh", "numeric"),
+    ("reconstruct", "numeric parameters stylus mesh"),
+    ("haptic", "numeric parameters stylus mesh reconstruct"),
+    ("live", "clock stylus mesh reconstruct haptic"),
+    ("plan", "numeric parameters stylus mesh features conformity"),
+    ("arm", "numeric parameters stylus plan"),
+    (
+        "execute",
+        "numeric parameters stylus mesh features calibrate plan arm",
+    ),
+    ("sim", "numeric stylus mesh calibrate diagnose arm"),
+    ("form", "numeric"),
+    ("features", "numeric stylus mesh form"),
+    ("conformity", "numeric features"),
+    ("align", "numeric mesh features"),
+    ("compare", "numeric stylus mesh align features"),
+    ("calibrate", "numeric stylus mesh align"),
+    ("diagnose", "numeric stylus mesh"),
+    (
+        "io",
+        "numeric parameters stylus mesh form features conformity align arm execute",
+    ),
+    ("scan", "mesh reconstruct io threads"),
+    (
+        "scene",
+        "parameters stylus mesh reconstruct haptic diagnose plan arm execute sim io",
+    ),
+    ("replay", "numeric stylus io scene"),
+    (
+        "session",
+        "clock numeric stylus mesh reconstruct haptic live features io threads scan replay",
+    ),
+    (
+        "refinement",
+        "stylus mesh reconstruct haptic live diagnose threads scene replay session",
+    ),
+    (
+        "sweep",
+        "stylus mesh features compare sim io threads scan scene replay session refinement",
+    ),
+    ("html", ""),
+    (
+        "inspection",
+        "html numeric stylus mesh features conformity align compare io scan scene session",
+    ),
+    (
+        "calibration",
+        "stylus align calibrate execute io scene replay",
+    ),
+    ("input_check", "stylus mesh diagnose threads scene replay"),
+    (
+        "report",
+        "numeric stylus mesh reconstruct haptic live features align sim compare diagnose io scan scene session replay",
+    ),
+    (
+        "python",
+        "numeric parameters stylus mesh reconstruct haptic live features align sim compare diagnose io threads scan scene session replay refinement sweep",
+    ),
+    ("ur", "clock stylus plan arm"),
+    (
+        "ros",
+        "parameters clock log_lines stylus mesh reconstruct haptic live form features plan arm execute sim align \
+         calibrate compare diagnose io scan scene session replay conformity inspection input_check calibration",
+    ),
+    ("ros2_control", "clock stylus plan arm ros"),
+    (
+        "cli",
+        "clock numeric stylus mesh reconstruct haptic live features conformity plan arm execute sim align \
+         calibrate compare diagnose io threads scan scene session replay refinement sweep html inspection input_check calibration ros \
+         ros2_control ur",
+    ),
+];
+
+/// Same input, same bytes out: nothing of the world outside comes in.
+pub const PURE: &[&str] = &["touchup-core", "touchup-sim"];
+
+/// The only places with Python.
+pub const MAY_USE_PYTHON: &[&str] = &["src/ur/child/", "crates/touchup-python/"];
+
+/// What a pure crate may not name.
+pub const IMPURE_PATHS: &[&str] = &[
+    "std::fs",
+    "std::thread",
+    "std::env",
+    "std::io",
+    "std::net",
+    "std::process",
+];
+pub const IMPURE_NAMES: &[&str] = &[
+    "Instant",
+    "SystemTime",
+    "println",
+    "eprintln",
+    "print",
+    "eprint",
+    "dbg",
+];
+
+/// The only places with file access.
+pub const MAY_OPEN_FILES: &[&str] = &["crates/touchup-io/", "crates/touchup-session/src/scene/"];
+
+/// The files that ask the system about itself, which answers by files: the packet sizes of its
+/// networks, the open sockets.
+pub const MAY_ASK_THE_SYSTEM: &[&str] = &["src/ros/dds/answers.rs", "src/ros/dds/sockets.rs"];
+
+/// Crates that are one room each, as other crates name them, and its name.
+pub const WHOLE: &[(&str, &str)] = &[
+    ("touchup_sim", "sim"),
+    ("touchup_io", "io"),
+    ("touchup_report", "report"),
+    ("touchup_python", "python"),
+];
+
+/// Crates with several rooms, as other crates name them.
+pub const WITH_ROOMS: &[&str] = &["touchup_core", "touchup_session"];
+
+/// Where a file is.
+pub struct Place<'a> {
+    pub package: &'a str,
+    /// empty for `lib.rs` and `main.rs` of a crate with several
+    pub room: &'a str,
+    /// how many modules deep, where the crate has several rooms; 0 where all of it is one
+    pub depth: usize,
+    /// whether it is one of the rooms of `probing`
+    pub has_siblings: bool,
+}
+
+impl<'a> Place<'a> {
+    /// Of a file's path in the repository.
+    pub fn of(file: &'a str) -> Self {
+        let (package, path) = match file.strip_prefix("crates/") {
+            Some(file) => file.split_once("/src/").unwrap(),
+            None => ("touchup", file.strip_prefix("src/").unwrap()),
+        };
+        let name = package.replace('-', "_");
+        if let Some((_, room)) = WHOLE.iter().find(|(whole, _)| *whole == name) {
+            return Self {
+                package,
+                room,
+                depth: 0,
+                has_siblings: false,
+            };
+        }
+        let path = path.strip_suffix(".rs").unwrap();
+        let path = path.strip_suffix("/mod").unwrap_or(path);
+        if path == "lib" || path == "main" {
+            return Self {
+                package,
+                room: "",
+                depth: 0,
+                has_siblings: false,
+            };
+        }
+        let inner = path.strip_prefix("probing/").unwrap_or(path);
+        let room = if inner == "probing" {
+            ""
+        } else {
+            inner.split('/').next().unwrap()
+        };
+        Self {
+            package,
+            room,
+            depth: path.split('/').count(),
+            has_siblings: inner != path,
+        }
+    }
+}
