@@ -4,8 +4,8 @@
 //! A radius that is off by ρ, a part that lies off by t and is turned by ω (both in O) about the
 //! place p₀ at which its registration is known best shift a feature at p by t + ω × (p − p₀), turn
 //! its axis by ω, and change a diameter or a width by 2ρ, a plane by ρ, an edge by both of its
-//! faces. With standard uncertainties u_t and u_ω for each axis the shift has the covariance u_t² I
-//! + u_ω² (|l|² I − l lᵀ), l = p − p₀ \[JCGM 100:2008, 5.2\].
+//! faces. With standard uncertainties u_t and u_ω for each axis the shift has the covariance
+//! u_t² I + u_ω² (|l|² I − l lᵀ), l = p − p₀ \[JCGM 100:2008, 5.2\].
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
