@@ -28,3 +28,12 @@ def copy_part(recording, out, is_kept):
                 writer.add_message(channels[channel.topic], *times)
         writer.finish()
     return left_out
+
+
+def first_seconds(recording, seconds, out):
+    """Copies the beginning of a recording; the copy."""
+    stamps = []
+    copy_part(recording, out, lambda _, stamp_ns: stamps.append(stamp_ns))
+    until = min(stamps) + seconds * 10**9
+    copy_part(recording, out, lambda _, stamp_ns: stamp_ns < until)
+    return out

@@ -4,6 +4,8 @@ Streams of samples are best effort: messages beyond the capacity of a node's soc
 sent at a time, and then the node is asked something that it answers behind them, as it takes all that comes one after the other.
 """
 
+import itertools
+
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from ros_cyclone import (
@@ -46,14 +48,16 @@ STAMPED = {
 }
 
 
-def recorded(recording, streams=STAMPED):
+def recorded(recording, streams=STAMPED, most=None):
     """Messages of a recording in order of their stamps, as a sensor sends them: topic and message.
 
-    For each topic of the recording that on which it is played, the type, and what makes one of a header and of what was read.
+    - `streams`: for each topic of the recording that on which it is played, the type, and what makes one of a header and of what was read.
+    - `most`: so many of those that were recorded first; all of them where it is left out.
     """
     messages = []
     with recording.open("rb") as file:
-        for _, channel, _, read in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(list(streams)):
+        every = make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(list(streams))
+        for _, channel, _, read in itertools.islice(every, most):
             topic, _, make = streams[channel.topic]
             stamp = Time(read.header.stamp.sec, read.header.stamp.nanosec)
             messages.append(((stamp.sec, stamp.nanosec), topic, make(Header(stamp, read.header.frame_id), read)))

@@ -4,6 +4,7 @@ import igl
 import numpy as np
 import pytest
 import trimesh
+from part_of_recording import first_seconds
 
 
 def colour_of(points):
@@ -24,9 +25,11 @@ def uv_of(points, chart):
 
 
 @pytest.fixture(scope="module")
-def demo(demo_folder):
-    scan = trimesh.load(demo_folder / "scan.ply", process=False)
-    return demo_folder, np.asarray(scan.vertices), np.asarray(scan.faces)
+def demo(demo_folder, tmp_path_factory):
+    """Folder of a recording of the first touches, and the scan."""
+    folder, scan = tmp_path_factory.mktemp("touched"), trimesh.load(demo_folder / "scan.ply", process=False)
+    first_seconds(demo_folder / "touch.mcap", 12, folder / "touch.mcap")
+    return folder, np.asarray(scan.vertices), np.asarray(scan.faces)
 
 
 def refine(touchup, folder, scan, out):

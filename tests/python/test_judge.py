@@ -5,6 +5,7 @@ ball's radius and stiffness go into touchup; the truth is read by the judge alon
 libigl behind the judge; with TOUCHUP_FULL all cases are judged with open3d, and their tables go into docs/results.md.
 """
 
+import functools
 import importlib
 import json
 import sys
@@ -106,6 +107,10 @@ def run(touchup, judging, shared, tmp_path_factory):
     """Refines one case, with or without a scene: the report of touchup, and the judge's verdict on scan and result."""
     out = tmp_path_factory.mktemp("judge")
 
+    @functools.cache
+    def of_scan(folder):
+        return judging.judge(str(folder), str(folder / "scan.ply"))
+
     def run(case, scene=None):
         folder = shared / "data" / "cases" / case
         refined = out / f"{case}_{scene.stem if scene else 'default'}.ply"
@@ -114,9 +119,8 @@ def run(touchup, judging, shared, tmp_path_factory):
         done = touchup("refine", *files, *KNOWN, *(["--scene", scene] if scene else []), "--json")
         # 4: the recordings lose messages on purpose
         assert done.returncode in (0, 4), done.stderr
-        before = judging.judge(str(folder), str(folder / "scan.ply"))
         after = judging.judge(str(folder), str(refined), str(features))
-        return Judged(json.loads(done.stdout), before, after, folder, refined)
+        return Judged(json.loads(done.stdout), of_scan(folder), after, folder, refined)
 
     return run
 

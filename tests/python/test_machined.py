@@ -36,12 +36,22 @@ def drawn_features(touchup, mesh, folder):
     return [feature for feature in json.loads(done.stdout)["features"] if feature["kind"] in KINDS]
 
 
-def test_every_feature_of_a_drawing_is_found_and_no_other(touchup, tmp_path):
-    required, missed, false, wrong_kind, off = 0, [], [], [], []
-    for seed in SEEDS:
-        _, part = random_part(seed)
+@pytest.fixture(scope="module")
+def drawings(touchup, tmp_path_factory):
+    """Of each seed the family, the part, its mesh, and the features that are found in it."""
+    folder = tmp_path_factory.mktemp("drawn")
+
+    def drawn(seed):
+        family, part = random_part(seed)
         mesh, _ = part.finished()
-        found = drawn_features(touchup, mesh, tmp_path)
+        return family, part, mesh, drawn_features(touchup, mesh, folder)
+
+    return {seed: drawn(seed) for seed in SEEDS}
+
+
+def test_every_feature_of_a_drawing_is_found_and_no_other(drawings):
+    required, missed, false, wrong_kind, off = 0, [], [], [], []
+    for seed, (_, part, _, found) in drawings.items():
         verdict = judge(found, part.features, [not feature.is_optional for feature in part.features])
         required += len(verdict.required)
         missed += [f"{seed}: {described(feature)}" for feature in verdict.missed]
@@ -71,13 +81,13 @@ def alike(one, other):
 
 
 @pytest.mark.parametrize("change", ["shuffled", "turned", "subdivided"])
-def test_features_of_a_drawing_are_the_same(touchup, tmp_path, change):
+def test_features_of_a_drawing_are_the_same(touchup, drawings, tmp_path, change):
     different = []
     # of each family, but for shafts: their long facets may be parted otherwise
-    seeds = [seed for seed in SEEDS if random_part(seed)[0] != "shaft"][: None if IS_FULL else 8]
+    seeds = [seed for seed, (family, *_) in drawings.items() if family != "shaft"][: None if IS_FULL else 8]
     for seed in seeds:
-        mesh, _ = random_part(seed)[1].finished()
-        before = sizes_of(drawn_features(touchup, mesh, tmp_path))
+        _, _, mesh, found = drawings[seed]
+        before = sizes_of(found)
         random = np.random.default_rng(seed)
         if change == "shuffled":
             faces = np.array([np.roll(face, random.integers(3)) for face in random.permutation(mesh.faces)])

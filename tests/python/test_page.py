@@ -213,6 +213,96 @@ def test_the_code_of_a_link_that_a_camera_reads_lets_its_role_in(browser, touche
     page.context.close()
 
 
+def on_screen(camera, points):
+    """Pixels of the picture at places of the part, m."""
+    view = numpy.array(camera["view"]).reshape(4, 4).T
+    projection = numpy.array(camera["projection"]).reshape(4, 4).T
+    x, y, _, w = projection @ view @ numpy.c_[points, numpy.ones(len(points))].T
+    return numpy.c_[(x / w + 1) * camera["width"] / 2, (1 - y / w) * camera["height"] / 2]
+
+
+def touched_place(page, follower, seed):
+    """A place of the picture where a touched vertex is seen, and nothing lies over it; with that vertex, m."""
+    touched = [vertex for vertex, support in follower.support.items() if support == 1]
+    places = numpy.array([follower.vertices[vertex] for vertex in touched])
+    order = numpy.random.default_rng(seed).permutation(len(places))
+    for place, (x, y) in zip(places[order], on_screen(page.evaluate("touchup.camera()"), places)[order], strict=True):
+        picked = page.evaluate("([x, y]) => touchup.pick(x, y)", [x, y])
+        box = page.locator("canvas").first.bounding_box()
+        is_free = page.evaluate("([x, y]) => document.elementFromPoint(x, y)?.tagName === 'CANVAS'", [box["x"] + x, box["y"] + y])
+        if picked and is_free and numpy.linalg.norm(place - picked["point"]) < 2e-4:
+            return x, y, picked["point"]
+    raise AssertionError("no touched vertex is seen")
+
+
+def is_red(page, points):
+    """Of places of the part, which are drawn in the colour of a touch that may go."""
+    pixels = on_screen(page.evaluate("touchup.camera()"), points)
+    seen = numpy.array([page.evaluate("([x, y]) => touchup.pixel(x, y)", [x, y])[:3] for x, y in pixels.tolist()])
+    return (seen[:, 0] > 150) & (seen[:, 1:].max(1) < 90)
+
+
+def tap(page, x, y):
+    page.locator("canvas").first.click(position={"x": x, "y": y})
+
+
+def test_a_touch_behind_a_tapped_place_is_shown_and_goes_and_comes(browser, touched):
+    page = page_of(browser, touched)
+    saved_at_rest(page, touched)
+    seen = touched.session / "seen.ply"
+    before = seen.read_bytes()
+    # the line that says that no samples come any more moves the picture when it appears
+    page.locator(".remedy").wait_for()
+    page.evaluate("touchup.idle()")
+    with Socket(touched.url, cookie=cookie_of(page)) as follower:
+        follower.take_until(lambda: follower.version >= page.evaluate("touchup.version()"))
+        for seed in range(50):
+            x, y, place = touched_place(page, follower, seed)
+            # what the node says of it, by another way than the page
+            point = {"header": {"frame_id": "object"}, "point": dict(zip("xyz", place, strict=True))}
+            asked = {"point": point, "preview": True}
+            found = follower.call("~/take_out_touch", **asked)["response"]
+            # a stroke and no tap, so that its line is long
+            if found["success"] and found["contacts"] > 50:
+                break
+    assert found["success"] and found["contacts"] > 50, found
+    contacts = numpy.array([[point[axis] for axis in "xyz"] for point in found["points"]])
+    assert not is_red(page, contacts).any()
+    tap(page, x, y)
+    out = page.get_by_role("button", name="Take out this touch")
+    out.wait_for()
+    assert f"its contacts: {found['contacts']}" in page.get_by_role("dialog").inner_text()
+    page.evaluate("touchup.idle()")
+    assert is_red(page, contacts).mean() > 0.8
+    page.keyboard.press("Escape")
+    assert out.is_hidden()
+    page.evaluate("touchup.idle()")
+    assert not is_red(page, contacts).any()
+
+    # who only looks may open the menu of a place, and is offered nothing
+    looking = page_of(browser, touched, role="look")
+    looking.locator(".remedy").wait_for()
+    looking.evaluate("touchup.idle()")
+    tap(looking, x, y)
+    looking.get_by_role("dialog").wait_for()
+    with Socket(touched.url, cookie=cookie_of(looking)) as onlooker:
+        assert "may look and not operate" in onlooker.call("~/take_out_touch", **asked)["error"]
+    assert looking.get_by_role("button", name="Take out this touch").is_hidden()
+    looking.context.close()
+
+    tap(page, x, y)
+    out.click()
+    page.get_by_text("The touch is out").wait_for()
+    saved_at_rest(page, touched)
+    assert seen.read_bytes() != before
+    page.get_by_role("button", name="Put it back").click()
+    page.get_by_text("The touch counts again").wait_for()
+    saved_at_rest(page, touched)
+    assert seen.read_bytes() == before
+    assert page.wrong == []
+    page.context.close()
+
+
 def test_changes_come_while_it_is_touched_and_a_page_that_was_away_catches_up(browser, touchup_bin, demo_folder, tmp_path):
     with PageNode(touchup_bin, tmp_path, demo_folder / "scan.ply") as node:
         page = opened(browser, node.url)
@@ -220,10 +310,13 @@ def test_changes_come_while_it_is_touched_and_a_page_that_was_away_catches_up(br
         with Process(touchup_bin, "replay", demo_folder / "touch.mcap", domain=node.domain) as player:
             wait_until(page, f"touchup.version() > {before} && touchup.tip() !== null")
             page.context.set_offline(True)
-            time.sleep(5)
             away = page.evaluate("touchup.version()")
+            with Socket(node.url) as other:
+                # the node goes on meanwhile
+                other.take_until(lambda: other.version > away + 100)
+                gone_on = other.version
             page.context.set_offline(False)
-            wait_until(page, f"touchup.version() > {away}")
+            wait_until(page, f"touchup.version() >= {gone_on}")
             player.process.kill()
         # the node ends and another one begins at the same address
         assert node.end() in (0, 4), node.text()

@@ -212,15 +212,14 @@ def assert_is(result, hole):
     assert result.touch_count < 40 and result.max_force < 4.5, summary
 
 
+@pytest.mark.full
 def test_flagged_holes_are_probed_by_service_and_action(cell):
     (x, y, z), _ = THROUGH
     through, blind = cell.flag(HOLE, (x + 1.5, y - 1.2, z)), cell.flag(HOLE, (31.0, 35.5, 12.0))
     assert cell.probe(999).code == NO_SUCH_FEATURE
     dry = cell.probe(through, DRY)
     assert dry.code == PLANNED and dry.touch_count == 0, dry.message
-    # of a UR the service is tested in the other test
-    if cell.robot == "sim":
-        assert_is(cell.probe(through), THROUGH)
+    assert_is(cell.probe(through), THROUGH)
 
     feedback = cell.peer.reader("/touchup/probe/_action/feedback", FeedbackMessage, RELIABLE)
     followed = cell.peer.reader("/probe_results", ProbeResult, RELIABLE)
@@ -250,9 +249,8 @@ def test_flagged_holes_are_probed_by_service_and_action(cell):
     assert all(message.feature_count == 1 and message.touch <= message.touch_count for message in messages)
     # the target is +- 0.02 mm at 95 %
     assert messages[-1].uncertainty < 0.0103e-3, messages[-1]
-    if cell.robot == "sim":
-        everything = cell.trigger("probe_all")
-        assert not everything.success and "nothing is flagged" in everything.message
+    everything = cell.trigger("probe_all")
+    assert not everything.success and "nothing is flagged" in everything.message
 
     shown = cell.peer.reader("/feature_markers", MarkerArray, LATCHED)
     diameters = []
@@ -260,51 +258,44 @@ def test_flagged_holes_are_probed_by_service_and_action(cell):
     def is_shown():
         texts = [marker.text for array in shown.take(10) for marker in array.markers]
         diameters.extend(float(number) for text in texts for number in re.findall(r"Ø([0-9.]+)", text))
-        wanted = (8.0, 6.0) if cell.robot == "sim" else (6.0,)
-        return all(any(abs(shown - diameter) < 0.05 for shown in diameters) for diameter in wanted)
+        return all(any(abs(shown - diameter) < 0.05 for shown in diameters) for diameter in (8.0, 6.0))
 
     cell.wait_for(is_shown)
 
 
-def has_touched(cell, feedback, least):
+def has_touched(cell, feedback, name, least):
     """Waits until a goal has come to its so many-th touch."""
     messages = []
 
     def has_come():
-        messages.extend(feedback.take(100))
+        messages.extend(message for message in feedback.take(100) if list(message.goal_id) == name)
         return any(message.touch >= least for message in messages)
 
     cell.wait_for(has_come)
 
 
-def test_a_cancelled_goal_stops_and_the_next_is_taken_up(cell):
+def test_a_cancelled_goal_stops_the_next_is_taken_up_and_after_a_stop_nothing_is_until_the_arm_is_recovered(cell):
     (x, y, z), _ = THROUGH
     through, blind = cell.flag(HOLE, (x + 0.5, y, z)), cell.flag(HOLE, (32.0, 33.0, 12.0))
+    dry = cell.probe(through, DRY)
+    assert dry.code == PLANNED and dry.touch_count == 0, dry.message
     feedback = cell.peer.reader("/touchup/probe/_action/feedback", FeedbackMessage, RELIABLE)
     name = [40] * 16
     assert cell.cancel([41] * 16) == 2, "this goal is unknown"
-    # until both sides know each other
-    assert cell.probe(999).code == NO_SUCH_FEATURE
+    # both sides know each other before anything moves: recovering an arm that nothing stopped changes nothing
+    assert cell.trigger("recover").success
     assert cell.send_goal(name, [through, blind])
-    has_touched(cell, feedback, 3)
+    has_touched(cell, feedback, name, 3)
     assert cell.probe(blind).code == BUSY
     assert "works at an order" in cell.trigger("arm_state").message
     assert cell.cancel(name) == 0
     response = cell.result(name)
     assert (response.status, response.code, response.ids) == (5, CANCELLED, [through]), response.message
     assert cell.trigger("arm_state").success
-    assert_is(cell.probe(through), THROUGH)
 
-
-def test_a_stopped_arm_stays_and_takes_nothing_up_until_it_is_recovered(cell):
-    (x, y, z), _ = THROUGH
-    through = cell.flag(HOLE, (x + 0.5, y, z))
-    feedback = cell.peer.reader("/touchup/probe/_action/feedback", FeedbackMessage, RELIABLE)
-    # both sides know each other before anything moves: recovering an arm that nothing stopped changes nothing
-    assert cell.trigger("recover").success
     name = [60] * 16
     assert cell.send_goal(name, [through])
-    has_touched(cell, feedback, 3)
+    has_touched(cell, feedback, name, 1)
     stopped = cell.trigger("stop")
     assert stopped.success, stopped.message
     response = cell.result(name)

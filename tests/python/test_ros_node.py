@@ -1,13 +1,16 @@
-"""`touchup node` and `touchup replay` as two processes: the same result as `touchup refine`, whatever happens to them."""
+"""`touchup node` as a process on a network: what it leaves and what others see of it, whatever happens to them."""
 
 import contextlib
 import itertools
 import json
+import math
 import os
 import random
 import signal
 import subprocess
 import time
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy
 import pytest
@@ -16,7 +19,8 @@ from mcap.exceptions import EndOfFile
 from mcap.records import Channel, Message, Schema
 from mcap.stream_reader import StreamReader
 from mcap_ros2.decoder import DecoderFactory
-from part_of_recording import copy_part
+from mesh_follower import Follower
+from part_of_recording import first_seconds
 from ros_cyclone import (
     BEST_EFFORT,
     LATCHED,
@@ -37,17 +41,16 @@ from ros_cyclone import (
     SaveMeshRequest,
     SaveMeshResponse,
     Time,
-    UndoRequest,
-    UndoResponse,
+    TriggerRequest,
+    TriggerResponse,
     Vector3,
     Wrench,
     WrenchStamped,
 )
 from ros_domains import domains
-from ros_player import in_step, play_in_step
-from ros_process import Client, Node, Process
+from ros_player import in_step
+from ros_process import Client, Node
 from scipy.spatial import KDTree
-from test_ros_follower import Follower
 
 
 @pytest.fixture
@@ -85,20 +88,141 @@ def stamps(recording, topic):
 
 
 CYCLONE = ["-p", "service_mapping:=cyclone"]
+# a follower that waits for the whole state asks again after eleven of these
+TICK_S = 0.1
 # a disk that refused is asked again
 ASKS_AGAIN_S = 1.0
 
 
-def test_a_played_recording_gives_the_files_of_refine(demo_folder, tmp_path, touchup_bin, domain):
-    recording = demo_folder / "touch.mcap"
-    with Node(touchup_bin, tmp_path, "--scene", scene_for(demo_folder, tmp_path), domain=domain, ros=CYCLONE) as node:
-        play_in_step(node, recording, domain)
-        assert node.end() == 0, node.text()
-        report = node.report()
+def in_order(triangles):
+    """Triangles as they are however they and their corners are numbered: places as float32 in m, each from its least corner on."""
+    turned = numpy.asarray(triangles, numpy.float32).reshape(-1, 3, 3)
+    first = numpy.array([min(range(3), key=lambda k: tuple(corners[k])) for corners in turned.tolist()])
+    turned = turned[numpy.arange(len(turned))[:, None], (first[:, None] + numpy.arange(3)) % 3].reshape(-1, 9)
+    return turned[numpy.lexsort(turned.T)].tobytes()
+
+
+def triangles_of(follower):
+    """Those that a follower has, m."""
+    places = {vertex: place[:3] for vertex, place in follower.vertices.items()}
+    return [[places[corner] for corner in corners] for corners in follower.faces.values()]
+
+
+@dataclass
+class Played:
+    """What a node leaves to which the demo was played, and what others saw of it at rest."""
+
+    folder: Path
+    code: int
+    # of `~/save_mesh`, and the file that it wrote
+    answer: SaveMeshResponse
+    saved: trimesh.Trimesh
+    lost: int
+    # of a follower: its triangles when the mesh was saved, and its vertices when their variances had come
+    followed: bytes
+    known: dict
+    # and its triangles after `~/reset`
+    begun_again: bytes
+    # of a viewer that came when nothing moved any more
+    tiles: bytes
+
+
+@pytest.fixture(scope="module")
+def played(demo_folder, tmp_path_factory, touchup_bin):
+    """The demo is played to a node while a follower loses one of ten changes; at rest the mesh is saved and seen, then comes a reset."""
+    folder, domain, pick = tmp_path_factory.mktemp("played"), next(domains), random.Random(5)
+    with Node(touchup_bin, folder, "--scene", scene_for(demo_folder, folder), domain=domain, ros=CYCLONE) as node:
+        save = Client(node, domain, "save_mesh", SaveMeshRequest, SaveMeshResponse)
+        resync = Client(node, domain, "resync_mesh", ResyncMeshRequest, ResyncMeshResponse)
+        reset = Client(node, domain, "reset", TriggerRequest, TriggerResponse)
+        changes = Peer(domain).reader("/mesh_patch", MeshPatch, RELIABLE)
+        follower, lost, ticked = Follower(lambda: resync.ask("", 0)), 0, time.monotonic()
+
+        def follow(loss=0.0):
+            nonlocal lost, ticked
+            for patch in changes.take(1000):
+                if pick.random() < loss:
+                    lost += 1
+                else:
+                    follower.take(patch)
+            if time.monotonic() - ticked > TICK_S:
+                follower.tick()
+                ticked = time.monotonic()
+
+        assert not save.introduce("../nowhere.ply", False, False).success
+        resync.introduce("", 0)
+        for _ in in_step(node, demo_folder / "touch.mcap", domain):
+            follow(0.1)
+        answers = []
+
+        def is_saved():
+            follow()
+            answers.append(save.ask(f"try{len(answers)}.ply", False, False))
+            return answers[-1].mesh_version == follower.version != 0 and not follower.is_waiting
+
+        node.wait_for(is_saved)
+        saved, followed = trimesh.load(answers[-1].path, process=False), in_order(triangles_of(follower))
+
+        def is_known():
+            follow()
+            touched = [place for place in follower.vertices.values() if place[4] == 1]
+            return len(touched) > 1000 and all(math.isfinite(place[3]) for place in touched)
+
+        # at rest all that was touched gets its variance
+        node.wait_for(is_known)
+        known = dict(follower.vertices)
+        reader, tiles = Peer(domain).reader("/mesh", Marker, LATCHED), {}
+
+        def seen():
+            return [(point.x, point.y, point.z) for tile in tiles.values() for point in tile.points]
+
+        def are_all_seen():
+            tiles.update((tile.id, tile) for tile in reader.take(100))
+            return len(seen()) == 3 * len(saved.faces)
+
+        node.wait_for(are_all_seen, every_s=0.1)
+        # more than once where nobody hears the answer: a session that nobody touched begins again too
+        assert reset.introduce(0).success
+
+        def begins_again():
+            follow()
+            return follower.session != node.session.name and not follower.is_waiting
+
+        node.wait_for(begins_again)
+        code = node.end()
+    begun_again = in_order(triangles_of(follower))
+    return Played(node.session, code, answers[-1], saved, lost, followed, known, begun_again, in_order(seen()))
+
+
+def test_a_played_recording_gives_the_files_of_refine(played, demo_folder):
+    """Over the network nothing is lost and nothing comes twice: what the node makes of it is compared with one thread on a file."""
+    report = json.loads((played.folder / "report.json").read_text())
+    assert played.code == 0
     assert report["lost"] == report["dropped"] == [0, 0] and report["unrecorded"] == 0
     for name in ["refined.ply", "features.json", "touches.csv"]:
-        assert (node.session / name).read_bytes() == (demo_folder / name).read_bytes(), name
-    assert stamps(node.session / "recording", "/stylus/pose") == sorted(stamps(recording, "/stylus/pose"))
+        assert (played.folder / name).read_bytes() == (demo_folder / name).read_bytes(), name
+    for topic in ["/stylus/pose", "/stylus/wrench"]:
+        assert stamps(played.folder / "recording", topic) == sorted(stamps(demo_folder / "touch.mcap", topic))
+
+
+def test_a_follower_that_loses_messages_has_what_is_saved(played):
+    assert played.lost > 5
+    answer, saved = played.answer, played.saved
+    assert (answer.vertex_count, answer.face_count) == (len(saved.vertices), len(saved.faces)) == (len(played.known), len(saved.faces))
+    assert played.followed == in_order(saved.triangles * 1e-3)
+    # the variance of what was touched is the square of what the file has
+    touched = numpy.array([place for place in played.known.values() if place[4] == 1])
+    sigmas = saved.metadata["_ply_raw"]["vertex"]["data"]["sigma_mm"].ravel()
+    far, at = KDTree(saved.vertices).query(touched[:, :3] * 1e3)
+    assert far.max() < 1e-3 and numpy.abs(numpy.sqrt(touched[:, 3]) * 1e3 / sigmas[at] - 1).max() < 1e-3
+
+
+def test_a_follower_begins_again_with_another_session(played, demo_folder):
+    assert played.begun_again == in_order(trimesh.load(demo_folder / "scan.ply", process=False).triangles * 1e-3)
+
+
+def test_who_comes_late_sees_what_is_saved(played):
+    assert played.tiles == in_order(played.saved.triangles * 1e-3)
 
 
 def test_a_killed_node_leaves_all_that_was_on_the_disk(demo_folder, tmp_path, touchup, touchup_bin, domain):
@@ -118,123 +242,11 @@ def test_a_killed_node_leaves_all_that_was_on_the_disk(demo_folder, tmp_path, to
         node.wait()
     taken = stamps(node.session / "recording", "/stylus/wrench")
     assert taken[: len(on_disk)] == on_disk
-    resumed, again = tmp_path / "resumed.ply", tmp_path / "again.ply"
-    done = touchup("refine", "--resume", node.session, "--out", resumed)
-    assert done.returncode in (0, 4), done.stderr
-    whole = ["--scan", demo_folder / "scan.ply", "--bag", node.session / "recording", "--scene", node.session / "scene.yaml"]
-    done = touchup("refine", *whole, "--out", again)
-    assert done.returncode in (0, 4), done.stderr
-    assert resumed.read_bytes() == again.read_bytes()
-    # and it is all that was played up to there
+    # all that was played up to there
     assert taken == sorted(stamps(recording, "/stylus/wrench"))[: len(taken)]
-
-
-def test_a_stroke_is_taken_back_while_it_runs(demo_folder, tmp_path, touchup, touchup_bin, domain):
-    scene = scene_for(demo_folder, tmp_path)
-    with Node(touchup_bin, tmp_path, "--scene", scene, domain=domain, ros=CYCLONE) as node:
-        undo = Client(node, domain, "undo", UndoRequest, UndoResponse)
-        # nothing was touched yet
-        assert not undo.introduce(1).success
-        play_in_step(node, demo_folder / "touch.mcap", domain)
-        undone = undo.ask(1)
-        assert undone.success, undone.message
-        assert node.end(signal.SIGTERM) in (0, 4), node.text()
-    done = touchup("refine", "--resume", node.session, "--out", tmp_path / "resumed.ply")
+    done = touchup("refine", "--resume", node.session, "--json")
     assert done.returncode in (0, 4), done.stderr
-    refined = (node.session / "refined.ply").read_bytes()
-    assert refined == (tmp_path / "resumed.ply").read_bytes() != (demo_folder / "refined.ply").read_bytes()
-
-
-def test_who_comes_late_sees_what_is_saved(demo_folder, tmp_path, touchup_bin, domain):
-    scene = scene_for(demo_folder, tmp_path)
-    with Node(touchup_bin, tmp_path, "--scene", scene, domain=domain, ros=CYCLONE) as node:
-        save = Client(node, domain, "save_mesh", SaveMeshRequest, SaveMeshResponse)
-        assert not save.introduce("../nowhere.ply", False, False).success
-        play_in_step(node, demo_folder / "touch.mcap", domain)
-        reader = Peer(domain).reader("/mesh", Marker, LATCHED)
-        answer = save.ask("now.ply", False, False)
-        assert answer.success, answer.message
-        saved = trimesh.load(answer.path, process=False)
-        assert (len(saved.vertices), len(saved.faces)) == (answer.vertex_count, answer.face_count)
-        kept, tiles = KDTree(saved.vertices), {}
-
-        def is_what_was_saved():
-            came = reader.take(100)
-            tiles.update((tile.id, tile) for tile in came)
-            corners = numpy.array([(point.x, point.y, point.z) for tile in tiles.values() for point in tile.points]) * 1e3
-            if not came or abs(len(corners) / 3 - len(saved.faces)) >= 0.01 * len(saved.faces):
-                return False
-            # live, the skin is made bit by bit, saved all at once
-            shares = [(one.query(other)[0] < 0.01).mean() for one, other in [(KDTree(corners), saved.vertices), (kept, corners)]]
-            return min(shares) > 0.95
-
-        node.wait_for(is_what_was_saved)
-        assert node.end() in (0, 4), node.text()
-
-
-def in_order(vertices, faces):
-    """A mesh as it is however its vertices and faces are numbered: places as float32 in m, faces by their places."""
-    places = {vertex: tuple(float(numpy.float32(x)) for x in place[:3]) for vertex, place in vertices}
-    turned = []
-    for corners in faces:
-        at = [places[int(corner)] for corner in corners]
-        turned.append(min(tuple(at[k:] + at[:k]) for k in range(3)))
-    return numpy.array(sorted(turned), numpy.float32).tobytes()
-
-
-def test_a_follower_that_loses_messages_has_the_bytes_that_are_saved(demo_folder, tmp_path, touchup_bin, domain):
-    scene, pick = scene_for(demo_folder, tmp_path), random.Random(5)
-    with Node(touchup_bin, tmp_path, "--scene", scene, domain=domain, ros=CYCLONE) as node:
-        save = Client(node, domain, "save_mesh", SaveMeshRequest, SaveMeshResponse)
-        resync = Client(node, domain, "resync_mesh", ResyncMeshRequest, ResyncMeshResponse)
-        reader = Peer(domain).reader("/mesh_patch", MeshPatch, RELIABLE)
-        follower = Follower(lambda: resync.ask("", 0))
-        save.introduce("../nowhere.ply", False, False)
-        resync.introduce("", 0)
-        play_in_step(node, demo_folder / "touch.mcap", domain)
-        lost, versions = 0, []
-
-        def follows(loss):
-            nonlocal lost
-            for patch in reader.take(1000):
-                if pick.random() < loss:
-                    lost += 1
-                else:
-                    follower.take(patch)
-            follower.tick()
-            return not follower.is_waiting
-
-        node.wait_for(lambda: follows(0.1) or lost > 5)
-
-        def is_saved():
-            follows(0.0)
-            answer = save.ask(f"try{len(versions)}.ply", False, False)
-            versions.append(answer.mesh_version)
-            return answer.mesh_version == follower.version != 0 and answer
-
-        answer = []
-        node.wait_for(lambda: answer.append(is_saved()) or answer[-1])
-        assert lost > 0
-        assert (answer[-1].vertex_count, answer[-1].face_count) == (len(follower.vertices), len(follower.faces))
-        saved = trimesh.load(answer[-1].path, process=False)
-        of_file = in_order(enumerate(numpy.asarray(saved.vertices) * 1e-3), saved.faces)
-        assert of_file == in_order(follower.vertices.items(), follower.faces.values())
-        # at rest all that was touched gets its variance: the square of what the file has
-        touched, variances = [], []
-
-        def is_known():
-            follows(0.0)
-            places = follower.vertices.values()
-            touched[:] = [place[:3] for place in places if place[4] == 1]
-            variances[:] = [place[3] for place in places if place[4] == 1]
-            return len(touched) > 1000 and numpy.isfinite(variances).all()
-
-        node.wait_for(is_known)
-        sigmas = saved.metadata["_ply_raw"]["vertex"]["data"]["sigma_mm"].ravel()
-        far, at = KDTree(saved.vertices).query(numpy.array(touched) * 1e3)
-        assert far.max() < 1e-3 and numpy.abs(numpy.sqrt(variances) * 1e3 / sigmas[at] - 1).max() < 1e-3
-        assert in_order(follower.vertices.items(), follower.faces.values()) == of_file
-        assert node.end() in (0, 4), node.text()
+    assert json.loads(done.stdout)["samples"] == len(taken)
 
 
 def test_samples_that_are_not_used_are_a_warning_on_diagnostics_and_rosout(demo_folder, tmp_path, touchup_bin, domain):
@@ -265,13 +277,7 @@ def test_samples_that_are_not_used_are_a_warning_on_diagnostics_and_rosout(demo_
         assert "ROS_STATIC_PEERS=192.0.2.7 is not heeded" in node.text()
 
 
-def first_seconds(recording, seconds, out):
-    """A copy of the beginning of a recording."""
-    until = min(stamps(recording, "/stylus/pose")) + seconds * 10**9
-    copy_part(recording, out, lambda _, stamp_ns: stamp_ns < until)
-    return out
-
-
+@pytest.mark.full
 def test_a_full_disk_is_reported_and_the_recording_resumes_when_there_is_room(demo_folder, tmp_path, touchup, touchup_bin, domain):
     disk = tmp_path / "disk"
     disk.mkdir()

@@ -21,7 +21,7 @@ import pytest
 BIN = os.environ.get("TOUCHUP_BIN", str(Path(__file__).parents[2] / "target/release/touchup"))
 EPS = mp.mpf(2) ** -52
 RELATIVE = mp.mpf("1e-10")
-CASES = int(os.environ.get("TOUCHUP_STEP_CASES", "300" if os.environ.get("TOUCHUP_FULL") else "100"))
+CASES = int(os.environ.get("TOUCHUP_STEP_CASES", "300" if os.environ.get("TOUCHUP_FULL") else "40"))
 
 mp.mp.dps = 50
 

@@ -35,6 +35,7 @@ mod mesh;
 mod node;
 mod probing;
 mod reconstruct;
+mod refinement;
 #[cfg(feature = "ros")]
 mod ros;
 #[cfg(feature = "ros")]

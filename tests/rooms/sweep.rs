@@ -9,6 +9,7 @@ use std::process::{Command, Output, Stdio};
 use nalgebra::UnitQuaternion;
 use serde_json::{Value, json};
 use touchup::io::recording::{Topics, write_recording};
+use touchup::sweep::{GivenInput, JobRunner, JobsFile};
 
 use crate::cli::{code, flat_scan, json as one_object, text, touch, touchup};
 
@@ -321,6 +322,36 @@ fn a_result_has_the_same_bytes_wherever_and_under_whatever_names_it_is_made() {
     assert_eq!(code(&one.run(&["--job", "0", "--again"])), 0);
     assert_eq!(one.result("results", id), result);
     assert_eq!(one.names_in("results"), std::slice::from_ref(id));
+}
+
+/// As the Python package runs one whose files an engine has brought along.
+#[test]
+fn a_job_of_given_bytes_is_that_of_its_files() {
+    let sweep = Sweep::new(ONE_JOB);
+    let id = sweep.ids().remove(0);
+    let job = JobsFile::job(&sweep.path("jobs.jsonl"), 0).unwrap();
+    let run = |results: &str, given: GivenInput<'_>| {
+        let runner = JobRunner::new(sweep.folder.path().to_owned(), sweep.path(results));
+        runner.run(&job, given, false, &mut || {})
+    };
+    run("by_files", GivenInput::default()).unwrap();
+    let [scan, recording] = ["scan.ply", "touch.mcap"].map(|name| {
+        let bytes = fs::read(sweep.path(name)).unwrap();
+        fs::remove_file(sweep.path(name)).unwrap();
+        bytes
+    });
+    let given = |scan| GivenInput {
+        scan: Some(scan),
+        recording: Some(&recording),
+    };
+    let report = run("by_bytes", given(&scan)).unwrap();
+    assert!(!report.was_there && report.failed.is_none());
+    assert_eq!(sweep.result("by_files", &id), sweep.result("by_bytes", &id));
+    let refused = run("by_others", given(&[&scan[..], b" "].concat())).unwrap_err();
+    assert!(
+        refused.to_string().contains("not what was planned"),
+        "{refused}"
+    );
 }
 
 /// The mesh and the features are those of `touchup refine` with the same scene.

@@ -40,6 +40,7 @@ def by_slurm(jobs, results, folder):
         assert ended.returncode == 0, ended.stderr + "\n".join(path.read_text() for path in folder.glob("job_*.out")) + slurm.logs()
 
 
+@pytest.mark.full
 def test_snakemake_makes_the_table_of_one_process(ring, tmp_path):
     jobs = planned(tmp_path, ring, seeds=(1,))
     reference = serial(jobs)

@@ -31,21 +31,14 @@ def test_touches_measure_the_hole_better_than_the_scan(ring, refined):
     assert holes[0]["fitted_to"] == "touches" and holes[0]["std"]["diameter_mm"] > 0
 
 
-def test_features_of_arrays_are_those_of_the_command(refined, tmp_path):
-    from conftest import done
-
-    refined.mesh.write(tmp_path / "refined.ply", "m")
-    refined.touches.write(tmp_path / "touches.csv")
-    flags = ("--mesh-unit", "m", "--touches", tmp_path / "touches.csv", "--json")
-    by_command = done("features", tmp_path / "refined.ply", *flags)
-    assert touchup.features(refined.mesh, touchup.Touches.read(tmp_path / "touches.csv")) == by_command
-
-
 def test_a_plate_above_another_deviates_by_its_height():
     compared = touchup.compare(plate(z=0.1e-3), plate(), samples=2000)
     assert np.allclose(compared.deviation, 0.1e-3, atol=1e-12)
     assert compared.region()["mesh_to_truth"]["bias_mm"] == pytest.approx(0.1, abs=1e-9)
     assert [region["region"] for region in compared.report["regions"]] == ["all"]
+    for tolerance_mm, share in [(0.05, 0.0), (0.15, 1.0)]:
+        within = touchup.compare(plate(z=0.1e-3), plate(), samples=500, tolerance_mm=tolerance_mm).region()
+        assert within["within_tolerance_share"] == share
 
 
 def test_a_unit_and_a_frame_that_are_probably_wrong_are_warned_of(ring):
@@ -64,17 +57,6 @@ def test_deviations_are_the_distances_of_trimesh(ring, refined):
     compared = touchup.compare(refined.mesh, touchup.Mesh.of(ring, "mm"), samples=5000)
     _, distance, _ = trimesh.proximity.closest_point_naive(ring, refined.mesh.vertices[::50] * 1e3)
     assert np.allclose(np.abs(compared.deviation[::50]) * 1e3, distance, atol=1e-9)
-
-
-def test_the_comparison_is_that_of_the_command(ring, refined, tmp_path):
-    from conftest import done
-
-    truth = touchup.Mesh.of(ring, "mm")
-    truth.write(tmp_path / "truth.ply", "m")
-    refined.mesh.write(tmp_path / "refined.ply", "m")
-    flags = ("--mesh-unit", "m", "--truth-unit", "m", "--samples", 5000, "--tolerance-mm", 0.1, "--json")
-    by_command = done("compare", tmp_path / "refined.ply", tmp_path / "truth.ply", *flags)["after"]
-    assert touchup.compare(refined.mesh, truth, samples=5000, tolerance_mm=0.1).report == by_command
 
 
 def bracket():

@@ -11,17 +11,10 @@ import touchup
 from conftest import ROOT, SCENE, plate, run, slide
 
 
-def error_of_command(*arguments):
-    return json.loads(run(*arguments, "--json").stderr.splitlines()[-1])
-
-
-def test_the_usual_scene_is_the_one_that_the_command_writes(tmp_path):
+def test_the_usual_scene_is_a_scene():
     scene = touchup.default_scene()
     assert scene["patch"] is None or isinstance(scene["patch"], dict)
-    written = tmp_path / "scene.yaml"
-    assert run("init", "--help").returncode == 0
-    written.write_text(json.dumps({part: keys for part, keys in scene.items() if keys is not None}), encoding="utf-8")
-    touchup.check_scene(written)
+    touchup.check_scene({part: keys for part, keys in scene.items() if keys is not None})
     assert "robot" not in scene and "compensation" not in scene, "what is off is not there"
 
 
@@ -39,27 +32,22 @@ def test_numbers_of_numpy_and_what_is_off_are_taken():
 
 
 @pytest.mark.parametrize(
-    "scene",
+    ("scene", "says"),
     [
-        {"tip": {"radius_mm": 1.5}, "contact": {"on_n": -1}},
-        {"tip": {"radius_mm": 1.5, "raduis_mm": 2}},
-        {"tip": {"radius_mm": 1.5, "shape": "cone"}},
-        {"tip": {"radius_mm": 1.5}, "contact": "off"},
+        ({"tip": {"radius_mm": 1.5}, "contact": {"on_n": -1}}, "on_n"),
+        ({"tip": {"radius_mm": 1.5, "raduis_mm": 2}}, "raduis_mm"),
+        ({"tip": {"radius_mm": 1.5, "shape": "cone"}}, "cone"),
+        ({"tip": {"radius_mm": 1.5}, "contact": "off"}, "contact"),
     ],
 )
-def test_a_scene_is_refused_in_the_words_of_the_command(scene, tmp_path):
+def test_a_scene_is_refused_by_its_key_and_its_file(scene, says, tmp_path):
     path = tmp_path / "scene.yaml"
     path.write_text(json.dumps(scene), encoding="utf-8")
-    command = error_of_command("refine", "--scan", "no.ply", "--bag", "no.mcap", "--out", tmp_path / "o.ply", "--scene", path)
-    with pytest.raises(touchup.TouchupError) as refusal:
+    with pytest.raises(touchup.TouchupError, match=says) as refusal:
         touchup.check_scene(path)
-    assert str(refusal.value) == command["message"]
-    assert (refusal.value.kind, refusal.value.hint, refusal.value.exit_code) == tuple(
-        command[key] for key in ("kind", "hint", "exit_code")
-    )
-    with pytest.raises(touchup.TouchupError) as of_dictionary:
+    assert (refusal.value.kind, refusal.value.exit_code) == ("scene", 3) and str(path) in str(refusal.value)
+    with pytest.raises(touchup.TouchupError, match=says):
         touchup.check_scene(scene)
-    assert str(of_dictionary.value) in command["message"]
 
 
 def test_a_scene_without_a_radius_is_refused():
@@ -67,33 +55,35 @@ def test_a_scene_without_a_radius_is_refused():
         touchup.refine(plate(), slide(0.1e-3, count=10))
 
 
-@pytest.mark.parametrize(("scan", "bag"), [("no.ply", "no.mcap"), ("bad.ply", "no.mcap"), ("scan.ply", "no.mcap"), ("scan.ply", "bad.mcap")])
-def test_files_are_refused_in_the_words_of_the_command(scan, bag, tmp_path):
+@pytest.mark.parametrize(
+    ("scan", "bag", "kind"),
+    [("no.ply", "no.mcap", "mesh"), ("bad.ply", "no.mcap", "mesh"), ("scan.ply", "no.mcap", "recording"), ("scan.ply", "bad.mcap", "recording")],
+)
+def test_a_file_is_refused_by_its_name(scan, bag, kind, tmp_path):
     (tmp_path / "bad.ply").write_text("ply\nformat ascii 1.0\n", encoding="utf-8")
     (tmp_path / "bad.mcap").write_text("no recording", encoding="utf-8")
-    (tmp_path / "scene.yaml").write_text(json.dumps(SCENE), encoding="utf-8")
     touchup.Mesh(*plate()).write(tmp_path / "scan.ply")
-    scan, bag, scene = tmp_path / scan, tmp_path / bag, tmp_path / "scene.yaml"
-    command = error_of_command("refine", "--scan", scan, "--bag", bag, "--out", tmp_path / "o.ply", "--scene", scene)
+    wrong = bag if scan == "scan.ply" else scan
+    with pytest.raises(touchup.TouchupError, match=wrong) as refusal:
+        touchup.refine(tmp_path / scan, tmp_path / bag, SCENE)
+    assert (refusal.value.kind, refusal.value.exit_code) == (kind, 3)
+
+
+def test_an_error_has_the_words_of_the_command(tmp_path):
+    """All of its fields, once: both make them of one error."""
     with pytest.raises(touchup.TouchupError) as refusal:
-        touchup.refine(scan, bag, scene)
-    assert str(refusal.value) == command["message"]
-    assert (refusal.value.kind, refusal.value.hint, refusal.value.exit_code) == tuple(
-        command[key] for key in ("kind", "hint", "exit_code")
-    )
+        touchup.refine(tmp_path / "no.ply", tmp_path / "no.mcap", SCENE)
+    command = run("refine", "--scan", tmp_path / "no.ply", "--bag", "no.mcap", "--out", tmp_path / "o.ply", "--tip-radius-mm", 1.5, "--json")
+    told = json.loads(command.stderr.splitlines()[-1])
+    assert {"message": str(refusal.value), "kind": refusal.value.kind, "hint": refusal.value.hint, "exit_code": refusal.value.exit_code} == told
 
 
-def test_a_recording_that_is_surely_wrong_is_refused_as_by_the_command(touched, touched_files, tmp_path):
+def test_a_recording_that_is_surely_wrong_is_refused(touched, touched_files, tmp_path):
     pulls = touchup.Recording(
         *touched.recording._poses(), touched.recording.wrench_stamp_ns, -touched.recording.force, -touched.recording.torque
     )
     pulls.write(tmp_path / "pulls.mcap")
-    scan, scene = touched_files / "scan.ply", touched_files / "scene.yaml"
-    flags = ("--scan", scan, "--mesh-unit", "m", "--bag", tmp_path / "pulls.mcap", "--scene", scene)
-    command = error_of_command("refine", *flags, "--out", tmp_path / "o.ply")
-    with pytest.raises(touchup.TouchupError) as refusal:
-        touchup.refine(scan, tmp_path / "pulls.mcap", scene, unit="m")
-    assert refusal.value.kind == command["kind"] == "input" and str(refusal.value) == command["message"]
-    with pytest.raises(touchup.TouchupError) as of_arrays:
-        touchup.refine(touched.scan, pulls, SCENE)
-    assert str(of_arrays.value).partition(": ")[2] == command["message"].partition(": ")[2]
+    for scan, recording in [(touched.scan, pulls), (touched_files / "scan.ply", tmp_path / "pulls.mcap")]:
+        with pytest.raises(touchup.TouchupError, match="force") as refusal:
+            touchup.refine(scan, recording, SCENE, unit="m")
+        assert (refusal.value.kind, refusal.value.exit_code) == ("input", 3)

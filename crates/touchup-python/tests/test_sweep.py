@@ -1,11 +1,11 @@
-"""Sweeps and what-if of the package against the command."""
+"""Sweeps and what-if of the package."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 import touchup
-from conftest import SCENE, done, run
 
 
 @pytest.fixture(scope="module")
@@ -23,43 +23,33 @@ def planned(touched_files, tmp_path_factory):
     return folder
 
 
-def files(folder):
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
-
-
-def test_a_job_is_the_same_from_files_bytes_and_by_the_command(planned, touched_files):
+def test_a_job_is_run_once_and_refuses_what_was_not_planned(planned, touched_files):
     jobs = planned / "jobs.jsonl"
     assert [job["keys"] for job in touchup.sweep.jobs(jobs)] == [{"tip.stiffness_n_per_mm": 20}, {"tip.stiffness_n_per_mm": 10}]
-    of_command = done("sweep", "run", jobs, "--job", 0, "--json")
-    of_files = touchup.sweep.run_job(jobs, 0, planned / "by_files")
+    made = touchup.sweep.run_job(jobs, 0)
+    assert made.failed is None and not made.was_there and made.summary["samples"] > 0
+    assert {path.name for path in Path(made.result).iterdir()} == {"job.json", "summary.json", "refined.ply", "features.json"}
+    assert touchup.sweep.run_job(jobs, 0).was_there
     given = {name: (touched_files / file).read_bytes() for name, file in (("scan", "scan.ply"), ("recording", "touch.mcap"))}
-    of_bytes = touchup.sweep.run_job(jobs, 0, planned / "by_bytes", **given)
-    assert of_files.summary == of_bytes.summary == of_command["summary"]
-    assert not of_files.was_there and of_files.failed is None
-    results = [files(planned / place / of_files.id) for place in ("results", "by_files", "by_bytes")]
-    assert results[0] == results[1] == results[2] and "refined.ply" in results[0]
-    assert touchup.sweep.run_job(jobs, 0, planned / "by_files").was_there
+    # not even the folder of its results is another one: what is given is looked at all the same
     with pytest.raises(touchup.TouchupError, match="not what was planned"):
-        touchup.sweep.run_job(jobs, 1, planned / "by_bytes", scan=given["scan"] + b" ")
+        touchup.sweep.run_job(jobs, 1, planned / "others", scan=given["scan"] + b" ", recording=given["recording"])
+    assert not touchup.sweep.run_job(jobs, 1, **given).was_there
     with pytest.raises(touchup.TouchupError, match="has no job 2"):
-        touchup.sweep.run_job(jobs, 2, planned / "by_bytes")
+        touchup.sweep.run_job(jobs, 2)
 
 
-def test_tables_and_what_if_are_those_of_the_command(planned):
+def test_tables_and_what_if_are_of_the_results(planned):
     jobs = planned / "jobs.jsonl"
-    done("sweep", "run", jobs, "--json")
+    results = [touchup.sweep.run_job(jobs, job) for job in range(2)]
     rows = touchup.sweep.table(jobs)
-    assert [row["tip.stiffness_n_per_mm"] for row in rows] == [20, 10]
-    assert all(row["samples"] > 0 for row in rows)
+    assert [(row["id"], row["tip.stiffness_n_per_mm"]) for row in rows] == [(results[0].id, 20), (results[1].id, 10)]
+    assert [row["samples"] for row in rows] == [result.summary["samples"] for result in results]
     assert len(touchup.sweep.features(jobs)) == sum(row["features"] for row in rows)
-    folders = [planned / "results" / row["id"] for row in rows]
-    found = touchup.what_if(*folders)
-    report = done("whatif", 0, 1, "--jobs", jobs, "--json")
-    assert found.keys == report["keys"] == {"tip.stiffness_n_per_mm": [20, 10]}
-    assert int(found.b.moved.sum()) == report["vertices_b"]["moved"] > 0
-    assert int(found.a.moved.sum()) == report["vertices_a"]["moved"]
-    assert found.b.displacement.shape == (len(found.b.mesh.vertices),)
+    found = touchup.what_if(results[0].result, results[1].result)
+    assert found.keys == {"tip.stiffness_n_per_mm": [20, 10]}
+    assert found.b.moved.sum() > 0 and found.b.displacement.shape == (len(found.b.mesh.vertices),)
     # a softer stylus bends farther: what it touched lies higher
     assert np.median(found.b.displacement[found.b.moved]) > 0
-    assert run("whatif", folders[0], planned).returncode == 3
-    assert SCENE["tip"]["stiffness_n_per_mm"] == 20
+    with pytest.raises(touchup.TouchupError):
+        touchup.what_if(results[0].result, planned)

@@ -154,6 +154,8 @@ fn text(name: &str, given: &Option<String>) -> Result<Option<String>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::conformity::DecisionParams;
+    use crate::inspection::DrawingParams;
 
     fn request(json: serde_json::Value) -> ReportRequest {
         serde_json::from_value(json).unwrap()
@@ -175,6 +177,37 @@ mod tests {
                 && params.drawing.unit == MeshUnit::Inch
                 && params.part.is_none()
         );
+    }
+
+    #[test]
+    fn each_field_is_the_setting_that_the_flag_of_its_name_is() {
+        let asked = serde_json::json!({
+            "nominal": "part", "unit": "inch", "general": "iso2768-f", "position_mm": 0.2, "match_mm": 0.5, "align": "best-fit",
+            "rule": "simple", "confidence": 0.9, "k": 3.0, "part": " Plate 4711 ", "serial": "SN 1", "operator": "R. Ö",
+        });
+        let params = request(asked).params(MeshUnit::Metre).unwrap();
+        let expected = InspectionParams {
+            drawing: DrawingParams {
+                unit: MeshUnit::Inch,
+                general: Some(general_tolerance("iso2768-f").unwrap()),
+                tolerance_mm: None,
+                position_mm: Some(0.2),
+            },
+            decision: DecisionParams {
+                rule: decision_rule("simple").unwrap(),
+                confidence: 0.9,
+            },
+            coverage_factor: 3.0,
+            match_mm: 0.5,
+            align: Some("best-fit".parse().unwrap()),
+            part: Some("Plate 4711".to_owned()),
+            serial: Some("SN 1".to_owned()),
+            operator: Some("R. Ö".to_owned()),
+        };
+        assert_eq!(format!("{params:?}"), format!("{expected:?}"));
+        let own = serde_json::json!({ "nominal": "part", "tolerance_mm": 0.1 });
+        let params = request(own).params(MeshUnit::Metre).unwrap();
+        assert_eq!(params.drawing.tolerance_mm, Some(0.1));
     }
 
     #[test]

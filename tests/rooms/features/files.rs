@@ -7,6 +7,7 @@ use proptest::prelude::*;
 use touchup::features::{Feature, Kind, detect};
 use touchup::io::features_file::{FeatureFile, FeaturesFileError, read_features, write_features};
 use touchup::io::file_error::FileError;
+use touchup::io::result_table::{ResultTable, write_features_as_named, write_touches_as_named};
 use touchup::io::touches_file::{
     HEADER, TouchesFileError, as_written, read_touches, write_touches,
 };
@@ -85,6 +86,12 @@ proptest! {
             prop_assert!((a.weight - b.weight).abs() < weight);
         }
         prop_assert_eq!(read, as_written(&touches));
+
+        // as a table, what refine writes is what is made of its file
+        let [direct, made] = [(); 2].map(|()| tempfile::Builder::new().suffix(".parquet").tempfile().unwrap());
+        write_touches_as_named(direct.path(), &touches).unwrap();
+        ResultTable::of_touches_file(file.path()).unwrap().write(made.path()).unwrap();
+        prop_assert!(fs::read(direct.path()).unwrap() == fs::read(made.path()).unwrap());
     }
 
     /// Whatever some fields hold of a good line: it is a touch of finite numbers, or the line is
@@ -339,6 +346,17 @@ fn features_come_back_bit_by_bit() {
     let bytes = fs::read(file.path()).unwrap();
     write_features(file.path(), &read).unwrap();
     assert_eq!(fs::read(file.path()).unwrap(), bytes);
+    // as a table, what refine and features write is what is made of that file
+    for ending in [".csv", ".parquet"] {
+        let [direct, made] =
+            [(); 2].map(|()| tempfile::Builder::new().suffix(ending).tempfile().unwrap());
+        write_features_as_named(direct.path(), &written).unwrap();
+        ResultTable::of_features(&read.features)
+            .write(made.path())
+            .unwrap();
+        assert!(fs::read(direct.path()).unwrap() == fs::read(made.path()).unwrap());
+        assert!(fs::read(direct.path()).unwrap() != bytes, "{ending}");
+    }
 }
 
 /// As the judge's README shows it: unknown values are left out.

@@ -1,5 +1,6 @@
 """Text that is known only when it is launched."""
 
+import functools
 import shlex
 import subprocess
 
@@ -26,6 +27,11 @@ class LaunchConfiguration:
         return context.launch_configurations.get(self.variable_name, self.default)
 
 
+@functools.cache
+def ran(words):
+    return subprocess.run(words, capture_output=True, text=True, timeout=60)
+
+
 class Command:
     """What a command prints."""
 
@@ -34,9 +40,9 @@ class Command:
         self.command, self.on_stderr = command, on_stderr
 
     def perform(self, context):
-        """Runs it, without a shell."""
-        words = shlex.split(perform(self.command, context))
-        done = subprocess.run(words, capture_output=True, text=True, timeout=60)
+        """Runs it, without a shell: the same words once, as each run of xacro takes a while and reads files that stay."""
+        words = tuple(shlex.split(perform(self.command, context)))
+        done = ran(words)
         if done.returncode != 0 or self.on_stderr == "fail" and done.stderr:
             raise RuntimeError(f"executed command failed: {words}: {done.stderr}")
         return done.stdout

@@ -1,5 +1,5 @@
 //! A program that follows the mesh as docs/ros.md says, written from that and from MeshPatch.msg
-//! alone.
+//! alone; tests/python/mesh_follower.py is the same in Python.
 
 use std::collections::BTreeMap;
 
@@ -12,6 +12,8 @@ pub struct Follower {
     pub version: u64,
     next_part: u32,
     pub vertices: BTreeMap<u32, [f32; 3]>,
+    /// of each vertex what it rests on, and the bits of its variance, m²
+    pub known: BTreeMap<u32, (u8, u32)>,
     pub faces: BTreeMap<u32, [u32; 3]>,
     /// the whole state is wanted
     pub asks: bool,
@@ -30,6 +32,10 @@ impl Follower {
             vertices: (0..)
                 .zip(scan.positions())
                 .map(|(v, p)| (v, [p.x as f32, p.y as f32, p.z as f32]))
+                .collect(),
+            known: (0..)
+                .zip(scan.positions())
+                .map(|(v, _)| (v, (MeshPatch::SUPPORT_SCAN, f32::NAN.to_bits())))
                 .collect(),
             faces: scan
                 .faces()
@@ -66,7 +72,7 @@ impl Follower {
 
     fn take_whole(&mut self, patch: &MeshPatch) {
         if patch.part == 0 {
-            (self.vertices, self.faces, self.kept) = Default::default();
+            (self.vertices, self.known, self.faces, self.kept) = Default::default();
             (self.begun, self.next_part) = (Some((patch.session.clone(), patch.version)), 0);
         }
         if self.begun != Some((patch.session.clone(), patch.version))
@@ -107,6 +113,10 @@ impl Follower {
             self.vertices
                 .insert(*vertex, [position[0], position[1], position[2]]);
         }
+        let known = patch.support.iter().zip(&patch.variance);
+        for (vertex, (support, variance)) in patch.vertices.iter().zip(known) {
+            self.known.insert(*vertex, (*support, variance.to_bits()));
+        }
         for (face, corners) in patch.faces.iter().zip(patch.corners.chunks(3)) {
             let corners = [corners[0], corners[1], corners[2]];
             assert!(
@@ -122,6 +132,7 @@ impl Follower {
                 self.vertices.remove(vertex).is_some(),
                 "vertex {vertex} was not there"
             );
+            self.known.remove(vertex);
         }
         let count = patch.vertices.len();
         assert_eq!(
