@@ -327,9 +327,9 @@ impl ProbedWorld for SeenPlaces {
     fn publish(&mut self, _: &Progress) {}
 }
 
-/// An arm that comes back from less than 1 mm has the error that it had, and the fit takes errors of
-/// touches for independent. The ball of 3 mm falls in 0.2 mm from a wall of the slot, and that of 5
-/// mm has 0.5 mm of room in the hole.
+/// An arm that comes back from less than 1 mm has the error that it had, and the fit takes errors
+/// of touches for independent. The ball of 3 mm falls in 0.2 mm from a wall of the slot, and that
+/// of 5 mm has 0.5 mm of room in the hole.
 #[test]
 fn the_arm_comes_anew_to_each_touch_of_a_wall_nearby() {
     for (kind, place, ball) in [
