@@ -58,7 +58,9 @@ fn a_recording_its_messages_and_its_samples_make_the_same_mesh() {
     let mut pushed = JudgedRefinement::new(input(), wrench_frame).unwrap();
     let scene = input().scene;
     let (placement, sync) = (scene.placement(), scene.sync_params());
-    let push = |sample: &_| drop(pushed.push(sample).unwrap());
+    let push = |sample: &_| {
+        pushed.push(sample).unwrap();
+    };
     each_sample_of(messages, wrench_frame, placement, sync, &mut |_| {}, push).unwrap();
     let of_samples = pushed.finish(names, false).unwrap();
 

@@ -78,6 +78,19 @@ const SLOT: Opening = Opening {
 
 /// Errors of place, size, second size, lean; m, and rad times 4 mm.
 type Errors = [f64; 4];
+
+/// Axis of walls, of height 1, that lean as is believed of them. Of walls that are all square a fit
+/// would err the less the less it is told: it takes them for square where touches say nothing.
+fn drawn_axis(rng: &mut Pcg64) -> Vector3<f64> {
+    let mut lean = || SQUARE * rng.sample::<f64, _>(StandardNormal);
+    Vector3::new(lean(), lean(), 1.0)
+}
+
+/// By which an axis is off, over 4 mm.
+fn lean_error(found: &Vector3<f64>, axis: &Vector3<f64>) -> f64 {
+    (found / found.z - axis).norm() * 4e-3
+}
+
 /// The place of a surface for a place near it, and its normal there.
 type OnSurface<'a> = &'a dyn Fn(&Point3<f64>) -> (Point3<f64>, Vector3<f64>);
 
@@ -106,7 +119,7 @@ impl Opening {
     /// Errors of as many touches spread evenly, where the scan has the opening 0.2 mm and 0.01 rad
     /// off (standard deviations); `None` where they leave an end of a slot open.
     #[expect(clippy::too_many_lines)]
-    fn grid_errors(&self, count: usize, rng: &mut Pcg64) -> Option<Errors> {
+    fn grid_errors(&self, count: usize, axis: &Vector3<f64>, rng: &mut Pcg64) -> Option<Errors> {
         let mut draw = |sigma: f64| sigma * rng.sample::<f64, _>(StandardNormal);
         let shift = Vector3::new(draw(0.2e-3), draw(0.2e-3), 0.0);
         let turn = Vector3::new(draw(0.01), draw(0.01), draw(0.01));
@@ -136,7 +149,7 @@ impl Opening {
             center - axis * (top.distance(&center) / top.normal().dot(&axis))
         };
         if self.kind == Kind::Hole {
-            let truth = Cylinder::new(self.middle, &Vector3::z(), self.radius, true);
+            let truth = Cylinder::new(self.middle, axis, self.radius, true);
             let on_wall = |p: &Point3<f64>| (on(&truth, p), normal_of(&truth, &on(&truth, p)));
             let walls: Vec<_> = walls.iter().map(|p| touch(&on_wall, p, rng)).collect();
             let guess = Cylinder::new(
@@ -153,14 +166,14 @@ impl Opening {
                 place,
                 2.0 * (found.radius - self.radius),
                 0.0,
-                found.axis().xy().norm() * 4e-3,
+                lean_error(&found.axis(), axis),
             ]);
         }
         let sizes = [2.0 * self.radius, 2.0 * (self.radius + self.half)];
         let stadium = |center: Point3<f64>, axis: Vector3<f64>, along: Vector3<f64>| {
             Stadium::new(center, &axis, &along, sizes, Ends::Round, true)
         };
-        let truth = stadium(self.middle, Vector3::z(), Vector3::x());
+        let truth = stadium(self.middle, *axis, Vector3::x());
         let on_wall = |p: &Point3<f64>| (on(&truth, p), normal_of(&truth, &on(&truth, p)));
         let walls: Vec<_> = walls.iter().map(|p| touch(&on_wall, p, rng)).collect();
         let guess = stadium(
@@ -178,13 +191,21 @@ impl Opening {
             place,
             found.width - sizes[0],
             found.length - sizes[1],
-            found.axis().xy().norm() * 4e-3,
+            lean_error(&found.axis(), axis),
         ])
     }
 
     /// Errors of planned touches from a flag up to 2 mm beside it, and how many there were.
-    fn planned_errors(&self, quantity: Quantity, rng: &mut Pcg64) -> (Errors, usize) {
+    fn planned_errors(
+        &self,
+        quantity: Quantity,
+        axis: &Vector3<f64>,
+        rng: &mut Pcg64,
+    ) -> (Errors, usize) {
         let plate = Plate::default();
+        // sheared by so small an angle distances change in the second order, by some nm
+        let lean = axis - Vector3::z();
+        let distance = |p: &Point3<f64>| plate.signed_distance(&(p - lean * (p.z - TOP)));
         let mut some = |most: f64| rng.random_range(-most..most);
         let flag = self.middle + Vector3::new(some(1.4e-3), some(1.4e-3), some(0.2e-3));
         let normal = Unit::new_normalize(Vector3::new(some(0.03), some(0.03), 1.0));
@@ -199,17 +220,12 @@ impl Opening {
             Explorer::new(Some(self.kind), &flag, &normal, params, &plate_scan(1)).unwrap();
         while let Some(planned) = search.next_touch() {
             let noise: f64 = SIGMA * rng.sample::<f64, _>(StandardNormal);
-            search.take(&probe(
-                &|p| plate.signed_distance(p),
-                &planned,
-                params.ball_radius,
-                noise,
-            ));
+            search.take(&probe(&distance, &planned, params.ball_radius, noise));
         }
         let found = search.found().unwrap();
         let Feature {
             centre,
-            axis,
+            axis: found_axis,
             diameter,
             width,
             length,
@@ -219,7 +235,12 @@ impl Opening {
         let second = length.map_or(0.0, |length| length.value - 2.0 * (self.radius + self.half));
         let place = (centre.value - self.middle).xy().norm();
         (
-            [place, size, second, axis.unwrap().value.xy().norm() * 4e-3],
+            [
+                place,
+                size,
+                second,
+                lean_error(&found_axis.unwrap().value, axis),
+            ],
             found.touches,
         )
     }
@@ -278,8 +299,8 @@ fn no_plan_halves_the_error_of_a_grid_on_the_same_wall() {
 /// With as many touches as the plan made, misses and the search for the opening included, against
 /// touches spread evenly over wall and surface around it as a scan has them, which is spared that
 /// search, and with the same belief in square walls: the place is better by a third at the least,
-/// and no number that is asked for is worse. Half the error of the place is what is wanted; 0.51 to
-/// 0.59 are reached.
+/// and no number that is asked for is worse. Half the error of the place is what is wanted; 0.49 to
+/// 0.58 are reached by 200 seeds.
 #[test]
 fn planned_touches_are_better_than_a_grid_over_the_region() {
     let seeds = if crate::full::is_full() { 200 } else { 20 };
@@ -294,9 +315,10 @@ fn planned_touches_are_better_than_a_grid_over_the_region() {
             let (mut planned, mut grid) = (Vec::new(), Vec::new());
             for seed in 0..seeds {
                 let mut rng = Pcg64::seed_from_u64(seed);
-                let (errors, touches) = opening.planned_errors(quantity, &mut rng);
+                let axis = drawn_axis(&mut rng);
+                let (errors, touches) = opening.planned_errors(quantity, &axis, &mut rng);
                 planned.push(errors);
-                grid.extend(opening.grid_errors(touches, &mut rng));
+                grid.extend(opening.grid_errors(touches, &axis, &mut rng));
             }
             println!(
                 "{name}: {} of {seeds} grids leave an end open",

@@ -43,6 +43,10 @@ const SHORT: f64 = 0.1e-3;
 /// Touches that begin nearer than this to each other, over the ball's radius, are gone between
 /// inside of the feature.
 const INSIDE: f64 = 0.5;
+/// An arm comes to a place with a new error only from farther than this, m. Touches between which
+/// the ball stays nearer would share one error, and the fit takes the errors of touches for
+/// independent.
+const ANEW: f64 = 1e-3;
 
 impl<'a> Prober<'a> {
     /// Probes one flagged feature. Whatever happens, the arm is stopped when this returns; it has
@@ -325,8 +329,9 @@ impl FeatureProbing<'_, '_> {
         let is_near = self
             .from
             .is_some_and(|from| (from - planned.from).norm() < near);
+        let is_away = self.touches.last().is_none_or(ends_away);
         // else it stays inside of the feature
-        if !is_near || planned.from == planned.entry {
+        if !is_near || !is_away || planned.from == planned.entry {
             self.reach(&planned.entry)?;
         }
         self.touch(planned)
@@ -460,6 +465,16 @@ impl FeatureProbing<'_, '_> {
             self.is_out = self.from.take().is_none() && self.entry.take().is_none();
         }
         Ok(())
+    }
+}
+
+/// Whether a touch ends with the ball away from its contact, so that the arm comes to the next one
+/// anew.
+fn ends_away(touch: &ProbedTouch) -> bool {
+    match touch.record.as_ref().map(|record| &record.outcome) {
+        Some(TouchOutcome::Contact { onset, .. }) => onset.travel > ANEW,
+        Some(TouchOutcome::Miss { .. }) => true,
+        Some(TouchOutcome::Unclear(_)) | None => false,
     }
 }
 
