@@ -59,7 +59,9 @@ fn displacement(p: &Point3<f64>, lean: f64) -> Vector3<f64> {
 }
 
 impl Worn {
-    fn moved(&self, s: SurfacePoint) -> SurfacePoint {
+    /// A point of the plate as it is here, seen from `p`. Along the surface it goes with `p`: below
+    /// a ball the floor is straight below, at whichever height that is moved less or more.
+    fn moved(&self, s: SurfacePoint, p: &Point3<f64>) -> SurfacePoint {
         const STEP: f64 = 1e-6;
         let slope = |axis: Vector3<f64>| {
             (displacement(&(s.point + axis * STEP), self.lean)
@@ -71,8 +73,10 @@ impl Worn {
             slope(Vector3::y()),
             slope(Vector3::z()),
         ]);
+        let own = displacement(&s.point, self.lean);
+        let slide = displacement(p, self.lean) - own;
         SurfacePoint {
-            point: s.point + displacement(&s.point, self.lean),
+            point: s.point + own + (slide - s.normal * slide.dot(&s.normal)),
             normal: (s.normal - slopes.tr_mul(&s.normal)).normalize(),
         }
     }
@@ -85,7 +89,7 @@ impl Surface for Worn {
     }
 
     fn closest(&self, p: &Point3<f64>) -> SurfacePoint {
-        self.moved(self.plate.closest(&(p - displacement(p, self.lean))))
+        self.moved(self.plate.closest(&(p - displacement(p, self.lean))), p)
     }
 
     fn bounds(&self) -> Bounds {
@@ -96,7 +100,9 @@ impl Surface for Worn {
         let before = found.len();
         self.plate
             .near(&(p - displacement(p, self.lean)), reach, found);
-        found[before..].iter_mut().for_each(|s| *s = self.moved(*s));
+        found[before..]
+            .iter_mut()
+            .for_each(|s| *s = self.moved(*s, p));
     }
 }
 

@@ -101,7 +101,7 @@ pub(super) fn contact_slots(
     };
     let kept: Vec<usize> = kept.into_iter().filter(|&at| !is_round[at]).collect();
     let planes = large_planes(parted);
-    let mut found: Vec<(usize, Slot)> = Vec::new();
+    let mut found: Vec<(f64, Slot)> = Vec::new();
     for axis in axes(parted, &planes, touches, &kept, radius) {
         let upright: Vec<usize> = kept
             .iter()
@@ -123,13 +123,15 @@ pub(super) fn contact_slots(
             .collect();
         for (at, one) in lines.iter().enumerate() {
             for other in &lines[..at] {
-                let count = one.touches.len() + other.touches.len();
-                found.extend(view.between(one, other).map(|slot| (count, slot)));
+                let count = (one.touches.len() + other.touches.len()) as f64;
+                let seen = view.between(one, other);
+                found.extend(seen.map(|(slot, share)| (share * count, slot)));
             }
         }
     }
-    // of walls in pieces, and seen along several axes, those count that most contacts are on
-    found.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
+    // of walls in pieces, and seen along several axes, those count that most contacts are on with
+    // the land beside them: flat walls are lines along every axis in both
+    found.sort_by(|(one, _), (other, _)| other.total_cmp(one));
     without_repeats(found.into_iter().map(|(_, slot)| slot), |one, other| {
         one.holds(other) || other.holds(one)
     })
@@ -271,8 +273,9 @@ impl AxisView<'_> {
         line
     }
 
-    /// The void between two walls that face each other.
-    fn between(&self, one: &Line, other: &Line) -> Option<Slot> {
+    /// The void between two walls that face each other, with the share of them that has its land
+    /// beside it.
+    fn between(&self, one: &Line, other: &Line) -> Option<(Slot, f64)> {
         let across = (one.normal - other.normal).try_normalize(0.0)?;
         let gap = (other.at - one.at).dot(&across);
         if one.normal.dot(&other.normal) > -PARALLEL || gap < 0.0 {
@@ -440,9 +443,10 @@ impl Void<'_> {
         })
     }
 
-    /// The slot or pocket; `None` where it is none.
+    /// The slot or pocket, and the share of its walls that has the land beside it; `None` where it
+    /// is none.
     #[expect(clippy::too_many_lines)]
-    fn slot(&self) -> Option<Slot> {
+    fn slot(&self) -> Option<(Slot, f64)> {
         let width = self.width();
         let contacts = self.contacts(self.view.kept.iter().copied());
         if self.has_island(&contacts) {
@@ -494,7 +498,8 @@ impl Void<'_> {
         let is_pocket = !is_long && is_boxed && is_shut;
         let is_deep = width < depth * if is_shut { SHALLOW } else { WIDE };
         // the undercut of a T-slot, seen along it, has walls and ends too
-        (is_deep && depth < DEEPEST * length && (is_long || is_pocket)).then(|| Slot {
+        let is_one = is_deep && depth < DEEPEST * length && (is_long || is_pocket);
+        let slot = || Slot {
             walls: Vec::new(),
             ends: [None; 2],
             shape,
@@ -512,7 +517,8 @@ impl Void<'_> {
             is_closed: true,
             is_aslant: false,
             area: length * depth,
-        })
+        };
+        is_one.then(|| (slot(), land.share))
     }
 
     /// Whether something stands between the walls.

@@ -131,6 +131,8 @@ impl<'a> Measure<'a> {
         guess: &Plane,
         is_wide: impl Fn([f64; 3]) -> bool,
     ) -> Fitted<Plane> {
+        let all = self.observed.touches_of(&[number]);
+        let is_inside = self.inside(&all, &guess.normal());
         let spread = |touches: &[u32]| {
             spreads(
                 touches
@@ -145,7 +147,7 @@ impl<'a> Measure<'a> {
                 .max(0.0)
                 .sqrt()
         };
-        let touches = self.squarest(self.observed.touches_of(&[number]), lean, is_enough);
+        let touches = self.squarest(all, lean, is_inside, is_enough);
         self.fitted(guess, touches, &self.observed.of_mesh(&[number]), None)
     }
 
@@ -245,6 +247,7 @@ impl<'a> Measure<'a> {
         self.squarest(
             touches,
             |touch| touch.normal.dot(&wall.axis).abs(),
+            |_| true,
             is_enough,
         )
     }
@@ -254,10 +257,12 @@ impl<'a> Measure<'a> {
     /// nearer to the surface than its radius.
     ///
     /// - `lean`: sine of the angle between the normal of a touch and the normals of the surface.
+    /// - `is_inside`: whether a touch that leans is of the surface and not of its edge.
     fn squarest(
         &self,
-        touches: Vec<u32>,
+        mut touches: Vec<u32>,
         lean: impl Fn(&ProbedPoint) -> f64,
+        is_inside: impl Fn(&ProbedPoint) -> bool,
         is_enough: impl Fn(&[u32]) -> bool,
     ) -> Vec<u32> {
         for most in LEANS {
@@ -267,10 +272,31 @@ impl<'a> Measure<'a> {
                 return square;
             }
         }
+        touches.retain(|&number| is_inside(self.observed.touch(number)));
         if is_enough(&touches) {
             touches
         } else {
             Vec::new()
+        }
+    }
+
+    /// Whether a ball is above what some touches felt of a plane: over an edge its centre goes on
+    /// while its contact stays.
+    fn inside(
+        &self,
+        touches: &[u32],
+        normal: &Vector3<f64>,
+    ) -> impl Fn(&ProbedPoint) -> bool + use<> {
+        let [u, v] = tangent_basis(normal);
+        let farthest = [u, -u, v, -v, u + v, u - v, v - u, -u - v].map(|way| {
+            let along = touches
+                .iter()
+                .map(|&number| self.observed.touch(number).point.coords.dot(&way));
+            (way, along.fold(f64::NEG_INFINITY, f64::max))
+        });
+        move |touch| {
+            let mut all = farthest.iter();
+            all.all(|(way, most)| touch.centre.coords.dot(way) <= *most)
         }
     }
 
@@ -331,6 +357,7 @@ impl<'a> Measure<'a> {
         let touches = self.squarest(
             touches,
             |touch| touch.normal.dot(&slot.out).abs(),
+            |_| true,
             is_enough,
         );
         self.fitted(&guess, touches, &of_mesh, Some(DRILLED))
