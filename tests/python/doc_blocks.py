@@ -21,6 +21,7 @@ RUN, OUTPUT = {"sh", "console", "python", "yaml", "json", "rust"}, {"text"}
 # reasons for which a block of commands or code is not run, each with what it must have: a mark without it is not needed
 REASONS = {
     "needs ROS": r"\bros2 |/opt/ros|colcon",
+    "needs Ray": r"\btouchup\.ray\b",
     "needs a UR arm": r"rtde_receive|UrArm",
     "installs packages": r"\b(apt|pip|cargo) install|\bur setup",
     "changes the system": r"\bsudo ",

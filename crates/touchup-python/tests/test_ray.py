@@ -126,3 +126,8 @@ def title(pid):
         return Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
     except OSError:
         return ""
+
+
+def test_types_are_right_beside_those_of_ray(tmp_path):
+    ended = subprocess.run([sys.executable, "-m", "mypy", "--strict", "-p", "touchup"], capture_output=True, text=True, cwd=tmp_path)
+    assert ended.returncode == 0, ended.stdout

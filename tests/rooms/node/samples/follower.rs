@@ -12,7 +12,7 @@ pub struct Follower {
     pub version: u64,
     next_part: u32,
     pub vertices: BTreeMap<u32, [f32; 3]>,
-    /// of each vertex what it rests on, and the bits of its variance, m²
+    /// of each vertex that was sent what it rests on, and the bits of its variance, m²
     pub known: BTreeMap<u32, (u8, u32)>,
     pub faces: BTreeMap<u32, [u32; 3]>,
     /// the whole state is wanted
@@ -33,10 +33,7 @@ impl Follower {
                 .zip(scan.positions())
                 .map(|(v, p)| (v, [p.x as f32, p.y as f32, p.z as f32]))
                 .collect(),
-            known: (0..)
-                .zip(scan.positions())
-                .map(|(v, _)| (v, (MeshPatch::SUPPORT_SCAN, f32::NAN.to_bits())))
-                .collect(),
+            known: BTreeMap::new(),
             faces: scan
                 .faces()
                 .map(|(face, corners)| (face.0, corners.map(|v| v.0)))

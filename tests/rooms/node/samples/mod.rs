@@ -179,7 +179,12 @@ fn a_follower_that_loses_messages_ends_with_the_mesh() {
         (&strict.session, strict.version)
     );
     assert!(follower.vertices == strict.vertices && follower.faces == strict.faces);
-    assert!(follower.known == strict.known);
+    // who was there from the beginning was sent nothing of what was never touched
+    let is_known_alike = |(v, known): (&u32, &(u8, u32))| match strict.known.get(v) {
+        Some(own) => own == known,
+        None => known.0 == MeshPatch::SUPPORT_SCAN,
+    };
+    assert!(strict.known.len() > 100 && follower.known.iter().all(is_known_alike));
     // the tiles show the same triangles
     let mut tiles = BTreeMap::new();
     for publication in bench.published() {
