@@ -15,8 +15,8 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use touchup::io::recording::{RecordingReader, Topics};
 use touchup::ros::messages::{
-    DetectFeaturesRequest, Feature, FlagFeatureRequest, Header, Marker, Point, PointStamped,
-    ProbeFeatureRequest, ProbeResult, ResyncMeshRequest, SaveMeshRequest, TFMessage,
+    DetectFeaturesRequest, Feature, FlagFeatureRequest, Header, Marker, MeshPatch, Point,
+    PointStamped, ProbeFeatureRequest, ProbeResult, ResyncMeshRequest, SaveMeshRequest, TFMessage,
     TransformStamped, UndoRequest, UnflagFeatureRequest,
 };
 use touchup::ros::parameters::ParameterValue;
