@@ -18,12 +18,15 @@ command -v cargo-nextest > /dev/null || { echo "cargo-nextest is missing: cargo 
 target=${CARGO_TARGET_DIR:-target}
 case $target in /*) ;; *) target=$PWD/$target ;; esac
 export CARGO_TARGET_DIR=$target
-logs=$target/test-logs
+reports=$target/test-logs
+logs=$reports/quick
 venv=$target/python
 wheel_crate=crates/touchup-python
 # members and features of every command of cargo: with others shared libraries would be built once more
 everything=(--workspace --features everything)
 stages=()
+# one more than there are cores: some wait for a controller or a node
+at_a_time=$(($(nproc) + 1))
 
 # note OUTCOME NAME [REASON]: counts what has no report of its own
 note() { printf '%s\t%s\t%s\n' "$1" "$2" "${3-}" >> "$logs/notes.tsv"; }
@@ -61,7 +64,7 @@ build() {
 # rust_tests NAME ARGUMENT...: of nextest, into the report NAME
 rust_tests() {
   local name=$1 status; shift
-  cargo nextest run "$@" 2>&1 | tee "$logs/$name.log"
+  cargo nextest run --test-threads "$at_a_time" "$@" 2>&1 | tee "$logs/$name.log"
   status=${PIPESTATUS[0]}
   mv "$target/nextest/default/junit.xml" "$logs/$name.xml" || { note failed "$name" "nextest ended with $status, see $logs/$name.log"; return; }
   [ "$status" -eq 0 ] || [ "$status" -eq 100 ] || note failed "$name" "nextest ended with $status, see $logs/$name.log"
@@ -80,7 +83,7 @@ documentation_tests() {
 # python_tests NAME FOLDER ARGUMENT...: of pytest, in a folder, into the report NAME
 python_tests() {
   local name=$1 folder=$2 status; shift 2
-  (cd "$folder" && "${python:-$venv/bin/python}" -m pytest "$@" --numprocesses 2 --dist loadfile -rs --tb=short --no-header --quiet \
+  (cd "$folder" && "${python:-$venv/bin/python}" -m pytest "$@" --numprocesses "$at_a_time" --dist loadfile -rs --tb=short --no-header --quiet \
     -o "cache_dir=$logs/pytest_cache" -o junit_logging=system-out --junitxml="$logs/$name.xml") 2>&1 | tee "$logs/$name.log"
   status=${PIPESTATUS[0]}
   # 1: tests failed, which the report says
@@ -106,6 +109,7 @@ package_tests() {
 
 quick_checks() {
   local packages
+  rm -rf "$logs" && mkdir -p "$logs" || exit 1
   # property tests try the same cases in every run, here; others in the shards
   export PROPTEST_RNG_SEED=1
   # they arrive while the tests are built
@@ -125,23 +129,24 @@ source tests/shards.sh
 
 # one_shard K: runs it, and writes its section of docs/results.md
 one_shard() {
-  local number=$1 before=$logs
+  local number=$1
+  logs=$reports/shard-$1
+  rm -rf "$logs" && mkdir -p "$logs" || exit 1
   export TOUCHUP_FULL=1 PROPTEST_CASES=2560 PROPTEST_MAX_GLOBAL_REJECTS=10240
-  logs=$logs/shard-$number && mkdir -p "$logs"
   stage "build" build && "shard_$number"
   python3 tests/results.py "$number/$shard_count" "$logs" || note failed "docs/results.md" "tests/results.py failed"
-  logs=$before
   unset TOUCHUP_FULL PROPTEST_CASES PROPTEST_MAX_GLOBAL_REJECTS
 }
 
-rm -rf "$logs" && mkdir -p "$logs" || exit 1
 case "$#:${1-}:${2-}" in
-  0::) quick_checks ;;
-  1:--full:) quick_checks; for number in $(seq "$shard_count"); do one_shard "$number"; done ;;
-  2:--shard:[1-9]*/"$shard_count") [ "${2%/*}" -le "$shard_count" ] || { echo "--shard K/$shard_count: K is 1 to $shard_count" >&2; exit 2; }; one_shard "${2%/*}" ;;
+  0::) counted=$logs; quick_checks ;;
+  1:--full:) counted=$reports; rm -rf "$reports"; quick_checks; for number in $(seq "$shard_count"); do one_shard "$number"; done ;;
+  2:--shard:[1-9]*/"$shard_count")
+    [ "${2%/*}" -le "$shard_count" ] || { echo "--shard K/$shard_count: K is 1 to $shard_count" >&2; exit 2; }
+    counted=$reports/shard-${2%/*}; one_shard "${2%/*}" ;;
   *) echo "usage: tests/all.sh [--full | --shard K/$shard_count]" >&2; exit 2 ;;
 esac
 
 echo
 printf '%s\n' "${stages[@]}"
-exec python3 tests/count.py "$logs"
+exec python3 tests/count.py "$counted"

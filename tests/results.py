@@ -30,10 +30,10 @@ def lines_of(*command):
 
 
 def printed_by(test, reports):
-    """The output of a test, by the end of its name."""
+    """The output of a test, by the end of its name; of one with parameters, that of the first."""
     for report in reports:
         for case in tree.parse(report).iter("testcase"):
-            if f"{case.get('classname', '')}::{case.get('name')}".endswith(test):
+            if f"{case.get('classname', '')}::{case.get('name')}".partition("[")[0].endswith(test):
                 text = "".join(out.text or "" for out in case.iter("system-out"))
                 # libtest frames the output of its one test
                 inner = re.search(r"^running 1 test\n(.*?)^test \S+ \.\.\. ", text, re.DOTALL | re.MULTILINE)

@@ -70,7 +70,7 @@ shard_3() {
 
 shard_4() {
   title "Sweeps of the published rule and of the robust mode"
-  slow_rust 'test(/^haptic::(sweeps|push::extreme)/)'
+  slow_rust 'binary(rooms) & test(/^haptic::/)'
   text haptic::sweeps::the_published_rule_converges_where_no_face_leans_out_of_its_basin_and_only_there "Where the published rule converges"
   text haptic::sweeps::the_guard_lets_the_published_rule_starve_no_face "The published rule, throttled by the longest step of the guard"
   text haptic::sweeps::the_robust_mode_never_blows_up_with_noise_larger_than_half_an_edge "The robust mode"
@@ -85,10 +85,77 @@ shard_5() {
   stage "engines" package_tests engines test_ray.py test_engines.py
 }
 
-# the site, and what it shows beside what a forge shows
+# links and names in the documentation of the crates; the site, and what it shows beside what a forge shows
 shard_6() {
-  title "Site of the documentation, and judged cases"
+  title "Documentation, and judged cases"
+  checked "documentation of the crates" env RUSTDOCFLAGS="-D warnings" cargo doc "${everything[@]}" --no-deps
   slow_python test_docs_site.py test_judge.py
+  markdown test_judge::test_no_worse_than_the_better_offline_baseline "Judged cases"
+}
+
+shard_7() {
+  title "Features"
+  slow_rust 'binary(rooms) & test(/^(features|form)::/)'
+  text features::touched::touched_features_are_found_within_their_stated_uncertainty "Features of the touched plate, fifty seeds"
+}
+
+shard_8() {
+  title "The surface, and how well it is known"
+  slow_rust 'binary(rooms) & test(/^reconstruct::/)'
+  text reconstruct::accuracy::other_tips_balls_hands_and_friction "Other balls, hands and friction, twenty seeds"
+  text reconstruct::accuracy::other_tips_flat_ends "Flat ends, twenty seeds"
+  text reconstruct::accuracy::other_tips_a_cone "A cone, twenty seeds"
+  text reconstruct::uncertainty::what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_has_them "Stated uncertainty where errors are as the model has them"
+  text reconstruct::uncertainty::errors_outside_of_the_model_are_not_in_the_stated_uncertainty "Stated uncertainty where errors are others"
+  text reconstruct::tips::contacts_of_a_tip_are_located "Where a tip touched"
+}
+
+shard_9() {
+  title "Probing"
+  slow_rust 'binary(rooms) & test(/^probing::/) & !test(/^probing::execute::uncertainty::errors/)'
+  text probing::arm::touching::a_hole_is_found_from_one_click_and_measured "A hole from one click, by a simulated arm"
+  markdown probing::decided::deciding_takes_the_touches_that_the_distance_from_the_limit_asks_for "Touches until decided"
+  text probing::grid::planned_touches_are_better_than_a_grid_over_the_region "Planned touches and a grid"
+}
+
+shard_10() {
+  title "Errors of an arm over their uncertainty"
+  slow_rust 'binary(rooms) & test(/^probing::execute::uncertainty::errors/)'
+  markdown probing::execute::uncertainty::errors_are_as_large_as_stated_of_a_rough_arm "A rough arm"
+  markdown probing::execute::uncertainty::errors_are_as_large_as_stated_of_a_calibrated_arm "A calibrated arm"
+}
+
+shard_11() {
+  title "Comparison, alignment, sessions and files"
+  slow_rust 'binary(rooms) & test(/^(align|compare|diagnose|io|live|node|refinement|sweep)/)'
+}
+
+# the client in the interpreter beside it, against a controller that fails; what else the library and its tests have of property tests
+shard_12() {
+  title "Faults of a UR arm"
+  slow_rust 'package(touchup) | package(touchup-core) | (binary(rooms) & test(/^(mesh|scene|sim|stylus)::/))'
+  markdown scripted::faults::each_fault_alone_ends_as_it_should "Faults of the arm"
+  markdown scripted::faults::random_scripts_end_as_they_should "Faults at random"
+  markdown scripted::hours::hours_of_faults_and_recoveries_leave_no_stuck_state_and_no_memory_behind "Hours of faults at the arm"
+}
+
+shard_13() {
+  title "The report"
+  slow_rust 'package(touchup-report)'
+}
+
+shard_14() {
+  title "Machined parts"
+  slow_python test_machined.py
+  markdown test_machined::test_touched_parts_in_three_worlds "Parts of another modeller in three worlds"
+}
+
+# other people's programs on the wire
+debian_packages[15]="xvfb python3-rosmaster python3-rosbag ros-robot-state-publisher rviz iproute2 libusb-1.0-0 libgl1 libgomp1 libegl1 libx11-6"
+shard_15() {
+  title "ROS"
+  slow_python test_ros_arm.py test_ros_fastdds_network.py test_ros_network.py test_ros_node.py test_ros_rviz.py test_step.py test_web_arm.py
+  text test_web_arm::test_the_arm_stands_within_200_ms_of_the_last_beat_and_probes_to_the_end_while_the_button_is_held "Hold to run"
 }
 
 shard_count=$(declare -F | grep -c ' shard_[0-9]*$')

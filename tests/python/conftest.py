@@ -48,12 +48,6 @@ def pytest_terminal_summary(terminalreporter):
         terminalreporter.write("\n".join([*doc_blocks.counts(), ""]))
 
 
-def write_result(name, text):
-    """Puts what a test measured where `tests/all.sh --full` makes docs/results.md of it."""
-    if folder := os.environ.get("TOUCHUP_RESULTS"):
-        (Path(folder) / f"{name}.md").write_text(text)
-
-
 @pytest.fixture(scope="session")
 def touchup_bin():
     """Path of the release binary."""
@@ -80,6 +74,14 @@ def demo_folder(touchup, tmp_path_factory):
     done = touchup("demo", "--out", out)
     assert done.returncode == 0, done.stderr
     return out
+
+
+@pytest.fixture(scope="session")
+def begun(demo_folder, tmp_path_factory):
+    """The first 20 s of the touches of the demo: its edges, two sides of the plate, and the boss."""
+    from part_of_recording import first_seconds
+
+    return first_seconds(demo_folder / "touch.mcap", 20, tmp_path_factory.mktemp("begun") / "touch.mcap")
 
 
 @pytest.fixture(scope="session")

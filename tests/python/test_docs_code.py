@@ -17,7 +17,7 @@ from dataclasses import replace
 import doc_blocks
 import pytest
 import yaml
-from conftest import ROOT, write_result
+from conftest import ROOT
 from doc_inputs import make_calibrations, make_inputs, make_programs, path_with
 
 BLOCKS = {page: doc_blocks.blocks_of(page) for page in doc_blocks.PAGES}
@@ -163,8 +163,6 @@ def test_each_block_runs_or_says_why_not():
         if doc_blocks.marks_of(page) != sum(block.mark is not None for block in blocks)
     ]
     assert wrong == []
-    lines = [f"- {line}" for line in doc_blocks.counts()]
-    write_result("docs_code", "\n".join(["## Blocks of the documentation", "", *lines]) + "\n")
 
 
 @pytest.mark.parametrize("page", [page for page, blocks in BLOCKS.items() if any(block.is_run for block in blocks)], ids=name_of)

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from conftest import IS_FULL, ROOT, write_result
+from conftest import IS_FULL, ROOT
 from scipy.spatial import cKDTree
 
 PARTS = ["plate", "flange", "featuretype"] if IS_FULL else ["plate"]
@@ -129,7 +129,6 @@ def run(touchup, judging, shared, tmp_path_factory):
 def judged(run):
     """Each case as plain `touchup refine` does it."""
     found = {case: run(case) for case in CASES}
-    write_result("judged_cases", table_of(found) + "\n" + features_of(found))
     print("\n" + table_of(found) + "\n" + features_of(found))
     return found
 

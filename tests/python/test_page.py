@@ -26,12 +26,12 @@ AXE = ROOT / "web/node_modules/axe-core/axe.min.js"
 
 
 @pytest.fixture(scope="module")
-def touched(touchup_bin, demo_folder, tmp_path_factory):
-    """A node after the recording of the demo, at rest."""
+def touched(touchup_bin, demo_folder, begun, tmp_path_factory):
+    """A node after the beginning of the demo, at rest."""
     folder = tmp_path_factory.mktemp("touched")
     with PageNode(touchup_bin, folder, demo_folder / "scan.ply", "--web-links", ros=CYCLONE) as node:
         # however busy the machine is, all of it has come
-        play_in_step(node, demo_folder / "touch.mcap", node.domain)
+        play_in_step(node, begun, node.domain)
         yield node
 
 
@@ -161,8 +161,8 @@ def test_holes_and_bosses_are_listed_with_value_and_expanded_uncertainty_as_the_
             # to the last digit that is shown, the uncertainty rounded up
             both = [(*shown[one], *known[one]) for one in shown.keys() & known.keys()]
             near = [abs(value - true) < 0.51 * last and -1e-6 < u - true_u < last for value, u, last, true, true_u in both]
-            # features come one after the other: the through hole of the plate of the demo is among them
-            is_there = any(abs(value - 8.0) < 0.03 for value, *_ in shown.values())
+            # features come one after the other: the boss of the plate of the demo is among them
+            is_there = any(abs(value - 10.0) < 0.03 for value, *_ in shown.values())
             if is_there and shown.keys() == known.keys() and all(near):
                 break
             assert time.monotonic() < until, (shown, known)

@@ -116,7 +116,7 @@ def running(robot, demo_folder, folder, program):
             assert report["dropped"] == [0, 0] and report["unrecorded"] == 0, report
 
 
-# ur-rtde is installed for it: tests/all.sh --full
+# ur-rtde is installed for it by the slow proofs
 ROBOTS = ["sim", "ur"] if os.environ.get("TOUCHUP_FULL") else ["sim"]
 
 

@@ -1,6 +1,6 @@
 """The answers of the node to Fast DDS on another computer: a network of Ethernet's packets, and a tunnel of smaller ones.
 
-A heavy proof: tests/all.sh --full runs it, without that it is not collected (conftest.py).
+A slow proof: a shard of tests/shards.sh runs it; without that it is not collected (conftest.py).
 """
 
 import pytest

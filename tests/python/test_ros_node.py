@@ -128,8 +128,8 @@ class Played:
 
 
 @pytest.fixture(scope="module")
-def played(demo_folder, tmp_path_factory, touchup_bin):
-    """The demo is played to a node while a follower loses one of ten changes; at rest the mesh is saved and seen, then comes a reset."""
+def played(demo_folder, begun, tmp_path_factory, touchup_bin):
+    """The beginning of the demo is played to a node while a follower loses one of ten changes; at rest the mesh is saved and seen, then comes a reset."""
     folder, domain, pick = tmp_path_factory.mktemp("played"), next(domains), random.Random(5)
     with Node(touchup_bin, folder, "--scene", scene_for(demo_folder, folder), domain=domain, ros=CYCLONE) as node:
         save = Client(node, domain, "save_mesh", SaveMeshRequest, SaveMeshResponse)
@@ -151,7 +151,7 @@ def played(demo_folder, tmp_path_factory, touchup_bin):
 
         assert not save.introduce("../nowhere.ply", False, False).success
         resync.introduce("", 0)
-        for _ in in_step(node, demo_folder / "touch.mcap", domain):
+        for _ in in_step(node, begun, domain):
             follow(0.1)
         answers = []
 
@@ -194,15 +194,20 @@ def played(demo_folder, tmp_path_factory, touchup_bin):
     return Played(node.session, code, answers[-1], saved, lost, followed, known, begun_again, in_order(seen()))
 
 
-def test_a_played_recording_gives_the_files_of_refine(played, demo_folder):
+def test_a_played_recording_gives_the_files_of_refine(played, begun, touchup, tmp_path):
     """Over the network nothing is lost and nothing comes twice: what the node makes of it is compared with one thread on a file."""
     report = json.loads((played.folder / "report.json").read_text())
     assert played.code == 0
     assert report["lost"] == report["dropped"] == [0, 0] and report["unrecorded"] == 0
-    for name in ["refined.ply", "features.json", "touches.csv"]:
-        assert (played.folder / name).read_bytes() == (demo_folder / name).read_bytes(), name
+    files = {"--out": "refined.ply", "--features-out": "features.json", "--touches-out": "touches.csv"}
+    out = [word for flag, name in files.items() for word in (flag, tmp_path / name)]
+    done = touchup("refine", "--scene", played.folder.parents[1] / "scene.yaml", "--bag", begun, *out)
+    assert done.returncode == 0, done.stderr
+    assert '"boss"' in (tmp_path / "features.json").read_text()
+    for name in files.values():
+        assert (played.folder / name).read_bytes() == (tmp_path / name).read_bytes(), name
     for topic in ["/stylus/pose", "/stylus/wrench"]:
-        assert stamps(played.folder / "recording", topic) == sorted(stamps(demo_folder / "touch.mcap", topic))
+        assert stamps(played.folder / "recording", topic) == sorted(stamps(begun, topic))
 
 
 def test_a_follower_that_loses_messages_has_what_is_saved(played):

@@ -123,7 +123,7 @@ KINDS = {
 
 
 # of the 74 s of the demo: enough for some windows of the player, and a stroke and more
-FEW, STROKE = 1_000, 20_000
+FEW, STROKE = 1_000, 7_500
 
 
 def row_of(one):

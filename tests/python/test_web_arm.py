@@ -8,7 +8,7 @@ import time
 import numpy
 import pytest
 from browser import opened
-from conftest import ROOT, write_result
+from conftest import ROOT
 from running import DEADLINE_S
 from web_page import PageNode, Socket
 
@@ -144,7 +144,7 @@ def test_the_arm_stands_within_200_ms_of_the_last_beat_and_probes_to_the_end_whi
     watcher.join()
     assert result["code"] == STOPPED_IN_PLACE
     stands = stood_at(places) - let_go
-    write_result("hold_to_run", f"The arm stood {1e3 * stands:.0f} ms after the last beat, by its stamps and how far it went since a marker.\n")
+    print(f"The arm stood {1e3 * stands:.0f} ms after the last beat, by its stamps and how far it went since a marker.")
     # before the last beat: one before it was late, and the arm stopped for that
     assert 0.0 < stands < STANDS_WITHIN_S, stands
     recover(node)

@@ -135,6 +135,7 @@ fn distances(from: &TriMesh, to: &TriMesh) -> Vec<f64> {
 }
 
 #[test]
+#[ignore = "a slow proof"]
 #[expect(clippy::too_many_lines)]
 fn renewed_bit_by_bit_it_is_the_skin_of_all_at_once_and_sound_all_along() {
     let stream = stream(1, 0.25);
@@ -480,8 +481,9 @@ fn a_late_patch_holds_no_sample_up_and_changes_nothing_of_the_result() {
 
 /// Where the thread is done in time, no sample that waits would find another mesh.
 #[test]
+#[ignore = "a slow proof"]
 fn a_patch_in_time_equals_one_awaited_at_every_sample() {
-    let stream = stream(5, either(0.06, 0.1));
+    let stream = stream(5, 0.1);
     let mut patient = engine(&stream, PATIENT, Gate::default());
     let mut kept = Kept::new(&stream);
     for (i, sample) in stream.samples.iter().enumerate() {
@@ -710,6 +712,7 @@ fn take(engine: &mut Engine, samples: &[Sample]) {
 /// The samples go on while the evidence is made again without one in the middle; the last one goes
 /// when nothing comes any more.
 #[test]
+#[ignore = "a slow proof"]
 fn evidence_made_again_without_a_stroke_is_that_of_an_engine_that_never_took_it() {
     let stream = last_strokes(4, 0.15);
     let mut counted = patcher(&stream);

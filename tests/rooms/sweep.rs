@@ -812,7 +812,7 @@ fn a_softer_stylus_lifts_the_touched_place_by_the_difference_of_its_bending() {
 /// surface comes out farther by the same bending: the top rises by it, holes and slot shrink and
 /// the boss grows by twice as much. What does not bend, the axes, stays.
 #[test]
-#[ignore = "full"]
+#[ignore = "a slow proof"]
 #[expect(clippy::too_many_lines)]
 fn the_plate_touched_by_a_softer_stylus_grows_everywhere_by_its_bending() {
     let folder = tempfile::tempdir().unwrap();

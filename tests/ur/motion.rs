@@ -167,6 +167,7 @@ fn a_slide_keeps_its_force() {
 /// The controller reads one command in a cycle: a velocity right behind a press would take its
 /// place.
 #[test]
+#[ignore = "a slow proof"]
 fn a_press_is_never_lost() {
     with_library(|packages| {
         let stand_in = StandIn::start(&["--start-mm", "10,5,13.6"]);

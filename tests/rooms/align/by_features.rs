@@ -594,17 +594,18 @@ fn refined_case(name: &str, folder: &Path) -> Option<[PathBuf; 2]> {
 // is as good as that. From above the flange has a half turn that the touches do not break: the
 // dowel hole is on the other side.
 #[test]
+#[ignore = "a slow proof"]
 fn refined_meshes_come_onto_their_truth_from_anywhere() {
     let mut rng = Pcg64::new(77, 7);
     let cases = [("plate", 1), ("flange", 2), ("featuretype", 1)];
-    for &(name, motions) in &cases[..either(2, 3)] {
+    for &(name, motions) in &cases {
         let folder = tempfile::tempdir().unwrap();
         let Some([refined, truth]) = refined_case(name, folder.path()) else {
             return;
         };
         let [refined, truth] = [refined, truth]
             .map(|path| Part::new(read_mesh(&path, MeshUnit::Millimetre).unwrap().mesh));
-        for _ in 0..either(1, 2) {
+        for _ in 0..2 {
             let known = anywhere(&mut rng);
             let source = refined.moved(&known.inverse());
             let found = match align(&source, &source.features, &truth) {

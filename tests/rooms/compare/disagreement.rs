@@ -3,7 +3,6 @@
 
 use std::path::PathBuf;
 use std::process::Command;
-use std::sync::OnceLock;
 
 use nalgebra::{Point3, Vector3};
 use serde_json::Value;
@@ -228,71 +227,28 @@ fn ears(outline: &[[f64; 2]]) -> Vec<[u32; 3]> {
     triangles
 }
 
-/// A plate that was touched as it was scanned.
-struct Unchanged {
-    scanner: ScannerParams,
-    report: Value,
-    /// the refined mesh as `--coloured` writes it
-    map: TriMesh,
-    /// exit code and message for a mesh in which refine did not mark what was touched
-    unmarked: (Option<i32>, String),
-}
-
-#[derive(Clone, Copy)]
-enum Scanner {
-    /// that of the demo
-    Poor,
-    Better,
-}
-
-/// The same case serves all tests that need it.
-fn unchanged(kind: Scanner, seed: u64) -> &'static Unchanged {
-    static CASES: [[OnceLock<Unchanged>; 3]; 2] = [const { [const { OnceLock::new() }; 3] }; 2];
-    CASES[kind as usize][seed as usize - 1].get_or_init(|| {
-        let scanner = match kind {
-            Scanner::Poor => ScannerParams {
-                seed,
-                ..Default::default()
-            },
-            Scanner::Better => scanner(seed),
-        };
-        let case = Case::new(&plate(), &plate(), &scanner, |_| ());
-        let report = case.disagree();
-        let map = read_mesh(&case.path("map.ply"), MeshUnit::Millimetre)
-            .unwrap()
-            .mesh;
-        let [scan, csv] = ["scan.ply", "touches.csv"].map(|name| case.text(name));
-        let unmarked = Command::new(env!("CARGO_BIN_EXE_touchup-tested"))
-            .args(["disagree", &scan, &scan, "--touches", &csv])
-            .output()
-            .unwrap();
-        let unmarked = (
-            unmarked.status.code(),
-            String::from_utf8(unmarked.stderr).unwrap(),
-        );
-        Unchanged {
-            scanner,
-            report,
-            map,
-            unmarked,
-        }
-    })
-}
-
 #[test]
 fn a_part_that_was_not_changed_is_not_called_changed() {
     for seed in 1..=either(1, 3) {
-        for kind in [Scanner::Poor, Scanner::Better] {
-            let Unchanged {
-                scanner, report, ..
-            } = unchanged(kind, seed);
-            assert_eq!(regions(report, "changed part").len(), 0, "{seed}: {report}");
-            assert_eq!(area(report, "changed part"), 0.0);
-            let touched = area(report, "agrees") + area(report, "scanner error");
+        let poor = ScannerParams {
+            seed,
+            ..Default::default()
+        };
+        for scanner in [poor, scanner(seed)] {
+            let case = Case::new(&plate(), &plate(), &scanner, |_| ());
+            let report = case.disagree();
+            assert_eq!(
+                regions(&report, "changed part").len(),
+                0,
+                "{seed}: {report}"
+            );
+            assert_eq!(area(&report, "changed part"), 0.0);
+            let touched = area(&report, "agrees") + area(&report, "scanner error");
             // noise at an edge cannot be distinguished from a small change, least of all that of a
             // poor scanner
-            let share = if scanner.noise > 0.3e-3 { 0.06 } else { 0.04 };
-            let small = |class| area(report, class) < share * touched;
+            let is_poor = scanner.noise > 0.3e-3;
+            let share = if is_poor { 0.06 } else { 0.04 };
+            let small = |class| area(&report, class) < share * touched;
             assert!(
                 small("unsure") && small("bad touch"),
                 "{seed}: {} {}",
@@ -305,8 +261,74 @@ fn a_part_that_was_not_changed_is_not_called_changed() {
                 (0.5..1.6).contains(&(noise / (scanner.noise * 1e3))),
                 "{seed}: {noise}"
             );
+            if is_poor {
+                turned_no_farther_than_known(&report, seed);
+            } else {
+                assert_eq!(spikes(&report), 0, "{seed}: {report}");
+                written_columns_match(&report, &case);
+                refuses_a_mesh_without_marks(&case);
+            }
         }
     }
+}
+
+/// The scan is turned by 0.15° and shifted by 0.2 mm, of which noise of 0.6 mm hides most: the
+/// reported offset is no more than that, as far as the stated deviation goes.
+fn turned_no_farther_than_known(report: &Value, seed: u64) {
+    let vector =
+        |name: &str| Vector3::from_fn(|i, _| report["rigid_offset"][name][i].as_f64().unwrap());
+    if !report["rigid_offset"].is_null() {
+        let far = vector("turn_deg").norm() - 0.15;
+        assert!(
+            far < 3.0 * vector("turn_std_deg").norm(),
+            "{seed}: {}",
+            report["rigid_offset"]
+        );
+    }
+}
+
+/// The mesh as `--coloured` writes it has the area of all classes.
+fn written_columns_match(report: &Value, case: &Case) {
+    let map = read_mesh(&case.path("map.ply"), MeshUnit::Millimetre)
+        .unwrap()
+        .mesh;
+    let all: f64 = report["classes"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|c| c["refined_mm2"].as_f64().unwrap())
+        .sum();
+    let area: f64 = map
+        .faces()
+        .map(|(face, _)| map.double_area_normal(face).norm() / 2.0)
+        .sum();
+    assert!((all / (area * 1e6) - 1.0).abs() < 1e-4);
+}
+
+/// Of a scan nobody knows where it was touched.
+fn refuses_a_mesh_without_marks(case: &Case) {
+    let [scan, csv] = ["scan.ply", "touches.csv"].map(|name| case.text(name));
+    let unmarked = Command::new(env!("CARGO_BIN_EXE_touchup-tested"))
+        .args(["disagree", &scan, &scan, "--touches", &csv])
+        .output()
+        .unwrap();
+    assert_eq!(unmarked.status.code(), Some(2));
+    let message = String::from_utf8(unmarked.stderr).unwrap();
+    assert!(
+        message.contains("give the PLY that refine wrote"),
+        "{message}"
+    );
+}
+
+/// Number of bad touches that are far off.
+fn spikes(report: &Value) -> usize {
+    let far = |bad: &&Value| bad["off_mm"].as_f64().unwrap() > 0.4;
+    report["bad_touches"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(far)
+        .count()
 }
 
 #[test]
@@ -375,8 +397,9 @@ fn a_groove_that_was_cut_is_found() {
 }
 
 #[test]
+#[ignore = "a slow proof"]
 fn spikes_of_the_pose_are_bad_touches() {
-    for seed in 1..=either(1, 2) {
+    for seed in 1..=2 {
         // 12 times for 30 ms the tracker reads 1.2 mm too high
         let shake = |messages: &mut [Message]| {
             let last = messages.len();
@@ -393,79 +416,24 @@ fn spikes_of_the_pose_are_bad_touches() {
                 }
             }
         };
-        let plain = &unchanged(Scanner::Better, seed).report;
         let spiked = Case::new(&plate(), &plate(), &scanner(seed), shake).disagree();
-        let count = |report: &Value| {
-            let far = |bad: &&Value| bad["off_mm"].as_f64().unwrap() > 0.4;
-            report["bad_touches"]
-                .as_array()
-                .unwrap()
-                .iter()
-                .filter(far)
-                .count()
-        };
-        assert_eq!(count(plain), 0, "{seed}: {plain}");
-        assert!(count(&spiked) >= 3, "{seed}: {}", spiked["bad_touches"]);
+        assert!(spikes(&spiked) >= 3, "{seed}: {}", spiked["bad_touches"]);
         assert_eq!(area(&spiked, "changed part"), 0.0, "{seed}: {spiked}");
     }
 }
 
 #[test]
-fn written_columns_match_the_report() {
-    let Unchanged { report, map, .. } = unchanged(Scanner::Better, 1);
-    let all: f64 = report["classes"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|c| c["refined_mm2"].as_f64().unwrap())
-        .sum();
-    let area: f64 = map
-        .faces()
-        .map(|(face, _)| map.double_area_normal(face).norm() / 2.0)
-        .sum();
-    assert!((all / (area * 1e6) - 1.0).abs() < 1e-4);
-}
-
-#[test]
-fn a_mesh_without_marks_of_touch_is_refused() {
-    let (code, message) = &unchanged(Scanner::Better, 1).unmarked;
-    assert_eq!(*code, Some(2));
-    assert!(
-        message.contains("give the PLY that refine wrote"),
-        "{message}"
-    );
-}
-
-// The scan is turned by 0.15° and shifted by 0.2 mm, of which noise of 0.6 mm hides most: the
-// reported offset is no more than that, as far as the stated deviation goes. Turned by 3°, it is
-// reported in most.
-#[test]
-fn a_turned_scan_is_reported_only_as_far_as_the_turn_is_known() {
-    let mut turned_found = 0;
-    for seed in 1..=either(1, 3) {
-        let Unchanged {
-            scanner, report, ..
-        } = unchanged(Scanner::Poor, seed);
-        let vector =
-            |name: &str| Vector3::from_fn(|i, _| report["rigid_offset"][name][i].as_f64().unwrap());
-        if !report["rigid_offset"].is_null() {
-            let far = vector("turn_deg").norm() - 0.15;
-            assert!(
-                far < 3.0 * vector("turn_std_deg").norm(),
-                "{seed}: {}",
-                report["rigid_offset"]
-            );
-        }
+#[ignore = "a slow proof"]
+fn a_scan_that_is_turned_by_three_degrees_is_reported_in_most() {
+    let found = |seed: &u64| {
         let turned = ScannerParams {
+            seed: *seed,
             rigid_turn: 3f64.to_radians(),
-            ..*scanner
+            ..Default::default()
         };
         let report = Case::new(&plate(), &plate(), &turned, |_| ()).disagree();
-        turned_found += usize::from(!report["rigid_offset"].is_null());
-    }
-    assert!(
-        turned_found >= either(1, 2),
-        "{turned_found} of {}",
-        either(1, 3)
-    );
+        !report["rigid_offset"].is_null()
+    };
+    let count = (1..=3).filter(found).count();
+    assert!(count >= 2, "{count} of 3");
 }

@@ -166,7 +166,7 @@ fn a_part_touched_on_all_sides_of_an_open_scan_raises_no_alarm() {
 }
 
 #[test]
-#[ignore = "full"]
+#[ignore = "a slow proof"]
 fn over_twenty_seeds_nine_of_ten_mistakes_are_named() {
     let (mut all, mut lost) = (0, 0);
     for seed in 1..=20 {

@@ -292,6 +292,7 @@ fn json_has_the_documented_fields() {
 }
 
 #[test]
+#[ignore = "a slow proof"]
 #[expect(clippy::too_many_lines)]
 fn features_of_the_files_are_those_of_refine() {
     let folder = Folder::new();

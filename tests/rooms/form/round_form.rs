@@ -147,6 +147,7 @@ fn a_round_wall_is_found_round_to_its_uncertainty() {
 }
 
 #[test]
+#[ignore = "a slow proof"]
 fn a_cone_and_a_bent_axis_are_off_by_their_uncertainty() {
     let seeds = either(50, 150);
     let wall = |radius: &dyn Fn(f64, f64) -> f64| {

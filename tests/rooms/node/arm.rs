@@ -16,6 +16,7 @@ use super::cell::{Cell, HUNG, SimulatedArm};
 
 /// Of a plane one raster: planned, made, and published.
 #[test]
+#[ignore = "a slow proof"]
 fn what_was_found_is_slid_over_where_that_is_asked_for() {
     let cell = Cell::start(true);
     let id = cell.flag(Feature::KIND_PLANE, [45.0, 9.0, 12.0]);

@@ -231,6 +231,7 @@ fn an_input_that_is_surely_wrong_is_an_error_with_its_cause() {
 
 /// The result is that of the messages without the wrong ones, byte for byte.
 #[test]
+#[ignore = "a slow proof"]
 #[expect(clippy::too_many_lines)]
 fn a_wrong_stamp_costs_itself_alone() {
     let plate = Plate::touched(0.1);
@@ -334,6 +335,7 @@ fn written(mesh: &TriMesh, path: &Path) -> Vec<u8> {
 /// of the follower and the mesh in the file have the same bytes, and the answer of the service
 /// names the version that the follower has.
 #[test]
+#[ignore = "a slow proof"]
 #[expect(clippy::too_many_lines)]
 fn what_is_shown_becomes_what_is_saved_at_a_follower_that_loses_patches() {
     let plate = Plate::touched(0.15);
@@ -421,6 +423,7 @@ fn what_is_shown_becomes_what_is_saved_at_a_follower_that_loses_patches() {
 
 /// A pause in the middle, in which the mesh settles, changes nothing of the result.
 #[test]
+#[ignore = "a slow proof"]
 fn a_mesh_that_settles_in_a_pause_goes_on_as_if_it_had_not() {
     let plate = Plate::touched(0.1);
     let bench = Bench::start(&plate);

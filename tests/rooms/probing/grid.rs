@@ -302,8 +302,9 @@ fn no_plan_halves_the_error_of_a_grid_on_the_same_wall() {
 /// and no number that is asked for is worse. Half the error of the place is what is wanted; 0.49 to
 /// 0.58 are reached by 200 seeds.
 #[test]
+#[ignore = "a slow proof"]
 fn planned_touches_are_better_than_a_grid_over_the_region() {
-    let seeds = if crate::full::is_full() { 200 } else { 20 };
+    let seeds = 200;
     let mut failures = Vec::new();
     for (name, opening) in [("hole", HOLE), ("slot", SLOT)] {
         let names = if opening.kind == Kind::Hole {

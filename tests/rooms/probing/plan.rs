@@ -645,6 +645,7 @@ fn a_slot_that_is_claimed_is_the_one_of_the_drawing() {
 
 /// A pin in the slot: the slot does not end where it was met.
 #[test]
+#[ignore = "a slow proof"]
 fn an_obstacle_in_a_slot_is_not_its_end() {
     let (plate, mut rng) = (Plate::default(), Pcg64::seed_from_u64(22));
     for _ in 0..40 {

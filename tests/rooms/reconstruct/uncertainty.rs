@@ -300,6 +300,7 @@ fn foreign(stated: [f64; 2], noise: Foreign, seed: u64) -> (Normalised, ByArea, 
 }
 
 #[test]
+#[ignore = "a slow proof"]
 fn errors_outside_of_the_model_are_not_in_the_stated_uncertainty() {
     let report = |name: &str, stated, noise| {
         let (z, errors, sigmas) = foreign(stated, noise, 201);
@@ -495,10 +496,11 @@ fn disturbed_places(touch: &Touch) -> Vec<Point3<f64>> {
 }
 
 #[test]
+#[ignore = "a slow proof"]
 #[expect(clippy::too_many_lines)]
 fn outliers_are_counted_and_do_not_dent_the_mesh() {
     let (mut places, mut listed, mut errors) = (0, 0, [const { Vec::new() }; 3]);
-    for seed in 1..=either(2, 20) {
+    for seed in 1..=20 {
         let (scan, touch, params) = touched_plate(&StylusParams::default(), seed);
         let shaken = shaken_and_slipped(&touch.messages);
         let silent = PatcherParams {

@@ -312,6 +312,7 @@ fn the_cheapest_scene_moves_the_mesh_as_the_hand_written_loop_does() {
 }
 
 #[test]
+#[ignore = "a slow proof"]
 fn the_small_measurement_measures_every_part() {
     let mut lines = Vec::new();
     let began = std::time::Instant::now();

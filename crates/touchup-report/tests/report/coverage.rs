@@ -4,7 +4,6 @@ use touchup_report::coverage::{CoverageKind, CoverageParams, KindInWorld, Stated
 use touchup_report::{Effort, TableCell};
 use touchup_sim::SimWorld;
 
-use crate::full::is_full;
 use crate::markdown;
 
 fn number(error: f64, std: f64) -> StatedNumber {
@@ -73,10 +72,9 @@ fn vertices_hold_by_their_share_too() {
 }
 
 #[test]
+#[ignore = "a slow proof"]
 fn coverage_is_measured_and_reported() {
-    let params = CoverageParams::of(Effort {
-        is_quick: !is_full(),
-    });
+    let params = CoverageParams::of(Effort { is_quick: false });
     let found = coverage(params.clone(), &mut |_| {});
     assert_eq!(found.failed, Vec::<String>::new());
     for &world in &params.worlds {

@@ -76,7 +76,7 @@ fn the_default_is_stable_everywhere_and_explicit_euler_is_not() {
     }
 }
 
-/// 240 samples, 10,000 with --full; against collocation of order 13 in numbers of 32 digits.
+/// 240 samples, 10,000 in the slow proofs; against collocation of order 13 in numbers of 32 digits.
 #[test]
 fn the_step_with_an_error_bound_keeps_it_however_stiff_the_sample_is() {
     let cases = full::either(60, 2_500);

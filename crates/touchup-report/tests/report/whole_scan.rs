@@ -415,6 +415,7 @@ fn what_touches_nothing_is_refused() {
 }
 
 #[test]
+#[ignore = "a slow proof"]
 fn convergence_is_measured_and_reported() {
     let found = convergence(QUICK, &mut |_| {});
     assert!(found.failed.is_empty());
@@ -436,6 +437,7 @@ fn convergence_is_measured_and_reported() {
 /// Fig 6 and 7: b* stays on the line of n*(0), the distance falls before the angle, and both come
 /// to zero.
 #[test]
+#[ignore = "a slow proof"]
 fn one_face_goes_along_its_first_normal_and_corrects_the_distance_before_the_angle() {
     let found = convergence(QUICK, &mut |_| {});
     assert_eq!(found.one_face.len(), 3);

@@ -168,6 +168,7 @@ fn a_recording_without_the_markers_is_reported() {
 }
 
 #[test]
+#[ignore = "a slow proof"]
 fn cut_and_flipped_recordings_of_markers_lose_no_more_than_what_is_damaged() {
     let folder = tempfile::tempdir().unwrap();
     let records = records(6000);

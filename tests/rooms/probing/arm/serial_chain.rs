@@ -284,6 +284,7 @@ fn limits_hold_for_a_chain_as_for_a_ur() {
 
 /// By the matrices the flange is in the column of the base, 110 mm thick.
 #[test]
+#[ignore = "a slow proof"]
 fn links_of_a_chain_that_meet_are_named() {
     let arm = ArmGeometry::from(seven_joints());
     let probe = Isometry3::translation(0.0, 0.0, 0.15);

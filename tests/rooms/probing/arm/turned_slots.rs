@@ -8,7 +8,6 @@ use touchup::probing::arm::{OnsetVerdict, TouchOutcome, TouchParams, TouchTarget
 use touchup::probing::plan::{Explorer, PatternParams};
 use touchup::sim::{ArmParams, Bounds, Plate, SimArm, Surface, SurfacePoint};
 
-use crate::full::either;
 use crate::plate_stream::plate_scan;
 
 use super::touching::{at, explored, touched};
@@ -118,11 +117,12 @@ fn a_wall_met_at_a_flat_angle_is_a_contact_at_its_place() {
     }
 }
 
-/// Every 15°, with a flag up to 3 mm beside the middle; `--full`: every 5°, three flags each.
+/// Every 5°, with three flags up to 3 mm beside the middle each.
 #[test]
+#[ignore = "a slow proof"]
 #[expect(clippy::too_many_lines)]
 fn a_slot_is_found_at_every_angle() {
-    let (step, seeds) = either((15, 1), (5, 3));
+    let (step, seeds) = (5, 3);
     let mut missed = Vec::new();
     for degrees in (0..180u32).step_by(step) {
         for seed in 0..seeds {

@@ -10,7 +10,6 @@ use touchup::io::mesh_file::{MeshFile, MeshUnit, read_mesh, write_mesh};
 use touchup::mesh::TriMesh;
 use touchup::sim::{ArmErrorSigmas, ArmErrors, Plate, Surface};
 
-use crate::full::either;
 use crate::plate_stream::plate_scan;
 
 fn touchup(arguments: &[&str]) -> Output {
@@ -65,10 +64,10 @@ fn probe(folder: &Path, change: impl Fn(String) -> String, more: &[&str]) -> Out
 /// by an arm that differs from what is told of it, its numbers within three of their uncertainties
 /// with fewer than 40 touches each, and no force is above 1.5 times the 3 N that are set.
 #[test]
+#[ignore = "a slow proof"]
 fn the_arm_of_the_demo_finds_every_feature() {
-    // with seed 8, one of the slow proofs, the ball slides over a rim first, and one touch alone
-    // measures an end of the slot
-    for seed in &["1", "8"][..either(1, 2)] {
+    // with seed 8 the ball slides over a rim first, and one touch alone measures an end of the slot
+    for seed in &["1", "8"] {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().to_str().unwrap();
         let done = touchup(&["demo", "--robot", "sim", "--seed", seed, "--out", out]);
@@ -169,6 +168,7 @@ fn errors_match_the_stated_uncertainty(folder: &Path) {
 
 /// Touches determine the dimensions of a hole; slides bring the mesh around it to the drawing.
 #[test]
+#[ignore = "a slow proof"]
 fn slides_bring_the_mesh_to_the_part() {
     let plate = Plate::default();
     // mean distance from the drawing of the vertices around the hole, above the bottom of the

@@ -184,6 +184,7 @@ fn found_as_by(whole: &[Value], resumed: &[Value]) {
 }
 
 #[test]
+#[ignore = "a slow proof"]
 fn a_killed_probing_keeps_each_touch_and_goes_on_with_the_rest() {
     let case = Case::new();
     let out = case.path("out");

@@ -242,8 +242,9 @@ fn errors_are_as_large_as_stated_of_a_calibrated_arm() {
 
 /// Of χ² with 6 degrees of freedom 0.0001 lies below 0.1 and as much above 27.9, so that the rms of
 /// 6 errors of one dimension over their deviation is 0.13 to 2.16; more dimensions scatter less.
-/// With `--full` it is 200 errors, within what is asked of 50, 0.8 to 1.25: of 50 the rms of a size
-/// scatters by 0.1. All are found. The errors of each feature are drawn apart, from a seed on.
+/// In the slow proofs it is 200 errors, within what is asked of 50, 0.8 to 1.25: of 50 the rms of a
+/// size scatters by 0.1. All are found. The errors of each feature are drawn apart, from a seed
+/// on.
 fn errors_are_as_large_as_stated(world: &World, first: u64) {
     let (seeds, [least, most]) = (either(6, 200), either([0.13, 2.16], [0.8, 1.25]));
     let scan = plate_scan(1);

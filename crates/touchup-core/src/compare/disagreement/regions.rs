@@ -33,7 +33,8 @@ pub struct DisagreementRegion {
     pub centre: Point3<f64>,
     /// m²
     pub area: f64,
-    /// mean of touch − scan, m
+    /// mean of touch − scan, m: over the places that the scanner should have seen well, or over all
+    /// where there are none
     pub mean: f64,
     /// why
     pub evidence: RegionEvidence,
@@ -184,7 +185,10 @@ fn judged(
     let is_new =
         |at: usize| !is_taken[at] && goes_on(at) && !std::mem::replace(&mut is_taken[at], true);
     let all = flood(own.to_vec(), |at| neighbours(mesh, at), is_new);
-    let (area, mean) = mean_of(places, all.iter().copied());
+    // what it has grown by is where the scanner rounds: that adds to its area, and tells nothing of
+    // how far the part was changed
+    let (area, all_mean) = mean_of(places, all.iter().copied());
+    let mean = if open_area > 0.0 { open_mean } else { all_mean };
     let moments = all
         .iter()
         .map(|&at| places.positions[at].coords * places.areas[at]);

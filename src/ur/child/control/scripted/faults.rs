@@ -475,6 +475,7 @@ fn a_part_met_at_link_speed_is_pressed_with_no_more_than_the_limit_and_left() {
 
 /// In the fastest link, in the search for the surface, and pressed; each as a row of a table.
 #[test]
+#[ignore = "a slow proof"]
 fn each_fault_alone_ends_as_it_should() {
     let mut wrong = Vec::new();
     let free = played(Vec::new(), 1, 8.0).record;
@@ -521,16 +522,6 @@ fn each_fault_alone_ends_as_it_should() {
         }
     }
     println!("{table}");
-    if let (true, Some(folder)) = (
-        std::env::var_os("TOUCHUP_FULL").is_some(),
-        std::env::var_os("TOUCHUP_RESULTS"),
-    ) {
-        std::fs::write(
-            std::path::Path::new(&folder).join("Faults_of_the_arm.md"),
-            &table,
-        )
-        .unwrap();
-    }
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
@@ -595,12 +586,13 @@ fn an_arm_whose_caller_is_held_up_stands_also_where_its_program_hangs() {
     assert!(held < 0.07 && both < 0.2, "{held} s, {both} s");
 }
 
-/// One or two faults of any kind at any moment; 25 scripts, with `--full` 200 of each of 20 seeds.
+/// One or two faults of any kind at any moment; 10 scripts, in the slow proofs 200 of each of two
+/// seeds.
 #[test]
 fn random_scripts_end_as_they_should() {
     let is_full = std::env::var_os("TOUCHUP_FULL").is_some();
     let (mut reported, mut touches, mut peak) = (0, 0, 0.0_f64);
-    let (scripts, seeds) = if is_full { (200, 20) } else { (25, 1) };
+    let (scripts, seeds) = if is_full { (200, 2) } else { (10, 1) };
     let mut wrong = Vec::new();
     for seed in 1..=seeds {
         let mut rng = Pcg64::seed_from_u64(seed);

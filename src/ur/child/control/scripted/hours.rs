@@ -16,12 +16,12 @@ const QUIET: f64 = 0.3;
 /// bytes.
 const FLAT: isize = 64 << 10;
 
-/// Five minutes of the arm's time, with `--full` eight hours.
+/// Five minutes of the arm's time, in the slow proofs an hour.
 #[test]
 #[expect(clippy::too_many_lines)]
 fn hours_of_faults_and_recoveries_leave_no_stuck_state_and_no_memory_behind() {
     let is_full = std::env::var_os("TOUCHUP_FULL").is_some();
-    let end = if is_full { 8.0 * 3600.0 } else { 300.0 };
+    let end = if is_full { 3600.0 } else { 300.0 };
     let mut rng = Pcg64::seed_from_u64(22);
     let plate = Plate::default();
     let world = World::new(&plate, Vec::new(), 22);
@@ -102,13 +102,6 @@ fn hours_of_faults_and_recoveries_leave_no_stuck_state_and_no_memory_behind() {
          {touches} | {peak:.1} | {first}, {last} |\n"
     );
     println!("{table}");
-    if let (true, Some(folder)) = (is_full, std::env::var_os("TOUCHUP_RESULTS")) {
-        std::fs::write(
-            std::path::Path::new(&folder).join("Hours_of_faults_at_the_arm.md"),
-            &table,
-        )
-        .unwrap();
-    }
     assert!(
         reported > 5 && touches > 10 && peak <= 1.5 * limits().force,
         "{table}"
