@@ -33,24 +33,17 @@ checked() {
   if stage "$name" "$@"; then note passed "$name"; else note failed "$name"; fi
 }
 
-# fuzzing guided by coverage, with counters at every branch
 shard_1() {
-  title "Guided fuzzing"
-  fuzz/run 120 > "$logs/fuzz.log" 2>&1
-  cat "$logs/fuzz.log"
-  awk '$1 ~ /^[a-z]/ && $3 == "executions" { end[$1] = "passed" } /^failed: fuzz target / { sub(/;/, "", $4); end[$4] = "failed" }
-       END { for (name in end) print end[name] "\tfuzz " name "\t" }' "$logs/fuzz.log" >> "$logs/notes.tsv"
-  grep -q '^[0-9]* executions: [0-9]* passed' "$logs/fuzz.log" || note failed "fuzz/run" "it did not count"
-  file "$logs/fuzz.log" "Executions, and edges of the code that they reached"
+  title "Sweeps of the published rule and of the robust mode"
+  slow_rust 'binary(rooms) & test(/^haptic::/)'
+  text haptic::sweeps::the_published_rule_converges_where_no_face_leans_out_of_its_basin_and_only_there "Where the published rule converges"
+  text haptic::sweeps::the_guard_lets_the_published_rule_starve_no_face "The published rule, throttled by the longest step of the guard"
+  text haptic::sweeps::the_robust_mode_never_blows_up_with_noise_larger_than_half_an_edge "The robust mode"
 }
 
-# of the node on r2r what it adds, as far as it goes where no ROS is installed; and the library without features
 shard_2() {
-  title "Other builds"
-  checked "lint of r2r" cargo clippy --lib --no-default-features --features r2r-check -- -D warnings
-  stage "tests of r2r" rust_tests r2r --package touchup --lib --no-default-features --features r2r-check --filterset 'test(/r2r/)'
-  checked "without features" cargo check --lib --no-default-features
-  checked "lint of the wheel" cargo clippy --package touchup-python --features abi3 -- -D warnings
+  title "The report"
+  slow_rust 'package(touchup-report)'
 }
 
 # as it is handed out: release profile, weighed, in an environment of its own
@@ -69,11 +62,9 @@ shard_3() {
 }
 
 shard_4() {
-  title "Sweeps of the published rule and of the robust mode"
-  slow_rust 'binary(rooms) & test(/^haptic::/)'
-  text haptic::sweeps::the_published_rule_converges_where_no_face_leans_out_of_its_basin_and_only_there "Where the published rule converges"
-  text haptic::sweeps::the_guard_lets_the_published_rule_starve_no_face "The published rule, throttled by the longest step of the guard"
-  text haptic::sweeps::the_robust_mode_never_blows_up_with_noise_larger_than_half_an_edge "The robust mode"
+  title "Machined parts"
+  slow_python test_machined.py
+  markdown test_machined::test_touched_parts_in_three_worlds "Parts of another modeller in three worlds"
 }
 
 # engines of a sweep, on a cluster of this machine
@@ -139,23 +130,32 @@ shard_12() {
   markdown scripted::hours::hours_of_faults_and_recoveries_leave_no_stuck_state_and_no_memory_behind "Hours of faults at the arm"
 }
 
-shard_13() {
-  title "The report"
-  slow_rust 'package(touchup-report)'
-}
-
-shard_14() {
-  title "Machined parts"
-  slow_python test_machined.py
-  markdown test_machined::test_touched_parts_in_three_worlds "Parts of another modeller in three worlds"
-}
-
 # other people's programs on the wire
-debian_packages[15]="xvfb python3-rosmaster python3-rosbag ros-robot-state-publisher rviz iproute2 libusb-1.0-0 libgl1 libgomp1 libegl1 libx11-6"
-shard_15() {
+debian_packages[13]="xvfb python3-rosmaster python3-rosbag ros-robot-state-publisher rviz iproute2 libusb-1.0-0 libgl1 libgomp1 libegl1 libx11-6"
+shard_13() {
   title "ROS"
   slow_python test_ros_arm.py test_ros_fastdds_network.py test_ros_network.py test_ros_node.py test_ros_rviz.py test_step.py test_web_arm.py
   text test_web_arm::test_the_arm_stands_within_200_ms_of_the_last_beat_and_probes_to_the_end_while_the_button_is_held "Hold to run"
+}
+
+# fuzzing guided by coverage, with counters at every branch
+shard_14() {
+  title "Guided fuzzing"
+  fuzz/run 120 > "$logs/fuzz.log" 2>&1
+  cat "$logs/fuzz.log"
+  awk '$1 ~ /^[a-z]/ && $3 == "executions" { end[$1] = "passed" } /^failed: fuzz target / { sub(/;/, "", $4); end[$4] = "failed" }
+       END { for (name in end) print end[name] "\tfuzz " name "\t" }' "$logs/fuzz.log" >> "$logs/notes.tsv"
+  grep -q '^[0-9]* executions: [0-9]* passed' "$logs/fuzz.log" || note failed "fuzz/run" "it did not count"
+  file "$logs/fuzz.log" "Executions, and edges of the code that they reached"
+}
+
+# of the node on r2r what it adds, as far as it goes where no ROS is installed; and the library without features
+shard_15() {
+  title "Other builds"
+  checked "lint of r2r" cargo clippy --lib --no-default-features --features r2r-check -- -D warnings
+  stage "tests of r2r" rust_tests r2r --package touchup --lib --no-default-features --features r2r-check --filterset 'test(/r2r/)'
+  checked "without features" cargo check --lib --no-default-features
+  checked "lint of the wheel" cargo clippy --package touchup-python --features abi3 -- -D warnings
 }
 
 shard_count=$(declare -F | grep -c ' shard_[0-9]*$')
