@@ -122,6 +122,7 @@ quick_checks() {
   stage "Python package" install_package || { note failed "Python package"; return; }
   stage "tests of the package" package_tests package ""
   stage "Python tests" python_tests python "$PWD" tests/python
+  echo "$(sed -nE 's/^ *Summary .*, ([0-9]+) skipped$/\1/p' "$logs/rust.log") Rust tests, and those of tests/python that are marked full, belong to the shards"
   unset PROPTEST_RNG_SEED
 }
 

@@ -118,13 +118,14 @@ shard_10() {
 
 shard_11() {
   title "Comparison, alignment, sessions and files"
-  slow_rust 'binary(rooms) & test(/^(align|compare|diagnose|io|live|node|refinement|sweep)/)'
+  # what is in no other shard
+  slow_rust 'binary(rooms) & !test(/^(features|form|haptic|mesh|probing|reconstruct|scene|sim|stylus)::/)'
 }
 
-# the client in the interpreter beside it, against a controller that fails; what else the library and its tests have of property tests
+# the client in the interpreter beside it, against a controller that fails; unit tests, and rooms of many property tests
 shard_12() {
   title "Faults of a UR arm"
-  slow_rust 'package(touchup) | package(touchup-core) | (binary(rooms) & test(/^(mesh|scene|sim|stylus)::/))'
+  slow_rust 'package(touchup) | package(/^touchup-(core|io|session|sim)$/) | binary(ur) | (binary(rooms) & test(/^(mesh|scene|sim|stylus)::/))'
   markdown scripted::faults::each_fault_alone_ends_as_it_should "Faults of the arm"
   markdown scripted::faults::random_scripts_end_as_they_should "Faults at random"
   markdown scripted::hours::hours_of_faults_and_recoveries_leave_no_stuck_state_and_no_memory_behind "Hours of faults at the arm"
