@@ -366,20 +366,21 @@ def test_the_page_says_that_it_is_a_replay_and_offers_nothing_else(browser, touc
             assert page.get_by_role("button", name=name).count() == 0 or page.get_by_role("button", name=name).is_hidden(), name
         page.get_by_role("button", name="4 times").click()
         page.locator("button[aria-pressed=true]", has_text="4").wait_for()
+        page.get_by_role("button", name="1 times").click()
         before = page.evaluate("touchup.version()")
         # behind the place to which it goes back
-        wait_until(page, f"touchup.version() > {before} && document.querySelector('.replay-controls input').valueAsNumber > 12")
-        page.screenshot(path=tmp_path / "replay.png")
+        wait_until(page, f"touchup.version() > {before} && document.querySelector('.replay-controls input').valueAsNumber > 4")
         page.get_by_role("button", name="Pause").click()
         page.get_by_role("button", name="Continue").wait_for()
+        page.screenshot(path=tmp_path / "replay.png")
         camera = page.evaluate("touchup.camera().view")
         slider = page.get_by_role("slider", name="Place in the recording")
-        slider.fill("8")
+        slider.fill("3")
         page.get_by_text("Touched again from the scan on").wait_for()
         page.screenshot(path=tmp_path / "ahead.png")
         page.get_by_text("Touched again from the scan on").wait_for(state="hidden")
         wait_until(page, "touchup.session() === 'one#2'")
-        assert page.locator("output.replay-time").inner_text().startswith("0:08 / 0:2")
+        assert page.locator("output.replay-time").inner_text().startswith("0:03 / 0:2")
         assert page.evaluate("touchup.camera().view") == camera
         # a tap on the part offers nothing
         page.locator("canvas").first.click()
