@@ -25,8 +25,6 @@ wheel_crate=crates/touchup-python
 # members and features of every command of cargo: with others shared libraries would be built once more
 everything=(--workspace --features everything)
 stages=()
-# one more than there are cores: some wait for a controller or a node
-at_a_time=$(($(nproc) + 1))
 
 # note OUTCOME NAME [REASON]: counts what has no report of its own
 note() { printf '%s\t%s\t%s\n' "$1" "$2" "${3-}" >> "$logs/notes.tsv"; }
@@ -64,7 +62,8 @@ build() {
 # rust_tests NAME ARGUMENT...: of nextest, into the report NAME
 rust_tests() {
   local name=$1 status; shift
-  cargo nextest run --test-threads "$at_a_time" "$@" 2>&1 | tee "$logs/$name.log"
+  # one more than there are cores, as some wait for a controller
+  cargo nextest run --test-threads $(($(nproc) + 1)) "$@" 2>&1 | tee "$logs/$name.log"
   status=${PIPESTATUS[0]}
   mv "$target/nextest/default/junit.xml" "$logs/$name.xml" || { note failed "$name" "nextest ended with $status, see $logs/$name.log"; return; }
   [ "$status" -eq 0 ] || [ "$status" -eq 100 ] || note failed "$name" "nextest ended with $status, see $logs/$name.log"
@@ -80,10 +79,11 @@ documentation_tests() {
   grep -q '^test .* FAILED$' "$logs/documentation.log" || note failed "documentation" "cargo test --doc ended with $status, see $logs/documentation.log"
 }
 
-# python_tests NAME FOLDER ARGUMENT...: of pytest, in a folder, into the report NAME
+# python_tests NAME FOLDER ARGUMENT...: of pytest, in a folder, into the report NAME; three at a time, as some wait for a node, and
+# no more, as each takes up to 15 of the 60 free DDS domains (ros_domains.py)
 python_tests() {
   local name=$1 folder=$2 status; shift 2
-  (cd "$folder" && "${python:-$venv/bin/python}" -m pytest "$@" --numprocesses "$at_a_time" --dist loadfile -rs --tb=short --no-header --quiet \
+  (cd "$folder" && "${python:-$venv/bin/python}" -m pytest "$@" --numprocesses 3 --dist loadfile -rs --tb=short --no-header --quiet \
     -o "cache_dir=$logs/pytest_cache" -o junit_logging=system-out --junitxml="$logs/$name.xml") 2>&1 | tee "$logs/$name.log"
   status=${PIPESTATUS[0]}
   # 1: tests failed, which the report says

@@ -73,7 +73,7 @@ shard_5() {
   title "Engines of a sweep"
   slow_python_packages "$wheel_crate/tests/requirements-full.txt" || return
   stage "Python package" install_package || { note failed "Python package"; return; }
-  stage "engines" package_tests engines test_ray.py test_engines.py
+  stage "engines" package_tests engines test_ray.py test_engines.py test_mesh.py
 }
 
 # links and names in the documentation of the crates; the site, and what it shows beside what a forge shows

@@ -433,7 +433,8 @@ fn a_number_is_taken_up_to_its_limits_and_refused_beyond_them() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// `TOUCHUP_WRITE=1 cargo test -p touchup-tests --test rooms written_from_the_definition` writes them.
+/// `TOUCHUP_WRITE=1 cargo test -p touchup-tests --test rooms written_from_the_definition` writes
+/// them.
 #[test]
 fn the_shipped_scene_and_the_page_of_parameters_are_written_from_the_definition() {
     for (file, text) in [

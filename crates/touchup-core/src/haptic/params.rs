@@ -120,8 +120,8 @@ const RELAXATION: f64 = 25.0;
 /// Contact force at which [`relaxing_alpha`] holds, N.
 const USUAL_FORCE: f64 = 2.5;
 /// Edges of what the haptic update works on, in radii of the tip. With 0.6 a dense scan 0.3 mm too
-/// high ends 0.014 mm off the part (`cargo test -p touchup-tests --test rooms haptic::dense -- --nocapture`); with
-/// 0.5, where a region has more vertices, it ended 0.038 mm off.
+/// high ends 0.014 mm off the part (`cargo test -p touchup-tests --test rooms haptic::dense --
+/// --nocapture`); with 0.5, where a region has more vertices, it ended 0.038 mm off.
 const WORKING_EDGE: f64 = 0.6;
 /// A scan whose edges are at least this share of that is left as it is: simplified it would have
 /// hardly fewer faces.

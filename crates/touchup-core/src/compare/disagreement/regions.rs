@@ -185,8 +185,8 @@ fn judged(
     let is_new =
         |at: usize| !is_taken[at] && goes_on(at) && !std::mem::replace(&mut is_taken[at], true);
     let all = flood(own.to_vec(), |at| neighbours(mesh, at), is_new);
-    // what it has grown by is where the scanner rounds: that adds to its area, and tells nothing of
-    // how far the part was changed
+    // it has grown to edges that the scanner rounds: these add to its area, and say nothing of how
+    // far the part was changed
     let (area, all_mean) = mean_of(places, all.iter().copied());
     let mean = if open_area > 0.0 { open_mean } else { all_mean };
     let moments = all
