@@ -44,14 +44,13 @@ fn fine_scan(divisions: u32) -> TriMesh {
 #[divan::bench(args = DIVISIONS, sample_count = 5)]
 fn found(bencher: Bencher, divisions: u32) {
     let mesh = fine_scan(divisions);
-    let tree = FaceTree::new(&mesh);
-    let features = detect(&mesh, &tree, &[]).features;
+    let features = detect(&mesh, &[]).features;
     println!(
         "{} vertices, {} features",
         mesh.vertex_count(),
         features.len()
     );
-    bencher.bench_local(|| detect(black_box(&mesh), &tree, &[]));
+    bencher.bench_local(|| detect(black_box(&mesh), &[]));
 }
 
 /// The demo's plate after all touches, and the touches.
@@ -75,11 +74,7 @@ fn touched_plate() -> (TriMesh, Vec<ProbedPoint>) {
 fn followed(bencher: Bencher) {
     let (mesh, touches) = touched_plate();
     let mut known = Tracker::new();
-    known.renew(
-        &mesh,
-        &FaceTree::new(&mesh),
-        &touches[..touches.len() - 2000],
-    );
+    known.renew(&mesh, &touches[..touches.len() - 2000]);
     // the first news that change a feature
     let is_news = |count: &usize| !known.clone().update(&touches[..*count]).is_empty();
     let until = (touches.len() - 2000..touches.len())

@@ -5,7 +5,10 @@ where it lies, nor on how finely it is tessellated.
 """
 
 import json
+import os
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from itertools import product
 
 import numpy as np
 import pytest
@@ -18,7 +21,7 @@ from scipy.spatial.transform import Rotation
 
 # none of these seeds was looked at while the program was written
 SEEDS = range(1000, 1060 if IS_FULL else 1018)
-TOUCHED_SEEDS = range(2000, 2024)
+TOUCHED_SEEDS = range(2000, 2012)
 # share of the features of a drawing that is found at least: holes across shafts whose tessellation is long and thin are missed now and then
 FOUND = 0.97
 # what a size of a drawing may be off: polygons lie this far from the circle that they stand for, mm
@@ -113,9 +116,9 @@ def test_what_was_touched_of_a_sheet_is_found(touchup_bin, tmp_path):
 def test_touched_parts_in_three_worlds(touchup_bin, tmp_path):
     totals = Totals()
     lines = []
-    for seed in TOUCHED_SEEDS:
-        for world in WORLDS:
-            result = part_run(touchup_bin, tmp_path, seed, world, None)
+    # each waits for programs of one thread
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for result in pool.map(lambda run: part_run(touchup_bin, tmp_path, *run, None), product(TOUCHED_SEEDS, WORLDS)):
             totals.add(result)
             lines += result.lines()
     print(totals.table() + "\n\n" + "\n".join(f"- {line}" for line in lines))

@@ -229,8 +229,8 @@ fn by_features(
     alternative: Option<usize>,
     seed: u64,
 ) -> Result<(Isometry3<f64>, serde_json::Value), CliError> {
-    let own = detect(source, &FaceTree::new_by(source, &Threads), &[]).features;
-    let theirs = detect(&target.mesh, &target.tree, &[]).features;
+    let own = detect(source, &[]).features;
+    let theirs = detect(&target.mesh, &[]).features;
     let points = spread(source, POINTS_EACH, seed);
     let surfaces = Surfaces {
         points: &points,

@@ -16,7 +16,7 @@ use crate::cli::{CliError, counted, print_report, reported};
 use crate::compare::{IndexedMesh, sample_surface, surface_area};
 use crate::features::detect;
 use crate::io::pairs_file::read_pairs;
-use crate::mesh::{FaceTree, TriMesh, VertexId};
+use crate::mesh::{TriMesh, VertexId};
 use crate::threads::Threads;
 
 /// Points of the mesh that are brought onto the truth.
@@ -169,8 +169,8 @@ pub(super) fn aligned_by_features(
     json: bool,
 ) -> Aligned {
     let _aligning = WorkProgress::stage("align by features");
-    let own = detect(mesh, &FaceTree::new_by(mesh, &Threads), &[]).features;
-    let theirs = detect(truth.mesh, truth.tree, &[]).features;
+    let own = detect(mesh, &[]).features;
+    let theirs = detect(truth.mesh, &[]).features;
     let points = spread(mesh, POINTS_EACH, seed);
     let surfaces = Surfaces {
         points: &points,

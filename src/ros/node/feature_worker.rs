@@ -13,7 +13,7 @@ use super::feature_messages::{flagged, found, related};
 use super::shared::Shared;
 use crate::clock::Clock;
 use crate::features::{Feature, Kind, Tracker, relations};
-use crate::mesh::{FaceTree, MeshError};
+use crate::mesh::MeshError;
 use crate::probing::execute::Flag;
 use crate::probing::plan::{NextTouch, advise_next_touch};
 use crate::ros::messages::{
@@ -199,8 +199,7 @@ impl FeatureWorker {
         self.looked = Some((snapshot.version, snapshot.stamp_ns));
         // its next version need not be a copy
         drop(snapshot);
-        self.tracker
-            .renew(&mesh, &FaceTree::new(&mesh), &self.touches);
+        self.tracker.renew(&mesh, &self.touches);
         self.name_found_flags();
         let now = self.clock.now();
         (self.look_took, self.looked_at, self.has_changes) =

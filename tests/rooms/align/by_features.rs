@@ -32,7 +32,7 @@ struct Part {
 impl Part {
     fn new(mesh: TriMesh) -> Self {
         let tree = FaceTree::new(&mesh);
-        let features = detect(&mesh, &tree, &[]).features;
+        let features = detect(&mesh, &[]).features;
         Self {
             mesh,
             tree,

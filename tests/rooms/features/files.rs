@@ -11,7 +11,6 @@ use touchup::io::result_table::{ResultTable, write_features_as_named, write_touc
 use touchup::io::touches_file::{
     HEADER, TouchesFileError, as_written, read_touches, write_touches,
 };
-use touchup::mesh::FaceTree;
 use touchup::sim::Plate;
 use touchup::stylus::ProbedPoint;
 
@@ -284,7 +283,7 @@ fn another_header_is_refused() {
 /// The features of the drawing, one of them as if it had been touched.
 fn features() -> Vec<Feature> {
     let plate = Plate::default().mesh(10e-6).unwrap();
-    let mut features = detect(&plate, &FaceTree::new(&plate), &[]).features;
+    let mut features = detect(&plate, &[]).features;
     let hole = features
         .iter_mut()
         .find(|feature| feature.kind == Kind::Hole)

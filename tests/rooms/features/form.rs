@@ -144,10 +144,7 @@ fn found(part: &dyn Surface, seed: u64) -> (Vec<Feature>, bool) {
         }
     }
     let is_felt = twelfths.iter().filter(|is_felt| **is_felt).count() >= 10;
-    (
-        detect(&mesh, &FaceTree::new(&mesh), patcher.probed()).features,
-        is_felt,
-    )
+    (detect(&mesh, patcher.probed()).features, is_felt)
 }
 
 fn hole_at(features: &[Feature], axis: [f64; 2]) -> &Feature {

@@ -4,8 +4,11 @@
 //! `TOUCHUP_FULL=1` runs all seeds; `--nocapture` or `--show-output` shows the numbers.
 
 use nalgebra::{Point3, Vector3};
+use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 use touchup::features::{Feature, FittedTo, Kind, Measured, detect};
-use touchup::mesh::FaceTree;
+use touchup::mesh::{FaceTree, TriMesh};
 use touchup::reconstruct::{CalibrationParams, Patcher, PatcherParams};
 use touchup::sim::{Plate, StylusParams, TruthFeature, TruthShape};
 use touchup::stylus::ProbedPoint;
@@ -27,8 +30,8 @@ struct CalibrationOffset {
     stiffness: f64,
 }
 
-/// Features of the plate of one seed, scanned and touched as in the demo.
-fn found(seed: u64, off: CalibrationOffset) -> Vec<Feature> {
+/// The plate of one seed, scanned and touched as in the demo, up to a share of its contacts; the touches.
+fn touched(seed: u64, off: CalibrationOffset, share: f64) -> (TriMesh, Vec<ProbedPoint>) {
     let stylus = StylusParams::default();
     assert_eq!(
         (stylus.friction, stylus.sensor.pose_noise),
@@ -54,12 +57,51 @@ fn found(seed: u64, off: CalibrationOffset) -> Vec<Feature> {
         stiffness_share: 0.02,
     };
     let mut patcher = Patcher::new(params).unwrap();
-    contacts_of(radius, Some(stiffness), &samples)
+    let contacts = contacts_of(radius, Some(stiffness), &samples);
+    contacts[..(share * contacts.len() as f64) as usize]
         .iter()
         .for_each(|contact| patcher.push(contact));
     patcher.flush();
     let mesh = patcher.patched(&scan, &FaceTree::new(&scan)).unwrap().mesh;
-    detect(&mesh, &FaceTree::new(&mesh), patcher.probed()).features
+    (mesh, patcher.probed().to_vec())
+}
+
+/// Its features after all touches.
+fn found(seed: u64, off: CalibrationOffset) -> Vec<Feature> {
+    let (mesh, touches) = touched(seed, off, 1.0);
+    detect(&mesh, &touches).features
+}
+
+/// While little is touched much is decided by little: the order in which faces are met must be no part of it.
+#[test]
+fn features_do_not_depend_on_how_the_mesh_is_numbered() {
+    let (mesh, touches) = touched(7, CalibrationOffset::default(), 0.25);
+    let features = detect(&mesh, &touches).features;
+    let mut random = Pcg64::seed_from_u64(7);
+    for _ in 0..either(4, 20) {
+        let mut vertices: Vec<u32> = (0..mesh.vertex_slots() as u32).collect();
+        vertices.shuffle(&mut random);
+        let mut positions = mesh.positions().to_vec();
+        let mut number = vec![0; vertices.len()];
+        for (new, &old) in vertices.iter().enumerate() {
+            positions[new] = mesh.positions()[old as usize];
+            number[old as usize] = new as u32;
+        }
+        let mut faces: Vec<_> = mesh
+            .faces()
+            .map(|(_, corners)| corners.map(|corner| number[corner.0 as usize]))
+            .collect();
+        faces.shuffle(&mut random);
+        faces
+            .iter_mut()
+            .for_each(|corners| corners.rotate_left(random.random_range(0..3)));
+        let other = TriMesh::new(positions, faces).unwrap();
+        assert!(detect(&other, &touches).features == features);
+    }
+    assert!(
+        features.iter().any(|feature| feature.kind == Kind::Boss),
+        "what was touched by then"
+    );
 }
 
 /// Errors of one dimension of one feature, and its standard uncertainty, seed by seed; mm or
@@ -483,8 +525,7 @@ fn what_was_not_felt_is_a_bound_or_has_no_uncertainty() {
             number + 1,
         ));
     }
-    let tree = FaceTree::new(&mesh);
-    let of = |touches: &[ProbedPoint]| detect(&mesh, &tree, touches).features;
+    let of = |touches: &[ProbedPoint]| detect(&mesh, touches).features;
     let depth = |features: &[Feature]| {
         of_truth(&truth, Kind::Hole, features)
             .depth

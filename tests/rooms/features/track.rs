@@ -36,11 +36,10 @@ fn sizes(features: &[Feature]) -> Vec<(u32, Kind, f64)> {
 #[test]
 fn new_touches_are_in_the_numbers_at_once() {
     let (mesh, touches) = touched_plate(3);
-    let tree = FaceTree::new(&mesh);
     // runs along the walls come at the end of the demo: leave most of them out at first
     let early = &touches[..touches.len() * 3 / 4];
     let mut tracker = Tracker::new();
-    let before = sizes(tracker.renew(&mesh, &tree, early));
+    let before = sizes(tracker.renew(&mesh, early));
     let known: Vec<Feature> = tracker.features().to_vec();
     let changed = tracker.update(&touches);
     assert!(!changed.is_empty());
@@ -83,7 +82,7 @@ fn new_touches_are_in_the_numbers_at_once() {
     assert_eq!(before.len(), after.len());
     // a search of the whole mesh agrees within the error of the subsampled fit, and keeps the
     // numbers
-    let whole = sizes(tracker.renew(&mesh, &tree, &touches));
+    let whole = sizes(tracker.renew(&mesh, &touches));
     assert_eq!(whole.len(), after.len());
     for ((id, kind, size), (other_id, other_kind, other)) in whole.iter().zip(&after) {
         assert_eq!((id, kind), (other_id, other_kind));
@@ -99,9 +98,8 @@ fn new_touches_are_in_the_numbers_at_once() {
 #[test]
 fn nothing_new_changes_nothing() {
     let (mesh, touches) = touched_plate(5);
-    let tree = FaceTree::new(&mesh);
     let mut tracker = Tracker::new();
-    let first = tracker.renew(&mesh, &tree, &touches).to_vec();
+    let first = tracker.renew(&mesh, &touches).to_vec();
     assert!(tracker.update(&touches).is_empty());
     assert_eq!(tracker.features(), first);
     assert!(
@@ -113,7 +111,7 @@ fn nothing_new_changes_nothing() {
     assert!(tracker.update(&others).is_empty());
     assert_eq!(tracker.features(), first);
     assert_eq!(
-        tracker.renew(&mesh, &tree, &touches),
+        tracker.renew(&mesh, &touches),
         first,
         "the same, by the same numbers"
     );

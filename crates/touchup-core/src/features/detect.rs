@@ -13,7 +13,7 @@ use super::holes::{Boss, Hole, bosses, groups, holes};
 use super::measure::{Fitted, Measure};
 use super::observe::{NOT_ALIKE, Observed};
 use super::rims::{RoundOpening, rims};
-use super::scene::Parted;
+use super::scene::{Parted, numbered_by_place};
 use super::slots::{Slot, slots};
 use super::walls::{ALL_AROUND, Wall};
 use crate::mesh::{FaceTree, TriMesh};
@@ -37,13 +37,16 @@ const LEAST_PLANE: f64 = 1e-3;
 /// A round wall is as wide as the ball within these shares: the mesh is coarse.
 const OF_BALL: std::ops::Range<f64> = 0.97..1.12;
 
-/// Finds the features of a mesh, measured by touches where there are any.
+/// Finds the features of a mesh, measured by touches where there are any. The same surface has the
+/// same ones, however its vertices and faces are numbered.
 ///
 /// - `touches`: as [`crate::reconstruct::Patcher::probed`] has them; features name them by their
 ///   place in it.
 #[expect(clippy::too_many_lines)]
-pub fn detect(mesh: &TriMesh, tree: &FaceTree, touches: &[ProbedPoint]) -> Detection {
-    let mut parted = Parted::of(mesh, tree);
+pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
+    let mesh = numbered_by_place(mesh);
+    let tree = FaceTree::new(&mesh);
+    let mut parted = Parted::of(&mesh, &tree);
     join_planes(&mut parted);
     let is_round = add_contact_walls(&mut parted, touches);
     // contacts took faces from planes of the mesh that are the same ones

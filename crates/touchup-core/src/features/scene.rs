@@ -1,5 +1,6 @@
 //! A mesh parted into segments, with queries.
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector3};
@@ -10,7 +11,7 @@ use super::fit::Plane;
 use super::grow::MeshScale;
 use super::primitive::Primitive;
 use super::segment::{Segment, Segmentation};
-use crate::mesh::{FaceTree, TriMesh};
+use crate::mesh::{FaceTree, TriMesh, VertexId};
 use crate::numeric::tangent_basis;
 
 /// A parted mesh.
@@ -33,6 +34,56 @@ const AROUND: usize = 24;
 const LEAST_AREA: f64 = 1e-5;
 /// A plane around an opening is square to the axis within 20°.
 const SQUARE: f64 = 0.94;
+
+/// The same surface with its faces in the order of their places, from below, each from its first
+/// corner on, and its vertices as faces use them. What depends on the order in which faces are met
+/// depends on the surface alone then.
+pub(super) fn numbered_by_place(mesh: &TriMesh) -> TriMesh {
+    let place = |vertex: u32| mesh.position(VertexId(vertex));
+    let order = |&a: &u32, &b: &u32| {
+        let (a, b) = (place(a), place(b));
+        let axes = (0..3).rev().map(|axis| a[axis].total_cmp(&b[axis]));
+        axes.fold(Ordering::Equal, Ordering::then)
+    };
+    let mut by_place: Vec<u32> = (0..mesh.vertex_slots() as u32)
+        .filter(|&vertex| mesh.has_vertex(VertexId(vertex)))
+        .collect();
+    by_place.sort_unstable_by(order);
+    let mut rank = vec![NONE; mesh.vertex_slots()];
+    // those at one place have one rank
+    for (number, alike) in by_place.chunk_by(|a, b| order(a, b).is_eq()).enumerate() {
+        for &vertex in alike {
+            rank[vertex as usize] = number as u32;
+        }
+    }
+    let ranked = mesh.faces().map(|(_, corners)| {
+        let mut corners = corners.map(|corner| (rank[corner.0 as usize], corner.0));
+        let first = (0..3).min_by_key(|&at| corners[at].0).unwrap_or(0);
+        corners.rotate_left(first);
+        (
+            corners.map(|(rank, _)| rank),
+            corners.map(|(_, vertex)| vertex),
+        )
+    });
+    let mut faces: Vec<_> = ranked.collect();
+    faces.sort_unstable_by_key(|(ranks, _)| *ranks);
+    let mut positions = Vec::with_capacity(by_place.len());
+    let mut number = rank;
+    number.fill(NONE);
+    let mut renumbered = |vertex: u32| {
+        let number = &mut number[vertex as usize];
+        if *number == NONE {
+            *number = positions.len() as u32;
+            positions.push(place(vertex));
+        }
+        *number
+    };
+    let faces = faces
+        .iter()
+        .map(|(_, corners)| corners.map(&mut renumbered))
+        .collect();
+    TriMesh::new(positions, faces).expect("it was sound under its other numbers")
+}
 
 impl<'a> Parted<'a> {
     pub fn of(mesh: &'a TriMesh, tree: &'a FaceTree) -> Self {

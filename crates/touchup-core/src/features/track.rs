@@ -11,7 +11,7 @@ use super::feature::{Feature, FittedTo, Kind, Measured, Walls};
 use super::fit::{Cylinder, Fit, FitParams, Freedom, Stadium, Surface, fit};
 use super::from_fits::{Touches, axis_of, number};
 use super::observe::{groups, observation, systematic};
-use crate::mesh::{FaceTree, TriMesh};
+use crate::mesh::TriMesh;
 use crate::numeric::distinct;
 use crate::stylus::ProbedPoint;
 
@@ -54,16 +54,11 @@ impl Tracker {
     }
 
     /// Detects features in the whole mesh again; features that were known keep their ids.
-    pub fn renew(
-        &mut self,
-        mesh: &TriMesh,
-        tree: &FaceTree,
-        touches: &[ProbedPoint],
-    ) -> &[Feature] {
+    pub fn renew(&mut self, mesh: &TriMesh, touches: &[ProbedPoint]) -> &[Feature] {
         let Detection {
             mut features,
             unexplained,
-        } = detect(mesh, tree, touches);
+        } = detect(mesh, touches);
         self.unexplained = Some(unexplained);
         let mut known = std::mem::take(&mut self.features);
         for feature in &mut features {

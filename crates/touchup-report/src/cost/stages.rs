@@ -215,8 +215,7 @@ pub(super) fn seldom_costs(faces: usize, repeats: usize) -> Measured<Vec<SeldomC
     // the first renewal takes in all that came before
     renew(&contacts[..1000]);
     let renewals = spread(contacts[1000..].chunks_exact(RENEWAL).map(renew))?;
-    let looks =
-        spread((0..repeats.clamp(1, 3)).map(|_| timed(|| detect(&mesh, &tree, &[])).0 * 1e3))?;
+    let looks = spread((0..repeats.clamp(1, 3)).map(|_| timed(|| detect(&mesh, &[])).0 * 1e3))?;
     let cost = |work: &str, time_ms| SeldomCost {
         work: work.to_owned(),
         faces,

@@ -113,7 +113,7 @@ fn guessed_share(support: &[Support]) -> f64 {
 
 /// Features of a mesh and the touches on it, also as a file has them.
 pub fn found(mesh: &TriMesh, touches: &[ProbedPoint]) -> (Detection, FeatureFile) {
-    let detection = detect(mesh, &FaceTree::new(mesh), touches);
+    let detection = detect(mesh, touches);
     let file = FeatureFile::of(&detection.features, detection.unexplained);
     (detection, file)
 }

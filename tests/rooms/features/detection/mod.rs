@@ -12,7 +12,7 @@ mod sheets;
 use nalgebra::Point3;
 use touchup::features::{Feature, Kind, detect};
 use touchup::io::mesh_file::{MeshUnit, read_mesh};
-use touchup::mesh::{FaceTree, TriMesh, repair};
+use touchup::mesh::{TriMesh, repair};
 
 use crate::shared::shared;
 
@@ -26,7 +26,7 @@ fn part(name: &str, unit: MeshUnit) -> Option<TriMesh> {
 }
 
 fn found(mesh: &TriMesh) -> Vec<Feature> {
-    detect(mesh, &FaceTree::new(mesh), &[]).features
+    detect(mesh, &[]).features
 }
 
 fn of_kind(features: &[Feature], kind: Kind) -> Vec<&Feature> {
