@@ -159,4 +159,10 @@ shard_15() {
   checked "lint of the wheel" cargo clippy --package touchup-python --features abi3 -- -D warnings
 }
 
+# the page of a session that is over, and what takes long in the documentation
+shard_16() {
+  title "Replays, and blocks of the documentation"
+  slow_python test_web_replay.py test_docs_code.py
+}
+
 shard_count=$(declare -F | grep -c ' shard_[0-9]*$')

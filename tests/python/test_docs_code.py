@@ -22,6 +22,8 @@ from doc_inputs import make_calibrations, make_inputs, make_programs, path_with
 
 BLOCKS = {page: doc_blocks.blocks_of(page) for page in doc_blocks.PAGES}
 ALL = [block for blocks in BLOCKS.values() for block in blocks]
+# pages whose blocks take more than some ten seconds
+SLOW = {"docs/compare.md", "docs/probing.md"}
 PYTHON = os.environ.get("TOUCHUP_PYTHON", sys.executable)
 
 # flags of tests/all.sh, touchup-report, colcon, touchup.ray, Slurm and Snakemake
@@ -165,7 +167,12 @@ def test_each_block_runs_or_says_why_not():
     assert wrong == []
 
 
-@pytest.mark.parametrize("page", [page for page, blocks in BLOCKS.items() if any(block.is_run for block in blocks)], ids=name_of)
+def pages_that_run():
+    pages = [page for page, blocks in BLOCKS.items() if any(block.is_run for block in blocks)]
+    return [pytest.param(page, marks=[pytest.mark.full] if name_of(page) in SLOW else []) for page in pages]
+
+
+@pytest.mark.parametrize("page", pages_that_run(), ids=name_of)
 def test_the_blocks_of_a_page_run(page, folder, programs):
     with Page(folder, programs) as running:
         for block in BLOCKS[page]:

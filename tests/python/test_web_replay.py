@@ -20,6 +20,7 @@ from test_web import ask, let_in
 from web_page import DEADLINE_S, PageNode, Socket
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
+pytestmark = pytest.mark.full
 # support of a vertex that rests on a touch
 TOUCHED = 1
 # of the demo's touches are in the session, twice

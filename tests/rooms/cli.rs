@@ -1101,6 +1101,7 @@ fn init_writes_a_scene_that_refine_takes() {
 /// error as poses do.
 #[test]
 #[expect(clippy::too_many_lines)]
+#[ignore = "a slow proof"]
 fn simulated_markers_refine_the_scan() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();

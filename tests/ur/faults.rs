@@ -440,6 +440,7 @@ fn one_fault(packages: &Path, fault: &Fault) -> Result<(), ProbeError> {
 /// reset of a safeguard. With a dashboard its program is gone by then; without one the client
 /// brakes it as soon as it is resumed, and its watchdog ends it.
 #[test]
+#[ignore = "a slow proof"]
 fn an_arm_that_was_paused_does_not_go_on_when_it_is_resumed() {
     for (pause, resume, is_mute) in [
         ("pause", "resume", false),
@@ -587,6 +588,7 @@ fn signal(id: u32, name: &str) {
 }
 
 #[test]
+#[ignore = "a slow proof"]
 fn after_a_protective_stop_it_is_recovered() {
     with_library(|packages| {
         let mut stand_in = StandIn::start(&["--start-mm", "45,8,40"]);

@@ -118,6 +118,7 @@ fn a_slide_goes_over_a_rim() {
 
 /// 5 N within 0.3 N over 40 mm.
 #[test]
+#[ignore = "a slow proof"]
 fn a_slide_keeps_its_force() {
     with_library(|packages| {
         let mut stand_in = StandIn::start(&["--start-mm", "10,5,14"]);

@@ -14,8 +14,6 @@ use touchup::sim::{
 };
 use touchup::stylus::Message;
 
-use crate::full::either;
-
 /// A scanner of the better kind; it still closes holes, rounds edges, is too large and displaced.
 fn scanner(seed: u64) -> ScannerParams {
     let closes = 6e-3;
@@ -228,8 +226,9 @@ fn ears(outline: &[[f64; 2]]) -> Vec<[u32; 3]> {
 }
 
 #[test]
+#[ignore = "a slow proof"]
 fn a_part_that_was_not_changed_is_not_called_changed() {
-    for seed in 1..=either(1, 3) {
+    for seed in 1..=3 {
         let poor = ScannerParams {
             seed,
             ..Default::default()
@@ -332,8 +331,9 @@ fn spikes(report: &Value) -> usize {
 }
 
 #[test]
+#[ignore = "a slow proof"]
 fn a_boss_that_was_milled_off_by_a_millimetre_is_found() {
-    for seed in 1..=either(1, 3) {
+    for seed in 1..=3 {
         let now = moved(&plate(), |p| {
             if p.z > 15e-3 {
                 p - Vector3::z() * 1e-3
@@ -366,6 +366,7 @@ fn a_boss_that_was_milled_off_by_a_millimetre_is_found() {
 }
 
 #[test]
+#[ignore = "a slow proof"]
 fn a_groove_that_was_cut_is_found() {
     let before = block(&[[0.0, 12.0], [60.0, 12.0]]);
     let now = block(&[
@@ -376,7 +377,7 @@ fn a_groove_that_was_cut_is_found() {
         [38.0, 12.0],
         [60.0, 12.0],
     ]);
-    for seed in 1..=either(1, 3) {
+    for seed in 1..=3 {
         let report = Case::new(&before, &now, &scanner(seed), |_| ()).disagree();
         let found = regions(&report, "changed part");
         assert!(!found.is_empty(), "{seed}: {report}");

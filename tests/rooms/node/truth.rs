@@ -15,7 +15,6 @@ use touchup::stylus::Message;
 
 use super::samples::bench::{Bench, Plate, patches, read, refine};
 use super::samples::follower::Follower;
-use crate::full::either;
 
 /// A second of ROS, ns.
 const SECOND: i64 = 1_000_000_000;
@@ -147,6 +146,7 @@ const FAULTS: [(&str, Fault, &[&str]); 10] = [
 /// Each way in which two streams come at full rate and no sample is of use, with what the node has
 /// to say of it.
 #[test]
+#[ignore = "a slow proof"]
 fn a_stream_that_is_not_used_is_a_warning_with_its_cause() {
     let plate = Plate::touched(0.1);
     let messages = &plate.messages;
@@ -188,8 +188,9 @@ fn a_stream_that_is_not_used_is_a_warning_with_its_cause() {
 
 /// Samples are taken, and what they say of the part cannot be.
 #[test]
+#[ignore = "a slow proof"]
 fn an_input_that_is_surely_wrong_is_an_error_with_its_cause() {
-    let plate = Plate::touched(either(0.1, 0.2));
+    let plate = Plate::touched(0.2);
     let states_of = |sign: f64| {
         let mut bench = Bench::start(&plate);
         bench.play_as(&plate.messages, |message| {
@@ -216,7 +217,7 @@ fn an_input_that_is_surely_wrong_is_an_error_with_its_cause() {
     };
     let sound = states_of(1.0);
     assert!(
-        sound.len() > either(5, 10)
+        sound.len() > 10
             && sound
                 .iter()
                 .all(|(level, _)| *level != DiagnosticStatus::ERROR),

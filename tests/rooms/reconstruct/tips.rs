@@ -12,8 +12,6 @@ use touchup::stylus::{
     TipPlace, TipShape,
 };
 
-use crate::full::either;
-
 const FLAT: TipShape = TipShape::Flat {
     edge_radius: 0.2e-3,
     length: 6e-3,
@@ -165,12 +163,13 @@ fn depth(stylus: &StylusParams, contacts: &[(TipTouch, Moment)]) -> f64 {
 }
 
 #[test]
+#[ignore = "a slow proof"]
 fn contacts_of_a_tip_are_located() {
     println!(
         "{:24} {:>6} {:>14} {:>14}",
         "", "share", "distance, mm", "normal, °"
     );
-    for (name, stylus) in &tips()[..either(2, 6)] {
+    for (name, stylus) in &tips() {
         let contacts = contacts(stylus, 1);
         let deepest = depth(stylus, &contacts);
         assert!(deepest < 8e-6, "{name}: {deepest} m in the part");

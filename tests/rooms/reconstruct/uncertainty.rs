@@ -20,7 +20,6 @@ use touchup::stylus::{
     Synchroniser, TipParams, Wrench,
 };
 
-use crate::full::either;
 use crate::plate_stream::plate_scan;
 
 fn normal(rng: &mut Pcg64) -> f64 {
@@ -139,9 +138,10 @@ impl Normalised {
 /// model.
 #[test]
 #[expect(clippy::too_many_lines)]
+#[ignore = "a slow proof"]
 fn what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_has_them() {
     // one draw of the stiffness says nothing about its coverage
-    let seeds = either(3, 20);
+    let seeds = 20;
     let noisy = SensorParams {
         pose_noise: 0.2e-3,
         orientation_noise: 0.3f64.to_radians(),
@@ -183,7 +183,7 @@ fn what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_ha
         "{:20} {:>9} {:>6} {:>7} {:>7} {:>7}   guessed: rms, 95 %",
         "", "vertices", "rms z", "68.3 %", "95 %", "99 %"
     );
-    for &(name, ref stylus, least) in &styli[..either(2, styli.len())] {
+    for &(name, ref stylus, least) in &styli {
         let (mut touched, mut guessed) = (Normalised::default(), Normalised::default());
         for seed in 101..=100 + seeds {
             let (scan, touch, params) = touched_plate(stylus, seed);
@@ -370,6 +370,7 @@ fn errors_outside_of_the_model_are_not_in_the_stated_uncertainty() {
 /// µm together), or 16 % of the 125 µm that 2.5 N bend the stylus, stand beside all else in every
 /// touched vertex.
 #[test]
+#[ignore = "a slow proof"]
 fn what_the_calibration_leaves_is_in_every_vertex() {
     let (scan, touch, params) = touched_plate(&StylusParams::default(), 1);
     let sigmas = |radius: f64, place: f64, stiffness_share: f64| {

@@ -74,7 +74,11 @@ fn vertices_hold_by_their_share_too() {
 #[test]
 #[ignore = "a slow proof"]
 fn coverage_is_measured_and_reported() {
-    let params = CoverageParams::of(Effort { is_quick: false });
+    // the chapter itself has twenty seeds
+    let params = CoverageParams {
+        seeds: 1..=4,
+        ..CoverageParams::of(Effort { is_quick: false })
+    };
     let found = coverage(params.clone(), &mut |_| {});
     assert_eq!(found.failed, Vec::<String>::new());
     for &world in &params.worlds {

@@ -5,7 +5,6 @@ use touchup_report::Effort;
 use touchup_report::mistakes::{CheckedRecording, MistakesParams, RightCount, mistakes};
 use touchup_sim::{INPUT_MISTAKES, InputMistake, SimWorld};
 
-use crate::full::is_full;
 use crate::markdown;
 
 fn finding(cause: InputCause, is_sure: bool) -> InputFinding {
@@ -56,13 +55,13 @@ fn a_mistake_is_named_by_its_cause_alone_and_surely() {
 }
 
 #[test]
+#[ignore = "a slow proof"]
 fn mistakes_are_named_and_sound_recordings_raise_no_alarm() {
-    let mut params = MistakesParams::of(Effort {
-        is_quick: !is_full(),
-    });
-    if is_full() {
-        params.seeds = 1..=20;
-    }
+    // the chapter itself has five seeds
+    let params = MistakesParams {
+        seeds: 1..=2,
+        ..MistakesParams::of(Effort { is_quick: false })
+    };
     let found = mistakes(params.clone(), &mut |_| {});
     assert_eq!(found.failed, Vec::<String>::new());
     let [made, sound] = found.counts();

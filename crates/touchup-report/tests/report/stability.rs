@@ -8,6 +8,7 @@ use super::full;
 
 #[test]
 #[expect(clippy::too_many_lines)]
+#[ignore = "a slow proof"]
 fn the_default_is_stable_everywhere_and_explicit_euler_is_not() {
     let measured = stability(Effort { is_quick: true }, &mut |_| {});
     for flow in &measured.sub_flows {

@@ -66,6 +66,7 @@ fn interleaved(messages: &[Message], seed: u64) -> Vec<Message> {
 }
 
 #[test]
+#[ignore = "a slow proof"]
 fn the_result_is_that_of_refine_byte_for_byte_however_messages_interleave() {
     let plate = Plate::touched(0.15);
     let expected = plate.refined("touch.mcap");
@@ -326,6 +327,7 @@ fn what_cannot_be_is_refused_and_counted_and_the_rest_goes_on() {
 /// need them.
 #[test]
 #[expect(clippy::too_many_lines)]
+#[ignore = "a slow proof"]
 fn poses_wait_for_the_transform_of_a_moving_frame_and_not_for_ever() {
     let plate = Plate::touched(0.05);
     let bench = Bench::start(&plate);
@@ -807,6 +809,7 @@ fn parameters_change_while_it_runs_or_say_why_not() {
 }
 
 #[test]
+#[ignore = "a slow proof"]
 fn it_holds_while_a_stream_is_away_and_after_the_clock_was_set_back_and_goes_on() {
     let plate = Plate::touched(0.1);
     let mut bench = Bench::start(&plate);

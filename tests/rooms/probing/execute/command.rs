@@ -305,6 +305,7 @@ fn a_dry_run_connects_to_no_arm() {
 /// refuse that by the same words, and what was touched is kept.
 #[test]
 #[expect(clippy::too_many_lines)]
+#[ignore = "a slow proof"]
 fn what_is_surely_wrong_becomes_a_mesh_only_when_forced() {
     let folder = tempfile::tempdir().unwrap();
     let [scene, truth] = cell(folder.path(), |scene| scene);
@@ -423,6 +424,7 @@ fn what_the_scan_has_lost_is_probed_without_force() {
 
 /// A tolerance below what a touch can be known by, and too few touches for a hole.
 #[test]
+#[ignore = "a slow proof"]
 fn what_is_not_as_asked_is_named_with_its_reason_and_exit_code() {
     for (more, code, why) in [
         (
@@ -606,6 +608,7 @@ const SPHERES: [&str; 8] = [
 /// are told but for the scatter of touches.
 #[test]
 #[expect(clippy::too_many_lines)]
+#[ignore = "a slow proof"]
 fn spheres_say_how_well_an_arm_repeats_and_how_large_its_ball_is_and_the_record_is_in_each_result()
 {
     let folder = tempfile::tempdir().unwrap();
@@ -1131,6 +1134,7 @@ fn nominal_file(folder: &Path, lines: &[&str]) -> String {
 
 /// The hole is 8 mm wide: far within one tolerance, far outside of another.
 #[test]
+#[ignore = "a slow proof"]
 fn a_probing_until_decided_ends_with_the_decision_of_each_characteristic() {
     for (nominal, code, said) in [("8,0.1", 0, "pass"), ("8.3,0.1", 4, "fail")] {
         let folder = tempfile::tempdir().unwrap();

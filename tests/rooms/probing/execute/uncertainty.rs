@@ -16,7 +16,6 @@ use touchup::probing::plan::{ArmUncertainty, PatternParams};
 use touchup::sim::{ArmErrorSigmas, ArmErrors, ArmParams, Plate, SimArm};
 
 use super::{cell, params};
-use crate::full::either;
 use crate::plate_stream::plate_scan;
 
 /// By what an arm differs from its scene, and what is wanted of its numbers.
@@ -218,6 +217,7 @@ fn rms(errors: &[f64]) -> f64 {
 
 /// Sizes are off by the radius, which all touches share.
 #[test]
+#[ignore = "a slow proof"]
 fn errors_are_as_large_as_stated_of_a_rough_arm() {
     let world = World {
         name: "rough",
@@ -230,6 +230,7 @@ fn errors_are_as_large_as_stated_of_a_rough_arm() {
 
 /// Sizes are off by what touches scatter.
 #[test]
+#[ignore = "a slow proof"]
 fn errors_are_as_large_as_stated_of_a_calibrated_arm() {
     let world = World {
         name: "calibrated",
@@ -240,13 +241,11 @@ fn errors_are_as_large_as_stated_of_a_calibrated_arm() {
     errors_are_as_large_as_stated(&world, 5000);
 }
 
-/// Of χ² with 6 degrees of freedom 0.0001 lies below 0.1 and as much above 27.9, so that the rms of
-/// 6 errors of one dimension over their deviation is 0.13 to 2.16; more dimensions scatter less.
-/// In the slow proofs it is 200 errors, within what is asked of 50, 0.8 to 1.25: of 50 the rms of a
-/// size scatters by 0.1. All are found. The errors of each feature are drawn apart, from a seed
-/// on.
+/// Of 200 errors the rms over their deviation is within what is asked of 50, 0.8 to 1.25: of 50 that
+/// of a size scatters by 0.1. All are found. The errors of each feature are drawn apart, from a
+/// seed on.
 fn errors_are_as_large_as_stated(world: &World, first: u64) {
-    let (seeds, [least, most]) = (either(6, 200), either([0.13, 2.16], [0.8, 1.25]));
+    let (seeds, [least, most]) = (200, [0.8, 1.25]);
     let scan = plate_scan(1);
     let mut table = String::from(
         "| arm | feature | number | error over ±, rms | found |\n|---|---|---|---|---|\n",
