@@ -102,11 +102,17 @@ shard_7() {
 }
 
 shard_8() {
-  title "The surface, and how well it is known"
-  slow_rust 'binary(rooms) & test(/^reconstruct::/)'
-  text reconstruct::accuracy::other_tips_balls_hands_and_friction "Other balls, hands and friction, twenty seeds"
-  text reconstruct::accuracy::other_tips_flat_ends "Flat ends, twenty seeds"
-  text reconstruct::accuracy::other_tips_a_cone "A cone, twenty seeds"
+  title "The surface"
+  slow_rust 'binary(rooms) & test(/^reconstruct::accuracy::/)'
+  text reconstruct::accuracy::other_tips_balls_hands_and_friction "Other balls, hands and friction, six seeds"
+  text reconstruct::accuracy::other_tips_flat_ends "Flat ends, six seeds"
+  text reconstruct::accuracy::other_tips_a_cone "A cone, six seeds"
+}
+
+# … and how well it is known
+shard_17() {
+  title "The uncertainty of the surface, its grid and its tips"
+  slow_rust 'binary(rooms) & test(/^reconstruct::/) & !test(/^reconstruct::accuracy::/)'
   text reconstruct::uncertainty::what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_has_them "Stated uncertainty where errors are as the model has them"
   text reconstruct::uncertainty::errors_outside_of_the_model_are_not_in_the_stated_uncertainty "Stated uncertainty where errors are others"
   text reconstruct::tips::contacts_of_a_tip_are_located "Where a tip touched"

@@ -322,7 +322,6 @@ fn touched_features_are_found_within_their_stated_uncertainty() {
     let mut table = Table::default();
     let mut others = Vec::new();
     for seed in 1..=seeds() {
-        println!("seed {seed}");
         // by one and a half of what the calibration says, each sign in turn: no draws of the model
         // under test
         let sign = |bit: u64| if seed >> bit & 1 == 0 { 1.5 } else { -1.5 };

@@ -437,7 +437,7 @@ fn are_right(styli: &[(&str, StylusParams, Expected)]) {
     println!("mean distances, mm, from the part to the mesh and back; rims, m");
     let mut wrong = Vec::new();
     for (name, stylus, expected) in styli {
-        for (seed, errors, rims) in measured(stylus, 20) {
+        for (seed, errors, rims) in measured(stylus, 6) {
             println!(
                 "{name:14} {seed:2} {:6.3} {:6.3} {rims:?}",
                 errors[0], errors[1]
