@@ -536,24 +536,18 @@ fn other_tips_flat_ends() {
         shape: FLAT,
         ..StylusParams::default()
     };
+    // in one hand of six the rim goes up and down the wall too, by 2 % of its length
+    let expected = || Expected {
+        rim: 1.1,
+        ..OF_A_BALL
+    };
+    let upright = StylusParams {
+        tilt: 0.0,
+        ..flat()
+    };
     are_right(&[
-        ("flat, 1.5 mm", flat(), OF_A_BALL),
-        (
-            "flat, upright",
-            StylusParams {
-                tilt: 0.0,
-                ..flat()
-            },
-            OF_A_BALL,
-        ),
-        (
-            "flat, tilt 15°",
-            StylusParams {
-                tilt: 15f64.to_radians(),
-                ..flat()
-            },
-            OF_A_BALL,
-        ),
+        ("flat, 1.5 mm", flat(), expected()),
+        ("flat, upright", upright, expected()),
     ]);
 }
 
