@@ -61,8 +61,10 @@ fn probe(folder: &Path, change: impl Fn(String) -> String, more: &[&str]) -> Out
 }
 
 /// The features of the plate are known by its drawing: each is found from one click up to 3 mm off
-/// by an arm that differs from what is told of it, its numbers within three of their uncertainties
-/// with fewer than 40 touches each, and no force is above 1.5 times the 3 N that are set.
+/// by an arm that differs from what is told of it, its numbers within 4.2 of their standard
+/// uncertainties with fewer than 40 touches each, and no force is above 1.5 times the 3 N that are
+/// set. Of 20 numbers one is beyond three in 1 of 19 such proofs, beyond 4.2 in 1 of 1900; whether
+/// errors are as large as stated 200 seeds tell (`uncertainty`).
 #[test]
 #[ignore = "a slow proof"]
 fn the_arm_of_the_demo_finds_every_feature() {
@@ -82,10 +84,9 @@ fn the_arm_of_the_demo_finds_every_feature() {
             for number in error["numbers"].as_array().unwrap() {
                 let [off, expanded] =
                     ["error_mm", "expanded_mm"].map(|key| number[key].as_f64().unwrap());
-                // three standard uncertainties, and no more than the tolerance of the scene leads
-                // to
+                // and no more than the tolerance of the scene leads to
                 assert!(
-                    off.abs() < 1.5 * expanded && expanded < 0.25,
+                    off.abs() < 2.1 * expanded && expanded < 0.25,
                     "{name}: {number}"
                 );
             }
