@@ -44,6 +44,8 @@ shard_1() {
 shard_2() {
   title "The report"
   slow_rust 'package(touchup-report)'
+  markdown coverage::coverage_is_measured_and_reported "Coverage, four seeds"
+  markdown mistakes::mistakes_are_named_and_sound_recordings_raise_no_alarm "Mistakes, two seeds"
 }
 
 # weighed NAME FILE LIMIT: in bytes
