@@ -1100,8 +1100,8 @@ fn init_writes_a_scene_that_refine_takes() {
 /// The markers on the stylus in place of its pose, with occlusion, swaps and outliers, lower the
 /// error as poses do.
 #[test]
-#[expect(clippy::too_many_lines)]
 #[ignore = "a slow proof"]
+#[expect(clippy::too_many_lines)]
 fn simulated_markers_refine_the_scan() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();

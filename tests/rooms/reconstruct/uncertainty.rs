@@ -137,8 +137,8 @@ impl Normalised {
 /// Consistency, not truth: noise, friction and residual calibration errors are drawn from the
 /// model.
 #[test]
-#[expect(clippy::too_many_lines)]
 #[ignore = "a slow proof"]
+#[expect(clippy::too_many_lines)]
 fn what_was_touched_is_as_well_known_as_it_says_where_errors_are_as_the_model_has_them() {
     // one draw of the stiffness says nothing about its coverage
     let seeds = 20;

@@ -7,8 +7,8 @@ use touchup_report::stability::{Integrator, RunEnding, bounded_steps, stability}
 use super::full;
 
 #[test]
-#[expect(clippy::too_many_lines)]
 #[ignore = "a slow proof"]
+#[expect(clippy::too_many_lines)]
 fn the_default_is_stable_everywhere_and_explicit_euler_is_not() {
     let measured = stability(Effort { is_quick: true }, &mut |_| {});
     for flow in &measured.sub_flows {

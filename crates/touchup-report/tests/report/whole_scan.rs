@@ -309,8 +309,8 @@ fn given() -> GivenPart {
 const QUICK: Effort = Effort { is_quick: true };
 
 #[test]
-#[expect(clippy::too_many_lines)]
 #[ignore = "a slow proof"]
+#[expect(clippy::too_many_lines)]
 fn whole_scans_are_measured_and_reported() {
     let (given, mut lines) = (given(), 0);
     let begun = std::time::Instant::now();

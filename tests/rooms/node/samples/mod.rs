@@ -326,8 +326,8 @@ fn what_cannot_be_is_refused_and_counted_and_the_rest_goes_on() {
 /// A rig that carries the tracker moves while it looks: its transforms come after the poses that
 /// need them.
 #[test]
-#[expect(clippy::too_many_lines)]
 #[ignore = "a slow proof"]
+#[expect(clippy::too_many_lines)]
 fn poses_wait_for_the_transform_of_a_moving_frame_and_not_for_ever() {
     let plate = Plate::touched(0.05);
     let bench = Bench::start(&plate);

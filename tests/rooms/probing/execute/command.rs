@@ -305,8 +305,8 @@ fn a_dry_run_connects_to_no_arm() {
 /// The part lies 2 mm below its scan, farther than the scan's noise explains: `refine` and `probe`
 /// refuse that by the same words, and what was touched is kept.
 #[test]
-#[expect(clippy::too_many_lines)]
 #[ignore = "a slow proof"]
+#[expect(clippy::too_many_lines)]
 fn what_is_surely_wrong_becomes_a_mesh_only_when_forced() {
     let folder = tempfile::tempdir().unwrap();
     let [scene, truth] = cell(folder.path(), |scene| scene);
@@ -608,8 +608,8 @@ const SPHERES: [&str; 8] = [
 /// repeatability of 0.03 mm, and no error of joints and lengths, so that the spheres are where they
 /// are told but for the scatter of touches.
 #[test]
-#[expect(clippy::too_many_lines)]
 #[ignore = "a slow proof"]
+#[expect(clippy::too_many_lines)]
 fn spheres_say_how_well_an_arm_repeats_and_how_large_its_ball_is_and_the_record_is_in_each_result()
 {
     let folder = tempfile::tempdir().unwrap();

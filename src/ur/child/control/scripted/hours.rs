@@ -18,8 +18,8 @@ const FLAT: isize = 64 << 10;
 
 /// Five minutes of the arm's time, in the slow proofs an hour.
 #[test]
-#[expect(clippy::too_many_lines)]
 #[ignore = "a slow proof"]
+#[expect(clippy::too_many_lines)]
 fn hours_of_faults_and_recoveries_leave_no_stuck_state_and_no_memory_behind() {
     let end = 3600.0;
     let mut rng = Pcg64::seed_from_u64(22);
