@@ -37,16 +37,18 @@ const LEAST_PLANE: f64 = 1e-3;
 /// A round wall is as wide as the ball within these shares: the mesh is coarse.
 const OF_BALL: std::ops::Range<f64> = 0.97..1.12;
 
-/// Finds the features of a mesh, measured by touches where there are any. The same surface has the
-/// same ones, however its vertices and faces are numbered.
+/// Finds the features of a mesh, measured by touches where there are any. With touches the same
+/// surface has the same ones, however its vertices and faces are numbered: a live mesh and a saved
+/// one are numbered as they were made. A drawing keeps the order of its file.
 ///
 /// - `touches`: as [`crate::reconstruct::Patcher::probed`] has them; features name them by their
 ///   place in it.
 #[expect(clippy::too_many_lines)]
 pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
-    let mesh = numbered_by_place(mesh);
-    let tree = FaceTree::new(&mesh);
-    let mut parted = Parted::of(&mesh, &tree);
+    let numbered = (!touches.is_empty()).then(|| numbered_by_place(mesh));
+    let mesh = numbered.as_ref().unwrap_or(mesh);
+    let tree = FaceTree::new(mesh);
+    let mut parted = Parted::of(mesh, &tree);
     join_planes(&mut parted);
     let is_round = add_contact_walls(&mut parted, touches);
     // contacts took faces from planes of the mesh that are the same ones
