@@ -111,7 +111,7 @@ shard_8() {
   text reconstruct::accuracy::other_tips_a_cone "A cone, six seeds"
 }
 
-# … and how well it is known
+# how well the surface is known
 shard_17() {
   title "The uncertainty of the surface, its grid and its tips"
   slow_rust 'binary(rooms) & test(/^reconstruct::/) & !test(/^reconstruct::accuracy::/)'
