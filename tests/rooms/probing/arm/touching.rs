@@ -477,6 +477,31 @@ fn a_wall_beside_the_way_out_is_no_obstacle() {
     assert!((1.5..3.0).contains(&seen.0), "{} N", seen.0);
 }
 
+/// The way out of the hole leans into its wall by so little that it is felt only near the rim: what
+/// the ball has passed until the arm stands is behind it, and it goes on.
+#[test]
+fn a_rim_that_is_passed_while_the_arm_brakes_is_no_obstacle() {
+    let (plate, params) = (Plate::default(), ArmParams::default());
+    let touching = TouchParams {
+        stiffness: params.stiffness,
+        ..TouchParams::default()
+    };
+    let wall = HOLE.0[0] + HOLE.1 - params.radius;
+    let inside = at(&params, [wall - 50e-6, HOLE.0[1], TOP - 6e-3]);
+    let mut passed = 0;
+    for beyond in (10..40).map(|step| 10e-6 * f64::from(step)) {
+        let above = at(&params, [wall + beyond, HOLE.0[1], TOP + 5e-3]);
+        let mut arm = SimArm::new(&plate, params.clone(), &inside).unwrap();
+        let mut seen = ForceSeen::default();
+        let mut watched = Watched::new(&mut arm, limits(), &mut seen);
+        watched.zero().unwrap();
+        let left = watched.leave("going up", &above, touching.link_speed, &touching);
+        left.unwrap_or_else(|error| panic!("{:.0} µm: {error}", beyond * 1e6));
+        passed += u32::from((1.2..2.0).contains(&seen.0));
+    }
+    assert!(passed > 3, "{passed}");
+}
+
 /// The largest force, N.
 #[derive(Default)]
 struct ForceSeen(f64);

@@ -345,8 +345,7 @@ impl<'a> Watched<'a> {
     ) -> Result<Option<Vector3<f64>>, ProbeError> {
         let (heeds, doing) = (self.heeds, "coming free of what it met");
         (self.comes_free, self.heeds) = (true, StopRequest::Stay);
-        let met = self.last.map(|state| state.pose_bt.translation.vector);
-        let freed = self.stop_and_free(doing, met.and_then(|met| way_of(command, &met)));
+        let freed = self.stop_and_free(doing, command);
         (self.comes_free, self.heeds) = (false, heeds);
         freed
     }
@@ -354,39 +353,55 @@ impl<'a> Watched<'a> {
     fn stop_and_free(
         &mut self,
         doing: &'static str,
-        way: Option<Vector3<f64>>,
+        command: &Command,
     ) -> Result<Option<Vector3<f64>>, ProbeError> {
+        let met = self.last;
         self.stand(doing, &self.hard_stop(), &mut |_| {})?;
-        let is_free = |state: &ArmState| state.wrench_b.force.norm() < FREE_N;
-        let (Some(way), Some(stood)) = (way, self.last.filter(|state| !is_free(state))) else {
+        let (Some(met), Some(stood)) = (met, self.last) else {
             return Ok(None);
         };
-        let (push, met_n) = (stood.wrench_b.force, stood.wrench_b.force.norm());
-        let along = push.dot(&way);
+        let Some(way) = way_of(command, &met.pose_bt.translation.vector) else {
+            return Ok(None);
+        };
+        let is_free = |state: &ArmState| state.wrench_b.force.norm() < FREE_N;
+        // what was passed while it braked pushes no more
+        let push = if is_free(&stood) { met } else { stood }.wrench_b.force;
+        let (along, met_n) = (push.dot(&way), push.norm());
         let aside = (push - way * along)
             .try_normalize(0.0)
             .filter(|_| along.abs() < BESIDE * met_n);
-        let (mut free, mut worse) = (0, 0);
-        self.search(
-            doing,
-            aside.unwrap_or(-way) * FREEING,
-            FREEING_WAY,
-            &mut |state| {
-                free = if is_free(state) { free + 1 } else { 0 };
-                // what was met is not that way, or was no contact
-                worse = if state.wrench_b.force.norm() > met_n + WORSE_N {
-                    worse + 1
-                } else {
-                    0
-                };
-                free >= TRIGGERS || worse >= TRIGGERS
-            },
-        )?;
-        self.stand(doing, &self.stop(), &mut |_| {})?;
+        if !is_free(&stood) {
+            self.go_until_free(doing, aside.unwrap_or(-way), met_n)?;
+        }
         let gone =
             |state: ArmState| state.pose_bt.translation.vector - stood.pose_bt.translation.vector;
         let by = self.last.filter(is_free).map(gone).zip(aside);
         Ok(by.map(|(gone, aside)| aside * (gone.dot(&aside).max(0.0) + OFF)))
+    }
+
+    /// Slowly in a direction, until nothing is felt or more than what was met.
+    ///
+    /// - `direction`: unit vector in B.
+    /// - `met_n`: N
+    fn go_until_free(
+        &mut self,
+        doing: &'static str,
+        direction: Vector3<f64>,
+        met_n: f64,
+    ) -> Result<(), ProbeError> {
+        let (mut free, mut worse) = (0, 0);
+        self.search(doing, direction * FREEING, FREEING_WAY, &mut |state| {
+            let force_n = state.wrench_b.force.norm();
+            free = if force_n < FREE_N { free + 1 } else { 0 };
+            // what was met is not that way, or was no contact
+            worse = if force_n > met_n + WORSE_N {
+                worse + 1
+            } else {
+                0
+            };
+            free >= TRIGGERS || worse >= TRIGGERS
+        })?;
+        self.stand(doing, &self.stop(), &mut |_| {})
     }
 
     /// Goes straight to a pose through what should be free air.
