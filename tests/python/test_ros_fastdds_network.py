@@ -3,6 +3,8 @@
 A slow proof: a shard of tests/shards.sh runs it; without that it is not collected (conftest.py).
 """
 
+from functools import partial
+
 import pytest
 from ros_domains import domains
 from ros_echo import Echo
@@ -26,7 +28,7 @@ def test_the_largest_answers_reach_another_computer(fast_dds, packet):  # noqa: 
         caller = hub.wrapper("caller")
         # a node for each, so that its log has each answer that does not fit
         for proof in [
-            parameters_are_listed_dumped_and_described,
+            partial(parameters_are_listed_dumped_and_described, packet=packet),
             features_are_on_the_topic,
             what_was_probed_is_on_topics,
             the_result_of_a_goal_comes,
