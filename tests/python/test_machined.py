@@ -106,6 +106,7 @@ def test_features_of_a_drawing_are_the_same(touchup, drawings, tmp_path, change)
     assert not different, different
 
 
+@pytest.mark.full
 def test_what_was_touched_of_a_sheet_is_found(touchup_bin, tmp_path):
     result = part_run(touchup_bin, tmp_path, 2003, None, None)
     assert len(result.verdict.required) >= 2

@@ -400,6 +400,7 @@ fn touched_features_are_found_within_their_stated_uncertainty() {
 /// times what the calibration says, makes bores and slots 40 µm wider and bosses 40 µm thinner, and
 /// their stated uncertainties do not show it.
 #[test]
+#[ignore = "a slow proof"]
 #[expect(clippy::too_many_lines)]
 fn a_wrong_radius_goes_twice_into_every_width_and_is_not_in_its_uncertainty() {
     let off = 20e-6;

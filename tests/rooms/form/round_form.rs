@@ -10,8 +10,6 @@ use touchup::form::{
     Deviation, Estimate, FormPoint, RoundForm, cylindricity, round_form, roundness,
 };
 
-use crate::full::either;
-
 const RADIUS: f64 = 4e-3;
 const HEIGHT: f64 = 8e-3;
 /// Error that points of one group share, and that of each alone, m.
@@ -100,6 +98,7 @@ const HONEST: std::ops::RangeInclusive<f64> = 0.8..=1.25;
 /// 150 seeds determine a root mean square to 6 %. A groove is of many undulations, of which the
 /// smallest are lost in noise.
 #[test]
+#[ignore = "a slow proof"]
 fn roundness_is_off_by_its_uncertainty() {
     let three = |t: f64| RADIUS + 25e-6 * (3.0 * t + 0.4).cos();
     let mixed = |t: f64| RADIUS + 20e-6 * (2.0 * t).cos() + 8e-6 * (5.0 * t + 1.0).sin();
@@ -149,7 +148,7 @@ fn a_round_wall_is_found_round_to_its_uncertainty() {
 #[test]
 #[ignore = "a slow proof"]
 fn a_cone_and_a_bent_axis_are_off_by_their_uncertainty() {
-    let seeds = either(50, 150);
+    let seeds = 150;
     let wall = |radius: &dyn Fn(f64, f64) -> f64| {
         let points: Vec<Point3<f64>> = (0..=20)
             .flat_map(|ring| {

@@ -601,6 +601,7 @@ const SLOT: Point3<f64> = Point3::new(25e-3, 14e-3, TOP);
 /// Wherever in it a slot is flagged: claimed dimensions agree with the drawing, and most are
 /// claimed.
 #[test]
+#[ignore = "a slow proof"]
 fn a_slot_that_is_claimed_is_the_one_of_the_drawing() {
     let (plate, mut rng) = (Plate::default(), Pcg64::seed_from_u64(21));
     let (mut claimed, mut worst, count) = (0, 0.0f64, 100);

@@ -95,12 +95,13 @@ fn measured(
     ))
 }
 
-/// Every 15°, in the slow proofs every 5°, with sharp corners and with corners up to half of half
+/// Every 5°, with sharp corners and with corners up to half of half
 /// the width: within 25 µm of the drawing with touches of 5 µm and a tolerance of 10 µm.
 #[test]
+#[ignore = "a slow proof"]
 fn pockets_with_straight_ends_are_found_at_every_angle() {
     let scan = flat([-100.0, 100.0], [-100.0, 100.0]);
-    let step = if crate::full::is_full() { 5 } else { 15 };
+    let step = 5;
     let (mut missed, mut worst, mut count) = (Vec::new(), [0.0f64; 4], 0);
     for (length, width, corner) in [
         (20e-3, 8e-3, 0.0),

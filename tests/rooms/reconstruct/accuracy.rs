@@ -360,6 +360,7 @@ fn where_free_space_is_no_evidence_lids_stay() {
 
 /// Friction of 0.35 tilts the force by 19°, to and fro.
 #[test]
+#[ignore = "a slow proof"]
 fn where_friction_is_no_part_the_patch_is_worse_for_it() {
     let stylus = StylusParams {
         friction: 0.35,

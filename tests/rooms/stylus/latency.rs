@@ -54,6 +54,7 @@ fn estimated_from(messages: impl IntoIterator<Item = Message>) -> Option<ClockOf
 }
 
 #[test]
+#[ignore = "a slow proof"]
 fn the_delay_is_right_within_its_uncertainty_over_twenty_seeds() {
     let mut worst: f64 = 0.0;
     for seed in 1..=20 {

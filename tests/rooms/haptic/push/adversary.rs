@@ -352,6 +352,7 @@ fn no_sample_makes_the_mesh_unsound() {
 }
 
 #[test]
+#[ignore = "a slow proof"]
 fn no_sample_makes_the_mesh_unsound_with_other_regions_and_rules() {
     let rigid = TipParams {
         stiffness: None,
@@ -390,6 +391,7 @@ fn no_sample_makes_the_mesh_unsound_with_other_regions_and_rules() {
 /// A ball sinks on one spot, with and without a force: the lid before it comes down onto a floor 2
 /// mm below, that was out of sight at first.
 #[test]
+#[ignore = "a slow proof"]
 fn a_lid_pushed_onto_a_floor_does_not_pierce_it() {
     let lid = grid(15, EDGE, |_, _| 0.0);
     let count = lid.vertex_count() as u32;

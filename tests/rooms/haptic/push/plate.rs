@@ -218,6 +218,7 @@ fn a_face_turned_away_from_the_measured_normal_never_blows_up() {
 
 /// The same within a mesh: every tenth face of a plate is inverted or on edge.
 #[test]
+#[ignore = "a slow proof"]
 fn turned_faces_in_a_plate_stay_within_bounds() {
     let mut rng = Pcg64::seed_from_u64(4);
     let mut scan = noisy_plate(9);

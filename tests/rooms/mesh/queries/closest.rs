@@ -217,6 +217,7 @@ fn move_one(
 }
 
 #[test]
+#[ignore = "a slow proof"]
 fn twenty_thousand_faces_after_five_thousand_edits() {
     let mut rng = Pcg64::seed_from_u64(20);
     let mut mesh = grid(100, 2e-3, |_, _| within(&mut rng, -1e-3, 1e-3));
