@@ -15,6 +15,7 @@ use crate::io::features_file::FeaturesFileError;
 use crate::io::file_error::FileError;
 use crate::io::mesh_file::MeshFileError;
 use crate::io::nominal_file::NominalFileError;
+use crate::io::recording::RecordingError;
 use crate::io::result_table::ResultTableError;
 use crate::io::touches_file::TouchesFileError;
 use crate::probing::execute::{Ending, PayloadProbeError, SpotError};
@@ -235,13 +236,25 @@ errors_of_rooms! {
     SceneError => |error| if matches!(error, SceneError::NoRadius) { ("usage", 2) } else { ("scene", 3) }, "";
     // settings come from a scene file: its flags are checked before
     crate::stylus::SettingError => |_| ("scene", 3), "";
-    MeshFileError => |_| ("mesh", 3), "";
+    MeshFileError => |error| match error {
+        MeshFileError::File(FileError::Write { .. }) => NOT_WRITTEN,
+        _ => ("mesh", 3),
+    }, "";
     ScanError => |_| ("mesh", 3), "";
     crate::mesh::MeshError => |_| ("mesh", 3), "";
-    crate::io::recording::RecordingError => |_| ("recording", 3), "";
+    RecordingError => |error| match error {
+        RecordingError::Write(_) | RecordingError::NotWritten(_) => NOT_WRITTEN,
+        _ => ("recording", 3),
+    }, "";
     crate::session::SessionError => |_| ("session", 3), "";
-    TouchesFileError => |_| ("touches", 3), "";
-    FeaturesFileError => |_| ("features", 3), "";
+    TouchesFileError => |error| match error {
+        TouchesFileError::File(FileError::Write { .. }) => NOT_WRITTEN,
+        _ => ("touches", 3),
+    }, "";
+    FeaturesFileError => |error| match error {
+        FeaturesFileError::File(FileError::Write { .. }) => NOT_WRITTEN,
+        _ => ("features", 3),
+    }, "";
     ResultTableError => |_| NOT_WRITTEN, "";
     NominalFileError => |error| match error {
         NominalFileError::File(FileError::Write { .. }) => NOT_WRITTEN,

@@ -1024,6 +1024,68 @@ fn demo_that_cannot_write_is_1() {
     assert!(text(&output.stderr).contains("file") && text(&output.stderr).lines().count() == 1);
 }
 
+/// On a disk that takes nothing, as the limit of the size of files makes one.
+#[test]
+fn what_the_disk_does_not_take_is_1_whatever_it_is() {
+    let case = Case::new();
+    let [scan, bag, mesh, recording, features, demonstrated] = [
+        "scan.ply",
+        "touch.mcap",
+        "out.ply",
+        "out.mcap",
+        "out.json",
+        "demonstrated",
+    ]
+    .map(|name| case.path(name).to_str().unwrap().to_owned());
+    for arguments in [
+        &["convert", &bag, "--out", &recording][..],
+        &["features", &scan, "--out", &features],
+        &[
+            "refine",
+            "--scan",
+            &scan,
+            "--bag",
+            &bag,
+            "--tip-radius-mm",
+            "1.5",
+            "--out",
+            &mesh,
+        ],
+        &["demo", "--out", &demonstrated],
+    ] {
+        let output = Command::new("bash")
+            .args(["-c", "trap '' XFSZ; ulimit -f 0; exec \"$@\"", "bash"])
+            .arg(env!("CARGO_BIN_EXE_touchup-tested"))
+            .args(arguments)
+            .arg("--json")
+            .output()
+            .unwrap();
+        let error: Value = serde_json::from_slice(&output.stderr)
+            .unwrap_or_else(|_| panic!("{arguments:?}: {}", text(&output.stderr)));
+        assert_eq!(
+            (code(&output), &error["kind"]),
+            (1, &"not_written".into()),
+            "{arguments:?}: {error}"
+        );
+        let message = error["message"].as_str().unwrap();
+        assert!(
+            message.contains("out.") || message.contains("demonstrated"),
+            "{message}"
+        );
+    }
+}
+
+#[test]
+fn a_scene_without_an_end_is_refused_before_it_is_all_in_memory() {
+    let case = Case::new();
+    let output = case.refine("touch.mcap", "out.ply", &["--scene", "/dev/zero"]);
+    let error = text(&output.stderr);
+    assert!(
+        code(&output) == 3 && error.contains("/dev/zero: it is longer than 64 MiB"),
+        "{error}"
+    );
+}
+
 // ---- init
 // -------------------------------------------------------------------------------------------------------
 

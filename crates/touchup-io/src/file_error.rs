@@ -53,38 +53,36 @@ impl fmt::Display for FilePlace {
 }
 
 /// Longest file that is read as a whole: its numbers take several times that.
-const MAX_FILE_BYTES: u64 = 4 << 30;
+pub(super) const MAX_FILE_BYTES: u64 = 4 << 30;
 /// … and longest input whose end is not known before, as that of a pipe.
 const MAX_STREAM_BYTES: u64 = 256 << 20;
 
-/// All bytes of a file, or of a pipe, that is not longer than [`MAX_FILE_BYTES`] or
-/// [`MAX_STREAM_BYTES`].
-pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, FileError> {
-    let read = || {
-        let file = File::open(path)?;
-        let info = file.metadata()?;
-        let limit = if info.is_file() {
-            MAX_FILE_BYTES
-        } else {
-            MAX_STREAM_BYTES
-        };
-        let mut bytes = Vec::new();
-        bytes.try_reserve(if info.is_file() {
-            info.len().min(limit) as usize + 1
-        } else {
-            0
-        })?;
-        file.take(limit + 1).read_to_end(&mut bytes)?;
-        if bytes.len() as u64 > limit {
-            let why = format!(
-                "it is longer than {} MiB, and no end is near: reduce it first",
-                limit >> 20
-            );
-            return Err(io::Error::new(io::ErrorKind::FileTooLarge, why));
-        }
-        Ok(bytes)
+/// All bytes of a file, or of a pipe, that is not longer than `limit`, nor than
+/// [`MAX_STREAM_BYTES`] where its end is not known before.
+pub(super) fn read_up_to(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
+    let file = File::open(path)?;
+    let info = file.metadata()?;
+    let mut bytes = Vec::new();
+    let limit = if info.is_file() {
+        bytes.try_reserve(info.len().min(limit) as usize + 1)?;
+        limit
+    } else {
+        limit.min(MAX_STREAM_BYTES)
     };
-    read().map_err(|source| FileError::Read {
+    file.take(limit + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > limit {
+        let why = format!(
+            "it is longer than {} MiB, and no end is near: reduce it first",
+            limit >> 20
+        );
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, why));
+    }
+    Ok(bytes)
+}
+
+/// All bytes of a file that is not longer than [`MAX_FILE_BYTES`].
+pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, FileError> {
+    read_up_to(path, MAX_FILE_BYTES).map_err(|source| FileError::Read {
         path: path.to_owned(),
         source,
     })

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+use super::file_error::{MAX_FILE_BYTES, read_up_to};
 use touchup_core::probing::arm::{Onset, TouchMoment, TouchOutcome};
 use touchup_core::probing::execute::{Probed, ProbedTouch};
 
@@ -133,7 +134,7 @@ impl TouchLog {
     /// # Errors
     /// Of the file, also where a whole line of it is no touch.
     pub fn resume(path: &Path, ball_radius: f64) -> io::Result<Self> {
-        let text = std::fs::read(path)?;
+        let text = read_up_to(path, MAX_FILE_BYTES)?;
         let whole = whole_lines(&text);
         let mut counts = BTreeMap::new();
         for touch in touches_of(whole)? {
@@ -183,7 +184,7 @@ impl TouchLog {
 /// # Errors
 /// Of the file, also where a whole line of it is no touch.
 pub fn read_probed_touches(path: &Path) -> io::Result<Vec<TouchLine>> {
-    match std::fs::read(path) {
+    match read_up_to(path, MAX_FILE_BYTES) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
         text => touches_of(whole_lines(&text?)),
     }

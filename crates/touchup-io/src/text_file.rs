@@ -1,21 +1,25 @@
 //! Texts as whole files.
 
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::Path;
 
-use super::file_error::{FileError, read_file, write_file};
+use super::file_error::{FileError, read_up_to, write_file};
 
+/// Longest text: a scene, a record or a list, no table of samples.
+const MAX_TEXT_BYTES: u64 = 64 << 20;
+
+/// A text of not more than 64 MiB.
+///
 /// # Errors
 /// [`FileError::Read`], also where it is no UTF-8.
 pub fn read_text(path: &Path) -> Result<String, FileError> {
-    let no_text = |error| {
-        let source = std::io::Error::new(std::io::ErrorKind::InvalidData, error);
-        FileError::Read {
-            path: path.to_owned(),
-            source,
-        }
-    };
-    String::from_utf8(read_file(path)?).map_err(no_text)
+    let no_text = |error| io::Error::new(io::ErrorKind::InvalidData, error);
+    let text = read_up_to(path, MAX_TEXT_BYTES)
+        .and_then(|bytes| String::from_utf8(bytes).map_err(no_text));
+    text.map_err(|source| FileError::Read {
+        path: path.to_owned(),
+        source,
+    })
 }
 
 /// Writes it, as a whole or not at all.

@@ -574,6 +574,129 @@ fn obj_variants_are_read() {
     );
 }
 
+/// A prism of this height over an outline, in m, with its two ends as one polygon each that begins
+/// at corner `first`: OBJ, PLY, and ASCII STL.
+fn prism(outline: &[[f64; 2]], height: f64, first: usize) -> [(&'static str, String); 3] {
+    let count = outline.len();
+    let corners: Vec<[f64; 3]> = [0.0, height]
+        .iter()
+        .flat_map(|&z| outline.iter().map(move |&[x, y]| [x, y, z - 0.2 * x]))
+        .collect();
+    let from_first = |at: usize| (first + at) % count;
+    let mut faces: Vec<Vec<usize>> = vec![
+        (0..count).rev().map(from_first).collect(),
+        (0..count).map(|at| count + from_first(at)).collect(),
+    ];
+    faces.extend((0..count).map(|at| {
+        let next = (at + 1) % count;
+        vec![at, next, count + next, count + at]
+    }));
+    let words = |corner: [f64; 3]| corner.map(|x| x.to_string()).join(" ");
+    let mut obj: String = corners
+        .iter()
+        .map(|&p| format!("v {}\n", words(p)))
+        .collect();
+    let mut ply = format!(
+        "ply\nformat ascii 1.0\nelement face {}\nproperty list uchar int vertex_indices\n\
+         element vertex {}\nproperty double x\nproperty double y\nproperty double z\nend_header\n",
+        faces.len(),
+        corners.len()
+    );
+    let mut stl = String::from("solid\n");
+    for face in &faces {
+        let names =
+            |by: usize| -> String { face.iter().map(|at| format!(" {}", at + by)).collect() };
+        obj += &format!("f{}\n", names(1));
+        ply += &format!("{}{}\n", face.len(), names(0));
+        let loops: String = face
+            .iter()
+            .map(|&at| format!("vertex {}\n", words(corners[at])))
+            .collect();
+        stl += &format!("facet normal 0 0 0\nouter loop\n{loops}endloop\nendfacet\n");
+    }
+    ply += &corners
+        .iter()
+        .map(|&p| format!("{}\n", words(p)))
+        .collect::<String>();
+    [("prism.obj", obj), ("prism.ply", ply), ("prism.stl", stl)]
+}
+
+/// An L, a comb, a spiral, and a frame whose opening is joined to its rim by a cut, each with its
+/// area.
+#[rustfmt::skip]
+const OUTLINES: [(&[[f64; 2]], f64); 4] = [
+    (&[[0., 0.], [4., 0.], [4., 1.], [1., 1.], [1., 3.], [0., 3.]], 6.0),
+    (&[
+        [0., 0.], [7., 0.], [7., 4.], [6., 4.], [6., 1.], [5., 1.], [5., 4.], [4., 4.],
+        [4., 1.], [3., 1.], [3., 4.], [2., 4.], [2., 1.], [1., 1.], [1., 4.], [0., 4.],
+    ], 19.0),
+    (&[
+        [0., 0.], [5., 0.], [5., 5.], [1., 5.], [1., 2.], [3., 2.], [3., 3.], [2., 3.],
+        [2., 4.], [4., 4.], [4., 1.], [0., 1.],
+    ], 15.0),
+    (&[
+        [0., 0.], [4., 0.], [4., 4.], [0., 4.], [0., 0.], [1., 1.], [1., 3.], [3., 3.],
+        [3., 1.], [1., 1.],
+    ], 12.0),
+];
+
+/// Each begun at every corner: closed, and with the volume of area times height. That no triangle
+/// lies outside shows the area of the surface, twice that of the outline besides the sides.
+#[test]
+fn polygons_of_any_shape_are_divided_within_their_outline() {
+    for (outline, area) in OUTLINES {
+        for first in 0..outline.len() {
+            for (name, text) in prism(outline, 0.5, first) {
+                let MeshFile { mesh, .. } = read_text(name, text.as_bytes()).unwrap();
+                let found = volume(&mesh);
+                assert!(
+                    (found - 0.5 * area).abs() < 1e-6,
+                    "{name} from {first}: {found}"
+                );
+                let ends: f64 = mesh
+                    .faces()
+                    .map(|(face, _)| mesh.double_area_normal(face))
+                    .map(|normal| normal.z.abs() / 2.0)
+                    .sum();
+                // sides are upright
+                assert!(
+                    (ends - 2.0 * area).abs() < 1e-6,
+                    "{name} from {first}: {ends}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_polygon_whose_sides_cross_is_refused_with_its_place() {
+    let bow = [[0., 0.], [4., 0.], [0., 3.], [4., 3.], [5., 1.]];
+    for (name, text) in prism(&bow, 0.5, 0) {
+        let error = read_text(name, text.as_bytes()).unwrap_err().to_string();
+        let line = 1 + text
+            .lines()
+            .position(|line| match name {
+                "prism.obj" => line.starts_with("f "),
+                "prism.ply" => line.starts_with("5 "),
+                _ => line == "endfacet",
+            })
+            .unwrap();
+        let wanted =
+            format!("line {line}: the sides of a polygon cross: export the mesh in triangles");
+        assert!(error.ends_with(&wanted), "{error}");
+    }
+}
+
+#[test]
+fn lines_that_go_on_are_joined_and_the_next_have_their_numbers() {
+    let text = "v 0 0 \\\n0\nv 1 0 0\r\nv 0 \\\r\n 1 \\\n0\nf 1 2 \\\n3\n# to \\\nbe passed over\n";
+    let file = read_text("a.obj", text.as_bytes()).unwrap();
+    assert_eq!((file.mesh.vertex_count(), file.mesh.face_count()), (3, 1));
+    let error = read_text("a.obj", format!("{text}f 1 2 9\n").as_bytes()).unwrap_err();
+    let wanted = "line 11: a face uses vertex 9, but there are only 3 vertices";
+    assert!(error.to_string().ends_with(wanted), "{error}");
+}
+
 #[test]
 fn stl_with_more_than_its_header_announces_is_refused() {
     let folder = tempfile::tempdir().unwrap();

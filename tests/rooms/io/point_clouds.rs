@@ -75,17 +75,8 @@ fn a_noisy_ball_comes_out_closed_within_the_noise_in_any_unit() {
         let [rms, most] = spread(mesh.positions().iter().map(|p| radius(p) - 0.05));
         assert!(rms < NOISE && most < 5.0 * NOISE, "{rms} {most}");
         assert_eq!(summary.normals, NormalSource::SpanningTree);
-        // V = 4/3 π r³ by the divergence theorem, positive where the faces look outside
-        let corner = |v| mesh.positions()[v] - Point3::new(1.0, 2.0, 3.0);
-        let volume: f64 = mesh
-            .faces()
-            .map(|(_, f)| f.map(|v| corner(v.0 as usize)))
-            .map(|[a, b, c]| a.dot(&b.cross(&c)) / 6.0)
-            .sum();
-        assert!(
-            (volume / (4.0 / 3.0 * std::f64::consts::PI * 0.05f64.powi(3)) - 1.0).abs() < 0.01,
-            "{volume}"
-        );
+        let share = share_of_ball(&mesh);
+        assert!((share - 1.0).abs() < 0.01, "{share}");
         // 5000 points share 4πr²: √(6.28e-6) m
         assert!((summary.spacing_mm - 2.5).abs() < 0.3, "{summary}");
         assert!((summary.noise_mm - 0.1).abs() < 0.15, "{summary}");
@@ -217,6 +208,61 @@ fn a_ply_without_faces_goes_by_its_normals_and_an_organised_pcd_by_its_scanner()
         mesh.faces()
             .all(|(f, _)| mesh.double_area_normal(f).z > 0.0)
     );
+}
+
+/// Volume, by the divergence theorem, over that of the ball; positive where the faces look outside.
+fn share_of_ball(mesh: &TriMesh) -> f64 {
+    let corner = |v| mesh.positions()[v] - Point3::new(1.0, 2.0, 3.0);
+    let volume: f64 = mesh
+        .faces()
+        .map(|(_, f)| f.map(|v| corner(v.0 as usize)))
+        .map(|[a, b, c]| a.dot(&b.cross(&c)) / 6.0)
+        .sum();
+    volume / (4.0 / 3.0 * std::f64::consts::PI * 0.05f64.powi(3))
+}
+
+/// A file in which the scans of a whole part were merged names one place: in the middle of the
+/// part, on it, beside it, far away. Nothing sees all of the part from there.
+#[test]
+fn a_place_that_is_no_scanners_turns_no_closed_part_inside_out() {
+    let points = ball_points(3000);
+    for eye in [
+        [1.0, 2.0, 3.0],
+        [1.01, 2.02, 3.0],
+        [1.05, 2.0, 3.0],
+        [1.1, 2.1, 3.1],
+        [0.0, 0.0, 0.0],
+        [9.0, 2.0, 3.0],
+    ] {
+        let [x, y, z] = eye;
+        let text = format!(
+            "FIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {0}\nHEIGHT 1\n\
+             VIEWPOINT {x} {y} {z} 1 0 0 0\nPOINTS {0}\nDATA ascii\n{1}",
+            points.len(),
+            text_of(&points, Metre)
+        );
+        let (mesh, summary) = read("ball.pcd", &text, Metre).unwrap();
+        assert_eq!(summary.normals, NormalSource::SpanningTree, "{eye:?}");
+        let share = share_of_ball(&mesh);
+        assert!((share - 1.0).abs() < 0.02, "{eye:?}: {share}");
+    }
+    // its upper half alone is seen from above, and its inside from within
+    let upper: Vec<_> = points.into_iter().filter(|p| p.z > 3.01).collect();
+    for (eye, sign) in [(9.0, 1.0), (3.0, -1.0)] {
+        let text = format!(
+            "FIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {0}\nHEIGHT 1\n\
+             VIEWPOINT 1 2 {eye} 1 0 0 0\nPOINTS {0}\nDATA ascii\n{1}",
+            upper.len(),
+            text_of(&upper, Metre)
+        );
+        let (mesh, summary) = read("ball.pcd", &text, Metre).unwrap();
+        assert_eq!(summary.normals, NormalSource::Scanner, "{eye}");
+        assert!(
+            mesh.faces()
+                .all(|(f, _)| sign * mesh.double_area_normal(f).z > 0.0),
+            "{eye}"
+        );
+    }
 }
 
 #[test]

@@ -20,7 +20,8 @@ pub struct ScanStation {
     pub points: usize,
     /// where the scanner stood, m; `None`: the file does not say
     pub eye: Option<Point3<f64>>,
-    /// whether it saw every point from there; else the place may be a mere default
+    /// whether it saw every point from there, as the points are a grid of its rays; else the place
+    /// may be a mere default, or that of a file in which scans were merged
     pub is_sure: bool,
 }
 

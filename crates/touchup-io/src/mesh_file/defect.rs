@@ -38,6 +38,9 @@ pub enum Defect {
         /// how many there are
         vertices: usize,
     },
+    /// A polygon that is none.
+    #[error("the sides of a polygon cross: export the mesh in triangles")]
+    SidesCross,
     /// A file of points without one.
     #[error("no point in it: export it again with x, y and z of each point")]
     NoPoints,

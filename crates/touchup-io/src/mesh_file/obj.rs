@@ -14,7 +14,7 @@ use touchup_core::mesh::VertexColours;
 use super::appearance::{PaintedSoup, SoupTexture};
 use super::column::{ColumnValues, VertexColumn};
 use super::defect::{Defect, Syntax};
-use super::soup::Soup;
+use super::soup::{Soup, divided};
 use super::text::NumberedLines;
 use crate::file_error::FilePlace;
 
@@ -22,14 +22,15 @@ use crate::file_error::FilePlace;
 /// normals, texture and materials are passed over. Vertices come in the order in which faces first
 /// name them.
 pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
-    let bytes = as_utf8(bytes)?;
+    let bytes = joined(as_utf8(bytes)?);
     let mut lines = Lines::new(&bytes, false);
     let no_materials = |_: &Path| Err(LoadError::OpenFileFailed);
     let (models, _) = load(&bytes, &mut lines, no_materials)?;
     let mut soup = Soup::default();
-    models
-        .iter()
-        .for_each(|model| take(model, scale, &mut soup.positions, &mut soup.faces));
+    for model in &models {
+        take(model, scale, &mut soup.positions, &mut soup.faces, |_| {})
+            .map_err(|face| crossing(&bytes, face))?;
+    }
     soup.unused = lines.vertices - soup.positions.len().min(lines.vertices);
     Ok(soup)
 }
@@ -39,7 +40,7 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
 /// Colours count where each vertex has one: three numbers from 0 to 1 after its coordinates. A file
 /// with neither colours nor texture coordinates is not parsed: nothing comes of it.
 pub(super) fn read_painted(bytes: &[u8], scale: f64, folder: &Path) -> Result<PaintedSoup, Syntax> {
-    let bytes = as_utf8(bytes)?;
+    let bytes = joined(as_utf8(bytes)?);
     let mut lines = Lines::new(&bytes, true);
     lines.has_colours = every_vertex_has_a_colour(&bytes);
     if !lines.has_colours && !has_texture_coordinates(&bytes) {
@@ -56,20 +57,20 @@ pub(super) fn read_painted(bytes: &[u8], scale: f64, folder: &Path) -> Result<Pa
     let mut image_of = vec![None; materials.len()];
     for model in &models {
         let mesh = &model.mesh;
-        let of = |&corner: &u32| {
-            mesh.texcoords
-                .as_chunks()
-                .0
-                .get(corner as usize)
+        // [0, 0] where a corner has none
+        let of = |corner: usize| {
+            let number = mesh.texcoord_indices.get(corner).copied();
+            let coordinates = mesh.texcoords.as_chunks::<2>().0;
+            let of_number = |number: u32| coordinates.get(number as usize);
+            number
+                .and_then(of_number)
                 .map_or([0.0; 2], |uv| uv.map(|x| x as f32))
         };
-        let triangles = mesh.texcoord_indices.as_chunks::<3>().0;
-        texture
-            .corners
-            .extend(triangles.iter().map(|[a, b, c]| [of(a), of(b), of(c)]));
-        take(model, scale, &mut soup.positions, &mut soup.faces);
-        // a model without texture coordinates between others that have them
-        texture.corners.resize(soup.faces.len(), [[0.0; 2]; 3]);
+        let PaintedSoup {
+            positions, faces, ..
+        } = &mut soup;
+        let add = |corners: [usize; 3]| texture.corners.push(corners.map(of));
+        take(model, scale, positions, faces, add).map_err(|face| crossing(&bytes, face))?;
         let shown = mesh.material_id.and_then(|id| {
             let name = materials.get(id)?.diffuse_texture.clone()?;
             Some(*image_of[id].get_or_insert_with(|| {
@@ -103,37 +104,65 @@ fn load(
     materials: impl Fn(&Path) -> tobj::MTLLoadResult,
 ) -> Result<Loaded, Syntax> {
     let options = LoadOptions {
-        triangulate: true,
         ignore_points: true,
         ignore_lines: true,
         ..Default::default()
     };
     let loaded = tobj::load_obj_buf(&mut *lines, &options, materials);
     let (models, materials) = loaded.map_err(|error| place_of(error, bytes, lines.number))?;
+    let has_corners = |model: &Model| model.mesh.face_arities.iter().all(|&corners| corners > 0);
+    if !models.iter().all(has_corners) {
+        return Err(place_of(LoadError::InvalidPolygon, bytes, lines.number));
+    }
     Ok((models, materials.unwrap_or_default()))
 }
 
-/// Adds the triangles of a model.
-fn take(model: &Model, scale: f64, positions: &mut Vec<Point3<f64>>, faces: &mut Vec<[u32; 3]>) {
-    let first = positions.len() as u32;
-    positions.extend(
-        model
-            .mesh
-            .positions
-            .as_chunks()
-            .0
-            .iter()
-            .map(|&p| Point3::from(p) * scale),
-    );
-    faces.extend(
-        model
-            .mesh
-            .indices
-            .as_chunks()
-            .0
-            .iter()
-            .map(|f| f.map(|v| v + first)),
-    );
+/// Adds the triangles of a model; of each `corners` gets the numbers of its three corners in the
+/// model. The error is the number of a face whose sides cross.
+fn take(
+    model: &Model,
+    scale: f64,
+    positions: &mut Vec<Point3<f64>>,
+    faces: &mut Vec<[u32; 3]>,
+    mut corners: impl FnMut([usize; 3]),
+) -> Result<(), usize> {
+    let (mesh, first) = (&model.mesh, positions.len());
+    let own = mesh.positions.as_chunks().0.iter();
+    positions.extend(own.map(|&p| Point3::from(p) * scale));
+    let mut add = |of_model: [usize; 3]| {
+        faces.push(of_model.map(|at| mesh.indices[at] + first as u32));
+        corners(of_model);
+    };
+    // triangles alone have no list of how many corners each face has
+    if mesh.face_arities.is_empty() {
+        (0..mesh.indices.len() / 3).for_each(|face| add([0, 1, 2].map(|at| 3 * face + at)));
+    }
+    let mut start = 0;
+    for (face, &count) in mesh.face_arities.iter().enumerate() {
+        let vertices = &mesh.indices[start..start + count as usize];
+        let triangles = divided(vertices, &positions[first..]).ok_or(face)?;
+        for triangle in triangles {
+            add(triangle.map(|at| start + at as usize));
+        }
+        start += count as usize;
+    }
+    Ok(())
+}
+
+/// The sides of a face cross: where it is among those with three corners and more.
+fn crossing(bytes: &[u8], face: usize) -> Syntax {
+    let mut lines = NumberedLines::new(bytes, b'\n');
+    let numbers = std::iter::from_fn(|| {
+        let line = lines.next()?;
+        let mut words = line.split_ascii_whitespace();
+        let is_face = words.next() == Some("f") && words.count() > 2;
+        Some(is_face.then_some(lines.number()))
+    });
+    let line = numbers.flatten().nth(face).unwrap_or_default();
+    Syntax {
+        place: FilePlace::Line(line),
+        defect: Defect::SidesCross,
+    }
 }
 
 /// The text as UTF-8: UTF-16 with a byte order mark is turned into it. Comments may be in any
@@ -158,6 +187,28 @@ fn as_utf8(bytes: &[u8]) -> Result<Cow<'_, [u8]>, Syntax> {
         )
     };
     Ok(Cow::Owned(text.map_err(broken)?.into_bytes()))
+}
+
+/// With lines that end with a backslash joined to the next; the numbers of those that follow stay.
+fn joined(bytes: Cow<'_, [u8]>) -> Cow<'_, [u8]> {
+    let goes_on = |line: &[u8]| line.trim_ascii_end().ends_with(b"\\");
+    let lines = || bytes.split_inclusive(|&b| b == b'\n');
+    if !bytes.contains(&b'\\') || !lines().any(goes_on) {
+        return bytes;
+    }
+    let (mut text, mut ends) = (Vec::with_capacity(bytes.len()), 0);
+    for line in lines() {
+        if goes_on(line) {
+            let end = line.trim_ascii_end().len() - 1;
+            text.extend_from_slice(&line[..end]);
+            text.push(b' ');
+            ends += 1;
+        } else {
+            text.extend_from_slice(line);
+            text.extend(std::iter::repeat_n(b'\n', std::mem::take(&mut ends)));
+        }
+    }
+    Cow::Owned(text)
 }
 
 /// Passes on the lines that make the mesh, `v` without colours and `f`, or also what says how it

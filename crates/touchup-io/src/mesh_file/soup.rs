@@ -1,7 +1,10 @@
 //! Triangles between a file and a mesh.
 
 use nalgebra::Point3;
-use touchup_core::mesh::TriMesh;
+use touchup_core::mesh::{TriMesh, triangulate};
+
+use super::defect::{Defect, Syntax};
+use crate::file_error::FilePlace;
 
 /// Triangles as read from a file.
 #[derive(Debug, Default)]
@@ -10,6 +13,60 @@ pub(super) struct Soup {
     pub faces: Vec<[u32; 3]>,
     /// vertices in the file that did not even get into `positions`
     pub unused: usize,
+}
+
+/// Polygons as read from a file, before the vertices may have been.
+#[derive(Debug, Default)]
+pub(super) struct Polygons {
+    vertices: Vec<u32>,
+    /// where those of each end, and its place in the file
+    ends: Vec<(usize, FilePlace)>,
+}
+
+impl Polygons {
+    pub fn push(
+        &mut self,
+        vertices: impl Iterator<Item = Result<u32, Syntax>>,
+        place: FilePlace,
+    ) -> Result<(), Syntax> {
+        for vertex in vertices {
+            self.vertices.push(vertex?);
+        }
+        self.ends.push((self.vertices.len(), place));
+        Ok(())
+    }
+
+    /// Divides each in turn: the number of the polygon, its vertices, and of each triangle which
+    /// three of these it has.
+    pub fn divide(
+        &self,
+        positions: &[Point3<f64>],
+        mut take: impl FnMut(usize, &[u32], [u32; 3]),
+    ) -> Result<(), Syntax> {
+        let mut start = 0;
+        for (number, &(end, place)) in self.ends.iter().enumerate() {
+            let vertices = &self.vertices[start..end];
+            start = end;
+            if vertices.len() == 3 {
+                take(number, vertices, [0, 1, 2]);
+                continue;
+            }
+            let defect = Defect::SidesCross;
+            for triangle in divided(vertices, positions).ok_or(Syntax { place, defect })? {
+                take(number, vertices, triangle);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The triangles of a polygon, as indices into its vertices; `None` where its sides cross. Of one
+/// whose vertices are not there the numbers alone are divided: what reads them refuses it.
+pub(super) fn divided(vertices: &[u32], positions: &[Point3<f64>]) -> Option<Vec<[u32; 3]>> {
+    let at = |&vertex: &u32| positions.get(vertex as usize).copied();
+    let nowhere = || vec![Point3::origin(); vertices.len()];
+    let corners: Option<Vec<Point3<f64>>> = vertices.iter().map(at).collect();
+    triangulate(&corners.unwrap_or_else(nowhere))
 }
 
 impl Soup {

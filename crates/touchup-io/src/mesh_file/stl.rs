@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 
 use nalgebra::Point3;
+use touchup_core::mesh::triangulate;
 
 use super::defect::{Defect, Syntax};
 use super::soup::Soup;
@@ -78,7 +79,8 @@ fn read_binary(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     Ok(Soup::of_triangles(positions))
 }
 
-/// Any number of solids; words in any case; facets of more than three corners are cut into a fan.
+/// Any number of solids; words in any case; facets of more than three corners are
+/// divided into triangles.
 fn read_ascii(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     let mut positions: Vec<Point3<f64>> = Vec::new();
     let mut corners: Vec<Point3<f64>> = Vec::new();
@@ -106,10 +108,15 @@ fn read_ascii(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
                 ));
             }
             "endfacet" => {
+                let triangles = triangulate(&corners).ok_or(Syntax {
+                    place,
+                    defect: Defect::SidesCross,
+                })?;
                 positions.extend(
-                    corners[1..]
-                        .windows(2)
-                        .flat_map(|pair| [corners[0], pair[0], pair[1]]),
+                    triangles
+                        .as_flattened()
+                        .iter()
+                        .map(|&at| corners[at as usize]),
                 );
                 corners.clear();
             }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::writer::not_written;
 use super::{Record, RecordingError, RecordingReader, RecordingWriter, Topics};
 use crate::atomic::AtomicFile;
 use touchup_core::stylus::Message;
@@ -39,12 +40,9 @@ pub fn copy_recording(
     topics: &Topics,
     at_each: &mut dyn FnMut(),
 ) -> Result<CopiedRecording, RecordingError> {
-    let io = |source| RecordingError::Io {
-        path: path.to_owned(),
-        source,
-    };
-    let mut file = AtomicFile::create(path).map_err(io)?;
-    let mut writer = RecordingWriter::new(&mut file, topics)?;
+    let file_error = |error: RecordingError| error.of_file(path);
+    let mut file = AtomicFile::create(path).map_err(|error| not_written(path, error))?;
+    let mut writer = RecordingWriter::new(&mut file, topics).map_err(file_error)?;
     let mut copied = CopiedRecording::default();
     while let Some(record) = reader.next_record() {
         let record = match record {
@@ -60,18 +58,16 @@ pub fn copy_recording(
             false => (&mut copied.poses, reader.pose_frame()),
         };
         *count += 1;
-        writer.write(
-            record,
-            frame.filter(|frame| !frame.is_empty()).unwrap_or(UNNAMED),
-        )?;
+        let frame = frame.filter(|frame| !frame.is_empty()).unwrap_or(UNNAMED);
+        writer.write(record, frame).map_err(file_error)?;
         at_each();
     }
-    writer.finish()?;
+    writer.finish().map_err(file_error)?;
     if copied.poses == 0 || copied.wrenches == 0 {
         let what = if copied.poses == 0 { "pose" } else { "wrench" };
         return Err(copied.damage.unwrap_or_else(|| reader.without(what)));
     }
-    file.commit().map_err(io)?;
+    file.commit().map_err(|error| not_written(path, error))?;
     let own = |frame: Option<&str>| frame.unwrap_or_default().to_owned();
     (copied.pose_frame, copied.wrench_frame) =
         (own(reader.pose_frame()), own(reader.wrench_frame()));

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
-use crate::file_error::FilePlace;
+use crate::file_error::{FileError, FilePlace};
 
 /// Why a recording cannot be opened, read to its end, or written.
 #[derive(Debug, thiserror::Error)]
@@ -89,6 +89,9 @@ pub enum RecordingError {
         /// ns
         stamp_ns: i64,
     },
+    /// The system did not write it.
+    #[error(transparent)]
+    NotWritten(#[from] FileError),
     /// The container could not be written.
     #[error("writing the recording: {0}")]
     Write(#[from] ::mcap::McapError),

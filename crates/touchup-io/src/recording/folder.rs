@@ -77,11 +77,40 @@ pub(super) fn files_of(path: &Path) -> Result<VecDeque<PathBuf>, RecordingError>
     if names.is_empty() {
         return Err(bad("it names no files".to_owned()));
     }
-    names
+    let files = names
         .iter()
         .map(|name| find_file(path, name).ok_or_else(|| bad(format!("{name:?} is not there"))))
-        .collect()
+        .collect::<Result<VecDeque<_>, _>>()?;
+    if let Some(name) = not_named(path, &files).map_err(|error| bad(error.to_string()))? {
+        return Err(bad(format!(
+            "{name:?} lies beside the files that it names: add it to relative_file_paths, in its turn, or move it elsewhere"
+        )));
+    }
+    Ok(files)
 }
+
+/// The name of a recording in a folder that is none of its files, nor one of them unpacked.
+fn not_named(folder: &Path, files: &VecDeque<PathBuf>) -> io::Result<Option<String>> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let packed = entry.file_name().to_string_lossy().into_owned() + PACKED;
+        let is_named = [entry.path(), folder.join(&packed)]
+            .iter()
+            .any(|path| files.contains(path));
+        let name = &packed[..packed.len() - PACKED.len()];
+        let plain = name.strip_suffix(PACKED).unwrap_or(name);
+        let is_recording = plain.ends_with(".mcap") || plain.ends_with(".db3");
+        // a recorder that was killed leaves empty ones
+        if is_recording && !is_named && entry.metadata()?.len() > 0 {
+            names.push(name.to_owned());
+        }
+    }
+    Ok(names.into_iter().min())
+}
+
+/// Ending of a compressed file, behind its own.
+const PACKED: &str = ".zstd";
 
 fn read_metadata(path: &Path) -> io::Result<String> {
     let mut text = String::new();

@@ -1,7 +1,7 @@
 //! Writes a touch as MCAP with profile `ros2`.
 
 use std::collections::BTreeMap;
-use std::io::{Seek, Write};
+use std::io::{self, Seek, Write};
 use std::path::Path;
 
 use ::mcap::records::MessageHeader;
@@ -12,6 +12,7 @@ use super::cdr::{encode_pose, encode_wrench};
 use super::point_cloud::{POINT_CLOUD, POINT_FIELD, encode_markers};
 use super::{Record, RecordingError, TopicKind, Topics};
 use crate::atomic::AtomicFile;
+use crate::file_error::FileError;
 use touchup_core::stylus::Message;
 
 /// Message definitions in the form rosbag2 stores: the type, then each type it uses behind a line
@@ -183,7 +184,7 @@ fn add_channel<W: Write + Seek>(
 ///   of the frame the wrenches are expressed in.
 ///
 /// # Errors
-/// As [`RecordingWriter`], and [`RecordingError::Io`] with the path for whatever the system
+/// As [`RecordingWriter`], and [`RecordingError::NotWritten`] with the path for whatever the system
 /// refuses.
 pub fn write_recording(
     path: &Path,
@@ -192,11 +193,7 @@ pub fn write_recording(
     wrench_frame: &str,
     records: impl IntoIterator<Item = impl Into<Record>>,
 ) -> Result<(), RecordingError> {
-    let io = |source| RecordingError::Io {
-        path: path.to_owned(),
-        source,
-    };
-    let mut file = AtomicFile::create(path).map_err(io)?;
+    let mut file = AtomicFile::create(path).map_err(|error| not_written(path, error))?;
     let write = || {
         let mut writer = RecordingWriter::new(&mut file, topics)?;
         for record in records {
@@ -206,9 +203,24 @@ pub fn write_recording(
         }
         writer.finish().map(drop)
     };
-    write().map_err(|error| match error {
-        RecordingError::Write(McapError::Io(source)) => io(source),
-        error => error,
-    })?;
-    file.commit().map_err(io)
+    write().map_err(|error: RecordingError| error.of_file(path))?;
+    file.commit().map_err(|error| not_written(path, error))
+}
+
+pub(super) fn not_written(path: &Path, source: io::Error) -> RecordingError {
+    RecordingError::NotWritten(FileError::Write {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+impl RecordingError {
+    /// With the path, where it is one of writing the container.
+    pub(super) fn of_file(self, path: &Path) -> Self {
+        match self {
+            Self::Write(McapError::Io(source)) => not_written(path, source),
+            Self::Write(error) => not_written(path, io::Error::other(error)),
+            error => error,
+        }
+    }
 }

@@ -3,18 +3,14 @@
 use std::path::PathBuf;
 
 use touchup_core::stylus::SettingError;
+use touchup_io::file_error::FileError;
 
 /// Why a scene is not usable.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
     /// The file cannot be read.
-    #[error("cannot read the scene {path}: {source}", path = path.display())]
-    Read {
-        /// which file
-        path: PathBuf,
-        /// what the system says
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Read(#[from] FileError),
     /// Not YAML, an unknown key, or a value of the wrong kind.
     #[error("{message}{hint}")]
     Yaml {

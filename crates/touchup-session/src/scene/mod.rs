@@ -37,6 +37,7 @@ use touchup_core::reconstruct::{PatchParams, UncertaintyParams};
 use touchup_core::stylus::{BiasParams, ContactGateParams, SyncParams, TipBody};
 use touchup_io::mesh_file::MeshUnit;
 use touchup_io::recording::TableColumns;
+use touchup_io::text_file::read_text;
 
 parameters! {
     /// The parts of a scene. `None`: not built. Those with a default are built unless the scene
@@ -125,10 +126,7 @@ impl Scene {
     /// # Errors
     /// As [`Self::read`].
     pub fn read_with_text(path: &Path) -> Result<(Self, String), SceneError> {
-        let yaml = std::fs::read_to_string(path).map_err(|source| SceneError::Read {
-            path: path.to_owned(),
-            source,
-        })?;
+        let yaml = read_text(path)?;
         let in_file = |error| SceneError::In {
             path: path.to_owned(),
             error: Box::new(error),

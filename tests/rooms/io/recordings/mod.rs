@@ -364,6 +364,26 @@ fn a_db3_in_write_ahead_mode_is_read_without_a_trace() {
 }
 
 #[test]
+fn what_lies_beside_the_files_of_a_recording_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = mcap_bytes(&touch(600));
+    put(folder.path(), "a.mcap", &bytes);
+    let metadata = b"rosbag2_bagfile_information:\n  version: 5\n  relative_file_paths: [a.mcap]\n";
+    put(folder.path(), "metadata.yaml", metadata);
+    let opened = || RecordingReader::open(folder.path(), &Topics::default());
+    for name in ["c.mcap", "c.db3", "c.db3.zstd"] {
+        // nothing is in it
+        let beside = put(folder.path(), name, b"");
+        assert!(opened().is_ok(), "{name}");
+        put(folder.path(), name, &bytes);
+        let text = opened().err().unwrap().to_string();
+        let wanted = format!("{name:?} lies beside the files that it names");
+        assert!(text.contains(&wanted), "{text}");
+        fs::remove_file(beside).unwrap();
+    }
+}
+
+#[test]
 fn a_folder_is_read_in_the_order_of_its_metadata() {
     let folder = tempfile::tempdir().unwrap();
     let messages = touch(600);

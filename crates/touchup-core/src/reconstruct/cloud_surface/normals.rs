@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
 use super::clean::UsablePoints;
 use super::summary::NormalSource;
-use crate::mesh::{PointTree, Workers, map_by};
+use crate::mesh::{PointTree, ScanStation, Workers, map_by};
 
 /// Neighbours that a plane is laid through: two rings about a point, and enough that noise of one
 /// spacing turns it by a tenth alone.
@@ -86,23 +86,46 @@ pub(super) fn oriented(
         return (given, NormalSource::File);
     }
     let mut normals: Vec<_> = near.iter().map(|near| near.normal).collect();
-    if points
-        .stations
-        .iter()
-        .all(|station| station.eye.is_some() && station.is_sure)
-    {
-        for (at, (normal, p)) in normals.iter_mut().zip(&points.positions).enumerate() {
-            if points
-                .eye(at)
-                .is_some_and(|eye| normal.dot(&(eye - p)) < 0.0)
-            {
-                normal.neg_mut();
-            }
-        }
-        return (normals, NormalSource::Scanner);
+    let is_known = |station: &ScanStation| station.eye.is_some();
+    let is_sure = points.stations.iter().all(|station| station.is_sure);
+    if !is_sure {
+        turn_along_tree(points, near, &mut normals);
     }
-    turn_along_tree(points, near, &mut normals);
-    (normals, NormalSource::SpanningTree)
+    let seen = share_seen(0..normals.len(), points, &normals);
+    if !points.stations.iter().all(is_known) || !is_sure && seen < SEEN {
+        return (normals, NormalSource::SpanningTree);
+    }
+    for (at, normal) in normals.iter_mut().enumerate() {
+        if looks_away(at, points, normal) == Some(true) {
+            normal.neg_mut();
+        }
+    }
+    (normals, NormalSource::Scanner)
+}
+
+/// Of a surface that was seen from its scanner this share looks at it at least: the rest are edges
+/// and noise. Of a part that was seen from all sides, from a place that is not its scanner's, it is
+/// half.
+const SEEN: f64 = 0.9;
+
+/// Whether a normal points away from where its point was seen; `None`: that is not known.
+fn looks_away(at: usize, points: &UsablePoints, normal: &Vector3<f64>) -> Option<bool> {
+    Some(normal.dot(&(points.eye(at)? - points.positions[at])) < 0.0)
+}
+
+/// Share of the points whose normals point to where they were seen, of those of which that is
+/// known; 0.5 without any.
+fn share_seen(
+    piece: impl Iterator<Item = usize>,
+    points: &UsablePoints,
+    normals: &[Vector3<f64>],
+) -> f64 {
+    let [seen, known] = piece
+        .filter_map(|at| looks_away(at, points, &normals[at]))
+        .fold([0.0; 2], |[seen, known], is_away| {
+            [seen + f64::from(!is_away), known + 1.0]
+        });
+    if known > 0.0 { seen / known } else { 0.5 }
 }
 
 fn is_finite(v: &Vector3<f64>) -> bool {
@@ -110,8 +133,8 @@ fn is_finite(v: &Vector3<f64>) -> bool {
 }
 
 /// Turns the normals so that neighbours agree, along a minimum spanning tree of the neighbours
-/// whose cost is 1 − |nᵢ·nⱼ| [Hoppe 1992]; and all of a piece that hangs together so that most look
-/// at the scanner or, where it is not known, out of the piece.
+/// whose cost is 1 − |nᵢ·nⱼ| [Hoppe 1992]; and all of a piece that hangs together so that they look
+/// at the scanner or, where that cannot be, out of the piece.
 fn turn_along_tree(points: &UsablePoints, near: &[Neighbourhood], normals: &mut [Vector3<f64>]) {
     let mut pairs: Vec<(u32, [u32; 2])> = Vec::with_capacity(near.len() * TURNED);
     for (at, found) in (0u32..).zip(near) {
@@ -182,20 +205,17 @@ impl Sides {
     }
 }
 
-/// Whether the normals of a piece look more to the scanner than away, or out of the piece: their
-/// flux through a closed surface is thrice its volume.
+/// Whether the normals of a piece look outside. Of a closed one that is out of it, wherever its
+/// scanner is said to have stood, of another to where it was seen from; where that contradicts
+/// itself, again out of the piece: the flux of the normals through a closed surface is thrice its
+/// volume.
 fn looks_outside(piece: &[usize], points: &UsablePoints, normals: &[Vector3<f64>]) -> bool {
-    let positions = &points.positions;
-    let vote = |&at: &usize| Some(normals[at].dot(&(points.eye(at)? - positions[at])).signum());
-    let votes: f64 = piece.iter().filter_map(vote).sum();
-    if votes != 0.0 {
-        return votes > 0.0;
-    }
+    let (positions, count) = (&points.positions, piece.len() as f64);
     let middle = piece
         .iter()
         .map(|&at| positions[at].coords)
         .sum::<Vector3<f64>>()
-        / piece.len() as f64;
+        / count;
     let [flux, reach] = piece.iter().fold([0.0; 2], |[flux, reach], &at| {
         let from_middle = positions[at].coords - middle;
         [
@@ -203,15 +223,27 @@ fn looks_outside(piece: &[usize], points: &UsablePoints, normals: &[Vector3<f64>
             reach + from_middle.norm(),
         ]
     });
-    /// Of a flat piece there is no flux but that of noise; then up is outside, as of a part on a
-    /// table.
-    const FLAT: f64 = 0.02;
-    if flux.abs() > FLAT * reach {
+    let sum: Vector3<f64> = piece.iter().map(|&at| normals[at]).sum();
+    let seen = share_seen(piece.iter().copied(), points, normals);
+    let (has_flux, is_closed) = (flux.abs() > FLAT * reach, sum.norm() < CLOSED * count);
+    let agrees = !(1.0 - SEEN..SEEN).contains(&seen);
+    if has_flux && (is_closed || !agrees) {
         return flux > 0.0;
     }
-    let sum: Vector3<f64> = piece.iter().map(|&at| normals[at]).sum();
+    if seen != 0.5 {
+        return seen > 0.5;
+    }
+    if has_flux {
+        return flux > 0.0;
+    }
+    // up, as of a part on a table
     sum[sum.iamax()] >= 0.0
 }
+
+/// A flat piece has no more flux than noise makes, over the sum of the distances from its middle.
+const FLAT: f64 = 0.02;
+/// The normals of a closed piece cancel, but for this share: its sides are sampled unevenly.
+const CLOSED: f64 = 0.1;
 
 #[cfg(test)]
 mod tests {

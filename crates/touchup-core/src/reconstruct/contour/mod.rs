@@ -11,4 +11,3 @@ pub(in crate::reconstruct) mod qef;
 pub(in crate::reconstruct) mod scan_clipping;
 pub(in crate::reconstruct) mod splice;
 pub(in crate::reconstruct) mod trace;
-pub(in crate::reconstruct) mod triangulation;

@@ -3,11 +3,10 @@
 
 use nalgebra::{Point2, Point3, Vector3};
 
-use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh};
+use crate::mesh::{BoxQuery, FaceId, FaceTree, TriMesh, fill};
 use crate::numeric::{direction, distinct};
 use crate::reconstruct::contour::clip::{Pieces, PointSupport, SideOrigin, wall};
 use crate::reconstruct::contour::patched::Patch;
-use crate::reconstruct::contour::triangulation::fill;
 use crate::reconstruct::field::lattice::{
     CellBox, Edge, Lattice, LatticeNode, LatticeRegion, Owner, PatchFace, Square, VertexKey,
 };

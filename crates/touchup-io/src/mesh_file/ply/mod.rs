@@ -11,7 +11,7 @@ use nalgebra::Point3;
 use super::appearance::SoupTexture;
 use super::column::{ColumnValues, VertexColumn};
 use super::defect::Syntax;
-use super::soup::Soup;
+use super::soup::{Polygons, Soup};
 use crate::file_error::FilePlace;
 use body::Body;
 use header::{Element, PlyHeader};
@@ -25,20 +25,38 @@ const OF_CORNERS: [&str; 2] = ["texcoord", "texnumber"];
 const IMAGE: &str = "comment TextureFile ";
 
 /// Reads `vertex`, and `face` or `tristrips`; coordinates are multiplied by `scale`, polygons are
-/// cut into fans.
+/// divided into triangles.
 pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     let header = PlyHeader::read(bytes)?;
     let mut body = Body::new(bytes, &header);
-    let mut soup = Soup::default();
+    let (mut soup, mut polygons) = (Soup::default(), Polygons::default());
     for element in &header.elements {
         body.check_count(element)?;
         match element.name.as_str() {
             "vertex" => (soup.positions, _) = read_vertices(&mut body, element, scale, [])?,
-            "face" => read_polygons(&mut body, element, &mut soup, fan)?,
-            "tristrips" => read_polygons(&mut body, element, &mut soup, strips)?,
+            "face" => {
+                let (list, triangles) = (vertex_list(element)?, body.triangles(element));
+                let rest = element.count - triangles.len();
+                soup.faces.extend(triangles);
+                body.rows(element, rest, Some(list), |row, place| {
+                    polygons.push(vertices(row, place), place)
+                })?;
+            }
+            "tristrips" => {
+                let list = vertex_list(element)?;
+                body.rows(element, element.count, Some(list), |row, place| {
+                    strips(row, place, &mut soup.faces)
+                })?;
+            }
             _ => body.rows(element, element.count, None, |_, _| Ok(()))?,
         }
     }
+    let Soup {
+        positions, faces, ..
+    } = &mut soup;
+    polygons.divide(positions, |_, vertices, triangle| {
+        faces.push(triangle.map(|at| vertices[at as usize]));
+    })?;
     Ok(soup)
 }
 
@@ -63,9 +81,6 @@ pub(super) fn read_columns<const N: usize>(
     }
     Ok((Vec::new(), [const { None }; N]))
 }
-
-/// Adds the triangles of one row to the faces.
-type Triangulate = fn(&[f64], FilePlace, &mut Vec<[u32; 3]>) -> Result<(), Syntax>;
 
 fn read_vertices<const N: usize>(
     body: &mut Body,
@@ -109,61 +124,33 @@ fn position_columns(element: &Element) -> Result<[usize; 3], Syntax> {
     Ok(columns)
 }
 
-fn read_polygons(
-    body: &mut Body,
-    element: &Element,
-    soup: &mut Soup,
-    cut: Triangulate,
-) -> Result<(), Syntax> {
-    let list = VERTEX_LISTS
-        .iter()
-        .find_map(|name| element.list(name))
-        .ok_or_else(|| {
-            Syntax::unexpected(
-                FilePlace::Line(element.line),
-                "faces with a list vertex_indices",
-                "none",
-            )
-        })?;
-    let triangles = body.triangles(element);
-    let rest = element.count - triangles.len();
-    if soup.faces.is_empty() {
-        soup.faces = triangles;
-    } else {
-        soup.faces.extend(triangles);
-    }
-    body.rows(element, rest, Some(list), |row, place| {
-        cut(row, place, &mut soup.faces)
+/// The list of the vertices of each face.
+fn vertex_list(element: &Element) -> Result<usize, Syntax> {
+    let list = VERTEX_LISTS.iter().find_map(|name| element.list(name));
+    list.ok_or_else(|| {
+        Syntax::unexpected(
+            FilePlace::Line(element.line),
+            "faces with a list vertex_indices",
+            "none",
+        )
     })
 }
 
-/// The vertices that three numbers name.
-fn triangle(corners: [f64; 3], place: FilePlace) -> Result<[u32; 3], Syntax> {
-    let whole = corners.map(|number| number as u32);
-    match corners
-        .into_iter()
-        .zip(whole)
-        .find(|(number, whole)| f64::from(*whole) != *number)
-    {
-        Some((number, _)) => Err(Syntax::unexpected(place, "a vertex number", number)),
-        None => Ok(whole),
-    }
-}
-
-/// Triangles from the first corner of a polygon to its sides; fewer than three corners make none.
-fn fan(polygon: &[f64], place: FilePlace, faces: &mut Vec<[u32; 3]>) -> Result<(), Syntax> {
-    for pair in polygon.get(1..).unwrap_or_default().windows(2) {
-        faces.push(triangle([polygon[0], pair[0], pair[1]], place)?);
-    }
-    Ok(())
+/// The vertices that numbers name.
+fn vertices(numbers: &[f64], place: FilePlace) -> impl Iterator<Item = Result<u32, Syntax>> {
+    numbers.iter().map(move |&number| match number as u32 {
+        whole if f64::from(whole) == number => Ok(whole),
+        _ => Err(Syntax::unexpected(place, "a vertex number", number)),
+    })
 }
 
 /// Strips end with −1; every second triangle of a strip runs the other way round.
 fn strips(numbers: &[f64], place: FilePlace, faces: &mut Vec<[u32; 3]>) -> Result<(), Syntax> {
     for strip in numbers.split(|&n| n == -1.0) {
+        let strip: Vec<u32> = vertices(strip, place).collect::<Result<_, _>>()?;
         for (i, corners) in strip.windows(3).enumerate() {
             let (a, b) = if i % 2 == 0 { (0, 1) } else { (1, 0) };
-            faces.push(triangle([corners[a], corners[b], corners[2]], place)?);
+            faces.push([corners[a], corners[b], corners[2]]);
         }
     }
     Ok(())

@@ -1,13 +1,14 @@
 //! Colours and texture coordinates in PLY files.
 
+use nalgebra::Point3;
 use touchup_core::mesh::VertexColours;
 
 use super::super::appearance::{PaintedSoup, SoupTexture};
 use super::super::defect::Syntax;
+use super::super::soup::Polygons;
 use super::body::Body;
 use super::header::{Element, PlyHeader, PlyKind};
-use super::{IMAGE, OF_CORNERS, VERTEX_LISTS, fan, read, read_vertices};
-use crate::file_error::FilePlace;
+use super::{IMAGE, OF_CORNERS, read, read_vertices, vertex_list, vertices};
 use crate::scalar::Scalar;
 
 /// Names of the colours, as programs write them; the fourth says how opaque they are.
@@ -74,7 +75,7 @@ pub(in crate::mesh_file) fn read_painted(bytes: &[u8], scale: f64) -> Result<Pai
     };
     let images = images(&bytes[..header.len]);
     if let Some(face) = face {
-        let (faces, texture) = read_corners(bytes, &header, face)?;
+        let (faces, texture) = read_corners(bytes, &header, face, &positions)?;
         return Ok(PaintedSoup {
             positions,
             faces,
@@ -126,27 +127,18 @@ fn read_corners(
     bytes: &[u8],
     header: &PlyHeader,
     face: &Element,
+    positions: &[Point3<f64>],
 ) -> Result<(Vec<[u32; 3]>, SoupTexture), Syntax> {
     let body = || body_of(bytes, header, "face");
-    let list = VERTEX_LISTS.iter().find_map(|name| face.list(name));
-    let list = list.ok_or_else(|| {
-        Syntax::unexpected(
-            FilePlace::Line(face.line),
-            "faces with a list vertex_indices",
-            "none",
-        )
+    let (list, mut polygons) = (vertex_list(face)?, Polygons::default());
+    body()?.rows(face, face.count, Some(list), |row, place| {
+        polygons.push(vertices(row, place), place)
     })?;
     // of each triangle its row, and which corners of the polygon it has
-    let (mut faces, mut places, mut row_count, mut numbers) =
-        (Vec::new(), Vec::new(), 0usize, Vec::new());
-    body()?.rows(face, face.count, Some(list), |row, place| {
-        fan(row, place, &mut faces)?;
-        numbers.clear();
-        let order: Vec<f64> = (0..row.len()).map(|corner| corner as f64).collect();
-        fan(&order, place, &mut numbers)?;
-        places.extend(numbers.iter().map(|corners| (row_count, *corners)));
-        row_count += 1;
-        Ok(())
+    let (mut faces, mut places) = (Vec::new(), Vec::new());
+    polygons.divide(positions, |row, vertices, triangle| {
+        faces.push(triangle.map(|at| vertices[at as usize]));
+        places.push((row, triangle));
     })?;
     let (mut values, mut starts) = (Vec::new(), Vec::with_capacity(face.count));
     body()?.rows(face, face.count, face.list(OF_CORNERS[0]), |row, _| {

@@ -44,7 +44,7 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
         cloud.stations.push(ScanStation {
             points: cloud.positions.len() - first,
             eye,
-            is_sure: eye.is_some(),
+            is_sure: eye.is_some() && scan.has_row_column(),
         });
     }
     match cloud.positions.is_empty() {
@@ -148,7 +148,7 @@ mod tests {
         assert_eq!((first.points, first.eye, second.points), (3, None, 3));
         assert_eq!(
             (second.eye, second.is_sure),
-            (Some(Point3::new(20.0, 0.0, 1.0)), true)
+            (Some(Point3::new(20.0, 0.0, 1.0)), false)
         );
     }
 

@@ -118,11 +118,10 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
         .eye
         .or(is_grid.then(Point3::origin))
         .map(|eye| eye * scale);
-    let is_sure = is_grid || eye.is_some_and(|eye| eye != Point3::origin());
     cloud.stations = vec![ScanStation {
         points: cloud.positions.len(),
         eye,
-        is_sure,
+        is_sure: is_grid,
     }];
     Ok(cloud)
 }
@@ -493,7 +492,7 @@ mod tests {
             } = cloud.stations[0];
             assert_eq!(
                 (points, eye, is_sure),
-                (2, Some(Point3::new(0.0, 0.0, 2.0)), true)
+                (2, Some(Point3::new(0.0, 0.0, 2.0)), false)
             );
         }
     }

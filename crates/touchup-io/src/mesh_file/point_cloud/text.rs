@@ -12,10 +12,10 @@ const SHORTEST: usize = 6;
 /// How long a normal may be: its digits are rounded.
 const UNIT_LENGTH: std::ops::RangeInclusive<f64> = 0.98..=1.02;
 
-/// Reads lines of numbers, separated by blanks, tabs, commas or semicolons; coordinates are
-/// multiplied by `scale`. Lines that begin with `#`, `//` or a letter, and the number of the points
-/// in the first line, are passed over. Columns 4 to 6, or the last three, are the normals where
-/// they are of length 1 in every line.
+/// Reads lines of numbers; coordinates are multiplied by `scale`. The first of them decides what
+/// separates them, the first decimal sign which one all have ([`Notation`]). Lines that begin with
+/// `#`, `//` or a letter, and the number of the points in the first line, are passed over. Columns
+/// 4 to 6, or the last three, are the normals where they are of length 1 in every line.
 pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
     let end_of_line = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
     let mut lines = NumberedLines::new(
@@ -27,25 +27,23 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
         after_xyz: Some(Vec::new()),
         at_end: Some(Vec::new()),
     };
-    let mut row = Vec::new();
+    let (mut row, mut notation) = (Vec::new(), None);
     while let Some(line) = lines.next() {
         if is_comment(&line) {
             continue;
         }
         let place = FilePlace::Line(lines.number());
-        row.clear();
-        for word in line
-            .split(|c: char| c.is_whitespace() || c == ',' || c == ';')
-            .filter(|word| !word.is_empty())
-        {
-            row.push(
-                word.parse::<f64>()
-                    .map_err(|_| Syntax::unexpected(place, "a number", word))?,
-            );
+        if line.trim().is_empty() {
+            continue;
         }
+        let (_, decided) = notation.get_or_insert_with(|| (place, Notation::of(&line)));
+        decided
+            .numbers(&line, &mut row)
+            .map_err(|(expected, found)| Syntax::unexpected(place, expected, found))?;
         match row[..] {
-            [] => {}
-            [count] if positions.is_empty() && count >= 0.0 && count.fract() == 0.0 => {}
+            [count] if positions.is_empty() && count >= 0.0 && count.fract() == 0.0 => {
+                notation = None;
+            }
             [x, y, z, ..] => {
                 positions.push(Point3::new(x, y, z) * scale);
                 normals.take(&row);
@@ -59,6 +57,20 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
             defect: Defect::NoPoints,
         });
     }
+    if let Some((
+        place,
+        Notation {
+            may_be_decimals: true,
+            ..
+        },
+    )) = notation
+    {
+        return Err(Syntax::unexpected(
+            place,
+            DECIDED,
+            "whole numbers and commas alone",
+        ));
+    }
     let stations = vec![ScanStation::unknown(positions.len())];
     Ok(PointCloud {
         positions,
@@ -66,6 +78,86 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
         stations,
     })
 }
+
+/// How a file writes its numbers, in all of its lines.
+struct Notation {
+    /// `None`: blanks
+    separator: Option<char>,
+    /// `None`: no number has had one yet
+    decimal_sign: Option<char>,
+    /// commas between whole numbers, as many as decimals would make
+    may_be_decimals: bool,
+}
+
+impl Notation {
+    /// By the first line of numbers: semicolons separate; commas do, but not those within at least
+    /// three words, one in each at the most.
+    fn of(line: &str) -> Self {
+        let has_decimals = |word: &str| {
+            word.matches(',').count() < 2 && !word.starts_with(',') && !word.ends_with(',')
+        };
+        let words = line.split_whitespace();
+        let are_decimals = words.clone().count() > 2 && words.clone().all(has_decimals);
+        let separator = [';', ',']
+            .into_iter()
+            .find(|&separator| line.contains(separator))
+            .filter(|&separator| separator == ';' || !are_decimals);
+        let columns = line.trim().trim_end_matches(',').split(',').count();
+        Self {
+            separator,
+            decimal_sign: None,
+            may_be_decimals: separator == Some(',') && columns >= 6 && columns.is_multiple_of(2),
+        }
+    }
+
+    /// The numbers of a line; or what was expected, and found.
+    fn numbers<'a>(
+        &mut self,
+        line: &'a str,
+        row: &mut Vec<f64>,
+    ) -> Result<(), (&'static str, &'a str)> {
+        row.clear();
+        let line = line.trim();
+        match self.separator {
+            None => {
+                for word in line.split_whitespace() {
+                    row.push(self.number(word)?);
+                }
+            }
+            Some(separator) => {
+                let line = line.strip_suffix(separator).unwrap_or(line);
+                for word in line.split(separator) {
+                    row.push(self.number(word.trim())?);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn number<'a>(&mut self, word: &'a str) -> Result<f64, (&'static str, &'a str)> {
+        let sign = word.chars().find(|c| ['.', ','].contains(c));
+        if let Some(sign) = sign {
+            self.may_be_decimals = false;
+            if *self.decimal_sign.get_or_insert(sign) != sign {
+                return Err(("the decimal sign of the lines before", word));
+            }
+        }
+        // what follows a decimal sign may begin with a zero
+        let digits = word.trim_start_matches(['+', '-']).as_bytes();
+        if self.separator == Some(',') && matches!(digits, [b'0', b'0'..=b'9', ..]) {
+            return Err((DECIDED, word));
+        }
+        let parsed = match sign {
+            Some(',') => word.replace(',', ".").parse(),
+            _ => word.parse(),
+        };
+        parsed.map_err(|_| ("a number", word))
+    }
+}
+
+/// What is expected where a comma may be either.
+const DECIDED: &str = "numbers with decimal points, or with decimal commas and separated by \
+     semicolons or blanks";
 
 /// A line that is none of numbers; "nan" and "inf" are numbers.
 fn is_comment(line: &str) -> bool {
@@ -114,18 +206,59 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_read_with_any_separator_between_comments() {
-        let text = "3\n# a cloud\n//x y z\nX,Y,Z\n1 2\t3\r\n\n4;5;6\n7, 8, nan\n-1e1,+.5,2.\n";
-        let cloud = read(text.as_bytes(), 2.0).unwrap();
-        let [a, b, c, d] = cloud.positions[..] else {
-            panic!("{cloud:?}")
+    fn numbers_are_read_with_any_separator_and_sign_between_comments() {
+        for [first, second] in [
+            ["1 2\t3\r", "-1e1  +.5 2."],
+            ["1;2 ; 3", "-1e1;+.5;2.;"],
+            ["1, 2, 3", "-1e1,+.5 ,2."],
+            ["1,2,3,", "-1e1,+.5,2."],
+            ["1 2 3", "-1e1 0,5 2,0"],
+            ["1,0\t2,00\t3", "-1e1\t+0,5\t2"],
+            ["1;2;3", "-1,0e1;0,5;2"],
+        ] {
+            let text = format!("2\n# a cloud\n//x y z\nX,Y,Z\n{first}\n\n{second}\n");
+            let cloud = read(text.as_bytes(), 2.0).unwrap();
+            let wanted = [[2.0, 4.0, 6.0], [-20.0, 1.0, 4.0]].map(Point3::from);
+            assert_eq!(cloud.positions, wanted, "{text}");
+            assert!(cloud.normals.is_empty());
+        }
+        let cloud = read(b"7, 8, nan\n1, 2, 3, 255, 0, 0\n0.5,0,0,1,2,3", 1.0).unwrap();
+        assert!(cloud.positions.len() == 3 && cloud.positions[0].z.is_nan());
+    }
+
+    #[test]
+    fn a_notation_that_changes_or_may_be_two_is_refused() {
+        let error = |text: &str| {
+            let Syntax { place, defect } = read(text.as_bytes(), 1.0).unwrap_err();
+            format!("{place}: {defect}")
         };
+        for (text, wanted) in [
+            (
+                "1.5 2 3\n4 5,5 6\n",
+                "line 2: expected the decimal sign of the lines before, found '5,5'",
+            ),
+            (
+                "1,5;2;3\n4;5.5;6\n",
+                "line 2: expected the decimal sign of the lines before, found '5.5'",
+            ),
+            ("1 2 3\n4;5;6\n", "line 2: expected a number, found '4;5;6'"),
+            ("1;2;3\n4 5 6\n", "line 2: expected a number, found '4 5 6'"),
+            ("1,2,3\n4 5 6\n", "line 2: expected a number, found '4 5 6'"),
+            ("1,2,3 4\n", "line 1: expected a number, found '3 4'"),
+            (
+                "1,234.5;2;3\n",
+                "line 1: expected a number, found '1,234.5'",
+            ),
+            ("1;;3\n", "line 1: expected a number, found ''"),
+        ] {
+            assert_eq!(error(text), wanted);
+        }
         assert_eq!(
-            [a, b, d],
-            [[2.0, 4.0, 6.0], [8.0, 10.0, 12.0], [-20.0, 1.0, 4.0]].map(Point3::from)
+            error("33,0580,4,2960,10,0000\n"),
+            format!("line 1: expected {DECIDED}, found '0580'")
         );
-        assert!(c.z.is_nan());
-        assert!(cloud.normals.is_empty());
+        let whole = format!("line 2: expected {DECIDED}, found 'whole numbers and commas alone'");
+        assert_eq!(error("2\n33,5,4,2,10,1\n34,5,4,2,10,1\n"), whole);
     }
 
     #[test]

@@ -1,26 +1,103 @@
-//! Triangles of a plane region with holes, on its own corners: a constrained Delaunay
-//! triangulation, so that no triangle is thinner than it has to be.
+//! Triangles of polygons, and of plane regions with holes, on their own corners: a constrained
+//! Delaunay triangulation, so that no triangle is thinner than it has to be.
 
-use nalgebra::Point2;
+use std::collections::HashMap;
+
+use nalgebra::{Point2, Point3, Vector3};
 use spade::handles::{FixedFaceHandle, FixedVertexHandle, InnerTag};
 use spade::{ConstrainedDelaunayTriangulation, Triangulation};
 
-use crate::numeric::flood;
+use crate::numeric::{flood, tangent_basis};
 
 /// Indices of three corners, counter-clockwise.
-pub(in crate::reconstruct) type Triangle = [u32; 3];
+type Triangle = [u32; 3];
 
 type Delaunay = ConstrainedDelaunayTriangulation<spade::Point2<f64>>;
+
+/// Triangles of a polygon of any shape, as indices of its corners, in its own sense of rotation.
+///
+/// A convex polygon becomes the fan from its first corner, and so does one without an area. The
+/// others are divided in the plane across their mean normal (Newell's), on which corners need not
+/// lie. A hole may be joined to the rim by a cut, a side that is passed both ways. `None` where
+/// sides cross.
+pub fn triangulate(corners: &[Point3<f64>]) -> Option<Vec<[u32; 3]>> {
+    let fan = || {
+        (2..corners.len() as u32)
+            .map(|at| [0, at - 1, at])
+            .collect()
+    };
+    let Some(points) = in_mean_plane(corners).filter(|points| !is_convex(points)) else {
+        return Some(fan());
+    };
+    // the ends of a cut are named twice
+    let mut named = HashMap::new();
+    let mut outline: Vec<u32> = points
+        .iter()
+        .zip(0..)
+        .map(|(p, at)| *named.entry([p.x, p.y].map(f64::to_bits)).or_insert(at))
+        .collect();
+    outline.dedup();
+    while outline.len() > 1 && outline.first() == outline.last() {
+        outline.pop();
+    }
+    let triangles = fill(&points, &[outline])?;
+    // a side that is passed both ways outside of the rest would fill that side
+    let filled: f64 = triangles
+        .iter()
+        .map(|corners| doubled_area(corners.map(|at| points[at as usize])))
+        .sum();
+    let wanted: f64 = fan_areas(&points).sum();
+    ((filled - wanted).abs() < ROUNDING).then_some(triangles)
+}
+
+/// The corners in the plane across the mean normal, about which they run counter-clockwise, in
+/// parts of their extent; `None` without an area.
+fn in_mean_plane(corners: &[Point3<f64>]) -> Option<Vec<Point2<f64>>> {
+    let first = corners.get(..4)?[0];
+    let extent = corners
+        .iter()
+        .map(|p| (p - first).amax())
+        .fold(0.0, f64::max);
+    let from_first: Vec<Vector3<f64>> = corners.iter().map(|p| (p - first) / extent).collect();
+    let normal: Vector3<f64> = from_first
+        .windows(2)
+        .map(|side| side[0].cross(&side[1]))
+        .sum();
+    let [u, v] = tangent_basis(&normal.try_normalize(ROUNDING)?);
+    // what is rounding alone is 0, and −0 is
+    let rounded = |x: f64| if x.abs() > f64::EPSILON { x } else { 0.0 };
+    let at = |p: &Vector3<f64>| Point2::new(rounded(p.dot(&u)), rounded(p.dot(&v)));
+    Some(from_first.iter().map(at).collect())
+}
+
+/// Twice the areas of the triangles from the first corner to each side, positive
+/// counter-clockwise; their sum is twice that of the polygon.
+fn fan_areas(points: &[Point2<f64>]) -> impl Iterator<Item = f64> {
+    points
+        .windows(2)
+        .map(|side| doubled_area([points[0], side[0], side[1]]))
+}
+
+fn doubled_area([a, b, c]: [Point2<f64>; 3]) -> f64 {
+    (b - a).perp(&(c - a))
+}
+
+/// Whether a polygon turns to the left alone, and once.
+fn is_convex(points: &[Point2<f64>]) -> bool {
+    let count = points.len();
+    let corner = |at: usize| doubled_area([0, 1, 2].map(|next| points[(at + next) % count]));
+    fan_areas(points).all(|area| area >= 0.0) && (0..count).all(|at| corner(at) >= 0.0)
+}
+
+/// What rounding makes of sums of areas, over the square of the extent.
+const ROUNDING: f64 = 1e-10;
 
 /// Triangles of the region that `loops` bound: each a list of indices into `points`, the region on
 /// its left.
 ///
 /// Loops may share points, and pass one twice. `None` when rounding has put two points in one place
 /// or lets two sides cross.
-pub(in crate::reconstruct) fn fill(
-    points: &[Point2<f64>],
-    loops: &[Vec<u32>],
-) -> Option<Vec<Triangle>> {
+pub(crate) fn fill(points: &[Point2<f64>], loops: &[Vec<u32>]) -> Option<Vec<Triangle>> {
     if let [corners] = loops
         && let [a, b, c] = corners[..]
     {
@@ -170,6 +247,52 @@ mod tests {
                 .len(),
             2
         );
+    }
+
+    #[test]
+    fn a_polygon_without_area_or_with_a_bend_is_a_fan() {
+        let fan = Some(vec![[0, 1, 2], [0, 2, 3]]);
+        let at = |x: f64, y: f64, z: f64| Point3::new(x, y, z);
+        assert_eq!(triangulate(&[at(5.0, 5.0, 5.0); 4]), fan);
+        let line = [0.0, 1.0, 3.0, 2.0].map(|x| at(x, 2.0 * x, 1.0));
+        assert_eq!(triangulate(&line), fan);
+        let bent = [
+            (0.0, 0.0, 0.0),
+            (1.0, 0.0, 0.4),
+            (1.0, 1.0, 0.0),
+            (0.0, 1.0, 0.4),
+        ];
+        assert_eq!(triangulate(&bent.map(|(x, y, z)| at(x, y, z))), fan);
+        assert_eq!(
+            triangulate(&bent.map(|(x, y, z)| at(x * f64::NAN, y, z))),
+            fan
+        );
+        assert_eq!(triangulate(&[at(0.0, 0.0, 0.0); 2]), Some(vec![]));
+    }
+
+    /// The corner at 2 is inside of the triangle of the other three: one diagonal alone is inside.
+    #[test]
+    fn an_arrow_has_the_diagonal_that_is_inside() {
+        let arrow = [(0.0, 0.0), (4.0, 0.0), (1.0, 1.0), (0.0, 4.0)];
+        for (x, y, z) in [(0.0, 0.0, 1.0), (0.6, 0.0, 0.8), (-0.48, 0.64, -0.6)] {
+            let [u, v] = tangent_basis(&Vector3::new(x, y, z));
+            for first in 0..4 {
+                let corner = |at: usize| arrow[(first + at) % 4];
+                let corners = [0, 1, 2, 3]
+                    .map(corner)
+                    .map(|(a, b)| Point3::from(u * a + v * b));
+                let triangles = triangulate(&corners).unwrap();
+                let areas: Vec<f64> = triangles
+                    .iter()
+                    .map(|t| t.map(|at| corners[at as usize]))
+                    .map(|[a, b, c]| (b - a).cross(&(c - a)).dot(&Vector3::new(x, y, z)) / 2.0)
+                    .collect();
+                assert!(
+                    areas.len() == 2 && areas.iter().all(|&area| (area - 2.0).abs() < 1e-12),
+                    "{areas:?}"
+                );
+            }
+        }
     }
 
     #[test]
