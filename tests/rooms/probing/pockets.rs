@@ -95,8 +95,8 @@ fn measured(
     ))
 }
 
-/// Every 5°, with sharp corners and with corners up to half of half
-/// the width: within 25 µm of the drawing with touches of 5 µm and a tolerance of 10 µm.
+/// Every 5°, with sharp corners and with corners up to half of half the width: within 25 µm of the
+/// drawing with touches of 5 µm and a tolerance of 10 µm.
 #[test]
 #[ignore = "a slow proof"]
 fn pockets_with_straight_ends_are_found_at_every_angle() {

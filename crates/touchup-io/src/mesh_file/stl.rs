@@ -79,8 +79,8 @@ fn read_binary(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     Ok(Soup::of_triangles(positions))
 }
 
-/// Any number of solids; words in any case; facets of more than three corners are
-/// divided into triangles.
+/// Any number of solids; words in any case; facets of more than three corners are divided into
+/// triangles.
 fn read_ascii(bytes: &[u8], scale: f64) -> Result<Soup, Syntax> {
     let mut positions: Vec<Point3<f64>> = Vec::new();
     let mut corners: Vec<Point3<f64>> = Vec::new();
