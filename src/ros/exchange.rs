@@ -12,6 +12,7 @@ use super::inbox::Inbox;
 use super::names::NameError;
 use super::port::{MESH_PATCH_TOPIC, Port, Publication, Reply};
 use super::send_queue::{SendQueue, Sent};
+use crate::threads::give_way;
 
 /// Why the node cannot speak to others.
 #[derive(Debug, thiserror::Error)]
@@ -98,7 +99,10 @@ impl Exchange {
         };
         Ok([
             self.thread("touchup-send", move |exchange| exchange.urgent.send(urgent))?,
-            self.thread("touchup-mesh", move |exchange| exchange.mesh.send(mesh))?,
+            self.thread("touchup-mesh", move |exchange| {
+                give_way();
+                exchange.mesh.send(mesh);
+            })?,
         ])
     }
 

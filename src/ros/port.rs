@@ -44,8 +44,8 @@ pub enum Arrival {
     SetParameter(String, ParameterValue, Reply<Result<(), String>>),
     /// other software that listens or sends came or went on a topic: for the diagnostics
     Matched(Endpoint),
-    /// somebody new listens to `mesh`
-    Viewer,
+    /// so many listen to `mesh` now; a port that does not say has one
+    Viewers(usize),
     /// somebody wants to see how well the mesh is known: a copy of the evidence, once it is made;
     /// `None` where nothing was touched
     Evidence(Reply<Option<Receiver<Patcher>>>),

@@ -97,7 +97,7 @@ mod tests {
     #[test]
     fn a_stop_is_answered_on_the_thread_that_hears_it_though_no_sample_finds_room() {
         let (inbox, _arrivals) = inbox(1, &Clock::system());
-        while inbox.put(Arrival::Viewer) {}
+        while inbox.put(Arrival::Viewers(1)) {}
         let mut calls = CallsStops(Vec::new());
         serve(&mut calls, &Arc::new(inbox.clone())).unwrap();
         let CallsStops(answers) = calls;

@@ -191,9 +191,6 @@ impl DdsGraph {
                 if is_new {
                     self.report(local, None);
                 }
-                if is_new && self.tiles == Some(local) {
-                    self.exchange.inbox.put(Arrival::Viewer);
-                }
                 if let Some((service, what)) = self.callers.get(&remote) {
                     tracing::info!(service, "{what}");
                 }
@@ -342,6 +339,9 @@ impl DdsGraph {
     fn report(&self, local: GUID, mismatch: Option<String>) {
         if let Some((name, others)) = self.matched.get(&local) {
             let mismatch = mismatch.or_else(|| self.unread.get(name).cloned());
+            if self.tiles == Some(local) {
+                self.exchange.inbox.put(Arrival::Viewers(others.len()));
+            }
             self.exchange
                 .inbox
                 .report(name.clone(), others.len(), mismatch);

@@ -71,6 +71,7 @@ impl<M: RosMessage> Publishes<M> for DdsBackEnd<'_> {
         graph.add(publisher.guid(), &announced, whole);
         if topic == MESH {
             graph.tiles = Some(publisher.guid());
+            self.exchange.inbox.put(Arrival::Viewers(0));
         }
         drop(graph);
         Ok(Box::new(move |message| match publisher.publish(message) {

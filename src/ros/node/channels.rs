@@ -14,7 +14,7 @@ use crate::probing::execute::Flag;
 use crate::probing::plan::NextTouch;
 use crate::ros::messages::{
     DetectFeaturesRequest, DetectFeaturesResponse, DiagnosticArray, FeatureArray,
-    FlagFeatureResponse, HapticMismatch, UnflagFeatureResponse,
+    FlagFeatureResponse, UnflagFeatureResponse,
 };
 use crate::ros::port::Reply;
 
@@ -26,8 +26,8 @@ pub enum ViewInput {
     Variances(Variances),
     /// a new session
     Session(Box<MeshVersion>),
-    /// one sample
-    Mismatch(HapticMismatch),
+    /// a face was touched so far from where the mesh had it, m; where tiles are coloured by that
+    Mismatch(u32, f64),
     /// where the tip is
     Tip(LastTip),
     /// all features, and where a hand should touch them next

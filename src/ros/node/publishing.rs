@@ -10,8 +10,11 @@ use super::channels::{FeatureInput, LastTip, ViewInput};
 use super::convert::{header, point, vector};
 use super::refinement::RefinementWorker;
 use super::replica::Edits;
+use super::tiles::ColourBy;
+use super::view::colour_by;
 use crate::haptic::{Case, Mismatch, Update};
 use crate::ros::messages::HapticMismatch;
+use crate::ros::port::Publication;
 
 /// The distance at the tip is looked up so often.
 const TIP_EVERY: Duration = Duration::from_millis(25);
@@ -72,9 +75,13 @@ impl RefinementWorker {
             rotational: vector(&of(|found| found.rotational)),
             signed_distance: found.map_or(f64::NAN, |found| found.distance),
         };
-        self.setup
-            .shared
-            .offer(&self.view, ViewInput::Mismatch(message));
+        let shared = &self.setup.shared;
+        if found.is_some() && colour_by(shared) == ColourBy::Mismatch {
+            let coloured = ViewInput::Mismatch(message.face, message.signed_distance);
+            shared.offer(&self.view, coloured);
+        }
+        // an answer waits for no other thread of the node
+        self.port.publish(Publication::Mismatch(message));
         let now = self.setup.clock.now();
         if now.saturating_duration_since(self.tip_published) >= TIP_EVERY {
             self.tip_published = now;

@@ -4,7 +4,6 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
 use std::time::{Duration, Instant};
 
@@ -224,11 +223,7 @@ impl RefinementWorker {
                 reply.send(self.set_parameter(&name, &value))
             }
             Arrival::Matched(endpoint) => self.note_endpoint(endpoint),
-            Arrival::Viewer => self
-                .setup
-                .shared
-                .has_new_viewer
-                .store(true, Ordering::Relaxed),
+            Arrival::Viewers(count) => self.setup.shared.note_viewers(count),
             Arrival::Evidence(reply) => {
                 reply.send(self.session.engine.copy_patcher().ok().flatten())
             }

@@ -14,7 +14,7 @@ use super::refinement::RefinementWorker;
 use super::replica::Edits;
 use super::session::{NodeEnd, NodeSession};
 use super::setup::Setup;
-use super::side_work::begin;
+use super::side_work::{begin, begin_behind};
 use super::view::View;
 use crate::clock::Clock;
 use crate::io::mesh_file::MeshUnit;
@@ -209,8 +209,8 @@ impl Prepared {
         let haptic =
             RefinementWorker::new(setup, port, session, to_view, to_features, spare, stops)
                 .with_arm(handle);
-        let view = begin(&clock, "view", move || view.run(&view_inputs))?;
-        let features = begin(&clock, "features", move || features.run(&feature_inputs))?;
+        let view = begin_behind(&clock, "view", move || view.run(&view_inputs))?;
+        let features = begin_behind(&clock, "features", move || features.run(&feature_inputs))?;
         let haptic = begin(&clock, "haptic", move || haptic.run(arrivals))?;
         Ok(Node {
             haptic,

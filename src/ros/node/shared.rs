@@ -23,6 +23,8 @@ pub struct Shared {
     pub tiles_waiting: AtomicUsize,
     /// frames of the view that were dropped
     pub dropped_frames: AtomicU64,
+    /// how many look at the tiles; one where the port does not say
+    pub viewers: AtomicUsize,
     /// somebody joined who has no tiles yet
     pub has_new_viewer: AtomicBool,
 }
@@ -37,6 +39,7 @@ impl Shared {
             parameters: Mutex::new(Arc::new(parameters)),
             tiles_waiting: AtomicUsize::new(0),
             dropped_frames: AtomicU64::new(0),
+            viewers: AtomicUsize::new(1),
             has_new_viewer: AtomicBool::new(false),
         }
     }
@@ -49,6 +52,13 @@ impl Shared {
     /// Sets them.
     pub fn set_parameters(&self, parameters: Parameters) {
         *locked(&self.parameters) = Arc::new(parameters);
+    }
+
+    /// So many look at the tiles now.
+    pub fn note_viewers(&self, count: usize) {
+        if self.viewers.swap(count, Ordering::Relaxed) < count {
+            self.has_new_viewer.store(true, Ordering::Relaxed);
+        }
     }
 
     /// Sends the view something that it can do without: where it has no time, that is dropped and

@@ -6,6 +6,7 @@ use std::thread::{Builder, JoinHandle};
 
 use crate::clock::Clock;
 use crate::ros::exchange::join;
+use crate::threads::give_way;
 
 /// Starts a thread that waits on `clock`.
 ///
@@ -23,6 +24,21 @@ pub fn begin<T: Send + 'static>(
         ended
     };
     Builder::new().name(name.to_owned()).spawn(work)
+}
+
+/// The same for work that gives way to the thread of the samples.
+///
+/// # Errors
+/// As there.
+pub fn begin_behind<T: Send + 'static>(
+    clock: &Clock,
+    name: &str,
+    run: impl FnOnce() -> T + Send + 'static,
+) -> io::Result<JoinHandle<T>> {
+    begin(clock, name, || {
+        give_way();
+        run()
+    })
 }
 
 /// What is under way.
@@ -52,7 +68,7 @@ impl SideWork {
     /// # Errors
     /// Of the operating system, when there is no thread for it.
     pub fn begin(&mut self, name: &str, work: impl FnOnce() + Send + 'static) -> io::Result<()> {
-        self.threads.push(begin(&self.clock, name, work)?);
+        self.threads.push(begin_behind(&self.clock, name, work)?);
         Ok(())
     }
 

@@ -122,15 +122,9 @@ impl View {
                 // change
                 (self.whole, self.asked_whole) = (None, true);
             }
-            ViewInput::Mismatch(mismatch) => {
-                if self.colour_by == ColourBy::Mismatch && !mismatch.signed_distance.is_nan() {
-                    self.tiles.note_mismatch(
-                        mismatch.face,
-                        mismatch.signed_distance,
-                        &self.shared.mesh.now().0,
-                    );
-                }
-                self.port.publish(Publication::Mismatch(mismatch));
+            ViewInput::Mismatch(face, distance) => {
+                self.tiles
+                    .note_mismatch(face, distance, &self.shared.mesh.now().0);
             }
             ViewInput::Tip(tip) => self.tip = Some(tip),
             ViewInput::Features(features, next) => {
@@ -202,22 +196,24 @@ impl View {
             port,
             ..
         } = self;
-        let most = if is_last {
-            usize::MAX
-        } else {
-            TILES_AHEAD.saturating_sub(port.tiles_waiting())
+        // tiles that nobody looks at wait for who comes
+        let is_seen = self.shared.viewers.load(Ordering::Relaxed) > 0;
+        let most = match (is_last, is_seen) {
+            (_, false) => 0,
+            (true, true) => usize::MAX,
+            (false, true) => TILES_AHEAD.saturating_sub(port.tiles_waiting()),
         };
         tiles.take(most, now, &replica, (*colour_by, frame), |tile| {
             port.publish(Publication::Tile(tile))
         });
-        self.shared
-            .tiles_waiting
-            .store(self.tiles.waiting(), Ordering::Relaxed);
-        self.tiles.waiting() > 0 || self.whole.is_some() || self.asked_whole
+        let waiting = if is_seen { self.tiles.waiting() } else { 0 };
+        self.shared.tiles_waiting.store(waiting, Ordering::Relaxed);
+        waiting > 0 || self.whole.is_some() || self.asked_whole
     }
 }
 
-fn colour_by(shared: &Shared) -> ColourBy {
+/// As the parameter of this name has it.
+pub(super) fn colour_by(shared: &Shared) -> ColourBy {
     match shared.parameters().string("colour_by") {
         "mismatch" => ColourBy::Mismatch,
         _ => ColourBy::Touched,

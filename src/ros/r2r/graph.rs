@@ -93,11 +93,12 @@ impl R2rGraph {
             reported,
         } in &mut self.watched
         {
-            match look(node) {
+            let seen = look(node);
+            if let (true, Ok((viewers, _))) = (*is_mesh, &seen) {
+                exchange.inbox.put(Arrival::Viewers(*viewers));
+            }
+            match seen {
                 Ok(seen) if seen != *reported => {
-                    if *is_mesh && seen.0 > reported.0 {
-                        exchange.inbox.put(Arrival::Viewer);
-                    }
                     exchange.inbox.report(topic.clone(), seen.0, seen.1.clone());
                     *reported = seen;
                 }

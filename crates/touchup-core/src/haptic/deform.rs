@@ -16,7 +16,7 @@ use crate::reconstruct::{PatchDelta, Support};
 const CUT: f64 = 0.35;
 /// … this often, and then given up.
 const TRIES: usize = 3;
-/// Faces within this many mean edges of a region are what it could run into.
+/// Faces within this many mean edges of a region are what it could run into while its handle stays.
 const MARGIN_EDGES: f64 = 0.2;
 /// By how much of the mean edge the boxes of what moves are made wider: a touch moves vertices by
 /// less while it stays on a face.
@@ -79,6 +79,8 @@ pub(super) struct HandleRegion {
     seen: Option<u64>,
     /// whether the motion that needs no look was bounded since the region was refreshed
     is_bounded: bool,
+    /// faces within this distance are what it could run into, m
+    margin: f64,
 }
 
 impl DeformableMesh {
@@ -152,6 +154,7 @@ impl DeformableMesh {
             refit: RefitPlan::with_room(3 * vertices),
             seen: None,
             is_bounded: false,
+            margin: MARGIN_EDGES * self.mean_edge,
         }
     }
 
@@ -168,11 +171,11 @@ impl DeformableMesh {
         }
         if region.seen != Some(self.edits) {
             if let Some(guard) = &self.guard {
-                let (margin, gap) = (MARGIN_EDGES * self.mean_edge, self.evidence(guard).gap);
+                let gap = self.evidence(guard).gap;
                 region
                     .roi
                     .neighbourhood
-                    .refresh(&self.mesh, &self.tree, margin, gap);
+                    .refresh(&self.mesh, &self.tree, region.margin, gap);
             }
             region.refit.spend();
             (region.seen, region.is_bounded) = (Some(self.edits), false);
@@ -191,6 +194,10 @@ impl DeformableMesh {
         handle: FaceId,
         steps: &[Vector3<f64>; 3],
     ) -> RegionFit {
+        if region.size == RoiSize::Handle {
+            // it moves once, by no more than this
+            region.margin = 2.0 * steps.iter().map(Vector3::norm).fold(0.0, f64::max);
+        }
         self.prepare(region, handle);
         if let Some(strokes) = &mut self.strokes {
             strokes.note_positions(&region.roi.vertices, &self.mesh);
@@ -369,13 +376,14 @@ impl DeformableMesh {
         longest: f64,
         guard: &GuardParams,
     ) -> RegionFit {
-        let margin = MARGIN_EDGES * self.mean_edge;
+        let margin = region.margin;
         if !std::mem::replace(&mut region.is_bounded, true) {
             region
                 .roi
                 .neighbourhood
                 .bound_unseen(&self.mesh, &self.evidence(guard));
-        } else if region.roi.neighbourhood.is_outdated(longest) {
+        }
+        if region.roi.neighbourhood.is_outdated(longest) {
             region
                 .roi
                 .neighbourhood

@@ -1,6 +1,7 @@
 //! Gate before a renewal of the patch: open in a program, controlled in a test.
 
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::Instant;
 
 use crate::clock::{Clock, Working, locked};
 
@@ -39,13 +40,13 @@ impl Gate {
         }
     }
 
-    /// Lets nothing through without a permit.
+    /// Lets nothing through without a permit; no time passes for who works behind it.
     pub fn kept() -> (Self, GateKeeper) {
         let permits = Arc::new(Permits::default());
         (
             Self {
                 permits: Some(Arc::clone(&permits)),
-                clock: Clock::system(),
+                clock: Clock::manual().0,
             },
             GateKeeper(permits),
         )
@@ -54,6 +55,11 @@ impl Gate {
     /// To be held from a question until its answer is there.
     pub(super) fn begin_work(&self) -> Working {
         self.clock.begin_work()
+    }
+
+    /// The time of who works behind it.
+    pub(super) fn now(&self) -> Instant {
+        self.clock.now()
     }
 
     /// Returns when a renewal may be worked at.

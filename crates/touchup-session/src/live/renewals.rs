@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::mpsc::SyncSender;
+use std::time::Duration;
 
 use super::error::LiveError;
 use super::gate::Gate;
@@ -18,6 +19,14 @@ const AT_ONCE: usize = 80;
 /// Renewals that are asked for and not taken up at most, where samples do not wait: one that the
 /// thread works at, and one for it to go on with.
 const MOST_OPEN: usize = 2;
+
+/// Where samples do not wait, a renewal is followed by the next when so many times what one takes
+/// have passed: the patch has a quarter of a core, and on a small machine the rest is left to what
+/// answers.
+const TIMES_APART: u32 = 4;
+/// A renewal that took longer holds the next no longer up: there are 25 a second, as a
+/// patch far behind leaves more of the mesh to be moved sample by sample.
+const LONGEST_WORK: Duration = Duration::from_millis(10);
 
 /// When the patch is renewed, in time of the samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,6 +79,26 @@ pub struct LiveCounts {
     pub late: u64,
 }
 
+/// How long the thread of the patch is left alone, in time of the samples.
+#[derive(Debug, Default)]
+struct Rest {
+    /// what the last renewal took
+    took: Duration,
+    until_ns: Option<i64>,
+}
+
+impl Rest {
+    fn is_over(&self, stamp_ns: i64) -> bool {
+        self.until_ns.is_none_or(|until_ns| stamp_ns >= until_ns)
+    }
+
+    /// A renewal is asked for.
+    fn begin(&mut self, stamp_ns: i64) {
+        let rest_ns = (TIMES_APART * self.took.min(LONGEST_WORK)).as_nanos() as i64;
+        self.until_ns = Some(stamp_ns.saturating_add(rest_ns));
+    }
+}
+
 /// The thread of the patch, and the channels to it and from it.
 #[derive(Debug)]
 pub(super) struct Renewals {
@@ -79,6 +108,7 @@ pub(super) struct Renewals {
     batch: Vec<ContactSample>,
     /// number of the time between two renewals in which the last sample lies
     slot: Option<i64>,
+    rest: Rest,
     /// due times of the requested changes, ns
     due_ns: VecDeque<i64>,
     /// the change that was taken up last …
@@ -117,6 +147,7 @@ impl Renewals {
             pace,
             batch: Vec::new(),
             slot: None,
+            rest: Rest::default(),
             due_ns: VecDeque::new(),
             delta: PatchDelta::default(),
             is_done: true,
@@ -138,7 +169,9 @@ impl Renewals {
         let stamp_ns = contact.tip.stamp_ns;
         let slot = stamp_ns.div_euclid(self.pace.every_ns);
         let has_begun = self.slot.replace(slot).is_some_and(|before| slot > before);
-        if has_begun && (self.pace.is_patient || self.due_ns.len() < MOST_OPEN) {
+        let has_room = self.due_ns.len() < MOST_OPEN && self.rest.is_over(stamp_ns);
+        if has_begun && (self.pace.is_patient || has_room) {
+            self.rest.begin(stamp_ns);
             self.ask(
                 slot.saturating_mul(self.pace.every_ns)
                     .saturating_add(self.pace.after_ns),
@@ -289,8 +322,10 @@ impl Renewals {
             at_rest,
             probed,
             has_replaced,
+            took,
             ..
         } = answer;
+        self.rest.took = took;
         self.has_replaced = has_replaced;
         self.due_ns.pop_front();
         self.at_rest = at_rest;
@@ -318,5 +353,33 @@ impl Renewals {
 
     pub fn finish(self) -> Result<Patcher, LiveError> {
         self.worker.finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One second of samples, with a renewal asked for at each 8 ms at which that may be.
+    #[test]
+    fn long_renewals_are_four_times_what_they_take_apart_or_40_ms() {
+        let asked_ms = |took_ms: u64| {
+            let mut rest = Rest {
+                took: Duration::from_millis(took_ms),
+                until_ns: None,
+            };
+            let mut asked = Vec::new();
+            for stamp_ms in (0..1000).step_by(8) {
+                let stamp_ns = stamp_ms * 1_000_000;
+                if rest.is_over(stamp_ns) {
+                    rest.begin(stamp_ns);
+                    asked.push(stamp_ms);
+                }
+            }
+            asked
+        };
+        assert_eq!(asked_ms(2).len(), 125, "each time");
+        assert_eq!(asked_ms(10)[..3], [0, 40, 80]);
+        assert_eq!(asked_ms(31)[..3], [0, 40, 80]);
     }
 }

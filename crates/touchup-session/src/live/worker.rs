@@ -3,11 +3,13 @@
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, SyncSender, TryRecvError, channel};
 use std::thread::{Builder, JoinHandle};
+use std::time::Duration;
 
 use super::error::LiveError;
 use super::gate::Gate;
 use super::probed::{PublishedList, TouchDelta};
 use crate::clock::Working;
+use crate::threads::give_way;
 use touchup_core::mesh::{FaceTree, TriMesh};
 use touchup_core::reconstruct::{PatchDelta, Patcher};
 use touchup_core::stylus::ContactSample;
@@ -40,6 +42,8 @@ pub(super) struct WorkerAnswer {
     pub changed_stroke_ns: Option<i64>,
     /// whether another patcher was put in place
     pub has_replaced: bool,
+    /// how long a renewal keeps the thread busy
+    pub took: Duration,
     /// to be filled again
     batch: Vec<ContactSample>,
 }
@@ -71,20 +75,25 @@ impl Worker {
         let (to_engine, answers) = channel();
         let gate_of_thread = gate.clone();
         let work = move || {
+            give_way();
             let gate = gate_of_thread;
             let mut published = PublishedList::default();
             let PatchedScans {
                 working: scan,
                 shown,
             } = scans;
+            // what is farther off is renewed behind the answer, and counts for the next
+            let mut far = Duration::ZERO;
             for (question, _working) in inbox {
                 let (mut batch, mut changed_stroke_ns, mut has_replaced) =
                     (Vec::new(), None, false);
                 let is_renewal = matches!(question, Question::Renew(_));
+                let mut begun = gate.now();
                 let settles = matches!(question, Question::Settle);
                 match question {
                     Question::Renew(samples) => {
                         gate.pass();
+                        begun = gate.now();
                         samples.iter().for_each(|sample| patcher.push(sample));
                         batch = samples;
                         batch.clear();
@@ -131,6 +140,7 @@ impl Worker {
                     probed,
                     changed_stroke_ns,
                     has_replaced,
+                    took: far + gate.now().saturating_duration_since(begun),
                     batch,
                 };
                 if to_engine.send(answer).is_err() {
@@ -139,7 +149,9 @@ impl Worker {
                 if is_renewal {
                     gate.note_done();
                     // while the next samples come
+                    let answered = gate.now();
                     patcher.renew_far(&scan.0, &scan.1);
+                    far = gate.now().saturating_duration_since(answered);
                 }
             }
             patcher

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::strokes::{StrokeChange, StrokeChanges};
 use crate::clock::{Clock, locked};
+use crate::threads::give_way;
 use touchup_core::stylus::Message;
 use touchup_io::mesh_file::MeshUnit;
 use touchup_io::recording::{RecordingError, SegmentedWriter, Topics};
@@ -258,6 +259,7 @@ impl SessionRecorder {
         };
         let working = clock.begin_work();
         let work = move || {
+            give_way();
             taker.take_down(&messages);
             drop(working);
         };
