@@ -186,4 +186,10 @@ shard_16() {
   slow_python test_web_replay.py test_docs_code.py
 }
 
+# a minute or two at a time passes in which nothing happens
+shard_18() {
+  title "ROS: programs that stand still"
+  slow_python test_ros_pauses.py
+}
+
 shard_count=$(declare -F | grep -c ' shard_[0-9]*$')

@@ -300,6 +300,8 @@ pub fn log_filter(arguments: &[OsString]) -> Targets {
         ("ros2_client", LevelFilter::ERROR),
         // what it sends to /rosout is in the log already
         ("ros2_client::rosout", LevelFilter::OFF),
+        // it takes every distribution but that it was built for to be another one; the node checks
+        ("ros2_client::distributions", LevelFilter::OFF),
         ("rustdds", LevelFilter::ERROR),
         ("rustdds::dds::pubsub", LevelFilter::OFF),
         ("rustdds::network::udp_listener", LevelFilter::OFF),

@@ -7,9 +7,10 @@ use ros2_client::dds::rustdds;
 use ros2_client::{Context, Node, NodeName, NodeOptions};
 
 use super::answers::Room;
+use super::environment;
 use super::graph::DdsGraph;
 use super::incoming::Listener;
-use super::sockets::{OpenSockets, Range};
+use super::sockets::{OpenSockets, guard};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::exchange::{Exchange, RosError};
 
@@ -52,7 +53,15 @@ pub(super) struct DdsBackEnd<'a> {
 }
 
 /// Joins the network as a node that does nothing yet.
+///
+/// # Errors
+/// [`RosError`]: the environment asks for what this back end does not do, or there is no network.
 pub(super) fn join(config: &NodeConfig, options: NodeOptions) -> Result<(Context, Node), RosError> {
+    let variable = |name: &str| std::env::var(name).ok();
+    environment::check(variable)?;
+    for line in environment::unheeded(variable) {
+        tracing::warn!("{line}");
+    }
     let mut builder = rustdds::DomainParticipantBuilder::new(config.domain_id);
     if config.localhost_only {
         builder = builder.with_only_networks([std::net::Ipv4Addr::LOCALHOST]);
@@ -69,29 +78,6 @@ pub(super) fn join(config: &NodeConfig, options: NodeOptions) -> Result<(Context
     let name = NodeName::new(namespace, &config.place.node).during("naming the node")?;
     let node = context.new_node(name, options).during("making the node")?;
     Ok((context, node))
-}
-
-/// A node that others must not reach does not run where they do; without a filter for what is too
-/// large it does.
-fn guard(before: std::io::Result<OpenSockets>, localhost_only: bool) -> Result<(), RosError> {
-    let range = if localhost_only {
-        Range::Computer
-    } else {
-        Range::Networks
-    };
-    match before.and_then(|before| before.guard_since(range)) {
-        Ok(guarded) => tracing::debug!(guarded, ?range, "sockets are guarded"),
-        Err(error) if localhost_only => {
-            let remedy = "unset ROS_AUTOMATIC_DISCOVERY_RANGE and ROS_LOCALHOST_ONLY where other computers may reach the node";
-            return Err(RosError::Refused {
-                call: "binding to loopback",
-                reason: error.to_string(),
-                remedy,
-            });
-        }
-        Err(error) => tracing::warn!(%error, "messages of any size are taken from the network"),
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use ros2_client::dds::rustdds::mio1::event::Source;
 use ros2_client::dds::rustdds::policy::Durability;
@@ -15,8 +15,10 @@ use ros2_client::{Context, ServiceMapping};
 
 use super::incoming::Listener;
 use super::keep_alive::{KeepAlive, LOOK_EVERY};
+use super::rematch::Rematch;
+use super::sockets::{OpenSockets, guard};
 use crate::ros::arguments::NodeConfig;
-use crate::ros::exchange::Exchange;
+use crate::ros::exchange::{Exchange, RosError};
 use crate::ros::locked;
 use crate::ros::port::Arrival;
 
@@ -42,8 +44,9 @@ const MOST_WRITERS: usize = 64;
 
 pub(super) struct DdsGraph {
     listener: DomainParticipantStatusListener,
-    /// `None` on this computer alone, where nobody is out of reach
+    /// `None` where its ports are not to be had
     keep_alive: Option<KeepAlive>,
+    rematch: Rematch,
     exchange: Arc<Exchange>,
     mapping: ServiceMapping,
     own: GUID,
@@ -69,19 +72,30 @@ pub(super) struct DdsGraph {
 }
 
 impl DdsGraph {
-    pub fn new(context: &Context, exchange: &Arc<Exchange>, config: &NodeConfig) -> Self {
+    /// Follows who is there from now on.
+    ///
+    /// # Errors
+    /// [`RosError`]: of this computer alone, and a socket cannot be closed to others.
+    pub fn new(
+        context: &Context,
+        exchange: &Arc<Exchange>,
+        config: &NodeConfig,
+    ) -> Result<Self, RosError> {
         let participant = context.domain_participant();
-        let keep_alive = (!config.localhost_only).then(|| {
-            KeepAlive::new(config.domain_id, participant.participant_id()).inspect_err(
-                |error| tracing::warn!(%error, "who is out of reach for some seconds may not be met again"),
-            )
-        });
-        Self {
+        let before = OpenSockets::now();
+        let own = participant.guid();
+        let keep_alive = KeepAlive::new(config.domain_id, participant.participant_id(), own);
+        let keep_alive = keep_alive.inspect_err(
+            |error| tracing::warn!(%error, "who is out of reach for some seconds is not met again"),
+        );
+        guard(before, config.localhost_only)?;
+        Ok(Self {
             listener: participant.status_listener(),
-            keep_alive: keep_alive.and_then(Result::ok),
+            keep_alive: keep_alive.ok(),
             exchange: exchange.clone(),
             mapping: mapping(config),
-            own: participant.guid(),
+            own,
+            rematch: Rematch::new(participant),
             topics: BTreeMap::new(),
             published: BTreeMap::new(),
             unread: BTreeMap::new(),
@@ -91,7 +105,7 @@ impl DdsGraph {
             vendors: BTreeMap::new(),
             reported: BTreeSet::new(),
             tiles: None,
-        }
+        })
     }
 
     /// A reader or writer of ours, and what its topic is called in ROS.
@@ -149,18 +163,85 @@ impl DdsGraph {
         self.keep_alive.as_ref().map(|_| LOOK_EVERY)
     }
 
+    /// Remembers participants that RustDDS may forget, and has it match them when it meets them again.
+    fn remember(&mut self, event: &Event) {
+        match event {
+            Event::ParticipantDiscovered { dpd } => {
+                let prefix = dpd.guid.prefix;
+                let matched = self
+                    .rematch
+                    .met(|guid| guid.prefix == prefix, Instant::now());
+                if let Err(error) = matched {
+                    tracing::warn!(
+                        ?error,
+                        "not all topics of a program that came back are heard"
+                    );
+                }
+                if let Some(keep_alive) = &mut self.keep_alive {
+                    keep_alive.met(prefix.as_ref());
+                }
+            }
+            Event::ReaderDetected { reader: other } | Event::WriterDetected { writer: other } => {
+                let is_reader = matches!(event, Event::ReaderDetected { .. });
+                self.rematch.described(other, is_reader);
+            }
+            Event::RemoteReaderMatched {
+                remote_reader: remote,
+                ..
+            }
+            | Event::RemoteWriterMatched {
+                remote_writer: remote,
+                ..
+            } if remote.prefix != self.own.prefix => {
+                self.rematch.matched(*remote);
+            }
+            Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => {
+                self.rematch.left(|other| other == guid);
+            }
+            Event::ParticipantLost {
+                id,
+                reason: LostReason::Disposed,
+            } => {
+                self.rematch.left(|guid| guid.prefix == *id);
+                if let Some(keep_alive) = &mut self.keep_alive {
+                    keep_alive.left(id.as_ref());
+                }
+            }
+            Event::ParticipantLost {
+                id,
+                reason: LostReason::Timeout { .. },
+            } => {
+                if let Some(keep_alive) = &mut self.keep_alive {
+                    keep_alive.lost(id.as_ref(), Instant::now());
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn vendor(&self, guid: GUID) -> Option<[u8; 2]> {
+        let mut vendors = self.vendors.iter();
+        let vendor = vendors.find(|(participant, _)| participant.prefix == guid.prefix);
+        vendor.map(|(_, vendor)| *vendor)
+    }
+
     #[expect(clippy::too_many_lines)]
     fn on(&mut self, event: Event) {
+        self.remember(&event);
+        if let Event::RemoteWriterMatched {
+            local_reader,
+            remote_writer,
+        } = &event
+            && self.vendor(*remote_writer) == Some(FAST_DDS)
+            && let Some(keep_alive) = &self.keep_alive
+        {
+            keep_alive.ask(*local_reader, *remote_writer);
+        }
         match event {
             Event::ParticipantDiscovered { dpd } if self.vendors.len() < MOST_PARTICIPANTS => {
                 self.vendors.insert(dpd.guid, dpd.vendor_id.as_bytes());
             }
-            Event::ParticipantLost { id, reason } => {
-                match (&mut self.keep_alive, reason) {
-                    (Some(keep_alive), LostReason::Timeout { .. }) => keep_alive.lost(id.as_ref()),
-                    (Some(keep_alive), LostReason::Disposed) => keep_alive.left(id.as_ref()),
-                    (None, _) => {}
-                }
+            Event::ParticipantLost { id, .. } => {
                 self.vendors.retain(|guid, _| guid.prefix != id);
                 self.callers.retain(|guid, _| guid.prefix != id);
                 self.reported.retain(|guid| guid.prefix != id);
@@ -308,13 +389,9 @@ impl DdsGraph {
             }
             return;
         }
-        let vendor = self
-            .vendors
-            .iter()
-            .find(|(participant, _)| participant.prefix == guid.prefix);
-        let wants = match vendor.map(|(_, vendor)| vendor) {
-            Some(&CYCLONE_DDS) => ServiceMapping::Cyclone,
-            Some(&FAST_DDS) => ServiceMapping::Enhanced,
+        let wants = match self.vendor(guid) {
+            Some(CYCLONE_DDS) => ServiceMapping::Cyclone,
+            Some(FAST_DDS) => ServiceMapping::Enhanced,
             _ => return,
         };
         let Some(service) = asked else { return };
@@ -387,7 +464,8 @@ impl Listener for Arc<Mutex<DdsGraph>> {
         graph
             .keep_alive
             .iter_mut()
-            .try_for_each(|keep_alive| each(&mut keep_alive.socket))
+            .flat_map(|keep_alive| &mut keep_alive.sockets)
+            .try_for_each(|socket| each(socket))
     }
 
     fn take(&mut self) {
@@ -398,6 +476,7 @@ impl Listener for Arc<Mutex<DdsGraph>> {
         if let Some(keep_alive) = &mut graph.keep_alive {
             keep_alive.take();
         }
+        graph.rematch.look(Instant::now());
     }
 }
 

@@ -1,23 +1,29 @@
-//! Waits longer for participants that are silent than RustDDS does: a cable was out, a computer was
-//! busy, a packet was lost.
+//! Waits longer for participants that are silent than RustDDS does, and has it meet again those that
+//! it has forgotten: a cable was out, a program was stopped, a computer slept, a packet was lost.
 //!
 //! A participant says that it is alive by announcing itself every few seconds (RTPS 2.5, 8.5.3),
 //! and whoever hears nothing of it for the time that it asks for forgets it: CycloneDDS asks for 10
-//! s and announces itself every 8 s, so one lost packet is enough. RustDDS 0.15 then never meets it
-//! again, as it takes what the participant says of itself once more for what it knows already. So
-//! it hears the last announcement again from here until the participant has been silent for
-//! [`PATIENCE`], unless its computer says that the program has ended.
+//! s and announces itself every 8 s, so one lost packet is enough. So RustDDS hears the last
+//! announcement again from here until the participant has been silent for [`PATIENCE`], unless its
+//! computer says that the program has ended.
+//!
+//! RustDDS 0.15 never meets again whom it has forgotten: others repeat their announcement under the
+//! number that it had, and RustDDS passes over messages with a number that it knows. From here it hears
+//! the announcement of one that came back under a new number. [`super::rematch`] does the rest.
 
 use std::collections::BTreeMap;
 use std::io::{Error, ErrorKind, Result};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
 
+use ros2_client::dds::rustdds::GUID;
 use ros2_client::dds::rustdds::mio1::net::UdpSocket as MioSocket;
 use socket2::{Domain, Protocol, Socket, Type};
 
+use super::first_request;
+
 /// So long a participant may be silent. RustDDS asks the others for 50 s and announces itself every
-/// 10 s: beyond 40 s of silence they may have forgotten us, and both sides must begin anew.
+/// 10 s: beyond 40 s of silence they may have forgotten us, and both sides begin anew.
 const PATIENCE: Duration = Duration::from_secs(40);
 /// How often it is looked for who is silent.
 pub(super) const LOOK_EVERY: Duration = Duration::from_millis(500);
@@ -29,6 +35,9 @@ const MULTICAST_PORT: u32 = 7400;
 const UNICAST_PORT: u32 = 7410;
 const PORTS_OF_A_DOMAIN: u32 = 250;
 const PORTS_OF_A_PARTICIPANT: u32 = 2;
+/// A participant that knows no multicast announces itself to the ports of this number of participants
+/// of a computer, as rmw_fastrtps and rmw_cyclonedds do that meet programs of their computer alone.
+const ASKED_PARTICIPANTS: u32 = 32;
 /// Participants that are remembered; a domain holds 120.
 const MOST_PARTICIPANTS: usize = 1024;
 /// No datagram is larger.
@@ -41,9 +50,13 @@ type Prefix = [u8; 12];
 
 /// The participants of a domain, by what they announce.
 pub(super) struct KeepAlive {
-    /// wakes who takes
-    pub socket: MioSocket,
-    /// where our own participant listens
+    /// wake the thread that takes: one hears announcements to all, one has the port of a participant
+    /// of this computer and hears those to each
+    pub sockets: Vec<MioSocket>,
+    /// numbers of the announcements that are handed over
+    next_number: i64,
+    /// our own participant, and where it listens
+    own: Prefix,
     own_port: u16,
     known: BTreeMap<Prefix, KnownParticipant>,
     datagram: Vec<u8>,
@@ -81,6 +94,30 @@ impl KnownParticipant {
             && now.saturating_duration_since(self.renewed) >= self.lease - early
             && silent + self.lease <= PATIENCE
     }
+
+    /// Whether it may have forgotten us, and RustDDS waits on.
+    fn is_forgotten_late(&self, now: Instant) -> bool {
+        !matches!(self.state, PeerState::Ended | PeerState::Lost)
+            && self.lease > PATIENCE
+            && now.saturating_duration_since(self.heard) > PATIENCE
+    }
+
+    /// Sends its last announcement to our own participant, under a new number.
+    ///
+    /// - `lease_s`: that RustDDS is to take it for; `None`: its own.
+    fn hand_over(&self, next_number: &mut i64, lease_s: Option<i32>, own_port: u16) {
+        let Some(announcement) = announcement(&self.datagram) else {
+            return;
+        };
+        let mut datagram = self.datagram.clone();
+        announcement.renumber(&mut datagram, *next_number, lease_s);
+        *next_number += 1;
+        let sent =
+            way_from(self.from).and_then(|(way, own)| way.send_to(&datagram, (own, own_port)));
+        if let Err(error) = sent {
+            tracing::debug!(%error, "a silent participant may be forgotten too early");
+        }
+    }
 }
 
 impl KeepAlive {
@@ -88,10 +125,11 @@ impl KeepAlive {
     ///
     /// # Errors
     /// Those of the system, when the port cannot be shared.
-    pub fn new(domain_id: u16, participant_id: u16) -> Result<Self> {
+    pub fn new(domain_id: u16, participant_id: u16, own: GUID) -> Result<Self> {
         let offset = u32::from(domain_id) * PORTS_OF_A_DOMAIN;
-        let own_offset = offset + u32::from(participant_id) * PORTS_OF_A_PARTICIPANT;
-        let ports = [MULTICAST_PORT + offset, UNICAST_PORT + own_offset].map(u16::try_from);
+        let port_of =
+            |participant: u32| UNICAST_PORT + offset + participant * PORTS_OF_A_PARTICIPANT;
+        let ports = [MULTICAST_PORT + offset, port_of(participant_id.into())].map(u16::try_from);
         let [Ok(port), Ok(own_port)] = ports else {
             return Err(Error::new(
                 ErrorKind::InvalidInput,
@@ -108,22 +146,44 @@ impl KeepAlive {
         if let Err(error) = socket.join_multicast_v4(&GROUP, &Ipv4Addr::UNSPECIFIED) {
             tracing::debug!(%error, "no route for multicast yet");
         }
-        let socket = MioSocket::from_std(socket.into());
+        // participants take the first free port
+        let free = (0..ASKED_PARTICIPANTS).rev().find_map(|participant| {
+            let port = u16::try_from(port_of(participant)).ok()?;
+            UdpSocket::bind((Ipv4Addr::UNSPECIFIED, port)).ok()
+        });
+        let mut sockets = vec![MioSocket::from_std(socket.into())];
+        if let Some(free) = free {
+            free.set_nonblocking(true)?;
+            sockets.push(MioSocket::from_std(free));
+        }
         Ok(Self {
-            socket,
+            sockets,
+            next_number: FIRST_NUMBER,
+            own: own.to_bytes().first_chunk().copied().unwrap_or_default(),
             own_port,
             known: BTreeMap::new(),
             datagram: vec![0; LARGEST_DATAGRAM],
         })
     }
 
-    /// RustDDS has waited for it in vain.
-    pub fn lost(&mut self, prefix: &[u8]) {
-        if let Some(known) = Prefix::try_from(prefix)
-            .ok()
-            .and_then(|prefix| self.known.get_mut(&prefix))
-        {
-            known.state = PeerState::Lost;
+    /// RustDDS has waited for it in vain, or this process stood still meanwhile.
+    pub fn lost(&mut self, prefix: &[u8], now: Instant) {
+        let Ok(prefix) = Prefix::try_from(prefix) else {
+            return;
+        };
+        let Some(known) = self.known.get_mut(&prefix) else {
+            return;
+        };
+        let before = std::mem::replace(&mut known.state, PeerState::Lost);
+        let silent = now.saturating_duration_since(known.heard);
+        // this process was stopped, not the other one
+        if silent < known.lease.min(PATIENCE) {
+            self.meet(prefix);
+        } else if !matches!(before, PeerState::Ended) {
+            tracing::warn!(
+                address = %known.from.ip(), silent_s = silent.as_secs(),
+                "a program there is out of reach: nothing of it is heard until it comes back"
+            );
         }
     }
 
@@ -134,15 +194,43 @@ impl KeepAlive {
         }
     }
 
+    /// Has a writer of Fast DDS say what it has sent, as [`first_request`] has it.
+    ///
+    /// - `reader`: ours.
+    pub fn ask(&self, reader: GUID, writer: GUID) {
+        let known = Prefix::try_from(writer.prefix.as_ref())
+            .ok()
+            .and_then(|prefix| self.known.get(&prefix));
+        let Some((known, place)) =
+            known.and_then(|known| Some((known, announcement(&known.datagram)?.listens?)))
+        else {
+            return;
+        };
+        let heartbeat = first_request::heartbeat(reader, writer);
+        let question = first_request::question(reader, writer);
+        // one directly behind the other: the writer's answer must not come before the heartbeat;
+        // readers and writers have the port behind that of the participant
+        let asked = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).and_then(|socket| {
+            let (way, own) = way_from(known.from)?;
+            socket.send_to(&question, place)?;
+            way.send_to(&heartbeat, (own, self.own_port + 1))
+        });
+        if let Err(error) = asked {
+            tracing::debug!(%error, "a first request may be heard late");
+        }
+    }
+
     /// Takes all announcements that are there, and looks who is silent.
     pub fn take(&mut self) {
         let mut datagram = std::mem::take(&mut self.datagram);
-        loop {
-            match self.socket.recv_from(&mut datagram) {
-                Ok((length, from)) => self.hear(&datagram[..length], from, Instant::now()),
-                Err(error) if error.kind() == ErrorKind::Interrupted => {}
-                // nothing is left; any other error ends what was there as well
-                Err(_) => break,
+        for number in 0..self.sockets.len() {
+            loop {
+                match self.sockets[number].recv_from(&mut datagram) {
+                    Ok((length, from)) => self.hear(&datagram[..length], from, Instant::now()),
+                    Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                    // nothing is left; any other error ends what was there as well
+                    Err(_) => break,
+                }
             }
         }
         self.datagram = datagram;
@@ -150,42 +238,47 @@ impl KeepAlive {
     }
 
     fn hear(&mut self, datagram: &[u8], from: SocketAddr, now: Instant) {
-        let Some((prefix, lease)) = announcement(datagram) else {
+        let Some(Announcement { prefix, lease, .. }) = announcement(datagram) else {
             return;
         };
-        if datagram.len() > LARGEST_ANNOUNCEMENT {
+        if prefix == self.own || datagram.len() > LARGEST_ANNOUNCEMENT {
             return;
         }
-        if self
-            .known
-            .get(&prefix)
-            .is_some_and(|known| matches!(known.state, PeerState::Lost))
-        {
-            tracing::warn!(
-                address = %from.ip(),
-                "a program there was out of reach for too long and is not met again: start it anew, or this node"
-            );
-        } else if self.known.len() >= MOST_PARTICIPANTS && !self.known.contains_key(&prefix) {
-            self.known.pop_first();
+        let state = match self.known.get(&prefix).map(|known| &known.state) {
+            Some(PeerState::Lost) => PeerState::Lost,
+            None if self.known.len() >= MOST_PARTICIPANTS => {
+                self.known.pop_first();
+                PeerState::Heard
+            }
+            _ => PeerState::Heard,
+        };
+        let is_lost = matches!(state, PeerState::Lost);
+        let known = KnownParticipant {
+            datagram: datagram.to_vec(),
+            from,
+            heard: now,
+            lease,
+            renewed: now,
+            state,
+        };
+        self.known.insert(prefix, known);
+        if is_lost {
+            self.meet(prefix);
         }
-        let datagram = datagram.to_vec();
-        self.known.insert(
-            prefix,
-            KnownParticipant {
-                datagram,
-                from,
-                heard: now,
-                lease,
-                renewed: now,
-                state: PeerState::Heard,
-            },
-        );
     }
 
     fn look(&mut self, now: Instant) {
-        for known in self.known.values_mut().filter(|known| known.is_due(now)) {
+        let (own_port, next_number) = (self.own_port, &mut self.next_number);
+        for known in self.known.values_mut() {
+            if known.is_forgotten_late(now) {
+                known.lease = Duration::ZERO;
+                known.hand_over(next_number, Some(0), own_port);
+            }
+            if !known.is_due(now) {
+                continue;
+            }
             let PeerState::Asked(asked) = &known.state else {
-                known.state = PeerState::Asked(ask(known.from).ok());
+                known.state = PeerState::Asked(knock(known.from).ok());
                 continue;
             };
             if asked.as_ref().is_some_and(is_refused) {
@@ -194,9 +287,25 @@ impl KeepAlive {
             }
             known.state = PeerState::Heard;
             known.renewed = now;
-            if let Err(error) = hand_over(&known.datagram, known.from, self.own_port) {
-                tracing::debug!(%error, "a silent participant may be forgotten too early");
-            }
+            known.hand_over(next_number, None, own_port);
+        }
+    }
+
+    /// Has RustDDS meet one that it has forgotten.
+    fn meet(&mut self, prefix: Prefix) {
+        if let Some(known) = self.known.get(&prefix) {
+            known.hand_over(&mut self.next_number, None, self.own_port);
+        }
+    }
+
+    /// RustDDS has met it.
+    pub fn met(&mut self, prefix: &[u8]) {
+        let known = Prefix::try_from(prefix)
+            .ok()
+            .and_then(|prefix| self.known.get_mut(&prefix));
+        if let Some(known) = known.filter(|known| matches!(known.state, PeerState::Lost)) {
+            tracing::warn!(address = %known.from.ip(), "a program there is met again");
+            known.state = PeerState::Heard;
         }
     }
 }
@@ -204,7 +313,7 @@ impl KeepAlive {
 /// A message without content, for the port that a participant sends from. Where the program has
 /// ended its computer answers that nobody is there (ICMP, RFC 792); nobody answers where the way is
 /// cut.
-fn ask(port: SocketAddr) -> Result<UdpSocket> {
+fn knock(port: SocketAddr) -> Result<UdpSocket> {
     let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0))?;
     socket.set_nonblocking(true)?;
     socket.connect(port)?;
@@ -216,18 +325,16 @@ fn is_refused(asked: &UdpSocket) -> bool {
     matches!(asked.take_error(), Ok(Some(error)) if error.kind() == ErrorKind::ConnectionRefused)
 }
 
-/// Sends a datagram to our own participant, from an address of ours that reaches whom it is from: a
-/// loopback address would make RustDDS believe that he is on this computer. It is taken where there
-/// is no way to him at all.
-fn hand_over(datagram: &[u8], from: SocketAddr, port: u16) -> Result<()> {
+/// A way to our own participant, and where on it that is: from an address of ours that reaches
+/// somebody. A loopback address would make RustDDS believe that he is on this computer; it is taken
+/// if there is no way to him at all.
+fn way_from(somebody: SocketAddr) -> Result<(UdpSocket, IpAddr)> {
     let way = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0))?;
-    let own: IpAddr = match way.connect(from) {
+    let own: IpAddr = match way.connect(somebody) {
         Ok(()) => way.local_addr()?.ip(),
         Err(_) => Ipv4Addr::LOCALHOST.into(),
     };
-    UdpSocket::bind((own, 0))?
-        .send_to(datagram, (own, port))
-        .map(drop)
+    Ok((UdpSocket::bind((own, 0))?, own))
 }
 
 /// Length of the header of a message (RTPS 2.5, 9.4.4), which ends with who sends it.
@@ -244,9 +351,15 @@ const HAS_PARAMETERS: u8 = 0x02;
 const HAS_DATA: u8 = 0x04;
 /// The writer of announcements (RTPS 2.5, 9.3.1.3).
 const ANNOUNCER: [u8; 4] = [0x00, 0x01, 0x00, 0xc2];
-/// Parameters (RTPS 2.5, 9.6.3): how long to wait, and the last one of a list.
+/// Parameters (RTPS 2.5, 9.6.3): how long to wait, where readers and writers listen, and the last one
+/// of a list.
 const LEASE: u16 = 0x0002;
+const LISTENS: u16 = 0x0031;
 const SENTINEL: u16 = 0x0001;
+/// The kind of such a place (RTPS 2.5, 9.3.2.4).
+const UDP_V4: u32 = 1;
+/// Announcements that are handed over have numbers from here on: no participant comes so far.
+const FIRST_NUMBER: i64 = 1 << 40;
 /// Where an announcement has no lease, RustDDS waits so long.
 const DEFAULT_LEASE: Duration = Duration::from_secs(60);
 
@@ -259,8 +372,74 @@ fn short(bytes: &[u8], at: usize, is_little_endian: bool) -> Option<u16> {
     })
 }
 
+/// What a datagram says of a participant, and where in it.
+#[derive(Debug, PartialEq, Eq)]
+struct Announcement {
+    prefix: Prefix,
+    lease: Duration,
+    /// where its readers and writers listen
+    listens: Option<SocketAddr>,
+    /// place of its number, and its byte order
+    number: (usize, bool),
+    /// place of the seconds of its lease, and their byte order
+    lease_s: Option<(usize, bool)>,
+}
+
+impl Announcement {
+    /// Reads its data, which end at a place of the datagram; `None` for data that are none.
+    fn take_from(&mut self, data: &[u8], end: usize) -> Option<()> {
+        // the byte order of the data is its own: an even number is big endian
+        let is_little_endian = data.get(1)? & 1 != 0;
+        let word = |bytes: [u8; 4]| {
+            if is_little_endian {
+                u32::from_le_bytes(bytes)
+            } else {
+                u32::from_be_bytes(bytes)
+            }
+        };
+        parameters(data.get(4..)?, is_little_endian, |id, value, left| {
+            if let (LEASE, Some(seconds)) = (id, value.first_chunk()) {
+                let seconds = u64::from(word(*seconds));
+                // the highest bit is a sign
+                let is_negative = seconds > i32::MAX as u64;
+                self.lease = Duration::from_secs(if is_negative { 0 } else { seconds });
+                self.lease_s = Some((end - left, is_little_endian));
+            }
+            // kind, port, address, of which IPv4 has the last four bytes
+            if let (LISTENS, Some((head, tail))) = (id, value.split_first_chunk::<8>())
+                && let (Some(kind), Some(port)) = (head.first_chunk(), head.last_chunk())
+                && (self.listens, word(*kind)) == (None, UDP_V4)
+                && let (Some(address), Ok(port)) =
+                    (tail.last_chunk::<4>(), u16::try_from(word(*port)))
+            {
+                self.listens = Some(SocketAddr::from((*address, port)));
+            }
+        })
+        .map(drop)
+    }
+
+    /// Writes another number and another lease into the datagram that it was read from.
+    fn renumber(&self, datagram: &mut [u8], number: i64, lease_s: Option<i32>) {
+        let mut put = |(at, is_little_endian): (usize, bool), value: i32| {
+            let bytes = if is_little_endian {
+                value.to_le_bytes()
+            } else {
+                value.to_be_bytes()
+            };
+            datagram[at..at + 4].copy_from_slice(&bytes);
+        };
+        let (at, is_little_endian) = self.number;
+        // the high half comes first (RTPS 2.5, 9.3.2.3)
+        put((at, is_little_endian), (number >> 32) as i32);
+        put((at + 4, is_little_endian), number as i32);
+        if let (Some(place), Some(lease_s)) = (self.lease_s, lease_s) {
+            put(place, lease_s);
+        }
+    }
+}
+
 /// Who announces itself in an RTPS datagram, and its lease; `None` for anything else.
-fn announcement(datagram: &[u8]) -> Option<(Prefix, Duration)> {
+fn announcement(datagram: &[u8]) -> Option<Announcement> {
     if !datagram.starts_with(b"RTPS") {
         return None;
     }
@@ -276,27 +455,24 @@ fn announcement(datagram: &[u8]) -> Option<(Prefix, Duration)> {
             at + 4 + length
         };
         let body = datagram.get(at + 4..end)?;
-        // more flags, where the data is, reader, writer
         if id == DATA && flags & HAS_DATA != 0 && body.get(8..12) == Some(&ANNOUNCER) {
+            // more flags, where the data is, reader, writer, and then the number
+            body.get(12..20)?;
+            let number = (at + 16, is_little_endian);
             let skipped = 4 + usize::from(short(body, 2, is_little_endian)?);
             let mut data = body.get(skipped..)?;
             if flags & HAS_PARAMETERS != 0 {
-                data = parameters(data, is_little_endian, |_, _| {})?;
+                data = parameters(data, is_little_endian, |_, _, _| {})?;
             }
-            // the byte order of the data is its own: an even number is big endian
-            let is_little_endian = data.get(1)? & 1 != 0;
-            let mut lease = DEFAULT_LEASE;
-            parameters(data.get(4..)?, is_little_endian, |id, value| {
-                if let (LEASE, Some(seconds)) = (id, value.first_chunk()) {
-                    let seconds = if is_little_endian {
-                        i32::from_le_bytes(*seconds)
-                    } else {
-                        i32::from_be_bytes(*seconds)
-                    };
-                    lease = Duration::from_secs(u64::try_from(seconds).unwrap_or(0));
-                }
-            })?;
-            return Some((prefix, lease));
+            let mut read = Announcement {
+                prefix,
+                lease: DEFAULT_LEASE,
+                listens: None,
+                number,
+                lease_s: None,
+            };
+            read.take_from(data, end)?;
+            return Some(read);
         }
         // what follows would be from somebody else
         if id == INFO_SOURCE {
@@ -306,11 +482,12 @@ fn announcement(datagram: &[u8]) -> Option<(Prefix, Duration)> {
     }
 }
 
-/// Reads a list of parameters, number and value; what comes after it.
+/// Reads a list of parameters: number, value, and how many bytes there are from the value on; what
+/// comes after it.
 fn parameters(
     mut bytes: &[u8],
     is_little_endian: bool,
-    mut each: impl FnMut(u16, &[u8]),
+    mut each: impl FnMut(u16, &[u8], usize),
 ) -> Option<&[u8]> {
     loop {
         let id = short(bytes, 0, is_little_endian)?;
@@ -318,7 +495,7 @@ fn parameters(
         if id == SENTINEL {
             return bytes.get(4..);
         }
-        each(id, bytes.get(4..4 + length)?);
+        each(id, bytes.get(4..4 + length)?, bytes.len() - 4);
         bytes = bytes.get(4 + length..)?;
     }
 }
@@ -333,6 +510,11 @@ mod tests {
 
     /// A timestamp, then an announcement with a lease, as RTPS 2.5 9.4.5 and 9.6.3 draw them.
     fn datagram(lease_s: i32, is_little_endian: bool, flags: u8) -> Vec<u8> {
+        numbered([0, 1], lease_s, is_little_endian, flags)
+    }
+
+    /// The same with another number: its high half, its low half.
+    fn numbered(number: [u32; 2], lease_s: i32, is_little_endian: bool, flags: u8) -> Vec<u8> {
         let flag = u8::from(is_little_endian);
         let short = |value: u16| {
             if is_little_endian {
@@ -348,12 +530,30 @@ mod tests {
         };
         let header = [b"RTPS".as_slice(), &[2, 5, 1, 16], &SENDER].concat();
         let time = [&[0x09, flag], short(8).as_slice(), &[0; 8]].concat();
-        let ids = [[0, 0, 0, 0], [0, 1, 0, 0xc2], [0, 0, 0, 0], [0, 0, 0, 1]].concat();
+        let long = |value: u32| {
+            if is_little_endian {
+                value.to_le_bytes()
+            } else {
+                value.to_be_bytes()
+            }
+        };
+        let [high, low] = number.map(long);
+        let ids = [[0, 0, 0, 0], [0, 1, 0, 0xc2], high, low].concat();
+        let place = |kind: u32, address: [u8; 4]| {
+            [
+                [short(0x31), short(24)].concat(),
+                [long(kind), long(7411), [0; 4], [0; 4], [0; 4], address].concat(),
+            ]
+            .concat()
+        };
         let version = [short(0x15), short(4), [2, 5], [0, 0]].concat();
         let lease = [&short(2), &short(8), seconds.as_slice(), &[0; 4]].concat();
         let list = [
             [0, 2 | flag, 0, 0].as_slice(),
             &version,
+            // one of another kind stands before it
+            &place(16, [0; 4]),
+            &place(1, [10, 0, 0, 7]),
             &lease,
             &short(1),
             &short(0),
@@ -374,15 +574,25 @@ mod tests {
     fn an_announcement_is_read_in_both_byte_orders() {
         for is_little_endian in [true, false] {
             let heard = datagram(10, is_little_endian, HAS_DATA);
-            assert_eq!(
-                announcement(&heard),
-                Some((SENDER, Duration::from_secs(10)))
-            );
+            let read = announcement(&heard).unwrap();
+            assert_eq!((read.prefix, read.lease), (SENDER, Duration::from_secs(10)));
+            assert_eq!(read.listens, Some(SocketAddr::from(([10, 0, 0, 7], 7411))));
         }
-        assert_eq!(
-            announcement(&datagram(-1, true, HAS_DATA)),
-            Some((SENDER, Duration::ZERO))
-        );
+        let read = announcement(&datagram(-1, true, HAS_DATA)).unwrap();
+        assert_eq!(read.lease, Duration::ZERO);
+    }
+
+    #[test]
+    fn an_announcement_gets_another_number_and_lease_and_nothing_else() {
+        for is_little_endian in [true, false] {
+            let numbered = |number, lease_s| numbered(number, lease_s, is_little_endian, HAS_DATA);
+            let mut heard = numbered([0, 1], 10);
+            let read = announcement(&heard).unwrap();
+            read.renumber(&mut heard, (7 << 32) + 0xfedc_ba98, None);
+            assert_eq!(heard, numbered([7, 0xfedc_ba98], 10));
+            read.renumber(&mut heard, 3, Some(0));
+            assert_eq!(heard, numbered([0, 3], 0));
+        }
     }
 
     #[test]
@@ -402,8 +612,9 @@ mod tests {
             let mut near = datagram(10, true, HAS_DATA);
             near.truncate(cut);
             for bytes in [bytes.clone(), [b"RTPS".to_vec(), bytes.clone()].concat(), [near, bytes].concat()] {
-                if let Some((prefix, _)) = announcement(&bytes) {
-                    prop_assert_eq!(prefix.as_slice(), &bytes[8..20]);
+                if let Some(read) = announcement(&bytes) {
+                    prop_assert_eq!(read.prefix.as_slice(), &bytes[8..20]);
+                    read.renumber(&mut bytes.clone(), 7, Some(0));
                 }
             }
         }
@@ -423,13 +634,13 @@ mod tests {
         fn new() -> Self {
             let own = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
             own.set_nonblocking(true).unwrap();
-            let mut keep_alive = KeepAlive::new(0, 0).unwrap();
+            let mut keep_alive = KeepAlive::new(0, 0, GUID::from_bytes([0; 16])).unwrap();
             keep_alive.own_port = own.local_addr().unwrap().port();
             let sender = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
             let from = sender.local_addr().unwrap();
             Self {
                 keep_alive,
-                own,
+                own: own.to_bytes().first_chunk().copied().unwrap_or_default(),
                 sender: Some(sender),
                 from,
                 begun: Instant::now(),
@@ -451,13 +662,21 @@ mod tests {
             for at_s in looks {
                 self.keep_alive
                     .look(self.begun + Duration::from_secs_f64(at_s));
-                let mut bytes = [0; 200];
-                if let Ok(length) = self.own.recv(&mut bytes) {
-                    assert_eq!(announcement(&bytes[..length]).unwrap().0, SENDER);
-                    found.push(at_s);
-                }
+                found.extend(self.received().map(|_| at_s));
             }
             found
+        }
+
+        /// What our own participant has heard.
+        fn received(&mut self) -> Option<Vec<u8>> {
+            let mut bytes = [0; 400];
+            let length = self.own.recv(&mut bytes).ok()?;
+            Some(bytes[..length].to_vec())
+        }
+
+        fn lost(&mut self, at_s: f64) {
+            let now = self.begun + Duration::from_secs_f64(at_s);
+            self.keep_alive.lost(&SENDER, now);
         }
     }
 
@@ -492,15 +711,62 @@ mod tests {
     }
 
     #[test]
-    fn who_waits_for_longer_has_left_or_is_lost_is_not_spoken_for() {
+    fn who_has_left_or_is_lost_is_not_spoken_for() {
         let mut watched = WatchedPeer::new();
-        watched.hear(60, 0.0);
-        assert!(watched.handed_over(0.0, 100.0).is_empty());
         watched.hear(10, 100.0);
         watched.keep_alive.left(&SENDER);
         assert!(watched.handed_over(100.0, 200.0).is_empty());
         watched.hear(10, 200.0);
-        watched.keep_alive.lost(&SENDER);
-        assert!(watched.handed_over(200.0, 300.0).is_empty());
+        watched.lost(212.0);
+        assert!(watched.handed_over(212.0, 300.0).is_empty());
+    }
+
+    #[test]
+    fn who_is_lost_is_met_when_it_comes_back_under_a_number_that_is_new() {
+        let mut watched = WatchedPeer::new();
+        let mut numbers = vec![];
+        for at_s in [0.0, 200.0, 400.0] {
+            watched.hear(10, at_s);
+            if at_s > 0.0 {
+                numbers.push(watched.received().unwrap());
+            }
+            watched.keep_alive.met(&SENDER);
+            watched.lost(at_s + 12.0);
+            assert!(watched.received().is_none());
+        }
+        // as long as it is not met
+        for _ in 0..2 {
+            watched.hear(10, 600.0);
+            assert!(watched.received().is_some());
+        }
+        watched.keep_alive.met(&SENDER);
+        watched.hear(10, 601.0);
+        assert!(watched.received().is_none());
+        assert_eq!(
+            numbers,
+            [0, 1].map(|low| numbered([1 << 8, low], 10, true, HAS_DATA))
+        );
+    }
+
+    #[test]
+    fn who_is_lost_because_this_process_stood_still_is_met_at_once() {
+        let mut watched = WatchedPeer::new();
+        watched.hear(10, 100.0);
+        watched.lost(101.0);
+        assert!(watched.received().is_some());
+    }
+
+    #[test]
+    fn who_waits_for_longer_than_patience_is_forgotten_with_it() {
+        let mut watched = WatchedPeer::new();
+        watched.hear(60, 0.0);
+        assert!(watched.handed_over(0.0, 40.5).is_empty());
+        watched
+            .keep_alive
+            .look(watched.begun + Duration::from_secs(41));
+        let expected = numbered([1 << 8, 0], 0, true, HAS_DATA);
+        assert_eq!(watched.received(), Some(expected));
+        watched.lost(43.0);
+        assert!(watched.handed_over(43.0, 100.0).is_empty());
     }
 }

@@ -9,9 +9,11 @@ mod answers;
 mod arm_port;
 mod back_end;
 mod environment;
+mod first_request;
 mod graph;
 mod incoming;
 mod keep_alive;
+mod rematch;
 mod rosout;
 mod sample_topic;
 mod samples;
@@ -86,9 +88,6 @@ impl Drop for DdsConnection {
 /// [`RosError`]: a name that is none, no network, no thread.
 #[expect(clippy::too_many_lines)]
 pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosError> {
-    for line in environment::unheeded(|name| std::env::var(name).ok()) {
-        tracing::warn!("{line}");
-    }
     let exchange = Exchange::new(config, inbox);
     // its own parameter services know one mapping alone, and nothing of ranges
     let options = declare(
@@ -98,7 +97,7 @@ pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosErro
     let (context, node) = join(config, options)?;
     let mut back_end = DdsBackEnd {
         config,
-        graph: Arc::new(Mutex::new(DdsGraph::new(&context, &exchange, config))),
+        graph: Arc::new(Mutex::new(DdsGraph::new(&context, &exchange, config)?)),
         begun: BegunNode::default(),
         context,
         node,

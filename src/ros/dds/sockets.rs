@@ -15,6 +15,8 @@ use std::path::PathBuf;
 
 use socket2::{SockFilter, SockRef, Type};
 
+use crate::ros::exchange::RosError;
+
 /// Messages in fragments up to so many bytes are taken; what a node of ours listens to has a
 /// hundredth of it.
 const LARGEST_MESSAGE: u32 = 1 << 20;
@@ -85,6 +87,29 @@ impl OpenSockets {
         }
         Ok(guarded)
     }
+}
+
+/// A node that others must not reach does not run where they do; without a filter for what is too
+/// large it does.
+pub(super) fn guard(before: io::Result<OpenSockets>, localhost_only: bool) -> Result<(), RosError> {
+    let range = if localhost_only {
+        Range::Computer
+    } else {
+        Range::Networks
+    };
+    match before.and_then(|before| before.guard_since(range)) {
+        Ok(guarded) => tracing::debug!(guarded, ?range, "sockets are guarded"),
+        Err(error) if localhost_only => {
+            let remedy = "unset ROS_AUTOMATIC_DISCOVERY_RANGE and ROS_LOCALHOST_ONLY where other computers may reach the node";
+            return Err(RosError::Refused {
+                call: "binding to loopback",
+                reason: error.to_string(),
+                remedy,
+            });
+        }
+        Err(error) => tracing::warn!(%error, "messages of any size are taken from the network"),
+    }
+    Ok(())
 }
 
 /// Of a datagram as a filter sees it: the header of UDP, and behind it that of RTPS.

@@ -30,7 +30,16 @@ impl RefinementWorker {
         // ages in it grow: what is said once is said until something else is
         let name = words.split(':').next().unwrap_or_default().to_owned();
         if name != self.last_state {
+            let now = self.setup.clock.now();
+            let since_s = now
+                .saturating_duration_since(self.state_since)
+                .as_secs_f64();
+            self.state_since = now;
             match level {
+                // who sees a warning sees its end too
+                DiagnosticStatus::OK if self.last_state.starts_with("holds") => {
+                    warn!("{words}, again after {since_s:.1} s");
+                }
                 DiagnosticStatus::OK => info!("{words}"),
                 // the first second is too short to say anything
                 _ if name == BEGINS => return,

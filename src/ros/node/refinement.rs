@@ -99,6 +99,8 @@ pub struct RefinementWorker {
     /// when a message was refused because its frames are not connected, and why
     pub(super) lost_transform: Option<(Instant, String)>,
     pub(super) last_state: String,
+    /// since when
+    pub(super) state_since: Instant,
     /// who else is on the topics
     pub(super) endpoints: BTreeMap<String, Endpoint>,
     /// sessions that are being ended, and files that are being written
@@ -167,6 +169,7 @@ impl RefinementWorker {
             fault: None,
             lost_transform: None,
             last_state: String::new(),
+            state_since: now,
             endpoints: BTreeMap::new(),
             sampled: now,
             edits_sent: now,
