@@ -124,6 +124,33 @@ pub enum ArmFault {
     ProtectiveStop,
     /// Something hits the probe for three states, N against the shaft.
     ForceSpike(f64),
+    /// From then on its force sensor senses something else.
+    Sensor(SensorFault),
+    /// The probe is bent: its ball is displaced by this, m in the axes of the tip.
+    TipBent(Vector3<f64>),
+    /// The part moves: by a scaled axis about the origin of O, rad, then by a shift, m; in O.
+    PartMoved(Vector3<f64>, Vector3<f64>),
+}
+
+/// What becomes of a force sensor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SensorFault {
+    /// Each reading is the last one, but along some axes of the flange (0) it goes on (1).
+    Frozen(Vector3<f64>),
+    /// The same in all axes, with noise of this root mean square, N, on it.
+    Dithers(f64),
+    /// It reads nothing.
+    Zero,
+    /// It reads no more than this along each axis of the flange, N.
+    Clipped(f64),
+    /// Its noise has another root mean square, N.
+    Noise(f64),
+    /// Its bias drifts along each axis of the flange, N/s.
+    Drifts(Vector3<f64>),
+    /// It is later than before, s.
+    Late(f64),
+    /// It reads a multiple of the force.
+    Gain(f64),
 }
 
 /// Time between two states, s.
@@ -180,6 +207,12 @@ pub struct SimArm<'a> {
     doing: Command,
     heard_at: f64,
     faults: Vec<(f64, ArmFault)>,
+    /// … once the ball has left so many contacts
+    faults_of_contacts: Vec<(usize, ArmFault)>,
+    contacts: usize,
+    /// since when it is another sensor, s, and its last reading before that, N in the flange
+    sensor: Option<(f64, SensorFault, Vector3<f64>)>,
+    last_force: Vector3<f64>,
     spike: u32,
     spike_force: f64,
     is_lost: bool,
@@ -251,6 +284,10 @@ impl<'a> SimArm<'a> {
             },
             heard_at: 0.0,
             faults: Vec::new(),
+            faults_of_contacts: Vec::new(),
+            contacts: 0,
+            sensor: None,
+            last_force: Vector3::zeros(),
             spike: 0,
             spike_force: 0.0,
             is_lost: false,
@@ -264,6 +301,11 @@ impl<'a> SimArm<'a> {
     /// Has something go wrong at a time of the arm, s.
     pub fn fail_at(&mut self, time: f64, fault: ArmFault) {
         self.faults.push((time, fault));
+    }
+
+    /// Has something go wrong once the ball has left its contact so many times for another one.
+    pub fn fail_after_contacts(&mut self, contacts: usize, fault: ArmFault) {
+        self.faults_of_contacts.push((contacts, fault));
     }
 
     /// Its own time, s.
@@ -340,14 +382,45 @@ impl<'a> SimArm<'a> {
             .extract_if(.., |(at, _)| *at <= now)
             .map(|(_, fault)| fault)
             .collect();
-        for fault in due {
+        let (left, touched) = (self.contacts, self.touched.is_some());
+        let is_due = |(contacts, _): &mut (usize, ArmFault)| !touched && *contacts <= left;
+        let of_contacts = self.faults_of_contacts.extract_if(.., is_due);
+        let of_contacts: Vec<_> = of_contacts.map(|(_, fault)| fault).collect();
+        for fault in due.into_iter().chain(of_contacts) {
             match fault {
                 ArmFault::LinkLost => self.is_lost = true,
                 ArmFault::ControllerKilled => (self.is_killed, self.safety) = (true, Safety::Fault),
                 ArmFault::OperatorStop => self.safety = Safety::OperatorStop,
                 ArmFault::ProtectiveStop => self.safety = Safety::ProtectiveStop,
                 ArmFault::ForceSpike(force) => (self.spike, self.spike_force) = (SPIKE, force),
+                ArmFault::TipBent(by) => self.params.errors.tip += by,
+                ArmFault::PartMoved(turn, by) => {
+                    self.pose_bo *= Isometry3::new(by, turn);
+                }
+                ArmFault::Sensor(SensorFault::Noise(noise)) => self.params.force_noise = noise,
+                ArmFault::Sensor(SensorFault::Late(by)) => {
+                    let oldest = self.contact_force();
+                    (0..(by / STEP) as usize).for_each(|_| self.forces.push_front(oldest));
+                }
+                ArmFault::Sensor(fault) => self.sensor = Some((now, fault, self.last_force)),
             }
+        }
+    }
+
+    /// What the sensor makes of a force, N in the flange.
+    fn sensed(&mut self, force: Vector3<f64>) -> Vector3<f64> {
+        let Some((since, fault, held)) = self.sensor else {
+            self.last_force = force;
+            return force;
+        };
+        match fault {
+            SensorFault::Frozen(alive) => held + (force - held).component_mul(&alive),
+            SensorFault::Dithers(noise) => held + gauss_vector(&mut self.rng) * noise,
+            SensorFault::Zero => Vector3::zeros(),
+            SensorFault::Clipped(most) => force.map(|along| along.clamp(-most, most)),
+            SensorFault::Drifts(rate) => force + rate * (self.time - since),
+            SensorFault::Gain(gain) => force * gain,
+            SensorFault::Noise(_) | SensorFault::Late(_) => force,
         }
     }
 
@@ -464,6 +537,7 @@ impl<'a> SimArm<'a> {
         let is_away = |touched: Point3<f64>| (self.ball - touched).norm() > NEW_APPROACH;
         if self.touched.is_some_and(is_away) {
             self.touched = None;
+            self.contacts += 1;
             self.approach = gauss_vector(&mut self.approach_rng) * errors.repeatability;
         }
         self.pose_bo
@@ -540,13 +614,15 @@ impl<'a> SimArm<'a> {
             r_bf.inverse() * (self.contact_force() + spike),
         );
         let ball = pose_ft * Point3::from(ball_offset + errors.tip);
-        Wrench {
+        let mut wrench = Wrench {
             force: contact + r_bf.inverse() * (weight.force + noise) + force_bias,
             torque: ball.coords.cross(&contact)
                 + r_bf.inverse() * weight.torque
                 + torque_bias
                 + torque_noise,
-        }
+        };
+        wrench.force = self.sensed(wrench.force);
+        wrench
     }
 
     /// What of a force the controller does not take for weight, N in the flange.

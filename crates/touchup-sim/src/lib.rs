@@ -37,7 +37,7 @@ pub mod wavy;
 mod with_spheres;
 mod world;
 
-pub use arm::{ArmFault, ArmParams, SimArm, WEIGHTLESS};
+pub use arm::{ArmFault, ArmParams, SensorFault, SimArm, WEIGHTLESS};
 pub use arm_errors::{ArmErrorSigmas, ArmErrors};
 pub use ball::{BallContact, push_ball};
 pub use bending::TipBending;
