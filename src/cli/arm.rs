@@ -312,11 +312,10 @@ impl CellArguments {
                     spheres: &ready.spheres,
                 };
                 let params = truth(ready.simulated_arm(self.seed, self.arm_errors))?;
-                work(&mut SimArm::new(
-                    &all,
-                    params,
-                    &ready.cell.above(&ready.with_spheres(&part)?),
-                )?)
+                let start = ready.cell.above(&ready.with_spheres(&part)?);
+                let mut arm = SimArm::new(&all, params, &start)?;
+                self.arm_errors.befall(&mut arm);
+                work(&mut arm)
             }
         }
     }

@@ -1,9 +1,9 @@
 //! By what a simulated arm differs from what its scene tells of it.
 
 use clap::ValueEnum;
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
-use crate::sim::{ArmErrorSigmas, ArmErrors};
+use crate::sim::{ArmErrorSigmas, ArmErrors, ArmFault, SimArm};
 
 /// By what a simulated arm differs from what is told of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -14,7 +14,12 @@ pub(super) enum ArmErrorsName {
     /// the stiffness, 0.002 mm of the ball's radius, 0.05 mm and 0.02° of the place of the part,
     /// 0.03 mm of repeatability
     Calibrated,
+    /// By the same, and the probe is bent aside by 1 mm after its twelfth contact
+    Bent,
 }
+
+/// How the probe is bent, m in the axes of the tip, and after how many contacts.
+const BEND: (usize, Vector3<f64>) = (12, Vector3::new(0.8e-3, 0.6e-3, 0.0));
 
 impl ArmErrorsName {
     /// The errors of a seed.
@@ -23,7 +28,17 @@ impl ArmErrorsName {
     pub fn drawn(self, registered_at: Point3<f64>, seed: u64) -> ArmErrors {
         match self {
             Self::None => ArmErrors::NONE,
-            Self::Calibrated => ArmErrors::draw(&ArmErrorSigmas::CALIBRATED, registered_at, seed),
+            Self::Calibrated | Self::Bent => {
+                ArmErrors::draw(&ArmErrorSigmas::CALIBRATED, registered_at, seed)
+            }
+        }
+    }
+
+    /// Has happen to a simulated arm what happens while it works.
+    pub fn befall(self, arm: &mut SimArm) {
+        if self == Self::Bent {
+            let (contacts, by) = BEND;
+            arm.fail_after_contacts(contacts, ArmFault::TipBent(by));
         }
     }
 }

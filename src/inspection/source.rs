@@ -59,6 +59,8 @@ impl InspectionSource {
         let probed =
             read_probed_touches(&probed_path).map_err(|error| not_read(&probed_path, error))?;
         let mut files = vec![inspected_file("features", &features_path)?];
+        let of_arm = probed_file(&folder).as_deref().map(probed_features);
+        let of_arm = of_arm.transpose()?.unwrap_or_default();
         let probed_path = (!probed.is_empty()).then_some(probed_path);
         let others = [
             ("touches", &touches_path),
@@ -80,7 +82,7 @@ impl InspectionSource {
             mesh,
             scene,
             files,
-            notes: Vec::new(),
+            notes: of_arm.iter().flat_map(ProbedFeature::notes).collect(),
         })
     }
 
@@ -96,17 +98,13 @@ impl InspectionSource {
                 .map(Path::to_owned)
                 .or_else(|| Some(folder.join(name)).filter(|path| path.is_file()))
         };
-        let text = read_text(path).map_err(|error| not_read(path, error))?;
-        let ProbedFeatures { features } =
-            serde_json::from_str(&text).map_err(|source| InspectionError::Probed {
-                path: path.to_owned(),
-                source,
-            })?;
+        let features = probed_features(path)?;
+        let mut notes: Vec<String> = features.iter().flat_map(ProbedFeature::notes).collect();
         let probed_path = folder.join("probed_touches.jsonl");
         let probed =
             read_probed_touches(&probed_path).map_err(|error| not_read(&probed_path, error))?;
         let (mut found, mut touches) = (FeatureFile::default(), Vec::new());
-        for ProbedFeature { flag, feature } in features {
+        for ProbedFeature { flag, feature, .. } in features {
             let Some(feature) = feature else { continue };
             let offset = touches.len() as u32;
             let mut of_flag: Vec<_> = probed.iter().filter(|touch| touch.flag == flag).collect();
@@ -129,8 +127,7 @@ impl InspectionSource {
                     .transpose()?,
             );
         }
-        let note =
-            "Measured by an arm: ids are the numbers of the flags; form and relations were not measured.".to_owned();
+        notes.push("Measured by an arm: ids are the numbers of the flags; form and relations were not measured.".to_owned());
         Ok(Self {
             features: found,
             touches,
@@ -138,7 +135,7 @@ impl InspectionSource {
             mesh,
             scene,
             files,
-            notes: vec![note],
+            notes,
         })
     }
 }
@@ -180,6 +177,43 @@ struct ProbedFeature {
     flag: u32,
     #[serde(default)]
     feature: Option<FeatureRecord>,
+    #[serde(default)]
+    code: String,
+    #[serde(default)]
+    ending: String,
+    #[serde(default)]
+    touches: usize,
+    /// older files do not say
+    #[serde(default)]
+    verified_touches: Option<usize>,
+}
+
+impl ProbedFeature {
+    /// What has to be known of it: what stopped the arm, and touches after which no contact was
+    /// found where it had been.
+    fn notes(&self) -> Vec<String> {
+        let Self { flag, ending, .. } = self;
+        let stopped = (self.code == "stopped").then(|| format!("Feature {flag}: {ending}."));
+        let verified = self
+            .verified_touches
+            .filter(|verified| *verified < self.touches);
+        let doubted = verified.map(|first| {
+            let last = self.touches - 1;
+            format!("Feature {flag}: touches {first} to {last} are in doubt: after them no contact was found where it had been.")
+        });
+        stopped.into_iter().chain(doubted).collect()
+    }
+}
+
+/// The features of a file of a probing.
+fn probed_features(path: &Path) -> Result<Vec<ProbedFeature>, InspectionError> {
+    let text = read_text(path).map_err(|error| not_read(path, error))?;
+    let file: ProbedFeatures =
+        serde_json::from_str(&text).map_err(|source| InspectionError::Probed {
+            path: path.to_owned(),
+            source,
+        })?;
+    Ok(file.features)
 }
 
 /// The file of a probing: it has the features that were flagged, also where few touches leave none

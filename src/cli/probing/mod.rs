@@ -22,7 +22,7 @@ use crate::features::Kind;
 use crate::io::atomic::create_folder;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 use crate::probing::arm::{Arm, ArmState};
-use crate::probing::execute::{Ending, Flag, Plan, Probed, Prober, plan};
+use crate::probing::execute::{Ending, Flag, Plan, Probed, Prober, References, plan};
 use files::{RECORDING, TOUCHES, probe_topics};
 use folder::{ProbingFolder, ProbingRequest};
 pub(super) use goals::goals_of;
@@ -117,13 +117,16 @@ impl Probing<'_> {
         if !is_resumed {
             folder.begin(&request)?;
         }
-        let mut probed: Vec<Probed> = Vec::new();
+        let (mut probed, mut references) = (Vec::<Probed>::new(), References::default());
         let check = CheckOfResults::of(&ready.check);
         for flag in self.flags {
             if features.iter().any(|record| record.flag == flag.id) {
                 continue;
             }
-            let one = Prober::new(arm, &ready.cell, &ready.params, &mut world).probe(flag);
+            let prober = Prober::new(arm, &ready.cell, &ready.params, &mut world);
+            let mut prober = prober.beside(references);
+            let one = prober.probe(flag);
+            references = prober.take_references();
             features.push(ProbedRecord::of(&one, flag));
             features.sort_by_key(|record| record.flag);
             // kept as it is, whatever comes after it
@@ -142,13 +145,20 @@ impl Probing<'_> {
         signals.arm_is_at_rest();
         let touches = world.finish()?;
         let ended = probed.last().map(|last| &last.ending);
-        if let Some(ending @ Ending::Cancelled(_)) = ended {
+        let next = match ended {
+            Some(Ending::Cancelled(_)) => Some("--resume goes on"),
+            Some(ending) if ending.is_displaced() && !self.is_forced => {
+                Some("no mesh is made of touches that do not hold together")
+            }
+            _ => None,
+        };
+        if let Some((ending, next)) = ended.zip(next) {
             let finished = features
                 .iter()
                 .filter(|record| record.is_finished())
                 .count();
             let error = CliError::ended(ending).with(format_args!(
-                "{finished} of {} features are finished, the touches ({touches}) are in {}; --resume goes on",
+                "{finished} of {} features are finished, the touches ({touches}) are in {}; {next}",
                 self.flags.len(),
                 self.out.join(TOUCHES).display()
             ));

@@ -12,7 +12,7 @@ use crate::conformity::Decision;
 use crate::features::Kind;
 use crate::io::features_file::FeatureRecord;
 use crate::probing::arm::SlideRecord;
-use crate::probing::execute::{Ending, Flag, Probed, ProbedSlide, ProbedTouch};
+use crate::probing::execute::{Ending, Flag, Probed, ProbedSlide, ProbedTouch, ReferenceTouch};
 use crate::probing::plan::DecidedCharacteristic;
 use crate::scene::{CheckRecord, CheckStanding};
 
@@ -39,6 +39,12 @@ reported! {
         beside_the_part_mm: Vec<[f64; 3]> = probed.left_out.iter().map(|place| (place * 1e3).coords.into()).collect(),
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         slides: Vec<SlideRecordOfFile> = probed.slides.iter().map(SlideRecordOfFile::of).collect(),
+        /// contacts that were touched again last, none of which had moved
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        touched_again: Vec<TouchedAgain> = probed.references.iter().map(TouchedAgain::of).collect(),
+        /// so many of the touches were made before that; those after it are in doubt
+        #[serde(default)]
+        verified_touches: usize = probed.verified,
         duration_s: f64 = probed.seconds,
         largest_force_n: f64 = probed.peak_force,
         /// of the wanted number, mm or rad
@@ -167,6 +173,21 @@ impl ProbedRecord {
         matches!(self.code.as_str(), "cancelled" | "stopped")
     }
 
+    /// What its references say, a line of the summary each.
+    fn references(&self) -> String {
+        let farthest = |one: &TouchedAgain| one.off_mm.abs();
+        let again = self.touched_again.iter().map(farthest).reduce(f64::max);
+        let again = again.map(|most_mm| {
+            let contacts = counted(self.touched_again.len(), "contact", "contacts");
+            format!("\n  {contacts} touched again, {most_mm:.3} mm off at most")
+        });
+        let doubted = (self.verified_touches < self.touches).then(|| {
+            let (first, last) = (self.verified_touches, self.touches - 1);
+            format!("\n  in doubt: after touches {first} to {last} no contact was found where it had been")
+        });
+        again.into_iter().chain(doubted).collect()
+    }
+
     /// Why it is not as it was asked for, where that is so.
     pub(super) fn loss(&self) -> Option<String> {
         let failed: Vec<_> = self
@@ -193,6 +214,21 @@ impl ProbedRecord {
             _ => false,
         };
         (!is_as_asked).then(|| format!("feature {}: {}", self.flag, self.ending))
+    }
+}
+
+reported! {
+    /// A contact that was touched again.
+    #[derive(Clone, Deserialize)]
+    struct TouchedAgain, fn of(touch: &ReferenceTouch) {
+        /// number of the feature that it was touched for first
+        flag: u32 = touch.flag,
+        /// which touch of that, from 0 on
+        index: usize = touch.index,
+        /// how much farther along its search it is now
+        off_mm: f64 = touch.off * 1e3,
+        /// standard uncertainty of that
+        std_mm: f64 = touch.sigma * 1e3,
     }
 }
 
@@ -329,6 +365,7 @@ impl fmt::Display for ProbingSummary {
                 .slides
                 .iter()
                 .try_for_each(|slide| write!(f, "\n  {slide}"))?;
+            write!(f, "{}", record.references())?;
             writeln!(f)?;
         }
         writeln!(f, "{}", self.check.summary)?;

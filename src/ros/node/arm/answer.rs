@@ -266,11 +266,16 @@ fn stopped(error: &ProbeError) -> u8 {
             ..
         } => ProbeResult::FORCE_OVER_LIMIT,
         ProbeError::Limit { .. } => ProbeResult::LIMIT_OVERRUN,
-        ProbeError::LowRate { .. } => ProbeResult::DATA_LOST,
+        ProbeError::LowRate { .. } | ProbeError::Senseless { .. } => ProbeResult::DATA_LOST,
         ProbeError::Obstacle { .. } | ProbeError::Loaded { .. } | ProbeError::Unsteady { .. } => {
             ProbeResult::UNEXPECTED_CONTACT
         }
-        ProbeError::TooLong { .. } | ProbeError::Pulls { .. } => ProbeResult::FAULT,
+        ProbeError::TooLong { .. }
+        | ProbeError::Pulls { .. }
+        | ProbeError::Noisy { .. }
+        | ProbeError::Drifts { .. }
+        | ProbeError::Unfelt { .. }
+        | ProbeError::Displaced { .. } => ProbeResult::FAULT,
         ProbeError::Cancelled { request, .. } => cancelled(*request),
     }
 }

@@ -19,7 +19,7 @@ use super::world::{ArmLink, ArmWorld, GoalWatcher, ask_mesh, is_cancelled};
 use crate::io::probed_touches_file::append_probed_touches;
 use crate::mesh::TriMesh;
 use crate::probing::arm::{Arm, StopRequest};
-use crate::probing::execute::{Cell, Ending, Flag, ProbeParams, Prober, WayOut, plan};
+use crate::probing::execute::{Cell, Ending, Flag, ProbeParams, Prober, References, WayOut, plan};
 use crate::ros::messages::{
     Header, Path as PathMsg, Pose, PoseStamped, ProbeFeatureResponse, ProbeGoal, ProbeResult,
     ProbeSettings, TriggerResponse,
@@ -122,6 +122,8 @@ struct ArmWorker {
     ros_ns: i64,
     /// of the feature that the last probing was stopped in
     way_out: Option<WayOut>,
+    /// contacts that are touched again after each feature
+    references: References,
 }
 
 /// Starts the thread of an arm.
@@ -162,6 +164,7 @@ pub fn start(
         inputs,
         ros_ns: i64::MIN,
         way_out: None,
+        references: References::default(),
     };
     let run = move || {
         let EndsArm(stops) = &ends;
@@ -537,8 +540,13 @@ impl ArmWorker {
             }
         }
         let prober = Prober::new(arm, &self.cell, &wanted.params, &mut world);
-        let mut prober = prober.leaving_by(self.way_out.take());
+        let references = std::mem::take(&mut self.references);
+        let mut prober = prober.leaving_by(self.way_out.take()).beside(references);
         let probed = prober.probe(target);
+        // after a contact that moved nothing holds that was touched before
+        if !probed.ending.is_displaced() {
+            self.references = prober.take_references();
+        }
         self.way_out = prober.into_way_out();
         self.link.common.stops.enter(Motion::Rests);
         info!(feature = target.id, ending = %probed.ending, touches = probed.touches.len(), "probed");

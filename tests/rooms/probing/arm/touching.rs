@@ -10,7 +10,7 @@ use touchup::probing::arm::{
     UNEXPECTED, Watched,
 };
 use touchup::probing::plan::{ExploreError, Explorer, PatternParams, TouchResult};
-use touchup::sim::{ArmFault, ArmParams, Plate, SimArm};
+use touchup::sim::{ArmFault, ArmParams, Plate, SensorFault, SimArm};
 use touchup::stylus::Wrench;
 
 use crate::plate_stream::plate_scan;
@@ -706,6 +706,58 @@ fn after_each_fault_the_arm_is_at_rest_and_the_reported_reason_is_true() {
             "{fault:?}: {error}; at rest after {:.0} ms",
             stood.max(0.0) * 1e3
         );
+    }
+}
+
+/// In the search it is in free air when the sensor fails, 3 mm above the part with 5 mm/s; while it
+/// presses the ball is at the part. The true force says how hard that was.
+#[test]
+fn a_force_sensor_that_does_not_sense_stops_the_arm_within_100_ms() {
+    let plate = Plate::default();
+    let frozen = |x, y, z| SensorFault::Frozen(Vector3::new(x, y, z));
+    let faults = [
+        (frozen(0.0, 0.0, 0.0), "frozen at"),
+        (SensorFault::Zero, "frozen at"),
+        (SensorFault::Clipped(0.6), "is clipped or dead: along"),
+        (SensorFault::Noise(0.0), "frozen at"),
+        (frozen(1.0, 1.0, 0.0), "is clipped or dead: along"),
+        (frozen(0.0, 1.0, 0.0), "is clipped or dead: along"),
+        (frozen(0.0, 1.0, 1.0), "is clipped or dead: along"),
+    ];
+    // the tip turned about its axis in the flange: no axis of the sensor is one of tip or base
+    let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.5);
+    for turn in [UnitQuaternion::identity(), turned] {
+        for (fault, named) in faults {
+            let params = ArmParams {
+                pose_ft: ArmParams::default().pose_ft * turn,
+                ..ArmParams::default()
+            };
+            let mut arm =
+                SimArm::new(&plate, params.clone(), &at(&params, [45e-3, 8e-3, 20e-3])).unwrap();
+            let at_s = 0.9;
+            arm.fail_at(at_s, ArmFault::Sensor(fault));
+            let slow = TouchParams {
+                search_speed: 5e-3,
+                ..TouchParams::default()
+            };
+            let error =
+                touched(&mut arm, &slow, &down(&params, [45e-3, 8e-3, 18.5e-3])).unwrap_err();
+            arm.advance(0.5);
+            let stood_ms = (arm.at_rest_since() - at_s) * 1e3;
+            println!(
+                "{fault:?}: {error}; at rest after {stood_ms:.0} ms, {:.1} N",
+                arm.peak_force()
+            );
+            assert!(
+                matches!(error, ProbeError::Senseless { .. }),
+                "{fault:?}: {error}"
+            );
+            assert!(error.to_string().contains(named), "{fault:?}: {error}");
+            assert!(
+                stood_ms < 100.0 && arm.peak_force() < 15.0,
+                "{fault:?}: {stood_ms} ms"
+            );
+        }
     }
 }
 

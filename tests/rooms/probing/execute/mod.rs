@@ -1,4 +1,5 @@
 mod command;
+mod displaced;
 mod interrupted;
 mod opened;
 mod planning;

@@ -136,8 +136,12 @@ impl Watched<'_> {
                 let stopping = "stopping at the surface";
                 self.halt(stopping, &mut |_| {})?;
                 self.check_sign(stopping, &line)?;
+                let met = self.last.filter(|state| line.felt(state) > params.trigger);
                 let is_free = self.back_off(&line)?;
-                match is_free && self.press(&line, SECOND * params.back_off, &mut states)? {
+                let pressed =
+                    is_free && self.press(&line, SECOND * params.back_off, &mut states)?;
+                self.check_follows(met.filter(|_| !pressed), &line, &states)?;
+                match pressed {
                     true => line.outcome_of(&states),
                     // the first search made a contact that the second did not
                     false => {
@@ -187,6 +191,33 @@ impl Watched<'_> {
             acceleration: self.limits.acceleration,
         })?;
         Err(ProbeError::Pulls { doing, force_n })
+    }
+
+    /// Where a contact was felt at rest, and the ball has gone beyond it by what the touch presses in,
+    /// it has to be felt again.
+    ///
+    /// - `met`: the contact; `states`: of the measuring search that did not reach its force.
+    fn check_follows(
+        &self,
+        met: Option<ArmState>,
+        line: &ApproachLine,
+        states: &[ArmState],
+    ) -> Result<(), ProbeError> {
+        let deep = |a: &&ArmState, b: &&ArmState| line.depth(a).total_cmp(&line.depth(b));
+        let Some((met, deepest)) = met.zip(states.iter().max_by(deep)) else {
+            return Ok(());
+        };
+        let beyond = line.depth(deepest) - line.depth(&met);
+        let (felt_n, force_n) = (line.felt(&met), line.felt(deepest));
+        if beyond < line.params.force / line.params.stiffness || force_n > felt_n {
+            return Ok(());
+        }
+        Err(ProbeError::Unfelt {
+            doing: "measuring",
+            mm: beyond * 1e3,
+            felt_n,
+            force_n,
+        })
     }
 
     /// Free of the surface again, then a little farther.
@@ -376,6 +407,6 @@ const MOST_ROOM: f64 = 3.0;
 /// The retraction is this much faster than the measuring search.
 const BACK: f64 = 2.0;
 /// Below this share of the trigger the tip is free.
-const FREE: f64 = 0.5;
+pub(super) const FREE: f64 = 0.5;
 /// The second search goes this much farther than it should have to.
 const SECOND: f64 = 3.0;

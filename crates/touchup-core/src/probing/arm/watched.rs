@@ -7,8 +7,11 @@ use nalgebra::{Isometry3, Vector3};
 
 use super::interface::{Arm, ArmError, ArmState, Command, Safety, Slowed};
 use super::limits::{LimitError, Limits};
+use super::liveness::{Liveness, StuckForce};
 use super::measured_motion::MeasuredMotion;
 use super::touch_params::{TouchParams, UNEXPECTED};
+use super::touching::FREE;
+use crate::numeric::mean;
 
 /// Why probing was broken off. The arm was commanded to stop before this was made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -74,6 +77,79 @@ pub enum ProbeError {
         place_mm: [f64; 3],
         /// whether that was in a fast move through free air
         is_link: bool,
+    },
+    /// Noise would be contact.
+    #[error(
+        "while {doing}: the force has a noise of {noise_n:.2} N rms at rest, so no contact of {trigger_n:.2} N can be told from it: raise \
+         robot.trigger_n to {least_n:.1} N with touch_force_n above it, or look what shakes the sensor"
+    )]
+    Noisy {
+        /// what was being done
+        doing: &'static str,
+        /// N
+        noise_n: f64,
+        /// N
+        trigger_n: f64,
+        /// N
+        least_n: f64,
+    },
+    /// What it reads in free air is not zero any more.
+    #[error(
+        "while {doing}: {force_n:.2} N in free air {seconds:.0} s after the sensor was zeroed, {per_s:.2} N/s: it drifts (warms up, or \
+         its cable pulls), so contacts of {trigger_n:.2} N cannot be told from that; let it warm up, or look at the cable"
+    )]
+    Drifts {
+        /// what was being done
+        doing: &'static str,
+        /// N
+        force_n: f64,
+        /// s
+        seconds: f64,
+        /// N/s
+        per_s: f64,
+        /// N
+        trigger_n: f64,
+    },
+    /// The sensor does not sense.
+    #[error(
+        "while {doing}: the force sensor {stuck}, and no sensor is without noise: look at its cable, its range and its driver, \
+         zero it, and check it by hand (docs/probing.md)"
+    )]
+    Senseless {
+        /// what was being done
+        doing: &'static str,
+        /// what it reads
+        stuck: StuckForce,
+    },
+    /// It does not follow what it is pressed with.
+    #[error(
+        "while {doing}: the ball was pressed {mm:.2} mm beyond where {felt_n:.1} N were felt, and now {force_n:.1} N are: the force \
+         sensor hangs or is late, or the part gives way; look before it is touched again"
+    )]
+    Unfelt {
+        /// what was being done
+        doing: &'static str,
+        /// mm
+        mm: f64,
+        /// when it was met, N
+        felt_n: f64,
+        /// now, N
+        force_n: f64,
+    },
+    /// A contact that was touched again is not where it was.
+    #[error(
+        "while {doing}: {reference} {how}, so the probe is bent or loose, the part has slipped or the arm has drifted, some time after \
+         {since}: nothing that was touched after that holds; look, calibrate tip and place anew, and probe it again"
+    )]
+    Displaced {
+        /// what was being done
+        doing: &'static str,
+        /// which contact
+        reference: String,
+        /// how it is now
+        how: String,
+        /// the last touch that holds
+        since: String,
     },
     /// States come too seldom to stop in time.
     #[error(
@@ -179,6 +255,7 @@ pub struct Watched<'a> {
     observer: &'a mut dyn Observer,
     pub(super) last: Option<ArmState>,
     frozen: u32,
+    liveness: Liveness,
     motion: MeasuredMotion,
     pub(super) peak_force: f64,
     /// The station that the ball has come to on the current slide, also where that breaks off; of a
@@ -201,6 +278,7 @@ impl<'a> Watched<'a> {
             observer,
             last: None,
             frozen: 0,
+            liveness: Liveness::default(),
             motion,
             peak_force,
             reached: None,
@@ -260,6 +338,9 @@ impl<'a> Watched<'a> {
             self.motion
                 .take(&state, &self.limits)
                 .map_err(|error| ProbeError::Limit { doing, error })?;
+        }
+        if let Some(stuck) = self.liveness.take(&state) {
+            return Err(ProbeError::Senseless { doing, stuck });
         }
         match self.limits.check_state(&state) {
             Err(LimitError::Force { .. }) if self.comes_free => {}
@@ -525,33 +606,33 @@ impl<'a> Watched<'a> {
         }))
     }
 
-    /// Stops, waits until the arm is at rest, and zeroes the sensor.
+    /// Stops, waits until the arm is at rest, and zeroes the sensor; returns the noise of its force,
+    /// root mean square along the axis of the base where it is largest, N.
     ///
     /// # Errors
     /// [`ProbeError`]; [`ProbeError::Loaded`] and [`ProbeError::Unsteady`] where it feels
     /// something.
-    pub fn zero(&mut self) -> Result<(), ProbeError> {
+    pub fn zero(&mut self) -> Result<f64, ProbeError> {
         self.zero_below(self.limits.tare)
     }
 
     /// As [`Self::zero`], of a sensor that may feel a weight.
     ///
     /// - `most_n`: N
-    pub(crate) fn zero_below(&mut self, most_n: f64) -> Result<(), ProbeError> {
+    pub(crate) fn zero_below(&mut self, most_n: f64) -> Result<f64, ProbeError> {
         let doing = "zeroing the sensor in free air";
-        let mut forces = Vec::new();
-        self.dwell(doing, STEADY, &mut |state| {
-            forces.push(state.wrench_b.force)
-        })?;
-        let mean = |forces: &[Vector3<f64>]| {
-            forces.iter().sum::<Vector3<f64>>() / forces.len().max(1) as f64
-        };
-        let (all, (first, second)) = (mean(&forces), forces.split_at(forces.len() / 2));
-        let spread = forces
-            .iter()
-            .map(|force| (force - all).norm_squared())
-            .sum::<f64>()
-            / forces.len().max(1) as f64;
+        let forces = self.forces_at_rest(doing)?;
+        let (all, (first, second)) = (
+            mean(forces.iter().copied()),
+            forces.split_at(forces.len() / 2),
+        );
+        let squares = mean(
+            forces
+                .iter()
+                .map(|force| (force - all).component_mul(&(force - all))),
+        );
+        let spread = squares.sum();
+        let mean = |forces: &[Vector3<f64>]| mean(forces.iter().copied());
         let change_n = (mean(second) - mean(first)).norm();
         if all.norm() > most_n {
             return Err(ProbeError::Loaded {
@@ -569,8 +650,45 @@ impl<'a> Watched<'a> {
             .map_err(|error| ProbeError::Arm { doing, error })?;
         // that took its time
         self.last = None;
+        self.liveness = Liveness::default();
         self.motion.forget();
-        Ok(())
+        Ok(squares.max().sqrt())
+    }
+
+    /// What the sensor reads at rest, N in B.
+    fn forces_at_rest(&mut self, doing: &'static str) -> Result<Vec<Vector3<f64>>, ProbeError> {
+        let mut forces = Vec::new();
+        self.dwell(doing, STEADY, &mut |state| {
+            forces.push(state.wrench_b.force)
+        })?;
+        Ok(forces)
+    }
+
+    /// Refuses a sensor whose zero has gone in free air by a share of the trigger.
+    ///
+    /// - `zeroed_ns`: when it was zeroed.
+    ///
+    /// # Errors
+    /// [`ProbeError::Drifts`]
+    pub(crate) fn check_zero(
+        &mut self,
+        zeroed_ns: i64,
+        params: &TouchParams,
+    ) -> Result<(), ProbeError> {
+        let doing = "looking at the zero of the sensor";
+        let force_n = mean(self.forces_at_rest(doing)?.into_iter()).norm();
+        let now_ns = self.last.map_or(zeroed_ns, |state| state.stamp_ns);
+        let seconds = (now_ns - zeroed_ns) as f64 * 1e-9;
+        if force_n <= FREE * params.trigger {
+            return Ok(());
+        }
+        Err(ProbeError::Drifts {
+            doing,
+            force_n,
+            seconds,
+            per_s: force_n / seconds,
+            trigger_n: params.trigger,
+        })
     }
 
     /// Stops, waits until the arm is at rest, and passes on the states of some time (s) after that.

@@ -5,6 +5,7 @@ use std::error::Error;
 use nalgebra::Point3;
 
 use super::links::LinkError;
+use super::reference::ReferenceTouch;
 use crate::probing::arm::{LimitError, ProbeError, SlideRecord, StopRequest, TouchRecord};
 use crate::probing::plan::{DecidedCharacteristic, ExploreError, Found, Slide, TouchPlan};
 
@@ -96,6 +97,11 @@ impl Ending {
         }
     }
 
+    /// Whether tip, part or arm are not where they were: which of the touches hold is not known.
+    pub fn is_displaced(&self) -> bool {
+        matches!(self, Self::Stopped(ProbeError::Displaced { .. }))
+    }
+
     /// The reason alone.
     pub(super) fn why(&self) -> String {
         self.source()
@@ -151,6 +157,10 @@ pub struct Probed {
     pub touches: Vec<ProbedTouch>,
     /// and the slides after them
     pub slides: Vec<ProbedSlide>,
+    /// the contacts that were touched again last, none of which had moved
+    pub references: Vec<ReferenceTouch>,
+    /// so many of the touches were made before that
+    pub verified: usize,
     /// places of the surface, m in O, that were not touched, for the scan has no part there
     pub left_out: Vec<Point3<f64>>,
     /// by the arm's clock, s

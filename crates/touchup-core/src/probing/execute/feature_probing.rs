@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion};
 
 use super::ending::{Ending, Probed, ProbedSlide, ProbedTouch};
 use super::prober::{Flag, Prober};
+use super::reference::ReferenceTouch;
 use super::route::ToolState;
 use super::way_out::WayOut;
 use super::world::{Phase, Progress, World};
@@ -31,10 +32,16 @@ pub(super) struct FeatureProbing<'p, 'a> {
     pub from: Option<Point3<f64>>,
     /// whether the sensor is zeroed where it is touched
     pub is_zeroed: bool,
+    /// when it was, by the arm's clock, ns
+    pub zeroed_ns: i64,
     pub begun_ns: i64,
     pub ended_ns: i64,
     pub touches: Vec<ProbedTouch>,
     pub slides: Vec<ProbedSlide>,
+    /// as they were touched again last
+    pub references: Vec<ReferenceTouch>,
+    /// touches that were made until then
+    pub verified: usize,
     pub peak_force: f64,
 }
 
@@ -55,7 +62,7 @@ impl<'a> Prober<'a> {
         let (mut explorer, mut probing) = match self.begin(flag) {
             Ok(begun) => begun,
             Err(ending) => {
-                let (touches, slides) = (Vec::new(), Vec::new());
+                let (touches, slides, references) = (Vec::new(), Vec::new(), Vec::new());
                 let (found, left_out, seconds, peak_force) = (None, Vec::new(), 0.0, 0.0);
                 return Probed {
                     flag: flag.id,
@@ -63,6 +70,8 @@ impl<'a> Prober<'a> {
                     found,
                     touches,
                     slides,
+                    references,
+                    verified: 0,
                     left_out,
                     seconds,
                     peak_force,
@@ -72,6 +81,12 @@ impl<'a> Prober<'a> {
         let mut ended = probing.explore(&mut explorer);
         if probing.prober.params.slides && ended.is_ok() {
             ended = probing.slide_over(explorer.slides());
+        }
+        if matches!(ended, Ok(()) | Err(Ending::TimeSpent)) {
+            let doubted = probing
+                .check_zero()
+                .and_then(|()| probing.touch_references());
+            ended = doubted.and(ended);
         }
         let ended = probing.finish(ended);
         let found = explorer.found();
@@ -92,12 +107,15 @@ impl<'a> Prober<'a> {
         };
         Probed {
             flag: flag.id,
+            // which of its touches hold is not known
+            found: found.ok().filter(|_| !ending.is_displaced()),
             ending,
-            found: found.ok(),
             seconds: probing.seconds(),
             peak_force: probing.peak_force,
             touches: probing.touches,
             slides: probing.slides,
+            references: probing.references,
+            verified: probing.verified,
             left_out: explorer.left_out().to_vec(),
         }
     }
@@ -108,7 +126,7 @@ impl<'a> Prober<'a> {
         flag: &Flag,
     ) -> Result<(Explorer, FeatureProbing<'_, 'a>), Ending> {
         self.leave(flag)?;
-        let state = self.in_free_air(self.params.limits.tare)?;
+        let state = self.ready_to_touch()?;
         let (explorer, rotation) = flag.explorer(self.cell, self.params, self.world, &state)?;
         let probing = FeatureProbing::new(self, flag.id, rotation, &state);
         Ok((explorer, probing))
@@ -162,10 +180,13 @@ impl<'p, 'a> FeatureProbing<'p, 'a> {
             entry: None,
             from: None,
             is_zeroed: false,
+            zeroed_ns: state.stamp_ns,
             begun_ns: state.stamp_ns,
             ended_ns: state.stamp_ns,
             touches: Vec::new(),
             slides: Vec::new(),
+            references: Vec::new(),
+            verified: 0,
             peak_force: 0.0,
             prober,
         }
@@ -200,7 +221,9 @@ impl FeatureProbing<'_, '_> {
         let may_move = is_unbroken
             || matches!(
                 ended,
-                Err(NoClearPath(_) | OutOfLimits(_) | Stopped(ProbeError::TooLong { .. }))
+                Err(NoClearPath(_)
+                    | OutOfLimits(_)
+                    | Stopped(ProbeError::TooLong { .. } | ProbeError::Displaced { .. }))
             );
         let retracted = if may_move { self.retract() } else { Ok(()) };
         // where nothing comes any more it ended when it was seen last
@@ -230,6 +253,7 @@ impl FeatureProbing<'_, '_> {
                 return Err(Ending::TimeSpent);
             }
             self.publish(explorer, explorer.touches() + 1);
+            let mut has_collided = false;
             let (result, touch) = match self.go_and_touch(&planned) {
                 Ok(touched) => touched,
                 // the first one is where the feature is
@@ -239,6 +263,7 @@ impl FeatureProbing<'_, '_> {
                     return Err(ending);
                 }
                 Err(ending) if ending.is_of_one() => {
+                    has_collided = matches!(ending, Ending::Stopped(_));
                     let refused = Some(ending.why());
                     let touch = ProbedTouch {
                         planned,
@@ -254,6 +279,9 @@ impl FeatureProbing<'_, '_> {
             self.prober.world.touched(self.flag, &touch);
             explorer.take(&result);
             self.touches.push(touch);
+            if has_collided {
+                self.touch_references()?;
+            }
         }
         self.publish(explorer, explorer.touches());
         Ok(())
@@ -320,8 +348,29 @@ impl FeatureProbing<'_, '_> {
         })
     }
 
+    /// Goes out, and looks whether the sensor still reads nothing in free air.
+    fn check_zero(&mut self) -> Result<(), Ending> {
+        self.go_out("going up out of the feature", LineGuard::Out)?;
+        if self.is_zeroed {
+            let (zeroed_ns, touch) = (self.zeroed_ns, &self.prober.params.touch);
+            self.prober.watched().check_zero(zeroed_ns, touch)?;
+        }
+        Ok(())
+    }
+
+    fn now_ns(&mut self) -> Result<i64, Ending> {
+        let arm = |error| ProbeError::Arm {
+            doing: "zeroing the sensor in free air",
+            error,
+        };
+        Ok(self.prober.arm.next_state().map_err(arm)?.stamp_ns)
+    }
+
     /// Brings the ball to where a touch is entered from, and touches.
-    fn go_and_touch(&mut self, planned: &TouchPlan) -> Result<(TouchResult, ProbedTouch), Ending> {
+    pub fn go_and_touch(
+        &mut self,
+        planned: &TouchPlan,
+    ) -> Result<(TouchResult, ProbedTouch), Ending> {
         self.prober
             .space()
             .may_touch(&self.rotation, planned, &self.out.joints)?;
@@ -356,6 +405,7 @@ impl FeatureProbing<'_, '_> {
             self.prober.world.enter(Phase::Zeroing);
             self.prober.watched().zero()?;
             self.is_zeroed = true;
+            self.zeroed_ns = self.now_ns()?;
         }
         self.is_out = false;
         if self.out.place != *above {
@@ -457,7 +507,7 @@ impl FeatureProbing<'_, '_> {
 
     /// Back through the places where the ball has been before, none of them twice, whatever breaks
     /// off the remaining path.
-    fn go_out(&mut self, doing: &'static str, guard: LineGuard) -> Result<(), Ending> {
+    pub fn go_out(&mut self, doing: &'static str, guard: LineGuard) -> Result<(), Ending> {
         while !self.is_out {
             let place = self.from.or(self.entry).unwrap_or(self.out.place);
             let pose = self.prober.cell.pose(&self.rotation, &place);
@@ -505,7 +555,7 @@ const SAMPLED: f64 = 0.1e-3;
 
 /// How a line is watched.
 #[derive(Clone, Copy, PartialEq)]
-enum LineGuard {
+pub(super) enum LineGuard {
     /// fast, where the path is clear
     Link,
     /// slow enough for whatever is there

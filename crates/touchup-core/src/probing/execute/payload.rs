@@ -66,7 +66,7 @@ impl Prober<'_> {
     /// # Errors
     /// [`PayloadProbeError`]; the arm is stopped then.
     pub fn measure_payload(&mut self) -> Result<PayloadReadings, PayloadProbeError> {
-        let state = self.in_free_air(self.params.limits.force)?;
+        let (state, _) = self.in_free_air(self.params.limits.force)?;
         let home = ToolState::of(self.cell, &state);
         // all of the probe up to the flange keeps clear
         let length = self.cell.pose_ft.translation.vector.norm();

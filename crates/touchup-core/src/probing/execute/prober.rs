@@ -8,6 +8,7 @@ use super::cell::Cell;
 use super::ending::Ending;
 use super::links::{Clearance, LinkError, Tool};
 use super::opening_surface::on_surface_around;
+use super::reference::References;
 use super::route::FreeSpace;
 use super::way_out::WayOut;
 use super::world::{World, distance, normal_about, on_mesh};
@@ -49,6 +50,10 @@ pub struct ProbeParams {
 /// The limit of force is so much above the force of a touch at least: the force grows a little
 /// while the arm brakes.
 const HEADROOM: f64 = 1.3;
+
+/// A trigger is so many times the noise at least: by chance two readings in a row are above it once
+/// in hundreds of hours.
+const QUIET: f64 = 4.0;
 
 impl ProbeParams {
     /// These with what a request asks for, which can only be less.
@@ -121,6 +126,7 @@ pub struct Prober<'a> {
     pub(super) params: &'a ProbeParams,
     pub(super) world: &'a mut dyn World,
     pub(super) way_out: Option<WayOut>,
+    pub(super) references: References,
 }
 
 impl<'a> Prober<'a> {
@@ -137,6 +143,7 @@ impl<'a> Prober<'a> {
             params,
             world,
             way_out: None,
+            references: References::default(),
         }
     }
 
@@ -153,6 +160,17 @@ impl<'a> Prober<'a> {
         self.way_out
     }
 
+    /// Has contacts of features that were probed before touched again after the next one.
+    #[must_use]
+    pub fn beside(self, references: References) -> Self {
+        Self { references, ..self }
+    }
+
+    /// The contacts that are touched again, for the next feature.
+    pub fn take_references(&mut self) -> References {
+        std::mem::take(&mut self.references)
+    }
+
     /// The arm, watched by all that watches it.
     pub(super) fn watched(&mut self) -> Watched<'_> {
         Watched::new(self.arm, self.params.limits.clone(), self.world)
@@ -167,10 +185,26 @@ impl<'a> Prober<'a> {
         }
     }
 
+    /// Where the arm is, at rest in free air, its sensor zeroed and quiet enough to touch by.
+    pub(super) fn ready_to_touch(&mut self) -> Result<ArmState, Ending> {
+        let (state, noise_n) = self.in_free_air(self.params.limits.tare)?;
+        let (trigger_n, least_n) = (self.params.touch.trigger, QUIET * noise_n);
+        if trigger_n < least_n {
+            return Err(Ending::Stopped(ProbeError::Noisy {
+                doing: "zeroing the sensor in free air",
+                noise_n,
+                trigger_n,
+                least_n,
+            }));
+        }
+        Ok(state)
+    }
+
     /// Where the arm is, at rest in free air with its sensor zeroed.
     ///
     /// - `most_n`: that the sensor may feel before, N.
-    pub(super) fn in_free_air(&mut self, most_n: f64) -> Result<ArmState, Ending> {
+    /// - returns also the noise of its force, N.
+    pub(super) fn in_free_air(&mut self, most_n: f64) -> Result<(ArmState, f64), Ending> {
         // zeroing the sensor would remove a force that acts now
         let arm = |error| ProbeError::Arm {
             doing: "asking where the arm is",
@@ -196,7 +230,7 @@ impl<'a> Prober<'a> {
             return Err(LinkError::InPart { place_mm }.into());
         }
         // in free air, where it is stopped: the first link is watched by the force as well
-        self.watched().zero_below(most_n)?;
-        Ok(self.arm.next_state().map_err(arm)?)
+        let noise_n = self.watched().zero_below(most_n)?;
+        Ok((self.arm.next_state().map_err(arm)?, noise_n))
     }
 }

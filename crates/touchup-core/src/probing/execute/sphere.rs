@@ -60,7 +60,7 @@ impl Prober<'_> {
     /// [`SpotError`]; the arm is stopped then, and has retracted wherever it was still allowed to
     /// move.
     pub fn touch_sphere(&mut self, sphere: &ReferenceSphere) -> Result<SphereTouches, SpotError> {
-        let home = ToolState::of(self.cell, &self.in_free_air(self.params.limits.tare)?);
+        let home = ToolState::of(self.cell, &self.ready_to_touch()?);
         let mut touched = SphereTouches {
             orientations: Vec::new(),
             not_reached: Vec::new(),
@@ -76,7 +76,7 @@ impl Prober<'_> {
             }
         }
         // as it was held before
-        let here = ToolState::of(self.cell, &self.in_free_air(self.params.limits.tare)?);
+        let here = ToolState::of(self.cell, &self.ready_to_touch()?);
         let back = self.space().route(&here, &home.rotation, &home.place)?;
         self.turn_along(&back)?;
         Ok(touched)
@@ -97,7 +97,7 @@ impl Prober<'_> {
             &self.cell.shaft(rotation),
         );
         // its time is that of a feature
-        let state = self.in_free_air(self.params.limits.tare)?;
+        let state = self.ready_to_touch()?;
         let mut probing = FeatureProbing::new(self, 0, *rotation, &state);
         let (mut centres, mut left_out) = (Vec::new(), None);
         let touched =

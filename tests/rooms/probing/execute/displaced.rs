@@ -1,0 +1,165 @@
+//! A probe that is bent, a part that slips and an arm that drifts while a feature is probed.
+
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use touchup::features::Kind;
+use touchup::probing::execute::{Ending, Flag, Probed, Prober, References};
+use touchup::sim::{ArmFault, ArmParams, Plate, SimArm};
+
+use super::static_scan::StaticScan;
+use super::{cell, params};
+use crate::plate_stream::plate_scan;
+
+const HOLE: (Kind, [f64; 3]) = (Kind::Hole, [17e-3, 35e-3, 12e-3]);
+const PLANE: (Kind, [f64; 3]) = (Kind::Plane, [45e-3, 8e-3, 12e-3]);
+const SLOT: (Kind, [f64; 3]) = (Kind::Slot, [26e-3, 13e-3, 12e-3]);
+const BOSS: (Kind, [f64; 3]) = (Kind::Boss, [47.5e-3, 26e-3, 16e-3]);
+
+/// Probes features one after the other, until one is stopped.
+fn probed(wanted: &[(Kind, [f64; 3])], seed: u64, change: impl FnOnce(&mut SimArm)) -> Vec<Probed> {
+    let (plate, cell, params) = (Plate::default(), cell(), params());
+    let start: Isometry3<f64> = cell.pose(
+        &UnitQuaternion::identity(),
+        &Point3::new(40e-3, 25e-3, 50e-3),
+    );
+    let arm = ArmParams {
+        seed,
+        ..ArmParams::default()
+    };
+    let mut arm = SimArm::new(&plate, arm, &start).unwrap();
+    change(&mut arm);
+    let mut world = StaticScan::new(plate_scan(1));
+    let (mut all, mut references) = (Vec::new(), References::default());
+    for (id, (kind, place)) in (1..).zip(wanted) {
+        let flag = Flag {
+            id,
+            kind: Some(*kind),
+            place: (*place).into(),
+            radius: 3e-3,
+        };
+        let mut prober = Prober::new(&mut arm, &cell, &params, &mut world).beside(references);
+        all.push(prober.probe(&flag));
+        references = prober.take_references();
+        if matches!(all[all.len() - 1].ending, Ending::Stopped(_)) {
+            break;
+        }
+    }
+    arm.advance(0.5);
+    assert!(arm.ball().z > 13e-3, "it has retracted: {}", arm.ball());
+    all
+}
+
+/// Each passes by its own touches, or ends as something else, where no contact is touched again.
+#[test]
+fn what_moved_while_a_feature_was_probed_is_found_by_a_contact_that_is_touched_again() {
+    let mm = |x: f64, y: f64, z: f64| Vector3::new(x, y, z) * 1e-3;
+    let moved = |turn_mrad: f64, by| ArmFault::PartMoved(Vector3::z() * turn_mrad * 1e-3, by);
+    type Case = (&'static str, &'static [(Kind, [f64; 3])], usize, ArmFault);
+    let cases: [Case; 9] = [
+        (
+            "tip bent by 1 mm",
+            &[HOLE],
+            12,
+            ArmFault::TipBent(mm(1.0, 0.0, 0.1)),
+        ),
+        (
+            "tip bent by 0.2 mm",
+            &[HOLE],
+            9,
+            ArmFault::TipBent(mm(0.0, 0.2, 0.0)),
+        ),
+        (
+            "tip pushed in",
+            &[PLANE],
+            4,
+            ArmFault::TipBent(mm(0.0, 0.0, 0.2)),
+        ),
+        (
+            "tip bent at the slot",
+            &[SLOT],
+            12,
+            ArmFault::TipBent(mm(0.0, 0.5, 0.0)),
+        ),
+        (
+            "part slips by 1 mm",
+            &[HOLE],
+            12,
+            moved(0.0, mm(0.7, 0.7, 0.0)),
+        ),
+        (
+            "part slips at the boss",
+            &[BOSS],
+            14,
+            moved(0.0, mm(0.5, 0.0, 0.0)),
+        ),
+        ("part turns", &[SLOT], 13, moved(10.0, mm(0.0, 0.0, 0.0))),
+        (
+            "part slips from one feature to the next",
+            &[HOLE, BOSS],
+            17,
+            moved(0.0, mm(0.4, 0.0, 0.0)),
+        ),
+        (
+            "tip bent at the first touch of the second",
+            &[HOLE, SLOT],
+            18,
+            ArmFault::TipBent(mm(-0.4, 0.0, 0.0)),
+        ),
+    ];
+    for (name, wanted, contacts, fault) in cases {
+        let all = probed(wanted, 3, |arm| arm.fail_after_contacts(contacts, fault));
+        let last = &all[all.len() - 1];
+        println!(
+            "{name}: after {} touches: {}",
+            last.touches.len(),
+            last.ending
+        );
+        assert!(last.ending.is_displaced(), "{name}: {}", last.ending);
+        assert!(
+            last.found.is_none() && last.verified < last.touches.len(),
+            "{name}"
+        );
+        assert!(
+            all[..all.len() - 1]
+                .iter()
+                .all(|one| one.verified == one.touches.len()),
+            "{name}"
+        );
+    }
+}
+
+/// 10 µm in each second, to the side.
+#[test]
+fn an_arm_that_drifts_slowly_is_found_as_well() {
+    let drift = |arm: &mut SimArm| {
+        for step in 1..3000 {
+            let by = ArmFault::TipBent(Vector3::new(0.6e-6, 0.8e-6, 0.0));
+            arm.fail_at(f64::from(step) * 0.1, by);
+        }
+    };
+    let all = probed(&[HOLE, BOSS, SLOT], 1, drift);
+    let last = &all[all.len() - 1];
+    println!("{}", last.ending);
+    assert!(last.ending.is_displaced(), "{}", last.ending);
+}
+
+/// Nothing moves, and the features of ten arms are found as ever.
+#[test]
+fn contacts_of_an_arm_that_stays_are_where_they_were() {
+    let mut worst: f64 = 0.0;
+    for seed in 0..10 {
+        for one in probed(&[HOLE, PLANE, SLOT, BOSS], seed, |_| {}) {
+            assert!(
+                one.found.is_some() && one.verified == one.touches.len(),
+                "{}",
+                one.ending
+            );
+            assert_eq!(one.references.len(), 3, "{:?}", one.references);
+            worst = one
+                .references
+                .iter()
+                .map(|again| again.off.abs() / again.sigma)
+                .fold(worst, f64::max);
+        }
+    }
+    println!("at most {worst:.1} standard deviations off");
+}
