@@ -65,7 +65,7 @@ pub use whatif::what_if_json;
 use error::{Losses, asks_for_json, print_error, print_parse_error, require, require_positive};
 use output::{
     by_reason, check_kept, check_kept_by, check_outputs, check_place, not_written, notify,
-    print_report, print_result, write_json,
+    notify_with_code, print_report, print_result, write_json,
 };
 
 use std::ffi::OsString;

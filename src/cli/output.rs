@@ -2,7 +2,7 @@
 //! begins.
 
 use std::collections::BTreeMap;
-use std::io::{self, ErrorKind, Write, stdout};
+use std::io::{self, ErrorKind, IsTerminal, Write, stdout};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -48,6 +48,18 @@ pub(super) fn by_reason(counts: &BTreeMap<String, u64>) -> String {
 /// One line on stderr that is no error.
 pub(super) fn notify(line: &str) {
     let _ = writeln!(io::stderr(), "touchup: {}", line.replace('\n', " "));
+}
+
+/// … and below it the lines of a QR code, which are dark on light whatever colours a terminal has.
+pub(super) fn notify_with_code(line: &str, code: &str) {
+    notify(line);
+    let mut err = io::stderr().lock();
+    let [begin, end] = match err.is_terminal() {
+        true => ["\x1b[30;107m", "\x1b[0m\n"],
+        false => ["", "\n"],
+    };
+    let lines = code.lines().map(|line| [begin, line, end].concat());
+    let _ = err.write_all(lines.collect::<String>().as_bytes());
 }
 
 /// Makes the error of a file or folder that cannot be written.

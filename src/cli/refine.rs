@@ -642,17 +642,18 @@ impl RefineArguments {
 impl RefineSummary {
     /// The verdict in one sentence: the reconstructed or moved part and its uncertainty.
     fn verdict(&self) -> String {
+        let faces = counted(self.moved_faces, "face", "faces");
         match (&self.patch, self.contacts) {
+            (_, 0) if self.moved_faces > 0 => {
+                format!("refined: contact was not told from free air, and {faces} moved")
+            }
             (_, 0) => "unchanged: the stylus never came into contact with the scan".to_owned(),
             (Some(patch), _) => match &self.uncertainty {
                 Some(uncertainty) => format!("refined: {patch}, {uncertainty}"),
                 None => format!("refined: {patch}"),
             },
             (None, contacts) => {
-                let (times, faces) = (
-                    counted(contacts, "time", "times"),
-                    counted(self.moved_faces, "face", "faces"),
-                );
+                let times = counted(contacts, "time", "times");
                 format!("refined: the stylus came into contact {times} and moved {faces}")
             }
         }

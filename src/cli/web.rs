@@ -8,11 +8,11 @@ use clap::Args;
 
 use super::CliError;
 use super::begin::BeginError;
-#[cfg(feature = "web")]
-use super::notify;
 use super::require;
 #[cfg(feature = "web")]
 use super::set_up::{set_up, set_up_on_page};
+#[cfg(feature = "web")]
+use super::{notify, notify_with_code};
 use crate::io::mesh_file::MeshUnit;
 use crate::mesh::TriMesh;
 use crate::ros::arguments::NodeConfig;
@@ -21,7 +21,7 @@ use crate::ros::node::Prepared;
 use crate::ros::parameters::Parameters;
 use crate::ros::port::Port;
 #[cfg(feature = "web")]
-use crate::ros::web::{Certificate, NodeFacts, WebParams, WebServer};
+use crate::ros::web::{Certificate, Invitation, NodeFacts, WebParams, WebServer};
 #[cfg(feature = "web")]
 use crate::scan::read_scan;
 use crate::scene::Scene;
@@ -232,17 +232,16 @@ impl WebFlags {
             by_link,
             certificate: self.certificate(),
         };
-        Ok(Some(WebServer::open(&params, notify)?))
+        Ok(Some(WebServer::open(&params, invite)?))
     }
 
     /// Says where the page is, and by which links it lets in.
     #[cfg(feature = "web")]
     fn announce(&self, server: &WebServer) {
-        notify(&format!("page: {}", server.url()));
-        server
-            .invitations()
-            .iter()
-            .for_each(|invitation| notify(invitation));
+        for url in server.urls() {
+            notify(&format!("page: {url}"));
+        }
+        server.invitations().iter().for_each(invite);
         if self.certificate().is_none()
             && self.web.is_some_and(|address| !address.ip().is_loopback())
         {
@@ -251,4 +250,9 @@ impl WebFlags {
             );
         }
     }
+}
+
+#[cfg(feature = "web")]
+fn invite(Invitation { text, code }: &Invitation) {
+    notify_with_code(text, code);
 }

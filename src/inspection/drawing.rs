@@ -246,10 +246,7 @@ fn general_limits(
         format!("{name} has no tolerance, and {from} has none for {nominal} mm: {own}")
     })?;
     Ok((
-        ToleranceLimits {
-            lower: Some(nominal - half),
-            upper: Some(nominal + half),
-        },
+        ToleranceLimits::about(nominal, Some(-half), Some(half)),
         from,
     ))
 }

@@ -4,10 +4,12 @@ import csv
 import html.parser
 import json
 import math
+import re
 import shutil
 import subprocess
 import xml.etree.ElementTree as ElementTree
 
+import lxml.etree
 import numpy as np
 import pytest
 from conftest import ROOT
@@ -204,3 +206,91 @@ def test_the_report_prints_to_pdf(plate, tmp_path):
     data = pdf.read_bytes()
     pages = data.count(b"/Type /Page\n") + data.count(b"/Type /Page ") + data.count(b"/Type /Page/")
     assert data.startswith(b"%PDF") and 4 <= pages <= 10, pages
+
+
+ROUND, LONG = ["hole", "boss", "cylinder", "notch"], ["slot", "pocket"]
+# kinds of features by quantity, as docs/inspect.md has them; the quantities of every kind are added
+KINDS = dict.fromkeys(["diameter_mm", "roundness_mm", "cylindricity_mm", "straightness_mm"], ROUND) | {
+    "width_mm": LONG,
+    "length_mm": [*LONG, "edge", "cylinder"],
+    "depth_mm": [*LONG, "hole", "boss", "cylinder"],
+    "cone_angle_deg": ["hole"],
+    "flatness_mm": ["plane"],
+    "position_mm": [*ROUND, *LONG, "edge"],
+}
+EVERY = [*ROUND, *LONG, "edge", "corner", "plane"]
+OF_EVERY_KIND = ["x_mm", "y_mm", "z_mm"]
+TO_DATUM = ["perpendicularity_mm", "parallelism_mm", "coaxiality_mm", "concentricity_mm", "distance_mm", "angle_deg"]
+KINDS |= dict.fromkeys([*OF_EVERY_KIND, *TO_DATUM], EVERY)
+
+
+def every_characteristic(tolerances):
+    """A drawing with every quantity of every kind of feature, once for each of the tolerances and once to no feature."""
+    for quantity, kinds in KINDS.items():
+        unit, is_zone = quantity.rsplit("_", 1)[1], quantity in TO_DATUM[:4] or KINDS[quantity] == ["plane"]
+        is_zone = is_zone or quantity in ("roundness_mm", "cylindricity_mm", "straightness_mm", "position_mm")
+        for kind in kinds:
+            for number, tolerance in enumerate(tolerances[-1:] if is_zone else tolerances):
+                # the first is measured, no feature has the numbers of the others
+                one = {"name": f"{kind} {quantity} <{number}>", "kind": kind, "quantity": quantity}
+                one |= {"feature": EVERY.index(kind) + 10 * number, "center_mm": [0.1 * number, 0, 0]}
+                one |= {f"{name}_{unit}": value for name, value in tolerance.items()}
+                if not is_zone:
+                    one[f"nominal_{unit}"] = 6.1
+                if quantity in TO_DATUM:
+                    one["datum"] = {"kind": "plane", "feature": 99}
+                yield one
+
+
+@pytest.fixture(scope="session")
+def qif_errors(shared):
+    """A function of a file: what the schema of QIF 3.0 finds wrong in it."""
+    folder = shared / "data/qif"
+    schema = lxml.etree.XMLSchema(lxml.etree.parse(folder / "QIFApplications/QIFDocument.xsd"))
+    assert schema.validate(lxml.etree.parse(folder / "nist/nist_ctc_01_asme1_ap242.qif")), schema.error_log
+
+    def errors(path):
+        schema.validate(lxml.etree.parse(path))
+        return list(schema.error_log)
+
+    return errors
+
+
+@pytest.mark.parametrize("is_bound", [False, True])
+def test_every_characteristic_is_valid_by_the_schema_of_qif(touchup, tmp_path, qif_errors, is_bound):
+    sizes = {"diameter_mm": 6.1, "width_mm": 6.1, "length_mm": 6.1, "depth_mm": 6.1, "cone_angle_deg": 6.1}
+    forms = {"roundness_mm": 0.01, "cylindricity_mm": 0.02, "straightness_mm": 0.01, "flatness_mm": 0.01}
+    std = dict.fromkeys([*sizes, "center_mm"], 0.001)
+    features = [
+        {"id": id, "kind": kind, "center_mm": [0, 0, 0], "axis": [0, 0, 1], "fitted_to": "touches", "std": std}
+        | sizes
+        | {"form": {**forms, "coverage": 1.0, "std": dict.fromkeys(forms, 0.001)}}
+        | ({"depth_is_at_least": True} if is_bound else {})
+        for id, kind in [*enumerate(EVERY), (99, "plane")]
+    ]
+    relations = [
+        {"kind": quantity.rsplit("_", 1)[0], "of": id, "to": 99, quantity: 6.1, "std": {quantity: 0.001}}
+        for quantity in TO_DATUM
+        for id in range(len(EVERY))
+    ]
+    tolerances = [
+        {"lower_deviation": -0.03},
+        {"upper_deviation": 0.07},
+        {"lower_deviation": -0.03, "upper_deviation": 0.07},
+        {"tolerance": 0.03},
+    ]
+    drawing = list(every_characteristic(tolerances))
+    assert len(drawing) > 250
+    (tmp_path / "f.json").write_text(json.dumps({"features": features, "relations": relations}))
+    (tmp_path / "d.json").write_text(json.dumps({"characteristics": drawing}))
+    out = tmp_path / "r.qif"
+    who = ["--part", "Plate <4711>", "--serial", " SN  1 ", "--operator", "A & B"] if is_bound else []
+    ran = touchup("inspect", tmp_path / "f.json", "--nominal", tmp_path / "d.json", "--json", "--qif", out, *who)
+    found = json.loads(ran.stdout)["characteristics"]
+    measured = {(one["kind"], one["quantity"]) for one in found if f"actual_{one['quantity'][-2:]}" in one or "actual_deg" in one}
+    assert len(measured) > 60, measured
+    assert qif_errors(out) == []
+    # the limits of a drawing of 6.1 −0.03 +0.07 have two decimals
+    text = out.read_text()
+    assert {float(x) for x in re.findall(r"<M..Value>(.*?)<", text)} == {6.07, 6.13, 6.17}
+    assert set(re.findall(r"<M..Value>(.*?)<", text)) == {"6.07", "6.13", "6.17"}

@@ -14,6 +14,7 @@ import igl
 import numpy
 import pytest
 import trimesh
+import zxingcpp
 from conftest import ROOT
 from part_of_recording import first_seconds
 from ros_domains import domains
@@ -319,3 +320,45 @@ def test_a_recording_on_the_page_ends_with_the_result_of_what_was_touched_until_
     assert [json.loads(line)["change"] for line in (session / "strokes.jsonl").read_text().splitlines()] == ["undo"]
     assert (tmp_path / "refined.ply").is_file()
     assert not list(tmp_path.glob("*.yaml")) and not list(ROOT.glob("*.yaml"))
+
+
+def code_in(lines):
+    """The text of the QR code that half blocks show, dark on light as a terminal has them."""
+    shades = {" ": (1, 1), "▀": (0, 1), "▄": (1, 0), "█": (0, 0)}
+    width = max(map(len, lines))
+    rows = [[shades[c][half] for c in line.ljust(width)] for line in lines for half in (0, 1)]
+    picture = numpy.kron(numpy.array(rows, dtype=numpy.uint8) * 255, numpy.ones((6, 6), dtype=numpy.uint8))
+    (read,) = zxingcpp.read_barcodes(picture, try_invert=False)
+    return read.text
+
+
+@pytest.mark.parametrize(("everywhere", "families"), [("0.0.0.0:0", "."), ("[::]:0", ".:")])
+def test_at_all_addresses_each_of_the_machine_has_its_link_and_a_telephone_reads_one(touchup_bin, demo_folder, tmp_path, everywhere, families):
+    listed = subprocess.run(["hostname", "-I"], check=True, capture_output=True, text=True).stdout.split()
+    own = {f"[{ip}]" if ":" in ip else ip for ip in listed if any(sign in ip for sign in families)}
+    with PageNode(touchup_bin, tmp_path, demo_folder / "scan.ply", address=everywhere) as node:
+        node.wait_for(lambda: any("not encrypted" in line for line in node.err))
+        port = urlsplit(node.url).port
+        pages = [found[1] for line in node.err if (found := re.search(r"page: (\S+)", line))]
+        assert sorted(pages) == sorted(f"http://{ip}:{port}" for ip in own or {"localhost"})
+        (at,) = [i for i, line in enumerate(node.err) if "may operate by" in line]
+        linked = re.findall(r"http://\S+", node.err[at])
+        assert [link.split("/pair?")[0] for link in linked] == pages
+        length = next(i for i, line in enumerate(node.err[at + 1 :]) if line.startswith("touchup:"))
+        assert code_in(node.err[at + 1 : at + 1 + length]) == linked[0]
+        for page in pages:
+            assert ask(page, "/", Origin=page)[0] == 200, page
+            assert ask(page, "/api/state", Origin=page)[0] == 401, page
+            before = len(links(node, "operate"))
+            cookie = let_in_by(page, links(node, "operate")[-1])
+            node.wait_for(lambda before=before: len(links(node, "operate")) > before)
+            assert ask(page, "/api/state", Cookie=cookie)[0] == 200
+        for host in ["evil.example", "192.0.2.77", "[2001:db8::77]", "0.0.0.1"]:
+            assert ask(node.url, "/", Host=f"{host}:{port}")[0] == 403, host
+
+
+def let_in_by(page, link):
+    """The cookie that a link gives at an address of the page."""
+    status, headers, _ = ask(page, link)
+    assert status == 303
+    return headers["set-cookie"].split(";")[0]

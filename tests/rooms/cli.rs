@@ -544,6 +544,28 @@ fn flags_go_over_the_scene() {
         paper["moved_faces"].as_u64().unwrap() > 0,
         "the paper has no gate"
     );
+    let off = case.path("off.yaml");
+    fs::write(
+        &off,
+        "contact: off\npatch: off\nuncertainty: off\ntip: { radius_mm: 1.5 }\n",
+    )
+    .unwrap();
+    for flags in [
+        ["--scene", scene.to_str().unwrap(), "--mode", "paper"],
+        ["--scene", off.to_str().unwrap(), "--mode", "robust"],
+    ] {
+        let ran = case.refine("touch.mcap", "out.ply", &flags);
+        let said = text(&ran.stdout).lines().next().unwrap();
+        let moved = &json(&case.refine(
+            "touch.mcap",
+            "out.ply",
+            &[&flags[..], &["--json"]].concat(),
+        ))["moved_faces"];
+        let wanted =
+            format!("refined: contact was not told from free air, and {moved} faces moved");
+        assert_eq!(said, wanted, "{}", text(&ran.stderr));
+        assert_ne!(*moved, 0);
+    }
     let [large, small] = ["9", "1.5"].map(|radius| {
         json(&case.refine_untold(
             "touch.mcap",

@@ -296,7 +296,13 @@ fn a_result_has_the_same_bytes_wherever_and_under_whatever_names_it_is_made() {
     let names: Vec<_> = result.keys().map(String::as_str).collect();
     assert_eq!(
         names,
-        ["features.json", "job.json", "refined.ply", "summary.json"]
+        [
+            "SHA256SUMS",
+            "features.json",
+            "job.json",
+            "refined.ply",
+            "summary.json"
+        ]
     );
     assert_eq!(result, other.result("results", id));
     for (name, bytes) in &result {
@@ -552,7 +558,7 @@ fn a_job_that_fails_is_in_the_table_with_its_reason_and_a_missing_one_is_named()
     );
     assert_eq!(
         sweep.result("results", &ids[1]).keys().collect::<Vec<_>>(),
-        ["failed.json", "job.json"]
+        ["SHA256SUMS", "failed.json", "job.json"]
     );
 
     assert_eq!(code(&table("table.csv")), 0);
@@ -609,6 +615,93 @@ fn a_job_that_fails_is_in_the_table_with_its_reason_and_a_missing_one_is_named()
     );
 }
 
+/// Every file of a result, changed in each way that a disk or a hand may.
+#[test]
+#[expect(clippy::too_many_lines)]
+fn a_damaged_result_names_its_job_and_how_it_is_made_anew_and_others_go_on() {
+    let sweep = Sweep::new("keys: { tip.radius_mm: 1.5, contact.on_n: [0.4, 0.5, 3] }\n");
+    let ids = sweep.ids();
+    assert_eq!(code(&sweep.run(&[])), 4, "job 2 fails by its input");
+    let table = |out: &str| {
+        let (jobs, out) = (sweep.name("jobs.jsonl"), sweep.name(out));
+        let ran = touchup(&["sweep", "table", &jobs, "--out", &out], "");
+        let rows = fs::read_to_string(out).unwrap().lines().count() - 1;
+        (code(&ran), text(&ran.stderr).to_owned(), rows)
+    };
+    let (whole_code, _, whole_rows) = table("whole.csv");
+    assert_eq!((whole_code, whole_rows), (0, 3));
+    let folders = ids.iter().map(|id| sweep.path("results").join(id));
+    let folders: Vec<_> = folders.collect();
+    let sums = Command::new("sha256sum")
+        .current_dir(&folders[0])
+        .args(["--check", "--strict", "SHA256SUMS"])
+        .output()
+        .unwrap();
+    assert!(sums.status.success(), "{}", text(&sums.stdout));
+    let edited = |bytes: &[u8]| {
+        let at = bytes.iter().rposition(u8::is_ascii_digit).unwrap_or(0);
+        [&bytes[..at], b"7", b"7", &bytes[at + 1..]].concat()
+    };
+    let garbage = |_: &[u8]| b"\xff{garbage".to_vec();
+    let cut = |bytes: &[u8]| bytes[..bytes.len() / 2].to_vec();
+    let ways: [&dyn Fn(&[u8]) -> Vec<u8>; 3] = [&edited, &garbage, &cut];
+    let mut damages = Vec::new();
+    for (job, names) in [
+        (
+            0,
+            &[
+                "features.json",
+                "job.json",
+                "refined.ply",
+                "summary.json",
+                "SHA256SUMS",
+            ][..],
+        ),
+        (2, &["failed.json", "job.json", "SHA256SUMS"]),
+    ] {
+        for name in names {
+            damages.extend(ways.map(|way| (job, *name, Some(way))));
+            damages.push((job, *name, None));
+        }
+    }
+    for (job, name, way) in damages {
+        let place: PathBuf = folders[job].join(name);
+        let whole = fs::read(&place).unwrap();
+        match way {
+            Some(way) => fs::write(&place, way(&whole)).unwrap(),
+            None => fs::remove_file(&place).unwrap(),
+        }
+        let (code_of_table, said, rows) = table("less.csv");
+        let named = format!("job {job}: ");
+        let remedy = format!("touchup sweep run --job {job} --again");
+        assert!(
+            code_of_table == 4 && rows == 2 && said.contains(&named) && said.contains(&remedy),
+            "{name}: {code_of_table}, {rows} rows, {said}"
+        );
+        fs::write(&place, whole).unwrap();
+    }
+    // another job's result under its name
+    fs::remove_dir_all(&folders[1]).unwrap();
+    fs::create_dir(&folders[1]).unwrap();
+    for entry in fs::read_dir(&folders[0]).unwrap() {
+        let entry = entry.unwrap();
+        fs::copy(entry.path(), folders[1].join(entry.file_name())).unwrap();
+    }
+    let (code_of_table, said, rows) = table("less.csv");
+    assert_eq!((code_of_table, rows), (4, 2), "{said}");
+    let all = sweep.run(&[]);
+    let said = text(&all.stderr);
+    assert!(
+        code(&all) == 4 && said.contains("job 1: ") && said.contains("job 2 failed"),
+        "{said}"
+    );
+    assert_eq!(code(&sweep.run(&["--job", "1"])), 3);
+    assert_eq!(code(&sweep.run(&["--job", "1", "--again"])), 0);
+    assert_eq!(table("again.csv").2, 3);
+    let [whole, again] = ["whole.csv", "again.csv"].map(|name| fs::read(sweep.path(name)).unwrap());
+    assert_eq!(whole, again);
+}
+
 // ---- whatif
 // -----------------------------------------------------------------------------------------------------
 
@@ -645,6 +738,10 @@ fn sheet_result(
     ] {
         fs::write(folder.join(name), value.to_string()).unwrap();
     }
+    let mut sums = Command::new("sha256sum");
+    sums.current_dir(folder)
+        .args(["features.json", "job.json", "refined.ply", "summary.json"]);
+    fs::write(folder.join("SHA256SUMS"), sums.output().unwrap().stdout).unwrap();
     folder.to_str().unwrap().to_owned()
 }
 

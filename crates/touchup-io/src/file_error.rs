@@ -3,7 +3,7 @@
 
 use std::fmt;
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, Read, Take};
 use std::path::{Path, PathBuf};
 
 use super::atomic::{AtomicFile, write_atomically};
@@ -57,26 +57,53 @@ pub(super) const MAX_FILE_BYTES: u64 = 4 << 30;
 /// … and longest input whose end is not known before, as that of a pipe.
 const MAX_STREAM_BYTES: u64 = 256 << 20;
 
-/// All bytes of a file, or of a pipe, that is not longer than `limit`, nor than
-/// [`MAX_STREAM_BYTES`] where its end is not known before.
-pub(super) fn read_up_to(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
+/// A file, or what comes out of a pipe, with an error in place of what is beyond a limit.
+pub(super) struct LimitedFile {
+    file: Take<File>,
+    bytes: u64,
+    limit: u64,
+}
+
+/// Opens a file that is not longer than `limit`, nor than [`MAX_STREAM_BYTES`] where its end is not
+/// known before.
+pub(super) fn open_up_to(path: &Path, limit: u64) -> io::Result<LimitedFile> {
     let file = File::open(path)?;
     let info = file.metadata()?;
-    let mut bytes = Vec::new();
-    let limit = if info.is_file() {
-        bytes.try_reserve(info.len().min(limit) as usize + 1)?;
-        limit
-    } else {
-        limit.min(MAX_STREAM_BYTES)
+    let (bytes, limit) = match info.is_file() {
+        true => (info.len(), limit),
+        false => (0, limit.min(MAX_STREAM_BYTES)),
     };
-    file.take(limit + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > limit {
-        let why = format!(
-            "it is longer than {} MiB, and no end is near: reduce it first",
-            limit >> 20
-        );
-        return Err(io::Error::new(io::ErrorKind::FileTooLarge, why));
+    if bytes > limit {
+        return Err(too_long(limit));
     }
+    Ok(LimitedFile {
+        file: file.take(limit + 1),
+        bytes,
+        limit,
+    })
+}
+
+impl Read for LimitedFile {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let read = self.file.read(into)?;
+        if read > 0 && self.file.limit() == 0 {
+            return Err(too_long(self.limit));
+        }
+        Ok(read)
+    }
+}
+
+fn too_long(limit: u64) -> io::Error {
+    let why = format!("it is longer than {} MiB: reduce it first", limit >> 20);
+    io::Error::new(io::ErrorKind::FileTooLarge, why)
+}
+
+/// All bytes of what [`open_up_to`] opens.
+pub(super) fn read_up_to(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
+    let mut file = open_up_to(path, limit)?;
+    let mut bytes = Vec::new();
+    bytes.try_reserve(file.bytes as usize + 1)?;
+    file.read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
@@ -97,4 +124,29 @@ pub(super) fn write_file(
         path: path.to_owned(),
         source,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_has_no_end_or_is_too_long_is_refused_with_the_limit() {
+        let said = |read: io::Result<Vec<u8>>| read.unwrap_err().to_string();
+        let endless = Path::new("/dev/zero");
+        let wanted = "it is longer than 3 MiB: reduce it first";
+        assert_eq!(said(read_up_to(endless, 3 << 20)), wanted);
+        let stream = open_up_to(endless, u64::MAX - 1)
+            .and_then(|mut file| io::copy(&mut file, &mut io::sink()));
+        assert_eq!(
+            stream.unwrap_err().to_string(),
+            "it is longer than 256 MiB: reduce it first"
+        );
+        // of a file that is long, and has nothing on the disk, nothing is read
+        let file = tempfile::NamedTempFile::new().unwrap();
+        file.as_file().set_len(1 << 42).unwrap();
+        assert_eq!(said(read_up_to(file.path(), 3 << 20)), wanted);
+        file.as_file().set_len(3 << 20).unwrap();
+        assert_eq!(read_up_to(file.path(), 3 << 20).unwrap().len(), 3 << 20);
+    }
 }

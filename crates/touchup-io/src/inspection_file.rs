@@ -2,12 +2,10 @@
 //! degrees.
 
 use std::collections::BTreeMap;
-use std::io::Write;
 use std::path::Path;
 
 use serde::Serialize;
 
-use super::csv_line::csv_line;
 use super::file_error::{FileError, write_file};
 
 /// A whole inspection.
@@ -273,14 +271,12 @@ pub fn write_inspection_table(
         .chain(BEHIND.map(str::to_owned))
         .collect();
     write_file(path, |out| {
-        writeln!(out, "{}", csv_line(header.iter().map(String::as_str)))?;
-        characteristics.iter().try_for_each(|one| {
-            writeln!(
-                out,
-                "{}",
-                csv_line(one.fields(&units, frame).iter().map(String::as_str))
-            )
-        })
+        let mut rows = csv::Writer::from_writer(out);
+        rows.write_record(&header)?;
+        for one in characteristics {
+            rows.write_record(one.fields(&units, frame))?;
+        }
+        rows.flush()
     })
 }
 

@@ -42,7 +42,6 @@ macro_rules! reported {
 
 pub mod atomic;
 pub mod content_hash;
-mod csv_line;
 pub mod features_file;
 pub mod file_error;
 pub mod inspection_file;
@@ -63,6 +62,7 @@ pub mod scan_folder;
 pub mod session_folder;
 pub mod static_poses;
 pub mod table;
+mod table_rows;
 pub mod text_file;
 pub mod touches_file;
 pub mod urdf;

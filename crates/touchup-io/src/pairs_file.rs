@@ -7,7 +7,7 @@ use std::path::Path;
 
 use nalgebra::Point3;
 
-use super::table::{Row, TableError, read_table};
+use super::table::{Row, TableError, WantedColumns, read_table};
 use touchup_core::align::PointPair;
 
 const SCAN: [&str; 3] = ["scan_x_mm", "scan_y_mm", "scan_z_mm"];
@@ -29,10 +29,12 @@ pub struct PairsFile {
 /// # Errors
 /// [`TableError`], with the line.
 pub fn read_pairs(path: &Path) -> Result<PairsFile, TableError> {
-    pairs(
-        path,
-        read_table(path, &[SCAN, SPACE].concat(), &[NAME, SIGMA])?,
-    )
+    let columns = WantedColumns {
+        needed: &[SCAN, SPACE].concat(),
+        numbers: &[SIGMA],
+        texts: &[NAME],
+    };
+    pairs(path, read_table(path, columns)?)
 }
 
 /// Reads the points on the scan alone, each with itself; columns of space are ignored.
@@ -40,10 +42,14 @@ pub fn read_pairs(path: &Path) -> Result<PairsFile, TableError> {
 /// # Errors
 /// [`TableError`], with the line.
 pub fn read_scan_points(path: &Path) -> Result<PairsFile, TableError> {
-    let more = [&[NAME, SIGMA], &SPACE[..]].concat();
-    let mut rows = read_table(path, &SCAN, &more)?;
+    let columns = WantedColumns {
+        needed: &SCAN,
+        numbers: &[SIGMA],
+        texts: &[&[NAME], &SPACE[..]].concat(),
+    };
+    let mut rows = read_table(path, columns)?;
     rows.iter_mut()
-        .for_each(|row| row.numbers.extend_from_within(..));
+        .for_each(|row| row.needed.extend_from_within(..));
     pairs(path, rows)
 }
 
@@ -57,7 +63,7 @@ fn pairs(path: &Path, rows: Vec<Row>) -> Result<PairsFile, TableError> {
         })?;
         file.pairs.push(pair);
         file.names.push(
-            row.more[0]
+            row.texts[0]
                 .clone()
                 .unwrap_or_else(|| file.pairs.len().to_string()),
         );
@@ -66,13 +72,13 @@ fn pairs(path: &Path, rows: Vec<Row>) -> Result<PairsFile, TableError> {
 }
 
 fn pair(row: &Row) -> Result<PointPair, String> {
-    let sigma = row.number(1, SIGMA)?;
+    let sigma = row.numbers[0];
     if sigma.is_some_and(|sigma| sigma <= 0.0) {
         return Err(format!(
             "{SIGMA} must be more than 0; leave it empty where it is not known"
         ));
     }
-    let point = |first: usize| Point3::from_slice(&row.numbers[first..first + 3]) / 1e3;
+    let point = |first: usize| Point3::from_slice(&row.needed[first..first + 3]) / 1e3;
     Ok(PointPair {
         from: point(0),
         to: point(3),
@@ -117,13 +123,37 @@ mod tests {
         );
     }
 
+    /// As a spreadsheet saves it where decimals have a comma.
+    #[test]
+    fn a_table_has_one_decimal_sign() {
+        let text = "\u{feff}\"name\";\"scan_x_mm\";scan_y_mm;scan_z_mm;space_x_mm;space_y_mm;space_z_mm\r\n\
+                    \"a; \"\"b\"\", c\";1;2,5;-3,25e0;4;5;\"6,5\"\r\n;;;;;;\r\n";
+        let PairsFile { pairs, names } = read(text).unwrap();
+        assert_eq!(names, ["a; \"b\", c"]);
+        assert_eq!(pairs[0].from, Point3::new(0.001, 0.0025, -0.00325));
+        assert_eq!(pairs[0].to, Point3::new(0.004, 0.005, 0.0065));
+        let mixed = read(&text.replace("\r\n;;", "\r\n;1.5;")).unwrap_err();
+        let wanted = "line 3: scan_x_mm is \"1.5\", and the decimals of this table have a comma";
+        assert!(mixed.to_string().contains(wanted), "{mixed}");
+    }
+
     #[test]
     fn errors_name_their_line() {
         let cases = [
             (String::new(), 1, "nothing in it"),
             ("# only this\n".into(), 1, "nothing in it"),
             ("scan_x_mm,scan_y_mm\n".into(), 1, "scan_z_mm is missing"),
-            (HEADER.replace(',', ";"), 1, "set apart by commas"),
+            (HEADER.replace(',', ":"), 1, "set apart by commas"),
+            (
+                format!("{HEADER}\n1,2,3,4,5,\"6,5\"\n"),
+                2,
+                "space_z_mm is \"6,5\", and the decimals of this table have a point",
+            ),
+            (
+                format!("{HEADER}\n1,2,3,4,5,6.5\n1,2,3,4,\"5,6\n").replace(',', ";"),
+                3,
+                "a quotation mark is not closed",
+            ),
             (
                 HEADER.replace("space_x_mm", "space_x_m"),
                 1,

@@ -22,9 +22,11 @@ pub fn write_qif(path: &Path, record: &InspectionRecord) -> Result<(), FileError
     write_file(path, |out| out.write_all(text.as_bytes()))
 }
 
-/// Identifiers: of the component, of the results, then four of each characteristic.
+/// Identifiers: of the component, of the results, of the standard that says what the
+/// characteristics mean, then four of each characteristic.
 const COMPONENT: usize = 1;
 const RESULTS: usize = 2;
+const STANDARD: usize = 3;
 
 struct Ids {
     definition: usize,
@@ -34,7 +36,7 @@ struct Ids {
 }
 
 fn ids(at: usize) -> Ids {
-    let first = RESULTS + 1 + 4 * at;
+    let first = STANDARD + 1 + 4 * at;
     Ids {
         definition: first,
         nominal: first + 1,
@@ -85,11 +87,15 @@ fn document(record: &InspectionRecord) -> String {
 <QPId>{id}</QPId>
 <Version><TimeCreated>{date}</TimeCreated></Version>
 <Header><Application><Name>{program}</Name></Application></Header>
+<StandardsDefinitions n="1">
+<Standard id="{STANDARD}"><Organization><StandardsOrganizationEnum>ISO</StandardsOrganizationEnum></Organization><Designator>1101:2017</Designator></Standard>
+</StandardsDefinitions>
 <FileUnits><PrimaryUnits>
 <AngularUnit><SIUnitName>radian</SIUnitName><UnitName>degree</UnitName><UnitConversion><Factor>0.017453292519943295</Factor></UnitConversion></AngularUnit>
 <LinearUnit><SIUnitName>meter</SIUnitName><UnitName>mm</UnitName><UnitConversion><Factor>0.001</Factor></UnitConversion></LinearUnit>
 </PrimaryUnits></FileUnits>
 <Characteristics>
+<FormalStandardId>{STANDARD}</FormalStandardId>
 <CharacteristicDefinitions n="{count}">
 {definitions}</CharacteristicDefinitions>
 <CharacteristicNominals n="{count}">
@@ -245,6 +251,10 @@ fn measurement(one: &CharacteristicRecord, ids: &Ids) -> String {
         "<Status><CharacteristicStatusEnum>{status}</CharacteristicStatusEnum></Status><CharacteristicItemId>{}</CharacteristicItemId>",
         ids.item
     );
+    if name_of(one) == "LinearCoordinate" {
+        content +=
+            "<TypeOfCoordinates><CoordinateEnum>CARTESIAN_3D</CoordinateEnum></TypeOfCoordinates>";
+    }
     // a bound is no measured value
     if let Some(actual) = actual.filter(|_| !one.is_at_least) {
         let accuracy = one
@@ -253,10 +263,6 @@ fn measurement(one: &CharacteristicRecord, ids: &Ids) -> String {
                 format!(" combinedUncertainty=\"{u}\" meanError=\"0\"")
             });
         let _ = write!(content, "<Value{accuracy}>{actual}</Value>");
-    }
-    if name_of(one) == "LinearCoordinate" {
-        content +=
-            "<TypeOfCoordinates><CoordinateEnum>CARTESIAN_3D</CoordinateEnum></TypeOfCoordinates>";
     }
     aspect(one, "Measurement", ids.measurement, &content)
 }

@@ -1,16 +1,15 @@
 //! Features and touches as a table of columns: CSV, or Parquet, which pandas, Polars, DuckDB and
 //! Ray read with its types.
 
-use std::io::Write;
+use std::borrow::Cow;
+use std::io::{self, Write};
 use std::path::Path;
 
 use parquet::errors::ParquetError;
 use serde_json::{Map, Value};
 
-use crate::atomic::write_atomically;
-use crate::csv_line::csv_line;
 use crate::features_file::{FeatureFile, FeatureRecord, write_features};
-use crate::file_error::FileError;
+use crate::file_error::{FileError, write_file};
 use crate::touches_file::{self, TouchesFileError, write_touches};
 use touchup_core::stylus::ProbedPoint;
 
@@ -93,11 +92,10 @@ impl ResultTable {
     /// A row for each touch, with the columns and the digits of a file of touches.
     pub fn of_touches(touches: &[ProbedPoint]) -> Self {
         let mut table = Self::default();
-        let lines = touches
-            .iter()
-            .enumerate()
-            .map(|(number, touch)| touches_file::line_of(touch, number));
-        lines.for_each(|line| table.add_touch(&line));
+        for (number, touch) in touches.iter().enumerate() {
+            let line = touches_file::line_of(touch, number);
+            table.add_touch(&touches_file::values_of(&line));
+        }
         table
     }
 
@@ -107,14 +105,12 @@ impl ResultTable {
     /// [`TouchesFileError`]
     pub fn of_touches_file(path: &Path) -> Result<Self, TouchesFileError> {
         let mut table = Self::default();
-        touches_file::read_lines(path, |line| table.add_touch(line))?;
+        touches_file::read_rows(path, |values| table.add_touch(values))?;
         Ok(table)
     }
 
-    fn add_touch(&mut self, line: &str) {
-        let named = touches_file::HEADER
-            .split(',')
-            .zip(line.split(',').map(str::trim));
+    fn add_touch(&mut self, values: &[Cow<'_, str>]) {
+        let named = touches_file::HEADER.split(',').zip(values);
         self.add_row(
             named
                 .map(|(name, value)| (name.to_owned(), touch_cell(name, value)))
@@ -174,30 +170,22 @@ impl ResultTable {
     /// # Errors
     /// [`ResultTableError`]
     pub fn write(&self, path: &Path) -> Result<(), ResultTableError> {
-        let bytes = if has_ending(path, "parquet") {
-            self.parquet()?
+        Ok(if has_ending(path, "parquet") {
+            let bytes = self.parquet()?;
+            write_file(path, |out| out.write_all(&bytes))
         } else {
-            self.csv().into_bytes()
-        };
-        let written = write_atomically(path, |out| out.write_all(&bytes));
-        Ok(written.map_err(|source| FileError::Write {
-            path: path.to_owned(),
-            source,
-        })?)
+            write_file(path, |out| self.csv(out))
+        }?)
     }
 
-    fn csv(&self) -> String {
-        let mut text = csv_line(self.columns.iter().map(|(name, _)| name.as_str())) + "\n";
+    fn csv(&self, out: impl Write) -> io::Result<()> {
+        let mut rows = csv::Writer::from_writer(out);
+        rows.write_record(self.columns.iter().map(|(name, _)| name))?;
         for row in 0..self.rows {
-            let values: Vec<_> = self
-                .columns
-                .iter()
-                .map(|(_, column)| text_of(column[row].as_ref()))
-                .collect();
-            text += &csv_line(values.iter().map(String::as_str));
-            text.push('\n');
+            let cells = self.columns.iter().map(|(_, column)| column[row].as_ref());
+            rows.write_record(cells.map(text_of).collect::<Vec<_>>())?;
         }
-        text
+        rows.flush()
     }
 }
 
@@ -294,6 +282,12 @@ fn flatten(name: &str, value: &Value, cells: &mut Vec<(String, Cell)>) {
 mod tests {
     use super::*;
 
+    fn csv(table: &ResultTable) -> String {
+        let mut text = Vec::new();
+        table.csv(&mut text).unwrap();
+        String::from_utf8(text).unwrap()
+    }
+
     #[test]
     fn what_is_nested_has_its_name_and_what_is_missing_is_empty() {
         let mut table = ResultTable::default();
@@ -307,7 +301,7 @@ mod tests {
             table.add_row(cells);
         }
         let expected = "center_mm_x,center_mm_y,center_mm_z,id,size.diameter_mm,ids,kind\n1,2.5,3,1,5.5,,\n,,,2,,\"[1,2]\",\"a, b\"\n";
-        assert_eq!(table.csv(), expected);
+        assert_eq!(csv(&table), expected);
         let parquet = table.parquet().unwrap();
         assert!(parquet.starts_with(b"PAR1") && parquet.ends_with(b"PAR1"));
     }
@@ -320,7 +314,7 @@ mod tests {
         ];
         let mut table = ResultTable::with_columns_of(&row);
         table.add_json(&row);
-        assert_eq!(table.csv(), "job,failed\n7,\n");
+        assert_eq!(csv(&table), "job,failed\n7,\n");
         assert_eq!(table.json_rows(), [serde_json::json!({ "job": 7 })]);
         assert!(table.parquet().unwrap().ends_with(b"PAR1"));
     }

@@ -5,6 +5,7 @@ use std::io::{self, Read, Write};
 use std::path::{Component, Path, PathBuf};
 
 use super::atomic::write_atomically;
+use super::file_error::open_up_to;
 
 /// Longest file of lines that is read: a million strokes.
 const MOST_BYTES: u64 = 64 << 20;
@@ -332,7 +333,8 @@ pub fn read_text(path: &Path) -> io::Result<String> {
 /// Whatever the system reports.
 pub fn fingerprint(path: &Path) -> io::Result<(PathBuf, u32)> {
     let (mut file, mut crc, mut buffer) = (
-        File::open(path)?,
+        // that has an end, however far
+        open_up_to(path, u64::MAX - 1)?,
         crc32fast::Hasher::new(),
         vec![0; 1 << 16],
     );

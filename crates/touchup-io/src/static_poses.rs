@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use super::table::{Row, TableError, read_table};
+use super::table::{Row, TableError, WantedColumns, read_table};
 use touchup_core::stylus::Wrench;
 
 const COLUMNS: [&str; 10] = [
@@ -24,7 +24,12 @@ const UNIT_TOLERANCE: f64 = 1e-2;
 /// # Errors
 /// [`TableError`], with the line.
 pub fn read_static_poses(path: &Path) -> Result<Vec<(UnitQuaternion<f64>, Wrench)>, TableError> {
-    let rows = read_table(path, &COLUMNS, &[])?;
+    let columns = WantedColumns {
+        needed: &COLUMNS,
+        numbers: &[],
+        texts: &[],
+    };
+    let rows = read_table(path, columns)?;
     let line = |row: Row| {
         pose(&row).map_err(|why| TableError::Line {
             path: path.to_owned(),
@@ -36,7 +41,7 @@ pub fn read_static_poses(path: &Path) -> Result<Vec<(UnitQuaternion<f64>, Wrench
 }
 
 fn pose(row: &Row) -> Result<(UnitQuaternion<f64>, Wrench), String> {
-    let [x, y, z, w, fx, fy, fz, tx, ty, tz] = row.numbers[..] else {
+    let [x, y, z, w, fx, fy, fz, tx, ty, tz] = row.needed[..] else {
         return Err("a column is missing".to_owned());
     };
     let quaternion = Quaternion::new(w, x, y, z);

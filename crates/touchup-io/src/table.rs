@@ -1,12 +1,9 @@
-//! Tables of numbers as comma-separated values, whose first line names the columns, in any order.
-//!
-//! Empty lines and lines that begin with `#` are passed over. No value holds a comma.
+//! Tables whose first row names the columns, in any order, as [`super::table_rows`] reads them.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::file_error::FileError;
+use super::file_error::{FileError, read_up_to};
+use super::table_rows::{DecimalSign, RowError, TableRows};
 
 /// Longest file: more than a hundred thousand rows.
 const MAX_BYTES: u64 = 16 << 20;
@@ -17,14 +14,6 @@ pub enum TableError {
     /// It cannot be read.
     #[error(transparent)]
     Io(#[from] FileError),
-    /// It is too long, or no text.
-    #[error("{}: {why}", path.display())]
-    NotText {
-        /// which file
-        path: PathBuf,
-        /// what is wrong
-        why: &'static str,
-    },
     /// A line that is wrong.
     #[error("{}, line {line}: {why}", path.display())]
     Line {
@@ -37,105 +26,89 @@ pub enum TableError {
     },
 }
 
-/// One line.
+/// The columns of a table.
+#[derive(Clone, Copy)]
+pub(super) struct WantedColumns<'a> {
+    /// numbers that must be there
+    pub needed: &'a [&'a str],
+    /// numbers that may be there
+    pub numbers: &'a [&'a str],
+    /// texts that may be there
+    pub texts: &'a [&'a str],
+}
+
+/// One row, its columns in the order asked for.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Row {
+    /// where it begins
     pub line: usize,
-    /// of the columns that must be there, in the order asked for; finite
-    pub numbers: Vec<f64>,
-    /// of those that may be there; `None` where it is not or is empty
-    pub more: Vec<Option<String>>,
+    /// finite
+    pub needed: Vec<f64>,
+    /// `None` where it is empty, or the column is not there
+    pub numbers: Vec<Option<f64>>,
+    /// likewise
+    pub texts: Vec<Option<String>>,
 }
 
-impl Row {
-    /// A number of those that may be there.
-    pub fn number(&self, which: usize, column: &str) -> Result<Option<f64>, String> {
-        self.more[which]
-            .as_deref()
-            .map(|value| number(value, column))
-            .transpose()
-    }
-}
-
-/// - `columns`: numbers that must be there.
-/// - `more`: columns that may be there.
-pub(super) fn read_table(
-    path: &Path,
-    columns: &[&str],
-    more: &[&str],
-) -> Result<Vec<Row>, TableError> {
-    let text = read_text(path)?;
-    parse(&text, columns, more).map_err(|(line, why)| TableError::Line {
+/// All rows that have a value.
+pub(super) fn read_table(path: &Path, columns: WantedColumns<'_>) -> Result<Vec<Row>, TableError> {
+    let bytes = read_up_to(path, MAX_BYTES).map_err(|source| FileError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    parse(&bytes, columns).map_err(|(line, why)| TableError::Line {
         path: path.to_owned(),
         line,
         why,
     })
 }
 
-fn read_text(path: &Path) -> Result<String, TableError> {
-    let io = |source| FileError::Read {
-        path: path.to_owned(),
-        source,
-    };
-    let not_text = |why| TableError::NotText {
-        path: path.to_owned(),
-        why,
-    };
-    let mut bytes = Vec::new();
-    File::open(path)
-        .map_err(io)?
-        .take(MAX_BYTES + 1)
-        .read_to_end(&mut bytes)
-        .map_err(io)?;
-    if bytes.len() as u64 > MAX_BYTES {
-        return Err(not_text("longer than 16 MiB; that is no list made by hand"));
-    }
-    String::from_utf8(bytes)
-        .map_err(|_| not_text("not UTF-8 text; save it as comma-separated values in UTF-8"))
-}
-
 /// `Err`: the line, and what is wrong in it.
-pub(super) fn parse(
-    text: &str,
-    columns: &[&str],
-    more: &[&str],
-) -> Result<Vec<Row>, (usize, String)> {
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let lines = text
-        .lines()
-        .enumerate()
-        .map(|(i, line)| (i + 1, line.trim()));
-    let mut lines = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
-    let Some((at, first)) = lines.next() else {
-        return Err((
-            1,
-            format!(
-                "there is nothing in it; its first line must be {}",
-                columns.join(",")
-            ),
-        ));
-    };
-    let names = split(first);
-    check_names(&names, columns, more).map_err(|why| (at, why))?;
-    lines
-        .map(|(at, line)| row(at, line, &names, columns, more).map_err(|why| (at, why)))
-        .collect()
+fn parse(bytes: &[u8], columns: WantedColumns<'_>) -> Result<Vec<Row>, (usize, String)> {
+    let wrong = |error: RowError, line| (line, error.to_string());
+    let mut rows = TableRows::open(bytes).map_err(|error| wrong(error, 1))?;
+    let names: Vec<_> = rows.values().into_iter().map(str::to_owned).collect();
+    let in_head = |why| (rows.line(), why);
+    if names.is_empty() {
+        let needed = columns.needed.join(",");
+        let why = format!("there is nothing in it; its first line must be {needed}");
+        return Err(in_head(why));
+    }
+    check_names(&names, columns).map_err(in_head)?;
+    let mut found = Vec::new();
+    loop {
+        match rows.advance() {
+            Err(error) => return Err(wrong(error, rows.line())),
+            Ok(false) => return Ok(found),
+            // spreadsheets save rows that were emptied
+            Ok(true) if rows.values().iter().all(|value| value.is_empty()) => {}
+            Ok(true) => {
+                let mut sign = rows.sign;
+                let line = rows.line();
+                let row = row(line, &rows.values(), &names, columns, &mut sign);
+                found.push(row.map_err(|why| (line, why))?);
+                rows.sign = sign;
+            }
+        }
+    }
 }
 
 /// Each column is known and there once, and none is missing.
-fn check_names(names: &[&str], columns: &[&str], more: &[&str]) -> Result<(), String> {
-    let (known, wanted) = (columns.join(","), more.join(" and "));
+fn check_names(names: &[String], columns: WantedColumns<'_>) -> Result<(), String> {
+    let needed = columns.needed;
+    let more = [columns.texts, columns.numbers].concat();
     if let Some(unknown) = names
         .iter()
-        .find(|name| !columns.contains(name) && !more.contains(name))
+        .find(|name| !needed.contains(&&***name) && !more.contains(&&***name))
     {
         let wanted = if more.is_empty() {
             String::new()
         } else {
-            format!(", where wanted {wanted}")
+            format!(", where wanted {}", more.join(" and "))
         };
+        let known = needed.join(",");
         return Err(format!(
-            "no column is called {unknown:?}; there are {known}{wanted}, set apart by commas"
+            "no column is called {unknown:?}; there are {known}{wanted}, set apart by commas, semicolons or tabs"
         ));
     }
     if let Some((_, twice)) = names
@@ -145,7 +118,9 @@ fn check_names(names: &[&str], columns: &[&str], more: &[&str]) -> Result<(), St
     {
         return Err(format!("the column {twice} is there twice"));
     }
-    let missing = columns.iter().find(|column| !names.contains(column));
+    let missing = needed
+        .iter()
+        .find(|column| names.iter().all(|name| name != *column));
     missing.map_or(Ok(()), |column| {
         Err(format!("the column {column} is missing"))
     })
@@ -153,47 +128,57 @@ fn check_names(names: &[&str], columns: &[&str], more: &[&str]) -> Result<(), St
 
 fn row(
     line: usize,
-    text: &str,
-    names: &[&str],
-    columns: &[&str],
-    more: &[&str],
+    values: &[&str],
+    names: &[String],
+    columns: WantedColumns<'_>,
+    sign: &mut DecimalSign,
 ) -> Result<Row, String> {
-    let values = split(text);
     let (there, named) = (values.len(), names.len());
     if there != named {
         return Err(format!(
-            "{there} values for {named} columns; commas separate values only, decimals have a point"
+            "{there} values for {named} columns; a value with a separator in it needs quotation marks, and between commas decimals have a point"
         ));
     }
     let value = |column: &&str| {
-        names
-            .iter()
-            .zip(&values)
-            .find(|(name, _)| *name == column)
-            .map(|(_, value)| *value)
+        let at = names.iter().position(|name| name == column);
+        at.map_or("", |at| values[at])
     };
-    let numbers = columns
-        .iter()
-        .map(|column| number(value(column).unwrap_or_default(), column));
-    let more = more.iter().map(|column| {
-        value(column)
-            .filter(|value| !value.is_empty())
-            .map(str::to_owned)
-    });
+    let mut number = |column: &&str| number(value(column), column, sign);
     Ok(Row {
         line,
-        numbers: numbers.collect::<Result<_, _>>()?,
-        more: more.collect(),
+        needed: columns
+            .needed
+            .iter()
+            .map(&mut number)
+            .collect::<Result<_, _>>()?,
+        numbers: columns
+            .numbers
+            .iter()
+            .map(|column| {
+                (!value(column).is_empty())
+                    .then(|| number(column))
+                    .transpose()
+            })
+            .collect::<Result<_, _>>()?,
+        texts: columns
+            .texts
+            .iter()
+            .map(|column| Some(value(column).to_owned()).filter(|value| !value.is_empty()))
+            .collect(),
     })
 }
 
-fn number(value: &str, column: &str) -> Result<f64, String> {
-    let parsed = value.parse::<f64>().ok().filter(|x| x.is_finite());
+fn number(value: &str, column: &str, sign: &mut DecimalSign) -> Result<f64, String> {
+    let Some(text) = sign.with_point(value) else {
+        let sign = if sign.0 == Some(',') {
+            "comma"
+        } else {
+            "point"
+        };
+        return Err(format!(
+            "{column} is {value:?}, and the decimals of this table have a {sign}"
+        ));
+    };
+    let parsed = text.parse::<f64>().ok().filter(|x| x.is_finite());
     parsed.ok_or_else(|| format!("{column} is {value:?} and must be a number"))
-}
-
-fn split(line: &str) -> Vec<&str> {
-    line.split(',')
-        .map(|value| value.trim().trim_matches('"'))
-        .collect()
 }

@@ -1,11 +1,13 @@
 //! Touches as a table, CSV: one line each, lengths in mm.
 
+use std::borrow::Cow;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Point3, Vector3};
 
 use super::file_error::{FileError, read_file, write_file};
+use super::table_rows::{RowError, TableRows};
 use touchup_core::stylus::ProbedPoint;
 
 /// The first line of a file of touches.
@@ -60,8 +62,14 @@ pub fn write_touches(path: &Path, touches: &[ProbedPoint]) -> Result<(), FileErr
 /// Touches as [`read_touches`] has them after [`write_touches`]: to the digits written. What is
 /// measured by them can be measured again from the file.
 pub fn as_written(touches: &[ProbedPoint]) -> Vec<ProbedPoint> {
-    let rounded = |(number, touch)| touch_of(&line_of(touch, number), number).unwrap_or(*touch);
+    let rounded =
+        |(number, touch)| touch_of(&values_of(&line_of(touch, number)), number).unwrap_or(*touch);
     touches.iter().enumerate().map(rounded).collect()
+}
+
+/// The values of such a line.
+pub(crate) fn values_of(line: &str) -> Vec<Cow<'_, str>> {
+    line.split(',').map(Cow::from).collect()
 }
 
 pub(crate) fn line_of(touch: &ProbedPoint, number: usize) -> String {
@@ -89,42 +97,55 @@ pub(crate) fn line_of(touch: &ProbedPoint, number: usize) -> String {
     )
 }
 
-/// Reads what [`write_touches`] wrote, also as spreadsheets save it: with a byte order mark, CRLF,
-/// empty lines.
+/// Reads what [`write_touches`] wrote, also as spreadsheets save it.
 ///
 /// # Errors
 /// [`TouchesFileError`], with the line.
 pub fn read_touches(path: &Path) -> Result<Vec<ProbedPoint>, TouchesFileError> {
-    read_lines(path, |_| ())
+    read_rows(path, |_| ())
 }
 
-/// Reads touches, and gives the line of each as it is in the file.
-pub(crate) fn read_lines(
+/// Reads touches, and gives the values of each as they are in the file, with decimal points.
+pub(crate) fn read_rows(
     path: &Path,
-    mut line_read: impl FnMut(&str),
+    mut row_read: impl FnMut(&[Cow<'_, str>]),
 ) -> Result<Vec<ProbedPoint>, TouchesFileError> {
-    let own = || path.to_owned();
-    let text = read_file(path)?;
-    let text = String::from_utf8_lossy(&text);
-    let mut lines = text.strip_prefix('\u{feff}').unwrap_or(&text).lines();
-    let header = lines.next().map(str::trim_end).unwrap_or_default();
-    if header != HEADER {
-        return Err(TouchesFileError::NoTouches { path: own() });
-    }
+    let bytes = read_file(path)?;
+    let bad = |line, what| TouchesFileError::BadLine {
+        path: path.to_owned(),
+        line,
+        what,
+    };
+    let no_row = |error: RowError, line| bad(line, error.to_string());
+    let mut rows = TableRows::open(&bytes[..])
+        .ok()
+        .filter(|rows| rows.values().join(",") == HEADER)
+        .ok_or_else(|| TouchesFileError::NoTouches {
+            path: path.to_owned(),
+        })?;
     let mut touches = Vec::new();
-    for (at, line) in lines
-        .enumerate()
-        .filter(|(_, line)| !line.trim().is_empty())
-    {
-        let touch = touch_of(line, touches.len()).and_then(|touch| in_order(&touches, touch));
-        touches.push(touch.map_err(|what| TouchesFileError::BadLine {
-            path: own(),
-            line: at + 2,
-            what,
-        })?);
-        line_read(line);
+    loop {
+        match rows.advance() {
+            Err(error) => return Err(no_row(error, rows.line())),
+            Ok(false) => return Ok(touches),
+            Ok(true) => {}
+        }
+        let mut sign = rows.sign;
+        let values: Option<Vec<_>> = rows
+            .values()
+            .into_iter()
+            .map(|value| sign.with_point(value))
+            .collect();
+        let touch = values
+            .ok_or_else(|| "decimal points and decimal commas in one file".to_owned())
+            .and_then(|values| {
+                let touch = in_order(&touches, touch_of(&values, touches.len())?)?;
+                row_read(&values);
+                Ok(touch)
+            });
+        touches.push(touch.map_err(|what| bad(rows.line(), what))?);
+        rows.sign = sign;
     }
-    Ok(touches)
 }
 
 /// Touches come in order of time, and all within a span that ns can count.
@@ -147,11 +168,8 @@ fn in_order(before: &[ProbedPoint], touch: ProbedPoint) -> Result<ProbedPoint, S
         .ok_or_else(|| "stamp_ns 292 years after the first".to_owned())
 }
 
-fn touch_of(line: &str, number: usize) -> Result<ProbedPoint, String> {
-    let (names, fields): (Vec<_>, Vec<_>) = (
-        HEADER.split(',').collect(),
-        line.split(',').map(str::trim).collect(),
-    );
+fn touch_of(fields: &[Cow<'_, str>], number: usize) -> Result<ProbedPoint, String> {
+    let names: Vec<_> = HEADER.split(',').collect();
     if fields.len() != names.len() {
         return Err(format!(
             "{} fields, a touch has {}",

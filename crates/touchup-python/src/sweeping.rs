@@ -72,8 +72,8 @@ pub fn run_job<'py>(
     Ok(into)
 }
 
-/// What came of all jobs, as JSON: a row for each job, one for each feature, and the number of
-/// those without a result.
+/// What came of all jobs, as JSON: a row for each job, one for each feature, the number of
+/// those without a result, and in words those whose result is damaged.
 #[pyfunction]
 #[pyo3(signature = (jobs, results, with_features))]
 pub fn sweep_tables(
@@ -88,10 +88,11 @@ pub fn sweep_tables(
             jobs,
             features,
             missing,
+            damaged,
             ..
         } = tables_of(&jobs, &results, with_features)?;
         to_json(
-            &json!({ "jobs": jobs.json_rows(), "features": features.json_rows(), "missing": missing }),
+            &json!({ "jobs": jobs.json_rows(), "features": features.json_rows(), "missing": missing, "damaged": damaged }),
         )
     })
 }

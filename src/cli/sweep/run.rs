@@ -10,7 +10,7 @@ use super::super::error::UNSOUND;
 use super::super::progress::WorkProgress;
 use super::super::{CliError, Losses, counted, print_report, print_result};
 use super::places::results_of;
-use crate::sweep::{GivenInput, JobReport, JobRunner, JobsFile};
+use crate::sweep::{GivenInput, JobReport, JobRunner, JobsFile, SweepError};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct RunArguments {
@@ -32,7 +32,7 @@ pub(in crate::cli) struct RunArguments {
 }
 
 /// Jobs that are named at most in one list.
-const MOST_NAMED: usize = 20;
+pub(super) const MOST_NAMED: usize = 20;
 
 pub(in crate::cli) fn run(arguments: &RunArguments) -> Result<Losses, CliError> {
     let RunArguments {
@@ -110,6 +110,8 @@ struct RunSummary {
     failed: u64,
     /// refined from a damaged recording
     with_losses: u64,
+    /// have a result that is no longer as it was written
+    damaged: u64,
 }
 
 fn run_all(
@@ -124,16 +126,23 @@ fn run_all(
     let mut progress = WorkProgress::new("sweep", Some(count));
     let mut named = Losses::new();
     for job in JobsFile::open(jobs)? {
-        let job = job?;
+        let ran = runner.run(&job?, GivenInput::default(), again, &mut || {});
+        progress.step_now();
+        summary.jobs += 1;
         let JobReport {
             job,
             was_there,
             failed,
             summary: numbers,
             ..
-        } = runner.run(&job, GivenInput::default(), again, &mut || {})?;
-        progress.step_now();
-        summary.jobs += 1;
+        } = match ran {
+            Err(damaged @ SweepError::Damaged { .. }) => {
+                summary.damaged += 1;
+                named.extend(Some(damaged.to_string()).filter(|_| named.len() < MOST_NAMED));
+                continue;
+            }
+            ran => ran?,
+        };
         *(if was_there {
             &mut summary.were_there
         } else {
@@ -147,7 +156,8 @@ fn run_all(
         named.extend(said.filter(|_| named.len() < MOST_NAMED));
     }
     drop(progress);
-    let more = (summary.failed + summary.with_losses).saturating_sub(named.len() as u64);
+    let more =
+        (summary.failed + summary.with_losses + summary.damaged).saturating_sub(named.len() as u64);
     if more > 0 {
         named.push(format!("and {more} more"));
     }

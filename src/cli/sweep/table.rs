@@ -7,6 +7,7 @@ use serde_json::json;
 
 use super::super::{CliError, Losses, counted, print_report, require};
 use super::places::{check_table, results_of};
+use super::run::MOST_NAMED;
 use crate::sweep::{SweepTables, tables_of};
 
 #[derive(Debug, Args)]
@@ -51,13 +52,14 @@ pub(in crate::cli) fn table(arguments: &TableArguments) -> Result<Losses, CliErr
         failed,
         missing,
         first_missing,
+        damaged,
     } = tables_of(jobs, &results, features_out.is_some())?;
     jobs.write(out)?;
     features_out
         .iter()
         .try_for_each(|path| features.write(path))?;
     let rows = jobs.rows();
-    let report = json!({ "rows": rows, "failed": failed, "missing": missing, "features": features.rows(), "out": out });
+    let report = json!({ "rows": rows, "failed": failed, "missing": missing, "damaged": damaged, "features": features.rows(), "out": out });
     print_report(*json, &report, || {
         let of_features = features_out.as_ref().map_or(String::new(), |path| {
             format!(
@@ -79,9 +81,10 @@ pub(in crate::cli) fn table(arguments: &TableArguments) -> Result<Losses, CliErr
         ", …"
     };
     let jobs = counted(missing, "job has", "jobs have");
-    Ok(if missing == 0 {
-        Losses::new()
-    } else {
-        vec![format!("{jobs} no result: {}{more}", named.join(", "))]
-    })
+    let mut losses = Losses::new();
+    if missing > 0 {
+        losses.push(format!("{jobs} no result: {}{more}", named.join(", ")));
+    }
+    losses.extend(damaged.into_iter().take(MOST_NAMED));
+    Ok(losses)
 }

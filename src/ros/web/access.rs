@@ -7,6 +7,7 @@ use std::sync::Mutex;
 
 use serde::{Deserialize, Serialize};
 
+use super::own_addresses::own_addresses;
 use crate::ros::locked;
 
 /// Links and cookies that are known at a time; the oldest go first.
@@ -55,8 +56,13 @@ type Known = VecDeque<(Secret, Role)>;
 /// Who may do what.
 #[derive(Debug)]
 pub(super) struct Access {
-    /// the values of `Host` by which the page is called
+    /// as it is listened to
+    address: SocketAddr,
+    /// the values of `Host` by which the page is called, beside the machine's own addresses where
+    /// it is listened to at all of them
     hosts: Vec<String>,
+    /// by which links call it
+    names: Vec<String>,
     scheme: &'static str,
     /// without links everybody who reaches the address operates
     needs_cookie: bool,
@@ -66,7 +72,7 @@ pub(super) struct Access {
 }
 
 impl Access {
-    /// - `address`: as it is listened to; with every address of the machine, links name `names`.
+    /// - `address`: as it is listened to.
     /// - `names`: other names and addresses of this machine by which the page may be called.
     /// - `by_link`: pages are let in by link alone.
     pub fn new(address: SocketAddr, names: &[String], by_link: bool, is_tls: bool) -> Self {
@@ -87,7 +93,9 @@ impl Access {
             hosts.extend(named.iter().map(|name| name.to_lowercase()));
         }
         Self {
+            address,
             hosts,
+            names: names.to_vec(),
             scheme,
             needs_cookie: by_link,
             cookie_name: format!("touchup_{port}"),
@@ -99,7 +107,42 @@ impl Access {
     /// Whether the page is called by one of its own names: a name that somebody else's server
     /// answers for is none, whatever address it leads to.
     pub fn is_host(&self, host: &str) -> bool {
-        self.hosts.contains(&host.to_lowercase())
+        self.hosts.contains(&host.to_lowercase()) || self.is_own_address(host)
+    }
+
+    /// Whether it is one that the machine has now, where all of them are listened to.
+    fn is_own_address(&self, host: &str) -> bool {
+        let own = self.address.ip();
+        let usual = if self.scheme == "https" { 443 } else { 80 };
+        let without_port = || {
+            let ip = host.trim_start_matches('[').trim_end_matches(']');
+            Some(SocketAddr::new(ip.parse().ok()?, usual))
+        };
+        let asked: Option<SocketAddr> = host.parse().ok().or_else(without_port);
+        own.is_unspecified()
+            && asked.is_some_and(|asked| {
+                asked.port() == self.address.port() && own_addresses(own).contains(&asked.ip())
+            })
+    }
+
+    /// The addresses of the page for links, as `http://192.168.0.7:8321`: by the given names first,
+    /// and by each address that the machine has now where all are listened to.
+    pub fn urls(&self) -> Vec<String> {
+        let (ip, port) = (self.address.ip(), self.address.port());
+        let mut names = self.names.clone();
+        if ip.is_unspecified() {
+            names.extend(own_addresses(ip).into_iter().map(in_a_link));
+        }
+        if names.is_empty() {
+            names.push(match ip.is_unspecified() {
+                true => "localhost".to_owned(),
+                false => in_a_link(ip),
+            });
+        }
+        names
+            .iter()
+            .map(|name| format!("{}://{name}:{port}", self.scheme))
+            .collect()
     }
 
     /// Whether what asks was loaded from here: the value of `Origin`.
@@ -107,11 +150,6 @@ impl Access {
         origin
             .split_once("://")
             .is_some_and(|(scheme, host)| scheme == self.scheme && self.is_host(host))
-    }
-
-    /// `http` or `https`.
-    pub fn scheme(&self) -> &'static str {
-        self.scheme
     }
 
     /// Whether a page has to be let in by a link.
@@ -245,6 +283,24 @@ mod tests {
                 && lan.is_host("192.168.0.7:80")
                 && !lan.is_host("127.0.0.1")
         );
+    }
+
+    #[test]
+    fn where_all_addresses_are_listened_to_each_that_the_machine_has_is_its_name() {
+        for [all, other] in [["0.0.0.0:80", "192.0.2.1"], ["[::]:80", "[2001:db8::1]"]] {
+            let lan = access(all);
+            let urls = lan.urls();
+            assert_eq!(urls[0], "http://cell.local:80");
+            for url in &urls {
+                assert!(lan.is_origin(url), "{url}");
+                assert!(lan.is_origin(url.trim_end_matches(":80")), "{url}");
+                assert!(!lan.is_origin(&url.replace(":80", ":81")), "{url}");
+            }
+            let own = own_addresses(all.parse::<SocketAddr>().unwrap().ip());
+            assert_eq!(urls.len(), 1 + own.len());
+            assert!(!lan.is_host(other) && !lan.is_host(&format!("{other}:80")));
+        }
+        assert!(!access("127.0.0.1:80").is_own_address("127.0.0.1"));
     }
 
     #[test]

@@ -32,12 +32,19 @@ const SEEN_AGAIN: &str = "no-cache";
 #[derive(Debug)]
 pub(super) struct Entrance {
     pub access: Access,
-    /// address of the page: for links
-    pub base: String,
     /// tells the operator beside the machine
-    pub notify: fn(&str),
+    pub notify: fn(&Invitation),
     /// pages that were ever opened on a node
     pub pages_so_far: AtomicU64,
+}
+
+/// A link for one page, in words and as a QR code.
+#[derive(Clone, Debug)]
+pub struct Invitation {
+    /// the link at each address of the page, and what it gives
+    pub text: String,
+    /// lines of half blocks, dark on light; empty for who only looks
+    pub code: String,
 }
 
 impl Entrance {
@@ -53,18 +60,13 @@ impl Entrance {
             .ok_or_else(|| Box::new(refusal(StatusCode::UNAUTHORIZED, why)))
     }
 
-    /// The link with a secret.
-    fn link(&self, token: &str) -> String {
-        format!("{}/pair?token={token}", self.base)
-    }
-
     /// A link that lets another page in where one needs it, and its QR code, row by row: 1 where it
     /// is dark.
     pub fn invite(&self, role: Role) -> io::Result<(String, Vec<String>)> {
-        let link = match self.access.needs_cookie() {
-            true => self.link(self.access.invite(role)?.text()),
-            false => self.base.clone(),
-        };
+        let mut link = self.access.urls().swap_remove(0);
+        if self.access.needs_cookie() {
+            link += &format!("/pair?token={}", self.access.invite(role)?.text());
+        }
         let code = QrCode::new(&link)
             .map(|code| rows(&code))
             .unwrap_or_default();
@@ -74,26 +76,33 @@ impl Entrance {
     /// Somebody came in by a link, which is used up: here is the next.
     fn note_paired(&self, role: Role) {
         match self.invitation(role) {
-            Ok(text) => (self.notify)(&format!("a page was let in to {}; {text}", in_words(role))),
+            Ok(Invitation { text, code }) => {
+                let text = format!("a page was let in to {}; {text}", in_words(role));
+                (self.notify)(&Invitation { text, code });
+            }
             Err(error) => tracing::warn!(%error, "there is no new link"),
         }
     }
 
     /// A new link in words, and as a QR code.
-    pub fn invitation(&self, role: Role) -> io::Result<String> {
-        let link = self.link(self.access.invite(role)?.text());
-        let code = QrCode::new(&link)
-            .map(|code| code.render::<Dense1x2>().build())
-            .unwrap_or_default();
-        let code = if role == Role::Operate {
-            format!("\n{code}")
-        } else {
-            String::new()
+    pub fn invitation(&self, role: Role) -> io::Result<Invitation> {
+        let secret = self.access.invite(role)?;
+        let mut links = self.access.urls();
+        links
+            .iter_mut()
+            .for_each(|link| *link += &format!("/pair?token={}", secret.text()));
+        let code = match role {
+            Role::Operate => QrCode::new(&links[0])
+                .map(|code| code.render::<Dense1x2>().build())
+                .unwrap_or_default(),
+            Role::Look => String::new(),
         };
-        Ok(format!(
-            "the next one may {} by {link}{code}",
-            in_words(role)
-        ))
+        let text = format!(
+            "the next one may {} by {}",
+            in_words(role),
+            links.join(" or ")
+        );
+        Ok(Invitation { text, code })
     }
 
     fn refused(&self, method: &Method, headers: &HeaderMap) -> Option<&'static str> {

@@ -20,6 +20,7 @@ use tokio_rustls::rustls::pki_types::pem::PemObject;
 use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
 
 use super::error::WebError;
+use crate::io::text_file::read_text;
 use crate::ros::locked;
 
 /// Connections at a time at most.
@@ -45,13 +46,14 @@ impl Certificate {
             file: file.to_owned(),
             why,
         };
-        let chain = CertificateDer::pem_file_iter(&self.chain)
-            .and_then(Iterator::collect::<Result<Vec<_>, _>>);
-        let chain = chain.map_err(|error| bad(&self.chain, error.to_string()))?;
+        let text = |file: &Path| read_text(file).map_err(|error| bad(file, error.to_string()));
+        let chain = CertificateDer::pem_slice_iter(text(&self.chain)?.as_bytes())
+            .collect::<Result<Vec<_>, _>>()
+            .map_err(|error| bad(&self.chain, error.to_string()))?;
         if chain.is_empty() {
             return Err(bad(&self.chain, "there is no certificate in it".to_owned()));
         }
-        let key = PrivateKeyDer::from_pem_file(&self.key)
+        let key = PrivateKeyDer::from_pem_slice(text(&self.key)?.as_bytes())
             .map_err(|error| bad(&self.key, error.to_string()))?;
         let config = ServerConfig::builder()
             .with_no_client_auth()

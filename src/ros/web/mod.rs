@@ -19,6 +19,7 @@ mod knowledge;
 mod listener;
 mod mesh_copy;
 mod nominal;
+mod own_addresses;
 mod page;
 mod page_place;
 mod page_port;
@@ -31,7 +32,7 @@ mod site;
 mod vertex_numbers;
 
 use std::io;
-use std::net::{SocketAddr, UdpSocket};
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
@@ -42,12 +43,13 @@ use tokio::net::TcpListener;
 use tokio::runtime::Handle;
 use tokio::sync::Notify;
 
+use self::access::Access;
 pub use self::access::Role;
-use self::access::{Access, in_a_link};
 use self::annotations::Annotations;
 use self::board::Board;
 use self::calls::Calls;
 use self::entrance::Entrance;
+pub use self::entrance::Invitation;
 pub use self::error::WebError;
 pub use self::listener::Certificate;
 use self::listener::Routes;
@@ -97,7 +99,7 @@ pub struct NodeFacts {
 
 /// Serves until it is dropped.
 pub struct WebServer {
-    invitations: Vec<String>,
+    invitations: Vec<Invitation>,
     entrance: Arc<Entrance>,
     routes: Routes,
     runtime: Handle,
@@ -112,8 +114,7 @@ impl WebServer {
     ///
     /// # Errors
     /// [`WebError`]
-    #[expect(clippy::too_many_lines)]
-    pub fn open(params: &WebParams, notify: fn(&str)) -> Result<Self, WebError> {
+    pub fn open(params: &WebParams, notify: fn(&Invitation)) -> Result<Self, WebError> {
         let tls = params
             .certificate
             .as_ref()
@@ -129,21 +130,9 @@ impl WebServer {
             source,
         })?;
         let address = listener.local_addr()?;
-        let names: Vec<String> = params
-            .names
-            .iter()
-            .cloned()
-            .chain(own_address(address))
-            .collect();
-        let access = Access::new(address, &names, params.by_link, tls.is_some());
-        let name = names
-            .first()
-            .cloned()
-            .unwrap_or_else(|| in_a_link(address.ip()));
-        let base = format!("{}://{name}:{}", access.scheme(), address.port());
+        let access = Access::new(address, &params.names, params.by_link, tls.is_some());
         let entrance = Arc::new(Entrance {
             access,
-            base,
             notify,
             pages_so_far: AtomicU64::new(0),
         });
@@ -235,9 +224,9 @@ impl WebServer {
         Ok(Arc::new(PagePort { network, site }))
     }
 
-    /// Address of the page.
-    pub fn url(&self) -> &str {
-        &self.entrance.base
+    /// Addresses of the page.
+    pub fn urls(&self) -> Vec<String> {
+        self.entrance.access.urls()
     }
 
     /// Whether a page was ever opened on a node.
@@ -246,7 +235,7 @@ impl WebServer {
     }
 
     /// Links by which pages are let in, each with what it gives; none where everybody is.
-    pub fn invitations(&self) -> &[String] {
+    pub fn invitations(&self) -> &[Invitation] {
         &self.invitations
     }
 }
@@ -259,19 +248,4 @@ impl Drop for WebServer {
             let _ = thread.join();
         }
     }
-}
-
-/// The address by which others reach a machine that listens to all of its own, as far as it is
-/// known: nothing is sent.
-fn own_address(address: SocketAddr) -> Option<String> {
-    if !address.ip().is_unspecified() {
-        return None;
-    }
-    // of a block for documentation (RFC 5737), so that the way out is that to other networks
-    let socket = UdpSocket::bind("0.0.0.0:0")
-        .and_then(|socket| socket.connect("192.0.2.1:9").map(|()| socket));
-    socket
-        .and_then(|socket| socket.local_addr())
-        .ok()
-        .map(|own| in_a_link(own.ip()))
 }

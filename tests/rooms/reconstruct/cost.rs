@@ -47,8 +47,8 @@ fn a_lattice_around_all_that_was_touched_is_refused_with_the_figure_before_it_is
         + 2.0 * SIDE * PI * reach.powi(2)
         + 4.0 / 3.0 * PI * reach.powi(3);
     assert!((volume * 1e9 - 11_196.0).abs() < 1.0, "{}", volume * 1e9);
-    let checked = |pitch: f64| {
-        let mut patcher = Patcher::new(with_pitch(RADIUS, pitch)).unwrap();
+    let touched = |params: PatcherParams| {
+        let mut patcher = Patcher::new(params).unwrap();
         let tip = TipParams {
             radius: RADIUS,
             stiffness: None,
@@ -73,6 +73,10 @@ fn a_lattice_around_all_that_was_touched_is_refused_with_the_figure_before_it_is
             );
         }
         patcher.flush();
+        patcher
+    };
+    let checked = |pitch: f64| {
+        let patcher = touched(with_pitch(RADIUS, pitch));
         patcher.check_extent().map_err(|error| error.to_string())
     };
     let why = checked(0.1e-3).unwrap_err();
@@ -87,6 +91,19 @@ fn a_lattice_around_all_that_was_touched_is_refused_with_the_figure_before_it_is
         assert!(why.contains(part), "{part} is not in: {why}");
     }
     assert_eq!(checked(0.15e-3), Ok(()));
+    // the usual one becomes as coarse as 8 million nodes are, and no coarser than it was where these
+    // suffice
+    let coarsest = (volume / 8e6).cbrt();
+    for pitch in [0.05e-3, 0.1e-3, 0.15e-3] {
+        let usual = PatcherParams {
+            is_usual_tolerance: true,
+            ..with_pitch(RADIUS, pitch)
+        };
+        let patcher = touched(usual);
+        assert!(patcher.check_extent().is_ok());
+        let ratio = (16.0 * RADIUS * patcher.tolerance()).sqrt() / pitch.max(coarsest);
+        assert!((0.9..1.1).contains(&ratio), "{pitch}: {ratio}");
+    }
 }
 
 #[test]

@@ -12,11 +12,32 @@ pub struct ToleranceLimits {
 }
 
 impl ToleranceLimits {
+    /// Those of a nominal value and its limit deviations, with the decimals that these have: 6.1 and
+    /// −0.03 make 6.07, where their binary fractions add up to 6.069999999999999.
+    pub fn about(nominal: f64, lower: Option<f64>, upper: Option<f64>) -> Self {
+        let limit = |deviation: f64| {
+            let decimals = decimals(nominal).max(decimals(deviation));
+            let sum = nominal + deviation;
+            format!("{sum:.decimals$}").parse().unwrap_or(sum)
+        };
+        Self {
+            lower: lower.map(limit),
+            upper: upper.map(limit),
+        }
+    }
+
     /// Whether a value is within them.
     pub fn hold(&self, value: f64) -> bool {
         self.lower.is_none_or(|lower| value >= lower)
             && self.upper.is_none_or(|upper| value <= upper)
     }
+}
+
+/// How many decimals the shortest text of a number has.
+fn decimals(number: f64) -> usize {
+    let text = number.to_string();
+    text.split_once('.')
+        .map_or(0, |(_, decimals)| decimals.len())
 }
 
 /// How the measurand is distributed about its measured value.

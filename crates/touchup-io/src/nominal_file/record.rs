@@ -107,15 +107,13 @@ impl NominalRecord {
                 lower: None,
                 upper: Some(width),
             }),
-            (Some(half), ..) => NominalTolerance::Limits(ToleranceLimits {
-                lower: Some(nominal - half),
-                upper: Some(nominal + half),
-            }),
+            (Some(half), ..) => {
+                NominalTolerance::Limits(ToleranceLimits::about(nominal, Some(-half), Some(half)))
+            }
             (None, None, None) => NominalTolerance::General,
-            (None, lower, upper) => NominalTolerance::Limits(ToleranceLimits {
-                lower: lower.map(|deviation| nominal + deviation),
-                upper: upper.map(|deviation| nominal + deviation),
-            }),
+            (None, lower, upper) => {
+                NominalTolerance::Limits(ToleranceLimits::about(nominal, lower, upper))
+            }
         }
     }
 

@@ -5,9 +5,8 @@ use std::path::Path;
 
 use super::error::NominalFileError;
 use super::record::{DatumRecord, NominalRecord};
-use crate::csv_line::csv_line;
 use crate::file_error::{FileError, write_file};
-use crate::table::{Row, TableError, read_table};
+use crate::table::{Row, TableError, WantedColumns, read_table};
 
 /// The columns, in any order; those without a value in any row may be left out.
 const COLUMNS: [&str; 23] = [
@@ -39,9 +38,26 @@ const COLUMNS: [&str; 23] = [
 /// Columns that must be there.
 const NEEDED: usize = 3;
 
+/// Columns that are no numbers, or whole ones.
+const TEXTS: [&str; 6] = [
+    "name",
+    "kind",
+    "quantity",
+    "feature",
+    "datum_kind",
+    "datum_feature",
+];
+
 pub(super) fn read(path: &Path) -> Result<Vec<(String, NominalRecord)>, NominalFileError> {
-    let rows = read_table(path, &[], &COLUMNS)?;
-    let record = |row: &Row| match record_of(row) {
+    let mut numbers = COLUMNS.to_vec();
+    numbers.retain(|column| !TEXTS.contains(column));
+    let columns = WantedColumns {
+        needed: &[],
+        numbers: &numbers,
+        texts: &TEXTS,
+    };
+    let rows = read_table(path, columns)?;
+    let record = |row: &Row| match record_of(row, &numbers) {
         Ok(record) => Ok((format!("line {}", row.line), record)),
         Err(why) => Err(TableError::Line {
             path: path.to_owned(),
@@ -53,16 +69,10 @@ pub(super) fn read(path: &Path) -> Result<Vec<(String, NominalRecord)>, NominalF
     rows.iter().map(record).collect()
 }
 
-#[expect(clippy::too_many_lines)]
-fn record_of(row: &Row) -> Result<NominalRecord, String> {
-    let at = |column: &str| {
-        COLUMNS
-            .iter()
-            .position(|known| *known == column)
-            .unwrap_or_default()
-    };
-    let text = |column: &str| row.more[at(column)].clone();
-    let number = |column: &str| row.number(at(column), column);
+fn record_of(row: &Row, numbers: &[&str]) -> Result<NominalRecord, String> {
+    let at = |known: &[&str], column: &str| known.iter().position(|known| *known == column);
+    let text = |column: &str| row.texts[at(&TEXTS, column)?].clone();
+    let number = |column: &str| row.numbers[at(numbers, column)?];
     let needed = |column: &str| {
         text(column).ok_or_else(|| format!("{column} is empty or the column {column} is missing"))
     };
@@ -75,7 +85,7 @@ fn record_of(row: &Row) -> Result<NominalRecord, String> {
     };
     let place = |columns: [&str; 3]| {
         let [x, y, z] = columns.map(number);
-        match (x?, y?, z?) {
+        match (x, y, z) {
             (Some(x), Some(y), Some(z)) => Ok(Some([x, y, z])),
             (None, None, None) => Ok(None),
             _ => Err(format!(
@@ -103,14 +113,14 @@ fn record_of(row: &Row) -> Result<NominalRecord, String> {
         name: needed(COLUMNS[0])?,
         kind: needed(COLUMNS[1])?,
         quantity: needed(COLUMNS[NEEDED - 1])?,
-        nominal_mm: number("nominal_mm")?,
-        nominal_deg: number("nominal_deg")?,
-        tolerance_mm: number("tolerance_mm")?,
-        tolerance_deg: number("tolerance_deg")?,
-        lower_deviation_mm: number("lower_deviation_mm")?,
-        upper_deviation_mm: number("upper_deviation_mm")?,
-        lower_deviation_deg: number("lower_deviation_deg")?,
-        upper_deviation_deg: number("upper_deviation_deg")?,
+        nominal_mm: number("nominal_mm"),
+        nominal_deg: number("nominal_deg"),
+        tolerance_mm: number("tolerance_mm"),
+        tolerance_deg: number("tolerance_deg"),
+        lower_deviation_mm: number("lower_deviation_mm"),
+        upper_deviation_mm: number("upper_deviation_mm"),
+        lower_deviation_deg: number("lower_deviation_deg"),
+        upper_deviation_deg: number("upper_deviation_deg"),
         center_mm: place(["center_x_mm", "center_y_mm", "center_z_mm"])?,
         axis: place(["axis_x", "axis_y", "axis_z"])?,
         feature: whole("feature")?,
@@ -132,18 +142,15 @@ pub(super) fn write(
         comment
             .iter()
             .try_for_each(|line| writeln!(out, "# {line}"))?;
-        writeln!(
-            out,
-            "{}",
-            csv_line(used.iter().map(|&column| COLUMNS[column]))
-        )?;
-        rows.iter().try_for_each(|row| {
-            writeln!(
-                out,
-                "{}",
-                csv_line(used.iter().map(|&column| row[column].as_str()))
-            )
-        })
+        // a name that begins as a comment does is put in quotation marks
+        let mut rows_out = csv::WriterBuilder::new()
+            .comment(Some(b'#'))
+            .from_writer(out);
+        rows_out.write_record(used.iter().map(|&column| COLUMNS[column]))?;
+        for row in &rows {
+            rows_out.write_record(used.iter().map(|&column| &row[column]))?;
+        }
+        rows_out.flush()
     })
 }
 
@@ -158,8 +165,7 @@ fn fields_of(record: &NominalRecord) -> [String; 23] {
     let [a, b, c] = place(record.axis);
     let [u, v, w] = place(datum.center_mm);
     [
-        // the reader of tables knows no commas within a value
-        record.name.replace(',', ";"),
+        record.name.clone(),
         record.kind.clone(),
         record.quantity.clone(),
         shown(record.nominal_mm),

@@ -5,6 +5,7 @@ use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use super::segments::{FileSegment, METADATA};
+use super::writer::not_written;
 use super::{RecordingError, RecordingReader, SegmentedWriter, Topics, write_recording};
 use touchup_core::stylus::Message;
 
@@ -13,16 +14,13 @@ impl SegmentedWriter {
     /// one.
     ///
     /// # Errors
-    /// [`RecordingError::Io`].
+    /// [`RecordingError::NotWritten`].
     pub fn replace(folder: &Path, topics: &Topics) -> Result<Self, RecordingError> {
-        let io = |source| RecordingError::Io {
-            path: folder.to_owned(),
-            source,
-        };
-        create_dir_all(folder).map_err(io)?;
-        remove(&folder.join(METADATA)).map_err(io)?;
+        let refused = |error| not_written(folder, error);
+        create_dir_all(folder).map_err(refused)?;
+        remove(&folder.join(METADATA)).map_err(refused)?;
         for path in segment_paths(folder) {
-            remove(&path).map_err(io)?;
+            remove(&path).map_err(refused)?;
         }
         Ok(Self::new(folder, topics))
     }
@@ -43,12 +41,9 @@ impl SegmentedWriter {
         frames: [&str; 2],
         each: &mut dyn FnMut(&Message),
     ) -> Result<Self, RecordingError> {
-        let io = |source| RecordingError::Io {
-            path: folder.to_owned(),
-            source,
-        };
-        create_dir_all(folder).map_err(io)?;
-        remove(&folder.join(METADATA)).map_err(io)?;
+        let refused = |error| not_written(folder, error);
+        create_dir_all(folder).map_err(refused)?;
+        remove(&folder.join(METADATA)).map_err(refused)?;
         let mut writer = Self::new(folder, topics);
         let paths = segment_paths(folder);
         for path in &paths {
@@ -62,7 +57,7 @@ impl SegmentedWriter {
                         reason,
                     });
                 }
-                remove(path).map_err(io)?;
+                remove(path).map_err(refused)?;
                 break;
             };
             let mut segment = FileSegment::begin(writer.segments.len(), first.stamp_ns());

@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
+use super::writer::not_written;
 use super::{RecordingError, RecordingWriter, TopicKind, Topics};
 use crate::atomic::write_atomically;
 use touchup_core::stylus::Message;
@@ -106,10 +107,7 @@ impl SegmentedWriter {
         self.end_segment()?;
         let segment = FileSegment::begin(self.segments.len(), stamp_ns);
         let path = self.folder.join(&segment.name);
-        let file = File::create_new(&path).map_err(|source| RecordingError::Io {
-            path: path.clone(),
-            source,
-        })?;
+        let file = File::create_new(&path).map_err(|error| not_written(&path, error))?;
         let begun = RecordingWriter::new(BufWriter::new(file), &self.topics);
         // a full disk takes a file and not its first bytes: an empty one would be in the way of the
         // next for ever
@@ -124,15 +122,12 @@ impl SegmentedWriter {
             return Ok(());
         };
         self.flushed_length = 0;
-        let io = |source| RecordingError::Io {
-            path: self.folder.clone(),
-            source,
-        };
+        let refused = |error| not_written(&self.folder, error);
         let file = writer
             .finish()?
             .into_inner()
-            .map_err(|error| io(error.into_error()))?;
-        file.sync_all().map_err(io)?;
+            .map_err(|error| refused(error.into_error()))?;
+        file.sync_all().map_err(refused)?;
         segment.is_whole = true;
         Ok(())
     }
@@ -140,7 +135,7 @@ impl SegmentedWriter {
     /// Flushes to the operating system; returns how many messages these are.
     ///
     /// # Errors
-    /// [`RecordingError::Write`], [`RecordingError::Io`].
+    /// [`RecordingError::Write`], [`RecordingError::NotWritten`].
     pub fn flush(&mut self) -> Result<u64, RecordingError> {
         let (Some(writer), Some(segment)) = (&mut self.current, self.segments.last()) else {
             return Ok(0);
@@ -152,7 +147,7 @@ impl SegmentedWriter {
         let path = self.folder.join(&segment.name);
         self.flushed_length = path
             .metadata()
-            .map_err(|source| RecordingError::Io { path, source })?
+            .map_err(|error| not_written(&path, error))?
             .len();
         Ok(std::mem::take(&mut self.unflushed))
     }
@@ -173,7 +168,7 @@ impl SegmentedWriter {
             .append(true)
             .open(&path)
             .and_then(|file| file.sync_data());
-        synced.map_err(|source| RecordingError::Io { path, source })
+        synced.map_err(|error| not_written(&path, error))
     }
 
     /// After an error: leaves of the file what was flushed, and nothing of one that was not. What
@@ -209,7 +204,7 @@ impl SegmentedWriter {
     /// crash.
     ///
     /// # Errors
-    /// [`RecordingError::Write`], [`RecordingError::Io`].
+    /// [`RecordingError::Write`], [`RecordingError::NotWritten`].
     pub fn finish(mut self) -> Result<(), RecordingError> {
         self.end_segment()?;
         if self.segments.is_empty() || !self.segments.iter().all(|segment| segment.is_whole) {
@@ -217,7 +212,7 @@ impl SegmentedWriter {
         }
         let (path, text) = (self.folder.join(METADATA), self.metadata());
         write_atomically(&path, |out| out.write_all(text.as_bytes()))
-            .map_err(|source| RecordingError::Io { path, source })
+            .map_err(|error| not_written(&path, error))
     }
 
     /// As rosbag2 writes it, version 5: every release reads that.

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -68,7 +69,7 @@ def run_job(
 
 
 def table(jobs: Path, results: Path | None = None) -> list[dict[str, Any]]:
-    """A row for each job that has a result, in the order of the plan, for ``pandas.DataFrame``.
+    """A row for each job that has a result, in the order of the plan, for ``pandas.DataFrame``; it warns of results that were changed.
 
     `job`, `id`, `recording`, `seed`, each key, `failed`, then the numbers of the summary. What a row has not is not in it.
 
@@ -83,5 +84,7 @@ def features(jobs: Path, results: Path | None = None) -> list[dict[str, Any]]:
 
 
 def _tables(jobs: Path, results: Path | None, with_features: bool) -> dict[str, list[dict[str, Any]]]:
-    tables: dict[str, list[dict[str, Any]]] = json.loads(_touchup.sweep_tables(jobs, results, with_features))
+    tables: dict[str, list[Any]] = json.loads(_touchup.sweep_tables(jobs, results, with_features))
+    for damaged in tables["damaged"]:
+        warnings.warn(damaged, stacklevel=3)
     return tables

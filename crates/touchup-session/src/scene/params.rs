@@ -227,6 +227,7 @@ impl Scene {
             params.touches.largest_gap_ns = sync.largest_gap_ns;
         }
         params.tolerance = tolerance.unwrap_or(params.tolerance);
+        params.is_usual_tolerance = tolerance.is_none();
         params.uncertainty = self.uncertainty.map(|known| UncertaintyParams {
             scan: noise,
             ..known

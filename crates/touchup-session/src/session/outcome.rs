@@ -87,6 +87,9 @@ reported! {
     pub struct PatchSummary, pub fn of(patched: &Patched, seconds: f64) {
         /// how far the new faces may be from the surface that the touches show
         tolerance_mm: f64 = patched.tolerance * 1e3,
+        /// whether that is more than usual: so much was touched by so small a tip that the lattice
+        /// of the usual one would not have fitted
+        is_coarser: bool = patched.is_coarser,
         /// faces of the scan that went
         removed_faces: usize = patched.removed_faces,
         /// faces that came
@@ -417,15 +420,20 @@ impl fmt::Display for PatchSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             tolerance_mm,
+            is_coarser,
             guessed_share,
             ..
         } = self;
+        let coarser = match is_coarser {
+            true => ", coarser than usual: more was touched by so small a tip than memory allows",
+            false => "",
+        };
         let [removed, added] =
             [self.removed_faces, self.added_faces].map(|count| counted(count, "face", "faces"));
         let guessed = guessed_share * 100.0;
         write!(
             f,
-            "{removed} of the scan replaced by {added}, within {tolerance_mm:.3} mm ({guessed:.0} % of their vertices guessed)"
+            "{removed} of the scan replaced by {added}, within {tolerance_mm:.3} mm{coarser} ({guessed:.0} % of their vertices guessed)"
         )?;
         match self.moved_vertices {
             0 => Ok(()),

@@ -91,6 +91,18 @@ pub enum SweepError {
         /// what is missing
         why: String,
     },
+    /// … that is no longer as the job wrote it.
+    #[error(
+        "job {job}: {} is damaged: {why}; run it anew by touchup sweep run --job {job} --again", result.display()
+    )]
+    Damaged {
+        /// by its number
+        job: u64,
+        /// its folder
+        result: PathBuf,
+        /// which file, and what is wrong with it
+        why: String,
+    },
     /// A simulated scan or touch.
     #[error(transparent)]
     Simulated(#[from] SimError),

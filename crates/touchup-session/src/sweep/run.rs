@@ -9,7 +9,7 @@ use serde_json::Value;
 use super::base_scene::{BaseScene, JobScene};
 use super::error::SweepError;
 use super::job::Job;
-use super::record::{JobRecord, RECORD};
+use super::record::{JobRecord, RECORD, read_record};
 use super::summary::{JobSummary, RefinedJob};
 use crate::refinement::{InputNames, RefinementError, RefinementInput, TouchSource, refine};
 use crate::replay::{Recording, marker_filter};
@@ -17,6 +17,7 @@ use crate::scan::read_scan;
 use crate::session::{OutcomeError, OutcomePlaces};
 use touchup_io::content_hash::{content_hash, hash_of};
 use touchup_io::features_file::read_features;
+use touchup_io::file_error::FileError;
 use touchup_io::machine::VERSION;
 use touchup_io::result_folder::{Claim, ClaimedFolder, FileBeside, claim};
 use touchup_io::text_file::{read_text, write_text};
@@ -25,6 +26,8 @@ pub(super) const SUMMARY: &str = "summary.json";
 pub(super) const FAILED: &str = "failed.json";
 pub(super) const MESH: &str = "refined.ply";
 pub(super) const FEATURES: &str = "features.json";
+/// What the others hold, as `sha256sum --check` reads it.
+const SUMS: &str = "SHA256SUMS";
 
 /// Content of files that a process has already: then they are not read.
 #[derive(Clone, Copy, Debug, Default)]
@@ -148,6 +151,8 @@ impl JobRunner {
             }
             Err(JobFailure::OfSystem(error)) => return Err(error),
         }
+        let sums = sums_of(claimed.path())?.concat();
+        write_text(&claimed.path().join(SUMS), &sums)?;
         report(job, claimed.publish(again)?, false)
     }
 
@@ -328,7 +333,7 @@ fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), SweepErr
 
 /// What is in the folder of a result.
 fn report(job: &Job, result: PathBuf, was_there: bool) -> Result<JobReport, SweepError> {
-    let ResultFiles { failed, summary } = ResultFiles::read(&result)?;
+    let ResultFiles { failed, summary } = ResultFiles::of_job(job, &result)?;
     Ok(JobReport {
         job: job.job,
         id: job.id.clone(),
@@ -339,6 +344,16 @@ fn report(job: &Job, result: PathBuf, was_there: bool) -> Result<JobReport, Swee
     })
 }
 
+/// A line for each file of a result with its hash.
+fn sums_of(result: &Path) -> Result<Vec<String>, FileError> {
+    let names: &[&str] = match result.join(FAILED).exists() {
+        true => &[FAILED, RECORD],
+        false => &[FEATURES, RECORD, MESH, SUMMARY],
+    };
+    let line = |name: &&str| Ok(format!("{}  {name}\n", content_hash(&result.join(name))?));
+    names.iter().map(line).collect()
+}
+
 /// Summary or failure of a job.
 pub(super) struct ResultFiles {
     pub failed: Option<String>,
@@ -346,9 +361,38 @@ pub(super) struct ResultFiles {
 }
 
 impl ResultFiles {
+    /// Those of a job, whose folder may have been changed since.
+    ///
     /// # Errors
-    /// [`SweepError::NoResult`]
+    /// [`SweepError::Damaged`]
+    pub fn of_job(job: &Job, result: &Path) -> Result<Self, SweepError> {
+        let damaged = |why: String| SweepError::Damaged {
+            job: job.job,
+            result: result.to_owned(),
+            why,
+        };
+        let files = Self::read(result).map_err(|error| damaged(error.to_string()))?;
+        let record = read_record(result).map_err(|error| damaged(error.to_string()))?;
+        if record.id != job.id {
+            return Err(damaged(format!("{RECORD} is that of job {}", record.id)));
+        }
+        Ok(files)
+    }
+
+    /// # Errors
+    /// [`SweepError::NoResult`]: a file that is missing, or is not as it was written.
     pub fn read(result: &Path) -> Result<Self, SweepError> {
+        let no_result = |why: String| SweepError::NoResult {
+            path: result.to_owned(),
+            why,
+        };
+        let sums = read_text(&result.join(SUMS)).map_err(|error| no_result(error.to_string()))?;
+        let found = sums_of(result).map_err(|error| no_result(error.to_string()))?;
+        let changed = |line: &&String| sums.split_inclusive('\n').all(|written| written != **line);
+        if let Some(changed) = found.iter().find(changed) {
+            let name = changed.trim_end().rsplit(' ').next().unwrap_or_default();
+            return Err(no_result(format!("{name} is not as it was written")));
+        }
         let read = |name: &str| {
             let path = result.join(name);
             let refused = |why: String| SweepError::NoResult {

@@ -26,6 +26,8 @@ pub struct SweepTables {
     pub missing: u64,
     /// … the first of them by their numbers
     pub first_missing: Vec<u64>,
+    /// jobs whose result is no longer as it was written, each in words
+    pub damaged: Vec<String>,
 }
 
 /// Reads all results of a plan.
@@ -33,7 +35,7 @@ pub struct SweepTables {
 /// - `with_features`: whether features are read as well.
 ///
 /// # Errors
-/// [`SweepError`]: a line of the plan or a file of a result that cannot be read.
+/// [`SweepError`]: a line of the plan that cannot be read.
 pub fn tables_of(
     jobs: &Path,
     results: &Path,
@@ -50,7 +52,13 @@ pub fn tables_of(
             }
             continue;
         }
-        let ResultFiles { failed, summary } = ResultFiles::read(&result)?;
+        let ResultFiles { failed, summary } = match ResultFiles::of_job(&job, &result) {
+            Err(damaged) => {
+                tables.damaged.push(damaged.to_string());
+                continue;
+            }
+            Ok(files) => files,
+        };
         tables.failed += u64::from(failed.is_some());
         let mut row = row_of(&job, failed.as_deref());
         if tables.jobs.rows() == 0 {

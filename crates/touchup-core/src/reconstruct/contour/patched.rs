@@ -90,6 +90,8 @@ pub struct Patched {
     pub sigma: Vec<f64>,
     /// how far the new faces may be from the surface that the touches show, m
     pub tolerance: f64,
+    /// whether that is more than usual, as a finer lattice would not have fitted
+    pub is_coarser: bool,
     /// faces of the scan that were removed
     pub removed_faces: usize,
     /// faces that were added
@@ -168,6 +170,7 @@ mod tests {
             support,
             sigma,
             tolerance: 1.0,
+            is_coarser: false,
             removed_faces: 0,
             added_faces: 0,
             moved_vertices: 0,

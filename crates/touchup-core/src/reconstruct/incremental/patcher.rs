@@ -39,6 +39,9 @@ pub struct PatcherParams {
     pub free_space: bool,
     /// how far the new faces may be from the surface that the touches show, m
     pub tolerance: f64,
+    /// whether it is the usual one, which is made larger where the lattice around all that was
+    /// touched would not fit; else that is refused
+    pub is_usual_tolerance: bool,
     /// the model of uncertainty; `None`: no uncertainty, and nothing is rejected
     pub uncertainty: Option<UncertaintyParams>,
     /// what the tip does elsewhere is not looked at; `None`: the scan may be touched anywhere
@@ -67,6 +70,7 @@ impl PatcherParams {
             evidence: EvidenceParams::new(radius, noise),
             free_space: true,
             tolerance: TOLERANCE * radius,
+            is_usual_tolerance: false,
             uncertainty: Some(UncertaintyParams::new(noise)),
             region: None,
         }
@@ -136,7 +140,7 @@ impl PatcherParams {
         let why = format!(
             "{:.2e} or more: the lattice around {around} would have {nodes:.1e} nodes and take {:.1} GB; a larger \
              patch.tolerance_mm takes less",
-            self.tolerance * (nodes / most).cbrt().powi(2) * 1e3,
+            self.fitting_tolerance(nodes, most) * 1e3,
             nodes * NODE_BYTES * 1e-9,
         );
         SettingError::check(
@@ -145,6 +149,11 @@ impl PatcherParams {
             nodes <= most,
             &why,
         )
+    }
+
+    /// The tolerance by whose lattice `nodes` are `most`: the edges of its cells are as its root.
+    fn fitting_tolerance(&self, nodes: f64, most: f64) -> f64 {
+        self.tolerance * (nodes / most).cbrt().powi(2)
     }
 
     /// # Errors
@@ -343,15 +352,34 @@ impl Patcher {
     }
 
     /// Refuses to reconstruct what was touched so far by a lattice that would not fit, before any
-    /// of it is made.
+    /// of it is made; that of the usual tolerance is made coarser.
     ///
     /// # Errors
     /// [`SettingError`] of `patch.tolerance_mm`, with nodes and memory.
     pub fn check_extent(&self) -> Result<(), SettingError> {
-        let means = self.history.contacts.means().iter().map(|mean| mean.point);
-        let nodes = nodes_around_contacts(means, self.params.evidence.radius, self.params.pitch());
+        if self.params.is_usual_tolerance {
+            return Ok(());
+        }
         self.params
-            .check_nodes(nodes, MOST_NODES_IN_ALL, "all that was touched")
+            .check_nodes(self.nodes(), MOST_NODES_IN_ALL, "all that was touched")
+    }
+
+    /// How far the new faces may be from the surface that the touches show, m: the usual tolerance,
+    /// or what makes the lattice around all that was touched fit.
+    pub fn tolerance(&self) -> f64 {
+        let params = &self.params;
+        match params.is_usual_tolerance {
+            true => params
+                .fitting_tolerance(self.nodes(), MOST_NODES_IN_ALL)
+                .max(params.tolerance),
+            false => params.tolerance,
+        }
+    }
+
+    /// About as many nodes has the lattice around all that was touched so far.
+    fn nodes(&self) -> f64 {
+        let means = self.history.contacts.means().iter().map(|mean| mean.point);
+        nodes_around_contacts(means, self.params.evidence.radius, self.params.pitch())
     }
 
     /// The touches themselves, in order of time.
@@ -435,13 +463,29 @@ impl Patcher {
     }
 
     /// The scan with its touched part remeshed from all that counts so far; vertices and faces that
-    /// were not touched keep their ids.
+    /// were not touched keep their ids. The usual tolerance is larger here where the lattice would
+    /// not fit.
     ///
     /// - `scan`: the original, with the tree over its faces.
     ///
     /// # Errors
     /// [`MeshError::TooMany`] when 32-bit ids do not suffice.
     pub fn patched(&mut self, scan: &TriMesh, tree: &FaceTree) -> Result<Patched, MeshError> {
+        let fitting = self.tolerance();
+        let usual = std::mem::replace(&mut self.params.tolerance, fitting);
+        let patched = self.patched_within_tolerance(scan, tree);
+        self.params.tolerance = usual;
+        patched.map(|patched| Patched {
+            is_coarser: patched.tolerance > usual,
+            ..patched
+        })
+    }
+
+    fn patched_within_tolerance(
+        &mut self,
+        scan: &TriMesh,
+        tree: &FaceTree,
+    ) -> Result<Patched, MeshError> {
         self.history.contacts.note_all();
         self.update(scan, tree);
         let kept = KeptDetail::of(&self.evidence(scan, tree, None));
@@ -475,6 +519,7 @@ impl Patcher {
             support,
             sigma,
             tolerance: self.params.tolerance,
+            is_coarser: false,
             removed_faces: patch.removed.len(),
             added_faces: patch.faces.len(),
             moved_vertices: moved.len(),

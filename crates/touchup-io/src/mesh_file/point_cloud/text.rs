@@ -5,6 +5,7 @@ use nalgebra::{Point3, Vector3};
 use super::super::defect::{Defect, Syntax};
 use super::super::text::NumberedLines;
 use crate::file_error::FilePlace;
+use crate::table_rows::DecimalSign;
 use touchup_core::mesh::{PointCloud, ScanStation};
 
 /// Bytes of the shortest line: three digits and what separates them.
@@ -83,8 +84,7 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<PointCloud, Syntax> {
 struct Notation {
     /// `None`: blanks
     separator: Option<char>,
-    /// `None`: no number has had one yet
-    decimal_sign: Option<char>,
+    decimal_sign: DecimalSign,
     /// commas between whole numbers, as many as decimals would make
     may_be_decimals: bool,
 }
@@ -105,7 +105,7 @@ impl Notation {
         let columns = line.trim().trim_end_matches(',').split(',').count();
         Self {
             separator,
-            decimal_sign: None,
+            decimal_sign: DecimalSign(None),
             may_be_decimals: separator == Some(',') && columns >= 6 && columns.is_multiple_of(2),
         }
     }
@@ -135,23 +135,19 @@ impl Notation {
     }
 
     fn number<'a>(&mut self, word: &'a str) -> Result<f64, (&'static str, &'a str)> {
-        let sign = word.chars().find(|c| ['.', ','].contains(c));
-        if let Some(sign) = sign {
+        if word.contains(['.', ',']) {
             self.may_be_decimals = false;
-            if *self.decimal_sign.get_or_insert(sign) != sign {
-                return Err(("the decimal sign of the lines before", word));
-            }
         }
+        let number = self
+            .decimal_sign
+            .with_point(word)
+            .ok_or(("the decimal sign of the lines before", word))?;
         // what follows a decimal sign may begin with a zero
         let digits = word.trim_start_matches(['+', '-']).as_bytes();
         if self.separator == Some(',') && matches!(digits, [b'0', b'0'..=b'9', ..]) {
             return Err((DECIDED, word));
         }
-        let parsed = match sign {
-            Some(',') => word.replace(',', ".").parse(),
-            _ => word.parse(),
-        };
-        parsed.map_err(|_| ("a number", word))
+        number.parse().map_err(|_| ("a number", word))
     }
 }
 
@@ -162,12 +158,13 @@ const DECIDED: &str = "numbers with decimal points, or with decimal commas and s
 /// A line that is none of numbers; "nan" and "inf" are numbers.
 fn is_comment(line: &str) -> bool {
     let word = line
+        .trim_start_matches(['"', '\''])
         .split(|c: char| !c.is_ascii_alphabetic())
         .next()
         .unwrap_or_default()
         .to_ascii_lowercase();
     let is_number = ["", "nan", "inf", "infinity"].contains(&word.as_str());
-    line.starts_with(['#', '/', '%', '!', '"', '\'']) || !is_number
+    line.starts_with(['#', '/', '%', '!']) || !is_number
 }
 
 /// The normals of all lines so far, where each line had one there.
@@ -250,6 +247,10 @@ mod tests {
                 "line 1: expected a number, found '1,234.5'",
             ),
             ("1;;3\n", "line 1: expected a number, found ''"),
+            (
+                "\"x\",\"y\",\"z\"\n1,2,3\n\"1,234\",2,3\n",
+                "line 3: expected a number, found '\"1'",
+            ),
         ] {
             assert_eq!(error(text), wanted);
         }

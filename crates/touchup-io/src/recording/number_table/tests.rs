@@ -177,10 +177,10 @@ fn tables_with_a_bad_line_are_refused_with_its_number() {
     let header = "t_s;x_m;y_m;z_m;qx;qy;qz;qw;fx_n;fy_n;fz_n\n";
     for (line, word) in [
         (
-            "0;0,1;0,2;0,3;0;0;0;1;1;2;3\n",
+            "0,5;0.1;0.2;0.3;0;0;0;1;1;2;3\n",
             "line 2 has a value that is no number",
         ),
-        ("0,5;0.1;0.2;0.3;0;0;0;1;1;2;3\n", "the time in line 2"),
+        ("x;0.1;0.2;0.3;0;0;0;1;1;2;3\n", "the time in line 2"),
         (
             "0;0.1;0.2;0.3;0;0;0;2;1;2;3\n",
             "the orientation in line 2 has not the length 1",
@@ -196,4 +196,31 @@ fn tables_with_a_bad_line_are_refused_with_its_number() {
     assert!(why("1,2,3\n", &usual).contains("numbers alone"));
     assert!(why("", &usual).contains("empty"));
     assert!(why(&"a".repeat(100_000), &usual).contains("over the limit"));
+    let open = why(&[header, "0;\"0.1;0.2\n1;2\n"].concat(), &usual);
+    assert!(
+        open.contains("line 2: a value in quotation marks runs out"),
+        "{open}"
+    );
+}
+
+/// As a spreadsheet saves it where decimals have a comma.
+#[test]
+fn a_table_has_one_decimal_sign_and_may_have_quotation_marks() {
+    let header = "\u{feff}\"t_s\";\"x, of the tip [mm]\";y_mm;z_mm;fx_n;fy_n;fz_n\r\n";
+    let columns = TableColumns {
+        position: names(&["x, of the tip [mm]", "y_mm", "z_mm"]),
+        ..TableColumns::default()
+    };
+    let rows = "\"1795000000,000000001\";1000,5;0;\"2,5\";1;2;-3,25\r\n2;1.5;0;0;1;2;3\r\n";
+    let rows = read(&[header, rows].concat(), &columns).unwrap();
+    let first = rows[0].as_ref().unwrap();
+    let pose = first.pose.unwrap();
+    assert_eq!(pose.stamp_ns, 1_795_000_000_000_000_001);
+    let expected = Vector3::new(1.0005, 0.0, 0.0025);
+    assert!((pose.pose_ot.translation.vector - expected).norm() < 1e-15);
+    assert_eq!(
+        first.wrench.unwrap().wrench.force,
+        Vector3::new(1.0, 2.0, -3.25)
+    );
+    assert_eq!(rows[1].as_ref().map(|_| ()), Err(&BadMessage::Malformed));
 }
