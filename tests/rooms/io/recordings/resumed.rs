@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use touchup::io::recording::{RecordingReader, SegmentedWriter, Topics};
+use touchup::io::recording::{RecordingError, RecordingReader, SegmentedWriter, Topics};
 use touchup::stylus::Message;
 
 use super::made::touch;
@@ -85,7 +85,8 @@ fn a_file_that_could_not_be_begun_takes_no_other_along() {
     let next = folder.path().join("touch_0001.mcap");
     fs::create_dir(&next).unwrap();
     for refused in &messages[20..23] {
-        assert!(writer.write(refused, FRAMES[0]).is_err());
+        let written = writer.write(refused, FRAMES[0]);
+        assert!(matches!(written, Err(RecordingError::NotWritten(_))));
         assert_eq!(writer.give_up_segment(), 0);
     }
     fs::remove_dir(&next).unwrap();
