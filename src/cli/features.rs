@@ -11,7 +11,7 @@ use super::progress::WorkProgress;
 use super::{CliError, Losses, check_kept, counted, print_report, require};
 use crate::features::clusters::{Cluster, ClusterParams, PaperParams, clusters, paper_clusters};
 use crate::features::curvature::curvature;
-use crate::features::{Detection, Feature, FittedTo, Kind, Measured};
+use crate::features::{Detection, Feature, FittedTo, Form, Kind, Measured};
 use crate::io::features_file::FeatureFile;
 use crate::io::mesh_file::MeshUnit;
 use crate::io::result_table::write_features_as_named;
@@ -173,7 +173,7 @@ fn feature_table(
             .collect();
         lines.push(format!("features: {}", counts.join(", ")));
         lines.push(format!(
-            "{:>4}  {:<7} {:>28}  {:<44} fitted to",
+            "{:>4}  {:<7} {:>28}  {:<61} fitted to",
             "id", "kind", "center, mm", "size, mm"
         ));
         lines.extend(
@@ -216,7 +216,7 @@ fn row(feature: &Feature) -> String {
         FittedTo::Mesh => "mesh".to_owned(),
     };
     format!(
-        "{:>4}  {:<7} {place:>28}  {:<44} {from}",
+        "{:>4}  {:<7} {place:>28}  {:<61} {from}",
         feature.id,
         feature.kind.name(),
         size(feature)
@@ -240,8 +240,20 @@ fn size(feature: &Feature) -> String {
     if let Some(cone) = &feature.cone_angle {
         parts.push(format!("countersunk {:.1}°", cone.value.to_degrees()));
     }
+    if let Some(facets) = feature.facets {
+        parts.push(format!("facets {:.3} inside", facets * 1e3));
+    }
+    if let (Some(Form::Round(form)), FittedTo::Mesh) = (&feature.form, feature.fitted_to)
+        && form.roundness.minimum_zone.value > NOTABLE_FORM
+    {
+        let roundness = form.roundness.minimum_zone.value;
+        parts.push(format!("out of round by {:.3}", roundness * 1e3));
+    }
     parts.join(" ")
 }
+
+/// Smallest roundness of a drawing that is told, m: that of its rounding is none.
+const NOTABLE_FORM: f64 = 1e-6;
 
 fn with_std(measured: &Measured<f64>) -> String {
     let std = measured

@@ -232,8 +232,12 @@ reported! {
         #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
         pub std: BTreeMap<String, f64> =
             known(feature).filter_map(|(name, std, _)| Some((name.to_owned(), std?))).collect(),
-        /// hole, notch, boss, cylinder, plane: how far what was touched is off its ideal form
+        /// hole, notch, boss, cylinder, plane: how far what was touched, or drawn, is off its ideal
+        /// form
         pub form?: FormRecord = feature.form.as_ref().map(FormRecord::of),
+        /// hole, notch, boss, cylinder, slot, pocket of a drawing: how far the middles of its facets
+        /// lie inside the round surface through their corners; left out where there are none
+        pub facets_mm?: f64 = feature.facets.map(|m| m * 1e3),
         /// share of its surface within a ball's radius of a touch
         #[serde(default)]
         pub touched: f64 = feature.touched,

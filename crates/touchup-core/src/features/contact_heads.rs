@@ -246,6 +246,7 @@ fn head_under(
         fit: Some(found),
         touches,
         to: FittedTo::Touches,
+        uneven: 0.0,
         is_confirmed: true,
     };
     Some(Head {

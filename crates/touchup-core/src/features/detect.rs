@@ -12,7 +12,7 @@ use super::fit::{Fit, Freedom, Plane, Stadium, Surface};
 use super::holes::{Boss, Hole, bosses, groups, holes};
 use super::measure::{Fitted, Measure};
 use super::observe::{NOT_ALIKE, Observed};
-use super::rims::{RoundOpening, rims};
+use super::rims::{Outline, RoundOpening, outlines, rims};
 use super::scene::{Parted, numbered_by_place};
 use super::slots::{Slot, slots};
 use super::walls::{ALL_AROUND, Wall};
@@ -119,6 +119,24 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
             .map(|rim| rim_feature(&measure, rim)),
     );
     features.retain(|feature| !is_way_of_ball(feature));
+    let bosses = bosses(&parted, &walls);
+    let is_shaft =
+        |at: &usize| is_shaft(&parted, &walls[*at]) && bosses.iter().all(|boss| boss.wall != *at);
+    let shafts: Vec<usize> = (0..walls.len()).filter(is_shaft).collect();
+    let of_holes = holes
+        .iter()
+        .flat_map(|hole| [Some(hole.wall), hole.countersink]);
+    let of_bosses = bosses.iter().map(|boss| boss.wall).chain(shafts.clone());
+    let round: Vec<&Wall> = of_holes
+        .flatten()
+        .chain(of_bosses)
+        .map(|wall| &walls[wall])
+        .collect();
+    let flat: Vec<&Slot> = slots.iter().chain(&pockets).collect();
+    let (raised, cut): (Vec<Feature>, Vec<Feature>) = of_other_outline(&measure, &round, &flat)
+        .into_iter()
+        .partition(|feature| feature.kind == Kind::Boss);
+    features.extend(cut);
     let mut features = with_heads(&measure, without_second_walls(features));
     let is_reported = |slot: &Slot, feature: &Feature| {
         // of a measured mesh what is open all around may be a gap between its pieces
@@ -138,18 +156,16 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
             .iter()
             .map(|pocket| slot_feature(&measure, pocket, Kind::Pocket)),
     );
-    let bosses = bosses(&parted, &walls);
     let raised = bosses
         .iter()
         .map(|boss| boss_feature(&measure, &walls, boss))
+        .chain(raised)
         .collect();
     features.extend(without_second_walls(raised));
-    let is_shaft =
-        |at: &usize| is_shaft(&parted, &walls[*at]) && bosses.iter().all(|boss| boss.wall != *at);
     features.extend(
-        (0..walls.len())
-            .filter(is_shaft)
-            .map(|at| cylinder_feature(&measure, &walls[at])),
+        shafts
+            .iter()
+            .map(|&at| cylinder_feature(&measure, &walls[at])),
     );
     features.extend(edges.iter().filter_map(|edge| edge_feature(&measure, edge)));
     features.extend(corners(&parted, &measure, &edges));
@@ -548,7 +564,8 @@ fn hole_feature(measure: &Measure, walls: &[Wall], hole: &Hole) -> Feature {
         axis: Some(axis),
         through: hole.through.filter(|_| is_known),
         walls: Some(Walls::Round(fitted.surface)),
-        form: measure.round_form(&fitted).map(Form::Round),
+        form: measure.round_form(&fitted, &wall.segments).map(Form::Round),
+        facets: measure.facets(&fitted.surface, &wall.segments),
         element: measure.axis_element(&fitted),
         cone_angle: cone.map(|cone| {
             cone.number(
@@ -588,6 +605,7 @@ fn rim_feature(measure: &Measure, rim: &RoundOpening) -> Feature {
         fit,
         touches: Vec::new(),
         to: FittedTo::Mesh,
+        uneven: 0.0,
         is_confirmed,
     };
     let std = fitted
@@ -611,6 +629,51 @@ fn rim_feature(measure: &Measure, rim: &RoundOpening) -> Feature {
     }
 }
 
+/// A wall is of an outline when it is about its axis and no narrower than its circle by this factor:
+/// broken edges and fillets are between both.
+const BROKEN_EDGE: f64 = 1.25;
+
+/// What is cut into the planes of a drawing or stands on them and is none of these walls, slots and
+/// pockets, whatever its outline is.
+fn of_other_outline(measure: &Measure, round: &[&Wall], flat: &[&Slot]) -> Vec<Feature> {
+    let parted = measure.observed.parted;
+    if parted.rounding.is_none() {
+        return Vec::new();
+    }
+    let mut is_known = vec![false; parted.segmentation.segments.len()];
+    let of_round = round.iter().flat_map(|wall| wall.segments.iter().copied());
+    let ends = flat.iter().flat_map(|slot| slot.ends.into_iter().flatten());
+    let of_flat = flat.iter().flat_map(|slot| slot.walls.iter().copied());
+    of_round
+        .chain(of_flat)
+        .chain(ends)
+        .for_each(|number| is_known[number] = true);
+    let is_new = |outline: &Outline| {
+        let (rim, radius) = (&outline.rim, outline.rim.fit.surface.radius);
+        let is_broken = |wall: &&Wall| is_rim_of(wall, rim) && radius < BROKEN_EDGE * wall.radius();
+        let is_of_slot = |slot: &&Slot| {
+            let v = rim.centre - slot.centre;
+            (v - slot.out * v.dot(&slot.out)).norm() < ALIKE * slot.width
+        };
+        !round.iter().any(is_broken) && !flat.iter().any(is_of_slot)
+    };
+    let named = |outline: Outline| Feature {
+        kind: outline.kind,
+        depth: Some(Measured {
+            value: outline.depth,
+            ..Measured::default()
+        }),
+        through: outline.through,
+        form: Some(Form::Round(outline.form)),
+        ..rim_feature(measure, &outline.rim)
+    };
+    outlines(parted, &is_known)
+        .into_iter()
+        .filter(is_new)
+        .map(named)
+        .collect()
+}
+
 fn boss_feature(measure: &Measure, walls: &[Wall], boss: &Boss) -> Feature {
     let wall = &walls[boss.wall];
     let fitted = measure.cylinder(wall, Some(boss.base));
@@ -627,7 +690,8 @@ fn boss_feature(measure: &Measure, walls: &[Wall], boss: &Boss) -> Feature {
         depth: Some(extent(measure, &fitted, &foot, &top, &axis.value)),
         axis: Some(axis),
         walls: Some(Walls::Round(fitted.surface)),
-        form: measure.round_form(&fitted).map(Form::Round),
+        form: measure.round_form(&fitted, &wall.segments).map(Form::Round),
+        facets: measure.facets(&fitted.surface, &wall.segments),
         element: measure.axis_element(&fitted),
         ..Feature::new(
             if boss.is_turned {
@@ -660,7 +724,8 @@ fn cylinder_feature(measure: &Measure, wall: &Wall) -> Feature {
         }),
         axis: Some(fitted.axis(&wall.axis)),
         walls: Some(Walls::Round(fitted.surface)),
-        form: measure.round_form(&fitted).map(Form::Round),
+        form: measure.round_form(&fitted, &wall.segments).map(Form::Round),
+        facets: measure.facets(&fitted.surface, &wall.segments),
         element: measure.axis_element(&fitted),
         ..Feature::new(
             Kind::Cylinder,
@@ -727,7 +792,14 @@ fn slot_feature(measure: &Measure, slot: &Slot, kind: Kind) -> Feature {
     } else {
         extent(measure, &fitted, &opening, &floor, &axis.value)
     };
+    let segments: Vec<usize> = slot
+        .walls
+        .iter()
+        .copied()
+        .chain(slot.ends.into_iter().flatten())
+        .collect();
     Feature {
+        facets: measure.facets(&fitted.surface, &segments),
         direction: Some(direction),
         width: Some(fitted.number(width, &[(Freedom::Size, 1.0)])),
         length: Some(fitted.number(length, &[(Freedom::Second, 1.0)])),

@@ -12,6 +12,9 @@ use crate::numeric::{distinct, tangent_basis};
 /// Directions in which the outermost touches of a plane are taken.
 const CORNERS: usize = 16;
 
+/// Facets are told when they are off by so many roundings.
+const SEEN_FACETS: f64 = 10.0;
+
 /// Covariance in O of what a fit says of point and direction, m and rad: without what all touches
 /// have in common.
 fn own_covariance<S: Surface>(fit: &Fit<S>) -> Matrix6<f64> {
@@ -45,18 +48,38 @@ impl Measure<'_> {
             .collect()
     }
 
-    /// Roundness, cylindricity and straightness of a wall that was fitted to touches.
-    pub fn round_form(&self, fitted: &Fitted<Cylinder>) -> Option<RoundForm> {
-        let cylinder = &fitted.surface;
-        let is_touched = fitted.to == FittedTo::Touches;
-        let points = self.form_points(fitted);
-        round_form(
-            &points,
-            &cylinder.center(),
-            &cylinder.axis(),
-            cylinder.radius,
-        )
-        .filter(|_| is_touched)
+    /// Roundness, cylindricity and straightness of a wall that was fitted to touches; in a drawing
+    /// that nobody touched the roundness of its corners.
+    ///
+    /// - `segments`: of the wall.
+    pub fn round_form(&self, fitted: &Fitted<Cylinder>, segments: &[usize]) -> Option<RoundForm> {
+        let (centre, axis) = (fitted.surface.center(), fitted.surface.axis());
+        if fitted.to == FittedTo::Touches {
+            let points = self.form_points(fitted);
+            return round_form(&points, &centre, &axis, fitted.surface.radius);
+        }
+        let is_drawn = self.observed.parted.rounding.is_some() && fitted.is_confirmed;
+        let corners = self.observed.of_mesh(segments);
+        let corners = corners.iter().map(|corner| &corner.point);
+        is_drawn.then(|| RoundForm::of_section(corners, &centre, &axis))?
+    }
+
+    /// How far the facets of a drawing lie inside the surface through their corners, m; `None`
+    /// where they do not, and of a mesh that was measured.
+    pub fn facets(&self, surface: &impl Surface, segments: &[usize]) -> Option<f64> {
+        let parted = self.observed.parted;
+        let rounding = parted.rounding?;
+        let faces = segments
+            .iter()
+            .flat_map(|&number| &parted.segment(number).faces);
+        let middles = faces.flat_map(|&face| {
+            [0, 1, 2].map(|edge| {
+                let [a, b] = parted.facets.edge(face, edge);
+                nalgebra::center(&a, &b)
+            })
+        });
+        let off = middles.map(|p| surface.distance(&p).abs());
+        Some(off.fold(0.0, f64::max)).filter(|&off| off > SEEN_FACETS * rounding)
     }
 
     /// Flatness of a plane that was fitted to touches.

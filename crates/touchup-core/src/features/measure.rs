@@ -8,6 +8,7 @@ use nalgebra::{Point3, Vector3};
 use super::feature::{FittedTo, Measured};
 use super::fit::{
     Cone, Cylinder, Ends, Fit, FitParams, Freedom, Observation, Plane, Stadium, Surface, fit,
+    fit_mesh,
 };
 use super::observe::Observed;
 use super::primitive::Primitive;
@@ -25,6 +26,8 @@ pub(super) struct Fitted<S> {
     /// numbers of the touches that were used
     pub touches: Vec<u32>,
     pub to: FittedTo,
+    /// of a mesh the root mean square of its residuals, m
+    pub uneven: f64,
     /// whether the residuals say how far the surface is off: those of touches do, and those of a
     /// mesh that nothing touched; beside touches they are of a surface that nobody felt, which may
     /// be off as a whole
@@ -37,10 +40,10 @@ pub(super) struct Measure<'a> {
     planes: RefCell<BTreeMap<usize, Fitted<Plane>>>,
 }
 
-/// Fewer touches than this are left to the mesh.
-const LEAST_TOUCHES: usize = 12;
+/// Fewer touches than this on a surface are left to the mesh.
+pub const LEAST_TOUCHES: usize = 12;
 /// Touches around less of a turn than this are left to the mesh.
-const LEAST_TURN: f64 = 0.4;
+pub const LEAST_TURN: f64 = 0.4;
 /// Touches on a plane that spread less than this share across their longest direction are left to
 /// the mesh; beside an edge they are enough when they spread over this share of what the mesh has.
 const LEAST_SPREAD: f64 = 0.1;
@@ -148,7 +151,13 @@ impl<'a> Measure<'a> {
                 .sqrt()
         };
         let touches = self.squarest(all, lean, is_inside, is_enough);
-        self.fitted(guess, touches, &self.observed.of_mesh(&[number]), None)
+        self.fitted(
+            guess,
+            touches,
+            &self.observed.of_mesh(&[number]),
+            None,
+            None,
+        )
     }
 
     /// The plane through touches, about square to `normal`; `None` where there are none.
@@ -165,6 +174,7 @@ impl<'a> Measure<'a> {
                 touches.to_vec(),
                 &[],
                 Some(DRILLED),
+                None,
             )
         })
     }
@@ -180,7 +190,13 @@ impl<'a> Measure<'a> {
         } else {
             touches
         };
-        Some(self.fitted(&guess, touches, &self.observed.of_mesh(&[number]), None))
+        Some(self.fitted(
+            &guess,
+            touches,
+            &self.observed.of_mesh(&[number]),
+            None,
+            None,
+        ))
     }
 
     /// The cylinder of a wall.
@@ -210,6 +226,7 @@ impl<'a> Measure<'a> {
             touches,
             &self.observed.of_mesh(&wall.segments),
             axis_sigma,
+            rim,
         )
     }
 
@@ -226,6 +243,7 @@ impl<'a> Measure<'a> {
             &guess,
             self.touches_around(wall),
             &self.observed.of_mesh(&wall.segments),
+            None,
             None,
         ))
     }
@@ -360,16 +378,20 @@ impl<'a> Measure<'a> {
             |_| true,
             is_enough,
         );
-        self.fitted(&guess, touches, &of_mesh, Some(DRILLED))
+        self.fitted(&guess, touches, &of_mesh, Some(DRILLED), Some(slot.land))
     }
 
     /// Fits to touches; where there are none, or it fails, to the mesh.
+    ///
+    /// - `around`: number of the plane that says how uneven the mesh is there: a small surface
+    ///   follows its waves.
     fn fitted<S: Surface>(
         &self,
         guess: &S,
         touches: Vec<u32>,
         of_mesh: &[Observation],
         axis_sigma: Option<f64>,
+        around: Option<usize>,
     ) -> Fitted<S> {
         let [common_sigma, shift_sigma] = self.observed.systematic(&touches);
         let params = FitParams {
@@ -393,6 +415,7 @@ impl<'a> Measure<'a> {
                 fit: Some(found),
                 touches,
                 to,
+                uneven: 0.0,
                 is_confirmed: true,
             };
         }
@@ -400,16 +423,29 @@ impl<'a> Measure<'a> {
             axis_sigma,
             ..FitParams::default()
         };
-        let found = fit(guess, of_mesh, &params).ok();
+        let is_confirmed = !self.observed.has_touches();
+        let found = if is_confirmed {
+            let radius = guess.section_radius();
+            let facets = radius.map_or(0.0, |radius| self.observed.sagitta(radius));
+            let uneven = around.and_then(|number| self.plane(number));
+            let uneven = uneven.map_or(0.0, |plane| plane.uneven);
+            fit_mesh(guess, of_mesh, &params, uneven, facets)
+        } else {
+            fit(guess, of_mesh, &params)
+        };
+        let found = found.ok();
         let surface = found
             .as_ref()
             .map_or_else(|| guess.clone(), |found| found.surface.clone());
-        let is_confirmed = !self.observed.has_touches();
+        let uneven = found
+            .as_ref()
+            .map_or(0.0, |found| found.unevenness(of_mesh));
         Fitted {
             surface,
             fit: found,
             touches: Vec::new(),
             to: FittedTo::Mesh,
+            uneven,
             is_confirmed,
         }
     }
@@ -471,9 +507,13 @@ impl<S: Surface> Fitted<S> {
         }
     }
 
-    /// The standard deviation at a place without what all touches have in common, m.
+    /// The standard deviation at a place without what all touches have in common, m: of a mesh two
+    /// surfaces have nothing in common.
     pub fn own_std_at(&self, place: &Point3<f64>) -> Option<f64> {
-        self.confirmed().and_then(|fit| fit.own_std_at(place))
+        self.confirmed().and_then(|fit| match self.to {
+            FittedTo::Touches => fit.own_std_at(place),
+            FittedTo::Mesh => fit.std_at(place),
+        })
     }
 
     /// The fit, where its standard deviations are those of the surface.

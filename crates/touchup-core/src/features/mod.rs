@@ -42,5 +42,6 @@ pub use detect::{Detection, detect};
 pub use feature::{Feature, FittedTo, Form, Kind, Measured, Walls};
 pub use from_fits::End;
 pub use k_means::{KMeans, k_means};
+pub use measure::{LEAST_TOUCHES, LEAST_TURN};
 pub use relations::{Relation, RelationKind, relations};
 pub use track::Tracker;

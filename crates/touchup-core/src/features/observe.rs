@@ -195,6 +195,15 @@ impl<'a> Observed<'a> {
             .collect()
     }
 
+    /// How far the faces of a measured mesh are off a surface of such a radius, m; 0 in a drawing,
+    /// which has their corners on it.
+    pub fn sagitta(&self, radius: f64) -> f64 {
+        match self.parted.rounding {
+            Some(_) => 0.0,
+            None => self.parted.edge.powi(2) / (8.0 * radius),
+        }
+    }
+
     /// Observations of a segment for a fit: its vertices, or points all over it where it is flat in
     /// a drawing, whose few corners may all lie at its ends.
     pub fn of_mesh_surface(&self, number: usize) -> Vec<Observation> {

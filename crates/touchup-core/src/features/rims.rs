@@ -1,16 +1,19 @@
-//! Round openings of an open mesh: where a sheet ends in a circle there is a hole, though it has no
-//! wall.
+//! Openings by their borders: where a sheet ends in a circle there is a hole, though it has no wall;
+//! and where a plane of a drawing is left or ends in a closed line, something of any outline is cut
+//! in or stands on it.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Point3, Vector3};
 
-use super::facets::Facets;
-use super::fit::{Cylinder, Fit, FitParams, Observation, Surface, fit};
+use super::facets::{Facets, NONE};
+use super::feature::Kind;
+use super::fit::{Cylinder, Fit, FitParams, Observation, Surface, fit_mesh};
 use super::grow::ROUNDING;
 use super::scene::Parted;
-use crate::mesh::VertexId;
+use crate::form::RoundForm;
+use crate::mesh::{FaceId, VertexId};
 use crate::numeric::{mean, tangent_basis};
 
 /// A round opening.
@@ -25,10 +28,25 @@ pub(super) struct RoundOpening {
     pub corners: Vec<Point3<f64>>,
 }
 
+/// What is cut into a plane, or stands on it, and is neither round nor a slot.
+#[derive(Clone, Debug)]
+pub(super) struct Outline {
+    /// a hole, or a boss
+    pub kind: Kind,
+    /// the circle nearest to it
+    pub rim: RoundOpening,
+    /// from the plane to the floor or the top, of what goes through to the other side, m
+    pub depth: f64,
+    /// whether it goes through; of a boss `None`
+    pub through: Option<bool>,
+    /// how far it is off the circle
+    pub form: RoundForm,
+}
+
 /// A loop of border edges, in the order of their faces: the part is on its left.
 struct Loop {
     corners: Vec<Point3<f64>>,
-    /// face of the edge that begins at each corner
+    /// of the edge that begins at each corner its face, or the one across it
     faces: Vec<u32>,
 }
 
@@ -41,6 +59,15 @@ const OFF: f64 = 0.05;
 const OFF_ROOT_MEAN_SQUARE: f64 = 0.025;
 /// Seen from the middle no edge spans more than this, rad: 45°.
 const WIDEST: f64 = PI / 4.0;
+/// Edges longer than this share of an outline are followed in pieces of this length.
+const PIECE: f64 = 1.0 / 48.0;
+/// What is met within this share of the radius is beside the plane itself.
+const AT_ONCE: f64 = 1e-3;
+/// What stands on a plane is a boss when it is off the circle by less than this share of the radius:
+/// a rib or a step is none.
+const BOSS_OFF: f64 = 0.5;
+/// Beside a corner of an outline by this share of the radius there is material.
+const BESIDE: f64 = 0.02;
 /// The edges go around once, without going back by more than this share of it.
 const BACK: f64 = 0.05;
 /// The part around an opening faces out of it: cosine of 66°. That of a wall which ends there does
@@ -56,7 +83,7 @@ const AXIS: f64 = 0.0087;
 /// All round openings, in order of their first faces. The longest border of each piece is where the
 /// piece ends.
 pub(super) fn rims(parted: &Parted) -> Vec<RoundOpening> {
-    let loops = loops(&parted.facets);
+    let loops = loops(parted, open_edges(&parted.facets));
     let mut longest: BTreeMap<u32, (f64, usize)> = BTreeMap::new();
     for (at, border) in loops.iter().enumerate() {
         let of_piece = longest
@@ -73,18 +100,52 @@ pub(super) fn rims(parted: &Parted) -> Vec<RoundOpening> {
         .collect()
 }
 
-/// Closed chains of edges of one face, those through a vertex where several meet left out.
-fn loops(facets: &Facets) -> Vec<Loop> {
+/// Outlines of what is cut into the planes of a drawing or stands on them.
+///
+/// - `is_known`: by segment, whether it is a wall of something that has a name.
+pub(super) fn outlines(parted: &Parted, is_known: &[bool]) -> Vec<Outline> {
+    let of_plane = |number: usize| {
+        let is_of = move |face: u32| parted.segmentation.of_face[face as usize] == number as u32;
+        let faces = parted.segment(number).faces.iter();
+        let edges = faces.flat_map(move |&face| {
+            let corners = parted.facets.mesh.corners(FaceId(face));
+            let beside = parted.facets.beside(face);
+            let left = beside.filter(move |&(_, other)| !is_of(other));
+            left.map(move |(edge, other)| (corners[edge], corners[(edge + 1) % 3], other))
+        });
+        let loops = loops(parted, edges);
+        let outlines = loops
+            .into_iter()
+            .filter_map(move |border| border.outline(parted, number, is_known));
+        outlines.collect::<Vec<_>>()
+    };
+    let planes = parted.planes().map(|(number, ..)| number);
+    planes
+        .filter(|&number| parted.is_strong(number))
+        .flat_map(of_plane)
+        .collect()
+}
+
+/// Edges of one face alone, from which vertex to which.
+fn open_edges<'a>(facets: &'a Facets) -> impl Iterator<Item = (VertexId, VertexId, u32)> + use<'a> {
+    facets.mesh.faces().flat_map(|(face, corners)| {
+        let open = facets.open_edges(face.0);
+        open.map(move |edge| (corners[edge], corners[(edge + 1) % 3], face.0))
+    })
+}
+
+/// Closed chains of edges, those through a vertex where several meet left out.
+///
+/// - `edges`: from which vertex to which, and a face of each.
+fn loops(parted: &Parted, edges: impl Iterator<Item = (VertexId, VertexId, u32)>) -> Vec<Loop> {
     let mut next: BTreeMap<VertexId, (VertexId, u32)> = BTreeMap::new();
     let mut forked: Vec<VertexId> = Vec::new();
-    for (face, corners) in facets.mesh.faces() {
-        for edge in facets.open_edges(face.0) {
-            let (from, to) = (corners[edge], corners[(edge + 1) % 3]);
-            if next.insert(from, (to, face.0)).is_some() {
-                forked.push(from);
-            }
+    for (from, to, face) in edges {
+        if next.insert(from, (to, face)).is_some() {
+            forked.push(from);
         }
     }
+    forked.sort_unstable();
     let mut starts: Vec<(u32, VertexId)> = next
         .iter()
         .map(|(&from, &(_, face))| (face, from))
@@ -102,7 +163,7 @@ fn loops(facets: &Facets) -> Vec<Loop> {
         );
         while let Some((to, face)) = next.remove(&at) {
             is_simple &= forked.binary_search(&at).is_err();
-            border.corners.push(facets.mesh.position(at));
+            border.corners.push(parted.facets.mesh.position(at));
             border.faces.push(face);
             at = to;
         }
@@ -123,17 +184,94 @@ impl Loop {
         self.edges().map(|(a, b)| (b - a).norm()).sum()
     }
 
-    fn rim(&self, parted: &Parted) -> Option<RoundOpening> {
-        if self.corners.len() < LEAST_CORNERS {
-            return None;
-        }
+    /// Its middle, and the unit vector out of an opening that it goes around.
+    fn middle(&self) -> Option<(Point3<f64>, Vector3<f64>)> {
         let middle = Point3::from(mean(self.corners.iter().map(|p| p.coords)));
         // the part is on the left: around an opening it is gone around clockwise
         let area = self
             .edges()
             .map(|(a, b)| (a - middle).cross(&(b - middle)))
             .sum::<Vector3<f64>>();
-        let out = -area.try_normalize(0.0)?;
+        Some((middle, -area.try_normalize(0.0)?))
+    }
+
+    /// The same with points on long edges: the corners of a square alone lie on a circle.
+    fn followed(&self) -> Self {
+        let longest = PIECE * self.length();
+        let along = |(a, b): (Point3<f64>, Point3<f64>)| {
+            let count = ((b - a).norm() / longest).ceil().max(1.0);
+            (0..count as usize).map(move |i| a + (b - a) * (i as f64 / count))
+        };
+        let faces = Vec::new();
+        let corners = self.edges().flat_map(along).collect();
+        Self { corners, faces }
+    }
+
+    /// What is cut into plane number `plane` or stands on it, where the loop goes around it.
+    fn outline(&self, parted: &Parted, plane: usize, is_known: &[bool]) -> Option<Outline> {
+        let followed = self.followed();
+        let (middle, out) = followed.middle()?;
+        let edges = || {
+            self.edges()
+                .zip(&self.faces)
+                .map(|((a, b), &face)| ((b - a).norm(), face))
+        };
+        let is_of_known = |face: u32| {
+            let number = parted.segmentation.of_face[face as usize];
+            number != NONE && is_known[number as usize]
+        };
+        let known = edges().filter(|&(_, face)| is_of_known(face));
+        let is_outer = out.dot(&parted.plane(plane)?.normal()) < 0.0;
+        if is_outer || 2.0 * known.map(|(length, _)| length).sum::<f64>() > self.length() {
+            return None;
+        }
+        let fit = followed.circle(parted, &middle, &out)?;
+        let (centre, radius) = (fit.surface.nearest_on_axis(&middle), fit.surface.radius);
+        if !followed.goes_around(&centre, &out) {
+            return None;
+        }
+        let height = |face: u32| (parted.facets.mesh.barycentre(FaceId(face)) - middle).dot(&out);
+        let is_raised = edges()
+            .map(|(length, face)| length * height(face))
+            .sum::<f64>()
+            > 0.0;
+        let (kind, way) = if is_raised {
+            (Kind::Boss, out)
+        } else {
+            (Kind::Hole, -out)
+        };
+        let around = parted.around(plane);
+        let mut rays = around.rays(radius);
+        let mut met = |from: Point3<f64>, before: f64| {
+            let met = rays.first(&(from - way * before), &way, parted.diagonal)?;
+            Some(met.distance - before)
+        };
+        let floor = met(centre, AT_ONCE * radius);
+        let beside = self.corners[0] + (self.corners[0] - centre).normalize() * (BESIDE * radius);
+        let depth = floor.or_else(|| met(beside, -AT_ONCE * radius))?;
+        let form = RoundForm::of_section(followed.corners.iter(), &centre, &out)?;
+        let corners = self.corners.clone();
+        let is_boss_or_hole = !is_raised || form.roundness.minimum_zone.value < BOSS_OFF * radius;
+        // what ends in the plane itself is a groove around something
+        (is_boss_or_hole && depth > AT_ONCE * radius).then_some(Outline {
+            kind,
+            rim: RoundOpening {
+                fit,
+                centre,
+                out,
+                corners,
+            },
+            depth,
+            through: (!is_raised).then_some(floor.is_none()),
+            form,
+        })
+    }
+
+    fn rim(&self, parted: &Parted) -> Option<RoundOpening> {
+        if self.corners.len() < LEAST_CORNERS {
+            return None;
+        }
+        let (middle, out) = self.middle()?;
         if !self.faces_out(parted, &out) {
             return None;
         }
@@ -172,14 +310,19 @@ impl Loop {
             .iter()
             .map(|p| (p - middle).dot(out).abs())
             .fold(0.0, f64::max);
-        let sigma = parted.rounding.unwrap_or(ROUNDING * parted.diagonal);
+        let rounding = parted.rounding.unwrap_or(ROUNDING * parted.diagonal);
+        let off = self.corners.iter().map(|p| away(p).norm() - radius);
+        let square = off.map(|off| off * off).sum::<f64>() / self.corners.len() as f64;
+        let sigma = square.sqrt().max(rounding);
         // triangles of a scan end before its rim does: all by as much as they please, up to an edge
         let common_sigma = if parted.rounding.is_some() {
             0.0
         } else {
             parted.edge / 12f64.sqrt()
         };
-        let axis_sigma = (height < FLAT * radius).then_some(AXIS);
+        // an oval is a circle of a leaning cylinder, and a drawn plane does not lean
+        let known = parted.rounding.map_or(AXIS, |rounding| rounding / radius);
+        let axis_sigma = (height < FLAT * radius).then_some(known);
         let params = FitParams {
             axis_sigma,
             common_sigma,
@@ -192,12 +335,8 @@ impl Loop {
             group: group as u32,
         };
         let observations: Vec<_> = self.corners.iter().enumerate().map(observation).collect();
-        fit(
-            &Cylinder::new(*middle, out, radius, true),
-            &observations,
-            &params,
-        )
-        .ok()
+        let guess = Cylinder::new(*middle, out, radius, true);
+        fit_mesh(&guess, &observations, &params, 0.0, 0.0).ok()
     }
 
     fn is_round(&self, centre: &Point3<f64>, out: &Vector3<f64>, radius: f64) -> bool {
@@ -210,18 +349,25 @@ impl Loop {
             .map(|[x, y]| (x.hypot(y) / radius - 1.0).abs())
             .collect();
         let mean_square = off.iter().map(|off| off * off).sum::<f64>() / off.len() as f64;
-        let turns = self.edges().map(|(a, b)| {
-            let ([x, y], [u, v]) = (place(&a), place(&b));
-            ((v.atan2(u) - y.atan2(x)) + PI).rem_euclid(TAU) - PI
-        });
-        let turns: Vec<f64> = turns.collect();
-        // `out` looks at us: the edges go clockwise
-        let back: f64 = turns.iter().map(|turn| turn.max(0.0)).sum();
-        let around: f64 = turns.iter().sum();
         off.iter().all(|&off| off < OFF)
             && mean_square.sqrt() < OFF_ROOT_MEAN_SQUARE
-            && turns.iter().all(|turn| turn.abs() < WIDEST)
-            && back < BACK * TAU
-            && (around + TAU).abs() < BACK
+            && self.turns(centre, out).all(|turn| turn.abs() < WIDEST)
+            && self.goes_around(centre, out)
+    }
+
+    /// What each edge spans, seen from a place, rad.
+    fn turns(&self, centre: &Point3<f64>, out: &Vector3<f64>) -> impl Iterator<Item = f64> {
+        let [e, g] = tangent_basis(out);
+        let angle = move |p: Point3<f64>| (p - centre).dot(&g).atan2((p - centre).dot(&e));
+        self.edges()
+            .map(move |(a, b)| (angle(b) - angle(a) + PI).rem_euclid(TAU) - PI)
+    }
+
+    /// Whether it goes around a place once.
+    fn goes_around(&self, centre: &Point3<f64>, out: &Vector3<f64>) -> bool {
+        // `out` looks at us: the edges go clockwise
+        let back: f64 = self.turns(centre, out).map(|turn| turn.max(0.0)).sum();
+        let around: f64 = self.turns(centre, out).sum();
+        back < BACK * TAU && (around + TAU).abs() < BACK
     }
 }

@@ -3,10 +3,10 @@
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-use nalgebra::{Point3, SVector, Vector3};
+use nalgebra::{Point2, Point3, SVector, Vector3};
 
 use super::profile::{Estimate, FormPoint, Profile, Row};
-use super::zone::{axis_straightness, linear_zone};
+use super::zone::{self, axis_straightness, linear_zone};
 use crate::numeric::{order_statistic, tangent_basis};
 
 /// A deviation of form, about both references.
@@ -42,6 +42,28 @@ pub struct RoundForm {
     pub undulations: u32,
     /// undulations per turn of what was found
     pub lobes: Vec<u32>,
+}
+
+impl RoundForm {
+    /// Roundness of points as they are, seen along an axis; `None` for fewer than 4.
+    ///
+    /// - `centre`: of the section, m.
+    pub fn of_section<'a>(
+        points: impl Iterator<Item = &'a Point3<f64>>,
+        centre: &Point3<f64>,
+        axis: &Vector3<f64>,
+    ) -> Option<Self> {
+        let [e, g] = tangent_basis(axis);
+        let on_plane = |p: &Point3<f64>| Point2::new((p - centre).dot(&e), (p - centre).dot(&g));
+        let points: Vec<Point2<f64>> = points.map(on_plane).collect();
+        let zone = zone::roundness(&points)?;
+        let exact = |value| Estimate { value, std: 0.0 };
+        Some(Self {
+            roundness: Deviation::of([zone.minimum_zone, zone.least_squares].map(exact)),
+            coverage: 1.0,
+            ..Self::default()
+        })
+    }
 }
 
 /// Undulations per turn, at most: the filter of 15 UPR of ISO 12181-2.

@@ -67,6 +67,10 @@ impl Surface for Cone {
         &self.pose_of
     }
 
+    fn section_radius(&self) -> Option<f64> {
+        Some(self.radius)
+    }
+
     #[inline]
     fn distance_at(&self, q: &Vector3<f64>) -> Distance {
         let (rho, away) = radial(q);

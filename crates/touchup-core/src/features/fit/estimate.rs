@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::solver::FreedomMatrix;
-use super::{Freedom, Steps, Surface};
+use super::{Freedom, Observation, Steps, Surface};
 
 /// A direction is free of what is unknown when less than this share of it lies there; roundings of
 /// the eigenvectors stay far below.
@@ -40,6 +40,19 @@ pub struct Fit<M> {
 }
 
 impl<M: Surface> Fit<M> {
+    /// Root mean square distance of what was kept of the observations, m.
+    pub(crate) fn unevenness(&self, observations: &[Observation]) -> f64 {
+        let used = observations
+            .iter()
+            .zip(&self.used)
+            .filter(|(_, used)| **used);
+        let (squares, count) = used.fold((0.0, 0.0), |(squares, count), (o, _)| {
+            let off = self.surface.distance(&o.point) - o.offset;
+            (squares + off * off, count + 1.0)
+        });
+        f64::sqrt(squares / f64::max(count, 1.0))
+    }
+
     /// Standard deviation of one freedom, m or rad; `None` where the observations do not fix it.
     pub fn std(&self, freedom: Freedom) -> Option<f64> {
         self.std_of(&Steps::ith(freedom as usize, 1.0))

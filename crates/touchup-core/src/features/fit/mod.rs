@@ -34,6 +34,7 @@ pub use estimate::Fit;
 pub use observation::{FitParams, Observation};
 pub use plane::Plane;
 pub use robust::fit;
+pub(crate) use robust::fit_mesh;
 pub(crate) use stadium::from_segment;
 pub use stadium::{Ends, Stadium};
 pub use surface::{Distance, FREEDOMS, Freedom, Steps, Surface};

@@ -54,6 +54,31 @@ pub fn fit<M: Surface>(
     fit.checked()
 }
 
+/// As [`fit`], to a mesh alone: neighbours are off alike, so its surface may be off as a whole by
+/// as much as the mesh is uneven, which no residual shows.
+///
+/// - `uneven`: how uneven it is around, m; what is more so itself counts as it is.
+/// - `facets`: how far flat faces are off the surface, m.
+///
+/// # Errors
+/// As [`fit`].
+pub(crate) fn fit_mesh<M: Surface>(
+    guess: &M,
+    observations: &[Observation],
+    params: &FitParams,
+    uneven: f64,
+    facets: f64,
+) -> Result<Fit<M>, FitError> {
+    let found = fit(guess, observations, params)?;
+    let off = found.unevenness(observations).max(uneven).hypot(facets);
+    let params = FitParams {
+        common_sigma: params.common_sigma.hypot(off),
+        shift_sigma: params.shift_sigma.hypot(off),
+        ..*params
+    };
+    fit(&found.surface, observations, &params)
+}
+
 /// Refuses fewer observations than unknowns, and those of one group alone.
 fn enough<M: Surface>(problem: &FitProblem, kept: &[f64]) -> Result<(), FitError> {
     let have = kept.iter().filter(|k| **k > 0.0).count();

@@ -100,6 +100,11 @@ pub trait Surface: Clone {
         self.pose_of().translation.vector.into()
     }
 
+    /// The radius of its sections across its axis, m; `None` where it is flat.
+    fn section_radius(&self) -> Option<f64> {
+        None
+    }
+
     /// Its axis or normal: z of F, in O.
     fn axis(&self) -> Vector3<f64> {
         self.pose_of().rotation * Vector3::z()
