@@ -8,6 +8,7 @@ use nalgebra::{Point3, Vector3};
 use super::InspectionError;
 use super::drawn_feature::{DrawnFeature, measured, shape_of};
 use super::source::inspected_file;
+use super::words::first_few;
 use crate::conformity::{GeneralTolerance, InspectedQuantity, ToleranceLimits};
 use crate::features::{Feature, Measured};
 use crate::io::features_file::{FeatureFile, FeatureRecord};
@@ -37,6 +38,9 @@ pub struct Drawn {
     pub limits: ToleranceLimits,
     /// where the limits are from
     pub from: String,
+    /// of a CAD mesh, by how much its facets make the size smaller than the circle through their
+    /// corners, which is the nominal value, mm
+    pub facets_mm: f64,
 }
 
 /// All characteristics of a part.
@@ -55,7 +59,7 @@ impl PartDrawing {
         if is_nominal_file(path) {
             let records = read_nominal(path)?;
             let drawn = |record: NominalRecord| {
-                drawn(record, params).map_err(|why| InspectionError::Drawing {
+                drawn(record, 0.0, params).map_err(|why| InspectionError::Drawing {
                     path: path.to_owned(),
                     why,
                 })
@@ -77,9 +81,10 @@ impl PartDrawing {
         let found = features_of_mesh(path, params)?.features;
         let records = of_features(&found, params);
         let (mut characteristics, mut left) = (Vec::new(), Vec::new());
-        for record in records {
+        for (record, facets_mm) in records {
             let name = record.name.clone();
-            drawn(record, params).map_or_else(|_| left.push(name), |one| characteristics.push(one));
+            drawn(record, facets_mm, params)
+                .map_or_else(|_| left.push(name), |one| characteristics.push(one));
         }
         if characteristics.is_empty() {
             let why = "no hole, slot, pocket, boss, notch or cylinder was found on it".to_owned();
@@ -93,6 +98,17 @@ impl PartDrawing {
             notes.push(format!(
                 "The general tolerance has no value for {}: not inspected.",
                 left.join(", ")
+            ));
+        }
+        let faceted = characteristics.iter().filter(|one| one.facets_mm > 0.0);
+        let faceted: Vec<String> = faceted
+            .map(|one| format!("{} {:.3} mm", one.nominal.name, one.facets_mm))
+            .collect();
+        if !faceted.is_empty() {
+            notes.push(format!(
+                "Round walls of the CAD mesh are facets. Nominal values are those of the circles through their corners; between the \
+                 facets less by: {}.",
+                first_few(&faceted, ", ")
             ));
         }
         let features = features_of_shapes(&found);
@@ -204,7 +220,7 @@ fn features_of_shapes(found: &[FeatureRecord]) -> Vec<DrawnFeature> {
 }
 
 /// A characteristic with its own limits, or those of the general tolerance.
-fn drawn(nominal: NominalRecord, params: &DrawingParams) -> Result<Drawn, String> {
+fn drawn(nominal: NominalRecord, facets_mm: f64, params: &DrawingParams) -> Result<Drawn, String> {
     let quantity = nominal
         .quantity()
         .ok_or_else(|| format!("{}: no such quantity", nominal.name))?;
@@ -217,6 +233,7 @@ fn drawn(nominal: NominalRecord, params: &DrawingParams) -> Result<Drawn, String
         quantity,
         limits,
         from,
+        facets_mm,
     })
 }
 
@@ -259,9 +276,9 @@ fn features_of_mesh(path: &Path, params: &DrawingParams) -> Result<FeatureFile, 
 /// Kinds that have sizes.
 const WITH_SIZES: [&str; 6] = ["hole", "slot", "pocket", "boss", "notch", "cylinder"];
 
-/// Sizes of features as nominal values without tolerances; those of a through hole without its
-/// depth.
-fn of_features(features: &[FeatureRecord], params: &DrawingParams) -> Vec<NominalRecord> {
+/// Sizes of features as nominal values without tolerances, each with what facets take off it, mm;
+/// those of a through hole without its depth.
+fn of_features(features: &[FeatureRecord], params: &DrawingParams) -> Vec<(NominalRecord, f64)> {
     let mut records = Vec::new();
     let mut counts = std::collections::BTreeMap::new();
     for feature in features
@@ -290,12 +307,18 @@ fn of_features(features: &[FeatureRecord], params: &DrawingParams) -> Vec<Nomina
             let Some(size) = size else { continue };
             let name = format!("{kind} {count} {}", quantity.parts().0);
             let nominal_mm = Some(rounded(size));
-            records.push(NominalRecord {
+            let is_round = matches!(
+                quantity,
+                InspectedQuantity::Diameter | InspectedQuantity::Length
+            );
+            let facets_mm = feature.facets_mm.filter(|_| is_round);
+            let record = NominalRecord {
                 name,
                 quantity: quantity.name().to_owned(),
                 nominal_mm,
                 ..base.clone()
-            });
+            };
+            records.push((record, 2.0 * facets_mm.unwrap_or(0.0)));
         }
         if let (Some(tolerance), "hole" | "slot" | "pocket" | "boss") =
             (params.position_mm, &**kind)
@@ -304,12 +327,13 @@ fn of_features(features: &[FeatureRecord], params: &DrawingParams) -> Vec<Nomina
                 format!("{kind} {count} position"),
                 InspectedQuantity::Position.name().to_owned(),
             );
-            records.push(NominalRecord {
+            let record = NominalRecord {
                 name,
                 quantity,
                 tolerance_mm: Some(tolerance),
                 ..base
-            });
+            };
+            records.push((record, 0.0));
         }
     }
     records
@@ -348,5 +372,6 @@ pub fn template(
             ..record
         }
     };
-    Ok(records.into_iter().map(with_tolerance).collect())
+    let records = records.into_iter().map(|(record, _)| record);
+    Ok(records.map(with_tolerance).collect())
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::features::{Feature, Kind, Measured};
+use crate::features::{Feature, FittedTo, Kind, Measured};
 use crate::io::features_file::FeatureRecord;
 
 /// A feature of the drawing.
@@ -58,6 +58,7 @@ pub(super) fn shape_of(record: &FeatureRecord) -> Option<Feature> {
         depth: size(record.depth_mm, "depth_mm"),
         through: record.through,
         is_convex: record.convex,
+        fitted_to: FittedTo::of_name(&record.fitted_to).unwrap_or(FittedTo::Touches),
         ..Feature::default()
     })
 }

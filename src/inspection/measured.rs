@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::conformity::{InspectedQuantity, MeasuredNumber, coordinate_std, position};
-use crate::features::Kind;
+use crate::features::{FittedTo, Kind, LEAST_TOUCHES, LEAST_TURN};
 use crate::io::features_file::{FeatureFile, FeatureRecord, RelationRecord};
 
 /// What a file says of a characteristic.
@@ -25,6 +25,49 @@ impl CharacteristicMeasurement {
     }
 }
 
+/// Whether no touches are behind the numbers of a feature: nothing is decided on those.
+pub(super) fn is_of_mesh(feature: &FeatureRecord) -> bool {
+    feature.fitted_to == FittedTo::Mesh.name()
+}
+
+/// Which touches a feature of the mesh lacks for a quantity: how many and where.
+pub(super) fn missing_touches(feature: &FeatureRecord, quantity: InspectedQuantity) -> String {
+    let is_raised = matches!(&*feature.kind, "boss" | "cylinder");
+    let is_slot = matches!(&*feature.kind, "slot" | "pocket");
+    let of_turn = format!(", over at least {LEAST_TURN} of the turn");
+    let (count, surface) = match (quantity, &*feature.kind) {
+        (InspectedQuantity::Depth, _) if is_raised => (2, ", half on its foot and half on its top"),
+        (InspectedQuantity::Depth, _) => (2, ", half around its opening and half on its floor"),
+        (InspectedQuantity::Length, _) if is_slot => {
+            (2, ", half on its walls and half on its ends")
+        }
+        (InspectedQuantity::ConeAngle, _) => (1, &*of_turn),
+        (_, "hole" | "notch" | "boss" | "cylinder") => (1, &*of_turn),
+        _ if is_slot => (1, ", half on each of its walls"),
+        (_, "edge") => (2, ", half on either side of it"),
+        (_, "corner") => (3, ", a third on each of its planes"),
+        _ => (1, ", spread over it"),
+    };
+    // walls lie below an opening and above a foot, the place of which is known
+    let depth = feature.depth_mm.unwrap_or(0.0) * if is_raised { 0.5 } else { -0.5 };
+    let place = feature.center_mm.map(|mm| {
+        let axis = feature.axis.map_or_else(Vector3::zeros, Vector3::from);
+        Point3::from(mm) + axis * depth
+    });
+    let near = place.map_or(String::new(), |p| {
+        format!(" near ({:.1} {:.1} {:.1}) mm", p.x, p.y, p.z)
+    });
+    let has = if feature.touched > 0.0 {
+        format!("with {:.0} % of it touched", feature.touched * 100.0)
+    } else {
+        "with no touches behind it".to_owned()
+    };
+    format!(
+        "it was fitted to the mesh, {has}, and a mesh alone decides nothing: it takes {} touches{near}{surface}",
+        count * LEAST_TOUCHES
+    )
+}
+
 /// - `nominal_mm`: centre of the feature in the drawing.
 /// - `datum`: the feature that the quantity relates to.
 #[expect(clippy::too_many_lines)]
@@ -37,18 +80,15 @@ pub(super) fn measurement(
     datum: Option<&FeatureRecord>,
 ) -> CharacteristicMeasurement {
     let not_measured = || {
-        CharacteristicMeasurement::none(match &*feature.fitted_to {
-            "mesh" => {
-                format!(
-                    "{quantity} of feature {} was not measured, which was fitted to the mesh: touch it",
-                    feature.id
-                )
-            }
-            _ => format!(
-                "{quantity} of feature {} was not measured: touch it",
-                feature.id
-            ),
-        })
+        let touch_it = if is_of_mesh(feature) {
+            missing_touches(feature, quantity)
+        } else {
+            "touch it".to_owned()
+        };
+        CharacteristicMeasurement::none(format!(
+            "{quantity} of feature {} was not measured: {touch_it}",
+            feature.id
+        ))
     };
     let name = quantity.name();
     let own = |value: Option<f64>, is_at_least: bool| {

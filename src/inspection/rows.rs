@@ -8,13 +8,13 @@ use nalgebra::{Point3, Vector3};
 
 use super::alignment::{Alignment, aligned};
 use super::drawing::{Drawn, PartDrawing};
-use super::measured::{CharacteristicMeasurement, measurement};
+use super::measured::{CharacteristicMeasurement, is_of_mesh, measurement, missing_touches};
 use super::source::InspectionSource;
 use super::words::first_few;
 use super::{InspectionError, InspectionParams};
 use crate::conformity::{
-    Assessment, Decision, FeatureMatch, FeaturePlace, InspectedQuantity, SoughtFeature, assess,
-    match_features,
+    Assessment, Decision, FeatureMatch, FeaturePlace, InspectedQuantity, SoughtFeature,
+    ToleranceLimits, assess, match_features,
 };
 use crate::features::Kind;
 use crate::io::features_file::{FeatureFile, FeatureRecord};
@@ -272,6 +272,7 @@ fn characteristic(
         quantity,
         limits,
         from,
+        facets_mm,
     } = drawn;
     let feature = found_feature(matched, file);
     let datum_feature = datum.as_ref().and_then(|datum| found_feature(datum, file));
@@ -306,18 +307,31 @@ fn characteristic(
             )
         }
     };
-    let assessment = match &measured.number {
-        Some(number) => assess(number, *limits, quantity.distribution(), &params.decision),
-        None => Assessment::default(),
-    };
-    let is_of_mesh = feature.is_some_and(|feature| feature.fitted_to == "mesh");
-    let why = assessment.reason.map(|reason| match reason {
-        crate::conformity::OpenReason::NoUncertainty if is_of_mesh => {
-            "it was fitted to the mesh, not to touches, so nothing says how far it is off: touch it"
-                .to_owned()
+    let untouched = [feature, datum_feature]
+        .into_iter()
+        .flatten()
+        .find(|feature| is_of_mesh(feature));
+    let assessed = |limits| match &measured.number {
+        Some(number) if untouched.is_none() => {
+            assess(number, limits, quantity.distribution(), &params.decision)
         }
-        reason => reason.to_string(),
-    });
+        _ => Assessment::default(),
+    };
+    let of_facets = ToleranceLimits {
+        lower: limits.lower.map(|lower| lower - facets_mm),
+        ..*limits
+    };
+    let (mut assessment, as_facets) = (assessed(*limits), assessed(of_facets));
+    let mut why = match untouched {
+        Some(feature) => Some(missing_touches(feature, *quantity)),
+        None => assessment.reason.map(|reason| reason.to_string()),
+    };
+    if assessment.decision == Decision::Fail && as_facets.decision != Decision::Fail {
+        (assessment.decision, assessment.rejection) = (Decision::Undecided, as_facets.rejection);
+        why = Some(format!(
+            "a part made as the facets of the CAD mesh measures up to {facets_mm:.3} mm less: take a finer mesh, or the number of the drawing"
+        ));
+    }
     let mut record = CharacteristicRecord {
         number,
         name: nominal.name.clone(),

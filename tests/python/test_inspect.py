@@ -12,6 +12,7 @@ import xml.etree.ElementTree as ElementTree
 import lxml.etree
 import numpy as np
 import pytest
+import trimesh
 from conftest import ROOT
 from scipy.stats import ncx2, norm, truncnorm
 
@@ -294,3 +295,31 @@ def test_every_characteristic_is_valid_by_the_schema_of_qif(touchup, tmp_path, q
     text = out.read_text()
     assert {float(x) for x in re.findall(r"<M..Value>(.*?)<", text)} == {6.07, 6.13, 6.17}
     assert set(re.findall(r"<M..Value>(.*?)<", text)) == {"6.07", "6.13", "6.17"}
+
+
+def test_nothing_is_decided_on_a_mesh_alone_and_the_missing_touches_are_named(touchup, demo_folder, tmp_path):
+    features = tmp_path / "features.json"
+    assert touchup("features", demo_folder / "refined.ply", "--out", features).returncode == 0
+    ran = touchup("inspect", features, "--nominal", DRAWING, "--json")
+    assert ran.returncode == 4
+    measured = [one for one in json.loads(ran.stdout)["characteristics"] if "actual_mm" in one]
+    assert {one["decision"] for one in measured} == {"undecided"}
+    # the uncertainty of the mesh is told all the same
+    assert sum("standard_uncertainty_mm" in one for one in measured) >= 5
+    (bore,) = [one for one in measured if one["name"] == "through-hole diameter"]
+    assert "no touches behind it" in bore["reason"] and "12 touches near (" in bore["reason"]
+
+
+@pytest.mark.parametrize("diameter, decision", [(11.1125, "pass"), (11.018, "undecided"), (10.9, "fail"), (11.2, "fail")])
+def test_facets_of_a_cad_mesh_fail_no_part_that_is_as_they_are(touchup, tmp_path, diameter, decision):
+    """A bore of 24 sides: its corners lie on the circle, its flats 0.048 mm inside."""
+    cad = trimesh.creation.annulus(r_min=11.1125 / 2, r_max=20, height=10, sections=24)
+    cad.export(tmp_path / "cad.stl")
+    (tmp_path / "features.json").write_text(json.dumps({"features": [hole(0, diameter, 0.002) | {"center_mm": [0, 0, 5]}]}))
+    flags = ["--nominal", tmp_path / "cad.stl", "--tolerance-mm", 0.05, "--match-mm", 20, "--json"]
+    ran = touchup("inspect", tmp_path / "features.json", *flags)
+    record = json.loads(ran.stdout)
+    (bore,) = [one for one in record["characteristics"] if one["name"] == "hole 1 diameter"]
+    assert bore["nominal_mm"] == pytest.approx(11.1125, abs=0.001)
+    assert bore["decision"] == decision, bore
+    assert any("facets" in note and "0.095 mm" in note for note in record["notes"]), record["notes"]

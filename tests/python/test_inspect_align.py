@@ -260,9 +260,10 @@ def test_a_named_feature_that_is_far_off_is_refused_with_its_distance(touchup, t
     assert (boss["decision"], boss["actual_mm"]) == ("fail", pytest.approx(6.0, abs=1e-6))
 
 
-def test_features_that_were_not_touched_are_named_and_do_not_count(touchup, tmp_path):
+@pytest.mark.parametrize("of_mesh", [{"std": {}, "fitted_to": "mesh"}, {"fitted_to": "mesh"}])
+def test_features_that_were_not_touched_are_named_and_do_not_count(touchup, tmp_path, of_mesh):
     features = measured(PLATE, MOTION)
-    features[3] |= {"std": {}, "fitted_to": "mesh", "center_mm": (np.array(features[3]["center_mm"]) + 0.3).tolist()}
+    features[3] |= of_mesh | { "center_mm": (np.array(features[3]["center_mm"]) + 0.3).tolist()}
     record = aligned(touchup, tmp_path, features, rows_of(PLATE), "--align", "best-fit")
     assert record["alignment"]["residual_max_mm"] < 1e-6
     assert [one["name"] for one in record["alignment"]["features"]] == ["top", "bore", "pin", "side"]

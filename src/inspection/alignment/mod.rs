@@ -13,7 +13,7 @@ use self::start::{is_aligned_by, start_of_named, start_of_pattern};
 use super::drawn_feature::{DrawnFeature, shape_of};
 use crate::align::{DatumFit, DatumPair, fit_datums};
 use crate::conformity::{FeatureMatch, FeaturePlace, SoughtFeature, match_features};
-use crate::features::Feature;
+use crate::features::{Feature, FittedTo};
 use crate::io::features_file::{FeatureFile, FeatureRecord};
 use crate::io::inspection_file::{AlignedFeatureRecord, AlignmentRecord};
 
@@ -208,7 +208,8 @@ fn paired(drawn: usize, one: &DrawnFeature, feature: &Feature) -> Result<Matched
     let place_std = feature
         .centre
         .std
-        .ok_or_else(|| format!("feature {id} has no standard uncertainty: touch it"))?;
+        .filter(|_| feature.fitted_to == FittedTo::Touches)
+        .ok_or_else(|| format!("feature {id} has no touches behind its place: touch it"))?;
     let pair = DatumPair {
         kind: one.shape.kind,
         nominal: one.shape.centre.value,
