@@ -15,7 +15,7 @@ use super::observe::{NOT_ALIKE, Observed};
 use super::rims::{Outline, RoundOpening, outlines, rims};
 use super::scene::{Parted, numbered_by_place};
 use super::slots::{Slot, slots};
-use super::walls::{ALL_AROUND, Wall};
+use super::walls::{ALL_AROUND, SAME_WALL, Wall};
 use crate::mesh::{FaceTree, TriMesh};
 use crate::numeric::distinct;
 use crate::stylus::ProbedPoint;
@@ -319,8 +319,9 @@ fn without_second_walls(mut features: Vec<Feature>) -> Vec<Feature> {
 }
 
 /// Whether two holes, or two bosses, overlap along one axis over more than half of the shorter one,
-/// and are as wide.
-fn is_one_wall(one: &Feature, other: &Feature) -> bool {
+/// and are as wide. One of which the end was not felt goes on in what was not felt at all, where that
+/// is as near as pieces of one wall are.
+fn is_one_wall(one: &Feature, other_feature: &Feature) -> bool {
     // from its bottom to its opening, or from its foot to its top, and how wide
     let wall = |feature: &Feature| {
         let (axis, depth) = (feature.axis.as_ref()?.value, feature.depth.as_ref()?.value);
@@ -328,7 +329,7 @@ fn is_one_wall(one: &Feature, other: &Feature) -> bool {
         let bottom = feature.centre.value - axis * if is_hole { depth } else { 0.0 };
         (depth > 0.0).then_some((bottom, axis, depth, feature.diameter.as_ref()?.value))
     };
-    let (Some((bottom, axis, depth, wide)), Some(other)) = (wall(one), wall(other)) else {
+    let (Some((bottom, axis, depth, wide)), Some(other)) = (wall(one), wall(other_feature)) else {
         return false;
     };
     let (other_bottom, other_axis, other_depth, other_wide) = other;
@@ -339,8 +340,14 @@ fn is_one_wall(one: &Feature, other: &Feature) -> bool {
     let aside = (middle - axis * middle.dot(&axis)).norm();
     let near = ONE_WALL * wide.min(other_wide);
     let is_along = axis.dot(&other_axis).abs() > ONE_AXIS;
+    let goes_on = |felt: &Feature, rest: &Feature| {
+        let is_open = felt.depth.as_ref().is_some_and(|depth| depth.is_at_least);
+        is_open && rest.fitted_to == FittedTo::Mesh
+    };
+    let is_rest = (goes_on(one, other_feature) || goes_on(other_feature, one))
+        && overlap > -SAME_WALL * wide / 2.0;
     is_along
-        && overlap > 0.5 * depth.min(other_depth)
+        && (is_rest || overlap > 0.5 * depth.min(other_depth))
         && (wide - other_wide).abs() < near
         && aside < near
 }

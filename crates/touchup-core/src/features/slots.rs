@@ -54,13 +54,18 @@ pub(super) struct Slot {
 }
 
 impl Slot {
-    /// Whether the middle of another void is in it.
+    /// Whether the middle of another void is between its walls, and both are there over more than
+    /// half of the depth of the shallower: how deep each of them is seen may differ.
     pub fn holds(&self, other: &Self) -> bool {
-        let v = other.centre - other.out * (other.depth / 2.0) - self.centre;
+        let v = other.centre - self.centre;
+        let middle = v - other.out * (other.depth / 2.0);
         let across = self.out.cross(&self.direction);
-        let is_beside = v.dot(&across).abs() < self.width / 2.0
-            && v.dot(&self.direction).abs() < self.length / 2.0;
-        is_beside && (-self.depth..0.0).contains(&v.dot(&self.out))
+        let is_between = middle.dot(&across).abs() < self.width / 2.0
+            && middle.dot(&self.direction).abs() < self.length / 2.0;
+        let top = v.dot(&self.out);
+        let bottom = top - other.depth * other.out.dot(&self.out);
+        let overlap = top.max(bottom).min(0.0) - top.min(bottom).max(-self.depth);
+        is_between && overlap > self.depth.min(other.depth) / 2.0
     }
 }
 
@@ -604,4 +609,52 @@ fn is_round_end(parted: &Parted, number: usize, out: &Vector3<f64>, width: f64) 
     end.concave
         && end.axis().dot(out).abs() > PARALLEL
         && (2.0 * end.radius - width).abs() < 0.2 * width
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn slot(top: f64, depth: f64) -> Slot {
+        Slot {
+            walls: Vec::new(),
+            ends: [None; 2],
+            shape: Ends::Round,
+            centre: Point3::new(0.0, 0.0, top),
+            out: Vector3::z(),
+            direction: Vector3::x(),
+            width: 6.0,
+            length: 20.0,
+            depth,
+            through: None,
+            floor: None,
+            felt_floor: Vec::new(),
+            land: 0,
+            is_boxed: false,
+            is_closed: true,
+            is_aslant: false,
+            area: 0.0,
+        }
+    }
+
+    #[test]
+    fn a_void_is_the_same_however_deep_it_is_seen_and_a_step_of_it_is_not() {
+        let upside_down = Slot {
+            centre: Point3::new(0.0, 0.0, -11.0),
+            out: -Vector3::z(),
+            ..slot(0.0, 11.0)
+        };
+        // felt at its top alone, and closed in the mesh far below; or seen from below
+        for other in [slot(0.0, 11.0), slot(0.1, 3.0), upside_down] {
+            assert!(slot(0.0, 4.0).holds(&other) && other.holds(&slot(0.0, 4.0)));
+        }
+        // in its floor, and farther along
+        assert!(!slot(0.0, 4.0).holds(&slot(-4.0, 3.0)));
+        assert!(!slot(0.0, 4.0).holds(&slot(4.0, 4.5)));
+        let beyond = Slot {
+            centre: Point3::new(22.0, 0.0, 0.0),
+            ..slot(0.0, 4.0)
+        };
+        assert!(!slot(0.0, 4.0).holds(&beyond));
+    }
 }

@@ -48,7 +48,7 @@ const SAME_AXIS: f64 = 0.9945;
 /// Radii of one wall differ by less than this share, and so do places of the axis.
 const SAME_RADIUS: f64 = 0.08;
 /// Pieces of a wall are no farther apart along the axis than this many radii.
-const SAME_WALL: f64 = 2.0;
+pub(super) const SAME_WALL: f64 = 2.0;
 
 impl Wall {
     /// All round walls of a mesh, the largest first.
