@@ -640,7 +640,7 @@ mod tests {
             let from = sender.local_addr().unwrap();
             Self {
                 keep_alive,
-                own: own.to_bytes().first_chunk().copied().unwrap_or_default(),
+                own,
                 sender: Some(sender),
                 from,
                 begun: Instant::now(),

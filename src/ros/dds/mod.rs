@@ -12,6 +12,8 @@ mod environment;
 mod first_request;
 mod graph;
 mod incoming;
+#[cfg(target_os = "linux")]
+mod interrupted;
 mod keep_alive;
 mod rematch;
 mod rosout;

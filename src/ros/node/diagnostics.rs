@@ -34,7 +34,6 @@ impl RefinementWorker {
             let since_s = now
                 .saturating_duration_since(self.state_since)
                 .as_secs_f64();
-            self.state_since = now;
             match level {
                 // who sees a warning sees its end too
                 DiagnosticStatus::OK if self.last_state.starts_with("holds") => {
@@ -45,7 +44,7 @@ impl RefinementWorker {
                 _ if name == BEGINS => return,
                 _ => warn!("{words}"),
             }
-            self.last_state = name;
+            (self.last_state, self.state_since) = (name, now);
         }
     }
 
