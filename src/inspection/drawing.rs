@@ -100,17 +100,7 @@ impl PartDrawing {
                 left.join(", ")
             ));
         }
-        let faceted = characteristics.iter().filter(|one| one.facets_mm > 0.0);
-        let faceted: Vec<String> = faceted
-            .map(|one| format!("{} {:.3} mm", one.nominal.name, one.facets_mm))
-            .collect();
-        if !faceted.is_empty() {
-            notes.push(format!(
-                "Round walls of the CAD mesh are facets. Nominal values are those of the circles through their corners; between the \
-                 facets less by: {}.",
-                first_few(&faceted, ", ")
-            ));
-        }
+        notes.extend(facets_note(&characteristics));
         let features = features_of_shapes(&found);
         Ok(Self {
             characteristics,
@@ -119,6 +109,22 @@ impl PartDrawing {
             notes,
         })
     }
+}
+
+/// By how much the facets of a CAD mesh make its sizes smaller; `None` where it has none.
+fn facets_note(characteristics: &[Drawn]) -> Option<String> {
+    let faceted = characteristics.iter().filter(|one| one.facets_mm > 0.0);
+    let faceted: Vec<String> = faceted
+        .map(|one| format!("{} {:.3} mm", one.nominal.name, one.facets_mm))
+        .collect();
+    let note = || {
+        format!(
+            "Round walls of the CAD mesh are facets. Nominal values are those of the circles through their corners; between the \
+             facets less by: {}.",
+            first_few(&faceted, ", ")
+        )
+    };
+    (!faceted.is_empty()).then(note)
 }
 
 /// The features that characteristics are about, and those that are datums alone.
