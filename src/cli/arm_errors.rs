@@ -14,7 +14,7 @@ pub(super) enum ArmErrorsName {
     /// the stiffness, 0.002 mm of the ball's radius, 0.05 mm and 0.02° of the place of the part,
     /// 0.03 mm of repeatability
     Calibrated,
-    /// By the same, and the probe is bent aside by 1 mm after its twelfth contact
+    /// By nothing, until the probe is bent aside by 1 mm after its twelfth contact
     Bent,
 }
 
@@ -27,10 +27,8 @@ impl ArmErrorsName {
     /// - `registered_at`: where the place of the part is known best, m in O.
     pub fn drawn(self, registered_at: Point3<f64>, seed: u64) -> ArmErrors {
         match self {
-            Self::None => ArmErrors::NONE,
-            Self::Calibrated | Self::Bent => {
-                ArmErrors::draw(&ArmErrorSigmas::CALIBRATED, registered_at, seed)
-            }
+            Self::None | Self::Bent => ArmErrors::NONE,
+            Self::Calibrated => ArmErrors::draw(&ArmErrorSigmas::CALIBRATED, registered_at, seed),
         }
     }
 

@@ -66,7 +66,7 @@ impl Liveness {
         let seen = self
             .seen
             .get_or_insert(forces.map(|force| <[f64; 3]>::from(force).map(|n| (n, now))));
-        let mut stuck = None;
+        let mut stuck: Option<StuckForce> = None;
         for ((seen, force), of) in seen.iter_mut().zip(forces).zip(AXES) {
             for ((held, since), now_n) in seen.iter_mut().zip(force.iter()) {
                 if (now_n - *held).abs() > ROUNDING {
@@ -84,12 +84,17 @@ impl Liveness {
             }
             let ms = (now - since) as f64 * 1e-6;
             let force = force.into();
-            stuck = stuck.or(Some(StuckForce {
+            // the axes that most of them are in are its own
+            let count = |is_stuck: [bool; 3]| is_stuck.iter().filter(|is_stuck| **is_stuck).count();
+            if stuck.is_some_and(|before| count(before.is_stuck) >= count(is_stuck)) {
+                continue;
+            }
+            stuck = Some(StuckForce {
                 force,
                 is_stuck,
                 of,
                 ms,
-            }));
+            });
         }
         stuck
     }

@@ -134,8 +134,9 @@ impl Watched<'_> {
             Some(outcome) => outcome,
             None if is_contact || searched(self, "searching", travel - gone)? => {
                 let stopping = "stopping at the surface";
-                self.halt(stopping, &mut |_| {})?;
-                self.check_sign(stopping, &line)?;
+                let mut forces = Vec::new();
+                self.halt(stopping, &mut |state| forces.push(state.wrench_b.force))?;
+                self.check_sign(stopping, &line, mean(forces.into_iter()))?;
                 let met = self.last.filter(|state| line.felt(state) > params.trigger);
                 let is_free = self.back_off(&line)?;
                 let pressed =
@@ -177,12 +178,17 @@ impl Watched<'_> {
     }
 
     /// A part pushes: where it pulls, the force has the other sign.
-    fn check_sign(&mut self, doing: &'static str, line: &ApproachLine) -> Result<(), ProbeError> {
-        let Some(state) = self.last else {
-            return Ok(());
-        };
-        let force_n = state.wrench_b.force.norm();
-        let pulls = force_n > line.params.trigger && -line.presses(&state) > PULLS * force_n;
+    ///
+    /// - `force_b`: mean while the arm came to rest, N.
+    fn check_sign(
+        &mut self,
+        doing: &'static str,
+        line: &ApproachLine,
+        force_b: Vector3<f64>,
+    ) -> Result<(), ProbeError> {
+        let force_n = force_b.norm();
+        let pulls =
+            force_n > line.params.trigger && force_b.dot(&line.target.direction) > PULLS * force_n;
         if !pulls {
             return Ok(());
         }
@@ -407,6 +413,6 @@ const MOST_ROOM: f64 = 3.0;
 /// The retraction is this much faster than the measuring search.
 const BACK: f64 = 2.0;
 /// Below this share of the trigger the tip is free.
-pub(super) const FREE: f64 = 0.5;
+const FREE: f64 = 0.5;
 /// The second search goes this much farther than it should have to.
 const SECOND: f64 = 3.0;

@@ -10,7 +10,6 @@ use super::limits::{LimitError, Limits};
 use super::liveness::{Liveness, StuckForce};
 use super::measured_motion::MeasuredMotion;
 use super::touch_params::{TouchParams, UNEXPECTED};
-use super::touching::FREE;
 use crate::numeric::mean;
 
 /// Why probing was broken off. The arm was commanded to stop before this was made.
@@ -57,7 +56,8 @@ pub enum ProbeError {
     },
     /// The part pulls.
     #[error(
-        "while {doing}: the part pulls with {force_n:.1} N where it should push: the sign of the force is turned (docs/ur.md has the check)"
+        "while {doing}: the part pulls with {force_n:.1} N where it should push: the sign of the force is turned (docs/ur.md has the check), or the force \
+         comes late"
     )]
     Pulls {
         /// what was being done
@@ -138,8 +138,8 @@ pub enum ProbeError {
     },
     /// A contact that was touched again is not where it was.
     #[error(
-        "while {doing}: {reference} {how}, so the probe is bent or loose, the part has slipped or the arm has drifted, some time after \
-         {since}: nothing that was touched after that holds; look, calibrate tip and place anew, and probe it again"
+        "while {doing}: {reference} {how}, so the probe is bent or loose, the part has slipped, the arm has drifted or its sensor feels \
+         less, some time after {since}: nothing that was touched after that holds; look, calibrate tip and place anew, and probe it again"
     )]
     Displaced {
         /// what was being done
@@ -664,7 +664,7 @@ impl<'a> Watched<'a> {
         Ok(forces)
     }
 
-    /// Refuses a sensor whose zero has gone in free air by a share of the trigger.
+    /// Refuses a sensor whose zero has gone in free air by more than the trigger.
     ///
     /// - `zeroed_ns`: when it was zeroed.
     ///
@@ -679,7 +679,7 @@ impl<'a> Watched<'a> {
         let force_n = mean(self.forces_at_rest(doing)?.into_iter()).norm();
         let now_ns = self.last.map_or(zeroed_ns, |state| state.stamp_ns);
         let seconds = (now_ns - zeroed_ns) as f64 * 1e-9;
-        if force_n <= FREE * params.trigger {
+        if force_n <= params.trigger {
             return Ok(());
         }
         Err(ProbeError::Drifts {

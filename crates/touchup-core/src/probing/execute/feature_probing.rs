@@ -354,6 +354,8 @@ impl FeatureProbing<'_, '_> {
         if self.is_zeroed {
             let (zeroed_ns, touch) = (self.zeroed_ns, &self.prober.params.touch);
             self.prober.watched().check_zero(zeroed_ns, touch)?;
+            // what it did drift by is no contact
+            self.is_zeroed = false;
         }
         Ok(())
     }

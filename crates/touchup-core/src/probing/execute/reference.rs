@@ -176,7 +176,7 @@ impl FeatureProbing<'_, '_> {
                 let (off_mm, most_mm) = (touched.off * 1e3, MOVED * touched.sigma * 1e3);
                 let (off_mm, side) = (off_mm.abs(), if off_mm > 0.0 { "deeper" } else { "higher" });
                 let how = format!(
-                    "is {off_mm:.3} mm {side} than it was (within ± {most_mm:.3} mm it would be the same)"
+                    "is {off_mm:.3} mm {side} along its search than it was (within ± {most_mm:.3} mm it would be the same)"
                 );
                 return Err(self.displaced(reference, how));
             }
