@@ -103,10 +103,7 @@ impl World for StaticScan {
         self.touches.push(progress.touch);
     }
 
-    fn touched(&mut self, flag: u32, touch: &ProbedTouch) {
-        // 0: of a contact that is touched again, or of a spot
-        if flag > 0 {
-            self.made.push(touch.clone());
-        }
+    fn touched(&mut self, _: u32, touch: &ProbedTouch) {
+        self.made.push(touch.clone());
     }
 }

@@ -144,14 +144,13 @@ impl FeatureProbing<'_, '_> {
         self.go_on_with(&reference.rotation)?;
         let (mut sum, mut count) = (0.0, 0.0);
         for _ in 0..LOOKS {
-            let (result, touch) = match self.go_and_touch(&planned) {
+            let (result, _) = match self.go_and_touch(&planned) {
                 // the path was clear when it was touched first
                 Err(Ending::Stopped(ProbeError::Obstacle { .. })) => {
                     return Err(self.displaced(reference, "is met before its stand-off".to_owned()));
                 }
                 touched => touched?,
             };
-            self.prober.world.touched(0, &touch);
             let (at, sigma) = match result {
                 TouchResult::At { centre, sigma } => (centre, sigma),
                 TouchResult::Unclear => continue,
