@@ -20,8 +20,12 @@ reported! {
             found.drift.map_or(found.offset, |of| of.offset_at_first) * 1e3 + applied.wrench_offset_ns as f64 * 1e-6,
         /// standard uncertainty
         sigma_ms: f64 = found.sigma * 1e3,
+        /// of that, what the scene applies
+        applied_offset_ms: f64 = applied.wrench_offset_ns as f64 * 1e-6,
         /// total drift: that which the scene applies, and the correction
         wrench_drift_ppm: f64 = (found.drift.map_or(0.0, |of| of.rate) + applied.wrench_drift) * 1e6,
+        /// of that, what the scene applies
+        applied_drift_ppm: f64 = applied.wrench_drift * 1e6,
         /// standard uncertainty of the correction; none: no drift is seen
         wrench_drift_sigma_ppm: Option<f64> = found.drift.map(|of| of.rate_sigma * 1e6),
         /// what it is estimated from
@@ -34,21 +38,41 @@ impl fmt::Display for WrenchOffset {
         let Self {
             wrench_offset_ms,
             sigma_ms,
+            applied_offset_ms,
             wrench_drift_ppm,
+            applied_drift_ppm,
             wrench_drift_sigma_ppm,
             evidence,
         } = *self;
+        let is_applied = applied_offset_ms != 0.0 || applied_drift_ppm != 0.0;
+        if is_applied {
+            write!(
+                f,
+                "the scene takes {applied_offset_ms:+.1} ms and {applied_drift_ppm:+.1} ppm off the clock of the wrench; beside that "
+            )?;
+        }
+        let [beside_ms, beside_ppm] = [
+            wrench_offset_ms - applied_offset_ms,
+            wrench_drift_ppm - applied_drift_ppm,
+        ];
         write!(
             f,
-            "the wrench seems to read {wrench_offset_ms:+.1} ± {sigma_ms:.1} ms beyond the pose"
+            "the wrench seems to read {beside_ms:+.1} ± {sigma_ms:.1} ms beyond the pose"
         )?;
-        match wrench_drift_sigma_ppm {
-            None => write!(f, ", by {evidence} (sync.wrench_offset_ms; not applied)"),
-            Some(ppm_sigma) => write!(
+        if let Some(ppm_sigma) = wrench_drift_sigma_ppm {
+            write!(
                 f,
-                " at first, and to gain {wrench_drift_ppm:+.1} ± {ppm_sigma:.1} ppm, by {evidence} \
-                 (sync.wrench_offset_ms, sync.wrench_drift_ppm; not applied)"
-            ),
+                " at first, and to gain {beside_ppm:+.1} ± {ppm_sigma:.1} ppm"
+            )?;
+        }
+        write!(f, ", by {evidence}, not applied; ")?;
+        if is_applied {
+            write!(f, "together ")?;
+        }
+        write!(f, "sync.wrench_offset_ms: {wrench_offset_ms:.1}")?;
+        match wrench_drift_sigma_ppm {
+            None => Ok(()),
+            Some(_) => write!(f, ", sync.wrench_drift_ppm: {wrench_drift_ppm:.1}"),
         }
     }
 }
@@ -159,5 +183,37 @@ impl ContactPoints {
                 &surface.normal,
             );
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 20 ms applied, and 1.5 found beside them.
+    #[test]
+    fn an_offset_that_the_scene_applies_is_told_as_applied() {
+        let found = ClockOffset {
+            offset: 1.5e-3,
+            sigma: 1e-3,
+            drift: None,
+            evidence: ClockEvidence::Onsets(30),
+        };
+        let told = |wrench_offset_ns| {
+            let applied = SyncParams {
+                wrench_offset_ns,
+                ..SyncParams::default()
+            };
+            WrenchOffset::of(&found, &applied).to_string()
+        };
+        assert_eq!(
+            told(0),
+            "the wrench seems to read +1.5 ± 1.0 ms beyond the pose, by 30 onsets of contact, not applied; sync.wrench_offset_ms: 1.5"
+        );
+        assert_eq!(
+            told(20_000_000),
+            "the scene takes +20.0 ms and +0.0 ppm off the clock of the wrench; beside that the wrench seems to read +1.5 ± 1.0 ms \
+             beyond the pose, by 30 onsets of contact, not applied; together sync.wrench_offset_ms: 21.5"
+        );
     }
 }

@@ -61,6 +61,15 @@ pub const INPUT_MISTAKES: &[InputMistake] = &[
     mistake("wrench's x and y reversed", InputCause::WrenchFrame, |x| {
         x.forces(|f| Vector3::new(-f.x, -f.y, f.z))
     }),
+    mistake(
+        "wrench turned 45° about the shaft",
+        InputCause::WrenchFrame,
+        |x| {
+            x.forces(|f| {
+                UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 45f64.to_radians()) * f
+            })
+        },
+    ),
     mistake("quaternion w first", InputCause::QuaternionOrder, |x| {
         x.poses(read_w_first)
     }),
@@ -137,6 +146,11 @@ pub const INPUT_MISTAKES: &[InputMistake] = &[
     mistake("scan turned 20°", InputCause::Frame, |x| {
         x.scan(|p| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 20f64.to_radians()) * p)
     }),
+    mistake(
+        "scan inside out",
+        InputCause::InsideOut,
+        ToldRecording::inside_out,
+    ),
     mistake("flange in place of ball", InputCause::Frame, |x| {
         x.poses(|p| {
             p.pose_ot *= Isometry3::from_parts(
@@ -196,6 +210,16 @@ impl ToldRecording {
                 let moved = change(self.scan.position(vertex));
                 self.scan.set_position(vertex, moved);
             });
+        self
+    }
+
+    fn inside_out(mut self) -> Self {
+        let corners = |(_, [a, b, c]): (_, [touchup_core::mesh::VertexId; 3])| [a.0, c.0, b.0];
+        let faces = self.scan.faces().map(corners).collect();
+        // the same faces in another order of their corners are a mesh as they were
+        if let Ok(scan) = TriMesh::new(self.scan.positions().to_vec(), faces) {
+            self.scan = scan;
+        }
         self
     }
 

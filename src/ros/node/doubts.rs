@@ -15,8 +15,9 @@ use crate::ros::locked;
 const LOOKED_EVERY: Duration = Duration::from_secs(5);
 /// What is no doubt while somebody may still come to touch something, or what the state of the
 /// streams says itself.
-const OF_OTHERS: [InputCause; 3] = [
+const OF_OTHERS: [InputCause; 4] = [
     InputCause::NoContact,
+    InputCause::FewContacts,
     InputCause::NoSample,
     InputCause::StampsGoBack,
 ];

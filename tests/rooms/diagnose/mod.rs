@@ -1,16 +1,17 @@
 //! Mistakes made of sound recordings, and the cause that is named.
 
+use crate::common::grid;
 use crate::full::either;
-use nalgebra::Vector3;
-use touchup::diagnose::{InputFinding, InputMonitor, InputMonitorParams};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use touchup::diagnose::{InputCause, InputFinding, InputMonitor, InputMonitorParams};
 use touchup::mesh::FaceTree;
 use touchup::sim::{
     Habit, INPUT_MISTAKES, InputMistake, PathParams, Plate, ScannerParams, SensorParams,
     StylusParams, ToldRecording, plan_demo, plan_sides, scan, touch,
 };
 use touchup::stylus::{
-    CompensatorParams, ContactEstimator, ContactEstimatorParams, Placement, SyncParams,
-    Synchroniser, TipParams, TipShape,
+    CompensatorParams, ContactEstimator, ContactEstimatorParams, Message, Placement, StampedPose,
+    StampedWrench, SyncParams, Synchroniser, TipParams, TipShape, Wrench,
 };
 
 /// Another stylus, sensor and scan for each seed.
@@ -179,4 +180,122 @@ fn over_twenty_seeds_nine_of_ten_mistakes_are_named() {
         (all, lost) = (all + count, lost + missed.len());
     }
     assert!(10 * lost <= all, "{lost} of {all}");
+}
+
+/// Poses and wrenches of one clock, 1 ms apart.
+///
+/// - `at`: of a time, s: the recorded pose, and the force on the stylus in its own axes, N.
+fn recorded(seconds: f64, at: impl Fn(f64) -> (Isometry3<f64>, Vector3<f64>)) -> Vec<Message> {
+    let of = |ms: i64| {
+        let stamp_ns = ms * 1_000_000;
+        let (pose_ot, force) = at(ms as f64 * 1e-3);
+        // a noise that repeats itself after longer than anything lasts
+        let noise =
+            Vector3::new(0.9, 1.7, 2.3).map(|turn| 0.01 * (turn * (ms * ms % 9973) as f64).sin());
+        let wrench = Wrench {
+            force: force + noise,
+            torque: Vector3::zeros(),
+        };
+        [
+            Message::Pose(StampedPose { stamp_ns, pose_ot }),
+            Message::Wrench(StampedWrench { stamp_ns, wrench }),
+        ]
+    };
+    (0..(seconds * 1e3) as i64).flat_map(of).collect()
+}
+
+fn on_flat_scan(messages: Vec<Message>) -> Vec<InputFinding> {
+    let tip = TipParams {
+        radius: 1.5e-3,
+        stiffness: None,
+    };
+    findings(&ToldRecording {
+        scan: grid(60, 1e-3, |_, _| 0.0),
+        messages,
+        tip,
+    })
+}
+
+/// A hole of Ø 12 mm that the scan has closed, touched along its wall alone, and a third of it.
+#[test]
+fn a_hole_that_the_scan_has_closed_is_no_other_place_of_the_part() {
+    for share in [1.0, 0.35] {
+        let wall = recorded(20.0, |t| {
+            let angle = share * std::f64::consts::TAU * (0.5 * t).sin().abs();
+            let outward = Vector3::new(angle.cos(), angle.sin(), 0.0);
+            let middle = Vector3::new(2e-3, -3e-3, -3e-3 - 2e-3 * (0.7 * t).sin());
+            let is_lifted = t % 4.0 < 0.5;
+            let off = if is_lifted { 1.5e-3 } else { 0.0 };
+            let pose = Isometry3::from_parts(
+                (middle + outward * (4.5e-3 - off)).into(),
+                Default::default(),
+            );
+            (
+                pose,
+                if is_lifted {
+                    Vector3::zeros()
+                } else {
+                    -outward * 2.0
+                },
+            )
+        });
+        assert_eq!(on_flat_scan(wall), [], "{share} of the hole");
+    }
+}
+
+#[test]
+fn three_touches_are_said_to_be_few_and_nothing_is_made_of_them() {
+    let three = recorded(9.0, |t| {
+        let height = 4e-3 * (1.0 + 3.0 * (std::f64::consts::TAU * t / 3.0).cos());
+        let at = Vector3::new(8e-3 * (t / 3.0).floor(), 0.0, 1.5e-3 + height.max(0.0));
+        let is_pressed = height < 0.0;
+        let force = Vector3::z() * if is_pressed { 2.0 } else { 0.0 };
+        (Isometry3::from_parts(at.into(), Default::default()), force)
+    });
+    let found = on_flat_scan(three);
+    let said: Vec<_> = found
+        .iter()
+        .map(|found| (found.cause, found.is_sure))
+        .collect();
+    assert_eq!(said, [(InputCause::FewContacts, false)], "{found:?}");
+}
+
+/// At rest and turning 39 mm above the scan, with a weight of 2 N that was not tared.
+#[test]
+fn what_touches_nothing_yet_is_to_be_tared_and_nothing_else() {
+    for turns in [0.0, 0.4] {
+        let idle = recorded(10.0, |t| {
+            let rotation = UnitQuaternion::from_euler_angles(
+                turns * (0.9 * t).sin(),
+                turns * (0.6 * t).cos(),
+                0.3 * turns * t,
+            );
+            let at = Vector3::new(turns * 0.02 * t.sin(), 0.0, 39e-3);
+            let weight = rotation.inverse() * Vector3::new(0.0, 0.0, -2.0);
+            (
+                Isometry3::from_parts(at.into(), rotation),
+                weight + Vector3::new(0.3, 0.0, 0.0),
+            )
+        });
+        let said: Vec<_> = on_flat_scan(idle).iter().map(|found| found.cause).collect();
+        assert_eq!(
+            said,
+            [InputCause::NoContact, InputCause::Tare],
+            "turned by {turns}"
+        );
+    }
+}
+
+/// The first quarter, the first half and three quarters of a sound recording.
+#[test]
+fn a_part_of_a_sound_recording_is_as_sound() {
+    for seed in 3..=either(4, 8) {
+        let sound = simulated(seed);
+        for share in [0.25, 0.5, 0.75] {
+            let mut part = sound.clone();
+            part.messages
+                .truncate((share * sound.messages.len() as f64) as usize);
+            assert_eq!(findings(&part), [], "the first {share} of seed {seed}");
+        }
+    }
 }

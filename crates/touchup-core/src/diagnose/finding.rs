@@ -26,6 +26,8 @@ names! {
         NoSample = "no_sample",
         /// No force that stands out of the noise.
         NoContact = "no_contact",
+        /// So few places were touched that they fit almost anywhere.
+        FewContacts = "few_contacts",
         /// Forces in another unit.
         ForceUnit = "force_unit",
         /// Contacts whose force is below the threshold of contact.
@@ -36,6 +38,8 @@ names! {
         PositionAxes = "position_axes",
         /// The components of the orientation are in another order.
         QuaternionOrder = "quaternion_order",
+        /// The scan has its outside within.
+        InsideOut = "inside_out",
         /// The wrench is what the stylus does to the part.
         WrenchSign = "wrench_sign",
         /// The wrench is in other axes than those it was read in.
@@ -65,6 +69,7 @@ impl InputCause {
             | Self::Frame
             | Self::Radius
             | Self::Stiffness
+            | Self::InsideOut
             | Self::WrenchSign
             | Self::WrenchFrame
             | Self::QuaternionOrder => true,
@@ -76,6 +81,7 @@ impl InputCause {
             | Self::Delay
             | Self::NoSample
             | Self::NoContact
+            | Self::FewContacts
             | Self::Tare
             | Self::ForceUnit
             | Self::LightTouch

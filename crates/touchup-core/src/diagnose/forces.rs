@@ -1,9 +1,9 @@
 //! What the forces alone say: rest, noise, and which samples press.
 
-use nalgebra::Vector3;
+use nalgebra::{SMatrix, Vector3, Vector6};
 
 use super::input_record::InputRecord;
-use crate::numeric::quantile;
+use crate::numeric::{NormalEquations, quantile};
 
 /// Samples that are tried as the rest.
 const REST_CANDIDATES: usize = 64;
@@ -73,12 +73,62 @@ impl ForceLevels {
         (record.force_t() - self.rest_t).norm()
     }
 
+    /// F − rest in O, N.
+    pub fn force_o(&self, record: &InputRecord) -> Vector3<f64> {
+        record.force_o - record.rotation * self.rest_t
+    }
+
     pub fn is_pressing(&self, record: &InputRecord) -> bool {
         self.off_rest(record) > (NOISES * self.noise).max(SHARE_OF_LARGEST * self.largest)
     }
 
     pub fn is_resting(&self, record: &InputRecord) -> bool {
         self.off_rest(record) <= (4.0 * self.noise).max(0.05 * self.largest)
+    }
+}
+
+/// The force of a sensor that touches nothing: its zero b and its weight w, F_T = b + Rᵀ w.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SensorWeight {
+    /// mean of both, N
+    pub mean_t: Vector3<f64>,
+    /// mean of their length, N
+    pub size: f64,
+    /// 95th percentile of what they leave of the force, N
+    pub left: f64,
+}
+
+/// Where the stylus hardly turns, zero and weight are not told apart: the least of both.
+const DAMPING: f64 = 1e-6;
+
+impl SensorWeight {
+    pub fn of(records: &[InputRecord]) -> Option<Self> {
+        let turned = |record: &InputRecord| {
+            let back = record.rotation.inverse().to_rotation_matrix();
+            let mut rows = SMatrix::<f64, 3, 6>::zeros();
+            rows.fixed_columns_mut::<3>(0).fill_with_identity();
+            rows.fixed_columns_mut::<3>(3).copy_from(back.matrix());
+            rows
+        };
+        let rows = records.iter().flat_map(|record| {
+            let (rows, force) = (turned(record), record.force_t());
+            (0..3).map(move |axis| (Vector6::from(rows.row(axis).transpose()), force[axis]))
+        });
+        let both = NormalEquations::of(rows).damped(DAMPING).solution()?;
+        let predicted: Vec<Vector3<f64>> =
+            records.iter().map(|record| turned(record) * both).collect();
+        let mut left: Vec<f64> = records
+            .iter()
+            .zip(&predicted)
+            .map(|(record, predicted)| (record.force_t() - predicted).norm())
+            .collect();
+        left.sort_unstable_by(f64::total_cmp);
+        let count = records.len() as f64;
+        Some(Self {
+            mean_t: predicted.iter().sum::<Vector3<f64>>() / count,
+            size: predicted.iter().map(Vector3::norm).sum::<f64>() / count,
+            left: quantile(&left, 0.95),
+        })
     }
 }
 

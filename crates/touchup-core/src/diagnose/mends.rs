@@ -1,6 +1,6 @@
 //! What may have happened to all poses, or to the unit of the scan, and what brings it back.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, UnitQuaternion};
+use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, UnitQuaternion, Vector3};
 
 use super::finding::InputCause;
 use super::forces::{axes_in_words, signed_permutations};
@@ -20,16 +20,22 @@ pub(super) struct PlaceMend {
     is_w_first: bool,
     /// what is read as 1 m of the scan is so many
     pub scan_unit: f64,
+    /// the centre of the ball from where it was taken to be, in the axes of T, m
+    tip: Vector3<f64>,
 }
 
 impl PlaceMend {
     /// Where the ball is then, in the scan as it was read.
     pub fn centre(&self, placement: &Placement, record: &InputRecord) -> Point3<f64> {
-        self.pose(placement, record)
-            .translation
-            .vector
+        let pose = self.pose(placement, record);
+        (pose.translation.vector + pose.rotation * self.tip)
             .scale(self.scan_unit)
             .into()
+    }
+
+    /// A force in O, where the axes of the positions are also its own.
+    pub fn turned(&self, force: &Vector3<f64>) -> Vector3<f64> {
+        self.poses * force
     }
 
     /// How the ball is turned then.
@@ -56,9 +62,34 @@ impl PlaceMend {
         Self {
             cause: InputCause::QuaternionOrder,
             says: "the poses fit with w first in the quaternion".to_owned(),
-            poses: Matrix3::identity(),
             is_w_first: true,
+            ..Self::of_poses(Matrix3::identity())
+        }
+    }
+
+    fn of_poses(poses: Matrix3<f64>) -> Self {
+        Self {
+            cause: InputCause::PositionAxes,
+            says: String::new(),
+            poses,
+            is_w_first: false,
             scan_unit: 1.0,
+            tip: Vector3::zeros(),
+        }
+    }
+
+    /// A ball that is farther along the stylus than the recorded point.
+    ///
+    /// - `tip`: from that point, in the axes of T, m.
+    pub fn tip(tip: Vector3<f64>) -> Self {
+        let [x, y, z] = [tip.x, tip.y, tip.z].map(|x| x * 1e3);
+        Self {
+            cause: InputCause::Frame,
+            says: format!(
+                "the ball is ({x:.0}, {y:.0}, {z:.0}) mm from the recorded point in the axes of the stylus"
+            ),
+            tip,
+            ..Self::of_poses(Matrix3::identity())
         }
     }
 
@@ -91,23 +122,19 @@ impl PlaceMend {
         UNITS.into_iter().map(|(poses, scan_unit, says)| Self {
             cause: InputCause::LengthUnit,
             says: says.to_owned(),
-            poses: Matrix3::identity() * poses,
-            is_w_first: false,
             scan_unit,
+            ..Self::of_poses(Matrix3::identity() * poses)
         })
     }
 
     /// Axes of the positions, swapped and mirrored.
     pub fn axes() -> impl Iterator<Item = Self> {
         signed_permutations().skip(1).map(|poses| Self {
-            cause: InputCause::PositionAxes,
             says: format!(
                 "the positions fit with their axes taken as {}",
                 axes_in_words(&poses)
             ),
-            poses,
-            is_w_first: false,
-            scan_unit: 1.0,
+            ..Self::of_poses(poses)
         })
     }
 }

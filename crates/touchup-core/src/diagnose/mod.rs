@@ -6,7 +6,6 @@
 //! centre one radius off the surface and a force along the outward normal of it; free, it has no
 //! force. What breaks one of these is compared with what would mend it.
 
-mod axes;
 mod finding;
 mod forces;
 mod input_record;
@@ -14,9 +13,12 @@ mod judge;
 mod mends;
 mod monitor;
 mod monitor_params;
+mod placed;
 mod places;
 mod shift;
 mod stamps;
+mod stiffness;
+mod wrench;
 
 pub use finding::{InputCause, InputFinding};
 pub use monitor::InputMonitor;

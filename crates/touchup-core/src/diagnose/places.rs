@@ -12,6 +12,9 @@ pub(super) const LEAST_TOLERANCE: f64 = 0.3e-3;
 /// Vertices that the noise is estimated from.
 const NOISE_VERTICES: usize = 4000;
 
+/// A force points out of the surface when it is no farther from its normal, as cosine.
+const LEANS: f64 = 0.5;
+
 /// What the scan says of itself.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ScanScale {
@@ -100,6 +103,40 @@ pub(super) struct BallFit {
     pub normals: Vec<Vector3<f64>>,
 }
 
+/// Whether a press is against a wall that the scan lacks: lower than a ball can rest on it, as under
+/// a lid over a hole.
+pub(super) fn is_in_hole(
+    distance: f64,
+    normal: &Vector3<f64>,
+    force: &Vector3<f64>,
+    radius: f64,
+) -> bool {
+    distance < radius && force.dot(normal).abs() <= LEANS * force.norm()
+}
+
+/// How many presses the scan explains.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Explained {
+    on_scan: usize,
+    /// against walls that it lacks
+    in_holes: usize,
+    count: usize,
+}
+
+impl Explained {
+    /// Share on the scan; what is in holes that it lacks says nothing, unless it is most of all.
+    pub fn on_scan(&self) -> f64 {
+        let is_lid = self.in_holes as f64 <= MOST_UNDER_LIDS * self.count as f64;
+        let count = self.count - if is_lid { self.in_holes } else { 0 };
+        self.on_scan as f64 / count.max(1) as f64
+    }
+
+    /// Share on the scan, or in holes that it lacks.
+    pub fn on_scan_or_in_holes(&self) -> f64 {
+        (self.on_scan + self.in_holes) as f64 / self.count.max(1) as f64
+    }
+}
+
 /// Touches that follow each other share the same error of the scan: so many count as one.
 pub(super) const ALIKE: f64 = 10.0;
 
@@ -165,6 +202,25 @@ impl BallFit {
             distances,
             normals,
         }
+    }
+
+    /// How many of the presses the scan explains: the centre is one radius off it, and the force
+    /// points out of it.
+    ///
+    /// - `forces`: of each centre, in O.
+    pub fn explained(&self, forces: &[Vector3<f64>], radius: f64, tolerance: f64) -> Explained {
+        let mut of = Explained {
+            on_scan: 0,
+            in_holes: 0,
+            count: forces.len(),
+        };
+        for ((distance, normal), force) in self.distances.iter().zip(&self.normals).zip(forces) {
+            let is_near = (distance - radius).abs() <= tolerance;
+            let is_outward = force.dot(normal) > LEANS * force.norm();
+            of.on_scan += usize::from(is_near && is_outward);
+            of.in_holes += usize::from(is_in_hole(*distance, normal, force, radius));
+        }
+        of
     }
 
     /// Share of the centres that are farther off the surface than `distance`, m, on whichever side:

@@ -21,7 +21,7 @@ const STEPS: usize = 6;
 pub(super) struct ContactShift {
     /// m
     pub shift: Vector3<f64>,
-    /// share of the contacts on the scan
+    /// share of the contacts that the scan explains
     pub share: f64,
 }
 
@@ -30,22 +30,21 @@ pub(super) struct ContactShift {
 pub(super) fn best_shift(
     scan: &TriMesh,
     tree: &FaceTree,
-    centres: &[Point3<f64>],
+    (centres, forces): (&[Point3<f64>], &[Vector3<f64>]),
     radius: f64,
     tolerance: f64,
 ) -> Option<ContactShift> {
-    let some = |most: usize| centres.iter().step_by(centres.len().div_ceil(most).max(1));
+    let every = |most: usize| centres.len().div_ceil(most).max(1);
+    let some = |most: usize| centres.iter().step_by(every(most));
     let judges: Vec<Point3<f64>> = some(JUDGES).copied().collect();
-    let share = |of: &[Point3<f64>], shift: Vector3<f64>| {
-        BallFit::of(
-            scan,
-            tree,
-            of.iter().map(|centre| centre + shift),
-            radius,
-            tolerance,
-        )
-        .share
+    let of_judges: Vec<Vector3<f64>> = forces.iter().step_by(every(JUDGES)).copied().collect();
+    let share_of = |of: &[Point3<f64>], forces: &[Vector3<f64>], shift: Vector3<f64>| {
+        let moved = of.iter().map(|centre| centre + shift);
+        BallFit::of(scan, tree, moved, radius, tolerance)
+            .explained(forces, radius, tolerance)
+            .on_scan()
     };
+    let share = |of: &[Point3<f64>], shift| share_of(of, forces, shift);
     let vertices = (0..scan.vertex_slots()).step_by((scan.vertex_slots() / VERTICES).max(1));
     let vertices = vertices
         .map(|at| VertexId(at as u32))
@@ -62,7 +61,7 @@ pub(super) fn best_shift(
         .flat_map(|place| some(CONTACTS).map(move |centre| place - centre))
         .map(|shift| ContactShift {
             shift,
-            share: share(&judges, shift),
+            share: share_of(&judges, &of_judges, shift),
         })
         .collect();
     shifts.sort_by(|a, b| b.share.total_cmp(&a.share));

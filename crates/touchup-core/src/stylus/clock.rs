@@ -30,7 +30,8 @@ const SEARCHED_STEPS: usize = 2 * (SEARCHED / SEARCH_STEP) as usize + 1;
 /// What is kept of an onset, on each side of the instant at which the gate opens, ns.
 const BEFORE_NS: i64 = 160_000_000;
 const AFTER_NS: i64 = 150_000_000;
-/// Two stops that are this far apart are two, s.
+/// Two stops that are this far apart are two, s; one within half of it of an end of what is
+/// searched may go on beyond it.
 const APART: f64 = 20e-3;
 /// The second stop has this share of the first at most.
 const SECOND_STOP: f64 = 0.7;
@@ -200,7 +201,8 @@ impl ClockEstimator {
             .sum();
         let sigma = (scatter / (bend * bend) + SHAPE * SHAPE + (self.period / 2.0).powi(2)).sqrt();
         let offset = coarse + (best as f64 - REACH as f64) * STEP + shift.clamp(-width, width);
-        (sigma <= LARGEST_SIGMA).then_some(ClockOffset {
+        let is_inside = offset.abs() <= SEARCHED - APART / 2.0;
+        (is_inside && sigma <= LARGEST_SIGMA).then_some(ClockOffset {
             offset,
             sigma,
             drift: None,

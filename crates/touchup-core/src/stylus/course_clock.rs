@@ -62,6 +62,10 @@ const MOST_RATES: i64 = 400;
 /// gains this much, s.
 const SURE_SIGMAS: f64 = 5.0;
 const LEAST_GAIN: f64 = 8e-3;
+/// A delay or a drift by which the sum falls by less than so many of its standard errors is none.
+const LEAST_FALL: f64 = 4.0;
+/// A delay that is off by more than so many of its standard uncertainties is to make the sum fall.
+const CLEAR_SIGMAS: f64 = 3.0;
 /// A wider uncertainty is no estimate, s.
 const LARGEST_SIGMA: f64 = 12e-3;
 
@@ -162,9 +166,12 @@ impl DelayBlocks {
         {
             return None;
         }
-        let without = (0..parts.curves.len())
-            .map(|at| least(&sum_of(&total, &parts.shifted(at, rate), -1.0)));
-        let without: Vec<f64> = without.collect::<Option<_>>()?;
+        let without: Vec<OfDelays> = (0..parts.curves.len())
+            .map(|at| sum_of(&total, &parts.shifted(at, rate), -1.0))
+            .collect();
+        let fall = |sums: &OfDelays| sums[REACH] - self::lowest(sums);
+        let fall_errors = in_errors(fall(&total), without.iter().map(fall));
+        let without: Vec<f64> = without.iter().map(least).collect::<Option<_>>()?;
         let [step, every] = [STEP_NS, EVERY_NS].map(|ns| ns as f64 * 1e-9);
         let instants: usize = self.blocks.iter().map(|block| block.count).sum();
         // of the steps, and of the mean that a sensor takes over a period
@@ -179,7 +186,10 @@ impl DelayBlocks {
             offset_at_first: at(ends[0]),
             offset_at_last: at(ends[1]),
         });
-        (sigma <= LARGEST_SIGMA).then_some(ClockOffset {
+        let is_inside = offset.abs() + CLEAR_SIGMAS * sigma < SPAN_NS as f64 * 1e-9;
+        let is_seen =
+            drift.is_some() || offset.abs() <= CLEAR_SIGMAS * sigma || fall_errors >= LEAST_FALL;
+        (is_inside && is_seen && sigma <= LARGEST_SIGMA).then_some(ClockOffset {
             offset,
             sigma,
             drift,
@@ -244,7 +254,7 @@ impl Parts {
 
     /// The rate at which the least of the sum is least, and its standard uncertainty: by the
     /// jackknife over all rates, since without a block it may be another one altogether. `None` at
-    /// an end of what is tried.
+    /// an end of what is tried, and where the sum hardly falls by it.
     fn drift(&self) -> Option<[f64; 2]> {
         // one step of the rate is one of the delay from end to end
         let rate_step = (STEP_NS as f64 * 1e-9 / self.span().max(f64::MIN_POSITIVE)).min(RATE_STEP);
@@ -256,23 +266,44 @@ impl Parts {
             let (before, after) = (depths.get(at.checked_sub(1)?)?, depths.get(at + 1)?);
             Some(rates[at] + parabola([*before, depths[at], *after]) * rate_step)
         };
-        let rate = best(&totals.iter().map(lowest).collect::<Vec<_>>())?;
-        let without = |left_out: usize| {
-            let less = |(rate, total): (&f64, &OfDelays)| {
-                lowest(&sum_of(total, &self.shifted(left_out, *rate), -1.0))
+        let depths = |left_out: Option<usize>| {
+            let depth = |(rate, total): (&f64, &OfDelays)| match left_out {
+                Some(at) => lowest(&sum_of(total, &self.shifted(at, *rate), -1.0)),
+                None => lowest(total),
             };
-            best(&rates.iter().zip(&totals).map(less).collect::<Vec<_>>())
+            rates.iter().zip(&totals).map(depth).collect::<Vec<_>>()
         };
-        let without: Vec<f64> = (0..self.curves.len()).map(without).collect::<Option<_>>()?;
+        let all = depths(None);
+        let rate = best(&all)?;
+        let without: Vec<Vec<f64>> = (0..self.curves.len()).map(|at| depths(Some(at))).collect();
+        let steady = rates.len() / 2;
+        let drifting = (0..rates.len()).min_by(|&a, &b| all[a].total_cmp(&all[b]))?;
+        let fall = |depths: &Vec<f64>| depths[steady] - depths[drifting];
+        if in_errors(fall(&all), without.iter().map(fall)) < LEAST_FALL {
+            return None;
+        }
+        let without: Vec<f64> = without
+            .iter()
+            .map(|depths| best(depths))
+            .collect::<Option<_>>()?;
         // what a step of the delays hides
         let of_steps = STEP_NS as f64 * 0.5e-9 / self.span().max(f64::MIN_POSITIVE);
-        Some([rate, jackknife_variance(&without).sqrt().hypot(of_steps)])
+        let sigma = jackknife_variance(&without).sqrt().hypot(of_steps);
+        (rate.abs() + CLEAR_SIGMAS * sigma < *rates.last()?).then_some([rate, sigma])
     }
 }
 
 /// One sum and `weight` times another, at each delay.
 fn sum_of(one: &OfDelays, other: &OfDelays, weight: f64) -> OfDelays {
     std::array::from_fn(|at| one[at] + weight * other[at])
+}
+
+/// A sum over blocks in its standard errors, by the jackknife.
+///
+/// - `without`: the same without each block.
+fn in_errors(sum: f64, without: impl Iterator<Item = f64>) -> f64 {
+    let without: Vec<f64> = without.collect();
+    sum / jackknife_variance(&without).sqrt().max(f64::MIN_POSITIVE)
 }
 
 fn lowest(sums: &OfDelays) -> f64 {

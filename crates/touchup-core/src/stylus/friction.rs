@@ -141,6 +141,8 @@ const EARLY_PATH: f64 = 0.1e-3;
 const CREEP: f64 = 1e-3;
 /// … and slower than so many times the noise of the velocity it may be at rest.
 const CLEAR: f64 = 3.0;
+/// No dry surface holds a ball back more.
+const MOST_FRICTION: f64 = 0.8;
 /// φ before anything is known, and its standard deviation, rad: μ from 0.05 to 0.3.
 const USUAL_ANGLE: [f64; 2] = [0.17, 0.12];
 /// Friction and force are never known better than this, rad: bias and noise of a usual force
@@ -206,9 +208,10 @@ impl Friction {
         self.stretch = SlidingStretch::default();
     }
 
-    /// What was found; `None` until the ball has slid far enough.
+    /// What was found; `None` until the ball has slid far enough, and where it is more than friction
+    /// can be: then motion and force do not belong together.
     pub fn coefficient(&self) -> Option<FrictionCoefficient> {
-        self.known
+        self.known.filter(|found| found.mu <= MOST_FRICTION)
     }
 
     /// The normal under the ball; `None` without a force.

@@ -1,0 +1,337 @@
+//! Whether the presses are on the scan, and what would bring them there.
+
+use nalgebra::{Point3, Vector3};
+
+use super::finding::{InputCause, InputFinding};
+use super::input_record::InputRecord;
+use super::judge::{InputJudge, LARGEST_SCAN_NOISE, LEAST_BALL, Presses, off_by_radius};
+use super::mends::PlaceMend;
+use super::places::{BallFit, Explained, error_of_median, extent_of};
+use super::shift::{ContactShift, best_shift};
+use crate::stylus::{TipShape, WrenchFrame};
+
+/// Contacts are on the scan when this share of them is: where the scan lacks a wall or a hole, they
+/// are not.
+pub(super) const SHARE_ON_SCAN: f64 = 0.5;
+/// What mends an input brings so many more onto the scan.
+const MENDED_SHARE: f64 = 0.3;
+/// What would mend it brings so many more onto the scan than anything else would.
+const REFUTED_SHARE: f64 = 0.1;
+/// The touched part is no smaller and no larger than this share of the scan …
+const SHARES_OF_SCAN: std::ops::RangeInclusive<f64> = 0.05..=1.5;
+/// … and larger than so many tolerances: less lies on anything.
+const LEAST_SPREAD: f64 = 8.0;
+/// Contacts do not span more than this many times the scan.
+const LARGEST_SPREAD: f64 = 5.0;
+/// A shift is one when it is longer than so many tolerances …
+const LEAST_SHIFT: f64 = 4.0;
+/// … brings all but some contacts onto the scan …
+const SHIFTED_SHARE: f64 = 0.85;
+/// … and this many more than are there as it is.
+const SHIFT_GAIN: f64 = 0.15;
+/// A ball this much farther from the surface than its radius is another one.
+const LEAST_RATIO: f64 = 20.0;
+/// Of contacts on a rough scan this share is not farther off than so many times what most are.
+const SHARE_NOT_FAR: f64 = 0.9;
+const FAR: f64 = 3.0;
+/// No ball is larger than this share of the scan that it is for.
+const LARGEST_BALL: f64 = 0.25;
+/// No ball is farther from the recorded point of the stylus, m.
+const LONGEST_TIP: f64 = 0.4;
+/// Presses that such a distance is searched by.
+const TIP_JUDGES: usize = 60;
+const FRAME_REMEDY: &str =
+    "are the poses those of the ball in the frame of the scan (scan_to_space, tip.offset_mm)?";
+
+/// How the presses lie on the scan as they were reported.
+struct Reported {
+    fit: BallFit,
+    centres: Vec<Point3<f64>>,
+    /// in O, N
+    forces: Vec<Vector3<f64>>,
+    /// of the distance from one radius, m
+    tolerance: f64,
+    is_on_scan: bool,
+}
+
+impl InputJudge<'_> {
+    /// What is wrong with where the presses are, and whether they are on the scan even so.
+    pub fn judge_places(&self, presses: &Presses) -> Option<(InputFinding, bool)> {
+        let Presses { records, .. } = presses;
+        let radius = self.params.tip.radius;
+        let tolerance = presses.tolerance + presses.sunk;
+        let fit = self.fit(records, tolerance);
+        let reported = Reported {
+            is_on_scan: fit.share >= SHARE_ON_SCAN && (fit.distance - radius).abs() <= tolerance,
+            fit,
+            centres: records.iter().map(|record| record.centre).collect(),
+            forces: records
+                .iter()
+                .map(|record| presses.levels.force_o(record))
+                .collect(),
+            tolerance,
+        };
+        if let Some(inside) = self.inside_out(&reported) {
+            return Some((inside, false));
+        }
+        if let Some(ball) = self.ball_of_other_unit(presses, &reported) {
+            return Some((ball, true));
+        }
+        let other_ball = self.other_ball(presses, &reported);
+        if !reported.is_on_scan
+            && let Some(finding) = self.mend(presses, &reported, other_ball.is_none())
+        {
+            return Some((finding, false));
+        }
+        let extent = extent_of(reported.centres.iter().copied()) / presses.scale.extent;
+        if extent > LARGEST_SPREAD {
+            let measured = format!("the contacts span {extent:.3} times the scan");
+            let remedy =
+                "poses are in m, the scan as --mesh-unit says: is one of them in another unit?";
+            return Some((
+                InputFinding::new(InputCause::LengthUnit, true, measured, remedy),
+                false,
+            ));
+        }
+        if let Some(ball) = other_ball {
+            return Some((ball, true));
+        }
+        self.judge_frame(presses, &reported)
+    }
+
+    /// A scan whose faces look inwards: the centres are a radius below its surface, and the forces
+    /// point into it.
+    fn inside_out(&self, reported: &Reported) -> Option<InputFinding> {
+        let Reported {
+            fit,
+            forces,
+            tolerance,
+            ..
+        } = reported;
+        let radius = self.params.tip.radius;
+        let inwards = BallFit {
+            distances: fit.distances.iter().map(|distance| -distance).collect(),
+            normals: fit.normals.iter().map(|normal| -normal).collect(),
+            ..fit.clone()
+        };
+        let [as_read, inwards] =
+            [fit, &inwards].map(|fit| fit.explained(forces, radius, *tolerance).on_scan());
+        // a wrench that is reversed leaves the centres a radius above it
+        let is_below = (fit.distance + radius).abs() < (fit.distance - radius).abs();
+        let is_found = is_below && inwards >= SHARE_ON_SCAN && inwards > as_read + MENDED_SHARE;
+        is_found.then(|| {
+            let measured = format!(
+                "{:.0} % of the contacts are on the scan from within, where their forces point, and {:.0} % from outside",
+                100.0 * inwards,
+                100.0 * as_read
+            );
+            let remedy = "turn the faces of the scan: they are counter-clockwise seen from outside";
+            InputFinding::new(InputCause::InsideOut, true, measured, remedy)
+        })
+    }
+
+    /// A radius in another unit: no matter of tolerance.
+    fn ball_of_other_unit(&self, presses: &Presses, reported: &Reported) -> Option<InputFinding> {
+        let radius = self.params.tip.radius;
+        let BallFit {
+            distance, scatter, ..
+        } = reported.fit;
+        let error = error_of_median(scatter, presses.records.len());
+        let is_other = distance > LEAST_RATIO * radius && distance > 3.0 * error;
+        // a tip of radius 0 is a point
+        let is_none = radius > 0.0 && radius < LEAST_BALL;
+        let is_ball = self.params.shape == TipShape::Ball;
+        (is_ball && reported.is_on_scan && (is_none || is_other))
+            .then(|| off_by_radius(distance, error, radius))
+    }
+
+    /// Presses that are all as far from the surface as each other: another ball.
+    fn other_ball(&self, presses: &Presses, reported: &Reported) -> Option<InputFinding> {
+        let Presses { records, scale, .. } = presses;
+        let BallFit {
+            distance, scatter, ..
+        } = reported.fit;
+        let radius = self.params.tip.radius;
+        let may_be_ball = self.params.shape == TipShape::Ball
+            && (0.0..LARGEST_BALL * scale.extent).contains(&distance);
+        let noise = scale
+            .noise
+            .max(self.params.scan_noise)
+            .min(LARGEST_SCAN_NOISE);
+        let is_off = (distance - radius).abs() > reported.tolerance;
+        (is_off && may_be_ball && scatter <= noise + 0.2 * scale.edge + 0.1e-3)
+            .then(|| off_by_radius(distance, error_of_median(scatter, records.len()), radius))
+    }
+
+    /// Contacts that are not on the scan, or many more of them when all are shifted alike.
+    fn judge_frame(&self, presses: &Presses, reported: &Reported) -> Option<(InputFinding, bool)> {
+        let Reported {
+            fit,
+            forces,
+            tolerance,
+            is_on_scan,
+            ..
+        } = reported;
+        let radius = self.params.tip.radius;
+        let shown = |x: f64| 1e3 * x;
+        let mut measured = format!(
+            "the ball's centre is {:.2} ± {:.2} mm off the scan where it presses, and its radius is {:.2} mm; {:.0} % of \
+             the contacts are on the scan",
+            shown(fit.distance),
+            shown(fit.scatter),
+            shown(radius),
+            100.0 * fit.share
+        );
+        let as_it_is = fit.explained(forces, radius, *tolerance);
+        if let Some(ContactShift { shift, share }) = self.shift(reported, &as_it_is) {
+            let [x, y, z] = [shift.x, shift.y, shift.z].map(shown);
+            measured += &format!(
+                ", and shifted by ({x:.1}, {y:.1}, {z:.1}) mm {:.0} % are",
+                100.0 * share
+            );
+            return Some((
+                InputFinding::new(InputCause::Frame, true, measured, FRAME_REMEDY),
+                *is_on_scan,
+            ));
+        }
+        if *is_on_scan || as_it_is.on_scan_or_in_holes() >= SHARE_NOT_FAR {
+            return None;
+        }
+        // a rough scan: most are less than a radius off, and hardly one is far
+        let wide = radius.max(presses.tolerance) + presses.sunk;
+        let share_within = |distance: f64| self.fit(&presses.records, distance).share;
+        let is_near = (fit.distance - radius).abs() <= wide
+            && share_within(wide) >= SHARE_ON_SCAN
+            && share_within(FAR * wide) >= SHARE_NOT_FAR;
+        let is_sure = !is_near && as_it_is.on_scan_or_in_holes() < SHARE_ON_SCAN;
+        Some((
+            InputFinding::new(InputCause::Frame, is_sure, measured, FRAME_REMEDY),
+            is_near,
+        ))
+    }
+
+    /// Another unit, other axes, another order of the quaternion or another point of the stylus,
+    /// with which the contacts are on the scan.
+    ///
+    /// - `is_far`: whether no other ball explains them as well.
+    fn mend(&self, presses: &Presses, reported: &Reported, is_far: bool) -> Option<InputFinding> {
+        let as_it_is = reported.fit.share;
+        let tip = is_far.then(|| self.best_tip(presses)).flatten();
+        let mut mends: Vec<(f64, PlaceMend)> = PlaceMend::units()
+            .chain([PlaceMend::w_first()])
+            .chain(PlaceMend::axes())
+            .chain(tip)
+            .filter_map(|mend| Some((self.mended(presses, &presses.records, &mend)?, mend)))
+            .filter(|(share, _)| *share >= SHARE_ON_SCAN && *share > as_it_is + MENDED_SHARE)
+            .collect();
+        mends.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let (share, best) = mends.first()?;
+        let other = mends.iter().find(|(_, mend)| mend.cause != best.cause);
+        let mut measured = format!(
+            "{}: {:.0} % of the contacts are then on the scan, and {:.0} % as it is",
+            best.says,
+            100.0 * share,
+            100.0 * as_it_is
+        );
+        let remedy = match best.cause {
+            InputCause::LengthUnit => "poses are in m, the scan as --mesh-unit says",
+            InputCause::QuaternionOrder => "give the orientation as x, y, z, w",
+            InputCause::PositionAxes => {
+                "give the positions in the axes of the scan, or scan_to_space"
+            }
+            _ => "give the place of the ball as tip.offset_mm (touchup calibrate tip)",
+        };
+        match other.filter(|(other, _)| *other > share - REFUTED_SHARE) {
+            Some((share, other)) => {
+                measured += &format!("; or {}: {:.0} %", other.says, 100.0 * share);
+                Some(InputFinding::new(
+                    InputCause::Frame,
+                    true,
+                    measured,
+                    FRAME_REMEDY,
+                ))
+            }
+            None => Some(InputFinding::new(best.cause, true, measured, remedy)),
+        }
+    }
+
+    /// Share of `records` that the scan explains with a mend; `None` where they would be so close
+    /// together that they lie on anything, or much wider apart than the scan.
+    fn mended(&self, presses: &Presses, records: &[&InputRecord], mend: &PlaceMend) -> Option<f64> {
+        let Presses {
+            levels,
+            scale,
+            sunk,
+            ..
+        } = presses;
+        let (placement, unit) = (&self.params.placement, mend.scan_unit);
+        let radius = self.params.tip.radius * unit;
+        let tolerance = scale.tolerance(0.0, radius, unit) + sunk * unit;
+        let centres: Vec<Point3<f64>> = records
+            .iter()
+            .map(|record| mend.centre(placement, record))
+            .collect();
+        let extent = extent_of(centres.iter().copied());
+        let is_spread =
+            SHARES_OF_SCAN.contains(&(extent / scale.extent)) && extent > LEAST_SPREAD * tolerance;
+        let rotation = |record: &InputRecord| match self.params.compensator.wrench_frame {
+            WrenchFrame::Sensor => mend.rotation(placement, record),
+            WrenchFrame::Object => record.rotation,
+        };
+        let forces: Vec<Vector3<f64>> = records
+            .iter()
+            .map(|record| rotation(record) * (record.force_t() - levels.rest_t))
+            .collect();
+        // whoever swaps axes of the positions may have those of the orientation swapped as well
+        let turned: Vec<Vector3<f64>> = forces.iter().map(|force| mend.turned(force)).collect();
+        is_spread.then(|| {
+            let fit = BallFit::of(self.scan, self.tree, centres.into_iter(), radius, tolerance);
+            let [as_it_is, turned] =
+                [forces, turned].map(|forces| fit.explained(&forces, radius, tolerance).on_scan());
+            as_it_is.max(turned)
+        })
+    }
+
+    /// The place of the ball along an axis of the stylus with which most presses are on the scan.
+    fn best_tip(&self, presses: &Presses) -> Option<PlaceMend> {
+        let records = &presses.records;
+        let every = records.len().div_ceil(TIP_JUDGES).max(1);
+        let judges: Vec<&InputRecord> = records.iter().step_by(every).copied().collect();
+        let step = presses.tolerance;
+        let count = (LONGEST_TIP / step) as i64;
+        let at = |axis: usize, length: f64| PlaceMend::tip(Vector3::ith(axis, length));
+        let share = |mend: &PlaceMend| self.mended(presses, &judges, mend).unwrap_or(0.0);
+        (0..3)
+            .flat_map(|axis| (-count..=count).map(move |steps| (axis, steps as f64 * step)))
+            .map(|(axis, length)| at(axis, length))
+            .map(|mend| (share(&mend), mend))
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, mend)| mend)
+    }
+
+    /// The shift of all contacts that brings many more of them onto the scan, and explains more of
+    /// them than holes do that the scan lacks; `None` where none does.
+    fn shift(&self, reported: &Reported, as_it_is: &Explained) -> Option<ContactShift> {
+        let Reported {
+            centres,
+            forces,
+            tolerance,
+            ..
+        } = reported;
+        if as_it_is.on_scan().max(reported.fit.share) + SHIFT_GAIN > 1.0 {
+            return None;
+        }
+        let best = best_shift(
+            self.scan,
+            self.tree,
+            (centres, forces),
+            self.params.tip.radius,
+            *tolerance,
+        )?;
+        let is_one = best.shift.norm() > LEAST_SHIFT * tolerance
+            && best.share >= SHIFTED_SHARE
+            && best.share >= as_it_is.on_scan() + SHIFT_GAIN
+            && best.share > as_it_is.on_scan_or_in_holes();
+        is_one.then_some(best)
+    }
+}
