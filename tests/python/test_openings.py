@@ -8,9 +8,6 @@ import numpy as np
 import pytest
 import trimesh
 
-SEEDS = range(50 if IS_FULL else 4)
-# root mean square of error over standard uncertainty
-HONEST = 1.25
 HEIGHT_MM = 12.0
 
 
