@@ -274,7 +274,6 @@ fn stopped(error: &ProbeError) -> u8 {
         | ProbeError::Pulls { .. }
         | ProbeError::Noisy { .. }
         | ProbeError::Drifts { .. }
-        | ProbeError::Unfelt { .. }
         | ProbeError::Displaced { .. } => ProbeResult::FAULT,
         ProbeError::Cancelled { request, .. } => cancelled(*request),
     }

@@ -858,8 +858,14 @@ impl Arm for Creeping {
     fn next_state(&mut self) -> Result<ArmState, ArmError> {
         self.stamp_ns += 2_000_000;
         let x = -0.4 + 20e-6 * (self.stamp_ns / 2_000_000) as f64 % 0.1;
+        // no sensor is without noise
+        let noise = if self.stamp_ns % 4_000_000 == 0 {
+            0.1
+        } else {
+            -0.1
+        };
         let wrench_b = Wrench {
-            force: Vector3::zeros(),
+            force: Vector3::repeat(noise),
             torque: Vector3::zeros(),
         };
         let pose_bt = Isometry3::translation(x, 0.0, 0.1);

@@ -1,9 +1,11 @@
-//! A probe that is bent, a part that slips and an arm that drifts while a feature is probed.
+//! A probe that is bent, a part that slips, an arm that drifts and a sensor that does while a
+//! feature is probed.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use touchup::features::Kind;
+use touchup::probing::arm::ProbeError;
 use touchup::probing::execute::{Ending, Flag, Probed, Prober, References};
-use touchup::sim::{ArmFault, ArmParams, Plate, SimArm};
+use touchup::sim::{ArmFault, ArmParams, Plate, SensorFault, SimArm};
 
 use super::static_scan::StaticScan;
 use super::{cell, params};
@@ -162,4 +164,26 @@ fn contacts_of_an_arm_that_stays_are_where_they_were() {
         }
     }
     println!("at most {worst:.1} standard deviations off");
+}
+
+/// 0.5 N rms are half of the trigger of 1 N; 0.2 N/s are more than it after 5 s.
+#[test]
+fn noise_is_refused_at_the_start_and_drift_is_named_as_drift() {
+    let noise = ArmFault::Sensor(SensorFault::Noise(0.5));
+    let all = probed(&[HOLE], 2, |arm| arm.fail_at(0.0, noise));
+    assert!(
+        matches!(&all[0].ending, Ending::Stopped(ProbeError::Noisy { noise_n, .. }) if (0.3..0.7).contains(noise_n)),
+        "{}",
+        all[0].ending
+    );
+    assert!(all[0].touches.is_empty());
+    for rate in [Vector3::z() * 0.2, Vector3::z() * -0.2, Vector3::x() * 0.2] {
+        let drift = ArmFault::Sensor(SensorFault::Drifts(rate));
+        let all = probed(&[HOLE], 2, |arm| arm.fail_at(0.0, drift));
+        assert!(
+            matches!(&all[0].ending, Ending::Stopped(ProbeError::Drifts { per_s, .. }) if (0.15..0.25).contains(per_s)),
+            "{}",
+            all[0].ending
+        );
+    }
 }

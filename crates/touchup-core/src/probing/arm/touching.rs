@@ -137,12 +137,8 @@ impl Watched<'_> {
                 let mut forces = Vec::new();
                 self.halt(stopping, &mut |state| forces.push(state.wrench_b.force))?;
                 self.check_sign(stopping, &line, mean(forces.into_iter()))?;
-                let met = self.last.filter(|state| line.felt(state) > params.trigger);
                 let is_free = self.back_off(&line)?;
-                let pressed =
-                    is_free && self.press(&line, SECOND * params.back_off, &mut states)?;
-                self.check_follows(met.filter(|_| !pressed), &line, &states)?;
-                match pressed {
+                match is_free && self.press(&line, SECOND * params.back_off, &mut states)? {
                     true => line.outcome_of(&states),
                     // the first search made a contact that the second did not
                     false => {
@@ -197,33 +193,6 @@ impl Watched<'_> {
             acceleration: self.limits.acceleration,
         })?;
         Err(ProbeError::Pulls { doing, force_n })
-    }
-
-    /// Where a contact was felt at rest, and the ball has gone beyond it by what the touch presses in,
-    /// it has to be felt again.
-    ///
-    /// - `met`: the contact; `states`: of the measuring search that did not reach its force.
-    fn check_follows(
-        &self,
-        met: Option<ArmState>,
-        line: &ApproachLine,
-        states: &[ArmState],
-    ) -> Result<(), ProbeError> {
-        let deep = |a: &&ArmState, b: &&ArmState| line.depth(a).total_cmp(&line.depth(b));
-        let Some((met, deepest)) = met.zip(states.iter().max_by(deep)) else {
-            return Ok(());
-        };
-        let beyond = line.depth(deepest) - line.depth(&met);
-        let (felt_n, force_n) = (line.felt(&met), line.felt(deepest));
-        if beyond < line.params.force / line.params.stiffness || force_n > felt_n {
-            return Ok(());
-        }
-        Err(ProbeError::Unfelt {
-            doing: "measuring",
-            mm: beyond * 1e3,
-            felt_n,
-            force_n,
-        })
     }
 
     /// Free of the surface again, then a little farther.

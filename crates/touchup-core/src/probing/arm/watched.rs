@@ -121,21 +121,6 @@ pub enum ProbeError {
         /// what it reads
         stuck: StuckForce,
     },
-    /// It does not follow what it is pressed with.
-    #[error(
-        "while {doing}: the ball was pressed {mm:.2} mm beyond where {felt_n:.1} N were felt, and now {force_n:.1} N are: the force \
-         sensor hangs or is late, or the part gives way; look before it is touched again"
-    )]
-    Unfelt {
-        /// what was being done
-        doing: &'static str,
-        /// mm
-        mm: f64,
-        /// when it was met, N
-        felt_n: f64,
-        /// now, N
-        force_n: f64,
-    },
     /// A contact that was touched again is not where it was.
     #[error(
         "while {doing}: {reference} {how}, so the probe is bent or loose, the part has slipped, the arm has drifted or its sensor feels \

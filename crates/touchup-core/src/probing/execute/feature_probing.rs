@@ -82,11 +82,11 @@ impl<'a> Prober<'a> {
         if probing.prober.params.slides && ended.is_ok() {
             ended = probing.slide_over(explorer.slides());
         }
-        if matches!(ended, Ok(()) | Err(Ending::TimeSpent)) {
-            let doubted = probing
+        // a limit of time holds for these as well
+        if ended.is_ok() {
+            ended = probing
                 .check_zero()
                 .and_then(|()| probing.touch_references());
-            ended = doubted.and(ended);
         }
         let ended = probing.finish(ended);
         let found = explorer.found();
