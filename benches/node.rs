@@ -224,8 +224,7 @@ fn beside_pages(faces: usize, turns: usize) {
             let port = page
                 .serve_node(facts, inbox, ready.whole_mesh(), port)
                 .expect("the services have names");
-            let address = page
-                .url()
+            let address = page.urls()[0]
                 .trim_start_matches("http://")
                 .parse()
                 .expect("it is an address");

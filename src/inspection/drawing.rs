@@ -111,7 +111,7 @@ impl PartDrawing {
     }
 }
 
-/// By how much the facets of a CAD mesh make its sizes smaller; `None` where it has none.
+/// By how much the facets of a CAD mesh make its sizes smaller; `None` if it has none.
 fn facets_note(characteristics: &[Drawn]) -> Option<String> {
     let faceted = characteristics.iter().filter(|one| one.facets_mm > 0.0);
     let faceted: Vec<String> = faceted

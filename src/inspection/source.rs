@@ -190,7 +190,7 @@ struct ProbedFeature {
 
 impl ProbedFeature {
     /// What has to be known of it: what stopped the arm, and touches after which no contact was
-    /// found where it had been.
+    /// found if it had been.
     fn notes(&self) -> Vec<String> {
         let Self { flag, ending, .. } = self;
         let stopped = (self.code == "stopped").then(|| format!("Feature {flag}: {ending}."));

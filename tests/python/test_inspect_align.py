@@ -241,7 +241,7 @@ def test_what_cannot_be_aligned_is_one_error_that_says_what_to_do(touchup, tmp_p
     assert '"axle"' in error and "it has top, bore, pin" in error, error
     untouched = [one | {"std": {}} if one["id"] == 11 else one for one in features]
     error = refused(touchup, tmp_path, untouched, rows_of(PLATE), "--align", "datums=top,bore,pin")
-    assert '"bore"' in error and "feature 11 has no standard uncertainty: touch it" in error, error
+    assert '"bore"' in error and "feature 11 has no touches behind its place: touch it" in error, error
     # a method that is none is wrong usage
     ran = inspect(touchup, tmp_path, features, rows_of(PLATE), "--align", "icp")
     assert ran.returncode == 2 and "best-fit, or datums=NAME" in ran.stderr, ran.stderr

@@ -18,10 +18,6 @@ def outline(radius, corners=96):
     return np.column_stack([radii * np.cos(angles), radii * np.sin(angles)])
 
 
-def polygon(corners, radius):
-    return outline(lambda _: radius, corners)
-
-
 def oval(a, b):
     angles = 2 * np.pi * np.arange(96) / 96
     return np.column_stack([a * np.cos(angles), b * np.sin(angles)])
@@ -58,8 +54,6 @@ OUT_OF_ROUND = {
     "oval by 0.6": (oval(4.15, 3.85), 0.30),
     "three lobes": (outline(lambda angle: 4 + 0.1 * math.cos(3 * angle)), 0.20),
     "five lobes": (outline(lambda angle: 4 + 0.05 * math.cos(5 * angle)), 0.10),
-    "hexagon": (polygon(6, 4.0), 4 - 4 * math.cos(math.pi / 6)),
-    "triangle": (polygon(3, 5.0), 2.5),
 }
 
 

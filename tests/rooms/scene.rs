@@ -398,7 +398,11 @@ fn the_patch_needs_a_ball_and_a_gate_and_is_no_part_of_the_paper() {
         (2e-3, 6e-3)
     );
     let default = Scene::default().patcher_params();
-    assert_eq!(default, Some(PatcherParams::new(1.5e-3, Some(2e4), 0.6e-3)));
+    let usual = PatcherParams {
+        is_usual_tolerance: true,
+        ..PatcherParams::new(1.5e-3, Some(2e4), 0.6e-3)
+    };
+    assert_eq!(default, Some(usual));
     let paper = Scene::from_yaml("tip:\ncontact:\npatch:\nrefine: { mode: paper }").unwrap();
     assert!(paper.patcher_params().is_none());
 }

@@ -236,7 +236,7 @@ reported! {
         /// form
         pub form?: FormRecord = feature.form.as_ref().map(FormRecord::of),
         /// hole, notch, boss, cylinder, slot, pocket of a drawing: how far the middles of its facets
-        /// lie inside the round surface through their corners; left out where there are none
+        /// lie inside the round surface through their corners; left out if there are none
         pub facets_mm?: f64 = feature.facets.map(|m| m * 1e3),
         /// share of its surface within a ball's radius of a touch
         #[serde(default)]

@@ -64,7 +64,7 @@ pub(super) struct LimitedFile {
     limit: u64,
 }
 
-/// Opens a file that is not longer than `limit`, nor than [`MAX_STREAM_BYTES`] where its end is not
+/// Opens a file that is not longer than `limit`, nor than [`MAX_STREAM_BYTES`] if its end is not
 /// known before.
 pub(super) fn open_up_to(path: &Path, limit: u64) -> io::Result<LimitedFile> {
     let file = File::open(path)?;

@@ -44,7 +44,7 @@ pub(super) struct Row {
     pub line: usize,
     /// finite
     pub needed: Vec<f64>,
-    /// `None` where it is empty, or the column is not there
+    /// `None` if it is empty, or the column is not there
     pub numbers: Vec<Option<f64>>,
     /// likewise
     pub texts: Vec<Option<String>>,

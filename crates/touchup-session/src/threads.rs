@@ -7,12 +7,12 @@ use std::thread::{Builder, available_parallelism, scope};
 use touchup_core::mesh::{Job, Workers};
 
 /// Steps by which a thread gives way to others (setpriority(2)): with a third of their share its
-/// work still comes to an end where the machine is busy.
+/// work still comes to an end if the machine is busy.
 const STEPS_BEHIND: i32 = 5;
 
 /// Has this thread, and those that it begins from now on, give way to the ordinary threads of the
 /// process: a sample is answered first, and what follows from it has the time that is left. Needs
-/// no privilege. Where the system has no priority for a single thread, or refuses it, the work is
+/// no privilege. If the system has no priority for a single thread, or refuses it, the work is
 /// done at the ordinary one.
 pub fn give_way() {
     #[cfg(target_os = "linux")]

@@ -132,7 +132,7 @@ pub enum ArmFault {
     PartMoved(Vector3<f64>, Vector3<f64>),
 }
 
-/// What becomes of a force sensor.
+/// A fault of a force sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SensorFault {
     /// Each reading is the last one, but along some axes of the flange (0) it goes on (1).
@@ -224,6 +224,18 @@ pub struct SimArm<'a> {
     peak_force: f64,
 }
 
+/// Refuses a ball that would be in the part.
+fn check_free(surface: &dyn Surface, ball: &Point3<f64>, radius_m: f64) -> Result<(), SimError> {
+    let clearance_m = surface.signed_distance(ball);
+    if clearance_m < radius_m {
+        return Err(SimError::StartsInside {
+            clearance_m,
+            radius_m,
+        });
+    }
+    Ok(())
+}
+
 impl<'a> SimArm<'a> {
     /// An arm at rest with its tip at a pose in B.
     ///
@@ -246,16 +258,7 @@ impl<'a> SimArm<'a> {
         let offset = params.ball_offset + params.errors.tip;
         let kinematic = kinematic_error(&geometry, &params, &joints);
         let ball = pose_bo.inverse_transform_point(&(kinematic * start_bt * Point3::from(offset)));
-        let (clearance_m, radius_m) = (
-            surface.signed_distance(&ball),
-            params.radius + params.errors.radius,
-        );
-        if clearance_m < radius_m {
-            return Err(SimError::StartsInside {
-                clearance_m,
-                radius_m,
-            });
-        }
+        check_free(surface, &ball, params.radius + params.errors.radius)?;
         let mut approach_rng = Pcg64::seed_from_u64(params.seed ^ 0x2d31_6f0a_94c5_e87b);
         let late = (params.force_latency / STEP).round() as usize;
         Ok(Self {
@@ -407,7 +410,7 @@ impl<'a> SimArm<'a> {
         }
     }
 
-    /// What the sensor makes of a force, N in the flange.
+    /// The reading of the sensor for a force, N in the flange.
     fn sensed(&mut self, force: Vector3<f64>) -> Vector3<f64> {
         let Some((since, fault, held)) = self.sensor else {
             self.last_force = force;

@@ -218,10 +218,10 @@ impl ProbedRecord {
 }
 
 reported! {
-    /// A contact that was touched again.
+    /// A reference that the arm touched again.
     #[derive(Clone, Deserialize)]
     struct TouchedAgain, fn of(touch: &ReferenceTouch) {
-        /// number of the feature that it was touched for first
+        /// number of the feature that it belongs to
         flag: u32 = touch.flag,
         /// which touch of that, from 0 on
         index: usize = touch.index,

@@ -1,4 +1,4 @@
-//! The first request of a program that was met in the same moment.
+//! The first request of a program that the node meets in the same moment.
 //!
 //! Fast DDS sends a request as soon as it knows our reader, be it before RustDDS knows the writer: that
 //! request is passed over, and comes again only when it is asked for. RustDDS 0.15 asks by an ACKNACK

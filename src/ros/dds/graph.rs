@@ -44,7 +44,7 @@ const MOST_WRITERS: usize = 64;
 
 pub(super) struct DdsGraph {
     listener: DomainParticipantStatusListener,
-    /// `None` where its ports are not to be had
+    /// `None` if its ports are not to be had
     keep_alive: Option<KeepAlive>,
     rematch: Rematch,
     exchange: Arc<Exchange>,

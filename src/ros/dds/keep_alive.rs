@@ -53,7 +53,7 @@ pub(super) struct KeepAlive {
     /// wake the thread that takes: one hears announcements to all, one has the port of a participant
     /// of this computer and hears those to each
     pub sockets: Vec<MioSocket>,
-    /// numbers of the announcements that are handed over
+    /// numbers of the announcements handed over
     next_number: i64,
     /// our own participant, and where it listens
     own: Prefix,
@@ -372,7 +372,7 @@ fn short(bytes: &[u8], at: usize, is_little_endian: bool) -> Option<u16> {
     })
 }
 
-/// What a datagram says of a participant, and where in it.
+/// The announcement of a participant in a datagram, and where in it.
 #[derive(Debug, PartialEq, Eq)]
 struct Announcement {
     prefix: Prefix,
@@ -667,7 +667,7 @@ mod tests {
             found
         }
 
-        /// What our own participant has heard.
+        /// The datagram that our own participant has heard.
         fn received(&mut self) -> Option<Vec<u8>> {
             let mut bytes = [0; 400];
             let length = self.own.recv(&mut bytes).ok()?;

@@ -17,7 +17,7 @@ use ros2_client::dds::rustdds::{
     QosPolicyBuilder, TopicKind,
 };
 
-/// Endpoints of others that are remembered.
+/// Endpoints of others to remember.
 const MOST_ENDPOINTS: usize = 4096;
 /// How long one of ours is there: RustDDS takes a few milliseconds.
 const MOMENT: Duration = Duration::from_secs(1);

@@ -26,7 +26,7 @@ pub enum ViewInput {
     Variances(Variances),
     /// a new session
     Session(Box<MeshVersion>),
-    /// a face was touched so far from where the mesh had it, m; where tiles are coloured by that
+    /// a face was touched so far from where the mesh had it, m; if tiles are coloured by that
     Mismatch(u32, f64),
     /// where the tip is
     Tip(LastTip),

@@ -23,7 +23,7 @@ pub struct Shared {
     pub tiles_waiting: AtomicUsize,
     /// frames of the view that were dropped
     pub dropped_frames: AtomicU64,
-    /// how many look at the tiles; one where the port does not say
+    /// how many look at the tiles; one if the port does not say
     pub viewers: AtomicUsize,
     /// somebody joined who has no tiles yet
     pub has_new_viewer: AtomicBool,

@@ -72,7 +72,7 @@ pub(super) struct Access {
 }
 
 impl Access {
-    /// - `address`: as it is listened to.
+    /// - `address`: to listen to.
     /// - `names`: other names and addresses of this machine by which the page may be called.
     /// - `by_link`: pages are let in by link alone.
     pub fn new(address: SocketAddr, names: &[String], by_link: bool, is_tls: bool) -> Self {
@@ -110,7 +110,7 @@ impl Access {
         self.hosts.contains(&host.to_lowercase()) || self.is_own_address(host)
     }
 
-    /// Whether it is one that the machine has now, where all of them are listened to.
+    /// Whether it is one that the machine has now, if all of them are listened to.
     fn is_own_address(&self, host: &str) -> bool {
         let own = self.address.ip();
         let usual = if self.scheme == "https" { 443 } else { 80 };
@@ -126,7 +126,7 @@ impl Access {
     }
 
     /// The addresses of the page for links, as `http://192.168.0.7:8321`: by the given names first,
-    /// and by each address that the machine has now where all are listened to.
+    /// and by each address that the machine has now if all are listened to.
     pub fn urls(&self) -> Vec<String> {
         let (ip, port) = (self.address.ip(), self.address.port());
         let mut names = self.names.clone();

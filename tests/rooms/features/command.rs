@@ -202,13 +202,29 @@ fn a_mesh_with_nothing_on_it_gives_an_empty_list() {
 /// Fields that the issue names for each kind, without those that only touches give.
 fn documented(kind: &str) -> &'static [&'static str] {
     match kind {
-        "hole" => &["axis", "center_mm", "depth_mm", "diameter_mm", "through"],
-        "boss" => &["axis", "center_mm", "depth_mm", "diameter_mm"],
+        "hole" => &[
+            "axis",
+            "center_mm",
+            "depth_mm",
+            "diameter_mm",
+            "facets_mm",
+            "form",
+            "through",
+        ],
+        "boss" => &[
+            "axis",
+            "center_mm",
+            "depth_mm",
+            "diameter_mm",
+            "facets_mm",
+            "form",
+        ],
         "slot" => &[
             "axis",
             "center_mm",
             "depth_mm",
             "direction",
+            "facets_mm",
             "length_mm",
             "points_mm",
             "through",

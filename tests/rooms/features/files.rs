@@ -250,13 +250,7 @@ fn damaged_lines_are_named() {
 #[test]
 fn another_header_is_refused() {
     let body = line(&[]);
-    for header in [
-        "",
-        "touch",
-        &HEADER.replace("sigma", "Sigma"),
-        &HEADER.replace(',', ";"),
-        &HEADER[1..],
-    ] {
+    for header in ["", "touch", &HEADER.replace("sigma", "Sigma"), &HEADER[1..]] {
         let error = read(&format!("{header}\n{body}\n")).unwrap_err();
         assert!(
             matches!(error, TouchesFileError::NoTouches { .. }),

@@ -13,7 +13,7 @@ pub const MAY_USE: &[(&str, &str)] = &[
     ("mesh", "numeric"),
     ("reconstruct", "numeric parameters stylus mesh"),
     ("haptic", "numeric parameters stylus mesh reconstruct"),
-    ("live", "clock stylus mesh reconstruct haptic"),
+    ("live", "clock stylus mesh reconstruct haptic threads"),
     ("plan", "numeric parameters stylus mesh features conformity"),
     ("arm", "numeric parameters stylus plan"),
     (
@@ -72,7 +72,7 @@ pub const MAY_USE: &[(&str, &str)] = &[
     (
         "ros",
         "parameters clock log_lines stylus mesh reconstruct haptic live form features plan arm execute sim align \
-         calibrate compare diagnose io scan scene session replay conformity inspection input_check calibration",
+         calibrate compare diagnose io scan scene session replay conformity inspection input_check calibration threads",
     ),
     ("ros2_control", "clock stylus plan arm ros"),
     (
@@ -112,8 +112,12 @@ pub const IMPURE_NAMES: &[&str] = &[
 pub const MAY_OPEN_FILES: &[&str] = &["crates/touchup-io/", "crates/touchup-session/src/scene/"];
 
 /// The files that ask the system about itself, which answers by files: the packet sizes of its
-/// networks, the open sockets.
-pub const MAY_ASK_THE_SYSTEM: &[&str] = &["src/ros/dds/answers.rs", "src/ros/dds/sockets.rs"];
+/// networks, the open sockets, the priority of a thread.
+pub const MAY_ASK_THE_SYSTEM: &[&str] = &[
+    "crates/touchup-session/src/threads.rs",
+    "src/ros/dds/answers.rs",
+    "src/ros/dds/sockets.rs",
+];
 
 /// Crates that are one room each, as other crates name them, and its name.
 pub const WHOLE: &[(&str, &str)] = &[

@@ -5,11 +5,11 @@ use super::source::{Source, of_program};
 use std::sync::LazyLock;
 
 const WHAT: Bound = Bound {
-    today: 110,
+    today: 109,
     wanted: 8,
 };
 const WHERE: Bound = Bound {
-    today: 71,
+    today: 70,
     wanted: 8,
 };
 const SO_MANY: Bound = Bound {

@@ -40,6 +40,7 @@ fn a_lattice_that_one_contact_would_fill_the_memory_with_is_refused_with_the_fig
 /// the square times 8.4 mm, half a cylinder along each side and a quarter of a ball at each corner,
 /// 11,196 mm³ in all: 11 million nodes 0.1 mm apart.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn a_lattice_around_all_that_was_touched_is_refused_with_the_figure_before_it_is_made() {
     const SIDE: f64 = 30e-3;
     let reach: f64 = 2.8 * RADIUS;

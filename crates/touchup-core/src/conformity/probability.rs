@@ -13,7 +13,7 @@ pub struct ToleranceLimits {
 
 impl ToleranceLimits {
     /// Those of a nominal value and its limit deviations, with the decimals that these have: 6.1 and
-    /// −0.03 make 6.07, where their binary fractions add up to 6.069999999999999.
+    /// −0.03 make 6.07, if their binary fractions add up to 6.069999999999999.
     pub fn about(nominal: f64, lower: Option<f64>, upper: Option<f64>) -> Self {
         let limit = |deviation: f64| {
             let decimals = decimals(nominal).max(decimals(deviation));

@@ -98,7 +98,7 @@ pub(super) struct SensorWeight {
     pub left: f64,
 }
 
-/// Where the stylus hardly turns, zero and weight are not told apart: the least of both.
+/// If the stylus hardly turns, zero and weight are not told apart: the least of both.
 const DAMPING: f64 = 1e-6;
 
 impl SensorWeight {

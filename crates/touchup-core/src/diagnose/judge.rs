@@ -9,8 +9,9 @@ use super::forces::{ForceLevels, NOISES, SensorWeight};
 use super::input_record::InputRecord;
 use super::mends::PlaceMend;
 use super::monitor_params::InputMonitorParams;
-use super::placed::SHARE_ON_SCAN;
-use super::places::{ALIKE, BallFit, LEAST_TOLERANCE, ScanScale, error_of_median, is_in_hole};
+use super::places::{
+    ALIKE, BallFit, LEAST_TOLERANCE, SHARE_ON_SCAN, ScanScale, error_of_median, is_in_hole,
+};
 use super::stiffness::{SunkPress, judge_stiffness};
 use super::wrench::{ReadPress, course_at, judge_wrench};
 use crate::mesh::{FaceTree, TriMesh};
@@ -21,6 +22,8 @@ use crate::stylus::{ClockDrift, ClockOffset, SyncParams, TipParams, TipShape, Wr
 pub(super) const FEWEST_PRESSES: usize = 20;
 /// Fewer places do not fix the six numbers of a rigid motion and one more.
 const FEWEST_PLACES: usize = 7;
+/// A place is no larger than this share of the scan.
+const PLACE_SHARE: f64 = 1.0 / 16.0;
 /// Presses within so many edges of the scan share its errors.
 const PLACE_EDGES: f64 = 2.0;
 /// … and its normals are alike within so many.
@@ -98,8 +101,13 @@ impl InputJudge<'_> {
         let mut findings = Vec::new();
         self.judge_forces(&presses, resting, &mut findings);
         let few = self.few_places(&presses);
-        let is_told = |(place, _): &(InputFinding, bool)| {
-            few.is_none() || matches!(place.cause, InputCause::LengthUnit | InputCause::InsideOut)
+        let is_told = |(place, _): &(InputFinding, bool)| match place.cause {
+            InputCause::LengthUnit | InputCause::InsideOut => true,
+            // no hole of a scan is deeper than the scan is large
+            _ if few.is_some() => {
+                self.fit(&presses.records, presses.tolerance).distance > presses.scale.extent
+            }
+            _ => true,
         };
         let place = self.judge_places(&presses).filter(is_told);
         let is_placed = place.as_ref().is_none_or(|(_, is_placed)| *is_placed);
@@ -129,8 +137,8 @@ impl InputJudge<'_> {
         findings
     }
 
-    /// What there is to say where nothing is touched: zero and weight of the sensor explain all of
-    /// its force, F = b + Rᵀ w. `None` where they do not.
+    /// The finding of a source that touches nothing: zero and weight of the sensor explain all of
+    /// its force, F = b + Rᵀ w. `None` if they do not.
     fn untouched(&self) -> Option<Vec<InputFinding>> {
         let SensorWeight { mean_t, size, left } = SensorWeight::of(self.records)?;
         let free = self.params.gate?.free;
@@ -147,10 +155,10 @@ impl InputJudge<'_> {
             .then(|| [no_contact].into_iter().chain(tare).collect())
     }
 
-    /// What presses, and how many free samples the rest is the mean of, where it is one.
+    /// The presses, and how many free samples the rest is the mean of, if it is one.
     ///
     /// # Errors
-    /// What is to be said where nothing is touched.
+    /// The finding of a source that touches nothing.
     fn presses(&self) -> Result<(Presses<'_>, Option<usize>), Vec<InputFinding>> {
         let TipParams { radius, stiffness } = self.params.tip;
         let scale = ScanScale::of(self.scan);
@@ -194,15 +202,21 @@ impl InputJudge<'_> {
 
     /// So few places fix no rigid motion of the scan, so that they fit almost anywhere.
     fn few_places(&self, presses: &Presses) -> Option<InputFinding> {
-        let size = (2.0 * self.params.tip.radius).max(2.0 * LEAST_TOLERANCE);
+        // the radius may be told wrongly
+        let ball = (2.0 * self.params.tip.radius).min(PLACE_SHARE * presses.scale.extent);
+        let size = ball.max(2.0 * LEAST_TOLERANCE);
         let places: BTreeSet<_> = presses
             .records
             .iter()
             .map(|record| voxel_of(&record.centre, size))
             .collect();
         let measured = format!(
-            "only {} of the part were touched",
-            counted(places.len(), "place", "places")
+            "only {} touched",
+            counted(
+                places.len(),
+                "place of the part was",
+                "places of the part were"
+            )
         );
         let remedy = "touch more of it: so few fit almost anywhere, and nothing can be said of poses, tip and clock";
         (places.len() < FEWEST_PLACES)

@@ -33,7 +33,7 @@ impl PlaceMend {
             .into()
     }
 
-    /// A force in O, where the axes of the positions are also its own.
+    /// A force in O, if the axes of the positions are also its own.
     pub fn turned(&self, force: &Vector3<f64>) -> Vector3<f64> {
         self.poses * force
     }

@@ -1,4 +1,4 @@
-//! Whether the presses are on the scan, and what would bring them there.
+//! Whether the presses are on the scan, and the remedies that bring them there.
 
 use nalgebra::{Point3, Vector3};
 
@@ -6,16 +6,13 @@ use super::finding::{InputCause, InputFinding};
 use super::input_record::InputRecord;
 use super::judge::{InputJudge, LARGEST_SCAN_NOISE, LEAST_BALL, Presses, off_by_radius};
 use super::mends::PlaceMend;
-use super::places::{BallFit, Explained, error_of_median, extent_of};
+use super::places::{BallFit, SHARE_ON_SCAN, ScanAgreement, error_of_median, extent_of};
 use super::shift::{ContactShift, best_shift};
 use crate::stylus::{TipShape, WrenchFrame};
 
-/// Contacts are on the scan when this share of them is: where the scan lacks a wall or a hole, they
-/// are not.
-pub(super) const SHARE_ON_SCAN: f64 = 0.5;
-/// What mends an input brings so many more onto the scan.
+/// A remedy of an input brings so many more onto the scan.
 const MENDED_SHARE: f64 = 0.3;
-/// What would mend it brings so many more onto the scan than anything else would.
+/// A sure remedy brings so many more onto the scan than anything else would.
 const REFUTED_SHARE: f64 = 0.1;
 /// The touched part is no smaller and no larger than this share of the scan …
 const SHARES_OF_SCAN: std::ops::RangeInclusive<f64> = 0.05..=1.5;
@@ -43,8 +40,8 @@ const TIP_JUDGES: usize = 60;
 const FRAME_REMEDY: &str =
     "are the poses those of the ball in the frame of the scan (scan_to_space, tip.offset_mm)?";
 
-/// How the presses lie on the scan as they were reported.
-struct Reported {
+/// The presses on the scan as reported.
+struct ReportedPlacement {
     fit: BallFit,
     centres: Vec<Point3<f64>>,
     /// in O, N
@@ -55,13 +52,13 @@ struct Reported {
 }
 
 impl InputJudge<'_> {
-    /// What is wrong with where the presses are, and whether they are on the scan even so.
+    /// The fault in the places of the presses, and whether they are on the scan even so.
     pub fn judge_places(&self, presses: &Presses) -> Option<(InputFinding, bool)> {
         let Presses { records, .. } = presses;
         let radius = self.params.tip.radius;
         let tolerance = presses.tolerance + presses.sunk;
         let fit = self.fit(records, tolerance);
-        let reported = Reported {
+        let reported = ReportedPlacement {
             is_on_scan: fit.share >= SHARE_ON_SCAN && (fit.distance - radius).abs() <= tolerance,
             fit,
             centres: records.iter().map(|record| record.centre).collect(),
@@ -101,8 +98,8 @@ impl InputJudge<'_> {
 
     /// A scan whose faces look inwards: the centres are a radius below its surface, and the forces
     /// point into it.
-    fn inside_out(&self, reported: &Reported) -> Option<InputFinding> {
-        let Reported {
+    fn inside_out(&self, reported: &ReportedPlacement) -> Option<InputFinding> {
+        let ReportedPlacement {
             fit,
             forces,
             tolerance,
@@ -131,7 +128,11 @@ impl InputJudge<'_> {
     }
 
     /// A radius in another unit: no matter of tolerance.
-    fn ball_of_other_unit(&self, presses: &Presses, reported: &Reported) -> Option<InputFinding> {
+    fn ball_of_other_unit(
+        &self,
+        presses: &Presses,
+        reported: &ReportedPlacement,
+    ) -> Option<InputFinding> {
         let radius = self.params.tip.radius;
         let BallFit {
             distance, scatter, ..
@@ -146,7 +147,7 @@ impl InputJudge<'_> {
     }
 
     /// Presses that are all as far from the surface as each other: another ball.
-    fn other_ball(&self, presses: &Presses, reported: &Reported) -> Option<InputFinding> {
+    fn other_ball(&self, presses: &Presses, reported: &ReportedPlacement) -> Option<InputFinding> {
         let Presses { records, scale, .. } = presses;
         let BallFit {
             distance, scatter, ..
@@ -164,8 +165,12 @@ impl InputJudge<'_> {
     }
 
     /// Contacts that are not on the scan, or many more of them when all are shifted alike.
-    fn judge_frame(&self, presses: &Presses, reported: &Reported) -> Option<(InputFinding, bool)> {
-        let Reported {
+    fn judge_frame(
+        &self,
+        presses: &Presses,
+        reported: &ReportedPlacement,
+    ) -> Option<(InputFinding, bool)> {
+        let ReportedPlacement {
             fit,
             forces,
             tolerance,
@@ -214,7 +219,12 @@ impl InputJudge<'_> {
     /// with which the contacts are on the scan.
     ///
     /// - `is_far`: whether no other ball explains them as well.
-    fn mend(&self, presses: &Presses, reported: &Reported, is_far: bool) -> Option<InputFinding> {
+    fn mend(
+        &self,
+        presses: &Presses,
+        reported: &ReportedPlacement,
+        is_far: bool,
+    ) -> Option<InputFinding> {
         let as_it_is = reported.fit.share;
         let tip = is_far.then(|| self.best_tip(presses)).flatten();
         let mut mends: Vec<(f64, PlaceMend)> = PlaceMend::units()
@@ -255,7 +265,7 @@ impl InputJudge<'_> {
         }
     }
 
-    /// Share of `records` that the scan explains with a mend; `None` where they would be so close
+    /// Share of `records` that the scan explains with a mend; `None` if they would be so close
     /// together that they lie on anything, or much wider apart than the scan.
     fn mended(&self, presses: &Presses, records: &[&InputRecord], mend: &PlaceMend) -> Option<f64> {
         let Presses {
@@ -310,9 +320,13 @@ impl InputJudge<'_> {
     }
 
     /// The shift of all contacts that brings many more of them onto the scan, and explains more of
-    /// them than holes do that the scan lacks; `None` where none does.
-    fn shift(&self, reported: &Reported, as_it_is: &Explained) -> Option<ContactShift> {
-        let Reported {
+    /// them than holes do that the scan lacks; `None` if none does.
+    fn shift(
+        &self,
+        reported: &ReportedPlacement,
+        as_it_is: &ScanAgreement,
+    ) -> Option<ContactShift> {
+        let ReportedPlacement {
             centres,
             forces,
             tolerance,

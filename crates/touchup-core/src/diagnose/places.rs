@@ -5,6 +5,10 @@ use nalgebra::{Point3, Vector3};
 use crate::mesh::{FaceTree, TriMesh, is_on_rim};
 use crate::numeric::{SIGMA_OF_MEDIAN, median};
 
+/// Contacts are on the scan when this share of them is: if the scan lacks a wall or a hole, they
+/// are not.
+pub(super) const SHARE_ON_SCAN: f64 = 0.5;
+
 /// A noisy scan is this much off at most, m: a wider tolerance would hide a wrong unit.
 const LARGEST_TOLERANCE: f64 = 6e-3;
 /// … and no pose is better than this, m.
@@ -116,14 +120,14 @@ pub(super) fn is_in_hole(
 
 /// How many presses the scan explains.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Explained {
+pub(super) struct ScanAgreement {
     on_scan: usize,
     /// against walls that it lacks
     in_holes: usize,
     count: usize,
 }
 
-impl Explained {
+impl ScanAgreement {
     /// Share on the scan; what is in holes that it lacks says nothing, unless it is most of all.
     pub fn on_scan(&self) -> f64 {
         let is_lid = self.in_holes as f64 <= MOST_UNDER_LIDS * self.count as f64;
@@ -208,8 +212,8 @@ impl BallFit {
     /// points out of it.
     ///
     /// - `forces`: of each centre, in O.
-    pub fn explained(&self, forces: &[Vector3<f64>], radius: f64, tolerance: f64) -> Explained {
-        let mut of = Explained {
+    pub fn explained(&self, forces: &[Vector3<f64>], radius: f64, tolerance: f64) -> ScanAgreement {
+        let mut of = ScanAgreement {
             on_scan: 0,
             in_holes: 0,
             count: forces.len(),

@@ -1,4 +1,4 @@
-//! Sign and axes of the wrench: a force points out of the surface that is pressed and, where the
+//! Sign and axes of the wrench: a force points out of the surface that is pressed and, if the
 //! ball slides, against its motion.
 //!
 //! Each way in which the wrench may be read turns the measured forces. How well it explains them is
@@ -46,7 +46,7 @@ pub(super) struct ReadPress {
     pub place: VoxelKey,
     /// out of the scan; a unit vector
     pub normal: Vector3<f64>,
-    /// of the ball over it; 0 where it does not slide
+    /// of the ball over it; 0 if it does not slide
     pub course: Vector3<f64>,
     /// the measured force, as unit vectors: as it was read, and by the other readings
     pub force: Vector3<f64>,
@@ -207,7 +207,7 @@ fn turned_reading(presses: &[ReadPress]) -> Option<WrenchReading> {
         .max_by(|a, b| a.mean.total_cmp(&b.mean))
 }
 
-/// What is wrong with sign or axes of the wrench; `None` where nothing explains the forces better
+/// The fault in sign or axes of the wrench; `None` if nothing explains the forces better
 /// than they were read.
 ///
 /// - `presses`: on the scan.
@@ -254,7 +254,7 @@ pub(super) fn judge_wrench(presses: &[ReadPress], other_frame: &str) -> Option<I
 }
 
 /// The unit vector along the scan by which the record `at` has slid there from another one that
-/// presses, all between them too, in O; 0 where it has not.
+/// presses, all between them too, in O; 0 if it has not.
 ///
 /// - `normal`: of the scan under it.
 pub(super) fn course_at(

@@ -12,7 +12,7 @@ use super::fit::{Fit, Freedom, Plane, Stadium, Surface};
 use super::holes::{Boss, Hole, bosses, groups, holes};
 use super::measure::{Fitted, Measure};
 use super::observe::{NOT_ALIKE, Observed};
-use super::rims::{Outline, RoundOpening, outlines, rims};
+use super::rims::{OpeningOutline, RoundOpening, outlines, rims};
 use super::scene::{Parted, numbered_by_place};
 use super::slots::{Slot, slots};
 use super::walls::{ALL_AROUND, SAME_WALL, Wall};
@@ -319,7 +319,7 @@ fn without_second_walls(mut features: Vec<Feature>) -> Vec<Feature> {
 }
 
 /// Whether two holes, or two bosses, overlap along one axis over more than half of the shorter one,
-/// and are as wide. One of which the end was not felt goes on in what was not felt at all, where that
+/// and are as wide. One of which the end was not felt goes on in what was not felt at all, if that
 /// is as near as pieces of one wall are.
 fn is_one_wall(one: &Feature, other_feature: &Feature) -> bool {
     // from its bottom to its opening, or from its foot to its top, and how wide
@@ -655,7 +655,7 @@ fn of_other_outline(measure: &Measure, round: &[&Wall], flat: &[&Slot]) -> Vec<F
         .chain(of_flat)
         .chain(ends)
         .for_each(|number| is_known[number] = true);
-    let is_new = |outline: &Outline| {
+    let is_new = |outline: &OpeningOutline| {
         let (rim, radius) = (&outline.rim, outline.rim.fit.surface.radius);
         let is_broken = |wall: &&Wall| is_rim_of(wall, rim) && radius < BROKEN_EDGE * wall.radius();
         let is_of_slot = |slot: &&Slot| {
@@ -664,7 +664,7 @@ fn of_other_outline(measure: &Measure, round: &[&Wall], flat: &[&Slot]) -> Vec<F
         };
         !round.iter().any(is_broken) && !flat.iter().any(is_of_slot)
     };
-    let named = |outline: Outline| Feature {
+    let named = |outline: OpeningOutline| Feature {
         kind: outline.kind,
         depth: Some(Measured {
             value: outline.depth,

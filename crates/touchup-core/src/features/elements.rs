@@ -4,6 +4,7 @@ use nalgebra::{Matrix6, Point3, SMatrix, Vector3};
 
 use super::feature::FittedTo;
 use super::fit::{Cylinder, Fit, Plane, Surface};
+use super::grow::SEEN_FACETS;
 use super::measure::{Fitted, Measure};
 use super::observe::NOT_ALIKE;
 use crate::form::{Element, FlatForm, FormPoint, RoundForm, Shape, flat_form, round_form};
@@ -11,9 +12,6 @@ use crate::numeric::{distinct, tangent_basis};
 
 /// Directions in which the outermost touches of a plane are taken.
 const CORNERS: usize = 16;
-
-/// Facets are told when they are off by so many roundings.
-const SEEN_FACETS: f64 = 10.0;
 
 /// Covariance in O of what a fit says of point and direction, m and rad: without what all touches
 /// have in common.
@@ -65,7 +63,7 @@ impl Measure<'_> {
     }
 
     /// How far the facets of a drawing lie inside the surface through their corners, m; `None`
-    /// where they do not, and of a mesh that was measured.
+    /// if they do not, and of a mesh that was measured.
     pub fn facets(&self, surface: &impl Surface, segments: &[usize]) -> Option<f64> {
         let parted = self.observed.parted;
         let rounding = parted.rounding?;

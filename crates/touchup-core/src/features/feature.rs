@@ -99,10 +99,10 @@ pub struct Feature {
     pub fitted_to: FittedTo,
     /// the walls that its sizes are of, where it has some
     pub walls: Option<Walls>,
-    /// how far its surface is off its ideal form, where it was fitted to touches or drawn
+    /// how far its surface is off its ideal form, if it was fitted to touches or drawn
     pub form: Option<Form>,
     /// in a drawing, how far the flat facets of its round walls lie inside the surface through their
-    /// corners, m; `None` where they do not
+    /// corners, m; `None` if they do not
     pub facets: Option<f64>,
     /// its axis or plane as an element of relations, where it was fitted to touches
     pub element: Option<Element>,

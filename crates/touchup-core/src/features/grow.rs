@@ -23,6 +23,8 @@ pub(super) struct MeshScale {
 
 /// Rounding of coordinates that were stored in single precision, in diagonals.
 pub(super) const ROUNDING: f64 = 1e-6;
+/// Surfaces off by more roundings of a file than this are off.
+pub(super) const SEEN_FACETS: f64 = 10.0;
 /// Waves of a surface that is good otherwise, in median edges.
 const WAVES: f64 = 0.05;
 /// The same, at most, in diagonals of the mesh.

@@ -10,7 +10,7 @@ use nalgebra::{Point3, Vector3};
 use super::facets::{Facets, NONE};
 use super::feature::Kind;
 use super::fit::{Cylinder, Fit, FitParams, Observation, Surface, fit_mesh};
-use super::grow::ROUNDING;
+use super::grow::{ROUNDING, SEEN_FACETS};
 use super::scene::Parted;
 use crate::form::RoundForm;
 use crate::mesh::{FaceId, VertexId};
@@ -30,7 +30,7 @@ pub(super) struct RoundOpening {
 
 /// What is cut into a plane, or stands on it, and is neither round nor a slot.
 #[derive(Clone, Debug)]
-pub(super) struct Outline {
+pub(super) struct OpeningOutline {
     /// a hole, or a boss
     pub kind: Kind,
     /// the circle nearest to it
@@ -61,11 +61,8 @@ const OFF_ROOT_MEAN_SQUARE: f64 = 0.025;
 const WIDEST: f64 = PI / 4.0;
 /// Edges longer than this share of an outline are followed in pieces of this length.
 const PIECE: f64 = 1.0 / 48.0;
-/// What is met within this share of the radius is beside the plane itself.
+/// Material within this share of the radius is beside the plane itself.
 const AT_ONCE: f64 = 1e-3;
-/// What stands on a plane is a boss when it is off the circle by less than this share of the radius:
-/// a rib or a step is none.
-const BOSS_OFF: f64 = 0.5;
 /// Beside a corner of an outline by this share of the radius there is material.
 const BESIDE: f64 = 0.02;
 /// The edges go around once, without going back by more than this share of it.
@@ -103,7 +100,7 @@ pub(super) fn rims(parted: &Parted) -> Vec<RoundOpening> {
 /// Outlines of what is cut into the planes of a drawing or stands on them.
 ///
 /// - `is_known`: by segment, whether it is a wall of something that has a name.
-pub(super) fn outlines(parted: &Parted, is_known: &[bool]) -> Vec<Outline> {
+pub(super) fn outlines(parted: &Parted, is_known: &[bool]) -> Vec<OpeningOutline> {
     let of_plane = |number: usize| {
         let is_of = move |face: u32| parted.segmentation.of_face[face as usize] == number as u32;
         let faces = parted.segment(number).faces.iter();
@@ -207,8 +204,11 @@ impl Loop {
         Self { corners, faces }
     }
 
-    /// What is cut into plane number `plane` or stands on it, where the loop goes around it.
-    fn outline(&self, parted: &Parted, plane: usize, is_known: &[bool]) -> Option<Outline> {
+    /// What is cut into plane number `plane` or stands on it, if the loop goes around it.
+    fn outline(&self, parted: &Parted, plane: usize, is_known: &[bool]) -> Option<OpeningOutline> {
+        if self.corners.len() < LEAST_CORNERS {
+            return None;
+        }
         let followed = self.followed();
         let (middle, out) = followed.middle()?;
         let edges = || {
@@ -251,9 +251,12 @@ impl Loop {
         let depth = floor.or_else(|| met(beside, -AT_ONCE * radius))?;
         let form = RoundForm::of_section(followed.corners.iter(), &centre, &out)?;
         let corners = self.corners.clone();
-        let is_boss_or_hole = !is_raised || form.roundness.minimum_zone.value < BOSS_OFF * radius;
+        // polygons, ribs and steps are no circles out of round, and a circle has a wall
+        let by_corners = RoundForm::of_section(self.corners.iter(), &centre, &out)?;
+        let is_circle = by_corners.roundness.minimum_zone.value <= SEEN_FACETS * parted.rounding?;
+        let is_round = !is_circle && form.roundness.minimum_zone.value < 2.0 * OFF * radius;
         // what ends in the plane itself is a groove around something
-        (is_boss_or_hole && depth > AT_ONCE * radius).then_some(Outline {
+        (is_round && depth > AT_ONCE * radius).then_some(OpeningOutline {
             kind,
             rim: RoundOpening {
                 fit,
@@ -355,7 +358,7 @@ impl Loop {
             && self.goes_around(centre, out)
     }
 
-    /// What each edge spans, seen from a place, rad.
+    /// The angle of each edge, seen from a place, rad.
     fn turns(&self, centre: &Point3<f64>, out: &Vector3<f64>) -> impl Iterator<Item = f64> {
         let [e, g] = tangent_basis(out);
         let angle = move |p: Point3<f64>| (p - centre).dot(&g).atan2((p - centre).dot(&e));

@@ -79,7 +79,7 @@ impl Refiner {
             {
                 let moved = self.displace(&carve, face, &inside, dt);
                 fit = fit.or(Some(moved));
-                // where the mesh cannot follow a deeper face, it does not follow those beside it
+                // if the mesh cannot follow a deeper face, it does not follow those beside it
                 // either
                 if moved == RegionFit::CutBack {
                     break;

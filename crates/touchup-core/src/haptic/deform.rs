@@ -16,7 +16,7 @@ use crate::reconstruct::{PatchDelta, Support};
 const CUT: f64 = 0.35;
 /// … this often, and then given up.
 const TRIES: usize = 3;
-/// Faces within this many mean edges of a region are what it could run into while its handle stays.
+/// Other faces within this many mean edges are in the way of a region while its handle stays.
 const MARGIN_EDGES: f64 = 0.2;
 /// By how much of the mean edge the boxes of what moves are made wider: a touch moves vertices by
 /// less while it stays on a face.
@@ -79,7 +79,7 @@ pub(super) struct HandleRegion {
     seen: Option<u64>,
     /// whether the motion that needs no look was bounded since the region was refreshed
     is_bounded: bool,
-    /// faces within this distance are what it could run into, m
+    /// other faces within this distance are in its way, m
     margin: f64,
 }
 

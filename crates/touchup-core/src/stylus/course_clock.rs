@@ -254,7 +254,7 @@ impl Parts {
 
     /// The rate at which the least of the sum is least, and its standard uncertainty: by the
     /// jackknife over all rates, since without a block it may be another one altogether. `None` at
-    /// an end of what is tried, and where the sum hardly falls by it.
+    /// an end of what is tried, and if the sum hardly falls by it.
     fn drift(&self) -> Option<[f64; 2]> {
         // one step of the rate is one of the delay from end to end
         let rate_step = (STEP_NS as f64 * 1e-9 / self.span().max(f64::MIN_POSITIVE)).min(RATE_STEP);

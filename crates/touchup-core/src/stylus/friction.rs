@@ -208,7 +208,7 @@ impl Friction {
         self.stretch = SlidingStretch::default();
     }
 
-    /// What was found; `None` until the ball has slid far enough, and where it is more than friction
+    /// The friction; `None` until the ball has slid far enough, and if it is more than friction
     /// can be: then motion and force do not belong together.
     pub fn coefficient(&self) -> Option<FrictionCoefficient> {
         self.known.filter(|found| found.mu <= MOST_FRICTION)

@@ -58,7 +58,7 @@ fn limits_have_the_decimals_of_the_drawing() {
     assert_eq!(limits(&text), expected);
     // the same from a spreadsheet of a country where decimals have a comma
     let quoted = text.replace("c, (", "c| (").replace(',', ";");
-    let other = quoted.replace('.', ",").replace('|', ",");
+    let other = quoted.replace(['.', '|'], ",");
     assert_eq!(
         limits(&format!("\u{feff}{}", other.replace('\n', "\r\n"))),
         expected

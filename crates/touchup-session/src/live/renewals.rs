@@ -82,7 +82,7 @@ pub struct LiveCounts {
 /// How long the thread of the patch is left alone, in time of the samples.
 #[derive(Debug, Default)]
 struct Rest {
-    /// what the last renewal took
+    /// time of the last renewal
     took: Duration,
     until_ns: Option<i64>,
 }
@@ -92,7 +92,7 @@ impl Rest {
         self.until_ns.is_none_or(|until_ns| stamp_ns >= until_ns)
     }
 
-    /// A renewal is asked for.
+    /// Begins with a renewal.
     fn begin(&mut self, stamp_ns: i64) {
         let rest_ns = (TIMES_APART * self.took.min(LONGEST_WORK)).as_nanos() as i64;
         self.until_ns = Some(stamp_ns.saturating_add(rest_ns));

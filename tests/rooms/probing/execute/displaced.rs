@@ -52,6 +52,7 @@ fn probed(wanted: &[(Kind, [f64; 3])], seed: u64, change: impl FnOnce(&mut SimAr
 
 /// Each passes by its own touches, or ends as something else, where no contact is touched again.
 #[test]
+#[expect(clippy::too_many_lines)]
 fn what_moved_while_a_feature_was_probed_is_found_by_a_contact_that_is_touched_again() {
     let mm = |x: f64, y: f64, z: f64| Vector3::new(x, y, z) * 1e-3;
     let moved = |turn_mrad: f64, by| ArmFault::PartMoved(Vector3::z() * turn_mrad * 1e-3, by);

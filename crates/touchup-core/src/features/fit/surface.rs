@@ -100,7 +100,7 @@ pub trait Surface: Clone {
         self.pose_of().translation.vector.into()
     }
 
-    /// The radius of its sections across its axis, m; `None` where it is flat.
+    /// The radius of its sections across its axis, m; `None` if it is flat.
     fn section_radius(&self) -> Option<f64> {
         None
     }

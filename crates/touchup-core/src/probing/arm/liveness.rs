@@ -2,7 +2,7 @@
 //!
 //! No reading of a real sensor is exactly the one before it for long: noise is in all of them. One
 //! that hangs, is clipped, has lost an axis or reads nothing repeats itself, and the arm would press
-//! on whatever it meets. Where it is clipped or dead in one axis that axis alone repeats itself: of
+//! on whatever it meets. If it is clipped or dead in one axis that axis alone repeats itself: of
 //! the sensor, of the tip or of the base, whoever turns the force.
 
 use super::interface::ArmState;
@@ -10,7 +10,7 @@ use super::interface::ArmState;
 /// Readings that are equal for so long are no readings, s: a sensor that is slower than 17 Hz is
 /// too slow to stop by.
 const STUCK: f64 = 60e-3;
-/// What turning a force and back rounds by, N.
+/// Rounding of a force that turns there and back, N.
 const ROUNDING: f64 = 1e-9;
 
 /// The axes that forces are seen in.

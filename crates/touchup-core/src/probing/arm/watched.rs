@@ -18,7 +18,7 @@ pub enum ProbeError {
     /// The arm.
     #[error("while {doing}: {error}")]
     Arm {
-        /// what was being done
+        /// the motion or measurement at hand
         doing: &'static str,
         /// what it said
         error: ArmError,
@@ -26,7 +26,7 @@ pub enum ProbeError {
     /// A limit.
     #[error("while {doing}: {error}")]
     Limit {
-        /// what was being done
+        /// the motion or measurement at hand
         doing: &'static str,
         /// which
         error: LimitError,
@@ -37,7 +37,7 @@ pub enum ProbeError {
          arm what it holds (`touchup calibrate payload`)"
     )]
     Loaded {
-        /// what was being done
+        /// the motion or measurement at hand
         doing: &'static str,
         /// N
         force_n: f64,
@@ -49,7 +49,7 @@ pub enum ProbeError {
         "while {doing}: what the sensor feels at rest changes by {change_n:.1} N: something moves the tip, or its cable"
     )]
     Unsteady {
-        /// what was being done
+        /// the motion or measurement at hand
         doing: &'static str,
         /// N
         change_n: f64,
@@ -60,7 +60,7 @@ pub enum ProbeError {
          comes late"
     )]
     Pulls {
-        /// what was being done
+        /// the motion or measurement at hand
         doing: &'static str,
         /// N
         force_n: f64,
@@ -69,7 +69,7 @@ pub enum ProbeError {
     #[error("while {doing}: up to {force_n:.1} N at ({:.1} {:.1} {:.1}) mm, where the path is clear by the mesh; look what is there",
             place_mm[0], place_mm[1], place_mm[2])]
     Obstacle {
-        /// what was being done
+        /// the motion or measurement at hand
         doing: &'static str,
         /// until the arm stood, N
         force_n: f64,
@@ -84,7 +84,7 @@ pub enum ProbeError {
          robot.trigger_n to {least_n:.1} N with touch_force_n above it, or look what shakes the sensor"
     )]
     Noisy {
-        /// what was being done
+        /// the motion or measurement at hand
         doing: &'static str,
         /// N
         noise_n: f64,
@@ -93,13 +93,13 @@ pub enum ProbeError {
         /// N
         least_n: f64,
     },
-    /// What it reads in free air is not zero any more.
+    /// Its reading in free air has left zero.
     #[error(
         "while {doing}: {force_n:.2} N in free air {seconds:.0} s after the sensor was zeroed, {per_s:.2} N/s: it drifts (warms up, or \
          its cable pulls), so contacts of {trigger_n:.2} N cannot be told from that; let it warm up, or look at the cable"
     )]
     Drifts {
-        /// what was being done
+        /// the motion or measurement at hand
         doing: &'static str,
         /// N
         force_n: f64,
@@ -116,9 +116,9 @@ pub enum ProbeError {
          zero it, and check it by hand (docs/probing.md)"
     )]
     Senseless {
-        /// what was being done
+        /// the motion or measurement at hand
         doing: &'static str,
-        /// what it reads
+        /// its readings
         stuck: StuckForce,
     },
     /// A contact that was touched again is not where it was.
@@ -127,7 +127,7 @@ pub enum ProbeError {
          less, some time after {since}: nothing that was touched after that holds; look, calibrate tip and place anew, and probe it again"
     )]
     Displaced {
-        /// what was being done
+        /// the motion or measurement at hand
         doing: &'static str,
         /// which contact
         reference: String,
@@ -141,7 +141,7 @@ pub enum ProbeError {
         "while {doing}: the arm's states came {gap_ms:.0} ms apart; they have to come each {period_ms:.0} ms"
     )]
     LowRate {
-        /// what was being done
+        /// the motion or measurement at hand
         doing: &'static str,
         /// ms
         gap_ms: f64,
@@ -151,7 +151,7 @@ pub enum ProbeError {
     /// A motion does not end.
     #[error("while {doing}: the arm did not arrive within {limit_s:.1} s{}", slowed.map(|by| format!(": {by}")).unwrap_or_default())]
     TooLong {
-        /// what was being done
+        /// the motion or measurement at hand
         doing: &'static str,
         /// s
         limit_s: f64,
@@ -161,7 +161,7 @@ pub enum ProbeError {
     /// A request stopped it.
     #[error("cancelled while {doing}")]
     Cancelled {
-        /// what was being done
+        /// the motion or measurement at hand
         doing: &'static str,
         /// what was asked for
         request: StopRequest,
@@ -640,7 +640,7 @@ impl<'a> Watched<'a> {
         Ok(squares.max().sqrt())
     }
 
-    /// What the sensor reads at rest, N in B.
+    /// Readings of the sensor at rest, N in B.
     fn forces_at_rest(&mut self, doing: &'static str) -> Result<Vec<Vector3<f64>>, ProbeError> {
         let mut forces = Vec::new();
         self.dwell(doing, STEADY, &mut |state| {

@@ -5,7 +5,6 @@ use std::error::Error;
 use nalgebra::Point3;
 
 use super::links::LinkError;
-use super::reference::ReferenceTouch;
 use crate::probing::arm::{LimitError, ProbeError, SlideRecord, StopRequest, TouchRecord};
 use crate::probing::plan::{DecidedCharacteristic, ExploreError, Found, Slide, TouchPlan};
 
@@ -142,6 +141,19 @@ pub struct ProbedSlide {
     pub record: Option<SlideRecord>,
     /// why it was not made; `None`: it was
     pub refused: Option<String>,
+}
+
+/// A reference that the arm touched again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReferenceTouch {
+    /// number of the feature that it belongs to
+    pub flag: u32,
+    /// which touch of that feature, from 0 on
+    pub index: usize,
+    /// how much farther along its search it is than it was, m
+    pub off: f64,
+    /// standard uncertainty of that, m
+    pub sigma: f64,
 }
 
 /// The result of a flag.

@@ -2,9 +2,8 @@
 
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion};
 
-use super::ending::{Ending, Probed, ProbedSlide, ProbedTouch};
+use super::ending::{Ending, Probed, ProbedSlide, ProbedTouch, ReferenceTouch};
 use super::prober::{Flag, Prober};
-use super::reference::ReferenceTouch;
 use super::route::ToolState;
 use super::way_out::WayOut;
 use super::world::{Phase, Progress, World};

@@ -39,7 +39,7 @@ pub struct PatcherParams {
     pub free_space: bool,
     /// how far the new faces may be from the surface that the touches show, m
     pub tolerance: f64,
-    /// whether it is the usual one, which is made larger where the lattice around all that was
+    /// whether it is the usual one, which is made larger if the lattice around all that was
     /// touched would not fit; else that is refused
     pub is_usual_tolerance: bool,
     /// the model of uncertainty; `None`: no uncertainty, and nothing is rejected
@@ -463,7 +463,7 @@ impl Patcher {
     }
 
     /// The scan with its touched part remeshed from all that counts so far; vertices and faces that
-    /// were not touched keep their ids. The usual tolerance is larger here where the lattice would
+    /// were not touched keep their ids. The usual tolerance is larger here if the lattice would
     /// not fit.
     ///
     /// - `scan`: the original, with the tree over its faces.

@@ -249,7 +249,7 @@ mod tests {
             ("1;;3\n", "line 1: expected a number, found ''"),
             (
                 "\"x\",\"y\",\"z\"\n1,2,3\n\"1,234\",2,3\n",
-                "line 3: expected a number, found '\"1'",
+                "line 3: expected a number, found '\\\"1'",
             ),
         ] {
             assert_eq!(error(text), wanted);
