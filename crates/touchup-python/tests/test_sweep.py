@@ -28,7 +28,7 @@ def test_a_job_is_run_once_and_refuses_what_was_not_planned(planned, touched_fil
     assert [job["keys"] for job in touchup.sweep.jobs(jobs)] == [{"tip.stiffness_n_per_mm": 20}, {"tip.stiffness_n_per_mm": 10}]
     made = touchup.sweep.run_job(jobs, 0)
     assert made.failed is None and not made.was_there and made.summary["samples"] > 0
-    assert {path.name for path in Path(made.result).iterdir()} == {"job.json", "summary.json", "refined.ply", "features.json"}
+    assert {path.name for path in Path(made.result).iterdir()} == {"SHA256SUMS", "job.json", "summary.json", "refined.ply", "features.json"}
     assert touchup.sweep.run_job(jobs, 0).was_there
     given = {name: (touched_files / file).read_bytes() for name, file in (("scan", "scan.ply"), ("recording", "touch.mcap"))}
     # not even the folder of its results is another one: what is given is looked at all the same

@@ -19,6 +19,8 @@ const OTHER_COMPLIANCE: f64 = 0.4;
 const LEAST_SUNK: f64 = 0.15e-3;
 /// An estimate that is less than nothing by more than so many of its standard uncertainties is none.
 const CLEAR_SIGMAS: f64 = 2.0;
+/// A force that varies within places by less than this share of the largest says nothing.
+const LEAST_VARIATION: f64 = 0.01;
 /// The difference is so many standard uncertainties; surely with so many.
 const DOUBTED_SIGMAS: f64 = 4.0;
 const SURE_SIGMAS: f64 = 6.0;
@@ -45,7 +47,7 @@ fn sums_of(presses: &[Vector2<f64>]) -> PlaceSums {
 
 /// Compliance and its standard uncertainty, m/N, by places that are `place` wide, m; `None` where too few places say something, or what
 /// they say cannot be.
-fn compliance(presses: &[SunkPress], place: f64) -> Option<[f64; 2]> {
+fn compliance(presses: &[SunkPress], place: f64, largest: f64) -> Option<[f64; 2]> {
     let mut places: BTreeMap<VoxelKey, Vec<Vector2<f64>>> = BTreeMap::new();
     for press in presses {
         places
@@ -64,6 +66,9 @@ fn compliance(presses: &[SunkPress], place: f64) -> Option<[f64; 2]> {
     let [square, product] = sums
         .iter()
         .fold([0.0; 2], |all, one| [all[0] + one[0], all[1] + one[1]]);
+    if square.sqrt() < LEAST_VARIATION * largest * (presses.len() as f64).sqrt() {
+        return None;
+    }
     let without: Vec<f64> = sums
         .iter()
         .map(|one| -(product - one[1]) / (square - one[0]).max(f64::MIN_POSITIVE))
@@ -81,7 +86,7 @@ pub(super) fn judge_stiffness(
     place: f64,
     largest: f64,
 ) -> Option<InputFinding> {
-    let [found, sigma] = compliance(presses, place)?;
+    let [found, sigma] = compliance(presses, place, largest)?;
     let off = (told - found).abs();
     let is_beyond = |sigmas: f64| off > sigmas * sigma + OTHER_COMPLIANCE * told.max(found);
     let is_doubted = is_beyond(DOUBTED_SIGMAS) && off * largest > LEAST_SUNK;

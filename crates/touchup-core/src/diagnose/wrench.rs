@@ -214,10 +214,12 @@ fn turned_reading(presses: &[ReadPress]) -> Option<WrenchReading> {
 /// - `other_frame`: the other axes that the wrench may be in, in words.
 pub(super) fn judge_wrench(presses: &[ReadPress], other_frame: &str) -> Option<InputFinding> {
     let places: BTreeSet<VoxelKey> = presses.iter().map(|press| press.place).collect();
-    if presses.len() < FEWEST || places.len() < FEWEST_PLACES {
+    let as_read = WrenchReading::of(presses, (None, "", ""), |press| press.force);
+    // forces into the surface need no other normals to be wrong
+    let is_told = places.len() >= FEWEST_PLACES || as_read.mean < -LEANS;
+    if presses.len() < FEWEST || !is_told {
         return None;
     }
-    let as_read = WrenchReading::of(presses, (None, "", ""), |press| press.force);
     let others = fixed_readings(presses, other_frame);
     let turned = turned_reading(presses)?;
     let is_better = |one: &WrenchReading, other: &WrenchReading| {
