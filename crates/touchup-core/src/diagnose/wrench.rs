@@ -28,9 +28,11 @@ const LEANS: f64 = 0.5;
 const LEAST_GAIN: f64 = 0.02;
 /// … and the difference is so many standard errors.
 const CLEAR_ERRORS: f64 = 3.0;
-/// Fewer presses, or presses on fewer places, say nothing.
+/// Fewer presses, or presses on fewer places, say nothing …
 const FEWEST: usize = 32;
-const FEWEST_PLACES: usize = 24;
+const FEWEST_PLACES: usize = 6;
+/// … and on fewer than this nothing of a rotation, which has three numbers to choose.
+const FEWEST_TURNED: usize = 24;
 /// Friction of a dry surface is no more.
 const MOST_FRICTION: f64 = 0.8;
 /// Rounds of friction and rotation.
@@ -214,14 +216,14 @@ fn turned_reading(presses: &[ReadPress]) -> Option<WrenchReading> {
 /// - `other_frame`: the other axes that the wrench may be in, in words.
 pub(super) fn judge_wrench(presses: &[ReadPress], other_frame: &str) -> Option<InputFinding> {
     let places: BTreeSet<VoxelKey> = presses.iter().map(|press| press.place).collect();
-    let as_read = WrenchReading::of(presses, (None, "", ""), |press| press.force);
-    // forces into the surface need no other normals to be wrong
-    let is_told = places.len() >= FEWEST_PLACES || as_read.mean < -LEANS;
-    if presses.len() < FEWEST || !is_told {
+    if presses.len() < FEWEST || places.len() < FEWEST_PLACES {
         return None;
     }
+    let as_read = WrenchReading::of(presses, (None, "", ""), |press| press.force);
     let others = fixed_readings(presses, other_frame);
-    let turned = turned_reading(presses)?;
+    let turned = (places.len() >= FEWEST_TURNED)
+        .then(|| turned_reading(presses))
+        .flatten();
     let is_better = |one: &WrenchReading, other: &WrenchReading| {
         one.mean > other.mean + LEAST_GAIN && one.errors_beyond(other, presses) > CLEAR_ERRORS
     };
@@ -234,11 +236,10 @@ pub(super) fn judge_wrench(presses: &[ReadPress], other_frame: &str) -> Option<I
         .find(|other| is_possible(other))
         .filter(|first| first.mean > as_read.mean)
         .unwrap_or(&as_read);
-    let best = if turned.mean > fixed.mean + LEAST_GAIN {
-        &turned
-    } else {
-        fixed
-    };
+    let best = turned
+        .as_ref()
+        .filter(|turned| turned.mean > fixed.mean + LEAST_GAIN)
+        .unwrap_or(fixed);
     let cause = best.cause.filter(|_| is_better(best, &as_read))?;
     // of an upright stylus whose quaternion has w first, the wrench is right in the axes of the poses
     let is_order = cause == InputCause::QuaternionOrder;
