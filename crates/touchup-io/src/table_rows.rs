@@ -97,7 +97,7 @@ impl<R: BufRead> TableRows<R> {
         value.collect()
     }
 
-    /// If the last row begins, from 1 on.
+    /// Where the last row begins, from 1 on.
     pub fn line(&self) -> usize {
         self.first
     }

@@ -2,7 +2,7 @@
 //!
 //! A process that is stopped and goes on (SIGSTOP, Ctrl-Z, a debugger) has its waits for events end
 //! with EINTR (signal(7)), and RustDDS 0.15 ends its threads at that: the node would hear nothing
-//! any more. So the call that mio waits by is this one, which waits again.
+//! any more. So the call that mio waits by is this one, to which a signal is no event.
 
 use std::ffi::{c_int, c_void};
 use std::io::{Error, ErrorKind};
@@ -18,7 +18,8 @@ unsafe extern "C" {
     ) -> c_int;
 }
 
-/// As epoll_wait(2), but a signal does not end it.
+/// As epoll_wait(2), but no events where a signal ends it: the caller waits again for the time that
+/// it has left.
 ///
 /// # Safety
 /// As of epoll_wait(2): `events` has room for `most` of them.
@@ -29,11 +30,8 @@ unsafe extern "C" fn epoll_wait(
     most: c_int,
     timeout_ms: c_int,
 ) -> c_int {
-    loop {
-        // SAFETY: the arguments are those of the caller; without a mask it is the same call
-        let count = unsafe { epoll_pwait(epoll, events, most, timeout_ms, null()) };
-        if count >= 0 || Error::last_os_error().kind() != ErrorKind::Interrupted {
-            return count;
-        }
-    }
+    // SAFETY: the arguments are those of the caller; without a mask it is the same call
+    let count = unsafe { epoll_pwait(epoll, events, most, timeout_ms, null()) };
+    let is_signal = count < 0 && Error::last_os_error().kind() == ErrorKind::Interrupted;
+    if is_signal { 0 } else { count }
 }

@@ -258,6 +258,12 @@ fn another_header_is_refused() {
         );
         assert!(error.to_string().contains("--touches-out"));
     }
+    // semicolons above commas
+    let error = read(&format!("{}\n{body}\n", HEADER.replace(',', ";"))).unwrap_err();
+    assert!(
+        matches!(error, TouchesFileError::BadLine { line: 2, .. }),
+        "{error}"
+    );
     assert!(matches!(
         read("").unwrap_err(),
         TouchesFileError::NoTouches { .. }

@@ -13,7 +13,7 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use super::finding::{InputCause, InputFinding};
 use super::forces::{ForceLevels, axes_in_words, signed_permutations};
 use super::input_record::InputRecord;
-use crate::numeric::{VoxelKey, jackknife_variance};
+use crate::numeric::{VoxelKey, jackknife_variance, mean};
 
 /// Of the way that the ball slid, m: so short that it is straight, so long that no noise of the
 /// pose turns it.
@@ -301,13 +301,6 @@ impl ReadPress {
     }
 }
 
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = values.fold((0.0, 0usize), |(sum, count), value| {
-        (sum + value, count + 1)
-    });
-    sum / count.max(1) as f64
-}
-
 /// A mean in standard errors, by the jackknife over places: the scan's normal is off by as much for
 /// all presses on one place.
 fn errors_of_mean(presses: &[ReadPress], values: &[f64]) -> f64 {
@@ -321,5 +314,5 @@ fn errors_of_mean(presses: &[ReadPress], values: &[f64]) -> f64 {
         .values()
         .map(|(of_place, some)| (sum - of_place) / (count - some).max(1) as f64)
         .collect();
-    sum / count.max(1) as f64 / jackknife_variance(&without).sqrt().max(f64::MIN_POSITIVE)
+    mean(values.iter().copied()) / jackknife_variance(&without).sqrt().max(f64::MIN_POSITIVE)
 }

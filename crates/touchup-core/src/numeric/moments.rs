@@ -1,11 +1,16 @@
 //! Mean and spread of points.
 
+use std::ops::{Add, Div};
+
 use nalgebra::{Matrix3, Point3, Vector3};
 
-/// Mean of some vectors; 0 where there are none.
-pub(crate) fn mean(vectors: impl Iterator<Item = Vector3<f64>>) -> Vector3<f64> {
-    let (sum, count) = vectors.fold((Vector3::zeros(), 0usize), |(sum, count), v| {
-        (sum + v, count + 1)
+/// Mean of some numbers or vectors; 0 where there are none.
+pub(crate) fn mean<T>(values: impl Iterator<Item = T>) -> T
+where
+    T: Default + Add<Output = T> + Div<f64, Output = T>,
+{
+    let (sum, count) = values.fold((T::default(), 0usize), |(sum, count), value| {
+        (sum + value, count + 1)
     });
     sum / count.max(1) as f64
 }
@@ -65,6 +70,6 @@ mod tests {
             Matrix3::from_diagonal(&Vector3::new(4.0, 4.0, 0.0))
         );
         assert_eq!(spreads(corners().iter().map(|p| p.coords)), [0.0, 1.0, 1.0]);
-        assert_eq!(mean(std::iter::empty()), Vector3::zeros());
+        assert_eq!(mean(std::iter::empty::<Vector3<f64>>()), Vector3::zeros());
     }
 }

@@ -185,7 +185,7 @@ impl<'a> Prober<'a> {
         }
     }
 
-    /// If the arm is, at rest in free air, its sensor zeroed and quiet enough to touch by.
+    /// Where the arm is, at rest in free air, its sensor zeroed and quiet enough to touch by.
     pub(super) fn ready_to_touch(&mut self) -> Result<ArmState, Ending> {
         let (state, noise_n) = self.in_free_air(self.params.limits.tare)?;
         let (trigger_n, least_n) = (self.params.touch.trigger, QUIET * noise_n);
