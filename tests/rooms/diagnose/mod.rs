@@ -243,21 +243,33 @@ fn a_hole_that_the_scan_has_closed_is_no_other_place_of_the_part() {
     }
 }
 
-#[test]
-fn three_touches_are_said_to_be_few_and_nothing_is_made_of_them() {
+/// Three touches on the flat scan, whose surface lies at `height`, m.
+fn three_touches(height: f64) -> Vec<(InputCause, bool)> {
     let three = recorded(9.0, |t| {
-        let height = 4e-3 * (1.0 + 3.0 * (std::f64::consts::TAU * t / 3.0).cos());
-        let at = Vector3::new(8e-3 * (t / 3.0).floor(), 0.0, 1.5e-3 + height.max(0.0));
-        let is_pressed = height < 0.0;
+        let lift = 4e-3 * (1.0 + 3.0 * (std::f64::consts::TAU * t / 3.0).cos());
+        let at = Vector3::new(
+            8e-3 * (t / 3.0).floor(),
+            0.0,
+            height + 1.5e-3 + lift.max(0.0),
+        );
+        let is_pressed = lift < 0.0;
         let force = Vector3::z() * if is_pressed { 2.0 } else { 0.0 };
         (Isometry3::from_parts(at.into(), Default::default()), force)
     });
     let found = on_flat_scan(three);
-    let said: Vec<_> = found
+    found
         .iter()
         .map(|found| (found.cause, found.is_sure))
-        .collect();
-    assert_eq!(said, [(InputCause::FewContacts, false)], "{found:?}");
+        .collect()
+}
+
+#[test]
+fn three_touches_are_said_to_be_few_and_nothing_is_made_of_them() {
+    assert_eq!(three_touches(0.0), [(InputCause::FewContacts, false)]);
+    // farther off than a scan is wrong by where it is pressed
+    for height in [-4e-3, 4e-3] {
+        assert_eq!(three_touches(height), [(InputCause::Frame, true)]);
+    }
 }
 
 /// At rest and turning 39 mm above the scan, with a weight of 2 N that was not tared.

@@ -101,15 +101,7 @@ impl InputJudge<'_> {
         let mut findings = Vec::new();
         self.judge_forces(&presses, resting, &mut findings);
         let few = self.few_places(&presses);
-        let is_told = |(place, _): &(InputFinding, bool)| match place.cause {
-            InputCause::LengthUnit | InputCause::InsideOut => true,
-            // no hole of a scan is deeper than the scan is large
-            _ if few.is_some() => {
-                self.fit(&presses.records, presses.tolerance).distance > presses.scale.extent
-            }
-            _ => true,
-        };
-        let place = self.judge_places(&presses).filter(is_told);
+        let place = self.judge_places(&presses, few.is_some());
         let is_placed = place.as_ref().is_none_or(|(_, is_placed)| *is_placed);
         findings.extend(place.map(|(finding, _)| finding));
         let is_of_poses = |finding: &InputFinding| finding.cause.is_read_off_the_scan();

@@ -53,7 +53,9 @@ struct ReportedPlacement {
 
 impl InputJudge<'_> {
     /// The fault in the places of the presses, and whether they are on the scan even so.
-    pub fn judge_places(&self, presses: &Presses) -> Option<(InputFinding, bool)> {
+    ///
+    /// - `is_few`: so few were touched that almost any motion and ball explains them.
+    pub fn judge_places(&self, presses: &Presses, is_few: bool) -> Option<(InputFinding, bool)> {
         let Presses { records, .. } = presses;
         let radius = self.params.tip.radius;
         let tolerance = presses.tolerance + presses.sunk;
@@ -71,12 +73,14 @@ impl InputJudge<'_> {
         if let Some(inside) = self.inside_out(&reported) {
             return Some((inside, false));
         }
-        if let Some(ball) = self.ball_of_other_unit(presses, &reported) {
+        let ball_of_other_unit = self.ball_of_other_unit(presses, &reported);
+        if let Some(ball) = ball_of_other_unit.filter(|_| !is_few) {
             return Some((ball, true));
         }
-        let other_ball = self.other_ball(presses, &reported);
+        let other_ball = self.other_ball(presses, &reported).filter(|_| !is_few);
+        let tried = || self.mends(presses, is_few, other_ball.is_none());
         if !reported.is_on_scan
-            && let Some(finding) = self.mend(presses, &reported, other_ball.is_none())
+            && let Some(finding) = self.mend(presses, &reported, tried())
         {
             return Some((finding, false));
         }
@@ -93,7 +97,7 @@ impl InputJudge<'_> {
         if let Some(ball) = other_ball {
             return Some((ball, true));
         }
-        self.judge_frame(presses, &reported)
+        self.judge_frame(presses, &reported, is_few)
     }
 
     /// A scan whose faces look inwards: the centres are a radius below its surface, and the forces
@@ -165,10 +169,13 @@ impl InputJudge<'_> {
     }
 
     /// Contacts that are not on the scan, or many more of them when all are shifted alike.
+    ///
+    /// - `is_few`: so few that a shift fits almost always.
     fn judge_frame(
         &self,
         presses: &Presses,
         reported: &ReportedPlacement,
+        is_few: bool,
     ) -> Option<(InputFinding, bool)> {
         let ReportedPlacement {
             fit,
@@ -188,7 +195,8 @@ impl InputJudge<'_> {
             100.0 * fit.share
         );
         let as_it_is = fit.explained(forces, radius, *tolerance);
-        if let Some(ContactShift { shift, share }) = self.shift(reported, &as_it_is) {
+        let shift = (!is_few).then(|| self.shift(reported, &as_it_is)).flatten();
+        if let Some(ContactShift { shift, share }) = shift {
             let [x, y, z] = [shift.x, shift.y, shift.z].map(shown);
             measured += &format!(
                 ", and shifted by ({x:.1}, {y:.1}, {z:.1}) mm {:.0} % are",
@@ -215,22 +223,32 @@ impl InputJudge<'_> {
         ))
     }
 
-    /// Another unit, other axes, another order of the quaternion or another point of the stylus,
-    /// with which the contacts are on the scan.
+    /// Another unit, other axes, another order of the quaternion or another point of the stylus.
     ///
-    /// - `is_far`: whether no other ball explains them as well.
+    /// - `is_few`: so few contacts that some motion always fits: a unit is all that is tried.
+    /// - `is_far`: whether no other ball explains them as well as another point of the stylus.
+    fn mends(&self, presses: &Presses, is_few: bool, is_far: bool) -> Vec<PlaceMend> {
+        let mut mends: Vec<PlaceMend> = PlaceMend::units().collect();
+        if !is_few {
+            mends.push(PlaceMend::w_first());
+            mends.extend(PlaceMend::axes());
+        }
+        if !is_few && is_far {
+            mends.extend(self.best_tip(presses));
+        }
+        mends
+    }
+
+    /// That of `tried` with which the contacts are on the scan.
     fn mend(
         &self,
         presses: &Presses,
         reported: &ReportedPlacement,
-        is_far: bool,
+        tried: Vec<PlaceMend>,
     ) -> Option<InputFinding> {
         let as_it_is = reported.fit.share;
-        let tip = is_far.then(|| self.best_tip(presses)).flatten();
-        let mut mends: Vec<(f64, PlaceMend)> = PlaceMend::units()
-            .chain([PlaceMend::w_first()])
-            .chain(PlaceMend::axes())
-            .chain(tip)
+        let mut mends: Vec<(f64, PlaceMend)> = tried
+            .into_iter()
             .filter_map(|mend| Some((self.mended(presses, &presses.records, &mend)?, mend)))
             .filter(|(share, _)| *share >= SHARE_ON_SCAN && *share > as_it_is + MENDED_SHARE)
             .collect();
