@@ -195,8 +195,10 @@ impl DeformableMesh {
         steps: &[Vector3<f64>; 3],
     ) -> RegionFit {
         if region.size == RoiSize::Handle {
-            // it moves once, by no more than this
-            region.margin = 2.0 * steps.iter().map(Vector3::norm).fold(0.0, f64::max);
+            // it moves once, by no more than the longest step
+            let longest = steps.iter().map(Vector3::norm).fold(0.0, f64::max);
+            region.margin =
+                2.0 * longest + self.guard.map_or(0.0, |guard| self.evidence(&guard).gap);
         }
         self.prepare(region, handle);
         if let Some(strokes) = &mut self.strokes {
@@ -376,7 +378,7 @@ impl DeformableMesh {
         longest: f64,
         guard: &GuardParams,
     ) -> RegionFit {
-        let margin = region.margin;
+        let (margin, gap) = (region.margin, self.evidence(guard).gap);
         if !std::mem::replace(&mut region.is_bounded, true) {
             region
                 .roi
@@ -387,7 +389,7 @@ impl DeformableMesh {
             region
                 .roi
                 .neighbourhood
-                .collect(&self.mesh, &self.tree, margin);
+                .collect(&self.mesh, &self.tree, margin, gap);
         }
         if region.roi.neighbourhood.pass_unseen(longest) {
             self.place(&region.roi, 1.0);
@@ -401,7 +403,7 @@ impl DeformableMesh {
                 region
                     .roi
                     .neighbourhood
-                    .roughen(&self.mesh, &self.tree, margin);
+                    .roughen(&self.mesh, &self.tree, margin, gap);
                 verdict = self.judge_at(region, share, longest, guard);
             }
             if verdict == GuardVerdict::Sound {

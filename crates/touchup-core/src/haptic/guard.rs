@@ -174,7 +174,7 @@ impl Neighbourhood {
         self.before.clear();
         self.before
             .extend(self.ring.faces.iter().map(|&face| shape_of(mesh, face)));
-        self.collect(mesh, tree, margin);
+        self.collect(mesh, tree, margin, gap);
         if self.smooth.is_none() {
             self.suspects.measure(mesh, gap);
         }
@@ -193,19 +193,21 @@ impl Neighbourhood {
         }
     }
 
-    /// Looks for faces that could be met within `margin` (m) of motion.
-    pub fn collect(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64) {
-        self.allowance = 0.5 * margin;
+    /// Looks for other faces within `margin` (m), which both sides of a pair may use up but for the
+    /// gap; `gap` as in [`GuardEvidence`].
+    pub fn collect(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64, gap: f64) {
+        self.allowance = 0.5 * (margin - gap);
         self.find_near(mesh, tree, margin);
         self.smooth = self.smooth_normal(mesh);
         if self.smooth.is_none() {
-            self.roughen(mesh, tree, margin);
+            self.roughen(mesh, tree, margin, gap);
         }
     }
 
-    /// Gives up the claim to be smooth: pairs of faces are looked at from now on.
-    pub fn roughen(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64) {
-        self.allowance = 0.5 * margin;
+    /// Gives up the claim to be smooth: pairs of faces are looked at from now on; parameters as of
+    /// [`Self::collect`].
+    pub fn roughen(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64, gap: f64) {
+        self.allowance = 0.5 * (margin - gap);
         self.smooth = None;
         self.find_near(mesh, tree, margin);
         self.suspects.clear();
