@@ -7,7 +7,7 @@
 //!
 //! It does what ur_rtde 1.6.5 and its program see of a controller; how a real one stops, presses
 //! and watches is modelled, not copied. Lines on stdin make faults: drop, undash, mute, silent,
-//! deaf, stuck, hung, tired, late states MS, late orders MS, rate HZ, slider PERCENT, reduced,
+//! deaf, stuck, hung, slow PERIODS, tired, late states MS, late orders MS, rate HZ, slider PERCENT, reduced,
 //! full, watchdog counts, pause, resume, open, shut, unplug, die, protective, operator, release,
 //! halt, off, local, spike N, drift N_PER_S, noise N, payload KG, raise MM, mend, mark TEXT. It
 //! ends when stdin does.

@@ -15,14 +15,12 @@ use super::lateness::StartLateness;
 use super::params::UrParams;
 use super::priority;
 use super::probe::probe;
-use super::protocol::{Action, UrState, pose_of, vector_of};
+use super::protocol::{Action, PERIOD, UrState, pose_of, vector_of};
 use crate::probing::arm::{
     Arm, ArmError, ArmState, Command, Freshness, Safety, Slowed, velocity_towards,
 };
 use crate::stylus::Wrench;
 
-/// Time between two states, s: an e-Series sends them at 500 Hz.
-pub(super) const PERIOD: f64 = 2e-3;
 /// States at the start whose rate is looked at.
 const RATED: usize = 5;
 /// The least time between two of them may be longer than it should be by this factor.
@@ -57,7 +55,7 @@ impl UrArm {
     /// [`UrError`]
     pub fn connect(params: &UrParams) -> Result<Self, UrError> {
         params.check()?;
-        probe(&params.host, params.deadlines.dashboard)?;
+        let version = probe(&params.host, params.deadlines.dashboard)?;
         let mut dashboard = Dashboard::connect(&params.host, params.deadlines.dashboard)?;
         dashboard.check_remote()?;
         dashboard.check_power()?;
@@ -65,7 +63,7 @@ impl UrArm {
         if safety != Safety::Normal {
             return Err(UrError::Stopped(safety));
         }
-        let client = Client::start(params, dashboard)?;
+        let client = Client::start(params, version, dashboard)?;
         let next = || {
             client
                 .next_state(params.deadlines.connect)

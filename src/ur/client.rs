@@ -41,9 +41,13 @@ fn be_in_time(is_lock_step: bool) {
 impl Client {
     /// Starts the process; returns when the arm is at its command.
     ///
-    /// - `dashboard`: for the guard alone.
+    /// - `version`: major and minor, of the controller; `dashboard`: for the guard alone.
     #[expect(clippy::too_many_lines)]
-    pub fn start(params: &UrParams, dashboard: Dashboard) -> Result<Self, UrError> {
+    pub fn start(
+        params: &UrParams,
+        version: [u32; 2],
+        dashboard: Dashboard,
+    ) -> Result<Self, UrError> {
         let mut child = Command::new(&params.program)
             .args(["ur", "child"])
             .stdin(Stdio::piped())
@@ -70,6 +74,7 @@ impl Client {
             tool: vector_of(&params.pose_ft),
             mass_kg: params.mass,
             centre_m: params.centre.into(),
+            version,
             damping: params.damping,
             gain: params.gain,
             is_lock_step,
@@ -310,7 +315,7 @@ mod tests {
                 is_lock_step: is_allowed,
                 ..UrParams::new(&host, "none")
             };
-            let ended = Client::start(&params, dashboard).err().unwrap();
+            let ended = Client::start(&params, [5, 15], dashboard).err().unwrap();
             assert!(
                 matches!(&ended, UrError::Client(reason) if reason.contains("has ended")),
                 "{ended}"

@@ -17,7 +17,7 @@ use nalgebra::Vector3;
 use super::dashboard::Dashboard;
 use super::lateness::Lateness;
 use super::params::Deadlines;
-use super::protocol::{Action, ClientReport, Link, ProgramState, UrState, pose_of};
+use super::protocol::{Action, ClientReport, Link, PERIOD, ProgramState, UrState, pose_of};
 use crate::clock::{Clock, ManualClock};
 use crate::probing::arm::{ArmError, Obedience, OrderedMotion, Safety};
 
@@ -31,6 +31,8 @@ pub(super) const ZEROING: Duration = Duration::from_secs(3);
 const ZEROING_STOP: f64 = 2.0;
 /// A dashboard that did not stop the arm is asked again this often.
 pub(super) const AGAIN: Duration = Duration::from_millis(100);
+/// A program that counts no cycle for so many hangs: one that is late by one does not.
+const CYCLES: f64 = 2.0;
 /// The client ends by itself within this time of its stdin.
 pub(super) const FAREWELL: Duration = Duration::from_millis(1500);
 
@@ -72,6 +74,9 @@ pub(super) struct GuardState {
     /// whether a state has said since it was ready that something stops the arm or its program
     has_halted: bool,
     obedience: Obedience,
+    /// the newest that the program has counted, and the stamp of the first state with it, s; `None`
+    /// while it is at a command, or another has the arm
+    cycle: Option<(i32, f64)>,
     pub lateness: Lateness,
     pub broken: Option<ClientLoss>,
     /// since when it is asked to end
@@ -221,6 +226,7 @@ impl GuardState {
             was_paused: false,
             has_halted: false,
             obedience: Obedience::new(Duration::ZERO),
+            cycle: None,
             lateness: Lateness::new(now),
             broken: None,
             closing_since: None,
@@ -318,13 +324,13 @@ impl GuardState {
                 self.states.push_back(*state);
                 self.serve(state.served, now);
                 // what does not play is somebody else's, or stands
-                let disobeys = self.is_ready && !self.has_halted && state.may_move();
-                let since = now.saturating_duration_since(self.begun_at);
-                let pose = pose_of(state.pose);
-                if let Some(fault) = disobeys
-                    .then(|| self.obedience.see(&pose, &state.velocity, since))
-                    .flatten()
-                {
+                if !self.is_ready || self.has_halted || !state.may_move() {
+                    self.cycle = None;
+                } else if let Some(fault) = self.hangs(&state).or_else(|| {
+                    let since = now.saturating_duration_since(self.begun_at);
+                    self.obedience
+                        .see(&pose_of(state.pose), &state.velocity, since)
+                }) {
                     return Some(ClientLoss::Arm(fault));
                 }
             }
@@ -368,6 +374,19 @@ impl GuardState {
                 "hangs: a call of ur-rtde has not returned for {} ms",
                 waited.as_millis()
             ))
+        })
+    }
+
+    /// The fault of a program whose main loop has stopped, whatever it was ordered; at a command
+    /// that takes more than a cycle the deadline of its call counts.
+    fn hangs(&mut self, state: &UrState) -> Option<ArmError> {
+        let seen = self.cycle.filter(|(cycle, _)| *cycle == state.cycle);
+        let since_s = seen.map_or(state.stamp_s, |(_, since_s)| since_s);
+        self.cycle = (state.cycle >= 0).then_some((state.cycle, since_s));
+        let silent_s = state.stamp_s - since_s;
+        ((silent_s / PERIOD).round() >= CYCLES).then_some(ArmError::ProgramHangs {
+            silent_ms: silent_s * 1e3,
+            cycle_ms: PERIOD * 1e3,
         })
     }
 

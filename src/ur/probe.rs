@@ -17,8 +17,9 @@ const OLDEST: u32 = 9;
 /// Number of states read; the clock has to advance between them.
 const STATES: usize = 3;
 
-/// Refuses a controller that is silent, or not of the kind that is needed.
-pub(super) fn probe(host: &str, deadline: Duration) -> Result<(), UrError> {
+/// The major and minor version of a controller. Refuses one that is silent, or not of the kind that
+/// is needed.
+pub(super) fn probe(host: &str, deadline: Duration) -> Result<[u32; 2], UrError> {
     let mut socket = socket(host, PORT, "RTDE", deadline)?;
     let reason = |reason: String| UrError::Unreachable {
         host: host.to_owned(),
@@ -53,21 +54,24 @@ pub(super) fn probe(host: &str, deadline: Duration) -> Result<(), UrError> {
         Ok((version, stamps))
     };
     let (version, stamps) = talk().map_err(|error| reason(error.to_string()))?;
-    if !matches!(version[..], [5, minor, ..] if minor >= OLDEST) {
-        let found = version
-            .iter()
-            .map(u32::to_string)
-            .collect::<Vec<_>>()
-            .join(".");
-        return Err(UrError::Version {
-            host: host.to_owned(),
-            found,
-        });
-    }
+    let minor = match version[..] {
+        [5, minor, ..] if minor >= OLDEST => minor,
+        _ => {
+            let found = version
+                .iter()
+                .map(u32::to_string)
+                .collect::<Vec<_>>()
+                .join(".");
+            return Err(UrError::Version {
+                host: host.to_owned(),
+                found,
+            });
+        }
+    };
     if stamps.first() == stamps.last() {
         return Err(reason("its clock has stopped".to_owned()));
     }
-    Ok(())
+    Ok([5, minor])
 }
 
 fn ask(socket: &mut TcpStream, kind: u8, body: &[u8]) -> std::io::Result<Vec<u8>> {

@@ -13,6 +13,9 @@ use crate::probing::arm::{Safety, Slowed};
 /// The one version of ur-rtde that this was made and tested with.
 pub const WHEEL: &str = "1.6.5";
 
+/// Time between two states, and a cycle of the controller, s: 500 Hz of an e-Series.
+pub const PERIOD: f64 = 2e-3;
+
 /// The first line: whom to connect, and how.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Begin {
@@ -23,6 +26,8 @@ pub struct Begin {
     pub mass_kg: f64,
     /// in the flange
     pub centre_m: [f64; 3],
+    /// major and minor version of the controller
+    pub version: [u32; 2],
     pub damping: f64,
     pub gain: f64,
     /// the clock of the controller waits for its client
@@ -106,6 +111,8 @@ pub struct UrState {
     pub speed_fraction: f64,
     /// what of the uploaded program
     pub program: ProgramState,
+    /// that its main loop has counted last; negative: that is at a command that takes more than one
+    pub cycle: i32,
     /// number of the last order whose calls have returned
     pub served: u64,
 }
@@ -221,6 +228,7 @@ pub(super) mod tests {
         safety_bits: 1,
         speed_fraction: 1.0,
         program: ProgramState::Playing,
+        cycle: -1,
         served: 7,
     };
 

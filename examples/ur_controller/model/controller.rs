@@ -23,6 +23,10 @@ const QUIET_LOOKS_MOVING: u32 = 200;
 /// program.
 const AHEAD: f64 = 80e-3;
 
+/// Where the program of the client counts the cycles of its main loop, and by what line it does.
+const COUNT: usize = 19;
+const COUNTS: &str = "write_output_integer_register(19, cycle)";
+
 /// Status of the safety system.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Safety {
@@ -47,6 +51,8 @@ pub struct Faults {
     /// its main loop hangs as soon as it is ready for the next command: each is taken and none is
     /// read, and its threads live
     pub is_hung: bool,
+    /// its main loop takes so many periods for a cycle where it is more than one
+    pub slow: u64,
     /// the thread of its motion has ended, and its main loop lives: commands are read, and none is
     /// followed
     pub is_tired: bool,
@@ -81,6 +87,8 @@ struct Program {
     speeding: Option<(Motion, Option<f64>)>,
     /// how long it stays at one, s
     speed_time: f64,
+    /// cycles of its main loop; `None`: it does not count them
+    count: Option<i32>,
 }
 
 /// A register that a client writes.
@@ -265,6 +273,7 @@ impl<'a> Controller<'a> {
         {
             self.program = Program {
                 is_running: true,
+                count: self.program.count,
                 ..Program::default()
             };
             self.heard_at = self.body.time;
@@ -278,6 +287,7 @@ impl<'a> Controller<'a> {
         if program.contains("def rtde_control") && !self.faults.is_dead {
             self.stop_program("a new program");
             self.program.starts_at = Some(self.body.time + START);
+            self.program.count = program.contains(COUNTS).then_some(0);
         }
     }
 
@@ -340,6 +350,13 @@ impl<'a> Controller<'a> {
             self.program.braking = None;
             self.ints_out[0] = 2;
         }
+        if !self.periods.is_multiple_of(self.faults.slow.max(1)) {
+            return self.speed();
+        }
+        if let Some(count) = &mut self.program.count {
+            *count += 1;
+            self.ints_out[COUNT] = *count;
+        }
         let id = self.ints_in[0];
         match id {
             // the motion of a realtime command goes on
@@ -353,6 +370,9 @@ impl<'a> Controller<'a> {
             _ => {
                 self.program.is_handled = true;
                 self.ints_out[0] = 2;
+                if self.program.count.is_some() {
+                    self.ints_out[COUNT] = -1;
+                }
                 self.regular(id);
             }
         }

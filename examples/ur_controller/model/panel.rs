@@ -16,6 +16,7 @@ pub fn happen(controller: &mut Controller, line: &str) {
         ["deaf"] => controller.faults.is_deaf = true,
         ["stuck"] => controller.faults.is_stuck = true,
         ["hung"] => controller.faults.is_hung = true,
+        ["slow", periods] => controller.faults.slow = number(periods) as u64,
         ["tired"] => controller.faults.is_tired = true,
         ["mute"] => controller.faults.is_mute = true,
         ["late", "states", ms] => controller.faults.states_late = number(ms) * 1e-3,

@@ -3,6 +3,7 @@
 //! Each call returns `true` or it failed; the library has no other words. Lengths of vectors are
 //! those of arrays here, for the library does not look at them.
 
+use std::io::Write;
 use std::path::Path;
 use std::time::Duration;
 
@@ -10,17 +11,18 @@ use pyo3::call::PyCallArgs;
 use pyo3::prelude::*;
 
 use super::error::ChildError;
+use super::program;
 use crate::clock::Clock;
-use crate::ur::protocol::{ProgramState, UrState, WHEEL};
+use crate::ur::protocol::{Begin, ProgramState, UrState, WHEEL};
 
 /// Rate of the states and of the control, Hz.
 const RATE_HZ: f64 = 500.0;
-/// Uploads its program, and takes the force from the arm's own sensor: no upper registers, no cap,
-/// no external sensor.
-const FLAGS: u32 = 0x01 | 0x40;
+/// Uploads no program by itself and waits for none, and takes the force from the arm's own sensor:
+/// no upper registers, no cap, no external sensor.
+const FLAGS: u32 = 0x10 | 0x40;
 const CAP_PORT: u16 = 50002;
 /// The requested states: the default are 58 of 1180 bytes.
-const VARIABLES: [&str; 10] = [
+const VARIABLES: [&str; 11] = [
     "timestamp",
     "actual_q",
     "actual_TCP_pose",
@@ -31,7 +33,10 @@ const VARIABLES: [&str; 10] = [
     "target_speed_fraction",
     "runtime_state",
     "robot_status_bits",
+    COUNT,
 ];
+/// The register of [`program::REGISTER`].
+const COUNT: &str = "output_int_register_19";
 /// Of `runtime_state`, as the RTDE guide has it: the program runs; it pauses, is paused, resumes.
 const PLAYING: u32 = 2;
 const PAUSED: std::ops::RangeInclusive<u32> = 3..=5;
@@ -43,6 +48,18 @@ fn failed(call: &'static str) -> impl Fn(PyErr) -> ChildError {
         call,
         reason: error.to_string(),
     }
+}
+
+/// An object of a class of the library.
+fn made<'py>(
+    py: Python<'py>,
+    module: &str,
+    class: &'static str,
+    arguments: impl PyCallArgs<'py>,
+) -> Result<Bound<'py, PyAny>, ChildError> {
+    py.import(module)
+        .and_then(|module| module.call_method1(class, arguments))
+        .map_err(failed(class))
 }
 
 /// Finds the library in a folder of packages, and looks at its version.
@@ -69,10 +86,9 @@ pub fn load(site_packages: &Path) -> Result<(), ChildError> {
                 reason,
             });
         }
-        py.import("rtde_receive")
-            .map_err(failed("import rtde_receive"))?;
-        py.import("rtde_control")
-            .map_err(failed("import rtde_control"))?;
+        for module in ["rtde_receive", "rtde_control", "script_client"] {
+            py.import(module).map_err(failed("import"))?;
+        }
         Ok(())
     })
 }
@@ -95,13 +111,9 @@ impl Receive {
     /// Waits, without letting any other thread use Python, until the first state has come.
     pub fn connect(host: &str) -> Result<Self, ChildError> {
         Python::attach(|py| {
-            let module = py
-                .import("rtde_receive")
-                .map_err(failed("import rtde_receive"))?;
             let arguments = (host, RATE_HZ, VARIABLES.to_vec(), false, false, 0);
-            let made = module.call_method1("RTDEReceiveInterface", arguments);
-            made.map(|made| Self(made.unbind()))
-                .map_err(failed("RTDEReceiveInterface"))
+            let made = made(py, "rtde_receive", "RTDEReceiveInterface", arguments)?;
+            Ok(Self(made.unbind()))
         })
     }
 
@@ -135,6 +147,10 @@ impl Receive {
                         state if PAUSED.contains(&state) => ProgramState::Paused,
                         _ => ProgramState::Ended,
                     },
+                    cycle: self
+                        .0
+                        .call_method1(py, "getOutputIntRegister", (program::REGISTER,))?
+                        .extract(py)?,
                     served,
                 };
                 // the next one may have come between two of these calls
@@ -197,16 +213,32 @@ pub trait Control {
 pub struct RtdeControl(Py<PyAny>);
 
 impl RtdeControl {
-    /// Uploads the program and waits until it runs; no other thread can use Python in that time.
-    pub fn connect(host: &str) -> Result<Self, ChildError> {
+    /// Clears the registers of commands, ends a program that runs, and uploads that of the library
+    /// with the count of its cycles; no other thread can use Python in that time.
+    pub fn connect(begin: &Begin) -> Result<Self, ChildError> {
+        let (host, [major, minor]) = (begin.host.as_str(), begin.version);
         Python::attach(|py| {
-            let module = py
-                .import("rtde_control")
-                .map_err(failed("import rtde_control"))?;
-            let made =
-                module.call_method1("RTDEControlInterface", (host, RATE_HZ, FLAGS, CAP_PORT, 0));
-            made.map(|made| Self(made.unbind()))
-                .map_err(failed("RTDEControlInterface"))
+            let scripts = made(py, "script_client", "ScriptClient", (host, major, minor))?;
+            let script = scripts
+                .call_method0("getScript")
+                .and_then(|script| script.extract::<String>());
+            let program = program::counting(&script.map_err(failed("getScript"))?)?;
+            let arguments = (host, RATE_HZ, FLAGS, CAP_PORT, 0);
+            let control = made(py, "rtde_control", "RTDEControlInterface", arguments)?;
+            // the library takes another program from a file alone
+            let call = "setCustomScriptFile";
+            let file = tempfile::NamedTempFile::new().and_then(|mut file| {
+                file.write_all(program.as_bytes())?;
+                Ok(file)
+            });
+            let file = file.map_err(|error| ChildError::Python {
+                call,
+                reason: error.to_string(),
+            })?;
+            control
+                .call_method1(call, (file.path().to_string_lossy().as_ref(),))
+                .map_err(failed(call))?;
+            Ok(Self(control.unbind()))
         })
     }
 

@@ -8,6 +8,7 @@
 mod control;
 mod error;
 mod library;
+mod program;
 mod shared;
 mod states;
 
@@ -54,7 +55,7 @@ pub fn run() -> Result<(), ChildError> {
     }
     // the constructor of control starts a program: only when states come
     let connected = Receive::connect(&begin.host)
-        .and_then(|receive| Ok((receive, RtdeControl::connect(&begin.host)?)));
+        .and_then(|receive| Ok((receive, RtdeControl::connect(&begin)?)));
     let (receive, control) = connected.inspect_err(|error| shared.report(&failure(error)))?;
     let (sender, orders) = channel();
     let (clock, hand) = begin.is_lock_step.then(Clock::manual).unzip();

@@ -448,6 +448,48 @@ fn an_arm_that_does_not_do_what_it_is_ordered_to_is_stopped_by_the_dashboard() {
     assert!((100..=130).contains(&after), "{after} ms");
 }
 
+/// A state each 2 ms with what the program has counted by it; when it is said to hang, ms, and since
+/// when.
+fn hangs(count: impl Fn(i32) -> Option<i32>) -> Option<(i32, f64)> {
+    let mut bench = GuardBench::ready();
+    (0..500).find_map(|number| {
+        bench.hand.advance(2 * MS);
+        let state = UrState {
+            stamp_s: 86_400.0 + f64::from(number) * 2e-3,
+            cycle: count(number)?,
+            ..STATE
+        };
+        match bench.take(ClientReport::State(Box::new(state)))? {
+            ClientLoss::Arm(ArmError::ProgramHangs { silent_ms, .. }) => {
+                Some((number * 2, silent_ms.round()))
+            }
+            other => panic!("{other:?}"),
+        }
+    })
+}
+
+#[test]
+fn a_program_that_counts_no_cycle_for_two_of_them_hangs_and_one_that_is_late_by_one_does_not() {
+    assert_eq!(hangs(Some), None);
+    // it hangs at 200 ms, whose cycle it has counted
+    assert_eq!(hangs(|number| Some(number.min(100))), Some((204, 4.0)));
+    assert_eq!(hangs(|number| Some(number / 2)), None, "each takes two");
+    assert_eq!(hangs(|number| Some(number / 3)), Some((4, 4.0)));
+    assert_eq!(hangs(|number| Some(number % 7)), None, "begins anew");
+    // states that were left out take nothing from the time
+    let left_out = |number: i32| (number != 101).then_some(number.min(100));
+    assert_eq!(hangs(left_out), Some((204, 4.0)));
+    // a command of 300 ms, and a hang after it
+    let command = |number: i32| {
+        Some(if (100..250).contains(&number) {
+            -1
+        } else {
+            number.min(300)
+        })
+    };
+    assert_eq!(hangs(command), Some((604, 4.0)));
+}
+
 /// Whoever resumes it finds nothing to go on with.
 #[test]
 fn a_program_that_somebody_pauses_is_ended_once() {

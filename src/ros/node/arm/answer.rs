@@ -257,6 +257,7 @@ fn stopped(error: &ProbeError) -> u8 {
             ArmError::Stopped { .. } => ProbeResult::PROTECTIVE_STOP,
             ArmError::Client { .. }
             | ArmError::Disobeys { .. }
+            | ArmError::ProgramHangs { .. }
             | ArmError::Ignores { .. }
             | ArmError::GoesOn { .. } => ProbeResult::DRIVER_LOST,
             ArmError::Refused { .. } => ProbeResult::FAULT,

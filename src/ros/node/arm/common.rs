@@ -63,10 +63,13 @@ impl Common {
     /// None came; whether that is new.
     pub fn miss(&self, error: &ArmError) -> bool {
         let mut seen = locked(&self.seen);
-        use ArmError::{Client, Disobeys, GoesOn, Ignores, ProgramEnded, ProgramPaused, Stopped};
+        use ArmError::{
+            Client, Disobeys, GoesOn, Ignores, ProgramEnded, ProgramHangs, ProgramPaused, Stopped,
+        };
         if let Stopped { .. }
         | ProgramEnded
         | ProgramPaused
+        | ProgramHangs { .. }
         | Disobeys { .. }
         | Ignores { .. }
         | GoesOn { .. }

@@ -177,6 +177,7 @@ impl ControlBench {
             tool,
             mass_kg: 0.25,
             centre_m: [0.0, 0.0, 0.05],
+            version: [5, 15],
             damping: 0.025,
             gain: 0.5,
             is_lock_step: false,

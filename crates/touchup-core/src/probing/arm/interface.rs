@@ -188,6 +188,17 @@ pub enum ArmError {
          itself: look, then recover"
     )]
     ProgramPaused,
+    /// What it runs for us counts its cycles no more; it was stopped by other means.
+    #[error(
+        "the program on the arm's controller hangs, or another runs in its place: it has counted no cycle for {silent_ms:.0} ms, where each \
+         takes {cycle_ms:.0} ms; the arm was stopped: look, then recover"
+    )]
+    ProgramHangs {
+        /// since its last cycle, by the stamps of the states, ms
+        silent_ms: f64,
+        /// of the controller, ms
+        cycle_ms: f64,
+    },
     /// It does not do what it is ordered to; it was stopped by other means.
     #[error(
         "the arm moves with {mm_per_s:.0} mm/s and {deg_per_s:.0}°/s where {ordered_mm_per_s:.0} mm/s are ordered: its program hangs, or \

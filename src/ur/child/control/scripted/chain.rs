@@ -15,14 +15,15 @@ use crate::probing::arm::{Arm, ArmError, ArmState, Command, Freshness, Safety, S
 use crate::sim::{ArmParams, Plate, WEIGHTLESS};
 use crate::stylus::Payload;
 use crate::ur::UrParams;
-use crate::ur::arm::{PERIOD, order_of, seen};
+use crate::ur::arm::{order_of, seen};
 use crate::ur::child::error::ChildError;
+use crate::ur::child::program;
 use crate::ur::child::shared::ChildShared;
 use crate::ur::child::states::LastReport;
 use crate::ur::guard::{AGAIN, ClientLoss, GuardState};
 use crate::ur::params::Deadlines;
 use crate::ur::protocol::{
-    Action, Begin, ClientReport, Link, Order, ProgramState, UrState, vector_of,
+    Action, Begin, ClientReport, Link, Order, PERIOD, ProgramState, UrState, vector_of,
 };
 
 #[path = "../../../../../examples/ur_controller/model/mod.rs"]
@@ -97,6 +98,7 @@ impl<'a> World<'a> {
             tool: vector_of(&client.pose_ft),
             mass_kg: client.mass,
             centre_m: client.centre.into(),
+            version: [5, 15],
             damping: client.damping,
             gain: client.gain,
             is_lock_step: false,
@@ -221,6 +223,7 @@ impl<'a> World<'a> {
                 (_, true) => ProgramState::Playing,
                 _ => ProgramState::Ended,
             },
+            cycle: states.ints[usize::from(program::REGISTER)],
             served: self.shared.number(),
         }
     }
@@ -282,7 +285,7 @@ impl<'a> World<'a> {
         // the registers of a client that is gone are another's
         (controller.ints_in, controller.doubles_in) = ([0; 48], [0.0; 48]);
         controller.owner = Some(0);
-        controller.load("def rtde_control");
+        controller.load(&program::counting(program::LIBRARY).unwrap());
         while controller.sent().is_some() {}
         *self.states.borrow_mut() = States::read(&mut controller);
         drop(controller);

@@ -1,0 +1,91 @@
+//! The program of ur-rtde that the controller runs, made to count its cycles.
+//!
+//! Its main loop reads the command registers once in each cycle of the controller. When that loop
+//! hangs its threads live, and with them the last motion; the registers of the client are written
+//! as before, and no answer of the program is missed. So the loop counts its cycles in an output
+//! register, which comes with each state.
+
+use super::error::ChildError;
+
+/// The output register of the count.
+pub const REGISTER: u8 = 19;
+/// Where a cycle begins, and where a command begins that takes more than one; each once in the
+/// program.
+const CYCLE: &str = "        while keep_running:\n";
+const COMMAND: &str = "                    if not executing_cmd:\n";
+
+/// The program of the library with its count, as it is uploaded.
+///
+/// # Errors
+/// [`ChildError::Python`] where it is another than this was made for.
+pub fn counting(library: &str) -> Result<String, ChildError> {
+    if [CYCLE, COMMAND]
+        .iter()
+        .any(|place| library.matches(place).count() != 1)
+    {
+        return Err(ChildError::Python {
+            call: "getScript",
+            reason: "the program of ur-rtde has another main loop than this was made for"
+                .to_owned(),
+        });
+    }
+    // the count begins anew before its numbers become too large
+    let cycle = format!(
+        "        cycle = 0
+{CYCLE}            cycle = cycle + 1
+            if cycle > 1000000:
+                cycle = 1
+            end
+            write_output_integer_register({REGISTER}, cycle)
+"
+    );
+    let command =
+        format!("{COMMAND}                        write_output_integer_register({REGISTER}, -1)\n");
+    let counted = library.replace(CYCLE, &cycle).replace(COMMAND, &command);
+    Ok(format!("def rtde_control():\n{counted}end\n"))
+}
+
+/// The main loop of ur-rtde 1.6.5, without its realtime commands.
+#[cfg(test)]
+pub const LIBRARY: &str = "        while keep_running:
+            cmd = rtde_cmd()
+                if cmd == 0:
+                    executing_cmd = False
+                else:
+                    if not executing_cmd:
+                        keep_running = process_cmd(cmd)
+                    end
+                end
+            sync()
+        end
+";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_cycle_is_counted_before_its_command_is_read_and_a_long_command_says_so_first() {
+        let program = counting(LIBRARY).unwrap();
+        let lines: Vec<_> = program.lines().map(str::trim).collect();
+        let at = |line: &str| lines.iter().position(|other| *other == line).unwrap();
+        let order = [
+            "def rtde_control():",
+            "cycle = 0",
+            "while keep_running:",
+            "cycle = cycle + 1",
+            "write_output_integer_register(19, cycle)",
+            "cmd = rtde_cmd()",
+            "write_output_integer_register(19, -1)",
+            "keep_running = process_cmd(cmd)",
+            "sync()",
+        ];
+        assert!(order.map(at).is_sorted(), "{program}");
+        assert_eq!(lines.last(), Some(&"end"));
+        // nothing of the library is lost
+        assert!(LIBRARY.lines().all(|line| program.contains(line)));
+        for other in ["", &LIBRARY.repeat(2)] {
+            assert!(counting(other).is_err());
+        }
+    }
+}
