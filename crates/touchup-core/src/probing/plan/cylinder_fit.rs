@@ -195,7 +195,7 @@ impl RoundWall {
         &self,
         context: &SearchContext,
         top: &Fit<Plane>,
-    ) -> Result<Fit<Cylinder>, FitError> {
+    ) -> Result<Fit<Cylinder>, ExploreError> {
         let middle = self.guess(context).pose_of.translation.vector.into();
         let guess = Cylinder::new(
             middle,
@@ -210,7 +210,7 @@ impl RoundWall {
             &self.measuring.observations,
             &LEAN,
         );
-        fit(&guess, &self.measuring.observations, &params)
+        self.measuring.fitted(&guess, &params)
     }
 
     /// Paths along the wall and across its rim.

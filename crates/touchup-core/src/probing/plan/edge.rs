@@ -11,7 +11,7 @@ use super::search::ROUGH;
 use super::search_context::{PatternParams, RING, SearchContext, TouchPlan, TouchResult};
 use super::slide::{RimStation, Slide};
 use crate::features::Feature;
-use crate::features::fit::{FitParams, Freedom, Observation, Plane, fit};
+use crate::features::fit::{FitParams, Freedom, Observation, Plane};
 use crate::numeric::mean;
 
 /// Lower by this, over the ball's radius, is beyond the edge.
@@ -406,16 +406,9 @@ impl Stage for EdgePattern {
                 touches: context.touches,
             });
         }
-        let top = fit(
-            &self.top_plane(context),
-            &self.top.observations,
-            &FitParams::default(),
-        )?;
-        let side = fit(
-            &self.side_plane(context),
-            &self.side.observations,
-            &FitParams::default(),
-        )?;
+        let params = FitParams::default();
+        let top = self.top.fitted(&self.top_plane(context), &params)?;
+        let side = self.side.fitted(&self.side_plane(context), &params)?;
         let along = |o: &Observation| context.in_f(&o.point).coords.dot(&self.along());
         let all = || {
             self.top

@@ -55,6 +55,22 @@ pub enum ExploreError {
         /// diameter, mm
         ball_mm: f64,
     },
+    /// Contacts that the others leave out, and that agree among themselves.
+    #[error(
+        "{misfits} of {of} contacts{since} lie together {how} the surface of the others, which no outliers do: it has a step there, or \
+         probe or part moved between them; look, and flag nearer what is wanted",
+        since = since.map(|touch| format!(", all from touch {touch} on,")).unwrap_or_default()
+    )]
+    TwoSurfaces {
+        /// that lie elsewhere
+        misfits: usize,
+        /// of how many
+        of: usize,
+        /// how far off, and to which side
+        how: String,
+        /// the first of them, from 0 on, where they are the later ones
+        since: Option<u32>,
+    },
     /// The touches are not of such a surface.
     #[error(transparent)]
     Fit(#[from] FitError),

@@ -202,6 +202,10 @@ impl Explorer {
         if self.ended.is_some() || self.context.touches >= self.context.params.budget {
             return None;
         }
+        // no more touches make outliers of contacts that agree
+        if let Err(error @ ExploreError::TwoSurfaces { .. }) = self.stage.feature(&self.context) {
+            self.ended = Some(Err(error));
+        }
         while self.asked.is_none() && self.ended.is_none() {
             let is_known = self.is_done();
             match if is_known {

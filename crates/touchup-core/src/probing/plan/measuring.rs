@@ -1,13 +1,14 @@
 //! The contacts of one surface, and the next touch of it with the largest gain.
 
-use nalgebra::Point3;
+use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::design::{Asked, Candidate, Knowledge};
+use super::error::ExploreError;
 use super::pattern::Touched;
 use super::search_context::{
     Expected, PatternParams, Quantity, SearchContext, TouchPlan, TouchResult,
 };
-use crate::features::fit::{FitParams, Freedom, Observation, Plane, Surface, fit};
+use crate::features::fit::{Fit, FitParams, Freedom, Observation, Plane, Surface, fit};
 
 /// A candidate touch: where the surface would be touched, and how.
 pub(super) struct Possible {
@@ -111,6 +112,12 @@ pub(super) struct Measuring {
 
 /// Share of the touches that may lie elsewhere than on the surface.
 const MOST_REFUSED: f64 = 0.2;
+/// Misfits agree where so many more of them than it takes to say how they are off do so …
+const AGREEING: usize = 2;
+/// … within so many of their standard deviations.
+const WITHIN: f64 = 2.0;
+/// A direction that misfits determine has this share of their normals at least.
+const SHARE: f64 = 0.2;
 /// Places nearer than this to one without contact are not tried, m.
 const DEAD: f64 = 0.2e-3;
 
@@ -167,6 +174,55 @@ impl Measuring {
         )
     }
 
+    /// The surface through the contacts.
+    ///
+    /// # Errors
+    /// [`ExploreError::TwoSurfaces`] where those that it leaves out agree; as [`fit`].
+    pub fn fitted<M: Surface>(
+        &self,
+        guess: &M,
+        params: &FitParams,
+    ) -> Result<Fit<M>, ExploreError> {
+        let found = fit(guess, &self.observations, params)?;
+        // walls that lean more than is believed are no second surface
+        let leaning = FitParams {
+            axis_sigma: None,
+            ..*params
+        };
+        match fit(&found.surface, &self.observations, &leaning) {
+            Ok(free) if free.degrees >= AGREEING => self.agreeing(&free).map_or(Ok(found), Err),
+            _ => Ok(found),
+        }
+    }
+
+    /// What is wrong where the contacts that a fit leaves out are off its surface alike.
+    fn agreeing<M: Surface>(&self, fit: &Fit<M>) -> Option<ExploreError> {
+        let off: Vec<_> = self
+            .observations
+            .iter()
+            .zip(&fit.used)
+            .filter(|(_, used)| !**used)
+            .map(|(o, _)| {
+                let (distance, normal) = fit.surface.distance_and_normal(&o.point);
+                let std = fit.std_at(&o.point).unwrap_or(0.0);
+                (distance - o.offset, normal, o.sigma.hypot(std))
+            })
+            .collect();
+        let how = lying_together(&off)?;
+        let numbers = |is_used| {
+            let all = self.observations.iter().zip(&fit.used);
+            all.filter(move |(_, used)| **used == is_used)
+                .map(|(o, _)| o.group)
+        };
+        let first = numbers(false).min()?;
+        Some(ExploreError::TwoSurfaces {
+            misfits: off.len(),
+            of: self.observations.len(),
+            how,
+            since: (numbers(true).max()? < first).then(|| first - 1),
+        })
+    }
+
     /// The touch with the largest gain for the requested numbers, and its gain.
     pub fn best<M: Surface>(
         &self,
@@ -205,5 +261,84 @@ impl Measuring {
     pub fn aim(&mut self, possible: &Possible) -> TouchPlan {
         self.aimed = Some(possible.point);
         possible.planned
+    }
+}
+
+/// How contacts are off a surface together: all by as much along its normals, or as it would be
+/// displaced; `None` where they are not.
+///
+/// - `off`: of each, m; the normal there, in O, and its standard deviation, m.
+fn lying_together(off: &[(f64, Vector3<f64>, f64)]) -> Option<String> {
+    let mean = off.iter().map(|(off, ..)| off).sum::<f64>() / off.len() as f64;
+    let is_mean = |(off, _, sigma): &(f64, Vector3<f64>, f64)| (off - mean).abs() <= WITHIN * sigma;
+    if off.len() > AGREEING && off.iter().all(is_mean) {
+        let side = if mean > 0.0 { "outside of" } else { "below" };
+        return Some(format!("{:.3} mm {side}", mean.abs() * 1e3));
+    }
+    let normals = off.iter().map(|(_, n, _)| n * n.transpose());
+    let parts = normals.sum::<Matrix3<f64>>().symmetric_eigen();
+    let pulls = off.iter().map(|(off, n, _)| n * *off).sum::<Vector3<f64>>();
+    // a direction that hardly any of them has is not theirs to say
+    let is_theirs = |axis: &usize| parts.eigenvalues[*axis] > SHARE * off.len() as f64;
+    let axes: Vec<_> = (0..3).filter(is_theirs).collect();
+    let by: Vector3<f64> = axes
+        .iter()
+        .map(|axis| {
+            let direction = parts.eigenvectors.column(*axis);
+            direction * (direction.dot(&pulls) / parts.eigenvalues[*axis])
+        })
+        .sum();
+    let is_by =
+        |(off, n, sigma): &(f64, Vector3<f64>, f64)| (off - n.dot(&by)).abs() <= WITHIN * sigma;
+    let [x, y, z] = (by * 1e3).into();
+    (off.len() >= axes.len() + AGREEING && off.iter().all(is_by))
+        .then(|| format!("displaced by ({x:.3}, {y:.3}, {z:.3}) mm from"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Residuals in µm with 10 µm each, by hand.
+    #[test]
+    fn misfits_that_agree_lie_together_and_those_that_scatter_do_not() {
+        let together = |list: &[(f64, [f64; 2])]| {
+            let off: Vec<_> = list
+                .iter()
+                .map(|(um, [x, y])| (um * 1e-6, Vector3::new(*x, *y, 0.0).normalize(), 10e-6))
+                .collect();
+            lying_together(&off)
+        };
+        let step = [
+            (200.0, [1.0, 0.0]),
+            (195.0, [0.0, 1.0]),
+            (205.0, [-1.0, 0.0]),
+        ];
+        assert_eq!(together(&step).unwrap(), "0.200 mm outside of");
+        let below = step.map(|(um, normal)| (-um, normal));
+        assert_eq!(together(&below).unwrap(), "0.200 mm below");
+        assert_eq!(together(&step[..2]), None, "two agree by chance");
+        // displaced by 300 µm along x: 300 cos
+        let slipped = [
+            (300.0, [1.0, 0.0]),
+            (-300.0, [-1.0, 0.0]),
+            (0.0, [0.0, 1.0]),
+            (212.1, [1.0, 1.0]),
+        ];
+        let by = together(&slipped).unwrap();
+        assert!(by.starts_with("displaced by (0.300, "), "{by}");
+        assert_eq!(
+            together(&slipped[..3]),
+            None,
+            "three say nothing of two directions"
+        );
+        let scattered = [
+            (300.0, [1.0, 0.0]),
+            (250.0, [-1.0, 0.0]),
+            (-200.0, [0.0, 1.0]),
+            (90.0, [1.0, 1.0]),
+        ];
+        assert_eq!(together(&scattered), None);
+        assert_eq!(together(&[]), None);
     }
 }

@@ -11,7 +11,7 @@ use super::search::{ROUGH, hexagonal};
 use super::search_context::{PatternParams, SearchContext, TouchPlan, TouchResult, toward};
 use super::slide::Slide;
 use crate::features::Feature;
-use crate::features::fit::{Freedom, Plane};
+use crate::features::fit::{FitParams, Freedom, Observation, Plane};
 
 /// Places across the field that are candidates.
 const ACROSS: f64 = 6.0;
@@ -70,7 +70,21 @@ impl PlanePattern {
             travel: clearance,
             planned: context.down(place, search),
         };
-        context.on_part(self.places.iter().map(at))
+        let possible = |places: Vec<&Point3<f64>>| context.on_part(places.into_iter().map(at));
+        // three places fit any plane: only others show a step
+        let touched = &self.measuring.observations;
+        let is_new = |place: &&Point3<f64>| {
+            let far = |contact: &Observation| (context.in_f(&contact.point) - **place).xy().norm();
+            touched
+                .iter()
+                .all(|contact| far(contact) > context.params.flag_radius / ACROSS)
+        };
+        let new = possible(self.places.iter().filter(is_new).collect());
+        if new.is_empty() || touched.len() >= LEAST {
+            possible(self.places.iter().collect())
+        } else {
+            new
+        }
     }
 }
 
@@ -117,7 +131,9 @@ impl Stage for PlanePattern {
                 touches: context.touches,
             });
         }
-        let fitted = surface_about(context, &Point3::origin(), &self.measuring.observations)?;
+        let fitted = self
+            .measuring
+            .fitted(&Self::guess(context), &FitParams::default())?;
         let middle = context.pose_of * Point3::origin();
         Ok(Some(Feature::plane(
             &fitted,

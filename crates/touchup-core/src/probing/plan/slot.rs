@@ -573,7 +573,7 @@ impl Stage for SlotPattern {
             .ok_or_else(not_done)?;
         let top = surface_about(context, &context.in_f(&walls.center()), &self.opening.top)?;
         let (_, params) = self.squareness(context, walls);
-        let fitted = fit(walls, &self.measuring.observations, &params)?;
+        let fitted = self.measuring.fitted(walls, &params)?;
         // where an end was not touched it has no length, and no middle
         fitted.std(Freedom::Second).ok_or_else(not_done)?;
         let touches = numbers([&self.measuring.observations, &self.opening.top]);
