@@ -1,8 +1,10 @@
 //! Mistakes made of sound recordings, and the cause that is named.
 
-use crate::common::grid;
+use crate::common::{grid, within};
 use crate::full::either;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use rand::SeedableRng;
+use rand_pcg::Pcg64;
 use touchup::diagnose::{InputCause, InputFinding, InputMonitor, InputMonitorParams};
 use touchup::mesh::FaceTree;
 use touchup::sim::{
@@ -269,6 +271,101 @@ fn three_touches_are_said_to_be_few_and_nothing_is_made_of_them() {
     // farther off than a scan is wrong by where it is pressed
     for height in [-4e-3, 4e-3] {
         assert_eq!(three_touches(height), [(InputCause::Frame, true)]);
+    }
+}
+
+#[test]
+fn forces_that_are_rounded_to_more_than_what_decides_of_contact_are_named() {
+    let sound = simulated(3);
+    let rounded = |step: f64| {
+        let mut input = sound.clone();
+        for message in &mut input.messages {
+            if let Message::Wrench(StampedWrench { wrench, .. }) = message {
+                wrench.force = wrench.force.map(|x| (x / step).round() * step);
+            }
+        }
+        let said = findings(&input);
+        said.first().map(|first| (first.cause, first.is_sure))
+    };
+    for (step, said) in [
+        (0.05, None),
+        (0.35, Some((InputCause::ForceSteps, false))),
+        (0.5, Some((InputCause::ForceSteps, true))),
+        (1.0, Some((InputCause::ForceSteps, true))),
+    ] {
+        assert_eq!(rounded(step), said, "{step} N");
+    }
+}
+
+/// A tap every 240 ms on a plane that the scan has turned by `turn` about x, rad, with a `noise`, m.
+///
+/// - `lifted`: between two, m. `late`: of the force, s. `tare`: N.
+fn taps(
+    noise: f64,
+    lifted: f64,
+    turn: f64,
+    late: f64,
+    tare: Vector3<f64>,
+) -> Vec<(InputCause, bool)> {
+    let (period, free) = (0.24, 0.16);
+    let messages = recorded(40.0, |t| {
+        let at = Vector3::new(
+            48e-3 * (t / 3.7).fract() - 24e-3,
+            1.2e-3 * t - 24e-3,
+            1.5e-3,
+        );
+        let turned = std::f64::consts::TAU * (t % period) / free;
+        let lift = if t % period < free {
+            lifted / 2.0 * (1.0 - turned.cos())
+        } else {
+            0.0
+        };
+        let pressed = ((t - late).rem_euclid(period) - free).max(0.0) / (period - free);
+        let force = Vector3::z() * 3.0 * (std::f64::consts::PI * pressed).sin();
+        let pose = Isometry3::from_parts((at + Vector3::z() * lift).into(), Default::default());
+        (pose, force + tare)
+    });
+    let mut rng = Pcg64::seed_from_u64(8);
+    let scan = grid(60, 1e-3, |_, y| {
+        y * turn.tan() + within(&mut rng, -1.0, 1.0) * 3f64.sqrt() * noise
+    });
+    let tip = TipParams {
+        radius: 1.5e-3,
+        stiffness: None,
+    };
+    let found = findings(&ToldRecording {
+        scan,
+        messages,
+        tip,
+    });
+    let said = found.iter().map(|found| (found.cause, found.is_sure));
+    said.collect()
+}
+
+#[test]
+fn taps_on_a_rough_scan_tell_its_turn_their_tare_and_that_they_are_late() {
+    let none = Vector3::zeros();
+    for noise in [0.3e-3, 0.9e-3] {
+        assert_eq!(taps(noise, 2e-3, 0.0, 0.0, none), [], "{noise} m");
+    }
+    // by 100 or by −140 ms: a ball that is nearer without force is no larger one
+    for late in [0.1, 0.14] {
+        assert_eq!(
+            taps(0.3e-3, 1e-3, 0.0, late, none),
+            [(InputCause::Delay, true)]
+        );
+    }
+    // lifted by less than the scan is rough
+    for tare in [Vector3::new(0.0, 4.0, 3.0), Vector3::new(-1.2, 0.0, 1.6)] {
+        assert_eq!(
+            taps(0.9e-3, 2e-3, 0.0, 0.0, tare),
+            [(InputCause::Tare, true)]
+        );
+    }
+    // all contacts are as near as the scan may be off; 1.1 and 0.69 mm, root mean square
+    for (turn, is_sure) in [(-0.08, true), (0.05, false)] {
+        let said = taps(0.4e-3, 2e-3, turn, 0.0, none);
+        assert_eq!(said, [(InputCause::Frame, is_sure)], "{turn} rad");
     }
 }
 

@@ -32,6 +32,8 @@ names! {
         ForceUnit = "force_unit",
         /// Contacts whose force is below the threshold of contact.
         LightTouch = "light_touch",
+        /// Forces in steps wider than what decides about contact.
+        ForceSteps = "force_steps",
         /// Poses, scan or radius in another unit of length.
         LengthUnit = "length_unit",
         /// Axes of the positions are swapped or mirrored.
@@ -85,6 +87,7 @@ impl InputCause {
             | Self::Tare
             | Self::ForceUnit
             | Self::LightTouch
+            | Self::ForceSteps
             | Self::Saturation => false,
         }
     }

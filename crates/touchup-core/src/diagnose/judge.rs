@@ -25,7 +25,7 @@ const FEWEST_PLACES: usize = 7;
 /// A place is no larger than this share of the scan.
 const PLACE_SHARE: f64 = 1.0 / 16.0;
 /// Presses within so many edges of the scan share its errors.
-const PLACE_EDGES: f64 = 2.0;
+pub(super) const PLACE_EDGES: f64 = 2.0;
 /// … and its normals are alike within so many.
 const WIDE_EDGES: f64 = 4.0;
 /// Presses that are compared with the scan.
@@ -36,8 +36,8 @@ const LARGEST_PATH: f64 = 0.32e-3;
 const USUAL_SPEED: f64 = 0.04;
 /// A ball that is free is farther from the surface than one that presses by this at least, m.
 const LEAST_LIFT: f64 = 0.3e-3;
-/// … and by so many deviations of the scan: the scan may be that low under all of what rests.
-const LIFT_NOISES: f64 = 1.5;
+/// … and by so many standard errors of the scan: it may be that low under all of what rests.
+const LIFT_ERRORS: f64 = 3.0;
 /// Half of what presses is beyond the median; of what is free, more than this is.
 const SHARE_OF_FREE: f64 = 0.55;
 /// No cell resolves less, N.
@@ -58,10 +58,13 @@ pub(super) const LEAST_BALL: f64 = 20e-6;
 const STRAIGHT: f64 = 0.8;
 /// The ball is another one when its centre is so many deviations of the scan from where it should
 /// be, and surely with so many.
-const DOUBTED_NOISES: f64 = 1.0;
-const SURE_NOISES: f64 = 1.5;
+pub(super) const DOUBTED_NOISES: f64 = 1.0;
+pub(super) const SURE_NOISES: f64 = 1.5;
 /// … beyond this share of what the stylus bends by: so far its stiffness may be off.
 const OTHER_SINK: f64 = 0.2;
+/// A ball that does not press is nearer to the scan than its radius in no more than this share of
+/// the time.
+const NEARER_SHARE: f64 = 0.1;
 /// No scanner is worse, m.
 pub(super) const LARGEST_SCAN_NOISE: f64 = 2e-3;
 
@@ -74,6 +77,8 @@ pub(super) struct InputJudge<'a> {
     pub records: &'a [InputRecord],
     /// of one axis of the force, N
     pub noise: f64,
+    /// smallest change of a component of the measured force, N
+    pub force_step: f64,
     /// largest component of the measured force, N, how often it was exactly that, and of how many
     pub largest: (f64, u64, u64),
     pub clock: Option<ClockOffset>,
@@ -91,6 +96,18 @@ pub(super) struct Presses<'a> {
     pub tolerance: f64,
 }
 
+/// A press straight on the scan.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct StraightPress {
+    pub centre: Point3<f64>,
+    /// outward, of the scan under it
+    pub normal: Vector3<f64>,
+    /// of the centre from the scan, m
+    pub distance: f64,
+    /// N
+    pub force: f64,
+}
+
 impl InputJudge<'_> {
     /// All doubts.
     pub fn findings(&self) -> Vec<InputFinding> {
@@ -100,6 +117,7 @@ impl InputJudge<'_> {
         };
         let mut findings = Vec::new();
         self.judge_forces(&presses, resting, &mut findings);
+        findings.extend(self.judge_steps(&presses.levels));
         let few = self.few_places(&presses);
         let place = self.judge_places(&presses, few.is_some());
         let is_placed = place.as_ref().is_none_or(|(_, is_placed)| *is_placed);
@@ -112,6 +130,12 @@ impl InputJudge<'_> {
             findings.extend(if is_explained { wrench } else { Some(few) });
             return findings;
         }
+        // turned forces choose other presses
+        let is_registration = wrench.is_none() && !is_doubted_place;
+        let registration = is_registration
+            .then(|| self.judge_registration(&presses))
+            .flatten();
+        findings.extend(registration);
         // each of these decides what is a contact, and turns the force in its course
         if wrench.is_none() && !findings.iter().any(|finding| finding.is_sure) {
             findings.extend(self.judge_clock());
@@ -167,7 +191,9 @@ impl InputJudge<'_> {
             return Err(untouched);
         }
         // what rests on the surface presses all the time: then the rest is no force of free motion
-        let lift = LEAST_LIFT.max(LIFT_NOISES * self.params.scan_noise.max(scale.noise));
+        let places = places_of(&resting, WIDE_EDGES * scale.edge.max(LEAST_BALL)).len();
+        let error = self.params.scan_noise.max(scale.noise) / (places.max(1) as f64).sqrt();
+        let lift = LEAST_LIFT.max(LIFT_ERRORS * error);
         let is_free = rest_fit.share_beyond(press_fit.distance.abs() + lift) > SHARE_OF_FREE;
         if !is_free {
             levels = levels.without_rest(self.records);
@@ -197,11 +223,7 @@ impl InputJudge<'_> {
         // the radius may be told wrongly
         let ball = (2.0 * self.params.tip.radius).min(PLACE_SHARE * presses.scale.extent);
         let size = ball.max(2.0 * LEAST_TOLERANCE);
-        let places: BTreeSet<_> = presses
-            .records
-            .iter()
-            .map(|record| voxel_of(&record.centre, size))
-            .collect();
+        let places = places_of(&presses.records, size);
         let measured = format!(
             "only {} touched",
             counted(
@@ -327,6 +349,22 @@ impl InputJudge<'_> {
         }
     }
 
+    /// Forces that are rounded to more than the noise, which would average it out, and than what the
+    /// zero may be off by.
+    fn judge_steps(&self, levels: &ForceLevels) -> Option<InputFinding> {
+        let (gate, step) = (self.params.gate?, self.force_step);
+        // a force that is there or not has no steps
+        let is_coarse = 2.0 * step < levels.largest && step / 2.0 > gate.free.max(levels.noise);
+        let measured = format!(
+            "the forces come in steps of {step:.2} N, and contact.on_n is {:.2} N",
+            gate.on
+        );
+        let remedy =
+            "record the wrench before it is rounded, or choose a finer range of the sensor";
+        is_coarse
+            .then(|| InputFinding::new(InputCause::ForceSteps, step > gate.on, measured, remedy))
+    }
+
     /// Whether sign and axes of the wrench are right, by the presses on the scan.
     fn judge_wrench(&self, presses: &Presses) -> Option<InputFinding> {
         let other_frame = match self.params.compensator.wrench_frame {
@@ -444,29 +482,16 @@ impl InputJudge<'_> {
     /// Whether the ball is as far from the scan as its radius where it presses straight on it; what
     /// leans is at edges and in holes, of which the scan knows little.
     fn judge_radius(&self, presses: &Presses) -> Option<InputFinding> {
-        let Presses {
-            records,
-            levels,
-            scale,
-            tolerance,
-            sunk,
-        } = presses;
+        let Presses { levels, scale, .. } = presses;
         let TipParams { radius, stiffness } = self.params.tip;
         if self.params.shape != TipShape::Ball {
             return None;
         }
         let compliance = stiffness.map_or(0.0, f64::recip);
-        let fit = self.fit(records, tolerance + sunk);
-        let mut distances: Vec<f64> = records
+        let straight = self.straight_presses(presses);
+        let mut distances: Vec<f64> = straight
             .iter()
-            .zip(&fit.distances)
-            .zip(&fit.normals)
-            .filter_map(|((record, distance), normal)| {
-                let force = levels.force_o(record);
-                let is_straight =
-                    force.dot(normal) > STRAIGHT * force.norm() && *distance > -tolerance;
-                is_straight.then(|| distance + compliance * force.norm())
-            })
+            .map(|press| press.distance + compliance * press.force)
             .collect();
         let count = distances.len();
         // a radius of less than nothing is none
@@ -488,10 +513,67 @@ impl InputJudge<'_> {
             (distance + 0.5 * roughness - radius).abs() - OTHER_SINK * compliance * levels.largest;
         let is_doubted = off - 3.0 * error > (DOUBTED_NOISES * noise).max(LEAST_TOLERANCE);
         let is_sure = off - 4.0 * error > (SURE_NOISES * noise).max(2.0 * LEAST_TOLERANCE);
-        is_doubted.then(|| InputFinding {
-            is_sure,
-            ..off_by_radius(distance, error, radius)
+        is_doubted.then(|| {
+            self.early_force(presses, distance)
+                .unwrap_or_else(|| InputFinding {
+                    is_sure,
+                    ..off_by_radius(distance, error, radius)
+                })
         })
+    }
+
+    /// Presses that are no ball of another radius: without force it comes nearer to the scan than
+    /// any ball of that radius can.
+    ///
+    /// - `distance`: of the centre from the scan where it presses, m.
+    pub(super) fn early_force(&self, presses: &Presses, distance: f64) -> Option<InputFinding> {
+        let Presses {
+            levels, tolerance, ..
+        } = presses;
+        let resting = thinned(
+            self.records
+                .iter()
+                .filter(|record| levels.is_resting(record)),
+        );
+        let near = -tolerance..(distance + self.params.tip.radius) / 2.0;
+        let fit = self.fit(&resting, *tolerance);
+        let nearer = fit.distances.iter().filter(|x| near.contains(x)).count();
+        let share = nearer as f64 / resting.len().max(1) as f64;
+        let measured = format!(
+            "the ball's centre is {:.2} mm off the scan where it presses, and nearer than {:.2} mm in {:.0} % of the time in which it does not",
+            distance * 1e3,
+            near.end * 1e3,
+            share * 100.0
+        );
+        let remedy = "the wrench is stamped later or earlier than the pose: record strokes that slide and turn back, which show by how much";
+        (distance > near.end && share > NEARER_SHARE)
+            .then(|| InputFinding::new(InputCause::Delay, true, measured, remedy))
+    }
+
+    /// All that presses straight on the scan.
+    pub(super) fn straight_presses(&self, presses: &Presses) -> Vec<StraightPress> {
+        let Presses {
+            records,
+            levels,
+            tolerance,
+            sunk,
+            ..
+        } = presses;
+        let fit = self.fit(records, tolerance + sunk);
+        let of = fit.distances.iter().zip(&fit.normals);
+        let pressed = records.iter().zip(of);
+        pressed
+            .filter_map(|(record, (&distance, &normal))| {
+                let force = levels.force_o(record);
+                let is_straight = force.dot(&normal) > STRAIGHT * force.norm();
+                (is_straight && distance > -tolerance).then(|| StraightPress {
+                    centre: record.centre,
+                    normal,
+                    distance,
+                    force: force.norm(),
+                })
+            })
+            .collect()
     }
 
     fn judge_clock(&self) -> Option<InputFinding> {
@@ -571,6 +653,12 @@ pub(super) fn off_by_radius(distance: f64, error: f64, radius: f64) -> InputFind
     );
     let remedy = "give the radius in mm (--tip-radius-mm, tip.radius_mm); the stiffness, and the scan's offset, act alike";
     InputFinding::new(InputCause::Radius, true, measured, remedy)
+}
+
+/// Where some records are, in cubes of `size`, m.
+fn places_of(records: &[&InputRecord], size: f64) -> BTreeSet<VoxelKey> {
+    let place = |record: &&InputRecord| voxel_of(&record.centre, size);
+    records.iter().map(place).collect()
 }
 
 /// Not more than [`MOST_PRESSES`], spread over all.

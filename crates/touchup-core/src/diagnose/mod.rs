@@ -15,6 +15,7 @@ mod monitor;
 mod monitor_params;
 mod placed;
 mod places;
+mod registration;
 mod shift;
 mod stamps;
 mod stiffness;

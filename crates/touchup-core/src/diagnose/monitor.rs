@@ -35,6 +35,8 @@ pub struct InputMonitor {
     last_force: Option<Vector3<f64>>,
     /// |F − F of the sample before|, N
     steps: Vec<f64>,
+    /// smallest change of a component of the measured force, N
+    force_step: f64,
     /// largest component of the measured force, N, and how often it was exactly that
     largest: (f64, u64),
 }
@@ -55,6 +57,7 @@ impl InputMonitor {
             stride: 1,
             last_force: None,
             steps: Vec::new(),
+            force_step: f64::INFINITY,
             largest: (0.0, 0),
         })
     }
@@ -78,6 +81,11 @@ impl InputMonitor {
             self.largest = (size, 1);
         } else if size == self.largest.0 {
             self.largest.1 += 1;
+        }
+        if let Some(last) = self.last_force {
+            let changes = (force - last).abs();
+            let changes = changes.iter().filter(|change| **change > 0.0);
+            self.force_step = changes.fold(self.force_step, |least, change| least.min(*change));
         }
         let is_kept = self.samples.is_multiple_of(self.stride);
         if is_kept {
@@ -159,6 +167,7 @@ impl InputMonitor {
             tree,
             records: &self.records,
             noise,
+            force_step: self.force_step,
             largest: (self.largest.0, self.largest.1, self.samples),
             clock: self.clock_offset(),
         };

@@ -23,7 +23,7 @@ const LARGEST_SPREAD: f64 = 5.0;
 /// A shift is one when it is longer than so many tolerances …
 const LEAST_SHIFT: f64 = 4.0;
 /// … brings all but some contacts onto the scan …
-const SHIFTED_SHARE: f64 = 0.85;
+pub(super) const SHIFTED_SHARE: f64 = 0.85;
 /// … and this many more than are there as it is.
 const SHIFT_GAIN: f64 = 0.15;
 /// A ball this much farther from the surface than its radius is another one.
@@ -37,7 +37,7 @@ const LARGEST_BALL: f64 = 0.25;
 const LONGEST_TIP: f64 = 0.4;
 /// Presses that such a distance is searched by.
 const TIP_JUDGES: usize = 60;
-const FRAME_REMEDY: &str =
+pub(super) const FRAME_REMEDY: &str =
     "are the poses those of the ball in the frame of the scan (scan_to_space, tip.offset_mm)?";
 
 /// The presses on the scan as reported.
@@ -95,7 +95,11 @@ impl InputJudge<'_> {
             ));
         }
         if let Some(ball) = other_ball {
-            return Some((ball, true));
+            return Some((
+                self.early_force(presses, reported.fit.distance)
+                    .unwrap_or(ball),
+                true,
+            ));
         }
         self.judge_frame(presses, &reported, is_few)
     }

@@ -43,6 +43,15 @@ impl<const N: usize> NormalEquations<N> {
         self.square += weight * value * value;
     }
 
+    /// The same without what some of its rows added.
+    pub fn without(&self, some: &Self) -> Self {
+        Self {
+            information: self.information - some.information,
+            right: self.right - some.right,
+            square: self.square - some.square,
+        }
+    }
+
     /// Takes in rows and values with weights that follow how far `x` leaves them off; returns the
     /// sum of the weights.
     ///
