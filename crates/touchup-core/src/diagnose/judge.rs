@@ -353,8 +353,7 @@ impl InputJudge<'_> {
     /// zero may be off by.
     fn judge_steps(&self, levels: &ForceLevels) -> Option<InputFinding> {
         let (gate, step) = (self.params.gate?, self.force_step);
-        // a force that is there or not has no steps
-        let is_coarse = 2.0 * step < levels.largest && step / 2.0 > gate.free.max(levels.noise);
+        let is_coarse = step.is_finite() && step / 2.0 > gate.free.max(levels.noise);
         let measured = format!(
             "the forces come in steps of {step:.2} N, and contact.on_n is {:.2} N",
             gate.on

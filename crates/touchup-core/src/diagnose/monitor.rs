@@ -35,10 +35,56 @@ pub struct InputMonitor {
     last_force: Option<Vector3<f64>>,
     /// |F − F of the sample before|, N
     steps: Vec<f64>,
-    /// smallest change of a component of the measured force, N
-    force_step: f64,
+    /// of each component of the measured force
+    changes: [ComponentChanges; 3],
     /// largest component of the measured force, N, and how often it was exactly that
     largest: (f64, u64),
+}
+
+/// How a component of the measured force changes, N.
+#[derive(Clone, Copy, Debug)]
+struct ComponentChanges {
+    last: f64,
+    smallest: f64,
+    low: f64,
+    high: f64,
+    /// it had a value other than these two
+    has_others: bool,
+}
+
+impl Default for ComponentChanges {
+    fn default() -> Self {
+        let (last, smallest) = (f64::NAN, f64::INFINITY);
+        let [low, high] = [f64::INFINITY, f64::NEG_INFINITY];
+        Self {
+            last,
+            smallest,
+            low,
+            high,
+            has_others: false,
+        }
+    }
+}
+
+impl ComponentChanges {
+    fn push(&mut self, value: f64) {
+        let change = (value - self.last).abs();
+        if change > 0.0 {
+            self.smallest = self.smallest.min(change);
+        }
+        self.has_others |= self.low < self.high && value != self.low && value != self.high;
+        (self.low, self.high) = (self.low.min(value), self.high.max(value));
+        self.last = value;
+    }
+
+    /// Smallest change; infinite of a force that is there or not, which has no steps.
+    fn step(&self) -> f64 {
+        if self.has_others {
+            self.smallest
+        } else {
+            f64::INFINITY
+        }
+    }
 }
 
 impl InputMonitor {
@@ -57,7 +103,7 @@ impl InputMonitor {
             stride: 1,
             last_force: None,
             steps: Vec::new(),
-            force_step: f64::INFINITY,
+            changes: Default::default(),
             largest: (0.0, 0),
         })
     }
@@ -82,10 +128,8 @@ impl InputMonitor {
         } else if size == self.largest.0 {
             self.largest.1 += 1;
         }
-        if let Some(last) = self.last_force {
-            let changes = (force - last).abs();
-            let changes = changes.iter().filter(|change| **change > 0.0);
-            self.force_step = changes.fold(self.force_step, |least, change| least.min(*change));
+        for (changes, component) in self.changes.iter_mut().zip(&force) {
+            changes.push(*component);
         }
         let is_kept = self.samples.is_multiple_of(self.stride);
         if is_kept {
@@ -167,7 +211,10 @@ impl InputMonitor {
             tree,
             records: &self.records,
             noise,
-            force_step: self.force_step,
+            force_step: self
+                .changes
+                .iter()
+                .fold(f64::INFINITY, |least, of| least.min(of.step())),
             largest: (self.largest.0, self.largest.1, self.samples),
             clock: self.clock_offset(),
         };
