@@ -98,7 +98,6 @@ fn main() -> anyhow::Result<()> {
     let config = NodeConfig::new(&ros, |name| std::env::var(name).ok())?;
     let (inbox, arrivals) = inbox(4096, &Clock::system());
     let port = dds::start(&config, inbox.clone())?;
-    (0..tiles).for_each(|id| port.publish(Publication::Tile(tile(id))));
     thread::spawn(move || {
         // ends as well when the other end is dropped
         let _ = std::io::copy(&mut stdin(), &mut std::io::sink());
@@ -181,6 +180,10 @@ fn main() -> anyhow::Result<()> {
                 goal.result.send((GoalEnd::Succeeded, result));
             }
             Arrival::SetParameter(_, _, reply) => reply.send(Ok(())),
+            // as the node does: DDS keeps no more than the last of them for who is not there yet
+            Arrival::Viewers(count) if count > 0 => {
+                (0..tiles).for_each(|id| port.publish(Publication::Tile(tile(id))));
+            }
             Arrival::Shutdown => break,
             other => println!("{other:?}"),
         }

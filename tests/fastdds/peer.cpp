@@ -39,8 +39,8 @@ using eprosima::fastrtps::rtps::SerializedPayload_t;
 using eprosima::fastrtps::rtps::WriteParams;
 using Clock = std::chrono::steady_clock;
 
-// what comes is asked for, not when: a machine that is busy may take its time
-constexpr std::chrono::seconds PATIENCE{300};
+// what comes is asked for, not when: a machine that is busy may take its time; tests wait for 120 s
+constexpr std::chrono::seconds PATIENCE{100};
 
 // a message as it is on the wire, four bytes of encapsulation first
 using Bytes = std::vector<uint8_t>;
