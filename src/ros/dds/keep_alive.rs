@@ -50,9 +50,10 @@ type Prefix = [u8; 12];
 
 /// The participants of a domain, by what they announce.
 pub(super) struct KeepAlive {
-    /// wake the thread that takes: one hears announcements to all, one has the port of a participant
-    /// of this computer and hears those to each
+    /// wake the thread that takes: one hears announcements to all, one answers of our readers, one has
+    /// the port of a participant of this computer and hears announcements to each
     pub sockets: Vec<MioSocket>,
+    answers_port: u16,
     /// numbers of the announcements handed over
     next_number: i64,
     /// our own participant, and where it listens
@@ -151,13 +152,17 @@ impl KeepAlive {
             let port = u16::try_from(port_of(participant)).ok()?;
             UdpSocket::bind((Ipv4Addr::UNSPECIFIED, port)).ok()
         });
-        let mut sockets = vec![MioSocket::from_std(socket.into())];
+        let answers = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0))?;
+        answers.set_nonblocking(true)?;
+        let answers_port = answers.local_addr()?.port();
+        let mut sockets: Vec<_> = [socket.into(), answers].map(MioSocket::from_std).into();
         if let Some(free) = free {
             free.set_nonblocking(true)?;
             sockets.push(MioSocket::from_std(free));
         }
         Ok(Self {
             sockets,
+            answers_port,
             next_number: FIRST_NUMBER,
             own: own.to_bytes().first_chunk().copied().unwrap_or_default(),
             own_port,
@@ -201,21 +206,32 @@ impl KeepAlive {
         let known = Prefix::try_from(writer.prefix.as_ref())
             .ok()
             .and_then(|prefix| self.known.get(&prefix));
-        let Some((known, place)) =
-            known.and_then(|known| Some((known, announcement(&known.datagram)?.listens?)))
-        else {
+        let Some(known) = known else {
             return;
         };
-        let heartbeat = first_request::heartbeat(reader, writer);
-        let question = first_request::question(reader, writer);
-        // one directly behind the other: the writer's answer must not come before the heartbeat;
-        // readers and writers have the port behind that of the participant
-        let asked = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).and_then(|socket| {
-            let (way, own) = way_from(known.from)?;
-            socket.send_to(&question, place)?;
-            way.send_to(&heartbeat, (own, self.own_port + 1))
+        let asked = way_from(known.from).and_then(|(way, own)| {
+            let answers = SocketAddr::new(own, self.answers_port);
+            let heartbeat = first_request::heartbeat(reader, writer, answers);
+            // readers and writers have the port behind that of the participant
+            let to = (own, self.own_port + 1);
+            heartbeat.map_or(Ok(0), |heartbeat| way.send_to(&heartbeat, to))
         });
         if let Err(error) = asked {
+            tracing::debug!(%error, "a first request may be heard late");
+        }
+    }
+
+    /// The answer of our reader goes on to the writer.
+    fn pass_on(&self, answer: &[u8]) {
+        let Ok(mut question) = <[u8; first_request::LENGTH]>::try_from(answer) else {
+            return;
+        };
+        let to = first_request::question(&mut question, &self.own);
+        let known = to.and_then(|prefix| self.known.get(&prefix));
+        let place = known.and_then(|known| announcement(&known.datagram)?.listens);
+        let sent = place
+            .map(|place| UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0))?.send_to(&question, place));
+        if let Some(Err(error)) = sent {
             tracing::debug!(%error, "a first request may be heard late");
         }
     }
@@ -239,6 +255,7 @@ impl KeepAlive {
 
     fn hear(&mut self, datagram: &[u8], from: SocketAddr, now: Instant) {
         let Some(Announcement { prefix, lease, .. }) = announcement(datagram) else {
+            self.pass_on(datagram);
             return;
         };
         if prefix == self.own || datagram.len() > LARGEST_ANNOUNCEMENT {

@@ -13,10 +13,10 @@ use pyo3::prelude::*;
 use super::error::ChildError;
 use super::program;
 use crate::clock::Clock;
-use crate::ur::protocol::{Begin, ProgramState, UrState, WHEEL};
+use crate::ur::protocol::{Begin, PERIOD, ProgramState, UrState, WHEEL};
 
 /// Rate of the states and of the control, Hz.
-const RATE_HZ: f64 = 500.0;
+const RATE_HZ: f64 = 1.0 / PERIOD;
 /// Uploads no program by itself and waits for none, and takes the force from the arm's own sensor:
 /// no upper registers, no cap, no external sensor.
 const FLAGS: u32 = 0x10 | 0x40;
@@ -278,7 +278,7 @@ impl Control for RtdeControl {
     fn speed(&self, twist: [f64; 6], acceleration: f64) -> Result<(), ChildError> {
         // the time does not end the motion: it is how soon the program on the controller looks for
         // the next velocity, and without one it first reaches this
-        self.done("speedL", (twist.to_vec(), acceleration, 1.0 / RATE_HZ))
+        self.done("speedL", (twist.to_vec(), acceleration, PERIOD))
     }
 
     fn press(

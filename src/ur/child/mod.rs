@@ -3,7 +3,7 @@
 //! One thread owns `rtde_control` and executes the orders ([`control`]); a second one passes on the
 //! states of `rtde_receive` ([`states`]); a third reads the orders. When a connection of the
 //! library is lost the process says so and ends at once, for the library would connect again by
-//! itself, start its program unasked, and crash.
+//! itself, and crash.
 
 mod control;
 mod error;

@@ -45,17 +45,13 @@ pub fn counting(library: &str) -> Result<String, ChildError> {
     Ok(format!("def rtde_control():\n{counted}end\n"))
 }
 
-/// The main loop of ur-rtde 1.6.5, without its realtime commands.
+/// A program with both places and nothing else of the library's.
 #[cfg(test)]
-pub const LIBRARY: &str = "        while keep_running:
-            cmd = rtde_cmd()
-                if cmd == 0:
-                    executing_cmd = False
-                else:
+pub const PLACES: &str = "        before_the_loop()
+        while keep_running:
                     if not executing_cmd:
-                        keep_running = process_cmd(cmd)
+                        take_the_command()
                     end
-                end
             sync()
         end
 ";
@@ -66,25 +62,25 @@ mod tests {
 
     #[test]
     fn each_cycle_is_counted_before_its_command_is_read_and_a_long_command_says_so_first() {
-        let program = counting(LIBRARY).unwrap();
+        let program = counting(PLACES).unwrap();
         let lines: Vec<_> = program.lines().map(str::trim).collect();
         let at = |line: &str| lines.iter().position(|other| *other == line).unwrap();
         let order = [
             "def rtde_control():",
+            "before_the_loop()",
             "cycle = 0",
             "while keep_running:",
             "cycle = cycle + 1",
             "write_output_integer_register(19, cycle)",
-            "cmd = rtde_cmd()",
             "write_output_integer_register(19, -1)",
-            "keep_running = process_cmd(cmd)",
+            "take_the_command()",
             "sync()",
         ];
         assert!(order.map(at).is_sorted(), "{program}");
         assert_eq!(lines.last(), Some(&"end"));
         // nothing of the library is lost
-        assert!(LIBRARY.lines().all(|line| program.contains(line)));
-        for other in ["", &LIBRARY.repeat(2)] {
+        assert!(PLACES.lines().all(|line| program.contains(line)));
+        for other in ["", &PLACES.repeat(2)] {
             assert!(counting(other).is_err());
         }
     }

@@ -49,6 +49,8 @@ struct ReportedPlacement {
     /// of the distance from one radius, m
     tolerance: f64,
     is_on_scan: bool,
+    /// so few were touched that almost any motion and ball explains them
+    is_few: bool,
 }
 
 impl InputJudge<'_> {
@@ -69,20 +71,20 @@ impl InputJudge<'_> {
                 .map(|record| presses.levels.force_o(record))
                 .collect(),
             tolerance,
+            is_few,
         };
         if let Some(inside) = self.inside_out(&reported) {
             return Some((inside, false));
         }
-        let ball_of_other_unit = self.ball_of_other_unit(presses, &reported);
-        if let Some(ball) = ball_of_other_unit.filter(|_| !is_few) {
+        if let Some(ball) = self.ball_of_other_unit(presses, &reported) {
             return Some((ball, true));
         }
-        let other_ball = self.other_ball(presses, &reported).filter(|_| !is_few);
-        let tried = || self.mends(presses, is_few, other_ball.is_none());
-        if !reported.is_on_scan
-            && let Some(finding) = self.mend(presses, &reported, tried())
-        {
-            return Some((finding, false));
+        let other_ball = self.other_ball(presses, &reported);
+        if !reported.is_on_scan {
+            let tried = self.mends(presses, is_few, other_ball.is_none());
+            if let Some(finding) = self.mend(presses, &reported, tried) {
+                return Some((finding, false));
+            }
         }
         let extent = extent_of(reported.centres.iter().copied()) / presses.scale.extent;
         if extent > LARGEST_SPREAD {
@@ -101,7 +103,7 @@ impl InputJudge<'_> {
                 true,
             ));
         }
-        self.judge_frame(presses, &reported, is_few)
+        self.judge_frame(presses, &reported)
     }
 
     /// A scan whose faces look inwards: the centres are a radius below its surface, and the forces
@@ -150,7 +152,7 @@ impl InputJudge<'_> {
         // a tip of radius 0 is a point
         let is_none = radius > 0.0 && radius < LEAST_BALL;
         let is_ball = self.params.shape == TipShape::Ball;
-        (is_ball && reported.is_on_scan && (is_none || is_other))
+        (is_ball && !reported.is_few && reported.is_on_scan && (is_none || is_other))
             .then(|| off_by_radius(distance, error, radius))
     }
 
@@ -162,6 +164,7 @@ impl InputJudge<'_> {
         } = reported.fit;
         let radius = self.params.tip.radius;
         let may_be_ball = self.params.shape == TipShape::Ball
+            && !reported.is_few
             && (0.0..LARGEST_BALL * scale.extent).contains(&distance);
         let noise = scale
             .noise
@@ -173,19 +176,17 @@ impl InputJudge<'_> {
     }
 
     /// Contacts that are not on the scan, or many more of them when all are shifted alike.
-    ///
-    /// - `is_few`: so few that a shift fits almost always.
     fn judge_frame(
         &self,
         presses: &Presses,
         reported: &ReportedPlacement,
-        is_few: bool,
     ) -> Option<(InputFinding, bool)> {
         let ReportedPlacement {
             fit,
             forces,
             tolerance,
             is_on_scan,
+            is_few,
             ..
         } = reported;
         let radius = self.params.tip.radius;
@@ -229,7 +230,7 @@ impl InputJudge<'_> {
 
     /// Another unit, other axes, another order of the quaternion or another point of the stylus.
     ///
-    /// - `is_few`: so few contacts that some motion always fits: a unit is all that is tried.
+    /// - `is_few`: of few contacts a unit is all that is tried.
     /// - `is_far`: whether no other ball explains them as well as another point of the stylus.
     fn mends(&self, presses: &Presses, is_few: bool, is_far: bool) -> Vec<PlaceMend> {
         let mut mends: Vec<PlaceMend> = PlaceMend::units().collect();
@@ -331,14 +332,14 @@ impl InputJudge<'_> {
         let judges: Vec<&InputRecord> = records.iter().step_by(every).copied().collect();
         let step = presses.tolerance;
         let count = (LONGEST_TIP / step) as i64;
-        let at = |axis: usize, length: f64| PlaceMend::tip(Vector3::ith(axis, length));
+        let at = |axis: usize, steps: i64| PlaceMend::tip(Vector3::ith(axis, steps as f64 * step));
         let share = |mend: &PlaceMend| self.mended(presses, &judges, mend).unwrap_or(0.0);
-        (0..3)
-            .flat_map(|axis| (-count..=count).map(move |steps| (axis, steps as f64 * step)))
-            .map(|(axis, length)| at(axis, length))
-            .map(|mend| (share(&mend), mend))
-            .max_by(|a, b| a.0.total_cmp(&b.0))
-            .map(|(_, mend)| mend)
+        let (_, steps, mend) = (0..3)
+            .flat_map(|axis| (-count..=count).map(move |steps| (steps, at(axis, steps))))
+            .map(|(steps, mend)| (share(&mend), steps, mend))
+            .max_by(|a, b| a.0.total_cmp(&b.0))?;
+        // the best of all that was searched lies within it
+        (steps.abs() < count).then_some(mend)
     }
 
     /// The shift of all contacts that brings many more of them onto the scan, and explains more of

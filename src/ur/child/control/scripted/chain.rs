@@ -285,7 +285,7 @@ impl<'a> World<'a> {
         // the registers of a client that is gone are another's
         (controller.ints_in, controller.doubles_in) = ([0; 48], [0.0; 48]);
         controller.owner = Some(0);
-        controller.load(&program::counting(program::LIBRARY).unwrap());
+        controller.load(&program::counting(program::PLACES).unwrap());
         while controller.sent().is_some() {}
         *self.states.borrow_mut() = States::read(&mut controller);
         drop(controller);
