@@ -72,6 +72,19 @@ fn found(seed: u64, off: CalibrationOffset) -> Vec<Feature> {
     detect(&mesh, &touches).features
 }
 
+/// The scan smears the rims of the plate that nobody touched, and is too high there: beside what was
+/// touched is a step.
+#[test]
+fn a_smeared_rim_beside_what_was_touched_is_no_shaft() {
+    for seed in either(vec![1, 12, 35], (1..=50).collect()) {
+        let features = found(seed, CalibrationOffset::default());
+        let shafts = features
+            .iter()
+            .filter(|feature| feature.kind == Kind::Cylinder);
+        assert_eq!(shafts.count(), 0, "seed {seed}");
+    }
+}
+
 /// While little is touched much is decided by little: the order in which faces are met must be no part of it.
 #[test]
 fn features_do_not_depend_on_how_the_mesh_is_numbered() {

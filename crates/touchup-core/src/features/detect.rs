@@ -14,6 +14,7 @@ use super::measure::{Fitted, Measure};
 use super::observe::{NOT_ALIKE, Observed};
 use super::rims::{OpeningOutline, RoundOpening, outlines, rims};
 use super::scene::{Parted, numbered_by_place};
+use super::shafts::is_shaft;
 use super::slots::{Slot, slots};
 use super::walls::{ALL_AROUND, SAME_WALL, Wall};
 use crate::mesh::{FaceTree, TriMesh};
@@ -120,8 +121,9 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
     );
     features.retain(|feature| !is_way_of_ball(feature));
     let bosses = bosses(&parted, &walls);
-    let is_shaft =
-        |at: &usize| is_shaft(&parted, &walls[*at]) && bosses.iter().all(|boss| boss.wall != *at);
+    let is_shaft = |at: &usize| {
+        bosses.iter().all(|boss| boss.wall != *at) && is_shaft(&measure, &borders, &walls[*at])
+    };
     let shafts: Vec<usize> = (0..walls.len()).filter(is_shaft).collect();
     let of_holes = holes
         .iter()
@@ -205,30 +207,6 @@ fn join_planes(parted: &mut Parted) {
     parted
         .segmentation
         .join_planes(&parted.facets, beside.into_iter());
-}
-
-/// A cylinder is reported when it covers more than this share of a turn: less is the rounding of an
-/// edge, which looks wider in a measured mesh …
-const ROUNDED_EDGE: f64 = 0.3;
-const ROUNDED_EDGE_MEASURED: f64 = 0.45;
-/// … and when it is there between its ends: what lies on it of four walls of a block is not.
-const SHAFT_FILLED: f64 = 0.8;
-
-/// Whether a wall has the material inside and is large enough to be reported.
-fn is_shaft(parted: &Parted, wall: &Wall) -> bool {
-    let area: f64 = wall
-        .segments
-        .iter()
-        .map(|&number| parted.segment(number).area)
-        .sum();
-    let is_large = area > LEAST_PLANE * parted.diagonal * parted.diagonal;
-    let least = if parted.rounding.is_some() {
-        ROUNDED_EDGE
-    } else {
-        ROUNDED_EDGE_MEASURED
-    };
-    let is_whole = wall.coverage > least && wall.filled > SHAFT_FILLED;
-    is_large && !wall.is_concave && !wall.is_cone() && is_whole
 }
 
 /// Holes, and the heads around them that contacts alone show; both are steps of one.

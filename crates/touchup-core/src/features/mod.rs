@@ -34,6 +34,7 @@ mod relations;
 mod rims;
 mod scene;
 mod segment;
+mod shafts;
 mod slots;
 mod track;
 mod walls;

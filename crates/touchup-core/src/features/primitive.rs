@@ -52,7 +52,7 @@ impl Primitive {
 }
 
 /// A face's normal may be off that of the primitive by this much: 25°.
-const ALIKE: f64 = 0.906;
+pub(super) const FACES_ALIKE: f64 = 0.906;
 
 /// Whether a face lies on the primitive within `tolerance` (m) and faces as it does.
 pub(super) fn belongs(facets: &Facets, face: u32, primitive: &Primitive, tolerance: f64) -> bool {
@@ -72,7 +72,7 @@ pub(super) fn belongs(facets: &Facets, face: u32, primitive: &Primitive, toleran
         Primitive::Cone(cone) => normal_beneath(facets, face, cone, tolerance),
     };
     normal.is_some_and(|normal| {
-        facets.normal(face).dot(&normal) > ALIKE || {
+        facets.normal(face).dot(&normal) > FACES_ALIKE || {
             // the normal of a sliver says nothing
             let corners = facets.triangle(face);
             let longest = (0..3)
