@@ -93,8 +93,8 @@ mod tests {
         };
         let parts = [
             // count, kind, port, address
-            &[0x0f, 1, 32, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0xf3, 0x1c, 0, 0],
-            [0; 12].as_slice(),
+            [0x0f, 1, 32, 0, 1, 0, 0, 0, 1, 0, 0, 0, 0xf3, 0x1c, 0, 0].as_slice(),
+            &[0; 12],
             &[10, 0, 0, 7, 0, 0, 0, 0],
             // reader, writer; first (8), last (8), count (4)
             &[7, 1, 28, 0, 0, 0, 3, 4, 0, 0, 0x14, 3],
@@ -117,9 +117,9 @@ mod tests {
         // reader, writer; base (8), bits (4), count (4)
         let acknack = |flags, base, bits| {
             let parts = [
-                &[6, flags, 24, 0, 0, 0, 3, 4, 0, 0, 0x14, 3],
-                [0, 0, 0, 0, base, 0, 0, 0].as_slice(),
-                &[bits, 0, 0, 0, 9, 0, 0, 0],
+                vec![6, flags, 24, 0, 0, 0, 3, 4, 0, 0, 0x14, 3],
+                vec![0, 0, 0, 0, base, 0, 0, 0],
+                vec![bits, 0, 0, 0, 9, 0, 0, 0],
             ];
             let message = [header(3, 5), parts.concat()].concat();
             <[u8; LENGTH]>::try_from(message).unwrap()
