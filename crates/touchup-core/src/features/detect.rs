@@ -32,8 +32,6 @@ pub struct Detection {
 
 /// A plane is worth telling when it is so many tolerances wide.
 const SURE_WIDTH: f64 = 25.0;
-/// A plane is worth telling from this area on, in squared diagonals.
-const LEAST_PLANE: f64 = 1e-3;
 
 /// A round wall is as wide as the ball within these shares: the mesh is coarse.
 const OF_BALL: std::ops::Range<f64> = 0.97..1.12;
@@ -171,9 +169,7 @@ pub fn detect(mesh: &TriMesh, touches: &[ProbedPoint]) -> Detection {
     );
     features.extend(edges.iter().filter_map(|edge| edge_feature(&measure, edge)));
     features.extend(corners(&parted, &measure, &edges));
-    let is_large = |number: usize| {
-        parted.segment(number).area > LEAST_PLANE * parted.diagonal * parted.diagonal
-    };
+    let is_large = |number: usize| parted.is_large(parted.segment(number).area);
     let planes = parted
         .planes()
         .filter(|&(number, ..)| is_sure_plane(&parted, number) && is_large(number));

@@ -32,6 +32,8 @@ pub(super) struct Parted<'a> {
 const AROUND: usize = 24;
 /// A segment of less area than this is no neighbour worth naming, in squared diagonals.
 const LEAST_AREA: f64 = 1e-5;
+/// A plane or a shaft is worth telling from this area on, in squared diagonals.
+const LARGE_AREA: f64 = 1e-3;
 /// A plane around an opening is square to the axis within 20°.
 const SQUARE: f64 = 0.94;
 
@@ -116,6 +118,11 @@ impl<'a> Parted<'a> {
     /// Whether a segment is large enough to be named beside others.
     pub fn is_strong(&self, number: usize) -> bool {
         self.segment(number).area > LEAST_AREA * self.diagonal * self.diagonal
+    }
+
+    /// Whether a surface of this area, m², is worth telling.
+    pub fn is_large(&self, area: f64) -> bool {
+        area > LARGE_AREA * self.diagonal * self.diagonal
     }
 
     /// The plane of a segment, if it is flat.

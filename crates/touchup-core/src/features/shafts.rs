@@ -1,5 +1,5 @@
-//! Shafts: round walls with the material inside that are surfaces of the part, and not what a scan
-//! makes of its edges.
+//! Shafts: round walls with the material inside that are surfaces of the part, and no edges that the
+//! scan has smeared.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
@@ -12,13 +12,11 @@ use super::segment::Segment;
 use super::walls::Wall;
 use crate::mesh::FaceId;
 
-/// A shaft has at least this area, in squared diagonals.
-const LEAST_AREA: f64 = 1e-3;
-/// It covers more than this share of a turn: less is the rounding of an edge, which looks wider in a
-/// measured mesh …
+/// A shaft covers more than this share of a turn: less is the rounding of an edge, which looks wider
+/// in a measured mesh.
 const ROUNDED_EDGE: f64 = 0.3;
 const ROUNDED_EDGE_MEASURED: f64 = 0.45;
-/// … and it is there between its ends: what lies on it of four walls of a block is not.
+/// A shaft has faces between its ends: the cylinder through four walls of a block has few.
 const FILLED: f64 = 0.8;
 /// Rounds in which two planes share corners among them.
 const ROUNDS: usize = 8;
@@ -29,14 +27,13 @@ pub(super) fn is_shaft(measure: &Measure, borders: &Borders, wall: &Wall) -> boo
     let parted = measure.observed.parted;
     let of_wall = wall.segments.iter().map(|&number| parted.segment(number));
     let area: f64 = of_wall.map(|segment| segment.area).sum();
-    let is_large = area > LEAST_AREA * parted.diagonal * parted.diagonal;
     let least = if parted.rounding.is_some() {
         ROUNDED_EDGE
     } else {
         ROUNDED_EDGE_MEASURED
     };
     let is_whole = |wall: &Wall| wall.coverage > least && wall.filled > FILLED;
-    if !is_large || wall.is_concave || wall.is_cone() || !is_whole(wall) {
+    if !parted.is_large(area) || wall.is_concave || wall.is_cone() || !is_whole(wall) {
         return false;
     }
     if parted.rounding.is_some() || measure.cylinder(wall, None).to == FittedTo::Touches {
