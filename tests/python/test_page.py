@@ -17,7 +17,7 @@ from ros_player import play_in_step
 from ros_process import Process
 from running import DEADLINE_S
 from test_ros_node import CYCLONE
-from test_web import links
+from test_web import links, newest_link
 from web_page import PageNode, Socket
 
 # the part is 0.07 m from 700 px wide
@@ -37,8 +37,9 @@ def touched(touchup_bin, demo_folder, begun, tmp_path_factory):
 
 def page_of(browser, node, role="operate", **options):
     """A page that is let in by a new link."""
+    link = newest_link(node, role)
     count = len(links(node, role))
-    page = opened(browser, node.url.rstrip("/") + links(node, role)[-1], **options)
+    page = opened(browser, node.url.rstrip("/") + link, **options)
     node.wait_for(lambda: len(links(node, role)) > count)
     return page
 

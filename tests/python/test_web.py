@@ -63,10 +63,17 @@ def links(node, role):
     return [found[1] for line in node.err if (found := re.search(rf"may {role} by \S+(/pair\?token=\w+)", line))]
 
 
+def newest_link(node, role):
+    """The newest link for a role, once there is one: a node prints them after the address of its page."""
+    node.wait_for(lambda: links(node, role))
+    return links(node, role)[-1]
+
+
 def let_in(node, role):
     """The cookie that the newest link for a role gives."""
+    link = newest_link(node, role)
     count = len(links(node, role))
-    status, headers, _ = ask(node.url, links(node, role)[-1])
+    status, headers, _ = ask(node.url, link)
     assert (status, headers["location"]) == (303, "/")
     # who comes next has another link
     node.wait_for(lambda: len(links(node, role)) > count)
@@ -125,7 +132,7 @@ def test_without_a_link_nothing_is_shown_and_the_page_itself_is_no_secret(closed
 
 
 def test_a_link_is_good_once_and_gives_its_role(closed):
-    used = links(closed, "look")[-1]
+    used = newest_link(closed, "look")
     looks, operates = let_in(closed, "look"), let_in(closed, "operate")
     assert ask(closed.url, used)[0] == 403
     with Socket(closed.url, cookie=looks) as one, Socket(closed.url, cookie=operates) as other:
@@ -208,7 +215,7 @@ def test_a_certificate_of_the_user_encrypts_the_page(touchup_bin, demo_folder, t
     with PageNode(touchup_bin, tmp_path, demo_folder / "scan.ply", *files) as node:
         assert node.url.startswith("https://")
         trusted = ssl.create_default_context(cafile=chain)
-        status, headers, _ = ask(node.url, links(node, "look")[-1], context=trusted)
+        status, headers, _ = ask(node.url, newest_link(node, "look"), context=trusted)
         assert status == 303 and "; Secure" in headers["set-cookie"]
         cookie = headers["set-cookie"].split(";")[0]
         with Socket(node.url, cookie=cookie, ssl=trusted) as page:
@@ -349,8 +356,9 @@ def test_at_all_addresses_each_of_the_machine_has_its_link_and_a_telephone_reads
         for page in pages:
             assert ask(page, "/", Origin=page)[0] == 200, page
             assert ask(page, "/api/state", Origin=page)[0] == 401, page
+            link = newest_link(node, "operate")
             before = len(links(node, "operate"))
-            cookie = let_in_by(page, links(node, "operate")[-1])
+            cookie = let_in_by(page, link)
             node.wait_for(lambda before=before: len(links(node, "operate")) > before)
             assert ask(page, "/api/state", Cookie=cookie)[0] == 200
         for host in ["evil.example", "192.0.2.77", "[2001:db8::77]", "0.0.0.1"]:
