@@ -15,8 +15,9 @@ use super::found::FoundTable;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use super::page::{on_page, parameters_of};
 use super::progress::WorkProgress;
-use super::refine::{RefineArguments, RefineSummary, Refined};
+use super::refinement::{RefineSummary, Refined, RefinementFiles};
 use super::simulate::{Simulated, write_simulation};
+use super::told::ToldFlags;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use super::web::WebFlags;
 use super::{CliError, Losses, print_result, reported, write_json};
@@ -24,9 +25,10 @@ use crate::compare::TouchedRegion;
 use crate::io::features_file::read_features;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
 #[cfg(any(feature = "ros", feature = "r2r"))]
-use crate::io::recording::StampSource;
-use crate::io::recording::Topics;
+use crate::io::recording::{StampSource, Topics};
 use crate::mesh::{FaceTree, MeshError, TriMesh};
+use crate::refinement::RefinementOptions;
+use crate::replay::RecordedAs;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use crate::replay::Recording;
 #[cfg(any(feature = "ros", feature = "r2r"))]
@@ -145,16 +147,25 @@ pub(super) fn demo(arguments: &DemoArguments) -> Result<Losses, CliError> {
         return demo_on_page(&arguments.web, out, stylus.radius);
     }
     let (scan_file, recording) = (out.join("scan.ply"), out.join("touch.mcap"));
-    let mut files =
-        RefineArguments::in_folder(scan_file, unit, recording, out, None, Topics::default());
-    files.told.tip_radius_mm = Some(stylus.radius * 1e3);
+    let (scene, told) = ToldFlags::of_radius(stylus.radius).scene(None)?;
+    let [mesh_out, features_out, touches_out] =
+        ["refined.ply", "features.json", "touches.csv"].map(|name| out.join(name));
+    let files = RefinementFiles {
+        scan: &scan_file,
+        mesh_unit: unit,
+        recording: &recording,
+        recorded: &RecordedAs::default(),
+        mesh_out: &mesh_out,
+        features_out: Some(&features_out),
+        touches_out: Some(&touches_out),
+    };
     let Refined {
         summary, losses, ..
-    } = files.refined()?;
+    } = files.refine(scene, told, RefinementOptions::default())?;
     // measured is what was written
-    let MeshFile { mesh: refined, .. } = read_mesh(&out.join("refined.ply"), unit)?;
+    let MeshFile { mesh: refined, .. } = read_mesh(&mesh_out, unit)?;
 
-    let named = read_features(&out.join("features.json"))?.features;
+    let named = read_features(&features_out)?.features;
     let found = FoundTable::of(&plate.features(), &named);
     compared(&CompareArguments::in_folder(out, named))?;
 

@@ -1,12 +1,11 @@
 //! `touchup doctor`: what is wrong with a recording, before anything is made of it.
 
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
 
-use super::offsets::WrenchOffset;
 use super::progress::WorkProgress;
 use super::recorded::RecordedFlags;
 use super::told::{ToldFlags, ToldNumbers};
@@ -15,7 +14,7 @@ use crate::diagnose::InputFinding;
 use crate::input_check::{InputCheck, check_input};
 use crate::io::mesh_file::MeshUnit;
 use crate::io::recording::StampSource;
-use crate::refinement::{self, InputNames};
+use crate::refinement::{InputNames, WrenchOffset, refuse_unsound};
 use crate::replay::{Recording, marker_filter};
 use crate::scan::read_scan;
 
@@ -99,20 +98,10 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Losses, CliError> {
         findings,
     };
     print_report(arguments.json, &diagnosis, || diagnosis.to_string())?;
-    refuse_unsound(&diagnosis.findings, &arguments.scan, &arguments.recording)?;
+    let names = InputNames {
+        scan: &arguments.scan,
+        recording: &arguments.recording,
+    };
+    refuse_unsound(&diagnosis.findings, names)?;
     Ok(losses)
-}
-
-/// Refuses an input of which something is surely wrong.
-///
-/// - `scan`, `recording`: to be named.
-pub(super) fn refuse_unsound(
-    findings: &[InputFinding],
-    scan: &Path,
-    recording: &Path,
-) -> Result<(), CliError> {
-    Ok(refinement::refuse_unsound(
-        findings,
-        InputNames { scan, recording },
-    )?)
 }

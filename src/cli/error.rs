@@ -376,6 +376,8 @@ impl From<RefinementError> for CliError {
         match error {
             RefinementError::Scene(error) => error.into(),
             RefinementError::Setting(error) => error.into(),
+            RefinementError::Scan(error) => error.into(),
+            RefinementError::RecordedAs(what) => Self::usage(what),
             RefinementError::Replay(error) => error.into(),
             RefinementError::Live(error) => error.into(),
             RefinementError::Outcome(error) => (*error).into(),

@@ -24,7 +24,6 @@ mod init;
 mod inspect;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 mod node;
-mod offsets;
 mod output;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 mod page;
@@ -34,10 +33,10 @@ mod pictures;
 mod probe;
 mod probing;
 mod progress;
-mod rates;
 mod recorded;
 mod recover;
 mod refine;
+mod refinement;
 #[cfg(any(feature = "ros", feature = "r2r"))]
 mod replay;
 mod report;

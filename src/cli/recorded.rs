@@ -3,7 +3,7 @@
 
 use clap::Args;
 
-use crate::io::recording::{RecordingLayout, Topics};
+use crate::io::recording::{RecordingLayout, StampSource, Topics};
 use crate::replay::RecordedAs;
 use crate::scene::Scene;
 
@@ -50,6 +50,13 @@ impl From<Topics> for RecordedFlags {
 impl RecordedFlags {
     /// What they name, and the scene of the columns of a table.
     pub fn layout(&self, scene: &Scene) -> RecordingLayout {
+        self.named(StampSource::default()).layout(scene)
+    }
+
+    /// The names that they give.
+    ///
+    /// - `stamp`: which time of a message counts.
+    pub fn named(&self, stamp: StampSource) -> RecordedAs {
         let Self {
             wrench_topic,
             pose_topic,
@@ -63,8 +70,7 @@ impl RecordedFlags {
             pose_frame,
             base_frame,
             markers_topic,
-            stamp: None,
+            stamp: Some(stamp.to_string()),
         }
-        .layout(scene)
     }
 }

@@ -1,54 +1,30 @@
 //! `touchup refine`: a scan and a recording in, the refined mesh out.
 
-use std::collections::BTreeMap;
-use std::fmt;
-use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::{OsStringValueParser, TypedValueParser};
-use serde::Serialize;
-use tracing::{debug, warn};
 
-use super::doctor::refuse_unsound;
-use super::error::UNSOUND;
-use super::offsets::{ContactPoints, ScanOffset, WrenchOffset};
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use super::page::{on_page, parameters_of};
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use super::path_parameter::path;
-use super::progress::WorkProgress;
-use super::rates::{LiveSummary, Rates};
 use super::recorded::RecordedFlags;
+use super::refinement::{Refined, RefinementFiles};
 use super::told::{ToldFlags, ToldNumbers};
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use super::web::WebFlags;
-use super::{
-    CliError, Losses, by_reason, check_kept_by, check_place, counted, print_report, reported,
-    require,
-};
-use crate::diagnose::{InputFinding, InputMonitor};
-use crate::haptic::Refiner;
+use super::{CliError, Losses, check_kept_by, check_place, print_report, require};
 use crate::io::atomic::is_same_file;
 use crate::io::mesh_file::{MeshFileError, MeshUnit, check_target};
-use crate::io::recording::{StampSource, Topics};
-use crate::live::{Latencies, LiveError, Quantiles};
-use crate::mesh::{FaceTree, RepairReport, TriMesh};
-use crate::reconstruct::CloudSummary;
-use crate::refinement::{
-    JudgedReplay, NOTHING_MOVES, RefinementInput, SampleTaker, TouchSource, reason_of_refusal,
-};
-use crate::replay::{Recording, Replayed, marker_filter};
+use crate::io::recording::StampSource;
+use crate::refinement::RefinementOptions;
+#[cfg(any(feature = "ros", feature = "r2r"))]
+use crate::replay::{Recording, marker_filter};
 #[cfg(any(feature = "ros", feature = "r2r"))]
 use crate::ros::node::NodeEnd;
-use crate::scan::{Scan, read_scan};
-use crate::scene::{LeftOut, Memory, Mode, Scene, SceneCost};
-use crate::session::{
-    Outcome, OutcomePlaces, PatchSummary, SessionRecord, StrokeChanges, StrokeReplay,
-    UncertaintySummary,
-};
-use crate::stylus::{ContactSample, MarkerCounts, Sample};
-use crate::threads::Threads;
+use crate::scene::{Mode, Scene};
+use crate::session::{SessionRecord, StrokeChanges};
 
 #[derive(Clone, Debug, Default, Args)]
 pub(super) struct RefineArguments {
@@ -76,7 +52,7 @@ pub(super) struct RefineArguments {
     #[arg(long, value_name = "S", default_value = "header")]
     stamp: StampSource,
     #[command(flatten)]
-    pub told: ToldFlags,
+    told: ToldFlags,
     /// The robust method, or the published one literally
     #[arg(long)]
     mode: Option<Mode>,
@@ -106,11 +82,7 @@ pub(super) struct RefineArguments {
     resume: Option<PathBuf>,
     /// Refines also where something of the recording is surely wrong (`touchup doctor`)
     #[arg(long)]
-    pub force: bool,
-    /// The touches are on what the scan may lack, as a hole that it closed: how they lie on it is
-    /// then a doubt and not sure
-    #[arg(skip)]
-    pub touches_flaws: bool,
+    force: bool,
     /// Strokes that were taken back, done again, taken out or put back in the session
     #[arg(skip)]
     strokes: StrokeChanges,
@@ -125,75 +97,6 @@ pub(super) struct RefineArguments {
 /// Takes a path that may be left out; empty: left out.
 fn path_or_none() -> impl TypedValueParser<Value = PathBuf> {
     OsStringValueParser::new().map(PathBuf::from)
-}
-
-reported! {
-    /// What `--json` prints; times in s, `push_ns` in ns.
-    pub(super) struct RefineSummary, fn of(
-        run: (SceneCost, [f64; 2], Option<LiveSummary>),
-        replayed: &Replayed,
-        pushes: Pushes,
-        refiner: &Refiner,
-        outcome: Outcome,
-        input: (ToldNumbers, Vec<InputFinding>, Option<CloudSummary>),
-        offsets: (Option<WrenchOffset>, Option<ScanOffset>)
-    ) {
-        /// stages built from the scene, those left out with the reason of each, and the memory at
-        /// start
-        scene: SceneCost = run.0,
-        /// what was told of tip and scan, and by what
-        told: ToldNumbers = input.0,
-        /// how the scan came of a point cloud; not there where it is a mesh
-        cloud?: CloudSummary = input.2,
-        /// wrenches of the recording: each could be a sample
-        samples: u64 = replayed.wrenches,
-        /// those that the refiner took
-        accepted: u64 = pushes.accepted - refiner.counts().outside_region,
-        /// those that it refused, by reason; `pose_…` are lost poses and not samples
-        refused: BTreeMap<String, u64> = pushes.refused,
-        /// times that the stylus came into contact
-        contacts: u64 = refiner.counts().contacts,
-        /// of the markers, where they give the pose
-        markers?: MarkerCounts = replayed.markers,
-        /// how late the clock of the wrench reads beyond what the scene says, where the touches
-        /// determine it and the scene has `clock`
-        wrench_offset?: WrenchOffset = offsets.0,
-        /// rigid offset of the scan from the part, with --registration
-        registration?: ScanOffset = offsets.1,
-        /// what is doubtful about the recording, the surest first (`touchup doctor`)
-        findings: Vec<InputFinding> = input.1,
-        /// faces that are not where the scan had them
-        moved_faces: u64 = outcome.moved_faces,
-        /// updates made smaller because a face would have folded
-        cut_back: u64 = refiner.counts().cut_back,
-        /// of the ball on the part; `null` when it never slid far enough
-        friction: Option<FrictionFound> = refiner.friction().map(|found| FrictionFound { mu: found.mu, sigma: found.sigma }),
-        /// of one sample through the whole chain
-        push_ns: Quantiles = pushes.latencies.quantiles(),
-        load_s: f64 = run.1[0],
-        replay_s: f64 = run.1[1],
-        /// of the patch beside the samples, with --live
-        live?: LiveSummary = run.2,
-        /// the reconstructed faces; `null` where `patch` is off, or nothing was touched
-        patch: Option<PatchSummary> = outcome.patch,
-        /// how well that is known; not there where `uncertainty` is off
-        uncertainty?: UncertaintySummary = outcome.uncertainty,
-    }
-}
-
-/// Coefficient of kinetic friction and its standard error.
-#[derive(Debug, Serialize)]
-struct FrictionFound {
-    mu: f64,
-    sigma: f64,
-}
-
-/// Result of refining a scan.
-pub(super) struct Refined {
-    /// repairs of the scan's file
-    repair: RepairReport,
-    pub summary: RefineSummary,
-    pub losses: Losses,
 }
 
 const NO_SCAN: &str =
@@ -222,93 +125,7 @@ pub(super) fn refine(arguments: &RefineArguments) -> Result<Losses, CliError> {
     Ok(losses)
 }
 
-/// Counts and times of the samples.
-#[derive(Default)]
-struct Pushes {
-    accepted: u64,
-    refused: BTreeMap<String, u64>,
-    latencies: Latencies,
-}
-
-impl Pushes {
-    fn push(&mut self, rates: &mut Rates, sample: &Sample) {
-        let (pushed, time) = rates.push(sample);
-        self.latencies.record(time);
-        match pushed {
-            Ok(()) => self.accepted += 1,
-            Err(error) => {
-                *self
-                    .refused
-                    .entry(reason_of_refusal(&LiveError::Refine(error)).to_owned())
-                    .or_default() += 1
-            }
-        }
-    }
-}
-
-/// Gives samples to both rates, as the strokes of a session and the clock have them.
-struct RateTaker {
-    rates: Rates,
-    pushes: Pushes,
-    strokes: StrokeReplay,
-    /// samples of strokes that were taken out
-    taken_out: u64,
-    /// for the registration
-    contacts: Option<ContactPoints>,
-}
-
-impl SampleTaker for RateTaker {
-    fn take(&mut self, sample: &Sample) -> bool {
-        self.rates
-            .change_strokes(&mut self.strokes, sample.stamp_ns);
-        if !self.strokes.takes(sample.stamp_ns) {
-            self.taken_out += 1;
-            return false;
-        }
-        self.pushes.push(&mut self.rates, sample);
-        true
-    }
-
-    fn refiner(&self) -> &Refiner {
-        self.rates.engine.refiner()
-    }
-
-    fn observe(&mut self, contact: &ContactSample) {
-        if let Some(contacts) = &mut self.contacts {
-            contacts.push(contact);
-        }
-    }
-}
-
 impl RefineArguments {
-    /// Writes refined.ply, features.json and touches.csv into a folder.
-    pub(super) fn in_folder(
-        scan: PathBuf,
-        mesh_unit: MeshUnit,
-        bag: PathBuf,
-        folder: &Path,
-        scene: Option<PathBuf>,
-        topics: Topics,
-    ) -> Self {
-        let out = folder.join("refined.ply");
-        let [features_out, touches_out] =
-            ["features.json", "touches.csv"].map(|name| Some(folder.join(name)));
-        let files = Self {
-            scan,
-            bag,
-            out,
-            mesh_unit,
-            scene,
-            features_out,
-            touches_out,
-            ..Self::default()
-        };
-        Self {
-            recorded: topics.into(),
-            ..files
-        }
-    }
-
     /// With what the session to be resumed, or the scene, names in place of flags.
     fn completed(mut self) -> Result<Self, CliError> {
         if let Some(session) = self.resume.take() {
@@ -365,13 +182,17 @@ impl RefineArguments {
         self.check_out()?;
         let markers = marker_filter(&scene, self.recorded.markers_topic.as_deref())?;
         let recording = Recording::open(&self.bag, self.recorded.layout(&scene), self.stamp)?;
-        let folder = self.out.parent().unwrap_or(Path::new("")).join("sessions");
+        let folder = self
+            .out
+            .parent()
+            .unwrap_or(std::path::Path::new(""))
+            .join("sessions");
         let mut parameters = parameters_of(&self.scan, self.mesh_unit, &folder)?;
         // files that the scene names are relative to its folder
         let beside = self
             .scene
             .as_deref()
-            .and_then(Path::parent)
+            .and_then(std::path::Path::parent)
             .filter(|folder| !folder.as_os_str().is_empty());
         let mut files = tempfile::Builder::new();
         files.suffix(".yaml");
@@ -413,176 +234,27 @@ impl RefineArguments {
     }
 
     /// Reads, replays and writes.
-    #[expect(clippy::too_many_lines)]
-    pub(super) fn refined(&self) -> Result<Refined, CliError> {
+    fn refined(&self) -> Result<Refined, CliError> {
         let (scene, told) = self.scene()?;
         self.check_out()?;
-        let started = Instant::now();
-        let Scan {
-            mesh,
-            repair,
-            cloud,
-        } = read_scan(&self.scan, self.mesh_unit)?;
-        let input = RefinementInput::new(scene, mesh)?;
-        let markers = marker_filter(&input.scene, self.recorded.markers_topic.as_deref())?;
-        let recording = Recording::open(&self.bag, self.recorded.layout(&input.scene), self.stamp)?;
-        let settings = input.settings(recording.wrench_frame);
-        let (params, patch) = settings.ok_or_else(|| CliError::usage(NOTHING_MOVES))?;
-        require(patch.is_some() || !self.live, NO_PATCH)?;
-        let mut rates = Rates::new(input.scan.clone(), params, patch, self.live)?;
-        if self.strokes.has_exchanges() {
-            rates.engine.keep_strokes();
-        }
-        let load_s = started.elapsed().as_secs_f64();
-        let RefinementInput {
-            scene,
-            scan: as_scanned,
-            cut,
-        } = &input;
-        let cost = self.cost(scene, &rates, as_scanned.bytes() + cut.bytes());
-
-        let started = Instant::now();
-        let mut progress = WorkProgress::new("replay", recording.message_count());
-        let contacts = self
-            .registration
-            .then(|| ContactPoints::new(&params))
-            .transpose()?;
-        let mut taker = RateTaker {
-            rates,
-            pushes: Pushes::default(),
-            strokes: self.strokes.replay(),
-            taken_out: 0,
-            contacts,
-        };
-        let touches = TouchSource::Recorded {
-            recording: Box::new(recording),
-            markers: markers.map(Box::new),
-        };
-        let judged = input.replay(touches, &params, &mut taker, &mut || progress.step())?;
-        let JudgedReplay {
-            mut replayed,
-            monitor,
-        } = judged;
-        let RateTaker {
-            mut rates,
-            mut pushes,
-            mut strokes,
-            taken_out,
-            contacts,
-        } = taker;
-        rates.change_strokes(&mut strokes, i64::MAX);
-        let tree = FaceTree::new_by(as_scanned, &Threads);
-        let findings = self.doubt(&monitor, as_scanned, &tree, pushes.accepted)?;
-        let registration =
-            contacts.map(|contacts| ScanOffset::of(contacts.registrar.estimate(as_scanned, &tree)));
-        drop(tree);
-        let (mut ended, live) = rates.finish()?;
-        let replay_s = started.elapsed().as_secs_f64();
-        let stage = WorkProgress::stage("reconstruct");
-        let patcher = ended
-            .patcher
-            .take()
-            .filter(|_| ended.refiner.counts().contacts > 0);
-        if let Some(patcher) = patcher.as_ref().filter(|_| !self.force) {
-            patcher.check_extent()?;
-        }
-        let places = OutcomePlaces {
-            mesh: &self.out,
-            unit: self.mesh_unit,
+        require(!self.live || scene.patcher_params().is_some(), NO_PATCH)?;
+        let files = RefinementFiles {
             scan: &self.scan,
-            features: self.features_out.as_deref(),
-            touches: self.touches_out.as_deref(),
-            outside: cut.outside.as_ref(),
-            must_change: !self.force,
+            mesh_unit: self.mesh_unit,
+            recording: &self.bag,
+            recorded: &self.recorded.named(self.stamp),
+            mesh_out: &self.out,
+            features_out: self.features_out.as_deref(),
+            touches_out: self.touches_out.as_deref(),
         };
-        let outcome = match patcher {
-            Some(patcher) => places.write_patched(as_scanned, patcher)?,
-            None => places.write_moved(as_scanned, &ended.mesh())?,
+        let options = RefinementOptions {
+            is_live: self.live,
+            strokes: self.strokes.clone(),
+            registration: self.registration,
+            force: self.force,
+            ..RefinementOptions::default()
         };
-        drop(stage);
-        replayed.losses.extend(outcome.loss());
-        let counts = ended.refiner.counts();
-        debug!(?counts, "replayed");
-        pushes.refused.extend(std::mem::take(&mut replayed.refused));
-        if counts.outside_region > 0 {
-            pushes
-                .refused
-                .insert("outside_region".to_owned(), counts.outside_region);
-        }
-        if taken_out > 0 {
-            pushes.refused.insert("taken_out".to_owned(), taken_out);
-        }
-        let wrench_offset = monitor
-            .clock_offset()
-            .filter(|_| scene.clock.is_some())
-            .map(|found| WrenchOffset::of(&found, &scene.sync_params()));
-        let (run, input) = ((cost, [load_s, replay_s], live), (told, findings, cloud));
-        let offsets = (wrench_offset, registration);
-        let summary = RefineSummary::of(
-            run,
-            &replayed,
-            pushes,
-            &ended.refiner,
-            outcome,
-            input,
-            offsets,
-        );
-        Ok(Refined {
-            repair,
-            summary,
-            losses: replayed.losses,
-        })
-    }
-
-    /// Warns of what is doubtful, and refuses what is surely wrong before anything is written.
-    fn doubt(
-        &self,
-        monitor: &InputMonitor,
-        scan: &TriMesh,
-        tree: &FaceTree,
-        accepted: u64,
-    ) -> Result<Vec<InputFinding>, CliError> {
-        let mut findings = monitor.findings(scan, tree);
-        if self.touches_flaws {
-            let off_the_scan = findings
-                .iter_mut()
-                .filter(|finding| finding.cause.is_read_off_the_scan());
-            off_the_scan.for_each(|finding| finding.is_sure = false);
-            findings.sort_by_key(|finding| !finding.is_sure);
-        }
-        if !self.force {
-            refuse_unsound(&findings, &self.scan, &self.bag)?;
-            if accepted == 0 {
-                let why = format!("{}: no sample of it could be used", self.bag.display());
-                return Err(CliError::new(UNSOUND, why, None));
-            }
-        }
-        findings.iter().for_each(|finding| warn!("{finding}"));
-        Ok(findings)
-    }
-
-    /// The stages built from the scene for these samples.
-    fn cost(&self, scene: &Scene, rates: &Rates, scan_bytes: usize) -> SceneCost {
-        let unused = [
-            LeftOut {
-                part: "robot",
-                reason: "a replay moves no arm",
-            },
-            LeftOut {
-                part: "markers",
-                reason: "the recording is read for poses",
-            },
-        ];
-        let unused = if self.recorded.markers_topic.is_some() {
-            &unused[..1]
-        } else {
-            &unused
-        };
-        let memory = Memory::of(rates.engine.footprint(), scan_bytes + rates.scan_bytes());
-        SceneCost {
-            parts: scene.built(unused, &crate::FEATURES),
-            memory,
-        }
+        files.refine(scene, told, options)
     }
 
     /// Checks that the result can be written before the work begins.
@@ -636,99 +308,5 @@ impl RefineArguments {
             scene.refine.get_or_insert_default().mode = mode;
         }
         Ok((scene, told))
-    }
-}
-
-impl RefineSummary {
-    /// The verdict in one sentence: the reconstructed or moved part and its uncertainty.
-    fn verdict(&self) -> String {
-        let faces = counted(self.moved_faces, "face", "faces");
-        match (&self.patch, self.contacts) {
-            (_, 0) if self.moved_faces > 0 => {
-                format!("refined: contact was not told from free air, and {faces} moved")
-            }
-            (_, 0) => "unchanged: the stylus never came into contact with the scan".to_owned(),
-            (Some(patch), _) => match &self.uncertainty {
-                Some(uncertainty) => format!("refined: {patch}, {uncertainty}"),
-                None => format!("refined: {patch}"),
-            },
-            (None, contacts) => {
-                let times = counted(contacts, "time", "times");
-                format!("refined: the stylus came into contact {times} and moved {faces}")
-            }
-        }
-    }
-
-    /// Counts of samples, timings, and the stages built from the scene.
-    fn details(&self) -> String {
-        let (read, accepted, refused) = (self.samples, self.accepted, by_reason(&self.refused));
-        let Quantiles {
-            median,
-            p99,
-            p999,
-            max,
-        } = self.push_ns;
-        let mut lines = vec![
-            format!("samples: {read} read, {accepted} accepted; refused: {refused}"),
-            format!(
-                "faces moved: {}; updates cut back: {}",
-                self.moved_faces, self.cut_back
-            ),
-        ];
-        lines.extend(
-            self.patch
-                .as_ref()
-                .map(|patch| format!("reconstruction: {:.2} s", patch.build_s)),
-        );
-        lines.push(format!(
-            "time of a sample: median {median} ns, p99 {p99} ns, p99.9 {p999} ns, max {max} ns"
-        ));
-        lines.push(format!(
-            "loaded in {:.2} s, replayed in {:.2} s",
-            self.load_s, self.replay_s
-        ));
-        lines.push(self.scene.to_string());
-        lines.join("\n")
-    }
-}
-
-/// The verdict, then further results.
-impl fmt::Display for RefineSummary {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}\n{}", self.verdict(), self.told)?;
-        let last_outlier = self
-            .uncertainty
-            .as_ref()
-            .and_then(UncertaintySummary::last_outlier);
-        last_outlier
-            .iter()
-            .try_for_each(|last| write!(f, "\n{last}"))?;
-        let friction = &self.friction;
-        friction
-            .iter()
-            .try_for_each(|FrictionFound { mu, sigma }| {
-                write!(f, "\nfriction: {mu:.3} ± {sigma:.3}")
-            })?;
-        if let Some(MarkerCounts {
-            held,
-            coasting,
-            lost,
-            relabelled,
-            rejected,
-        }) = self.markers
-        {
-            write!(
-                f,
-                "\nmarker frames: {held} held the pose, {coasting} coasted, {lost} without a pose; markers: {relabelled} \
-                 relabelled, {rejected} rejected"
-            )?;
-        }
-        self.wrench_offset
-            .iter()
-            .try_for_each(|clock| write!(f, "\nclock: {clock}"))?;
-        self.registration
-            .iter()
-            .try_for_each(|registration| write!(f, "\nscan: {registration}"))?;
-        self.live.iter().try_for_each(|live| write!(f, "\n{live}"))
     }
 }

@@ -16,7 +16,7 @@ use crate::scene::Setting;
 pub(super) struct ToldFlags {
     /// Radius of the ball, mm; needed where no scene names it
     #[arg(long, value_name = "R", allow_negative_numbers = true)]
-    pub tip_radius_mm: Option<f64>,
+    tip_radius_mm: Option<f64>,
     /// Stiffness of stylus and holder at the ball, N/mm
     #[arg(long, value_name = "K", allow_negative_numbers = true)]
     stiffness_n_per_mm: Option<f64>,
@@ -26,6 +26,14 @@ pub(super) struct ToldFlags {
 }
 
 impl ToldFlags {
+    /// Only the radius of the ball, m.
+    pub fn of_radius(radius: f64) -> Self {
+        Self {
+            tip_radius_mm: Some(radius * 1e3),
+            ..Self::default()
+        }
+    }
+
     /// The scene of a file, or the usual one, with the flags over it, and by what its numbers are
     /// told.
     ///

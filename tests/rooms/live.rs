@@ -738,7 +738,7 @@ fn evidence_made_again_without_a_stroke_is_that_of_an_engine_that_never_took_it(
         samples[..asked]
             .iter()
             .filter(is_left)
-            .for_each(|sample| replay.push(sample));
+            .for_each(|sample| _ = replay.push(sample).unwrap());
         assert_eq!(
             live.end_replay(Some(replay)).unwrap(),
             0,

@@ -8,9 +8,10 @@ use nalgebra::UnitQuaternion;
 use touchup::io::mesh_file::MeshUnit;
 use touchup::io::recording::{StampSource, Topics, write_recording};
 use touchup::refinement::{
-    InputNames, JudgedRefinement, RefinedScan, RefinementInput, TouchSource, refine,
+    InputNames, RefinedScan, Refinement, RefinementInput, RefinementOptions, RefinementSummary,
+    refine,
 };
-use touchup::replay::{Recording, each_sample_of};
+use touchup::replay::{Recording, each_sample};
 use touchup::scan::read_scan;
 use touchup::scene::Scene;
 use touchup::session::RefinedMesh;
@@ -43,32 +44,42 @@ fn a_recording_its_messages_and_its_samples_make_the_same_mesh() {
         scan: Path::new("the scan"),
         recording: Path::new("the recording"),
     };
-    let refined = |touches| refine(input(), touches, names, false, &mut || {}).unwrap();
+    let open = || Recording::open(&bag, &Topics::default(), StampSource::Header).unwrap();
+    let wrench_frame = open().wrench_frame;
+    let options = RefinementOptions::default;
+    let refined =
+        |recording| refine(input(), recording, None, options(), names, &mut || {}).unwrap();
+    let of_recording = refined(open());
+    let of_messages = refined(Recording::of_messages(messages.clone(), wrench_frame));
 
-    let recording =
-        Box::new(Recording::open(&bag, &Topics::default(), StampSource::Header).unwrap());
-    let wrench_frame = recording.wrench_frame;
-    let markers = None;
-    let of_recording = refined(TouchSource::Recorded { recording, markers });
-    let of_messages = refined(TouchSource::Messages {
-        messages: messages.clone(),
-        wrench_frame,
-    });
-
-    let mut pushed = JudgedRefinement::new(input(), wrench_frame).unwrap();
+    let mut pushed = Refinement::new(input(), wrench_frame, options()).unwrap();
     let scene = input().scene;
     let (placement, sync) = (scene.placement(), scene.sync_params());
+    let mut moved = 0;
     let push = |sample: &_| {
-        pushed.push(sample).unwrap();
+        let update = pushed.push(sample).unwrap();
+        moved += u64::from(update.is_some_and(|update| update.fit.is_some()));
     };
-    each_sample_of(messages, wrench_frame, placement, sync, &mut |_| {}, push).unwrap();
-    let of_samples = pushed.finish(names, false).unwrap();
+    let again = Recording::of_messages(messages, wrench_frame);
+    each_sample(again, placement, sync, None, &mut || {}, &mut |_| {}, push).unwrap();
+    // pushed samples move the mesh one by one, those of a recording are kept for the patch alone
+    assert!(moved > 100);
+    let of_samples = pushed.finish(names).unwrap();
 
-    assert!(of_recording.finished.counts.contacts == 1 && of_recording.accepted > 900);
-    let judged = |refined: &RefinedScan| (refined.accepted, refined.findings.clone());
+    let summary = &of_recording.summary;
+    assert!(summary.contacts == 1 && summary.accepted > 900);
+    let judged = |refined: &RefinedScan| {
+        let RefinementSummary {
+            accepted,
+            contacts,
+            findings,
+            ..
+        } = &refined.summary;
+        (*accepted, *contacts, findings.clone())
+    };
     for other in [&of_messages, &of_samples] {
-        assert!(same_bits(&of_recording.finished.mesh, &other.finished.mesh));
+        assert!(same_bits(&of_recording.mesh, &other.mesh));
         assert_eq!(judged(&of_recording), judged(other));
     }
-    assert_eq!(of_recording.refused, of_messages.refused);
+    assert_eq!(summary.refused, of_messages.summary.refused);
 }

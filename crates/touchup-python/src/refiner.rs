@@ -13,7 +13,7 @@ use touchup::cli::CliError;
 use touchup_core::haptic::{Case, Mismatch, RefineCounts};
 use touchup_core::stylus::{Sample, SampleError};
 use touchup_session::live::LiveError;
-use touchup_session::refinement::{JudgedRefinement, reason_of_refusal};
+use touchup_session::refinement::{Refinement, reason_of_refusal};
 
 use crate::arrays::{Compact, MeshArrays, of_equal_length, rows, sample, wrench_frame};
 use crate::failure::{at_work, exception, usage};
@@ -154,17 +154,19 @@ impl Pushed {
     }
 
     #[inline]
-    fn push(&mut self, refinement: &mut JudgedRefinement, sample: &Result<Sample, SampleError>) {
+    fn push(&mut self, refinement: &mut Refinement, sample: &Result<Sample, SampleError>) {
         let updated = match sample {
             Ok(sample) => refinement.push(sample),
             Err(error) => Err(LiveError::Refine((*error).into())),
         };
         match updated {
             Ok(update) => {
-                let mismatch = update
-                    .mismatch
-                    .map(|mismatch| (i64::from(mismatch.face.0), mismatch.distance));
-                self.append(update.case as u8, mismatch);
+                let mismatch = update.and_then(|update| update.mismatch);
+                let case = update.map_or(Case::Free, |update| update.case);
+                self.append(
+                    case as u8,
+                    mismatch.map(|mismatch| (i64::from(mismatch.face.0), mismatch.distance)),
+                );
             }
             Err(error) => self.refuse(&error),
         }
@@ -195,13 +197,13 @@ pub struct Refiner {
 
 /// How far it is.
 enum RefinerState {
-    Open(Box<JudgedRefinement>),
+    Open(Box<Refinement>),
     /// what had become of the samples
     Finished(RefineCounts),
 }
 
 impl RefinerState {
-    fn open(&mut self) -> Option<&mut JudgedRefinement> {
+    fn open(&mut self) -> Option<&mut Refinement> {
         if let Self::Open(refinement) = self {
             Some(refinement)
         } else {
@@ -211,7 +213,7 @@ impl RefinerState {
 
     fn counts(&self) -> RefineCounts {
         match self {
-            Self::Open(refinement) => *refinement.refinement.engine.refiner().counts(),
+            Self::Open(refinement) => *refinement.counts(),
             Self::Finished(counts) => *counts,
         }
     }
@@ -232,7 +234,7 @@ impl Refiner {
     fn in_use<T>(
         &self,
         py: Python<'_>,
-        with: impl FnOnce(&mut JudgedRefinement) -> PyResult<T>,
+        with: impl FnOnce(&mut Refinement) -> PyResult<T>,
     ) -> PyResult<T> {
         match self.locked(py).open() {
             Some(refinement) => with(refinement),
@@ -354,7 +356,7 @@ impl Refiner {
         orientation_xyzw: &Bound<'_, PyAny>,
         force: &Bound<'_, PyAny>,
         torque: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Update> {
+    ) -> PyResult<Option<Update>> {
         let torque = torque.map_or(Ok([0.0; 3]), |torque| numbers(torque, "torque"))?;
         let (position, force) = (numbers(position, "position")?, numbers(force, "force")?);
         let turn = numbers(orientation_xyzw, "orientation_xyzw")?;
@@ -363,7 +365,7 @@ impl Refiner {
             Err(error) => return Err(exception(py, LiveError::Refine(error.into()).into())),
         };
         self.in_use(py, |refinement| match refinement.push(&sample) {
-            Ok(update) => Ok(Update { update }),
+            Ok(update) => Ok(update.map(|update| Update { update })),
             Err(error) => Err(exception(py, error.into())),
         })
     }
@@ -420,9 +422,7 @@ impl Refiner {
 
     /// The mesh as the samples so far have moved it.
     fn _mesh<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let compact = self.in_use(py, |refinement| {
-            Ok(Compact::of(refinement.refinement.engine.mesh()))
-        })?;
+        let compact = self.in_use(py, |refinement| Ok(Compact::of(refinement.mesh())))?;
         let into = PyDict::new(py);
         compact.into_dict(&into)?;
         Ok(into)

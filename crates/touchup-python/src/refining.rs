@@ -4,18 +4,15 @@ use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use serde_json::{Map, Value, json};
 use touchup::cli::CliError;
 use touchup_core::mesh::TriMesh;
 use touchup_core::stylus::{Message, WrenchFrame};
 use touchup_io::mesh_file::{MeshFile, MeshUnit, repaired};
 use touchup_session::refinement::{
-    FinishedRefinement, InputNames, JudgedRefinement, RefinedScan, RefinementInput, TouchSource,
-    refine as refine_scan,
+    InputNames, RefinedScan, Refinement, RefinementInput, RefinementOptions, refine as refine_scan,
 };
-use touchup_session::replay::{Recording, marker_filter};
+use touchup_session::replay::{RecordedAs, Recording, marker_filter};
 use touchup_session::scan::{read_scan, warn_of_left_out};
-use touchup_session::scene::Scene;
 use touchup_session::session::RefinedMesh;
 
 use crate::arrays::{
@@ -70,7 +67,7 @@ fn input_of(scan: ScanSource, scene: &SceneSource) -> Result<RefinementInput, Cl
     Ok(RefinementInput::new(scene, scan.read()?)?)
 }
 
-/// Reads scene and scan.
+/// A refinement whose samples are pushed.
 ///
 /// # Errors
 /// As `touchup refine`.
@@ -78,53 +75,13 @@ pub fn refinement(
     scan: ScanSource,
     scene: &SceneSource,
     frame: WrenchFrame,
-) -> Result<JudgedRefinement, CliError> {
-    Ok(JudgedRefinement::new(input_of(scan, scene)?, frame)?)
+) -> Result<Refinement, CliError> {
+    let options = RefinementOptions::default();
+    Ok(Refinement::new(input_of(scan, scene)?, frame, options)?)
 }
 
 /// A refined scan and its report.
-pub struct Reported {
-    mesh: RefinedMesh,
-    summary: Map<String, Value>,
-}
-
-impl From<RefinedScan> for Reported {
-    fn from(refined: RefinedScan) -> Self {
-        let RefinedScan {
-            finished,
-            replayed,
-            accepted,
-            refused,
-            findings,
-        } = refined;
-        let FinishedRefinement {
-            mesh,
-            counts,
-            friction,
-        } = finished;
-        let friction = friction.map(|found| json!({ "mu": found.mu, "sigma": found.sigma }));
-        let mut summary = Map::new();
-        let mut note = |name: &str, value: Value| summary.insert(name.to_owned(), value);
-        note("samples", replayed.wrenches.into());
-        note("accepted", accepted.into());
-        note("refused", json!(refused));
-        note("findings", value(&findings));
-        note("contacts", counts.contacts.into());
-        note("cut_back", counts.cut_back.into());
-        note("friction", friction.unwrap_or(Value::Null));
-        note("moved_faces", mesh.outcome.moved_faces.into());
-        note("patch", value(&mesh.outcome.patch));
-        if let Some(uncertainty) = &mesh.outcome.uncertainty {
-            note("uncertainty", value(uncertainty));
-        }
-        Self { mesh, summary }
-    }
-}
-
-/// What is reported holds finite numbers and names alone.
-fn value(report: &impl serde::Serialize) -> Value {
-    serde_json::to_value(report).unwrap_or(Value::Null)
-}
+pub struct Reported(RefinedScan);
 
 impl Reported {
     /// As a dictionary of arrays.
@@ -132,113 +89,93 @@ impl Reported {
     /// # Errors
     /// Those of NumPy.
     pub fn into_dict(self, py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
-        let Self {
-            mesh:
-                RefinedMesh {
-                    mesh,
-                    support,
-                    sigma,
-                    touches,
-                    ..
-                },
-            summary,
-        } = self;
+        let RefinedScan { mesh, summary, .. } = self.0;
+        let RefinedMesh {
+            mesh,
+            support,
+            sigma,
+            touches,
+            ..
+        } = mesh;
         let into = PyDict::new(py);
         let compact = Compact::of(&mesh);
         let support: Vec<u8> = support.iter().map(|support| *support as u8).collect();
         set_columns(&into, &compact, Some(&sigma), Some(&support))?;
         compact.into_dict(&into)?;
         into.set_item("touches", touches_array(py, &touches)?)?;
-        into.set_item("summary", Value::Object(summary).to_string())?;
+        let summary = crate::arrays::json(&summary).map_err(|error| exception(py, error))?;
+        into.set_item("summary", summary)?;
         Ok(into)
     }
 }
 
-/// Where samples come from.
+/// Where messages come from.
 enum Touching {
-    File {
-        recording: Box<Recording>,
-        path: PathBuf,
-        markers: Option<String>,
-    },
-    Messages {
-        all: Vec<Message>,
-        frame: WrenchFrame,
-    },
+    File(PathBuf, RecordedAs),
+    Messages(Vec<Message>, WrenchFrame),
 }
 
 /// Refines, and judges the recording as `touchup refine` does.
-///
-/// - `touching`: opens what was recorded, once scene and scan were read.
 fn refined(
     scan: ScanSource,
     scene: &SceneSource,
-    touching: impl FnOnce(&Scene) -> Result<Touching, CliError>,
+    touching: Touching,
     force: bool,
 ) -> Result<Reported, CliError> {
-    let scan_name = if let ScanSource::File(path, _) = &scan {
-        path.clone()
-    } else {
-        shown(None, "the scan")
+    let scan_name = match &scan {
+        ScanSource::File(path, _) => path.clone(),
+        ScanSource::Arrays(_) => shown(None, "the scan"),
     };
     let input = input_of(scan, scene)?;
-    let (touches, recording_name) = match touching(&input.scene)? {
-        Touching::File {
-            recording,
-            path,
-            markers,
-        } => {
-            let markers = marker_filter(&input.scene, markers.as_deref())?.map(Box::new);
-            (TouchSource::Recorded { recording, markers }, path)
+    let (recording, recording_name, markers) = match touching {
+        Touching::File(path, recorded) => {
+            let stamps = recorded.checked_stamps().map_err(usage)?;
+            let layout = recorded.layout(&input.scene);
+            let markers = marker_filter(&input.scene, recorded.markers_topic.as_deref())?;
+            (Recording::open(&path, layout, stamps)?, path, markers)
         }
-        Touching::Messages { all, frame } => (
-            TouchSource::Messages {
-                messages: all,
-                wrench_frame: frame,
-            },
+        Touching::Messages(all, frame) => (
+            Recording::of_messages(all, frame),
             shown(None, "the recording"),
+            None,
         ),
     };
     let names = InputNames {
         scan: &scan_name,
         recording: &recording_name,
     };
-    Ok(warned(refine_scan(
-        input,
-        touches,
-        names,
+    let options = RefinementOptions {
         force,
-        &mut || {},
-    )?))
+        ..RefinementOptions::default()
+    };
+    let refined = refine_scan(input, recording, markers, options, names, &mut || {})?;
+    Ok(warned(refined))
 }
 
 /// Judges and reconstructs what was pushed.
 ///
 /// # Errors
 /// As [`refine`].
-pub fn finish_refinement(refinement: JudgedRefinement, force: bool) -> Result<Reported, CliError> {
+pub fn finish_refinement(mut refinement: Refinement, force: bool) -> Result<Reported, CliError> {
     let (scan, recording) = (shown(None, "the scan"), shown(None, "the samples"));
-    Ok(warned(refinement.finish(
-        InputNames {
-            scan: &scan,
-            recording: &recording,
-        },
-        force,
-    )?))
+    refinement.force(force);
+    Ok(warned(refinement.finish(InputNames {
+        scan: &scan,
+        recording: &recording,
+    })?))
 }
 
-/// Says what is doubtful, and what was lost.
+/// Logs findings and losses.
 fn warned(refined: RefinedScan) -> Reported {
-    refined
+    let RefinedScan {
+        summary, losses, ..
+    } = &refined;
+    summary
         .findings
         .iter()
         .for_each(|finding| tracing::warn!("{finding}"));
-    refined
-        .replayed
-        .losses
-        .iter()
-        .for_each(|loss| tracing::warn!("{loss}"));
-    refined.into()
+    losses.iter().for_each(|loss| tracing::warn!("{loss}"));
+    Reported(refined)
 }
 
 /// Refines a scan by a recording: of both either arrays or files.
@@ -278,20 +215,14 @@ pub fn refine<'py>(
     };
     let (scan, scene, all) = read().map_err(|error| exception(py, error))?;
     let reported = at_work(py, || {
-        let touching = |scene: &Scene| match (all, recording_file) {
-            (Some((all, frame)), None) => Ok(Touching::Messages { all, frame }),
-            (None, Some((path, recorded))) => {
-                let (recorded, stamps) = recorded_as(&recorded)?;
-                let recording = Box::new(Recording::open(&path, recorded.layout(scene), stamps)?);
-                Ok(Touching::File {
-                    recording,
-                    path,
-                    markers: recorded.markers_topic,
-                })
+        let touching = match (all, recording_file) {
+            (Some((all, frame)), None) => Touching::Messages(all, frame),
+            (None, Some((path, recorded))) => Touching::File(path, recorded_as(&recorded)?.0),
+            _ => {
+                return Err(usage(
+                    "a recording is a Recording of arrays, or the path of a file".to_owned(),
+                ));
             }
-            _ => Err(usage(
-                "a recording is a Recording of arrays, or the path of a file".to_owned(),
-            )),
         };
         refined(scan, &scene, touching, force)
     })?;

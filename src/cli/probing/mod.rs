@@ -15,14 +15,19 @@ use std::path::Path;
 use nalgebra::{Point3, Vector3};
 
 use super::progress::WorkProgress;
-use super::refine::{RefineArguments, Refined};
+use super::recorded::RecordedFlags;
+use super::refinement::{Refined, RefinementFiles};
 use super::signals::StopSignals;
+use super::told::ToldFlags;
 use super::{CliError, Losses, not_written};
 use crate::features::Kind;
 use crate::io::atomic::create_folder;
 use crate::io::mesh_file::{MeshFile, MeshUnit, read_mesh};
+use crate::io::probed_touches_file::TouchLine;
+use crate::io::recording::StampSource;
 use crate::probing::arm::{Arm, ArmState};
 use crate::probing::execute::{Ending, Flag, Plan, Probed, Prober, References, plan};
+use crate::refinement::RefinementOptions;
 use files::{RECORDING, TOUCHES, probe_topics};
 use folder::{ProbingFolder, ProbingRequest};
 pub(super) use goals::goals_of;
@@ -175,16 +180,7 @@ impl Probing<'_> {
             });
         }
         let touched = folder.touches()?;
-        let (scan, scene) = (self.scan.to_owned(), Some(self.scene.to_owned()));
-        let bag = self.out.join(RECORDING);
-        let mut arguments =
-            RefineArguments::in_folder(scan, self.unit, bag, self.out, scene, probe_topics());
-        // an arm that met no surface has measured nothing that could be wrong: each feature says
-        // why
-        arguments.force = self.is_forced || touched.iter().all(|touch| touch.centre_mm.is_none());
-        // all but a plane is probed where the scan may lack it
-        arguments.touches_flaws = self.flags.iter().any(|flag| flag.kind != Some(Kind::Plane));
-        let (refine, mut losses, failed) = match arguments.refined() {
+        let (refine, mut losses, failed) = match self.refined(&touched) {
             Ok(Refined {
                 summary, losses, ..
             }) => (Some(summary), losses, None),
@@ -229,6 +225,34 @@ impl Probing<'_> {
             probed,
             outcome,
         })
+    }
+}
+
+impl Probing<'_> {
+    /// Makes the mesh of the recording in the folder.
+    fn refined(&self, touches: &[TouchLine]) -> Result<Refined, CliError> {
+        let (scene, told) = ToldFlags::default().scene(Some(self.scene))?;
+        let [recording, mesh_out, features_out, touches_out] =
+            [RECORDING, "refined.ply", "features.json", "touches.csv"]
+                .map(|name| self.out.join(name));
+        let files = RefinementFiles {
+            scan: self.scan,
+            mesh_unit: self.unit,
+            recording: &recording,
+            recorded: &RecordedFlags::from(probe_topics()).named(StampSource::default()),
+            mesh_out: &mesh_out,
+            features_out: Some(&features_out),
+            touches_out: Some(&touches_out),
+        };
+        let options = RefinementOptions {
+            // an arm that met no surface has measured nothing that could be wrong: each feature
+            // says why
+            force: self.is_forced || touches.iter().all(|touch| touch.centre_mm.is_none()),
+            // all but a plane is probed where the scan may lack it
+            touches_flaws: self.flags.iter().any(|flag| flag.kind != Some(Kind::Plane)),
+            ..RefinementOptions::default()
+        };
+        files.refine(scene, told, options)
     }
 }
 

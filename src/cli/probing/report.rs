@@ -5,7 +5,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::cli::refine::RefineSummary;
+use crate::cli::refinement::RefineSummary;
 use crate::cli::told::ToldNumbers;
 use crate::cli::{counted, reported};
 use crate::conformity::Decision;

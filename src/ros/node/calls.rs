@@ -17,6 +17,7 @@ use super::session::ResultFiles;
 use super::take_out::BUSY;
 use crate::features::Kind;
 use crate::io::session_folder::SessionFolder;
+use crate::live::EngineResult;
 use crate::probing::execute::Flag;
 use crate::ros::messages::{
     DetectFeaturesResponse, FlagFeatureRequest, FlagFeatureResponse, PointStamped, ProbeResult,
@@ -326,20 +327,15 @@ impl RefinementWorker {
         Ok(move || {
             let late = |_| "mesh and touches were not complete in time: save again".to_owned();
             let patcher = patcher.map(|patcher| setup.clock.recv_timeout(&patcher, COPY_WAIT));
-            let patcher = patcher.transpose().map_err(late)?;
-            let refined = match patcher {
-                // all of it comes from scan and patch
-                Some(_) => None,
-                None => Some(
-                    setup
-                        .clock
-                        .recv_timeout(&snapshot, COPY_WAIT)
-                        .map_err(late)?
-                        .mesh(),
-                ),
+            let result = match patcher.transpose().map_err(late)? {
+                Some(patcher) => EngineResult::Touched(patcher.into()),
+                None => {
+                    let snapshot = setup.clock.recv_timeout(&snapshot, COPY_WAIT);
+                    let mesh = snapshot.map_err(late)?.mesh();
+                    EngineResult::Moved(mesh.map_err(|why| why.to_string())?.into())
+                }
             };
-            let refined = refined.transpose().map_err(|why| why.to_string())?;
-            let outcome = files.write(&setup, refined.as_ref().unwrap_or(&setup.scan.0), patcher);
+            let outcome = files.write(&setup, result);
             let [vertices, faces] = outcome.map_err(|why| why.to_string())?.counts;
             let path = files.mesh.display().to_string();
             Ok(SaveMeshResponse {

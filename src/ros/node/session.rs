@@ -15,12 +15,11 @@ use super::setup::Setup;
 use super::streams::Epoch;
 use crate::diagnose::InputMonitor;
 use crate::io::session_folder::SessionFolder;
-use crate::live::{Engine, Gate, Latencies, Pace, Quantiles, Renewal, TouchDelta};
-use crate::mesh::TriMesh;
-use crate::reconstruct::Patcher;
+use crate::live::{Engine, EngineResult, Gate, Latencies, Pace, Quantiles, Renewal, TouchDelta};
 use crate::ros::port::Port;
 use crate::session::{
-    Outcome, OutcomeError, OutcomePlaces, SessionRecord, SessionRecorder, StrokeChanges, Unrecorded,
+    Outcome, OutcomeError, OutcomePlaces, RefinedMesh, SessionRecord, SessionRecorder,
+    StrokeChanges, Unrecorded,
 };
 use crate::stylus::{Synchroniser, WrenchFrame};
 
@@ -261,11 +260,7 @@ impl NodeSession {
             messages, reason, ..
         } = recorder.finish();
         report.unrecorded = messages;
-        let mut ended = engine.finish()?;
-        let patcher = ended
-            .patcher
-            .take()
-            .filter(|_| ended.refiner.counts().contacts > 0);
+        let result = engine.finish()?.into_result();
         let [mesh, features, touches] =
             ["refined.ply", "features.json", "touches.csv"].map(|name| folder.path().join(name));
         let files = ResultFiles {
@@ -273,15 +268,11 @@ impl NodeSession {
             features: Some(features),
             touches: Some(touches),
         };
-        let outcome = files
-            .write(setup, &ended.mesh(), patcher)
-            .inspect_err(|_| {
-                if let Some(reason) = &reason {
-                    tracing::error!(
-                        "{messages} messages are not in the session's recording: {reason}"
-                    );
-                }
-            })?;
+        let outcome = files.write(setup, result).inspect_err(|_| {
+            if let Some(reason) = &reason {
+                tracing::error!("{messages} messages are not in the session's recording: {reason}");
+            }
+        })?;
         report.result = Some(outcome);
         let text =
             serde_json::to_string_pretty(&report).expect("numbers and names alone cannot fail");
@@ -399,28 +390,18 @@ impl ResultFiles {
     ///
     /// # Errors
     /// [`OutcomeError`]
-    pub fn write(
-        &self,
-        setup: &Setup,
-        refined: &TriMesh,
-        patcher: Option<Patcher>,
-    ) -> Result<Outcome, Box<OutcomeError>> {
-        let (features, touches) = (self.features.as_deref(), self.touches.as_deref());
-        let (unit, outside) = (setup.mesh_unit, setup.cut.outside.as_ref());
-        let (mesh, scan) = (&self.mesh, &setup.scan_path);
+    pub fn write(&self, setup: &Setup, result: EngineResult) -> Result<Outcome, Box<OutcomeError>> {
+        let outside = setup.cut.outside.as_ref();
+        let (mesh, outcome) = RefinedMesh::of(&setup.scan, result, outside, false)?;
         let places = OutcomePlaces {
-            mesh,
-            unit,
-            scan,
-            features,
-            touches,
-            outside,
-            must_change: false,
+            mesh: &self.mesh,
+            unit: setup.mesh_unit,
+            scan: &setup.scan_path,
+            features: self.features.as_deref(),
+            touches: self.touches.as_deref(),
         };
-        Ok(match patcher {
-            Some(patcher) => places.write_patched(&setup.scan.0, patcher)?,
-            None => places.write_moved(&setup.scan.0, refined)?,
-        })
+        places.write(mesh)?;
+        Ok(outcome)
     }
 }
 

@@ -44,7 +44,7 @@ pub const MAY_USE: &[(&str, &str)] = &[
     ),
     (
         "refinement",
-        "stylus mesh reconstruct haptic live diagnose threads scene replay session",
+        "numeric stylus mesh reconstruct haptic live diagnose io threads scan scene replay session",
     ),
     (
         "sweep",

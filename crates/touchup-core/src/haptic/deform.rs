@@ -33,7 +33,7 @@ pub enum RegionFit {
 }
 
 /// Memory of a mesh under refinement, bytes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Footprint {
     /// positions, faces, adjacency, where each vertex was scanned, the normal measured on each face
     pub mesh: usize,

@@ -725,6 +725,11 @@ impl Refiner {
         Ok(ContactEstimator::new(self.params.contact())?)
     }
 
+    /// Decides about contact, after the samples so far.
+    pub fn contacts(&self) -> &ContactEstimator {
+        &self.contacts
+    }
+
     /// Lets another estimator decide about contacts from here on, as if it had from the first
     /// sample on. The mesh stays.
     pub fn set_contacts(&mut self, contacts: ContactEstimator) {

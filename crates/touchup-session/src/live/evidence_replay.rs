@@ -1,7 +1,7 @@
 //! The evidence of samples alone, without a mesh: made again, some samples can be left out.
 
 use touchup_core::reconstruct::{Patcher, PatcherParams};
-use touchup_core::stylus::{ContactEstimator, Sample, SettingError};
+use touchup_core::stylus::{ContactEstimator, ContactSample, Sample, SampleError, SettingError};
 
 /// Takes samples as an [`super::Engine`] does, and moves no mesh.
 #[derive(Clone, Debug)]
@@ -27,11 +27,14 @@ impl EvidenceReplay {
         })
     }
 
-    /// Takes the next sample; one that is refused changes nothing.
-    pub fn push(&mut self, sample: &Sample) {
-        if let Ok(contact) = self.contacts.observe(sample) {
-            self.patcher.push(contact);
-        }
+    /// Takes the next sample.
+    ///
+    /// # Errors
+    /// [`SampleError`] of a refused sample, which changes nothing.
+    pub fn push(&mut self, sample: &Sample) -> Result<&ContactSample, SampleError> {
+        let contact = self.contacts.observe(sample)?;
+        self.patcher.push(contact);
+        Ok(contact)
     }
 
     /// Takes the last stroke back; returns its touch-down, ns, `None` where there was none.
@@ -48,6 +51,16 @@ impl EvidenceReplay {
     /// What was kept.
     pub fn patcher(&self) -> &Patcher {
         &self.patcher
+    }
+
+    /// The kept evidence alone.
+    pub fn into_patcher(self) -> Patcher {
+        self.patcher
+    }
+
+    /// Decides about contact.
+    pub fn contacts(&self) -> &ContactEstimator {
+        &self.contacts
     }
 }
 

@@ -33,7 +33,7 @@ pub use latency::{Latencies, Quantiles};
 pub use probed::TouchDelta;
 use renewals::Renewals;
 pub use renewals::{LiveCounts, Pace};
-use touchup_core::haptic::{Footprint, RefineError, RefineParams, Refiner, Update};
+use touchup_core::haptic::{Footprint, RefineCounts, RefineError, RefineParams, Refiner, Update};
 use touchup_core::mesh::{Changes, FaceId, FaceTree, TriMesh, VertexId};
 use touchup_core::reconstruct::{Patcher, PatcherParams, Support};
 use touchup_core::stylus::{BiasParams, ContactSample, Sample};
@@ -84,6 +84,15 @@ pub struct Ended {
     detail: Option<Detail>,
 }
 
+/// Result of an [`Engine`].
+#[derive(Debug)]
+pub enum EngineResult {
+    /// contacts, of which the patch is made
+    Touched(Box<Patcher>),
+    /// the scan as the haptic update has moved it: without a patch, or without a contact
+    Moved(Box<TriMesh>),
+}
+
 impl Ended {
     /// The scan as the haptic update alone has moved it.
     pub fn mesh(&self) -> Cow<'_, TriMesh> {
@@ -91,6 +100,15 @@ impl Ended {
         self.detail.as_ref().map_or(Cow::Borrowed(moved), |detail| {
             Cow::Owned(detail.moved_as(moved))
         })
+    }
+
+    /// The result.
+    pub fn into_result(mut self) -> EngineResult {
+        let has_contacts = self.refiner.counts().contacts > 0;
+        match self.patcher.take().filter(|_| has_contacts) {
+            Some(patcher) => EngineResult::Touched(patcher.into()),
+            None => EngineResult::Moved(self.mesh().into_owned().into()),
+        }
     }
 }
 
@@ -325,6 +343,23 @@ impl Engine {
         self.changed_stroke_ns
     }
 
+    /// Evidence of a patch that is made at the end, once there is a contact, with the
+    /// counts so far: the patch replaces whatever the haptic update would do. `None` before, and
+    /// without such a patch.
+    pub fn touched_evidence(&self) -> Option<(EvidenceReplay, RefineCounts)> {
+        let counts = *self.refiner.counts();
+        let Reconstruction::AtEnd(patcher) = &self.patch else {
+            return None;
+        };
+        (counts.contacts > 0).then(|| {
+            let evidence = EvidenceReplay {
+                contacts: self.refiner.contacts().clone(),
+                patcher: patcher.copy(),
+            };
+            (evidence, counts)
+        })
+    }
+
     /// Begins to make the evidence again beside the samples: what is returned takes all samples so
     /// far but those to be left out, on any thread, and comes back with [`Self::end_replay`]. Until
     /// then the samples are kept, as far as there is room for them. `None` without a patch beside
@@ -358,7 +393,8 @@ impl Engine {
             return Ok(0);
         };
         match since.all() {
-            Ok(samples) => samples.iter().for_each(|sample| replay.push(sample)),
+            // a refused sample changes nothing
+            Ok(samples) => samples.iter().for_each(|sample| _ = replay.push(sample)),
             Err(dropped) => return Ok(dropped),
         }
         let EvidenceReplay { contacts, patcher } = replay;

@@ -1,31 +1,49 @@
-//! A scan refined by a recording from its first message to the result: the same steps for `touchup
-//! refine`, the Python package and sweeps. [`refine`] does them all; who changes something in
-//! between, as strokes or the rate of the samples, takes them one by one.
+//! A scan refined by a recording, from its first message to the result: `touchup refine`, `probe`
+//! and `demo`, the Python package and sweeps.
+//!
+//! [`refine`] does all of it. [`Refinement`] takes samples one by one and shows the mesh in between.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
 
-use crate::live::{Engine, LiveError, Renewal};
-use crate::replay::{Recording, ReplayError, Replayed, each_sample, each_sample_of};
+use crate::live::{
+    Engine, EngineResult, EvidenceReplay, Gate, Latencies, LiveError, Pace, Renewal,
+};
+use crate::replay::{RecordedAs, Recording, ReplayError, Replayed, each_sample, marker_filter};
+use crate::scan::{Scan, ScanError, read_scan};
 use crate::scene::{CutScan, RegionCut, Scene, SceneError};
-use crate::session::{OutcomeError, RefinedMesh};
+use crate::session::{OutcomeError, RefinedMesh, StrokeChanges, StrokeReplay};
 use crate::threads::Threads;
-use touchup_core::diagnose::{InputFinding, InputMonitor};
-use touchup_core::haptic::{RefineCounts, RefineError, RefineParams, Refiner, Update};
-use touchup_core::mesh::{FaceTree, TriMesh};
-use touchup_core::reconstruct::PatcherParams;
+use touchup_core::diagnose::InputFinding;
+use touchup_core::haptic::{Footprint, RefineCounts, RefineError, ScanRegion, Update};
+use touchup_core::mesh::{FaceTree, RepairReport, TriMesh};
+use touchup_core::reconstruct::CloudSummary;
 use touchup_core::stylus::{
     ContactSample, FrictionCoefficient, MarkerFilter, Message, Sample, SettingError, WrenchFrame,
 };
+use touchup_io::mesh_file::MeshUnit;
 
+mod offsets;
+mod pace;
+mod summary;
 mod watch;
 
+pub use offsets::{ScanOffset, WrenchOffset};
+pub use pace::LiveSummary;
+pub use summary::RefinementSummary;
+
+use offsets::ContactPoints;
+use pace::RealTime;
 use watch::InputWatch;
 
-/// What is said of a scene in which nothing moves the mesh.
+/// Message for a scene in which nothing moves the mesh.
 pub const NOTHING_MOVES: &str =
     "the scene says `refine: off`, so nothing would move the mesh: take that out of it";
+/// Room reserved for new faces in real time.
+const ROOM: usize = 1 << 18;
 
 /// Why nothing came of a refinement.
 #[derive(Debug, thiserror::Error)]
@@ -39,6 +57,12 @@ pub enum RefinementError {
     /// The scene has no update.
     #[error("{NOTHING_MOVES}")]
     NothingMoves,
+    /// The scan.
+    #[error(transparent)]
+    Scan(#[from] ScanError),
+    /// Topics, frames and stamps that do not go together.
+    #[error("{0}")]
+    RecordedAs(String),
     /// The recording.
     #[error(transparent)]
     Replay(#[from] ReplayError),
@@ -77,57 +101,10 @@ impl From<OutcomeError> for RefinementError {
 pub struct RefinementInput {
     /// read and checked
     pub scene: Scene,
-    /// unrefined, without what cannot be touched; m, in O
-    pub scan: TriMesh,
+    /// unrefined, without what cannot be touched, with the tree over its faces; m, in O
+    pub scan: Arc<(TriMesh, FaceTree)>,
     /// what was cut off
     pub cut: RegionCut,
-}
-
-/// What was touched.
-pub enum TouchSource {
-    /// a recording …
-    Recorded {
-        /// which
-        recording: Box<Recording>,
-        /// makes the poses of one that holds markers
-        markers: Option<Box<MarkerFilter>>,
-    },
-    /// … or messages that are there already
-    Messages {
-        /// of each kind in order of time
-        messages: Vec<Message>,
-        /// in which axes the wrenches are
-        wrench_frame: WrenchFrame,
-    },
-}
-
-impl TouchSource {
-    /// In which axes the wrenches are.
-    pub fn wrench_frame(&self) -> WrenchFrame {
-        match self {
-            Self::Recorded { recording, .. } => recording.wrench_frame,
-            Self::Messages { wrench_frame, .. } => *wrench_frame,
-        }
-    }
-}
-
-/// What samples are given to.
-pub trait SampleTaker {
-    /// Takes the next sample; `false`: it is left out, and counts for nothing.
-    fn take(&mut self, sample: &Sample) -> bool;
-    /// What decides about contact after it.
-    fn refiner(&self) -> &Refiner;
-    /// Sees each sample that was taken, with what is decided about its contact.
-    fn observe(&mut self, _contact: &ContactSample) {}
-}
-
-/// A replay, and what judges it.
-#[derive(Debug)]
-pub struct JudgedReplay {
-    /// counts and losses
-    pub replayed: Replayed,
-    /// has seen all messages, samples and contacts
-    pub monitor: InputMonitor,
 }
 
 impl RefinementInput {
@@ -137,174 +114,495 @@ impl RefinementInput {
     /// [`SceneError::EmptyRegion`]
     pub fn new(scene: Scene, scan: TriMesh) -> Result<Self, SceneError> {
         let CutScan { mesh, cut } = scene.cut(scan)?;
+        let tree = FaceTree::new_by(&mesh, &Threads);
         Ok(Self {
             scene,
-            scan: mesh,
+            scan: Arc::new((mesh, tree)),
             cut,
         })
     }
 
-    /// Settings of the haptic update and of the patch; `None` where nothing moves the mesh.
-    pub fn settings(
-        &self,
-        wrench_frame: WrenchFrame,
-    ) -> Option<(RefineParams, Option<PatcherParams>)> {
-        let params = self
-            .cut
-            .refine_params(self.scene.refine_params(wrench_frame)?);
-        Some((
-            params,
-            self.scene
-                .patcher_params()
-                .map(|params| self.cut.patcher_params(params)),
-        ))
+    /// Memory of the scan, bytes.
+    pub fn bytes(&self) -> usize {
+        self.scan.0.bytes() + self.scan.1.bytes() + self.cut.bytes()
     }
+}
 
-    /// Gives each sample to `taker`, and watches what comes.
+/// Scan and recording of a refinement, opened.
+pub struct OpenedInput {
+    /// scene and scan
+    pub input: RefinementInput,
+    /// repairs of the scan's file
+    pub repair: RepairReport,
+    /// how the scan came of a point cloud; `None` for a mesh
+    pub cloud: Option<CloudSummary>,
+    /// the touches
+    pub recording: Recording,
+    /// makes the poses of a recording of markers
+    pub markers: Option<MarkerFilter>,
+}
+
+impl OpenedInput {
+    /// Opens the files.
     ///
-    /// - `params`: those of [`Self::settings`].
-    /// - `at_each`: called after each record, to show the progress.
+    /// - `mesh_unit`: of the coordinates in the scan's file.
     ///
     /// # Errors
-    /// [`ReplayError`]
-    pub fn replay(
-        &self,
-        touches: TouchSource,
-        params: &RefineParams,
-        taker: &mut impl SampleTaker,
-        at_each: &mut dyn FnMut(),
-    ) -> Result<JudgedReplay, ReplayError> {
-        let (placement, sync) = (self.scene.placement(), self.scene.sync_params());
-        let watch = InputWatch::new(
-            self.scene.input_monitor_params(touches.wrench_frame()),
-            params,
-        )?;
-        let watch = RefCell::new(watch);
-        let mut at_message = |message: &Message| watch.borrow_mut().monitor.message(message);
-        let each = |sample: &Sample| {
-            if !taker.take(sample) {
-                return;
-            }
-            let contact = watch.borrow_mut().sample(sample, taker.refiner());
-            if let Some(contact) = &contact {
-                taker.observe(contact);
-            }
-        };
-        let replayed = match touches {
-            TouchSource::Recorded { recording, markers } => {
-                let markers = markers.map(|markers| *markers);
-                each_sample(
-                    *recording,
-                    placement,
-                    sync,
-                    markers,
-                    at_each,
-                    &mut at_message,
-                    each,
-                )?
-            }
-            TouchSource::Messages {
-                messages,
-                wrench_frame,
-            } => each_sample_of(
-                messages,
-                wrench_frame,
-                placement,
-                sync,
-                &mut at_message,
-                each,
-            )?,
-        };
-        Ok(JudgedReplay {
-            replayed,
-            monitor: watch.into_inner().monitor,
+    /// [`RefinementError::Scan`], [`RefinementError::Scene`], [`RefinementError::Replay`],
+    /// [`RefinementError::RecordedAs`].
+    pub fn open(
+        scene: Scene,
+        (scan, mesh_unit): (&Path, MeshUnit),
+        (recording, recorded): (&Path, &RecordedAs),
+    ) -> Result<Self, RefinementError> {
+        let stamps = recorded
+            .checked_stamps()
+            .map_err(RefinementError::RecordedAs)?;
+        let Scan {
+            mesh,
+            repair,
+            cloud,
+        } = read_scan(scan, mesh_unit)?;
+        let input = RefinementInput::new(scene, mesh)?;
+        let markers = marker_filter(&input.scene, recorded.markers_topic.as_deref())?;
+        let layout = recorded.layout(&input.scene);
+        Ok(Self {
+            input,
+            repair,
+            cloud,
+            recording: Recording::open(recording, layout, stamps).map_err(ReplayError::from)?,
+            markers,
         })
     }
 }
 
-/// A scan under refinement, the patch to be made at the end.
-#[derive(Debug)]
-pub struct Refinement {
-    /// takes the samples
-    pub engine: Engine,
-    /// scene and scan
-    pub input: RefinementInput,
+/// Names of scan and recording in messages.
+#[derive(Clone, Copy, Debug)]
+pub struct InputNames<'a> {
+    /// file or description of the scan
+    pub scan: &'a Path,
+    /// file or description of the recording
+    pub recording: &'a Path,
 }
 
-/// What came of a refinement.
+/// How a refinement runs.
+#[derive(Clone, Debug, Default)]
+pub struct RefinementOptions {
+    /// samples come in real time, with the patch beside them; else as fast as they can be read
+    pub is_live: bool,
+    /// undone, redone, taken out and put back strokes of a session
+    pub strokes: StrokeChanges,
+    /// estimates the rigid offset of the scan from the touched part; it is not applied
+    pub registration: bool,
+    /// refines an unsound recording, and accepts a result that is the scan
+    pub force: bool,
+    /// the touches lie where the scan may be wrong, as at a hole that it closed: findings that are
+    /// read off the scan are not sure
+    pub touches_flaws: bool,
+}
+
+/// A scan under refinement.
 #[derive(Debug)]
-pub struct FinishedRefinement {
-    /// the result
+pub struct Refinement {
+    input: RefinementInput,
+    options: RefinementOptions,
+    stage: Stage,
+    /// of the touchable part of the scan
+    region: Option<ScanRegion>,
+    watch: InputWatch,
+    strokes: StrokeReplay,
+    real_time: Option<RealTime>,
+    contact_points: Option<ContactPoints>,
+    pushes: Latencies,
+    accepted: u64,
+    refused: BTreeMap<String, u64>,
+    replayed: Replayed,
+    /// ended before the last sample
+    stopped: Option<LiveError>,
+}
+
+/// What takes the samples.
+#[derive(Debug)]
+enum Stage {
+    /// each sample moves the mesh
+    Moving(Box<Engine>),
+    /// contacts are kept for the patch at the end: it replaces whatever the haptic update would do
+    Keeping {
+        evidence: Box<EvidenceReplay>,
+        counts: RefineCounts,
+    },
+}
+
+/// A refined scan and the judgement of its recording.
+#[derive(Debug)]
+pub struct RefinedScan {
+    /// mesh and touches
     pub mesh: RefinedMesh,
-    /// of the haptic update
-    pub counts: RefineCounts,
-    /// of the ball on the part; `None` when it never slid far enough
-    pub friction: Option<FrictionCoefficient>,
+    /// counts, findings and numbers of the result
+    pub summary: RefinementSummary,
+    /// what a better recording would not lack
+    pub losses: Vec<String>,
 }
 
 impl Refinement {
     /// Nothing touched yet.
     ///
+    /// - `wrench_frame`: axes of the wrenches.
+    ///
     /// # Errors
-    /// [`RefinementError::NothingMoves`], [`RefinementError::Live`].
-    pub fn new(input: RefinementInput, wrench_frame: WrenchFrame) -> Result<Self, RefinementError> {
-        let (params, patch) = input
-            .settings(wrench_frame)
+    /// [`RefinementError::NothingMoves`], [`RefinementError::Setting`], [`RefinementError::Live`].
+    pub fn new(
+        input: RefinementInput,
+        wrench_frame: WrenchFrame,
+        options: RefinementOptions,
+    ) -> Result<Self, RefinementError> {
+        let RefinementInput { scene, scan, cut } = &input;
+        let params = scene
+            .refine_params(wrench_frame)
             .ok_or(RefinementError::NothingMoves)?;
-        let engine = Engine::new(input.scan.clone(), params, patch, Renewal::AtEnd)?;
-        Ok(Self { engine, input })
+        let params = cut.refine_params(params);
+        let patch = scene
+            .patcher_params()
+            .map(|params| cut.patcher_params(params));
+        let watch = InputWatch::new(scene.input_monitor_params(wrench_frame), &params)?;
+        let contact_points = options
+            .registration
+            .then(|| ContactPoints::new(&params))
+            .transpose()?;
+        let renewal = match options.is_live {
+            true => Renewal::Beside {
+                scan: Arc::clone(scan),
+                pace: Pace::default(),
+                room: ROOM,
+                gate: Gate::default(),
+            },
+            false => Renewal::AtEnd,
+        };
+        let region = params.region;
+        let mut engine = Engine::new(scan.0.clone(), params, patch, renewal)?;
+        if options.strokes.has_exchanges() {
+            engine.keep_strokes();
+        }
+        Ok(Self {
+            stage: Stage::Moving(engine.into()),
+            region,
+            watch,
+            strokes: options.strokes.replay(),
+            real_time: options.is_live.then(RealTime::default),
+            contact_points,
+            pushes: Latencies::new(),
+            accepted: 0,
+            refused: BTreeMap::new(),
+            replayed: Replayed::default(),
+            stopped: None,
+            input,
+            options,
+        })
     }
 
-    /// Reconstructs what was touched.
+    /// Scene and scan.
+    pub fn input(&self) -> &RefinementInput {
+        &self.input
+    }
+
+    /// The mesh as the samples so far have moved it; the scan, where the patch at the end is the
+    /// only result.
+    pub fn mesh(&self) -> &TriMesh {
+        match &self.stage {
+            Stage::Moving(engine) => engine.mesh(),
+            Stage::Keeping { .. } => &self.input.scan.0,
+        }
+    }
+
+    /// Whether [`Self::finish`] accepts an unsound recording, and a result that is the scan.
+    pub fn force(&mut self, force: bool) {
+        self.options.force = force;
+    }
+
+    /// Counts of the samples so far.
+    pub fn counts(&self) -> &RefineCounts {
+        match &self.stage {
+            Stage::Moving(engine) => engine.refiner().counts(),
+            Stage::Keeping { counts, .. } => counts,
+        }
+    }
+
+    /// Memory of the mesh that is moved.
+    pub fn footprint(&self) -> Footprint {
+        match &self.stage {
+            Stage::Moving(engine) => engine.footprint(),
+            Stage::Keeping { .. } => Footprint::default(),
+        }
+    }
+
+    /// Takes the next sample; a refused one is counted and changes nothing.
     ///
-    /// - `force`: also where no face of the scan is moved or replaced.
+    /// Returns what it did to the mesh; `None` after a replay of contacts, whose only result is the
+    /// patch at the end.
+    ///
+    /// # Errors
+    /// [`LiveError`] of a refused sample.
+    #[inline]
+    pub fn push(&mut self, sample: &Sample) -> Result<Option<Update>, LiveError> {
+        self.replayed.wrenches += 1;
+        let update = self.take(sample)?;
+        self.watch.monitor.paired_message(sample.stamp_ns);
+        Ok(update)
+    }
+
+    /// Takes all samples of a recording.
+    ///
+    /// - `markers`: makes the poses of a recording of markers.
+    /// - `at_each`: called after each record, to show the progress.
+    ///
+    /// # Errors
+    /// [`ReplayError`]
+    pub fn replay(
+        &mut self,
+        recording: Recording,
+        markers: Option<MarkerFilter>,
+        at_each: &mut dyn FnMut(),
+    ) -> Result<(), ReplayError> {
+        let scene = &self.input.scene;
+        let (placement, sync) = (scene.placement(), scene.sync_params());
+        let this = RefCell::new(self);
+        let mut at_message = |message: &Message| this.borrow_mut().watch.monitor.message(message);
+        let replayed = each_sample(
+            recording,
+            placement,
+            sync,
+            markers,
+            at_each,
+            &mut at_message,
+            |sample| this.borrow_mut().replay_sample(sample),
+        )?;
+        this.into_inner().replayed = replayed;
+        Ok(())
+    }
+
+    /// Takes a sample of a recording when it is due, unless its stroke was taken out.
+    fn replay_sample(&mut self, sample: &Sample) {
+        self.exchange_strokes(sample.stamp_ns);
+        if !self.strokes.takes(sample.stamp_ns) {
+            return self.refuse("taken_out");
+        }
+        if let Some(real_time) = &mut self.real_time {
+            real_time.wait_for(sample.stamp_ns);
+        }
+        let started = Instant::now();
+        // a refused sample is counted
+        let _ = self.take(sample);
+        self.pushes.record(started.elapsed());
+        match (&mut self.real_time, &self.stage) {
+            (Some(real_time), Stage::Moving(engine)) => {
+                real_time.note(sample.stamp_ns, engine.patched_until_ns());
+            }
+            _ => self.stage.keep_only_evidence(),
+        }
+    }
+
+    fn take(&mut self, sample: &Sample) -> Result<Option<Update>, LiveError> {
+        match self.stage.push(sample, self.region.as_ref()) {
+            Ok(update) => {
+                self.accepted += 1;
+                let contact = self.watch.sample(sample, self.stage.contact());
+                if let (Some(points), Some(contact)) = (&mut self.contact_points, contact) {
+                    points.push(&contact);
+                }
+                Ok(update)
+            }
+            Err(error) => {
+                if matches!(error, LiveError::Refine(_)) {
+                    self.refuse(reason_of_refusal(&error));
+                } else {
+                    // nothing that follows changes the mesh
+                    self.stopped.get_or_insert_with(|| error.clone());
+                }
+                Err(error)
+            }
+        }
+    }
+
+    #[cold]
+    fn refuse(&mut self, reason: &str) {
+        *self.refused.entry(reason.to_owned()).or_default() += 1;
+    }
+
+    /// Undoes and redoes strokes up to the sample of this stamp, ns.
+    fn exchange_strokes(&mut self, before_ns: i64) {
+        while let Some((_, is_undo)) = self.strokes.next_before(before_ns) {
+            if let Err(error) = self.stage.exchange(is_undo) {
+                self.stopped = Some(error);
+            }
+        }
+    }
+
+    /// Judges the recording, and reconstructs what was touched.
     ///
     /// # Errors
     /// [`RefinementError`]
-    pub fn finish(self, force: bool) -> Result<FinishedRefinement, RefinementError> {
-        let RefinementInput { scan, cut, .. } = &self.input;
-        let mut ended = self.engine.finish()?;
-        let counts = *ended.refiner.counts();
-        let patcher = ended.patcher.take().filter(|_| counts.contacts > 0);
-        if let Some(patcher) = patcher.as_ref().filter(|_| !force) {
+    pub fn finish(mut self, names: InputNames<'_>) -> Result<RefinedScan, RefinementError> {
+        self.exchange_strokes(i64::MAX);
+        let findings = self.checked_findings(names)?;
+        if let Some(stopped) = self.stopped {
+            return Err(stopped.into());
+        }
+        let RefinementInput { scene, scan, cut } = &self.input;
+        let registration = self
+            .contact_points
+            .map(|points| ScanOffset::of(points.registrar.estimate(&scan.0, &scan.1)));
+        let wrench_offset = self.watch.monitor.clock_offset();
+        let wrench_offset = wrench_offset
+            .filter(|_| scene.clock.is_some())
+            .map(|found| WrenchOffset::of(&found, &scene.sync_params()));
+        let EndOfSamples {
+            result,
+            counts,
+            friction,
+            live,
+        } = self.stage.finish(self.real_time)?;
+        let (outside, must_change) = (cut.outside.as_ref(), !self.options.force);
+        if let EngineResult::Touched(patcher) = &result
+            && must_change
+        {
             patcher.check_extent()?;
         }
-        let outside = cut.outside.as_ref();
-        let mesh = match patcher {
-            Some(patcher) => RefinedMesh::patched(scan, patcher, outside, !force)?,
-            None => RefinedMesh::moved(scan, &ended.mesh(), outside, !force)?,
+        let (mesh, outcome) = RefinedMesh::of(scan, result, outside, must_change)?;
+        let mut replayed = self.replayed;
+        replayed.losses.extend(outcome.loss());
+        let mut refused = self.refused;
+        refused.append(&mut replayed.refused);
+        if counts.outside_region > 0 {
+            refused.insert("outside_region".to_owned(), counts.outside_region);
+        }
+        tracing::debug!(?counts, "replayed");
+        let summary = RefinementSummary {
+            samples: replayed.wrenches,
+            accepted: self.accepted - counts.outside_region,
+            refused,
+            contacts: counts.contacts,
+            markers: replayed.markers,
+            wrench_offset,
+            registration,
+            findings,
+            cut_back: counts.cut_back,
+            friction: friction.map(Into::into),
+            push_ns: self.pushes.quantiles(),
+            live,
+            outcome,
         };
-        Ok(FinishedRefinement {
+        Ok(RefinedScan {
             mesh,
-            counts,
+            summary,
+            losses: replayed.losses,
+        })
+    }
+
+    /// The findings on the recording; an unsound one is refused.
+    fn checked_findings(
+        &self,
+        names: InputNames<'_>,
+    ) -> Result<Vec<InputFinding>, RefinementError> {
+        let (scan, tree) = &*self.input.scan;
+        let mut findings = self.watch.monitor.findings(scan, tree);
+        if self.options.touches_flaws {
+            findings
+                .iter_mut()
+                .filter(|finding| finding.cause.is_read_off_the_scan())
+                .for_each(|finding| finding.is_sure = false);
+            findings.sort_by_key(|finding| !finding.is_sure);
+        }
+        if !self.options.force {
+            refuse_unsound(&findings, names)?;
+            if self.accepted == 0 {
+                let recording = names.recording.to_owned();
+                return Err(RefinementError::NoSample { recording });
+            }
+        }
+        Ok(findings)
+    }
+}
+
+/// After the last sample.
+struct EndOfSamples {
+    result: EngineResult,
+    counts: RefineCounts,
+    friction: Option<FrictionCoefficient>,
+    live: Option<LiveSummary>,
+}
+
+impl Stage {
+    fn push(
+        &mut self,
+        sample: &Sample,
+        region: Option<&ScanRegion>,
+    ) -> Result<Option<Update>, LiveError> {
+        match self {
+            Self::Moving(engine) => engine.push(sample).map(Some),
+            Self::Keeping { evidence, counts } => {
+                let contact = evidence.push(sample).map_err(RefineError::from)?;
+                let is_outside = region.is_some_and(|of| !of.region.contains(&contact.ball.centre));
+                counts.outside_region += u64::from(is_outside && contact.ball_contact.is_some());
+                counts.contacts = evidence.contacts().contacts();
+                Ok(None)
+            }
+        }
+    }
+
+    fn contact(&self) -> Option<&ContactSample> {
+        match self {
+            Self::Moving(engine) => engine.refiner().contact(),
+            Self::Keeping { evidence, .. } => evidence.contacts().latest(),
+        }
+    }
+
+    /// From the first contact on a patch at the end is the only result: the haptic update, whose
+    /// mesh is the result of a recording without contact, stops.
+    fn keep_only_evidence(&mut self) {
+        if let Self::Moving(engine) = self
+            && let Some((evidence, counts)) = engine.touched_evidence()
+        {
+            let evidence = Box::new(evidence);
+            *self = Self::Keeping { evidence, counts };
+        }
+    }
+
+    fn exchange(&mut self, is_undo: bool) -> Result<(), LiveError> {
+        match (self, is_undo) {
+            (Self::Moving(engine), true) => _ = engine.undo()?,
+            (Self::Moving(engine), false) => _ = engine.redo()?,
+            (Self::Keeping { evidence, .. }, true) => _ = evidence.undo(),
+            (Self::Keeping { evidence, .. }, false) => _ = evidence.redo(),
+        }
+        Ok(())
+    }
+
+    fn finish(self, real_time: Option<RealTime>) -> Result<EndOfSamples, LiveError> {
+        let engine = match self {
+            Self::Moving(engine) => engine,
+            Self::Keeping { evidence, counts } => {
+                let friction = evidence.contacts().friction();
+                return Ok(EndOfSamples {
+                    result: EngineResult::Touched(evidence.into_patcher().into()),
+                    counts,
+                    friction,
+                    live: None,
+                });
+            }
+        };
+        let live_counts = engine.counts();
+        let ended = engine.finish()?;
+        Ok(EndOfSamples {
+            counts: *ended.refiner.counts(),
             friction: ended.refiner.friction(),
+            result: ended.into_result(),
+            live: real_time.map(|real_time| LiveSummary::of(&real_time.behind, live_counts)),
         })
     }
 }
 
-/// Counts what becomes of the samples.
-struct CountingTaker<'a> {
-    engine: &'a mut Engine,
-    accepted: u64,
-    refused: BTreeMap<String, u64>,
-}
-
-impl SampleTaker for CountingTaker<'_> {
-    fn take(&mut self, sample: &Sample) -> bool {
-        match self.engine.push(sample) {
-            Ok(_) => self.accepted += 1,
-            Err(error) => count_refusal(&mut self.refused, &error),
-        }
-        true
-    }
-
-    fn refiner(&self) -> &Refiner {
-        self.engine.refiner()
-    }
-}
-
-/// Why a sample was not taken, in one word. The synchroniser lets only checked samples out, in
-/// order of time, so that what is left of a recording is a step whose result is no number.
+/// Reason of a refused sample, one word. The synchroniser passes only checked samples, in order of
+/// time, so a sample of a recording is refused where a step has no finite result.
 pub fn reason_of_refusal(error: &LiveError) -> &'static str {
     match error {
         LiveError::Refine(RefineError::Sample(_)) => "sample",
@@ -314,205 +612,30 @@ pub fn reason_of_refusal(error: &LiveError) -> &'static str {
     }
 }
 
-/// By what scan and recording are named in messages.
-#[derive(Clone, Copy, Debug)]
-pub struct InputNames<'a> {
-    /// …
-    pub scan: &'a Path,
-    /// …
-    pub recording: &'a Path,
-}
-
-/// A refined scan with all that its recording was worth.
-#[derive(Debug)]
-pub struct RefinedScan {
-    /// mesh and touches
-    pub finished: FinishedRefinement,
-    /// counts of the replay, and losses, also of the contacts; what it refused is in `refused`
-    pub replayed: Replayed,
-    /// samples that the update took
-    pub accepted: u64,
-    /// those that it, or the replay, refused, by reason
-    pub refused: BTreeMap<String, u64>,
-    /// what is doubtful, the surest first
-    pub findings: Vec<InputFinding>,
-}
-
-/// What became of all samples.
-struct JudgedSamples {
-    monitor: InputMonitor,
-    replayed: Replayed,
-    accepted: u64,
-    refused: BTreeMap<String, u64>,
-}
-
-impl JudgedSamples {
-    fn finish(
-        self,
-        refinement: Refinement,
-        names: InputNames<'_>,
-        force: bool,
-    ) -> Result<RefinedScan, RefinementError> {
-        let Self {
-            monitor,
-            mut replayed,
-            accepted,
-            mut refused,
-        } = self;
-        let scan = &refinement.input.scan;
-        let findings = monitor.findings(scan, &FaceTree::new_by(scan, &Threads));
-        if !force {
-            refuse_unsound(&findings, names)?;
-            if accepted == 0 {
-                return Err(RefinementError::NoSample {
-                    recording: names.recording.to_owned(),
-                });
-            }
-        }
-        refused.append(&mut replayed.refused);
-        let finished = refinement.finish(force)?;
-        replayed.losses.extend(finished.mesh.outcome.loss());
-        let outside_region = finished.counts.outside_region;
-        if outside_region > 0 {
-            refused.insert("outside_region".to_owned(), outside_region);
-        }
-        Ok(RefinedScan {
-            finished,
-            replayed,
-            accepted: accepted - outside_region,
-            refused,
-            findings,
-        })
-    }
-}
-
-/// A refinement whose samples are pushed.
-#[derive(Debug)]
-pub struct JudgedRefinement {
-    /// engine and input
-    pub refinement: Refinement,
-    watch: InputWatch,
-    accepted: u64,
-    refused: BTreeMap<String, u64>,
-}
-
-impl JudgedRefinement {
-    /// Nothing touched yet.
-    ///
-    /// # Errors
-    /// Those of [`Refinement::new`]; [`RefinementError::Setting`].
-    pub fn new(input: RefinementInput, wrench_frame: WrenchFrame) -> Result<Self, RefinementError> {
-        let (params, _) = input
-            .settings(wrench_frame)
-            .ok_or(RefinementError::NothingMoves)?;
-        let monitor = input.scene.input_monitor_params(wrench_frame);
-        let watch = InputWatch::new(monitor, &params)?;
-        Ok(Self {
-            refinement: Refinement::new(input, wrench_frame)?,
-            watch,
-            accepted: 0,
-            refused: BTreeMap::new(),
-        })
-    }
-
-    /// Takes the next sample; a refused one is counted and changes nothing.
-    ///
-    /// # Errors
-    /// [`LiveError`] where it is refused.
-    #[inline]
-    pub fn push(&mut self, sample: &Sample) -> Result<Update, LiveError> {
-        let update = self
-            .refinement
-            .engine
-            .push(sample)
-            .inspect_err(|error| count_refusal(&mut self.refused, error))?;
-        self.watch.monitor.paired_message(sample.stamp_ns);
-        self.watch.sample(sample, self.refinement.engine.refiner());
-        self.accepted += 1;
-        Ok(update)
-    }
-
-    /// Judges what came, and reconstructs what was touched.
-    ///
-    /// - `names`: for messages. `force`: also where something is surely wrong, or no face is moved.
-    ///
-    /// # Errors
-    /// [`RefinementError`]
-    pub fn finish(
-        self,
-        names: InputNames<'_>,
-        force: bool,
-    ) -> Result<RefinedScan, RefinementError> {
-        let Self {
-            refinement,
-            watch,
-            accepted,
-            refused,
-        } = self;
-        let wrenches = accepted + refused.values().sum::<u64>();
-        let replayed = Replayed {
-            wrenches,
-            ..Replayed::default()
-        };
-        let samples = JudgedSamples {
-            monitor: watch.monitor,
-            replayed,
-            accepted,
-            refused,
-        };
-        samples.finish(refinement, names, force)
-    }
-}
-
-/// Counts it by its reason.
-#[cold]
-fn count_refusal(refused: &mut BTreeMap<String, u64>, error: &LiveError) {
-    *refused
-        .entry(reason_of_refusal(error).to_owned())
-        .or_default() += 1;
-}
-
 /// Refines a scan by a recording.
 ///
-/// - `force`: also where something is surely wrong, or no face is moved.
+/// - `markers`: makes the poses of a recording of markers.
 /// - `at_each`: called after each record, to show the progress.
 ///
 /// # Errors
-/// [`RefinementError`]: as `touchup refine` says it.
+/// [`RefinementError`]
 pub fn refine(
     input: RefinementInput,
-    touches: TouchSource,
+    recording: Recording,
+    markers: Option<MarkerFilter>,
+    options: RefinementOptions,
     names: InputNames<'_>,
-    force: bool,
     at_each: &mut dyn FnMut(),
 ) -> Result<RefinedScan, RefinementError> {
-    let wrench_frame = touches.wrench_frame();
-    let (params, _) = input
-        .settings(wrench_frame)
-        .ok_or(RefinementError::NothingMoves)?;
-    let Refinement { mut engine, input } = Refinement::new(input, wrench_frame)?;
-    let mut taker = CountingTaker {
-        engine: &mut engine,
-        accepted: 0,
-        refused: BTreeMap::new(),
-    };
-    let JudgedReplay { replayed, monitor } = input.replay(touches, &params, &mut taker, at_each)?;
-    let CountingTaker {
-        accepted, refused, ..
-    } = taker;
-    JudgedSamples {
-        monitor,
-        replayed,
-        accepted,
-        refused,
-    }
-    .finish(Refinement { engine, input }, names, force)
+    let mut refinement = Refinement::new(input, recording.wrench_frame, options)?;
+    refinement.replay(recording, markers, at_each)?;
+    refinement.finish(names)
 }
 
-/// Refuses an input of which something is surely wrong.
+/// Refuses an unsound input.
 ///
 /// # Errors
-/// [`RefinementError::Unsound`] with the first finding that is.
+/// [`RefinementError::Unsound`] with the first sure finding.
 pub fn refuse_unsound(
     findings: &[InputFinding],
     names: InputNames<'_>,

@@ -1,7 +1,7 @@
 //! What watches the input of a refinement.
 
 use touchup_core::diagnose::{InputMonitor, InputMonitorParams};
-use touchup_core::haptic::{RefineParams, Refiner};
+use touchup_core::haptic::RefineParams;
 use touchup_core::stylus::{ContactEstimator, ContactSample, Sample, SettingError};
 
 /// Watches messages, samples, and what is decided about their contact.
@@ -25,13 +25,17 @@ impl InputWatch {
         })
     }
 
-    /// A sample that was taken; returns what is decided about its contact.
+    /// Notes an accepted sample; returns its contact.
     ///
-    /// - `refiner`: as that sample has left it.
-    pub fn sample(&mut self, sample: &Sample, refiner: &Refiner) -> Option<ContactSample> {
+    /// - `decided`: what the update has decided about its contact.
+    pub fn sample(
+        &mut self,
+        sample: &Sample,
+        decided: Option<&ContactSample>,
+    ) -> Option<ContactSample> {
         let contact = match &mut self.observer {
             Some(observer) => observer.observe(sample).ok().copied(),
-            None => refiner.contact().copied(),
+            None => decided.copied(),
         };
         self.monitor.sample(sample);
         if let Some(contact) = &contact {

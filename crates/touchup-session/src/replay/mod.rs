@@ -53,9 +53,9 @@ pub struct Replayed {
 const MOST_AHEAD: usize = 100_000;
 
 /// A recording that has been read until the frames of both topics are known, and keeps what it has
-/// read.
+/// read; or messages in memory.
 pub struct Recording {
-    reader: RecordingReader,
+    reader: Option<RecordingReader>,
     ahead: VecDeque<Result<Record, RecordingError>>,
     /// In which axes the wrenches are: a header that names the frame of the pose means O, any other
     /// the stylus' own.
@@ -88,15 +88,36 @@ impl Recording {
             find_wrench_frame(path, &layout)?
         };
         Ok(Self {
-            reader,
+            reader: Some(reader),
             ahead,
             wrench_frame,
         })
     }
 
+    /// Messages in memory.
+    ///
+    /// - `messages`: of each kind in order of time.
+    /// - `wrench_frame`: axes of the wrenches.
+    pub fn of_messages(
+        messages: impl IntoIterator<Item = Message>,
+        wrench_frame: WrenchFrame,
+    ) -> Self {
+        let ahead = messages
+            .into_iter()
+            .map(|message| Ok(Record::Message(message)));
+        Self {
+            reader: None,
+            ahead: ahead.collect(),
+            wrench_frame,
+        }
+    }
+
     /// How many messages it has, where the recording says so.
     pub fn message_count(&self) -> Option<u64> {
-        self.reader.message_count()
+        match &self.reader {
+            Some(reader) => reader.message_count(),
+            None => Some(self.ahead.len() as u64),
+        }
     }
 
     /// The next pose or wrench; frames of markers are passed over. After damage the error, then
@@ -112,7 +133,9 @@ impl Recording {
     }
 
     fn next(&mut self) -> Option<Result<Record, RecordingError>> {
-        self.ahead.pop_front().or_else(|| self.reader.next_record())
+        self.ahead
+            .pop_front()
+            .or_else(|| self.reader.as_mut()?.next_record())
     }
 }
 
@@ -194,7 +217,10 @@ pub fn each_message(
         filter.finish(|pose| each(Message::Pose(pose)));
         replayed.account_markers(filter);
     }
-    replayed.account_reader(&recording.reader);
+    recording
+        .reader
+        .iter()
+        .for_each(|reader| replayed.account_reader(reader));
     Ok(replayed)
 }
 
@@ -223,36 +249,6 @@ pub fn each_sample(
         sync.push(placement.map_or(message, |placement| placement.place(message, wrench_frame)));
         std::iter::from_fn(|| sync.next_sample()).for_each(|sample| each(&sample));
     })?;
-    sync.finish();
-    std::iter::from_fn(|| sync.next_sample()).for_each(|sample| each(&sample));
-    replayed.account_sync(&sync);
-    Ok(replayed)
-}
-
-/// As [`each_sample`], of messages that are there already.
-///
-/// - `messages`: of each kind in order of time.
-/// - `wrench_frame`: in which axes the wrenches are.
-///
-/// # Errors
-/// [`ReplayError::Setting`].
-pub fn each_sample_of(
-    messages: impl IntoIterator<Item = Message>,
-    wrench_frame: WrenchFrame,
-    placement: Option<Placement>,
-    sync: SyncParams,
-    at_message: &mut dyn FnMut(&Message),
-    mut each: impl FnMut(&Sample),
-) -> Result<Replayed, ReplayError> {
-    let mut sync = Synchroniser::new(sync)?;
-    placement.iter().try_for_each(Placement::check)?;
-    let mut replayed = Replayed::default();
-    for message in messages {
-        replayed.wrenches += u64::from(matches!(message, Message::Wrench(_)));
-        at_message(&message);
-        sync.push(placement.map_or(message, |placement| placement.place(message, wrench_frame)));
-        std::iter::from_fn(|| sync.next_sample()).for_each(|sample| each(&sample));
-    }
     sync.finish();
     std::iter::from_fn(|| sync.next_sample()).for_each(|sample| each(&sample));
     replayed.account_sync(&sync);

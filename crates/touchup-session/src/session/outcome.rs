@@ -9,9 +9,9 @@ use serde::Serialize;
 use tracing::{debug, warn};
 
 use super::outliers::UncertaintySummary;
+use crate::live::EngineResult;
 use crate::reported;
 use crate::scan::carried_over;
-use crate::threads::Threads;
 use touchup_core::features::{Detection, detect};
 use touchup_core::mesh::{FaceId, FaceTree, MeshError, Outside, TriMesh, VertexId};
 use touchup_core::numeric::counted;
@@ -60,11 +60,6 @@ pub struct OutcomePlaces<'a> {
     pub features: Option<&'a Path>,
     /// the touches that features name: Parquet where the name ends so, else CSV
     pub touches: Option<&'a Path>,
-    /// the rest of a scan of which a part was refined
-    pub outside: Option<&'a Outside>,
-    /// whether a result in which no face of the scan is moved or replaced, or whose contacts
-    /// contradict each other, is refused
-    pub must_change: bool,
 }
 
 /// Result on the touched part.
@@ -202,8 +197,6 @@ pub struct RefinedMesh {
     pub columns: Vec<VertexColumn>,
     /// the touches that features are measured by
     pub touches: Vec<ProbedPoint>,
-    /// numbers
-    pub outcome: Outcome,
 }
 
 fn check_changed(must_change: bool, changed: usize) -> Result<(), OutcomeError> {
@@ -215,31 +208,44 @@ fn check_changed(must_change: bool, changed: usize) -> Result<(), OutcomeError> 
 }
 
 impl RefinedMesh {
-    /// A mesh without patch.
+    /// Whole mesh and numbers of a result.
     ///
-    /// - `scan`: unrefined.
-    /// - `refined`: as the haptic update left it.
+    /// - `scan`: unrefined, with the tree over its faces.
     /// - `outside`: the rest of the scan.
-    /// - `must_change`: whether a result that is the scan is refused.
+    /// - `must_change`: whether a result that is the scan, or whose contacts contradict each other,
+    ///   is refused.
     ///
     /// # Errors
-    /// [`OutcomeError::Unchanged`], [`OutcomeError::Mesh`].
-    pub fn moved(
-        scan: &TriMesh,
-        refined: &TriMesh,
+    /// [`OutcomeError::Unchanged`], [`OutcomeError::Contradictory`], [`OutcomeError::Mesh`].
+    pub fn of(
+        scan: &(TriMesh, FaceTree),
+        result: EngineResult,
         outside: Option<&Outside>,
         must_change: bool,
-    ) -> Result<Self, OutcomeError> {
-        let moved_faces = moved_faces(scan, refined);
+    ) -> Result<(Self, Outcome), OutcomeError> {
+        match result {
+            EngineResult::Touched(patcher) => Self::patched(scan, *patcher, outside, must_change),
+            EngineResult::Moved(mesh) => Self::moved(&scan.0, *mesh, outside, must_change),
+        }
+    }
+
+    /// A mesh without patch.
+    fn moved(
+        scan: &TriMesh,
+        refined: TriMesh,
+        outside: Option<&Outside>,
+        must_change: bool,
+    ) -> Result<(Self, Outcome), OutcomeError> {
+        let moved_faces = moved_faces(scan, &refined);
         check_changed(must_change, moved_faces as usize)?;
-        let own = origins(scan, refined);
+        let own = origins(scan, &refined);
         let (mesh, origins) = match outside {
             Some(outside) => {
-                let sewn = outside.sew_to(refined)?;
+                let sewn = outside.sew_to(&refined)?;
                 let origins = sewn.column(&own, None);
                 (sewn.mesh, origins)
             }
-            None => (refined.clone(), own),
+            None => (refined, own),
         };
         let outcome = Outcome {
             moved_faces,
@@ -248,32 +254,27 @@ impl RefinedMesh {
             counts: written_counts(&mesh),
         };
         let (support, sigma, columns, touches) = Default::default();
-        Ok(Self {
+        let refined = Self {
             mesh,
             origins,
             support,
             sigma,
             columns,
             touches,
-            outcome,
-        })
+        };
+        Ok((refined, outcome))
     }
 
-    /// The touched part of the scan remeshed; arguments as of [`Self::moved`].
-    ///
-    /// - `must_change`: also whether one whose contacts contradict each other is refused.
-    ///
-    /// # Errors
-    /// [`OutcomeError::Unchanged`], [`OutcomeError::Contradictory`], [`OutcomeError::Mesh`].
-    pub fn patched(
-        scan: &TriMesh,
+    /// The touched part of the scan remeshed.
+    fn patched(
+        (scan, tree): &(TriMesh, FaceTree),
         mut patcher: Patcher,
         outside: Option<&Outside>,
         must_change: bool,
-    ) -> Result<Self, OutcomeError> {
+    ) -> Result<(Self, Outcome), OutcomeError> {
         let started = Instant::now();
         patcher.flush();
-        let patched = patcher.patched(scan, &FaceTree::new_by(scan, &Threads))?;
+        let patched = patcher.patched(scan, tree)?;
         check_changed(must_change, patched.removed_faces + patched.moved_vertices)?;
         let build_s = started.elapsed().as_secs_f64();
         debug!(open_squares = patched.open_squares, "patched");
@@ -313,15 +314,15 @@ impl RefinedMesh {
             sigma,
             ..
         } = patched;
-        Ok(Self {
+        let refined = Self {
             mesh,
             origins,
             support,
             sigma,
             columns,
             touches: patcher.probed().to_vec(),
-            outcome,
-        })
+        };
+        Ok((refined, outcome))
     }
 }
 
@@ -333,51 +334,20 @@ impl Outcome {
 }
 
 impl OutcomePlaces<'_> {
-    /// Writes a mesh without patch.
-    ///
-    /// - `scan`: unrefined.
-    /// - `refined`: as the haptic update left it.
+    /// Writes mesh, touches and features.
     ///
     /// # Errors
     /// [`OutcomeError`]; no file is left half written.
-    pub fn write_moved(&self, scan: &TriMesh, refined: &TriMesh) -> Result<Outcome, OutcomeError> {
-        self.write(RefinedMesh::moved(
-            scan,
-            refined,
-            self.outside,
-            self.must_change,
-        )?)
-    }
-
-    /// Remeshes the touched part of the scan and writes the result.
-    ///
-    /// # Errors
-    /// [`OutcomeError`]; no file is left half written.
-    pub fn write_patched(&self, scan: &TriMesh, patcher: Patcher) -> Result<Outcome, OutcomeError> {
-        self.write(RefinedMesh::patched(
-            scan,
-            patcher,
-            self.outside,
-            self.must_change,
-        )?)
-    }
-
-    /// Writes a result that is whole already.
-    ///
-    /// # Errors
-    /// [`OutcomeError`]; no file is left half written.
-    pub fn write(&self, refined: RefinedMesh) -> Result<Outcome, OutcomeError> {
+    pub fn write(&self, refined: RefinedMesh) -> Result<(), OutcomeError> {
         let RefinedMesh {
             mesh,
             origins,
             columns,
             touches,
-            outcome,
             ..
         } = refined;
         self.write_mesh(&mesh, &origins, columns)?;
-        self.write_features(&touches)?;
-        Ok(outcome)
+        self.write_features(&touches)
     }
 
     /// Writes the mesh with the colours and texture coordinates of the scan.

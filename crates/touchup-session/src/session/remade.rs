@@ -74,7 +74,8 @@ impl EvidenceSource<'_> {
                 }
                 are_same &= exchanged(&mut replay, &mut strokes, sample.stamp_ns);
                 if strokes.takes(sample.stamp_ns) {
-                    replay.push(sample);
+                    // a refused sample changes nothing
+                    let _ = replay.push(sample);
                 }
                 last_ns = Some(sample.stamp_ns);
             },

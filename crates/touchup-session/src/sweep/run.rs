@@ -10,10 +10,10 @@ use super::base_scene::{BaseScene, JobScene};
 use super::error::SweepError;
 use super::job::Job;
 use super::record::{JobRecord, RECORD, read_record};
-use super::summary::{JobSummary, RefinedJob};
-use crate::refinement::{InputNames, RefinementError, RefinementInput, TouchSource, refine};
-use crate::replay::{Recording, marker_filter};
-use crate::scan::read_scan;
+use super::summary::JobSummary;
+use crate::refinement::{
+    InputNames, OpenedInput, RefinedScan, RefinementError, RefinementOptions, refine,
+};
 use crate::session::{OutcomeError, OutcomePlaces};
 use touchup_io::content_hash::{content_hash, hash_of};
 use touchup_io::features_file::read_features;
@@ -283,28 +283,19 @@ fn refined(
     plain: &dyn Fn(&str) -> String,
     at_each: &mut dyn FnMut(),
 ) -> Result<JobSummary, JobFailure> {
-    let of_input = |error: &dyn std::fmt::Display| JobFailure::OfInput(error.to_string());
-    let mesh = read_scan(scan, job.mesh_unit)
-        .map_err(|error| of_input(&error))?
-        .mesh;
-    let markers = marker_filter(&scene, job.recorded.markers_topic.as_deref())
-        .map_err(|error| of_input(&error))?;
-    let stamps = job.recorded.checked_stamps().map_err(JobFailure::OfInput)?;
-    let opened = Recording::open(recording, job.recorded.layout(&scene), stamps)
-        .map_err(|error| of_input(&error))?;
-    let input = RefinementInput::new(scene, mesh).map_err(|error| of_input(&error))?;
-    let touches = TouchSource::Recorded {
-        recording: Box::new(opened),
-        markers: markers.map(Box::new),
-    };
-    let refined = refine(
-        input,
-        touches,
+    let opened = OpenedInput::open(scene, (scan, job.mesh_unit), (recording, &job.recorded))?;
+    let RefinedScan {
+        mesh: refined,
+        summary,
+        losses,
+    } = refine(
+        opened.input,
+        opened.recording,
+        opened.markers,
+        RefinementOptions::default(),
         InputNames { scan, recording },
-        false,
         at_each,
     )?;
-    let said = RefinedJob::of(&refined, plain);
     let [mesh, features] = [MESH, FEATURES].map(|name| claimed.path().join(name));
     let places = OutcomePlaces {
         mesh: &mesh,
@@ -312,17 +303,15 @@ fn refined(
         scan,
         features: Some(&features),
         touches: None,
-        outside: None,
-        must_change: true,
     };
-    let outcome = places
-        .write(refined.finished.mesh)
+    places
+        .write(refined)
         .map_err(|error| JobFailure::OfSystem(error.into()))?;
     let count = read_features(&features)
         .map_err(|error| JobFailure::OfSystem(error.into()))?
         .features
         .len();
-    Ok(JobSummary::of(&said, &outcome, count))
+    Ok(JobSummary::of(summary, &losses, count, plain))
 }
 
 fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), SweepError> {

@@ -4,83 +4,48 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::refinement::RefinedScan;
+use crate::refinement::RefinementSummary;
 use crate::reported;
 use crate::session::Outcome;
 use serde_json::Value;
 
 reported! {
     /// The numbers of `touchup refine --json` that a recording and a scene determine.
-    pub(super) struct JobSummary, pub fn of(refined: &RefinedJob, outcome: &Outcome, features: usize) {
+    pub(super) struct JobSummary, pub fn of(
+        refined: RefinementSummary,
+        lost: &[String],
+        feature_count: usize,
+        plain: &dyn Fn(&str) -> String
+    ) {
         /// wrenches of the recording: each could be a sample
         samples: u64 = refined.samples,
-        /// those that the refiner took
+        /// accepted samples
         accepted: u64 = refined.accepted,
-        /// those that it refused, by reason; `pose_…` are lost poses and not samples
-        refused: BTreeMap<String, u64> = refined.refused.clone(),
+        /// refused samples by reason; `pose_…` are lost poses and not samples
+        refused: BTreeMap<String, u64> = refined.refused,
         /// times that the stylus came into contact
         contacts: u64 = refined.contacts,
-        /// updates made smaller because a face would have folded
+        /// updates made smaller because a face would have folded, before the first contact
         cut_back: u64 = refined.cut_back,
-        /// coefficient of friction of the ball on the part, and its standard error; left out when
-        /// it never slid far enough
-        friction?: f64 = refined.friction.map(|[mu, _]| mu),
-        /// … its standard error
-        friction_sigma?: f64 = refined.friction.map(|[_, sigma]| sigma),
+        /// coefficient of friction of the ball on the part; left out when it never slid far enough
+        friction?: f64 = refined.friction.map(|found| found.mu),
+        /// standard error of the friction
+        friction_sigma?: f64 = refined.friction.map(|found| found.sigma),
         /// faces that are not where the scan had them
-        moved_faces: u64 = outcome.moved_faces,
+        moved_faces: u64 = refined.outcome.moved_faces,
         /// of the refined mesh
-        vertices: usize = outcome.counts[0],
+        vertices: usize = refined.outcome.counts[0],
         /// of the refined mesh
-        faces: usize = outcome.counts[1],
+        faces: usize = refined.outcome.counts[1],
         /// of features.json
-        features: usize = features,
-        /// what was remeshed, and how well it is known, as in `patch` and `uncertainty` of `touchup
-        /// refine --json`
+        features: usize = feature_count,
+        /// numbers of the remeshed part, as in `patch` and `uncertainty` of `touchup refine --json`
         #[serde(flatten)]
-        reconstruction: BTreeMap<String, Value> = reconstruction(outcome),
-        /// what is doubtful about the recording, the surest first
-        findings: Vec<String> = refined.findings.clone(),
-        /// what a better recording would not lack
-        losses: Vec<String> = refined.losses.clone(),
-    }
-}
-
-/// What is reported of a refinement, apart from its mesh.
-pub(super) struct RefinedJob {
-    samples: u64,
-    accepted: u64,
-    refused: BTreeMap<String, u64>,
-    contacts: u64,
-    cut_back: u64,
-    friction: Option<[f64; 2]>,
-    findings: Vec<String>,
-    losses: Vec<String>,
-}
-
-impl RefinedJob {
-    /// - `plain`: takes paths out of a message.
-    pub fn of(refined: &RefinedScan, plain: impl Fn(&str) -> String) -> Self {
-        let RefinedScan {
-            finished,
-            replayed,
-            accepted,
-            refused,
-            findings,
-        } = refined;
-        Self {
-            samples: replayed.wrenches,
-            accepted: *accepted,
-            refused: refused.clone(),
-            contacts: finished.counts.contacts,
-            cut_back: finished.counts.cut_back,
-            friction: finished.friction.map(|found| [found.mu, found.sigma]),
-            findings: findings
-                .iter()
-                .map(|finding| plain(&finding.to_string()))
-                .collect(),
-            losses: replayed.losses.iter().map(|loss| plain(loss)).collect(),
-        }
+        reconstruction: BTreeMap<String, Value> = reconstruction(&refined.outcome),
+        /// doubts about the recording, the surest first, without paths
+        findings: Vec<String> = refined.findings.iter().map(|finding| plain(&finding.to_string())).collect(),
+        /// what a better recording would not lack, without paths
+        losses: Vec<String> = lost.iter().map(|loss| plain(loss)).collect(),
     }
 }
 

@@ -5,15 +5,17 @@ use std::fmt;
 
 use nalgebra::Vector6;
 use serde::Serialize;
+use touchup_core::haptic::{
+    RefineParams, Registrar, Registration, RegistrationError, RegistrationParams,
+};
+use touchup_core::stylus::{ClockEvidence, ClockOffset, ContactSample, SettingError, SyncParams};
 
-use super::reported;
-use crate::haptic::{RefineParams, Registrar, Registration, RegistrationError, RegistrationParams};
-use crate::stylus::{ClockEvidence, ClockOffset, ContactSample, SettingError, SyncParams};
+use crate::reported;
 
 reported! {
     /// Clock offset of the wrench against the pose; never applied automatically.
     #[derive(Clone, Copy)]
-    pub(super) struct WrenchOffset, pub fn of(found: &ClockOffset, applied: &SyncParams) {
+    pub struct WrenchOffset, pub fn of(found: &ClockOffset, applied: &SyncParams) {
         /// total offset: that which the scene applies, and the correction; where there is a drift,
         /// at the first sample
         wrench_offset_ms: f64 =
@@ -80,14 +82,20 @@ impl fmt::Display for WrenchOffset {
 /// Motion of the scan onto the contacts; never applied automatically.
 #[derive(Clone, Debug, Serialize)]
 #[serde(untagged)]
-pub(super) enum ScanOffset {
+pub enum ScanOffset {
+    /// determined
     Found(FoundOffset),
-    Refused { refused: String },
+    /// undetermined
+    Refused {
+        /// why
+        refused: String,
+    },
 }
 
 reported! {
     #[derive(Clone)]
-    pub(super) struct FoundOffset, fn of(found: &Registration) {
+    /// Shift and turn of the scan with their uncertainties.
+    pub struct FoundOffset, fn of(found: &Registration) {
         /// of the middle of the contacts, and its standard uncertainty
         shift_mm: [f64; 3] = three(&found.twist, 0, 1e3),
         shift_sigma_mm: [f64; 3] = three(&sigma(found), 0, 1e3),
@@ -111,6 +119,7 @@ fn three(v: &Vector6<f64>, first: usize, unit: f64) -> [f64; 3] {
 }
 
 impl ScanOffset {
+    /// As it is reported.
     pub fn of(found: Result<Registration, RegistrationError>) -> Self {
         match found {
             Ok(found) => Self::Found(FoundOffset::of(&found)),
@@ -155,6 +164,7 @@ impl fmt::Display for ScanOffset {
 }
 
 /// Where the part was touched, for the registration.
+#[derive(Debug)]
 pub(super) struct ContactPoints {
     pub registrar: Registrar,
     /// slower than this the normal of the surface is not known, m/s

@@ -1,0 +1,207 @@
+//! A refinement from files to files, for every verb that refines.
+
+use std::fmt;
+use std::path::Path;
+use std::time::Instant;
+
+use serde::Serialize;
+use tracing::warn;
+
+use super::progress::WorkProgress;
+use super::told::ToldNumbers;
+use super::{CliError, Losses, by_reason};
+use crate::io::mesh_file::MeshUnit;
+use crate::live::Quantiles;
+use crate::mesh::RepairReport;
+use crate::reconstruct::CloudSummary;
+use crate::refinement::{
+    InputNames, OpenedInput, RefinedScan, Refinement, RefinementOptions, RefinementSummary,
+};
+use crate::replay::RecordedAs;
+use crate::scene::{LeftOut, Memory, Scene, SceneCost};
+use crate::session::OutcomePlaces;
+
+/// Input and output files of a refinement.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RefinementFiles<'a> {
+    pub scan: &'a Path,
+    /// of the scan and of the refined mesh
+    pub mesh_unit: MeshUnit,
+    pub recording: &'a Path,
+    pub recorded: &'a RecordedAs,
+    pub mesh_out: &'a Path,
+    pub features_out: Option<&'a Path>,
+    pub touches_out: Option<&'a Path>,
+}
+
+/// Output of `--json`; times in s.
+#[derive(Debug, Serialize)]
+pub(super) struct RefineSummary {
+    /// stages built from the scene, those left out with the reason of each, and the memory at start
+    scene: SceneCost,
+    /// numbers of tip and scan, and their sources
+    told: ToldNumbers,
+    /// origin of the scan in a point cloud; absent for a mesh
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cloud: Option<CloudSummary>,
+    #[serde(flatten)]
+    refinement: RefinementSummary,
+    load_s: f64,
+    replay_s: f64,
+}
+
+/// Result of refining a scan.
+pub(super) struct Refined {
+    /// repairs of the scan's file
+    pub repair: RepairReport,
+    pub summary: RefineSummary,
+    pub losses: Losses,
+}
+
+impl RefinementFiles<'_> {
+    /// Reads scan and recording, refines, and writes mesh, features and touches.
+    ///
+    /// - `told`: sources of the numbers in `scene`.
+    pub fn refine(
+        &self,
+        scene: Scene,
+        told: ToldNumbers,
+        options: RefinementOptions,
+    ) -> Result<Refined, CliError> {
+        let started = Instant::now();
+        let OpenedInput {
+            input,
+            repair,
+            cloud,
+            recording,
+            markers,
+        } = OpenedInput::open(
+            scene,
+            (self.scan, self.mesh_unit),
+            (self.recording, self.recorded),
+        )?;
+        let mut refinement = Refinement::new(input, recording.wrench_frame, options)?;
+        let load_s = started.elapsed().as_secs_f64();
+        let scene = self.cost(&refinement);
+
+        let started = Instant::now();
+        let mut progress = WorkProgress::new("replay", recording.message_count());
+        refinement.replay(recording, markers, &mut || progress.step())?;
+        drop(progress);
+        let replay_s = started.elapsed().as_secs_f64();
+        let stage = WorkProgress::stage("reconstruct");
+        let names = InputNames {
+            scan: self.scan,
+            recording: self.recording,
+        };
+        let RefinedScan {
+            mesh,
+            summary: refinement,
+            losses,
+        } = refinement.finish(names)?;
+        refinement
+            .findings
+            .iter()
+            .for_each(|finding| warn!("{finding}"));
+        let places = OutcomePlaces {
+            mesh: self.mesh_out,
+            unit: self.mesh_unit,
+            scan: self.scan,
+            features: self.features_out,
+            touches: self.touches_out,
+        };
+        places.write(mesh)?;
+        drop(stage);
+        let summary = RefineSummary {
+            scene,
+            told,
+            cloud,
+            refinement,
+            load_s,
+            replay_s,
+        };
+        Ok(Refined {
+            repair,
+            summary,
+            losses,
+        })
+    }
+
+    /// The stages built from the scene for these samples.
+    fn cost(&self, refinement: &Refinement) -> SceneCost {
+        let unused = [
+            LeftOut {
+                part: "robot",
+                reason: "a replay moves no arm",
+            },
+            LeftOut {
+                part: "markers",
+                reason: "the recording is read for poses",
+            },
+        ];
+        let unused = match self.recorded.markers_topic {
+            Some(_) => &unused[..1],
+            None => &unused,
+        };
+        let input = refinement.input();
+        SceneCost {
+            parts: input.scene.built(unused, &crate::FEATURES),
+            memory: Memory::of(refinement.footprint(), input.bytes()),
+        }
+    }
+}
+
+impl RefineSummary {
+    /// Counts of samples, timings, and the stages built from the scene.
+    pub fn details(&self) -> String {
+        let RefinementSummary {
+            samples,
+            accepted,
+            refused,
+            cut_back,
+            push_ns,
+            outcome,
+            ..
+        } = &self.refinement;
+        let refused = by_reason(refused);
+        let Quantiles {
+            median,
+            p99,
+            p999,
+            max,
+        } = push_ns;
+        let mut lines = vec![
+            format!("samples: {samples} read, {accepted} accepted; refused: {refused}"),
+            format!(
+                "faces moved: {}; updates cut back: {cut_back}",
+                outcome.moved_faces
+            ),
+        ];
+        lines.extend(
+            outcome
+                .patch
+                .as_ref()
+                .map(|patch| format!("reconstruction: {:.2} s", patch.build_s)),
+        );
+        lines.push(format!(
+            "time of a sample: median {median} ns, p99 {p99} ns, p99.9 {p999} ns, max {max} ns"
+        ));
+        lines.push(format!(
+            "loaded in {:.2} s, replayed in {:.2} s",
+            self.load_s, self.replay_s
+        ));
+        lines.push(self.scene.to_string());
+        lines.join("\n")
+    }
+}
+
+/// The verdict, then further results.
+impl fmt::Display for RefineSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}\n{}", self.refinement.verdict(), self.told)?;
+        match self.refinement.to_string() {
+            further if further.is_empty() => Ok(()),
+            further => write!(f, "\n{further}"),
+        }
+    }
+}
