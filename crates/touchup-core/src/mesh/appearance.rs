@@ -1,23 +1,23 @@
-//! Colours and texture coordinates of a mesh, and how they are carried over to another one.
+//! Colours and texture coordinates of a mesh, and their transfer to another mesh.
 
 use nalgebra::{Point3, Vector2};
 
 use super::workers::map_by;
 use super::{FaceHit, FaceId, FaceTree, TriMesh, VertexId, Workers};
 
-/// What is drawn on the faces of a mesh.
+/// Texture of the faces of a mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Texture {
-    /// for each face slot the texture coordinates (u, v) of its corners, in the order of
+    /// texture coordinates (u, v) of the corners of each face slot, in the order of
     /// [`TriMesh::corners`]
     pub corners: Vec<[[f32; 2]; 3]>,
-    /// for each face slot which of `images` it shows
+    /// index into `images` for each face slot
     pub shown: Vec<u32>,
-    /// files of the images; none: they are not known
+    /// files of the images; empty if unknown
     pub images: Vec<std::path::PathBuf>,
 }
 
-/// Colours of the vertices: red, green, blue, and how opaque they are where that is known.
+/// Vertex colours: red, green, blue, and an optional opacity.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum VertexColours {
     /// by vertex id
@@ -26,7 +26,7 @@ pub enum VertexColours {
     Rgba(Vec<[u8; 4]>),
 }
 
-/// How a mesh looks.
+/// Colours and texture of a mesh.
 #[derive(Clone, Debug)]
 pub struct Appearance {
     mesh: TriMesh,
@@ -35,14 +35,14 @@ pub struct Appearance {
     texture: Option<Texture>,
 }
 
-/// A corner may lie on another face than the middle of its face where the texture coordinates there
-/// are those that the face in the middle would have, to this share of how far they are from the
-/// middle: else there is a seam between the two.
+/// Largest difference between the texture coordinates of a corner on another face and those
+/// extrapolated from the face of the triangle's middle, as a share of their distance from the
+/// middle; a larger difference marks a seam.
 const ON_ONE_CHART: f32 = 0.5;
 
 impl Appearance {
-    /// - `mesh`: all faces there; coordinates m.
-    /// - `colours`, `texture`: as many as it has vertices, and faces.
+    /// - `mesh`: without removed faces; coordinates m.
+    /// - `colours`, `texture`: one entry for each vertex, and for each face.
     pub fn new(mesh: TriMesh, colours: Option<VertexColours>, texture: Option<Texture>) -> Self {
         let tree = FaceTree::new(&mesh);
         Self {
@@ -53,8 +53,7 @@ impl Appearance {
         }
     }
 
-    /// The colours of vertices at `places` (m, in O): those of the nearest vertex of the nearest
-    /// face.
+    /// Colours at `places` (m, in O): the colours of the nearest vertex of the nearest face.
     pub fn colours_at(
         &self,
         places: &[Point3<f64>],
@@ -74,10 +73,10 @@ impl Appearance {
         })
     }
 
-    /// The texture of `mesh`: of each face that of the face nearest to its middle, which also says
-    /// where the corners are in it unless they lie on faces beside it, without a seam between them.
+    /// Texture of `mesh`: each face takes image and texture coordinates from the face nearest to
+    /// its middle, except at corners on other faces without a seam in between.
     ///
-    /// - `places`: for each vertex where it is on this mesh, m in O.
+    /// - `places`: position of each vertex on this mesh, m in O.
     pub fn texture_on(
         &self,
         mesh: &TriMesh,
@@ -105,7 +104,7 @@ impl Appearance {
         })
     }
 
-    /// Texture coordinates of a triangle, and which image it shows.
+    /// Texture coordinates of a triangle, and the index of its image.
     fn corners_at(&self, texture: &Texture, triangle: [Point3<f64>; 3]) -> ([[f32; 2]; 3], u32) {
         let [a, b, c] = &triangle;
         let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
@@ -141,7 +140,7 @@ impl Appearance {
     }
 }
 
-/// The vertex of the face that was hit which is nearest.
+/// The corner of the hit face nearest to `place`.
 fn nearest_corner(mesh: &TriMesh, hit: &FaceHit, place: &Point3<f64>) -> usize {
     let off = |v: &VertexId| (mesh.position(*v) - place).norm_squared();
     let nearest = mesh
@@ -151,7 +150,7 @@ fn nearest_corner(mesh: &TriMesh, hit: &FaceHit, place: &Point3<f64>) -> usize {
     nearest.map_or(0, |v| v.0 as usize)
 }
 
-/// Texture coordinates in the plane of a face, also beside it: u = Σ λᵢ uᵢ.
+/// Texture coordinates in the plane of a face, inside or outside of it: u = Σ λᵢ uᵢ.
 fn at_point(mesh: &TriMesh, texture: &Texture, face: FaceId, point: &Point3<f64>) -> Vector2<f32> {
     let [a, b, c] = mesh.triangle(face);
     let normal = (b - a).cross(&(c - a));
@@ -172,7 +171,7 @@ mod tests {
     use super::super::Alone;
     use super::*;
 
-    /// A roof over x = 0 … 4 with its ridge at x = 2, two triangles a side; the second side is in
+    /// A roof over x = 0 … 4 with its ridge at x = 2, two triangles a side; the second side uses
     /// another corner of the image.
     fn roof() -> (Vec<Point3<f64>>, Vec<[u32; 3]>, Texture) {
         let heights = [(0.0, 0.0), (2.0, 1.0), (4.0, 0.0)];
@@ -237,7 +236,7 @@ mod tests {
         );
     }
 
-    /// By hand: u = x / 16 on the first side, and half more on the second; v = y / 16.
+    /// By hand: u = x / 16 on the first side, plus 1/2 on the second; v = y / 16.
     #[test]
     fn a_new_face_is_on_one_side_of_a_seam_and_reaches_over_faces_of_its_own() {
         let places = [
@@ -258,7 +257,7 @@ mod tests {
                 "{found:?} {expected:?}"
             );
         }
-        // the middle of the second face is on the first side, its second corner on the other: it
+        // the second face has its middle on the first side and its second corner on the other: u
         // goes straight on there, 0.3 along x and 0.15 down on a slope of 1 in 2
         let along = 2.0 + (2.0 * 0.3 - 0.15) / 5.0 * 2.0;
         let [u, v] = texture.corners[1][1];

@@ -1,13 +1,13 @@
-//! An order of points in which neighbours in space follow each other, so that what a query has read
-//! is still in the cache for the next.
+//! A point order that keeps neighbours in space close together: data read by one query is still in
+//! the cache for the next.
 
 use nalgebra::Point3;
 
 /// Cells of the curve on each axis: 2 to this power.
 const BITS: u32 = 10;
 
-/// The indices of `points` along a Z-order curve through cells of 1/1024 of their box; within a
-/// cell as they come.
+/// The indices of `points` along a Z-order curve through cells of 1/1024 of their box; in input
+/// order within a cell.
 ///
 /// - `points`: finite, fewer than 2³².
 pub(crate) fn coherent_order(points: &[Point3<f64>]) -> Vec<u32> {
@@ -15,7 +15,7 @@ pub(crate) fn coherent_order(points: &[Point3<f64>]) -> Vec<u32> {
     let [lo, hi] = points
         .iter()
         .fold(empty, |[lo, hi], p| [lo.inf(p), hi.sup(p)]);
-    // cubes: a flat part is ordered as a flat one
+    // cubes: the order of a flat part is that of a plane
     let cells = f64::from(1 << BITS) / (hi - lo).amax().max(f64::MIN_POSITIVE);
     let mut keys: Vec<u64> = points
         .iter()
@@ -26,7 +26,7 @@ pub(crate) fn coherent_order(points: &[Point3<f64>]) -> Vec<u32> {
     keys.into_iter().map(|key| key as u32).collect()
 }
 
-/// The bits of the three cell numbers in turn.
+/// The interleaved bits of the three cell numbers.
 fn code(cell: &[f64; 3]) -> u64 {
     let [x, y, z] = cell.map(|x| spread((x as u32).min((1 << BITS) - 1)));
     x << 2 | y << 1 | z

@@ -1,4 +1,4 @@
-//! Names of the faces and vertices of one mesh.
+//! Ids of the faces and vertices of one mesh.
 
 /// A face of one [`super::TriMesh`]; stays valid until that face is removed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -1,9 +1,8 @@
-//! Which vertices and faces of a mesh changed, for a caller that keeps a copy of it.
+//! Changed vertices and faces of a mesh, for callers that keep a copy of it.
 
 use super::{FaceId, VertexId};
 
-/// What changed in a [`super::TriMesh`] that is watched; each thing is named once, in no particular
-/// order.
+/// Changes of a watched [`super::TriMesh`], each id once, in no particular order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Changes {
     /// moved, added or removed: see [`super::TriMesh::has_vertex`]
@@ -13,24 +12,24 @@ pub struct Changes {
 }
 
 impl Changes {
-    /// Forgets all, keeps the memory.
+    /// Removes all entries, keeps the memory.
     pub fn clear(&mut self) {
         self.vertices.clear();
         self.faces.clear();
     }
 }
 
-/// What changed and was not taken yet: a bit for each slot, so memory is bounded by the mesh.
+/// Changes not taken yet: one bit for each slot, so the mesh bounds the memory.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Journal {
     vertices: IdSet,
     faces: IdSet,
-    /// edits so far
+    /// number of edits
     edits: u64,
 }
 
 impl Journal {
-    /// Nothing noted yet, room for so many slots.
+    /// An empty journal with room for the given slots.
     pub fn new(vertices: usize, faces: usize) -> Self {
         Self {
             vertices: IdSet::with_slots(vertices),
@@ -39,7 +38,7 @@ impl Journal {
         }
     }
 
-    /// Never inlined: most meshes are not watched.
+    /// Never inlined: most meshes have no journal.
     #[inline(never)]
     pub fn note_vertex(&mut self, vertex: u32) {
         self.edits += 1;
@@ -52,7 +51,7 @@ impl Journal {
         self.faces.insert(face);
     }
 
-    /// Moves up to `most` vertices and as many faces over; returns whether that was all.
+    /// Moves up to `most` vertices and up to `most` faces to `into`; returns whether none remain.
     pub fn take(&mut self, most: usize, into: &mut Changes) -> bool {
         self.vertices
             .take(most, |vertex| into.vertices.push(VertexId(vertex)));
@@ -72,17 +71,16 @@ impl Journal {
     }
 }
 
-/// A set of ids that is filled and emptied again and again: a bit for each, and a list of those
-/// that are in it.
+/// A set of ids for repeated filling and emptying: a bit for each id, and a list of its members.
 #[derive(Clone, Debug, Default)]
 pub struct IdSet {
-    /// bit `id % 64` of word `id / 64`: it is in the list
+    /// bit `id % 64` of word `id / 64`: the list has the id
     is_in: Vec<u64>,
     ids: Vec<u32>,
 }
 
 impl IdSet {
-    /// An empty one with room for ids below `slots`; others are taken too.
+    /// An empty set with room for ids below `slots`; larger ids are allowed too.
     pub(crate) fn with_slots(slots: usize) -> Self {
         Self {
             is_in: vec![0; slots.div_ceil(64)],
@@ -90,7 +88,7 @@ impl IdSet {
         }
     }
 
-    /// Puts an id in.
+    /// Adds an id.
     #[inline]
     pub fn insert(&mut self, id: u32) {
         let (word, bit) = (id as usize / 64, 1 << (id % 64));
@@ -103,17 +101,17 @@ impl IdSet {
         }
     }
 
-    /// Whether none is in.
+    /// Whether the set is empty.
     pub fn is_empty(&self) -> bool {
         self.ids.is_empty()
     }
 
-    /// How many are in.
+    /// Number of ids in the set.
     pub fn len(&self) -> usize {
         self.ids.len()
     }
 
-    /// Takes up to `most` out and gives them to `each`.
+    /// Removes up to `most` ids and passes them to `each`.
     pub fn take(&mut self, most: usize, mut each: impl FnMut(u32)) {
         for id in self.ids.drain(self.ids.len().saturating_sub(most)..) {
             self.is_in[id as usize / 64] &= !(1 << (id % 64));

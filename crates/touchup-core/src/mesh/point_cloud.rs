@@ -1,4 +1,4 @@
-//! Points of a scan, before there is a surface.
+//! Scan points without a surface.
 
 use nalgebra::{Point3, Vector3};
 
@@ -7,26 +7,26 @@ use nalgebra::{Point3, Vector3};
 pub struct PointCloud {
     /// N, m, in the file's own frame, which becomes O; NaN and infinity are allowed
     pub positions: Vec<Point3<f64>>,
-    /// N, of any length, out of the object; or none at all
+    /// N outward normals of any length, or none at all
     pub normals: Vec<Vector3<f64>>,
-    /// whose points follow one another; N points in all
+    /// in the order of their points; N points in all
     pub stations: Vec<ScanStation>,
 }
 
-/// Points that were scanned from one place.
+/// Points scanned from one place.
 #[derive(Clone, Copy, Debug)]
 pub struct ScanStation {
-    /// how many of the points are of it
+    /// number of its points
     pub points: usize,
-    /// where the scanner stood, m; `None`: the file does not say
+    /// position of the scanner, m; `None`: not in the file
     pub eye: Option<Point3<f64>>,
-    /// whether it saw every point from there, as the points are a grid of its rays; else the place
-    /// may be a mere default, or that of a file in which scans were merged
+    /// whether the scanner saw every point from there, as the points are a grid of its rays; else
+    /// the position may be a mere default, or that of a file of merged scans
     pub is_sure: bool,
 }
 
 impl ScanStation {
-    /// Points from a place that is not known.
+    /// Points from an unknown place.
     pub fn unknown(points: usize) -> Self {
         Self {
             points,

@@ -3,8 +3,8 @@
 use nabo::{CandidateContainer, KDTree, NotNan, Parameters, Point};
 use nalgebra::Point3;
 
-/// Steps into which the larger side of the cloud is divided for the search, 1e-13 m in 100 mm:
-/// whole numbers of them can always be halved, so no two points are too near for the tree.
+/// Steps along the larger side of the cloud, 1e-13 m in 100 mm: whole numbers of steps can always
+/// be halved, so no two points are too near for the tree.
 const STEPS: f64 = (1u64 << 40) as f64;
 
 /// A point of the tree, in steps.
@@ -27,12 +27,12 @@ impl Point<f64> for GridPoint {
 pub struct PointTree {
     tree: KDTree<f64, GridPoint>,
     low: Point3<f64>,
-    /// in 1 m
+    /// steps per metre
     steps: f64,
 }
 
 impl PointTree {
-    /// Points that the numbers of the tree can count, by far.
+    /// Maximum number of points, within the range of the tree's indices by far.
     pub const MOST_POINTS: usize = 1 << 28;
 
     /// The tree over `points`.
@@ -40,7 +40,7 @@ impl PointTree {
     /// - `points`: finite, m; at least one and at most [`Self::MOST_POINTS`].
     ///
     /// # Panics
-    /// Without a point, or with more.
+    /// Without a point, or with more than the maximum.
     pub fn new(points: &[Point3<f64>]) -> Self {
         assert!(
             (1..=Self::MOST_POINTS).contains(&points.len()),
@@ -59,8 +59,8 @@ impl PointTree {
         }
     }
 
-    /// By how much the distance of a point may be off in the tree, m: each of both points by a step
-    /// along each axis.
+    /// Error bound of a distance in the tree, m: rounding of both points by one step along each
+    /// axis.
     pub fn resolution(&self) -> f64 {
         2.0 * 3.0_f64.sqrt() / self.steps
     }

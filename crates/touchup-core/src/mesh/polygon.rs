@@ -1,5 +1,5 @@
 //! Triangles of polygons, and of plane regions with holes, on their own corners: a constrained
-//! Delaunay triangulation, so that no triangle is thinner than it has to be.
+//! Delaunay triangulation, which avoids thin triangles.
 
 use std::collections::HashMap;
 
@@ -16,10 +16,9 @@ type Delaunay = ConstrainedDelaunayTriangulation<spade::Point2<f64>>;
 
 /// Triangles of a polygon of any shape, as indices of its corners, in its own sense of rotation.
 ///
-/// A convex polygon becomes the fan from its first corner, and so does one without an area. The
-/// others are divided in the plane across their mean normal (Newell's), on which corners need not
-/// lie. A hole may be joined to the rim by a cut, a side that is passed both ways. `None` where
-/// sides cross.
+/// A polygon that is convex or without area becomes the fan from its first corner. The others are
+/// divided in the plane across their mean normal (Newell's), on which corners need not lie. A cut,
+/// a side passed both ways, may join a hole to the rim. `None` if sides cross.
 pub fn triangulate(corners: &[Point3<f64>]) -> Option<Vec<[u32; 3]>> {
     let fan = || {
         (2..corners.len() as u32)
@@ -29,7 +28,7 @@ pub fn triangulate(corners: &[Point3<f64>]) -> Option<Vec<[u32; 3]>> {
     let Some(points) = in_mean_plane(corners).filter(|points| !is_convex(points)) else {
         return Some(fan());
     };
-    // the ends of a cut are named twice
+    // the ends of a cut appear twice
     let mut named = HashMap::new();
     let mut outline: Vec<u32> = points
         .iter()
@@ -41,7 +40,7 @@ pub fn triangulate(corners: &[Point3<f64>]) -> Option<Vec<[u32; 3]>> {
         outline.pop();
     }
     let triangles = fill(&points, &[outline])?;
-    // a side that is passed both ways outside of the rest would fill that side
+    // a cut outside of the polygon would fill the wrong side
     let filled: f64 = triangles
         .iter()
         .map(|corners| doubled_area(corners.map(|at| points[at as usize])))
@@ -50,8 +49,8 @@ pub fn triangulate(corners: &[Point3<f64>]) -> Option<Vec<[u32; 3]>> {
     ((filled - wanted).abs() < ROUNDING).then_some(triangles)
 }
 
-/// The corners in the plane across the mean normal, about which they run counter-clockwise, in
-/// parts of their extent; `None` without an area.
+/// The corners in the plane across the mean normal, counter-clockwise about it, in parts of their
+/// extent; `None` without an area.
 fn in_mean_plane(corners: &[Point3<f64>]) -> Option<Vec<Point2<f64>>> {
     let first = corners.get(..4)?[0];
     let extent = corners
@@ -64,14 +63,14 @@ fn in_mean_plane(corners: &[Point3<f64>]) -> Option<Vec<Point2<f64>>> {
         .map(|side| side[0].cross(&side[1]))
         .sum();
     let [u, v] = tangent_basis(&normal.try_normalize(ROUNDING)?);
-    // what is rounding alone is 0, and −0 is
+    // rounds a mere rounding error, and −0, to 0
     let rounded = |x: f64| if x.abs() > f64::EPSILON { x } else { 0.0 };
     let at = |p: &Vector3<f64>| Point2::new(rounded(p.dot(&u)), rounded(p.dot(&v)));
     Some(from_first.iter().map(at).collect())
 }
 
-/// Twice the areas of the triangles from the first corner to each side, positive
-/// counter-clockwise; their sum is twice that of the polygon.
+/// Twice the areas of the triangles from the first corner to each side, positive counter-clockwise;
+/// their sum is twice the area of the polygon.
 fn fan_areas(points: &[Point2<f64>]) -> impl Iterator<Item = f64> {
     points
         .windows(2)
@@ -82,20 +81,20 @@ fn doubled_area([a, b, c]: [Point2<f64>; 3]) -> f64 {
     (b - a).perp(&(c - a))
 }
 
-/// Whether a polygon turns to the left alone, and once.
+/// Whether a polygon makes a single turn, and to the left alone.
 fn is_convex(points: &[Point2<f64>]) -> bool {
     let count = points.len();
     let corner = |at: usize| doubled_area([0, 1, 2].map(|next| points[(at + next) % count]));
     fan_areas(points).all(|area| area >= 0.0) && (0..count).all(|at| corner(at) >= 0.0)
 }
 
-/// What rounding makes of sums of areas, over the square of the extent.
+/// Rounding error of sums of areas, over the square of the extent.
 const ROUNDING: f64 = 1e-10;
 
-/// Triangles of the region that `loops` bound: each a list of indices into `points`, the region on
+/// Triangles of the region within `loops`: each a list of indices into `points`, with the region on
 /// its left.
 ///
-/// Loops may share points, and pass one twice. `None` when rounding has put two points in one place
+/// Loops may share points, and pass one twice. `None` if rounding has put two points in one place
 /// or lets two sides cross.
 pub(crate) fn fill(points: &[Point2<f64>], loops: &[Vec<u32>]) -> Option<Vec<Triangle>> {
     if let [corners] = loops
@@ -143,8 +142,7 @@ pub(crate) fn fill(points: &[Point2<f64>], loops: &[Vec<u32>]) -> Option<Vec<Tri
     )
 }
 
-/// The faces on the left of the sides, and those that are reached from there without crossing a
-/// side.
+/// The faces on the left of the sides, and those connected to them without crossing a side.
 fn faces_inside(
     delaunay: &Delaunay,
     sides: impl Iterator<Item = [FixedVertexHandle; 2]>,
@@ -183,7 +181,7 @@ mod tests {
             .collect()
     }
 
-    /// A square with so many square holes in a row, and points on its lower side.
+    /// A square with `holes` square holes in a row, and points on its lower side.
     fn holed(holes: u32) -> (Vec<Point2<f64>>, Vec<Vec<u32>>) {
         let width = f64::from(2 * holes + 1);
         let mut points: Vec<_> = [(0.0, 0.0), (width, 0.0), (width, 3.0), (0.0, 3.0)]

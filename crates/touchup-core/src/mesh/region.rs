@@ -1,4 +1,4 @@
-//! The part of a mesh that is touched, and the rest of it, kept aside as plain triangles.
+//! The touched part of a mesh, and the rest of it as plain triangles.
 
 use nalgebra::{Point3, Vector3};
 
@@ -9,14 +9,14 @@ use crate::numeric::distinct;
 /// A box, m, in O.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Region {
-    /// its lowest corner
+    /// lowest corner
     pub low: Point3<f64>,
-    /// its highest corner
+    /// highest corner
     pub high: Point3<f64>,
 }
 
 impl Region {
-    /// Larger by `margin` (m) on all sides.
+    /// The box widened by `margin` (m) on all sides.
     #[must_use]
     pub fn grown(&self, margin: f64) -> Self {
         Self {
@@ -25,50 +25,49 @@ impl Region {
         }
     }
 
-    /// Whether a point is in it.
+    /// Whether the box contains a point.
     #[inline]
     pub fn contains(&self, p: &Point3<f64>) -> bool {
         self.low <= *p && *p <= self.high
     }
 
-    /// Whether a triangle may reach into it: whether the box around it does.
+    /// Whether the box of a triangle overlaps this box.
     fn meets(&self, [a, b, c]: &[Point3<f64>; 3]) -> bool {
         let (low, high) = (a.inf(b).inf(c), a.sup(b).sup(c));
         low <= self.high && self.low <= high
     }
 }
 
-/// What is left of a mesh when a part of it was cut out: faces without adjacency. It is bit by bit
-/// what it was.
+/// The rest of a mesh after a cut: faces without adjacency, bit by bit as before.
 #[derive(Clone, Debug)]
 pub struct Outside {
-    /// of the vertices that the part does not have, m, in order of id
+    /// of the vertices outside the part, m, in order of id
     positions: Vec<Point3<f64>>,
-    /// for each vertex of the part its id in the whole, rising
+    /// id in the whole of each vertex of the part, rising
     vertices: Vec<u32>,
-    /// faces that the part does not have, by the ids of the whole, in order of id
+    /// faces outside the part, by the ids of the whole, in order of id
     faces: Vec<[u32; 3]>,
-    /// for each face of the part its place among all faces, rising
+    /// place of each face of the part among all faces, rising
     places: Vec<u32>,
-    /// vertices of the part that faces outside have, too, and where they are, m
+    /// vertices shared by the part and faces outside, and their positions, m
     rim: Vec<(VertexId, Point3<f64>)>,
-    /// edges of the part at which faces outside begin
+    /// edges shared by the part and faces outside
     rim_edges: Vec<[VertexId; 2]>,
 }
 
-/// A part put back into what was left of its mesh.
+/// A whole mesh made of its rest and the part cut from it.
 #[derive(Clone, Debug)]
 pub struct Sewn {
-    /// the whole: vertices and faces have the order they had, new ones come last
+    /// the whole: vertices and faces keep their order, new ones come last
     pub mesh: TriMesh,
-    /// for each vertex slot of the part its vertex in the whole
+    /// vertex in the whole of each vertex slot of the part
     pub vertices: Vec<VertexId>,
 }
 
 impl Sewn {
-    /// Values of the vertices of the part as values of those of the whole.
+    /// Values of the vertices of the part as values of the vertices of the whole.
     ///
-    /// - `outside`: of a vertex that the part does not have.
+    /// - `outside`: value of vertices outside the part.
     pub fn column<T: Copy>(&self, of_part: &[T], outside: T) -> Vec<T> {
         let mut values = vec![outside; self.mesh.vertex_slots()];
         for (vertex, value) in self.vertices.iter().zip(of_part) {
@@ -78,15 +77,14 @@ impl Sewn {
     }
 }
 
-/// No vertex of the part.
+/// A vertex outside the part.
 const NOT_IN: u32 = u32::MAX;
 
 impl TriMesh {
-    /// The faces that reach into `region`, as a mesh of their own with all corners they have, and
-    /// the rest.
+    /// Splits off the faces that reach into `region`, with all their corners, as a mesh of its own.
     ///
-    /// All faces around a vertex that lies in `region` are in the part. Vertices on its rim do not
-    /// lie in `region`: they are not to be moved, or [`Outside::sew_to`] refuses.
+    /// The part has all faces around a vertex in `region`. Vertices on its rim lie outside `region`
+    /// and must not move, or [`Outside::sew_to`] fails.
     pub fn cut(&self, region: &Region) -> (TriMesh, Outside) {
         let mut ids = vec![NOT_IN; self.vertex_slots()];
         let (mut inside, mut places, mut faces) = (Vec::new(), Vec::new(), Vec::new());
@@ -132,10 +130,10 @@ impl TriMesh {
     }
 }
 
-/// A vertex of the rim, and where it was scanned.
+/// A vertex of the rim, and its scanned position.
 type RimVertex = (VertexId, Point3<f64>);
 
-/// Vertices and edges of the part at which faces outside begin, each once.
+/// Vertices and edges shared by the part and faces outside, each once.
 fn rim_of(part: &TriMesh, faces: &[[u32; 3]], ids: &[u32]) -> (Vec<RimVertex>, Vec<[VertexId; 2]>) {
     let mut edges = Vec::new();
     let mut vertices = Vec::new();
@@ -177,10 +175,10 @@ impl Outside {
             + self.rim_edges.capacity() * size_of::<[VertexId; 2]>()
     }
 
-    /// Puts the part back, in which faces may have come, gone and moved.
+    /// Joins the rest and the part, in which faces may have come, gone and moved.
     ///
     /// # Errors
-    /// [`MeshError::TornRim`] where that reached the rim, [`MeshError::TooMany`].
+    /// [`MeshError::TornRim`] if that reached the rim, [`MeshError::TooMany`].
     pub fn sew_to(&self, part: &TriMesh) -> Result<Sewn, MeshError> {
         let is_as_it_was = |&(vertex, p): &(VertexId, Point3<f64>)| {
             part.has_vertex(vertex) && part.position(vertex) == p
@@ -218,7 +216,7 @@ impl Outside {
         })
     }
 
-    /// Faces in the order of the whole; those that were added to the part last.
+    /// Faces in the order of the whole; faces added to the part come last.
     fn all_faces(&self, part: &TriMesh, id_of: impl Fn(VertexId) -> u32) -> Vec<[u32; 3]> {
         let corners = |face: usize| {
             let face = FaceId(face as u32);

@@ -1,16 +1,16 @@
 //! Signed distance of a point from a mesh.
 //!
-//! The sign is that of (p − c)·ñ, where c is the closest point of the mesh and ñ the
-//! *pseudo-normal* there: the normal of the face, the sum of the normals of the faces at the edge,
-//! or the sum of the normals at the corner weighted by the angle each face has there. On a closed
-//! mesh this sign is right for every point \[Bærentzen Aanæs 2005\]; on an open one it goes on past
-//! the rims as the nearest face does.
+//! The sign is that of (p − c)·ñ, with the closest point c of the mesh and the *pseudo-normal* ñ
+//! there: the normal of the face, the sum of the normals of the faces at the edge, or the sum of
+//! the normals at the corner, weighted by the angle of each face there. On a closed mesh this sign
+//! is right for every point \[Bærentzen Aanæs 2005\]; beyond the rims of an open one it continues
+//! the nearest face.
 
 use nalgebra::{Point3, Vector3};
 
 use super::{FaceHit, FaceTree, TriMesh, VertexId};
 
-/// Signed distance from `p` to the mesh, m: positive outside, negative in the material; `None` when
+/// Signed distance from `p` to the mesh, m: positive outside, negative in the material; `None` if
 /// no face is nearer than `reach` (m).
 pub fn signed_distance(
     mesh: &TriMesh,
@@ -23,8 +23,7 @@ pub fn signed_distance(
     Some(hit.distance_squared.sqrt() * if is_behind { -1.0 } else { 1.0 })
 }
 
-/// Outward unit pseudo-normal of the mesh at a closest point; zero where the faces there have no
-/// area.
+/// Outward unit pseudo-normal of the mesh at a closest point; zero if the faces there have no area.
 ///
 /// - `hit`: from [`FaceTree::closest`], whose barycentric coordinates are exactly 0 on edges and
 ///   corners.
@@ -54,7 +53,7 @@ pub(crate) fn corner_normal(mesh: &TriMesh, vertex: VertexId) -> Vector3<f64> {
     weighted.sum()
 }
 
-/// Whether a closest point lies on an edge that one face alone has.
+/// Whether a closest point lies on an edge of a single face.
 pub fn is_on_rim(mesh: &TriMesh, hit: &FaceHit) -> bool {
     let corners = mesh.corners(hit.face);
     let is_open = |a: VertexId, b: VertexId| mesh.faces_at_edge(a, b).nth(1).is_none();
@@ -111,7 +110,7 @@ mod tests {
 
     #[test]
     fn a_corner_weights_its_faces_by_angle() {
-        // the corner of a cube at the origin, its faces cut into one, one and two triangles: x, y
+        // the corner of a cube at the origin, with its faces in one, one and two triangles: x, y
         // and z have the same weight
         let p = [
             [0., 0., 0.],

@@ -1,9 +1,9 @@
-//! A simplified mesh, and how its motion is carried over to the mesh that it stands for.
+//! A simplified mesh, and the transfer of its motion to the original mesh.
 //!
-//! The vertices are parted into cells around seeds (a Poisson-disk sampling with its Voronoi
-//! cells), so that thin sheets and what lies near without being connected stays apart. Each cell
-//! becomes one vertex, where the planes of its faces meet best \[Garland Heckbert 1997\]; three
-//! cells that meet in a face become a face \[Valette Chassery 2004\].
+//! Seeds (a Poisson-disk sampling) part the vertices into Voronoi cells, which keep thin sheets and
+//! near but unconnected parts separate. Each cell becomes one vertex at the best meeting point of
+//! the planes of its faces \[Garland Heckbert 1997\]; three cells that meet in a face become a face
+//! \[Valette Chassery 2004\].
 
 use std::collections::HashSet;
 
@@ -14,22 +14,22 @@ use crate::numeric::direction;
 
 /// Cell of a vertex that no face uses.
 const NONE: u32 = u32::MAX;
-/// Edges of the simplified mesh are longer than the distance between seeds by this, in the mean.
+/// Mean edge of the simplified mesh over the distance between seeds.
 const EDGE_OF_SPACING: f64 = 1.2;
-/// Share of the largest curvature of a quadric below which a direction is left to the mean of the
-/// cell: planes 8° from a common one do not say where along it they meet.
+/// Share of the largest curvature of a quadric below which the mean of the cell decides a
+/// direction: planes within 8° of a common one do not fix their meeting point along it.
 const FLAT: f64 = 0.02;
 
-/// A mesh with few faces in place of one with many.
+/// A coarse mesh in place of a fine one.
 #[derive(Clone, Debug)]
 pub struct Simplified {
     /// the simplified mesh, m, in O
     pub mesh: TriMesh,
-    /// for each vertex slot of the original the vertex that stands for it
+    /// vertex of `mesh` for each vertex slot of the original
     cells: Vec<u32>,
 }
 
-/// What is known of a cell while it is made.
+/// Sums over a cell.
 #[derive(Clone, Copy, Debug, Default)]
 struct Cell {
     sum: Vector3<f64>,
@@ -43,11 +43,11 @@ struct Cell {
 }
 
 impl Simplified {
-    /// Simplifies `mesh` to edges of about `edge` (m), wherever it has shorter ones. O(V edge² /
-    /// (its own edges)² + F).
+    /// Simplifies `mesh` to edges of about `edge` (m) in its finer parts. O(V edge² / (its own
+    /// edges)² + F).
     ///
     /// # Errors
-    /// None is expected: those of [`TriMesh::new`].
+    /// Those of [`TriMesh::new`]; none is likely.
     pub fn new(mesh: &TriMesh, edge: f64) -> Result<Self, MeshError> {
         let spacing = edge / EDGE_OF_SPACING;
         let (cells, seeds) = cells_of(mesh, spacing);
@@ -97,7 +97,7 @@ impl Simplified {
         self.mesh.bytes() + self.cells.capacity() * size_of::<u32>()
     }
 
-    /// The vertex that stands for a vertex of the original; `None`: no face uses it.
+    /// The simplified vertex of an original vertex; `None`: no face uses it.
     pub fn cell_of(&self, vertex: VertexId) -> Option<VertexId> {
         self.cells
             .get(vertex.0 as usize)
@@ -105,11 +105,11 @@ impl Simplified {
             .map(|&cell| VertexId(cell))
     }
 
-    /// The original, moved as the simplified mesh was: a vertex keeps its place beside the face
-    /// that it is nearest to, turned as the corners of that face are. What is near unmoved faces
-    /// alone stays, bit by bit.
+    /// The original with the motion of the simplified mesh: a vertex keeps its place beside its
+    /// nearest face, turned like the corners of that face. Vertices near unmoved faces alone stay,
+    /// bit by bit.
     ///
-    /// - `original`: that it was made of.
+    /// - `original`: source of the simplified mesh.
     /// - `moved`: the simplified mesh, with other positions.
     pub fn carry(&self, original: &TriMesh, moved: &TriMesh) -> TriMesh {
         let mut detailed = original.clone();
@@ -133,7 +133,7 @@ impl Simplified {
         detailed
     }
 
-    /// As [`Self::carry`], for vertices of one cell: `put` takes where each of them is then.
+    /// [`Self::carry`] for vertices of one cell: `put` receives the new place of each.
     ///
     /// - `moved`: has the vertices of the simplified mesh, and may have other faces.
     pub fn carry_cell(
@@ -170,8 +170,8 @@ impl Simplified {
         }
     }
 
-    /// How a vertex of the simplified mesh has turned: from its normal as scanned to that as moved;
-    /// `None` where it has not moved.
+    /// Rotation of a simplified vertex, from its normal before to its normal in `moved`; `None` if
+    /// it has not moved.
     fn turn(&self, vertex: VertexId, moved: &TriMesh) -> Option<UnitQuaternion<f64>> {
         if self.mesh.position(vertex) == moved.position(vertex) {
             return None;
@@ -183,7 +183,7 @@ impl Simplified {
 
     /// Sum of the normals of the faces around a vertex, each times its area, m².
     ///
-    /// - `positions`: of the simplified mesh or of one that was moved, m.
+    /// - `positions`: of the simplified or of a moved mesh, m.
     fn star_normal(&self, vertex: VertexId, positions: &[Point3<f64>]) -> Vector3<f64> {
         let doubled = self.mesh.star(vertex).iter().map(|&face| {
             let [a, b, c] = self
@@ -195,7 +195,7 @@ impl Simplified {
         doubled.sum::<Vector3<f64>>() * 0.5
     }
 
-    /// Where a vertex of the original goes; `None`: it stays.
+    /// New place of an original vertex; `None`: it stays.
     fn carried(
         &self,
         here: &Point3<f64>,
@@ -233,8 +233,8 @@ impl Simplified {
 }
 
 impl Cell {
-    /// Where its vertex is, relative to the seed, m: at the rim the mean of the rim, else where the
-    /// planes of its faces meet best, and the mean where they leave that open.
+    /// Place of the cell's vertex relative to the seed, m: the mean of its rim, else the best
+    /// meeting point of the planes of its faces, with the mean in directions left open.
     fn place(&self, spacing: f64) -> Vector3<f64> {
         if self.rim_count > 0.0 {
             return self.rim_sum / self.rim_count;
@@ -273,7 +273,7 @@ fn cells_of(mesh: &TriMesh, spacing: f64) -> (Vec<u32>, Vec<Point3<f64>>) {
         if mesh.star(VertexId(vertex)).is_empty() {
             continue;
         }
-        // takes what is nearer to it than to any seed before, as far as it is connected within the
+        // takes vertices nearer to it than to any earlier seed, as far as connected within the
         // spacing
         let (seed, number) = (mesh.position(VertexId(vertex)), seeds.len() as u32);
         seeds.push(seed);
@@ -306,7 +306,7 @@ fn cells_of(mesh: &TriMesh, spacing: f64) -> (Vec<u32>, Vec<Point3<f64>>) {
     (cells, seeds)
 }
 
-/// Whether a vertex is at the rim: around others each neighbour is met twice.
+/// Whether a vertex is at the rim: inside, each neighbour appears twice.
 fn is_at_rim(mesh: &TriMesh, vertex: VertexId) -> bool {
     mesh.star(vertex)
         .iter()

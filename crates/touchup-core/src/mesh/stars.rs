@@ -1,26 +1,26 @@
-//! The faces around each vertex, in one array that gives back what it took.
+//! The faces around each vertex, in one array that reuses its free blocks.
 //!
-//! The stars of a mesh as it was loaded are stored one after another, without gaps. A star that
-//! outgrows its place moves to a block of twice the size, one of which little is left to a block of
-//! half the size. Blocks that are left are kept by size (powers of two) and used again first, so
-//! that replacing faces without end takes no more than the largest number of blocks of each size
-//! that was ever needed at once.
+//! The stars of a loaded mesh are stored one after another, without gaps. A star that outgrows its
+//! place moves to a block of twice the size; a star much smaller than its block moves to one of
+//! half the size. Free blocks are kept by size (powers of two) and reused first, so endless
+//! replacement of faces takes no more than the largest number of blocks of each size ever in use at
+//! once.
 
 use super::FaceId;
 
-/// No block; also the entry of a block that holds no face.
+/// No block; also the entry of a block without a face.
 const NONE: u32 = u32::MAX;
 /// Faces in the smallest block.
 const SMALLEST_BLOCK: u32 = 4;
-/// A star moves to a smaller block when it fills less than this share (1/4) of its own, so that
-/// many faces come or go between two moves.
+/// Smallest share (1/4) of its block that a star fills before it moves to a smaller one; many faces
+/// come or go between two moves.
 const SMALLEST_FILL: u32 = 4;
-/// Largest number of entries: each is named by 32 bits, the last of which means none.
+/// Largest number of entries: their names have 32 bits, and the last name means none.
 const LARGEST: usize = NONE as usize;
-/// Faces that a mesh can have at most: each is in three stars.
+/// Maximum number of faces of a mesh: each is in three stars.
 pub(super) const MOST_FACES: usize = LARGEST / 3;
 
-/// Where the faces around one vertex are in the list of entries.
+/// Place of the faces around one vertex in the list of entries.
 #[derive(Clone, Copy, Debug, Default)]
 struct StarSlot {
     start: u32,
@@ -40,8 +40,7 @@ const REMOVED: StarSlot = StarSlot {
 pub(super) struct Stars {
     slots: Vec<StarSlot>,
     entries: Vec<FaceId>,
-    /// for each power of two: the first free block of that size, whose first entry names the next
-    /// one
+    /// first free block of each power of two; its first entry names the next one
     free: [u32; 32],
 }
 
@@ -53,7 +52,7 @@ impl Stars {
         &self.entries[slot.start as usize..(slot.start + slot.len) as usize]
     }
 
-    /// Adds a vertex without faces: a new one, or one that was removed.
+    /// Adds a vertex without faces: a new or a removed one.
     pub fn add_vertex(&mut self, vertex: u32) {
         match self.slots.get_mut(vertex as usize) {
             Some(slot) => *slot = StarSlot::default(),
@@ -61,7 +60,7 @@ impl Stars {
         }
     }
 
-    /// Whether a vertex is there.
+    /// Whether a vertex exists.
     #[inline]
     pub fn has(&self, vertex: u32) -> bool {
         self.slots
@@ -76,13 +75,13 @@ impl Stars {
         self.give_back(slot);
     }
 
-    /// Whether a face more at each of three vertices is sure to find a place.
+    /// Whether one more face at each of three vertices surely fits.
     #[inline]
     pub fn have_room(&self, corners: &[u32; 3]) -> bool {
         self.growth(corners) <= LARGEST - self.entries.len()
     }
 
-    /// Entries that a face more at each of three vertices may add.
+    /// Entries that one more face at each of three vertices may add.
     #[inline]
     fn growth(&self, corners: &[u32; 3]) -> usize {
         let full = corners
@@ -150,7 +149,7 @@ impl Stars {
         start as u32
     }
 
-    /// Keeps a block for later; of one that was never moved, as much as is a power of two.
+    /// Frees a block; of a star in its first place, the largest power of two in it.
     fn give_back(&mut self, slot: StarSlot) {
         if slot.capacity >= SMALLEST_BLOCK {
             let first = &mut self.free[slot.capacity.ilog2() as usize];
@@ -159,9 +158,9 @@ impl Stars {
         }
     }
 
-    /// Makes room for so many vertices and faces more; `None` where memory is short.
+    /// Makes room for more vertices and faces; `None` if memory is short.
     pub fn reserve(&mut self, vertices: usize, faces: usize) -> Option<()> {
-        // each face is in three stars: of six faces in blocks of eight
+        // each face is in three stars, of six faces in blocks of eight
         let entries = faces.checked_mul(4)?;
         self.slots.try_reserve(vertices).ok()?;
         self.entries.try_reserve(entries).ok()
@@ -174,13 +173,13 @@ impl Stars {
     }
 }
 
-/// The smallest block for so many faces.
+/// Size of the smallest block for `faces` faces.
 #[inline]
 fn block_for(faces: u32) -> u32 {
     faces.max(SMALLEST_BLOCK).next_power_of_two()
 }
 
-/// How many faces each vertex has: the first half of the counting sort that finds the stars, in the
+/// Number of faces of each vertex: the first half of the counting sort that finds the stars, in the
 /// place of its result.
 pub(super) struct Valences(Vec<StarSlot>);
 
@@ -203,13 +202,13 @@ impl Valences {
         self.0.iter().map(|slot| slot.capacity > 0)
     }
 
-    /// Forgets the vertices without a face.
+    /// Removes the vertices without a face.
     pub fn retain_used(&mut self) {
         self.0.retain(|slot| slot.capacity > 0);
     }
 
-    /// The faces around each vertex, in rising order; `faces`: those that were counted,
-    /// [`MOST_FACES`] at most.
+    /// The faces around each vertex, in rising order; `faces`: the counted ones, at most
+    /// [`MOST_FACES`].
     pub fn stars_of(self, faces: &[[u32; 3]]) -> Stars {
         let mut slots = self.0;
         let mut end = 0;
@@ -237,7 +236,7 @@ impl Valences {
 mod tests {
     use super::*;
 
-    /// One vertex whose star is as counted, for each valence.
+    /// Stars of one vertex for each valence.
     fn stars(valences: &[u32]) -> Stars {
         let mut counted = Valences::new(valences.len());
         for (vertex, &valence) in valences.iter().enumerate() {

@@ -7,23 +7,23 @@ use super::stars::{MOST_FACES, Stars, Valences};
 use super::{FaceId, VertexId};
 use crate::numeric::direction;
 
-/// Faces looked at to find the mean edge.
+/// Sample size in faces for the mean edge.
 const EDGE_SAMPLE: usize = 20_000;
 /// Marks the slot of a removed face; no id.
 const REMOVED: u32 = u32::MAX;
-/// A coordinate beyond it is a fault and not a place, m: products of six such lengths are still far
-/// from overflow.
+/// Largest coordinate of a place, m; larger ones are faults. Products of six such lengths are still
+/// far from overflow.
 pub const FARTHEST: f64 = 1e9;
-/// Vertices that ids can name.
+/// Maximum number of vertices that ids can name.
 const MOST_VERTICES: usize = REMOVED as usize - 1;
 
-/// What makes a triangle soup unusable as a [`TriMesh`].
+/// Faults that make a triangle soup unusable as a [`TriMesh`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
-    /// No face is left to touch.
+    /// No usable face.
     #[error("the mesh has no face of non-zero area")]
     Empty,
-    /// A part that was cut out and does not fit into the rest any more.
+    /// A part that no longer fits into the rest it was cut from.
     #[error(
         "what was touched reaches the rim of the part that may be: make scan.region_low_mm and scan.region_high_mm wider, \
          and refine the recording again"
@@ -32,54 +32,54 @@ pub enum MeshError {
     /// An index beyond the vertices.
     #[error("face {face} uses vertex {vertex}, but there are only {vertices} vertices")]
     VertexOutOfRange {
-        /// which face, counted from 0
+        /// index of the face, from 0
         face: usize,
-        /// the index found
+        /// its index
         vertex: u32,
-        /// how many vertices there are
+        /// number of vertices
         vertices: usize,
     },
-    /// A face that names a vertex that was removed.
+    /// A face that names a removed vertex.
     #[error("face {face} uses vertex {vertex}, which was removed")]
     RemovedVertex {
-        /// which face, counted from 0
+        /// index of the face, from 0
         face: usize,
-        /// the vertex that is gone
+        /// the removed vertex
         vertex: u32,
     },
     /// A face that names a vertex twice.
     #[error("face {face} uses vertex {vertex} twice")]
     RepeatedVertex {
-        /// which face, counted from 0
+        /// index of the face, from 0
         face: usize,
-        /// the index found twice
+        /// the repeated vertex
         vertex: u32,
     },
-    /// NaN or infinite coordinate, or one that no place has.
+    /// NaN, infinite or implausibly large coordinate.
     #[error("vertex {vertex} has a coordinate that is not a number within {FARTHEST:e} m")]
     NotFinite {
-        /// which vertex, counted from 0
+        /// index of the vertex, from 0
         vertex: usize,
     },
-    /// More faces or vertices than 32-bit ids can name, or than there is memory for.
+    /// More faces or vertices than 32-bit ids can name or memory can hold.
     #[error(
         "{count} {what} are more than 32-bit numbers can count or memory can hold: reduce the mesh first"
     )]
     TooMany {
         /// "faces" or "vertices"
         what: &'static str,
-        /// how many
+        /// their number
         count: usize,
     },
 }
 
-/// A triangle mesh whose vertices are expressed in the object frame O.
+/// A triangle mesh with vertices in the object frame O.
 ///
 /// `positions`: V × 3, m, in O; `faces`: F × 3, counter-clockwise seen from outside.
 ///
 /// Invariants: every coordinate is within [`FARTHEST`]; every index is in range; no face uses a
-/// vertex twice. Faces may have any shape, edges may be shared by any number of faces (scans are
-/// like that): what a scan lacks is in [`crate::mesh::RepairReport`], not refused here.
+/// vertex twice. Faces may have any shape, and any number of faces may share an edge, as in scans:
+/// [`crate::mesh::RepairReport`] counts such faults, this type allows them.
 #[derive(Clone, Debug)]
 pub struct TriMesh {
     positions: Vec<Point3<f64>>,
@@ -87,15 +87,15 @@ pub struct TriMesh {
     stars: Stars,
     free_faces: Vec<FaceId>,
     free_vertices: Vec<VertexId>,
-    /// what changed since the last [`Self::take_changes`], once [`Self::watch`] was called
+    /// changes since the last [`Self::take_changes`], after a call of [`Self::watch`]
     journal: Option<Box<Journal>>,
 }
 
 impl TriMesh {
-    /// Builds the adjacency of checked arrays.
+    /// Builds the adjacency after checking the arrays.
     ///
     /// # Errors
-    /// Every breach of the invariants above; nothing is repaired here.
+    /// Every breach of the invariants above; repairs nothing.
     pub fn new(positions: Vec<Point3<f64>>, faces: Vec<[u32; 3]>) -> Result<Self, MeshError> {
         for (what, count, limit) in [
             ("vertices", positions.len(), MOST_VERTICES),
@@ -116,8 +116,7 @@ impl TriMesh {
         Ok(Self::of_sound(positions, faces, valences))
     }
 
-    /// Builds the adjacency of arrays that keep the invariants above, and whose faces have been
-    /// counted.
+    /// Builds the adjacency of arrays that keep the invariants above, with their faces counted.
     pub(super) fn of_sound(
         positions: Vec<Point3<f64>>,
         faces: Vec<[u32; 3]>,
@@ -139,7 +138,7 @@ impl TriMesh {
         }
     }
 
-    /// Number of vertices, removed ones not counted.
+    /// Number of vertices without the removed ones.
     pub fn vertex_count(&self) -> usize {
         self.positions.len() - self.free_vertices.len()
     }
@@ -150,7 +149,7 @@ impl TriMesh {
         self.positions.len()
     }
 
-    /// Number of faces, removed ones not counted.
+    /// Number of faces without the removed ones.
     pub fn face_count(&self) -> usize {
         self.faces.len() - self.free_faces.len()
     }
@@ -166,8 +165,8 @@ impl TriMesh {
         &self.positions
     }
 
-    /// The lowest and the highest corner of the box around all vertices, m, in O; inverted where
-    /// there is none.
+    /// The lowest and the highest corner of the box around all vertices, m, in O; inverted without
+    /// vertices.
     pub fn bounds(&self) -> [Point3<f64>; 2] {
         let empty = [f64::INFINITY, f64::NEG_INFINITY].map(|x| Point3::new(x, x, x));
         self.positions
@@ -175,7 +174,7 @@ impl TriMesh {
             .fold(empty, |[lo, hi], p| [lo.inf(p), hi.sup(p)])
     }
 
-    /// All faces with their ids, in order of id, removed ones left out.
+    /// All faces except removed ones with their ids, in order of id.
     pub fn faces(&self) -> impl Iterator<Item = (FaceId, [VertexId; 3])> + '_ {
         let there = self
             .faces
@@ -185,12 +184,12 @@ impl TriMesh {
         there.map(|(face, corners)| (FaceId(face as u32), corners.map(VertexId)))
     }
 
-    /// Whether `vertex` names a vertex that is there.
+    /// Whether `vertex` names an existing vertex.
     pub fn has_vertex(&self, vertex: VertexId) -> bool {
         self.stars.has(vertex.0)
     }
 
-    /// Whether `face` names a face that is there.
+    /// Whether `face` names an existing face.
     pub fn has_face(&self, face: FaceId) -> bool {
         self.faces
             .get(face.0 as usize)
@@ -203,11 +202,11 @@ impl TriMesh {
         self.faces[face.0 as usize].map(VertexId)
     }
 
-    /// The two corners of a face that follow one of it, in the order of [`Self::corners`].
+    /// The two corners of a face that follow `vertex`, in the order of [`Self::corners`].
     #[inline]
     pub(crate) fn other_corners(&self, face: FaceId, vertex: VertexId) -> [VertexId; 2] {
         let [a, b, c] = self.corners(face);
-        // each chosen alone, so that no branch has to be guessed
+        // separate choices, which need no branch
         let (at_a, at_b) = (vertex == a, vertex == b);
         let next = if at_a {
             b
@@ -245,7 +244,7 @@ impl TriMesh {
         (b - a).cross(&(c - a))
     }
 
-    /// Outward unit normal of a face; zero when the face has no area.
+    /// Outward unit normal of a face; zero if the face has no area.
     #[inline]
     pub fn normal(&self, face: FaceId) -> Vector3<f64> {
         direction(&self.double_area_normal(face)).unwrap_or_else(Vector3::zeros)
@@ -272,14 +271,14 @@ impl TriMesh {
             .filter(move |&f| self.corners(f).contains(&b))
     }
 
-    /// Whether no edge is that of one face alone. O(F).
+    /// Whether no edge belongs to a single face. O(F).
     pub fn is_closed(&self) -> bool {
         let is_rim = |a, b| self.faces_at_edge(a, b).nth(1).is_none();
         self.faces()
             .all(|(_, [a, b, c])| !is_rim(a, b) && !is_rim(b, c) && !is_rim(c, a))
     }
 
-    /// Moves one vertex; an index over the faces must be refitted
+    /// Moves one vertex; refit any index over the faces afterwards
     /// ([`crate::mesh::FaceTree::refit`]).
     #[inline]
     pub fn set_position(&mut self, vertex: VertexId, position: Point3<f64>) {
@@ -288,7 +287,7 @@ impl TriMesh {
         self.note_vertex(vertex.0);
     }
 
-    /// From here on notes what changes, for [`Self::take_changes`].
+    /// Starts to record changes for [`Self::take_changes`].
     pub fn watch(&mut self) {
         self.journal = Some(Box::new(Journal::new(
             self.vertex_slots(),
@@ -296,8 +295,8 @@ impl TriMesh {
         )));
     }
 
-    /// Lists what changed since the last call, up to `most` vertices and as many faces, and adds it
-    /// to `into`; returns whether that was all. Nothing before [`Self::watch`].
+    /// Adds the changes since the last call, up to `most` vertices and up to `most` faces, to
+    /// `into`; returns whether none remain. Nothing before [`Self::watch`].
     pub fn take_changes(&mut self, most: usize, into: &mut Changes) -> bool {
         self.journal
             .as_mut()
@@ -316,7 +315,7 @@ impl TriMesh {
         if count > 0.0 { sum / count } else { 0.0 }
     }
 
-    /// How many edits were noted since [`Self::watch`]: it grows with each.
+    /// Number of edits since [`Self::watch`].
     pub fn edits(&self) -> u64 {
         self.journal.as_ref().map_or(0, |journal| journal.edits())
     }
@@ -335,11 +334,11 @@ impl TriMesh {
         }
     }
 
-    /// Makes room for so many vertices and faces more: adding them in the shape of a regular mesh
+    /// Makes room for more vertices and faces: adding them in the shape of a regular mesh then
     /// allocates nothing.
     ///
     /// # Errors
-    /// [`MeshError::TooMany`] where memory is short.
+    /// [`MeshError::TooMany`] if memory is short.
     pub fn reserve(&mut self, vertices: usize, faces: usize) -> Result<(), MeshError> {
         let short = |what, count| MeshError::TooMany { what, count };
         self.positions
@@ -363,7 +362,7 @@ impl TriMesh {
             + self.journal.as_ref().map_or(0, |journal| journal.bytes())
     }
 
-    /// Adds a vertex that no face uses yet; the slot of a removed vertex is used again first.
+    /// Adds a vertex without faces; reuses the slot of a removed vertex first.
     ///
     /// # Errors
     /// [`MeshError::NotFinite`], [`MeshError::TooMany`].
@@ -403,8 +402,7 @@ impl TriMesh {
         true
     }
 
-    /// Adds a face, counter-clockwise seen from outside; the slot of a removed face is used again
-    /// first.
+    /// Adds a face, counter-clockwise seen from outside; reuses the slot of a removed face first.
     ///
     /// # Errors
     /// [`MeshError::VertexOutOfRange`], [`MeshError::RemovedVertex`],
@@ -437,7 +435,7 @@ impl TriMesh {
 
     /// Removes a face; its vertices stay. Returns whether there was such a face.
     ///
-    /// Remove it from an index over the faces before ([`crate::mesh::FaceTree::remove`]).
+    /// Remove it from any index over the faces first ([`crate::mesh::FaceTree::remove`]).
     pub fn remove_face(&mut self, face: FaceId) -> bool {
         if !self.has_face(face) {
             return false;
@@ -458,7 +456,7 @@ impl TriMesh {
     }
 }
 
-/// Whether all coordinates are within [`FARTHEST`]; not of NaN.
+/// Whether all coordinates are within [`FARTHEST`]; false for NaN.
 #[inline]
 pub fn is_place(p: &Point3<f64>) -> bool {
     p.coords.iter().all(|x| x.abs() <= FARTHEST)

@@ -4,19 +4,19 @@ use nalgebra::{Point3, Vector3};
 
 use crate::numeric::{direction, length_and_direction};
 
-/// Twice the area over the longest edge squared, itself squared, below which the foot inside a
-/// triangle is found by another formula: the quotient of areas loses ε/0.01 of the edge there, and
-/// everything where there is no area.
+/// Quality below which another formula finds the foot inside a triangle, as twice the area over the
+/// longest edge squared, itself squared: the quotient of areas loses ε/0.01 of the edge there, and
+/// everything without an area.
 const THIN: f64 = 0.01;
-/// A product of four lengths, m⁴, below which its parts have lost digits or are gone: edges of some
+/// A product of four lengths, m⁴, below which its parts lack digits or are gone: edges of some
 /// 1e-73 m.
 const SMALLEST_PRODUCT: f64 = f64::MIN_POSITIVE / f64::EPSILON;
 
-/// The point of triangle `abc` that is closest to `p`, with its barycentric coordinates.
+/// The point of triangle `abc` closest to `p`, with its barycentric coordinates.
 ///
-/// The Voronoi region of `p` (corner, edge or inside) is found from signed areas \[Ericson 2005,
-/// sec. 5.1.5\]. A triangle without area is treated as its sides: the result is always a point of
-/// the triangle.
+/// Signed areas give the Voronoi region of `p` (corner, edge or inside) \[Ericson 2005, sec.
+/// 5.1.5\]. A triangle without area counts as its sides: the result is always a point of the
+/// triangle.
 #[inline]
 pub fn closest_point(p: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> (Point3<f64>, [f64; 3]) {
     let (ab, ac, ap) = (b - a, c - a, p - a);
@@ -50,7 +50,7 @@ pub fn closest_point(p: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> (Point3<f
         return (b + (c - b) * t, [0.0, 1.0 - t, t]);
     }
     let area = va + vb + vc;
-    // the squared edges are differences of what is there
+    // the squared edges are differences of known terms
     let longest = (d1 - d3).max(d2 - d6).max((d4 - d3) + (d5 - d6));
     if area < (THIN * longest * longest).max(SMALLEST_PRODUCT) {
         return closest_point_of_thin(p, [a, b, c]);
@@ -61,7 +61,7 @@ pub fn closest_point(p: &Point3<f64>, [a, b, c]: &[Point3<f64>; 3]) -> (Point3<f
 }
 
 /// [`closest_point`] of a triangle with little or no area: the nearest of the points on its sides,
-/// and of the foot on its plane where that is inside.
+/// and of the foot on its plane if that is inside.
 #[cold]
 fn closest_point_of_thin(p: &Point3<f64>, corners: [&Point3<f64>; 3]) -> (Point3<f64>, [f64; 3]) {
     let mut best = (*corners[0], [1.0, 0.0, 0.0]);

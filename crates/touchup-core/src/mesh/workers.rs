@@ -3,13 +3,12 @@
 /// A piece of work.
 pub type Job<'a> = Box<dyn FnOnce() + Send + 'a>;
 
-/// Runs pieces of work that do not depend on each other. Their results are the same however they
-/// are run, and in whatever order.
+/// Runs independent pieces of work. The results depend neither on the threads nor on the order.
 pub trait Workers: Sync {
-    /// How many pieces are done at the same time, about.
+    /// Approximate number of pieces in progress at the same time.
     fn count(&self) -> usize;
 
-    /// Does them all before it returns.
+    /// Completes all pieces before it returns.
     fn run(&self, jobs: Vec<Job<'_>>);
 }
 
@@ -27,10 +26,10 @@ impl Workers for Alone {
     }
 }
 
-/// Items of a piece at least: a thread costs as much as a hundred closest faces.
+/// Smallest number of items in a piece: a thread costs as much as a hundred closest faces.
 const LEAST_PIECE: usize = 4_000;
 
-/// What `each` makes of 0 to `count` − 1, in this order, for any workers.
+/// Results of `each` for 0 to `count` − 1, in this order, for any workers.
 pub(crate) fn map_by<T: Send>(
     workers: &dyn Workers,
     count: usize,
@@ -39,7 +38,7 @@ pub(crate) fn map_by<T: Send>(
     map_pieces_by(workers, count, LEAST_PIECE, each)
 }
 
-/// As [`map_by`], of items of which `least` are worth a thread.
+/// [`map_by`] for items worth a thread from `least` on.
 pub(crate) fn map_pieces_by<T: Send>(
     workers: &dyn Workers,
     count: usize,
@@ -61,7 +60,7 @@ pub(crate) fn map_pieces_by<T: Send>(
     parts.into_iter().flatten().collect()
 }
 
-/// For tests: as if so many pieces were done at the same time, the last one first.
+/// For tests: as if `self.0` pieces ran at the same time, the last one first.
 #[cfg(test)]
 pub(in crate::mesh) struct Backwards(pub usize);
 

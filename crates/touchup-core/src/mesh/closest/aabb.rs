@@ -25,7 +25,7 @@ impl Aabb {
         }
     }
 
-    /// Around some faces.
+    /// Bounds of some faces.
     #[inline]
     pub fn around(
         mesh: &TriMesh,
@@ -45,8 +45,8 @@ impl Aabb {
         }
     }
 
-    /// Takes in the corners of a face, rounded to nearest; [`Self::rounded_outward`] makes up for
-    /// that.
+    /// Extends the box by the corners of a face, rounded to nearest; [`Self::rounded_outward`]
+    /// makes up for the rounding.
     #[inline]
     fn take(&mut self, mesh: &TriMesh, face: FaceId, origin: &Point3<f64>) {
         for corner in mesh.triangle(face) {
@@ -83,14 +83,14 @@ impl Aabb {
         .rounded_outward()
     }
 
-    /// Half of the surface, m²; what a query pays for a box grows with it.
+    /// Half of the surface, m²; the cost of a query grows with it.
     #[inline]
     pub fn half_area(&self) -> f32 {
         let [x, y, z]: [f32; 3] = std::array::from_fn(|i| self.hi[i] - self.lo[i]);
         x * y + y * z + z * x
     }
 
-    /// Whether another box is wholly inside.
+    /// Whether this box contains all of another one.
     #[inline]
     pub fn encloses(&self, other: &Self) -> bool {
         (0..3).fold(true, |all, i| {
@@ -106,7 +106,7 @@ impl Aabb {
         x * x + y * y + z * z
     }
 
-    /// The largest box of single precision within a box: it overlaps the same boxes of single
+    /// The largest box of single precision within a box; it overlaps the same boxes of single
     /// precision.
     pub fn within(lo: &Vector3<f64>, hi: &Vector3<f64>) -> Self {
         let up = |x: f64| {
@@ -122,7 +122,7 @@ impl Aabb {
         }
     }
 
-    /// Whether two boxes meet; without branches, for the outcome is hard to predict.
+    /// Whether two boxes overlap; without branches, as the outcome is hard to predict.
     #[inline]
     pub fn overlaps(&self, other: &Self) -> bool {
         (0..3).fold(true, |all, i| {

@@ -1,7 +1,7 @@
 //! Builds the tree over a mesh, or rebuilds it over the few faces below a node.
 //!
-//! First the faces are sorted into the order of the leaves, then the nodes above them are made:
-//! once it is known how many there are on either side, both sides are made at the same time.
+//! The faces are first sorted into the order of the leaves; then the nodes above them follow, both
+//! sides at the same time as soon as their sizes are known.
 
 use std::slice;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -13,12 +13,12 @@ use super::{FaceTree, Item, LEAF_FACES, NONE, ROOT, SiblingNodes, TreeNode};
 use crate::mesh::{Alone, FaceId, Job, TriMesh, Workers};
 use crate::numeric::largest;
 
-/// A split at the middle is taken only if it leaves at least this share on either side (1/4).
+/// Smallest share (1/4) on either side of a split at the middle; else the split is by count.
 const SMALLEST_SHARE: usize = 4;
-/// So few are halved by count, to fill two leaves: 3 bytes less for a face, and queries are no
-/// slower.
+/// Up to this number, items are halved by count to fill two leaves: 3 bytes less for a face, with
+/// queries as fast.
 const FULL_LEAVES: usize = 2 * LEAF_FACES;
-/// Fewer faces are not worth a thread.
+/// Smallest number of faces worth a thread.
 const LEAST_FORKED: usize = 20_000;
 
 impl FaceTree {
@@ -27,7 +27,7 @@ impl FaceTree {
         Self::new_by(mesh, &Alone)
     }
 
-    /// [`Self::new`] by `workers`: the same tree, whoever builds it.
+    /// [`Self::new`] by `workers`; the tree does not depend on them.
     pub fn new_by(mesh: &TriMesh, workers: &dyn Workers) -> Self {
         let [lo, hi] = mesh.bounds();
         let origin = if mesh.positions().is_empty() {
@@ -39,7 +39,7 @@ impl FaceTree {
             .faces()
             .map(|(face, _)| Item::of(mesh, face, &origin))
             .collect();
-        // two pieces for each worker: they are not equally large
+        // two pieces for each worker, as pieces differ in size
         let forks = if workers.count() > 1 {
             usize::BITS - workers.count().leading_zeros()
         } else {
@@ -49,7 +49,7 @@ impl FaceTree {
         let count = order.pairs();
         let (mut pairs, mut parents, mut leaf_faces) = (Vec::new(), Vec::new(), Vec::new());
         let mut leaf_of_face: Vec<AtomicU32> = Vec::new();
-        // each is written by whoever has the face
+        // the job of a face writes its entry
         let blank = |slots| (0..slots).map(|_| AtomicU32::new(NONE)).collect();
         workers.run(vec![
             Box::new(|| pairs = vec![SiblingNodes([TreeNode::NOTHING; 2]); count]),
@@ -90,8 +90,7 @@ impl FaceTree {
         }
     }
 
-    /// Rebuilds the subtree of node `at`, from the faces below `nodes` and one face more if there
-    /// is one to add.
+    /// Rebuilds the subtree of node `at`, from the faces below `nodes` and an optional added face.
     pub(super) fn rebuild(
         &mut self,
         mesh: &TriMesh,
@@ -118,7 +117,7 @@ impl FaceTree {
         (self.items, self.lefts) = (items, lefts);
     }
 
-    /// Lists the faces below a node and gives back what holds them.
+    /// Lists the faces below a node and frees its pairs and leaves.
     fn take_apart(&mut self, mesh: &TriMesh, node: TreeNode, items: &mut Vec<Item>) {
         if node.is_leaf() {
             items.extend(
@@ -154,7 +153,7 @@ impl Item {
     }
 }
 
-/// How the boxes around faces are found.
+/// Source of the boxes around faces.
 struct Boxes<'a> {
     mesh: &'a TriMesh,
     origin: Point3<f64>,
@@ -167,19 +166,19 @@ impl Boxes<'_> {
     }
 }
 
-/// Where nodes are put.
+/// Storage of the nodes.
 trait NodeStore {
-    /// A place for two nodes below the node `above`.
+    /// Allocates a pair of nodes below the node `above`.
     fn take_pair(&mut self, above: u32) -> u32;
 
-    /// Puts nodes there.
+    /// Writes a pair of nodes.
     fn put_pair(&mut self, pair: u32, nodes: SiblingNodes);
 
-    /// Puts the faces of the leaf `at` in a place of their own.
+    /// Stores the faces of the leaf `at`, and returns their place.
     fn put_leaf(&mut self, items: &[Item], at: u32) -> u32;
 }
 
-/// Places that are free are used first.
+/// Free places are used first.
 impl NodeStore for FaceTree {
     fn take_pair(&mut self, above: u32) -> u32 {
         let pair = self.free_pair;
@@ -221,13 +220,13 @@ struct Places<'a> {
     parents: &'a mut [u32],
     leaf_faces: &'a mut [[FaceId; LEAF_FACES]],
     leaf_of_face: &'a [AtomicU32],
-    /// which is the first of these pairs …
+    /// first of these pairs in the whole tree
     first_pair: u32,
-    /// … and leaves, in the whole tree
+    /// first of these leaves in the whole tree
     first_leaf: u32,
 }
 
-/// What is left of some [`Places`].
+/// The unused rest of some [`Places`].
 struct PlacesLeft<'a> {
     all: Places<'a>,
     pairs: u32,
@@ -258,17 +257,17 @@ impl NodeStore for PlacesLeft<'_> {
     }
 }
 
-/// How many items go to the left of each inner node, from the top down, left before right.
+/// Number of items to the left of each inner node, from the top down, left before right.
 enum LeafOrder {
     Whole(Vec<u32>),
-    /// of a node whose sides are known each for itself
+    /// a node with an order for each side
     Forked(usize, Box<[LeafOrder; 2]>),
 }
 
 impl LeafOrder {
     /// Sorts the items into the order of the leaves.
     ///
-    /// - `forks`: so often the items are shared by two jobs.
+    /// - `forks`: number of levels that split the items between two jobs.
     fn arrange(items: &mut [Item], forks: u32, workers: &dyn Workers) -> Self {
         if forks == 0 || items.len() < LEAST_FORKED {
             let mut lefts = Vec::with_capacity(items.len() / 2);
@@ -285,7 +284,7 @@ impl LeafOrder {
         Self::Forked(left, sides)
     }
 
-    /// How many inner nodes there are.
+    /// Number of inner nodes.
     fn pairs(&self) -> usize {
         match self {
             Self::Whole(lefts) => lefts.len(),
@@ -293,7 +292,7 @@ impl LeafOrder {
         }
     }
 
-    /// Makes the node `at` over the sorted items, and the nodes below it.
+    /// Builds the node `at` over the sorted items, and the nodes below it.
     fn grow(
         &self,
         items: &[Item],
@@ -360,8 +359,8 @@ impl LeafOrder {
     }
 }
 
-/// Sorts the items into the order of the leaves, and notes how many go to the left of each inner
-/// node, from the top down, left before right.
+/// Sorts the items into the order of the leaves, and lists the number of items to the left of each
+/// inner node, from the top down, left before right.
 fn arrange(items: &mut [Item], lefts: &mut Vec<u32>) {
     if items.len() <= LEAF_FACES {
         return;
@@ -373,7 +372,7 @@ fn arrange(items: &mut [Item], lefts: &mut Vec<u32>) {
     arrange(upper, lefts);
 }
 
-/// Makes the node `at` over the sorted items, and the nodes below it.
+/// Builds the node `at` over the sorted items, and the nodes below it.
 fn grow(
     items: &[Item],
     lefts: &mut slice::Iter<u32>,
@@ -404,8 +403,8 @@ fn grow(
     TreeNode::above(&nodes, pair)
 }
 
-/// Sorts the items into two groups and gives the size of the first: at the middle of the longest
-/// axis, or by count where that would be lopsided.
+/// Sorts the items into two groups and returns the size of the first. The split is at the middle of
+/// the longest axis, or by count if that would be lopsided.
 fn split(items: &mut [Item]) -> usize {
     let (mut lo, mut hi) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
     for item in items.iter() {
@@ -433,8 +432,8 @@ fn split(items: &mut [Item]) -> usize {
     half
 }
 
-/// Sorts the items into those below `middle` along an axis and the others; gives the number of the
-/// first.
+/// Sorts the items into those below `middle` along an axis and the others; returns the number of
+/// the first.
 fn part(items: &mut [Item], axis: usize, middle: f32) -> usize {
     let mut left = 0;
     for i in 0..items.len() {
@@ -453,8 +452,8 @@ mod tests {
     use super::*;
     use crate::mesh::workers::Backwards;
 
-    /// A wavy sheet whose columns lie closer and closer, so that splits at the middle are lopsided;
-    /// every seventh face was removed.
+    /// A wavy sheet with columns closer and closer, which makes splits at the middle lopsided;
+    /// without every seventh face.
     fn sheet(columns: u32, rows: u32) -> TriMesh {
         let point = |i: u32, j: u32| {
             let (x, y) = (

@@ -1,29 +1,28 @@
 //! Insertion and removal of faces: the tree stays exact, tight and shallow, and no edit costs more
 //! than the path to the root.
 //!
-//! A new face goes down where the boxes grow least. On the path back up each box becomes the union
-//! of the two below it, and a node one of whose sides holds too small a share of the faces is
-//! mended: where few faces are below it, it is rebuilt; else one of the two grandchildren on the
-//! heavy side goes over to the light side. Faces have no order in the tree, so that one such step
-//! always suffices.
+//! A new face goes down the path on which the boxes grow least. On the path back up each box
+//! becomes the union of the two below it. A node with too small a share of its faces on one side is
+//! rebuilt if it has few faces; else one of the two grandchildren on the heavy side moves to the
+//! light side. Faces have no order in the tree, so one such step always suffices.
 
 use super::aabb::Aabb;
 use super::{FaceTree, NONE, ROOT, TreeNode};
 use crate::mesh::{FaceId, MeshError, TriMesh};
 
-/// Each side of a node holds at least this share of its faces (1/5), less than a split leaves at
-/// first (1/4), so that many edits lie between two repairs; 1/3 at most, or a grandchild would not
+/// Smallest share of a node's faces on each side (1/5). It is less than a split leaves at first
+/// (1/4), which puts many edits between two repairs, and at most 1/3, or a grandchild would not
 /// suffice. The depth is at most log(2^31 / 5) / log(5 / 4) + 2 = 91 levels.
 const SMALLEST_SHARE: u64 = 5;
-/// Faces that are rebuilt at most, one or two µs. Above, both sides of what [`FaceTree::lean`]
-/// joins are large enough for an inner node and differ by little enough; nine faces would do.
+/// Largest rebuild in faces, one or two µs. Above it, both sides joined by [`FaceTree::lean`] are
+/// large enough for an inner node and close enough in size; nine faces would do.
 const MOST_REBUILT: u32 = 16;
 
 impl FaceTree {
-    /// Takes in a face of `mesh`: after [`TriMesh::add_face`]. O(log F).
+    /// Adds a face of `mesh`; call it after [`TriMesh::add_face`]. O(log F).
     ///
-    /// Every face in the tree must still be in the mesh. Returns whether there was such a face, and
-    /// not in the tree yet. Arrays that are full are copied once and doubled, a pause of
+    /// Every face in the tree must still be in the mesh. Returns false if the mesh lacks the face
+    /// or the tree already has it. Full arrays double, which copies them once and takes
     /// milliseconds on a large mesh: see [`Self::reserve`].
     pub fn insert(&mut self, mesh: &TriMesh, face: FaceId) -> bool {
         if !mesh.has_face(face) || self.has(face) {
@@ -50,11 +49,11 @@ impl FaceTree {
         true
     }
 
-    /// Lets go of a face: before [`TriMesh::remove_face`], for the faces beside it are measured.
-    /// O(log F).
+    /// Removes a face; call it before [`TriMesh::remove_face`], as it measures the neighbouring
+    /// faces. O(log F).
     ///
-    /// Every other face in the tree must still be in the mesh. Returns whether the face was in the
-    /// tree.
+    /// Every other face in the tree must still be in the mesh. Returns whether the tree had the
+    /// face.
     pub fn remove(&mut self, mesh: &TriMesh, face: FaceId) -> bool {
         if !self.has(face) {
             return false;
@@ -79,10 +78,10 @@ impl FaceTree {
             .is_some_and(|&leaf| leaf != NONE)
     }
 
-    /// Makes room for so many faces more, so that inserting them allocates nothing.
+    /// Makes room for `faces` more faces; inserting them then allocates nothing.
     ///
     /// # Errors
-    /// [`MeshError::TooMany`] where memory is short.
+    /// [`MeshError::TooMany`] if memory is short.
     pub fn reserve(&mut self, faces: usize) -> Result<(), MeshError> {
         let short = |_| MeshError::TooMany {
             what: "faces",
@@ -98,8 +97,8 @@ impl FaceTree {
         self.lefts.try_reserve(MOST_REBUILT as usize).map_err(short)
     }
 
-    /// The lowest node that encloses a box and a face beside it: a node where the box makes nothing
-    /// grow, found sooner than from the root.
+    /// The lowest node that encloses both a box and a face beside it: no node above it grows by the
+    /// box, and it is quicker to find than from the root.
     fn above_neighbour(&self, mesh: &TriMesh, face: FaceId, bounds: &Aabb) -> u32 {
         let beside = mesh
             .corners(face)
@@ -115,7 +114,7 @@ impl FaceTree {
         at
     }
 
-    /// The leaf below `at` where a box makes the boxes above grow least.
+    /// The leaf below `at` on the path along which the boxes grow least by `bounds`.
     fn leaf_for(&self, bounds: &Aabb, mut at: u32) -> u32 {
         let mut node = self.node(at);
         while !node.is_leaf() {
@@ -130,11 +129,11 @@ impl FaceTree {
         at
     }
 
-    /// Brings the nodes above `at` up to date after what is below it changed.
+    /// Updates the nodes above `at` after a change below it.
     fn rebalance(&mut self, mesh: &TriMesh, mut at: u32) {
         self.edits += 1;
         self.changes += 1;
-        // kept in a variable: to write a node and read it again at once is slow
+        // a local copy: writing a node and reading it again at once is slow
         let mut node = *self.node(at);
         while at != ROOT {
             let pair = at / 2;
@@ -174,8 +173,8 @@ impl FaceTree {
         let grandchildren = self.pairs[inner as usize].0;
         let joined = grandchildren.map(|node| node.bounds.union(&light.bounds));
         let larger = usize::from(grandchildren[1].count > grandchildren[0].count);
-        // the smaller one can always go over; the larger one if enough stays and the light one is
-        // enough beside it
+        // the smaller one can always move; the larger one only if the staying one and the light one
+        // are both large enough
         let (goes, stays) = (grandchildren[larger].count, grandchildren[1 - larger].count);
         let share = |part: u32, whole: u32| u64::from(part) * SMALLEST_SHARE >= u64::from(whole);
         let may_choose =
@@ -198,7 +197,7 @@ impl FaceTree {
         );
     }
 
-    /// Puts a node in a place and updates the parents of what is below it.
+    /// Writes a node and updates the parents of its children or faces.
     fn place(&mut self, at: u32, node: TreeNode) {
         *self.node_mut(at) = node;
         if node.is_leaf() {
@@ -218,7 +217,7 @@ mod tests {
     use super::*;
     use crate::mesh::VertexId;
 
-    /// Checks all that a node stores about what is below it; returns the number of levels and of
+    /// Checks all numbers stored in the nodes from `at` down; returns the number of levels and of
     /// nodes.
     fn check(tree: &FaceTree, mesh: &TriMesh, at: u32, seen: &mut Vec<FaceId>) -> (usize, usize) {
         let node = *tree.node(at);
@@ -282,7 +281,7 @@ mod tests {
         TriMesh::new(positions, (0..count).map(|i| [i, i + 1, i + 2]).collect()).unwrap()
     }
 
-    /// The worst order for a tree that does not balance itself: always beyond the last.
+    /// The worst order for a tree without rebalancing: each face lies beyond the last.
     #[test]
     fn faces_inserted_in_a_row_leave_a_sound_and_shallow_tree() {
         let mut mesh = strip(1);

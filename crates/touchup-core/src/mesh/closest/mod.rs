@@ -1,13 +1,12 @@
-//! Closest face of a mesh that changes: a bounding volume tree that is exact after every edit, and
+//! Closest face of a changing mesh: a bounding volume tree that is exact after every edit, and
 //! never far from tight.
 //!
-//! A binary tree over the faces. Boxes are kept in single precision relative to the middle of the
-//! mesh and rounded outward, so a query that prunes by them never misses a face; distances to faces
-//! are computed in double precision. [`FaceTree::refit`] recomputes the boxes of the leaves that
-//! hold moved faces and all boxes above them; [`FaceTree::insert`] and [`FaceTree::remove`] do the
-//! same on one path to the root. [`FaceTree::refit_planned`] may leave a margin, so that small
-//! motions inside of it cost nothing. Boxes never only grow, so nothing is left to be tightened
-//! later.
+//! A binary tree over the faces. Boxes have single precision relative to the middle of the mesh,
+//! rounded outward, so pruning by them never misses a face; distances to faces have double
+//! precision. [`FaceTree::refit`] recomputes the boxes of the leaves with moved faces and all boxes
+//! above them; [`FaceTree::insert`] and [`FaceTree::remove`] do the same on one path to the root.
+//! [`FaceTree::refit_planned`] may leave a margin, within which small motions cost nothing. As
+//! boxes also shrink, no later tightening is necessary.
 
 mod aabb;
 mod build;
@@ -25,18 +24,18 @@ pub use nearby::Nearby;
 pub use query::{BoxQuery, FaceHit};
 pub use refit::RefitPlan;
 
-/// Faces in a leaf at most. Two to four are equally fast within noise; four makes the smallest
-/// tree.
+/// Maximum number of faces in a leaf. Two to four are equally fast within noise; four makes the
+/// smallest tree.
 const LEAF_FACES: usize = 4;
 /// Slots of the traversal stack: one for each level, see [`edit`].
 const STACK: usize = 96;
 /// No node.
 const NONE: u32 = u32::MAX;
-/// The node above all others, which is in no pair.
+/// The root node, which is in no pair.
 const ROOT: u32 = u32::MAX >> 1;
 
-/// One node over `count` faces: a leaf of the faces in place `first` if these fit there, else an
-/// inner node whose children are the pair `first`.
+/// One node over `count` faces: a leaf with its faces at `first` if they fit there, else an inner
+/// node with the children in pair `first`.
 #[derive(Clone, Copy, Debug)]
 struct TreeNode {
     bounds: Aabb,
@@ -86,31 +85,29 @@ pub struct FaceTree {
     origin: Point3<f64>,
     root: TreeNode,
     pairs: Vec<SiblingNodes>,
-    /// for each pair: the node above it (2 · pair + side), or [`ROOT`]; for a free one the next
-    /// free one
+    /// node above each pair (2 · pair + side), or [`ROOT`]; in a free pair the next free one
     parents: Vec<u32>,
-    /// faces of the leaves; in a free place the next free one
+    /// faces of the leaves; in a free leaf the next free one
     leaf_faces: Vec<[FaceId; LEAF_FACES]>,
-    /// leaf (2 · pair + side, or [`ROOT`]) of each face, [`NONE`] for faces that are not in the
-    /// tree
+    /// leaf (2 · pair + side, or [`ROOT`]) of each face, [`NONE`] for faces not in the tree
     leaf_of_face: Vec<u32>,
     free_pair: u32,
     free_leaf: u32,
-    /// room for what is rebuilt …
+    /// buffer of the faces of a rebuild
     items: Vec<Item>,
-    /// … and its order
+    /// buffer of the leaf order of a rebuild
     lefts: Vec<u32>,
-    /// counts insertions and removals, so that a plan knows whether it still holds
+    /// number of insertions and removals, which tells a plan whether it is still valid
     edits: u64,
-    /// counts those and the refits after motions of unknown length …
+    /// number of edits and of refits after motions of unknown length
     changes: u64,
-    /// … and sums by how much boxes became wider at most in the other refits, m, so that leaves
-    /// that are kept know whether they still hold
+    /// sum over all other refits of the most by which their boxes widened, m; tells stored nearby
+    /// leaves whether they are still valid
     widened: f64,
 }
 
 impl FaceTree {
-    /// Number of levels; looks at every node.
+    /// Number of levels; visits every node.
     pub fn depth(&self) -> usize {
         let (mut deepest, mut stack) = (1, vec![(&self.root, 1)]);
         while let Some((node, level)) = stack.pop() {

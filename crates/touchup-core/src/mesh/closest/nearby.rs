@@ -1,5 +1,5 @@
-//! Queries that follow each other closely: the leaves around the last one are kept, and visited
-//! without a descent from the root.
+//! Queries in close succession: they keep the leaves around the last query, and visit them without
+//! a descent from the root.
 
 use nalgebra::Point3;
 
@@ -8,12 +8,12 @@ use super::{FaceHit, FaceTree, ROOT, STACK};
 use crate::mesh::triangle::{closest_point, longest_edge_squared};
 use crate::mesh::{FaceId, TriMesh};
 
-/// The reach of a query with a hint over the distance to the hinted face.
+/// Factor of the reach of a query with a hint over the distance to the hinted face.
 const HINT_WIDTH: f64 = 1.0 + 1e-6;
-/// Leaves that are kept at most: to look at the boxes of more takes as long as a descent from the
+/// Maximum number of stored leaves: checking the boxes of more takes as long as a descent from the
 /// root.
 const MOST_LEAVES: usize = 64;
-/// How far beyond a query leaves are kept, in longest edges of the hinted face.
+/// Distance beyond a query up to which leaves are stored, in longest edges of the hinted face.
 const EDGES_BEYOND: f64 = 0.7;
 
 /// The leaves of one tree that meet a ball, for [`FaceTree::closest_nearby`].
@@ -21,12 +21,12 @@ const EDGES_BEYOND: f64 = 0.7;
 pub struct Nearby {
     leaves: Vec<u32>,
     centre: Point3<f64>,
-    /// m; negative where nothing is kept
+    /// m; negative if nothing is stored
     radius: f64,
-    /// what the tree counted and summed when they were found
+    /// `changes` and `widened` of the tree at the time of storing
     changes: u64,
     widened: f64,
-    /// the face around which there were too many
+    /// face with too many leaves around it
     crowded: Option<FaceId>,
 }
 
@@ -45,10 +45,10 @@ impl Default for Nearby {
 }
 
 impl FaceTree {
-    /// [`Self::closest`] of a point that is likely near `hint`, and near the point that was asked
-    /// for last with `nearby`: the same answer, sooner.
+    /// [`Self::closest`] of a point likely near `hint` and near the last query with `nearby`: the
+    /// same answer, sooner.
     ///
-    /// - `nearby`: has always been used with this tree.
+    /// - `nearby`: for this tree alone.
     pub fn closest_nearby(
         &self,
         mesh: &TriMesh,
@@ -58,12 +58,11 @@ impl FaceTree {
         nearby: &mut Nearby,
     ) -> Option<FaceHit> {
         let triangle = mesh.triangle(hint);
-        // a little farther, so that the hint itself is found too; a touching point still has some
-        // reach
+        // a little farther, to include the hint itself; a touching point still has some reach
         let known =
             (p - closest_point(p, &triangle).0).norm() * HINT_WIDTH + f64::MIN_POSITIVE.sqrt();
         let reach = reach.min(known);
-        // a box that was not met then is met now at most by what all became wider since
+        // a box not met at that time can be met now by at most the widening of all boxes since
         let away = (p - nearby.centre).norm() + (self.widened - nearby.widened);
         let is_kept = nearby.changes == self.changes && away + reach <= nearby.radius;
         if !is_kept {
@@ -89,7 +88,7 @@ impl FaceTree {
         found.best
     }
 
-    /// Finds the leaves that meet the ball around `p`; whether they are few enough to be kept.
+    /// Stores the leaves that meet the ball around `p`; returns whether they are few enough.
     fn keep_near(&self, p: &Point3<f64>, radius: f64, nearby: &mut Nearby) -> bool {
         let ball = SearchState::new(self, p, radius);
         (nearby.radius, nearby.crowded) = (-1.0, None);
@@ -121,7 +120,7 @@ impl FaceTree {
 mod tests {
     use super::*;
 
-    /// Squares of 1 m, each cut in two.
+    /// Squares of 1 m, two triangles each.
     fn plane(squares: u32) -> TriMesh {
         let n = squares + 1;
         let positions = (0..n * n)
@@ -157,13 +156,13 @@ mod tests {
             "{} leaves",
             nearby.leaves.len()
         );
-        // 0.6 m of the 0.99 m are left: a motion by 0.3 m with a margin of 0.2 m is within
+        // 0.6 m of the 0.99 m remain, enough for a motion by 0.3 m with a margin of 0.2 m
         let mut plan = crate::mesh::RefitPlan::default();
         tree.plan(mesh.star(corner), &mut plan);
         mesh.set_position(corner, Point3::new(10.0, 10.0, 0.3));
         tree.refit_planned(&mesh, &mut plan, 0.3, 0.2);
         assert_eq!(ask(&tree, &mesh, 10.5, &mut nearby), 10.4);
-        // 0.2 m more go into the margin, and are free
+        // 0.2 m more stay within the margin, and are free
         mesh.set_position(corner, Point3::new(10.0, 10.0, 0.1));
         tree.refit_planned(&mesh, &mut plan, 0.2, 0.2);
         assert_eq!(ask(&tree, &mesh, 10.5, &mut nearby), 10.4);

@@ -7,25 +7,24 @@ use super::{FaceTree, LEAF_FACES, STACK};
 use crate::mesh::triangle::closest_point;
 use crate::mesh::{FaceId, TriMesh};
 
-/// Roundings of the largest coordinate M by which the distances of two faces that meet at the
-/// closest point may differ.
+/// Tolerance in roundings of the largest coordinate M for the distances of two faces that meet at
+/// the closest point.
 ///
 /// The point a + v·ab + w·ac is rounded by ε/2 · M at each sum, which makes ε M along each axis, √3
 /// ε M in length. The products add ε times the longest edge, at most the diagonal D of the mesh;
-/// difference to `p`, squares and their sum 5/4 ε times the distance d. Two faces:
-/// 2√3 ε M + 2 ε D + 5/2 ε d. That v and w are rounded too moves the point along the face, where
-/// the distance is stationary; only for a `p` on the surface to rounding it is not, and that has no
-/// side.
+/// difference to `p`, squares and their sum 5/4 ε times the distance d. Two faces: 2√3 ε M + 2 ε D
+/// + 5/2 ε d. The roundings of v and w move the point along the face, on which the distance is
+/// stationary; it is not for a `p` on the surface to rounding alone, which has no side.
 const TIE_COORDINATE: f64 = 4.0 * f64::EPSILON;
 /// The same for the diagonal of the mesh, see [`TIE_COORDINATE`].
 const TIE_DIAGONAL: f64 = 2.0 * f64::EPSILON;
 /// The same for the distance, see [`TIE_COORDINATE`].
 const TIE_DISTANCE: f64 = 3.0 * f64::EPSILON;
-/// What the squared distance to a box is rounded by, as a share of it: differences, squares and
-/// sums, 4 ε; 8 ε to be sure.
+/// Relative rounding of the squared distance to a box: differences, squares and sums, 4 ε; 8 ε for
+/// safety.
 const BOX_ROUNDING: f64 = 8.0 * f64::EPSILON;
 
-/// The face that was asked for, and the point of it.
+/// The closest face to a query point, and its closest point or barycentre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FaceHit {
     /// the face
@@ -38,19 +37,19 @@ pub struct FaceHit {
     pub distance_squared: f64,
 }
 
-/// The faces found by [`FaceTree::faces_in_box`], with the buffers of the search.
+/// Results of [`FaceTree::faces_in_box`], with the buffers of the search.
 #[derive(Clone, Debug, Default)]
 pub struct BoxQuery {
     /// in no particular order
     pub faces: Vec<FaceId>,
-    /// pairs met, in order
+    /// pairs that overlap the box, in order
     pairs: Vec<u32>,
-    /// place and number of faces of the leaves met
+    /// place and number of faces of the leaves that overlap the box
     leaves: Vec<(u32, u32)>,
 }
 
 impl BoxQuery {
-    /// A query with room for so many faces.
+    /// A query with room for `faces` faces.
     pub(crate) fn with_room(faces: usize) -> Self {
         let (pairs, leaves) = (vec![0; faces + STACK], vec![(0, 0); faces + STACK]);
         Self {
@@ -61,16 +60,16 @@ impl BoxQuery {
     }
 }
 
-/// What a search has found so far, and how far it still has to look.
+/// State of a search: the best hit, and the remaining reach.
 pub(super) struct SearchState {
     pub best: Option<FaceHit>,
     /// the point, relative to the tree's origin
     pub q: [f32; 3],
-    /// squared distance to a box beyond which nothing is left to be found
+    /// squared distance beyond which no box can hold a better hit
     pub far: f32,
-    /// least squared distance so far, m²
+    /// least squared distance up to now, m²
     limit: f64,
-    /// by how much squared distances about that may differ for one point, m²
+    /// tolerance of squared distances about `limit` for one point, m²
     width: f64,
     tie: f64,
     slack: f64,
@@ -102,7 +101,7 @@ impl SearchState {
         self.far = beyond(limit, self.slack);
     }
 
-    /// Looks at the faces of a leaf; see [`FaceTree::search`].
+    /// Updates the best hit by the faces of a leaf; see [`FaceTree::search`].
     #[inline]
     pub fn take(
         &mut self,
@@ -121,7 +120,7 @@ impl SearchState {
                 Some(best) if hit.distance_squared < best.distance_squared - width => true,
                 Some(best) => yields(best, &hit) || (!yields(&hit, best) && hit.face < best.face),
             };
-            // also where the other face is named, which then is no farther than this one and a tie
+            // also if the other face wins, which then is no farther than this one and a tie
             if hit.distance_squared < limit {
                 self.shorten(hit.distance_squared);
             }
@@ -133,12 +132,11 @@ impl SearchState {
 }
 
 impl FaceTree {
-    /// The face whose surface is closest to `p`, among those nearer than `reach` (m); `None` when
-    /// there is none.
+    /// The face with the surface closest to `p` among those nearer than `reach` (m), if any.
     ///
-    /// Where faces meet at the closest point (an edge or a corner), the one that `p` lies most
-    /// squarely above or below is named, so that the sign of (p − point)·n distinguishes inside
-    /// from outside; among equals the smallest id.
+    /// If faces meet at the closest point (an edge or a corner), the result is the one most
+    /// squarely above or below `p`, which makes the sign of (p − point)·n distinguish inside from
+    /// outside; among equals the smallest id.
     pub fn closest(&self, mesh: &TriMesh, p: &Point3<f64>, reach: f64) -> Option<FaceHit> {
         self.search(
             p,
@@ -148,7 +146,7 @@ impl FaceTree {
         )
     }
 
-    /// The face whose barycentre is closest to `p` (Eq 12), among those nearer than `reach` (m).
+    /// The face with the barycentre closest to `p` (Eq 12), among those nearer than `reach` (m).
     pub fn closest_barycentre(
         &self,
         mesh: &TriMesh,
@@ -171,9 +169,9 @@ impl FaceTree {
         )
     }
 
-    /// Branch and bound over the tree. `measure` gives the hit of one face, whose point must lie in
-    /// the face's box, or nothing where its squared distance is surely above a limit; `yields(a,
-    /// b)` whether `a` steps back behind `b` when both are equally near.
+    /// Branch and bound over the tree. `measure` returns the hit of one face, with its point in the
+    /// face's box, or `None` if its squared distance is surely above a limit; `yields(a, b)`
+    /// whether `a` steps back behind `b` if both are equally near.
     #[inline]
     fn search(
         &self,
@@ -215,8 +213,8 @@ impl FaceTree {
         }
     }
 
-    /// How much a distance between `q` and a box may be off in single precision, m: three roundings
-    /// of the largest coordinate that enters it.
+    /// Error bound of a single-precision distance between `q` and a box, m: three roundings of the
+    /// largest coordinate in it.
     fn slack(&self, q: &Vector3<f64>) -> f64 {
         let bounds = &self.root.bounds;
         let largest = (0..3)
@@ -225,8 +223,8 @@ impl FaceTree {
         4.0 * f64::from(f32::EPSILON) * largest
     }
 
-    /// How much the distances of faces that meet at the closest point may differ, without the part
-    /// of the distance, m.
+    /// Tolerance for the distances of faces that meet at the closest point, without the part of the
+    /// distance, m.
     fn tie(&self) -> f64 {
         let Aabb { lo, hi } = self.root.bounds;
         let largest = |i: usize| self.origin[i].abs() + f64::from(hi[i].max(-lo[i]));
@@ -237,8 +235,8 @@ impl FaceTree {
         if tie.is_finite() { tie } else { 0.0 }
     }
 
-    /// Finds every face whose leaf's box meets the box from `lo` to `hi` (m, in O); those of the
-    /// last query are forgotten.
+    /// Finds every face in a leaf whose box overlaps the box from `lo` to `hi` (m, in O); replaces
+    /// the results of the last query.
     pub fn faces_in_box(&self, lo: &Point3<f64>, hi: &Point3<f64>, query: &mut BoxQuery) {
         let wanted = Aabb::within(&(lo - self.origin), &(hi - self.origin));
         let BoxQuery {
@@ -254,7 +252,7 @@ impl FaceTree {
         let (mut level, mut hits) = (0..1, 0);
         pairs.clear();
         pairs.push(self.narrow_down(&wanted));
-        // level by level: the boxes of one are fetched from memory at the same time
+        // level by level, so the memory accesses for its boxes overlap
         while !level.is_empty() {
             let mut met = level.end;
             pairs.resize(pairs.len().max(met + 2 * level.len()), 0);
@@ -262,7 +260,7 @@ impl FaceTree {
             let (above, below) = pairs.split_at_mut(met);
             for &pair in &above[level.clone()] {
                 for node in &self.pairs[pair as usize].0 {
-                    // no branches: which boxes are met cannot be foretold
+                    // no branches: which boxes overlap is unpredictable
                     let (is_met, is_leaf) = (node.bounds.overlaps(&wanted), node.is_leaf());
                     below[met - level.end] = node.first;
                     met += usize::from(is_met & !is_leaf);
@@ -273,14 +271,14 @@ impl FaceTree {
             level = level.end..met;
         }
         for &(first, count) in &leaves[..hits] {
-            // a full leaf is copied sooner than a part of it
+            // copying a full leaf is faster than a part of it
             faces.extend_from_slice(&self.leaf_faces[first as usize]);
             faces.truncate(faces.len() + count as usize - LEAF_FACES);
         }
     }
 
-    /// The pair below which all leaves that meet a box are found, from the root down as long as one
-    /// side alone is met.
+    /// The lowest pair above all leaves that overlap a box: goes down as long as one side alone
+    /// overlaps.
     fn narrow_down(&self, wanted: &Aabb) -> u32 {
         let mut at = self.root.first;
         loop {
@@ -298,8 +296,8 @@ impl FaceTree {
     }
 }
 
-/// How much squared distances about `limit` may differ where the distances may by `tie` and
-/// [`TIE_DISTANCE`].
+/// Tolerance of squared distances about `limit`, for tolerances `tie` and [`TIE_DISTANCE`] of the
+/// distances.
 #[inline]
 fn tie_squared(limit: f64, tie: f64) -> f64 {
     let distance = limit.sqrt();
@@ -308,18 +306,18 @@ fn tie_squared(limit: f64, tie: f64) -> f64 {
 }
 
 /// The single-precision squared distance to a box beyond which no face of it can be nearer than
-/// √`limit`, nor equally near within the tie that `slack` holds; [`TIE_DISTANCE`] is far below the
-/// roundings of single precision.
+/// √`limit`, nor equally near within the tie contained in `slack`; [`TIE_DISTANCE`] is far below
+/// the roundings of single precision.
 #[inline]
 fn beyond(limit: f64, slack: f64) -> f32 {
     let distance = limit.sqrt() + slack;
-    // 8 roundings: the squares, their sum, and this conversion; the smallest normal number for
-    // where they underflow
+    // 8 roundings: the squares, their sum, and this conversion; the smallest normal number covers
+    // their underflow
     (distance * distance * (1.0 + 8.0 * f64::from(f32::EPSILON))) as f32 + f32::MIN_POSITIVE
 }
 
 /// Whether the box around a triangle is farther from `p` than √`limit`: cheaper than its closest
-/// point, and decides for most faces that a query meets.
+/// point, and decisive for most faces of a query.
 #[inline]
 fn is_box_beyond(p: &Point3<f64>, [a, b, c]: [&Point3<f64>; 3], limit: f64) -> bool {
     let outside = |i: usize| {
@@ -331,7 +329,7 @@ fn is_box_beyond(p: &Point3<f64>, [a, b, c]: [&Point3<f64>; 3], limit: f64) -> b
     x * x + y * y + z * z > limit * (1.0 + BOX_ROUNDING)
 }
 
-/// The point of a face closest to `p`; nothing where its squared distance is surely above a limit.
+/// The point of a face closest to `p`; `None` if its squared distance is surely above a limit.
 #[inline]
 pub(super) fn surface_hit(
     mesh: &TriMesh,
@@ -357,7 +355,7 @@ pub(super) fn surface_hit(
     })
 }
 
-/// Whether `p` lies less squarely above or below the first face that was hit than the second.
+/// Whether `p` lies less squarely above or below the first hit face than the second.
 pub(super) fn is_less_square(mesh: &TriMesh, p: &Point3<f64>, a: &FaceHit, b: &FaceHit) -> bool {
     let squareness = |hit: &FaceHit| (p - hit.point).dot(&mesh.normal(hit.face)).abs();
     squareness(a) < squareness(b)

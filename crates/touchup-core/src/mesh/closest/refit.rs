@@ -3,7 +3,7 @@
 use super::{FaceTree, NONE, ROOT, STACK};
 use crate::mesh::{FaceId, TriMesh};
 
-/// Marks a pair that a plan has met; pairs are numbered below it.
+/// Marks a pair already in a plan; pair numbers are below it.
 const SEEN: u32 = 1 << 31;
 
 /// The boxes of one tree that depend on certain faces: leaves, and the pairs above them from the
@@ -13,16 +13,16 @@ pub struct RefitPlan {
     faces: Vec<FaceId>,
     leaves: Vec<u32>,
     pairs: Vec<u32>,
-    /// how far corners of the faces may still move before one could leave its box, m
+    /// distance that corners of the faces may still move before one could leave its box, m
     room: f64,
-    /// the tree's count of edits when it was made
+    /// edit count of the tree at the time of planning
     edits: u64,
 }
 
 impl RefitPlan {
-    /// A plan with room for so many faces.
+    /// A plan with room for `faces` faces.
     pub(crate) fn with_room(faces: usize) -> Self {
-        // the path from the leaves to the root adds a level or so for each halving of the mesh
+        // the paths to the root add about one level for each halving of the mesh
         let pairs = Vec::with_capacity(2 * faces + STACK);
         Self {
             faces: Vec::with_capacity(faces),
@@ -33,7 +33,7 @@ impl RefitPlan {
         }
     }
 
-    /// Counts on no room in the boxes: others may have moved the faces.
+    /// Drops the remaining room in the boxes, as others may have moved the faces.
     #[inline]
     pub fn spend(&mut self) {
         self.room = 0.0;
@@ -41,30 +41,29 @@ impl RefitPlan {
 }
 
 impl FaceTree {
-    /// Makes the tree exact again after the corners of `faces`, each named once or more often,
-    /// moved.
+    /// Makes the tree exact again after the corners of `faces` moved; repeated faces are allowed.
     pub fn refit(&mut self, mesh: &TriMesh, faces: &[FaceId]) {
         let mut plan = RefitPlan::default();
         self.plan(faces, &mut plan);
         self.refit_planned(mesh, &mut plan, f64::INFINITY, 0.0);
     }
 
-    /// Notes which boxes depend on `faces`, for [`Self::refit_planned`]; faces that the tree does
-    /// not hold are skipped.
+    /// Plans the boxes that depend on `faces`, for [`Self::refit_planned`]; skips faces not in the
+    /// tree.
     pub fn plan(&mut self, faces: &[FaceId], plan: &mut RefitPlan) {
         plan.faces.clear();
         plan.faces.extend_from_slice(faces);
         self.renew(plan);
     }
 
-    /// Makes the tree exact again after the corners of the planned faces moved; a plan made before
-    /// faces were inserted or removed is made again.
+    /// Makes the tree exact again after the corners of the planned faces moved; renews a plan made
+    /// before faces were inserted or removed.
     ///
-    /// - `displacement`: how far a corner moved at most since the last call with this plan, m;
-    ///   infinite where that is not known. Where others moved corners in between, and refitted the
-    ///   tree, [`RefitPlan::spend`] comes before.
-    /// - `margin`: by how much the boxes are made wider than they need be, m. They are left as they
-    ///   are until corners may have left them: a query stays exact and looks at little more.
+    /// - `displacement`: largest motion of a corner since the last call with this plan, m; infinite
+    ///   if unknown. If others moved corners in between, and refitted the tree, call
+    ///   [`RefitPlan::spend`] first.
+    /// - `margin`: extra width of the boxes, m. They stay as they are until corners may have left
+    ///   them: a query stays exact and visits few more faces.
     #[inline]
     pub fn refit_planned(
         &mut self,
@@ -129,8 +128,7 @@ impl FaceTree {
         }
         pairs.clear();
         for &leaf in leaves.iter() {
-            // the path up ends where it meets that of an earlier leaf, so that parents come before
-            // children
+            // the path up ends at the path of an earlier leaf, so parents come before children
             let (known, mut at) = (pairs.len(), leaf);
             while at != ROOT && self.parents[at as usize / 2] & SEEN == 0 {
                 pairs.push(at / 2);

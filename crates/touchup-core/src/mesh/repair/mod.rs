@@ -1,4 +1,4 @@
-//! From the triangles of a file to a mesh that can be worked on, and a report of what was wrong.
+//! Repair of the triangles of a file to a usable mesh, with a report of the faults.
 
 mod orient;
 mod pieces;
@@ -15,26 +15,25 @@ use super::tri_mesh::{FARTHEST, MeshError, TriMesh};
 use crate::numeric::counted;
 use orient::{Edges, boundary_loops};
 
-/// Two times the area below which a face counts as having none, relative to its longest edge times
-/// its largest coordinate: each coordinate was rounded at least once (digits of the file, unit), by
-/// up to ε/2 of itself, and moves an edge of the face by as much. 16 leaves room for the roundings
-/// of the cross product.
+/// Two times the area of a face without area, relative to its longest edge times its largest
+/// coordinate: at least one rounding (digits of the file, unit) of each coordinate, by up to ε/2 of
+/// itself, moves an edge by as much. 16 leaves room for the roundings of the cross product.
 const ZERO_AREA: f64 = 16.0 * f64::EPSILON;
 
-/// What [`repair`] found and did. Numbers only, no lengths.
+/// Findings and changes of [`repair`]. Numbers only, no lengths.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct RepairReport {
     /// vertices merged into an earlier one at the same position
     pub welded_vertices: usize,
-    /// faces left out because a coordinate is not a number within [`FARTHEST`]
+    /// faces left out for a coordinate that is not a number within [`FARTHEST`]
     pub dropped_not_finite: usize,
-    /// faces left out because they name a vertex twice or have no area
+    /// faces left out for a repeated vertex or zero area
     pub dropped_zero_area: usize,
-    /// faces left out because an earlier face has the same three vertices
+    /// faces left out for the same three vertices as an earlier face
     pub dropped_duplicates: usize,
-    /// faces turned over so that neighbours agree and closed pieces have their normals outside
+    /// faces turned over to agree with neighbours and to have outward normals on closed pieces
     pub flipped_faces: usize,
-    /// vertices left out because no face uses them
+    /// vertices left out, without a face
     pub unused_vertices: usize,
     /// edges of three faces or more; they stay
     pub non_manifold_edges: usize,
@@ -42,7 +41,7 @@ pub struct RepairReport {
     pub boundary_edges: usize,
     /// chains of boundary edges: holes and outer rims; rims that touch in a vertex count as one
     pub boundary_loops: usize,
-    /// pieces that hang together over edges of two faces
+    /// pieces connected over edges of two faces
     pub components: usize,
 }
 
@@ -72,18 +71,18 @@ impl fmt::Display for RepairReport {
 }
 
 /// Makes a mesh of any triangles: welds vertices at the same position, leaves out faces that are
-/// not finite, have no area or are there twice, turns faces over until they agree, and leaves out
-/// vertices that no face uses.
+/// not finite, have no area or are repeated, turns faces over until they agree, and leaves out
+/// vertices without a face.
 ///
-/// What stays keeps its order, so a clean mesh comes out as it went in. Holes, non-manifold edges
-/// and self-intersections are left as they are: to close or cut is to invent surface.
+/// The rest keeps its order, so a clean mesh comes out unchanged. Holes, non-manifold edges and
+/// self-intersections stay: to close or cut is to invent surface.
 ///
 /// - `positions`: V × 3, m, in O; NaN and infinity are allowed.
 /// - `faces`: F × 3.
 ///
 /// # Errors
-/// [`MeshError::VertexOutOfRange`], [`MeshError::TooMany`]; [`MeshError::Empty`] when no face is
-/// left.
+/// [`MeshError::VertexOutOfRange`], [`MeshError::TooMany`]; [`MeshError::Empty`] if no face
+/// remains.
 ///
 /// # Example
 /// ```
@@ -119,9 +118,9 @@ pub fn repair(
     Ok((mesh, report))
 }
 
-/// Counts fit, indices are in range.
+/// Checks counts and indices.
 fn check(positions: &[Point3<f64>], faces: &[[u32; 3]]) -> Result<(), MeshError> {
-    // two ends of three edges of every face are counted in 32 bits
+    // 32 bits count two ends of three edges of every face
     for (what, count, limit) in [
         ("vertices", positions.len(), u32::MAX - 1),
         ("faces", faces.len(), u32::MAX / 6),
@@ -132,7 +131,7 @@ fn check(positions: &[Point3<f64>], faces: &[[u32; 3]]) -> Result<(), MeshError>
     }
     let (vertices, used) = (positions.len(), faces.as_flattened());
     let is_beyond = |v: u32| v as usize >= vertices;
-    // the highest is found without a branch for each
+    // finds the highest without a branch for each
     if used.iter().copied().max().is_some_and(is_beyond)
         && let Some(at) = used.iter().position(|&v| is_beyond(v))
     {
@@ -162,7 +161,7 @@ fn drop_faces(
         );
         let limit_2 = longest_2
             * (ZERO_AREA * greater(largest(&a), greater(largest(&b), largest(&c)))).powi(2);
-        // false for NaN, which every coordinate that is not a number brings about
+        // false for NaN, the result of any coordinate that is not a number
         let is_near = greater(largest(&a), greater(largest(&b), largest(&c))) <= FARTHEST;
         let stays = double_area_2 > limit_2 && is_near;
         if stays {
@@ -177,13 +176,13 @@ fn drop_faces(
     valences
 }
 
-/// The largest coordinate, without its sign.
+/// The largest absolute coordinate.
 #[inline]
 fn largest(p: &Point3<f64>) -> f64 {
     greater(p.x.abs(), greater(p.y.abs(), p.z.abs()))
 }
 
-/// Leaves out vertices that no face uses; returns how many.
+/// Leaves out vertices that no face uses; returns their number.
 fn drop_unused(
     valences: &mut Valences,
     positions: &mut Vec<Point3<f64>>,
@@ -261,7 +260,7 @@ mod tests {
         )
     }
 
-    /// Divergence theorem over the faces as they are.
+    /// Volume by the divergence theorem.
     fn volume(mesh: &TriMesh) -> f64 {
         mesh.faces()
             .map(|(f, _)| mesh.barycentre(f).coords.dot(&mesh.double_area_normal(f)) / 6.0)
@@ -313,8 +312,7 @@ mod tests {
 
     #[test]
     fn an_open_patch_keeps_the_side_of_its_larger_area() {
-        // unit square in two halves of equal area and a flap three times as large, which lies
-        // upside down
+        // unit square in two halves of equal area and a flap three times as large, upside down
         let p = |x, y| Point3::new(x, y, 0.0);
         let positions = vec![
             p(0.0, 0.0),
@@ -389,8 +387,8 @@ mod tests {
 
     #[test]
     fn thin_faces_far_from_the_origin_stay_while_they_differ_from_a_line() {
-        // at 10⁶ m a coordinate is rounded to 1.2e-10 m: a height of 1e-6 m is real, one of 2e-10 m
-        // is not
+        // at 10⁶ m a coordinate has a rounding of 1.2e-10 m: a height of 1e-6 m is real, one of
+        // 2e-10 m is not
         for (height, kept) in [(1e-6, 1), (2e-10, 0)] {
             let p = |x: f64, y: f64| Point3::new(1e6 + x, 1e6 + y, 1e6);
             let outcome = repair(

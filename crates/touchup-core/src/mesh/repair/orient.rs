@@ -1,11 +1,10 @@
-//! The edges of a mesh, and faces that agree on which side is outside.
+//! The edges of a mesh, and consistent orientation of its faces.
 
 use super::pieces::{FaceSets, Numbered};
 use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::numeric::distinct;
 
-/// A face at an edge: the higher vertex of the edge (upper 32 bits) and the face, one key to sort
-/// by.
+/// A face at an edge: the higher vertex of the edge (upper 32 bits) and the face, as one sort key.
 #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 struct EdgeSide(u64);
 
@@ -23,22 +22,22 @@ impl EdgeSide {
     }
 }
 
-/// What the edges of a mesh show.
+/// Edge statistics of a mesh.
 pub(super) struct Edges {
-    /// edges of one face: their vertices and that face
+    /// edges of one face: their vertices and the face
     pub boundary: Vec<([u32; 2], u32)>,
-    /// faces whose three vertices an earlier face has as well, in rising order
+    /// faces with the same three vertices as an earlier face, in rising order
     pub duplicates: Vec<u32>,
     /// number of edges of three faces or more
     pub non_manifold: usize,
-    /// the faces at these, and whether they run along the edge from its lower to its higher vertex,
-    /// one run after the other; every run starts where the first field changes
+    /// the faces at these edges: index of the edge, face, and whether it runs along the edge from
+    /// its lower to its higher vertex; sorted by edge
     crowded: Vec<(usize, u32, bool)>,
     pieces: FaceSets,
 }
 
 impl Edges {
-    /// Looks at every edge once.
+    /// Visits every edge once.
     pub fn of(mesh: &TriMesh) -> Self {
         let mut edges = Self {
             boundary: Vec::new(),
@@ -61,8 +60,8 @@ impl Edges {
         edges
     }
 
-    /// One edge: the faces that run along it from its lower to its higher vertex, and those that
-    /// run against it.
+    /// Adds one edge: the faces that run along it from its lower to its higher vertex, and those
+    /// that run against it.
     #[inline]
     fn add(&mut self, mesh: &TriMesh, ends: [u32; 2], along: &[EdgeSide], against: &[EdgeSide]) {
         match (along, against) {
@@ -107,9 +106,9 @@ impl Edges {
 
     /// Turns faces over until neighbours agree and closed pieces have their normals outside.
     ///
-    /// A piece is what hangs together over edges of two faces. A closed piece gets a positive
-    /// volume; an open one keeps the side that the larger part of its area has. A one-sided piece
-    /// (Möbius) keeps a seam.
+    /// Faces are of one piece if they hang together over edges of two faces. A closed piece gets a
+    /// positive volume; an open one keeps the side of the larger part of its area. A one-sided
+    /// piece (Möbius) keeps a seam.
     ///
     /// Returns the number of faces turned over and the number of pieces.
     pub fn orient(self, mesh: &mut TriMesh) -> (usize, usize) {
@@ -131,8 +130,8 @@ impl Edges {
     }
 }
 
-/// Which pieces have a border: an edge of one face, or a crowded edge at which their own faces do
-/// not cancel.
+/// Pieces with a border: an edge of one face, or a crowded edge at which their own faces do not
+/// cancel.
 fn open_pieces(
     boundary: &[([u32; 2], u32)],
     crowded: &[(usize, u32, bool)],
@@ -156,7 +155,7 @@ fn open_pieces(
     open
 }
 
-/// For each piece the parity of the faces to turn over.
+/// Parity of the faces to turn over, for each piece.
 fn turned_parities(mesh: &TriMesh, pieces: &Numbered, open: &[bool]) -> Vec<bool> {
     // area of parity 0 less area of parity 1, or six times the volume as parity 0 sees it
     let mut balance = vec![0.0; open.len()];
@@ -175,7 +174,7 @@ fn turned_parities(mesh: &TriMesh, pieces: &Numbered, open: &[bool]) -> Vec<bool
 }
 
 /// The sides of all edges from `vertex` to a higher vertex, ordered by that vertex, then by face:
-/// first of the faces that run along the edge upwards, then of the others.
+/// first the faces that run along the edge upwards, then the others.
 #[inline]
 fn sides_above<'a>(
     mesh: &TriMesh,
@@ -192,8 +191,8 @@ fn sides_above<'a>(
     let (mut ahead, mut behind) = (0, 0);
     for &face in star {
         let [VertexId(next), VertexId(previous)] = mesh.other_corners(face, VertexId(vertex));
-        // written first and counted afterwards: which ones go up is past any guess, so no branch
-        // hangs on it
+        // written first and counted afterwards: their order is unpredictable, so no branch depends
+        // on it
         forward[ahead] = EdgeSide::new(next, face);
         ahead += usize::from(next > vertex);
         backward[behind] = EdgeSide::new(previous, face);
@@ -213,7 +212,7 @@ fn corner_sum(mesh: &TriMesh, face: u32) -> u32 {
     a ^ b ^ c
 }
 
-/// The lowest higher vertex of these sides.
+/// The lowest of the higher vertices of these sides.
 #[inline]
 fn lowest(forward: &[EdgeSide], backward: &[EdgeSide]) -> Option<u32> {
     match (forward, backward) {
@@ -234,8 +233,8 @@ fn split_run(sides: &[EdgeSide], higher: u32) -> (&[EdgeSide], &[EdgeSide]) {
     )
 }
 
-/// How many chains the boundary edges form: one for each hole or outer rim; rims that touch in a
-/// vertex count as one.
+/// Number of chains of boundary edges: one for each hole or outer rim; rims that touch in a vertex
+/// count as one.
 pub(super) fn boundary_loops(boundary: &[([u32; 2], u32)]) -> usize {
     let vertices = distinct(boundary.iter().flat_map(|(ends, _)| *ends));
     let index = |v: u32| vertices.partition_point(|&w| w < v) as u32;

@@ -1,8 +1,7 @@
-//! Connected components of faces, and which faces of one are oriented upside down against the
-//! others.
+//! Connected components of faces, and the orientation of each face against the others.
 
-/// Disjoint sets of faces; each face stores whether it is oriented as the root of its set (parity
-/// false) or upside down.
+/// Disjoint sets of faces; each face stores its orientation: as the root of its set (parity false)
+/// or upside down.
 pub(super) struct FaceSets {
     /// parent (31 bits) and parity against it (1 bit)
     parents: Vec<u32>,
@@ -19,7 +18,7 @@ impl FaceSets {
         }
     }
 
-    /// Root of the set and parity against it; shortens the path as it goes.
+    /// Root of the set and parity against it; shortens the path on the way.
     #[inline]
     fn find(&mut self, mut face: u32) -> (u32, u32) {
         let mut parity = 0;
@@ -35,12 +34,12 @@ impl FaceSets {
         }
     }
 
-    /// Joins the sets of two neighbours; `against`: one of them is upside down. The lowest face is
-    /// the root.
+    /// Joins the sets of two neighbours; `against`: one of the two is upside down. The lowest face
+    /// becomes the root.
     #[inline]
     pub fn join(&mut self, a: u32, b: u32, against: bool) {
         self.any_against |= against;
-        // most have the same parent already
+        // most share a parent already
         if self.parents[a as usize] != self.parents[b as usize] ^ u32::from(against) {
             self.join_roots(a, b, against);
         }
@@ -60,7 +59,7 @@ impl FaceSets {
         let (mut pieces, mut roots) = (self.parents, Vec::new());
         for face in 0..pieces.len() {
             let up = pieces[face];
-            // a parent is lower than its children, so it has its number already
+            // a parent is lower than its children, and has its number already
             pieces[face] = if up as usize >> 1 == face {
                 roots.push(face as u32);
                 (roots.len() as u32 - 1) << 1
@@ -72,11 +71,11 @@ impl FaceSets {
     }
 }
 
-/// The disjoint sets, numbered.
+/// Numbered disjoint sets.
 pub(super) struct Numbered {
     /// number (31 bits) and parity against its root (1 bit) for each face
     pieces: Vec<u32>,
-    /// the lowest face of each
+    /// the lowest face of each set
     pub roots: Vec<u32>,
 }
 

@@ -4,32 +4,31 @@ use nalgebra::Point3;
 
 use crate::numeric::median;
 
-/// Marks a free place in the table: no vertex has this number.
+/// Marks a free place in the table; no vertex has this number.
 const FREE: u32 = u32::MAX;
 
-/// Width of a cell in which positions count as the same one, relative to the spread of the mesh
-/// (0.1 nm on 100 mm).
+/// Width of a cell of equal positions, relative to the spread of the mesh (0.1 nm on 100 mm).
 ///
-/// CAD programs write the same corner once as 0 and once as 1e-17, so that comparing bits leaves
-/// seams in their parts: of 13 binary STL files of real parts five had such pairs, all closer than
-/// 1e-12 of the diagonal, and no other two vertices were closer than 1e-6 of it. Wider cells would
-/// begin to close slots that are really there.
+/// CAD programs write the same corner once as 0 and once as 1e-17, and comparing bits leaves seams
+/// in their parts: of 13 binary STL files of real parts five had such pairs, all closer than 1e-12
+/// of the diagonal, and no other two vertices were closer than 1e-6 of it. Wider cells would begin
+/// to close real slots.
 const CELL: f64 = 1e-9;
 
-/// Merges vertices in the same cell of a grid of width [`CELL`], in order of first occurrence,
-/// whose position stays; −0 becomes 0.
+/// Merges vertices in the same cell of a grid of width [`CELL`] into the first of them, which keeps
+/// its position; −0 becomes 0.
 ///
-/// Zero lies in the middle of a cell, which is where the difference matters. Two positions that
-/// rounding put on two sides of a border between cells are not merged: it takes 16 digits that
-/// agree up to the last and a chance of 1e-6. In return the result depends on no order.
+/// Zero lies in the middle of a cell, as differences matter there. Two positions that rounding put
+/// on two sides of a cell border stay apart: this takes 16 digits that agree up to the last and a
+/// chance of 1e-6. In return the result depends on no order.
 ///
 /// - `positions`: V × 3, any unit; shortened in place.
 /// - `faces`: F × 3, every index below V; renamed in place.
-/// - returns: how many vertices were removed.
+/// - returns: number of removed vertices.
 pub(super) fn weld(positions: &mut Vec<Point3<f64>>, faces: &mut [[u32; 3]]) -> usize {
     // a closed mesh has half as many vertices as faces; the table has two places for each
     let mut table = PositionTable::new(CELL * spread(positions), positions.len(), faces.len());
-    // empty until the first vertex is removed
+    // empty until the first vertex goes
     let mut renamed = Vec::new();
     let mut kept = 0;
     for start in (0..positions.len()).step_by(BLOCK) {
@@ -63,7 +62,7 @@ pub(super) fn weld(positions: &mut Vec<Point3<f64>>, faces: &mut [[u32; 3]]) -> 
 /// Median distance (largest coordinate) from the median position, over a sample: single wild
 /// vertices do not count.
 fn spread(positions: &[Point3<f64>]) -> f64 {
-    /// Every n-th vertex, so that there are at least this many.
+    /// Smallest sample: every n-th vertex.
     const SAMPLE: usize = 1000;
     let sample = || positions.iter().step_by((positions.len() / SAMPLE).max(1));
     let middle = |mut values: Vec<f64>| median(&mut values).unwrap_or(0.0);
@@ -75,15 +74,15 @@ fn spread(positions: &[Point3<f64>]) -> f64 {
     )
 }
 
-/// Vertices that are looked up together: their memory accesses overlap.
+/// Vertices looked up together, with overlapping memory accesses.
 const BLOCK: usize = 64;
 
-/// Where to look for a position in a [`PositionTable`].
+/// Place of a position in a [`PositionTable`].
 #[derive(Clone, Copy, Default)]
 struct PositionProbe {
     /// hash of its cell
     hash: u64,
-    /// what was at the first place when the block began
+    /// entry of the first place at the start of the block
     entry: u32,
 }
 
@@ -92,14 +91,14 @@ struct PositionTable {
     /// vertex (lower bits), part of the hash of its cell (the bits above)
     places: Vec<u32>,
     len: usize,
-    /// bits for the vertex, one number more than there are vertices: so no entry is [`FREE`]
+    /// bits for the vertex, with one number more than there are vertices: no entry is [`FREE`]
     vertex_bits: u32,
-    /// cells per length; 0 when positions must agree in every bit
+    /// cells per length; 0 if positions must agree in every bit
     cells: f64,
 }
 
 impl PositionTable {
-    /// For at most `vertices` below 2³² − 1.
+    /// A table for at most `vertices` below 2³² − 1.
     fn new(cell: f64, vertices: usize, places: usize) -> Self {
         let cells = if cell.is_normal() { cell.recip() } else { 0.0 };
         let places = vec![FREE; places.max(2 * BLOCK).next_power_of_two()];
@@ -111,14 +110,14 @@ impl PositionTable {
         }
     }
 
-    /// Room for one more block; `known`: the positions of the vertices in the table.
+    /// Makes room for one more block; `known`: the positions of the vertices in the table.
     fn make_room(&mut self, known: &[Point3<f64>]) {
         if 2 * (self.len + BLOCK) > self.places.len() {
             self.grow(known);
         }
     }
 
-    /// Where to look for each position of a block.
+    /// First place of each position of a block.
     #[inline]
     fn probes(&self, block: &[Point3<f64>]) -> [PositionProbe; BLOCK] {
         let mut probes = [PositionProbe::default(); BLOCK];
@@ -131,8 +130,7 @@ impl PositionTable {
         probes
     }
 
-    /// The vertex in the cell of this position, or the next number, `known.len()`, which is then
-    /// taken.
+    /// The vertex in the cell of this position, or a new one with the next number, `known.len()`.
     #[inline]
     fn find_or_add(
         &mut self,
@@ -146,12 +144,12 @@ impl PositionTable {
             probe.entry,
         );
         if entry == FREE {
-            // may have been taken since
+            // may have an entry since
             entry = self.places[place];
         }
         while entry != FREE {
             let vertex = entry ^ tag;
-            // below only when the tags agree
+            // below only if the tags agree
             if let Some(known) = known.get(vertex as usize)
                 && self.cell_of(known) == self.cell_of(position)
             {
@@ -190,7 +188,7 @@ impl PositionTable {
 
     #[inline]
     fn cell_of(&self, position: &Point3<f64>) -> [u64; 3] {
-        /// Added and taken away it rounds to whole numbers, as long as the sum keeps its exponent.
+        /// Adding and subtracting it rounds to integers while the sum keeps its exponent.
         const ROUND: f64 = 1.5 * (1u64 << 52) as f64;
         let cell = |x: f64| {
             let x = x + 0.0;
@@ -228,7 +226,7 @@ mod tests {
 
     use super::*;
 
-    /// How many of these are left, a hundred more being spread over 0 … 99 on each axis.
+    /// Number of these left after welding, beside a hundred more spread over 0 … 99 on each axis.
     fn left(positions: &[[f64; 3]]) -> usize {
         let mut all: Vec<_> = positions.iter().map(|&p| Point3::from(p)).collect();
         all.extend((0..100).map(|i| Point3::new(f64::from(i), f64::from(i), f64::from(i) + 0.5)));
@@ -290,8 +288,8 @@ mod tests {
     }
 
     proptest! {
-        /// More vertices than a block and than the table is made for, each position many times:
-        /// against an ordered map.
+        /// More vertices than a block and than the initial table, each position many times: against
+        /// an ordered map.
         #[test]
         fn copies_of_lattice_points_get_the_number_of_the_first(
             points in prop::collection::vec((-4..4i8, -4..4i8, -4..4i8), 3..1500)
