@@ -2,12 +2,12 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// An axis is far enough from x where its share along x is below this: the cross product is then at
-/// least 0.8 long.
+/// Largest share along x of an axis counted as far from x: the cross product is then at least 0.8
+/// long.
 const FAR_FROM_X: f64 = 0.6;
 
 /// Two unit vectors u and v across `axis`, a unit vector: (u, v, axis) is right-handed. No
-/// continuous choice exists: where they are discontinuous as the axis turns is not defined.
+/// continuous choice exists; the axes of discontinuity are unspecified.
 pub(crate) fn tangent_basis(axis: &Vector3<f64>) -> [Vector3<f64>; 2] {
     let aside = if axis.x.abs() < FAR_FROM_X {
         Vector3::x()
@@ -18,7 +18,7 @@ pub(crate) fn tangent_basis(axis: &Vector3<f64>) -> [Vector3<f64>; 2] {
     [u, axis.cross(&u)]
 }
 
-/// The smallest turn that takes z to a direction; half a turn about x to the opposite one.
+/// The smallest rotation from z to a direction; half a turn about x to the opposite one.
 pub fn turned_to(direction: &Vector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::rotation_between(&Vector3::z(), direction).unwrap_or_else(|| {
         UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)

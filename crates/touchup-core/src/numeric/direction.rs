@@ -1,14 +1,14 @@
-//! Length and direction of a vector, whatever the size of its components.
+//! Length and direction of a vector with components of any size.
 
 use nalgebra::Vector3;
 
-/// Squares below it have lost digits.
+/// Smaller squares have lost digits.
 const SMALLEST_SQUARE: f64 = f64::MIN_POSITIVE / f64::EPSILON;
 
-/// |v| and v/|v|, also where |v|² would underflow or overflow; the direction is zero where `v` is.
+/// |v| and v/|v|, even if |v|² would underflow or overflow; the direction of a zero vector is zero.
 ///
-/// The components are divided by the largest of them first, where their squares lose digits. Finite
-/// for every finite `v`, but for a length beyond the largest number.
+/// If squares lose digits, the components are divided by the largest of them first. Finite for
+/// every finite `v`, but for a length beyond the largest number.
 #[inline]
 pub(crate) fn length_and_direction(v: &Vector3<f64>) -> (f64, Vector3<f64>) {
     let squared = v.norm_squared();
@@ -19,7 +19,7 @@ pub(crate) fn length_and_direction(v: &Vector3<f64>) -> (f64, Vector3<f64>) {
     scaled(v)
 }
 
-/// v/|v|; `None` where `v` is zero or not finite.
+/// v/|v|; `None` if `v` is zero or not finite.
 #[inline]
 pub(crate) fn direction(v: &Vector3<f64>) -> Option<Vector3<f64>> {
     let (length, direction) = length_and_direction(v);
@@ -30,7 +30,7 @@ pub(crate) fn direction(v: &Vector3<f64>) -> Option<Vector3<f64>> {
 fn scaled(v: &Vector3<f64>) -> (f64, Vector3<f64>) {
     let largest = v.amax();
     if largest == 0.0 || !v.iter().all(|x| x.is_finite()) {
-        // NaN is a length that no comparison holds for
+        // every comparison with a NaN length fails
         return (
             if largest == 0.0 { 0.0 } else { f64::NAN },
             Vector3::zeros(),

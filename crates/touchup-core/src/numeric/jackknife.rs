@@ -1,8 +1,8 @@
-//! The uncertainty of an estimate from what it becomes without each part of its data.
+//! Uncertainty of an estimate from its values without each part of its data.
 
 /// Variance of an estimate by the delete-one jackknife \[Tukey 1958\]: (n − 1)/n Σ (xᵢ − x̄)².
 ///
-/// - `without`: the estimate with one part of the data left out, each part once.
+/// - `without`: the estimates without one part of the data, for each part.
 pub(crate) fn jackknife_variance(without: &[f64]) -> f64 {
     let count = without.len().max(1) as f64;
     let mean = without.iter().sum::<f64>() / count;
@@ -13,7 +13,7 @@ pub(crate) fn jackknife_variance(without: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Of a mean it is the variance of the data over their number, here 2.5 / 5.
+    /// For a mean it is the variance of the data over their number, here 2.5 / 5.
     #[test]
     fn the_variance_of_a_mean_is_that_of_the_data_over_their_number() {
         let data = [1.0, 2.0, 3.0, 4.0, 5.0];

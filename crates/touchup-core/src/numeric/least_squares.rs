@@ -1,11 +1,10 @@
-//! Weighted least squares by the normal equations: linear, and by damped steps where it is not.
+//! Weighted least squares by the normal equations: linear, or by damped steps if nonlinear.
 
 use nalgebra::{SMatrix, SVector};
 
 /// Sums over rows a, values z and weights w that determine the x of least Σ w (a·x − z)².
 ///
-/// That is Σ w z² − 2 `right`·x + x·`information` x, and its least is where `information` x =
-/// `right`.
+/// The sum is Σ w z² − 2 `right`·x + x·`information` x, and least for `information` x = `right`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct NormalEquations<const N: usize> {
     /// Σ w a aᵀ: symmetric to rounding, positive semi-definite
@@ -27,7 +26,7 @@ impl<const N: usize> Default for NormalEquations<N> {
 }
 
 impl<const N: usize> NormalEquations<N> {
-    /// Of rows and values of weight 1.
+    /// Sums of rows and values of weight 1.
     pub fn of(rows: impl IntoIterator<Item = (SVector<f64, N>, f64)>) -> Self {
         let mut sums = Self::default();
         rows.into_iter()
@@ -35,7 +34,7 @@ impl<const N: usize> NormalEquations<N> {
         sums
     }
 
-    /// Takes in w (a·x − z)².
+    /// Adds w (a·x − z)².
     #[inline]
     pub fn add(&mut self, row: &SVector<f64, N>, value: f64, weight: f64) {
         self.information.ger(weight, row, row, 1.0);
@@ -43,7 +42,7 @@ impl<const N: usize> NormalEquations<N> {
         self.square += weight * value * value;
     }
 
-    /// The same without what some of its rows added.
+    /// These sums without those of some rows.
     pub fn without(&self, some: &Self) -> Self {
         Self {
             information: self.information - some.information,
@@ -52,10 +51,10 @@ impl<const N: usize> NormalEquations<N> {
         }
     }
 
-    /// Takes in rows and values with weights that follow how far `x` leaves them off; returns the
-    /// sum of the weights.
+    /// Adds rows and values with weights that depend on the residuals at `x`; returns the sum of
+    /// the weights.
     ///
-    /// - `weight`: of the number of a row, and of what `x` leaves of its value.
+    /// - `weight`: from the number of a row and its residual at `x`.
     pub fn add_reweighted(
         &mut self,
         rows: impl IntoIterator<Item = (SVector<f64, N>, f64)>,
@@ -70,14 +69,14 @@ impl<const N: usize> NormalEquations<N> {
         rows.into_iter().enumerate().map(add).sum()
     }
 
-    /// The same with a share of its diagonal added to the information: a solution is the shorter
-    /// the more.
+    /// These equations with a share of the diagonal added to the information; a larger share
+    /// shortens the solution.
     pub fn damped(mut self, share: f64) -> Self {
         self.information += SMatrix::from_diagonal(&(self.information.diagonal() * share));
         self
     }
 
-    /// The x of least squares; `None` where the rows do not determine it.
+    /// The x of least squares; `None` if the rows do not determine it.
     pub fn solution(&self) -> Option<SVector<f64, N>> {
         Some(self.information.cholesky()?.solve(&self.right))
     }
@@ -88,23 +87,22 @@ impl<const N: usize> NormalEquations<N> {
     }
 }
 
-/// Damped least squares \[Levenberg 1944, Marquardt 1963\]: how the damping changes, and when to
-/// stop.
+/// Damped least squares \[Levenberg 1944, Marquardt 1963\]: rules of damping and stopping.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DampedSearch {
     /// damping of the first step
     pub first: f64,
-    /// by which it is multiplied after a step that helps, and after one that does not
+    /// factor of the damping after a step that helps, and after one that does not
     pub factors: [f64; 2],
-    /// it falls no lower
+    /// lower bound of the damping
     pub least: f64,
-    /// where so much does not help nothing does
+    /// damping beyond which no step can help
     pub most: f64,
-    /// steps at most
+    /// maximum number of steps
     pub tries: usize,
 }
 
-/// Why a [`DampedSearch`] ended.
+/// Reason for the end of a [`DampedSearch`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum SearchEnd {
     /// at the least cost, to rounding
@@ -116,12 +114,12 @@ pub(crate) enum SearchEnd {
 }
 
 impl DampedSearch {
-    /// From a place with its cost to the least one near it.
+    /// Searches from a place with its cost for the least cost nearby.
     ///
-    /// - `equations`: of a step from a place, undamped.
-    /// - `damped`: the same with so much damping.
-    /// - `better`: the place after a step and its cost, where that helps against the cost before.
-    /// - `is_last`: whether a step that was made is the last.
+    /// - `equations`: undamped equations of a step from a place.
+    /// - `damped`: the same with the given damping.
+    /// - `better`: the place after a step and its cost, if better than the cost before.
+    /// - `is_last`: whether a completed step is the last.
     pub fn run<T, const N: usize>(
         &self,
         (mut place, mut cost): (T, f64),
@@ -160,7 +158,7 @@ mod tests {
 
     use super::*;
 
-    /// Of a line through (0, 1), (1, 2), (2, 5): slope 2, height 2/3 at 0, and 2/3 is left.
+    /// For the line through (0, 1), (1, 2), (2, 5): slope 2, height 2/3 at 0, residual 2/3.
     #[test]
     fn a_line_through_three_points_is_that_of_the_textbook() {
         let points = [(0.0, 1.0), (1.0, 2.0), (2.0, 5.0)];

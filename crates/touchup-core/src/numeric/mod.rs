@@ -1,5 +1,5 @@
-//! Numbers and vectors of no room of their own: order statistics, means, bases, voxels, sets,
-//! robust weights, least squares, small rigid motions.
+//! Numerics shared by all rooms: order statistics, means, bases, voxels, sets, robust weights,
+//! least squares, small rigid motions.
 
 mod basis;
 mod counted;

@@ -4,7 +4,7 @@ use std::ops::{Add, Div};
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-/// Mean of some numbers or vectors; 0 where there are none.
+/// Mean of some numbers or vectors; 0 without any.
 pub(crate) fn mean<T>(values: impl Iterator<Item = T>) -> T
 where
     T: Default + Add<Output = T> + Div<f64, Output = T>,

@@ -1,10 +1,10 @@
-//! The normal distribution: its distribution function, its quantile, and the share of a round one
-//! inside of a circle.
+//! The normal distribution: distribution function, quantile, and share of a round one inside a
+//! circle.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
-/// From here on the continued fraction of the tail is taken: its 60 terms are exact to the last
-/// digit there, and the series still is.
+/// Start of the tail with the continued fraction: its 60 terms are exact to the last digit there,
+/// and the series still is.
 const TAIL: f64 = 3.5;
 
 /// Density of the standard normal distribution.
@@ -34,7 +34,7 @@ pub fn normal_cdf(z: f64) -> f64 {
     0.5 + normal_density(z) * sum
 }
 
-/// 1 − Φ far out.
+/// 1 − Φ in the upper tail.
 fn upper_tail(z: f64) -> f64 {
     if z > 40.0 {
         return 0.0;
@@ -43,7 +43,7 @@ fn upper_tail(z: f64) -> f64 {
     normal_density(z) / fraction
 }
 
-/// The z of which Φ(z) = `share`, by bisection; infinite at 0 and 1.
+/// The z with Φ(z) = `share`, by bisection; infinite at 0 and 1.
 ///
 /// - `share`: 0 to 1.
 pub fn normal_quantile(share: f64) -> f64 {
@@ -68,11 +68,11 @@ pub fn normal_quantile(share: f64) -> f64 {
 /// Probability that a point of a round normal distribution lies within a circle, by Simpson's rule
 /// across the circle.
 ///
-/// - `off`: of the middle of the distribution from that of the circle, 0 or more.
+/// - `off`: distance between the centres of distribution and circle, 0 or more.
 /// - `std`: of one coordinate, more than 0.
 /// - `radius`: of the circle, in the same unit.
 pub fn circle_probability(off: f64, std: f64, radius: f64) -> f64 {
-    /// Standard deviations on either side that are integrated: what is beyond is less than a
+    /// Range of integration, in standard deviations on either side: the rest is less than a
     /// rounding.
     const REACH: f64 = 9.0;
     /// Steps, even: 0.02 standard deviations each.
@@ -103,8 +103,8 @@ pub fn circle_probability(off: f64, std: f64, radius: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Tables: NIST/SEMATECH e-Handbook 1.3.6.7.1 to its digits, and 50 digits of the error
-    /// function rounded.
+    /// Tables: NIST/SEMATECH e-Handbook 1.3.6.7.1 to its digits, and the error function rounded
+    /// from 50 digits.
     #[test]
     fn the_distribution_function_has_the_digits_of_tables() {
         let table = [
@@ -150,7 +150,7 @@ mod tests {
         );
     }
 
-    /// About the middle it is Rayleigh's distribution, and of a circle much larger than the spread
+    /// About the middle it is Rayleigh's distribution, and for a circle much larger than the spread
     /// a half-plane.
     #[test]
     fn a_circle_holds_what_closed_forms_say() {

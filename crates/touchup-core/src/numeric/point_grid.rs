@@ -6,7 +6,7 @@ use nalgebra::Point3;
 
 use super::voxel::{VoxelKey, voxel_neighbourhood, voxel_of};
 
-/// Numbered points by the voxel they lie in.
+/// Numbered points by voxel.
 #[derive(Clone, Debug)]
 pub(crate) struct PointGrid {
     size: f64,
@@ -15,7 +15,7 @@ pub(crate) struct PointGrid {
 }
 
 impl PointGrid {
-    /// Without points.
+    /// An empty grid.
     ///
     /// - `size`: of a voxel, m, more than 0: the largest distance of a query.
     pub fn new(size: f64) -> Self {
@@ -25,7 +25,7 @@ impl PointGrid {
         }
     }
 
-    /// Of those of `points` that `numbers` name.
+    /// A grid of the entries of `points` with the given numbers.
     pub fn of(points: &[Point3<f64>], numbers: impl Iterator<Item = usize>, size: f64) -> Self {
         let mut grid = Self::new(size);
         numbers.for_each(|at| grid.insert(at as u32, &points[at]));

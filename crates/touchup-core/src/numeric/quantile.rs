@@ -1,7 +1,7 @@
-//! Quantiles: one of the values itself, between two of them, and by weight.
+//! Quantiles: order statistics, interpolated and weighted.
 
-/// The one of `values` that has ⌊`share` n⌋ of the n before it in rising order, the last where that
-/// is all; `None` where there are none. The values come out in another order. O(n).
+/// The entry of `values` with ⌊`share` n⌋ of the n before it in rising order, or the last; `None`
+/// if empty. Reorders the values. O(n).
 ///
 /// - `share`: 0 to 1.
 pub(crate) fn order_statistic(values: &mut [f64], share: f64) -> Option<f64> {
@@ -9,19 +9,17 @@ pub(crate) fn order_statistic(values: &mut [f64], share: f64) -> Option<f64> {
     Some(*values.select_nth_unstable_by(at, f64::total_cmp).1)
 }
 
-/// Which of three is the largest, the first among equals.
+/// Index of the largest of three, the first among equals.
 pub(crate) fn largest<T: PartialOrd>(of: &[T; 3]) -> usize {
     (1..3).fold(0, |at, i| if of[i] > of[at] { i } else { at })
 }
 
-/// The middle one in rising order, the upper of two; `None` where there is none. The values come
-/// out in another order. O(n).
+/// The middle one in rising order, the upper of two; `None` if empty. Reorders the values. O(n).
 pub fn median(values: &mut [f64]) -> Option<f64> {
     order_statistic(values, 0.5)
 }
 
-/// The value at a share of the range of indices of rising `values`, between two of them by
-/// proportion; 0 where there are none.
+/// The value at a share of the range of indices of rising `values`, interpolated; 0 if empty.
 ///
 /// - `share`: from the first (0) to the last (1).
 pub fn quantile(rising: &[f64], share: f64) -> f64 {
@@ -33,8 +31,8 @@ pub fn quantile(rising: &[f64], share: f64) -> f64 {
     low + (high - low) * at.fract()
 }
 
-/// The least value up to which a share of the weight lies; `None` where there are none. Sorts the
-/// values, those that are equal keep their order.
+/// The least value with at least a share of the weight up to it; `None` if empty. Sorts the values;
+/// equal ones keep their order.
 ///
 /// - `values`: each with its weight, 0 or more.
 pub fn weighted_quantile(values: &mut [(f64, f64)], share: f64) -> Option<f64> {

@@ -1,11 +1,11 @@
-//! Weights of iteratively reweighted least squares, as functions of u², u a residual over the width
-//! of the weights.
+//! Weights of iteratively reweighted least squares, as functions of u², with u the residual over
+//! the width of the weights.
 
 /// Standard deviation of normal errors over the median of their sizes: 1/Φ⁻¹(3/4).
 pub(crate) const SIGMA_OF_MEDIAN: f64 = 1.482_602_218_505_602;
 
-/// Width of Tukey's weights in standard deviations: 95 % as good as plain least squares where there
-/// are no outliers.
+/// Width of Tukey's weights in standard deviations: 95 % as good as plain least squares without
+/// outliers.
 pub(crate) const TUKEY_WIDTH: f64 = 4.685;
 
 /// Tukey's biweight (1 − u²)², 0 from u = 1 on.

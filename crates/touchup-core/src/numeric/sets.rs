@@ -1,6 +1,6 @@
-//! Sets: things each once, what hangs together, disjoint sets of numbers (union–find).
+//! Sets: distinct things, connected things, disjoint sets of numbers (union–find).
 
-/// Things in rising order, each once.
+/// Distinct things in rising order.
 pub(crate) fn distinct<T: Ord>(things: impl IntoIterator<Item = T>) -> Vec<T> {
     let mut distinct: Vec<T> = things.into_iter().collect();
     distinct.sort_unstable();
@@ -8,7 +8,7 @@ pub(crate) fn distinct<T: Ord>(things: impl IntoIterator<Item = T>) -> Vec<T> {
     distinct
 }
 
-/// Things in their order, without those that are the same as one before.
+/// Things in their order, without repeats of earlier ones.
 pub(crate) fn without_repeats<T>(
     things: impl IntoIterator<Item = T>,
     is_same: impl Fn(&T, &T) -> bool,
@@ -22,9 +22,9 @@ pub(crate) fn without_repeats<T>(
     kept
 }
 
-/// `found`, then what hangs together with it, the nearest first.
+/// `found`, then everything connected to it, the nearest first.
 ///
-/// - `beside`: what lies beside one; `takes`: whether one belongs to them that was not taken yet.
+/// - `beside`: neighbours of one; `takes`: whether a neighbour belongs to them and is new.
 pub(crate) fn flood<T: Copy, Beside: IntoIterator<Item = T>>(
     mut found: Vec<T>,
     beside: impl Fn(T) -> Beside,
@@ -38,8 +38,7 @@ pub(crate) fn flood<T: Copy, Beside: IntoIterator<Item = T>>(
     found
 }
 
-/// Sets of the numbers below a limit, each number at first alone. The lowest number of a set is its
-/// root.
+/// Sets of the numbers below a limit, at first one each. The lowest number of a set is its root.
 #[derive(Clone, Debug)]
 pub(crate) struct DisjointSets(Vec<u32>);
 
@@ -48,7 +47,7 @@ impl DisjointSets {
         Self((0..count as u32).collect())
     }
 
-    /// The number that names the set of another; halves the path as it goes.
+    /// Root of the set of a number; halves the path on the way.
     pub fn root(&mut self, mut number: u32) -> u32 {
         while self.0[number as usize] != number {
             let above = self.0[self.0[number as usize] as usize];

@@ -1,4 +1,4 @@
-//! Small rigid motions about a centre, and how they change distances to planes.
+//! Small rigid motions about a centre, and the resulting change of distances to planes.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3, Vector6};
 
@@ -14,12 +14,11 @@ pub(crate) fn moved_by_twist(
     Isometry3::from_parts((shift + centre.coords - turn * centre.coords).into(), turn) * pose
 }
 
-/// How the distance of a point from a plane changes with a small motion of the point \[Chen Medioni
-/// 1992\]: (n, arm × n / lever), by shift and by turn, a turn counted by the shift that it gives at
-/// the lever.
+/// Change of the distance of a point from a plane with a small motion of the point \[Chen Medioni
+/// 1992\]: (n, arm × n / lever), by shift and by turn, with turns as the shift at the lever.
 ///
 /// - `arm`: of the point from the centre of the turn, m; `normal`: unit, of the plane; `lever`: m,
-///   1 where turns are counted in rad.
+///   1 for turns in rad.
 pub(crate) fn point_to_plane_row(
     arm: &Vector3<f64>,
     normal: &Vector3<f64>,

@@ -1,12 +1,12 @@
-//! Cubes of a regular grid, as keys of what lies in them.
+//! Cubes of a regular grid, as keys of their contents.
 
 use nalgebra::Point3;
 
-/// Which cube of a grid from the origin, counted along x, y and z.
+/// Index of a cube of a grid from the origin, along x, y and z.
 pub(crate) type VoxelKey = [i32; 3];
 
-/// The cube of edge `size` (m, > 0) that holds `p`: ⌊p / size⌋. What is farther than keys can count
-/// is in the last cube; NaN is in the first.
+/// The cube of edge `size` (m, > 0) around `p`: ⌊p / size⌋. Points beyond the range of keys are in
+/// the outermost one; NaN is in cube 0.
 #[inline]
 pub(crate) fn voxel_of(p: &Point3<f64>, size: f64) -> VoxelKey {
     [p.x, p.y, p.z].map(|x| (x / size).floor() as i32)
