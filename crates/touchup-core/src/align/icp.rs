@@ -1,11 +1,11 @@
 //! Rigid registration of points to a mesh, point to plane.
 //!
-//! A point x with the closest place q of the target and the normal n there meets the target when
-//! n·(x − q) vanishes; for a small twist (t, θ) about c that is n·t + ((x − c) × n)·θ = −n·(x − q)
-//! \[Chen Medioni 1992\]. Each round solves it by least squares with Tukey's weights, whose width
-//! begins at the distances found and shrinks to the scatter of the residuals: what alone holds a
-//! direction, such as the walls of a few holes, would else count as outliers before it has
-//! converge. A direction without constraint stays as it was and is reported.
+//! A point x with the closest place q of the target and the normal n there meets the target if n·(x
+//! − q) vanishes; for a small twist (t, θ) about c that is n·t + ((x − c) × n)·θ = −n·(x − q)
+//! \[Chen Medioni 1992\]. Each round solves it by least squares with Tukey's weights. Their width
+//! begins at the initial distances and shrinks to the scatter of the residuals: otherwise points
+//! that alone hold a direction, such as the walls of a few holes, would count as outliers before it
+//! has converged. A direction without constraint stays as it was and is reported.
 
 use nalgebra::{Isometry3, Matrix6, Point3, Vector3, Vector6};
 
@@ -18,10 +18,10 @@ use crate::numeric::{
 /// Settings of [`icp`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IcpParams {
-    /// Points farther from the target than this have no part in it, m. Default: none is too far at
-    /// first.
+    /// Points farther from the target than this have no part in the fit, m. Default: none is too
+    /// far at first.
     pub reach: f64,
-    /// Rounds after which it is given up. Default 100; from a start within reach it takes 10 to 20.
+    /// Maximum number of rounds. Default 100; from a start within reach it takes 10 to 20.
     pub most_rounds: usize,
 }
 
@@ -34,61 +34,61 @@ impl Default for IcpParams {
     }
 }
 
-/// One of six independent small motions about [`IcpFit::centre`], and how much the target holds it.
+/// One of six independent small motions about [`IcpFit::centre`], and its constraint by the target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     /// shift of the centre, in the frame of the target; with `turn` of unit length
     pub shift: Vector3<f64>,
-    /// rotation vector, counted by the shift that it gives on average: times [`IcpFit::lever`]
+    /// rotation vector times [`IcpFit::lever`]: the shift that it gives on average
     pub turn: Vector3<f64>,
-    /// mean square of how much the motion changes the distances, relative to a motion along all
+    /// mean square of the change of the distances by the motion, relative to a motion along all
     /// normals: 0 to 1 or a little more
     pub share: f64,
 }
 
 impl Motion {
-    /// Whether the target sets where to stop.
+    /// Whether the target determines this motion.
     pub(crate) fn is_determined(&self) -> bool {
         self.share >= LEAST_SHARE
     }
 }
 
-/// Where the points fit the target.
+/// Fit of the points to the target.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IcpFit {
-    /// Moves the points, as they were given, onto the target.
+    /// Moves the given points onto the target.
     pub source_to_target: Isometry3<f64>,
     /// Root mean square of the distances to the tangent planes, over the inliers, m.
     pub rms: f64,
-    /// The same robustly, 1.48 times the median, m.
+    /// Robust value of the same, 1.48 times the median, m.
     pub scatter: f64,
-    /// Points that have weight at the end.
+    /// Points with weight at the end.
     pub inliers: usize,
-    /// Rounds that it took.
+    /// Number of rounds.
     pub rounds: usize,
     /// The middle of the moved points, m, in the frame of the target.
     pub centre: Point3<f64>,
-    /// Root mean square distance of the points from it, m.
+    /// Root mean square distance of the points from the centre, m.
     pub lever: f64,
     /// Independent motions, the least determined first.
     pub motions: [Motion; 6],
 }
 
 impl IcpFit {
-    /// The motions that leave the fit as it is: a sphere turns, a plane slides. The pose is where
-    /// the start had it in these.
+    /// The motions that leave the fit as it is: a sphere turns, a plane slides. In these the pose
+    /// stays as in the start.
     pub fn undetermined(&self) -> impl Iterator<Item = &Motion> {
         self.motions.iter().filter(|motion| !motion.is_determined())
     }
 }
 
-/// Why there is no [`IcpFit`].
+/// Reason why there is no [`IcpFit`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum IcpError {
     /// NaN or infinity.
     #[error("point {point} has a coordinate that is not finite")]
     NotFinite {
-        /// which, counted from 0
+        /// index of the point, from 0
         point: usize,
     },
     /// Nothing to fit.
@@ -96,55 +96,54 @@ pub enum IcpError {
     TooFew {
         /// points with a partner
         found: usize,
-        /// at least
+        /// required points
         needed: usize,
-        /// how far partners may be, m
+        /// largest distance of partners, m
         reach: f64,
     },
     /// The rounds do not converge.
     #[error("after {rounds} rounds the fit still moves by {:.4} mm, at a scatter of {:.4} mm: {LOOK_AT}",
             .step * 1e3, .scatter * 1e3)]
     Unsettled {
-        /// how many were made
+        /// number of rounds
         rounds: usize,
-        /// the last one, m
+        /// last step, m
         step: f64,
-        /// of the distances to the tangent planes, m
+        /// scatter of the distances to the tangent planes, m
         scatter: f64,
     },
 }
 
 const LOOK_AT: &str = "are both in the same unit, and roughly in place?";
 
-/// Six unknowns, each held by two points.
+/// Six unknowns with two points each.
 const LEAST_POINTS: usize = 12;
-/// A motion is undetermined below this share: facets make a cylinder of 32 sides hold its turn by
+/// Share below which a motion is undetermined: facets make a cylinder of 32 sides hold its turn by
 /// 0.003, while the walls of one hole of 6 mm hold a plate of 100 mm × 60 mm by 0.009.
 const LEAST_SHARE: f64 = 0.004;
-/// Points of the first rounds, and of those before all take part; each is every n-th along the
-/// curve.
+/// Number of points of the first rounds, and of those before all take part; each is every n-th
+/// along the curve.
 const LEVELS: [usize; 2] = [1_500, 12_000];
-/// The width is at most halved in a round.
+/// Smallest ratio of the width to that of the round before.
 const SHRINK: f64 = 0.5;
-/// The first width, over the distance within which nine of ten points are.
+/// The first width, over the distance that covers nine of ten points.
 const FIRST_WIDTH: f64 = 2.0;
-/// A round that moves less than this ends a level, in scatters: partners then stay where they are
-/// to the second order.
+/// Motion below which a round ends a level, in scatters: partners then stay in place to second
+/// order.
 const REST: f64 = 0.3;
-/// How often the weights are updated before the next partners.
+/// Number of weight updates before the next search of partners.
 const REWEIGHTINGS: usize = 4;
-/// Lengths below this are rounding, over the size of the target and its distance from the origin: 1
-/// pm for 100 mm.
+/// Length of rounding, over the size of the target and its distance from the origin: 1 pm for 100
+/// mm.
 const ROUNDING: f64 = 1e-11;
 
-/// The rigid motion at which `points` fit `target`, from a start that is roughly right.
+/// The rigid motion that fits `points` to `target`, from a roughly right start.
 ///
-/// - `points`: m, in their own frame, in any order; a subset of them is used far from the minimum,
-///   all of them at the end.
+/// - `points`: m, in their own frame, in any order; a subset far from the minimum, all at the end.
 /// - `tree`: over the faces of `target`.
-/// - `start`: moves the points to about where they belong.
+/// - `start`: moves the points to about their places.
 /// - `workers`: threads that search for the closest places; the motion is the same to the last bit.
-/// - returns: the motion; directions that are undetermined are listed in it.
+/// - returns: the motion, with a list of its undetermined directions.
 ///
 /// # Errors
 /// [`IcpError`].
@@ -204,37 +203,37 @@ pub fn icp(
 
 /// The state between rounds.
 struct Search<'a> {
-    /// along the curve
+    /// in the order of the curve
     points: &'a [Point3<f64>],
     target: &'a TriMesh,
     tree: &'a FaceTree,
     workers: &'a dyn Workers,
     pose: Isometry3<f64>,
-    /// of the points, in their own frame
+    /// middle of the points, in their own frame
     middle: Point3<f64>,
     lever: f64,
     /// width of the weights and farthest partner, m
     width: f64,
     scatter: f64,
-    /// length that is rounding, m
+    /// length of a rounding, m
     rounding: f64,
     rounds: usize,
     most_rounds: usize,
-    /// of points with the tangent planes of their closest places: how their distances change with
-    /// shift and turn, turns counted by the lever, and by how much they have to, m
+    /// for points with the tangent planes of their closest places: change of their distances with
+    /// shift and turn, turns in units of the lever, and the required change, m
     partners: Vec<(Vector6<f64>, f64)>,
     /// sizes of the residuals of a round
     sizes: Vec<f64>,
 }
 
-/// What one round found, and its step.
+/// Results of one round, and its step.
 struct Round {
-    /// ΣW rows rowsᵀ / ΣW, turns counted by the lever
+    /// ΣW rows rowsᵀ / ΣW, turns in units of the lever
     information: Matrix6<f64>,
     right: Vector6<f64>,
     inliers: usize,
     square: f64,
-    /// length of the step made, m
+    /// length of the step, m
     step: f64,
     /// whether the width of the weights has stopped shrinking
     is_narrow: bool,
@@ -291,7 +290,7 @@ impl<'a> Search<'a> {
         self.find_partners(stride);
         let mut round = self.weighted_round(&Vector6::zeros())?;
         let mut step = solve(&round);
-        // the weights follow the residuals before partners are searched again, which takes longest
+        // the weights follow the residuals before the next search of partners, which takes longest
         for _ in 1..REWEIGHTINGS {
             round = self.weighted_round(&step)?;
             let next = solve(&round);
@@ -315,7 +314,7 @@ impl<'a> Search<'a> {
         Ok(round)
     }
 
-    /// The closest places of every `stride`-th point, as far as they are within the width.
+    /// Closest places of every `stride`-th point within the width.
     fn find_partners(&mut self, stride: usize) {
         let centre = self.pose * self.middle;
         let partner = |at: usize| {
@@ -332,7 +331,7 @@ impl<'a> Search<'a> {
         self.partners.extend(found.into_iter().flatten());
     }
 
-    /// The normal equations with the weights that the residuals have after `step`.
+    /// The normal equations, weighted by the residuals after `step`.
     fn weighted_round(&self, step: &Vector6<f64>) -> Result<Round, IcpError> {
         let (mut equations, mut inliers, mut square) = (NormalEquations::default(), 0, 0.0);
         let weights = equations.add_reweighted(self.partners.iter().copied(), step, |_, left| {
@@ -361,7 +360,7 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Brings the width of the weights towards the scatter that is left: at once where the pose has
+    /// Brings the width of the weights towards the remaining scatter: at once if the pose has
     /// converged, else in steps.
     fn narrow(&mut self, round: &mut Round, step: &Vector6<f64>) {
         self.sizes.clear();
@@ -381,7 +380,7 @@ impl<'a> Search<'a> {
         self.width = wanted.max(least).min(self.width);
     }
 
-    /// Steps below this have converged, m.
+    /// Step below which the pose has converged, m.
     fn least_step(&self) -> f64 {
         (REST * self.scatter).max(self.rounding)
     }
@@ -423,7 +422,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// The smallest step that solves the equations in the directions that are determined.
+/// The smallest step that solves the equations in the determined directions.
 fn solve(round: &Round) -> Vector6<f64> {
     let eigen = round.information.symmetric_eigen();
     let along = |i: usize| {

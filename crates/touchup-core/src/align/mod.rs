@@ -1,4 +1,4 @@
-//! Where one thing lies relative to another: rigid motions with their uncertainty.
+//! Relative place of two things: rigid motions with their uncertainty.
 
 mod by_features;
 mod datum_fit;

@@ -1,11 +1,11 @@
 //! The rigid motion that takes picked points onto the same points picked elsewhere.
 //!
-//! R, t minimise Σ wᵢ |bᵢ − (R aᵢ + t)|²: with the weighted centroids taken off, R = U diag(1, 1,
-//! det U Vᵀ) Vᵀ of the singular value decomposition Σ wᵢ b′ᵢ a′ᵢᵀ = U S Vᵀ [Kabsch 1976, Umeyama
-//! 1991]. About the centroid shift and turn are independent: cov = σ² diag(I / Σ wᵢ, (Σ wᵢ (|qᵢ|² I
-//! − qᵢ qᵢᵀ))⁻¹), qᵢ = R a′ᵢ.
+//! R, t minimise Σ wᵢ |bᵢ − (R aᵢ + t)|²: relative to the weighted centroids, R = U diag(1, 1, det
+//! U Vᵀ) Vᵀ of the singular value decomposition Σ wᵢ b′ᵢ a′ᵢᵀ = U S Vᵀ [Kabsch 1976, Umeyama 1991].
+//! About the centroid shift and turn are independent: cov = σ² diag(I / Σ wᵢ, (Σ wᵢ (|qᵢ|² I − qᵢ
+//! qᵢᵀ))⁻¹), qᵢ = R a′ᵢ.
 //!
-//! People pick wrong points, in wrong units and wrong axes. What the pairs alone reveal: one pair
+//! People pick wrong points, in wrong units and wrong axes. The pairs alone reveal: one pair
 //! against all the others (leave one out, with an F test), distances that differ by a known factor,
 //! a mirror image that fits better.
 
@@ -22,20 +22,19 @@ pub use solved::{PairsFit, PairsParams, PointPair};
 use self::solved::SolvedMotion;
 use crate::numeric::{median, spreads};
 
-/// Farther from the origin than this, a point is a fault, m.
+/// Largest distance of a point from the origin, m; beyond it is a fault.
 const LARGEST_COORDINATE: f64 = 1e6;
-/// Standard deviations of a pick that are believed, m: far outside, their squares are no numbers.
+/// Range of plausible standard deviations of a pick, m: far outside, their squares are no numbers.
 const BELIEVABLE_SIGMA: RangeInclusive<f64> = 1e-12..=1e3;
-/// Points count as on one line when they scatter across it by less than this share of their scatter
-/// along it: 1°.
+/// Scatter across a line, as a share of the scatter along it, below which points count as on it:
+/// 1°.
 const LINE_SHARE: f64 = 0.02;
-/// … or by less than so many standard deviations of a pick: the turn about the line is then
-/// undetermined.
+/// The same limit in standard deviations of a pick: the turn about the line is then undetermined.
 const LINE_SIGMAS: f64 = 3.0;
-/// Picks closer together than this share of their scatter are one point.
+/// Share of their scatter below which two picks are one point.
 const SAME_SHARE: f64 = 1e-6;
 
-/// The motion, or why there is none.
+/// The motion, or the reason why there is none.
 ///
 /// # Errors
 /// [`PairsError`]: too few, coincident or collinear points, points that are no numbers, another
@@ -71,14 +70,13 @@ pub fn fit_pairs(pairs: &[PointPair], params: &PairsParams) -> Result<PairsFit, 
     Ok(fit)
 }
 
-/// The motion of least squares between pairs that are known to belong together, all of the same
-/// weight; where they lie on one line, one of the motions that fit equally well. `None` for no
-/// pairs, or where one is no number.
+/// The motion of least squares between corresponding pairs, all of the same weight; if they lie on
+/// one line, one of the motions that fit equally well. `None` for no pairs, or if one is no number.
 pub(crate) fn closest_motion(pairs: &[PointPair]) -> Option<Isometry3<f64>> {
     SolvedMotion::of(pairs, &vec![1.0; pairs.len()], None).map(|solved| solved.motion)
 }
 
-/// σ of a pair of unit weight, where it is known beforehand.
+/// σ of a pair of unit weight, if given beforehand.
 fn given_sigma(pairs: &[PointPair], params: &PairsParams) -> Option<f64> {
     params.sigma.or_else(|| {
         pairs
@@ -89,8 +87,8 @@ fn given_sigma(pairs: &[PointPair], params: &PairsParams) -> Option<f64> {
     })
 }
 
-/// (σ₀ / σᵢ)², so that a pair of σ₀ has weight 1. A pair without a sigma has the median weight of
-/// those that have one.
+/// (σ₀ / σᵢ)², which gives a pair of σ₀ weight 1. A pair without a sigma has the median weight of
+/// those with one.
 fn weights(pairs: &[PointPair], params: &PairsParams) -> Vec<f64> {
     let mut named: Vec<f64> = pairs.iter().filter_map(|pair| pair.sigma).collect();
     let usual = params.sigma.or(median(&mut named)).unwrap_or(1.0);
@@ -121,7 +119,7 @@ fn check(pairs: &[PointPair]) -> Result<(), PairsError> {
     Ok(())
 }
 
-/// Points that are too few or too close together on either side.
+/// Refuses points that are too few or too close together on either side.
 fn check_extent(pairs: &[PointPair], params: &PairsParams) -> Result<(), PairsError> {
     for side in [PairSide::From, PairSide::To] {
         let points: Vec<_> = pairs.iter().map(|pair| pair.on(side)).collect();

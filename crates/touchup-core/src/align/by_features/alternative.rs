@@ -1,4 +1,4 @@
-//! What an alignment by features is given, and one motion that it finds.
+//! Inputs of an alignment by features, and one resulting motion.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -8,10 +8,10 @@ use crate::mesh::{FaceTree, TriMesh};
 /// Settings of [`super::align_features`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FeaturesParams {
-    /// By how much features may be out of place beyond three standard uncertainties, over the size
-    /// of the target. Default 0.01: 1 mm on a part of 100 mm, as a poor scan has them.
+    /// Largest offset of features beyond three standard uncertainties, over the size of the target.
+    /// Default 0.01: 1 mm on a part of 100 mm, as in a poor scan.
     pub tolerance: f64,
-    /// By how much diameters and widths may differ beyond three standard uncertainties, over their
+    /// Largest difference of diameters and widths beyond three standard uncertainties, over their
     /// size. Default 0.05: the flats of a hole of 12 sides lie 3.4 % inside.
     pub size_tolerance: f64,
 }
@@ -34,14 +34,14 @@ pub struct OrientedSample {
     pub normal: Vector3<f64>,
 }
 
-/// What is known beside the features.
+/// Surfaces as evidence beside the features.
 #[derive(Clone, Copy, Debug)]
 pub struct Surfaces<'a> {
-    /// spread evenly over the source; 20 000 do
+    /// points spread evenly over the source; 20 000 suffice
     pub points: &'a [OrientedSample],
-    /// what they are brought onto
+    /// surface onto which the points move
     pub target: &'a TriMesh,
-    /// over its faces
+    /// tree over the faces of `target`
     pub tree: &'a FaceTree,
 }
 
@@ -50,17 +50,17 @@ pub struct Surfaces<'a> {
 pub struct Alternative {
     /// Moves the source onto the target.
     pub source_to_target: Isometry3<f64>,
-    /// Matched features: numbers in the lists of source and target.
+    /// Matched features: indices into the lists of source and target.
     pub explained: Vec<[usize; 2]>,
-    /// Share of the points that lie on the target, within three times the tolerance, with normals
-    /// alike; `None` without surfaces.
+    /// Share of the points on the target, within three times the tolerance and with similar
+    /// normals; `None` without surfaces.
     pub agreeing: Option<f64>,
-    /// How the surfaces fit; `None` without surfaces, or where the fit did not converge.
+    /// Fit of the surfaces; `None` without surfaces, or if the fit did not converge.
     pub icp: Option<IcpFit>,
-    /// Against the first alternative: rotation vector, rad, and shift of the middle of the
+    /// Difference from the first alternative: rotation vector, rad, and shift of the middle of the
     /// features, m; in the frame of the target.
     pub differs: [Vector3<f64>; 2],
 }
 
-/// Two motions are one when they move features no farther apart than so many tolerances.
+/// Largest distance between features, in tolerances, at which two motions count as one.
 pub(super) const SAME: f64 = 2.0;

@@ -6,12 +6,12 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 use super::landmark::{ALIKE, Landmark};
 use crate::features::Kind;
 
-/// What kind of set it is of.
+/// Class of a set of features.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum SetClass {
     /// two features with a place and an axis
     Pair(Kind, Kind),
-    /// one such feature and a plane that its axis is not square to
+    /// one such feature and a plane not square to its axis
     Beside(Kind),
     /// a slot with its direction
     Slot,
@@ -21,7 +21,7 @@ enum SetClass {
     Axis(Kind, Kind),
 }
 
-/// A frame that features make.
+/// A frame made of features.
 #[derive(Clone, Debug)]
 pub(super) struct Base {
     class: SetClass,
@@ -31,15 +31,15 @@ pub(super) struct Base {
     cosines: [f64; 4],
     origin: Point3<f64>,
     axes: Matrix3<f64>,
-    /// landmarks that have sizes to be compared
+    /// landmarks with sizes to compare
     pub of: [usize; 2],
 }
 
-/// Sine of the least angle between two directions that make a frame: 15°.
+/// Sine of the least angle between two directions of a frame: 15°.
 const LEAST_SINE: f64 = 0.26;
-/// Cosines of the same set differ by no more than this: 4° where it is most sensitive.
+/// Largest difference of the cosines of equal sets: 4° at the most sensitive angle.
 const COSINES: f64 = 0.07;
-/// Features with a place and an axis that make pairs, at most; the first of the list, which are the
+/// Maximum number of features with a place and an axis that make pairs; the first of the list, the
 /// largest of their kind.
 const MOST_LOCATED: usize = 150;
 
@@ -54,7 +54,7 @@ fn frame(first: &Vector3<f64>, second: &Vector3<f64>) -> Option<Matrix3<f64>> {
 
 /// All sets.
 ///
-/// - `all_frames`: also from the other end of what goes through, and each turn of a corner: of one
+/// - `all_frames`: also from the other end of through features, and each turn of a corner; for one
 ///   side of a match alone.
 pub(super) fn bases(landmarks: &[Landmark], all_frames: bool) -> Vec<Base> {
     let located = landmarks
@@ -90,7 +90,7 @@ fn pair(of: [usize; 2], first: &Landmark, second: &Landmark) -> Option<Base> {
     let (a, b) = (first.axis?, second.axis?);
     let between = second.place - first.place;
     let direction = between.try_normalize(0.0)?;
-    // the displacement from one to the other is known best
+    // the displacement between them is the most certain direction
     let axes = frame(&direction, &a).or_else(|| frame(&direction, &b))?;
     let class = SetClass::Pair(first.class(), second.class());
     let cosines = [
@@ -152,7 +152,7 @@ fn corner(at: usize, landmark: &Landmark, turn: usize) -> Option<Base> {
     })
 }
 
-/// Sets that leave the turn about an axis open, each with one turn of many.
+/// Sets that leave the turn about an axis open, each with one arbitrary turn.
 ///
 /// - `all_frames`: as in [`bases`].
 pub(super) fn axial_bases(landmarks: &[Landmark], all_frames: bool) -> Vec<Base> {
@@ -199,7 +199,7 @@ fn about(of: [usize; 2], first: &Landmark, second: &Landmark) -> Option<Base> {
 }
 
 impl Base {
-    /// The motion that maps this onto `other`.
+    /// The motion from this base onto `other`.
     pub fn onto(&self, other: &Self) -> Isometry3<f64> {
         let turn = Rotation3::from_matrix_unchecked(other.axes * self.axes.transpose());
         let mut turn = UnitQuaternion::from_rotation_matrix(&turn);
@@ -210,7 +210,7 @@ impl Base {
         )
     }
 
-    /// - `play`: by which lengths may differ, m
+    /// - `play`: largest difference of lengths, m
     fn is_like(&self, other: &Self, play: f64) -> bool {
         let cosines = self
             .cosines
@@ -221,7 +221,7 @@ impl Base {
     }
 }
 
-/// Sets in order, so that those like another are found without looking at all.
+/// Sets in sorted order, for a quick search of similar ones.
 pub(super) struct SortedSets(Vec<Base>);
 
 impl SortedSets {
@@ -230,7 +230,7 @@ impl SortedSets {
         Self(bases)
     }
 
-    /// Those that may be `base`, by lengths and angles.
+    /// Sets that may equal `base`, by lengths and angles.
     pub fn like<'a>(&'a self, base: &'a Base, play: f64) -> impl Iterator<Item = &'a Base> {
         let is_before =
             |other: &Base| (other.class, other.length) < (base.class, base.length - play);

@@ -1,38 +1,38 @@
-//! Why features determine no motion, or more than one.
+//! Reasons why features determine no motion, or more than one.
 
 use super::FreeTurn;
 use super::alternative::Alternative;
 use crate::names;
 
 names! {
-    /// Which of the two shapes.
+    /// One of the two shapes.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum FeaturesSide {
-        /// what is to be moved: the mesh
+        /// the shape to move: the mesh
         Source = "mesh",
-        /// what it is moved onto: the true part
+        /// the fixed shape: the true part
         Target = "truth",
     }
 }
 
-/// Why there is no one motion.
+/// Reason why there is no single motion.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FeaturesError {
-    /// Nothing was found on one side.
+    /// One side has no features.
     #[error("no features were found on the {side}: {OTHER_METHODS}")]
     NoFeatures {
-        /// which
+        /// the side without features
         side: FeaturesSide,
     },
-    /// What was found leaves a turn or a shift open.
+    /// The features leave a turn or a shift open.
     #[error(
         "the {found} features of the {side} leave a turn or a shift open; two holes or slots, one and a plane beside it, or a \
          corner of three planes would fix it: touch one more, or {OTHER_METHODS}"
     )]
     TooFew {
-        /// which
+        /// the side with too few features
         side: FeaturesSide,
-        /// how many there are
+        /// number of its features
         found: usize,
     },
     /// No motion matches enough features.
@@ -42,22 +42,22 @@ pub enum FeaturesError {
         agreeing.map_or_else(String::new, |share| format!(" and {:.0} % of the surface", share * 100.0))
     )]
     NoMatch {
-        /// features of the mesh
+        /// matched features of the mesh
         explained: usize,
         /// all features of the mesh
         of: usize,
-        /// share of the surface of the mesh
+        /// agreeing share of the surface of the mesh
         agreeing: Option<f64>,
     },
-    /// Left-handed.
+    /// The mesh fits a mirror image.
     #[error(
         "the mesh fits a mirror image of the truth ({mirrored} of {of} features) and no motion of it ({explained}): the sign \
          of one axis of a file is wrong, or it is the part's left-handed twin"
     )]
     Mirrored {
-        /// features that the best motion explains
+        /// features explained by the best motion
         explained: usize,
-        /// features that the best mirror image explains
+        /// features explained by the best mirror image
         mirrored: usize,
         /// all features of the mesh
         of: usize,
@@ -70,13 +70,13 @@ pub enum FeaturesError {
         .turn.through.x * 1e3, .turn.through.y * 1e3, .turn.through.z * 1e3
     )]
     FreeTurn {
-        /// about which axis
+        /// the free turn
         turn: FreeTurn,
-        /// one motion for each orientation of the axis on the other, the best first, each with one
-        /// turn of all
+        /// one motion for each orientation of one axis on the other, the best first, each with one
+        /// arbitrary turn
         alternatives: Vec<Alternative>,
     },
-    /// Several motions are about as good: a symmetric part, or too little of it was seen.
+    /// Several motions are about as good: a symmetric part, or too small a scanned part of it.
     #[error("{} motions explain the mesh about equally well: the part is symmetric, or what distinguishes them was not scanned", .alternatives.len())]
     Ambiguous {
         /// all of them, the best first

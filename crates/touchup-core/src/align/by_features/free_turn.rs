@@ -17,15 +17,14 @@ pub struct FreeTurn {
     pub through: Point3<f64>,
 }
 
-/// Turns that are tried, each by [`STEP`] more: 16 do not meet the symmetry of any part of fewer
-/// holes.
+/// Number of trial turns, [`STEP`] apart: 16 match the symmetry of no part with fewer holes.
 const TURNS: u32 = 16;
-/// The golden angle, rad: no multiple of it comes near one before.
+/// The golden angle, rad: no multiple of it comes near an earlier one.
 const STEP: f64 = 2.399_963_229_728_653;
 
 impl Judge<'_> {
-    /// The axis about which a motion may be turned and explains as much: all features that it
-    /// explains lie about it, and so does the surface where it is given.
+    /// The axis about which the motion may turn and explain as much: the axis of all its explained
+    /// features, and of the surface if given.
     pub(super) fn free_turn(&self, best: &Judged) -> Option<FreeTurn> {
         let explained: Vec<&Landmark> = best
             .explained()
@@ -38,9 +37,9 @@ impl Judge<'_> {
 }
 
 impl FreeTurn {
-    /// Those of the motions that are no such turn of one before.
+    /// The motions that are not such a turn of an earlier one.
     ///
-    /// - `near`: by how much a turn may move the axis, m
+    /// - `near`: largest shift of the axis by such a turn, m
     pub(super) fn distinct(&self, alternatives: Vec<Alternative>, near: f64) -> Vec<Alternative> {
         without_repeats(alternatives, |before, alternative| {
             let between = alternative.source_to_target * before.source_to_target.inverse();
@@ -59,9 +58,9 @@ impl FreeTurn {
     }
 }
 
-/// The line about which all are of revolution.
+/// The common axis of revolution.
 ///
-/// - `near`: by how much they may be off it, m
+/// - `near`: largest offset of a landmark from it, m
 fn axis_of(landmarks: &[&Landmark], near: f64) -> Option<FreeTurn> {
     let first = landmarks.iter().find(|landmark| landmark.is_located())?;
     let (axis, through) = (first.axis?, first.place);

@@ -1,4 +1,4 @@
-//! The evidence for a motion, by features and by surface, and whether it rules out another.
+//! The evidence for a motion, by features and by surface, and whether it rules out another motion.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -8,46 +8,46 @@ use crate::align::icp::{IcpFit, IcpParams, icp};
 use crate::mesh::Alone;
 use crate::numeric::{median, without_repeats};
 
-/// Points that refine each motion, at most; all judge it, and refine the last ones.
+/// Maximum number of points that refine each motion; all points judge it, and refine the last ones.
 const MOST_POINTS: usize = 5_000;
-/// Points farther than so many tolerances have no part in a fit: lids on holes, what is not there.
+/// Reach of a fit, in tolerances: leaves out lids on holes and missing parts.
 const REACH: f64 = 5.0;
-/// A point agrees within so many scatters of the best fit.
+/// Distance within which a point agrees, in scatters of the best fit.
 const SCATTERS: f64 = 4.0;
-/// … or this share of a tolerance: below it nothing is distinguished.
+/// Least such distance, as a share of a tolerance: nothing is distinguishable below it.
 const LEAST_NEAR: f64 = 0.05;
-/// Cosine between normals that count as alike: 45°, as noise turns the small faces of a scan.
+/// Cosine between similar normals: 45°, as noise turns the small faces of a scan.
 const FACING: f64 = 0.7;
-/// A point belongs to the target at all within so many tolerances: a noisy scan that is offset
-/// outward does too.
+/// Distance within which a point belongs to the target at all, in tolerances: includes a noisy scan
+/// with an outward offset.
 const COARSE: f64 = 1.5;
-/// What a motion explains alone outweighs so many times what the other explains alone.
+/// Ratio by which evidence for one motion alone must exceed evidence for the other alone.
 const CLEARLY: f64 = 3.0;
-/// Points that decide, at least …
+/// Smallest number of deciding points.
 const POINTS: f64 = 8.0;
-/// … and over the points that the better motion leaves over: where it fits all but the noise, noise
-/// decides nothing.
+/// Smallest number of deciding points, as a share of the points left over by the better motion: if
+/// it fits all but the noise, noise decides nothing.
 const LEFT_OVER: f64 = 0.05;
-/// Share of the points that a part of revolution may lose when it is turned: at the rim of its
-/// ends, where facets of one turn lie above those of another.
+/// Share of the points that a turn of a part of revolution may lose: at the rims of its ends, where
+/// facets of one turn lie above facets of another.
 const AT_RIMS: f64 = 0.003;
-/// Weight of features that decides: one opening, or what else is as much.
+/// Smallest deciding weight of features: one opening, or as much of others.
 const FEATURES: f64 = 1.0;
-/// A feature that one motion has in its place is missing by another when it is off by more: by so
-/// many times what half of those that are in their places are off …
+/// Additional misfit from which a feature in its place by one motion is missing by another, over
+/// the median misfit of the features in their places.
 const ABSENT: f64 = 3.0;
-/// … but at least, and at most, by so much of what it may be.
+/// Bounds of the additional misfit of a missing feature, in misfits.
 const ABSENT_BETWEEN: [f64; 2] = [0.3, 2.0];
 
-/// A motion with what it explains.
+/// A motion with its evidence.
 #[derive(Clone, Debug)]
 pub(super) struct Judged {
     motion: Isometry3<f64>,
     fit: Option<IcpFit>,
-    /// of each feature of the source: its best partner, and how far that is off over what it may be
+    /// best partner of each feature of the source, and its misfit: offset over the allowed one
     partners: Vec<Option<(usize, f64)>>,
-    /// of each point: how far it is from the target with a normal alike, m; infinite beyond the
-    /// coarse bound. Empty without surfaces
+    /// distance of each point from the target with a similar normal, m; infinite beyond the coarse
+    /// bound; empty without surfaces
     distances: Vec<f64>,
 }
 
@@ -62,7 +62,7 @@ impl Judged {
         self.partners.iter().enumerate().filter_map(is_there)
     }
 
-    /// Share of the points that agree.
+    /// Share of the agreeing points.
     pub fn agreeing(&self) -> Option<f64> {
         let count = self
             .distances
@@ -72,14 +72,14 @@ impl Judged {
         (!self.distances.is_empty()).then(|| count as f64 / self.distances.len() as f64)
     }
 
-    /// Of what is explained.
+    /// Weight of the explained features.
     pub fn weight(&self, matching: &Matching) -> f64 {
         self.explained()
             .map(|[own, _]| matching.source[own].weight())
             .sum()
     }
 
-    /// By how much more a feature has to be off to be missing, by how well others fit.
+    /// Additional misfit of a missing feature, from the misfits of the explained ones.
     fn absent(&self) -> f64 {
         let mut misfits: Vec<f64> = self.explained().map(|[own, _]| self.misfit(own)).collect();
         (ABSENT * median(&mut misfits).unwrap_or(1.0)).clamp(ABSENT_BETWEEN[0], ABSENT_BETWEEN[1])
@@ -90,11 +90,11 @@ impl Judged {
     }
 }
 
-/// Tries motions.
+/// Judge of motions.
 pub(super) struct Judge<'a> {
     pub matching: Matching,
     surfaces: Option<&'a Surfaces<'a>>,
-    /// in the mirror where that is asked for
+    /// mirrored for a search in the mirror
     points: Vec<OrientedSample>,
 }
 
@@ -182,8 +182,8 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Whether the evidence decides for `a` against `b`: the surface, and where that does not
-    /// decide, the features, which were found on it.
+    /// Whether the evidence decides for `a` against `b`: the surface, or if it does not decide, the
+    /// features found on it.
     fn rules_out(&self, a: &Judged, b: &Judged) -> bool {
         match (self.by_surface(a, b), self.by_surface(b, a)) {
             (true, false) => true,
@@ -192,7 +192,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Those that no other rules out; all where each is ruled out by one.
+    /// The motions that no other rules out; all of them if each has one that rules it out.
     pub fn left_over(&self, judged: Vec<Judged>) -> Vec<Judged> {
         let is_ruled_out = |b: &Judged| judged.iter().any(|a| self.rules_out(a, b));
         let left: Vec<Judged> = judged
@@ -208,8 +208,8 @@ impl<'a> Judge<'a> {
         self.by_features(a, b) && (self.surfaces.is_none() || self.by_surface(a, b))
     }
 
-    /// Among all points that belong to the target at all, or among those that lie on it within the
-    /// scatter of the best fit.
+    /// Decides among all points that belong to the target at all, or among the points on it within
+    /// the scatter of the best fit.
     fn by_surface(&self, a: &Judged, b: &Judged) -> bool {
         let alone = |a: &Judged, b: &Judged, near: f64| {
             a.distances
@@ -231,7 +231,7 @@ impl<'a> Judge<'a> {
             })
     }
 
-    /// Within which a point lies on the target within the scatter of the fit, m.
+    /// Largest distance of a point on the target within the scatter of the fit, m.
     fn near(&self, judged: &Judged) -> f64 {
         let (tolerance, scatter) = (
             self.matching.tolerance,
@@ -252,8 +252,7 @@ impl<'a> Judge<'a> {
         own >= FEATURES && own > CLEARLY * other
     }
 
-    /// Whether the surface is as much on the target after `turn`, facets of a round part taken for
-    /// round.
+    /// Whether `turn` keeps the surface on the target; facets of a round part count as round.
     pub fn stays(&self, best: &Judged, turn: &Isometry3<f64>) -> bool {
         let turned = self.judged(turn * best.motion, None);
         let is_lost = |(own, turned): &(&f64, &f64)| own.is_finite() && !turned.is_finite();
@@ -266,7 +265,7 @@ impl<'a> Judge<'a> {
         lost <= POINTS.max(AT_RIMS * self.points.len() as f64)
     }
 
-    /// The motions to report, refined with all points.
+    /// The motions of the result, refined with all points.
     pub fn settled(&self, judged: Vec<Judged>) -> Vec<Alternative> {
         let points: Vec<Point3<f64>> = self.points.iter().map(|p| p.point).collect();
         let mut alternatives: Vec<Alternative> = Vec::new();

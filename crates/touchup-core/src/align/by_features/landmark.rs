@@ -1,11 +1,11 @@
-//! Features as registration sees them: position, direction, size, and which of these are known.
+//! Features as landmarks for registration: position, direction and size, as far as known.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use super::alternative::FeaturesParams;
 use crate::features::{Feature, Kind};
 
-/// A feature, or the other end of it.
+/// A feature, or its other end.
 #[derive(Clone, Debug)]
 pub(super) struct Landmark {
     pub kind: Kind,
@@ -18,22 +18,22 @@ pub(super) struct Landmark {
     size: Option<[f64; 2]>,
     /// standard uncertainty of the place, m
     sigma: f64,
-    /// how far it extends from its place along the axis, backwards and forwards, m
+    /// extent from its place along the axis, backwards and forwards, m
     span: [f64; 2],
-    /// it goes through: which end is the opening is a matter of how it was seen
+    /// whether it goes through: which end is the opening then depends on the view
     is_through: bool,
     /// whether it stands on the shoulder of a shaft
     is_step: bool,
     is_convex: Option<bool>,
-    /// normals of the planes that meet in a corner, so that they turn to the left seen from outside
+    /// normals of the planes of a corner, turning to the left seen from outside
     pub normals: Option<[Vector3<f64>; 3]>,
 }
 
-/// Cosine of the largest angle between axes that are taken for one: 6°.
+/// Cosine of the largest angle between equal axes: 6°.
 pub(super) const ALIKE: f64 = 0.9945;
-/// Standard uncertainties that are allowed for.
+/// Allowed deviation in standard uncertainties.
 const SIGMAS: f64 = 3.0;
-/// Volume that the normals at a corner span, at least.
+/// Least volume spanned by the normals at a corner.
 const SPATIAL: f64 = 0.17;
 
 /// All features as landmarks, in their order.
@@ -82,18 +82,18 @@ impl Landmark {
         }
     }
 
-    /// Whether it has a position and an outward direction, so that two of them determine a motion.
+    /// Whether it has a position and an outward direction: two such landmarks determine a motion.
     pub fn is_located(&self) -> bool {
         let has_place = match self.kind {
             Kind::Hole | Kind::Slot | Kind::Pocket | Kind::Boss => true,
-            // that of a step is on its shoulder, that of another is somewhere on its axis
+            // the place of a step is on its shoulder, that of another is somewhere on its axis
             Kind::Cylinder => self.is_step,
             _ => false,
         };
         has_place && self.axis.is_some()
     }
 
-    /// Its kind; where a slot ends and a pocket begins is a matter of taste.
+    /// Its kind; pockets count as slots, as their border is a matter of taste.
     pub fn class(&self) -> Kind {
         if self.kind == Kind::Pocket {
             Kind::Slot
@@ -102,7 +102,7 @@ impl Landmark {
         }
     }
 
-    /// Itself, and what goes through also from its other end.
+    /// Itself, and the other end of a through feature.
     pub fn ends(&self) -> impl Iterator<Item = Self> + '_ {
         let other = self
             .axis
@@ -115,7 +115,7 @@ impl Landmark {
         std::iter::once(self.clone()).chain(other)
     }
 
-    /// What it counts: an opening is one thing, an edge part of many.
+    /// Its weight: an opening is one thing, an edge part of many.
     pub fn weight(&self) -> f64 {
         match self.kind {
             Kind::Hole | Kind::Slot | Kind::Pocket | Kind::Boss => 1.0,
@@ -126,7 +126,7 @@ impl Landmark {
         }
     }
 
-    /// Whether both may be the same thing, by what does not depend on where they are.
+    /// Whether both may be the same thing, by properties independent of their places.
     pub fn is_like(&self, other: &Self, params: &FeaturesParams) -> bool {
         let sizes = self.size.zip(other.size).is_none_or(|([a, s], [b, t])| {
             (a - b).abs() <= params.size_tolerance * a.max(b) + SIGMAS * s.hypot(t)
@@ -138,13 +138,13 @@ impl Landmark {
         self.class() == other.class() && sizes && sides
     }
 
-    /// How far the place of one may be from that of the other, m.
+    /// Largest distance between the places of one and the other, m.
     pub fn play(&self, other: &Self, tolerance: f64) -> f64 {
         tolerance + (SIGMAS * self.sigma.hypot(other.sigma)).min(3.0 * tolerance)
     }
 
-    /// How far it is from `other` after `motion`, over what it may be; infinite where its direction
-    /// differs. An edge or what goes through may be anywhere along the other.
+    /// Distance from `other` after `motion`, over the allowed one; infinite if the directions
+    /// differ. An edge or a through feature may be anywhere along the other.
     ///
     /// - `tolerance`: m
     pub fn misfit(&self, motion: &Isometry3<f64>, other: &Self, tolerance: f64) -> f64 {
@@ -172,7 +172,7 @@ impl Landmark {
         self.is_through || self.kind == Kind::Edge
     }
 
-    /// Which offsets from `other` say that it is not there.
+    /// Projection onto the constrained offsets from `other`.
     pub fn held(&self, other: &Self) -> Matrix3<f64> {
         match other.axis {
             Some(axis) if self.kind == Kind::Plane => axis * axis.transpose(),
@@ -188,7 +188,7 @@ impl Landmark {
         1.0 / (self.sigma.powi(2) + other.sigma.powi(2) + (0.1 * tolerance).powi(2))
     }
 
-    /// As in a mirror at x = 0.
+    /// Its mirror image at x = 0.
     pub fn mirrored(&self) -> Self {
         let flip = |v: Vector3<f64>| Vector3::new(-v.x, v.y, v.z);
         Self {
@@ -201,7 +201,7 @@ impl Landmark {
     }
 }
 
-/// Normals of three planes that meet in `place`; `None` where there are not just three such
+/// Normals of three planes that meet in `place`; `None` unless there are just three such
 /// directions.
 fn normals_at(
     place: &Point3<f64>,

@@ -1,4 +1,4 @@
-//! How many features a motion explains, and the motion that explains them best.
+//! The features explained by a motion, and the motion that explains them best.
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Vector3, Vector6};
 
@@ -6,25 +6,25 @@ use super::alternative::FeaturesParams;
 use super::landmark::Landmark;
 use crate::numeric::{mean, moved_by_twist};
 
-/// Both sets of features, and which may be the same.
+/// Both sets of features, and their possible matches.
 pub(super) struct Matching {
     pub source: Vec<Landmark>,
     pub target: Vec<Landmark>,
-    /// features of the target that each of the source may be
+    /// features of the target that may match each feature of the source
     like: Vec<Vec<usize>>,
     /// m
     pub tolerance: f64,
     /// middle of the features of the source
     pub middle: Point3<f64>,
-    /// half their extent, m: what a turn moves
+    /// half their extent, m: the arm of a turn
     pub lever: f64,
 }
 
-/// Rounds of least squares: the features that are explained change little.
+/// Rounds of least squares: the explained features change little.
 const ROUNDS: usize = 4;
 
 impl Matching {
-    /// - `size`: of the target, m: what tolerances are shares of
+    /// - `size`: of the target, m: the unit of the tolerances
     pub fn new(
         source: Vec<Landmark>,
         target: Vec<Landmark>,
@@ -52,17 +52,17 @@ impl Matching {
         }
     }
 
-    /// Pairs of landmarks that could be one another.
+    /// Whether two landmarks could be one.
     pub fn is_like(&self, own: usize, theirs: usize) -> bool {
         self.like[own].binary_search(&theirs).is_ok()
     }
 
-    /// Comparisons that one motion costs.
+    /// Number of comparisons for one motion.
     pub fn cost(&self) -> usize {
         self.like.iter().map(Vec::len).sum::<usize>() + self.source.len()
     }
 
-    /// The best partner of each feature and how well it fits: at most 1 is explained.
+    /// The best partner of each feature and its misfit; at most 1 means explained.
     pub fn partners(&self, motion: &Isometry3<f64>) -> Vec<Option<(usize, f64)>> {
         (0..self.source.len())
             .map(|own| self.partner(motion, own))
@@ -82,7 +82,7 @@ impl Matching {
             .min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// Sum of the weights of the features that are explained, each the less the farther it is off.
+    /// Sum of the weights of the explained features, decreasing with their misfits.
     pub fn score(&self, motion: &Isometry3<f64>) -> f64 {
         let part = |own: usize| match self.partner(motion, own) {
             Some((_, misfit)) if misfit <= 1.0 => self.source[own].weight() * (1.0 - 0.25 * misfit),
@@ -91,7 +91,7 @@ impl Matching {
         (0..self.source.len()).map(part).sum()
     }
 
-    /// How far two motions bring the features apart, m.
+    /// Distance between the features moved by two motions, m.
     pub fn apart(&self, a: &Isometry3<f64>, b: &Isometry3<f64>) -> f64 {
         (a * self.middle - b * self.middle).norm() + self.lever * a.rotation.angle_to(&b.rotation)
     }
@@ -116,7 +116,7 @@ impl Matching {
                        shifts: f64,
                        offset: &Vector3<f64>,
                        weight: f64| {
-            // a small turn θ moves the arm by θ × arm; both counted by the lever
+            // a small turn θ moves the arm by θ × arm, in units of the lever
             let mut rows = nalgebra::Matrix3x6::zeros();
             rows.fixed_columns_mut::<3>(0).copy_from(&(held * shifts));
             rows.fixed_columns_mut::<3>(3)
@@ -140,7 +140,7 @@ impl Matching {
             );
             if let Some((axis, onto)) = own.axis.zip(theirs.axis) {
                 let axis = motion * axis;
-                // as long as what it is the axis of may be far: a tenth of the extent
+                // a tenth of the extent: about the length of a feature along its axis
                 let arm = 0.1 * self.lever;
                 let offset = axis * arm - onto * (arm * axis.dot(&onto).signum());
                 add(&Matrix3::identity(), &(axis * arm), 0.0, &offset, weight);

@@ -1,14 +1,13 @@
 //! Global registration: the rigid motion that maps the features of one shape onto those of another,
 //! from any start.
 //!
-//! Pairs of features, slots, corners and features beside a plane are frames; each frame of the one
-//! that is like a frame of the other in what a motion leaves alone (kinds, sizes, distances,
-//! angles, handedness) is a hypothesis. It counts what it explains of all features, so some may be
-//! missing or false on either side; the best are refined by least squares and point to plane, and
-//! judged by how much of the surface then agrees. Two that the evidence does not distinguish are
-//! both returned. Features about one axis alone leave the turn about it open: where the surface
-//! does not fix it either, an error says so. The search is exhaustive and deterministic, without
-//! random samples.
+//! Pairs of features, slots, corners and features beside a plane are frames. A frame of one shape
+//! and a frame of the other with the same invariants (kinds, sizes, distances, angles, handedness)
+//! make a hypothesis. Its score counts all explained features, so some may be missing or false on
+//! either side. Least squares and point to plane refine the best hypotheses, and the agreeing share
+//! of the surface judges them. Two motions that the evidence does not distinguish are both
+//! returned. Features about one axis alone leave the turn about it open: unless the surface fixes
+//! it, an error says so. The search is exhaustive and deterministic, without random samples.
 
 mod alternative;
 mod bases;
@@ -31,38 +30,35 @@ use self::matching::Matching;
 use crate::features::Feature;
 use crate::numeric::mean;
 
-/// Frames of the source that are tried, at most; spread evenly over all.
+/// Maximum number of tried frames of the source; spread evenly over all.
 const MOST_BASES: usize = 3_000;
-/// Hypotheses that are counted out, at most.
+/// Maximum number of scored hypotheses.
 const MOST_HYPOTHESES: usize = 30_000;
-/// Comparisons of two features, at most: where features are very many, fewer hypotheses are counted
-/// out.
+/// Maximum number of feature comparisons: with very many features, fewer hypotheses get a score.
 const MOST_COMPARISONS: usize = 60_000_000;
-/// Motions that go on to the surfaces, at most.
+/// Maximum number of motions that go on to the surfaces.
 const MOST_CANDIDATES: usize = 64;
-/// They explain at least this share of what the best does: without it a feature that is false could
-/// not hide the truth.
+/// Their least score as a share of the best: without it a false feature could not hide the truth.
 const CANDIDATE: f64 = 0.5;
-/// Mirror images that are examined.
+/// Maximum number of examined mirror images.
 const MOST_MIRRORED: usize = 8;
-/// Share of the surface that must agree.
+/// Least agreeing share of the surface.
 const LEAST_AGREEING: f64 = 0.5;
-/// Where there are no surfaces, what must be explained: two openings, the planes about them, and
-/// more.
+/// Least explained weight without surfaces: two openings, the planes about them, and more.
 const LEAST_EXPLAINED: f64 = 2.5;
 
-/// The one motion that maps `source` onto `target`, or why there is none or more than one.
+/// The single motion that maps `source` onto `target`, or why there is none or more than one.
 ///
-/// Work is bounded: at most 30 000 hypotheses, of 3 000 frames of the source (among its 150 largest
-/// openings), 64 of which are tried on the surfaces.
+/// Bounds: 30 000 hypotheses, of 3 000 frames of the source (among its 150 largest openings), and
+/// 64 trials on the surfaces.
 ///
-/// - `source`, `target`: as [`crate::features::detect`] finds them, each in its own frame.
-/// - `surfaces`: where they are given they decide, and make the motion as exact as they are.
+/// - `source`, `target`: results of [`crate::features::detect`], each in its own frame.
+/// - `surfaces`: if given, they decide, and make the motion as exact as they are.
 ///
 /// # Errors
 /// [`FeaturesError`]; [`FeaturesError::Ambiguous`] has all motions among which the evidence does
-/// not decide, [`FeaturesError::FreeTurn`] those of a part of revolution, each with one turn of
-/// many.
+/// not decide, [`FeaturesError::FreeTurn`] those of a part of revolution, each with one arbitrary
+/// turn.
 #[expect(clippy::too_many_lines)]
 pub fn align_features(
     source: &[Feature],
@@ -117,7 +113,7 @@ pub fn align_features(
     }
     let free = judged.first().and_then(|best| judge.free_turn(best));
     if frames.is_axial && free.is_none() {
-        // the surface breaks the symmetry, but from which turn on is not known
+        // the surface breaks the symmetry, at an unknown turn
         return Err(FeaturesError::TooFew {
             side: frames.poor,
             found: frames.found,
@@ -134,7 +130,7 @@ pub fn align_features(
     }
 }
 
-/// Why the best motion is not to be believed.
+/// Reason to refuse the best motion.
 fn refusal(
     judge: &Judge<'_>,
     best: Option<&Judged>,
@@ -160,7 +156,7 @@ fn refusal(
     })
 }
 
-/// Twice the largest distance from the mean, m: the same wherever the shape lies.
+/// Twice the largest distance from the mean, m: independent of the place of the shape.
 fn size_of(points: impl Iterator<Item = Point3<f64>> + Clone) -> f64 {
     let middle = Point3::from(mean(points.clone().map(|p| p.coords)));
     2.0 * points
@@ -201,13 +197,13 @@ fn candidates(matching: &Matching, frames: &Frames, most: usize) -> Vec<Isometry
         .collect()
 }
 
-/// The frames that the features of both sides make.
+/// The frames of the features of both sides.
 struct Frames {
     own: Vec<Base>,
     theirs: SortedSets,
-    /// whether they leave a turn open, for the features of one side fix none
+    /// whether they leave a turn open, as the features of one side fix none
     is_axial: bool,
-    /// which side, and how many features it has
+    /// the side with few features, and their number
     poor: FeaturesSide,
     found: usize,
 }
@@ -250,7 +246,7 @@ impl Frames {
     }
 }
 
-/// Every motion that maps a frame onto a congruent one, with the features it explains.
+/// Every motion of a frame onto a congruent one, with its score.
 fn hypotheses(
     matching: &Matching,
     own: &[Base],
@@ -264,7 +260,7 @@ fn hypotheses(
     };
     let tried = own.iter().step_by(own.len().div_ceil(MOST_BASES));
     let mut matches: Vec<(&Base, Vec<&Base>)> = tried.map(|base| (base, like(base))).collect();
-    // what few can match is most specific
+    // frames with few matches are the most specific
     matches.sort_by_key(|(_, others)| others.len());
     let most = (MOST_COMPARISONS / matching.cost().max(1)).min(MOST_HYPOTHESES);
     let pairs = matches

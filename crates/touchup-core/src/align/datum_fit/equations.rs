@@ -1,4 +1,4 @@
-//! What pairs of features say of a small motion.
+//! Linear equations of a small motion from pairs of features.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -9,11 +9,10 @@ use super::pair::DatumPair;
 use crate::features::Kind;
 use crate::numeric::{point_to_plane_row, tangent_basis};
 
-/// Standard uncertainties are no smaller, m.
+/// Lower bound of standard uncertainties, m.
 const LEAST_STD: f64 = 1e-9;
 
-/// Equations of all pairs: misfit + rows · step = 0, in m; turns are counted by the shift at the
-/// lever.
+/// Equations of all pairs: misfit + rows · step = 0, in m, with turns as the shift at the lever.
 pub(super) struct Equations {
     /// A
     pub rows: DMatrix<f64>,
@@ -21,11 +20,11 @@ pub(super) struct Equations {
     pub misfits: DVector<f64>,
     /// standard uncertainties of the misfits
     pub stds: DVector<f64>,
-    /// rows of each pair, and how many of them are of its place
+    /// rows of each pair, and the number of them for its place
     of_pair: Vec<(Range<usize>, usize)>,
 }
 
-/// How a place across its axis, of a plane along its normal, changes with a small motion.
+/// Change of a place across its axis, or of a plane along its normal, with a small motion.
 ///
 /// - `arm`: from the centre of the turn.
 pub(super) fn place_rows(
@@ -48,8 +47,8 @@ fn place_directions(kind: Kind, axis: &Vector3<f64>) -> Vec<Vector3<f64>> {
     }
 }
 
-/// The rotation vector that turns one unit vector onto another the shortest way: it says at any
-/// angle how far there is to go.
+/// The rotation vector of the shortest turn from one unit vector onto another; its length is the
+/// remaining angle, of any size.
 fn turn_between(from: &Vector3<f64>, to: &Vector3<f64>) -> Vector3<f64> {
     let half_a_turn = || tangent_basis(from)[0] * PI;
     UnitQuaternion::rotation_between(from, to).map_or_else(half_a_turn, |turn| turn.scaled_axis())
@@ -70,7 +69,7 @@ impl Equations {
             let (arm, off) = (place - centre, place - pair.nominal);
             let across = pair.nominal_axis.unwrap_or(axis);
             let along = place_directions(pair.kind, &across);
-            // as many coordinates share the uncertainty
+            // these coordinates share the uncertainty
             let std = pair.place_std / (along.len() as f64).sqrt();
             all.extend(
                 along
@@ -79,7 +78,7 @@ impl Equations {
             );
             let places = all.len() - first;
             if let Some((nominal, std)) = pair.nominal_axis.zip(pair.axis_std) {
-                // which end of an axis is named does not matter, which side of a plane does
+                // the sign of an axis does not matter, the side of a plane does
                 let is_turned = pair.kind != Kind::Plane && axis.dot(&nominal) < 0.0;
                 let axis = if is_turned { -axis } else { axis };
                 let needed = turn_between(&axis, &nominal);
@@ -91,7 +90,7 @@ impl Equations {
             of_pair.push((first..all.len(), places));
         }
         Self {
-            // no measurement is better than that, and none weighs infinitely much
+            // no measurement is better, and no weight is infinite
             stds: DVector::from_iterator(all.len(), all.iter().map(|(.., std)| std.max(LEAST_STD))),
             rows: DMatrix::from_fn(all.len(), 6, |i, j| all[i].0[j]),
             misfits: DVector::from_iterator(all.len(), all.iter().map(|(_, misfit, _)| *misfit)),
@@ -108,7 +107,7 @@ impl Equations {
         self.of_pair[pair].0.clone()
     }
 
-    /// Those of its place.
+    /// Rows of the place of a pair.
     pub fn places(&self, pair: usize) -> Range<usize> {
         let (rows, places) = &self.of_pair[pair];
         rows.start..rows.start + places

@@ -1,19 +1,19 @@
-//! Why features fix no frame.
+//! Reasons why features fix no frame.
 
 use nalgebra::Vector3;
 
-/// Why there is no motion into the frame of a drawing.
+/// Reason why there is no motion into the frame of a drawing.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DatumFitError {
-    /// Some freedoms are left open.
+    /// Some freedoms remain open.
     #[error("{} left open", open(turns, shifts))]
     Free {
-        /// axes of turns that are open, unit vectors in the frame of the drawing
+        /// axes of open turns, unit vectors in the frame of the drawing
         turns: Vec<Vector3<f64>>,
-        /// directions of shifts that are open
+        /// directions of open shifts
         shifts: Vec<Vector3<f64>>,
     },
-    /// The search did not end.
+    /// The search did not converge.
     #[error("the fit did not converge: check the nominal places and axes")]
     NotConverged,
 }

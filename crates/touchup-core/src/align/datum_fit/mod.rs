@@ -1,17 +1,17 @@
 //! The rigid motion that takes measured features into the frame of a drawing: as a best fit of all
 //! of them, or step by step by datums.
 //!
-//! Each pair of a measured feature and its nominal one gives equations: the place of an axis two
-//! across it, that of a plane one along its normal; the direction of either two more, where the
-//! drawing has it. With small motions (shift t, turn ω about the middle c)
+//! Each pair of a measured feature and its nominal one gives equations: two for the place of an
+//! axis, across it, one for the place of a plane, along its normal, and two more for the direction
+//! of either, if the drawing has it. With small motions (shift t, turn ω about the middle c)
 //!
 //! y + A x = 0,  x = (t, L ω)
 //!
 //! by least squares, weighted by the standard uncertainties of the measurement. A best fit solves
-//! all at once. Datums are solved one after the other, each within the freedoms that those before
-//! it leave, as the datum system of ISO 5459 does: 3-2-1 for three planes. With x = −G y the
+//! all at once. Datums are solved one after the other, each within the freedoms left by those
+//! before it, as in the datum system of ISO 5459: 3-2-1 for three planes. With x = −G y the
 //! uncertainty of the motion is G Σ Gᵀ, and that of the places of the features in the fit (I − A G)
-//! Σ (I − A G)ᵀ: what a feature says of the frame it does not say of itself.
+//! Σ (I − A G)ᵀ: evidence of a feature for the frame is none for its own place.
 
 mod equations;
 mod error;
@@ -27,35 +27,35 @@ use self::solution::Solution;
 use crate::features::Kind;
 use crate::numeric::{mean, moved_by_twist};
 
-/// A motion into the frame of a drawing, and how well it is known.
+/// A motion into the frame of a drawing, and its uncertainty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DatumFit {
-    /// Moves what was measured, in O, into the frame of the drawing.
+    /// Moves measurements in O into the frame of the drawing.
     pub motion: Isometry3<f64>,
     /// Middle of the measured features, in the frame of the drawing, m.
     pub centre: Point3<f64>,
-    /// Of (shift of the centre, rotation vector about it), in the frame of the drawing; m², m·rad,
-    /// rad².
+    /// Covariance of (shift of the centre, rotation vector about it), in the frame of the drawing;
+    /// m², m·rad, rad².
     pub covariance: Matrix6<f64>,
-    /// How far each pair is off its nominal place across its axis, of a plane along its normal, m.
+    /// Offset of each pair from nominal across its axis, for a plane along its normal, m.
     pub residuals: Vec<f64>,
     /// Standard uncertainty of the place of each pair about the frame of the drawing, as
     /// [`DatumPair::place_std`], m.
     pub place_stds: Vec<f64>,
 }
 
-/// Steps of the search at most: it is Newton's, and begins near.
+/// Maximum number of steps; the search is Newton's, and begins near.
 const MOST_STEPS: usize = 50;
-/// Features are in one place when they are no farther apart than this, m.
+/// Distance up to which features are in one place, m.
 const LEAST_LEVER: f64 = 1e-9;
-/// It ends when a step moves no feature by more than this, m.
+/// Motion of the features below which the search ends, m.
 const STILL: f64 = 1e-10;
 
-/// The motion.
+/// Fits the motion.
 ///
 /// - `start`: from O into the frame of the drawing, good to some degrees.
-/// - `stages`: numbers of the pairs that are fitted together, in the order of the datums; of a best
-///   fit one stage of all.
+/// - `stages`: indices of the pairs fitted together, in the order of the datums; a best fit has one
+///   stage of all.
 ///
 /// # Errors
 /// [`DatumFitError`]
@@ -89,7 +89,7 @@ pub fn fit_datums(
         .iter()
         .map(|pair| (pair.measured - middle).norm())
         .fold(0.0, f64::max);
-    // of features in one place, which leave a turn open, any will do
+    // for features in one place, which leave a turn open, any lever will do
     let lever = if lever > LEAST_LEVER { lever } else { 1.0 };
     if pairs.is_empty() {
         return Err(DatumFitError::Free {
@@ -161,12 +161,11 @@ fn fit_of(
 }
 
 impl DatumFit {
-    /// Standard uncertainty of the place of a feature that is not in the fit, about the frame of
-    /// the drawing: its own, and what the frame is uncertain by there. As [`DatumPair::place_std`],
-    /// m.
+    /// Standard uncertainty of the place of a feature outside the fit, about the frame of the
+    /// drawing: its own uncertainty and that of the frame there. As [`DatumPair::place_std`], m.
     ///
     /// - `place`, `axis`: in the frame of the drawing; the place in m.
-    /// - `std`: of its own.
+    /// - `std`: own uncertainty of the feature.
     pub fn place_std(&self, kind: Kind, place: &Point3<f64>, axis: &Vector3<f64>, std: f64) -> f64 {
         let rows = equations::place_rows(kind, axis, &(place - self.centre), 1.0);
         let of_frame: f64 = rows

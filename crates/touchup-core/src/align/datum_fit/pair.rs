@@ -1,13 +1,13 @@
-//! A feature of the drawing, and the measured one that it is.
+//! A feature of the drawing, and its measurement.
 
 use nalgebra::{Point3, Vector3};
 
 use crate::features::Kind;
 
-/// A feature that was measured, and as the drawing has it.
+/// A measured feature and its nominal counterpart.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DatumPair {
-    /// of both
+    /// kind of both
     pub kind: Kind,
     /// nominal centre, m, in the frame of the drawing
     pub nominal: Point3<f64>,
@@ -20,6 +20,6 @@ pub struct DatumPair {
     /// standard uncertainty of the measured centre, root mean square distance across the axis, of a
     /// plane along its normal, m
     pub place_std: f64,
-    /// … of the measured axis, rad; `None`: its direction is not used
+    /// standard uncertainty of the measured axis, rad; `None`: its direction is unused
     pub axis_std: Option<f64>,
 }

@@ -1,24 +1,23 @@
-//! Stage by stage, each within the freedoms that those before it leave.
+//! Solution stage by stage, each within the freedoms left by those before it.
 
 use nalgebra::{DMatrix, DVector, SVD, Vector3, Vector6};
 
 use super::equations::Equations;
 use super::error::DatumFitError;
 
-/// A freedom is fixed where a step of it moves the equations by this share of the step: a direction
-/// that a feature says by chance alone, as an axis that leans by a degree says of the turn about
-/// itself, fixes none.
+/// Least change of the equations by a step of a fixed freedom, as a share of the step: chance
+/// evidence fixes none, such as that of an axis with a lean of a degree for the turn about itself.
 const LEAST_SHARE: f64 = 0.05;
 
-/// The solution of the equations: step = −gain · misfits; what is open stays.
+/// The solution of the equations: step = −gain · misfits; open freedoms stay.
 pub(super) struct Solution {
     pub gain: DMatrix<f64>,
-    /// orthonormal columns: the freedoms that are open
+    /// orthonormal columns: the open freedoms
     open: DMatrix<f64>,
 }
 
 impl Solution {
-    /// `None` where numbers are out of all proportion.
+    /// Solves the equations; `None` if numbers are out of all proportion.
     pub fn of(equations: &Equations, stages: &[Vec<usize>]) -> Option<Self> {
         let mut gain = DMatrix::<f64>::zeros(6, equations.len());
         let mut open = DMatrix::<f64>::identity(6, 6);
@@ -36,7 +35,7 @@ impl Solution {
                     DMatrix::from_diagonal(&DVector::from_iterator(numbers.len(), weights));
                 let weighted = &weights * &rows * &fixed;
                 let inverse = weighted.pseudo_inverse(0.0).ok()?;
-                // what is left of the misfits after the stages before
+                // misfits left by the earlier stages
                 let mut left_over = -(&rows * &gain);
                 numbers
                     .iter()
@@ -59,17 +58,17 @@ impl Solution {
         }
     }
 
-    /// Shift, and turn by the shift at the lever, m.
+    /// Step: shift, and turn as the shift at the lever, m.
     pub fn step(&self, equations: &Equations) -> Vector6<f64> {
         let step = -(&self.gain * &equations.misfits);
         Vector6::from_fn(|i, _| step[i])
     }
 }
 
-/// Orthonormal combinations of the columns that the rows fix, and those that they leave.
+/// Orthonormal combinations of the columns that the rows fix, and those left open.
 fn parted(rows: &DMatrix<f64>) -> [DMatrix<f64>; 2] {
     let columns = rows.ncols();
-    // as many rows as columns, so that the decomposition has all directions
+    // as many rows as columns, for a decomposition with all directions
     let square = rows
         .clone()
         .resize_vertically(rows.nrows().max(columns), 0.0);
@@ -91,7 +90,7 @@ fn parted(rows: &DMatrix<f64>) -> [DMatrix<f64>; 2] {
     [of(true), of(false)]
 }
 
-/// The open freedoms apart: turns about axes, and shifts without a turn.
+/// Splits the open freedoms into turns about axes, and shifts without a turn.
 fn free(open: &DMatrix<f64>) -> DatumFitError {
     let [shift, turn] = [0, 3].map(|first| open.rows(first, 3).into_owned());
     let columns = open.ncols();
@@ -116,7 +115,7 @@ fn free(open: &DMatrix<f64>) -> DatumFitError {
     DatumFitError::Free { turns, shifts }
 }
 
-/// Of the two opposite directions that whose largest coordinate is positive.
+/// The one of two opposite directions with a positive largest coordinate.
 fn upward(direction: &Vector3<f64>) -> Vector3<f64> {
     if direction[direction.iamax()] < 0.0 {
         -direction

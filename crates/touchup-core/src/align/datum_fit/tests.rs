@@ -6,7 +6,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::*;
 
-/// A plate: its top, three bores and a side, as drawn, and where it was measured.
+/// A plate: its top, three bores and a side, as drawn and as measured.
 fn plate(motion: &Isometry3<f64>) -> Vec<DatumPair> {
     let up = Vector3::z();
     let features = [
@@ -40,7 +40,7 @@ fn start(motion: &Isometry3<f64>) -> Isometry3<f64> {
     ) * motion
 }
 
-/// How far two motions bring a part of 60 mm apart, m and rad.
+/// Distance between a part of 60 mm moved by `a` and by `b`, m and rad.
 fn apart(a: &Isometry3<f64>, b: &Isometry3<f64>) -> [f64; 2] {
     let middle = a.inverse() * Point3::new(0.03, 0.025, 0.012);
     [
@@ -71,8 +71,8 @@ fn the_motion_of_a_part_as_drawn_is_found_by_best_fit_and_by_datums() {
     }
 }
 
-/// Three planes of which two are out of square: the first is met whole, the second in the turn that
-/// is left, the third in the shift.
+/// Three planes, two of them out of square: the first is met whole, the second in the remaining
+/// turn, the third in the shift.
 #[test]
 fn datums_count_in_their_order() {
     let lean: f64 = 0.01;
@@ -117,7 +117,7 @@ fn datums_count_in_their_order() {
     );
 }
 
-/// What repeated measurements scatter by, against what one of them says.
+/// Scatter of repeated measurements against the uncertainty of a single one.
 #[test]
 #[expect(clippy::too_many_lines)]
 fn uncertainties_are_those_of_repeated_measurements() {
@@ -154,7 +154,7 @@ fn uncertainties_are_those_of_repeated_measurements() {
             off.iter_mut()
                 .zip(&fit.residuals)
                 .for_each(|(sum, residual)| *sum += residual * residual);
-            // that of the side, which is in no stage, is about its nominal normal
+            // the side is in no stage; its residual is about its nominal normal
             stated = Some(fit);
         }
         let stated = stated.unwrap();

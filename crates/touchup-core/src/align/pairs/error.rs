@@ -1,19 +1,19 @@
-//! What can be wrong with picked pairs.
+//! Faults of picked pairs.
 
 use crate::names;
 
 names! {
-    /// Which of the two points of a pair.
+    /// One of the two points of a pair.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum PairSide {
         /// Before the motion: the scan.
         From = "scan",
-        /// After it: space.
+        /// After the motion: space.
         To = "space",
     }
 }
 
-/// Why pairs do not determine a motion. Pairs are counted from 1.
+/// Reason why pairs do not determine a motion. Pair numbers start at 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PairsError {
     /// Fewer than three.
@@ -21,17 +21,17 @@ pub enum PairsError {
         "{count} pairs do not determine a motion: pick at least 3, better 6, far apart and not on one line"
     )]
     TooFew {
-        /// how many there are
+        /// number of pairs
         count: usize,
     },
-    /// NaN, infinite or absurdly far.
+    /// NaN, infinite or too far.
     #[error(
         "pair {pair}: its {side} point is not finite or farther than 1000 km away; pick it again"
     )]
     BadPoint {
-        /// which pair
+        /// number of the pair
         pair: usize,
-        /// which of its points
+        /// its faulty point
         side: PairSide,
     },
     /// A standard deviation that is not positive and finite.
@@ -39,17 +39,17 @@ pub enum PairsError {
         "pair {pair}: its sigma is {sigma_mm} mm; it must be more than 0, leave it out where it is not known"
     )]
     BadSigma {
-        /// which pair
+        /// number of the pair
         pair: usize,
-        /// as given
+        /// given value
         sigma_mm: f64,
     },
-    /// The same for all pairs.
+    /// A sigma of all pairs that is not positive and finite.
     #[error(
         "the sigma of the pairs is {sigma_mm} mm; it must be 1e-9 to 1e6 mm, leave it out where it is not known"
     )]
     BadGivenSigma {
-        /// as given
+        /// given value
         sigma_mm: f64,
     },
     /// Fewer than three different points.
@@ -61,9 +61,9 @@ pub enum PairsError {
         first: usize,
         /// the other
         second: usize,
-        /// where they coincide
+        /// side of the coincidence
         side: PairSide,
-        /// between the two
+        /// distance between the two
         distance_mm: f64,
     },
     /// All points near one line.
@@ -72,7 +72,7 @@ pub enum PairsError {
          the turn about it is not determined; pick one more, far off the line"
     )]
     Collinear {
-        /// of which side
+        /// side of the line
         side: PairSide,
         /// rms distance from the middle along the line
         along_mm: f64,
@@ -84,9 +84,9 @@ pub enum PairsError {
         "distances in space are {factor:.5} times those on the scan{named}: give both in one unit"
     )]
     Scale {
-        /// space over scan
+        /// distance in space over distance on the scan
         factor: f64,
-        /// what that factor is known for
+        /// units that the factor stands for
         named: &'static str,
     },
     /// A left-handed set of axes.
@@ -95,9 +95,9 @@ pub enum PairsError {
          wrong, two axes are swapped, or one set of axes is left-handed"
     )]
     Mirrored {
-        /// of the best motion
+        /// rms of the best motion
         rms_mm: f64,
-        /// of the best mirror image
+        /// rms of the best mirror image
         mirrored_mm: f64,
     },
     /// One pair against all the others.
@@ -106,11 +106,11 @@ pub enum PairsError {
          {rest_mm:.3} mm rms; pick it again or take it out"
     )]
     Outlier {
-        /// which
+        /// number of the pair
         pair: usize,
-        /// from where the others put it
+        /// distance from its place by the others
         distance_mm: f64,
-        /// how many others
+        /// number of others
         others: usize,
         /// rms of the others without it
         rest_mm: f64,
@@ -123,13 +123,13 @@ pub enum PairsError {
     Disagree {
         /// √(mean |residual|²)
         rms_mm: f64,
-        /// what is believed
+        /// largest allowed rms
         limit_mm: f64,
         /// pair with the largest residual
         worst: usize,
         /// its residual
         worst_mm: f64,
-        /// what would help
+        /// advice
         hint: &'static str,
     },
     /// The decomposition did not converge.

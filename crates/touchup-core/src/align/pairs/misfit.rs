@@ -1,29 +1,29 @@
-//! What is wrong with pairs that no motion fits.
+//! Faults of pairs that no motion fits.
 //!
 //! Leave one out: with S the weighted squares of all pairs and Sᵢ without pair i, Sᵢ / S is Beta((3
-//! n − 9) / 2, 3 / 2) distributed when pair i is as good as the others (the F test of a shifted
-//! point). A smaller value than chance allows names the pair.
+//! n − 9) / 2, 3 / 2) distributed if pair i is as good as the others (the F test of a shifted
+//! point). A value too small for chance names the pair.
 
 use super::error::PairsError;
 use super::solved::{PairsParams, PointPair, SolvedMotion};
 
-/// Chance with which good pairs are refused, over all of them.
+/// Chance of refusing good pairs, over all of them.
 const FALSE_ALARM: f64 = 1e-4;
-/// Fewer pairs cannot say which one is wrong.
+/// Smallest number of pairs that can reveal a wrong one.
 const FEWEST_TO_BLAME: usize = 5;
-/// Only so many pairs are left out in turn, those of the largest residuals: among more than that no
-/// single one has the power to draw the motion to itself.
+/// Maximum number of pairs left out in turn, of the largest residuals: among more pairs no single
+/// one has the power to draw the motion to itself.
 const MOST_TO_BLAME: usize = 32;
-/// A factor between the distances is reported when it is off by more than this: picks scatter less.
+/// Relative difference of the distances from which a factor is an error: picks scatter less.
 const SCALE_TOLERANCE: f64 = 0.05;
-/// … and named when it is this near to one that is known.
+/// Relative difference from a known factor up to which the error names it.
 const NAMED_TOLERANCE: f64 = 0.03;
-/// Share of the points' scatter within which they must fit.
+/// Largest rms residual, as a share of the points' scatter.
 const LARGEST_SHARE: f64 = 0.1;
-/// A mirror image is reported when it fits so many times better.
+/// Ratio of residuals from which a mirror image is an error.
 const MIRROR_RATIO: f64 = 3.0;
 
-/// Factors between units, space over scan, and what they are known for.
+/// Factors between units, space over scan, and their meaning.
 const UNITS: [(f64, &str); 8] = [
     (
         1000.0,
@@ -112,7 +112,7 @@ fn check_scale([from, to]: [f64; 2]) -> Result<(), PairsError> {
     })
 }
 
-/// Each pair against the others; as many as may matter.
+/// Checks each pair that may matter against the others.
 fn check_each(
     pairs: &[PointPair],
     weights: &[f64],
@@ -163,7 +163,7 @@ fn check_each(
 fn beta_below(x: f64, a: f64) -> f64 {
     const STEPS: u32 = 512;
     let x = x.clamp(0.0, 1.0);
-    // t = 1 − u² makes the integrand smooth at 1, where it has a root otherwise
+    // t = 1 − u² makes the integrand smooth at 1, despite the square root
     let integral = |from: f64| {
         // beyond this it has fallen by e⁻⁶⁴
         let to = (from * from + 64.0 / a).sqrt().min(1.0);
@@ -195,7 +195,7 @@ mod tests {
             );
         }
         assert_eq!(beta_below(0.0, 3.0), 0.0);
-        // many pairs: −2 a ln t tends to χ² of three, of which 12.838 leaves 0.5 % above
+        // many pairs: −2 a ln t tends to χ² of three, with 0.5 % above 12.838
         assert!((beta_below((-12.838_f64 / 2e5).exp(), 1e5) / 0.005 - 1.0).abs() < 1e-2);
         assert!((beta_below(1.0, 7.5) - 1.0).abs() < 1e-12);
     }

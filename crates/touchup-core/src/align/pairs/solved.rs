@@ -2,16 +2,16 @@
 
 use nalgebra::{Isometry3, Matrix3, Matrix6, Point3, Rotation3, SVD, UnitQuaternion, Vector3};
 
-/// A given standard deviation is believed unless the residuals say so many times more: with three
-/// pairs once in 130.
+/// Ratio of the residuals' standard deviation to a given one from which the residuals decide: with
+/// three pairs once in 130.
 const LARGEST_SIGMA_RATIO: f64 = 2.0;
 
 /// One point seen twice, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointPair {
-    /// Where it is before the motion: on the scan, in O.
+    /// Its place before the motion: on the scan, in O.
     pub from: Point3<f64>,
-    /// Where it is after: in space, in W.
+    /// Its place after the motion: in space, in W.
     pub to: Point3<f64>,
     /// Standard deviation of the two together, per axis, m; `None`: as good as the others.
     pub sigma: Option<f64>,
@@ -20,13 +20,13 @@ pub struct PointPair {
 /// Settings of [`super::fit_pairs`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PairsParams {
-    /// Standard deviation of a pair that names none, per axis, m; `None`: found from the residuals.
+    /// Standard deviation of pairs without their own, per axis, m; `None`: from the residuals.
     pub sigma: Option<f64>,
-    /// Largest rms residual that is believed, m; never more than a tenth of the points' scatter.
-    /// Default 3 mm: a pick on a scan of a consumer camera is good to one or two.
+    /// Largest allowed rms residual, m; never more than a tenth of the points' scatter. Default 3
+    /// mm: a pick on a scan of a consumer camera is good to one or two.
     pub largest_rms: f64,
-    /// A pair that is off by less than this is kept, however well the others agree, m. Default 0.2
-    /// mm: no one picks better. Where a sigma is known, four times that is taken instead.
+    /// Offset below which a pair stays, however well the others agree, m. Default 0.2 mm: no one
+    /// picks better. Four times a given sigma takes its place.
     pub least_misfit: f64,
 }
 
@@ -40,7 +40,7 @@ impl Default for PairsParams {
     }
 }
 
-/// A motion found from pairs, and how well it is known.
+/// A motion from pairs, and its uncertainty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PairsFit {
     /// Maps `from` to `to`.
@@ -50,12 +50,12 @@ pub struct PairsFit {
     /// √(mean |residual|²), m.
     pub rms: f64,
     /// Standard deviation of a pair of unit weight, per axis, m: as given, or from the residuals
-    /// with 3 n − 6 degrees of freedom where none is given or they say more than twice as much.
+    /// with 3 n − 6 degrees of freedom if none is given or they say more than twice as much.
     pub sigma: f64,
     /// Middle of the pairs, in the frame of `to`, m.
     pub centroid: Point3<f64>,
-    /// Of (shift of the centroid, rotation vector about it), both in the frame of `to`; m², m·rad,
-    /// rad².
+    /// Covariance of (shift of the centroid, rotation vector about it), both in the frame of `to`;
+    /// m², m·rad, rad².
     pub covariance: Matrix6<f64>,
 }
 
@@ -66,12 +66,12 @@ pub(super) struct SolvedMotion {
     pub middle: Point3<f64>,
     /// Σ w |residual|².
     pub squares: f64,
-    /// The same of the best mirror image or motion.
+    /// The same for the best mirror image or motion.
     pub mirrored_squares: f64,
 }
 
 impl SolvedMotion {
-    /// - `without`: a pair that is left out.
+    /// - `without`: index of a pair to leave out.
     pub fn of(pairs: &[PointPair], weights: &[f64], without: Option<usize>) -> Option<Self> {
         let kept = || {
             pairs
