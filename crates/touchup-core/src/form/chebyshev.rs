@@ -1,25 +1,25 @@
 //! The least largest residual of linear equations, exactly.
 //!
-//! Of rows a and values r it finds the x with the least t such that |r − a·x| ≤ t. That is a linear
-//! programme; its dual has a basis of as many rows as there are unknowns, t included, and one row
-//! is exchanged for another until no residual is above t \[Stiefel 1960\].
+//! For rows a and values r it finds the x with the least t such that |r − a·x| ≤ t. That is a
+//! linear programme; its dual has a basis of as many rows as there are unknowns, t included, and
+//! each exchange replaces one row by another until no residual is above t \[Stiefel 1960\].
 
 use nalgebra::{SMatrix, SVector};
 
-/// Exchanges at most, for each unknown; sound problems need two to five.
+/// Maximum number of exchanges for each unknown; sound problems need two to five.
 const MOST_EXCHANGES: usize = 60;
-/// A residual is above t when it is so by this share of the largest value: some thousand roundings.
+/// Least excess of a residual above t, as a share of the largest value: some thousand roundings.
 const ABOVE: f64 = 1e-12;
-/// Where rounding ends the exchange, its result is no farther from the best than this share of the
-/// largest value.
+/// Largest distance from the best result if rounding ends the exchange, as a share of the largest
+/// value.
 const NEAR: f64 = 1e-6;
 /// Bound of each unknown, in units of the largest value over the largest entry of its column:
 /// beyond it the rows do not determine it.
 const BOUND: f64 = 1e5;
-/// A direction is exchanged against no row that it moves by less than this: below is rounding.
+/// Least motion of a row that may leave the basis: below is rounding.
 const LEAST_PIVOT: f64 = 1e-11;
-/// By so little, scaled, the aim is turned, so that no two rows leave the basis at once: rows of
-/// regular grids would, and the exchange might go in a circle. It costs the same share of t.
+/// Scaled turn of the aim, against two rows that leave the basis at once: rows of regular grids
+/// would, and the exchange might go in a circle. It costs the same share of t.
 const TURN: f64 = 1e-10;
 
 /// One inequality g·y ≥ h of the basis.
@@ -29,11 +29,10 @@ struct Bounded<const N: usize> {
     least: f64,
 }
 
-/// The x of the least largest |value − row·x|, and that residual; `None` where the exchange does
-/// not end.
+/// The x of the least largest |value − row·x|, and that residual; `None` if the exchange does not
+/// end.
 ///
-/// - `rows`: each with a last entry that is not looked at, in the place of the residual itself; x
-///   has 0 there.
+/// - `rows`: each with an unused last entry, in the place of the residual itself; x has 0 there.
 #[expect(clippy::too_many_lines)]
 pub(super) fn chebyshev<const N: usize>(
     rows: &[SVector<f64, N>],
@@ -79,7 +78,7 @@ pub(super) fn chebyshev<const N: usize>(
             least: -least,
         }
     };
-    // each its own, so that ties are broken
+    // different entries, which break ties
     let aim = SVector::<f64, N>::from_fn(|j, _| {
         if j == last {
             1.0
@@ -98,7 +97,7 @@ pub(super) fn chebyshev<const N: usize>(
             least: -BOUND,
         }
     });
-    // the residual of any x is no less than that of the best, and t of a basis no more
+    // the residual of any x is at least the best one, and t of a basis at most
     let (mut best, mut most, mut least) = (SVector::zeros(), f64::MAX, 0.0);
     for _ in 0..MOST_EXCHANGES * N {
         let matrix = SMatrix::<f64, N, N>::from_fn(|i, j| basis[i].row[j]);
@@ -160,7 +159,7 @@ mod tests {
         );
     }
 
-    /// The middle of the smallest and largest value, among many of the same.
+    /// The middle of the smallest and largest value, among repeated values.
     #[test]
     fn the_best_constant_is_between_the_ends() {
         let values = [3.0, -1.0, 3.0, 2.0, -1.0, -1.0, 3.0];
@@ -177,7 +176,7 @@ mod tests {
         );
     }
 
-    /// No small step in any direction makes the largest residual less: the problem is convex, so it
+    /// No small step in any direction makes the largest residual less; as the problem is convex, it
     /// is the least.
     #[test]
     fn no_step_makes_the_largest_residual_less() {

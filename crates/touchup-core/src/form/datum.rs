@@ -4,17 +4,17 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
 use super::element::{Element, Shape};
 
-/// A direction is across another when its sine is above this, and along it below: 10°.
+/// Sine between directions across each other, and along each other below it: 10°.
 const APART: f64 = 0.17;
 
-/// The frame of a datum system, as its pose in O, by the rule of 3-2-1; `None` where the datums do
-/// not determine one.
+/// The frame of a datum system, as its pose in O, by the rule of 3-2-1; `None` if the datums do not
+/// determine one.
 ///
-/// A gives z: its normal, or its axis. x is across z: the normal of B, or its axis; of an axis B
+/// A gives z: its normal, or its axis. x is across z: the normal of B, or its axis; for an axis B
 /// along z it comes from C, from B to another axis along z or along the normal of C. Each
-/// coordinate of the origin comes from the first datum that fixes it: a plane that along its
-/// normal, through the middle of what was touched, an axis both across itself, where it meets the
-/// plane A.
+/// coordinate of the origin comes from the first datum that fixes it: a plane fixes the one along
+/// its normal, through the middle of its touched part, an axis both across itself, at its
+/// intersection with the plane A.
 pub fn datum_frame([a, b, c]: [&Element; 3]) -> Option<Isometry3<f64>> {
     let z = a.direction;
     let across = |v: Vector3<f64>| v - z * v.dot(&z);

@@ -1,9 +1,8 @@
-//! Fitted axes and planes as the elements of relations: how well they are known, and how far they
-//! were touched.
+//! Fitted axes and planes as the elements of relations, with their uncertainty and touched extent.
 
 use nalgebra::{Matrix6, Point3, SymmetricEigen, Vector3, Vector6};
 
-/// What an element is.
+/// Shape of an element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
     /// the axis of a round wall
@@ -15,24 +14,24 @@ pub enum Shape {
 /// An axis or a plane, in O.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Element {
-    /// what it is
+    /// its shape
     pub shape: Shape,
-    /// on it, amid what was touched, m
+    /// point on the element, amid its touched part, m
     pub point: Point3<f64>,
     /// along an axis; the outward normal of a plane; unit vector
     pub direction: Vector3<f64>,
-    /// covariance of small changes of point and direction, m and rad: without what the touches of
-    /// all elements have in common
+    /// covariance of small changes of point and direction, m and rad: without the errors common to
+    /// the touches of all elements
     pub covariance: Matrix6<f64>,
-    /// standard deviation of what all planes have in common along their normals, m: the calibration
+    /// standard deviation of the common error of all planes along their normals, m: the calibration
     /// of the ball's radius
     pub calibration: f64,
-    /// how far it was touched: both ends of an axis, corners of what was touched of a plane; m
+    /// touched extent: both ends of an axis, corners of the touched part of a plane; m
     pub extent: Vec<Point3<f64>>,
 }
 
 impl Element {
-    /// Point and direction changed by so much; what was touched goes with them.
+    /// The element with changed point and direction; its extent follows.
     pub(super) fn moved(&self, by: &Vector6<f64>) -> Self {
         let [shift, turn] = [
             by.fixed_rows::<3>(0).into_owned(),
@@ -52,7 +51,7 @@ impl Element {
         }
     }
 
-    /// Moved as a larger ball would have it: planes along their normals, axes not at all.
+    /// The element with a larger ball: planes move along their normals, axes not at all.
     pub(super) fn lifted(&self, by: f64) -> Self {
         let along = if self.shape == Shape::Plane {
             self.direction * by
@@ -64,7 +63,7 @@ impl Element {
 
     /// Changes by one standard deviation in each independent direction.
     pub(super) fn deviations(&self) -> Vec<Vector6<f64>> {
-        // lengths and angles in units of their own, so that neither is lost beside the other
+        // lengths and angles in their own units, so neither is lost beside the other
         let unit = |i: usize| {
             let start = if i < 3 { 0 } else { 3 };
             let largest = (start..start + 3)
@@ -88,12 +87,12 @@ impl Element {
             .collect()
     }
 
-    /// Length of an axis as far as it was touched, m.
+    /// Touched length of an axis, m.
     pub(super) fn length(&self) -> f64 {
         self.span(&self.direction)
     }
 
-    /// How far what was touched reaches along a direction, m.
+    /// Length of the touched extent along a direction, m.
     pub(super) fn span(&self, along: &Vector3<f64>) -> f64 {
         let heights = self.extent.iter().map(|p| (p - self.point).dot(along));
         let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), x| {
@@ -103,5 +102,5 @@ impl Element {
     }
 }
 
-/// A variance is none below this share of the largest: rounding.
+/// Share of the largest variance below which a variance is rounding.
 const NOTHING: f64 = 1e-12;

@@ -9,18 +9,18 @@ use super::round_form::Deviation;
 use super::zone::linear_zone;
 use crate::numeric::tangent_basis;
 
-/// Form of a flat wall over what was touched of it.
+/// Form of the touched part of a flat wall.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FlatForm {
     /// distance of two parallel planes
     pub flatness: Deviation,
-    /// share of the rectangle around the touches that they cover: the form of the rest is not known
+    /// share of the rectangle around the touches that they cover: the form of the rest is unknown
     pub coverage: f64,
 }
 
-/// Polynomials up to this degree in both directions together: three undulations over the wall.
+/// Maximum degree of the polynomials in both directions together: three undulations over the wall.
 const MOST_DEGREE: usize = 6;
-/// Places in each direction of the rectangle at which the deviation is taken, from edge to edge.
+/// Places of the deviation in each direction of the rectangle, from edge to edge.
 const PLACES: usize = 17;
 
 /// Legendre's polynomials at x, −1 to 1.
@@ -52,7 +52,7 @@ fn degree_of(term: usize) -> usize {
 /// Number of terms of the plane.
 const REFERENCE: usize = 3;
 
-/// Flatness of a wall; `None` where the points do not determine it.
+/// Flatness of a wall; `None` if the points do not determine it.
 ///
 /// - `on_plane`, `normal`: of the fitted plane, m and a unit vector, in O.
 pub fn flat_form(
@@ -89,8 +89,8 @@ pub fn flat_form(
     let blocks: Vec<Range<usize>> = (REFERENCE..count).map(|term| term..term + 1).collect();
     let profile = Profile::of(&rows, REFERENCE, blocks)?;
 
-    // within a quarter of the shortest undulation of a touch: a polynomial of degree n has n/2 of
-    // them over a length of 2
+    // within a quarter of the shortest undulation of a touch: a polynomial of degree n has n/2
+    // undulations over a length of 2
     let shortest = profile
         .sought
         .iter()
@@ -124,7 +124,7 @@ pub fn flat_form(
     })
 }
 
-/// Unit vectors in a plane along the sides of the rectangle that its points fill: along their
+/// Unit vectors in a plane along the sides of the rectangle around its points: along their
 /// principal axes.
 fn long_sides(
     points: &[FormPoint],

@@ -1,9 +1,9 @@
-//! Form of what was touched and relations between features, as a drawing tolerances them (ISO
+//! Form of touched surfaces and relations between features, as in the tolerances of a drawing (ISO
 //! 1101), with their uncertainty.
 //!
 //! [`roundness`] and its kin take points as they are; [`round_form()`] and [`flat_form()`] take
-//! points with noise, of which they keep the longest undulations; [`orientation`], [`coaxiality`],
-//! [`distance`], [`position`] and their kin take fitted axes and planes.
+//! noisy points, and keep their longest undulations; [`orientation`], [`coaxiality`], [`distance`],
+//! [`position`] and their kin take fitted axes and planes.
 
 mod chebyshev;
 mod datum;

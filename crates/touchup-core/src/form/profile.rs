@@ -1,10 +1,10 @@
 //! The longest undulations of noisy points, by weighted least squares.
 //!
-//! Raw points are as far apart as the noise of the outermost ones: the more points, the wider. So
-//! the deviation is a sum of few terms, long undulations as a filter of ISO 12181 or 12781 leaves
-//! them, and only terms that stand out of the noise are part of it: they are taken up one after
-//! another, each time the one that explains most. Points of one group share their error and weigh
-//! as one; how large the errors are the residuals of all terms together say.
+//! Raw points are as far apart as the noise of the outermost ones: the more points, the wider. The
+//! deviation is therefore a sum of few terms, long undulations like those left by a filter of ISO
+//! 12181 or 12781, and only of terms that stand out of the noise: each step adds the term that
+//! explains most. Points of one group share their error and weigh as one; the residuals of all
+//! terms together give the size of the errors.
 
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ use rand_distr::StandardNormal;
 
 use crate::numeric::distinct;
 
-/// What is known of a number: the best estimate and its standard uncertainty.
+/// An estimate and its standard uncertainty.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Estimate {
     /// m or rad
@@ -35,7 +35,7 @@ pub struct FormPoint {
     pub group: u32,
 }
 
-/// A deviation and what each term would add to it there.
+/// A deviation and the contribution of each term at its place.
 pub(super) struct Row {
     pub terms: Vec<f64>,
     /// m
@@ -44,40 +44,40 @@ pub(super) struct Row {
     pub group: u32,
 }
 
-/// Probability that a block of terms is found where there is none …
+/// Probability of finding a block of terms in noise alone.
 const BY_CHANCE: f64 = 0.01;
-/// … and one more beside others: a deviation that is there is seldom of one term.
+/// Probability of finding a block by chance beside others: a real deviation seldom has one term.
 const MORE_BY_CHANCE: f64 = 0.05;
-/// A term is looked for when so much of it, squared, is not in the others.
+/// Least square share of a term outside of the others.
 const LEAST_SHARE: f64 = 0.1;
-/// … and of the reference, for which a short arc suffices.
+/// Least square share of a term of the reference, for which a short arc suffices.
 const LEAST_REFERENCE: f64 = 1e-7;
-/// Groups for each term, at least.
+/// Least number of groups for each term.
 const GROUPS_PER_TERM: usize = 3;
-/// From so many spare groups on the residuals say how large the errors are; with fewer these are no
-/// less than stated.
+/// Number of spare groups from which the residuals give the size of the errors; with fewer, errors
+/// are no less than stated.
 const SPARE_GROUPS: usize = 20;
 /// Draws of the errors, in pairs of opposite sign: their spread is known to 7 %.
 const PAIRS: usize = 50;
-/// Of the draws: the same points give the same numbers.
+/// Seed of the draws: the same points give the same numbers.
 const SEED: u64 = 12181;
 
 /// Terms fitted to points.
 pub(super) struct Profile {
-    /// blocks of terms that were looked for, in their order
+    /// candidate blocks of terms, in their order
     pub sought: Vec<usize>,
-    /// those that stand out of the noise
+    /// blocks that stand out of the noise
     pub found: Vec<usize>,
     blocks: Vec<Range<usize>>,
-    /// of all terms; 0 where not found
+    /// of all terms; 0 for terms not found
     coefficients: DVector<f64>,
-    /// of terms found: columns whose products with independent normal numbers are errors of the
-    /// coefficients
+    /// for the terms found: columns whose products with independent normal numbers are errors of
+    /// the coefficients
     root: DMatrix<f64>,
-    /// least length of the first term of each block at which it is found, m; 0 where it was not
-    /// sought
+    /// smallest length of the first term of each block that would be found, m; 0 for other blocks
+    /// than candidates
     least_found: Vec<f64>,
-    /// root mean square of what the terms that are not found hold together beyond noise, m
+    /// root mean square of the terms not found together, beyond noise, m
     hidden: f64,
 }
 
@@ -86,14 +86,14 @@ struct Weighted<'a> {
     rows: &'a [Row],
     /// 1/m²
     weights: Vec<f64>,
-    /// group of each row, counted from 0
+    /// group of each row, from 0
     group: Vec<usize>,
     groups: usize,
 }
 
 impl<'a> Weighted<'a> {
-    /// - `count`: of the terms of each row.
-    /// - returns: `None` where something is not finite, or a standard deviation is not positive.
+    /// - `count`: number of terms of each row.
+    /// - returns: `None` if a number is not finite, or a standard deviation is not positive.
     fn of(rows: &'a [Row], count: usize) -> Option<Self> {
         let names = distinct(rows.iter().map(|row| row.group));
         let group: Vec<usize> = rows
@@ -118,7 +118,7 @@ impl<'a> Weighted<'a> {
         })
     }
 
-    /// Variance of the errors over the stated one, by what a solution leaves of the groups.
+    /// Variance of the errors over the stated one, by the residuals of the groups.
     fn excess(&self, choice: &Choice, solution: &DVector<f64>) -> f64 {
         let (mut of_group, mut weight_of_group) = (vec![0.0; self.groups], vec![0.0; self.groups]);
         for ((row, &w), &g) in self.rows.iter().zip(&self.weights).zip(&self.group) {
@@ -153,16 +153,16 @@ struct Choice {
     inverse: DMatrix<f64>,
 }
 
-/// What a block adds to a choice.
+/// Contribution of a block to a choice.
 struct Own {
     information: DMatrix<f64>,
     right: DVector<f64>,
-    /// least share of a term that is in no term of the choice
+    /// least share of a term outside of the terms of the choice
     share: f64,
 }
 
 impl Own {
-    /// How much the squares of the residuals lose by the block.
+    /// Decrease of the squares of the residuals by the block.
     fn gain(&self) -> f64 {
         self.information
             .clone()
@@ -217,7 +217,7 @@ impl Sums {
         inverse * DVector::from_fn(terms.len(), |i, _| self.right[terms[i]])
     }
 
-    /// By how much the squares of the values are more than those of the residuals.
+    /// Squares of the values less the squares of the residuals.
     fn explained(&self, choice: &Choice) -> f64 {
         choice
             .terms
@@ -263,8 +263,8 @@ impl Sums {
         Some(choice)
     }
 
-    /// Numbers of the blocks that are no reference and that so many groups carry, and all terms
-    /// that the points can tell apart.
+    /// Numbers of the blocks behind the reference that this number of groups carries, and all terms
+    /// that the points distinguish.
     fn sought(
         &self,
         blocks: &[Range<usize>],
@@ -327,17 +327,17 @@ impl Sums {
     }
 }
 
-/// So much two squares of normal numbers have together by chance in one of so many trials: more
-/// than x with probability exp(−x/2).
+/// Sum of two squares of normal numbers exceeded with `chance` in one of `trials` trials: it is
+/// more than x with probability exp(−x/2).
 fn limit(trials: usize, chance: f64) -> f64 {
     2.0 * (trials.max(1) as f64 / chance).ln()
 }
 
 impl Profile {
-    /// - `reference`: how many of the first terms are the reference, which is no deviation.
-    /// - `blocks`: terms that are found together or not at all, behind the reference, the longest
+    /// - `reference`: number of first terms that are the reference, which is no deviation.
+    /// - `blocks`: terms found together or not at all, behind the reference, the longest
     ///   undulations first.
-    /// - returns: `None` where the points do not determine the reference.
+    /// - returns: `None` if the points do not determine the reference.
     pub fn of(rows: &[Row], reference: usize, blocks: Vec<Range<usize>>) -> Option<Self> {
         let count = blocks.last().map_or(reference, |last| last.end);
         let weighted =
@@ -355,8 +355,8 @@ impl Profile {
         }
         let left = (sums.explained(&all) - sums.explained(&choice)).max(0.0) / excess;
         let rest = all.terms.len().saturating_sub(choice.terms.len()) as f64;
-        // noise alone has its mean there and scatters by √(2 rest) about it: a quarter of that goes
-        // without saying
+        // noise alone has the mean `rest` and scatters by √(2 rest) about it: a quarter of that is
+        // no evidence
         let beyond = (left - rest - (rest / 8.0).sqrt()).max(0.0);
         let (mut coefficients, solution) = (DVector::zeros(count), sums.solution(&choice));
         let lower = (&choice.inverse * excess).cholesky()?.unpack();
@@ -377,18 +377,17 @@ impl Profile {
         })
     }
 
-    /// Sizes of the deviation that some blocks make, each without the bias of noise.
+    /// Sizes of the deviation of some blocks, each without the bias of noise.
     ///
-    /// Noise makes any size larger. What it adds is found by adding errors, as large as those of
-    /// the coefficients, once more \[Efron and Tibshirani 1993, ch. 10\], and taken off; their
-    /// spread is the uncertainty. Where no block was found the size is 0, and its uncertainty the
-    /// root mean square of a size that is equally likely anything up to the least that would have
-    /// been found.
+    /// Noise makes any size larger. Adding errors, as large as those of the coefficients, once more
+    /// gives its contribution \[Efron and Tibshirani 1993, ch. 10\], which is subtracted; the
+    /// spread of these sizes is the uncertainty. If no block was found the size is 0, and its
+    /// uncertainty the root mean square of a size that is equally likely anything up to the least
+    /// detectable one.
     ///
-    /// - `places`: terms at the places at which the deviation is taken, all that was touched and
-    ///   nothing else.
+    /// - `places`: terms at the places of the deviation, all touched parts and nothing else.
     /// - `sizes`: of deviations at these, m.
-    /// - returns: `None` where no block was sought.
+    /// - returns: `None` if no block was a candidate.
     pub fn sizes<const S: usize>(
         &self,
         blocks: impl Fn(usize) -> bool,
@@ -438,7 +437,7 @@ impl Profile {
         }))
     }
 
-    /// Sizes where nothing was found.
+    /// Sizes without any block found.
     fn least_sizes<const S: usize>(
         &self,
         blocks: &impl Fn(usize) -> bool,
@@ -464,14 +463,14 @@ impl Profile {
         let mean_square = |i: usize| {
             each.iter().map(|sizes| sizes[i] * sizes[i]).sum::<f64>() / each.len() as f64
         };
-        // of what is equally likely between 0 and a the mean square is a²/3
+        // a uniform variable between 0 and a has the mean square a²/3
         Some(std::array::from_fn(|i| Estimate {
             value: 0.0,
             std: (mean_square(i) / 3.0).sqrt(),
         }))
     }
 
-    /// Whether something of a block was looked for.
+    /// Whether any of the blocks was a candidate.
     pub fn has_sought(&self, blocks: impl Fn(usize) -> bool) -> bool {
         self.sought.iter().any(|number| blocks(*number))
     }

@@ -1,13 +1,13 @@
 //! Orientation, location and distance of features, by their fitted axes and planes (ISO 1101).
 //!
 //! The first element of each function is the toleranced one, whose extent counts; the second is the
-//! datum. A value changes with the changes of all elements, taken one standard deviation at a time
-//! in each independent direction, ± √n of it for n directions: mean and spread over these places
-//! are exact for linear and square functions. What all touches have in common is changed once, for
-//! all elements together.
+//! datum. Values are computed for changes of all elements, one standard deviation at a time in each
+//! independent direction, ± √n of it for n directions: mean and spread over these places are exact
+//! for linear and square functions. The common error of all touches is changed once, for all
+//! elements together.
 //!
 //! Widths and diameters cannot be negative, so noise makes them larger: w² by its variance, which
-//! is taken off. A perfect one so has 0 within its uncertainty.
+//! is subtracted. A perfect one thus has 0 within its uncertainty.
 
 use nalgebra::{Point3, Vector3, Vector6};
 
@@ -15,9 +15,8 @@ use super::datum::datum_frame;
 use super::element::{Element, Shape};
 use super::profile::Estimate;
 
-/// Spread of the values of some elements about that of the elements themselves: the value, mean
-/// square of all, and mean square of their differences from the value. `None` where one is not
-/// finite.
+/// Spread of a value over changes of the elements: the value of the elements themselves, mean
+/// square of all, and mean square of their differences from it. `None` if one is not finite.
 fn spread(elements: &[&Element], value: impl Fn(&[Element]) -> Option<f64>) -> Option<[f64; 3]> {
     let own: Vec<Element> = elements.iter().map(|&element| element.clone()).collect();
     let here = value(&own).filter(|x| x.is_finite())?;
@@ -53,7 +52,7 @@ fn number(elements: &[&Element], value: impl Fn(&[Element]) -> Option<f64>) -> O
     })
 }
 
-/// A number of 0 or more, without what noise adds to it.
+/// A number of 0 or more, without the contribution of noise.
 fn size(elements: &[&Element], value: impl Fn(&[Element]) -> Option<f64>) -> Option<Estimate> {
     spread(elements, value).map(|[here, squares, off]| {
         let added = (squares - here * here).max(0.0);
@@ -76,7 +75,7 @@ pub fn angle(a: &Element, b: &Element) -> Option<Estimate> {
     size(&[a, b], between)
 }
 
-/// Whether directions that are to be alike (axis and axis, normal and normal, axis and normal of a
+/// Whether nominally equal directions (axis and axis, normal and normal, axis and normal of a
 /// square plane) belong to parallelism.
 fn is_parallelism(a: Shape, b: Shape, is_aligned: bool) -> bool {
     (a == b) == is_aligned
@@ -85,20 +84,20 @@ fn is_parallelism(a: Shape, b: Shape, is_aligned: bool) -> bool {
 /// A deviation of orientation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orientation {
-    /// whether the features are to be parallel, and not perpendicular
+    /// whether the features are nominally parallel, and not perpendicular
     pub is_parallel: bool,
-    /// width of the zone between parallel planes, or diameter of the cylinder, that holds the
+    /// width of the zone between parallel planes, or diameter of the cylinder, that encloses the
     /// toleranced feature over its extent, m
     pub zone: Estimate,
-    /// by which the angle is off 0° or 90°, rad
+    /// deviation of the angle from 0° or 90°, rad
     pub off: Estimate,
 }
 
 /// Parallelism or perpendicularity to a datum, whichever is nearer.
 ///
-/// Directions that are to be alike deviate in two components, and the zone is as wide as the extent
-/// along the worse (of a toleranced axis: a cylinder). Those that are to be square deviate in one,
-/// and may turn about the other.
+/// Nominally equal directions deviate in two components, and the zone is as wide as the extent
+/// along the worse (for a toleranced axis: a cylinder). Nominally square ones deviate in one, and
+/// may turn about the other.
 pub fn orientation(toleranced: &Element, datum: &Element) -> Option<Orientation> {
     let is_aligned =
         toleranced.direction.dot(&datum.direction).abs() > std::f64::consts::FRAC_1_SQRT_2;
@@ -115,7 +114,7 @@ pub fn orientation(toleranced: &Element, datum: &Element) -> Option<Orientation>
     };
     let zone = |e: &[Element]| {
         let (t, d) = (&e[0], &e[1].direction);
-        // a plane over its extent along the normal that it should have; an axis by its ends
+        // a plane over its extent along the nominal normal; an axis by its ends
         Some(match (t.shape, is_aligned) {
             (Shape::Plane, true) => t.span(d),
             (Shape::Axis, true) => t.length() * t.direction.cross(d).norm(),
@@ -139,7 +138,7 @@ fn from_axis(p: &Point3<f64>, axis: &Element) -> Vector3<f64> {
     v - axis.direction * v.dot(&axis.direction)
 }
 
-/// Coaxiality, m: diameter of the cylinder about the axis of the datum that holds the toleranced
+/// Coaxiality, m: diameter of the cylinder about the axis of the datum that encloses the toleranced
 /// axis over its extent. `None` for planes.
 pub fn coaxiality(toleranced: &Element, datum: &Element) -> Option<Estimate> {
     let is_round = [toleranced, datum].iter().all(|e| e.shape == Shape::Axis);
@@ -152,8 +151,8 @@ pub fn coaxiality(toleranced: &Element, datum: &Element) -> Option<Estimate> {
     size(&[toleranced, datum], diameter).filter(|_| is_round)
 }
 
-/// Concentricity, m: diameter of the circle about the axis of the datum that holds the middle of
-/// the toleranced axis. `None` for planes.
+/// Concentricity, m: diameter of the circle about the axis of the datum through the middle of the
+/// toleranced axis. `None` for planes.
 pub fn concentricity(toleranced: &Element, datum: &Element) -> Option<Estimate> {
     let is_round = [toleranced, datum].iter().all(|e| e.shape == Shape::Axis);
     size(&[toleranced, datum], |e| {
@@ -162,7 +161,7 @@ pub fn concentricity(toleranced: &Element, datum: &Element) -> Option<Estimate> 
     .filter(|_| is_round)
 }
 
-/// Distance of the middle of what was touched from the datum, m: from a plane along its normal,
+/// Distance of the middle of the touched part from the datum, m: from a plane along its normal,
 /// from an axis across it.
 pub fn distance(a: &Element, datum: &Element) -> Option<Estimate> {
     let apart = |e: &[Element]| match (e[0].shape, e[1].shape) {
@@ -173,7 +172,7 @@ pub fn distance(a: &Element, datum: &Element) -> Option<Estimate> {
     number(&[a, datum], apart)
 }
 
-/// Position, m: diameter of the cylinder about the true axis that holds the toleranced axis over
+/// Position, m: diameter of the cylinder about the true axis that encloses the toleranced axis over
 /// its extent, or twice the farthest place of a toleranced plane from the true one (ISO 5458).
 ///
 /// - `system`: the datums A, B and C, see [`datum_frame`]; `true_place`, `true_direction`: in their
@@ -213,7 +212,7 @@ mod tests {
     const SHIFT: f64 = 3e-6;
     const TURN: f64 = 2e-4;
 
-    /// With independent errors of SHIFT and TURN in all directions that matter.
+    /// Element with independent errors of SHIFT and TURN in all directions that matter.
     fn element(shape: Shape, point: [f64; 3], direction: [f64; 3], extent: &[[f64; 3]]) -> Element {
         let (point, direction) = (Point3::from(point), Vector3::from(direction).normalize());
         let along = direction * direction.transpose();
@@ -357,8 +356,8 @@ mod tests {
         );
     }
 
-    /// Calibrated alike, two faces that look to the same side are displaced alike; two that look
-    /// away from one another are not.
+    /// With the same calibration error, two faces to the same side move alike; two opposite faces
+    /// do not.
     #[test]
     fn a_calibration_goes_twice_into_a_thickness_and_not_into_a_step() {
         let with = |element: Element| Element {
@@ -378,8 +377,8 @@ mod tests {
         );
     }
 
-    /// Elements with errors as large as they state: of each relation the root mean square of error
-    /// over uncertainty, both where it is perfect and where it is not.
+    /// Elements with errors as large as they state: root mean square of error over uncertainty of
+    /// each relation, for a perfect and for an imperfect one.
     #[test]
     #[expect(clippy::too_many_lines)]
     fn relations_are_off_by_their_uncertainty() {

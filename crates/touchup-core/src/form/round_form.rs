@@ -27,20 +27,20 @@ impl Deviation {
     }
 }
 
-/// Form of a round wall over what was touched of it.
+/// Form of the touched part of a round wall.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RoundForm {
     /// of the mean section
     pub roundness: Deviation,
-    /// `None` where it was touched at one height alone
+    /// `None` if all touches are at one height
     pub cylindricity: Option<Deviation>,
-    /// of the axis; `None` where it was not touched at three heights all around
+    /// of the axis; `None` unless touched at three heights all around
     pub straightness: Option<Deviation>,
-    /// share of the turn that was touched: the form of the rest is not known
+    /// touched share of the turn: the form of the rest is unknown
     pub coverage: f64,
-    /// most undulations per turn that were looked for
+    /// maximum number of undulations per turn among the candidates
     pub undulations: u32,
-    /// undulations per turn of what was found
+    /// undulations per turn of the lobes found
     pub lobes: Vec<u32>,
 }
 
@@ -66,34 +66,34 @@ impl RoundForm {
     }
 }
 
-/// Undulations per turn, at most: the filter of 15 UPR of ISO 12181-2.
+/// Maximum number of undulations per turn: the filter of 15 UPR of ISO 12181-2.
 const MOST_UNDULATIONS: u32 = 15;
-/// Places around a turn at which the deviation is taken: of 15 undulations 19 each.
+/// Places of the deviation around a turn: 19 for each of 15 undulations.
 const PLACES: usize = 288;
-/// This share of the touches is no farther from the next than all may be from a place.
+/// Share of the gaps between touches that sets the largest distance of a place from a touch.
 const TYPICAL_GAP: f64 = 0.9;
 /// Parts of a turn and of the height, each with one place for cylindricity.
 const PARTS: [usize; 2] = [48, 5];
-/// A wall was touched at several heights when they are apart by this share of its radius.
+/// Least height between touches at several heights, as a share of the radius.
 const SEVERAL_HEIGHTS: f64 = 0.1;
-/// An axis has a section where this share of the turn was touched at its height.
+/// Least touched share of the turn at the height of a section of the axis.
 const SECTION: f64 = 0.5;
 
-/// What a block of terms is of.
+/// Kind of a block of terms.
 #[derive(Clone, Copy, PartialEq)]
 enum Term {
-    /// so many undulations per turn, alike at all heights
+    /// this number of undulations per turn, alike at all heights
     Lobes(u32),
     /// radius by a power of the height
     Radius(i32),
     /// axis by a power of the height
     Axis(i32),
-    /// so many undulations that turn over from one end to the other
+    /// this number of undulations, turning over from one end to the other
     Twisted(u32),
 }
 
 impl Term {
-    /// All, the longest undulations first.
+    /// All blocks, the longest undulations first.
     fn all() -> Vec<Self> {
         let first = [
             Self::Lobes(2),
@@ -124,7 +124,7 @@ impl Term {
         }
     }
 
-    /// Of a place at an angle and a height, −1 to 1 over what was touched.
+    /// Adds the terms of a place at an angle and a height, −1 to 1 over the touched part.
     fn push(self, angle: f64, height: f64, terms: &mut Vec<f64>) {
         let (along, order) = match self {
             Self::Lobes(lobes) => (1.0, lobes),
@@ -230,7 +230,7 @@ fn touched_angles(places: &[[f64; 2]], undulations: u32) -> Option<Vec<f64>> {
     )
 }
 
-/// Form of a round wall; `None` where the points do not determine it.
+/// Form of a round wall; `None` if the points do not determine it.
 ///
 /// - `on_axis`, `axis`: of the fitted cylinder, m and a unit vector, in O; `radius`: its, m.
 pub fn round_form(
@@ -269,7 +269,7 @@ pub fn round_form(
     })
 }
 
-/// Of the terms that are alike at all heights, at the angles that were touched.
+/// Roundness from the terms alike at all heights, at the touched angles.
 fn roundness(profile: &Profile, all: &[Term], around: &[f64]) -> Option<Deviation> {
     let section: Vec<Vec<f64>> = around.iter().map(|&angle| terms(all, angle, 0.0)).collect();
     let circle: Vec<SVector<f64, 4>> = section
@@ -284,15 +284,15 @@ fn roundness(profile: &Profile, all: &[Term], around: &[f64]) -> Option<Deviatio
     sizes.map(Deviation::of)
 }
 
-/// Part of the turn and of the height in which a place is.
+/// Part of the turn and of the height of a place.
 fn part_of([angle, height]: &[f64; 2]) -> [usize; 2] {
     let turn = angle.rem_euclid(TAU) / TAU;
     let part = |share: f64, parts: usize| ((share * parts as f64) as usize).min(parts - 1);
     [part(turn, PARTS[0]), part((height + 1.0) / 2.0, PARTS[1])]
 }
 
-/// Of all terms, in the middle of the turn of each part of the wall, at its touched height that is
-/// farthest from half the height.
+/// Cylindricity from all terms, in the middle of the turn of each part of the wall, at its touched
+/// height farthest from half the height.
 fn cylindricity(profile: &Profile, all: &[Term], places: &[[f64; 2]]) -> Option<Deviation> {
     let mut of_part: Vec<Option<[f64; 2]>> = vec![None; PARTS[0] * PARTS[1]];
     for place in places {
@@ -319,7 +319,7 @@ fn cylindricity(profile: &Profile, all: &[Term], places: &[[f64; 2]]) -> Option<
     sizes.map(Deviation::of)
 }
 
-/// Of the terms that shift sections, at the heights that were touched around enough of the turn.
+/// Straightness from the terms that shift sections, at heights touched around enough of the turn.
 fn straightness(profile: &Profile, all: &[Term], places: &[[f64; 2]]) -> Option<Deviation> {
     let is_axis = |number: usize| matches!(all[number], Term::Axis(_));
     if !profile.has_sought(is_axis) {
@@ -345,7 +345,7 @@ fn straightness(profile: &Profile, all: &[Term], places: &[[f64; 2]]) -> Option<
     if heights.len() < 3 {
         return None;
     }
-    // towards angle 0 a shifted section is farther out by its x, a quarter of a turn on by its y
+    // a shifted section is farther out by its x towards angle 0, by its y a quarter of a turn on
     let both = heights
         .iter()
         .flat_map(|&height| [(0.0, height), (TAU / 4.0, height)]);
@@ -353,7 +353,7 @@ fn straightness(profile: &Profile, all: &[Term], places: &[[f64; 2]]) -> Option<
         .map(|(angle, height)| terms(all, angle, height))
         .collect();
     let sizes = profile.sizes(is_axis, &middles, |values| {
-        // the height in units of its own: only its proportions matter
+        // the height in its own units: only its proportions matter
         let middle = |(xy, height): (&[f64], &f64)| Point3::new(xy[0], xy[1], *height);
         let middles: Vec<Point3<f64>> = values.chunks(2).zip(&heights).map(middle).collect();
         axis_straightness(&middles).map(|zone| [zone.minimum_zone, zone.least_squares])

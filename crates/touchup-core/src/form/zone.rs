@@ -3,9 +3,8 @@
 //!
 //! ISO 1101 asks for the narrowest zone that holds the feature (minimum zone); ISO 12181, 12780,
 //! 12781 and 12180 also name the reference of least squares, about which the deviation is from the
-//! lowest to the highest point. Both are iterated from linear equations about the last reference.
-//! Points are taken without error: noise widens either zone, see [`super::round_form()`] for points
-//! that have some.
+//! lowest to the highest point. Both come from iterated linear equations about the last reference.
+//! Points count as exact: noise widens either zone, see [`super::round_form()`] for noisy points.
 
 use nalgebra::{Point2, Point3, SVector, SymmetricEigen, Vector2, Vector3};
 
@@ -21,18 +20,18 @@ pub struct Zone {
     pub minimum_zone: f64,
 }
 
-/// Steps to a reference, at most; each squares the error.
+/// Maximum number of steps to a reference; each squares the error.
 const MOST_STEPS: usize = 40;
-/// Halvings of a step that makes the zone wider.
+/// Maximum number of halvings of a step that widens the zone.
 const MOST_HALVINGS: usize = 30;
-/// A zone that a step makes narrower by less than this share is the narrowest: some thousand
-/// roundings of a coordinate.
+/// Least relative gain of a step that goes on to a narrower zone: some thousand roundings of a
+/// coordinate.
 const SETTLED: f64 = 1e-10;
-/// Directions in which each point of an axis is first held inside of a cylinder.
+/// Number of directions of the first tangents to the cylinder around an axis.
 const FIRST_DIRECTIONS: usize = 8;
 
-/// Deviations from a reference, m, with their derivatives by its freedoms; the last entry is not
-/// used.
+/// Deviations from a reference, m, with their derivatives by its freedoms; the last entry is
+/// unused.
 type Linear<const N: usize> = (Vec<SVector<f64, N>>, Vec<f64>);
 
 /// Width of a zone, m.
@@ -43,7 +42,7 @@ fn width(values: &[f64]) -> f64 {
     (high - low).max(0.0)
 }
 
-/// The x of least Σ (value − row·x)², the last entry of the rows left out.
+/// The x of least Σ (value − row·x)², without the last entry of the rows.
 fn least_squares<const N: usize>(
     rows: &[SVector<f64, N>],
     values: &[f64],
@@ -79,10 +78,9 @@ fn least_squares<const N: usize>(
     }))
 }
 
-/// Both zones of values from which a linear reference is taken: deviations from a reference near to
-/// both.
+/// Both zones of values about a linear reference: deviations from a reference near to both.
 ///
-/// - `rows`: of the reference, one of them constant; the last entry is not used.
+/// - `rows`: of the reference, one of them constant; the last entry is unused.
 pub(super) fn linear_zone<const N: usize>(
     rows: &[SVector<f64, N>],
     values: &[f64],
@@ -100,7 +98,7 @@ pub(super) fn linear_zone<const N: usize>(
     })
 }
 
-/// Both zones about references that are found by steps.
+/// Both zones about references from iterated steps.
 fn zone<S: Clone, const N: usize>(
     start: S,
     linear: impl Fn(&S) -> Linear<N>,
@@ -166,7 +164,7 @@ fn principal(points: &[Point3<f64>]) -> Option<(Point3<f64>, [Vector3<f64>; 3])>
     ))
 }
 
-/// Flatness of points, m (ISO 12781): distance of the two parallel planes that hold them. `None`
+/// Flatness of points, m (ISO 12781): distance of the two parallel planes that enclose them. `None`
 /// for fewer than 4 points.
 pub fn flatness(points: &[Point3<f64>]) -> Option<Zone> {
     let (middle, [normal, ..]) = principal(points).filter(|_| points.len() > 3)?;
@@ -192,7 +190,7 @@ pub fn flatness(points: &[Point3<f64>]) -> Option<Zone> {
 }
 
 /// Straightness of points of a profile in a plane, m (ISO 12780): distance of the two parallel
-/// lines that hold them. `None` for fewer than 3 points.
+/// lines that enclose them. `None` for fewer than 3 points.
 pub fn straightness(points: &[Point2<f64>]) -> Option<Zone> {
     let spatial: Vec<Point3<f64>> = points.iter().map(|p| Point3::new(p.x, p.y, 0.0)).collect();
     let (middle, [_, _, along]) = principal(&spatial).filter(|_| points.len() > 2)?;
@@ -217,7 +215,7 @@ pub fn straightness(points: &[Point2<f64>]) -> Option<Zone> {
 }
 
 /// Roundness of points of a section, m (ISO 12181): difference of the radii of the two concentric
-/// circles that hold them. `None` for fewer than 4 points, or those of no circle.
+/// circles that enclose them. `None` for fewer than 4 points, or without a circle.
 pub fn roundness(points: &[Point2<f64>]) -> Option<Zone> {
     let middle = mean(points.iter().map(|p| Vector3::new(p.x, p.y, 0.0))).xy();
     // x² + y² = 2 a x + 2 b y + c, about the middle [Kåsa 1976]
@@ -252,7 +250,7 @@ pub fn roundness(points: &[Point2<f64>]) -> Option<Zone> {
 }
 
 /// Cylindricity of points, m (ISO 12180): difference of the radii of the two coaxial cylinders that
-/// hold them. `None` for fewer than 6 points, or those of no cylinder.
+/// enclose them. `None` for fewer than 6 points, or without a cylinder.
 ///
 /// - `on_axis`, `axis`: of a cylinder near them; a unit vector.
 pub fn cylindricity(
@@ -293,7 +291,7 @@ pub fn cylindricity(
     zone((foot, *axis, radius), linear, moved)
 }
 
-/// Straightness of an axis, m (ISO 1101): diameter of the cylinder that holds the middles of its
+/// Straightness of an axis, m (ISO 1101): diameter of the cylinder that encloses the middles of its
 /// sections. `None` for fewer than 3.
 pub fn axis_straightness(middles: &[Point3<f64>]) -> Option<Zone> {
     let (from, [_, _, along]) = principal(middles).filter(|_| middles.len() > 2)?;
@@ -308,8 +306,8 @@ pub fn axis_straightness(middles: &[Point3<f64>]) -> Option<Zone> {
         })
         .collect();
     let least_squares = 2.0 * local.iter().map(|(q, _)| q.norm()).fold(0.0, f64::max);
-    // each point inside of tangents to the cylinder: first some all around, then those that face
-    // the point
+    // each point inside of tangents to the cylinder: first some all around, then those facing the
+    // point
     let row = |(q, z): &(Vector2<f64>, f64), w: &Vector2<f64>| {
         (SVector::from([w.x, w.y, w.x * z, w.y * z, 0.0]), w.dot(q))
     };
@@ -412,7 +410,7 @@ mod tests {
         assert_eq!(roundness(&[Point2::new(f64::NAN, 0.0); 9]), None);
     }
 
-    /// Of z = c x y over a square of half side h the corners are ± c h², and no tilted pair of
+    /// For z = c x y over a square of half side h the corners are ± c h², and no tilted pair of
     /// planes is closer: two opposite corners are up and the other two down.
     #[test]
     fn a_saddle_is_off_flat_by_its_corners_in_any_position() {
@@ -457,8 +455,8 @@ mod tests {
         }
     }
 
-    /// A cone of slope k over a height: its radii differ by k times that, and no tilted pair of
-    /// cylinders is closer together.
+    /// A cone of slope k over a height: its radii differ by k times the height, and no tilted pair
+    /// of cylinders is closer together.
     #[test]
     fn a_cone_is_off_a_cylinder_by_the_difference_of_its_end_radii() {
         let (slope, height, turn) = (0.002, 8e-3, Rotation3::from_euler_angles(1.0, 0.2, 0.3));
@@ -484,8 +482,8 @@ mod tests {
         );
     }
 
-    /// Middles on a circle of radius r that climbs: the cylinder about the mean axis has the
-    /// diameter 2 r. On a parabola: its sagitta.
+    /// Middles on a climbing circle of radius r: the cylinder about the mean axis has the diameter
+    /// 2 r. On a parabola: its sagitta.
     #[test]
     fn an_axis_is_as_straight_as_the_cylinder_that_holds_it_is_thin() {
         let bow: Vec<_> = (-4..=4)
