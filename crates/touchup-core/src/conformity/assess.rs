@@ -5,33 +5,33 @@ use crate::names;
 use crate::numeric::normal_quantile;
 
 names! {
-    /// What is said of a characteristic.
+    /// Decision on a characteristic.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
     pub enum Decision {
-        /// conformity is proved, as far as the rule asks
+        /// conformity is proved to the confidence of the rule
         Pass = "pass",
-        /// neither
+        /// neither is proved
         #[default]
         Undecided = "undecided",
-        /// nonconformity is proved
+        /// nonconformity is proved to the confidence of the rule
         Fail = "fail",
     }
 }
 
 names! {
-    /// How a decision is made.
+    /// Rule of a decision.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum DecisionRule {
         /// a guard band at each tolerance limit, on either side of it
         #[default]
         GuardBands = "iso14253",
-        /// the measured value alone, whatever its uncertainty: the risk is shared
+        /// the measured value alone, regardless of its uncertainty: both sides share the risk
         Simple = "simple",
     }
 }
 
 names! {
-    /// Why nothing was decided.
+    /// Reason for an open decision.
     #[derive(Clone, Copy, Debug, PartialEq, Eq)]
     pub enum OpenReason {
         /// within a guard band
@@ -40,7 +40,7 @@ names! {
         NoAcceptanceZone = "the uncertainty is too large for this tolerance: no measured value would pass; measure it better",
         /// no standard uncertainty
         NoUncertainty = "it has no standard uncertainty: touch it",
-        /// a lower bound that is not beyond the limits
+        /// a lower bound not beyond the limits
         LowerBound = "it is a lower bound, and its end was not touched: touch the floor",
     }
 }
@@ -52,17 +52,17 @@ pub struct MeasuredNumber {
     pub value: f64,
     /// u, its standard uncertainty
     pub std: Option<f64>,
-    /// the measurand is at least this
+    /// whether the value is a lower bound of the measurand
     pub is_at_least: bool,
 }
 
-/// How decisions are made.
+/// Settings of decisions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DecisionParams {
-    /// Default: guard bands, as ISO 14253-1 has it where nothing else was agreed
+    /// Default: guard bands, as in ISO 14253-1 unless agreed otherwise
     pub rule: DecisionRule,
     /// Least probability of conformity for a pass, and of nonconformity for a fail. Default 0.95,
-    /// that of ISO 14253-1.
+    /// as in ISO 14253-1.
     pub confidence: f64,
 }
 
@@ -75,23 +75,23 @@ impl Default for DecisionParams {
     }
 }
 
-/// A decision and what it rests on.
+/// A decision and its evidence.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Assessment {
-    /// what is said
+    /// the decision
     pub decision: Decision,
-    /// why that is nothing
+    /// reason for an open decision
     pub reason: Option<OpenReason>,
-    /// p_c; `None` without an uncertainty, and of a bound
+    /// p_c; `None` without an uncertainty, and for a bound
     pub conformance_probability: Option<f64>,
-    /// limits of measured values that pass; both `None` where there are none
+    /// limits of passing values; both `None` if no value passes
     pub acceptance: ToleranceLimits,
     /// limits beyond which measured values fail
     pub rejection: ToleranceLimits,
 }
 
 impl Assessment {
-    /// Probability that the decision is wrong; of none that of either: an acceptance, a rejection.
+    /// Probability that the decision is wrong: an acceptance, or a rejection; `None` if undecided.
     pub fn risk(&self) -> Option<f64> {
         let conforms = self.conformance_probability?;
         match self.decision {
@@ -104,11 +104,11 @@ impl Assessment {
 
 /// Decides whether a characteristic conforms.
 ///
-/// Guard bands: it passes where p_c is at least the confidence; so each guard band inside of the
-/// tolerance is z u with Φ(z) the confidence, 1.645 u for 95 %, and a little more where the
+/// Guard bands: it passes if p_c is at least the confidence; each guard band inside of the
+/// tolerance is then z u with Φ(z) the confidence, 1.645 u for 95 %, and a little more if the
 /// tolerance is not large against u [JCGM 106:2012, 8.3; ISO 14253-1:2017]. It fails beyond z u
-/// outside of the tolerance, where p_c is at most 1 less the confidence. A lower bound fails beyond
-/// the upper limit, and passes only where there is none.
+/// outside of the tolerance: p_c is at most 1 less the confidence there. A lower bound fails beyond
+/// the upper limit, and passes only without an upper limit.
 ///
 /// - `limits`: lower below upper.
 pub fn assess(
@@ -189,8 +189,8 @@ fn decision_on_bound(bound: &MeasuredNumber, limits: ToleranceLimits, z: f64) ->
     }
 }
 
-/// Measured values of which the probability of conformity is at least the confidence; `None`: there
-/// are none.
+/// Measured values with a probability of conformity of at least the confidence; `None`: there are
+/// none.
 fn acceptance_zone(
     limits: ToleranceLimits,
     distribution: Distribution,
@@ -202,7 +202,7 @@ fn acceptance_zone(
     } else {
         Some(0.0)
     };
-    // where it is most probable: in the middle, on 0, or far from a single limit
+    // the most probable value: in the middle, on 0, or far from a single limit
     let best = match (limits.lower.or(floor), limits.upper) {
         (Some(_), Some(_)) if limits.lower.is_none() => 0.0,
         (Some(lower), Some(upper)) => f64::midpoint(lower, upper),
@@ -219,14 +219,14 @@ fn acceptance_zone(
     })
 }
 
-/// The zone within a single limit: it has no end on the other side, so it always exists.
+/// The zone within a single limit; open on the other side, it always exists.
 fn one_sided(
     limits: ToleranceLimits,
     confidence: f64,
     probability: &impl Fn(f64) -> f64,
 ) -> ToleranceLimits {
     let end = |limit: f64, inward: f64| {
-        // doubled until the far end surely passes
+        // doubles until the far end surely passes
         let mut reach = limit.abs().max(1.0) * 1e-9;
         while probability(limit + inward * reach) < confidence {
             reach *= 2.0;
@@ -239,7 +239,7 @@ fn one_sided(
     }
 }
 
-/// Where the probability crosses the confidence, by bisection.
+/// The value at which the probability crosses the confidence, by bisection.
 fn crossing(inside: f64, outside: f64, confidence: f64, probability: &impl Fn(f64) -> f64) -> f64 {
     let (mut inside, mut outside) = (inside, outside);
     if probability(outside) >= confidence {

@@ -1,4 +1,4 @@
-//! General tolerances of a drawing, for what has none of its own.
+//! General tolerances of a drawing, for dimensions without their own.
 
 use crate::names;
 
@@ -17,10 +17,10 @@ names! {
     }
 }
 
-/// Lower end of the first range, mm: below it the drawing has to say a tolerance.
+/// Lower end of the first range, mm: below it the drawing has to state a tolerance.
 const LEAST_MM: f64 = 0.5;
-/// Upper ends of the ranges, mm, each included, and the deviations ± mm of f, m, c and v; NaN where
-/// the standard has none.
+/// Upper ends of the ranges, mm, inclusive, and the deviations ± mm of f, m, c and v; NaN if the
+/// standard has none.
 const LINEAR_MM: [(f64, [f64; 4]); 8] = [
     (3.0, [0.05, 0.1, 0.2, f64::NAN]),
     (6.0, [0.05, 0.1, 0.3, 0.5]),
@@ -33,7 +33,7 @@ const LINEAR_MM: [(f64, [f64; 4]); 8] = [
 ];
 
 impl GeneralTolerance {
-    /// Permissible deviation ± of a linear dimension, mm; `None` where the class has none for that
+    /// Permissible deviation ± of a linear dimension, mm; `None` if the class has none for that
     /// size.
     pub fn linear_mm(self, nominal_mm: f64) -> Option<f64> {
         let class = Self::ALL.iter().position(|class| *class == self)?;
@@ -51,7 +51,7 @@ impl GeneralTolerance {
 mod tests {
     use super::*;
 
-    /// Rows and ends of ranges as they stand in the table.
+    /// Rows and ends of ranges as in the table.
     #[test]
     fn ranges_end_where_the_table_says() {
         use GeneralTolerance::{Coarse, Fine, Medium, VeryCoarse};

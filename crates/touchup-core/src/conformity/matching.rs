@@ -1,15 +1,15 @@
-//! Which of the features that were found is the one that a drawing means.
+//! Matching of detected features with the features of a drawing.
 
 use nalgebra::{Point3, Vector3};
 
 use crate::features::Kind;
 
-/// A feature that was found.
+/// A detected feature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FeaturePlace {
-    /// its number
+    /// its id
     pub id: u32,
-    /// what it is
+    /// its kind
     pub kind: Kind,
     /// m, in O
     pub centre: Point3<f64>,
@@ -19,12 +19,12 @@ pub struct FeaturePlace {
     pub size: Option<f64>,
 }
 
-/// A feature as a drawing has it.
+/// A feature of a drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SoughtFeature {
-    /// what it is
+    /// its kind
     pub kind: Kind,
-    /// number of the found feature, where the drawing names it
+    /// id of the detected feature, if the drawing names it
     pub id: Option<u32>,
     /// nominal centre, m, in O
     pub place: Option<Point3<f64>>,
@@ -32,25 +32,25 @@ pub struct SoughtFeature {
     pub size: Option<f64>,
 }
 
-/// What came of the search for one feature.
+/// Result of the search for one feature.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FeatureMatch {
-    /// its number
+    /// its id
     Found(u32),
-    /// none of its kind is there
+    /// no feature of its kind fits
     Missing,
-    /// several could be it: their numbers
+    /// ids of several features that fit
     Ambiguous(Vec<u32>),
-    /// the only one that could be it could also be another one of the drawing
+    /// id of the only feature that fits, which also fits another one of the drawing
     Shared(u32),
 }
 
-/// Finds each feature of a drawing among those that were found: by its number, else by kind and
-/// place, and where several are on one axis by their places along it and sizes. What two of the
-/// drawing would share, neither gets; nothing is guessed.
+/// Finds each feature of a drawing among the detected ones: by its id, else by kind and place, and
+/// for several on one axis by their places along it and sizes. A feature that two of the drawing
+/// would share goes to neither; nothing is guessed.
 ///
-/// - `reach`: how far off a centre may be across its axis, of a plane along its normal, m. Two that
-///   are less than that apart in place and size are not told apart.
+/// - `reach`: largest offset of a centre across its axis, for a plane along its normal, m. Features
+///   less than that apart in place and size are not distinguished.
 pub fn match_features(
     sought: &[SoughtFeature],
     found: &[FeaturePlace],
@@ -105,7 +105,7 @@ fn match_one(sought: &SoughtFeature, found: &[FeaturePlace], reach: f64) -> Feat
     }
 }
 
-/// Distance across the axis, of a plane along its normal, m.
+/// Distance across the axis, for a plane along its normal, m.
 fn off(place: &FeaturePlace, nominal: &Point3<f64>) -> f64 {
     let off = place.centre - nominal;
     match (place.kind, &place.axis) {
@@ -237,7 +237,7 @@ mod tests {
         );
     }
 
-    /// A plane is matched along its normal; of two in one plane the nearer one in space.
+    /// A plane matches along its normal; of two in one plane the nearer one in space.
     #[test]
     fn a_plane_is_matched_along_its_normal() {
         let plane = |id, x_mm: f64, z_mm: f64| FeaturePlace {

@@ -1,14 +1,14 @@
 //! Conformity of measured characteristics with the tolerances of a drawing.
 //!
-//! A measured value y with standard uncertainty u says of the measurand, where nothing else is
-//! known of it, that it is distributed about y with the standard deviation u [JCGM 106:2012, 6].
-//! Its conformance probability is the share of that distribution between the tolerance limits,
+//! If nothing else is known of the measurand, a measured value y with standard uncertainty u
+//! implies a distribution about y with the standard deviation u [JCGM 106:2012, 6]. The conformance
+//! probability is the share of that distribution between the tolerance limits,
 //!
 //! p_c = Φ((T_U − y) / u) − Φ((T_L − y) / u)   [JCGM 106:2012, 7.3 and 7.4]
 //!
-//! and the decision is for acceptance where p_c is large enough ([`assess`]): the tolerance zone
-//! without a guard band at either limit [ISO 14253-1:2017]. Numbers of one characteristic are in
-//! one unit, whichever that is.
+//! and the decision is for acceptance if p_c is large enough ([`assess`]): the tolerance zone
+//! without a guard band at either limit [ISO 14253-1:2017]. Numbers of one characteristic share one
+//! unit, whichever that is.
 
 mod assess;
 mod general;

@@ -1,4 +1,4 @@
-//! The measured value of a characteristic, out of a feature.
+//! The measured value of a characteristic of a feature.
 
 use nalgebra::{Point3, Vector3};
 
@@ -7,8 +7,8 @@ use super::place::{coordinate_std, position};
 use super::quantity::InspectedQuantity;
 use crate::features::{Feature, Measured};
 
-/// What a feature says of a quantity of its own, m; `None` where it has none. The quantities that
-/// are not of its sizes and its place are none of these.
+/// The measured value of a quantity of a feature, m; `None` if it has none. Only sizes and places
+/// are such quantities.
 ///
 /// - `nominal`: its centre in the drawing, m in O.
 pub fn measured_number(

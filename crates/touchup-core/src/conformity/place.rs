@@ -1,11 +1,11 @@
-//! Where a feature is, as a drawing states it: coordinates of its centre and its position.
+//! Place of a feature as in a drawing: coordinates of its centre and its position.
 
 use nalgebra::{Point3, Vector3};
 
 use super::assess::MeasuredNumber;
 use crate::features::Kind;
 
-/// Cosine of 5°: within that a direction counts as along or square to an axis, as in relations of
+/// Cosine of 5°: a direction within that counts as along or square to an axis, as in relations of
 /// features.
 const ALONG: f64 = 0.996_194_698_091_745_5;
 /// Sine of 5°.
@@ -14,12 +14,12 @@ const SQUARE: f64 = 0.087_155_742_747_658_17;
 /// Standard uncertainty of the coordinate of a centre along a direction.
 ///
 /// The uncertainty of a centre is the root mean square distance across the axis, which two
-/// coordinates share; of a plane that along its normal; of a corner the distance in space, which
+/// coordinates share; for a plane it is along its normal, for a corner the distance in space, which
 /// three share.
 ///
 /// - `std`: of the centre.
 /// - `direction`: unit vector.
-/// - returns: `None` where the uncertainty of the centre says nothing of that direction.
+/// - returns: `None` if the uncertainty of the centre does not cover that direction.
 pub fn coordinate_std(
     kind: Kind,
     axis: Option<Vector3<f64>>,
@@ -36,11 +36,11 @@ pub fn coordinate_std(
 }
 
 /// Position of a centre: twice its distance from the nominal one across the axis [ISO 1101:2017,
-/// cylindrical zone]; of a plane along its normal, of a corner in space. Its standard uncertainty
-/// is twice that of one coordinate.
+/// cylindrical zone]; `None` for a plane or a corner. Its standard uncertainty is twice that of one
+/// coordinate.
 ///
 /// - `centre`, `nominal`: in one unit, which the result has too; `std` of the centre as well.
-/// - returns: `None` where there is no axis to measure across.
+/// - returns: `None` without an axis to measure across.
 pub fn position(
     kind: Kind,
     centre: &Point3<f64>,

@@ -12,8 +12,8 @@ pub struct ToleranceLimits {
 }
 
 impl ToleranceLimits {
-    /// Those of a nominal value and its limit deviations, with the decimals that these have: 6.1 and
-    /// −0.03 make 6.07, if their binary fractions add up to 6.069999999999999.
+    /// Limits of a nominal value and its limit deviations, with the decimals of these: 6.1 and
+    /// −0.03 make 6.07, even if their binary fractions add up to 6.069999999999999.
     pub fn about(nominal: f64, lower: Option<f64>, upper: Option<f64>) -> Self {
         let limit = |deviation: f64| {
             let decimals = decimals(nominal).max(decimals(deviation));
@@ -26,30 +26,30 @@ impl ToleranceLimits {
         }
     }
 
-    /// Whether a value is within them.
+    /// Whether a value is within the limits.
     pub fn hold(&self, value: f64) -> bool {
         self.lower.is_none_or(|lower| value >= lower)
             && self.upper.is_none_or(|upper| value <= upper)
     }
 }
 
-/// How many decimals the shortest text of a number has.
+/// Number of decimals of the shortest text of a number.
 fn decimals(number: f64) -> usize {
     let text = number.to_string();
     text.split_once('.')
         .map_or(0, |(_, decimals)| decimals.len())
 }
 
-/// How the measurand is distributed about its measured value.
+/// Distribution of the measurand about its measured value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Distribution {
     /// normal
     #[default]
     Normal,
-    /// normal without what is below 0: the width of a zone of form or direction
+    /// normal without its part below 0: the width of a zone of form or direction
     NonNegative,
-    /// the value is twice the distance of a point from its nominal place, and the point is
-    /// distributed round and normal in the plane: the diameter of a zone of position. The standard
+    /// the value is twice the distance of a point from its nominal place, with a round normal
+    /// distribution of the point in the plane: the diameter of a zone of position. The standard
     /// uncertainty is twice that of one coordinate.
     Position,
 }
@@ -66,10 +66,10 @@ pub fn conformance_probability(
     if std <= 0.0 {
         return if limits.hold(value) { 1.0 } else { 0.0 };
     }
-    // the distribution function without what is below `from`
+    // the distribution function without its part below `from`
     let between = |from: f64, to: f64| {
         let [from, to] = [from, to].map(|limit| (limit - value) / std);
-        // of two upper tails, lower ones have the digits
+        // for two upper tails, their mirrored lower ones have the digits
         if from > 0.0 {
             normal_cdf(-from) - normal_cdf(-to)
         } else {
@@ -119,8 +119,7 @@ mod tests {
         assert!((normal(-5.47, 0.05, limits(None, -5.40)) - 0.919).abs() < 5e-4);
     }
 
-    /// A tolerance of ±2 u about the value: erf(√2); a value on a limit that is far from the other:
-    /// a half.
+    /// A tolerance of ±2 u about the value: erf(√2); a value on a limit far from the other: a half.
     #[test]
     fn closed_forms_of_two_limits_hold() {
         assert!((normal(5.0, 0.5, limits(4.0, 6.0)) - 0.954_499_736_103_641_6).abs() < 1e-14);
@@ -135,7 +134,7 @@ mod tests {
         }
     }
 
-    /// Of a form of 0 nothing but its uncertainty is known: half a normal distribution is left.
+    /// A form of 0 with an uncertainty: half a normal distribution remains.
     #[test]
     fn a_form_of_nothing_conforms_as_half_a_normal_distribution() {
         let of_form = |value, upper| {

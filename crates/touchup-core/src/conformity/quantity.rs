@@ -1,11 +1,11 @@
-//! What is measured of a feature.
+//! Measured quantities of features.
 
 use super::probability::Distribution;
 use crate::features::Kind;
 use crate::names;
 
 names! {
-    /// A quantity that a drawing has tolerances for, by its name with its unit.
+    /// A toleranced quantity of a drawing, by its name with its unit.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
     pub enum InspectedQuantity {
         /// of a hole, notch, boss or cylinder
@@ -24,14 +24,14 @@ names! {
         Y = "y_mm",
         /// coordinate of the centre
         Z = "z_mm",
-        /// diameter of the cylinder about the nominal axis that holds the centre, twice its
-        /// distance (ISO 1101)
+        /// diameter of the cylinder about the nominal axis through the centre, twice its distance
+        /// (ISO 1101)
         Position = "position_mm",
         /// width of a zone
         Roundness = "roundness_mm",
         /// width of a zone
         Cylindricity = "cylindricity_mm",
-        /// diameter of the cylinder that holds the axis
+        /// diameter of the cylinder that encloses the axis
         Straightness = "straightness_mm",
         /// width of a zone
         Flatness = "flatness_mm",
@@ -61,8 +61,8 @@ impl InspectedQuantity {
         self.parts().1
     }
 
-    /// Whether it is a width that is 0 at best: its tolerance is an upper limit alone, and its
-    /// nominal value is 0.
+    /// Whether it is a width of 0 at best: its tolerance is an upper limit alone, and its nominal
+    /// value is 0.
     pub fn is_zone(self) -> bool {
         self.distribution() != Distribution::Normal
     }
@@ -85,7 +85,7 @@ impl InspectedQuantity {
         self == Self::Position
     }
 
-    /// Whether a feature of that kind has it.
+    /// Whether features of that kind have it.
     pub fn is_of(self, kind: Kind) -> bool {
         let is_round = matches!(kind, Kind::Hole | Kind::Boss | Kind::Cylinder | Kind::Notch);
         let is_slot = matches!(kind, Kind::Slot | Kind::Pocket);
@@ -109,7 +109,7 @@ impl InspectedQuantity {
         )
     }
 
-    /// How the measurand is distributed about a measured value.
+    /// Distribution of the measurand about a measured value.
     pub fn distribution(self) -> Distribution {
         match self {
             Self::Position => Distribution::Position,

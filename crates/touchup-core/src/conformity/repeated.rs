@@ -1,31 +1,30 @@
-//! A decision that is looked for after every touch.
+//! Confidence of a decision that is tested after every touch.
 //!
-//! Whoever tests again after every touch and stops at the first decision errs more often than each
-//! test by itself: with a value on its limit, the mean of the touches crosses a guard band of z u
-//! at some time with a higher probability than at a given one [Armitage, McPherson, Rowe 1969]. The
-//! guard band that is the same at every look and is crossed by chance at any of them with the
-//! stated probability alone is that of Pocock [Pocock 1977]; here for one side, as each limit is.
+//! Repeated tests that stop at the first decision err more often than each test by itself: with a
+//! value on its limit, the mean of the touches crosses a guard band of z u at some time with a
+//! higher probability than at a given one [Armitage, McPherson, Rowe 1969]. Pocock's guard band is
+//! the same at every look, and chance crosses it at any of them with the stated probability alone
+//! [Pocock 1977]; here for one side, as each limit has one.
 //!
 //! Looks are at n, n + 1, … touches, each of the same weight. The mean of n of them over its
-//! standard deviation is Z_n, and Z_m = √(n/m) Z_n + √(1 − n/m) ξ with ξ normal. Its density
-//! without what was stopped is followed from look to look, by the trapezoid rule. What all touches
-//! have in common ties the looks together more closely, so they cross less often than that.
+//! standard deviation is Z_n, and Z_m = √(n/m) Z_n + √(1 − n/m) ξ with ξ normal. The trapezoid rule
+//! follows its density, without the stopped part, from look to look. Errors common to all touches
+//! tie the looks together more closely, so they cross less often than that.
 
 use crate::numeric::{normal_cdf, normal_quantile};
 
-/// Step of the density, in standard deviations: two fifths of that of one step of Z at the most.
+/// Step of the density, in standard deviations: at most 2/5 of the deviation of one step of Z.
 const STEP: f64 = 0.05;
-/// The density is followed down to here.
+/// Lower end of the density.
 const LOWEST: f64 = -6.0;
-/// Of many touches one look in so many steps of a doubling stands for those beside it.
+/// Steps of a doubling: for many touches one look in each stands for those beside it.
 const LOOKS: usize = 64;
-/// Steps of the kernel are cut off here, in its standard deviations.
+/// Cut-off of the kernel, in its standard deviations.
 const TAIL: f64 = 6.0;
 /// Halves the range of quantiles to a thousandth of a standard deviation.
 const BISECTIONS: usize = 12;
 
-/// Probability of conformity that each look has to ask for, so that the decisions of all together
-/// have `confidence`.
+/// Probability of conformity that each look must require for a combined `confidence` of all looks.
 ///
 /// - `confidence`: above 0.5 and below 1.
 /// - `first`, `last`: touches at the first look and at the last, from 1 on.
@@ -34,7 +33,7 @@ pub fn repeated_confidence(confidence: f64, first: usize, last: usize) -> f64 {
     if last <= first {
         return confidence;
     }
-    // no more than all looks apart would need
+    // no more than separate looks would need
     let looks = (last - first + 1) as f64;
     let (mut low, mut high) = (
         normal_quantile(confidence),
@@ -56,7 +55,7 @@ fn crossing(bound: f64, first: usize, last: usize) -> f64 {
     let count = ((bound - LOWEST) / STEP).ceil() as usize + 1;
     let z = |at: usize| bound - at as f64 * STEP;
     let normal = |z: f64| (-0.5 * z * z).exp() / std::f64::consts::TAU.sqrt();
-    // on the bound itself, half a step belongs to it
+    // the bound itself has half a step
     let weight = |at: usize| if at == 0 { STEP / 2.0 } else { STEP };
     let mut density: Vec<f64> = (0..count).map(|at| normal(z(at))).collect();
     let mut crossed = normal_cdf(-bound);
@@ -89,8 +88,7 @@ fn crossing(bound: f64, first: usize, last: usize) -> f64 {
 mod tests {
     use super::*;
 
-    /// Table 1 of Pocock 1977, of both sides at 5 %: that of one side at 2.5 % is less than 0.005
-    /// below.
+    /// Table 1 of Pocock 1977, both sides at 5 %: one side at 2.5 % is less than 0.005 below.
     #[test]
     fn looks_at_equal_groups_need_the_constants_of_pocock() {
         for (looks, expected) in [
@@ -109,12 +107,12 @@ mod tests {
         }
     }
 
-    /// Armitage, McPherson and Rowe 1969, table 2: of both sides at 5 % each, ten looks err in 19.3
-    /// % of the cases.
+    /// Armitage, McPherson and Rowe 1969, table 2: both sides at 5 % each, ten looks err in 19.3 %
+    /// of the cases.
     #[test]
     fn looking_ten_times_nearly_quadruples_the_risk() {
         let both = 2.0 * crossing(1.959_964, 1, 10);
-        // what crosses both is counted twice
+        // counts a crossing of both twice
         assert!((0.193..0.200).contains(&both), "{both}");
     }
 
