@@ -1,9 +1,8 @@
-//! Points picked with the stylus itself: where it dwells on the part.
+//! Points picked by a dwell of the stylus on the part.
 //!
-//! While it presses and stays where it is, the mean of its ball and of the force make one point:
-//! c + F / k − r n, with the stiffness k of the stylus and n along the force. Friction lets a
-//! resting force lean: on a slope of the pressing hand by φ the point is off by r sin φ along the
-//! surface.
+//! While it presses and stays in place, the means of its ball and force give one point: c + F / k −
+//! r n, with the stiffness k of the stylus and n along the force. Friction lets a resting force
+//! lean: if the pressing hand slopes by φ the point is off by r sin φ along the surface.
 
 use nalgebra::{Point3, Vector3};
 
@@ -14,15 +13,15 @@ use crate::stylus::ContactSample;
 pub struct DwellParams {
     /// Shortest dwell, ns. Default 0.5 s: longer than a turning point of a stroke.
     pub dwell_ns: i64,
-    /// … and the ball stays within this of where it began, m. Default 0.5 mm: a hand trembles by a
-    /// tenth of that.
+    /// Largest distance of the ball from its place at the start, m. Default 0.5 mm: a hand trembles
+    /// by a tenth of that.
     pub largest_drift: f64,
-    /// Of the ball, m.
+    /// Radius of the ball, m.
     pub radius: f64,
 }
 
 impl Default for DwellParams {
-    /// A point.
+    /// The parameters of a point tip.
     fn default() -> Self {
         Self {
             dwell_ns: 500_000_000,
@@ -37,15 +36,15 @@ impl Default for DwellParams {
 pub struct Dwell {
     /// The point on the part, in the frame of the poses, m.
     pub point: Point3<f64>,
-    /// When it began, ns.
+    /// Start of the dwell, ns.
     pub begin_ns: i64,
-    /// How long it lasted, s.
+    /// Duration of the dwell, s.
     pub seconds: f64,
     /// Mean force, in the frame of the poses, N.
     pub force: Vector3<f64>,
 }
 
-/// A stretch in one place.
+/// A part of a recording with the ball in one place.
 #[derive(Clone, Copy, Debug)]
 struct Stretch {
     anchor: Vector3<f64>,
@@ -65,7 +64,7 @@ pub struct DwellFinder {
 }
 
 impl DwellFinder {
-    /// Nothing seen yet.
+    /// A finder without samples.
     pub fn new(params: DwellParams) -> Self {
         Self {
             params,
@@ -74,7 +73,7 @@ impl DwellFinder {
         }
     }
 
-    /// Takes the next sample, in order of time; O is the frame of the poses.
+    /// Adds the next sample, in order of time; O is the frame of the poses.
     pub fn push(&mut self, sample: &ContactSample) {
         if !sample.is_in_contact() {
             return self.close();

@@ -1,13 +1,12 @@
 //! Robust least squares of zᵢ = Aᵢ x + y for vectors x and y of three, with Aᵢ a known 3 × 3
 //! matrix.
 //!
-//! With the means taken off, N = Σ (Aᵢ − Ā)ᵀ (Aᵢ − Ā) and N x = Σ (Aᵢ − Ā)ᵀ (zᵢ − z̄), y = z̄ − Ā
-//! x; cov x = σ² N⁻¹, cov y = σ² (I / n + Ā N⁻¹ Āᵀ), σ² = Σ |r|² / (3 n − 6). What N does not
-//! determine is a direction along which Aᵢ x is the same for all i.
+//! Relative to the means, N = Σ (Aᵢ − Ā)ᵀ (Aᵢ − Ā) and N x = Σ (Aᵢ − Ā)ᵀ (zᵢ − z̄), y = z̄ − Ā x;
+//! cov x = σ² N⁻¹, cov y = σ² (I / n + Ā N⁻¹ Āᵀ), σ² = Σ |r|² / (3 n − 6). N leaves a direction
+//! undetermined if Aᵢ x along it is the same for all i.
 //!
-//! Observations that do not belong are found from the fit of least Σ |r| (by reweighting), whose
-//! scale is the median of
-//! |r|, and left out; what is left is fitted by least squares, until the choice no longer changes.
+//! Outliers come from the fit of least Σ |r| (by reweighting), with the median of |r| as its scale;
+//! the rest is fitted by least squares, until the choice no longer changes.
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
@@ -20,18 +19,18 @@ pub(super) struct Equation {
     pub z: Vector3<f64>,
 }
 
-/// What was found.
+/// Result of a fit.
 #[derive(Clone, Debug)]
 pub(super) struct CalibrationFit {
     pub x: Vector3<f64>,
     pub y: Vector3<f64>,
     pub covariance_x: Matrix3<f64>,
     pub covariance_y: Matrix3<f64>,
-    /// of one component of z
+    /// standard deviation of one component of z
     pub sigma: f64,
-    /// √(mean |r|²) of those that were kept
+    /// √(mean |r|²) of the kept observations
     pub rms: f64,
-    /// which observations were kept
+    /// whether each observation was kept
     pub kept: Vec<bool>,
 }
 
@@ -45,18 +44,17 @@ impl CalibrationFit {
     }
 }
 
-/// Fewer observations do not determine which of them is an outlier.
+/// Smallest number of observations that determine an outlier among them.
 const FEWEST_TO_REJECT: usize = 8;
 /// |r| of three normal components exceeds 5 σ once in 65 000.
 const GATE_SIGMAS: f64 = 5.0;
 /// The median of |r| of three normal components, in σ.
 const MEDIAN_NORM: f64 = 1.5382;
-/// A reweighted fit has converged by then; more would not change which observations are kept.
+/// Rounds to convergence of a reweighted fit; more would not change the kept observations.
 const ROBUST_ROUNDS: usize = 30;
-/// Choices that still change after so many rounds go back and forth between two that are equally
-/// good.
+/// Maximum number of choices; if they still change, they alternate between two equally good ones.
 const CHOICE_ROUNDS: usize = 30;
-/// Residuals below this share of the largest z are rounding, and no reason to leave anything out.
+/// Share of the largest z below which residuals are rounding, and no reason to leave anything out.
 const ROUNDING: f64 = 1e-12;
 
 /// A direction of x that the equations do not determine.
@@ -68,13 +66,13 @@ pub(super) struct Undetermined {
 }
 
 impl Undetermined {
-    /// By how much the poses turn to either side across the axis, where A is a rotation, rad.
+    /// Rotation of the poses to either side across the axis, if A is a rotation, rad.
     pub fn angle(&self) -> f64 {
         self.spread.clamp(0.0, 1.0).sqrt().asin()
     }
 }
 
-/// The least determined direction, over the observations that are kept.
+/// The least determined direction, over the kept observations.
 pub(super) fn least_determined(equations: &[Equation], kept: &[bool]) -> Undetermined {
     let weights: Vec<f64> = kept.iter().map(|&kept| f64::from(u8::from(kept))).collect();
     let (n, mean, _) = means(equations, &weights);
@@ -86,10 +84,10 @@ pub(super) fn least_determined(equations: &[Equation], kept: &[bool]) -> Undeter
     }
 }
 
-/// The fit, or the direction that it does not determine.
+/// The fit, or the direction left undetermined.
 ///
 /// - `equations`: at least three.
-/// - `smallest_spread`: a direction with less [`spread`] than this is not determined.
+/// - `smallest_spread`: [`spread`] below which a direction is undetermined.
 pub(super) fn fit(
     equations: &[Equation],
     smallest_spread: f64,

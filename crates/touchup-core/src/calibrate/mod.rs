@@ -1,13 +1,13 @@
-//! Calibration of the stylus from recordings made for it: [`fit_payload`] finds weight, centre of
+//! Calibration of the stylus from dedicated recordings: [`fit_payload`] finds weight, centre of
 //! mass and bias from static poses, [`fit_tip`] finds the centre of the ball from a swing about it.
 //!
-//! [`fit_tip_by_plane`] finds that centre from touches of a plane with a probe that leans: for an
-//! arm, which holds no ball in a cone.
+//! [`fit_tip_by_plane`] finds that centre from touches of a plane with a leaning probe: for an arm,
+//! which holds no ball in a cone.
 //!
 //! [`check_workspace`] finds repeatability, tip radius and growth of the error of an arm from
 //! touches of spheres.
 //!
-//! [`DwellFinder`] finds points that were picked with the stylus.
+//! [`DwellFinder`] finds points picked with the stylus.
 //!
 //! [`fit_payload`] and [`fit_tip`] are one robust least squares: zᵢ = Aᵢ x + y with a vector x seen
 //! in turned axes and a constant y.

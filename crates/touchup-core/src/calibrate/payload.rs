@@ -1,8 +1,8 @@
 //! Payload identification: weight, centre of mass and bias, from static poses.
 //!
 //! At rest and in free air the sensor measures f_S = R_WSᵀ w + b_f and τ_S = p_SC × R_WSᵀ w + b_τ
-//! with the weight w = m g in the frame of the poses. The first is linear in w and b_f: the
-//! direction of gravity is found, not assumed. With w known the second is linear in p_SC and b_τ.
+//! with the weight w = m g in the frame of the poses. The first is linear in w and b_f; gravity's
+//! direction is found, not assumed. With w known the second is linear in p_SC and b_τ.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -13,7 +13,7 @@ use crate::stylus::{Payload, Wrench, WrenchFrame};
 /// Settings of [`fit_payload`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PayloadParams {
-    /// In which axes the wrench is: the sensor's own, or those of the poses.
+    /// Axes of the wrench: the sensor's own, or those of the poses.
     pub wrench_frame: WrenchFrame,
     /// Orientation of the sensor in the frame of the tip.
     pub r_ts: UnitQuaternion<f64>,
@@ -34,7 +34,7 @@ impl Default for PayloadParams {
 /// A vector and the standard uncertainty of each component.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VectorEstimate {
-    /// what it is
+    /// the vector
     pub value: Vector3<f64>,
     /// its standard uncertainty
     pub sigma: Vector3<f64>,
@@ -64,25 +64,25 @@ pub struct PayloadFit {
     pub bias_force: VectorEstimate,
     /// Bias of the torque, expressed in S, N·m.
     pub bias_torque: VectorEstimate,
-    /// √(mean |residual|²) of the force over the poses that were kept, N.
+    /// √(mean |residual|²) of the force over the kept poses, N.
     pub rms_force: f64,
-    /// … of the torque, N·m.
+    /// √(mean |residual|²) of the torque over the kept poses, N·m.
     pub rms_torque: f64,
-    /// What the noise of the sensor lets expect for `rms_force`, N; `None` when no noise is known.
-    /// Much less than `rms_force` means that something else pulls: a cable, a contact, a sensor
-    /// that is turned otherwise.
+    /// `rms_force` expected from the noise of the sensor, N; `None` if no noise is known. If much
+    /// less than `rms_force`, something else pulls: a cable, a contact, a sensor in another
+    /// orientation.
     pub expected_force: Option<f64>,
-    /// Static poses.
+    /// Number of static poses.
     pub poses: usize,
-    /// Indices of those that did not fit and were left out.
+    /// Indices of the poses left out as outliers.
     pub rejected: Vec<usize>,
-    /// Least angle that the poses differ by about any axis, rms to either side, rad.
+    /// Least angle between the poses about any axis, rms to either side, rad.
     pub tilt: f64,
     gravity: f64,
 }
 
 impl PayloadFit {
-    /// As the compensator takes it off, with gravity in the frame of the poses.
+    /// Payload for the compensator, with gravity in the frame of the poses.
     pub fn payload(&self) -> Payload {
         let gravity_w = self.weight_w.value * (self.gravity / self.weight[0]);
         Payload {
@@ -92,7 +92,7 @@ impl PayloadFit {
         }
     }
 
-    /// As the compensator takes it off.
+    /// Bias for the compensator.
     pub fn bias_s(&self) -> Wrench {
         Wrench {
             force: self.bias_force.value,
@@ -101,7 +101,7 @@ impl PayloadFit {
     }
 }
 
-/// Why static poses do not determine the payload.
+/// Reason why static poses do not determine the payload.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PayloadError {
     /// Too few static poses.
@@ -110,7 +110,7 @@ pub enum PayloadError {
          least {FEWEST_POSES} orientations, better 12"
     )]
     TooFew {
-        /// how many there are
+        /// number of poses
         count: usize,
     },
     /// Poses that differ too little.
@@ -124,7 +124,7 @@ pub enum PayloadError {
     TooAlike {
         /// rms to either side, degrees
         tilt_deg: f64,
-        /// along this the weight is not determined, in W
+        /// axis along which the weight is undetermined, in W
         axis: [f64; 3],
     },
     /// Gravity always pulls in the same direction through the sensor.
@@ -133,7 +133,7 @@ pub enum PayloadError {
          lay the stylus down to the other side too", axis[0], axis[1], axis[2]
     )]
     CentreUndetermined {
-        /// along this the centre is not determined, in S
+        /// axis along which the centre is undetermined, in S
         axis: [f64; 3],
     },
     /// No weight.
@@ -153,23 +153,23 @@ pub enum PayloadError {
          say --wrench-axes {other}, and where they are recorded mend the frame_id of the wrench"
     )]
     WrongAxes {
-        /// as given
+        /// given axes
         given: &'static str,
-        /// what fits
+        /// axes that fit
         other: &'static str,
-        /// as given, N
+        /// rms with the given axes, N
         rms_n: f64,
-        /// of the other, N
+        /// rms with the other axes, N
         other_rms_n: f64,
     },
-    /// Too many poses that do not belong.
+    /// Too many outliers among the poses.
     #[error(
         "{rejected} of {poses} still phases do not fit the others: the stylus must touch nothing, and nothing may touch it"
     )]
     Inconsistent {
-        /// how many
+        /// number of rejected poses
         rejected: usize,
-        /// of how many
+        /// number of all poses
         poses: usize,
     },
 }
@@ -179,21 +179,21 @@ const FEWEST_POSES: usize = 4;
 /// sin² of the smallest tilt to either side: 5°. The uncertainty is then ten times that of a wide
 /// tilt.
 const SMALLEST_SPREAD: f64 = 0.0076;
-/// The same for the centre of mass, by how much gravity turns in the sensor: 2°. A worse condition
+/// The same for the centre of mass, by the rotation of gravity in the sensor: 2°. A worse condition
 /// shows in its uncertainty, and harms little: the force does not need it.
 const SMALLEST_CENTRE_SPREAD: f64 = 0.0012;
-/// The axes of the wrench are taken for wrong when the other ones fit so many times better.
+/// Ratio of the residuals from which the other axes of the wrench are the right ones.
 const AXES_RATIO: f64 = 2.0;
-/// … and there are equations enough to decide.
+/// Smallest number of poses that decide on the axes.
 const FEWEST_FOR_AXES: usize = 6;
-/// More of the poses may not be wrong.
+/// Largest share of wrong poses.
 const LARGEST_REJECTED: f64 = 0.4;
 
 /// Weight, centre of mass and bias.
 ///
 /// # Errors
-/// [`PayloadError`]: too few poses or too alike (which direction is not determined), no weight,
-/// wrong axes, too many poses that do not fit.
+/// [`PayloadError`]: too few poses or too alike (with the undetermined direction), no weight, wrong
+/// axes, too many outliers.
 pub fn fit_payload(
     poses: &[StaticPose],
     params: &PayloadParams,
@@ -249,7 +249,7 @@ pub fn fit_payload(
     })
 }
 
-/// R_WSᵀ w + b = f, in the axes of S whatever the wrench came in.
+/// R_WSᵀ w + b = f, in the axes of S for any axes of the wrench.
 fn equations(poses: &[StaticPose], params: &PayloadParams) -> Vec<Equation> {
     let equation = |pose: &StaticPose| {
         let turn = (pose.r_wt * params.r_ts).inverse();
@@ -272,8 +272,8 @@ fn in_sensor(
     }
 }
 
-/// −[R_WSᵀ w]× p + b = τ over the poses that the force kept, with covariances that count how well w
-/// is known.
+/// −[R_WSᵀ w]× p + b = τ over the poses kept by the force, with covariances that include the
+/// uncertainty of w.
 fn fit_torque(
     poses: &[StaticPose],
     params: &PayloadParams,
@@ -318,7 +318,7 @@ fn fit_torque(
     Ok(found)
 }
 
-/// Refuses axes when the other ones fit far better.
+/// Refuses the given axes if the other ones fit far better.
 fn check_axes(
     poses: &[StaticPose],
     params: &PayloadParams,

@@ -1,4 +1,4 @@
-//! A sphere of known diameter, and the sphere through the centres of a ball that touched it.
+//! A sphere of known diameter, and the sphere through the centres of a ball in contact with it.
 
 use std::f64::consts::{PI, TAU};
 
@@ -16,12 +16,12 @@ pub struct ReferenceSphere {
     pub radius: f64,
 }
 
-/// The sphere of least squares through the centres of a ball that touched a sphere.
+/// The sphere of least squares through the centres of a ball in contact with a sphere.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SphereFit {
     /// m, in the frame of the touches
     pub centre: Point3<f64>,
-    /// radius of the touched sphere plus that of the ball, m
+    /// radius of the touched sphere plus the radius of the ball, m
     pub radius: f64,
     /// covariance of centre and radius for touches with a standard deviation of 1 along their
     /// radius
@@ -32,16 +32,16 @@ pub struct SphereFit {
     pub degrees_of_freedom: usize,
 }
 
-/// Gauss–Newton steps at most; each squares the error.
+/// Maximum number of Gauss–Newton steps; each squares the error.
 const ROUNDS: usize = 20;
-/// A shorter step changes nothing, m.
+/// Length of a negligible step, m.
 const SETTLED: f64 = 1e-13;
 /// Segments of the equator of a mesh: its faces are within 0.3 % of the radius.
 const SEGMENTS: u32 = 48;
 
 /// Minimises Σ (|pᵢ − c| − ρ)² over centre c and radius ρ.
 ///
-/// - `points`: centres of the ball, m. `None` for fewer than five, or where they do not determine a
+/// - `points`: centres of the ball, m. `None` for fewer than five, or if they do not determine a
 ///   sphere.
 ///
 /// # Example
@@ -77,7 +77,7 @@ pub fn fit_sphere(points: &[Point3<f64>]) -> Option<SphereFit> {
     })
 }
 
-/// Of a step of the centre and the radius.
+/// Normal equations of a step of the centre and the radius.
 fn equations(points: &[Point3<f64>], centre: &Point3<f64>, radius: f64) -> NormalEquations<4> {
     NormalEquations::of(points.iter().map(|p| {
         let off = p - centre;
@@ -87,8 +87,8 @@ fn equations(points: &[Point3<f64>], centre: &Point3<f64>, radius: f64) -> Norma
     }))
 }
 
-/// Of |p|² = 2 p·c + (ρ² − |c|²), which is linear in c and ρ² − |c|²; p from the mean of the
-/// points, in units of their extent.
+/// Centre from |p|² = 2 p·c + (ρ² − |c|²), which is linear in c and ρ² − |c|²; p from the mean of
+/// the points, in units of their extent.
 fn linear_centre(points: &[Point3<f64>]) -> Option<Point3<f64>> {
     let mean =
         Point3::from(points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / points.len() as f64);
@@ -105,10 +105,10 @@ fn linear_centre(points: &[Point3<f64>]) -> Option<Point3<f64>> {
 }
 
 impl ReferenceSphere {
-    /// Its surface as triangles, for what must keep clear of it; corners lie on it.
+    /// Its surface as triangles with corners on the sphere, as an obstacle.
     ///
     /// # Errors
-    /// [`MeshError`] where centre or radius is no number.
+    /// [`MeshError`] if centre or radius is no number.
     fn mesh(&self) -> Result<TriMesh, MeshError> {
         let rings = SEGMENTS / 2;
         let on_ring = |ring: u32| {
@@ -153,7 +153,7 @@ impl ReferenceSphere {
 /// A mesh with the surfaces of spheres beside it.
 ///
 /// # Errors
-/// [`MeshError`] where the centre or radius of a sphere is no number, or there is too much of it.
+/// [`MeshError`] if the centre or radius of a sphere is no number, or the mesh is too large.
 pub fn beside_spheres(part: &TriMesh, spheres: &[ReferenceSphere]) -> Result<TriMesh, MeshError> {
     let mut positions = part.positions().to_vec();
     let mut faces: Vec<_> = part
@@ -177,7 +177,7 @@ mod tests {
 
     /// Five touches of a sphere, one of them too far out by 20 µm: with a pole and four at the
     /// equator the pole alone determines the height, so an error of the pole is one of the centre;
-    /// an error of one of the equator has the residuals of a hand count.
+    /// an error at the equator has the residuals of a hand count.
     #[test]
     fn a_fit_has_the_residuals_of_a_hand_count() {
         let out = [
@@ -190,7 +190,7 @@ mod tests {
         let mut points = out.map(|out| Point3::from(Vector3::from(out) * 0.015));
         points[0].x += 20e-6;
         let fit = fit_sphere(&points).unwrap();
-        // the radii of the x pair grow by 10 µm on average, which the common radius takes half of:
+        // the radii of the x pair grow by 10 µm on average, half of it in the common radius:
         // residuals ±5 µm on four touches
         assert!(
             (fit.residual_square - 4.0 * 5e-6f64.powi(2)).abs() < 1e-13,
@@ -199,7 +199,7 @@ mod tests {
         );
         assert!((fit.radius - 0.015 - 5e-6).abs() < 1e-8 && (fit.centre.x - 10e-6).abs() < 1e-8);
         assert_eq!(fit.degrees_of_freedom, 1);
-        // of x: two touches with ±1
+        // for x: two touches with ±1
         assert!(
             (fit.cofactors[(0, 0)] - 0.5).abs() < 1e-3,
             "{}",

@@ -1,8 +1,8 @@
-//! Static segments of a recording: where neither the stylus turns nor the wrench changes.
+//! Static segments of a recording: neither the stylus turns nor the wrench changes.
 //!
-//! Samples are averaged over blocks of a fifth of a second, which takes the noise out of the rates;
-//! blocks between which pose and wrench change slowly make a segment, and a segment that lasts is
-//! one static pose.
+//! Averages over blocks of a fifth of a second take the noise out of the rates; blocks with slow
+//! changes of pose and wrench in between make a segment, and a long enough segment is one static
+//! pose.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
@@ -11,13 +11,13 @@ use crate::stylus::{Sample, Wrench};
 /// A static pose of the stylus: means over a segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StaticPose {
-    /// Orientation of T (or H, which has its axes) in the frame of the poses.
+    /// Orientation of T (or of H, with the same axes) in the frame of the poses.
     pub r_wt: UnitQuaternion<f64>,
-    /// As measured, N and N·m.
+    /// Measured wrench, N and N·m.
     pub wrench: Wrench,
-    /// Standard deviation of one reading of the force, per axis, N; `None` when it is not known.
+    /// Standard deviation of one reading of the force, per axis, N; `None` if unknown.
     pub noise: Option<f64>,
-    /// Readings in the means.
+    /// Number of readings in the means.
     pub samples: usize,
 }
 
@@ -28,15 +28,15 @@ pub struct StaticSegmentParams {
     pub block_ns: i64,
     /// Shortest segment, ns. Default 0.6 s: three blocks.
     pub least_ns: i64,
-    /// Turning slower than this is static, rad/s. Default 0.02: a robot's settling oscillation,
-    /// less than the tremor of a hand over a block.
+    /// Largest rotation rate at rest, rad/s. Default 0.02: a robot's settling oscillation, less
+    /// than the tremor of a hand over a block.
     pub turning: f64,
-    /// The force changes more slowly than this at rest, N/s. Default 0.3: a sensor with 0.05 N of
-    /// noise at 200 Hz reaches a third of it by chance.
+    /// Largest rate of the force at rest, N/s. Default 0.3: a sensor with 0.05 N of noise at 200 Hz
+    /// reaches a third of it by chance.
     pub force_rate: f64,
-    /// … and the torque, N·m/s. Default 0.03.
+    /// Largest rate of the torque at rest, N·m/s. Default 0.03.
     pub torque_rate: f64,
-    /// A segment ends when the stylus has turned so far since its beginning, rad. Default 0.03.
+    /// Largest rotation since the start of a segment, rad. Default 0.03.
     pub largest_turn: f64,
 }
 
@@ -53,17 +53,17 @@ impl Default for StaticSegmentParams {
     }
 }
 
-/// A block, or blocks that belong together.
+/// A block, or joined blocks.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SampleBlock {
     begin_ns: i64,
     pub end_ns: i64,
     count: usize,
-    /// Σ q, each turned to the half of the first
+    /// Σ q, each on the hemisphere of the first
     orientation: Quaternion<f64>,
     force: Vector3<f64>,
     torque: Vector3<f64>,
-    /// Σ |fᵢ − fᵢ₋₁|² within blocks, and how many
+    /// Σ |fᵢ − fᵢ₋₁|² within blocks, and its number of terms
     squares: f64,
     differences: usize,
     last_force: Vector3<f64>,
@@ -152,15 +152,15 @@ impl SampleBlock {
 pub struct StaticSegmentFinder {
     params: StaticSegmentParams,
     block: Option<SampleBlock>,
-    /// the last whole block
+    /// the last complete block
     last: Option<SampleBlock>,
-    /// blocks of the segment so far, and its first
+    /// joined blocks of the open segment, and its first block
     phase: Option<(SampleBlock, SampleBlock)>,
     found: Vec<StaticPose>,
 }
 
 impl StaticSegmentFinder {
-    /// Nothing seen yet.
+    /// A finder without samples.
     pub fn new(params: StaticSegmentParams) -> Self {
         Self {
             params,
@@ -171,8 +171,7 @@ impl StaticSegmentFinder {
         }
     }
 
-    /// Takes one sample; those that cannot be a measurement, or are not after the one before, are
-    /// left out.
+    /// Adds one sample; skips invalid samples and samples not after the one before.
     pub fn push(&mut self, sample: &Sample) {
         if sample.check().is_err()
             || self

@@ -1,8 +1,8 @@
 //! Tip calibration by a pivot: the centre of the ball in the tracked stylus, from a swing about it.
 //!
-//! The ball rests in a cone or a divot while the stylus is swung: p_WH + R_WH d = c for all poses,
-//! with the offset d of the ball and the resting point c. Linear in both; where the stylus turned
-//! about one axis alone, d along it is not determined.
+//! The ball rests in a cone or a divot during a swing of the stylus: p_WH + R_WH d = c for all
+//! poses, with the offset d of the ball and the resting point c. Linear in both; if the stylus
+//! turned about one axis alone, d along it is undetermined.
 
 use nalgebra::{Isometry3, Vector3};
 
@@ -15,10 +15,10 @@ pub type SwingPose = Isometry3<f64>;
 /// Settings of [`fit_tip`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TipFitParams {
-    /// A ball that rests strays by less than this, rms, m. Default 1 mm.
+    /// Largest stray of a resting ball, rms, m. Default 1 mm.
     pub largest_rms: f64,
     /// Smallest swing to either side across any axis, rms, rad. Default 8°, that is ±12° each way:
-    /// below it the noise of the tracker is amplified sevenfold in the offset.
+    /// a smaller one amplifies the noise of the tracker sevenfold in the offset.
     pub smallest_swing: f64,
 }
 
@@ -36,22 +36,22 @@ impl Default for TipFitParams {
 pub struct TipFit {
     /// Centre of the ball from the origin of H, in its axes, m.
     pub offset: VectorEstimate,
-    /// Where it rested, in W, m.
+    /// Resting place of the ball, in W, m.
     pub rest: VectorEstimate,
-    /// √(mean |residual|²) of the poses that were kept, m.
+    /// √(mean |residual|²) of the kept poses, m.
     pub rms: f64,
-    /// Poses that were looked at.
+    /// Number of evaluated poses.
     pub poses: usize,
-    /// Those that did not fit and were left out: the ball had slipped, or was not yet at rest.
+    /// Number of poses left out as outliers: the ball had slipped, or was not yet at rest.
     pub rejected: usize,
-    /// Swing to either side across the axis across which it was smallest, rms, rad.
+    /// Swing to either side across the axis of the smallest swing, rms, rad.
     pub swing: f64,
-    /// How many poses carry as much information as one independent pose: 1 when the noise is not
-    /// correlated.
+    /// Number of poses that carry as much information as one independent pose: 1 for uncorrelated
+    /// noise.
     pub correlation: f64,
 }
 
-/// Why a swing does not determine the offset.
+/// Reason why a swing does not determine the offset.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TipError {
     /// Too few poses.
@@ -59,7 +59,7 @@ pub enum TipError {
         "{count} poses do not determine the tip: swing the stylus about its resting ball for at least ten seconds"
     )]
     TooFew {
-        /// how many there are
+        /// number of poses
         count: usize,
     },
     /// The swing is too small, or about one axis.
@@ -75,7 +75,7 @@ pub enum TipError {
         swing_deg: f64,
         /// least, degrees
         wanted_deg: f64,
-        /// along this the offset is not determined, in H
+        /// axis along which the offset is undetermined, in H
         axis: [f64; 3],
     },
     /// The ball did not rest.
@@ -84,27 +84,26 @@ pub enum TipError {
          divot that holds it, while the stylus is swung"
     )]
     NotAtRest {
-        /// of the poses that were kept
+        /// rms over the kept poses
         rms_mm: f64,
-        /// how many did not fit
+        /// number of rejected poses
         rejected: usize,
-        /// of how many
+        /// number of all poses
         poses: usize,
     },
 }
 
-/// Fewer poses leave no redundancy to detect slips.
+/// Smallest number of poses with redundancy to detect slips.
 const FEWEST_POSES: usize = 10;
-/// More of the poses may not be wrong.
+/// Largest share of wrong poses.
 const LARGEST_REJECTED: f64 = 0.4;
 
-/// Offset of the ball and where it rested.
+/// Offset of the ball and its resting place.
 ///
 /// - `poses`: in order of time; NaN is left out.
 ///
 /// # Errors
-/// [`TipError`]: too few poses, too small a swing (and across which axis), a ball that did not
-/// rest.
+/// [`TipError`]: too few poses, too small a swing (with its axis), a ball that did not rest.
 pub fn fit_tip(poses: &[SwingPose], params: &TipFitParams) -> Result<TipFit, TipError> {
     let is_number = |pose: &&SwingPose| {
         pose.translation
@@ -164,7 +163,7 @@ fn correlation(found: &CalibrationFit, equations: &[Equation]) -> f64 {
     if squares <= 0.0 {
         return 1.0;
     }
-    // all but equal residuals are one
+    // nearly equal residuals count as one
     let rho = (products / squares).clamp(0.0, 1.0 - 1.0 / residuals.len() as f64);
     (1.0 + rho) / (1.0 - rho)
 }

@@ -1,11 +1,10 @@
 //! Tip (TCP) calibration by a plane: the centre of the ball in the flange, from touches of one
 //! plane with the tip in several orientations.
 //!
-//! A ball that touches a plane has its centre at a height h over the plane, whatever the
-//! orientation: n · (p + R d) = h, with the place p of the nominal centre, the axes R of the
-//! flange, and the offset d of the true centre from there, in these axes. Unknown are d, n and h.
-//! The radius of the ball is in h: it is not determined, nor is it needed. Where Rᵀ n stays in a
-//! plane, d across that is not determined.
+//! A ball on a plane has its centre at a height h over the plane, in any orientation: n · (p + R d)
+//! = h, with the place p of the nominal centre, the axes R of the flange, and the offset d of the
+//! true centre from there, in these axes. Unknown are d, n and h. The radius of the ball is in h:
+//! it is neither determined nor necessary. If Rᵀ n stays in a plane, d across that is undetermined.
 
 use nalgebra::{Isometry3, Matrix3, SVector, SymmetricEigen, Unit, Vector3};
 
@@ -15,15 +14,15 @@ use crate::numeric::{NormalEquations, mean, scatter, tangent_basis};
 /// The calibrated tip and its uncertainty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlaneTipFit {
-    /// Of the centre of the ball from the nominal one, in the axes of the flange, m.
+    /// Offset of the centre of the ball from the nominal one, in the axes of the flange, m.
     pub offset: VectorEstimate,
     /// √(mean r²) of the heights, m.
     pub rms: f64,
-    /// Touches.
+    /// Number of touches.
     pub touches: usize,
 }
 
-/// Why touches of a plane do not determine the offset.
+/// Reason why touches of a plane do not determine the offset.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlaneTipError {
     /// Too few touches.
@@ -31,7 +30,7 @@ pub enum PlaneTipError {
         "{count} touches do not determine the tip: {FEWEST} are needed, upright and leaning to all sides"
     )]
     TooFew {
-        /// how many there are
+        /// number of touches
         count: usize,
     },
     /// The orientations differ too little.
@@ -40,10 +39,10 @@ pub enum PlaneTipError {
          gets to leans of 20° and 40° to all sides", axis[0], axis[1], axis[2]
     )]
     TooAlike {
-        /// along this the offset is not determined, in the axes of the flange
+        /// axis along which the offset is undetermined, in the axes of the flange
         axis: [f64; 3],
     },
-    /// The orientation of the plane is not determined.
+    /// The touches leave the orientation of the plane open.
     #[error(
         "the touches lie on one line, which does not determine the orientation of the plane: touch the spot upright to all sides of it too"
     )]
@@ -53,27 +52,27 @@ pub enum PlaneTipError {
         "the touches are {rms_mm:.3} mm rms off one plane: touch a flat spot of a stiff part that does not move"
     )]
     NotFlat {
-        /// mm
+        /// rms distance from the plane, mm
         rms_mm: f64,
     },
 }
 
 /// Six unknowns, and redundancy for their residuals.
 const FEWEST: usize = 9;
-/// Least spread of Rᵀ n along any axis, rms: the uncertainty of one touch is amplified at most
+/// Least spread of Rᵀ n along any axis, rms: it amplifies the uncertainty of one touch at most
 /// tenfold in the offset.
 const LEAST_SPREAD: f64 = 0.03;
-/// A plane that is touched is flat within this, rms, m.
+/// Flatness of a touched plane, rms, m.
 const FLAT: f64 = 0.1e-3;
-/// Newton's method squares its error each time; from some mm and some degrees these are plenty.
+/// Number of Newton steps: each squares the error; plenty from some mm and degrees.
 const ROUNDS: usize = 12;
 
 type Six = SVector<f64, 6>;
 
 /// Offset of the ball.
 ///
-/// - `poses`: with the axes of the flange, about the nominal centre of the ball, where the plane
-///   was touched; `normal`: out of the plane, about; both in the base.
+/// - `poses`: axes of the flange, about the nominal centre of the ball, at the touches; `normal`:
+///   approximate one, out of the plane; both in the base.
 ///
 /// # Errors
 /// [`PlaneTipError`]
@@ -126,7 +125,7 @@ pub fn fit_tip_by_plane(
         return Err(PlaneTipError::NotFlat { rms_mm: rms * 1e3 });
     }
     // the residuals of few touches know their own scale badly: the error is Student's t of n − 6,
-    // whose variance is larger by (n − 6)/(n − 8) (JCGM 101:2008, 6.4.9.4)
+    // with a variance larger by (n − 6)/(n − 8) (JCGM 101:2008, 6.4.9.4)
     let covariance =
         information.try_inverse().ok_or(PlaneTipError::OnOneLine)? * (square / (n - 8.0));
     let covariance: Matrix3<f64> = covariance.fixed_view::<3, 3>(0, 0).into_owned();
@@ -163,7 +162,7 @@ mod tests {
     use super::*;
 
     /// Touches of the plane n · p = 1.5 mm with a ball that is off by `offset` in the axes of a
-    /// flange that leans by these angles, °, and towards these; on a square, m.
+    /// flange with these leans, °, towards these angles; on a square, m.
     fn poses(
         leans: &[(f64, f64)],
         offset: Vector3<f64>,
@@ -200,7 +199,7 @@ mod tests {
     fn without_noise_the_offset_is_exact() {
         let normal = Unit::new_normalize(Vector3::new(0.05, -0.1, 1.0));
         let offset = Vector3::new(1.2e-3, -0.7e-3, 2.1e-3);
-        // the normal that it begins with is 2° off
+        // the initial normal is 2° off
         let about = Unit::new_normalize(normal.into_inner() + Vector3::new(0.03, 0.0, 0.0));
         let fit = fit_tip_by_plane(&poses(&all_sides(), offset, &normal), &about).unwrap();
         assert!(
@@ -215,7 +214,7 @@ mod tests {
         let offset = Vector3::new(1e-3, 0.0, 0.0);
         let to_one_side: Vec<_> = (0..12).map(|at| (4.0 * f64::from(at), 0.0)).collect();
         let error = fit_tip_by_plane(&poses(&to_one_side, offset, &normal), &normal).unwrap_err();
-        // it leans about y alone: along y nothing is determined
+        // it leans about y alone: the offset along y is undetermined
         assert!(
             matches!(error, PlaneTipError::TooAlike { axis } if axis[1].abs() > 0.99),
             "{error}"

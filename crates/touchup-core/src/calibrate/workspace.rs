@@ -1,17 +1,17 @@
-//! How far an arm is off over its workspace, from touches of spheres of known diameter at known
-//! places.
+//! Errors of an arm over its workspace, from touches of spheres of known diameter at known places.
 //!
 //! - Repeatability s of a touch along its direction: s² = Σ r² / Σ (n − 4) over the residuals r of
 //!   all sphere fits.
-//! - Tip radius: the fitted radius less that of the sphere, the mean of all fits. Its uncertainty
-//!   is the larger of what the residuals lead to and what the fits scatter by, with half of the
-//!   uncertainty of the diameter.
-//! - Errors over the workspace: eₖ = what remains of found less told centres after the rigid motion
-//!   of least squares, so that the place of the scan in the base is in none of them. With n spheres
-//!   f = 3n − 6 numbers remain (3n − 5 on one line: with two spheres their distance).
-//! - Growth g with the distance d from where the part was registered: a place has the standard
-//!   deviation g d along each axis, so g² = Σ |eₖ|² / (f Σ dₖ² / n). The noise of the centres stays
-//!   in it: with few spheres close together it comes out too large rather than too small.
+//! - Tip radius: the fitted radius less the radius of the sphere, the mean of all fits. Its
+//!   uncertainty is the larger of the one from the residuals and the scatter of the fits, with half
+//!   of the uncertainty of the diameter.
+//! - Errors over the workspace: eₖ = remainder of found less nominal centres after the rigid motion
+//!   of least squares, free of the place of the scan in the base. With n spheres f = 3n − 6 numbers
+//!   remain (3n − 5 on one line: with two spheres their distance).
+//! - Growth g with the distance d from the place of registration of the part: a place has the
+//!   standard deviation g d along each axis, so g² = Σ |eₖ|² / (f Σ dₖ² / n). The noise of the
+//!   centres stays in it: with few spheres close together it comes out too large rather than too
+//!   small.
 
 use nalgebra::{Point3, Vector3};
 
@@ -22,50 +22,50 @@ use crate::numeric::{mean, spreads};
 /// Touches of one sphere with one orientation of the probe.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SphereReading {
-    /// its number among the spheres, from 0 on
+    /// index of the sphere, from 0
     pub sphere: usize,
     /// centres of the ball at contact, m in O
     pub centres: Vec<Point3<f64>>,
 }
 
-/// A sphere, and where the arm has it.
+/// A sphere, and its place by the arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CheckedPlace {
-    /// its number among the spheres, from 0 on
+    /// index of the sphere, from 0
     pub sphere: usize,
     /// mean of its centres over the orientations, m in O
     pub found: Point3<f64>,
-    /// found less told, after the rigid motion that fits all spheres best, m; 0 for a sphere by
-    /// itself
+    /// found less nominal centre, after the rigid motion that fits all spheres best, m; 0 for a
+    /// sphere by itself
     pub error: Vector3<f64>,
 }
 
-/// What the touches of the spheres say of the arm.
+/// Findings on the arm from touches of spheres.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorkspaceCheck {
-    /// of each reading, in their order
+    /// fit of each reading, in their order
     pub fits: Vec<SphereFit>,
     /// standard deviation of one touch along its direction, m
     pub repeatability: f64,
-    /// numbers that it is known by
+    /// degrees of freedom of the repeatability
     pub degrees_of_freedom: usize,
     /// standard deviation of a centre along each axis from one orientation to the next, m; `None`
-    /// where each was touched in one alone
+    /// if each sphere has touches in one alone
     pub orientation_scatter: Option<f64>,
     /// effective radius of the ball, m
     pub tip_radius: f64,
     /// its standard uncertainty, m
     pub tip_radius_sigma: f64,
-    /// each sphere that was touched
+    /// each touched sphere
     pub places: Vec<CheckedPlace>,
-    /// standard deviation of a place along each axis over its distance from where the part was
-    /// registered, m per m; `None` for a sphere by itself
+    /// standard deviation of a place along each axis over its distance from the place of
+    /// registration of the part, m per m; `None` for a sphere by itself
     pub growth: Option<f64>,
-    /// numbers that it is known by
+    /// degrees of freedom of the growth
     pub growth_degrees_of_freedom: usize,
 }
 
-/// Why the touches say nothing.
+/// Reason why the touches give no result.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum WorkspaceError {
     /// No sphere was touched.
@@ -76,19 +76,19 @@ pub enum WorkspaceError {
         "{touches} touches of sphere {sphere} determine no sphere: touch it at five places that lie in no plane, or more"
     )]
     NoSphere {
-        /// from 1 on
+        /// number of the sphere, from 1
         sphere: usize,
-        /// how many
+        /// number of touches
         touches: usize,
     },
 }
 
-/// Scatter across a line below this share of that along it counts as none: 1°.
+/// Scatter across a line as a share of the scatter along it, below which it counts as none: 1°.
 const LINE_SHARE: f64 = 0.02;
 
 /// Evaluates the touches of spheres.
 ///
-/// - `registered_at`: where the place of the scan is known best, m in O; `diameter_sigma`: standard
+/// - `registered_at`: the best known place of the scan, m in O; `diameter_sigma`: standard
 ///   uncertainty of the diameters, m.
 ///
 /// # Errors
@@ -195,7 +195,7 @@ pub fn check_workspace(
     })
 }
 
-/// How many numbers a rigid motion leaves of so many places.
+/// Number of degrees of freedom left by a rigid motion of these places.
 fn free_numbers(pairs: &[PointPair]) -> usize {
     let [_, across, along] = spreads(pairs.iter().map(|pair| pair.from.coords));
     let fitted = match along > 0.0 {
@@ -275,9 +275,8 @@ mod tests {
         assert_eq!(found.orientation_scatter, None);
     }
 
-    /// An arm whose lengths are 1 mm per m too long: no motion takes that off. About the middle of
-    /// the spheres the squared distances are 3/4 · 0.2² · 3 = 0.09 m², from the first one on 0.12
-    /// m².
+    /// An arm with lengths 1 mm per m too long, which no motion removes. About the middle of the
+    /// spheres the squared distances are 3/4 · 0.2² · 3 = 0.09 m², from the first one on 0.12 m².
     #[test]
     fn a_scale_is_found_as_the_growth_of_its_closed_form() {
         let scaled = readings(|p| Point3::from(p.coords * 1.001));
@@ -304,8 +303,7 @@ mod tests {
         assert_eq!((alone.growth, alone.growth_degrees_of_freedom), (None, 0));
     }
 
-    /// Two orientations whose tip is 10 µm apart along x: ±5 µm, one degree of freedom of three
-    /// axes.
+    /// Two orientations with tips 10 µm apart along x: ±5 µm, one degree of freedom of three axes.
     #[test]
     fn what_turning_the_probe_moves_is_its_scatter() {
         let mut both = readings(|p| *p)[..1].to_vec();
