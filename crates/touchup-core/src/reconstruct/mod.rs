@@ -1,20 +1,20 @@
-//! The surface remeshed where it was touched, as one closed skin by construction.
+//! The touched surface remeshed as one closed skin by construction.
 //!
 //! [`TouchFinder`] makes touches of samples; [`ContactMap`] and `FreeSpace` keep contacts and free
-//! space. `Evidence` combines these and the scan at a point; the field is stored at the nodes of a
-//! regular [`Lattice`] and filled harmonically where there is no evidence. [`Patcher`] runs the
-//! whole pipeline: everything at once, or what changed since the last time, as a [`PatchDelta`] for
-//! a mesh that follows by [`Splice`].
+//! space. `Evidence` combines these and the scan at a point; the nodes of a regular [`Lattice`]
+//! store the field, with a harmonic fill between the evidence. [`Patcher`] runs the whole pipeline:
+//! everything at once, or the changes since the last time, as a [`PatchDelta`] for a mesh that
+//! follows by [`Splice`].
 //!
 //! In a set of the lattice's cells, the *region*, the surface is the zero set of that field f (f <
-//! 0 in the material), found by dual contouring that cannot intersect itself (after \[Ju Udeshi
-//! 2006\]); outside, the scan stays. On the squares that bound the region both sides share one
-//! *trace*: the polyline in which the scan crosses that square. [`Cut`] clips the scan and holds
-//! the traces, [`contour`] makes the new faces, [`Patch::applied_to`] puts the two together.
+//! 0 in the material), by dual contouring that cannot intersect itself (after \[Ju Udeshi 2006\]);
+//! outside, the scan stays. On the squares that bound the region both sides share one *trace*: the
+//! polyline in which the scan crosses that square. [`Cut`] clips the scan and holds the traces,
+//! [`contour`] makes the new faces, [`Patch::applied_to`] joins both.
 //!
-//! Where the scan is a cloud of points, [`surface_of_cloud`] makes a mesh of it first.
+//! [`surface_of_cloud`] first makes a mesh of a scan that is a point cloud.
 //!
-//! Vertices are named by [`VertexKey`], so neighbours share them without a search and no crack can
+//! [`VertexKey`] names a vertex, so neighbours share vertices without a search and no crack can
 //! arise. Each face has an [`Owner`] whose faces depend on the field, the region and the scan
 //! nearby alone.
 

@@ -1,9 +1,9 @@
-//! A small map that keeps the order of insertion, as long as no key is removed, so that walking it
+//! A small map that keeps the order of insertion, as long as no key is removed, so that iteration
 //! never depends on hashing.
 
-/// What a [`CellTable`] can look up.
+/// A key of a [`CellTable`].
 pub trait Key: Copy + Eq {
-    /// 64 bits that differ for different keys as often as possible; they need not be mixed.
+    /// 64 bits that differ for different keys as often as possible, not necessarily mixed.
     fn bits(&self) -> u64;
 }
 
@@ -18,13 +18,13 @@ impl Key for u32 {
 #[derive(Clone, Debug)]
 pub struct CellTable<K, V> {
     entries: Vec<(K, V)>,
-    /// index into `entries`, [`EMPTY`] where there is none; a power of two, at most half full
+    /// index into `entries`, [`EMPTY`] without one; a power of two, at most half full
     slots: Vec<u32>,
 }
 
 /// A slot without an entry.
 const EMPTY: u32 = u32::MAX;
-/// Slots at the start.
+/// Initial number of slots.
 const FIRST_ROOM: usize = 16;
 
 impl<K, V> Default for CellTable<K, V> {
@@ -42,7 +42,7 @@ impl<K: Key, V> CellTable<K, V> {
         self.entries.len()
     }
 
-    /// Whether there is no key.
+    /// Whether the table is empty.
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
@@ -89,7 +89,7 @@ impl<K: Key, V> CellTable<K, V> {
         (entry != EMPTY).then_some(entry)
     }
 
-    /// Whether `key` is there.
+    /// Whether the table holds `key`.
     #[inline]
     pub fn contains(&self, key: &K) -> bool {
         self.slots[self.slot(key)] != EMPTY
@@ -101,20 +101,21 @@ impl<K: Key, V> CellTable<K, V> {
         self.index_of(key).map(|at| &self.entries[at as usize].1)
     }
 
-    /// The value of `key`, to be changed.
+    /// Mutable value of `key`.
     #[inline]
     pub fn get_mut(&mut self, key: &K) -> Option<&mut V> {
         self.index_of(key)
             .map(|at| &mut self.entries[at as usize].1)
     }
 
-    /// The value of the `at`-th key inserted, to be changed.
+    /// Mutable value of the `at`-th key inserted.
     #[inline]
     pub(crate) fn value_mut(&mut self, at: u32) -> &mut V {
         &mut self.entries[at as usize].1
     }
 
-    /// Gives `key` the value of `make` unless it has one; returns its index and whether it is new.
+    /// Inserts `key` with the value of `make` unless present; returns its index and whether it is
+    /// new.
     #[inline]
     pub fn insert_with(&mut self, key: K, make: impl FnOnce() -> V) -> (u32, bool) {
         let slot = self.slot(&key);
@@ -130,7 +131,7 @@ impl<K: Key, V> CellTable<K, V> {
         (at, true)
     }
 
-    /// The value of `key`, to be changed; the default one where it had none.
+    /// Mutable value of `key`; inserts the default if absent.
     #[inline]
     pub fn get_or_default(&mut self, key: K) -> &mut V
     where
@@ -140,7 +141,7 @@ impl<K: Key, V> CellTable<K, V> {
         self.value_mut(at)
     }
 
-    /// Gives `key` the value `value`, in place of the one it had.
+    /// Sets the value of `key`.
     pub fn insert(&mut self, key: K, value: V) {
         if let Some(known) = self.get_mut(&key) {
             *known = value;
@@ -165,7 +166,7 @@ impl<K: Key, V> CellTable<K, V> {
         Some(self.entries.swap_remove(at as usize).1)
     }
 
-    /// Empties a slot, and brings what was put off because of it nearer to where it belongs.
+    /// Empties a slot, and moves displaced entries nearer to their first slots.
     fn vacate(&mut self, mut hole: usize) {
         let mask = self.slots.len() - 1;
         let mut at = hole;
@@ -239,7 +240,7 @@ mod tests {
         }
     }
 
-    /// Beside the standard library's map, over keys of which many share their first slots.
+    /// Compared with the standard library's map, for keys with many shared first slots.
     #[test]
     fn what_was_taken_out_is_gone_and_the_rest_stays() {
         let mut table = CellTable::default();
