@@ -1,4 +1,4 @@
-//! What of the points is of use.
+//! Usable points of a cloud.
 
 use std::collections::HashSet;
 
@@ -7,21 +7,21 @@ use nalgebra::{Point3, Vector3};
 use super::summary::CloudSummary;
 use crate::mesh::{PointCloud, ScanStation, coherent_order, is_place};
 
-/// Points that are finite and of which none is there twice, along a curve that fills space: what a
-/// search near one has read is in the cache for the next.
+/// Finite, distinct points along a space-filling curve: consecutive neighbour searches share the
+/// cache.
 #[derive(Debug)]
 pub(super) struct UsablePoints {
     /// m
     pub positions: Vec<Point3<f64>>,
-    /// of each point, of any length; or none at all
+    /// one per point, of any length; or none at all
     pub normals: Vec<Vector3<f64>>,
-    /// from which of the `stations` each is
+    /// index into `stations` of each point
     pub station: Vec<u32>,
     pub stations: Vec<ScanStation>,
 }
 
 impl UsablePoints {
-    /// Those of a cloud; the others are counted.
+    /// Usable points of a cloud, with counts of the others.
     pub fn of(cloud: PointCloud) -> (Self, CloudSummary) {
         let PointCloud {
             positions,
@@ -32,7 +32,7 @@ impl UsablePoints {
             points: positions.len(),
             ..CloudSummary::default()
         };
-        // 0 and −0 are one place
+        // 0 and −0 are the same coordinate
         let bits = |p: &Point3<f64>| p.coords.map(|x| (x + 0.0).to_bits());
         let mut seen = HashSet::with_capacity(positions.len());
         let mut is_kept = |p: &Point3<f64>| {
@@ -71,7 +71,7 @@ impl UsablePoints {
         (sorted, summary)
     }
 
-    /// Where the scanner stood for a point, m, where that is known.
+    /// Scanner position of a point, m, if known.
     pub fn eye(&self, at: usize) -> Option<Point3<f64>> {
         self.stations[self.station[at] as usize].eye
     }

@@ -1,4 +1,4 @@
-//! A surface through the points of a scan.
+//! Surface reconstruction from the points of a scan.
 
 mod clean;
 mod moving_least_squares;

@@ -1,5 +1,4 @@
-//! Implicit moving least squares [Kolluri 2005]: the distance from the planes of the points near a
-//! place.
+//! Implicit moving least squares [Kolluri 2005]: mean distance from the planes of nearby points.
 
 use nalgebra::{Point3, Vector3};
 
@@ -13,17 +12,17 @@ use crate::reconstruct::field::lattice::{
 };
 use crate::reconstruct::table::CellTable;
 
-/// Points whose planes are averaged at a place at most …
+/// Maximum number of points averaged at a place.
 const AVERAGED: u32 = 24;
-/// … weighted by a normal distribution of this many spacings about it, or of this many standard
-/// deviations of the noise.
+/// Standard deviation of the Gaussian weights of the averaged points: in spacings, or in standard
+/// deviations of the noise, the larger of both.
 const WIDTH: (f64, f64) = (1.2, 2.0);
-/// Points farther than this many widths have no weight that matters.
+/// Points farther than this many widths have negligible weight.
 const FARTHEST_WIDTHS: f64 = 3.0;
-/// Steps in which a crossing is looked for on an edge of the lattice.
+/// Steps of the search for a crossing on a lattice edge.
 const STEPS: usize = 3;
-/// … or until f is no more than this many spacings, of which the line through the last two places
-/// takes the rest away.
+/// Value of f, in spacings, that ends the search for a crossing early: linear interpolation between
+/// the last two places removes the rest.
 const ENOUGH: f64 = 1e-3;
 /// Points with their normals, and the tree over them.
 pub(super) struct OrientedPoints {
@@ -54,18 +53,17 @@ impl OrientedPoints {
         }
     }
 
-    /// f and its direction of growth at a place, by the points near it that face alike; `None`
-    /// where there are none.
+    /// f and its unit gradient at a place, from nearby points that face alike; `None` without any.
     ///
     /// On a curved surface the planes of the points lie outside of it by d² κ / 2 in the mean and
     /// the middle of the points inside by as much (d: their distance, κ: curvature), so half the
-    /// sum of both is free of that.
+    /// sum of both cancels this bias.
     fn plane_at(&self, p: &Point3<f64>) -> Option<(f64, Vector3<f64>)> {
         let mut facing = None;
         let (mut weights, mut to_planes, mut arms, mut normal) =
             (0.0, 0.0, Vector3::zeros(), Vector3::zeros());
         for (at, far) in self.tree.nearest(p, AVERAGED, FARTHEST_WIDTHS * self.width) {
-            // the other side of a thin sheet is another surface
+            // the opposite side of a thin sheet is a different surface
             let n = self.normals[at];
             if n.dot(facing.get_or_insert(n)) <= 0.0 {
                 continue;
@@ -81,7 +79,7 @@ impl OrientedPoints {
         (weights > 0.0).then(|| (0.5 * (to_planes + normal.dot(&arms)) / weights, normal))
     }
 
-    /// The zero set of f in the cells at the points and beside these: vertices, m, and faces.
+    /// The zero set of f in the cells of the points and their neighbours: vertices, m, and faces.
     pub fn contoured(
         &self,
         lattice: &Lattice,
@@ -90,7 +88,7 @@ impl OrientedPoints {
         let (mut region, mut last) = (LatticeRegion::default(), None);
         for p in &self.positions {
             let cell = lattice.cell_of(p);
-            // neighbours follow each other
+            // successive points are neighbours
             if last.replace(cell) == Some(cell) {
                 continue;
             }
@@ -136,7 +134,7 @@ impl OrientedPoints {
         values
     }
 
-    /// The crossings of all edges whose ends differ in sign.
+    /// Crossings of all edges with ends of opposite sign.
     fn crossings(
         &self,
         values: &NodeValues,
@@ -164,7 +162,7 @@ impl OrientedPoints {
         crossings
     }
 
-    /// Where f changes its sign on an edge.
+    /// Sign change of f on an edge.
     fn crossing(&self, edge: &Edge, values: &NodeValues, lattice: &Lattice) -> Crossing {
         let nodes = [edge.node, edge.end()];
         let mut ends = nodes.map(|node| lattice.position(node));
@@ -177,7 +175,7 @@ impl OrientedPoints {
                 break;
             };
             normal = grows;
-            // the end of the same sign moves up
+            // the end of the same sign moves to the point
             let side = usize::from((value < 0.0) == (values[1] < 0.0));
             (ends[side], values[side]) = (point, value);
             if value.abs() <= ENOUGH * self.spacing {

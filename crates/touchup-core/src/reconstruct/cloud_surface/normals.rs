@@ -1,4 +1,4 @@
-//! Normals of the points: a plane through the neighbours of each, turned to the outside.
+//! Point normals: planes through the neighbours, oriented outward.
 
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
@@ -6,18 +6,18 @@ use super::clean::UsablePoints;
 use super::summary::NormalSource;
 use crate::mesh::{PointTree, ScanStation, Workers, map_by};
 
-/// Neighbours that a plane is laid through: two rings about a point, and enough that noise of one
-/// spacing turns it by a tenth alone.
+/// Neighbours per plane fit: two rings about a point, enough that noise of one spacing tilts the
+/// plane by only a tenth.
 const PLANE: u32 = 24;
-/// Neighbours along which the normals are turned.
+/// Neighbours along which orientation spreads.
 const TURNED: usize = 8;
-/// The neighbour by which the spacing is measured …
+/// The neighbour whose distance measures the spacing.
 const RING: usize = 6;
-/// … whose distance on an even surface is this many spacings: the circle of that radius, √(6/π),
-/// holds six points.
+/// Distance of neighbour [`RING`] on an even surface, in spacings: the circle of that radius,
+/// √(6/π), holds six points.
 const RING_SPACINGS: f64 = 1.382;
 
-/// What the neighbours of a point say of it.
+/// Local geometry at a point, from its neighbours.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Neighbourhood {
     /// unit, of either sign
@@ -26,12 +26,12 @@ pub(super) struct Neighbourhood {
     pub spacing: f64,
     /// standard deviation of the neighbours from their plane, m
     pub noise: f64,
-    /// the nearest others
+    /// the nearest other points
     pub nearest: [u32; TURNED],
 }
 
 impl Neighbourhood {
-    /// Of every point.
+    /// Neighbourhoods of all points.
     ///
     /// - `positions`: more than [`PLANE`].
     pub fn of_all(positions: &[Point3<f64>], tree: &PointTree, workers: &dyn Workers) -> Vec<Self> {
@@ -52,12 +52,12 @@ impl Neighbourhood {
             let from_mean = offset(*at) - mean;
             sum + from_mean * from_mean.transpose()
         });
-        // scaled, so that squares of the smallest lengths are numbers still
+        // scaled, so that squares of the smallest lengths do not underflow
         let largest = covariance.amax().max(f64::MIN_POSITIVE);
         let planes = (covariance / largest).symmetric_eigen();
         let thinnest = planes.eigenvalues.imin();
         let normal = Unit::try_new(planes.eigenvectors.column(thinnest).into_owned(), 0.0);
-        // three numbers of the plane are fitted
+        // the plane fit has three parameters
         let noise =
             (planes.eigenvalues[thinnest].max(0.0) * largest / (count - 3.0).max(1.0)).sqrt();
         let normal = normal.map_or(Vector3::z(), Unit::into_inner);
@@ -72,7 +72,7 @@ impl Neighbourhood {
     }
 }
 
-/// A unit normal of each point that points outside, and what says so.
+/// Outward unit normal of each point, and the source of the orientation.
 pub(super) fn oriented(
     points: &UsablePoints,
     near: &[Neighbourhood],
@@ -103,18 +103,17 @@ pub(super) fn oriented(
     (normals, NormalSource::Scanner)
 }
 
-/// Of a surface that was seen from its scanner this share looks at it at least: the rest are edges
-/// and noise. Of a part that was seen from all sides, from a place that is not its scanner's, it is
-/// half.
+/// Minimum share of a surface that faces its own scanner: the rest are edges and noise. For a part
+/// scanned from all sides and a wrong scanner position the share is half.
 const SEEN: f64 = 0.9;
 
-/// Whether a normal points away from where its point was seen; `None`: that is not known.
+/// Whether a normal points away from the scanner; `None` for an unknown scanner position.
 fn looks_away(at: usize, points: &UsablePoints, normal: &Vector3<f64>) -> Option<bool> {
     Some(normal.dot(&(points.eye(at)? - points.positions[at])) < 0.0)
 }
 
-/// Share of the points whose normals point to where they were seen, of those of which that is
-/// known; 0.5 without any.
+/// Share of normals that face their scanner, among points with a known scanner position; 0.5
+/// without any.
 fn share_seen(
     piece: impl Iterator<Item = usize>,
     points: &UsablePoints,
@@ -132,14 +131,13 @@ fn is_finite(v: &Vector3<f64>) -> bool {
     v.iter().all(|x| x.is_finite())
 }
 
-/// Turns the normals so that neighbours agree, along a minimum spanning tree of the neighbours
-/// whose cost is 1 − |nᵢ·nⱼ| [Hoppe 1992]; and all of a piece that hangs together so that they look
-/// at the scanner or, where that cannot be, out of the piece.
+/// Orients neighbours consistently along a minimum spanning tree with cost 1 − |nᵢ·nⱼ| [Hoppe
+/// 1992]; then each connected piece towards the scanner or, failing this, out of the piece.
 fn turn_along_tree(points: &UsablePoints, near: &[Neighbourhood], normals: &mut [Vector3<f64>]) {
     let mut pairs: Vec<(u32, [u32; 2])> = Vec::with_capacity(near.len() * TURNED);
     for (at, found) in (0u32..).zip(near) {
         for other in found.nearest {
-            // where each is a neighbour of the other, once
+            // mutual neighbours: once
             if at < other || !near[other as usize].nearest.contains(&at) {
                 let cost =
                     (1.0 - normals[at as usize].dot(&normals[other as usize]).abs()).max(0.0);
@@ -168,11 +166,11 @@ fn turn_along_tree(points: &UsablePoints, near: &[Neighbourhood], normals: &mut 
     }
 }
 
-/// Costs are compared as whole numbers, so that their order is the same everywhere.
+/// Costs as integers have the same order on every platform.
 const COST_STEPS: f64 = 1e9;
 
-/// Disjoint sets of points, and for each whether it is to be turned against the one that names its
-/// set.
+/// Disjoint sets of points, with the orientation of each point relative to the root of its set
+/// (true: opposite).
 struct Sides(Vec<(u32, bool)>);
 
 impl Sides {
@@ -180,8 +178,7 @@ impl Sides {
         Self((0..count as u32).map(|at| (at, false)).collect())
     }
 
-    /// What names the set of `at`, and whether `at` is turned against it; halves the path as it
-    /// goes.
+    /// Root of the set of `at`, and whether `at` is opposite to it; halves the path.
     fn root(&mut self, mut at: u32) -> (u32, bool) {
         let mut is_opposite = false;
         loop {
@@ -196,7 +193,7 @@ impl Sides {
         }
     }
 
-    /// Makes one set of two, where they are not one yet.
+    /// Joins two sets, unless they are one already.
     fn join(&mut self, pair: [u32; 2], is_opposite: bool) {
         let [(a, of_a), (b, of_b)] = pair.map(|at| self.root(at));
         if a != b {
@@ -205,10 +202,9 @@ impl Sides {
     }
 }
 
-/// Whether the normals of a piece look outside. Of a closed one that is out of it, wherever its
-/// scanner is said to have stood, of another to where it was seen from; where that contradicts
-/// itself, again out of the piece: the flux of the normals through a closed surface is thrice its
-/// volume.
+/// Whether the normals of a piece point outside: for a closed piece out of it, regardless of any
+/// stated scanner position; otherwise towards the scanner or, if the piece gives no consistent view
+/// of it, out of the piece. The flux of the normals through a closed surface is thrice its volume.
 fn looks_outside(piece: &[usize], points: &UsablePoints, normals: &[Vector3<f64>]) -> bool {
     let (positions, count) = (&points.positions, piece.len() as f64);
     let middle = piece
@@ -236,13 +232,13 @@ fn looks_outside(piece: &[usize], points: &UsablePoints, normals: &[Vector3<f64>
     if has_flux {
         return flux > 0.0;
     }
-    // up, as of a part on a table
+    // up, as for a part on a table
     sum[sum.iamax()] >= 0.0
 }
 
-/// A flat piece has no more flux than noise makes, over the sum of the distances from its middle.
+/// Maximum flux that noise causes in a flat piece, over the sum of the distances from its middle.
 const FLAT: f64 = 0.02;
-/// The normals of a closed piece cancel, but for this share: its sides are sampled unevenly.
+/// Maximum mean normal of a closed piece: uneven sampling of its sides leaves this share.
 const CLOSED: f64 = 0.1;
 
 #[cfg(test)]
@@ -251,7 +247,7 @@ mod tests {
 
     #[test]
     fn sides_follow_every_chain_of_pairs() {
-        // 0 ≠ 1 ≠ 2 = 3, and 4 = 5; the last pair closes a circle and says nothing
+        // 0 ≠ 1 ≠ 2 = 3, and 4 = 5; the last pair closes a circle and adds nothing
         let mut sides = Sides::of(6);
         for (pair, is_opposite) in [
             ([2, 3], false),

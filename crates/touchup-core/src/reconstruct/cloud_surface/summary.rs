@@ -1,50 +1,50 @@
-//! What is reported of a surface that was made through points.
+//! Report on a surface made from points.
 
 use std::fmt;
 
 use serde::Serialize;
 
-/// What turned the normals to the outside.
+/// Source of the outward orientation of the normals.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NormalSource {
-    /// the file has them
+    /// the file
     File,
-    /// estimated, and turned towards the place of the scanner
+    /// estimated, oriented towards the scanner position
     Scanner,
-    /// estimated, and turned along a minimum spanning tree of the points [Hoppe 1992]: which side
-    /// is outside is a guess where the surface is open
+    /// estimated, oriented along a minimum spanning tree of the points [Hoppe 1992]: on an open
+    /// surface the outside is a guess
     #[default]
     SpanningTree,
 }
 
-/// How a surface came of the points of a file.
+/// Summary of a surface reconstruction from the points of a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct CloudSummary {
     /// points of the file
     pub points: usize,
-    /// left out: a coordinate is not a number within reason
+    /// left out: a coordinate is not finite or out of range
     pub not_finite: usize,
-    /// left out: an earlier point is at the same place
+    /// left out: duplicate of an earlier point
     pub duplicates: usize,
-    /// left out: farther from any other points than ten spacings
+    /// left out: farther than ten spacings from any other points
     pub isolated: usize,
-    /// where the normals are from
+    /// source of the normals
     pub normals: NormalSource,
     /// name of the reconstruction
     pub reconstruction: &'static str,
-    /// cell of the reconstruction: what is smaller is lost
+    /// cell of the reconstruction: smaller detail is lost
     pub resolution_mm: f64,
     /// median distance of neighbouring points
     pub spacing_mm: f64,
     /// median distance of the points from a plane through their neighbours
     pub noise_mm: f64,
-    /// standard deviation of the surface from the part, where that is smooth: its edges are rounded
-    /// by up to half a cell
+    /// standard deviation of the surface from smooth areas of the part; edges are rounded by up to
+    /// half a cell
     pub error_mm: f64,
-    /// faces made
+    /// faces of the surface
     pub faces: usize,
-    /// faces cut away because no point is near
+    /// faces cut away for lack of nearby points
     pub cut_faces: usize,
 }
 

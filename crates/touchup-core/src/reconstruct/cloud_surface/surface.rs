@@ -1,4 +1,4 @@
-//! From points to faces: normals, field, faces; those that no point bears out are cut away.
+//! From points to faces: normals, field, contour; without the faces that no point supports.
 
 use nalgebra::{Point3, Vector3};
 
@@ -10,83 +10,81 @@ use crate::mesh::{PointCloud, PointTree, Workers, map_by};
 use crate::numeric::DisjointSets;
 use crate::reconstruct::field::lattice::Lattice;
 
-/// Fewer points make no surface: a plane is laid through as many neighbours, and half of them again
-/// are no neighbours.
+/// Minimum number of points: a plane fit takes half of them as neighbours, the others lie farther
+/// away.
 const FEWEST: usize = 50;
-/// More would take some 10 GB.
+/// Maximum number of points: more need some 10 GB.
 const MOST: usize = 20_000_000;
-/// Points without others within this many spacings are left out, or one stray point would make the
-/// cells of all coarse.
+/// Points without others within this many spacings are left out: one stray point would coarsen all
+/// cells.
 const ISOLATED: f64 = 10.0;
-/// Edge of the cells, in spacings: a cell that the surface passes through has points, and there are
-/// two to three faces for each of them.
+/// Edge of the cells, in spacings: each cell on the surface holds points, and each point yields two
+/// to three faces.
 const CELL: f64 = 1.3;
-/// Places the planes of the lattice, in cells, where no coordinate that a scanner rounded to falls
-/// on them.
+/// Offset of the lattice planes, in cells, off the coordinates to which scanners round.
 const ORIGIN: [f64; 3] = [0.164_607_9, 0.312_756_1, 0.460_895_1];
-/// Error of a smooth surface, in standard deviations of the noise that is averaged: 0.29 on a
-/// plate, 0.31 and 0.33 on balls.
+/// Error of a smooth surface, in standard deviations of the averaged noise: 0.29 on a plate, 0.31
+/// and 0.33 on balls.
 const ERROR_SHARE: f64 = 1.0 / 3.0;
-/// A vertex without a point within this many spacings is invented.
+/// Spacings to the nearest point beyond which a vertex is unsupported.
 const FARTHEST: f64 = 2.2;
-/// Neighbours of a vertex, within this many spacings, whose middle is farther from it than this
-/// part of the farthest: it lies beyond the rim of what was scanned. On the rim of an even surface
-/// the middle is 4/(3π) = 0.42 away, at the corner of a cube 0.49.
+/// Rim test of a vertex: number of neighbours, their range in spacings, and the offset of their
+/// middle, as a share of the farthest, above which the vertex is outside the scanned area. On the
+/// rim of an even surface the middle is 4/(3π) = 0.42 away, at the corner of a cube 0.49.
 const RIM_NEIGHBOURS: (u32, f64, f64) = (64, 3.0, 0.5);
 
-/// So many vertices side by side or fewer without points come of chance: of a million points at
-/// random places some lie like a rim.
+/// Maximum number of adjacent vertices in a chance hole: of a million random points some form a
+/// rim.
 const PINHOLE: usize = 3;
 
-/// Why points make no surface.
+/// Reasons why points make no surface.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CloudError {
-    /// Too few are left.
+    /// Too few usable points.
     #[error(
         "only {left} of its {points} points are of use and at least {FEWEST} are needed: scan the part more densely"
     )]
     TooFew {
-        /// of use
+        /// usable points
         left: usize,
-        /// of the file
+        /// points of the file
         points: usize,
     },
-    /// More than there is memory for.
+    /// More points than memory allows.
     #[error("{points} points are more than {MOST}: thin it out first, by a voxel grid for example")]
     TooMany {
-        /// of the file
+        /// points of the file
         points: usize,
     },
-    /// The field has no zero set near them.
+    /// The field has no zero set near the points.
     #[error(
         "no surface passes through its {points} points: look at it in a viewer, and export it again or as a mesh"
     )]
     NoSurface {
-        /// of the file
+        /// points of the file
         points: usize,
     },
 }
 
-/// Triangles through points.
+/// Triangle surface of a point cloud.
 #[derive(Clone, Debug)]
 pub struct CloudSurface {
     /// V, m, in O
     pub positions: Vec<Point3<f64>>,
     /// F × 3, counter-clockwise seen from outside; not every vertex is in one
     pub faces: Vec<[u32; 3]>,
-    /// how it came about
+    /// report on the reconstruction
     pub summary: CloudSummary,
 }
 
-/// The surface through the points of a scan, which ends where they end: the zero set of implicit
-/// moving least squares of the points \[Kolluri 2005\], by dual contouring in cells of 1.3 spacings
-/// of the points.
+/// The surface through the points of a scan, open at its limits: the zero set of implicit moving
+/// least squares of the points \[Kolluri 2005\], by dual contouring in cells of 1.3 point spacings.
 ///
-/// Points that are not finite, at the place of another, or alone are left out. The result does not
-/// depend on the number of workers.
+/// Leaves out non-finite, duplicate and isolated points. The result does not depend on the number
+/// of workers.
 ///
 /// # Errors
-/// [`CloudError`]: one line with what to do.
+/// [`CloudError`]: one line with the remedy.
 pub fn surface_of_cloud(
     cloud: PointCloud,
     workers: &dyn Workers,
@@ -155,7 +153,7 @@ fn median(mut values: Vec<f64>) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Leaves out the faces of which a vertex is not among the points.
+/// Removes faces with a vertex outside the scanned area.
 fn cut_invented(
     vertices: &[Point3<f64>],
     faces: &mut Vec<[u32; 3]>,
@@ -180,7 +178,7 @@ fn cut_invented(
     faces.retain(|corners| corners.iter().all(|&v| is_scanned[v as usize]));
 }
 
-/// Takes the vertices of the smallest holes for scanned; no hole is what ends at a rim.
+/// Marks the vertices of the smallest holes as scanned; gaps open to a rim stay.
 fn keep_pinholes_closed(faces: &[[u32; 3]], is_scanned: &mut [bool]) {
     let is_invented = |v: &u32| !is_scanned[*v as usize];
     let at_invented = faces
