@@ -1,8 +1,8 @@
 //! A face of the scan, cut by planes of the lattice into convex pieces that each lie in one cell.
 //!
-//! Every new point is named by what it lies on and placed by that name alone, so the pieces of two
-//! neighbouring faces have the same points on their common edge. Which cell a piece lies in follows
-//! from the cuts, not from its coordinates.
+//! The support of a new point determines its name and its position, so the pieces of two
+//! neighbouring faces have the same points on their common edge. The cell of a piece follows from
+//! the cuts, not from its coordinates.
 
 use nalgebra::{Point3, Vector3};
 
@@ -12,7 +12,7 @@ use crate::reconstruct::field::lattice::{
 };
 use crate::reconstruct::table::CellTable;
 
-/// Where a side of a piece comes from.
+/// Origin of a side of a piece.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::reconstruct) enum SideOrigin {
     /// the face's own side, from its corner of this number
@@ -21,15 +21,15 @@ pub(in crate::reconstruct) enum SideOrigin {
     Plane { axis: u8, above: bool },
 }
 
-/// What a point lies on.
+/// Support of a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::reconstruct) enum PointSupport {
     /// a corner of the face
     Corner(u8),
     /// a side of the face and a plane of the lattice
     Trace { side: u8, axis: u8, plane: i32 },
-    /// the inside of the face and a line of the lattice along `axis`, which is at `planes` of the
-    /// two next axes
+    /// the inside of the face and a line of the lattice along `axis`, at `planes` of the two next
+    /// axes
     Pierce { axis: u8, planes: [i32; 2] },
 }
 
@@ -41,7 +41,7 @@ struct Span {
     count: u32,
 }
 
-/// One corner of a piece and the side from there to the next corner.
+/// A corner of a piece and the side from there to the next corner.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::reconstruct) struct Corner {
     pub point: u32,
@@ -60,13 +60,13 @@ pub(in crate::reconstruct) struct Pieces {
     pierces: CellTable<[i32; 3], u32>,
     corners: Vec<Corner>,
     spans: Vec<Span>,
-    /// the two halves of the piece that is being cut
+    /// the two halves of the piece being cut
     halves: [Vec<Corner>; 2],
 }
 
 impl Pieces {
-    /// Cuts a face by those planes of the lattice that lie between the cells from `lo` to `hi`;
-    /// what lies beyond these cells is given to the outermost of them.
+    /// Cuts a face by the planes of the lattice between the cells from `lo` to `hi`; the outermost
+    /// cells take the parts beyond.
     pub fn cut(
         &mut self,
         mesh: &TriMesh,
@@ -99,7 +99,7 @@ impl Pieces {
         }
     }
 
-    /// The pieces and the cells they lie in.
+    /// The pieces and their cells.
     pub fn iter(&self) -> impl Iterator<Item = (LatticeNode, &[Corner])> + '_ {
         self.spans
             .iter()
@@ -111,7 +111,7 @@ impl Pieces {
         self.points[point as usize].1
     }
 
-    /// What a point lies on.
+    /// Support of a point.
     pub fn place(&self, point: u32) -> PointSupport {
         self.points[point as usize].0
     }
@@ -121,7 +121,7 @@ impl Pieces {
         self.points.len()
     }
 
-    /// The name of a point of a piece that lies in `cell`.
+    /// Name of a point of a piece in `cell`.
     pub fn key(&self, point: u32, cell: LatticeNode) -> VertexKey {
         match self.place(point) {
             PointSupport::Corner(i) => VertexKey::Scan(self.vertices[i as usize]),
@@ -171,7 +171,7 @@ impl Pieces {
         self.spans.push(span);
     }
 
-    /// Splits a piece in two; returns the lower half and leaves the upper one as the last span.
+    /// Splits a piece in two; returns the lower half and leaves the upper half as the last span.
     fn split(&mut self, span: Span, axis: usize, plane: i32, lattice: &Lattice) -> Span {
         let height = lattice.coordinate(axis, plane);
         let mut halves = std::mem::take(&mut self.halves);
@@ -208,7 +208,7 @@ impl Pieces {
         below
     }
 
-    /// The point in which a plane cuts a side of a piece.
+    /// The intersection of a plane with a side of a piece.
     fn cut_side(
         &mut self,
         span: &Span,
@@ -259,7 +259,7 @@ impl Pieces {
         }
     }
 
-    /// Where a side of the face crosses a plane; the same from either face at that edge.
+    /// Crossing of a side of the face and a plane; the same from either face at that edge.
     fn trace(&self, side: usize, axis: usize, height: f64) -> Point3<f64> {
         let ends = [side, (side + 1) % 3];
         let is_turned = self.vertices[ends[0]] > self.vertices[ends[1]];
@@ -267,7 +267,7 @@ impl Pieces {
         between(&a, &b, axis, height)
     }
 
-    /// Where the face meets two planes: on the chord that the first of them cuts out of it.
+    /// Intersection of the face and two planes: on the chord of the first plane.
     fn pierce(
         &self,
         first: usize,
@@ -286,7 +286,7 @@ impl Pieces {
             .map(|side| self.trace(side, first, at));
         match (chord.next(), chord.next()) {
             (Some(a), Some(b)) => between(&a, &b, second, height),
-            // only where rounding lets a plane miss the face that it cuts
+            // only if rounding lets a plane miss the face that it cuts
             _ => Point3::from(
                 self.triangle[0]
                     .coords
@@ -300,8 +300,8 @@ impl Pieces {
     }
 }
 
-/// The point between `a` and `b` at which coordinate `axis` is `height`: exact in that coordinate,
-/// in the others never beyond the ends, and monotone in `height`.
+/// The point between `a` and `b` with coordinate `axis` equal to `height`: exact in that
+/// coordinate, in the others never beyond the ends, and monotone in `height`.
 fn between(a: &Point3<f64>, b: &Point3<f64>, axis: usize, height: f64) -> Point3<f64> {
     let rise = b[axis] - a[axis];
     let share = if rise == 0.0 {
@@ -320,7 +320,7 @@ fn between(a: &Point3<f64>, b: &Point3<f64>, axis: usize, height: f64) -> Point3
     point
 }
 
-/// The square of the lattice on which a side of a piece in `cell` lies, and the cell beyond it.
+/// The lattice square under a side of a piece in `cell`, and the cell beyond it.
 pub(in crate::reconstruct) fn wall(
     cell: LatticeNode,
     side: SideOrigin,

@@ -1,9 +1,8 @@
-//! Few faces where the surface is plain: a patch simplified as far as it stays within a tolerance
-//! of itself.
+//! Few faces on plain surfaces: a patch simplified within a tolerance of itself.
 //!
 //! Edges collapse in order of their quadric error \[Garland Heckbert 1997\], block by block of the
-//! lattice. What lies on the rim of a block stays, so what becomes of a block depends on its own
-//! faces alone, and no crack arises between blocks.
+//! lattice. The rim of a block stays, so the faces of a block depend on its own former faces alone,
+//! and no crack arises between blocks.
 
 use std::collections::HashSet;
 
@@ -17,12 +16,12 @@ use crate::reconstruct::table::CellTable;
 
 /// Side of a block, in cells.
 const BLOCK: i32 = 8;
-/// Faces of a block below which there is nothing to merge.
+/// Minimum number of faces in a block to merge.
 const FEW: usize = 4;
-/// Errors that are asked of the simplification, as shares of the tolerance: its own measure of
-/// error is a mean over planes.
+/// Error limits tried in the simplification, as shares of the tolerance: its own measure of error
+/// is a mean over planes.
 const SHARES: [f64; 3] = [1.0, 0.5, 0.25];
-/// Twice the area over the longest side squared below which no merged face is: a triangle stretched
+/// Minimum of twice the area over the longest side squared for a merged face: a triangle stretched
 /// thirtyfold.
 const THIN: f64 = 0.03;
 
@@ -30,31 +29,31 @@ fn block_of(node: LatticeNode) -> LatticeNode {
     node.map(|x| x.div_euclid(BLOCK))
 }
 
-/// The blocks of the lattice in which faces were merged.
+/// Blocks of the lattice with merged faces.
 #[derive(Clone, Debug, Default)]
 pub(in crate::reconstruct) struct CoarseBlocks(CellTable<LatticeNode, ()>);
 
 impl CoarseBlocks {
-    /// Whether the faces of an owner may have been merged with others.
+    /// Whether an owner's faces may be merged with others.
     pub fn holds(&self, owner: &Owner) -> bool {
         owner
             .node()
             .is_some_and(|node| self.0.contains(&block_of(node)))
     }
 
-    /// `core`, and the whole of the blocks whose faces depend on it.
+    /// `core`, and all blocks whose faces depend on it.
     pub fn around(&self, core: &CellBox) -> CellBox {
         let mut all = *core;
         self.each_near(core, |block| {
             let lo = block.map(|x| x * BLOCK);
-            // a face over a square belongs to the cell on one side of it
+            // the cell on one side of a square owns the face over it
             all.take(&lo.map(|x| x - 1));
             all.take(&lo.map(|x| x + BLOCK - 1));
         });
         all
     }
 
-    /// The blocks whose faces depend on `core` have the faces of the lattice again.
+    /// Restores the lattice's faces of the blocks that depend on `core`.
     pub fn refine(&mut self, core: &CellBox) {
         let mut near = Vec::new();
         self.each_near(core, |block| near.push(block));
@@ -74,13 +73,12 @@ impl CoarseBlocks {
     }
 }
 
-/// Merges faces of a patch that belong to the lattice, where the two surfaces stay within
-/// `tolerance` (m) of each other and vertices of one support go into vertices of the same. Vertices
-/// stay where they are, or go; a block stays as it is where merged faces would meet others.
-/// O(faces).
+/// Merges faces of a patch that belong to the lattice, if the two surfaces stay within `tolerance`
+/// (m) of each other and vertices of one support go into vertices of the same. Vertices stay in
+/// place, or go; a block stays as it is if merged faces would meet others. O(faces).
 ///
 /// - `support`: of each vertex of the patch.
-/// - `scan`: that the patch is for, with the tree over its faces.
+/// - `scan`: the patch's scan, with the tree over its faces.
 pub(in crate::reconstruct) fn coarsen(
     patch: &mut Patch,
     support: &[Support],
@@ -134,13 +132,13 @@ pub(in crate::reconstruct) fn coarsen(
     CoarseBlocks(is_coarse.map(|((block, _), _)| block).collect())
 }
 
-/// The faces of a patch, merged and not, and where they are.
+/// The faces of a patch, merged and not, and their blocks.
 struct PlacedFaces<'a, P> {
     lattice: &'a Lattice,
     position: P,
-    /// each with the number of the block whose faces were merged to it
+    /// with the number of the block for a merged face
     faces: Vec<(PatchFace, Option<usize>)>,
-    /// the numbers of the faces that reach into a block, where merged ones do
+    /// numbers of the faces that reach into a block, for blocks with merged faces
     reach: CellTable<LatticeNode, Vec<u32>>,
 }
 
@@ -157,8 +155,7 @@ impl<P: Fn(u32) -> Point3<f64>> PlacedFaces<'_, P> {
         CellBox { lo, hi }
     }
 
-    /// Takes one of the faces to which those of block number `of` were merged; all of these before
-    /// any other.
+    /// Takes a merged face of block number `of`; all of these before any other.
     fn take_merged(&mut self, face: PatchFace, of: usize) {
         let number = self.faces.len() as u32;
         self.blocks(&face)
@@ -166,7 +163,7 @@ impl<P: Fn(u32) -> Point3<f64>> PlacedFaces<'_, P> {
         self.faces.push((face, Some(of)));
     }
 
-    /// Takes another face: it may be as large as one of the scan.
+    /// Takes another face, possibly as large as a face of the scan.
     fn take(&mut self, face: PatchFace) {
         let (number, mut near) = (self.faces.len() as u32, Vec::new());
         self.blocks(&face)
@@ -183,8 +180,8 @@ impl<P: Fn(u32) -> Point3<f64>> PlacedFaces<'_, P> {
             .filter_map(|(number, (face, block))| Some((number, face, (*block)?)))
     }
 
-    /// The blocks with a merged face that has a side as another face has it, or meets another face.
-    /// Two blocks may join the same two corners of the rim between them.
+    /// Blocks with a merged face that shares a directed side with another face, or meets another
+    /// face. Two blocks may join the same two corners of the rim between them.
     fn unsound(&self) -> HashSet<usize> {
         let mut sides: Vec<[u32; 2]> = self
             .faces
@@ -222,7 +219,7 @@ impl<P: Fn(u32) -> Point3<f64>> PlacedFaces<'_, P> {
         unsound
     }
 
-    /// The blocks with a merged face that meets one of the scan's that is not `replaced`.
+    /// Blocks with a merged face that meets a face of the scan not in `replaced`.
     fn piercing(
         &self,
         scan: &TriMesh,
@@ -245,8 +242,8 @@ impl<P: Fn(u32) -> Point3<f64>> PlacedFaces<'_, P> {
     }
 }
 
-/// Whether two faces meet, other than in a common corner; those that share a side fold, they do not
-/// pierce.
+/// Whether two faces meet, other than in a common corner; faces with a common side fold, they do
+/// not pierce.
 fn meet_beside(
     t: &[Point3<f64>; 3],
     u: &[Point3<f64>; 3],
@@ -263,7 +260,7 @@ fn meet_beside(
     common.next().is_none() && triangle::meet(t, u, first, 0.0)
 }
 
-/// The faces of a block, merged; `None` where that leaves as many.
+/// The faces of a block, merged; `None` unless that leaves fewer.
 fn merged(
     faces: &[PatchFace],
     support: &[Support],
@@ -273,7 +270,7 @@ fn merged(
     if faces.len() < FEW {
         return None;
     }
-    // counted from the first corner: single precision holds a block to a nanometre
+    // relative to the first corner: single precision holds a block to a nanometre
     let mut local: CellTable<u32, ()> = CellTable::default();
     let indices: Vec<u32> = faces
         .iter()
@@ -322,9 +319,9 @@ fn merged(
     merged.chunks_exact(3).map(named).collect()
 }
 
-/// Whether `merged` are faces for the same rim as `faces`, and the two surfaces are nowhere farther
-/// than `tolerance` (m) from each other, by the corners of the one and by corners, sides and
-/// middles of the other; and no new face is thin.
+/// Whether `merged` has the same rim as `faces`, the two surfaces are within `tolerance` (m) of
+/// each other, by the corners of the one and by corners, sides and middles of the other, and no new
+/// face is thin.
 fn is_same_surface(faces: &[u32], merged: &[u32], places: &[Point3<f64>], tolerance: f64) -> bool {
     if rim(faces) != rim(merged) {
         return false;
@@ -381,7 +378,7 @@ fn sides([a, b, c]: &[u32; 3]) -> [[u32; 2]; 3] {
     [[*a, *b], [*b, *c], [*c, *a]]
 }
 
-/// Sides without a face on the other side, in order.
+/// Directed sides without a face on the other side, sorted.
 fn rim(faces: &[u32]) -> Vec<[u32; 2]> {
     let all: HashSet<[u32; 2]> = faces
         .chunks_exact(3)
@@ -426,7 +423,7 @@ mod tests {
         patch
     }
 
-    /// What [`coarsen`] leaves of a sheet whose vertices have these supports, far from its scan.
+    /// Result of [`coarsen`] for a sheet with these vertex supports, far from its scan.
     fn coarsened(mut patch: Patch, support: &[Support], tolerance: f64) -> (Patch, CoarseBlocks) {
         let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(|[x, y]| Point3::new(x, y, -1.0));
         let scan = TriMesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap();
@@ -456,8 +453,8 @@ mod tests {
     fn a_plane_keeps_the_rims_of_its_blocks() {
         let (patch, coarse) = coarsened(sheet(16, |_, _| 0.0), &[Support::Touched; 17 * 17], 1e-6);
         assert_eq!(coarse.0.len(), 4);
-        // a disk of triangles whose rim has 32 vertices has 30 faces, and two more for each vertex
-        // inside: some are left where the collapse of a further edge would turn a face over
+        // a disk of triangles with 32 rim vertices has 30 faces, and two more for each vertex
+        // inside: some stay if the collapse of a further edge would turn a face over
         assert!(patch.faces.len() <= 4 * 36, "{} of 512", patch.faces.len());
         assert!((area(&patch) - 256e-6).abs() < 1e-12);
         let mut sides: Vec<_> = patch
@@ -510,8 +507,7 @@ mod tests {
         );
     }
 
-    /// A bump of the scan pierces what the faces of a block would be merged to, and not the faces
-    /// themselves.
+    /// A bump of the scan pierces the merged faces of a block, and not the faces themselves.
     #[test]
     fn a_block_whose_merged_faces_would_meet_the_scan_stays() {
         let dent = |x: i32, y: i32| if (x, y) == (4, 4) { -0.1e-3 } else { 0.0 };

@@ -1,4 +1,4 @@
-//! Crossings: where the surface crosses an edge of the lattice.
+//! Crossings of the surface and the edges of the lattice.
 
 use nalgebra::{Point3, Vector3};
 
@@ -9,33 +9,32 @@ use crate::reconstruct::field::lattice::{Edge, LatticeNode, stepped};
 use crate::reconstruct::field::piecewise::FieldScratch;
 use crate::reconstruct::table::CellTable;
 
-/// Steps towards the zero of a field, at most: on a plane one is enough, at an edge it takes some
-/// more.
+/// Maximum number of steps to the zero of a field: one on a plane, some more at an edge.
 const STEPS: usize = 8;
-/// A value of less than this share of the step is zero.
+/// Share of the segment below which a value is zero.
 const ENOUGH: f64 = 1e-3;
 
-/// Where f changes its sign on an edge of the lattice.
+/// Sign change of f on an edge of the lattice.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing {
-    /// the point, m, in O; brought to the inside of the edge if it is not there
+    /// the point, m, in O; moved inside the edge if it is not there
     pub point: Point3<f64>,
     /// unit normal of the surface there, out of the material
     pub normal: Vector3<f64>,
 }
 
-/// Crossings of the touched field, kept as long as the values at both ends stay.
+/// Crossings of the touched field, valid as long as the values at both ends stay.
 #[derive(Clone, Debug, Default)]
 pub(in crate::reconstruct) struct Crossings {
-    /// with the renewals that gave the ends their values
+    /// with the renewals of the values at the ends
     known: CellTable<Edge, ([u32; 2], Crossing)>,
     scratch: FieldScratch,
 }
 
 impl Crossings {
-    /// The crossing of an edge whose ends differ in sign: by the touched field itself between
-    /// touched nodes, else between the values at the ends, and where the ball was there, on its
-    /// surface.
+    /// The crossing of an edge with ends of opposite sign: from the touched field between touched
+    /// nodes, else interpolated between the ends, and in free space moved to the surface of the
+    /// ball.
     pub fn at(
         &mut self,
         grid: &ReconstructionGrid,
@@ -62,7 +61,7 @@ impl Crossings {
     }
 }
 
-/// The crossing of an edge by the values at its ends, and where the ball was there, on its surface.
+/// Interpolated crossing of an edge; in free space, on the surface of the ball.
 fn between_beside_free_space(
     grid: &ReconstructionGrid,
     evidence: &Evidence<'_>,
@@ -81,7 +80,7 @@ fn between_beside_free_space(
     )
 }
 
-/// The crossing of an edge by the values at its ends.
+/// Interpolated crossing of an edge from the values at its ends.
 fn between(grid: &ReconstructionGrid, edge: &Edge, values: [f64; 2]) -> Crossing {
     let ends = [edge.node, edge.end()];
     let [a, b] = ends.map(|node| grid.lattice.position(node));
@@ -95,7 +94,7 @@ fn between(grid: &ReconstructionGrid, edge: &Edge, values: [f64; 2]) -> Crossing
     }
 }
 
-/// Where a straight line between two values is 0, as a share of the segment.
+/// Zero of a straight line between two values, as a share of the segment.
 fn share_of([at_a, at_b]: [f64; 2]) -> f64 {
     if at_a == at_b {
         0.5
@@ -104,10 +103,10 @@ fn share_of([at_a, at_b]: [f64; 2]) -> f64 {
     }
 }
 
-/// A crossing that lies where the ball was, moved to where the ball ended on the way into the
-/// material: the values at the nodes keep out of free space, a straight line between them does not.
+/// Moves a crossing in free space to the boundary of free space on the path into the material: the
+/// values at the nodes respect free space, a straight line between them does not.
 ///
-/// - `inner`: the end of the edge that is in the material.
+/// - `inner`: the end of the edge in the material.
 fn out_of_free_space(evidence: &Evidence<'_>, crossing: Crossing, inner: &Point3<f64>) -> Crossing {
     let depth = |x: &Point3<f64>| evidence.free_depth(x).map(|(depth, _)| depth);
     let depths = [&crossing.point, inner].map(depth);
@@ -122,9 +121,9 @@ fn out_of_free_space(evidence: &Evidence<'_>, crossing: Crossing, inner: &Point3
     zero_between([&crossing.point, inner], [here, at_inner], field).unwrap_or(crossing)
 }
 
-/// The crossing of the touched field between two points at which its values differ in sign. `None`
-/// where the field is discontinuous between two surfaces: the gradient of neither is that of the
-/// step between them.
+/// The crossing of the touched field between two points with values of opposite sign. `None` if the
+/// field is discontinuous between two surfaces: the gradient of neither matches the step between
+/// them.
 fn of_touches(
     evidence: &Evidence<'_>,
     [a, b]: [&Point3<f64>; 2],
@@ -139,7 +138,7 @@ fn of_touches(
     (rises == (values[1] > values[0])).then_some(crossing)
 }
 
-/// The zero of a field between two points at which its values differ in sign, by false position
+/// The zero of a field between two points with values of opposite sign, by false position
 /// (Illinois).
 ///
 /// - `field`: value, m, and unit gradient at a point.
@@ -172,8 +171,8 @@ fn zero_between(
     best.map(|(_, crossing)| crossing)
 }
 
-/// Slope of the values at a node, of any length: by central differences, one-sided where a
-/// neighbour is missing.
+/// Slope of the values at a node, unnormalised: central differences, one-sided beside a missing
+/// neighbour.
 fn gradient(grid: &ReconstructionGrid, node: &LatticeNode) -> Vector3<f64> {
     let value = |node: LatticeNode| {
         let state = grid.nodes.get(&node)?;
@@ -260,7 +259,7 @@ mod tests {
                 "{depth}: {found:?}"
             );
         }
-        // from outside below into the material above the face: no surface of the touches
+        // from outside below into the material above the face: no touched surface
         let [a, b] = [-0.2e-3, 0.2e-3].map(|z| Point3::new(0.1e-3, -4e-3, z));
         assert!(of_touches(&evidence, [&a, &b], [-0.2e-3, 0.2e-3], &mut scratch).is_some());
         assert_eq!(

@@ -1,9 +1,9 @@
 //! When two triangles may replace the four around an edge: the tests of intersection-free
 //! contouring \[Ju Udeshi 2006\].
 //!
-//! Four cells meet at an edge E of the lattice, their vertices are c0 … c3. Where each segment from
-//! ci to ci+1 passes through the square between the two cells, the tetrahedra (E, ci, ci+1) belong
-//! to E alone; a triangle inside their union cannot meet a triangle of another edge.
+//! Four cells with vertices c0 … c3 meet at an edge E of the lattice. If each segment from ci to
+//! ci+1 passes through the square between the two cells, the tetrahedra (E, ci, ci+1) belong to E
+//! alone; a triangle inside their union cannot meet a triangle of another edge.
 
 use nalgebra::{Point3, Vector2, Vector3};
 
@@ -11,21 +11,19 @@ use crate::mesh::triangle::shape_quality;
 use crate::numeric::direction;
 use crate::reconstruct::field::lattice::{Lattice, Square, across};
 
-/// How far inside the rim of a square a segment has to pass, as a share of the pitch.
+/// Minimum distance of a segment from the rim of a square, as a share of the pitch.
 const INSET: f64 = 1e-3;
-/// The least volume that counts as to one side, as a share of the cube of the lattice's pitch.
+/// Minimum volume that counts as to one side, as a share of the cube of the lattice's pitch.
 const SLACK: f64 = 1e-9;
-/// Difference of the angles (cosine) at the two diagonals above which the flatter one is taken: a
+/// Difference of the angles (cosine) at the two diagonals above which the flatter diagonal wins: a
 /// crease runs along it.
 const CREASE: f64 = 0.06;
 /// Places tried on either side of the middle of a fan that folds over.
 const STEPS: u32 = 8;
-/// Sine of the angle between two normals on a square above which there is a corner between them:
-/// 37°.
+/// Sine of the angle between two normals on a square above which a corner lies between them: 37°.
 const CORNER: f64 = 0.6;
 
-/// Whether the segment from `a` to `b`, which lie on either side, passes through the inside of a
-/// square.
+/// Whether the segment from `a` to `b`, on either side of a square, passes through its inside.
 pub(in crate::reconstruct) fn passes(
     lattice: &Lattice,
     square: &Square,
@@ -43,8 +41,8 @@ pub(in crate::reconstruct) fn passes(
     is_inside(u) && is_inside(v)
 }
 
-/// Where the surface bends on a square: the point of the square in which the planes at the two ends
-/// of a segment meet, or its middle where they hardly differ.
+/// Bend of the surface on a square: the point of the square in which the planes at the two ends of
+/// a segment meet, or the segment's middle if the planes hardly differ.
 ///
 /// - `ends`: points on two edges of the square, with the unit normals of the surface there.
 pub(in crate::reconstruct) fn bend(
@@ -72,7 +70,7 @@ fn volume(a: &Point3<f64>, b: &Point3<f64>, c: &Point3<f64>, d: &Point3<f64>) ->
     (b - a).dot(&(c - a).cross(&(d - a)))
 }
 
-/// Whether the segment from `p` to `q` passes through the inside of triangle `abc`, clearly.
+/// Whether the segment from `p` to `q` clearly passes through the inside of triangle `abc`.
 fn pierces(p: &Point3<f64>, q: &Point3<f64>, [a, b, c]: [&Point3<f64>; 3], slack: f64) -> bool {
     let turns = [volume(p, q, a, b), volume(p, q, b, c), volume(p, q, c, a)];
     let (below, above) = (volume(p, a, b, c), volume(q, a, b, c));
@@ -80,8 +78,8 @@ fn pierces(p: &Point3<f64>, q: &Point3<f64>, [a, b, c]: [&Point3<f64>; 3], slack
         && (below.min(above) < -slack && below.max(above) > slack)
 }
 
-/// The diagonal by which the quadrilateral c0 … c3 around the edge from `e0` to `e1` may be split:
-/// 0 for c0–c2, 1 for c1–c3, `None` where only the fan around a point of the edge is safe.
+/// The safe diagonal of the quadrilateral c0 … c3 around the edge from `e0` to `e1`: 0 for c0–c2, 1
+/// for c1–c3, `None` if only the fan around a point of the edge is safe.
 pub(in crate::reconstruct) fn diagonal(
     e0: &Point3<f64>,
     e1: &Point3<f64>,
@@ -106,13 +104,13 @@ pub(in crate::reconstruct) fn diagonal(
     }
 }
 
-/// Moves the middle of a fan along its edge where the fan would fold over: there the surface hardly
-/// leaves the edge, and where it crosses it is chance. Any point of the edge is safe.
+/// Moves the middle of a fan along its edge if the fan would fold over: there the surface hardly
+/// leaves the edge, and the crossing is arbitrary. Any point of the edge is safe.
 ///
 /// - `middle`: a point of the edge; `normal`: unit normal of the surface there.
 /// - `edge`: the parts of the edge below and above the middle, m, as vectors.
 /// - `ring`: the steps around the fan, counter-clockwise seen against the normal.
-/// - `drift`: how far the middle may leave the surface, m.
+/// - `drift`: maximum distance of the middle from the surface, m.
 pub(in crate::reconstruct) fn unfolded(
     middle: &Point3<f64>,
     normal: &Vector3<f64>,
@@ -144,7 +142,7 @@ pub(in crate::reconstruct) fn unfolded(
     middle + best
 }
 
-/// The flatter diagonal where they differ clearly, else the one with the better triangles.
+/// The flatter diagonal if they differ clearly, else the diagonal with the better triangles.
 fn better(c: &[Point3<f64>; 4]) -> usize {
     let rate = |i: usize| {
         let triangles = [[c[i], c[i + 1], c[i + 2]], [c[i], c[i + 2], c[(i + 3) % 4]]];
@@ -199,7 +197,7 @@ mod tests {
     #[test]
     fn only_the_fan_is_safe_where_the_edge_is_missed() {
         let [e0, e1] = edge();
-        // c0 is drawn in so far that c1–c3 leaves it on the edge's side
+        // c0 lies so near the edge that c1–c3 passes c0 on the edge's side
         let c = points([
             (0.05, 0.05, 0.0),
             (-0.5, 0.9, 0.0),

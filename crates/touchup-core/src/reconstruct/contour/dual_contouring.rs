@@ -1,9 +1,9 @@
 //! The surface inside the region, by dual contouring that cannot intersect itself.
 //!
 //! Around each cell the surface runs in closed loops over its squares; each loop has one vertex
-//! inside the cell, and the surface in the cell is the cone from there to the loop. Where a
-//! shortcut is safe, the four cones around an edge become two triangles. On the rim of the region
-//! the loops follow the traces of the scan.
+//! inside the cell, and the surface in the cell is the cone from there to the loop. If a shortcut
+//! is safe, the four cones around an edge become two triangles. On the rim of the region the loops
+//! follow the traces of the scan.
 
 use nalgebra::{Point3, Vector3};
 
@@ -22,14 +22,14 @@ use crate::reconstruct::field::lattice::{
 };
 use crate::reconstruct::table::CellTable;
 
-/// Eigenvalues of a cell's planes below this share of their sum count as noise: two planes make an
-/// edge when they are at more than 2 · atan √(share / (1 − share)) to each other, 37°.
+/// Share of their sum below which eigenvalues of a cell's planes are noise: two planes make an edge
+/// at more than 2 · atan √(share / (1 − share)) to each other, 37°.
 const FLAT_SHARE: f64 = 0.1;
-/// How far inside its cell a vertex stays, as a share of the pitch: what keeps triangles from
-/// losing their area.
+/// Minimum distance of a vertex from the sides of its cell, as a share of the pitch: keeps
+/// triangles from losing their area.
 const MARGIN: f64 = 1e-3;
-/// The middle of a fan may leave the surface by this share of the pitch to keep the fan from
-/// folding over.
+/// Maximum distance of a fan's middle from the surface to keep the fan from folding over, as a
+/// share of the pitch.
 const DRIFT: f64 = 0.05;
 
 /// Meshes the zero set of a field inside `region` and joins it to the scan along the traces of
@@ -37,7 +37,7 @@ const DRIFT: f64 = 0.05;
 ///
 /// - `values`: f at all corners of the cells of the region; a cell without is left out.
 /// - `cut`: the scan clipped at this region.
-/// - `crossing`: the crossing of an edge whose ends differ in sign; called once for each, in a
+/// - `crossing`: the crossing of an edge with ends of opposite sign; called once for each, in a
 ///   fixed order.
 pub fn contour(
     lattice: &Lattice,
@@ -49,8 +49,8 @@ pub fn contour(
     contour_in(lattice, region, &CellBox::ALL, values, cut, crossing)
 }
 
-/// As [`contour`], but of the new faces those alone that touch a cell in `core`: what else is in
-/// the patch, and is stored around, is not whole.
+/// As [`contour`], but only the new faces that touch a cell in `core`; the rest of the patch is
+/// incomplete.
 ///
 /// - `values`: f at all corners of the cells of the region in `core` and around it.
 /// - `cut`: the scan clipped at least in the cells up to two away from `core`.
@@ -96,7 +96,7 @@ pub(in crate::reconstruct) fn contour_in(
     patch
 }
 
-/// A cell that the surface passes through.
+/// A cell on the surface.
 #[derive(Clone, Copy, Debug)]
 struct SurfaceCell {
     /// bit i: corner i is in the material
@@ -120,7 +120,7 @@ impl SurfaceCell {
     }
 }
 
-/// The skin while it is made.
+/// The skin under construction.
 struct Skin<'a, F> {
     lattice: &'a Lattice,
     region: &'a LatticeRegion,
@@ -129,17 +129,17 @@ struct Skin<'a, F> {
     cut: &'a Cut,
     crossing: F,
     cells: CellTable<LatticeNode, SurfaceCell>,
-    /// vertex and normal where the surface crosses an edge
+    /// vertex and normal at the crossing of an edge
     crossings: CellTable<Edge, (u32, Vector3<f64>)>,
     /// squares on which patch and scan meet
     shared: CellTable<Square, ()>,
     /// from the cells on the rim to the segments of the traces
     fans: Vec<PatchFace>,
     /// the traces around the current cell: the number of the square, and a polyline against the
-    /// loop whose edges are numbered in the cell
+    /// loop with edges numbered in the cell
     rim: Vec<(u8, Polyline)>,
     planes: Planes,
-    /// middles of fans that are to be moved once all faces are made
+    /// middles of fans, to move once all faces exist
     moved: Vec<(u32, Point3<f64>)>,
     patch: Patch,
 }
@@ -179,7 +179,7 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         }
     }
 
-    /// Bit i of the result: corner i is in the material. `None` where the field has no value.
+    /// Bit i of the result: corner i is in the material. `None` if the field has no value.
     fn material(&self, cell: LatticeNode) -> Option<u8> {
         (0..8).try_fold(0, |material, corner| {
             let value = self.values.get(&node_at(cell, corner))?;
@@ -198,8 +198,7 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
             < 0.0
     }
 
-    /// The trace on a square on the rim of the region; `None` where patch and scan cannot meet
-    /// there.
+    /// The trace on a square on the rim of the region; `None` if patch and scan cannot meet there.
     fn trace_on(&mut self, square: &Square, beyond: LatticeNode) -> Option<Vec<Polyline>> {
         let lines = self.cut.trace_on(square, self.values);
         match &lines {
@@ -230,7 +229,7 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
                 start
             };
         }
-        // the crossings on the loops have their vertices by now
+        // the crossings on the loops now have their vertices
         let vertex = self.patch.vertices.len() as u32;
         for (number, point) in (0..count).zip(points) {
             self.patch
@@ -258,8 +257,8 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         }
     }
 
-    /// The planes that the loop from edge `first` meets: one at each crossing, and along each trace
-    /// those of the scan's faces, each with its share of the trace.
+    /// The planes on the loop from edge `first`: one at each crossing, and along each trace the
+    /// planes of the scan's faces, each with its share of the trace.
     fn gather_planes(&mut self, node: LatticeNode, loops: &Loops, first: u8) {
         self.planes.0.clear();
         for (edge, side) in loops.walk(first) {
@@ -293,8 +292,8 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         }
     }
 
-    /// Vertex and normal of the surface on an edge: the scan's where patch and scan agree on it,
-    /// else the field's.
+    /// Vertex and normal of the surface on an edge: the scan's if patch and scan agree on it, else
+    /// the field's.
     fn crossing(&mut self, edge: &Edge) -> (u32, Vector3<f64>) {
         if let Some(known) = self.crossings.get(edge) {
             return *known;
@@ -315,7 +314,7 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         found
     }
 
-    /// Makes the faces around those edges of a cell that no cell before it owns.
+    /// Makes the faces around the edges of a cell that no earlier cell owns.
     fn close_edges(&mut self, at: u32) {
         let (node, cell) = *self.cells.entry(at);
         for number in (0..12).filter(|&number| cell.loop_at[number as usize] != NONE) {
@@ -385,8 +384,8 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         }
     }
 
-    /// Moves the middle of a fan that goes all around an edge so that it does not fold over; one of
-    /// the scan stays.
+    /// Moves the middle of a full fan around an edge so that it does not fold over; a vertex of the
+    /// scan stays.
     fn unfold(
         &mut self,
         edge: &Edge,
@@ -431,8 +430,8 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         });
     }
 
-    /// Whether the fan around an edge covers the step from cell `i` to the next: always when it
-    /// goes all around, else only where the row of cells meets the scan at either end.
+    /// Whether the fan around an edge covers the step from cell `i` to the next: always in a full
+    /// fan, else only if the row of cells meets the scan at either end.
     fn is_fanned(&self, i: usize, vertices: &[Option<u32>; 4], squares: &[Square; 4]) -> bool {
         let Some(gap) = (0..4).find(|&k| vertices[(i + 4 - k) % 4].is_none()) else {
             return true;
@@ -444,9 +443,9 @@ impl<F: FnMut(&Edge) -> Crossing> Skin<'_, F> {
         self.shared.contains(&before) || after.is_some_and(|square| self.shared.contains(&square))
     }
 
-    /// The vertex on a square between two cells, on the segment that ends at `edge`; `None` where
-    /// the straight segment from one cell's vertex to the other's passes through the square and
-    /// serves no other segment.
+    /// The vertex on a square between two cells, on the segment that ends at `edge`; `None` if the
+    /// straight segment between the vertices of the cells passes through the square and serves no
+    /// other segment.
     fn middle(
         &mut self,
         edge: &Edge,

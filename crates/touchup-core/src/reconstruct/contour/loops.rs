@@ -1,19 +1,19 @@
-//! How the surface passes through squares and cells, by the signs at their corners.
+//! Course of the surface through squares and cells, from the signs at their corners.
 //!
-//! Corners of a cell are numbered x + 2y + 4z; its edges 4 · axis + a + 2b, where a and b are the
-//! steps along the two axes that follow; its squares 2 · axis + (1 when above). A segment on a
-//! square leads from edge to edge with the material on its left, seen against the square's axis.
+//! Corners of a cell are numbered x + 2y + 4z; its edges 4 · axis + a + 2b, with steps a and b
+//! along the two axes that follow; its squares 2 · axis + (1 when above). A segment on a square
+//! leads from edge to edge with the material on its left, seen against the square's axis.
 
 use crate::reconstruct::field::lattice::{Edge, LatticeNode, Square, across, stepped};
 
 /// No edge, no loop.
 pub(in crate::reconstruct) const NONE: u8 = u8::MAX;
 
-/// Two directed segments at most, as numbers of edges in [`Square::edges`].
+/// Up to two directed segments, as numbers of edges in [`Square::edges`].
 pub(in crate::reconstruct) type Segments = [Option<[u8; 2]>; 2];
 
-/// The segments on a square from the signs at its corners (true: material). Where all four edges
-/// are crossed, `is_joined`: whether the material in the two opposite corners is connected.
+/// The segments on a square from the signs at its corners (true: material). `is_joined`, for a
+/// square with four crossed edges: whether the material in the two opposite corners is connected.
 #[inline]
 pub(in crate::reconstruct) fn segments(
     is_material: [bool; 4],
@@ -98,8 +98,8 @@ pub(in crate::reconstruct) fn ring_corners(side: u8) -> [u8; 4] {
 /// The closed loops of a cell.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::reconstruct) struct Loops {
-    /// the edge that follows each edge, and the square between them; [`NONE`] where the surface
-    /// does not pass
+    /// the edge that follows each edge, and the square between them; [`NONE`] for an edge without a
+    /// crossing
     next: [[u8; 2]; 12],
 }
 
@@ -144,8 +144,7 @@ impl Loops {
         })
     }
 
-    /// The number of the loop at each edge, [`NONE`] where there is none, and how many loops there
-    /// are.
+    /// The number of the loop at each edge, [`NONE`] without a loop, and the number of loops.
     pub fn numbers(&self) -> ([u8; 12], u8) {
         let (mut numbers, mut count) = ([NONE; 12], 0);
         for edge in 0..12 {

@@ -1,5 +1,5 @@
-//! The patch, new faces for a part of a scan; and the scan with them in it, with support and
-//! uncertainty of each vertex.
+//! The patch, new faces for a part of a scan; and the patched scan, with support and uncertainty of
+//! each vertex.
 
 use nalgebra::Point3;
 
@@ -14,19 +14,19 @@ pub struct Patch {
     pub vertices: CellTable<VertexKey, Point3<f64>>,
     /// the new faces
     pub faces: Vec<PatchFace>,
-    /// faces of the scan that go, by id
+    /// removed faces of the scan, by id
     pub removed: Vec<FaceId>,
-    /// where scan and patch could not be joined
+    /// squares without a join of scan and patch
     pub open: Vec<OpenSquare>,
 }
 
 impl Patch {
-    /// The scan with the patch in it, and the id there of each vertex of the patch that a face
-    /// uses: vertices and untouched faces of the scan keep their ids.
+    /// The patched scan, and the id in it of each vertex of the patch that a face uses: vertices
+    /// and untouched faces of the scan keep their ids.
     ///
     /// # Errors
-    /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`] when the
-    /// field's crossings were not finite.
+    /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`] for
+    /// crossings of the field that are not finite.
     pub fn applied_to(
         &self,
         mut mesh: TriMesh,
@@ -50,16 +50,16 @@ impl Patch {
     }
 }
 
-/// A square on the rim of the region on which scan and field disagree: unless the cell beyond is
-/// added to the region, both end there.
+/// A square on the rim of the region on which scan and field disagree: both end there unless the
+/// region grows by the cell beyond.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OpenSquare {
     /// the square
     pub square: Square,
     /// the cell on its other side, not in the region
     pub beyond: LatticeNode,
-    /// whether the scan crosses the square; where it does not, the field goes on past the end of
-    /// the scan and widening the region would go on for ever
+    /// whether the scan crosses the square; if not, the field goes on past the end of the scan and
+    /// the region would widen without end
     pub is_scanned: bool,
 }
 
@@ -71,40 +71,39 @@ pub enum Support {
     Scan,
     /// touches
     Touched,
-    /// what touches, free space and scan nearby suggest; nothing was touched here
+    /// suggested by touches, free space and scan nearby; not touched itself
     Guessed,
-    /// as that, and nothing can be touched here: the ball does not go so far into an inner corner,
-    /// or into what is narrower
+    /// as guessed, and out of reach: the ball does not enter an inner corner, or a narrower gap,
+    /// that far
     Unreachable,
 }
 
 /// A scan with its touched part remeshed.
 #[derive(Clone, Debug)]
 pub struct Patched {
-    /// vertices and faces that were not touched keep their ids
+    /// untouched vertices and faces keep their ids
     pub mesh: TriMesh,
     /// the support of each vertex, by id
     pub support: Vec<Support>,
     /// standard deviation of each vertex along the normal, m, by id; none without
     /// [`crate::reconstruct::PatcherParams::uncertainty`]
     pub sigma: Vec<f64>,
-    /// how far the new faces may be from the surface that the touches show, m
+    /// maximum distance of the new faces from the touched surface, m
     pub tolerance: f64,
-    /// whether that is more than usual, as a finer lattice would not have fitted
+    /// whether `tolerance` is larger than usual, as a finer lattice would not have fitted
     pub is_coarser: bool,
-    /// faces of the scan that were removed
+    /// removed faces of the scan
     pub removed_faces: usize,
-    /// faces that were added
+    /// added faces
     pub added_faces: usize,
-    /// vertices of the scan that were moved to where they were touched, with the detail between
-    /// them
+    /// vertices of the scan moved to touched positions, with the detail between them
     pub moved_vertices: usize,
-    /// squares on which scan and patch could not be joined
+    /// squares without a join of scan and patch
     pub open_squares: usize,
 }
 
 impl Support {
-    /// How much of it was touched: 1 touched, 0.5 guessed from touches nearby, 0 scan.
+    /// Touched share: 1 touched, 0.5 guessed from touches nearby, 0 scan.
     fn touched(self) -> f32 {
         match self {
             Self::Touched => 1.0,
@@ -121,7 +120,7 @@ impl Support {
 
 impl Patched {
     /// Columns of a file for each vertex beside its position, by id: `touched`, `support`, and
-    /// `sigma_mm` where that is known.
+    /// `sigma_mm` if known.
     pub fn columns(&self) -> Vec<(&'static str, Vec<f32>)> {
         let of_support = |number: fn(Support) -> f32| {
             self.support

@@ -1,21 +1,20 @@
-//! The point that lies best on a set of planes: the quadratic error function of dual contouring
-//! \[Ju et al. 2002\].
+//! The point of least squared distance from a set of planes: the quadratic error function of dual
+//! contouring \[Ju et al. 2002\].
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
 /// Sweeps of the Jacobi iteration; five bring a 3 × 3 matrix to rounding.
 const SWEEPS: usize = 6;
-/// Steps towards the best point on the rim of a box; the error falls by a half or more with each.
+/// Steps to the best point on the rim of a box; each at least halves the error.
 const STEPS: usize = 16;
-/// Shares of the step from the start tried where the best point turns the surface over.
+/// Shares of the step from the start to try if the best point turns the surface over.
 const BACK: [f64; 3] = [0.5, 0.25, 0.0];
-/// A vertex lies on a plane to within this share of how far the crossings are from their mean.
+/// Tolerance of a vertex on a plane, as a share of the distance of the crossings from their mean.
 const ON_PLANE: f64 = 0.1;
-/// How strongly the start holds on where nothing else decides, as a share of the trace.
+/// Pull of the start, as a share of the trace; decides only in directions without planes.
 const PULL: f64 = 1e-3;
 
-/// Planes n·(x − p) = 0 with weights, to be met in the least-squares sense near the mean of their
-/// points.
+/// Weighted planes n·(x − p) = 0, to meet in the least-squares sense near the mean of their points.
 #[derive(Clone, Debug, Default)]
 pub(in crate::reconstruct) struct Planes(pub Vec<WeightedPlane>);
 
@@ -35,10 +34,9 @@ impl Planes {
         )
     }
 
-    /// The point nearest to `start` at which Σ w (n·(x − p))² is least within the box from `lo` to
-    /// `hi`, which holds `start`, and from which no part of the loop is seen from behind.
-    /// Directions in which the sum of the w n nᵀ has an eigenvalue below `threshold` times their
-    /// sum do not count.
+    /// The point nearest to `start` that minimises Σ w (n·(x − p))² within the box from `lo` to
+    /// `hi`, which holds `start`; no part of the loop is back-facing from there. Ignores directions
+    /// in which the sum of the w n nᵀ has an eigenvalue below `threshold` times their sum.
     pub fn solve(
         &self,
         start: &Point3<f64>,
@@ -69,10 +67,10 @@ impl Planes {
     }
 
     /// `start` + `best`, or the first point on the segment back to `start` from which no step of
-    /// the loop through the planes' points, in their order, is seen from behind; where there is
-    /// none, the one from which that is least.
+    /// the loop through the planes' points, in their order, is back-facing; without any, the point
+    /// with the least back-facing step.
     fn unturned(&self, start: &Point3<f64>, best: &Vector3<f64>) -> Point3<f64> {
-        // on all planes at once it is their edge or corner, however its loop looks from there
+        // a point on all planes is their edge or corner, however its loop looks from there
         let size = self
             .steps()
             .map(|(a, _)| (a.0 - start).norm())
@@ -111,7 +109,7 @@ impl Planes {
     }
 }
 
-/// The x within a box at which ½ xᵀ A x − bᵀ x is least, by projected Gauss–Seidel steps.
+/// The x within a box that minimises ½ xᵀ A x − bᵀ x, by projected Gauss–Seidel steps.
 fn least_in_box(
     a: &Matrix3<f64>,
     b: &Vector3<f64>,
@@ -207,7 +205,7 @@ mod tests {
 
     #[test]
     fn a_point_beyond_the_box_is_brought_to_the_best_place_on_its_rim() {
-        // the line x = y leaves the box at x = 1: with the plane z = 0.5 that leaves one point
+        // the line x = y leaves the box at x = 1: the plane z = 0.5 fixes the point on it
         let mut planes = Planes::default();
         for normal in [
             Vector3::new(1.0, -1.0, 0.0).normalize(),
@@ -230,7 +228,7 @@ mod tests {
         for (x, y) in [(0.3, -0.3), (0.3, 0.3), (-0.3, 0.3), (-0.3, -0.3)] {
             planes.0.push((Point3::new(x, y, 0.0), Vector3::z(), 1.0));
         }
-        // over the square every step is seen from the front, beside it one is not
+        // over the square every step is front-facing, beside it one is not
         let found = |x: f64| {
             planes
                 .unturned(&Point3::origin(), &Vector3::new(x, 0.0, 0.1))

@@ -1,5 +1,4 @@
-//! The scan, clipped at the region: which faces go, what is left of those that the region cuts, and
-//! where they end.
+//! The scan, clipped at the region: removed faces, remainders of cut faces, and their rims.
 
 use nalgebra::{Point2, Point3, Vector3};
 
@@ -12,16 +11,16 @@ use crate::reconstruct::field::lattice::{
 };
 use crate::reconstruct::table::{CellTable, Key};
 
-/// Side of the blocks of cells for which the faces nearby are looked up at once, in cells.
+/// Side of the blocks for joint look-ups of nearby faces, in cells.
 const BLOCK: i32 = 8;
-/// How far new points are moved within what they lie on, as a share of the pitch: some tools take
-/// collinear sides of coplanar faces for an intersection, and the cuts through one face leave them
-/// by the dozen.
+/// Maximum shift of new points within their support, as a share of the pitch: some tools take
+/// collinear sides of coplanar faces for an intersection, and the cuts through one face leave
+/// dozens of them.
 const LOOSENING: f64 = 1e-7;
 /// No vertex.
 const NONE: u32 = u32::MAX;
 
-/// A piece of a trace: where one face of the scan crosses one square that bounds the region.
+/// A piece of a trace: the crossing of one face of the scan and one square that bounds the region.
 /// Walking from `from` to `to` with the face's normal up, the region is on the left.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::reconstruct) struct TraceSegment {
@@ -30,7 +29,7 @@ pub(in crate::reconstruct) struct TraceSegment {
     pub normal: Vector3<f64>,
 }
 
-/// Where the scan crosses an edge of the lattice.
+/// Crossing of the scan and an edge of the lattice.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::reconstruct) struct Pierced {
     pub vertex: u32,
@@ -46,10 +45,9 @@ pub(in crate::reconstruct) struct Pierced {
 #[derive(Clone, Debug, Default)]
 pub struct Cut {
     /// the patch without new faces inside the region: the faces of the scan that the region holds
-    /// or cuts, what is left of them, and the vertices that the remainders and the traces use
+    /// or cuts, their remainders, and the vertices of remainders and traces
     pub patch: Patch,
-    /// faces that it cuts so close to a corner that rounding hides what is left of them; they go
-    /// without a remainder
+    /// faces cut so close to a corner that rounding hides the remainder; removed without one
     pub lost: Vec<FaceId>,
     pitch: f64,
     /// the segments on each square on the rim of the region
@@ -57,11 +55,11 @@ pub struct Cut {
     pierced: CellTable<Edge, Pierced>,
 }
 
-/// Buffers that serve one face after the other.
+/// Buffers reused from face to face.
 #[derive(Default)]
 struct Scratch {
     pieces: Pieces,
-    /// index of each point among the vertices, [`NONE`] before it is needed
+    /// index of each point among the vertices, [`NONE`] before use
     vertex_of: Vec<u32>,
     plane: Vec<Point2<f64>>,
 }
@@ -108,7 +106,7 @@ impl Cut {
         cut
     }
 
-    /// The segments on a square on the rim of the region, the last one first.
+    /// The segments on a square on the rim of the region, in reverse order.
     pub(in crate::reconstruct) fn segments_on(
         &self,
         square: &Square,
@@ -119,12 +117,12 @@ impl Cut {
             .flat_map(|segments| segments.iter().rev())
     }
 
-    /// Where the scan crosses an edge on the rim of the region.
+    /// Crossing of the scan and an edge on the rim of the region.
     pub(in crate::reconstruct) fn pierced(&self, edge: &Edge) -> Option<&Pierced> {
         self.pierced.get(edge)
     }
 
-    /// Takes in the pieces of a face, if the region holds any of them.
+    /// Adds the pieces of a face, if the region holds any of them.
     fn take(
         &mut self,
         region: &LatticeRegion,
@@ -160,7 +158,7 @@ impl Cut {
         self.take_remainder(region, double_area_normal, scratch);
     }
 
-    /// The vertex of a point; notes which edge of the lattice it is on.
+    /// The vertex of a point; records its lattice edge.
     fn vertex(
         &mut self,
         pieces: &Pieces,
@@ -192,7 +190,7 @@ impl Cut {
         vertex
     }
 
-    /// Fills what the region leaves of the face with triangles.
+    /// Triangulates the remainder of a face outside the region.
     fn take_remainder(
         &mut self,
         region: &LatticeRegion,
@@ -220,7 +218,7 @@ impl Cut {
             return;
         };
         for corners in triangles {
-            // every pierced point of an outline is on the rim and has its vertex already
+            // every pierced point of an outline is on the rim and already has its vertex
             let corners = corners.map(|point| {
                 debug_assert!(
                     vertex_of[point as usize] != NONE
@@ -236,8 +234,8 @@ impl Cut {
     }
 }
 
-/// A point moved by up to [`LOOSENING`] in the plane, or on the edge, of the lattice it lies on;
-/// the same for the same name.
+/// A point shifted by up to [`LOOSENING`] within its plane, or along its edge, of the lattice; the
+/// same for the same name.
 fn loosened(key: VertexKey, mut point: Point3<f64>, pitch: f64) -> Point3<f64> {
     let mut move_along = |axis: usize| {
         let bits = (key.bits() ^ axis as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -253,7 +251,7 @@ fn loosened(key: VertexKey, mut point: Point3<f64>, pitch: f64) -> Point3<f64> {
     point
 }
 
-/// The box of the cells that a face may meet.
+/// Box of the cells that a face may meet.
 pub(in crate::reconstruct) fn cells_around(
     lattice: &Lattice,
     scan: &TriMesh,
@@ -267,7 +265,7 @@ pub(in crate::reconstruct) fn cells_around(
     }
 }
 
-/// The faces of the scan that may meet any of `cells`, by id.
+/// Faces of the scan that may meet any of `cells`, by id.
 pub(in crate::reconstruct) fn faces_near(
     lattice: &Lattice,
     cells: impl Iterator<Item = LatticeNode>,
@@ -286,7 +284,7 @@ pub(in crate::reconstruct) fn faces_near(
     distinct(faces)
 }
 
-/// A side of a piece at which the part that stays ends.
+/// A side of a piece on the rim of the remainder.
 struct PieceRim {
     from: u32,
     to: u32,
@@ -295,7 +293,7 @@ struct PieceRim {
     is_used: bool,
 }
 
-/// Loops around all pieces whose cells are not in the region.
+/// Loops around all pieces with cells outside the region.
 fn outline(pieces: &Pieces, region: &LatticeRegion) -> Vec<Vec<u32>> {
     let mut rims = rims(pieces, region);
     let mut loops = Vec::new();
@@ -340,7 +338,7 @@ fn rims(pieces: &Pieces, region: &LatticeRegion) -> Vec<PieceRim> {
     rims
 }
 
-/// What follows side `i`: a side of the same piece first, so that two parts that meet at a point
+/// The side after side `i`: of the same piece if possible, so that two parts that meet at a point
 /// stay separate.
 fn next(rims: &[PieceRim], i: usize) -> Option<usize> {
     let follows = |j: &usize| !rims[*j].is_used && rims[*j].from == rims[i].to;
@@ -348,7 +346,7 @@ fn next(rims: &[PieceRim], i: usize) -> Option<usize> {
     same.or_else(|| (0..rims.len()).find(follows))
 }
 
-/// The points of a loop, without those on a side of the face where neither this face nor its
+/// The points of a loop, without points on a side of the face at which neither this face nor its
 /// neighbour ends.
 fn kept_points(pieces: &Pieces, rims: &[PieceRim], corners: &[usize]) -> Vec<u32> {
     let is_kept = |at: usize| {

@@ -5,10 +5,11 @@ use crate::reconstruct::field::lattice::{Owner, VertexKey};
 use crate::reconstruct::incremental::delta::{PatchDelta, PatchVertex};
 use crate::reconstruct::table::CellTable;
 
-/// To place so many vertices takes as long as to replace the faces of one owner.
+/// Number of vertices placed in the time that replacing the faces of one owner takes.
 const VERTICES_OF_A_PART: usize = 4;
 
-/// A mesh follows a patch: which of its faces and vertices are those of the patch.
+/// Makes a mesh follow a patch: maps owners and vertices of the patch to faces and vertices of the
+/// mesh.
 #[derive(Clone, Debug, Default)]
 pub struct Splice {
     faces: CellTable<Owner, Vec<FaceId>>,
@@ -16,24 +17,24 @@ pub struct Splice {
     added: Vec<FaceId>,
     placed: Vec<VertexId>,
     refit: Vec<FaceId>,
-    /// how many owners and faces of the current delta are done
+    /// number of finished owners and faces of the current delta
     next_owner: usize,
     next_face: usize,
 }
 
 impl Splice {
-    /// Begins with the next delta: [`Self::go_on`] takes it up.
+    /// Begins the next delta; [`Self::go_on`] continues it.
     pub fn begin(&mut self) {
         self.placed.clear();
         (self.next_owner, self.next_face) = (0, 0);
     }
 
-    /// Takes up to `most` parts more of the delta that was begun: places its vertices, a few to a
-    /// part, then replaces the faces of its owners; returns whether that was all. In between the
-    /// mesh has gaps and overlaps where old faces meet new ones. Faces and vertices that the delta
-    /// does not touch keep their ids.
+    /// Applies up to `most` further parts of the current delta: places its vertices, a few to a
+    /// part, then replaces the faces of its owners; returns whether the delta is complete. Until
+    /// then the mesh has gaps and overlaps between old faces and new ones. Faces and vertices that
+    /// the delta does not touch keep their ids.
     ///
-    /// - `mesh`, `tree`: the scan with all deltas before this one in it.
+    /// - `mesh`, `tree`: the scan with all earlier deltas applied.
     ///
     /// # Errors
     /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`] for a
@@ -77,12 +78,12 @@ impl Splice {
         Ok(is_done)
     }
 
-    /// The faces that were added last.
+    /// Faces added by the last call.
     pub fn added(&self) -> &[FaceId] {
         &self.added
     }
 
-    /// The vertices of the last delta that were placed so far, in its order.
+    /// Placed vertices of the last delta, in its order.
     pub fn placed(&self) -> &[VertexId] {
         &self.placed
     }
@@ -99,8 +100,7 @@ impl Splice {
         }
     }
 
-    /// Adds new vertices and moves those that are elsewhere now, up to `most` parts of them;
-    /// returns how many those were.
+    /// Adds new vertices and moves displaced ones, up to `most` parts; returns the number of parts.
     fn place(
         &mut self,
         delta: &PatchDelta,

@@ -1,4 +1,4 @@
-//! Whether the scan crosses a square on the rim of the region as the field prescribes.
+//! Agreement of scan and field on the squares of the region's rim.
 
 use nalgebra::{Point2, Point3};
 
@@ -17,7 +17,8 @@ pub(in crate::reconstruct) struct Polyline {
     pub segments: Vec<TraceSegment>,
 }
 
-/// Longest trace on one square that is shared; beyond, the scan is far finer than the lattice.
+/// Maximum number of segments of a shared trace on one square; beyond, the scan is far finer than
+/// the lattice.
 const SEGMENTS: usize = 256;
 
 impl Cut {
@@ -33,7 +34,7 @@ impl Cut {
         }
     }
 
-    /// What the scan leaves on a square; `None` where scan and field disagree.
+    /// The traces of the scan on a square; `None` if scan and field disagree.
     pub(in crate::reconstruct) fn trace_on(
         &self,
         square: &Square,
@@ -71,7 +72,7 @@ impl Cut {
         lines.filter(|lines| !self.is_crossed(square, lines))
     }
 
-    /// The crossing of an edge by the scan, where it is the only one and has the direction of the
+    /// The crossing of an edge by the scan, if it is the only one and has the direction of the
     /// field.
     pub(in crate::reconstruct) fn shared_crossing(
         &self,
@@ -89,7 +90,7 @@ impl Cut {
         is_alike.then_some(pierced)
     }
 
-    /// Sorts segments into polylines from edge to edge; `None` where that does not use all of them.
+    /// Sorts segments into polylines from edge to edge; `None` if some remain unused.
     fn chain(&self, edges: &[Edge; 4], all: &[TraceSegment]) -> Option<Vec<Polyline>> {
         let edge_at = |vertex: u32| match self.patch.vertices.entry(vertex).0 {
             VertexKey::Pierce(edge, _) => edges
@@ -126,7 +127,7 @@ impl Cut {
         (used == all.len() && self.is_paired(edges, &lines)).then_some(lines)
     }
 
-    /// Whether each edge that is crossed starts or ends just one polyline.
+    /// Whether each crossed edge starts or ends just one polyline.
     fn is_paired(&self, edges: &[Edge; 4], lines: &[Polyline]) -> bool {
         (0..).zip(edges).all(|(i, edge)| {
             let ends = lines
@@ -155,7 +156,7 @@ impl Cut {
     }
 }
 
-/// Which corners of a square are in the material; `None` where the field has no value.
+/// Material at the corners of a square; `None` if the field has no value.
 fn signs(square: &Square, values: &NodeValues) -> Option<[bool; 4]> {
     let [a, b, c, d] = square
         .corners()
