@@ -1,39 +1,38 @@
-//! The contacts that a scan agrees with, and where they move it.
+//! Contacts with scan agreement, and the displacement of the scan to them.
 
 use nalgebra::{Point3, Vector3};
 
 use crate::reconstruct::evidence::contact_map::{ContactMap, MeanContact};
 
-/// Mismatches beyond this are no agreement, in radii.
+/// Maximum mismatch of agreement, in radii.
 pub(in crate::reconstruct) const LARGEST_MISMATCH: f64 = 1.0 / 3.0;
 /// Width of the weights, in radii.
 const WIDTH: f64 = 1.0;
-/// Contacts without agreement take the scan from the field within this, in radii.
+/// Contacts without agreement within this distance, in radii, replace the scan by the field.
 const VETO: f64 = 1.0;
-/// … where they have more than this share of the weight.
+/// Share of the weight above which contacts without agreement replace the scan.
 const REFUSING: f64 = 0.1;
-/// What is farther off the moved scan than this, in radii, is another surface, unless the ball lay
-/// across it.
+/// Maximum height difference of scan and touched surface, in radii; beyond it the scan is another
+/// surface, unless the ball lay across it.
 const LARGEST_OFF: f64 = 0.1;
-/// … and where two touched surfaces meet, or one ends, and the scan is deeper, this.
+/// Maximum height difference at the edge of two touched surfaces, or of a deeper scan at a border.
 const EDGE_OFF: f64 = 1.0 / 30.0;
-/// Contacts face alike on one smooth surface, its engraved lines among them: cosine of the widest
-/// angle (26°).
+/// Minimum cosine between normals of contacts on one smooth surface, engraved lines included (26°).
 pub(in crate::reconstruct) const BENT: f64 = 0.9;
-/// They are all around where their mean is no farther off than this, in radii of the neighbourhood
-/// (of a half disc: 0.42).
+/// Maximum offset of the mean of contacts all around a point, in radii of the neighbourhood (of a
+/// half disc: 0.42).
 const RINGED: f64 = 0.35;
-/// So far from contacts that agree, in radii, the scan moves along with them …
+/// Distance from agreeing contacts, in radii, up to which the scan fully follows them.
 const MOVES: f64 = 1.0;
-/// … and from here on not at all.
+/// Distance from agreeing contacts, in radii, from which on the scan stays.
 pub(in crate::reconstruct) const RESTS: f64 = 2.0;
 
-/// Which contacts the moved scan agrees with.
+/// Contacts that agree with the moved scan.
 #[derive(Clone, Debug)]
 pub(crate) struct Agreement {
-    /// by number of the mean contact: its mismatch, m, where it agrees
+    /// mismatch by number of the mean contact, m, if it agrees
     pub mismatch: Vec<Option<f64>>,
-    /// of the ball, m
+    /// radius of the ball, m
     pub radius: f64,
 }
 
@@ -49,7 +48,7 @@ impl Agreement {
             .filter_map(|(contact, mismatch)| Some((contact, (*mismatch)?)))
     }
 
-    /// u(x), m, and s.
+    /// Displacement u(x), m, and its share s.
     pub fn displacement(&self, contacts: &ContactMap, x: &Point3<f64>) -> (Vector3<f64>, f64) {
         let of = |index: u32| self.mismatch[index as usize];
         let mut nearest = f64::INFINITY;
@@ -77,12 +76,11 @@ impl Agreement {
         (sum * (share * share * (3.0 - 2.0 * share) / weights), share)
     }
 
-    /// Whether the moved scan is what was touched around its point `foot`: some contacts near it
-    /// agree, and nearly all that are nearest do; and whether these are on one surface that goes on
-    /// all around.
+    /// Whether the moved scan is the touched surface around its point `foot` (some contacts near it
+    /// agree, and nearly all of the nearest), and whether these surround it on one surface.
     ///
-    /// - `normal`: of what was touched there.
-    /// - returns: `None` where it is not.
+    /// - `normal`: of the touched surface there.
+    /// - returns: `None` if the scan is not the touched surface.
     pub fn around(
         &self,
         contacts: &ContactMap,
@@ -113,8 +111,8 @@ impl Agreement {
         (is_known && refusing <= REFUSING * weights).then_some(surroundings)
     }
 
-    /// Whether the moved scan may be the surface where it is `deeper` (m) than the touched one, of
-    /// which that is the `part`.
+    /// Whether the moved scan may be the surface at a `part` of the touched one, `deeper` (m) than
+    /// it.
     pub fn is_alike(&self, deeper: f64, part: TouchedPart) -> bool {
         let [highest, deepest] = match part {
             TouchedPart::Edge => [EDGE_OFF; 2],
@@ -126,7 +124,7 @@ impl Agreement {
     }
 }
 
-/// What the contacts around a point of the moved scan are.
+/// Arrangement of the contacts around a point of the moved scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ContactsAround {
     /// on one smooth surface, all around
@@ -135,17 +133,15 @@ pub(crate) enum ContactsAround {
     BentOrOpen,
 }
 
-/// Where on a touched surface a point is: what a scan may be there that agrees with the contacts
-/// around.
+/// Part of a touched surface: determines how an agreeing scan may differ from it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum TouchedPart {
-    /// felt all around: where the scan is deeper, the ball may have lain across it
+    /// contacts all around: the ball may have lain across a deeper scan
     Middle,
     /// it meets another touched surface: both are known up to there
     Edge,
-    /// it ends here, or may, and a scan that is deeper may be a blurred edge
+    /// it ends here, or may, and a deeper scan may be a blurred edge
     Border,
-    /// … and no contact is so near that its surface is felt: the moved scan may rise to where it
-    /// was
+    /// a border without a contact near enough: the moved scan may rise to its original height
     Beyond,
 }

@@ -1,12 +1,12 @@
 //! Contact map: one mean contact for each voxel and range of normals.
 //!
-//! Nothing is ever integrated into a field: the field is evaluated again from what is stored here.
+//! The map integrates nothing into a field: the field is evaluated anew from these contacts.
 //!
 //! Contacts are independent from one pass to the next, not from sample to sample:
-//! [`ContactStatistics`] counts the passes. With a gate, a contact that contradicts the mean of its
-//! place (or of the place beside it, where it is the first) by more than both can be off is
-//! rejected. A second pass that agrees with it relocates the mean; one that confirms the mean
-//! forgets it.
+//! [`ContactStatistics`] counts the passes. With a gate, the map rejects a contact that contradicts
+//! the mean of its place (or, for the first contact, of a neighbouring place) by more than the
+//! uncertainty of both. A second pass that agrees with it relocates the mean; a pass that confirms
+//! the mean forgets it.
 
 use nalgebra::{Point3, Vector3};
 
@@ -25,27 +25,27 @@ pub struct MeanContact {
     pub point: Point3<f64>,
     /// unit, in O
     pub normal: Vector3<f64>,
-    /// sum of the weights; 0 for one that was refuted
+    /// sum of the weights; 0 if refuted
     pub weight: f64,
     /// normals close by differ much: the ball rolled over an edge here
     pub is_fan: bool,
 }
 
-/// What became of a contact.
+/// Outcome of adding a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// it is in the mean of its place
+    /// part of the mean of its place
     Taken,
-    /// it contradicts its place and is rejected
+    /// in contradiction to its place, rejected
     Rejected,
-    /// the second pass that contradicts: the place has moved to it
+    /// second contradicting pass: the place has moved to it
     Relocated,
 }
 
-/// When a contact is rejected.
+/// Outlier gate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GateParams {
-    /// a contact contradicts by more than this many standard deviations
+    /// standard deviations beyond which a contact contradicts
     pub sigmas: f64,
     /// contacts of one place within this time share their noise, ns: the longest smoothing window
     pub window_ns: i64,
@@ -67,24 +67,24 @@ struct Rival {
     sigmas: f64,
 }
 
-/// All of one mean that queries do not need.
+/// State of a mean beside the data for queries.
 #[derive(Clone, Debug)]
 struct Kept {
     bin: Bin,
     /// the cell in [`ContactMap::nearby`]
     home: LatticeNode,
     sums: ContactStatistics,
-    /// what was rejected here
+    /// contacts rejected here
     rejected: Option<Box<RejectedContacts>>,
     is_refuted: bool,
-    /// it mixes two contacts
+    /// whether it mixes two contacts
     is_mixed: bool,
-    /// the mean when it was last reported
+    /// point and normal at the last report
     reported: (Point3<f64>, Vector3<f64>),
 }
 
 impl Kept {
-    /// What it counts in queries.
+    /// Weight in queries.
     fn weight(&self) -> f64 {
         if self.is_refuted || self.is_mixed {
             0.0
@@ -94,7 +94,7 @@ impl Kept {
     }
 }
 
-/// A mean before a stroke; `None` where there was none.
+/// A mean before a stroke; `None` if it is new.
 type Past = Option<(Kept, MeanContact)>;
 
 /// Contacts that contradict a mean and agree with each other.
@@ -115,42 +115,41 @@ pub struct ContactMap {
     kept: Vec<Kept>,
     means: Vec<MeanContact>,
     nearby: CellTable<LatticeNode, Vec<u32>>,
-    /// what was rejected
+    /// rejected contacts
     pub(in crate::reconstruct) outliers: Outliers,
-    /// the mean that the last contact went into, and when, ns
+    /// mean of the last contact, and its stamp, ns
     last: Option<(u32, i64)>,
-    /// means that are new or moved since they were last reported
+    /// means that are new or moved since the last report
     changed: CellTable<u32, ()>,
     history: History<u32, Past>,
 }
 
-/// Normals whose components differ by less than this share a mean.
+/// Range of normal components that share a mean.
 const FACING: f64 = 0.25;
-/// A mean is reported again when it has shifted along its normal by more than this, in cells: 5 µm
-/// for a ball of 1.5 mm …
+/// Shift along its normal that reports a mean again, in cells: 5 µm for a ball of 1.5 mm.
 const SHIFT: f64 = 0.01;
-/// … or turned by more than this, rad: 0.3°, which are 5 µm a millimetre away.
+/// Turn that reports a mean again, rad: 0.3°, which are 5 µm a millimetre away.
 const TURN: f64 = 5e-3;
-/// Means kept for undoing: 100 MB at most.
+/// Maximum number of means for undo: 100 MB.
 const MOST_KEPT: usize = 200_000;
-/// A mean with less weight than this contradicts nothing; a sliding contact has weight 1.
+/// Minimum weight of a mean to contradict; a sliding contact has weight 1.
 const LEAST_EVIDENCE: f64 = 3.0;
-/// Normals within 25° are those of one surface.
+/// Normals within 25° belong to one surface.
 const ALIKE: f64 = 0.906;
-/// So many cells above and below a contact there is nothing that faces alike, or the ball would not
+/// Cells above and below a contact without another surface that faces alike: the ball would not
 /// have fitted in.
 const DEPTH: i32 = 3;
-/// Share of a cell by which a surface may be off the chord between two of its points.
+/// Distance of a surface from the chord between two of its points, as a share of a cell.
 const ROUGHNESS: f64 = 0.02;
-/// Up to so many cells away the previous contact predicts the next one.
+/// Maximum distance at which the previous contact predicts the next, in cells.
 const PREDICTION_REACH: f64 = 3.0;
-/// So many windows without a contact part two passes.
+/// Windows without a contact that separate two passes.
 const PAUSE: i64 = 2;
 
 impl ContactMap {
-    /// An empty store of cells of edge `cell` (m), for queries up to `reach` (m).
+    /// An empty map with cells of edge `cell` (m), for queries up to `reach` (m).
     ///
-    /// - `gate`: when contacts are rejected; `None`: never.
+    /// - `gate`: criterion for rejection; `None`: never.
     pub fn new(cell: f64, reach: f64, gate: Option<GateParams>) -> Self {
         Self {
             cell,
@@ -167,7 +166,7 @@ impl ContactMap {
         }
     }
 
-    /// Adds a contact to the mean of its cell, unless it contradicts what is known there.
+    /// Adds a contact to the mean of its cell, unless it contradicts its place.
     pub fn add(&mut self, contact: &SurfaceContact) -> Verdict {
         self.outliers.contacts += 1;
         let bin = self.bin_of(contact);
@@ -185,7 +184,7 @@ impl ContactMap {
                 .passes
                 .note(contact.stamp_ns, contact.weight, gate.window_ns)
         {
-            // a pass that confirms the mean: what is rejected was an outlier
+            // the pass confirms the mean: the rejected contacts were outliers
             *rejected = None;
         }
         self.renew(index, contact);
@@ -195,7 +194,7 @@ impl ContactMap {
         Verdict::Taken
     }
 
-    /// Whether a contact contradicts what is known at its place, and would be rejected.
+    /// Whether a contact contradicts its place, and would be rejected.
     pub(in crate::reconstruct) fn contradicts(&self, contact: &SurfaceContact) -> bool {
         let bin = self.bin_of(contact);
         self.gate.is_some_and(|gate| {
@@ -213,7 +212,7 @@ impl ContactMap {
         }
     }
 
-    /// The means of a cell, the last one first.
+    /// The means of a cell, latest first.
     fn in_cell(&self, cell: LatticeNode) -> impl Iterator<Item = u32> + '_ {
         self.of_cell
             .get(&cell)
@@ -226,9 +225,8 @@ impl ContactMap {
             .find(|&index| self.kept[index as usize].bin == *bin)
     }
 
-    /// The mean that a contact contradicts: that of its own cell, or where it is among the first
-    /// there the nearest around that faces alike, or where there is none the one before it on its
-    /// path.
+    /// The mean that a contact contradicts: of its own cell; for the first contacts there, the
+    /// nearest mean around that faces alike; without any, the previous mean on its path.
     fn rival(
         &self,
         contact: &SurfaceContact,
@@ -259,7 +257,7 @@ impl ContactMap {
         })
     }
 
-    /// Whether a mean belongs to the surface that a contact is of.
+    /// Whether a mean belongs to the surface of a contact.
     fn faces_alike(&self, index: u32, contact: &SurfaceContact) -> bool {
         let (kept, mean) = (&self.kept[index as usize], &self.means[index as usize]);
         kept.sums.weight >= LEAST_EVIDENCE && mean.normal.dot(&contact.normal) > ALIKE
@@ -279,7 +277,7 @@ impl ContactMap {
             .flat_map(|cell| self.in_cell(cell))
     }
 
-    /// The mean that the contact before went into, while that is near in time and place.
+    /// Mean of the previous contact, while near in time and place.
     fn before(&self, contact: &SurfaceContact, gate: &GateParams) -> Option<u32> {
         let (index, last_ns) = self.last?;
         let is_recent = contact.stamp_ns.saturating_sub(last_ns) <= gate.window_ns;
@@ -294,8 +292,7 @@ impl ContactMap {
             .innovation(contact, ROUGHNESS * self.cell)
     }
 
-    /// Rejects a contact, or lets it take the place of the mean that it contradicts in a second
-    /// pass.
+    /// Rejects a contact, or, in a second pass, lets it replace the mean that it contradicts.
     fn contest(
         &mut self,
         rival: &Rival,
@@ -347,8 +344,8 @@ impl ContactMap {
         Verdict::Rejected
     }
 
-    /// Empties the means that a contact contradicts and puts what was rejected in the cell of its
-    /// contacts.
+    /// Empties the means that a contact contradicts and puts the rejected contacts in the contact's
+    /// cell.
     fn move_to(
         &mut self,
         rival: u32,
@@ -380,7 +377,7 @@ impl ContactMap {
         self.changed.insert(index, ());
     }
 
-    /// The mean of a bin, about to change: `own`, or a new one where there is none.
+    /// The mean of a bin, about to change: `own`, or a new one if `None`.
     fn place(&mut self, own: Option<u32>, bin: &Bin, contact: &SurfaceContact) -> u32 {
         if let Some(index) = own {
             self.note_mean(index);
@@ -434,7 +431,7 @@ impl ContactMap {
         self.means.push(mean);
     }
 
-    /// Removes the mean inserted last.
+    /// Removes the latest mean.
     fn pop(&mut self) -> Option<(Kept, MeanContact)> {
         let (kept, mean) = (self.kept.pop()?, self.means.pop()?);
         self.of_cell.get_or_default(kept.bin.cell).pop();
@@ -442,7 +439,7 @@ impl ContactMap {
         Some((kept, mean))
     }
 
-    /// Brings a mean up to its sums, unless it was refuted.
+    /// Updates a mean from its sums; a refuted mean keeps weight 0.
     fn renew(&mut self, index: u32, contact: &SurfaceContact) {
         let (kept, mean) = (&self.kept[index as usize], &mut self.means[index as usize]);
         let (point, normal) = &kept.reported;
@@ -458,18 +455,17 @@ impl ContactMap {
         }
     }
 
-    /// Begins a stroke, which can be undone.
+    /// Begins an undoable stroke.
     pub(crate) fn begin_stroke(&mut self) {
         self.history.begin();
     }
 
-    /// How many strokes can be undone.
+    /// Number of undoable strokes.
     pub fn strokes(&self) -> usize {
         self.history.len()
     }
 
-    /// Undoes the last stroke, or does the one again that was undone last. Returns whether there
-    /// was one.
+    /// Undoes the last stroke, or redoes the last undone one. Returns whether there was one.
     pub(in crate::reconstruct) fn exchange(&mut self, direction: Direction) -> bool {
         let mut history = std::mem::replace(&mut self.history, History::new(MOST_KEPT));
         let has_changed = history.exchange(direction, |key, past| self.swap(key, past));
@@ -479,7 +475,7 @@ impl ContactMap {
         has_changed
     }
 
-    /// Exchanges a mean with what was kept of it; the last insertion is undone first.
+    /// Exchanges a mean with its kept state; the last insertion first.
     fn swap(&mut self, index: u32, past: &mut Past) {
         let at = index as usize;
         match past.take() {
@@ -495,8 +491,7 @@ impl ContactMap {
         }
     }
 
-    /// The numbers of the means that are new since the last call, or are clearly elsewhere than
-    /// when they were last reported, each once.
+    /// Numbers of the means that are new or clearly moved since the last call, each once.
     pub(crate) fn take_changed(&mut self) -> CellTable<u32, ()> {
         let changed = std::mem::take(&mut self.changed);
         for (at, ()) in changed.iter() {
@@ -506,12 +501,12 @@ impl ContactMap {
         changed
     }
 
-    /// Lets [`Self::take_changed`] report all means.
+    /// Makes [`Self::take_changed`] report all means.
     pub(crate) fn note_all(&mut self) {
         self.changed = (0..self.means.len() as u32).collect();
     }
 
-    /// What was added up for a mean, whether it counts in queries or not.
+    /// Sums of a mean, whether it counts in queries or not.
     pub(in crate::reconstruct) fn sums(&self, index: u32) -> &ContactStatistics {
         &self.kept[index as usize].sums
     }
@@ -522,34 +517,34 @@ impl ContactMap {
         self.noise_variance(index) + self.sums(index).sigma().systematic().powi(2)
     }
 
-    /// … by noise alone, m².
+    /// Variance of a mean along its normal by noise alone, m².
     pub(in crate::reconstruct) fn noise_variance(&self, index: u32) -> f64 {
         let sums = self.sums(index);
         sums.sigma().noise.powi(2) / f64::from(sums.passes.count.max(1))
     }
 
-    /// Takes a mean out of all queries, or back in; returns whether that is new.
+    /// Excludes a mean from all queries, or includes it again; returns whether that is new.
     pub(crate) fn refute(&mut self, at: u32, is_refuted: bool) -> bool {
         self.kept[at as usize].is_refuted = is_refuted;
         self.reweigh(at)
     }
 
-    /// Takes a mean of two mixed contacts out of all queries, or back in; returns whether that is
-    /// new.
+    /// Excludes a mean of two mixed contacts from all queries, or includes it again; returns
+    /// whether that is new.
     pub(in crate::reconstruct) fn mark_mixed(&mut self, at: u32, is_mixed: bool) -> bool {
         self.kept[at as usize].is_mixed = is_mixed;
         self.reweigh(at)
     }
 
-    /// Lets a mean count what its state allows; returns whether it is new that it counts, or that
-    /// it does not.
+    /// Updates the query weight of a mean from its state; returns whether the mean enters or leaves
+    /// queries.
     fn reweigh(&mut self, at: u32) -> bool {
         let mean = &mut self.means[at as usize];
         let before = std::mem::replace(&mut mean.weight, self.kept[at as usize].weight());
         (before == 0.0) != (mean.weight == 0.0)
     }
 
-    /// Finds whether normals within `width` (m) of a mean differ by more than the angle of
+    /// Marks a mean as a fan if normals within `width` (m) differ by more than the angle of
     /// `cosine`; returns whether that is new.
     pub(crate) fn mark_fan(&mut self, at: u32, width: f64, cosine: f64) -> bool {
         let MeanContact {
@@ -566,13 +561,13 @@ impl ContactMap {
         is_fan != before
     }
 
-    /// All means, in the order in which their cells were first touched.
+    /// All means, in the order of the first contact in their cells.
     pub fn means(&self) -> &[MeanContact] {
         &self.means
     }
 
     /// Calls `each` with the squared distance (m²) and the number of every mean nearer to `x` than
-    /// `reach` (m), which is cut off at that of the store.
+    /// `reach` (m), at most that of the map.
     #[inline]
     pub fn near(&self, x: &Point3<f64>, reach: f64, mut each: impl FnMut(f64, u32)) {
         self.near_known(x, reach, |distance_squared, index| {
@@ -582,7 +577,7 @@ impl ContactMap {
         });
     }
 
-    /// As [`Self::near`], but also those that are taken out of queries.
+    /// As [`Self::near`], but includes excluded means.
     #[inline]
     pub(in crate::reconstruct) fn near_known(
         &self,
@@ -711,7 +706,7 @@ mod tests {
         assert_eq!(changed(&mut store), [1], "it rose by 20 µm");
     }
 
-    /// A pass of eight contacts at height `z` (m) from `stamp_ns` on; what became of the last.
+    /// A pass of eight contacts at height `z` (m) from `stamp_ns` on; verdict on the last contact.
     fn pass(store: &mut ContactMap, z: f64, stamp_ns: i64) -> Verdict {
         let sigma = ContactSigma {
             noise: 10e-6,
@@ -735,7 +730,7 @@ mod tests {
             window_ns: 64_000_000,
         };
         let second = 1_000_000_000;
-        // within the cell, and in the one above
+        // within the cell, and in the cell above
         for moved in [0.2e-3, 0.45e-3] {
             let mut store = ContactMap::new(0.5e-3, 3e-3, Some(gate));
             let near = |store: &ContactMap| {
@@ -750,7 +745,7 @@ mod tests {
             assert_eq!(near(&store), [105.0], "what agrees is averaged");
             assert_eq!(pass(&mut store, moved, 3 * second), Verdict::Rejected);
             assert_eq!((near(&store), store.outliers.rejected), (vec![105.0], 8));
-            // a pass that confirms the mean: the next that contradicts is the first again
+            // after a pass that confirms the mean, the next contradiction is the first again
             assert_eq!(pass(&mut store, 0.0, 4 * second), Verdict::Taken);
             assert_eq!(pass(&mut store, moved, 5 * second), Verdict::Rejected);
             pass(&mut store, moved, 6 * second);

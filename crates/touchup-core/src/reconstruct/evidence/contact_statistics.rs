@@ -1,5 +1,5 @@
 //! Contact statistics: sums over the contacts of one place, its independent passes, and the
-//! innovation of another contact.
+//! innovation of a further contact.
 
 use nalgebra::{Point3, Vector3};
 
@@ -7,31 +7,31 @@ use crate::numeric::direction;
 use crate::reconstruct::evidence::contact_uncertainty::ContactSigma;
 use crate::reconstruct::evidence::touches::SurfaceContact;
 
-/// One pass over a place, or several put together.
+/// One pass over a place, or several merged ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(in crate::reconstruct) struct Pass {
-    /// when the last of them began, ns
+    /// start of the last merged pass, ns
     pub began_ns: i64,
-    /// sum of the weights of their contacts
+    /// sum of the weights of the contacts
     pub weight: f64,
-    /// how many they are
+    /// number of merged passes
     pub count: u32,
 }
 
-/// Passes remembered one by one; further ones are put to those.
+/// Number of separate passes in memory; further passes merge into them.
 const REMEMBERED: usize = 4;
 
-/// The passes over one place: samples in one smoothing window share their noise. A pass ends after
-/// the length of a window: later contacts are independent.
+/// The passes over one place: samples in one smoothing window share their noise. A pass lasts one
+/// window: later contacts are independent.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(in crate::reconstruct) struct IndependentPasses {
     slots: [Pass; REMEMBERED],
-    /// how many passes
+    /// number of passes
     pub count: u32,
 }
 
 impl IndependentPasses {
-    /// Counts a contact of this weight; whether it is independent of those before.
+    /// Counts a contact of this weight; returns whether it is independent of earlier ones.
     pub fn note(&mut self, stamp_ns: i64, weight: f64, window_ns: i64) -> bool {
         let newest = self.slots[(self.count.wrapping_sub(1)) as usize % REMEMBERED];
         let is_new = self.count == 0 || stamp_ns.saturating_sub(newest.began_ns) > window_ns;
@@ -51,10 +51,10 @@ impl IndependentPasses {
     }
 }
 
-/// No normal is known better than this, rad: 1°.
+/// Minimum standard deviation of a normal, rad: 1°.
 const LEAST_TILT: f64 = 0.017;
 
-/// Contacts added up.
+/// Sums over contacts.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::reconstruct) struct ContactStatistics {
     pub point: Vector3<f64>,
@@ -93,7 +93,7 @@ impl ContactStatistics {
         Point3::from(self.point / self.weight)
     }
 
-    /// Uncertainty of the place by one of the passes that were added.
+    /// Uncertainty of the place from one pass.
     pub fn sigma(&self) -> ContactSigma {
         let [noise, reach, tilt] =
             [self.noise, self.reach, self.tilt].map(|sum| (sum / self.weight).sqrt());
@@ -107,11 +107,11 @@ impl ContactStatistics {
         }
     }
 
-    /// How far a contact is off the chord to the mean, m, and how many standard deviations that is.
+    /// Distance of a contact from the chord to the mean, m, and the same in standard deviations.
     /// The chord is at right angles to the mean of both normals, unless one is known much better.
-    /// What calibration leaves is the same in both.
+    /// Both share the calibration error, which cancels.
     ///
-    /// - `roughness`: by which the surface itself may be off a chord, m.
+    /// - `roughness`: distance of the surface itself from a chord, m.
     pub fn innovation(&self, contact: &SurfaceContact, roughness: f64) -> (f64, f64) {
         let normal = direction(&self.normal).unwrap_or(contact.normal);
         let arm = contact.point - self.point();

@@ -1,14 +1,14 @@
 //! Uncertainty of a contact, cause by cause.
 //!
 //! Along the normal a contact is off by noise of the pose and of the force over the stiffness, both
-//! after the smoothing window, and by r (1 − cos σ) where its normal is off by σ: that much the
-//! ball reaches over the surface. These average out from window to window. What the radius, the
-//! pose of the scan and the stiffness are off by does not: it is the same in each.
+//! after the smoothing window, and by r (1 − cos σ) for a normal off by σ: the reach of the ball
+//! over the surface. These average out from window to window. Errors of the radius, the pose of the
+//! scan and the stiffness do not: they are the same in each.
 
 use crate::parameters;
 
 parameters! {
-    /// What a calibration leaves uncertain; standard deviations.
+    /// Residual uncertainty of the calibration; standard deviations.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct CalibrationParams in "uncertainty" {
         /// What is left after calibrating the radius of the tip; it averages out in no number of
@@ -29,7 +29,7 @@ parameters! {
 }
 
 parameters! {
-    /// Which uncertainties are estimated.
+    /// Uncertainty model.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct UncertaintyParams in "uncertainty" {
         /// Standard deviation of a vertex of the scan, m; 0: free of noise.
@@ -39,20 +39,20 @@ parameters! {
         gate_sigmas: f64 = 4.0, "gate_sigmas" [SIGMAS, 0.5, 1e6];
     }
     with {
-        /// What the calibration leaves.
+        /// residual uncertainty of the calibration
         calibration: CalibrationParams,
     }
 }
 
 impl ContactSigma {
-    /// What does not average out, together, m.
+    /// Systematic part, which does not average out, m.
     pub fn systematic(&self) -> f64 {
         self.calibration.hypot(self.place)
     }
 }
 
 impl UncertaintyParams {
-    /// The defaults, for a scan whose points are off by `noise` (m).
+    /// The defaults, for a scan with points off by `noise` (m).
     pub fn new(noise: f64) -> Self {
         Self {
             scan: noise,
@@ -61,16 +61,17 @@ impl UncertaintyParams {
     }
 }
 
-/// How well a contact is known; standard deviations.
+/// Uncertainty of a contact; standard deviations.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactSigma {
-    /// of the point along the normal by what averages out, m
+    /// of the point along the normal, by random noise, which averages out, m
     pub noise: f64,
-    /// … by how far the ball reaches over the surface where the normal is off, m
+    /// of the point along the normal, by the reach of the ball over the surface due to an error of
+    /// the normal, m
     pub reach: f64,
-    /// … by what radius and stiffness are off, which does not average out, m
+    /// of the point along the normal, by radius and stiffness, which does not average out, m
     pub calibration: f64,
-    /// … by what the place of the scan is off, the same displacement in each contact, m
+    /// of the place of the scan, the same displacement in each contact, m
     pub place: f64,
     /// of the direction of the normal, rad
     pub normal: f64,

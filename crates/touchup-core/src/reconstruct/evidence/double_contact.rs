@@ -1,10 +1,10 @@
 //! Double contact: a ball that touches two surfaces at once, as in an inner corner or a slot no
 //! wider than itself.
 //!
-//! The force is then the sum of two, and lies anywhere between their normals: taken for one normal
-//! it invents a surface that bridges the corner. Where both surfaces are known from contacts
-//! nearby, and the ball lies on both, it is two contacts and not one. On a convex edge the ball is
-//! nearer to the planes on either side than its radius, so that this does not take it for a corner.
+//! The force is then the sum of two, and lies anywhere between their normals: as one normal it
+//! would invent a surface that bridges the corner. If both surfaces are known from contacts nearby,
+//! and the ball lies on both, the touch is two contacts. On a convex edge the ball is nearer to the
+//! planes on either side than its radius, so an edge does not pass for a corner.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
@@ -12,58 +12,56 @@ use crate::numeric::direction;
 use crate::reconstruct::evidence::contact_map::ContactMap;
 use crate::reconstruct::evidence::touches::SurfaceContact;
 
-/// The ball lies on a surface when its centre is its radius away to within this share of it: four
-/// times the noise of a usual tracker, and less than it would be off at 20° beside an edge.
+/// Tolerance on the distance of the ball's centre from a surface that it lies on, as a share of its
+/// radius: four times the noise of a usual tracker, and less than the offset at 20° beside an edge.
 const ON_SURFACE: f64 = 0.05;
-/// Contacts within this many radii of where the ball would touch their plane support it.
+/// Maximum distance of supporting contacts from the ball's foot on their plane, in radii.
 const NEARBY: f64 = 1.0;
-/// … and within this many radii of where the ball seems to touch: a new contact affects means up to
-/// there.
+/// Maximum distance of supporting contacts from the apparent contact point, in radii: a new contact
+/// affects means up to there.
 const ASKED: f64 = 2.0;
-/// Contacts that face within 20° of each other are of one surface.
+/// Contacts that face within 20° of each other belong to one surface.
 const ALIKE: f64 = 0.94;
-/// Surfaces at less than 45° to each other are one that bends: beside an edge the ball may lie on
-/// both to within the noise.
+/// Surfaces at less than 45° to each other are a single curved one: beside an edge the ball may lie
+/// on both to within the noise.
 const DISTINCT: f64 = 0.707;
-/// A surface that takes less of the force than this share of the other one, 6°, is not pressed.
+/// Minimum share of the force on a surface relative to the other: 6°; below it is not pressed.
 const PRESSED: f64 = 0.1;
-/// Sine of how far the force may be off the plane of both normals: 20°, what friction leaves
-/// uncertain.
+/// Sine of the maximum angle between the force and the plane of both normals: 20°, the uncertainty
+/// from friction.
 const OFF_PLANE: f64 = 0.34;
-/// A surface is known by as much as so many contacts while sliding.
+/// Minimum weight of a known surface, in sliding contacts.
 const LEAST_WEIGHT: f64 = 2.0;
-/// The two take no more together than this many times the measured force: a corner of 75° or wider,
-/// and no wedge.
+/// Maximum sum of both forces, in measured forces: a corner of 75° or wider, and no wedge.
 const MOST_FORCE: f64 = 1.6;
-/// Standard deviation of the centres of the balls that touched either surface, across the corner,
-/// in radii: those of a ball that bridges it all lie on one line, to within the noise …
+/// Minimum standard deviation of the ball centres on both surfaces, across the corner, in radii:
+/// the centres of a ball that bridges the corner lie on one line, to within the noise.
 const SPREAD: f64 = 0.03;
-/// … or of one of both surfaces by as much as this.
+/// Minimum standard deviation of the ball centres on one surface that suffices alone, in radii.
 const WIDE_SPREAD: f64 = 0.05;
-/// Surfaces looked at.
+/// Maximum number of surfaces considered.
 const MOST: usize = 8;
 
-/// A surface that the ball lies on.
+/// A surface under the ball.
 #[derive(Clone, Copy, Debug, Default)]
 struct TouchedWall {
-    /// Σ W n, the nearest most
+    /// Σ W n, weighted towards the nearest
     normal: Vector3<f64>,
     /// unit
     facing: Vector3<f64>,
     weight: f64,
-    /// how many means
+    /// number of means
     count: f64,
-    /// Σ d and Σ d dᵀ, d: where the centres of the balls were that touched it, from that of the
+    /// Σ d and Σ d dᵀ, d: offset of the centre of a ball that touched it from the centre of the
     /// ball, m and m²
     offset: Vector3<f64>,
     spread: Matrix3<f64>,
 }
 
 impl TouchedWall {
-    /// Standard deviation of the places from which it was touched, across the corner that it makes
-    /// with another, m.
+    /// Standard deviation of the ball centres on this surface, across the corner with another, m.
     fn width(&self, other: &Self) -> f64 {
-        // of two that face the same way there is no corner, and no width
+        // two surfaces that face the same way form no corner, and have no width
         let across =
             direction(&self.facing.cross(&self.facing.cross(&other.facing))).unwrap_or_default();
         let mean = across.dot(&self.offset) / self.count;
@@ -73,9 +71,9 @@ impl TouchedWall {
     }
 }
 
-/// The two contacts of a ball of `radius` (m) with its centre at `centre` (m, in O) that the one
-/// measured along `normal` is the resultant of; `None` when it touches one surface, or the two are
-/// not known.
+/// The two contacts of a ball of `radius` (m) with its centre at `centre` (m, in O), of which the
+/// force along `normal` is the resultant; `None` if it touches one surface, or the two are not
+/// known.
 pub(in crate::reconstruct) fn double_contact(
     contacts: &ContactMap,
     radius: f64,
@@ -102,13 +100,13 @@ pub(in crate::reconstruct) fn double_contact(
         .min_by(|[a, b], [c, d]| a.dot(b).total_cmp(&c.dot(d)))
 }
 
-/// Whether two surfaces were touched from places so far from each other (m) that none of them is a
-/// bridge over their corner.
+/// Whether the ball centres on two surfaces spread so wide (m) that neither is a bridge over their
+/// corner.
 fn is_wide([a, b]: [f64; 2], radius: f64) -> bool {
     a.min(b) > SPREAD * radius || a.max(b) > WIDE_SPREAD * radius
 }
 
-/// The contact as what it is: one, or two with half of its weight each.
+/// Splits a double contact into two with half of its weight each; `None` for a single contact.
 pub(in crate::reconstruct) fn split(
     contacts: &ContactMap,
     radius: f64,
@@ -124,7 +122,7 @@ pub(in crate::reconstruct) fn split(
     }))
 }
 
-/// Whether a mean was kept as one contact before it was known to be two.
+/// Whether a mean is an earlier single contact now known to be two.
 pub(in crate::reconstruct) fn is_mixed(contacts: &ContactMap, radius: f64, at: u32) -> bool {
     let mean = &contacts.means()[at as usize];
     double_contact(
@@ -136,9 +134,10 @@ pub(in crate::reconstruct) fn is_mixed(contacts: &ContactMap, radius: f64, at: u
     .is_some()
 }
 
-/// The surfaces that a ball lies on, and how many.
+/// The surfaces under a ball, and their number.
 ///
-/// - `point`: where it seems to touch, m: means farther from there than two radii are not used.
+/// - `point`: the apparent contact point, m; means farther than two radii from there do not
+///   count.
 fn walls(
     contacts: &ContactMap,
     radius: f64,
@@ -219,7 +218,7 @@ mod tests {
         }
     }
 
-    /// Contacts each 0.4 mm on the floor z = 0 and on the wall x = 0, as far as a ball in the
+    /// Contacts every 0.4 mm on the floor z = 0 and on the wall x = 0, as far as a ball in the
     /// corner reaches.
     fn corner(open: bool) -> ContactMap {
         let mut store = ContactMap::new(0.5e-3, 3e-3, None);

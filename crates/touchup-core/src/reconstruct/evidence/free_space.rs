@@ -1,4 +1,4 @@
-//! Free space: the volume that the tip has swept, where no material can be.
+//! Free space: the swept volume of the tip, which holds no material.
 
 use nalgebra::{Point3, Vector3};
 
@@ -9,15 +9,15 @@ use crate::reconstruct::incremental::history::Direction;
 use crate::reconstruct::table::Key;
 use crate::stylus::{TipBody, TipPlace};
 
-/// Cosine of the widest angle between a path and what counts as straight ahead: 45°.
+/// Cosine of the maximum angle between a path and straight ahead: 45°.
 const STRAIGHT: f64 = 0.7;
-/// A tip that leans by more than this, as the difference of a component of its axis, is kept beside
-/// one in the same cell: 2°, which moves a shaft of two radii by a fourteenth of a radius.
+/// Lean, as the difference of a component of its axis, that separates two tips in the same cell:
+/// 2°, which moves a shaft of two radii by a fourteenth of a radius.
 const LEAN: f64 = 0.035;
-/// Free space around a body that is no ball is resolved up to this share of its scale around it.
+/// Range of free space around a body that is no ball, as a share of its scale.
 const AROUND: f64 = 2.0 / 3.0;
 
-/// Places of the tip, one kept per voxel.
+/// Places of the tip, one per voxel.
 #[derive(Clone, Debug)]
 pub(crate) struct FreeSpace {
     reach: f64,
@@ -30,7 +30,7 @@ pub(crate) struct FreeSpace {
 #[derive(Clone, Debug)]
 struct SweptVolume {
     tip: TipBody,
-    /// by the middles of the balls that hold the tip there, in cells as large as its scale
+    /// by the middles of the tip's bounding balls, in cells as large as its scale
     places: VoxelSet<TipPlace>,
 }
 
@@ -71,8 +71,8 @@ impl Keyed for TipPlace {
 }
 
 impl FreeSpace {
-    /// Empty: one place is kept for each cube of edge `cell` (m); queries of a ball go up to
-    /// `reach` (m).
+    /// Empty, with one place for each cube of edge `cell` (m); queries of a ball go up to `reach`
+    /// (m).
     pub fn new(tip: TipBody, cell: f64, reach: f64) -> Self {
         let body = (!tip.is_ball()).then(|| SweptVolume {
             tip,
@@ -91,7 +91,7 @@ impl FreeSpace {
         self.body.is_none()
     }
 
-    /// Takes a place of the tip.
+    /// Adds a place of the tip.
     pub fn add_place(&mut self, place: &TipPlace) {
         let centre = &place.centre;
         let is_new = self.centres.add(voxel_of(centre, self.reach), *centre);
@@ -105,8 +105,8 @@ impl FreeSpace {
         }
     }
 
-    /// Forgets where the tip was nearer to `p` with its middle than `distance` (m, up to the
-    /// reach); of a tip that is no ball, as much nearer with its surface as a ball of its scale.
+    /// Forgets places of the tip with its middle nearer to `p` than `distance` (m, up to the
+    /// reach); for a tip that is no ball, with its surface as near as that of a ball of its scale.
     pub fn forget(&mut self, p: &Point3<f64>, distance: f64) {
         let Self {
             reach,
@@ -127,12 +127,12 @@ impl FreeSpace {
         }
     }
 
-    /// The middles of balls that cover what was added or removed since the last call.
+    /// Middles of balls that cover the places added or removed since the last call.
     pub fn take_changed(&mut self) -> Vec<Point3<f64>> {
         std::mem::take(&mut self.changed)
     }
 
-    /// Begins a stroke, which can be undone.
+    /// Begins an undoable stroke.
     pub fn begin_stroke(&mut self) {
         self.centres.begin_stroke();
         self.body
@@ -140,7 +140,7 @@ impl FreeSpace {
             .for_each(|body| body.places.begin_stroke());
     }
 
-    /// How many strokes can be undone.
+    /// Number of undoable strokes.
     pub fn strokes(&self) -> usize {
         self.body
             .as_ref()
@@ -148,8 +148,7 @@ impl FreeSpace {
             .min(self.centres.strokes())
     }
 
-    /// Undoes the last stroke, or does the one again that was undone last; returns whether there
-    /// was one.
+    /// Undoes the last stroke, or redoes the last undone one; returns whether there was one.
     pub fn exchange(&mut self, direction: Direction) -> bool {
         self.changed.clear();
         if let Some(body) = &mut self.body {
@@ -158,12 +157,12 @@ impl FreeSpace {
         self.centres.exchange(direction)
     }
 
-    /// The centres that were kept.
+    /// Centres of the tip in memory.
     pub fn centres(&self) -> impl Iterator<Item = &Point3<f64>> + '_ {
         self.centres.iter()
     }
 
-    /// Radius of the balls of [`Self::cover`], m; of a tip that is a ball its `radius`.
+    /// Radius of the balls of [`Self::cover`], m; `radius` for a ball tip.
     pub fn cover_radius(&self, radius: f64) -> f64 {
         self.body.as_ref().map_or(radius, |body| body.tip.cover().1)
     }
@@ -197,8 +196,8 @@ impl FreeSpace {
 
     /// Distance from `x` to the nearest centre, m, and that centre; `None` beyond the reach.
     ///
-    /// Of a tip that is no ball it is the signed distance from its body plus its scale: like a ball
-    /// of that radius.
+    /// For a tip that is no ball, the signed distance from its body plus its scale: like a ball of
+    /// that radius.
     pub fn nearest(&self, x: &Point3<f64>) -> Option<(f64, Point3<f64>)> {
         if let Some(body) = &self.body {
             return body.nearest(x);
@@ -211,7 +210,7 @@ impl FreeSpace {
         nearest.map(|(distance_squared, centre)| (distance_squared.sqrt(), centre))
     }
 
-    /// The centres that may be within the reach of a point.
+    /// Centres possibly within the reach of a point.
     fn around(&self, x: &Point3<f64>) -> impl Iterator<Item = &Point3<f64>> + '_ {
         voxel_neighbourhood(voxel_of(x, self.reach)).flat_map(|bin| self.centres.get(&bin))
     }
@@ -257,7 +256,7 @@ impl SweptVolume {
     }
 }
 
-/// The cells of edge `size` that come nearer to `x` than `reach` (m), and some more.
+/// The cells of edge `size` nearer to `x` than `reach` (m), and some more.
 fn bins_around(x: &Point3<f64>, size: f64, reach: f64) -> CellBox {
     let (home, steps) = (voxel_of(x, size), (reach / size).ceil() as i32);
     CellBox { lo: home, hi: home }.widened(steps, steps)
@@ -377,7 +376,7 @@ mod tests {
         let (distance, centre) = free_space.nearest(&Point3::new(5e-3, 1.2e-3, 0.0)).unwrap();
         assert!((distance - 1.2e-3).abs() < 1e-5 && (centre.x - 5e-3).abs() < 1e-4);
         assert_eq!(free_space.nearest(&Point3::new(5e-3, 2.1e-3, 0.0)), None);
-        // what is forgotten can be swept again
+        // forgotten space can be swept again
         free_space.forget(&Point3::new(5e-3, 0.0, 0.0), 1.01e-3);
         let nearest =
             |free_space: &FreeSpace| free_space.nearest(&Point3::new(5e-3, 0.0, 0.0)).unwrap().0;

@@ -1,15 +1,14 @@
-//! The detail of a scan that is finer than the tip, where it agrees with the touches: the scan is
-//! moved there and not replaced.
+//! Scan detail finer than the tip that agrees with the touches: the scan moves there instead of
+//! being replaced.
 //!
-//! For each mean contact j the scan says where the ball would have been stopped: off by δⱼ = |x −
-//! c| − r, with the centre of the ball c = pⱼ + r nⱼ and the closest point x of the scan. Where
-//! these mismatches vary smoothly, the scan has the shape that was felt, and is moved by their
-//! weighted mean
+//! For each mean contact j the scan predicts the stop of the ball: off by δⱼ = |x − c| − r, with
+//! the centre of the ball c = pⱼ + r nⱼ and the closest point x of the scan. If these mismatches
+//! vary smoothly, the scan has the touched shape, and moves by their weighted mean
 //!
 //! u(x) = s(d) Σ wⱼ δⱼ nⱼ / Σ wⱼ,   wⱼ = Wⱼ exp(−(|x − pⱼ|² − d²) / max(σ², d²/2)),
 //!
-//! where d is the distance to the nearest contact that agrees; s falls smoothly from 1 within a
-//! radius to 0 at two.
+//! with d the distance to the nearest agreeing contact; s falls smoothly from 1 within a radius to
+//! 0 at two.
 
 use nalgebra::Vector3;
 
@@ -20,44 +19,43 @@ use crate::reconstruct::evidence::contact_map::MeanContact;
 use crate::reconstruct::evidence::point_evidence::Evidence;
 use crate::reconstruct::field::lattice::VertexKey;
 
-/// A scan is finer than the tip when its edges are shorter than this, in radii.
+/// Maximum edge length of a scan finer than the tip, in radii.
 const FINE: f64 = 0.36;
-/// Cosine of the widest angle between the arm to the scan and the normal of the contact.
+/// Cosine of the maximum angle between the arm to the scan and the normal of the contact.
 const ALONG: f64 = 0.9;
-/// A contact agrees when its mismatch is that around it but for this, in radii: 0.075 mm for a ball
-/// of 1.5 mm.
+/// Maximum difference between the mismatch of an agreeing contact and that around it, in radii:
+/// 0.075 mm for a ball of 1.5 mm.
 const AGREES: f64 = 0.05;
-/// … and for so many standard deviations of its own. What is left of it …
+/// Standard deviations of the contact added to [`AGREES`].
 const SIGMAS: f64 = 2.0;
-/// … is averaged with this width b, out to here, in radii …
+/// Width b of the average of the residual mismatches, and its range, in radii.
 const AVERAGED: f64 = 0.5;
 const AVERAGED_WITHIN: f64 = 1.2;
-/// … and may be so many standard deviations l …
+/// Maximum averaged residual, l, in standard deviations.
 const LIMIT: f64 = 3.0;
-/// … and this ε beside, in radii: 4.5 µm for a ball of 1.5 mm.
+/// Slack ε of the averaged residual, in radii: 4.5 µm for a ball of 1.5 mm.
 const SLACK: f64 = 0.003;
-/// Vertices may scatter by this across the straightest line through them, in radii (median): more
-/// is noise that touches do better, of 8 µm for a ball of 1.5 mm. Lines that are engraved are
-/// straight.
+/// Maximum scatter of vertices across the straightest line through them, in radii (median): more is
+/// noise, which touches beat, of 8 µm for a ball of 1.5 mm. Engraved lines are straight.
 const SCATTER: f64 = 0.002;
-/// Around a contact the scatter is looked at within this, in radii.
+/// Range of the scatter around a contact, in radii.
 const AROUND: f64 = 1.0 / 3.0;
 
-/// The scan, moved to where it was touched, and the contacts that it agrees with.
+/// The scan, moved to the touches, and the contacts that it agrees with.
 #[derive(Clone, Debug)]
 pub(in crate::reconstruct) struct KeptDetail {
-    /// the scan with `moved` elsewhere
+    /// the scan with `moved` displaced
     pub scan: TriMesh,
-    /// … with the tree over its faces
+    /// tree over the faces of `scan`
     pub tree: FaceTree,
-    /// vertices that are elsewhere, by their ids, and what they rest on
+    /// displaced vertices, by their ids, and their support
     pub moved: Vec<(VertexId, Support)>,
     pub agreement: Agreement,
 }
 
 impl KeptDetail {
-    /// Finds where the scan agrees, and moves it; `None` where it is no finer than the tip, or
-    /// agrees nowhere.
+    /// Finds agreement, and moves the scan; `None` unless the scan is finer than the tip and agrees
+    /// somewhere.
     pub fn of(evidence: &Evidence<'_>) -> Option<Self> {
         let (scan, tree, radius) = (evidence.scan, evidence.tree, evidence.params.radius);
         if !evidence.free_space.is_of_ball() || scan.mean_edge() >= FINE * radius {
@@ -109,7 +107,7 @@ impl KeptDetail {
         })
     }
 
-    /// What a vertex of the patch rests on that lies on the scan; `None` for any other.
+    /// Support of a patch vertex on the scan; `None` for any other.
     pub fn support(&self, key: &VertexKey) -> Option<Support> {
         let of = |vertex: &VertexId| {
             let at = self
@@ -134,10 +132,10 @@ impl KeptDetail {
     }
 }
 
-/// Looks at each contact alone, then beside the others: what is left of their mismatches, ρⱼ = δⱼ −
-/// u(pⱼ)·nⱼ, must be no more than the noise of touches. A ball that is bounced by engraved lines is
-/// smoothed by its window, so it is averaged first, ρ̄ = Σ gₖ ρₖ / Σ gₖ with variance Σ gₖ² σₖ² /
-/// (Σ gₖ)², gₖ = wₖ exp(−|pₖ − pⱼ|² / b²); then over the contacts within a radius
+/// Compares each contact alone, then beside the others: the residuals of their mismatches, ρⱼ = δⱼ
+/// − u(pⱼ)·nⱼ, must not exceed the noise of touches. The window smooths a ball bounced by engraved
+/// lines, so the residual is averaged first, ρ̄ = Σ gₖ ρₖ / Σ gₖ with variance Σ gₖ² σₖ² / (Σ gₖ)²,
+/// gₖ = wₖ exp(−|pₖ − pⱼ|² / b²); then over the contacts within a radius
 ///
 /// Σ wⱼ ρ̄ⱼ² ≤ Σ wⱼ (l² σ̄ⱼ² + ε²).
 #[expect(clippy::too_many_lines)]
@@ -171,7 +169,7 @@ fn agreement_of(evidence: &Evidence<'_>) -> Agreement {
         .zip(&agreement.mismatch)
         .map(rest)
         .collect();
-    // its square, and what it may be, m²
+    // squared averaged residual, and its limit, m²
     let averaged = |contact: &MeanContact| {
         let (mut sum, mut variance, mut weights) = (0.0, 0.0, 0.0);
         contacts.near(
@@ -212,7 +210,7 @@ fn agreement_of(evidence: &Evidence<'_>) -> Agreement {
     agreement
 }
 
-/// How far the ball of a contact is above the scan, m; negative: in it.
+/// Height of a contact's ball above the scan, m; negative: in it.
 fn mismatch_of(evidence: &Evidence<'_>, contact: &MeanContact) -> Option<f64> {
     let radius = evidence.params.radius;
     let centre = contact.point + contact.normal * radius;
@@ -225,10 +223,10 @@ fn mismatch_of(evidence: &Evidence<'_>, contact: &MeanContact) -> Option<f64> {
     (is_along && distance > (1.0 - LARGEST_MISMATCH) * radius).then_some(distance - radius)
 }
 
-/// Which parts of the scan are finer than the tip, with vertices that scatter less than touches do.
+/// Test for parts of the scan finer than the tip, with vertices that scatter less than touches.
 struct Fineness<'a> {
     evidence: &'a Evidence<'a>,
-    /// by vertex, m; not a number: not looked at yet
+    /// by vertex, m; NaN: not yet computed
     scatter: Vec<f64>,
     near: BoxQuery,
     around: Vec<f64>,
@@ -245,7 +243,7 @@ impl<'a> Fineness<'a> {
         }
     }
 
-    /// Around a contact.
+    /// Whether the scan is fine around a contact.
     fn is_fine(&mut self, contact: &MeanContact) -> bool {
         let (scan, radius) = (self.evidence.scan, self.evidence.params.radius);
         let reach = Vector3::repeat(AROUND * radius);
@@ -273,7 +271,7 @@ impl<'a> Fineness<'a> {
     }
 }
 
-/// How far a vertex is off the straightest of the lines through it from one neighbour to the one
+/// Distance of a vertex from the straightest of the lines through it from one neighbour to the one
 /// across, along its normal, m.
 fn scatter_of(scan: &TriMesh, vertex: VertexId) -> f64 {
     let star = scan.star(vertex);

@@ -1,50 +1,50 @@
-//! Outliers: contacts that contradicted earlier ones at their place; counted, and the last of them
-//! kept for inspection.
+//! Outliers: contacts that contradict earlier ones at their place; counted, and the latest kept for
+//! inspection.
 
 use std::collections::VecDeque;
 
 use nalgebra::{Point3, Vector3};
 
-/// Contacts one after the other that were rejected.
+/// Consecutive rejected contacts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outlier {
-    /// when it began, ns
+    /// stamp of the first contact, ns
     pub stamp_ns: i64,
-    /// where the contact was that contradicted most, m, in O
+    /// point of the contact with the largest contradiction, m, in O
     pub point: Point3<f64>,
-    /// … and its unit normal, in O
+    /// unit normal of that contact, in O
     pub normal: Vector3<f64>,
-    /// how far it was off, m; positive outside
+    /// distance from the earlier surface, m; positive outside
     pub innovation: f64,
-    /// how many standard deviations that was
+    /// distance from the earlier surface in standard deviations
     pub sigmas: f64,
-    /// how many contacts
+    /// number of contacts
     pub contacts: u64,
 }
 
-/// All that was rejected.
+/// Counts of rejected contacts, and the latest outliers.
 #[derive(Clone, Debug, Default)]
 pub struct Outliers {
-    /// how many contacts were judged
+    /// number of contacts
     pub contacts: u64,
-    /// how many of them were rejected
+    /// number of rejected contacts
     pub rejected: u64,
-    /// how many places moved because a second pass agreed
+    /// number of places relocated by an agreeing second pass
     pub relocated: u64,
     last: VecDeque<Outlier>,
     last_ns: i64,
 }
 
-/// So many are kept.
+/// Number of outliers in memory.
 const KEPT: usize = 64;
 
 impl Outliers {
-    /// The last ones, in order of time.
+    /// The latest outliers, in order of time.
     pub fn last(&self) -> impl Iterator<Item = &Outlier> + '_ {
         self.last.iter()
     }
 
-    /// Counts a contact; those within `pause_ns` are one outlier.
+    /// Counts a contact; contacts within `pause_ns` of each other form one outlier.
     pub(in crate::reconstruct) fn note(&mut self, outlier: Outlier, pause_ns: i64) {
         self.rejected += 1;
         let goes_on = outlier.stamp_ns.saturating_sub(self.last_ns) <= pause_ns;

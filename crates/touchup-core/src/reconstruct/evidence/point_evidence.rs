@@ -12,50 +12,49 @@ use crate::reconstruct::evidence::scan_distance::ScanDistance;
 use crate::reconstruct::field::inner_corner::is_inner_corner;
 use crate::reconstruct::field::piecewise::{FieldParams, FieldScratch, FieldValue};
 
-/// Values are cut off at ± this many cells: far from the surface only the sign matters.
+/// Limit of the values, in cells: far from the surface only the sign matters.
 const WIDEST: f64 = 2.7;
-/// The scan goes straight on beyond an open rim for this many cells: up to the corners of those
-/// that the rim runs through.
+/// Straight continuation of the scan beyond an open rim, in cells: up to the corners of the cells
+/// on the rim.
 const RIM_REACH: f64 = 1.732;
 
-/// How each kind of evidence is weighted.
+/// Weights of the kinds of evidence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EvidenceParams {
-    /// radius of the ball, or how large the tip is, m
+    /// radius of the ball, or size of another tip, m
     pub radius: f64,
     /// the fit of the contacts
     pub field: FieldParams,
-    /// the scan supports what is nearer to it than this, m
+    /// maximum distance at which the scan counts as evidence, m
     pub scan_reach: f64,
 }
 
-/// How deep the ball may seem to be in the surface by noise alone, in radii.
+/// Depth of the ball in the surface from noise alone, in radii.
 const SWEPT_MARGIN: f64 = 0.027;
-/// Contacts all around a point support it up to this distance along the surface, in radii.
+/// Support of contacts all around a point, along the surface, in radii.
 const INNER_SUPPORT: f64 = 1.3;
-/// The last contacts of a surface support what is beyond them up to this, in radii.
+/// Support of the last contacts of a surface beyond them, in radii.
 const BORDER_SUPPORT: f64 = 0.75;
-/// Two touched surfaces go on towards their common edge up to this, in radii.
+/// Continuation of two touched surfaces towards their common edge, in radii.
 const EDGE_SUPPORT: f64 = 1.0;
-/// The tilted plane at an edge that the ball rolled over goes on up to this, in radii.
+/// Continuation of the tilted plane at an edge that the ball rolled over, in radii.
 const FAN_SUPPORT: f64 = 0.25;
-/// A contact supports what is nearer to its surface than this, in radii: behind it may be another
+/// Maximum distance from its surface at which a contact counts, in radii: behind it may be another
 /// wall.
 const TOUCH_DEPTH: f64 = 0.8;
-/// The ball is free when nothing is touched within this distance of its centre, in radii.
+/// Minimum distance of a free ball's centre from any contact, in radii.
 pub(in crate::reconstruct) const FREE_REACH: f64 = 1.5;
-/// The scan is rejected within this distance of a contact that faces alike, in radii …
+/// Distance from a contact that faces alike within which the scan is rejected, in radii.
 pub(in crate::reconstruct) const SCAN_REMOVAL: f64 = 1.3;
-/// … and of any contact within a radius over this.
+/// Divisor of the radius: the scan is rejected within that distance of any contact.
 const WALL_REMOVAL: f64 = 3.0;
-/// Cosine of the widest angle between normals that face alike.
+/// Cosine of the maximum angle between normals that face alike.
 const ALIKE: f64 = 0.6;
-/// A scan that the ball came nearer to than its radius and this was swept away, in radii.
+/// The ball's centre within its radius plus this distance, in radii, sweeps the scan away.
 pub(in crate::reconstruct) const SWEPT_REACH: f64 = 0.067;
 
 impl EvidenceParams {
-    /// Settings that hold for a ball of `radius` (m) and a scan whose points are off by `noise`
-    /// (m).
+    /// Settings for a ball of `radius` (m) and a scan with points off by `noise` (m).
     pub fn new(radius: f64, noise: f64) -> Self {
         Self {
             radius,
@@ -68,15 +67,15 @@ impl EvidenceParams {
 /// The evidence for a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// the scan, which nothing contradicts
+    /// the scan, without contradiction
     Scan,
     /// touches
     Touch,
     /// the scan, beside touches of another surface
     Both,
-    /// nothing nearby: to be filled
+    /// nothing nearby; filled
     Nothing,
-    /// nothing, deep inside or far outside the scan: to be filled, with a pull towards the scan
+    /// nothing, deep inside or far outside the scan; filled with a pull towards the scan
     Far,
     /// nothing, just beyond an open rim of the scan: it goes straight on
     Rim,
@@ -93,21 +92,19 @@ pub(in crate::reconstruct) struct NodeState {
     pub source: Source,
     /// the scan's own value, m
     pub scan: f64,
-    /// where nothing is known: value of a touched surface going straight on, m, and its weight, 0
-    /// to 1
+    /// without evidence: value of a touched surface going straight on, m, and its weight, 0 to 1
     pub straight: (f64, f64),
-    /// the ball was here: f is no less than this, m
+    /// lower bound of f from the presence of the ball here, m
     pub least: f64,
-    /// … and ended its path here without touching anything, deep inside the scan
+    /// a free path of the ball ended here, deep inside the scan, without a contact
     pub is_free_end: bool,
-    /// it is out of reach of all evidence, and was looked at because a surface that is filled in
-    /// goes on there
+    /// out of reach of all evidence, evaluated for the continuation of a filled surface
     pub is_further: bool,
     /// value of the field of the touches, m; `None` out of their support
     pub touched_value: Option<f64>,
-    /// … in an inner corner that two touched surfaces go on into
+    /// whether it is in an inner corner that two touched surfaces extend into
     pub is_corner: bool,
-    /// number of the renewal that gave it this value
+    /// number of the renewal of this value
     pub renewal: u32,
 }
 
@@ -129,7 +126,7 @@ impl NodeState {
         }
     }
 
-    /// Whether nothing is known here, so that the value is filled in.
+    /// Whether nothing is known here, so the value needs a fill.
     pub fn is_open_question(&self) -> bool {
         matches!(self.source, Source::Nothing | Source::Far | Source::Rim)
     }
@@ -143,12 +140,12 @@ impl NodeState {
         }
     }
 
-    /// Whether it is on the other side of the skin than in the scan.
+    /// Whether the node is on the other side of the skin than of the scan.
     pub fn is_turned(&self) -> bool {
         (self.value < 0.0) != (self.scan < 0.0)
     }
 
-    /// Whether it shows another surface than `other`, by more than `slack` (m).
+    /// Whether the surface differs from `other` by more than `slack` (m).
     pub fn differs(&self, other: &Self, slack: f64) -> bool {
         self.source != other.source
             || (self.value < 0.0) != (other.value < 0.0)
@@ -156,48 +153,47 @@ impl NodeState {
     }
 }
 
-/// The scan is not used where it moves a touch, which is by gate × σₜ² / σₛ at most, by less than
-/// this share of what that may be off anyway.
+/// Share of the uncertainty of a touch below which its displacement by the scan, at most gate × σₜ²
+/// / σₛ, is negligible and the scan stays unused.
 const NOTICED: f64 = 0.1;
 
-/// Free space ends a touched surface farther than this from its last contact, in radii …
+/// Distance from its last contact beyond which free space ends a touched surface, in radii.
 const ENDS_FROM: f64 = 0.25;
-/// … and where the ball was deeper in it than this, in radii, and so many standard deviations of
-/// the contact.
+/// Minimum depth of the ball in a touched surface that ends there: in radii, and in standard
+/// deviations of the contact.
 const ENDS_MARGIN: f64 = 0.05;
 const ENDS_SIGMAS: f64 = 2.0;
 
-/// Farther behind the scan by each of these times its distance …
+/// Distances behind the scan of the test for further scan, in multiples of that of the point.
 const AWAY: [f64; 3] = [2.0, 6.0, 18.0];
-/// … all of the scan is as far away as its foot, to this share: nothing else of it is there.
+/// Minimum distance of the scan from the test points of [`AWAY`], as a share of the distance of its
+/// foot, for no further scan.
 const ALONE: f64 = 0.7;
 
 /// All evidence.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Evidence<'a> {
-    /// how it is weighted
+    /// weights
     pub params: &'a EvidenceParams,
-    /// what was touched
+    /// the contacts
     pub contacts: &'a ContactMap,
-    /// where the ball has been
+    /// the swept volume of the ball
     pub free_space: &'a FreeSpace,
     /// the original scan
     pub scan: &'a TriMesh,
-    /// … and the tree over its faces
+    /// tree over the faces of the scan
     pub tree: &'a FaceTree,
-    /// how well the scan was known before; `None`: where something was touched it does not count
+    /// prior uncertainty of the scan; `None`: touches fully replace the scan
     pub prior: Option<UncertaintyParams>,
-    /// the contacts that the scan agrees with: around them it is the surface, moved to where they
-    /// are
+    /// the contacts that the scan agrees with: around them the scan, moved to them, is the surface
     pub agreement: Option<&'a Agreement>,
-    /// whether the scan has no rim, so that what is behind it is known: then the patch has none
-    /// either
+    /// whether the scan has no rim, so that its back is known: then the patch has no rim either
     pub is_closed: bool,
 }
 
 impl Evidence<'_> {
-    /// The field at `x` (m, in O), a node of a lattice of `pitch` (m), with the scan's part in
-    /// `scan`.
+    /// The field at `x` (m, in O), a node of a lattice of `pitch` (m), with the distance of the
+    /// scan in `scan`.
     pub(in crate::reconstruct) fn beside(
         &self,
         scan: &ScanDistance,
@@ -236,7 +232,7 @@ impl Evidence<'_> {
                 straight = Some(((x - scan.foot).dot(&scan.normal), 1.0));
             }
         }
-        // the scan is used here for its side alone, which means nothing behind the part
+        // only the side of the scan counts here, which means nothing behind the part
         if source == Source::Far && swept_depth <= 0.0 && self.is_behind_part(scan, x, scratch) {
             source = Source::Beyond;
         }
@@ -264,15 +260,15 @@ impl Evidence<'_> {
         }
     }
 
-    /// The scan as seen from `x` (m, in O); `None` where it has no face.
+    /// Distance of the scan at `x` (m, in O); `None` without a face.
     pub fn scan_at(&self, x: &Point3<f64>) -> Option<ScanDistance> {
         ScanDistance::at(self.scan, self.tree, x)
     }
 
-    /// The field of the touches at `x` (m, in O), which take the place of the scan by the gain σₛ²
-    /// / (σₛ² + σₜ²) of the nearest one; `None` where none is within reach.
+    /// The field of the touches at `x` (m, in O), which replace the scan by the gain σₛ² / (σₛ² +
+    /// σₜ²) of the nearest one; `None` without contacts in reach.
     ///
-    /// - `scan`: as seen from there, where that is known.
+    /// - `scan`: distance of the scan there, if known.
     pub fn touched(
         &self,
         x: &Point3<f64>,
@@ -296,16 +292,16 @@ impl Evidence<'_> {
         Some(found)
     }
 
-    /// Ends a touched surface beyond its last contact where the ball was: it rolled around an edge
-    /// there, or sank into a hole.
+    /// Ends a touched surface beyond its last contact at the ball: it rolled around an edge there,
+    /// or sank into a hole.
     pub(in crate::reconstruct) fn end_at_free_space(
         &self,
         found: &mut FieldValue,
         x: &Point3<f64>,
     ) {
         let radius = self.params.radius;
-        // a tip of another shape reaches along its flank, and the nearest place of it says little
-        // of its surface
+        // a tip of another shape reaches along its flank, and its nearest place says little of its
+        // surface
         if found.lateral() < ENDS_FROM * radius || !self.free_space.is_of_ball() {
             return;
         }
@@ -322,7 +318,7 @@ impl Evidence<'_> {
         }
     }
 
-    /// The field of the touches where they support the point, else that of the scan where it holds.
+    /// The field of the touches if they support the point, else of the scan if it holds.
     fn beside_touches(&self, touched: &FieldValue, scan: &ScanDistance) -> (f64, Source) {
         let p = self.params;
         let lateral = touched.lateral();
@@ -340,7 +336,7 @@ impl Evidence<'_> {
         let is_wall = scan.normal.dot(&touched.gradient) < ALIKE;
         let ends_at_wall = is_wall && scan.value > touched.value;
         if (ends_at_wall || !is_supported) && self.scan_holds(scan) {
-            // a wall of the scan ends the surface that was touched
+            // a wall of the scan ends the touched surface
             return (
                 if is_wall {
                     scan.value.max(touched.value)
@@ -357,7 +353,7 @@ impl Evidence<'_> {
         }
     }
 
-    /// Whether the scan has the shape that was touched here, and in more detail.
+    /// Whether the scan has the touched shape here, in more detail.
     fn is_detail(
         &self,
         touched: Option<&FieldValue>,
@@ -375,7 +371,7 @@ impl Evidence<'_> {
             return false;
         };
         let Some(touched) = touched else { return true };
-        // where a touched surface ends the scan may go around a blurred edge
+        // at the end of a touched surface the scan may go around a blurred edge
         if around == ContactsAround::BentOrOpen && scan.normal.dot(&touched.gradient) < BENT {
             return false;
         }
@@ -389,9 +385,9 @@ impl Evidence<'_> {
         agreement.is_alike(scan.value - touched.value, part)
     }
 
-    /// Whether a point out of reach of contacts that is behind the scan is behind the part: a
-    /// radius nearer to the scan it is in front of a touched surface that faces away from there,
-    /// and farther away from both there is no other scan.
+    /// Whether a point out of reach of contacts and behind the scan is behind the part: a radius
+    /// nearer to the scan it is in front of a touched surface that faces away from there, and
+    /// farther away from both there is no other scan.
     fn is_behind_part(
         &self,
         scan: &ScanDistance,
@@ -419,8 +415,8 @@ impl Evidence<'_> {
         })
     }
 
-    /// The touched surface beyond its support: it goes straight on, unless the ball rolled over an
-    /// edge there, and not out of the scan.
+    /// Value and weight of the touched surface beyond its support: straight on, unless the ball
+    /// rolled over an edge there, and not out of the scan.
     fn straight_on(&self, touched: &FieldValue, scan: &ScanDistance) -> Option<(f64, f64)> {
         let p = self.params;
         let inside = (1.0 - scan.value / p.scan_reach).clamp(0.0, 1.0);
@@ -430,8 +426,8 @@ impl Evidence<'_> {
         goes_on.then(|| (touched.value, inside * share.clamp(0.0, 1.0).powi(2)))
     }
 
-    /// Whether two touched surfaces go straight on into an inner corner, there where the field was
-    /// evaluated last.
+    /// Whether two touched surfaces go straight on into an inner corner, at the point of the last
+    /// evaluation.
     fn is_corner(&self, touched: &FieldValue, scratch: &FieldScratch) -> bool {
         let p = self.params;
         touched.value.abs() <= TOUCH_DEPTH * p.radius
@@ -448,8 +444,8 @@ impl Evidence<'_> {
         }
     }
 
-    /// Whether the scan holds at its foot: near, not swept, and no contact beside it contradicts
-    /// it.
+    /// Whether the scan holds at its foot: near, not swept, without contradiction by a contact
+    /// beside it.
     fn scan_holds(&self, scan: &ScanDistance) -> bool {
         let p = self.params;
         if scan.value.abs() > p.scan_reach || scan.is_on_rim || self.is_swept_away(scan) {
@@ -482,15 +478,15 @@ impl Evidence<'_> {
             .is_some_and(|(distance, _)| distance < limit)
     }
 
-    /// How deep `x` lies in the space that the ball went through, m, and where it was then; `None`
-    /// far from there.
+    /// Depth of `x` in the space that the ball went through, m, and its centre there; `None` far
+    /// from there.
     pub(in crate::reconstruct) fn free_depth(&self, x: &Point3<f64>) -> Option<(f64, Point3<f64>)> {
         let (distance, centre) = self.free_space.nearest(x)?;
         Some(((1.0 - SWEPT_MARGIN) * self.params.radius - distance, centre))
     }
 
-    /// How deep `x` lies in the space that the ball went through, m, and whether that ball ended
-    /// its path here freely.
+    /// Depth of `x` in the space that the ball went through, m, and whether its path ended freely
+    /// here.
     fn swept_depth(&self, x: &Point3<f64>) -> (f64, bool) {
         let p = self.params;
         let Some((depth, centre)) = self.free_depth(x) else {
@@ -515,7 +511,7 @@ mod tests {
     use crate::reconstruct::{ContactSigma, SurfaceContact};
     use crate::stylus::{TipBody, TipPlace, TipShape};
 
-    /// The face z = 0 is touched up to the edge y = 0, and the ball rolls around it by 60°: 0.5 r
+    /// The face z = 0 has contacts up to the edge y = 0, and the ball rolls around it by 60°: 0.5 r
     /// beyond, the face is 0.26 r deep in it.
     #[test]
     #[expect(clippy::too_many_lines)]

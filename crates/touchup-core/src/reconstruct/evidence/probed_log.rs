@@ -1,4 +1,4 @@
-//! The touches themselves, downsampled in time, of which features are measured.
+//! The touches for feature measurement, downsampled in time.
 
 use nalgebra::Point3;
 
@@ -10,32 +10,32 @@ use crate::reconstruct::incremental::history::Direction;
 use crate::reconstruct::table::CellTable;
 use crate::stylus::ProbedPoint;
 
-/// Touches in order of time. Their number is bounded by the surface that they are on: when there
-/// are more, every second one is dropped of each cell that has many.
+/// Touches in order of time. Their surface bounds their number: beyond it, each cell with many
+/// loses every second touch.
 #[derive(Clone, Debug)]
 pub(crate) struct ProbedLog {
-    /// radius of the tip when it is a ball, m
+    /// radius of a ball tip, m
     ball: Option<f64>,
     points: Vec<ProbedPoint>,
-    /// how many of them are in each cell
+    /// number of touches in each cell
     of_cell: CellTable<LatticeNode, usize>,
     undone: Vec<ProbedPoint>,
-    /// strokes begun and not undone
+    /// number of strokes begun and not undone
     strokes: u32,
     spacing_ns: i64,
 }
 
-/// Touches closer together in time are redundant: the window in which they are smoothed is eight
+/// Minimum time between touches: closer ones are redundant, as their smoothing window is eight
 /// times as long.
 const SPACING_NS: i64 = 4_000_000;
-/// So many touches are kept wherever they are: four minutes of them, 10 MB.
+/// Number of touches always in memory: four minutes, 10 MB.
 const ALWAYS_KEPT: usize = 1 << 16;
-/// … and so many more for each cell of the surface: 0.1 mm apart they would be one for each of
-/// their places.
+/// Further touches for each cell of the surface: at 0.1 mm distance they would be one for each
+/// place.
 const OF_A_CELL: usize = 64;
 /// Edge of a cell, m.
 const CELL: f64 = 1e-3;
-/// So many are kept of however large a part.
+/// Maximum number of touches, for a part of any size.
 const MOST_POINTS: usize = 1 << 20;
 
 fn cell_of(point: &Point3<f64>) -> LatticeNode {
@@ -45,7 +45,7 @@ fn cell_of(point: &Point3<f64>) -> LatticeNode {
 impl ProbedLog {
     /// An empty log.
     ///
-    /// - `ball`: radius of the tip when it is a ball, m.
+    /// - `ball`: radius of a ball tip, m.
     pub fn new(ball: Option<f64>) -> Self {
         Self {
             ball,
@@ -68,7 +68,7 @@ impl ProbedLog {
         self.strokes += 1;
     }
 
-    /// Keeps a contact, which may be one of two of its touch, unless the last one is too recent.
+    /// Adds a contact, possibly one of two of its touch, unless the last touch is too recent.
     pub(in crate::reconstruct) fn note(
         &mut self,
         touch: &TipTouch,
@@ -112,7 +112,7 @@ impl ProbedLog {
         });
     }
 
-    /// Drops every second touch of each cell that has more than `few`.
+    /// Drops every second touch of each cell with more than `few`.
     fn thin(&mut self, few: usize) {
         let (of_cell, mut seen) = (&self.of_cell, CellTable::<LatticeNode, usize>::default());
         self.points.retain(|touch| {
@@ -131,7 +131,7 @@ impl ProbedLog {
             .for_each(|touch| *self.of_cell.get_or_default(cell_of(&touch.point)) += 1);
     }
 
-    /// Takes the last stroke back, or does the one again that was undone last.
+    /// Undoes the last stroke, or redoes the last undone one.
     pub(in crate::reconstruct) fn exchange(&mut self, direction: Direction) {
         match direction {
             Direction::Undo => {
@@ -210,8 +210,8 @@ mod tests {
         );
     }
 
-    /// An hour without a pause over 6 mm x 6 mm, 30 mm/s: what is kept has the bound of its cells
-    /// at any time, and every cell keeps many of its touches.
+    /// An hour without a pause over 6 mm x 6 mm, 30 mm/s: the log stays within the bound of its
+    /// cells, and every cell keeps many of its touches.
     #[test]
     fn an_hour_on_a_small_part_keeps_what_its_surface_bounds() {
         let mut log = ProbedLog::new(Some(1.5e-3));

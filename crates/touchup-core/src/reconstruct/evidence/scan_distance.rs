@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::mesh::{FaceTree, TriMesh, is_on_rim, pseudo_normal};
 
-/// The scan as seen from one point.
+/// Signed distance and foot on the scan for one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ScanDistance {
     /// signed distance, m: positive outside
@@ -18,7 +18,7 @@ pub(crate) struct ScanDistance {
 }
 
 impl ScanDistance {
-    /// Signed distance and foot of `scan` at `x` (m, in O); `None` where there is no face.
+    /// Signed distance and foot of `scan` at `x` (m, in O); `None` without a face.
     pub fn at(scan: &TriMesh, tree: &FaceTree, x: &Point3<f64>) -> Option<Self> {
         let hit = tree.closest(scan, x, f64::INFINITY)?;
         let normal = pseudo_normal(scan, &hit);

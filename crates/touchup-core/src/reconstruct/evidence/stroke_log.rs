@@ -1,41 +1,41 @@
-//! Which samples each stroke is made of.
+//! The samples of each stroke.
 
 use serde::{Deserialize, Serialize};
 
 use crate::reconstruct::incremental::history::Direction;
 use crate::stylus::{STROKE_PAUSE_NS, TouchState};
 
-/// The samples of a stroke: from touch-down to the touch-down of the next one, so with them where
-/// the tip went after it.
+/// The samples of a stroke: from touch-down to the next touch-down, so including the path of the
+/// tip after it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StrokeSpan {
     /// stamp of the first sample, ns
     pub from_ns: i64,
-    /// the first stamp that is not of it any more, ns; the largest there is where no stroke follows
+    /// stamp of the first sample after it, ns; the maximum without a next stroke
     pub until_ns: i64,
 }
 
 impl StrokeSpan {
-    /// Whether a sample of this stamp is of the stroke.
+    /// Whether a sample of this stamp is part of the stroke.
     pub fn contains(&self, stamp_ns: i64) -> bool {
         (self.from_ns..self.until_ns).contains(&stamp_ns)
     }
 
-    /// Whether this stamp, ns, is that of its touch-down. Where other samples were taken out, the
-    /// bias that is followed through them may move it by some samples.
+    /// Whether this stamp, ns, is that of its touch-down. If other samples are missing, the bias,
+    /// which follows the samples, may move it by some samples.
     pub fn begins_at(&self, stamp_ns: i64) -> bool {
         self.from_ns.abs_diff(stamp_ns) < STROKE_PAUSE_NS.unsigned_abs() / 2
     }
 }
 
-/// When strokes began. It grows by some bytes with each of them.
+/// Start times of strokes. Grows by some bytes per stroke.
 #[derive(Clone, Debug, Default)]
 pub(in crate::reconstruct) struct StrokeLog {
-    /// stamps of touch-down, also of strokes that were undone, ns, in order of time
+    /// stamps of touch-down, undone strokes included, ns, in order of time
     begun_ns: Vec<i64>,
-    /// which of them count, in order …
+    /// indices of the strokes that count, in order
     done: Vec<usize>,
-    /// … and which were undone, the last one last
+    /// indices of the undone strokes, the latest last
     undone: Vec<usize>,
     /// stamp of the first sample since the tip was free, ns
     touched_down_ns: Option<i64>,
@@ -43,7 +43,7 @@ pub(in crate::reconstruct) struct StrokeLog {
 }
 
 impl StrokeLog {
-    /// Notes what the force says at the next sample.
+    /// Records the touch state of the next sample.
     pub fn note(&mut self, stamp_ns: i64, state: TouchState) {
         if state == TouchState::Free {
             self.touched_down_ns = None;
@@ -52,11 +52,11 @@ impl StrokeLog {
         }
     }
 
-    /// Notes a contact, the first one of a stroke or another one of the last stroke.
+    /// Records a contact, the first of a stroke or a further one of the last stroke.
     pub fn note_contact(&mut self, stamp_ns: i64, is_first: bool) {
         if is_first {
             let down_ns = self.touched_down_ns.unwrap_or(stamp_ns);
-            // without a free sample in between, as where it was undone while touching, it goes on
+            // after an undo during a touch, without a free sample in between, the stroke goes on
             // from there
             let from_ns = self
                 .last_contact_ns
@@ -68,7 +68,7 @@ impl StrokeLog {
         self.last_contact_ns = Some(stamp_ns);
     }
 
-    /// The last stroke was undone, or the one was done again that was undone last.
+    /// Records an undo of the last stroke, or a redo of the last undone one.
     pub fn exchange(&mut self, direction: Direction) {
         let (from, to) = match direction {
             Direction::Undo => (&mut self.done, &mut self.undone),
@@ -77,7 +77,7 @@ impl StrokeLog {
         to.extend(from.pop());
     }
 
-    /// How many strokes count.
+    /// Number of strokes that count.
     pub fn count(&self) -> usize {
         self.done.len()
     }
@@ -97,7 +97,7 @@ impl StrokeLog {
 mod tests {
     use super::*;
 
-    /// A touch of three samples from `ms` on, of which the middle one is a contact.
+    /// A touch of three samples from `ms` on, the middle one a contact.
     fn touch(log: &mut StrokeLog, ms: i64) {
         for (at, state) in [TouchState::Light, TouchState::Contact, TouchState::Free]
             .into_iter()

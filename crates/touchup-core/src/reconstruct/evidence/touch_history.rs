@@ -1,4 +1,4 @@
-//! The touch history: contacts, and the space that the tip went through.
+//! The touch history: contacts, and the swept volume of the tip.
 
 use nalgebra::Point3;
 
@@ -15,20 +15,20 @@ use crate::reconstruct::incremental::history::Direction;
 use crate::reconstruct::table::CellTable;
 use crate::stylus::{STROKE_PAUSE_NS, TipPlace, TouchState};
 
-/// A contact that the ball went into by more than this is none, in radii: four times the noise of a
-/// usual tracker.
+/// Maximum depth of the ball in a contact, in radii: a deeper one refutes it; four times the noise
+/// of a usual tracker.
 const REFUTED_DEPTH: f64 = 0.133;
-/// Where a contact is relocated, the ball has been nearer than this to the earlier surface, in
-/// radii.
+/// Distance from a relocated contact within which places of the ball, on the earlier surface, are
+/// forgotten, in radii.
 const FORGOTTEN: f64 = 1.1;
-/// A contact farther outside of the scan than this belongs to something else, in radii; so does one
-/// so far out of the box around it.
+/// Maximum distance of a contact outside of the scan, or outside of the box around it, in radii:
+/// farther contacts belong to something else.
 const OUTSIDE: f64 = 4.0;
-/// Normals within this many radii …
+/// Range of the normals compared for an edge, in radii.
 const FAN_WIDTH: f64 = 0.4;
-/// … that differ by more than 25° are those of an edge.
+/// Cosine of the angle between normals, 25°, above which they belong to an edge.
 const FAN_COSINE: f64 = 0.906;
-/// A mean moves within its cell; what depends on it is looked for this many times as far.
+/// Range of the search for dependants of a moved mean, in fan widths: a mean moves within its cell.
 const MOVED: f64 = 2.0;
 
 /// All contacts and the free space.
@@ -38,11 +38,11 @@ pub(in crate::reconstruct) struct TouchHistory {
     pub free_space: FreeSpace,
     pub probed: ProbedLog,
     pub stroke_log: StrokeLog,
-    /// whether where the tip went counts; else `free_space` stays empty
+    /// whether free space counts as evidence; else `free_space` stays empty
     pub keeps_free_space: bool,
     /// size of the tip, m
     pub radius: f64,
-    /// radius of the tip when it is a ball, m
+    /// radius of a ball tip, m
     pub ball: Option<f64>,
     /// stamp of the last touch that counts, ns
     pub until_ns: i64,
@@ -63,7 +63,7 @@ impl TouchHistory {
             .last_contact_ns
             .is_none_or(|last| touch.stamp_ns.saturating_sub(last) > STROKE_PAUSE_NS);
         let Some(contact) = &touch.contact else {
-            // a firm touch of which no contact is known belongs to the stroke that it is in
+            // a firm touch without a known contact belongs to its stroke
             if touch.state == TouchState::Free
                 || touch.state == TouchState::Contact && !is_between_strokes
             {
@@ -87,7 +87,7 @@ impl TouchHistory {
             .as_ref()
             .map_or(std::slice::from_ref(contact), |two| two)
         {
-            // a wall that the ball would have to be nearer to is not touched: that is no outlier
+            // the ball cannot be on a wall that it would have to be nearer to: no outlier
             if two.is_some() && self.contacts.contradicts(contact) {
                 continue;
             }
@@ -104,7 +104,7 @@ impl TouchHistory {
         }
     }
 
-    /// What was touched up to this stamp is known, ns; never less than before.
+    /// Extends the time up to which touches are known, ns; never backwards.
     pub fn note_until(&mut self, stamp_ns: i64) {
         self.until_ns = self.until_ns.max(stamp_ns);
     }
@@ -115,13 +115,12 @@ impl TouchHistory {
         }
     }
 
-    /// How many strokes can be undone.
+    /// Number of undoable strokes.
     pub fn strokes(&self) -> usize {
         self.contacts.strokes().min(self.free_space.strokes())
     }
 
-    /// Takes the last stroke back, or does the one again that was undone last; returns whether
-    /// there was one.
+    /// Undoes the last stroke, or redoes the last undone one; returns whether there was one.
     pub fn exchange(&mut self, direction: Direction) -> bool {
         self.last_contact_ns = None;
         let is_possible = direction == Direction::Redo || self.strokes() > 0;
@@ -134,8 +133,8 @@ impl TouchHistory {
         has_changed
     }
 
-    /// Decides which contacts count and which are those of an edge, where there is new evidence;
-    /// returns where that is.
+    /// Decides near new evidence which contacts count and which belong to an edge; returns the
+    /// places.
     pub fn update(&mut self, scan: &TriMesh, tree: &FaceTree) -> GridChanges {
         let Self {
             contacts,
@@ -187,7 +186,7 @@ impl TouchHistory {
     }
 }
 
-/// These means and those within `reach` (m) of them, cut off at the reach of the store.
+/// These means and all within `reach` (m) of them, at most the reach of the map.
 fn beside(contacts: &ContactMap, means: &CellTable<u32, ()>, reach: f64) -> CellTable<u32, ()> {
     let mut beside = means.clone();
     for (at, ()) in means.iter() {
@@ -198,9 +197,9 @@ fn beside(contacts: &ContactMap, means: &CellTable<u32, ()>, reach: f64) -> Cell
     beside
 }
 
-/// Whether a contact is so far outside that the part of the scan cannot have been touched there.
-/// Beyond an open rim the scan has no outside: there it may be on what was not scanned, below a
-/// scan without sides or in a hole of it, but not beyond the box around it.
+/// Whether a contact is too far outside the scan to be on its part. Beyond an open rim the scan has
+/// no outside: a contact there may be on surface that was not scanned, below a scan without sides
+/// or in a hole of it, but not beyond the box around it.
 fn is_elsewhere(
     p: &Point3<f64>,
     scan: &TriMesh,

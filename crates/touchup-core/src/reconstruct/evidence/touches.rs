@@ -1,8 +1,8 @@
 //! From samples to touches: the true centre of the ball, and the contact there.
 //!
-//! The patch follows a few tens of milliseconds behind the stream, so position and force are
-//! smoothed by a window that looks as far ahead as back: it does not lag. Its length follows from
-//! the noise: as long as the velocity needs, and no longer than the path is a parabola.
+//! The patch follows a few tens of milliseconds behind the stream, so a window that looks as far
+//! ahead as back smooths position and force without lag. Its length follows from the noise: as long
+//! as the velocity needs, and no longer than the path is a parabola.
 
 use std::collections::VecDeque;
 
@@ -16,16 +16,16 @@ use crate::stylus::{
     WIDEST_CONE_COSINE,
 };
 
-/// A touch whose normal is uncertain by this many degrees has half the weight: what curved pieces
-/// take for smooth.
+/// Uncertainty of the normal that halves the weight of a touch, degrees: curved pieces pass for
+/// smooth within it.
 const UNCERTAIN_NORMAL: f64 = 5.0;
 
-/// How touches are found.
+/// Settings of the touch finder.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TouchFinderParams {
     /// radius of the ball, of the flat end or of the nose, m
     pub radius: f64,
-    /// which tip it is
+    /// shape of the tip
     pub shape: TipShape,
     /// stiffness of stylus and probe, N/m; `None`: rigid
     pub stiffness: Option<f64>,
@@ -33,12 +33,12 @@ pub struct TouchFinderParams {
     /// leaves the direction of 25 mm/s uncertain by 6°, which friction known from the stream turns
     /// into a normal within 1–2°.
     pub half_window_ns: i64,
-    /// a pause longer than this parts the stream, ns. Default 30 ms.
+    /// minimum pause that separates streams, ns. Default 30 ms.
     pub largest_gap_ns: i64,
-    /// cosine of the widest friction cone accepted; `None`: friction is not estimated, the normal
-    /// is the force. Default [`WIDEST_CONE_COSINE`].
+    /// cosine of the widest friction cone accepted; `None`: no friction estimate, the normal is the
+    /// force. Default [`WIDEST_CONE_COSINE`].
     pub cone_cosine: Option<f64>,
-    /// what the calibration leaves uncertain; `None`: the uncertainty of a contact is not estimated
+    /// residual uncertainty of the calibration; `None`: no uncertainty of contacts
     pub calibration: Option<CalibrationParams>,
 }
 
@@ -57,18 +57,18 @@ impl TouchFinderParams {
     }
 }
 
-/// What the ball touched.
+/// A contact of the tip with the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceContact {
     /// point of the surface, m, in O
     pub point: Point3<f64>,
     /// outward unit normal of the surface there, in O
     pub normal: Vector3<f64>,
-    /// how much it counts beside others: at most 1, less where the normal is uncertain
+    /// weight relative to others: at most 1, less for an uncertain normal
     pub weight: f64,
     /// ns
     pub stamp_ns: i64,
-    /// how well it is known; all 0 where that is not estimated
+    /// uncertainty; all 0 unless estimated
     pub sigma: ContactSigma,
 }
 
@@ -81,9 +81,9 @@ pub struct TipTouch {
     pub centre: Point3<f64>,
     /// from the tip to the handle, unit, in O
     pub axis: Vector3<f64>,
-    /// `None` in free motion, and where it is not known which point of the tip touches
+    /// `None` in free motion, and for an unknown point of contact on the tip
     pub contact: Option<SurfaceContact>,
-    /// what the force says
+    /// touch state from the force
     pub state: TouchState,
 }
 
@@ -108,13 +108,13 @@ pub struct TouchFinder {
     params: TouchFinderParams,
     body: TipBody,
     friction: Option<Friction>,
-    /// of the positions: of the distances from short pieces of the path to their parabolas, m
+    /// noise of the positions: of the distances from short pieces of the path to their parabolas, m
     noise: RunningMedian,
-    /// of the force
+    /// noise of the force
     force_noise: ForceNoise,
     /// samples since the last gap, as far as a window may still need them
     held: VecDeque<WindowEntry>,
-    /// the first of `held` whose touch has not been given out
+    /// index in `held` of the first touch not yet delivered
     next: usize,
 }
 
@@ -138,8 +138,8 @@ impl TouchFinder {
         })
     }
 
-    /// Takes the next sample, which is later than the one before; gives each touch whose window is
-    /// complete to `each`.
+    /// Adds the next sample, later than the one before; passes each touch with a complete window to
+    /// `each`.
     pub fn push(&mut self, sample: &ContactSample, mut each: impl FnMut(TipTouch)) {
         let tip = &sample.tip;
         if self.held.back().is_some_and(|last| {
@@ -172,7 +172,7 @@ impl TouchFinder {
         }
     }
 
-    /// Gives out what is held: the stream has ended or paused.
+    /// Delivers the remaining touches: the stream has ended or paused.
     pub fn flush(&mut self, mut each: impl FnMut(TipTouch)) {
         for at in self.next..self.held.len() {
             each(self.touch(at));
@@ -182,8 +182,8 @@ impl TouchFinder {
         self.next = 0;
     }
 
-    /// Kinetic friction as measured so far; `None` until the ball has slid far enough, or where
-    /// friction is not estimated.
+    /// Measured kinetic friction; `None` until the ball has slid far enough, or without a friction
+    /// estimate.
     pub fn friction(&self) -> Option<FrictionCoefficient> {
         self.friction.as_ref()?.coefficient()
     }
@@ -242,7 +242,7 @@ impl TouchFinder {
     }
 
     /// The longest window around a sample over which the path is a parabola and contact does not
-    /// change; the shortest in any case.
+    /// change; at least the shortest.
     fn window(&mut self, at: usize) -> Window {
         let longest = self.params.half_window_ns;
         let mut best = Window::new(&self.held[at], at, longest);
@@ -262,8 +262,8 @@ impl TouchFinder {
         best
     }
 
-    /// Variance of the centre where even the shortest window is no parabola, as after an outlier:
-    /// as much as the path is off it, in those of its noise. Such errors are alike in all of the
+    /// Variance of the centre if even the shortest window is no parabola, as after an outlier: the
+    /// distance of the path from it, in units of its noise. Such errors are alike in all of the
     /// window and do not average out in it.
     fn roughness(&self, motion: &SmoothedMotion) -> f64 {
         let noise = self.noise.length.max(LEAST_ROUGH * self.params.radius);
@@ -323,22 +323,22 @@ impl TouchFinder {
     }
 }
 
-/// What a contact counts of which it is not known how far up the side of the tip it was.
+/// Weight of a contact at an unknown height on the side of the tip.
 const VAGUE: f64 = 0.25;
-/// Halves of the windows that are tried, in eighths of the longest.
+/// Halves of the windows tried, in eighths of the longest.
 const WINDOWS: [i64; 4] = [3, 4, 6, 8];
-/// A path whose residuals are so many times the noise is no parabola any more.
+/// Residual, in units of noise, from which a path is no parabola.
 const ROUGH: f64 = 1.5;
-/// What the path of a calm hand over an edge is off a parabola, in radii.
+/// Distance of the path of a calm hand over an edge from a parabola, in radii.
 const LEAST_ROUGH: f64 = 0.02;
-/// Samples between two poses share their noise, so that it averages out more slowly than that of as
-/// many poses: in the velocity …
+/// Noise factor of the velocity: samples between two poses share their noise, so it averages out
+/// more slowly than for as many poses.
 const SHARED_NOISE: f64 = 1.3;
-/// … and, two of three samples sharing a pose, in the centre.
+/// Noise factor of the centre: two of three samples share a pose.
 const SHARED_POSE: f64 = 1.65;
 /// Lower bound of the noise of the positions, m: a good tracker at rest.
 const LEAST_NOISE: f64 = 1e-6;
-/// … and where it starts, m.
+/// Initial noise of the positions, m.
 const USUAL_NOISE: f64 = 0.03e-3;
 
 /// The samples around one.
@@ -369,7 +369,7 @@ impl Window {
         }
     }
 
-    /// Takes in all samples up to `half_ns` before and after.
+    /// Adds all samples up to `half_ns` before and after.
     fn widen(&mut self, held: &VecDeque<WindowEntry>, at: usize, half_ns: i64) {
         let middle = held[at].stamp_ns;
         while self.first > 0 && middle - held[self.first - 1].stamp_ns <= half_ns {

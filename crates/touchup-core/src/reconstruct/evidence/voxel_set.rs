@@ -1,28 +1,28 @@
-//! A voxel set: one thing is kept for each key, in cubes; strokes of them can be undone.
+//! A voxel set: one element per key, in cubes, with stroke undo.
 
 use crate::reconstruct::field::lattice::LatticeNode;
 use crate::reconstruct::incremental::history::{Direction, History};
 use crate::reconstruct::table::{CellTable, Key};
 
-/// Cubes kept for undoing: some tens of MB.
+/// Maximum number of cubes for undo: some tens of MB.
 const MOST_KEPT: usize = 2000;
 
-/// The things of one cube; `None` where there are none.
+/// The elements of one cube; `None` without any.
 type Bucket<T> = Option<Vec<T>>;
 
-/// A thing of which one is kept among those with the same key.
+/// An element of a voxel set, which holds one per key.
 pub(in crate::reconstruct) trait Keyed: Copy {
-    /// a small cell, and what else distinguishes the things in it
+    /// a small cell, and other distinctions between its elements
     type Key: Key;
-    /// Its key where the small cells have edge `cell` (m).
+    /// Key for small cells of edge `cell` (m).
     fn key(&self, cell: f64) -> Self::Key;
 }
 
-/// Things by the cubes they are in.
+/// Elements by their cubes.
 #[derive(Clone, Debug)]
 pub(in crate::reconstruct) struct VoxelSet<T: Keyed> {
     cell: f64,
-    /// whether a thing with this key is there
+    /// whether the set holds an element with this key
     is_kept: CellTable<T::Key, bool>,
     bins: CellTable<LatticeNode, Vec<T>>,
     history: History<LatticeNode, Bucket<T>>,
@@ -39,7 +39,7 @@ impl<T: Keyed> VoxelSet<T> {
         }
     }
 
-    /// Puts a thing into a cube, unless one with its key is there; returns whether it did.
+    /// Adds an element to a cube, unless its key is present; returns whether it did.
     pub fn add(&mut self, bin: LatticeNode, thing: T) -> bool {
         if std::mem::replace(self.is_kept.get_or_default(thing.key(self.cell)), true) {
             return false;
@@ -49,7 +49,7 @@ impl<T: Keyed> VoxelSet<T> {
         true
     }
 
-    /// Takes out of a cube what `stays` does not hold, and gives it to `each`.
+    /// Removes elements that fail `stays` from a cube, and passes them to `each`.
     pub fn retain(
         &mut self,
         bin: LatticeNode,
@@ -73,13 +73,13 @@ impl<T: Keyed> VoxelSet<T> {
         });
     }
 
-    /// What is in a cube.
+    /// The elements of a cube.
     #[inline]
     pub fn get(&self, bin: &LatticeNode) -> &[T] {
         self.bins.get(bin).map_or(&[], Vec::as_slice)
     }
 
-    /// All things, cube by cube.
+    /// All elements, cube by cube.
     pub fn iter(&self) -> impl Iterator<Item = &T> + '_ {
         self.bins.iter().flat_map(|(_, things)| things)
     }
@@ -88,18 +88,17 @@ impl<T: Keyed> VoxelSet<T> {
         self.history.note(bin, || self.bins.get(&bin).cloned());
     }
 
-    /// Begins a stroke, which can be undone.
+    /// Begins an undoable stroke.
     pub fn begin_stroke(&mut self) {
         self.history.begin();
     }
 
-    /// How many strokes can be undone.
+    /// Number of undoable strokes.
     pub fn strokes(&self) -> usize {
         self.history.len()
     }
 
-    /// Undoes the last stroke, or does the one again that was undone last; returns whether there
-    /// was one.
+    /// Undoes the last stroke, or redoes the last undone one; returns whether there was one.
     pub fn exchange(&mut self, direction: Direction) -> bool {
         let mut history = std::mem::replace(&mut self.history, History::new(MOST_KEPT));
         let has_changed = history.exchange(direction, |bin, past| self.swap(bin, past));
@@ -107,7 +106,7 @@ impl<T: Keyed> VoxelSet<T> {
         has_changed
     }
 
-    /// Exchanges the things of a cube with those that were kept; cubes inserted last go first.
+    /// Exchanges the elements of a cube with the kept ones; cubes inserted last go first.
     fn swap(&mut self, bin: LatticeNode, past: &mut Bucket<T>) {
         let before = past.take();
         let there = if before.is_some() {
