@@ -1,9 +1,7 @@
-//! Floating components: material that the ball went all around and never touched is attached to
-//! nothing.
+//! Floating components: untouched material that the ball went all around is attached to nothing.
 //!
-//! A scan that closes a hole over leaves its lid, or a plug, in the middle of it, where the ball
-//! never was. It is one piece of material within the space that was swept, and no part of the
-//! work-piece.
+//! A scan that closes a hole over leaves its lid, or a plug, in the middle of it, out of the ball's
+//! path. It is one piece of material within the swept volume, and no part of the work-piece.
 
 use std::collections::VecDeque;
 
@@ -12,11 +10,10 @@ use crate::reconstruct::field::grid::ReconstructionGrid;
 use crate::reconstruct::field::lattice::{LatticeNode, neighbours};
 use crate::reconstruct::table::CellTable;
 
-/// Nodes of a floating component at most: a plug eight radii wide and as high.
+/// Maximum number of nodes of a floating component: a plug eight radii wide and as high.
 const MOST: usize = 4000;
 
-/// The nodes of all floating components among the nodes `at` and around them, whose signs are
-/// final.
+/// Nodes of all floating components among and around the nodes `at`, which have final signs.
 pub(in crate::reconstruct) fn floating_components(
     grid: &mut ReconstructionGrid,
     evidence: &Evidence<'_>,
@@ -46,8 +43,7 @@ fn floating(
     let mut piece: CellTable<LatticeNode, ()> = std::iter::once((start, ())).collect();
     let mut next = VecDeque::from([start]);
     while let Some(node) = next.pop_front() {
-        // what was reached before is attached, or would have been found to float with this
-        // component
+        // a node reached before is attached, or would have been found to float with this component
         let is_known = !seen.insert_with(node, || ()).1;
         let is_attached =
             |state: &NodeState| matches!(state.source, Source::Touch | Source::Beyond);
@@ -64,7 +60,7 @@ fn floating(
     piece.iter().map(|(node, ())| node).collect()
 }
 
-/// Whether there is material at a node; beyond the evaluated nodes by the scan.
+/// Whether a node is in material; beyond the evaluated nodes by the scan.
 fn is_material(grid: &mut ReconstructionGrid, evidence: &Evidence<'_>, node: LatticeNode) -> bool {
     if let Some(state) = grid.nodes.get(&node) {
         return state.value < 0.0;

@@ -1,4 +1,4 @@
-//! The field at the nodes of the lattice, around everything that was touched or swept.
+//! The field at the nodes of the lattice, around all contacts and the swept volume.
 
 use std::collections::BTreeSet;
 
@@ -15,8 +15,8 @@ use crate::reconstruct::field::lattice::{
 use crate::reconstruct::field::piecewise::FieldScratch;
 use crate::reconstruct::table::CellTable;
 
-/// Changes of the evidence: where the contacts are whose mean is new or moved, and the centres that
-/// were kept, m, in O.
+/// Changes of the evidence: points of the contacts with a new or moved mean, and changed centres of
+/// the tip, m, in O.
 #[derive(Clone, Debug, Default)]
 pub(in crate::reconstruct) struct GridChanges {
     pub means: Vec<Point3<f64>>,
@@ -34,54 +34,53 @@ impl GridChanges {
     }
 }
 
-/// What a renewal changed.
+/// Changes from a renewal.
 #[derive(Clone, Debug, Default)]
 pub(in crate::reconstruct) struct Changed {
-    /// nodes that are new, or whose value or source is another
+    /// nodes that are new, or have a new value or source
     pub nodes: Vec<LatticeNode>,
-    /// those of them on which the surface in the cells around them depends
+    /// those that affect the surface in the cells around them
     pub at_surface: Vec<LatticeNode>,
-    /// cells that are to stay open now, or no more
+    /// cells that now stay open, or no longer do
     pub open: Vec<LatticeNode>,
 }
 
-/// Nodes that are looked at again, each with its earlier state, as far as that is known.
+/// Nodes for renewed evaluation, each with its earlier state, if known.
 pub(in crate::reconstruct) type EarlierStates = CellTable<LatticeNode, Option<NodeState>>;
 
-/// The field around everything that was touched or swept.
+/// The field around all contacts and the swept volume.
 #[derive(Clone, Debug, Default)]
 pub(in crate::reconstruct) struct ReconstructionGrid {
     pub lattice: Lattice,
-    /// every node looked at
+    /// every evaluated node
     pub nodes: CellTable<LatticeNode, NodeState>,
-    /// cells in which a freely moving ball alone would support the surface: they stay open
+    /// cells with a surface that only a freely moving ball would support: they stay open
     pub open: CellTable<LatticeNode, ()>,
-    /// the nodes at which a ball ended its path freely
+    /// nodes at the free ends of paths of the ball
     pub ends: CellTable<LatticeNode, ()>,
-    /// cells with a contact, and with a ball that went into the scan: what is around them is looked
-    /// at
+    /// cells with a contact, and with a ball that entered the scan: nodes around are evaluated
     touched: CellTable<LatticeNode, ()>,
     free_space: CellTable<LatticeNode, ()>,
-    /// signed distance of the scan at each of `nodes`: it never changes
+    /// signed distance of the scan at each of `nodes`; constant
     pub scan: Vec<ScanDistance>,
-    /// whether the scan has material at nodes that are not looked at, as far as that was evaluated
+    /// whether the scan has material at other nodes, cached
     pub beyond: CellTable<LatticeNode, bool>,
     pub renewals: u32,
     scratch: FieldScratch,
 }
 
-/// A distance field changes by no more than the distance between two points: between neighbours by
-/// a pitch, and by noise beyond.
+/// Maximum step of a distance field between neighbours, in pitches: the distance between the
+/// points, one pitch, and noise.
 const LARGEST_STEP: f64 = 1.1;
-/// Nodes within this many radii of a contact are looked at.
+/// Radius of evaluated nodes around a contact, in radii of the tip.
 const REACH: f64 = 2.8;
-/// … and within this many cells of a ball that went into the scan.
+/// Margin of evaluated nodes around a ball that entered the scan, in cells.
 const BALL_MARGIN: f64 = 2.0;
-/// Changes count most within this many radii.
+/// Radius within which changes count most, in radii of the tip.
 const NEAR: f64 = 1.1;
 
 impl ReconstructionGrid {
-    /// Without nodes yet.
+    /// A grid without nodes.
     pub fn new(lattice: Lattice) -> Self {
         Self {
             lattice,
@@ -89,10 +88,10 @@ impl ReconstructionGrid {
         }
     }
 
-    /// Brings the field up to date with the changes of `evidence`.
+    /// Updates the field with the changes of `evidence`.
     ///
-    /// - `changes`: taken in up to where they count most.
-    /// - `late`: earlier changes, taken in up to where they count at all.
+    /// - `changes`: applied up to the radius at which they count most.
+    /// - `late`: earlier changes, applied up to the radius at which they count at all.
     pub fn renew(
         &mut self,
         evidence: &Evidence<'_>,
@@ -142,8 +141,7 @@ impl ReconstructionGrid {
         self.update(evidence, &area, &look)
     }
 
-    /// Evaluates further nodes that are not known yet in and around `cells`: a surface that is
-    /// filled in goes on there.
+    /// Evaluates further unknown nodes in and around `cells`: a filled surface goes on there.
     pub fn look_further(&mut self, evidence: &Evidence<'_>, cells: &LatticeRegion) -> Changed {
         let (mut look, mut area) = (EarlierStates::default(), CellBox::EMPTY);
         for (cell, ()) in cells.iter() {
@@ -157,7 +155,7 @@ impl ReconstructionGrid {
         self.update(evidence, &area, &look)
     }
 
-    /// Evaluates a node that is not known yet; returns whether it is new.
+    /// Evaluates an unknown node; returns whether it is new.
     pub fn add(&mut self, evidence: &Evidence<'_>, node: LatticeNode, is_further: bool) -> bool {
         if self.nodes.contains(&node) {
             return false;
@@ -177,13 +175,13 @@ impl ReconstructionGrid {
         true
     }
 
-    /// Whether some corner of a cell was not looked at.
+    /// Whether a cell has an unevaluated corner.
     pub fn is_beyond(&self, cell: LatticeNode) -> bool {
         (0..8).any(|corner| !self.nodes.contains(&node_at(cell, corner)))
     }
 
-    /// Drops, or restores, the values of the touches at discontinuities: at the nodes looked at and
-    /// beside them.
+    /// Drops, or restores, the values of the touches at discontinuities: at the nodes evaluated
+    /// again and beside them.
     fn drop_discontinuities(&mut self, look: &mut EarlierStates, area: &mut CellBox) {
         let beside = |node: LatticeNode| std::iter::once(node).chain(neighbours(node));
         let near: CellTable<LatticeNode, ()> =
@@ -221,9 +219,9 @@ impl ReconstructionGrid {
     }
 
     /// Whether the field of the touches, `value` (m) at `node`, is discontinuous from outside into
-    /// the material towards a neighbour: the two are values of different surfaces, and which of
-    /// them is wrong is unknown. What is left around both fills the gap. Depends on the touched
-    /// values one step away alone.
+    /// the material towards a neighbour: the two are values of different surfaces, and the wrong
+    /// one is unknown. The remainder around both fills the gap. Depends on the touched values one
+    /// step away alone.
     fn is_discontinuous(&self, node: LatticeNode, value: f64) -> bool {
         let is_other = |other: f64| {
             (value < 0.0) != (other < 0.0)
@@ -262,8 +260,8 @@ impl ReconstructionGrid {
         }
     }
 
-    /// Adds the ends of paths near the changes: whether a path ended there depends on the path, and
-    /// on contacts beside its end.
+    /// Adds the ends of paths near the changes: the end of a path depends on the path, and on
+    /// contacts beside it.
     fn look_at_ends(
         &self,
         evidence: &Evidence<'_>,
@@ -283,7 +281,7 @@ impl ReconstructionGrid {
         }
     }
 
-    /// Adds the nodes near contacts, and those near the ball where it went into the scan.
+    /// Adds the nodes near contacts, and near a ball that entered the scan.
     fn widen(&mut self, evidence: &Evidence<'_>, changes: &GridChanges, look: &mut EarlierStates) {
         let radius = evidence.params.radius;
         let around_contact = ball((REACH * radius / self.lattice.pitch).ceil() as i32);
@@ -341,7 +339,7 @@ impl ReconstructionGrid {
         )
     }
 
-    /// Whether the skin in a cell is not the scan.
+    /// Whether the skin in a cell differs from the scan.
     pub fn is_in_region(&self, cell: LatticeNode) -> bool {
         let corners = || (0..8).filter_map(|corner| self.nodes.get(&node_at(cell, corner)));
         let is_on_rim = corners().any(|state| state.source == Source::Rim);
@@ -353,7 +351,7 @@ impl ReconstructionGrid {
         self.can_take(cell) && corners().any(is_other)
     }
 
-    /// Whether the field is known at all corners of a cell that is not to stay open.
+    /// Whether the field is known at all corners of a cell that need not stay open.
     pub fn can_take(&self, cell: LatticeNode) -> bool {
         let is_known = |node: LatticeNode| {
             self.nodes
@@ -363,7 +361,7 @@ impl ReconstructionGrid {
         !self.open.contains(&cell) && (0..8).all(|corner| is_known(node_at(cell, corner)))
     }
 
-    /// The values at the corners of the cells in a box.
+    /// Values at the corners of the cells in a box.
     pub fn values_in(&self, cells: &CellBox) -> NodeValues {
         let mut values = NodeValues::default();
         cells.widened(0, 1).each_in(&self.nodes, |node, state| {
@@ -375,15 +373,14 @@ impl ReconstructionGrid {
     }
 }
 
-/// How many nodes of a lattice of `pitch` (m) are looked at around one contact of a tip of `radius`
-/// (m).
+/// Number of nodes of a lattice of `pitch` (m) around one contact of a tip of `radius` (m).
 pub(in crate::reconstruct) fn nodes_around_contact(radius: f64, pitch: f64) -> f64 {
     4.0 / 3.0 * std::f64::consts::PI * (REACH * radius / pitch).powi(3)
 }
 
-/// About as many nodes are looked at around all of `contacts`: those of the cubes of half the reach
-/// that are next to one with a contact. Along a sheet these are three cubes high where what is
-/// looked at is four, which is made up for.
+/// Approximate number of nodes around all of `contacts`: of the cubes of half the reach that are
+/// next to one with a contact. Along a sheet these are three cubes high instead of the four
+/// evaluated, which the factor compensates.
 pub(in crate::reconstruct) fn nodes_around_contacts(
     contacts: impl Iterator<Item = Point3<f64>>,
     radius: f64,
@@ -395,7 +392,7 @@ pub(in crate::reconstruct) fn nodes_around_contacts(
     around.len() as f64 * 4.0 / 3.0 * (edge / pitch).powi(3)
 }
 
-/// The steps from a node to those within `radius` steps.
+/// Steps from a node to all nodes within `radius` steps.
 fn ball(radius: i32) -> Vec<LatticeNode> {
     let all = CellBox {
         lo: [-radius; 3],
@@ -410,7 +407,7 @@ fn moved(node: &LatticeNode, offset: &LatticeNode) -> LatticeNode {
     std::array::from_fn(|i| node[i].saturating_add(offset[i]))
 }
 
-/// The cells that a renewal may have taken into the region or out of it.
+/// Cells that a renewal may have added to the region or removed from it.
 pub(in crate::reconstruct) fn cells_of(changed: &Changed) -> LatticeRegion {
     let around = changed
         .nodes
@@ -433,7 +430,7 @@ mod tests {
         grid
     }
 
-    /// Which of a line of nodes one pitch (2 mm) apart are discontinuous.
+    /// Discontinuity of each of a line of nodes one pitch (2 mm) apart.
     fn discontinuous(value: &[f64]) -> Vec<bool> {
         let grid = touched((0..).zip(value).map(|(i, value)| ([i, 0, 0], value * 1e-3)));
         (0..)

@@ -1,9 +1,9 @@
-//! Harmonic fill of the field where there is no evidence.
+//! Harmonic fill of the field between evidence.
 //!
-//! Between the known values goes the smoothest field: ∇²f = 0. Flat goes on flat, a gap between two
-//! touched walls closes, and no island can arise. Where the ball was, f stays above the depth to
-//! which it was there. Deep in the material the scan's own distance pulls weakly, so that a pocket
-//! that was touched down to some depth gets a bottom.
+//! Between the known values lies the smoothest field: ∇²f = 0. Flat goes on flat, a gap between two
+//! touched walls closes, and no island can arise. In the swept volume f stays above its depth
+//! there. Deep in the material the scan's own distance pulls weakly, so that a pocket touched down
+//! to some depth gets a bottom.
 
 use crate::numeric::flood;
 use crate::reconstruct::evidence::point_evidence::{NodeState, Source};
@@ -11,31 +11,31 @@ use crate::reconstruct::field::grid::ReconstructionGrid;
 use crate::reconstruct::field::lattice::{self, LatticeNode, Numbers, cell_at, node_at};
 use crate::reconstruct::table::CellTable;
 
-/// Over-relaxation that converges fast on domains some ten nodes across.
+/// Over-relaxation factor that converges fast on domains some ten nodes across.
 const RELAXATION: f64 = 1.6;
-/// Weight, at most, of a touched surface going straight on beside the six neighbours of a node: as
-/// much as all of them.
+/// Maximum weight of the straight continuation of a touched surface, beside the six neighbours of a
+/// node: as much as all of them.
 const STRAIGHT: f64 = 6.0;
 /// Weight of the scan out of reach of all evidence: the surface is back at it within a cell or two.
 const FURTHER_PULL: f64 = 1.0;
-/// Nodes of a piece of noise at most: two cells in each direction.
+/// Maximum number of nodes of a noise speck: two cells in each direction.
 const SPECK: usize = 8;
-/// A node that differs from so many of its six neighbours is alone.
+/// Number of opposite neighbours, of six, from which a node counts as alone.
 const ALONE: usize = 5;
-/// … and may be taken for one on their side, if it is within this many cells of the surface.
+/// Maximum distance from the surface, in cells, at which a lone node changes sides.
 const NEARLY: f64 = 0.5;
-/// Sweeps at most: twice what the largest gaps of the tested parts need.
+/// Maximum number of sweeps: twice the need of the largest gaps of the tested parts.
 const SWEEPS: usize = 200;
-/// Changes below this share of the pitch end the relaxation.
+/// Change, in pitches, below which the relaxation ends.
 const ENOUGH: f64 = 1e-6;
-/// Radii around the end of a path within which a hole is opened: as wide as holes that a ball is
-/// let through.
+/// Radius of the opening of a hole around the end of a path, in radii: as wide as holes that let a
+/// ball through.
 const END_REACH: f64 = 3.0;
 /// No neighbour.
 const NONE: u32 = u32::MAX;
 
-/// Fills in what is not known among the nodes `at`, then drops what no evidence supports; what is
-/// around them stays as it is.
+/// Fills the unknown nodes among `at`, then drops pieces without evidence; nodes around them stay
+/// as they are.
 ///
 /// - `numbers`: of the nodes around these.
 /// - `radius`: of the ball, m.
@@ -45,7 +45,7 @@ pub(in crate::reconstruct) fn harmonic_fill(
     numbers: &Numbers,
     radius: f64,
 ) {
-    // it reaches two radii deep
+    // the pull reaches two radii deep
     let pull = (grid.lattice.pitch / (2.0 * radius)).powi(2);
     relax(grid, at, numbers, pull);
     if drop_islands(grid, at, numbers) {
@@ -54,8 +54,8 @@ pub(in crate::reconstruct) fn harmonic_fill(
     blunt(grid, at, numbers);
 }
 
-/// Takes nodes near the surface that differ from nearly all around them back to their side: tips
-/// and pits that noise makes where the surface passes through a node.
+/// Moves nodes near the surface that differ from nearly all around them to the other side: tips and
+/// pits that noise makes if the surface passes through a node.
 fn blunt(grid: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers) {
     let nearly = NEARLY * grid.lattice.pitch;
     for &at in at {
@@ -76,9 +76,9 @@ fn blunt(grid: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers) {
     }
 }
 
-/// An open question, and what decides it.
+/// An unknown node, and the equation for its value.
 struct OpenQuestion {
-    /// its number, and those of its neighbours that have a value, among the gathered values
+    /// its number, and those of its neighbours with a value, among the gathered values
     here: u32,
     around: [u32; 6],
     neighbours: u8,
@@ -88,9 +88,9 @@ struct OpenQuestion {
     least: f64,
 }
 
-/// Successive over-relaxation, from below by the space that the ball went through.
+/// Successive over-relaxation, bounded from below by the swept volume.
 ///
-/// - `pull`: weight of the scan beside the six neighbours of a node that is far from it.
+/// - `pull`: weight of the scan beside the six neighbours of a node far from it.
 fn relax(grid: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers, pull: f64) {
     let open: Vec<u32> = at
         .iter()
@@ -149,7 +149,7 @@ fn question(
         weight: pull + weight,
         least: state.least,
     };
-    // what was looked at further follows; its extent does not matter here
+    // nodes evaluated further follow; their extent does not matter here
     let counts =
         |other: u32| other != NONE && (state.is_further || !grid.nodes.entry(other).1.is_further);
     for other in neighbours(grid, at, numbers)
@@ -163,7 +163,7 @@ fn question(
     question
 }
 
-/// The nodes around one, as far as they are there and have a value.
+/// The nodes around one, if they exist and have a value.
 fn neighbours(grid: &ReconstructionGrid, at: u32, numbers: &Numbers) -> [u32; 6] {
     lattice::neighbours(grid.nodes.entry(at).0).map(|other| {
         let index = numbers.of(&grid.nodes, &other);
@@ -173,9 +173,8 @@ fn neighbours(grid: &ReconstructionGrid, at: u32, numbers: &Numbers) -> [u32; 6]
     })
 }
 
-/// Drops material and void that no evidence supports: a piece of one sign, within the nodes looked
-/// at, that was neither touched nor swept, or is smaller than a ball can resolve. Returns whether
-/// there was any.
+/// Drops material and void without evidence: a piece of one sign, within the nodes at hand, neither
+/// touched nor swept, or smaller than a ball can resolve. Returns whether there was any.
 fn drop_islands(grid: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers) -> bool {
     let mut seen = vec![Visited::Outside; grid.nodes.len()];
     at.iter()
@@ -199,17 +198,17 @@ fn drop_islands(grid: &mut ReconstructionGrid, at: &[u32], numbers: &Numbers) ->
     has_dropped
 }
 
-/// Whether a node was met while pieces are gathered.
+/// Visit state of a node while gathering pieces.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Visited {
-    /// it is not among those looked at
+    /// not among the nodes at hand
     Outside,
     NotYet,
     Yes,
 }
 
-/// Gathers the piece of one sign around its first node; whether what lies beyond those looked at
-/// holds it, or evidence and its size.
+/// Gathers the piece of one sign around its first node; returns whether it is attached beyond the
+/// nodes at hand, or has evidence and enough size.
 fn is_attached(
     grid: &ReconstructionGrid,
     piece: &mut Vec<u32>,
@@ -235,14 +234,13 @@ fn is_attached(
     goes_on || is_touched && piece.len() > SPECK
 }
 
-/// How far around the end of a path of a ball of `radius` (m) a hole is opened, in cells.
+/// Radius of the opening of a hole around the end of a path of a ball of `radius` (m), in cells.
 pub(in crate::reconstruct) fn end_reach(grid: &ReconstructionGrid, radius: f64) -> i32 {
     (END_REACH * radius / grid.lattice.pitch).ceil() as i32
 }
 
-/// The cells in which a filled surface depends on a ball that ended its path freely, from there to
-/// the nearest evidence within `reach` cells: a hole that the ball left at its far end has no
-/// bottom.
+/// Cells with a filled surface that depends on a ball that ended its path freely, from there to the
+/// nearest evidence within `reach` cells: a hole that the ball left at its far end has no bottom.
 pub(in crate::reconstruct) fn open_cells(
     grid: &ReconstructionGrid,
     reach: i32,
@@ -268,7 +266,7 @@ pub(in crate::reconstruct) fn open_cells(
     open
 }
 
-/// Whether the surface passes through a cell of which no corner is known.
+/// Whether the surface passes through a cell without a known corner.
 fn is_unsupported_surface(grid: &ReconstructionGrid, cell: LatticeNode) -> bool {
     let mut material = 0;
     for corner in 0..8 {
@@ -294,8 +292,7 @@ mod tests {
         hi: [6; 3],
     };
 
-    /// The signs of nodes that were touched everywhere, filled in: those of `value` (pitches)
-    /// before, at each node.
+    /// A filled grid with touched nodes everywhere, initially with values `value` (pitches).
     fn completed(value: impl Fn(LatticeNode) -> f64) -> ReconstructionGrid {
         let mut grid = ReconstructionGrid::new(Lattice {
             pitch: PITCH,

@@ -1,31 +1,31 @@
-//! Where two touched surfaces meet in an inner corner that the ball does not get into.
+//! Inner corners of two touched surfaces, out of reach of the ball.
 //!
 //! A ball that touches one surface at c has its centre at c + r n, and there is room for it before
-//! the other one, whose value is f and whose normal m: f(c) + r n·m ≥ r. Contacts of a hollow that
-//! bends from one surface to the other do not keep this distance; those beside an inner corner do,
-//! and the last of them have no more. Between these both surfaces go straight on to where they
-//! meet: nothing else can be measured there, and scans are least accurate in corners.
+//! the other one, with value f and normal m: f(c) + r n·m ≥ r. Contacts of a hollow that bends from
+//! one surface to the other do not keep this distance; contacts beside an inner corner do, and the
+//! last of them have no more. Between these both surfaces go straight on to their intersection:
+//! nothing else is measurable there, and scans are least accurate in corners.
 
 use crate::reconstruct::evidence::contact_map::ContactMap;
 use crate::reconstruct::field::piecewise::{FieldParams, FieldScratch, Piece};
 
-/// Surfaces at less than 60° to each other let the ball in as far as the last contacts reach
-/// anyway, and at more than 120° they are those of a slot: they meet nowhere near.
+/// Cosine of 60°: surfaces at less than that to each other let the ball in as far as the last
+/// contacts reach anyway, and at more than 120° they belong to a slot and meet nowhere near.
 const STEEP_COSINE: f64 = 0.5;
-/// Both surfaces were touched within this many radii of the point: for a corner of 90° the last
-/// contacts are one away from it on either side, and the passes of a hand leave gaps.
+/// Maximum distance of contacts of both surfaces from the point, in radii: for a corner of 90° the
+/// last contacts are one away from it on either side, and the passes of a hand leave gaps.
 const TOUCHED_WITHIN: f64 = 1.6;
-/// Contacts within this many radii beyond the nearest mark the end of a surface.
+/// Range beyond the nearest contact that marks the end of a surface, in radii.
 const BESIDE: f64 = 0.3;
-/// A ball in the corner has just room. There has to be this share of it: what is left is for noise,
-/// and walls that bend along the corner …
+/// Minimum room, as a share of the room of a ball in the corner: the rest is for noise, and for
+/// walls that bend along the corner.
 const LEAST_ROOM: f64 = 0.8;
-/// … and no more than this: where the last contacts are farther away, the corner may be as round as
-/// the ball or more.
+/// Maximum room, as a share of the room of a ball in the corner: beyond it the corner may be as
+/// round as the ball or more.
 const MOST_ROOM: f64 = 1.3;
 
 /// Whether the surface that decides at the point last evaluated meets another one there in an inner
-/// corner that a ball of `radius` (m) does not get into.
+/// corner out of reach of a ball of `radius` (m).
 pub(in crate::reconstruct) fn is_inner_corner(
     contacts: &ContactMap,
     params: &FieldParams,
@@ -54,8 +54,8 @@ pub(in crate::reconstruct) fn is_inner_corner(
     })
 }
 
-/// Whether a ball that touches the piece `at` where it ends near the point has room before `other`,
-/// and no more of it than one that lies in the corner.
+/// Whether a ball that touches the piece `at` at its end near the point has room before `other`,
+/// and no more than a ball in the corner.
 fn is_beside(
     contacts: &ContactMap,
     radius: f64,
@@ -105,15 +105,16 @@ mod tests {
         store
     }
 
-    /// Contacts of the floor z = 0 and of the wall x = 0, from this far from the corner on, mm.
+    /// Contacts of the floor z = 0 and of the wall x = 0, from this distance from the corner on,
+    /// mm.
     fn corner(from: f64) -> ContactMap {
         let from_corner = (0..6).map(|i| from + 0.5 * f64::from(i));
         let both = from_corner.flat_map(|a| [([a, 0.0], [0.0, 1.0]), ([0.0, a], [1.0, 0.0])]);
         store_of(&both.collect::<Vec<_>>())
     }
 
-    /// Whether there is an inner corner, and the value of the field (mm), at a place in x and z,
-    /// mm.
+    /// Whether a place in x and z (mm) is in an inner corner, and the value of the field (mm)
+    /// there.
     fn found(store: &ContactMap, x: f64, z: f64) -> (bool, f64) {
         let (params, mut scratch) = (FieldParams::for_ball(RADIUS), FieldScratch::default());
         let value = params
@@ -141,7 +142,7 @@ mod tests {
                 "{x} {z}: {found}"
             );
         }
-        // far along the floor, or where the wall is out of reach
+        // far along the floor, with the wall out of reach
         assert!(!found(&corner, 3.5, 0.1).0);
     }
 

@@ -5,10 +5,10 @@ use nalgebra::{Point3, Vector3};
 use crate::mesh::{FaceId, VertexId};
 use crate::reconstruct::table::{CellTable, Key};
 
-/// A node of the lattice, or the cell of which it is the lowest corner.
+/// A node of the lattice, or the cell with this lowest corner.
 pub type LatticeNode = [i32; 3];
 
-/// The lattice cells in which the surface is replaced, each named by its lowest node.
+/// The lattice cells with a replaced surface, each named by its lowest node.
 pub type LatticeRegion = CellTable<LatticeNode, ()>;
 
 /// The field at lattice nodes, m: negative in the material.
@@ -75,8 +75,8 @@ fn ring(node: LatticeNode, axis: u8, step: i32) -> [LatticeNode; 4] {
     ]
 }
 
-/// What lies between consecutive nodes of a [`ring`], by node and axis: edges where it goes up,
-/// squares where it goes down.
+/// Sides between consecutive nodes of a [`ring`], by node and axis: edges for `step` 1, squares for
+/// `step` −1.
 #[inline]
 fn ring_sides(node: LatticeNode, axis: u8, step: i32) -> [(LatticeNode, u8); 4] {
     let (u, v) = across(axis as usize);
@@ -99,7 +99,7 @@ pub struct Lattice {
 }
 
 impl Lattice {
-    /// Where plane number `index` across `axis` is on that axis, m.
+    /// Coordinate of plane number `index` across `axis`, m.
     #[inline]
     pub fn coordinate(&self, axis: usize, index: i32) -> f64 {
         self.origin[axis] + self.pitch * f64::from(index)
@@ -154,8 +154,8 @@ impl Lattice {
         ]
     }
 
-    /// `p` brought into the box from node `lo` to node `hi`, `margin` (share of the pitch) inside
-    /// where the box has any extent.
+    /// `p` clamped to the box from node `lo` to node `hi`, `margin` (share of the pitch) inside
+    /// along each axis with any extent.
     #[inline]
     pub(crate) fn clamped(
         &self,
@@ -216,13 +216,13 @@ impl CellBox {
         self.hi = std::array::from_fn(|i| self.hi[i].max(cell[i]));
     }
 
-    /// Takes in the cells from `below` cells below a cell to `above` cells above it, on each axis.
+    /// Adds the cells from `below` cells below a cell to `above` cells above it, on each axis.
     pub fn take_around(&mut self, cell: &LatticeNode, below: i32, above: i32) {
         self.take(&cell.map(|x| x.saturating_sub(below)));
         self.take(&cell.map(|x| x.saturating_add(above)));
     }
 
-    /// The cells in both.
+    /// Intersection of two boxes.
     pub fn meet(&self, other: &Self) -> Self {
         let lo = std::array::from_fn(|i| self.lo[i].max(other.lo[i]));
         Self {
@@ -239,7 +239,7 @@ impl CellBox {
         }
     }
 
-    /// Number of cells: ∞ where it is beyond what a float can count.
+    /// Number of cells; ∞ beyond the range of a float.
     pub fn volume(&self) -> f64 {
         (0..3)
             .map(|i| (f64::from(self.hi[i]) - f64::from(self.lo[i]) + 1.0).max(0.0))
@@ -289,12 +289,12 @@ impl CellBox {
     }
 }
 
-/// Numbers of the keys of a table, found by place within a box where that is small, else by the
-/// table. It holds until a key is inserted or removed.
+/// Numbers of the keys of a table, by place within a small box, else by the table. Valid until a
+/// key is inserted or removed.
 pub(in crate::reconstruct) struct Numbers {
     cells: CellBox,
     size: [usize; 3],
-    /// [`Self::NONE`] where there is no key
+    /// [`Self::NONE`] without a key
     numbers: Vec<u32>,
 }
 
@@ -302,7 +302,7 @@ impl Numbers {
     /// No key.
     const NONE: u32 = u32::MAX;
 
-    /// Looks the keys in `cells` up.
+    /// Looks up the keys in `cells`.
     pub fn new<V>(table: &CellTable<LatticeNode, V>, cells: &CellBox) -> Self {
         let cells = if cells.volume() < table.len() as f64 {
             *cells
@@ -325,7 +325,7 @@ impl Numbers {
         }
     }
 
-    /// The number of `node` in the table that this was made of.
+    /// The number of `node` in the source table.
     #[inline]
     pub fn of<V>(&self, table: &CellTable<LatticeNode, V>, node: &LatticeNode) -> Option<u32> {
         if !self.cells.contains(node) {
@@ -419,18 +419,18 @@ pub enum VertexKey {
     /// on a square between two cells of the region; for each segment of the surface there, numbered
     /// from 0
     Square(Square, u8),
-    /// where f changes its sign on an edge
+    /// the sign change of f on an edge
     Edge(Edge),
-    /// where an edge of the scan crosses a plane of the lattice
+    /// the crossing of an edge of the scan and a plane of the lattice
     Trace {
         /// the ends of the scan's edge, the smaller id first
         ends: [VertexId; 2],
-        /// the axis that the plane is at right angles to
+        /// the axis at right angles to the plane
         axis: u8,
         /// number of the plane
         plane: i32,
     },
-    /// where a face of the scan crosses an edge of the lattice
+    /// the crossing of a face of the scan and an edge of the lattice
     Pierce(Edge, FaceId),
 }
 
@@ -452,20 +452,20 @@ impl Key for VertexKey {
     }
 }
 
-/// Which part of the lattice or of the scan a face of the patch belongs to; its faces depend on
-/// what is nearby alone.
+/// The part of the lattice or of the scan that owns a face of the patch; its faces depend on its
+/// surroundings alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Owner {
-    /// the surface around an edge on which f changes its sign
+    /// the surface around an edge with a sign change of f
     Edge(Edge),
     /// the fan from the region to the trace of the scan on a square that bounds it
     Square(Square),
-    /// what the region leaves of a face of the scan
+    /// the remainder of a face of the scan outside the region
     Scan(FaceId),
 }
 
 impl Owner {
-    /// Its place on the lattice; `None` for a face of the scan.
+    /// Its node on the lattice; `None` for a face of the scan.
     pub(in crate::reconstruct) fn node(&self) -> Option<LatticeNode> {
         match self {
             Self::Edge(edge) => Some(edge.node),
@@ -492,6 +492,6 @@ impl Key for Owner {
 pub struct PatchFace {
     /// indices into the patch's vertices
     pub corners: [u32; 3],
-    /// what it belongs to
+    /// its owner
     pub owner: Owner,
 }

@@ -1,39 +1,38 @@
 //! The touched surface as the zero set of a field: piecewise smooth, evaluated from stored
 //! contacts.
 //!
-//! Contacts near the point are grouped into smooth pieces; each piece is fitted alone, so that
-//! nothing is averaged over an edge, and the pieces are put together by the larger value at a
-//! convex edge, by the smaller one at a concave. Within a piece a chord is at right angles to the
-//! mean of its end normals, which is exact on circles and cylinders:
+//! Contacts near the point form smooth pieces; each piece has its own fit, so that no average runs
+//! over an edge, and the pieces combine by the larger value at a convex edge, by the smaller one at
+//! a concave. Within a piece a chord is at right angles to the mean of its end normals, which is
+//! exact on circles and cylinders:
 //!
 //! f(x) = Σ wⱼ ½(nⱼ + g)·(x − cⱼ) / Σ wⱼ,   g = Σ wⱼ nⱼ / |Σ wⱼ nⱼ|
 //!
-//! wⱼ = Wⱼ exp(−(|x − cⱼ|² − d²) / max(σ², d²/2)), where d is the distance to the nearest contact
-//! of the piece: far from the surface all of its contacts count, near it only the nearest.
+//! wⱼ = Wⱼ exp(−(|x − cⱼ|² − d²) / max(σ², d²/2)), with d the distance to the nearest contact of
+//! the piece: far from the surface all of its contacts count, near it only the nearest.
 
 use nalgebra::{Point3, Vector3};
 
 use crate::numeric::{direction, tangent_basis};
 use crate::reconstruct::evidence::contact_map::{ContactMap, MeanContact};
 
-/// How contacts are grouped and weighted.
+/// Grouping and weights of contacts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldParams {
-    /// contacts within this distance count, m
+    /// range of contacts, m
     pub reach: f64,
     /// σ: width of the weight around the nearest contact, m
     pub sigma: f64,
     /// cosine of the widest angle between a contact and its piece
     pub piece_cosine: f64,
-    /// farthest that a contact may be off the chord to the middle of its piece, m
+    /// maximum distance of a contact from the chord to the middle of its piece, m
     pub chord: f64,
-    /// a piece with less weight than this is not used; a sliding contact has weight 1
+    /// minimum weight of a piece; a sliding contact has weight 1
     pub least_weight: f64,
 }
 
 impl FieldParams {
-    /// Settings that hold for a ball of `radius` (m): two radii are what passes of a hand leave
-    /// between them.
+    /// Settings for a ball of `radius` (m): the passes of a hand are up to two radii apart.
     pub(crate) fn for_ball(radius: f64) -> Self {
         Self {
             reach: 2.0 * radius,
@@ -50,16 +49,15 @@ impl FieldParams {
 pub struct FieldValue {
     /// signed distance from the surface, m; positive outside the part
     pub value: f64,
-    /// direction in which it rises, unit
+    /// unit gradient
     pub gradient: Vector3<f64>,
     /// distance to the nearest contact, m
     pub nearest: f64,
-    /// number of that contact
+    /// number of the nearest contact
     pub contact: u32,
-    /// the nearest contact is one of an edge that the ball rolled over
+    /// the nearest contact is on an edge that the ball rolled over
     pub is_fan: bool,
-    /// the contacts of the piece that decides do not surround the point: it is beyond the last of
-    /// them
+    /// the contacts of the decisive piece do not surround the point: it is beyond the last of them
     pub is_border: bool,
     /// two surfaces, each touched away from edges, meet near the point in a convex edge
     pub is_edge: bool,
@@ -77,10 +75,10 @@ impl FieldValue {
 /// A contact near the point.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::reconstruct) struct Member {
-    /// m²; weight of the fit once that is made
+    /// m²; weight of the fit once made
     pub(in crate::reconstruct) distance_squared: f64,
     pub(in crate::reconstruct) index: u32,
-    /// number of its piece; [`NO_PIECE`] for one too many
+    /// number of its piece; [`NO_PIECE`] beyond the maximum
     pub(in crate::reconstruct) piece: u32,
 }
 
@@ -88,11 +86,11 @@ pub(in crate::reconstruct) struct Member {
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::reconstruct) struct Piece {
     weight: f64,
-    /// weight of the members that are not on an edge
+    /// weight of the members away from edges
     pub(in crate::reconstruct) flat_weight: f64,
     /// squared distance of the nearest member, m²
     pub(in crate::reconstruct) nearest_squared: f64,
-    /// Σ W c and Σ W n of the members so far, then Σ w c / Σ w and Σ w n of the fit
+    /// Σ W c and Σ W n while grouping, then Σ w c / Σ w and Σ w n of the fit
     pub(in crate::reconstruct) point: Vector3<f64>,
     normal: Vector3<f64>,
     /// unit
@@ -109,7 +107,7 @@ impl Piece {
     }
 }
 
-/// What one pass over one place has in the fit.
+/// Share of one pass over one place in the fit.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::reconstruct) struct PassShare {
     pub(in crate::reconstruct) began_ns: i64,
@@ -117,7 +115,7 @@ pub(in crate::reconstruct) struct PassShare {
     pub(in crate::reconstruct) tilt: f64,
 }
 
-/// Room for one evaluation, used again by the next.
+/// Buffers of an evaluation, reused by the next.
 #[derive(Clone, Debug, Default)]
 pub struct FieldScratch {
     /// the point, m
@@ -125,13 +123,14 @@ pub struct FieldScratch {
     pub(in crate::reconstruct) near: Vec<Member>,
     pub(in crate::reconstruct) pieces: Vec<Piece>,
     angles: Vec<(f64, f64, f64)>,
-    /// number of the piece that decided
+    /// number of the decisive piece
     pub(in crate::reconstruct) decides: u32,
     pub(in crate::reconstruct) shares: Vec<PassShare>,
 }
 
 impl FieldScratch {
-    /// How far the value of the piece that decided is from that of the nearest other piece, m.
+    /// Difference between the value of the decisive piece and the nearest value of another piece,
+    /// m.
     pub(in crate::reconstruct) fn nearest_other(&self, value: f64) -> f64 {
         let others = (0..)
             .zip(&self.pieces)
@@ -142,29 +141,28 @@ impl FieldScratch {
     }
 }
 
-/// Pieces looked at, at most: three faces of a corner, and fans between them.
+/// Maximum number of pieces: three faces of a corner, and fans between them.
 const MOST_PIECES: usize = 8;
 /// No piece.
 const NO_PIECE: u32 = u32::MAX;
-/// Pieces at more than this angle to each other (cos 60°) make an edge, or the two sides of a thin
-/// wall.
+/// Cosine, 60°, of the angle from which two pieces make an edge, or the two sides of a thin wall.
 const EDGE_COSINE: f64 = 0.5;
 /// Share of the reach within which the tilted planes of an edge count as much as others.
 const TILTED_REACH: f64 = 0.5;
-/// An edge is near within this many σ.
+/// Maximum distance of a near edge, in σ.
 const EDGE_NEAR: f64 = 1.5;
-/// Share of σ by which two pieces may seem to overlap at a convex edge.
+/// Maximum apparent overlap of two pieces at a convex edge, in σ.
 const OVERLAP: f64 = 0.1;
-/// Share of σ by which noise may make a piece cut off the nearest contact.
+/// Maximum depth, in σ, at which noise lets a piece cut off the nearest contact.
 const CUT: f64 = 0.3;
-/// Seen from a point at a border, contacts in the tangent plane leave a gap of 150° or more: its
-/// cosine.
+/// Cosine, 150°, of the minimum gap between contacts in the tangent plane, seen from a point at a
+/// border.
 const BORDER_COSINE: f64 = -0.866_025_403_784_438_6;
-/// A contact nearer in the tangent plane than this share of σ is under the point.
+/// Distance in the tangent plane, in σ, within which a contact is under the point.
 const UNDER: f64 = 0.13;
 
 impl FieldParams {
-    /// The field at `x` (m, in O); `None` where no contact is within reach.
+    /// The field at `x` (m, in O); `None` without a contact in reach.
     pub fn at(
         &self,
         store: &ContactMap,
@@ -213,8 +211,7 @@ impl FieldParams {
         })
     }
 
-    /// Puts each contact, nearest first, to the piece it fits best, or makes it the first of a new
-    /// one.
+    /// Adds each contact, nearest first, to the piece it fits best, or starts a new one with it.
     fn group(&self, means: &[MeanContact], near: &mut [Member], pieces: &mut Vec<Piece>) {
         pieces.clear();
         for member in near {
@@ -240,7 +237,7 @@ impl FieldParams {
         }
     }
 
-    /// The piece that faces most like a contact, among those whose chord it is on.
+    /// The piece that faces most like a contact, among pieces with the contact on their chord.
     fn piece_of(&self, mean: &MeanContact, pieces: &[Piece]) -> Option<usize> {
         let mut best = None;
         let mut closest = self.piece_cosine;
@@ -276,7 +273,7 @@ impl FieldParams {
             piece.fit_weight += weight;
             piece.normal += mean.normal * weight;
             piece.point += mean.point.coords * weight;
-            // from here on the weight alone is needed
+            // from here on only the weight matters
             member.distance_squared = weight;
         }
         for piece in pieces.iter_mut() {
@@ -293,12 +290,12 @@ impl FieldParams {
         }
     }
 
-    /// Puts the pieces together around the nearest one with enough weight. The tilted planes of
-    /// edges that the ball rolled over mean little from afar: such can only cut off. A piece that
-    /// would cut off the nearest contact itself is refuted. Returns the value, the number of the
-    /// piece that decides, and whether there is an edge.
+    /// Combines the pieces around the nearest one with enough weight. Tilted planes of edges that
+    /// the ball rolled over mean little from afar: they can only cut off. A piece that would cut
+    /// off the nearest contact itself is refuted. Returns the value, the number of the decisive
+    /// piece, and whether there is an edge.
     ///
-    /// - `arm`: from the point to that contact, m.
+    /// - `arm`: from the point to the nearest contact, m.
     fn combine(&self, pieces: &[Piece], arm: &Vector3<f64>) -> Option<(f64, usize, bool)> {
         let is_flat = |at: usize| pieces[at].flat_weight >= self.least_weight;
         let is_tilted_afar = |at: usize| {
@@ -340,8 +337,8 @@ impl FieldParams {
         Some((value, at, is_edge))
     }
 
-    /// With which of the pieces in the set `taken` another one makes a convex edge: with the others
-    /// it makes a concave one. `None` where it makes neither with some.
+    /// The pieces in the set `taken` with which another one makes a convex edge; with the others it
+    /// makes a concave one. `None` if it makes neither with some.
     fn convex_among(&self, pieces: &[Piece], taken: u8, piece: &Piece) -> Option<u8> {
         let mut convex = 0;
         for at in members(taken) {
@@ -362,30 +359,30 @@ impl FieldParams {
     }
 }
 
-/// The half-spaces behind the pieces, put together to the solid whose edges are as the pieces meet:
-/// pieces that meet in convex edges are intersected, in concave ones united. Which comes first
-/// follows from all pairs: what no convex edge joins is united, what no concave edge joins is
-/// intersected (the cotree of the graph of convex edges).
+/// The half-spaces behind the pieces, combined to the solid with the same edges: intersections at
+/// convex edges, unions at concave ones. Their order follows from all pairs: a union of parts
+/// without a convex edge between them, an intersection of parts without a concave edge between them
+/// (the cotree of the graph of convex edges).
 struct Solid {
     values: [f64; MOST_PIECES],
     /// bit k of entry i: pieces i and k meet in a convex edge
     is_convex: [u8; MOST_PIECES],
 }
 
-/// The numbers in a set.
+/// Members of a set.
 fn members(set: u8) -> impl Iterator<Item = usize> {
     (0..MOST_PIECES).filter(move |&at| set >> at & 1 == 1)
 }
 
 impl Solid {
-    /// Takes in a piece that makes convex edges with those in the set `convex`.
+    /// Adds a piece with convex edges to the pieces in the set `convex`.
     fn take(&mut self, at: usize, convex: u8) {
         self.is_convex[at] |= convex;
         members(convex).for_each(|other| self.is_convex[other] |= 1 << at);
     }
 
-    /// Value of the solid of the pieces in `set`, and the piece that decides; of the part with
-    /// `first` where the edges contradict each other.
+    /// Value of the solid of the pieces in `set`, and the decisive piece; of the part with `first`
+    /// if the edges contradict each other.
     fn evaluate(&self, set: u8, first: usize) -> (f64, usize) {
         if set.is_power_of_two() {
             let at = set.trailing_zeros() as usize;
@@ -419,8 +416,7 @@ impl Solid {
         self.evaluate(set & !(1 << last), first)
     }
 
-    /// The part of `set` that hangs together with its lowest member by convex edges, or by concave
-    /// ones.
+    /// The part of `set` connected with its lowest member by convex edges, or by concave ones.
     fn connected(&self, set: u8, by_convex: bool) -> u8 {
         let mut part = set & set.wrapping_neg();
         loop {
@@ -491,7 +487,7 @@ mod tests {
 
     const RADIUS: f64 = 1.5e-3;
 
-    /// A point of a surface and its normal, where the surface has that parameter.
+    /// A point of a surface and its normal, if the surface has these parameters.
     type ParametricSurface<'a> = &'a dyn Fn(f64, f64) -> Option<(Point3<f64>, Vector3<f64>)>;
 
     /// Contacts of a surface at the points of a grid of 0.5 mm, each weighing 5.
@@ -623,7 +619,7 @@ mod tests {
                 value(&step, 0.0, y, -0.2)
             );
         }
-        // where it was touched it ends the face
+        // at its contacts the wall ends the face
         assert!(value(&step, -3.0, 0.4, -0.4) > 0.2);
     }
 

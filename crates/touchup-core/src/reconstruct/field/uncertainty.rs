@@ -1,9 +1,9 @@
 //! Uncertainty of the fit of the contacts at a point, and of the vertices of a patched mesh.
 //!
 //! The fit is a weighted mean of the contacts around, so the noise of each enters by its weight,
-//! together with that of the others in the same smoothing window. That is all on a surface which
-//! the pieces describe. Where they do not, the contacts show it themselves: they scatter around the
-//! fit, they end, or another surface is so near that the ball touched both.
+//! together with that of the others in the same smoothing window. On a surface that the pieces
+//! describe, this is all. Elsewhere the contacts show it: they scatter around the fit, they end, or
+//! another surface is so near that the ball touched both.
 
 use nalgebra::Point3;
 
@@ -19,17 +19,18 @@ use crate::reconstruct::field::piecewise::{
 pub struct FitSigma {
     /// noise of the contacts
     pub noise: f64,
-    /// directions of their normals, at the distance at which they are
+    /// directions of their normals, at their distance
     pub tilt: f64,
-    /// what calibration leaves; the same everywhere
+    /// residual calibration error; the same everywhere
     pub calibration: f64,
     /// contacts that do not lie on one smooth piece
     pub scatter: f64,
-    /// between contacts and beyond the last one the surface may turn, as much as those around it do
+    /// turn of the surface between contacts and beyond the last one, as much as the contacts around
+    /// it turn
     pub turning: f64,
-    /// another surface is near, and no edge between them was touched
+    /// another surface nearby, without a touched edge between them
     pub meeting: f64,
-    /// at an edge the surface is as far off as both surfaces that meet there
+    /// at an edge, the error of both surfaces that meet there
     pub edge: f64,
 }
 
@@ -51,40 +52,39 @@ impl FitSigma {
     }
 }
 
-/// Share of the scatter of the contacts by which the fit is off: ten of them would leave a third if
+/// Error of the fit as a share of the scatter of the contacts: ten of them would leave a third if
 /// they were independent.
 const SCATTER: f64 = 0.33;
-/// How much a plane may turn beyond its last contact, rad: 3°.
+/// Maximum turn of a plane beyond its last contact, rad: 3°.
 const TURN: f64 = 0.053;
-/// Where contacts that face otherwise are near, a surface turns before the next contact by this
-/// share of the angle between …
+/// Turn share: turn of a surface before the next contact, near contacts that face otherwise, as a
+/// share of the angle between.
 const TURN_SHARE: f64 = 0.45;
-/// … by twice that in a gap of so many σ to the nearest contact, growing with its square: the ball
-/// may have bridged a hole …
+/// Gap to the nearest contact, in σ, that doubles the turn share, which grows with the square of
+/// the gap: the ball may have bridged a hole.
 const DOUBLING_GAP: f64 = 0.7;
-/// … and by no more than this.
+/// Maximum turn share.
 const TURN_SHARE_IN_GAP: f64 = 1.2;
-/// Beyond the last contact it may go on as a wall does.
+/// Turn share beyond the last contact: the surface may go on as a wall does.
 const TURN_SHARE_AT_BORDER: f64 = 0.75;
-/// Where the edge that they make is known, it turns by this share.
+/// Turn share at a known edge.
 const TURN_SHARE_AT_EDGE: f64 = 0.06;
-/// By this much normals differ on a plane by noise and friction alone, rad: 11°.
+/// Difference of normals on a plane by noise and friction alone, rad: 11°.
 const TURN_NOISE: f64 = 0.2;
-/// A surface turns by what faces otherwise up to so many σ behind the nearest contact.
+/// Range behind the nearest contact, in σ, of contacts that face otherwise and turn the surface.
 const TURN_REACH: f64 = 2.0;
-/// Where two surfaces meet the ball touches both, and the fit is off by up to this share of σ …
+/// Maximum error of the fit near two meeting surfaces, both under the ball, as a share of σ.
 const MEETING: f64 = 0.15;
-/// … when the other is as near as the one; by less and less up to this many σ.
+/// Excess distance of the other of two meeting surfaces, in σ, over which its error falls to 0.
 const MEETING_REACH: f64 = 1.2;
-/// Both surfaces of an edge count where they are as near as each other, by less and less up to this
-/// many σ.
+/// Excess distance, in σ, over which the second surface of an edge ceases to count.
 const EDGE_REACH: f64 = 0.5;
-/// A parabola over a window of length T has the variance that noise of correlation time T / 2.25
-/// has.
+/// Window length over correlation time: a parabola over a window of length T has the variance of
+/// noise of correlation time T / 2.25.
 const WINDOW_TO_CORRELATION: f64 = 2.25;
 
 impl FieldParams {
-    /// How well the value is known that was found at `x` last, with the same scratch.
+    /// Uncertainty of the value last found at `x` with the same scratch.
     ///
     /// - `window_ns`: passes within this time share their noise, the nearer the more.
     #[expect(clippy::too_many_lines)]
@@ -171,7 +171,7 @@ impl FieldParams {
     }
 
     /// Root mean square angle between the field at `x` and the contacts around the nearest one, of
-    /// whichever piece, beyond what noise makes of it, rad.
+    /// any piece, beyond noise, rad.
     fn turn_around(
         &self,
         found: &FieldValue,
@@ -221,16 +221,16 @@ fn variances(shares: &[PassShare], correlation_ns: i64) -> [f64; 2] {
     sums
 }
 
-/// A vertex is off where it is not on the fit: edges and corners are put together of several
+/// Error of a vertex as a multiple of its distance from the fit: edges and corners combine several
 /// pieces.
 const OFF_FIT: f64 = 1.4;
-/// A guess one radius from the nearest contact is off by this share of the radius; it grows with
-/// the square of the distance.
+/// Error of a guess one radius from the nearest contact, as a share of the radius; grows with the
+/// square of the distance.
 const GUESS: f64 = 0.25;
 
 /// Standard deviation of a vertex along the normal, m.
 ///
-/// - `scan`: that of a vertex of the scan, m.
+/// - `scan`: standard deviation of a vertex of the scan, m.
 pub(in crate::reconstruct) fn vertex_sigma(
     evidence: &Evidence<'_>,
     p: &Point3<f64>,
@@ -274,8 +274,8 @@ mod tests {
 
     const WINDOW_NS: i64 = 64_000_000;
 
-    /// σ of the fit over the middle of a plane on which each of `passes` passes of 64 contacts ran
-    /// along x, 1 s apart; all passes on one line.
+    /// σ of the fit over the middle of a plane with `passes` passes of 64 contacts along x, 1 s
+    /// apart; all passes on one line.
     fn sigma_after(passes: i64, spacing_ns: i64) -> FitSigma {
         let gate = GateParams {
             sigmas: 4.0,

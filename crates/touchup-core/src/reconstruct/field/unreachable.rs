@@ -1,19 +1,19 @@
 //! Unreachable surface: in inner corners closer to the other wall than the radius of the ball, and
-//! in what is narrower than it.
+//! in gaps narrower than it.
 //!
-//! A ball that touched the surface at a vertex would have its centre a radius above it. Where some
-//! other piece of the new surface obstructs it there, no touch is possible.
+//! A ball on the surface at a vertex would have its centre a radius above it. If some other piece
+//! of the new surface obstructs it there, no touch is possible.
 
 use crate::mesh::{FaceTree, MeshError, TriMesh, VertexId, corner_normal};
 use crate::numeric::direction;
 use crate::reconstruct::Support;
 use crate::reconstruct::evidence::free_space::FreeSpace;
 
-/// The ball may enter the surface by this share of its radius: what the lattice and noise leave of
-/// a flat face.
+/// Maximum depth of the ball in the surface, as a share of its radius: lattice and noise cause it
+/// on a flat face.
 const SLACK: f64 = 0.1;
 
-/// Marks the vertices of the new surface that no ball of `radius` (m) can touch.
+/// Marks the vertices of the new surface out of reach of any ball of `radius` (m).
 ///
 /// # Errors
 /// [`MeshError`] when the faces of the patch alone are no mesh.
@@ -36,7 +36,7 @@ pub(in crate::reconstruct) fn mark_unreachable(
     if faces.is_empty() {
         return Ok(());
     }
-    // the scan is left out: its noise would obstruct the ball
+    // without the scan: its noise would obstruct the ball
     let patch = TriMesh::new(mesh.positions().to_vec(), faces)?;
     let tree = FaceTree::new(&patch);
     let deepest = radius * (1.0 - SLACK);
