@@ -1,4 +1,4 @@
-//! What changed in the patch since it was last published, for a mesh that follows it.
+//! Changes of the patch since its last publication, for a mesh that follows it.
 
 use nalgebra::Point3;
 
@@ -10,19 +10,19 @@ use crate::reconstruct::field::lattice::{CellBox, LatticeNode, Owner, VertexKey}
 use crate::reconstruct::incremental::remesh::{Remesh, Renewed};
 use crate::reconstruct::table::CellTable;
 
-/// What changed in the patch.
+/// Changes of the patch.
 #[derive(Clone, Debug, Default)]
 pub struct PatchDelta {
-    /// what was touched up to this stamp is in it, ns
+    /// includes all touches up to this stamp, ns
     pub until_ns: i64,
     /// vertices that are new, have moved, or are corners of `faces`
     pub vertices: Vec<PatchVertex>,
-    /// whose faces are others now, and how many of `faces` are theirs, in this order. A face of the
-    /// scan that the patch touches is removed when its remainder is first listed.
+    /// owners with new faces, and the number of their faces in `faces`, in this order. A face of
+    /// the scan that the patch touches is removed when its remainder is first listed.
     pub owners: Vec<(Owner, u32)>,
     /// corners as indices into `vertices`, counter-clockwise seen from outside
     pub faces: Vec<[u32; 3]>,
-    /// vertices that no face uses any more
+    /// vertices without a face
     pub gone: Vec<VertexKey>,
 }
 
@@ -38,30 +38,30 @@ pub struct PatchVertex {
 }
 
 impl PatchDelta {
-    /// Whether nothing changed.
+    /// Whether there are no changes.
     pub fn is_empty(&self) -> bool {
         self.vertices.is_empty() && self.owners.is_empty()
     }
 }
 
-/// Side of the blocks in which owners are looked up, in cells.
+/// Side of the blocks for look-ups of owners, in cells.
 const BLOCK: i32 = 4;
 
 fn block_of(node: LatticeNode) -> LatticeNode {
     node.map(|x| x.div_euclid(BLOCK))
 }
 
-/// Corners by name.
+/// A face by the names of its corners.
 type NamedFace = [VertexKey; 3];
 
 /// The patch as last published.
 #[derive(Clone, Debug, Default)]
 pub(in crate::reconstruct) struct PublishedPatch {
     faces: CellTable<Owner, Vec<NamedFace>>,
-    /// the owners of the lattice among them, by blocks of cells
+    /// the owners on the lattice, by blocks of cells
     blocks: CellTable<LatticeNode, Vec<Owner>>,
     vertices: CellTable<VertexKey, Placed>,
-    /// where faces were merged
+    /// blocks with merged faces
     coarse: CoarseBlocks,
 }
 
@@ -69,27 +69,27 @@ pub(in crate::reconstruct) struct PublishedPatch {
 struct Placed {
     position: Point3<f64>,
     support: Support,
-    /// corners of faces
+    /// number of face corners here
     uses: u32,
 }
 
-/// A delta while it is made.
+/// A delta under construction.
 #[derive(Default)]
 struct Draft {
     delta: PatchDelta,
     /// index of each vertex in the delta
     at: CellTable<VertexKey, ()>,
-    /// corners of faces that were removed
+    /// corners of removed faces
     left: Vec<VertexKey>,
 }
 
 impl PublishedPatch {
-    /// Where faces were merged.
+    /// Blocks with merged faces.
     pub fn coarse(&self) -> &CoarseBlocks {
         &self.coarse
     }
 
-    /// The faces of the scan that were touched.
+    /// Touched faces of the scan.
     fn scan_faces(&self) -> impl Iterator<Item = FaceId> + '_ {
         self.faces.iter().filter_map(|(owner, _)| match owner {
             Owner::Scan(face) => Some(face),
@@ -97,9 +97,9 @@ impl PublishedPatch {
         })
     }
 
-    /// As [`Self::take`], where everything was renewed.
+    /// As [`Self::take`], for a renewal of everything.
     ///
-    /// - `coarse`: where faces of it were merged.
+    /// - `coarse`: blocks of its merged faces.
     pub fn take_all(
         &mut self,
         mut renewed: Renewed,
@@ -114,14 +114,14 @@ impl PublishedPatch {
         delta
     }
 
-    /// Takes up what was renewed; returns what is another than before.
+    /// Adopts a renewal; returns the differences from before.
     ///
-    /// - `remesh`: by which it was renewed.
+    /// - `remesh`: source of the renewal.
     pub fn take(&mut self, renewed: &Renewed, remesh: &Remesh, scan: &TriMesh) -> PatchDelta {
         let mut draft = Draft::default();
         let core = self.coarse.around(&renewed.core);
         self.coarse.refine(&renewed.core);
-        // beside the blocks that are whole in it
+        // faces outside blocks that stay merged
         let next = faces_by_owner(&renewed.patch, |owner| !self.coarse.holds(owner));
         let mut around = self.owners_around(&core, &remesh.region);
         around.retain(|owner| !next.contains(owner) && !self.coarse.holds(owner));
@@ -156,11 +156,11 @@ impl PublishedPatch {
         draft.delta
     }
 
-    /// The owners with faces around the cells of `core`, those of the scan left out.
+    /// Owners with faces around the cells of `core`, without faces of the scan.
     fn owners_around(&self, core: &CellBox, region: &LatticeRegion) -> Vec<Owner> {
         let is_around = |owner: &Owner| match owner {
             Owner::Edge(edge) => edge.cells().iter().any(|cell| core.contains(cell)),
-            // at the rim of the core, the square goes with the cell that is in the region
+            // at the rim of the core, the square belongs to the cell in the region
             Owner::Square(square) => {
                 let cells = square.cells();
                 cells.iter().all(|cell| core.contains(cell))
@@ -182,7 +182,7 @@ impl PublishedPatch {
         owners
     }
 
-    /// Forgets an owner that has no faces any more.
+    /// Forgets an owner without faces.
     fn forget(&mut self, owner: Owner) {
         self.faces.remove(&owner);
         if let Some(block) = owner
@@ -194,7 +194,7 @@ impl PublishedPatch {
         }
     }
 
-    /// Gives an owner other faces, unless they are the same.
+    /// Replaces an owner's faces, unless they are the same.
     fn replace(&mut self, owner: Owner, faces: Vec<NamedFace>, draft: &mut Draft) {
         let (at, is_new) = self.faces.insert_with(owner, Vec::new);
         if !is_new && *self.faces.value_mut(at) == faces {
@@ -221,7 +221,7 @@ impl PublishedPatch {
         }
     }
 
-    /// Puts the vertices of the draft's faces, and those that moved, where they belong.
+    /// Updates the vertices of the draft's faces, and moved ones.
     fn place(&mut self, patch: &Patch, scan: &TriMesh, remesh: &Remesh, draft: &mut Draft) {
         let mut is_seen = vec![false; patch.vertices.len()];
         for &vertex in patch.faces.iter().flat_map(|face| &face.corners) {
@@ -257,8 +257,8 @@ impl PublishedPatch {
     }
 }
 
-/// The faces of a patch by those of their owners that are `wanted`; faces of the scan that go
-/// without a remainder have none.
+/// Faces of a patch by their `wanted` owners; removed faces of the scan without a remainder have
+/// none.
 fn faces_by_owner(
     patch: &Patch,
     wanted: impl Fn(&Owner) -> bool,

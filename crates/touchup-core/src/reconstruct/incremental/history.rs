@@ -1,31 +1,31 @@
-//! Stroke undo: old values by key, so that strokes can be undone and redone bit by bit.
+//! Stroke undo: old values by key, so that undo and redo restore strokes bit by bit.
 
 use std::collections::VecDeque;
 
 use crate::reconstruct::table::{CellTable, Key};
 
-/// Strokes that can be undone.
+/// Maximum number of undoable strokes.
 const MOST_STROKES: usize = 64;
 
-/// Which stroke is exchanged for what was there instead.
+/// The stroke to exchange with the state in its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::reconstruct) enum Direction {
-    /// the last one that was not undone
+    /// the latest stroke that counts
     Undo,
-    /// the one that was undone last
+    /// the stroke undone last
     Redo,
 }
 
 /// Old values by key, stroke by stroke.
 ///
-/// Undoing swaps what is kept with what is there, and so does redoing.
+/// Undo and redo both swap kept and current values.
 #[derive(Clone, Debug)]
 pub struct History<K, V> {
     done: VecDeque<Vec<(K, V)>>,
     undone: Vec<Vec<(K, V)>>,
     /// the keys of the current stroke
     noted: CellTable<K, ()>,
-    /// values kept at most
+    /// maximum number of values
     room: usize,
     kept: usize,
 }
@@ -42,7 +42,7 @@ impl<K: Key, V> History<K, V> {
         }
     }
 
-    /// Begins a stroke; what was undone can be redone no more.
+    /// Begins a stroke, which ends the redo of undone ones.
     pub fn begin(&mut self) {
         self.noted.clear();
         self.kept -= self
@@ -54,9 +54,8 @@ impl<K: Key, V> History<K, V> {
         self.forget();
     }
 
-    /// Keeps the value of `key` as it is before it changes, unless this stroke changed it already.
-    /// Before the first stroke nothing is kept; a stroke too long to be kept can not be undone, nor
-    /// those before it.
+    /// Keeps the value of `key` before its first change in this stroke. Before the first stroke
+    /// nothing is kept; a stroke beyond the limit cannot be undone, nor can earlier ones.
     pub fn note(&mut self, key: K, before: impl FnOnce() -> V) {
         let Some(stroke) = self.done.back_mut() else {
             return;
@@ -79,12 +78,12 @@ impl<K: Key, V> History<K, V> {
         }
     }
 
-    /// How many strokes can be undone.
+    /// Number of undoable strokes.
     pub fn len(&self) -> usize {
         self.done.len()
     }
 
-    /// Whether no stroke can be undone.
+    /// Whether there is no undoable stroke.
     pub fn is_empty(&self) -> bool {
         self.done.is_empty()
     }
@@ -101,8 +100,8 @@ impl<K: Key, V> History<K, V> {
         }
     }
 
-    /// Undoes the last stroke, the last change first: `swap` exchanges what is kept with what is
-    /// there. Returns whether there was one.
+    /// Undoes the last stroke, the last change first: `swap` exchanges kept and current values.
+    /// Returns whether there was one.
     pub fn undo(&mut self, mut swap: impl FnMut(K, &mut V)) -> bool {
         let Some(mut stroke) = self.done.pop_back() else {
             return false;
@@ -116,7 +115,7 @@ impl<K: Key, V> History<K, V> {
         true
     }
 
-    /// Does again what was undone last. Returns whether there was anything.
+    /// Redoes the last undone stroke. Returns whether there was one.
     pub fn redo(&mut self, mut swap: impl FnMut(K, &mut V)) -> bool {
         let Some(mut stroke) = self.undone.pop() else {
             return false;

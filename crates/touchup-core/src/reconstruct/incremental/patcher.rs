@@ -30,26 +30,26 @@ use crate::stylus::{ContactSample, ProbedPoint, SettingError, TipBody, TipShape}
 /// Settings of a [`Patcher`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PatcherParams {
-    /// how touches are found
+    /// settings of the touch finder
     pub touches: TouchFinderParams,
-    /// how they are weighted
+    /// weights of the evidence
     pub evidence: EvidenceParams,
-    /// whether free space is evidence: where the tip went, there is no material. Else the scan
-    /// stays where nothing was touched
+    /// whether free space is evidence: the swept volume holds no material. Else the scan stays
+    /// except at touches
     pub free_space: bool,
-    /// how far the new faces may be from the surface that the touches show, m
+    /// maximum distance of the new faces from the touched surface, m
     pub tolerance: f64,
-    /// whether it is the usual one, which is made larger if the lattice around all that was
-    /// touched would not fit; else that is refused
+    /// whether `tolerance` is the usual one, which grows if the lattice around all touches would
+    /// not fit; else such a lattice is an error
     pub is_usual_tolerance: bool,
-    /// the model of uncertainty; `None`: no uncertainty, and nothing is rejected
+    /// the model of uncertainty; `None`: no uncertainty, and no rejection
     pub uncertainty: Option<UncertaintyParams>,
-    /// what the tip does elsewhere is not looked at; `None`: the scan may be touched anywhere
+    /// region of the touches that count; `None`: anywhere on the scan
     pub region: Option<Region>,
 }
 
 parameters! {
-    /// How fine the reconstructed surface is.
+    /// Resolution of the reconstructed surface.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct PatchParams in "patch" {
         /// How far the new faces may be from the surface that the touches show, on planes and down
@@ -62,8 +62,8 @@ parameters! {
 }
 
 impl PatcherParams {
-    /// Settings that hold for a ball of `radius` (m) at a stylus of `stiffness` (N/m), and a scan
-    /// whose points are off by `noise` (m).
+    /// Settings for a ball of `radius` (m) at a stylus of `stiffness` (N/m), and a scan with points
+    /// off by `noise` (m).
     pub fn new(radius: f64, stiffness: Option<f64>, noise: f64) -> Self {
         Self {
             touches: TouchFinderParams::new(radius, stiffness),
@@ -87,12 +87,12 @@ impl PatcherParams {
         2 * self.touches.half_window_ns
     }
 
-    /// Radius of the tip when it is a ball, m.
+    /// Radius of a ball tip, m.
     fn ball(&self) -> Option<f64> {
         (self.touches.shape == TipShape::Ball).then_some(self.touches.radius)
     }
 
-    /// When contacts are rejected.
+    /// Gate of rejection.
     fn gate(&self) -> Option<GateParams> {
         self.uncertainty.map(|known| GateParams {
             sigmas: known.gate_sigmas,
@@ -100,17 +100,17 @@ impl PatcherParams {
         })
     }
 
-    /// How well the scan is known; a scan free of noise is no better than touches that contradict
-    /// it.
+    /// Prior uncertainty of the scan; a scan free of noise gets none, as it is no better than
+    /// touches that contradict it.
     fn scan_prior(&self) -> Option<UncertaintyParams> {
         self.uncertainty.filter(|known| known.scan > 0.0)
     }
 
-    /// Settings for a tip of `shape` whose ball, flat end or nose has `radius` (m), else as
-    /// [`Self::new`]. How far evidence is used depends on the resolution of the tip.
+    /// Settings for a tip of `shape` with a ball, flat end or nose of `radius` (m), else as
+    /// [`Self::new`]. The range of evidence depends on the resolution of the tip.
     ///
     /// # Errors
-    /// [`SettingError`] for sizes of which no tip can be made.
+    /// [`SettingError`] for impossible sizes of a tip.
     pub fn for_tip(
         shape: TipShape,
         radius: f64,
@@ -122,8 +122,7 @@ impl PatcherParams {
         Ok(params)
     }
 
-    /// Refuses a lattice so fine that what a few contacts need does not fit: nothing is built
-    /// before.
+    /// Refuses a lattice too fine to fit even around one contact, before building anything.
     fn check_cost(&self) -> Result<(), SettingError> {
         let around = format!("one contact of a tip of {} mm", self.evidence.radius * 1e3);
         self.check_nodes(
@@ -135,7 +134,7 @@ impl PatcherParams {
 
     /// Refuses a lattice of more than `most` nodes.
     ///
-    /// - `around`: what it is around.
+    /// - `around`: contents of the lattice, for the message.
     fn check_nodes(&self, nodes: f64, most: f64, around: &str) -> Result<(), SettingError> {
         let why = format!(
             "{:.2e} or more: the lattice around {around} would have {nodes:.1e} nodes and take {:.1} GB; a larger \
@@ -151,7 +150,8 @@ impl PatcherParams {
         )
     }
 
-    /// The tolerance by whose lattice `nodes` are `most`: the edges of its cells are as its root.
+    /// The tolerance of a lattice of `most` nodes instead of `nodes`: the edges of its cells scale
+    /// with its root.
     fn fitting_tolerance(&self, nodes: f64, most: f64) -> f64 {
         self.tolerance * (nodes / most).cbrt().powi(2)
     }
@@ -180,7 +180,7 @@ impl PatcherParams {
     }
 }
 
-/// Keeps what was touched and where the ball went, and makes the patch of it.
+/// Keeps touches and swept volume, and makes the patch of them.
 ///
 /// # Example
 /// ```
@@ -213,31 +213,30 @@ pub struct Patcher {
     finder: TouchFinder,
     history: TouchHistory,
     live: Option<LivePatch>,
-    /// whether the scan has no rim; `None` before it was seen
+    /// whether the scan has no rim; `None` before the first scan
     is_closed: Option<bool>,
 }
 
-/// The patch that a mesh follows.
+/// The patch of a following mesh.
 #[derive(Clone, Debug, Default)]
 struct LivePatch {
     remesh: Remesh,
     published: PublishedPatch,
     /// changes of the evidence since
     changes: GridChanges,
-    /// changes that were taken in only nearby
+    /// changes applied only nearby
     late: GridChanges,
-    /// renewals since they were taken in as a whole
+    /// renewals since the last full application
     since_late: u32,
-    /// strokes were undone: everything is to be remeshed
+    /// strokes were undone: a full remesh is due
     is_outdated: bool,
 }
 
-/// Changes are taken in as a whole after each so many renewals, or when there is nothing else to
-/// do.
+/// Number of renewals after which changes apply in full; sooner when idle.
 const LATE_EVERY: u32 = 4;
 
 impl LivePatch {
-    /// What is to be taken in nearby, and what as a whole.
+    /// Changes to apply nearby, and changes to apply in full.
     fn take_changes(&mut self) -> (GridChanges, GridChanges) {
         let changes = std::mem::take(&mut self.changes);
         self.late.extend(&changes);
@@ -248,34 +247,33 @@ impl LivePatch {
         }
     }
 
-    /// What was taken in only nearby.
+    /// Changes applied only nearby.
     fn take_late(&mut self) -> GridChanges {
         self.since_late = 0;
         std::mem::take(&mut self.late)
     }
 }
 
-/// The tolerance, in radii: a lattice of half the radius.
+/// The usual tolerance, in radii: a lattice of half the radius.
 const TOLERANCE: f64 = 1.0 / 64.0;
-/// Smallest radius of a tip that touches for a patch, m: a fifth of the finest stylus that is sold.
+/// Minimum radius of a tip for a patch, m: a fifth of the finest stylus on sale.
 const SMALLEST_TIP: f64 = 1e-5;
-/// Nodes around one contact at most: a ball of 1.5 mm on a lattice of 0.042 mm.
+/// Maximum number of nodes around one contact: a ball of 1.5 mm on a lattice of 0.042 mm.
 const MOST_NODES: f64 = 4e6;
-/// Nodes around all that was touched at most: 3.2 GB.
+/// Maximum number of nodes around all contacts: 3.2 GB.
 const MOST_NODES_IN_ALL: f64 = 8e6;
-/// Memory of a node while the field around it is made: its state, the scan's distance, its numbers,
-/// tables that are half full.
+/// Memory of a node while making the field around it, bytes: its state, the scan's distance, its
+/// numbers, half-full tables.
 const NODE_BYTES: f64 = 400.0;
 /// Edge of the cells of one mean contact, in radii.
 const CONTACT_CELL: f64 = 1.0 / 3.0;
 /// Edge of the cells of one centre, in radii.
 const SWEPT_CELL: f64 = 0.1;
-/// Places the planes of the lattice, in pitches, where no coordinate that a person chose falls on
-/// them.
+/// Offset of the lattice planes, in pitches, off the coordinates that a person would choose.
 const ORIGIN: [f64; 3] = [0.164_607_9, 0.312_756_1, 0.460_895_1];
 
 impl Patcher {
-    /// A patcher without touches yet.
+    /// A patcher without touches.
     ///
     /// # Errors
     /// [`SettingError`].
@@ -311,13 +309,13 @@ impl Patcher {
         })
     }
 
-    /// What was rejected because it contradicted earlier contacts at its place.
+    /// Rejected contacts, in contradiction to earlier contacts at their place.
     pub fn outliers(&self) -> &Outliers {
         &self.history.contacts.outliers
     }
 
-    /// A copy of the touch history, without the state of a mesh that follows: it may go on with
-    /// another scan of the part.
+    /// A copy of the touch history, without the state of a following mesh; usable with another scan
+    /// of the part.
     pub fn copy(&self) -> Self {
         let Self {
             params,
@@ -343,16 +341,16 @@ impl Patcher {
         &self.params
     }
 
-    /// Takes the next sample, which is later than the one before. It counts once the smoothing
-    /// window around it is complete.
+    /// Adds the next sample, later than the one before. It counts once the smoothing window around
+    /// it is complete.
     pub fn push(&mut self, sample: &ContactSample) {
         self.finder.push(sample, |touch| {
             keep(&mut self.history, &self.params, &touch)
         });
     }
 
-    /// Refuses to reconstruct what was touched so far by a lattice that would not fit, before any
-    /// of it is made; that of the usual tolerance is made coarser.
+    /// Refuses reconstruction on a lattice that would not fit, before making any of it; with the
+    /// usual tolerance the lattice becomes coarser instead.
     ///
     /// # Errors
     /// [`SettingError`] of `patch.tolerance_mm`, with nodes and memory.
@@ -364,8 +362,8 @@ impl Patcher {
             .check_nodes(self.nodes(), MOST_NODES_IN_ALL, "all that was touched")
     }
 
-    /// How far the new faces may be from the surface that the touches show, m: the usual tolerance,
-    /// or what makes the lattice around all that was touched fit.
+    /// Maximum distance of the new faces from the touched surface, m: the usual tolerance, or a
+    /// larger one that fits the lattice around all contacts.
     pub fn tolerance(&self) -> f64 {
         let params = &self.params;
         match params.is_usual_tolerance {
@@ -376,30 +374,30 @@ impl Patcher {
         }
     }
 
-    /// About as many nodes has the lattice around all that was touched so far.
+    /// Approximate number of nodes of the lattice around all contacts.
     fn nodes(&self) -> f64 {
         let means = self.history.contacts.means().iter().map(|mean| mean.point);
         nodes_around_contacts(means, self.params.evidence.radius, self.params.pitch())
     }
 
-    /// The touches themselves, in order of time.
+    /// All touches, in order of time.
     pub fn probed(&self) -> &[ProbedPoint] {
         self.history.probed.points()
     }
 
-    /// What was touched, as it was kept.
+    /// All mean contacts.
     pub fn contacts(&self) -> &ContactMap {
         &self.history.contacts
     }
 
-    /// Takes in what is still in the smoothing window: the stream has ended or pauses.
+    /// Adds the samples still in the smoothing window: the stream has ended or pauses.
     pub fn flush(&mut self) {
         self.finder
             .flush(|touch| keep(&mut self.history, &self.params, &touch));
     }
 
-    /// How many strokes can be undone. A stroke is what was touched without a pause of a tenth of a
-    /// second, and where the ball went after it.
+    /// Number of undoable strokes. A stroke is the touches without a pause of a tenth of a second,
+    /// and the path of the ball after them.
     pub fn strokes(&self) -> usize {
         self.history.strokes()
     }
@@ -417,25 +415,24 @@ impl Patcher {
         log.span(log.count().checked_sub(1)?)
     }
 
-    /// Takes the last stroke back, up to the last sample: what counts is bit by bit what counted
-    /// before it. Returns whether there was one. Estimates of friction and bias stay.
+    /// Undoes the last stroke, up to the last sample: the remaining evidence is bit by bit the same
+    /// as before it. Returns whether there was one. Estimates of friction and bias stay.
     pub fn undo(&mut self) -> bool {
         self.flush();
         self.exchange(Direction::Undo)
     }
 
-    /// Does the stroke again that was undone last, bit by bit, unless something was touched since.
-    /// Returns whether there was one. What is still in the smoothing window is taken in first, as
-    /// by [`Self::undo`].
+    /// Redoes the last undone stroke, bit by bit, unless there was a touch since. Returns whether
+    /// there was one. First adds the samples in the smoothing window, as [`Self::undo`].
     pub fn redo(&mut self) -> bool {
         self.flush();
         self.exchange(Direction::Redo)
     }
 
-    /// Goes on in the place of another patcher of the same scan, whose mesh follows: its next
-    /// change leads from that mesh to what this one has kept.
+    /// Replaces another patcher of the same scan that a mesh follows: the next change leads from
+    /// that mesh to this patcher's evidence.
     ///
-    /// - `until_ns`: stamp of the last sample of either: what that mesh shows up to there goes.
+    /// - `until_ns`: stamp of the last sample of either: the mesh's content up to there goes.
     pub fn take_over(&mut self, before: Self, until_ns: i64) {
         let Self {
             live,
@@ -453,7 +450,8 @@ impl Patcher {
         self.history.note_until(until_ns);
     }
 
-    /// The next renewal remeshes everything where a stroke was exchanged; returns whether one was.
+    /// Exchanges a stroke and, if there was one, schedules a full remesh; returns whether there
+    /// was.
     fn exchange(&mut self, direction: Direction) -> bool {
         let has_changed = self.history.exchange(direction);
         if let Some(live) = &mut self.live {
@@ -462,9 +460,8 @@ impl Patcher {
         has_changed
     }
 
-    /// The scan with its touched part remeshed from all that counts so far; vertices and faces that
-    /// were not touched keep their ids. The usual tolerance is larger here if the lattice would
-    /// not fit.
+    /// The scan with its touched part remeshed from all evidence; untouched vertices and faces keep
+    /// their ids. The usual tolerance grows here if the lattice would not fit.
     ///
     /// - `scan`: the original, with the tree over its faces.
     ///
@@ -527,11 +524,11 @@ impl Patcher {
         })
     }
 
-    /// Standard deviation along the normal at places of the patch, m, by all touches so far; empty
-    /// where the settings ask for none.
+    /// Standard deviation along the normal at places of the patch, m, from all touches; empty if
+    /// the settings ask for none.
     ///
     /// - `scan`, `tree`: as in [`Self::patched`].
-    /// - `places`: vertices of the patch, m, in O, and what each rests on.
+    /// - `places`: vertices of the patch, m, in O, and their support.
     pub fn sigma_at(
         &mut self,
         scan: &TriMesh,
@@ -543,7 +540,7 @@ impl Patcher {
         self.sigma(scan, tree, places.iter().copied())
     }
 
-    /// Standard deviation at each place, where the settings ask for it.
+    /// Standard deviation at each place, if the settings ask for it.
     fn sigma(
         &self,
         scan: &TriMesh,
@@ -571,12 +568,12 @@ impl Patcher {
         places.map(&mut of).collect()
     }
 
-    /// What changed in the patch since the last call. The time depends on how much there is to
-    /// remesh near the changes. Its faces are those of the lattice: they are merged to fewer where
-    /// the patch has settled, and come again where it changes then.
+    /// Changes of the patch since the last call. The time depends on the extent of the remesh near
+    /// the changes. The faces are those of the lattice: [`Self::settled`] merges them to fewer, and
+    /// they return at later changes.
     ///
-    /// What [`Self::patched`] shows can differ from the sum of these by some thousandths of an edge
-    /// of the lattice, and where nothing was touched by more.
+    /// [`Self::patched`] can differ from the sum of these by some thousandths of an edge of the
+    /// lattice, and by more away from touches.
     ///
     /// - `scan`, `tree`: as in [`Self::patched`], the same each time.
     pub fn renewed(&mut self, scan: &TriMesh, tree: &FaceTree) -> PatchDelta {
@@ -606,11 +603,11 @@ impl Patcher {
         }
     }
 
-    /// Each fourth time, brings the field up to date where changes count less, farther off than
-    /// [`Self::renewed`] looks: to be called when its result has been passed on. The faces follow
-    /// with the next.
+    /// Each fourth call, updates the field at distances at which changes count less, beyond
+    /// [`Self::renewed`]; call it after passing on the result of that. The faces follow with the
+    /// next call.
     ///
-    /// - `scan`, `tree`: as there.
+    /// - `scan`, `tree`: as in [`Self::renewed`].
     pub fn renew_far(&mut self, scan: &TriMesh, tree: &FaceTree) {
         let Some(mut live) = self.live.take() else {
             return;
@@ -624,11 +621,11 @@ impl Patcher {
         self.live = Some(live);
     }
 
-    /// As [`Self::renewed`], when the stream pauses: after it the sum of all changes is what
-    /// [`Self::patched`] shows of all touches so far, those in the smoothing window among them, bit
-    /// by bit. What counts later is as if this had not been asked for.
+    /// As [`Self::renewed`], for a pause of the stream: the sum of all changes is then bit by bit
+    /// the result of [`Self::patched`] from all touches, the smoothing window included. Does not
+    /// affect later results.
     ///
-    /// It takes the time of a whole reconstruction.
+    /// Takes the time of a whole reconstruction.
     pub fn settled(&mut self, scan: &TriMesh, tree: &FaceTree) -> PatchDelta {
         let all = self.flushed(scan, tree);
         let ((remesh, mut renewed), until_ns) =
@@ -641,11 +638,11 @@ impl Patcher {
         PatchDelta { until_ns, ..delta }
     }
 
-    /// What [`Self::patched`] makes of all touches so far, those in the smoothing window among
-    /// them, as a change of the scan. The mesh that follows [`Self::renewed`] has no part in it,
-    /// and may be one of another scan of the part.
+    /// The result of [`Self::patched`] from all touches, the smoothing window included, as a change
+    /// of the scan. Independent of the mesh that follows [`Self::renewed`], which may be of another
+    /// scan of the part.
     ///
-    /// It takes the time of a whole reconstruction.
+    /// Takes the time of a whole reconstruction.
     ///
     /// - `scan`: with the tree over its faces.
     pub fn patch_of_all(&self, scan: &TriMesh, tree: &FaceTree) -> PatchDelta {
@@ -674,7 +671,7 @@ impl Patcher {
         }
     }
 
-    /// A copy that has taken in all touches so far, those in the smoothing window among them.
+    /// A copy with all touches, the smoothing window included.
     fn flushed(&self, scan: &TriMesh, tree: &FaceTree) -> Self {
         let mut all = self.copy();
         all.flush();
@@ -734,9 +731,9 @@ impl Patcher {
         }
     }
 
-    /// The patch of everything, by the faces of the lattice.
+    /// The patch of everything, with the faces of the lattice.
     ///
-    /// - `kept`: in place of the scan, where its detail is kept.
+    /// - `kept`: replaces the scan if its detail stays.
     fn remeshed(
         &self,
         scan: &TriMesh,
@@ -762,10 +759,10 @@ impl Patcher {
         (remesh, renewed)
     }
 
-    /// Merges faces of a patch within the tolerance; returns the support of its vertices, and where
-    /// faces were merged.
+    /// Merges faces of a patch within the tolerance; returns the support of its vertices, and the
+    /// blocks with merged faces.
     ///
-    /// - `remesh`, `kept`: by which it was made.
+    /// - `remesh`, `kept`: sources of the patch.
     fn coarsen(
         &self,
         patch: &mut Patch,
@@ -791,7 +788,7 @@ impl Patcher {
     }
 }
 
-/// What the tip does outside the region is not looked at.
+/// Keeps touches inside the region only.
 fn keep(history: &mut TouchHistory, params: &PatcherParams, touch: &TipTouch) {
     if params
         .region

@@ -1,4 +1,4 @@
-//! The field, the region and the new faces in it, updated where there is new evidence.
+//! The field, the region and its new faces, updated near new evidence.
 
 use crate::mesh::FaceId;
 use crate::reconstruct::LatticeRegion;
@@ -12,43 +12,43 @@ use crate::reconstruct::field::grid::{Changed, GridChanges, ReconstructionGrid, 
 use crate::reconstruct::field::lattice::{CellBox, Lattice, LatticeNode, VertexKey, node_at};
 use crate::reconstruct::table::CellTable;
 
-/// Rounds in which the region grows over squares where scan and patch cannot be joined.
+/// Maximum rounds of growth of the region over squares without a join of scan and patch.
 const GROWTH: usize = 3;
-/// Rounds in which the field is looked at further, each two cells, where a surface that is filled
-/// in goes on.
+/// Maximum rounds of further evaluation of the field, two cells each, along a filled surface.
 const FURTHER: usize = 4;
-/// Rounds of both on a closed scan, where all that is open can be joined, and is.
+/// Maximum rounds of growth and further evaluation on a closed scan: there every open square can be
+/// joined, and is.
 const UNTIL_CLOSED: usize = 64;
 
-/// What is remeshed, and why.
+/// The remeshed region and its pending updates.
 #[derive(Clone, Debug, Default)]
 pub(in crate::reconstruct) struct Remesh {
     pub grid: ReconstructionGrid,
     pub region: LatticeRegion,
-    /// cells that patch and scan would need to be joined, without a value of the field
+    /// cells that a join of patch and scan needs, without a value of the field
     wanted: CellTable<LatticeNode, ()>,
     /// a box that holds the region
     bounds: CellBox,
     crossings: Crossings,
-    /// around these cells faces are to be made …
+    /// cells around which new faces are due
     pending: CellBox,
-    /// … and these are in the region no more
+    /// cells no longer in the region
     left: Vec<LatticeNode>,
 }
 
 /// The new faces in and around a part of the lattice.
 #[derive(Clone, Debug)]
 pub(in crate::reconstruct) struct Renewed {
-    /// what is around these cells is new …
+    /// cells around which everything is new
     pub core: CellBox,
-    /// … and is in here, beside more of which not all is there
+    /// the new faces around `core`, and incomplete ones beyond
     pub patch: Patch,
-    /// the faces of the scan that were looked at: what is left of them is in the patch
+    /// the faces of the scan considered; the patch holds their remainders
     pub scanned: Vec<FaceId>,
 }
 
 impl Remesh {
-    /// Nothing remeshed yet.
+    /// Without faces.
     pub fn new(lattice: Lattice) -> Self {
         Self {
             grid: ReconstructionGrid::new(lattice),
@@ -58,7 +58,7 @@ impl Remesh {
 
     /// Updates everything by the changes of `evidence`: as [`ReconstructionGrid::renew`].
     ///
-    /// - `coarse`: of which all faces are made where one is.
+    /// - `coarse`: blocks with merged faces; each is remade as a whole.
     pub fn renew(
         &mut self,
         evidence: &Evidence<'_>,
@@ -86,8 +86,8 @@ impl Remesh {
         self.grow(evidence, core, &left, coarse)
     }
 
-    /// Brings the field up to date with changes of `evidence` up to where they count at all; the
-    /// faces follow with [`Self::renew`].
+    /// Updates the field with changes of `evidence` up to the radius at which they count at all;
+    /// the faces follow with [`Self::renew`].
     pub fn renew_far(&mut self, evidence: &Evidence<'_>, late: &GridChanges) {
         let changed = self.grid.renew(evidence, &GridChanges::default(), late);
         let (mut core, mut left) = self.take_pending();
@@ -102,8 +102,8 @@ impl Remesh {
         )
     }
 
-    /// The support of a vertex: touched when most of the corners of its cell are near the surface
-    /// that was; those on the scan are its own.
+    /// Support of a vertex: touched if most of the corners of its cell are near the touched
+    /// surface; for a vertex on the scan, the scan.
     pub fn support(&self, key: &VertexKey) -> Support {
         let is_of_touch = |state: &NodeState| state.source == Source::Touch && !state.is_corner;
         let is_touched = |node: &LatticeNode| self.grid.nodes.get(node).is_some_and(is_of_touch);
@@ -134,13 +134,13 @@ impl Remesh {
         }
     }
 
-    /// Takes cells into the region, or out of it, as the field has changed.
+    /// Adds cells to the region, or removes them, after changes of the field.
     ///
-    /// - `core`: widened to the cells that depend on it.
-    /// - `left`: takes those that are in the region no more.
+    /// - `core`: widened to the dependent cells.
+    /// - `left`: receives the cells that leave the region.
     fn take_up(&mut self, changed: &Changed, core: &mut CellBox, left: &mut Vec<LatticeNode>) {
         for node in &changed.at_surface {
-            // the slope at a crossing is taken over the nodes beside it
+            // the slope at a crossing includes the nodes beside it
             core.take_around(node, 2, 1);
         }
         for (cell, ()) in cells_of(changed).iter() {
@@ -163,10 +163,10 @@ impl Remesh {
             .for_each(|cell| core.take_around(cell, 1, 1));
     }
 
-    /// Makes the faces around `core`, and takes cells into the region where they cannot be joined
-    /// to the scan.
+    /// Makes the faces around `core`, and adds cells to the region if the faces cannot join the
+    /// scan.
     ///
-    /// - `left`: cells that are in the region no more.
+    /// - `left`: cells no longer in the region.
     fn grow(
         &mut self,
         evidence: &Evidence<'_>,

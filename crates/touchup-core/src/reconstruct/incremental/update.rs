@@ -1,4 +1,4 @@
-//! Incremental update: the field is filled again around new evidence, and the changes are listed.
+//! Incremental update: refills the field around new evidence, and lists the changes.
 
 use crate::reconstruct::evidence::point_evidence::{Evidence, NodeState, Source};
 use crate::reconstruct::field::floating_components::floating_components;
@@ -6,14 +6,14 @@ use crate::reconstruct::field::grid::{Changed, EarlierStates, ReconstructionGrid
 use crate::reconstruct::field::harmonic_fill::{end_reach, harmonic_fill, open_cells};
 use crate::reconstruct::field::lattice::{CellBox, LatticeNode, Numbers, stepped};
 
-/// A node whose value would change by less than this keeps it, in cells: 3 µm for a ball of 1.5 mm.
+/// Minimum change of a node's value, in cells: 3 µm for a ball of 1.5 mm.
 const SLACK: f64 = 4e-3;
-/// The field is filled again up to this many cells around the nodes that were evaluated again.
+/// Margin of the refilled field around the nodes evaluated again, in cells.
 const FILL_MARGIN: i32 = 4;
 
 impl ReconstructionGrid {
-    /// Fills in what is not known in and around `area`; finds what differs from `before`, or from
-    /// its earlier value.
+    /// Fills the unknown nodes in and around `area`; finds differences from `before`, or from the
+    /// earlier value.
     pub(in crate::reconstruct) fn update(
         &mut self,
         evidence: &Evidence<'_>,
@@ -63,7 +63,7 @@ impl ReconstructionGrid {
         let at_surface =
             nodes.filter(|(node, has_turned)| *has_turned || self.is_at_surface(&numbers, node));
         changed.at_surface = at_surface.map(|(node, _)| *node).collect();
-        // behind a closed scan the bottom is known
+        // a closed scan has a known bottom
         changed.open = if evidence.is_closed {
             Vec::new()
         } else {
@@ -73,7 +73,7 @@ impl ReconstructionGrid {
     }
 
     /// Whether the surface in the cells around a node depends on its value: one of them is crossed,
-    /// or an edge from a neighbour is, at whose crossing the slope is taken with it.
+    /// or an edge from a neighbour, at whose crossing the node contributes to the slope.
     fn is_at_surface(&self, numbers: &Numbers, node: &LatticeNode) -> bool {
         let is_material = |node: LatticeNode| {
             let at = numbers.of(&self.nodes, &node)?;
@@ -93,7 +93,7 @@ impl ReconstructionGrid {
         .any(is_other)
     }
 
-    /// The nodes in `area` and their earlier state: of `before`, or the current one.
+    /// The nodes in `area` and their earlier state: from `before`, or the current one.
     fn known_in(
         &self,
         area: &CellBox,
@@ -108,12 +108,12 @@ impl ReconstructionGrid {
         (at, was)
     }
 
-    /// Drops floating components; returns its nodes and those beside them, with what was known
-    /// there before: nothing beyond what was looked at.
+    /// Drops floating components; returns their nodes and the nodes beside them, with their earlier
+    /// state: `None` for new nodes.
     fn drop_floating_components(&mut self, evidence: &Evidence<'_>, at: &[u32]) -> EarlierStates {
         let floating_components = floating_components(self, evidence, at);
         let mut dropped = EarlierStates::default();
-        // the scan's faces go with it, up to the nodes on their other side
+        // the faces of the scan go with it, up to the nodes on their other side
         let around = |&node: &LatticeNode| CellBox { lo: node, hi: node }.widened(1, 1).iter();
         for node in floating_components.iter().flat_map(around) {
             dropped.insert_with(node, || self.nodes.get(&node).copied());
@@ -132,7 +132,7 @@ impl ReconstructionGrid {
         dropped
     }
 
-    /// Numbers of the nodes in a box; in order of insertion where that is all of them.
+    /// Numbers of the nodes in a box; in order of insertion if that is all of them.
     fn indices_in(&self, area: &CellBox) -> Vec<u32> {
         if area.volume() < self.nodes.len() as f64 {
             let mut at = Vec::new();
@@ -145,8 +145,7 @@ impl ReconstructionGrid {
         }
     }
 
-    /// Determines again which cells stay open, if a path ends near `area`; returns those for which
-    /// that is new.
+    /// Updates the cells that stay open, if a path ends near `area`; returns the changed cells.
     fn renew_open(&mut self, area: &CellBox, radius: f64) -> Vec<LatticeNode> {
         let reach = end_reach(self, radius);
         let near = area.widened(reach, reach);
