@@ -1,9 +1,9 @@
 //! A UR behind the trait [`Arm`]: commands become velocities, and reports become states.
 //!
-//! Every motion is a velocity that is sent again with each state (`speedL`), lines too: v =
-//! min(v_max, √(2 η a d), d/T) towards the end, d away. So there is one kind of motion, no thread
-//! of the controller's program that would have to be ended before the next one begins, and an arm
-//! that hears nothing any more has nothing left to finish.
+//! Every motion, lines included, is a velocity resent with each state (`speedL`): v = min(v_max,
+//! √(2 η a d), d/T) towards the end, at distance d. So there is one kind of motion, no thread of
+//! the controller's program to end before the next motion, and an arm that receives no orders has
+//! nothing left to finish.
 
 use nalgebra::{Isometry3, Rotation3, UnitQuaternion, Vector3};
 
@@ -21,26 +21,26 @@ use crate::probing::arm::{
 };
 use crate::stylus::Wrench;
 
-/// States at the start whose rate is looked at.
+/// Number of states at the start from which the rate is measured.
 const RATED: usize = 5;
-/// The least time between two of them may be longer than it should be by this factor.
+/// Maximum ratio of the least time between two states to the nominal period.
 const SAME_PERIOD: f64 = 1.5;
-/// `actual_TCP_force` times this is the force of the part on the tip, and `ft_raw_wrench` likewise.
-/// An assumption, not yet verified on a robot: docs/ur.md has the check.
+/// Factor from `actual_TCP_force` to the force of the part on the tip, and likewise for
+/// `ft_raw_wrench`. An assumption, not yet verified on a robot: docs/ur.md has the check.
 const FORCE_SIGN: f64 = 1.0;
-/// A line comes to its end with this time constant, s: four times what passes from a state to the
-/// motion that answers it.
+/// Time constant of the end of a line, s: four times the latency from a state to the motion that
+/// answers it.
 const SETTLING_TIME: f64 = 60e-3;
-/// Of the feed while pressing, m/s².
+/// Acceleration of the feed while pressing, m/s².
 const FEED_ACCELERATION: f64 = 0.5;
-/// Most that anything may ask for, m/s².
+/// Maximum acceleration of a command, m/s².
 const TOP_ACCELERATION: f64 = 10.0;
 
 /// A UR arm that holds a probe.
 ///
-/// Its client lives in a process of its own. Whatever happens to it, the arm is stopped by the
-/// dashboard, and where that does not answer by the watchdog of the controller. After such a fault
-/// every call returns it, until [`Arm::recover`].
+/// Its client lives in a process of its own. After a fault of the client the dashboard stops the
+/// arm or, if that does not answer, the watchdog of the controller. Every later call returns the
+/// fault, until [`Arm::recover`].
 pub struct UrArm {
     params: UrParams,
     client: Client,
@@ -70,7 +70,7 @@ impl UrArm {
                 .map_err(|error| UrError::Client(error.to_string()))
         };
         let mut last = next()?;
-        // one may be left out
+        // a state may be missing
         let mut least_s = f64::INFINITY;
         for _ in 0..RATED {
             let state = next()?;
@@ -122,19 +122,19 @@ impl UrArm {
     ///
     /// # Errors
     /// [`ArmError::Stopped`] while the cause of the stop persists, [`ArmError::Lost`],
-    /// [`ArmError::Refused`] where it cannot be connected.
+    /// [`ArmError::Refused`] if it cannot connect.
     pub fn recovered(params: &UrParams) -> Result<Self, ArmError> {
         Self::unlock(params)?;
         Self::connect(params).map_err(|error| refused("to recover", error.to_string()))
     }
 
-    /// How the arm was stopped at the last fault of its connection or of its client; `None`: there
-    /// was none.
+    /// Means by which the arm stopped at the last fault of its connection or client; `None`: no
+    /// fault.
     pub fn halt(&mut self) -> Option<Halt> {
         self.client.halt()
     }
 
-    /// Number of the process that speaks to the arm.
+    /// Process number of the client.
     pub fn client_id(&self) -> u32 {
         self.client.id
     }
@@ -150,7 +150,7 @@ impl UrArm {
         loop {
             match dashboard.safety().map_err(lost)? {
                 Safety::Normal => break,
-                // the controller lets itself be unlocked some seconds after the stop, not before
+                // the controller allows unlocking only some seconds after the stop
                 Safety::ProtectiveStop if clock.since(begun) < params.deadlines.connect => {
                     if !dashboard.unlock().map_err(lost)? {
                         clock.sleep(params.deadlines.dashboard);
@@ -176,7 +176,7 @@ impl Arm for UrArm {
         }
         let order = order_of(command, &self.last, &self.params)?;
         let is_stop = matches!(command, Command::Stop { .. });
-        // a stop is right whenever it comes
+        // a stop is right at any time
         if is_stop
             || self
                 .freshness
@@ -197,9 +197,9 @@ impl Arm for UrArm {
         Ok(())
     }
 
-    /// With a new client in any case: the program of the controller does at once what the registers
-    /// hold from before, and only a new client clears them first. Tool, payload and watchdog are
-    /// set again. The sensor is not zeroed, for the probe may still be pressed: back off, then
+    /// Always starts a new client: the program of the controller at once obeys registers left from
+    /// before, and only a new client clears them first. Sets tool, payload and watchdog again. Does
+    /// not zero the sensor, as the probe may still be pressed: back off, then
     /// [`crate::probing::arm::Watched::zero`].
     fn recover(&mut self) -> Result<(), ArmError> {
         Self::unlock(&self.params)?;
@@ -226,7 +226,7 @@ fn refused(what: &'static str, reason: impl Into<String>) -> ArmError {
     }
 }
 
-/// What a state says of the arm.
+/// Arm state from a state of the controller.
 pub(super) fn seen(state: &UrState) -> ArmState {
     let wrench = |[x, y, z, a, b, c]: [f64; 6]| Wrench {
         force: Vector3::new(x, y, z) * FORCE_SIGN,
@@ -242,9 +242,9 @@ pub(super) fn seen(state: &UrState) -> ArmState {
     }
 }
 
-/// The order that a command is.
+/// Converts a command to an order.
 ///
-/// - `last`: the state that it follows.
+/// - `last`: state that the command follows.
 #[expect(clippy::too_many_lines)]
 pub(super) fn order_of(
     command: &Command,
@@ -339,7 +339,7 @@ fn check(
     Ok(())
 }
 
-/// Some orientation in B whose z is a direction; `None`: it is none.
+/// An orientation in B with its z along the axis; `None`: the axis is no direction.
 fn frame_along(axis: &Vector3<f64>) -> Option<UnitQuaternion<f64>> {
     let axis = axis
         .try_normalize(0.5)

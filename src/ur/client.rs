@@ -1,5 +1,4 @@
-//! The process that speaks to the arm, as seen from here: how it is started, commanded, queried and
-//! ended.
+//! The process that speaks to the arm, from the outside: start, commands, queries and end.
 
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::process::CommandExt;
@@ -25,13 +24,13 @@ pub(super) struct Client {
     orders: Option<ChildStdin>,
     guard: Option<JoinHandle<Option<Halt>>>,
     halt: Option<Halt>,
-    /// whether the controller is a simulation that waits for this client: nothing comes late then
+    /// whether the controller is a simulation that waits for this client: nothing is late then
     pub is_lock_step: bool,
-    /// of the process
+    /// process number
     pub id: u32,
 }
 
-/// The priority of a thread that watches the arm; who commands the arm says where it is refused.
+/// Raises the priority of a thread that watches the arm; the commanding thread reports a refusal.
 fn be_in_time(is_lock_step: bool) {
     if !is_lock_step {
         let _ = priority::raise(priority::GUARD, false);
@@ -39,7 +38,7 @@ fn be_in_time(is_lock_step: bool) {
 }
 
 impl Client {
-    /// Starts the process; returns when the arm is at its command.
+    /// Starts the process; returns when the arm takes commands.
     ///
     /// - `version`: major and minor, of the controller; `dashboard`: for the guard alone.
     #[expect(clippy::too_many_lines)]
@@ -151,7 +150,7 @@ impl Client {
         Ok(client)
     }
 
-    /// Waits until something is so, or the client is broken, or the time is over.
+    /// Waits for a condition, a broken client, or the deadline.
     fn wait(
         &self,
         deadline: Duration,
@@ -163,7 +162,7 @@ impl Client {
         })
     }
 
-    /// The next state, the oldest that has not been given yet.
+    /// The oldest state not yet returned.
     pub fn next_state(&self, deadline: Duration) -> Result<UrState, ArmError> {
         let has_ended = |known: &GuardState| known.has_ended(self.shared.clock.now());
         let mut known = self.wait(deadline, |known| {
@@ -179,19 +178,18 @@ impl Client {
         known.states.pop_front().ok_or(ArmError::Lost { silent_ms })
     }
 
-    /// Stamp of the newest state that has come, also where it was not given yet, and how late that
-    /// came, s.
+    /// Stamp of the newest state, returned or not, and its lateness, s.
     pub fn newest(&self) -> (f64, f64) {
         let known = self.shared.known();
         (known.newest_s, known.lateness.newest_s())
     }
 
-    /// How late the states of the first second came; `None`: it is not over.
+    /// Lateness of the states of the first second; `None`: the second is not over.
     pub fn late_at_start(&self) -> Option<StartLateness> {
         self.shared.known().lateness.at_start()
     }
 
-    /// Throws away the states that wait.
+    /// Discards the waiting states.
     pub fn forget_states(&self) {
         self.shared.known().states.clear();
     }
@@ -211,7 +209,7 @@ impl Client {
             None => Err(std::io::ErrorKind::BrokenPipe.into()),
         };
         if sent.is_err() {
-            // its end is found by the guard, which knows the reason
+            // the guard notices the end, and knows the reason
             let known = self.wait(ZEROING, |_| false);
             return Err(known
                 .broken
@@ -221,7 +219,7 @@ impl Client {
         Ok(number)
     }
 
-    /// Sends an order and waits until it is done.
+    /// Sends an order and waits for its completion.
     pub fn ask(&mut self, what: Action) -> Result<(), ArmError> {
         let number = self.order(what)?;
         let known = self.wait(ZEROING + FAREWELL, |known| known.done >= number);
@@ -231,10 +229,10 @@ impl Client {
             .map_or(Ok(()), |broken| Err(broken.error()))
     }
 
-    /// Ends it, and with it the program of the controller; later calls return the reason.
+    /// Ends the process and the program of the controller; later calls return the reason.
     pub fn close(&mut self, reason: &str) {
         self.shared.known().close(self.shared.clock.now());
-        // at the end of its stdin it brakes, ends the program of the controller and itself
+        // at the end of its stdin the process brakes, ends the program of the controller and itself
         self.orders = None;
         self.end_guard();
         self.shared.ask_no_more();
@@ -246,7 +244,7 @@ impl Client {
         self.shared.known().broken.get_or_insert_with(closed);
     }
 
-    /// How the guard stopped the arm, when it had to.
+    /// How the guard stopped the arm; `None`: it did not have to.
     pub fn halt(&mut self) -> Option<Halt> {
         if self.shared.known().broken.is_some() {
             self.end_guard();
@@ -256,7 +254,7 @@ impl Client {
 
     fn end_guard(&mut self) {
         if let Some(guard) = self.guard.take() {
-            // a guard that failed has nothing more to say
+            // a failed guard has no result
             self.halt = guard.join().ok().flatten();
         }
     }
@@ -282,8 +280,8 @@ mod tests {
     use super::*;
     use crate::ur::dashboard::tests::listen;
 
-    /// Time is the controller's only where both say so: a controller that could lift the deadlines
-    /// by its greeting alone would be without a guard.
+    /// Time is the controller's only if both say so: a controller that could lift the deadlines by
+    /// its greeting alone would be without a guard.
     #[test]
     fn a_greeting_alone_starts_no_lock_step() {
         let folder = tempfile::tempdir().unwrap();

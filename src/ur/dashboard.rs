@@ -1,5 +1,5 @@
-//! The dashboard of a UR, on a connection of its own: a stop of the arm that needs neither Python
-//! nor a program.
+//! The dashboard of a UR, on a connection of its own: it stops the arm without Python and without a
+//! program.
 
 use std::io::{BufRead, BufReader, ErrorKind, Write};
 use std::net::{TcpStream, ToSocketAddrs};
@@ -10,7 +10,7 @@ use crate::probing::arm::Safety;
 
 /// TCP port of the dashboard.
 const PORT: u16 = 29999;
-/// In the greeting of a simulated controller whose clock waits for its client. No robot sends it.
+/// End of the greeting of a simulated controller in lock step with its client. No robot sends it.
 const LOCK_STEP: &str = "in lock step";
 
 /// A connection to a dashboard.
@@ -19,14 +19,14 @@ pub(super) struct Dashboard {
     replies: BufReader<TcpStream>,
     /// whether this is a simulated controller whose clock waits for its client
     pub is_lock_step: bool,
-    /// whether it did not answer in time; not that it has closed the connection
+    /// whether an answer was late, as opposed to a closed connection
     pub is_silent: bool,
 }
 
 impl Dashboard {
     /// Connects and waits for the greeting.
     ///
-    /// - `deadline`: of this and of each answer.
+    /// - `deadline`: for this and for each answer.
     pub fn connect(host: &str, deadline: Duration) -> Result<Self, UrError> {
         let socket = socket(host, PORT, "dashboard", deadline)?;
         let mut dashboard = Self {
@@ -70,7 +70,7 @@ impl Dashboard {
         self.line()
     }
 
-    /// Whether it is open; a silent one counts as open.
+    /// Whether the connection is open; a silent one counts as open.
     pub fn is_open(&mut self) -> bool {
         let socket = self.replies.get_ref();
         let look = || {
@@ -88,14 +88,14 @@ impl Dashboard {
     /// Stops the program of the controller, and the arm with it.
     pub fn stop(&mut self) -> Result<(), UrError> {
         let answer = self.ask("stop")?;
-        // one that has ended already cannot be stopped
+        // a program that has already ended cannot be stopped
         if answer == "Stopped" || self.ask("programState")?.starts_with("STOPPED") {
             return Ok(());
         }
         Err(self.unreachable(format!("`stop` was answered by `{answer}`")))
     }
 
-    /// Whether the controller takes orders from outside.
+    /// Checks that the controller takes orders from outside.
     pub fn check_remote(&mut self) -> Result<(), UrError> {
         let answer = self.ask("is in remote control")?;
         if answer == "true" {
@@ -107,7 +107,7 @@ impl Dashboard {
         }
     }
 
-    /// Whether the arm has power and its brakes are open.
+    /// Checks that the arm has power and its brakes are open.
     pub fn check_power(&mut self) -> Result<(), UrError> {
         let mode = self.ask("robotmode")?;
         let is_running = mode.ends_with("RUNNING");
@@ -136,9 +136,9 @@ impl Dashboard {
         })
     }
 
-    /// Ends a protective stop; returns whether the controller let itself.
+    /// Ends a protective stop; returns whether the controller complied.
     pub fn unlock(&mut self) -> Result<bool, UrError> {
-        // with its message open the panel keeps the stop
+        // the panel keeps the stop while its message is open
         self.ask("close safety popup")?;
         Ok(self.ask("unlock protective stop")? == "Protective stop releasing")
     }
@@ -180,7 +180,7 @@ pub(super) mod tests {
 
     use super::PORT;
 
-    /// Where a dashboard may be that the test plays, on an address of its own.
+    /// Listens as a dashboard of a test, on an address of its own.
     pub fn listen() -> (String, TcpListener) {
         let host = |number: u8| format!("127.9.{}.{number}", std::process::id() % 250 + 1);
         let free = |host: String| {

@@ -1,9 +1,9 @@
 //! Waits for each line of the client with a deadline.
 //!
-//! When one stays away, or the arm does not do what it is ordered to, the guard kills the client,
-//! so that nothing feeds the arm any more, and stops the arm by the dashboard; then it says why. A
-//! program that somebody else has paused it ends by the dashboard, so that nothing of an old order
-//! is left when it is resumed.
+//! If a line is missing, or the arm disobeys an order, the guard kills the client, so that nothing
+//! feeds the arm any more, and stops the arm by the dashboard; then it reports the reason. It ends
+//! by the dashboard a program that somebody else has paused, so that no old order survives until
+//! the resumption.
 
 use std::collections::VecDeque;
 use std::process::Child;
@@ -21,76 +21,76 @@ use super::protocol::{Action, ClientReport, Link, PERIOD, ProgramState, UrState,
 use crate::clock::{Clock, ManualClock};
 use crate::probing::arm::{ArmError, Obedience, OrderedMotion, Safety};
 
-/// States that wait for a late caller, 128 ms of them; older ones are dropped.
+/// Maximum number of states that wait for a late caller, 128 ms; older ones drop out.
 const WAITING: usize = 64;
-/// The end of a program is reported after this time: a safety reason arrives a little later.
+/// Delay of the report of an ended program, as a safety reason arrives a little later.
 pub(super) const ENDED: Duration = Duration::from_millis(40);
-/// Zeroing, with the braking before it, has this much time.
+/// Maximum duration of zeroing, with the braking before it.
 pub(super) const ZEROING: Duration = Duration::from_secs(3);
 /// Deceleration of that braking, m/s².
 const ZEROING_STOP: f64 = 2.0;
-/// A dashboard that did not stop the arm is asked again this often.
+/// Period of further stop requests to a dashboard that did not stop the arm.
 pub(super) const AGAIN: Duration = Duration::from_millis(100);
-/// A program that counts no cycle for so many hangs: one that is late by one does not.
+/// Number of periods without a counted cycle that make a program hang: a delay by one does not.
 const CYCLES: f64 = 2.0;
-/// The client ends by itself within this time of its stdin.
+/// Maximum time from the end of its stdin to the end of the client.
 pub(super) const FAREWELL: Duration = Duration::from_millis(1500);
 
-/// How the arm was stopped after a fault.
+/// Means by which the arm stopped after a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Halt {
-    /// The dashboard said so.
+    /// The dashboard confirmed the stop.
     Dashboard {
-        /// from the fault being seen to the answer
+        /// time from the detection of the fault to the answer
         took: Duration,
     },
     /// The dashboard does not answer; the watchdog of the controller stops the arm.
     Watchdog,
 }
 
-/// State of the guard. It decides by the reports and by the time passed in, and never blocks.
+/// State of the guard. It decides by the reports and the time passed in, and never blocks.
 pub(super) struct GuardState {
     pub deadlines: Deadlines,
     pub is_ready: bool,
     pub states: VecDeque<UrState>,
-    /// of the newest state that has come, s
+    /// stamp of the newest state, s
     pub newest_s: f64,
     pub done: u64,
     pub sent: u64,
     pub served: u64,
-    /// when the client was started
+    /// start of the client
     begun_at: Instant,
-    /// since when an order waits for its call to return
+    /// time since which an order waits for its call to return
     waiting_since: Option<Instant>,
-    /// an order that takes its time
+    /// number of a long order
     asked: Option<u64>,
-    /// when the last new state came
+    /// arrival of the last new state
     fresh_at: Option<Instant>,
-    /// since when the program of the controller does not run, though nothing of the safety system
-    /// says why
+    /// time since which the program of the controller does not run without a reason from the safety
+    /// system
     ended_since: Option<Instant>,
-    /// whether it was paused before
+    /// whether a pause of the program came first
     was_paused: bool,
-    /// whether a state has said since it was ready that something stops the arm or its program
+    /// whether a state since `Ready` shows a stop of the arm or its program
     has_halted: bool,
     obedience: Obedience,
-    /// the newest that the program has counted, and the stamp of the first state with it, s; `None`
-    /// while it is at a command, or another has the arm
+    /// newest cycle count of the program, and the stamp of its first state, s; `None` during a
+    /// command, or while another has the arm
     cycle: Option<(i32, f64)>,
     pub lateness: Lateness,
     pub broken: Option<ClientLoss>,
-    /// since when it is asked to end
+    /// time of the request to end
     closing_since: Option<Instant>,
 }
 
-/// Why there is no client any more.
+/// Reason for the loss of the client.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum ClientLoss {
     /// the arm or its client
     Arm(ArmError),
-    /// no library, or another one
+    /// no library, or another version
     Wheel(String),
-    /// the tool that was set is not there
+    /// the commanded tool is not in effect
     Tool(String),
 }
 
@@ -99,12 +99,12 @@ pub(super) struct SharedGuard {
     pub known: Mutex<GuardState>,
     pub changed: Condvar,
     pub clock: Clock,
-    /// asks a dashboard that was mute
+    /// repeats the stop request to a mute dashboard
     asker: Mutex<Option<Asker>>,
 }
 
-/// Asks a dashboard to stop the arm until it has done so, on connections of its own. Who lets it go
-/// waits for the answer on its way, so that it never stops the program of a later client.
+/// Asks a dashboard to stop the arm until it succeeds, on connections of its own. Dropping it waits
+/// for the pending answer, so that it never stops the program of a later client.
 struct Asker {
     over: Option<Sender<()>>,
     thread: Option<JoinHandle<()>>,
@@ -136,7 +136,7 @@ impl Asker {
 impl Drop for Asker {
     fn drop(&mut self) {
         self.over = None;
-        // one that failed asks no more
+        // a failed thread asks no more
         let _ = self.thread.take().map(JoinHandle::join);
     }
 }
@@ -151,7 +151,7 @@ impl SharedGuard {
         }
     }
 
-    /// Asks the dashboard no more.
+    /// Ends the repeated stop requests.
     pub fn ask_no_more(&self) {
         *self.asker.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
@@ -176,7 +176,7 @@ impl ClientLoss {
     }
 }
 
-/// What of an order shows in the velocity of the arm.
+/// Motion of an order as visible in the velocity of the arm.
 fn ordered(what: &Action) -> OrderedMotion {
     match *what {
         Action::Move {
@@ -233,7 +233,7 @@ impl GuardState {
         }
     }
 
-    /// An order goes out; returns its number.
+    /// Notes an order; returns its number.
     pub fn send(&mut self, what: &Action, now: Instant) -> u64 {
         self.sent += 1;
         self.waiting_since.get_or_insert(now);
@@ -250,14 +250,14 @@ impl GuardState {
         self.closing_since = Some(now);
     }
 
-    /// Whether the program of the controller does not run, for long enough that the reason would
-    /// have arrived.
+    /// Whether the program of the controller has not run for longer than the delay of a safety
+    /// reason.
     pub fn has_ended(&self, now: Instant) -> bool {
         self.ended_since
             .is_some_and(|since| now.saturating_duration_since(since) > ENDED)
     }
 
-    /// Why it does not.
+    /// Reason why the program does not run.
     pub fn ended(&self) -> ArmError {
         if self.was_paused {
             ArmError::ProgramPaused
@@ -266,8 +266,8 @@ impl GuardState {
         }
     }
 
-    /// Notes a state of a client that is ready; whether it is the first in which something else
-    /// stops a program that is still there.
+    /// Notes a state of a ready client; returns whether it is the first in which something else
+    /// stops a program that is still present.
     pub fn is_to_be_ended(&mut self, state: &UrState) -> bool {
         let is_first = self.is_ready && !state.may_move() && !self.has_halted;
         self.has_halted |= is_first;
@@ -275,20 +275,19 @@ impl GuardState {
         is_first && state.program != ProgramState::Ended && self.closing_since.is_none()
     }
 
-    /// How long the next line may stay away from now on.
+    /// Remaining time for the next line.
     pub fn patience(&self, now: Instant) -> Duration {
         let (since, deadline, _) = self.awaited();
         deadline.saturating_sub(now.saturating_duration_since(since.unwrap_or(now)))
     }
 
-    /// The fault when that time has passed without a line.
+    /// Fault of a line missing for that time.
     pub fn missed(&self) -> ClientLoss {
         let (_, deadline, misses) = self.awaited();
         ClientLoss::client(format!("hangs: {misses} for {} ms", deadline.as_millis()))
     }
 
-    /// What is waited for: since when, where that was before now, how long, and what is said when
-    /// it stays away.
+    /// Next awaited event: earlier start of the wait, deadline, and words for its absence.
     fn awaited(&self) -> (Option<Instant>, Duration, &'static str) {
         match (self.closing_since, self.is_ready) {
             (Some(since), _) => (Some(since), FAREWELL, "it does not end"),
@@ -301,13 +300,13 @@ impl GuardState {
         }
     }
 
-    /// Takes a line of the client; returns a fault.
+    /// Handles a line of the client; returns a fault.
     #[expect(clippy::too_many_lines)]
     pub fn take(&mut self, report: ClientReport, now: Instant) -> Option<ClientLoss> {
         match report {
             ClientReport::Ready => {
                 (self.is_ready, self.fresh_at) = (true, Some(now));
-                // those of before have the pose of another tool
+                // older states have the pose of another tool
                 self.states.clear();
                 self.obedience = Obedience::new(now.saturating_duration_since(self.begun_at));
                 self.lateness = Lateness::new(now);
@@ -315,7 +314,7 @@ impl GuardState {
             ClientReport::State(state) => {
                 (self.fresh_at, self.newest_s) = (Some(now), state.stamp_s);
                 self.lateness.take(state.stamp_s, now);
-                // where the safety system has ended it, the state says so by itself
+                // a state after a safety stop carries its own reason
                 let has_ended = !state.is_playing() && state.safety() == Safety::Normal;
                 self.ended_since = has_ended.then(|| self.ended_since.unwrap_or(now));
                 if self.states.len() == WAITING {
@@ -323,7 +322,7 @@ impl GuardState {
                 }
                 self.states.push_back(*state);
                 self.serve(state.served, now);
-                // what does not play is somebody else's, or stands
+                // a program that does not play belongs to somebody else, or stands
                 if !self.is_ready || self.has_halted || !state.may_move() {
                     self.cycle = None;
                 } else if let Some(fault) = self.hangs(&state).or_else(|| {
@@ -377,8 +376,8 @@ impl GuardState {
         })
     }
 
-    /// The fault of a program whose main loop has stopped, whatever it was ordered; at a command
-    /// that takes more than a cycle the deadline of its call counts.
+    /// Fault of a program whose main loop has stopped, whatever the order; for a command longer
+    /// than a cycle the deadline of its call counts.
     fn hangs(&mut self, state: &UrState) -> Option<ArmError> {
         let seen = self.cycle.filter(|(cycle, _)| *cycle == state.cycle);
         let since_s = seen.map_or(state.stamp_s, |(_, since_s)| since_s);
@@ -398,25 +397,25 @@ impl GuardState {
     }
 }
 
-/// The thread that waits with deadlines, with a dashboard for itself.
+/// The thread that waits with deadlines, with its own dashboard.
 pub(super) struct Guard {
     pub child: Child,
     pub host: String,
     pub dashboard: Dashboard,
     pub shared: Arc<SharedGuard>,
-    /// of a controller in lock step: its states move the clock
+    /// clock of a controller in lock step, moved by its states
     pub hand: Option<ManualClock>,
 }
 
 impl Guard {
-    /// Until the client ends; returns how the arm was stopped when that was not wanted.
+    /// Runs until the client ends; returns how it stopped the arm after a fault.
     #[expect(clippy::too_many_lines)]
     pub fn watch(mut self, reports: &Receiver<ClientReport>) -> Option<Halt> {
         let clock = self.shared.clock.clone();
         let mut stamp_s = f64::INFINITY;
         let broken = loop {
             let patience = self.shared.known().patience(clock.now());
-            // lines may come and come from a client that is never ready or never ends
+            // a client that is never ready or never ends may send lines forever
             let report = if patience.is_zero() {
                 Err(RecvTimeoutError::Timeout)
             } else {
@@ -445,7 +444,7 @@ impl Guard {
                     }
                     broken
                 }
-                // it ended on request
+                // the client ended on request
                 Err(RecvTimeoutError::Disconnected)
                     if self.shared.known().closing_since.is_some() =>
                 {
@@ -469,9 +468,9 @@ impl Guard {
                 }));
             }
         };
-        // nothing feeds the arm any more from here on; one that has ended already is as good
+        // nothing feeds the arm from here on; a client that has already ended is as good
         let _ = self.child.kill();
-        // before it is ready nothing of ours moves, and what runs may be somebody else's
+        // before `Ready` nothing of ours moves, and a running program may be somebody else's
         let halt = (broken.is_some() && self.shared.known().is_ready).then(|| self.halt());
         let _ = self.child.wait();
         if let Some(broken) = broken {
@@ -486,7 +485,7 @@ impl Guard {
         let begun = self.shared.clock.now();
         let (host, deadline) = (&self.host, self.shared.known().deadlines.dashboard);
         let stopped = self.dashboard.stop().or_else(|error| {
-            // one that was closed, not one that is silent, may be there again
+            // a closed connection, unlike a silent one, may work again
             if self.dashboard.is_silent {
                 Err(error)
             } else {

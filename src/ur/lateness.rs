@@ -1,27 +1,26 @@
-//! How late the states of an arm come.
+//! Lateness of the states of an arm.
 //!
-//! Nothing says when a state was made by the clock of this machine. But the one that came soonest
-//! after its stamp was the least late, so another is later than that by what its arrival less its
-//! stamp is more. A clock of the controller that goes a little faster or slower is followed: only
-//! the last seconds count.
+//! No stamp is in the clock of this machine. But the state with the least delay from stamp to
+//! arrival was the least late; the excess of another state's delay is its lateness. Only the last
+//! seconds count, so the measure follows a controller clock that goes a little faster or slower.
 
 use std::time::{Duration, Instant};
 
-/// The soonest of one to two such times counts: two clocks differ by less than a millisecond after
-/// it.
+/// Memory of the least delay; the two newest memories count. Two clocks differ by less than a
+/// millisecond after it.
 const MEMORY: Duration = Duration::from_secs(5);
-/// States that are looked at before anything moves: one second of them.
+/// Number of states examined before any motion: one second.
 pub(super) const LOOKED_AT: usize = 500;
-/// Before anything moves 99 of 100 are late by at most this, ms: two periods, as an order that
-/// follows one that is older is not sent.
+/// Maximum 99th percentile of the lateness before any motion, ms: two periods, as an order that
+/// follows an older state is not sent.
 const USUAL_MS: f64 = 4.0;
-/// … and none by more than this, ms: a motion ends there.
+/// Maximum lateness before any motion, ms: beyond it a motion ends.
 const WORST_MS: f64 = 20.0;
 
-/// Of the states before anything moves.
+/// Lateness of the states before any motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct StartLateness {
-    /// 99 of 100 are not later, ms
+    /// 99th percentile, ms
     pub usual_ms: f64,
     pub worst_ms: f64,
 }
@@ -33,13 +32,13 @@ impl StartLateness {
     }
 }
 
-/// How late they are, by arrivals and stamps.
+/// Lateness by arrivals and stamps.
 #[derive(Debug)]
 pub(super) struct Lateness {
     begun: Instant,
-    /// how late the first states came, beside those before them, s
+    /// lateness of the first states relative to those before them, s
     first_s: Vec<f64>,
-    /// the least of the last two memories, s
+    /// least delay of the last two memories, s
     least_s: [f64; 2],
     since: Instant,
     newest_s: f64,
@@ -56,7 +55,7 @@ impl Lateness {
         }
     }
 
-    /// A state has come.
+    /// Notes a new state.
     pub fn take(&mut self, stamp_s: f64, now: Instant) {
         self.newest_s = now.saturating_duration_since(self.begun).as_secs_f64() - stamp_s;
         if now.saturating_duration_since(self.since) > MEMORY {
@@ -68,7 +67,7 @@ impl Lateness {
         }
     }
 
-    /// Of the newest state, s.
+    /// Lateness of the newest state, s.
     pub fn newest_s(&self) -> f64 {
         let least = self.least_s[0].min(self.least_s[1]);
         if least.is_finite() {
@@ -78,7 +77,7 @@ impl Lateness {
         }
     }
 
-    /// Of the first states; `None`: not all of them have come.
+    /// Lateness of the first states; `None`: some are missing.
     pub fn at_start(&self) -> Option<StartLateness> {
         let mut late = self.first_s.clone();
         late.sort_by(f64::total_cmp);
@@ -96,7 +95,7 @@ impl Lateness {
 mod tests {
     use super::*;
 
-    /// States each 2 ms, of which each is late by so many ms.
+    /// States each 2 ms with a given lateness, ms.
     fn after(count: usize, late_ms: impl Fn(usize) -> f64) -> Lateness {
         let begun = Instant::now();
         let mut lateness = Lateness::new(begun);
@@ -137,19 +136,19 @@ mod tests {
 
     #[test]
     fn a_constant_delay_that_begins_shows_and_a_clock_that_goes_faster_does_not() {
-        // from the 1000th on
+        // late from the 1000th on
         let late = after(1100, |number| if number < 1000 { 0.5 } else { 40.5 });
         assert!(
             (late.newest_s() - 40e-3).abs() < 1e-6,
             "{}",
             late.newest_s()
         );
-        // 50 millionths for an hour are 180 ms: of that the memory of at most ten seconds keeps 0.5
-        // ms
+        // 50 millionths for an hour are 180 ms; the memory of at most ten seconds keeps 0.5 ms of
+        // them
         let drifting = after(1_800_000, |number| number as f64 * 2.0 * 50e-6);
         assert!(drifting.newest_s() < 0.51e-3, "{}", drifting.newest_s());
         assert_eq!(after(0, |_| 0.0).newest_s(), 0.0);
-        // a clock that stands still while states come, as that of a test
+        // a clock that stands still while states come, as in a test
         let ahead = after(LOOKED_AT, |number| -2.0 * number as f64)
             .at_start()
             .unwrap();

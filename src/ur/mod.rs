@@ -1,12 +1,11 @@
 //! A UR arm, through the Python library ur-rtde in a process of its own (feature `ur`).
 //!
-//! The library waits without end for a controller that is silent, ends with a fault of memory when
-//! a connection is lost and comes back, and leaves the arm moving when it goes. So it lives in a
-//! child process: `touchup ur child`. [`UrArm`] speaks to it over a pipe, watches each line with a
-//! deadline, and stops the arm over the dashboard, without Python, when one is missed. Three things
-//! stop an uncommanded arm, each for when the one before fails: the child, which brakes when no
-//! order comes; the dashboard; the watchdog of the controller, which the child feeds while it
-//! lives.
+//! The library waits without end for a silent controller, ends with a memory fault when a
+//! connection drops and returns, and leaves the arm moving when it ends. So it lives in a child
+//! process: `touchup ur child`. [`UrArm`] speaks to it over a pipe, watches each line with a
+//! deadline, and on a missing line stops the arm over the dashboard, without Python. Three things
+//! stop an uncommanded arm, each if the one before fails: the child, which brakes without orders;
+//! the dashboard; the watchdog of the controller, which the child feeds while it lives.
 
 mod arm;
 pub(crate) mod child;

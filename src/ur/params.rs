@@ -13,36 +13,36 @@ use crate::clock::Clock;
 pub struct UrParams {
     /// Name or address of the controller.
     pub host: String,
-    /// Folder of Python packages with ur-rtde in it, as `touchup ur setup` prints it.
+    /// Folder of Python packages with ur-rtde, as printed by `touchup ur setup`.
     pub site_packages: PathBuf,
     /// The program that speaks to the arm: touchup itself, built with feature `ur`.
     pub program: PathBuf,
-    /// The tip (centre of its ball, z from tip to handle) in the flange F.
+    /// Pose of the tip (centre of its ball, z from tip to handle) in the flange F.
     pub pose_ft: Isometry3<f64>,
-    /// Of all that hangs on the flange, kg.
+    /// Mass of everything on the flange, kg.
     pub mass: f64,
     /// Its centre of mass, m in F.
     pub centre: Vector3<f64>,
     /// Highest commanded speed of the tip, m/s; [`crate::probing::arm::Limits`] are below it.
     pub top_speed: f64,
-    /// Most that is ever pressed with, N.
+    /// Maximum pressing force, N.
     pub top_force: f64,
-    /// Of force mode, 0 to 1: the higher, the sooner the tip is slower again where nothing pushes.
+    /// Damping of force mode, 0 to 1: the higher, the sooner the tip slows down without a push.
     pub damping: f64,
-    /// Of force mode, 0 to 2: below one it is calmer on stiff parts.
+    /// Gain of force mode, 0 to 2: below one it is calmer on stiff parts.
     pub gain: f64,
-    /// How long what may take.
+    /// Maximum durations.
     pub deadlines: Deadlines,
-    /// On which the deadlines are kept.
+    /// Clock of the deadlines.
     pub clock: Clock,
-    /// Whether a controller that greets as a simulation in lock step is believed: its stamps then
-    /// take the place of the machine's clock. Both have to say so, for a deadline that a controller
-    /// could lift would be none.
+    /// Whether to believe a controller that greets as a simulation in lock step: its stamps then
+    /// replace the machine's clock. Both have to say so, for a deadline that a controller could
+    /// lift would be none.
     pub is_lock_step: bool,
 }
 
 impl UrParams {
-    /// A probe of 150 mm and 0.25 kg, held upright; to be set to what is mounted.
+    /// A probe of 150 mm and 0.25 kg, held upright; to adapt to the mounted probe.
     pub fn new(host: impl Into<String>, site_packages: impl Into<PathBuf>) -> Self {
         let upright =
             nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
@@ -56,7 +56,7 @@ impl UrParams {
             // the limit of collaborative operation at reduced speed
             top_speed: 0.25,
             top_force: 50.0,
-            // as the program of ur_rtde has them
+            // defaults of ur_rtde's program
             damping: 0.025,
             gain: 0.5,
             deadlines: Deadlines::default(),
@@ -65,11 +65,11 @@ impl UrParams {
         }
     }
 
-    /// Checks the parameters before anything is connected.
+    /// Checks the parameters before connecting.
     pub(super) fn check(&self) -> Result<(), UrError> {
         let within =
             |what: &'static str, value: f64, lowest: f64, highest: f64, unit: &'static str| {
-                // what is no number is in no range
+                // NaN is in no range
                 let is_in = (lowest..=highest).contains(&value);
                 if is_in {
                     Ok(())
@@ -92,7 +92,7 @@ impl UrParams {
             "m",
         )?;
         within("the payload", self.mass, 0.0, 16.0, "kg")?;
-        // three zeros would leave the centre as it is
+        // three zeros would leave the centre unchanged
         within(
             "the distance of the payload's centre",
             self.centre.norm(),
@@ -124,25 +124,25 @@ impl UrParams {
     }
 }
 
-/// Longer calls are faults.
+/// Deadlines; longer calls are faults.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deadlines {
-    /// From the start of the client to the arm at its command.
+    /// Maximum time from the start of the client until the arm takes commands.
     pub connect: Duration,
-    /// Between two lines of the client.
+    /// Maximum time between two lines of the client.
     pub beat: Duration,
-    /// Between two states of the arm.
+    /// Maximum time between two states of the arm.
     pub silent: Duration,
-    /// From an order to its call having returned.
+    /// Maximum time from an order to the return of its call.
     pub order: Duration,
-    /// Of one answer of the dashboard.
+    /// Maximum time of one answer of the dashboard.
     pub dashboard: Duration,
 }
 
 impl Default for Deadlines {
-    /// A fault and the braking after it take less than 200 ms together; a machine that is not
-    /// real-time is late by 25 ms now and then. While a call hangs the watchdog of the controller,
-    /// 100 ms, is not fed: it is sooner where it works.
+    /// A fault and the braking after it take less than 200 ms together; a machine without real-time
+    /// priority is late by 25 ms now and then. While a call hangs nothing feeds the watchdog of the
+    /// controller, 100 ms, which then acts sooner if it works.
     fn default() -> Self {
         Self {
             connect: Duration::from_secs(10),

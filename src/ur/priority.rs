@@ -1,23 +1,23 @@
-//! Real-time priority of the threads that keep an arm moving, where this user may have it.
+//! Real-time priority of the threads that keep an arm moving, if this user may have it.
 //!
-//! A thread of ordinary priority waits for whatever else runs. `SCHED_FIFO` is asked for as
-//! sched(7) has it: the kernel allows it up to `RLIMIT_RTPRIO`, or to who has `CAP_SYS_NICE`.
+//! A thread of ordinary priority waits for all other work. The request is for `SCHED_FIFO` as in
+//! sched(7): the kernel allows it up to `RLIMIT_RTPRIO`, or with `CAP_SYS_NICE`.
 
 use std::io;
 
-/// Of the program that speaks to the arm, all of its threads.
+/// Priority of all threads of the program that speaks to the arm.
 pub(super) const CLIENT: i32 = 40;
-/// Of the guard, and of what passes it the lines of the client.
+/// Priority of the guard, and of the thread that passes it the lines of the client.
 pub(super) const GUARD: i32 = 50;
-/// Of the thread that commands the arm.
+/// Priority of the thread that commands the arm.
 pub(super) const CALLER: i32 = 30;
 
 /// Gives this thread a real-time priority.
 ///
-/// - `inherits`: also the threads that it starts from now on; otherwise they are ordinary ones.
+/// - `inherits`: also threads started from now on; otherwise they are ordinary ones.
 ///
 /// # Errors
-/// Of the system: `EPERM` where it is not allowed.
+/// Of the system: `EPERM` without permission.
 pub(super) fn raise(priority: i32, inherits: bool) -> io::Result<()> {
     let policy = libc::SCHED_FIFO
         | if inherits {
@@ -39,7 +39,7 @@ pub(super) fn raise(priority: i32, inherits: bool) -> io::Result<()> {
     }
 }
 
-/// What has to be done where [`raise`] was refused.
+/// Advice after a refusal of [`raise`].
 pub(super) fn remedy(error: &io::Error) -> String {
     format!(
         "the arm is commanded at ordinary priority ({error}), and may stop where this machine is busy: add the line \
@@ -51,7 +51,7 @@ pub(super) fn remedy(error: &io::Error) -> String {
 mod tests {
     use super::*;
 
-    /// Priority and policy of this thread, as proc(5) has them in the 40th and 41st field.
+    /// Priority and policy of this thread, the 40th and 41st field in proc(5).
     fn scheduled() -> (i32, i32) {
         let stat = std::fs::read_to_string("/proc/thread-self/stat").unwrap();
         // the second field is a name in parentheses, which may have blanks
@@ -67,8 +67,8 @@ mod tests {
         )
     }
 
-    /// A thread is what the kernel says it is, whether this user may have it or not; one that it
-    /// starts is so only where it is asked.
+    /// The kernel confirms priority or refusal; a started thread inherits the priority only on
+    /// request.
     #[test]
     fn a_thread_has_the_priority_that_it_was_granted_and_hands_it_on_where_it_is_asked() {
         for inherits in [false, true] {

@@ -1,5 +1,5 @@
-//! Whether a controller speaks RTDE, which version it runs, and whether its clock goes, before the
-//! library is let near it: that waits for a silent one without end.
+//! Checks that a controller speaks RTDE, has a known version, and a running clock, before the
+//! library connects: that waits for a silent controller without end.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -10,15 +10,14 @@ use super::error::UrError;
 
 /// TCP port of RTDE.
 const PORT: u16 = 30004;
-/// The version of RTDE, as the library asks for it.
+/// Version of RTDE requested, the same as the library's.
 const PROTOCOL: [u8; 2] = [0, 2];
 /// The oldest minor version of PolyScope 5 that sends the raw reading of its force sensor.
 const OLDEST: u32 = 9;
 /// Number of states read; the clock has to advance between them.
 const STATES: usize = 3;
 
-/// The major and minor version of a controller. Refuses one that is silent, or not of the kind that
-/// is needed.
+/// Major and minor version of a controller. Refuses a silent controller and an unsupported kind.
 pub(super) fn probe(host: &str, deadline: Duration) -> Result<[u32; 2], UrError> {
     let mut socket = socket(host, PORT, "RTDE", deadline)?;
     let reason = |reason: String| UrError::Unreachable {
@@ -75,13 +74,13 @@ pub(super) fn probe(host: &str, deadline: Duration) -> Result<[u32; 2], UrError>
 }
 
 fn ask(socket: &mut TcpStream, kind: u8, body: &[u8]) -> std::io::Result<Vec<u8>> {
-    // size of the whole, kind, body
+    // total size, kind, body
     let head = [0, body.len() as u8 + 3, kind];
     socket.write_all(&[&head[..], body].concat())?;
     wait(socket, kind)
 }
 
-/// The next packet of a kind; others are passed over.
+/// The next packet of a kind; skips others.
 fn wait(socket: &mut TcpStream, kind: u8) -> std::io::Result<Vec<u8>> {
     loop {
         let mut head = [0; 3];

@@ -1,7 +1,7 @@
 //! The protocol of the two processes: one JSON object on each line.
 //!
-//! Orders go down the client's stdin, reports come up its stdout. Poses and velocities are those of
-//! ur_rtde: place and rotation vector in the base B, m and rad.
+//! Orders go down the client's stdin, reports come up its stdout. Poses and velocities follow
+//! ur_rtde: position and rotation vector in the base B, m and rad.
 
 use std::path::PathBuf;
 
@@ -10,21 +10,21 @@ use serde::{Deserialize, Serialize};
 
 use crate::probing::arm::{Safety, Slowed};
 
-/// The one version of ur-rtde that this was made and tested with.
+/// The only supported and tested version of ur-rtde.
 pub const WHEEL: &str = "1.6.5";
 
 /// Time between two states, and a cycle of the controller, s: 500 Hz of an e-Series.
 pub const PERIOD: f64 = 2e-3;
 
-/// The first line: whom to connect, and how.
+/// The first line: connection and configuration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Begin {
     pub host: String,
     pub site_packages: PathBuf,
-    /// the tip in the flange
+    /// tip in the flange
     pub tool: [f64; 6],
     pub mass_kg: f64,
-    /// in the flange
+    /// centre of mass in the flange
     pub centre_m: [f64; 3],
     /// major and minor version of the controller
     pub version: [u32; 2],
@@ -34,21 +34,21 @@ pub struct Begin {
     pub is_lock_step: bool,
 }
 
-/// A line down.
+/// A line to the client.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Order {
-    /// one more for each
+    /// increases by one
     pub number: u64,
     pub what: Action,
 }
 
-/// What is to be done. The newest motion takes the place of those before; a zero is done whatever
-/// comes after it.
+/// Action of an order. The newest motion replaces those before; a zero happens whatever comes after
+/// it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Action {
-    /// Goes with a velocity, until the next order or until orders stay away.
+    /// Moves with a velocity, until the next order or until orders stop.
     Move { twist: [f64; 6], acceleration: f64 },
-    /// Presses along z of a frame of B and goes with a velocity.
+    /// Presses along z of a frame of B and moves with a velocity.
     Press {
         frame: [f64; 6],
         force_n: f64,
@@ -56,35 +56,34 @@ pub enum Action {
         feed: [f64; 3],
         acceleration: f64,
     },
-    /// To rest.
+    /// Brakes to rest.
     Stop { deceleration: f64 },
     /// Zeroes the sensor, at rest.
     Zero,
 }
 
-/// A line up.
+/// A line from the client.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum ClientReport {
-    /// The arm is at command.
+    /// The arm takes commands.
     Ready,
-    /// A new state.
+    /// A new state of the arm.
     State(Box<UrState>),
-    /// Nothing new from the arm; the client lives.
+    /// Heartbeat of the client without a new state.
     Beat { served: u64 },
     /// `Zero` is done.
     Done { number: u64 },
-    /// A connection of the library is gone. The last line of all: after that the library cannot be
-    /// trusted.
+    /// The library lost a connection. Always the last line: after it nobody can trust the library.
     Lost { which: Link },
-    /// No or another library.
+    /// No library, or another version.
     BadWheel { reason: String },
-    /// The tool that was set is not there.
+    /// The commanded tool is not in effect.
     BadTool { reason: String },
-    /// A call of the library failed, though nothing on the arm forbids it.
+    /// A call of the library failed, though the state of the arm allows it.
     Failed { call: String, reason: String },
 }
 
-/// Which connection of the library.
+/// A connection of the library.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Link {
     States,
@@ -94,56 +93,55 @@ pub enum Link {
 /// State of the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct UrState {
-    /// of the controller
+    /// time of the controller
     pub stamp_s: f64,
     pub pose: [f64; 6],
     /// of the tip, m/s and rad/s
     pub velocity: [f64; 6],
     /// N and N m, less payload and zero offset; in B about the tip
     pub wrench: [f64; 6],
-    /// as the sensor has it; in the flange
+    /// reading of the sensor; in the flange
     pub raw_wrench: [f64; 6],
     /// rad
     pub joints: [f64; 6],
-    /// as the controller has them
+    /// bits of the controller
     pub safety_bits: u32,
-    /// of the speed slider, 0 to 1
+    /// position of the speed slider, 0 to 1
     pub speed_fraction: f64,
-    /// what of the uploaded program
+    /// state of the uploaded program
     pub program: ProgramState,
-    /// that its main loop has counted last; negative: that is at a command that takes more than one
+    /// newest cycle count of its main loop; negative: a command longer than a cycle
     pub cycle: i32,
     /// number of the last order whose calls have returned
     pub served: u64,
 }
 
-/// What the program of the controller does.
+/// State of the controller's program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ProgramState {
     /// It runs.
     Playing,
-    /// It is paused, or on its way there or back: the next to resume it has it go on with what it
-    /// did.
+    /// It pauses, is paused or resumes: a resumption continues its previous action.
     Paused,
-    /// There is none.
+    /// No program.
     Ended,
 }
 
-/// Bits of `safety_status_bits`, as the RTDE guide has them: violation, fault, and recovery, which
-/// takes a panel.
+/// Bits of `safety_status_bits` in the RTDE guide: violation, fault, and recovery, which takes a
+/// panel.
 const FAULT_BITS: u32 = 1 << 3 | 1 << 8 | 1 << 9;
-/// Safeguard, and the buttons.
+/// Bits of safeguard and emergency stop buttons.
 const OPERATOR_BITS: u32 = 1 << 4 | 1 << 5 | 1 << 6 | 1 << 7;
-/// Protective stop, and stopped for any reason of safety.
+/// Bits of protective stop, and of any stop for safety.
 const PROTECTIVE_BITS: u32 = 1 << 2 | 1 << 10;
 
-/// Of `safety_status_bits`: reduced mode.
+/// Bit of `safety_status_bits`: reduced mode.
 const REDUCED_BIT: u32 = 1 << 1;
-/// A slider that is all the way up may read a little less.
+/// Minimum reading of a slider at its upper end.
 const FULL: f64 = 0.999;
 
 impl UrState {
-    /// What makes it slower than it is ordered to be.
+    /// Reasons why the arm is slower than ordered.
     pub fn slowed(&self) -> Option<Slowed> {
         let is_reduced = self.safety_bits & REDUCED_BIT != 0;
         let is_slow = is_reduced || self.speed_fraction < FULL;
@@ -153,17 +151,17 @@ impl UrState {
         })
     }
 
-    /// Whether it does what it is ordered to.
+    /// Whether the program runs.
     pub fn is_playing(&self) -> bool {
         self.program == ProgramState::Playing
     }
 
-    /// Whether nothing is in the way of an order.
+    /// Whether the arm can obey an order.
     pub fn may_move(&self) -> bool {
         self.is_playing() && self.safety() == Safety::Normal
     }
 
-    /// Norm of its velocity, m/s and rad/s together.
+    /// Norm of the velocity, m/s and rad/s together.
     pub fn speed(&self) -> f64 {
         self.velocity
             .iter()
@@ -183,13 +181,13 @@ impl UrState {
     }
 }
 
-/// Pose of ur_rtde: place and rotation vector.
+/// Pose of ur_rtde: position and rotation vector.
 pub fn vector_of(pose: &Isometry3<f64>) -> [f64; 6] {
     let (place, turn) = (pose.translation.vector, pose.rotation.scaled_axis());
     [place.x, place.y, place.z, turn.x, turn.y, turn.z]
 }
 
-/// The reverse direction.
+/// Pose from position and rotation vector.
 pub fn pose_of([x, y, z, rx, ry, rz]: [f64; 6]) -> Isometry3<f64> {
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(rx, ry, rz));
     Isometry3::from_parts(Translation3::new(x, y, z), turn)
@@ -201,7 +199,7 @@ pub(super) mod tests {
 
     #[test]
     fn a_pose_comes_back_from_its_vector() {
-        // half a turn about x, and one that a vector of roll, pitch and yaw would have otherwise
+        // half a turn about x, and a rotation unlike that by roll, pitch and yaw
         for vector in [
             [0.1, -0.2, 0.3, std::f64::consts::PI, 0.0, 0.0],
             [0.0, 0.0, 0.5, 0.7, -1.1, 0.4],

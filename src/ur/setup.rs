@@ -6,36 +6,36 @@ use std::process::Command;
 use super::child::python_version;
 use super::protocol::WHEEL;
 
-/// Why there is no such folder.
+/// Reason why the folder is missing.
 #[derive(Debug, thiserror::Error)]
 pub enum SetupError {
-    /// A step that did not work.
+    /// A failed step.
     #[error("{command}: {reason}")]
     Step {
-        /// what was run
+        /// command line
         command: String,
-        /// what it said last
+        /// its last words
         reason: String,
     },
-    /// The packages are for another Python than the program runs.
+    /// The packages are for another Python than the program's.
     #[error(
         "{python} is Python {found}, and touchup was built with {wanted}: give that one with --python"
     )]
     OtherPython {
-        /// what was run
+        /// interpreter
         python: String,
         /// its version
         found: String,
-        /// ours
+        /// version of the program
         wanted: String,
     },
 }
 
-/// Makes a virtual environment with ur-rtde in it; returns the folder of packages, for
+/// Makes a virtual environment with ur-rtde; returns the folder of packages, for
 /// [`super::UrParams::site_packages`].
 ///
-/// - `folder`: of the environment; one that is there already is kept and completed.
-/// - `python`: the interpreter; `None`: that of the version touchup was built with.
+/// - `folder`: of the environment; completes an existing one.
+/// - `python`: the interpreter; `None`: the version that touchup was built with.
 ///
 /// # Errors
 /// [`SetupError`]
@@ -55,7 +55,7 @@ pub fn setup(folder: &Path, python: Option<&str>) -> Result<PathBuf, SetupError>
     }
     run(&python, &["-m", "venv", &folder.to_string_lossy()])?;
     let python = folder.join("bin/python").to_string_lossy().into_owned();
-    // a wheel or nothing: its source takes a compiler, Boost and a quarter of an hour
+    // only a wheel: its source takes a compiler, Boost and a quarter of an hour
     let wheel = format!("ur-rtde=={WHEEL}");
     run(
         &python,
@@ -80,7 +80,7 @@ pub fn setup(folder: &Path, python: Option<&str>) -> Result<PathBuf, SetupError>
     .map(PathBuf::from)
 }
 
-/// What a command printed.
+/// Runs a command; returns its output.
 fn run(program: &str, arguments: &[&str]) -> Result<String, SetupError> {
     let command = || format!("{program} {}", arguments.join(" "));
     let output = Command::new(program)

@@ -1,10 +1,10 @@
 //! The one thread that commands the arm.
 //!
-//! It moves only while orders come: when they stay away it brakes, and so it does when a call
-//! fails. That the arm is at rest it takes from the states, and only then it feeds the watchdog of
-//! the controller, for as long as it lives and sees the arm stand. A thread that hangs in a call
-//! feeds nothing, and the arm is stopped by that watchdog. Once something has stopped the arm or
-//! its program, no order moves it any more: that takes a new client.
+//! It moves the arm only while orders come, and brakes when they stop or a call fails. It concludes
+//! rest from the states, and only then feeds the watchdog of the controller, for as long as it
+//! lives and sees the arm stand. A thread that hangs in a call feeds nothing, and that watchdog
+//! stops the arm. Once something has stopped the arm or its program, no order moves it: that takes
+//! a new client.
 
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
@@ -16,48 +16,46 @@ use super::shared::ChildShared;
 use crate::clock::Clock;
 use crate::ur::protocol::{Action, Begin, ClientReport, Link, Order, UrState};
 
-/// Time without an order after which it acts by itself.
+/// Time without an order after which the thread acts by itself.
 const TURN: Duration = Duration::from_millis(5);
-/// Orders that stay away for this long leave the arm to brake: ten of its periods.
+/// Time without orders after which the arm brakes: ten of its periods.
 const FRESH: Duration = Duration::from_millis(20);
-/// A state that is older tells nothing of now.
+/// Maximum age of a usable state.
 const SEEN: Duration = Duration::from_millis(20);
-/// With which it brakes then, m/s².
+/// Deceleration of braking without orders, m/s².
 const BRAKE: f64 = 2.0;
-/// The watchdog of the controller stops the arm when nothing has come for the tenth of a second.
+/// Minimum rate of the watchdog: the controller stops the arm after a tenth of a second of silence.
 const WATCHDOG_HZ: f64 = 10.0;
-/// At rest it is fed this often.
+/// Period of feeding the watchdog at rest.
 const FEED: Duration = Duration::from_millis(20);
-/// The tip counts as at rest below this speed, m/s and rad/s; what is left a hard stop takes.
+/// Maximum speed of a tip at rest, m/s and rad/s; a hard stop takes the remainder.
 const AT_REST: f64 = 1e-3;
-/// An arm that is at rest and yet goes faster than this is moved by somebody else, m/s and rad/s.
+/// Speed above which somebody else moves an arm that should be at rest, m/s and rad/s.
 const STANDS: f64 = 5e-3;
 /// Longest time from an order to the states that show its effect.
 const REST_TIME: Duration = Duration::from_millis(20);
-/// The hard stop of `speedStop`, m/s².
+/// Deceleration of the hard stop, `speedStop`, m/s².
 const HARD: f64 = 10.0;
-/// The program of the controller starts within this time of its upload.
+/// Maximum time from the upload of the program to its start.
 const UPLOAD: Duration = Duration::from_secs(5);
-/// A call that was refused because the program has just ended: the state that says so comes within
-/// this time.
+/// Time in which a state explains a refused call by the end of the program.
 const EXCUSE: Duration = Duration::from_millis(40);
-/// Force mode with a frame that stays as it is given.
+/// Type of force mode with a fixed frame.
 const FIXED_FRAME: i32 = 2;
-/// Two cycles of the controller: its program reads one command in each, and what comes sooner takes
-/// the place of the one before.
+/// Two cycles of the controller: its program reads one command in each, and a second command before
+/// that overwrites the first.
 const CYCLES: Duration = Duration::from_millis(4);
 /// Period in which a press is repeated, in case it was lost.
 const REPEAT: Duration = Duration::from_millis(100);
-/// Across the axis of a press the tip may be this far from where it should be, m and rad: what the
-/// feed and the friction make.
+/// Maximum deviation of the tip across the axis of a press, m and rad, from feed and friction.
 const ASIDE: [f64; 2] = [0.05, 0.2];
-/// The tool that is read back may differ by this rounding, m and rad.
+/// Rounding tolerance of the tool read back, m and rad.
 const SAME_TOOL: f64 = 1e-6;
 
 /// The current motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Doing {
-    /// seen, not assumed
+    /// from the states, not assumed
     Resting,
     Moving,
     Braking {
@@ -66,16 +64,16 @@ enum Doing {
     },
 }
 
-/// Force mode, as it was asked for: whether it is there is not known when that call failed.
+/// Force mode as requested; after a failed call its actual state is unknown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct ForceMode {
-    /// turn of its frame: the axis, not the place, is what makes it another press
+    /// rotation of its frame: another axis, not another position, makes another press
     turn: [f64; 3],
     force: f64,
     speed: f64,
 }
 
-/// Why a driver ends before its orders do.
+/// Reason why a driver ends before its orders.
 #[derive(Debug)]
 pub enum DriverEnd {
     Lost(Link),
@@ -97,7 +95,7 @@ pub struct Driver<'a, C> {
 }
 
 impl<'a, C: Control> Driver<'a, C> {
-    /// - `clock`: on which all that is kept in time is kept.
+    /// - `clock`: clock of all times and deadlines.
     pub fn new(control: &'a C, shared: &'a ChildShared, begin: &'a Begin, clock: Clock) -> Self {
         let now = clock.now();
         let (doing, force_mode) = (Doing::Resting, None);
@@ -114,15 +112,15 @@ impl<'a, C: Control> Driver<'a, C> {
         }
     }
 
-    /// Until the orders end.
+    /// Runs until the orders end.
     pub fn run(mut self, orders: &Receiver<Order>) -> Result<(), DriverEnd> {
         self.prepare()?;
         self.shared.is_ready.store(true, Ordering::Release);
         self.shared.report(&ClientReport::Ready);
         loop {
             self.check_connection()?;
-            // how often it looks is no deadline: it looks in real time also where its clock waits
-            // for it
+            // the polling period is no deadline: it is real time even if the clock waits for this
+            // thread
             match orders.recv_timeout(TURN) {
                 Ok(order) => self.turn(Some(newest(order, orders)))?,
                 Err(RecvTimeoutError::Timeout) => self.turn(None)?,
@@ -160,7 +158,7 @@ impl<'a, C: Control> Driver<'a, C> {
 
     fn serve(&mut self, what: &Action) -> Result<(), ChildError> {
         match *what {
-            // what was stopped is not set going again, whoever resumes it
+            // a stopped motion does not restart, whoever resumes the program
             Action::Move { .. } | Action::Press { .. }
                 if self.shared.has_halted.load(Ordering::Acquire) =>
             {
@@ -210,7 +208,7 @@ impl<'a, C: Control> Driver<'a, C> {
         }
     }
 
-    /// Everything that a newly started program does not know.
+    /// Sets everything that a newly started program lacks.
     fn prepare(&mut self) -> Result<(), DriverEnd> {
         let begun = self.clock.now();
         while !self.control.is_running() && self.clock.since(begun) < UPLOAD {
@@ -226,7 +224,7 @@ impl<'a, C: Control> Driver<'a, C> {
         {
             return Err(DriverEnd::BadTool(format!("{found:?} and not {tool:?}")));
         }
-        // last, for what is above takes its time
+        // last, as the calls above take time
         self.control
             .set_watchdog(WATCHDOG_HZ)
             .map_err(DriverEnd::NotReady)?;
@@ -262,7 +260,7 @@ impl<'a, C: Control> Driver<'a, C> {
         }
     }
 
-    /// The last state, when it is of now.
+    /// The last state, unless it is stale.
     fn seen(&self) -> Option<UrState> {
         self.shared
             .latest()
@@ -270,7 +268,7 @@ impl<'a, C: Control> Driver<'a, C> {
             .map(|latest| latest.state)
     }
 
-    /// Nothing is fed that was not just seen to stand, at our command.
+    /// Feeds the watchdog only if the newest state shows the arm at rest under our command.
     fn feed(&mut self) -> Result<(), ChildError> {
         let stands = self
             .seen()
@@ -282,8 +280,8 @@ impl<'a, C: Control> Driver<'a, C> {
         self.control.feed()
     }
 
-    /// One turn of braking: the velocity goes to zero with the deceleration, and what is left by a
-    /// hard stop. At rest the controller hears that there was an order.
+    /// One turn of braking: the velocity goes to zero with the deceleration, then a hard stop takes
+    /// the remainder. At rest it feeds the watchdog.
     fn brake(&mut self, deceleration: f64) -> Result<(), ChildError> {
         if self.doing == Doing::Resting && self.force_mode.is_none() {
             return self.feed();
@@ -293,15 +291,15 @@ impl<'a, C: Control> Driver<'a, C> {
         } else {
             self.clock.now()
         };
-        // before any call: one that fails leaves it braking
+        // before any call: after a failed call it still brakes
         self.doing = Doing::Braking {
             deceleration,
             since,
         };
         let state = self.seen();
-        // a program that is paused hears nothing; the arm is braked as soon as it is resumed
+        // a paused program receives nothing; braking starts as soon as it resumes
         if state.is_some_and(|state| !state.is_playing()) {
-            // where it is resumed its first states are those of an arm that does not move yet
+            // after resumption the first states show an arm that does not move yet
             self.doing = Doing::Braking {
                 deceleration,
                 since: self.clock.now(),
@@ -311,7 +309,7 @@ impl<'a, C: Control> Driver<'a, C> {
         self.end_press()?;
         self.control.speed([0.0; 6], deceleration)?;
         let is_at_rest = state.is_some_and(|state| state.speed() < AT_REST);
-        // the first states may still be those of an arm that has not begun to move
+        // the first states may still show an arm that has not begun to move
         if is_at_rest && self.clock.since(since) > REST_TIME {
             self.control.hard_stop(HARD)?;
             self.doing = Doing::Resting;
@@ -319,7 +317,7 @@ impl<'a, C: Control> Driver<'a, C> {
         Ok(())
     }
 
-    /// The feed is stopped first: the thread that drives it outlives the end of force mode.
+    /// Stops the feed first: its thread outlives the end of force mode.
     fn end_press(&mut self) -> Result<(), ChildError> {
         if self.force_mode.is_some() {
             self.control.hard_stop(HARD)?;
@@ -343,9 +341,8 @@ impl<'a, C: Control> Driver<'a, C> {
         }
     }
 
-    /// A call was refused. When the program has ended or the arm is not allowed to move, the states
-    /// say so; and the arm may still do what it was ordered before, so it is braked until it is
-    /// seen at rest.
+    /// Handles a refused call. If the program has ended or the arm may not move, the states tell;
+    /// the arm may still execute the previous order, so it brakes until the states show rest.
     fn failed(&mut self, error: &ChildError) -> Result<(), DriverEnd> {
         let begun = self.clock.now();
         if self.doing == Doing::Moving {
@@ -369,16 +366,15 @@ impl<'a, C: Control> Driver<'a, C> {
         Ok(())
     }
 
-    /// Orders have ended.
+    /// Ends after the last order.
     fn end(&mut self) {
-        // what fails here the watchdog does
+        // on failure the watchdog stops the arm
         let _ = self.rest();
         let _ = self.control.end_program();
     }
 }
 
-/// The last of the orders that wait, or the first of them that is to be done whatever comes after
-/// it.
+/// The last waiting order, or the first `Zero` among them.
 fn newest(mut order: Order, orders: &Receiver<Order>) -> Order {
     while order.what != Action::Zero {
         match orders.try_recv() {

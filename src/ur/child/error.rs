@@ -1,13 +1,13 @@
-//! Errors of the process, and how they are reported.
+//! Errors of the process, and their reports.
 
 use std::time::Duration;
 
 use crate::ur::protocol::ClientReport;
 
-/// Why the process gives up before it has begun.
+/// Reason why the process gives up before it has begun.
 #[derive(Debug, thiserror::Error)]
 pub enum ChildError {
-    /// It is started by touchup, with its orders on stdin.
+    /// No orders on stdin: only touchup starts this process.
     #[error(
         "this is started by touchup itself: the first line on stdin has to be an order to begin ({0})"
     )]
@@ -15,20 +15,20 @@ pub enum ChildError {
     /// The arm does not come to rest.
     #[error("the arm still moves after braking for {} s", after.as_secs())]
     Moves {
-        /// that it was braked
+        /// duration of braking
         after: Duration,
     },
-    /// A call of Python.
+    /// A failed call of Python.
     #[error("{call}: {reason}")]
     Python {
-        /// which
+        /// name of the call
         call: &'static str,
-        /// what it raised
+        /// exception text
         reason: String,
     },
 }
 
-/// A call that did not work, as a report.
+/// Report of a failed call.
 pub fn failure(error: &ChildError) -> ClientReport {
     match error {
         ChildError::Python { call, reason } => ClientReport::Failed {

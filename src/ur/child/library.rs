@@ -1,7 +1,7 @@
-//! The calls of ur-rtde that are used, and nothing of Python beyond this file.
+//! Calls of ur-rtde; the only file that uses Python.
 //!
-//! Each call returns `true` or it failed; the library has no other words. Lengths of vectors are
-//! those of arrays here, for the library does not look at them.
+//! A call returns `true` or it failed; the library has no other words. Vectors become arrays here,
+//! as the library does not check lengths.
 
 use std::io::Write;
 use std::path::Path;
@@ -17,11 +17,11 @@ use crate::ur::protocol::{Begin, PERIOD, ProgramState, UrState, WHEEL};
 
 /// Rate of the states and of the control, Hz.
 const RATE_HZ: f64 = 1.0 / PERIOD;
-/// Uploads no program by itself and waits for none, and takes the force from the arm's own sensor:
-/// no upper registers, no cap, no external sensor.
+/// Flags: no upload and no wait for a program, force from the arm's own sensor; hence no upper
+/// registers, no cap, no external sensor.
 const FLAGS: u32 = 0x10 | 0x40;
 const CAP_PORT: u16 = 50002;
-/// The requested states: the default are 58 of 1180 bytes.
+/// The requested states: the default is 58 variables in 1180 bytes.
 const VARIABLES: [&str; 11] = [
     "timestamp",
     "actual_q",
@@ -37,10 +37,10 @@ const VARIABLES: [&str; 11] = [
 ];
 /// The register of [`program::REGISTER`].
 const COUNT: &str = "output_int_register_19";
-/// Of `runtime_state`, as the RTDE guide has it: the program runs; it pauses, is paused, resumes.
+/// Values of `runtime_state` in the RTDE guide: running; pausing, paused, resuming.
 const PLAYING: u32 = 2;
 const PAUSED: std::ops::RangeInclusive<u32> = 3..=5;
-/// Readings of one state that may fall into the coming of the next.
+/// Maximum readings of one state, as a new state may arrive during a reading.
 const TORN_READS: usize = 3;
 
 fn failed(call: &'static str) -> impl Fn(PyErr) -> ChildError {
@@ -50,7 +50,7 @@ fn failed(call: &'static str) -> impl Fn(PyErr) -> ChildError {
     }
 }
 
-/// An object of a class of the library.
+/// Makes an object of a class of the library.
 fn made<'py>(
     py: Python<'py>,
     module: &str,
@@ -62,11 +62,11 @@ fn made<'py>(
         .map_err(failed(class))
 }
 
-/// Finds the library in a folder of packages, and looks at its version.
+/// Finds the library in a folder of packages, and checks its version.
 pub fn load(site_packages: &Path) -> Result<(), ChildError> {
     Python::attach(|py| {
         let os = py.import("os").map_err(failed("import os"))?;
-        // what the library prints goes to stderr: stdout is for reports alone
+        // prints of the library go to stderr: stdout is for reports alone
         os.call_method1("dup2", (2, 1)).map_err(failed("os.dup2"))?;
         let folder = site_packages.to_string_lossy();
         let site = py.import("site").map_err(failed("import site"))?;
@@ -96,7 +96,7 @@ pub fn load(site_packages: &Path) -> Result<(), ChildError> {
 /// Ends the process at once: the destructors of the library take a second, and after a lost link
 /// they crash.
 pub fn leave(code: i32) -> ! {
-    // a Python that cannot even do that is killed
+    // abort if Python cannot even do that
     let _ = Python::attach(|py| {
         py.import("os")
             .and_then(|os| os.call_method1("_exit", (code,)).map(drop))
@@ -108,7 +108,7 @@ pub fn leave(code: i32) -> ! {
 pub struct Receive(Py<PyAny>);
 
 impl Receive {
-    /// Waits, without letting any other thread use Python, until the first state has come.
+    /// Waits for the first state, without letting any other thread use Python.
     pub fn connect(host: &str) -> Result<Self, ChildError> {
         Python::attach(|py| {
             let arguments = (host, RATE_HZ, VARIABLES.to_vec(), false, false, 0);
@@ -122,12 +122,12 @@ impl Receive {
         Python::attach(|py| self.0.call_method0(py, "isConnected")?.extract(py)).unwrap_or(false)
     }
 
-    /// Of the newest state, s of the controller.
+    /// Stamp of the newest state, s of the controller.
     pub fn stamp(&self) -> Option<f64> {
         Python::attach(|py| self.0.call_method0(py, "getTimestamp")?.extract(py)).ok()
     }
 
-    /// The newest state, all of one moment; `None`: it cannot be read.
+    /// The newest state, all from one moment; `None`: unreadable.
     pub fn state(&self, served: u64) -> Option<UrState> {
         Python::attach(|py| -> PyResult<Option<UrState>> {
             let read = |name: &str| self.0.call_method0(py, name);
@@ -153,7 +153,7 @@ impl Receive {
                         .extract(py)?,
                     served,
                 };
-                // the next one may have come between two of these calls
+                // the next state may have come between two of these calls
                 if read("getTimestamp")?.extract::<f64>(py)? == stamp_s {
                     return Ok(Some(state));
                 }
@@ -165,16 +165,16 @@ impl Receive {
     }
 }
 
-/// What of ur-rtde a driver calls, from one thread alone. A call returns when the library does.
+/// Calls of ur-rtde for the driver, from one thread alone. A call returns when the library does.
 pub trait Control {
     /// Whether the library has a connection.
     fn is_connected(&self) -> bool;
     /// Whether the uploaded program runs; an old answer when the connection is lost.
     fn is_running(&self) -> bool;
-    /// Goes with a velocity, m/s and rad/s in B, reached with an acceleration, m/s², until the next
-    /// command.
+    /// Moves with a velocity, m/s and rad/s in B, reached with an acceleration, m/s², until the
+    /// next command.
     fn speed(&self, twist: [f64; 6], acceleration: f64) -> Result<(), ChildError>;
-    /// Presses along z of a frame of B with a force, N; `limits`: speed along z, m/s, how far off
+    /// Presses along z of a frame of B with a force, N; `limits`: speed along z, m/s, deviation
     /// across, m and rad.
     fn press(
         &self,
@@ -183,27 +183,27 @@ pub trait Control {
         kind: i32,
         limits: [f64; 6],
     ) -> Result<(), ChildError>;
-    /// Ends pressing. A velocity that was not stopped before goes on.
+    /// Ends pressing. A velocity not stopped before goes on.
     fn end_press(&self) -> Result<(), ChildError>;
-    /// Stops what `speed` began, with a deceleration, m/s²; returns when the arm is at rest.
+    /// Stops the motion of `speed` with a deceleration, m/s²; returns when the arm is at rest.
     fn hard_stop(&self, deceleration: f64) -> Result<(), ChildError>;
     /// Zeroes the sensor.
     fn zero(&self) -> Result<(), ChildError>;
-    /// kg, and m in the flange.
+    /// Sets mass, kg, and centre in the flange, m.
     fn set_payload(&self, mass: f64, centre: [f64; 3]) -> Result<(), ChildError>;
-    /// The tip in the flange.
+    /// Sets the tip in the flange.
     fn set_tool(&self, tool: [f64; 6]) -> Result<(), ChildError>;
-    /// The tip in the flange, as the controller has it.
+    /// The controller's tip in the flange.
     fn tool(&self) -> Result<[f64; 6], ChildError>;
-    /// Compliance of force mode.
+    /// Sets the compliance of force mode.
     fn set_force_mode(&self, damping: f64, gain: f64) -> Result<(), ChildError>;
-    /// Has the controller stop when it hears less often.
+    /// Has the controller stop at a lower rate of signs of life.
     fn set_watchdog(&self, least_hz: f64) -> Result<(), ChildError>;
-    /// Lets the watchdog hear something.
+    /// Feeds the watchdog.
     fn feed(&self) -> Result<(), ChildError>;
     /// Ends the program of the controller.
     fn end_program(&self) -> Result<(), ChildError>;
-    /// Lets time pass; what a library does meanwhile goes on.
+    /// Lets time pass; the library continues meanwhile.
     fn wait(&self, clock: &Clock, time: Duration) {
         clock.sleep(time);
     }
@@ -213,7 +213,7 @@ pub trait Control {
 pub struct RtdeControl(Py<PyAny>);
 
 impl RtdeControl {
-    /// Clears the registers of commands, ends a program that runs, and uploads that of the library
+    /// Clears the registers of commands, ends a running program, and uploads the library's program
     /// with the count of its cycles; no other thread can use Python in that time.
     pub fn connect(begin: &Begin) -> Result<Self, ChildError> {
         let (host, [major, minor]) = (begin.host.as_str(), begin.version);
@@ -225,7 +225,7 @@ impl RtdeControl {
             let program = program::counting(&script.map_err(failed("getScript"))?)?;
             let arguments = (host, RATE_HZ, FLAGS, CAP_PORT, 0);
             let control = made(py, "rtde_control", "RTDEControlInterface", arguments)?;
-            // the library takes another program from a file alone
+            // the library reads a custom program only from a file
             let call = "setCustomScriptFile";
             let file = tempfile::NamedTempFile::new().and_then(|mut file| {
                 file.write_all(program.as_bytes())?;
@@ -276,8 +276,8 @@ impl Control for RtdeControl {
     }
 
     fn speed(&self, twist: [f64; 6], acceleration: f64) -> Result<(), ChildError> {
-        // the time does not end the motion: it is how soon the program on the controller looks for
-        // the next velocity, and without one it first reaches this
+        // the time does not end the motion: it is the delay until the program on the controller
+        // looks for the next velocity, and without one it first reaches this
         self.done("speedL", (twist.to_vec(), acceleration, PERIOD))
     }
 

@@ -1,9 +1,8 @@
 //! The process that speaks to the arm, from the inside: the only place with Python.
 //!
 //! One thread owns `rtde_control` and executes the orders ([`control`]); a second one passes on the
-//! states of `rtde_receive` ([`states`]); a third reads the orders. When a connection of the
-//! library is lost the process says so and ends at once, for the library would connect again by
-//! itself, and crash.
+//! states of `rtde_receive` ([`states`]); a third reads the orders. After the loss of a connection
+//! the process reports it and ends at once, as the library would reconnect by itself, and crash.
 
 mod control;
 mod error;
@@ -31,15 +30,14 @@ use crate::clock::Clock;
 /// Serves orders until stdin ends; then brakes, ends the program of the controller and itself.
 ///
 /// # Errors
-/// [`ChildError`], when it cannot begin. Later errors go out as reports.
+/// [`ChildError`] if it cannot begin. Later errors go out as reports.
 pub fn run() -> Result<(), ChildError> {
     let mut lines = BufReader::new(stdin()).lines().map_while(Result::ok);
     let first = lines.next().unwrap_or_default();
     let begin: Begin =
         serde_json::from_str(&first).map_err(|error| ChildError::NoOrders(error.to_string()))?;
     if !begin.is_lock_step {
-        // for all threads, those of the library too; who started this process says where it is
-        // refused
+        // for all threads, the library's included; the parent process reports a refusal
         let _ = priority::raise(priority::CLIENT, true);
     }
     let reports = stdout()
@@ -53,7 +51,7 @@ pub fn run() -> Result<(), ChildError> {
         });
         return Err(error);
     }
-    // the constructor of control starts a program: only when states come
+    // the constructor of control starts a program: only after the first state
     let connected = Receive::connect(&begin.host)
         .and_then(|receive| Ok((receive, RtdeControl::connect(&begin)?)));
     let (receive, control) = connected.inspect_err(|error| shared.report(&failure(error)))?;
@@ -64,7 +62,7 @@ pub fn run() -> Result<(), ChildError> {
         scope.spawn(|| states::hand_on(&receive, &shared, &clock, hand.as_ref()));
         scope.spawn(move || {
             let mut orders = lines.filter_map(|line| serde_json::from_str::<Order>(&line).ok());
-            // until nobody takes them any more
+            // until the receiver is gone
             let _ = orders.try_for_each(|order| sender.send(order));
         });
         match Driver::new(&control, &shared, &begin, clock.clone()).run(&orders) {
@@ -82,7 +80,7 @@ pub fn run() -> Result<(), ChildError> {
     })
 }
 
-/// Version of the Python that this was linked with, as `3.11`.
+/// Version of the linked Python, as `3.11`.
 pub fn python_version() -> String {
     Python::attach(|py| {
         let version = py.version_info();

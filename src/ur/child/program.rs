@@ -1,23 +1,22 @@
-//! The program of ur-rtde that the controller runs, made to count its cycles.
+//! The program of ur-rtde on the controller, extended by a count of its cycles.
 //!
 //! Its main loop reads the command registers once in each cycle of the controller. When that loop
-//! hangs its threads live, and with them the last motion; the registers of the client are written
-//! as before, and no answer of the program is missed. So the loop counts its cycles in an output
-//! register, which comes with each state.
+//! hangs, its threads live on, and with them the last motion; the client writes its registers as
+//! before, and misses no answer. So the loop counts its cycles in an output register, which comes
+//! with each state.
 
 use super::error::ChildError;
 
 /// The output register of the count.
 pub const REGISTER: u8 = 19;
-/// Where a cycle begins, and where a command begins that takes more than one; each once in the
-/// program.
+/// Lines at the start of a cycle, and of a command longer than a cycle; each once in the program.
 const CYCLE: &str = "        while keep_running:\n";
 const COMMAND: &str = "                    if not executing_cmd:\n";
 
-/// The program of the library with its count, as it is uploaded.
+/// The program of the library with its count, ready for upload.
 ///
 /// # Errors
-/// [`ChildError::Python`] where it is another than this was made for.
+/// [`ChildError::Python`] for an unknown version of the program.
 pub fn counting(library: &str) -> Result<String, ChildError> {
     if [CYCLE, COMMAND]
         .iter()
@@ -29,7 +28,7 @@ pub fn counting(library: &str) -> Result<String, ChildError> {
                 .to_owned(),
         });
     }
-    // the count begins anew before its numbers become too large
+    // the count restarts before its numbers become too large
     let cycle = format!(
         "        cycle = 0
 {CYCLE}            cycle = cycle + 1
@@ -45,7 +44,7 @@ pub fn counting(library: &str) -> Result<String, ChildError> {
     Ok(format!("def rtde_control():\n{counted}end\n"))
 }
 
-/// A program with both places and nothing else of the library's.
+/// A program with both lines and nothing else of the library's.
 #[cfg(test)]
 pub const PLACES: &str = "        before_the_loop()
         while keep_running:
@@ -78,7 +77,7 @@ mod tests {
         ];
         assert!(order.map(at).is_sorted(), "{program}");
         assert_eq!(lines.last(), Some(&"end"));
-        // nothing of the library is lost
+        // the library's program is complete
         assert!(PLACES.lines().all(|line| program.contains(line)));
         for other in ["", &PLACES.repeat(2)] {
             assert!(counting(other).is_err());

@@ -1,4 +1,4 @@
-//! What the threads have in common.
+//! State shared by the threads.
 
 use std::io::{PipeWriter, Write};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -8,22 +8,22 @@ use std::time::Instant;
 use super::library::leave;
 use crate::ur::protocol::{ClientReport, Link, UrState};
 
-/// The newest state, and when it came.
+/// The newest state and its arrival.
 #[derive(Clone, Copy, Debug)]
 pub struct Latest {
     pub state: UrState,
     pub at: Instant,
 }
 
-/// Shared by the threads.
+/// State shared by the threads.
 pub struct ChildShared {
     reports: Box<dyn Fn(&ClientReport) + Send + Sync>,
     /// number of the last order whose calls have returned
     pub served: AtomicU64,
     pub latest: Mutex<Option<Latest>>,
-    /// the arm is at our command
+    /// the arm takes commands
     pub is_ready: AtomicBool,
-    /// since then a state has said that something stops the arm or its program
+    /// a state since then shows a stop of the arm or its program
     pub has_halted: AtomicBool,
 }
 
@@ -35,7 +35,7 @@ pub fn lines_to(pipe: PipeWriter) -> impl Fn(&ClientReport) + Send + Sync + 'sta
             return;
         };
         line.push(b'\n');
-        // when the reader is gone, stdin ends too
+        // a missing reader also ends stdin
         let _ = pipe
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
@@ -48,7 +48,7 @@ impl ChildShared {
         (self.reports)(report);
     }
 
-    /// - `reports`: takes each.
+    /// - `reports`: sink of each report.
     pub fn new(reports: impl Fn(&ClientReport) + Send + Sync + 'static) -> Self {
         Self {
             reports: Box::new(reports),
@@ -63,7 +63,7 @@ impl ChildShared {
         *self.latest.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A state has come.
+    /// Stores a new state.
     pub fn see(&self, state: UrState, at: Instant) {
         *self.latest.lock().unwrap_or_else(PoisonError::into_inner) = Some(Latest { state, at });
         if self.is_ready.load(Ordering::Acquire) && !state.may_move() {

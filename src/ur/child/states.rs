@@ -1,4 +1,4 @@
-//! Passes on each state of the arm once, and a heartbeat where none comes.
+//! Passes on each state of the arm once, and a heartbeat if none comes.
 
 use std::thread;
 use std::time::{Duration, Instant};
@@ -8,14 +8,14 @@ use super::shared::ChildShared;
 use crate::clock::{Clock, ManualClock};
 use crate::ur::protocol::{ClientReport, Link, UrState};
 
-/// Between two looks: a fifth of the time between two states.
+/// Polling period: a fifth of the time between two states.
 const LOOK: Duration = Duration::from_micros(400);
-/// Where no state comes, a sign of life each this often.
+/// Period of the heartbeat without states.
 const BEAT: Duration = Duration::from_millis(10);
 
-/// Until the connection is lost.
+/// Runs until the connection is lost.
 ///
-/// - `clock`: of the driver; `hand`: that moves it, where it follows the controller.
+/// - `clock`: of the driver; `hand`: moves it, if it follows the controller.
 pub fn hand_on(
     receive: &Receive,
     shared: &ChildShared,
@@ -41,7 +41,7 @@ pub fn hand_on(
                 Duration::try_from_secs_f64(state.stamp_s - last.stamp_s).unwrap_or_default()
             });
             shared.see(state, clock.now() + passed.unwrap_or_default());
-            // who waits finds it there
+            // waiting threads find the state
             hand.zip(passed)
                 .iter()
                 .for_each(|(hand, passed)| hand.advance(*passed));

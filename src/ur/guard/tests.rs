@@ -36,8 +36,7 @@ impl GuardBench {
         self.known.take(report, self.clock.now())
     }
 
-    /// Has the same line come each millisecond; returns after how many of them something is wrong,
-    /// and what.
+    /// Repeats a line each millisecond; returns the number of lines until a fault, and the fault.
     fn until_broken(&mut self, line: &ClientReport) -> (u64, ClientLoss) {
         for ms in 1..10_000 {
             self.hand.advance(MS);
@@ -67,7 +66,7 @@ const UP: Action = Action::Move {
 fn a_client_has_ten_seconds_to_be_ready_and_from_then_on_80_ms_for_each_line() {
     let mut bench = GuardBench::new();
     bench.hand.advance(9_000 * MS);
-    // its states in that time change nothing
+    // its lines in that time change nothing
     assert_eq!(bench.take(ClientReport::Beat { served: 0 }), None);
     assert_eq!(bench.known.patience(bench.clock.now()), 1_000 * MS);
     bench.hand.advance(999 * MS);
@@ -104,7 +103,7 @@ fn a_call_that_does_not_return_for_more_than_120_ms_is_a_hanging_client() {
     assert_eq!(bench.known.send(&UP, bench.clock.now()), 1);
     bench.hand.advance(100 * MS);
     assert_eq!(bench.known.send(&UP, bench.clock.now()), 2);
-    // the first has returned: the time of the second begins
+    // the first call has returned: the time of the second begins
     assert_eq!(bench.take(state(Playing, 1, 1)), None);
     let broken = bench.until_broken(&state(Playing, 1, 1));
     let hangs = |ms| {
@@ -113,11 +112,11 @@ fn a_call_that_does_not_return_for_more_than_120_ms_is_a_hanging_client() {
         ))
     };
     assert_eq!(broken, (121, hangs(121)));
-    // no running call, no deadline
+    // without a running call there is no deadline
     assert_eq!(bench.take(state(Playing, 1, 2)), None);
     bench.hand.advance(5_000 * MS);
     assert_eq!(bench.take(state(Playing, 1, 2)), None);
-    // zeroing has three seconds, and what comes after it 120 ms again
+    // zeroing has three seconds, and the next order 120 ms again
     assert_eq!(bench.known.send(&Action::Zero, bench.clock.now()), 3);
     assert_eq!(
         bench.until_broken(&state(Playing, 1, 2)),
@@ -144,7 +143,7 @@ fn a_program_that_has_ended_is_reported_after_40_ms_unless_the_state_gives_the_r
     assert!(!has_ended(&bench));
     bench.take(state(Ended, 1, 0));
     bench.hand.advance(30 * MS);
-    // it runs again
+    // the program runs again
     bench.take(state(Playing, 1, 0));
     bench.hand.advance(30 * MS);
     assert!(!has_ended(&bench));
@@ -180,8 +179,8 @@ fn untaken_states_are_the_newest_64() {
     assert_eq!(served, (36..100).collect::<Vec<_>>());
 }
 
-/// A dashboard that answers `stop`, with what it was asked, and a guard of a client that says what
-/// the test sends.
+/// A dashboard that answers `stop` and records its requests, and a guard of a client whose lines
+/// come from the test.
 struct Watch {
     hand: ManualClock,
     shared: Arc<SharedGuard>,
@@ -192,8 +191,8 @@ struct Watch {
 }
 
 impl Watch {
-    /// - `connections`: to the dashboard, each of which it serves; but the first it closes when
-    ///   there are two.
+    /// - `connections`: number of connections to the dashboard; it serves the last one and closes
+    ///   earlier ones.
     fn begin(connections: usize) -> Self {
         let (host, listener) = listen();
         let (ask, asked) = channel();
@@ -214,7 +213,7 @@ impl Watch {
             }
         });
         let (clock, hand) = Clock::manual();
-        // an answer of the dashboard is waited for in real time
+        // answers of the dashboard come in real time
         let deadlines = Deadlines {
             dashboard: Duration::from_secs(60),
             ..Deadlines::default()
@@ -251,7 +250,7 @@ impl Watch {
         }
     }
 
-    /// Has a line come, and returns when the guard waits for the next one.
+    /// Sends a line, and returns when the guard waits for the next one.
     fn say(&self, report: ClientReport) {
         let begun = self.hand.begun();
         self.reports.send(report).unwrap();
@@ -260,27 +259,27 @@ impl Watch {
         }
     }
 
-    /// No fault after some time.
+    /// Asserts that no fault occurs for some time.
     fn is_calm_after(&self, time: Duration) {
         self.hand.advance(time);
         assert_eq!(self.hand.waiting(), 1, "it waits on");
         assert!(self.shared.known().broken.is_none() && self.asked.try_recv().is_err());
     }
 
-    /// After some time the guard waits no longer.
+    /// Asserts that the guard stops waiting after some time.
     fn acts_after(&self, time: Duration) {
         self.hand.advance(time);
         assert_eq!(self.hand.waiting(), 0, "it waits on");
     }
 
-    /// Asks the client to end, as which its pipe closes; how the guard stopped the arm.
+    /// Asks the client to end and closes its pipe; returns how the guard stopped the arm.
     fn end_on_request(self) -> Option<Halt> {
         self.shared.known().close(self.shared.clock.now());
         drop(self.reports);
         self.guard.join().unwrap()
     }
 
-    /// The end of the guard, the fault, and the requests to the dashboard.
+    /// Result of the guard, the fault, and the requests to the dashboard.
     fn end(self) -> (Option<Halt>, Option<ClientLoss>, Vec<String>) {
         let begun = Instant::now();
         while !self.guard.is_finished() {
@@ -395,7 +394,7 @@ fn a_client_that_ends_on_request_is_no_fault() {
 fn a_dashboard_that_was_closed_is_connected_again_to_stop_the_arm() {
     let watch = Watch::begin(2);
     watch.reports.send(ClientReport::Ready).unwrap();
-    // that it is closed is seen with a line that comes after that
+    // a later line reveals the closed connection
     while watch.reports.send(ClientReport::Beat { served: 0 }).is_ok() {
         thread::yield_now();
     }
@@ -448,8 +447,8 @@ fn an_arm_that_does_not_do_what_it_is_ordered_to_is_stopped_by_the_dashboard() {
     assert!((100..=130).contains(&after), "{after} ms");
 }
 
-/// A state each 2 ms with what the program has counted by it; when it is said to hang, ms, and since
-/// when.
+/// One state each 2 ms with a cycle count; returns the time of the hang fault and its silent time,
+/// ms.
 fn hangs(count: impl Fn(i32) -> Option<i32>) -> Option<(i32, f64)> {
     let mut bench = GuardBench::ready();
     (0..500).find_map(|number| {
@@ -471,12 +470,12 @@ fn hangs(count: impl Fn(i32) -> Option<i32>) -> Option<(i32, f64)> {
 #[test]
 fn a_program_that_counts_no_cycle_for_two_of_them_hangs_and_one_that_is_late_by_one_does_not() {
     assert_eq!(hangs(Some), None);
-    // it hangs at 200 ms, whose cycle it has counted
+    // a hang at 200 ms, after the count of that cycle
     assert_eq!(hangs(|number| Some(number.min(100))), Some((204, 4.0)));
     assert_eq!(hangs(|number| Some(number / 2)), None, "each takes two");
     assert_eq!(hangs(|number| Some(number / 3)), Some((4, 4.0)));
     assert_eq!(hangs(|number| Some(number % 7)), None, "begins anew");
-    // states that were left out take nothing from the time
+    // missing states do not shorten the time
     let left_out = |number: i32| (number != 101).then_some(number.min(100));
     assert_eq!(hangs(left_out), Some((204, 4.0)));
     // a command of 300 ms, and a hang after it
@@ -490,7 +489,7 @@ fn a_program_that_counts_no_cycle_for_two_of_them_hangs_and_one_that_is_late_by_
     assert_eq!(hangs(command), Some((604, 4.0)));
 }
 
-/// Whoever resumes it finds nothing to go on with.
+/// A resumed program has nothing to continue.
 #[test]
 fn a_program_that_somebody_pauses_is_ended_once() {
     for stopped in [
@@ -522,7 +521,7 @@ fn a_program_that_somebody_pauses_is_ended_once() {
     }
 }
 
-/// The first connection never answers a request, each later one does.
+/// The first two connections never answer a request, the third does.
 #[test]
 fn a_mute_dashboard_is_asked_until_it_has_stopped_the_arm() {
     let (host, listener) = listen();

@@ -34,9 +34,9 @@ fn press(angle: f64, force_n: f64) -> Action {
 /// A call of the library.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum LibraryCall {
-    /// along z, and how fast it is reached
+    /// velocity along z, and acceleration
     Speed(f64, f64),
-    /// turn of the frame about x, and force
+    /// rotation of the frame about x, and force
     Press(f64, f64),
     EndPress,
     HardStop(f64),
@@ -54,7 +54,7 @@ struct Fake {
     is_connected: Cell<bool>,
     is_running: Cell<bool>,
     refuses: Cell<bool>,
-    /// of each call
+    /// duration of each call
     takes: Cell<Duration>,
     tool: Cell<[f64; 6]>,
 }
@@ -200,7 +200,7 @@ impl ControlBench {
         )
     }
 
-    /// The state says from now on that the tip goes up, m/s.
+    /// Sets the tip velocity of later states along z, m/s.
     fn goes(&self, speed: f64, program: ProgramState) {
         let velocity = [0.0, 0.0, speed, 0.0, 0.0, 0.0];
         self.shared.see(
@@ -213,12 +213,12 @@ impl ControlBench {
         );
     }
 
-    /// The state comes again, as it was.
+    /// Repeats the state unchanged.
     fn see_again(&self) {
         see_again(&self.shared, &self.fake.clock);
     }
 
-    /// Does something in which time passes as it is slept.
+    /// Runs work whose sleeps advance the clock.
     fn sleeping<T>(&self, work: impl FnOnce() -> T) -> T {
         let (is_over, hand) = (AtomicBool::new(false), &self.hand);
         let (shared, clock) = (&self.shared, &self.fake.clock);
@@ -238,7 +238,7 @@ impl ControlBench {
         })
     }
 
-    /// Some time without orders.
+    /// Lets time pass without orders.
     fn without_orders(&self, driver: &mut Driver<'_, Fake>, ms: u32) {
         for _ in 0..ms / 5 {
             self.hand.advance(TURN);
@@ -257,7 +257,7 @@ impl ControlBench {
         self.fake.calls.take()
     }
 
-    /// All that was reported.
+    /// All reports.
     fn reports(self) -> Vec<ClientReport> {
         drop(self.shared);
         let mut text = String::new();
@@ -353,7 +353,7 @@ fn a_stop_brakes_as_commanded_and_ends_hard_when_the_state_shows_rest_20_ms_late
     let bench = ControlBench::new();
     let mut driver = bench.driver();
     bench.order(&mut driver, 1, UP);
-    // the states do not show yet that it moves
+    // the states do not show the motion yet
     bench.goes(0.0, Playing);
     bench.order(&mut driver, 2, Action::Stop { deceleration: 0.5 });
     bench.without_orders(&mut driver, 30);
@@ -380,7 +380,7 @@ fn a_press_has_two_cycles_for_itself_and_is_repeated_after_100_ms() {
         bench.hand.advance(50 * MS);
         bench.order(&mut driver, number, press(0.0, 5.0));
     }
-    // since the beginning 100 ms and the two cycles
+    // 100 ms since the beginning, plus two cycles
     assert_eq!(
         bench.calls(),
         [(54, feed), (104, Press(0.0, 5.0)), (108, feed)]
@@ -501,8 +501,7 @@ fn of_orders_that_wait_the_newest_counts_and_no_zero_is_left_out() {
     assert_eq!(newest(orders.recv().unwrap(), &orders).number, 5);
 }
 
-/// Somebody pauses the program in mid-move, and resumes it: the thread of the motion still has the
-/// old velocity.
+/// A pause in mid-move and a resumption: the thread of the motion still has the old velocity.
 #[test]
 fn an_order_that_fails_leaves_it_braking_until_it_is_seen_at_rest() {
     for (fails, braked) in [
@@ -519,7 +518,7 @@ fn brakes_after_a_failed(order: Action, braked: LibraryCall) {
     bench.shared.is_ready.store(true, Ordering::Release);
     bench.goes(40e-3, Playing);
     bench.order(&mut driver, 1, UP);
-    // the call fails before any state says why
+    // the call fails before any state explains it
     bench.fake.refuses.set(true);
     bench.order(&mut driver, 2, order);
     bench.goes(0.0, Paused);
@@ -531,7 +530,7 @@ fn brakes_after_a_failed(order: Action, braked: LibraryCall) {
         "a program that is paused hears nothing, and is not fed"
     );
     bench.fake.refuses.set(false);
-    // its first states are those of an arm that does not move yet
+    // the first states after resumption show an arm that does not move yet
     bench.goes(0.0, Playing);
     bench.without_orders(&mut driver, 10);
     bench.goes(40e-3, Playing);
@@ -603,10 +602,10 @@ fn force_mode_is_ended_also_where_the_call_that_began_it_failed() {
 fn an_arm_that_is_not_seen_to_stand_is_not_fed() {
     let bench = ControlBench::new();
     let mut driver = bench.driver();
-    // moved by somebody else
+    // somebody else moves it
     bench.goes(10e-3, Playing);
     bench.without_orders(&mut driver, 100);
-    // no state comes any more
+    // no more states
     bench.goes(0.0, Playing);
     for _ in 0..20 {
         bench.hand.advance(TURN);

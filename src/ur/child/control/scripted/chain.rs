@@ -36,18 +36,18 @@ use model::panel::{answer, happen};
 use model::record::Record;
 use model::states::States;
 
-/// Between two states of the model.
+/// Time between two states of the model.
 pub const STEP: Duration = Duration::from_millis(2);
-/// A call waits so long for a program that is ready.
+/// Maximum wait of a call for a ready program.
 const READY: Duration = Duration::from_secs(3);
-/// A moment of the model.
+/// Record of the model at one time.
 #[derive(Clone, Copy)]
 pub struct Moment {
     /// s
     pub time: f64,
-    /// m/s and rad/s together
+    /// linear plus angular, m/s and rad/s
     pub speed: f64,
-    /// of the part, N
+    /// of the part on the tip, N
     pub force: f64,
 }
 
@@ -60,16 +60,16 @@ pub struct World<'a> {
     said: Arc<Mutex<VecDeque<ClientReport>>>,
     guard: RefCell<GuardState>,
     last_report: RefCell<LastReport>,
-    /// when the guard took a line
+    /// time of the guard's last line
     heard: Cell<Instant>,
-    /// the newest states that the library has
+    /// newest states received by the library
     states: RefCell<States>,
-    /// what happens next, and when, s
+    /// next events and their times, s
     pub script: RefCell<VecDeque<(f64, String)>>,
     pub record: RefCell<Vec<Moment>>,
-    /// until when the caller is held up, s
+    /// end of the caller's delay, s
     held_until: Cell<f64>,
-    /// when the dashboard was asked to stop and did not answer
+    /// time of an unanswered stop request to the dashboard
     asked: Cell<Option<Instant>>,
     begin: Begin,
     is_dropped: Cell<bool>,
@@ -78,7 +78,7 @@ pub struct World<'a> {
 }
 
 impl<'a> World<'a> {
-    /// - `script`: what happens when, s, in this order.
+    /// - `script`: events and their times, s, in order.
     pub fn new(surface: &'a Plate, script: Vec<(f64, String)>, seed: u64) -> Self {
         let (clock, hand) = Clock::manual();
         let payload = Payload {
@@ -132,12 +132,12 @@ impl<'a> World<'a> {
         }
     }
 
-    /// s
+    /// Time of the model, s.
     pub fn now(&self) -> f64 {
         self.controller.borrow().body.time
     }
 
-    /// The next line of the script, where its time has come.
+    /// The next line of the script if it is due.
     fn due(&self, now: f64) -> Option<String> {
         let mut script = self.script.borrow_mut();
         let is_due = script.front().is_some_and(|(at, _)| *at <= now);
@@ -147,7 +147,7 @@ impl<'a> World<'a> {
             .map(|(_, line)| line)
     }
 
-    /// One period of the controller, and what follows from it at once.
+    /// One period of the controller and its immediate consequences.
     fn step(&self) {
         self.hand.advance(STEP);
         let mut controller = self.controller.borrow_mut();
@@ -228,7 +228,7 @@ impl<'a> World<'a> {
         }
     }
 
-    /// The guard takes a line, as its thread does.
+    /// Hands a line to the guard, as its thread does.
     fn take(&self, report: ClientReport) {
         self.heard.set(self.clock.now());
         let mut guard = self.guard.borrow_mut();
@@ -244,7 +244,7 @@ impl<'a> World<'a> {
         }
     }
 
-    /// … and looks at its deadline and its dashboard.
+    /// Checks the deadline and the dashboard of the guard.
     fn look(&self) {
         let late =
             self.clock.since(self.heard.get()) > self.guard.borrow().patience(self.clock.now());
@@ -265,13 +265,13 @@ impl<'a> World<'a> {
         }
     }
 
-    /// The dashboard is asked to stop, again and again while it does not answer.
+    /// Asks the dashboard to stop, repeatedly until it answers.
     fn stop(&self) {
         self.asked
             .set(self.dashboard("stop").is_none().then(|| self.clock.now()));
     }
 
-    /// Its answer, where it gives one.
+    /// Answer of the dashboard, if any.
     fn dashboard(&self, line: &str) -> Option<String> {
         let mut controller = self.controller.borrow_mut();
         let faults = controller.faults;
@@ -279,10 +279,10 @@ impl<'a> World<'a> {
         is_there.then(|| answer(&mut controller, line))
     }
 
-    /// What a new client finds: its registers cleared, its program uploaded.
+    /// Prepares the controller for a new client: registers cleared, program uploaded.
     fn upload(&self) {
         let mut controller = self.controller.borrow_mut();
-        // the registers of a client that is gone are another's
+        // the registers belong to the previous client
         (controller.ints_in, controller.doubles_in) = ([0; 48], [0.0; 48]);
         controller.owner = Some(0);
         controller.load(&program::counting(program::PLACES).unwrap());
@@ -309,8 +309,7 @@ impl<'a> World<'a> {
     }
 }
 
-/// The library: it looks at the newest states it has, waits for a program that is ready, and writes
-/// registers.
+/// The library: looks at its newest states, waits for a ready program, and writes registers.
 pub struct Library<'a, 'b>(pub &'b World<'a>);
 
 impl Library<'_, '_> {
@@ -320,7 +319,7 @@ impl Library<'_, '_> {
         !self.0.is_killed.get() && !self.0.is_dropped.get() && states.is_playing && !is_stopped
     }
 
-    /// Until the program has answered with a number.
+    /// Waits until the program has answered with a number.
     fn until(&self, answered: i32) -> bool {
         let begun = self.0.clock.now();
         while self.may_send() && self.0.clock.since(begun) < READY {
@@ -464,7 +463,7 @@ pub struct ScriptedArm<'a, 'b> {
 }
 
 impl<'a, 'b> ScriptedArm<'a, 'b> {
-    /// As `UrArm::connect`.
+    /// Connects as `UrArm::connect`.
     pub fn connect(world: &'b World<'a>, library: &'b Library<'a, 'b>) -> Result<Self, ArmError> {
         world.upload();
         let mut driver = Driver::new(library, &world.shared, &world.begin, world.clock.clone());
@@ -473,7 +472,7 @@ impl<'a, 'b> ScriptedArm<'a, 'b> {
         })?;
         world.shared.is_ready.store(true, Ordering::Release);
         world.shared.report(&ClientReport::Ready);
-        // states of before have the pose of another tool
+        // older states have the pose of another tool
         world.step();
         Ok(Self {
             world,
@@ -509,7 +508,7 @@ impl<'a, 'b> ScriptedArm<'a, 'b> {
         number
     }
 
-    /// One period, with what the driver does in it.
+    /// One period, with the driver's actions in it.
     pub fn step(&mut self) {
         self.world.step();
         if self.world.is_killed.get() {
@@ -524,7 +523,7 @@ impl<'a, 'b> ScriptedArm<'a, 'b> {
         let is_due = self.world.clock.since(self.looked) >= TURN;
         if order.is_some() || is_due {
             self.looked = self.world.clock.now();
-            // a lost connection is seen by the guard
+            // the guard notices a lost connection
             let _ = self.driver.turn(order);
         }
     }
@@ -572,7 +571,7 @@ impl Arm for ScriptedArm<'_, '_> {
         Ok(())
     }
 
-    /// As `UrArm::recover`; a protective stop can be unlocked at once.
+    /// Recovers as `UrArm::recover`; a protective stop unlocks at once.
     fn recover(&mut self) -> Result<(), ArmError> {
         let lost = || ArmError::Lost { silent_ms: 500 };
         self.world

@@ -1,4 +1,4 @@
-//! Scripts of faults, and what is right after each.
+//! Scripts of faults, and the right behaviour after each.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -8,39 +8,38 @@ use super::session::{ProbingSession, limits};
 use crate::probing::arm::{Arm, ProbeError, TouchParams};
 use crate::sim::Plate;
 
-/// Without a dashboard the arm stands within this, s: the watchdog of the controller, and its
-/// brakes.
+/// Time in which the arm stands without a dashboard, s: watchdog of the controller plus braking.
 const WATCHDOG: f64 = 0.12;
-/// Nobody could end a program that is resumed: its thread speeds up with 0.5 m/s² until the client,
-/// which looks each 5 ms, brakes it 14 ms later, so it goes for some 20 ms, m.
+/// Travel of a program resumed before anybody could end it, m: its thread accelerates with 0.5 m/s²
+/// until the client, which looks each 5 ms, brakes 14 ms later, so some 20 ms of motion.
 const RESUMED_WAY: f64 = 0.15e-3;
-/// After a fault nobody orders anything for this long, s.
+/// Time without orders after a fault, s.
 const QUIET: f64 = 2.0;
-/// A touch after a fault finds the surface within this, m.
+/// Tolerance of the surface found by a touch after a fault, m.
 const FOUND: f64 = 0.1e-3;
 
-/// What came of a script.
+/// Result of a script.
 struct Outcome {
     error: Option<ProbeError>,
-    /// when it was reported, s
+    /// time of the report, s
     at: f64,
     touches: usize,
     record: Vec<Moment>,
-    /// until the fault is reported
+    /// missing states up to the report of the fault
     missing: i64,
-    /// when the arm was at command again, s; and what the touch after it found, m
+    /// time at which the arm took commands again, s, and surface error of the next touch, m
     recovered: Option<(f64, Result<Option<f64>, String>)>,
 }
 
 impl Outcome {
-    /// The last moment before the recovery at which the arm moved, s.
+    /// The last time before the recovery at which the arm moved, s.
     fn stood_at(&self) -> f64 {
         self.before()
             .rfind(|moment| moment.speed > 0.0)
             .map_or(0.0, |moment| moment.time)
     }
 
-    /// Until somebody orders something again.
+    /// Records before the next order.
     fn before(&self) -> impl DoubleEndedIterator<Item = &Moment> {
         let until = self.recovered.as_ref().map_or(f64::INFINITY, |(at, _)| *at);
         self.record
@@ -48,7 +47,7 @@ impl Outcome {
             .filter(move |moment| moment.time <= until)
     }
 
-    /// How far it went later than some time (s) after the report, m; and until when after it, s.
+    /// Travel later than some time (s) after the report, m; and its end relative to the report, s.
     fn after_report(&self, since: f64) -> (f64, f64) {
         let later = self.before().filter(|moment| moment.time > self.at + since);
         let way = later.map(|moment| moment.speed * STEP.as_secs_f64()).sum();
@@ -63,8 +62,7 @@ impl Outcome {
     }
 }
 
-/// Touches until some time (s); after a fault nobody orders anything for two seconds, then it goes
-/// on.
+/// Touches until some time (s); after a fault waits two seconds without orders, then goes on.
 fn played(script: Vec<(f64, String)>, seed: u64, seconds: f64) -> Outcome {
     let over = script.last().map_or(0.0, |(at, _)| at + 0.1);
     let plate = Plate::default();
@@ -97,16 +95,16 @@ fn played(script: Vec<(f64, String)>, seed: u64, seconds: f64) -> Outcome {
 /// A kind of fault.
 pub struct Kind {
     pub line: &'static str,
-    /// what ends it; empty: nothing
+    /// line that ends it; empty: none
     ends: &'static str,
-    /// the arm stands within this time where it lasts as long, s; `None`: it may go on, or is seen
-    /// by its next order
+    /// maximum time until the arm stands, for a fault that lasts as long, s; `None`: it may go on,
+    /// or notice the fault at its next order
     stands: Option<f64>,
-    /// words of the reasons that are true
+    /// words of the true reasons
     reasons: &'static [&'static str],
 }
 
-/// The end of a program by its watchdog, of orders that do not arrive.
+/// Reasons for the end of a program by its watchdog, as orders do not arrive.
 const UNHEARD: &[&str] = &[
     "has ended",
     "has not returned",
@@ -116,7 +114,7 @@ const UNHEARD: &[&str] = &[
     "did not arrive",
 ];
 
-/// At a command that takes longer than a cycle the deadline of its call counts.
+/// For a command that takes longer than a cycle the deadline of its call counts.
 const HANGS: &[&str] = &["counted no cycle", "has not returned"];
 
 pub const KINDS: &[Kind] = &[
@@ -311,7 +309,7 @@ pub const KINDS: &[Kind] = &[
 /// Faults of one script: kind, moment and length, s.
 type Faults = Vec<(&'static Kind, f64, f64)>;
 
-/// One or two of any kind, at any moment of a time that begins at `from`, s.
+/// One or two faults of any kind, at random times from `from` to `until`, s.
 pub fn random_faults(rng: &mut Pcg64, from: f64, until: f64) -> Faults {
     let count = 1 + usize::from(rng.random_range(0.0..1.0) < 0.4);
     let one = |_| {
@@ -345,7 +343,7 @@ fn is_true(words: &str, faults: &Faults) -> bool {
         .any(|reason| words.contains(reason))
 }
 
-/// What is wrong with how a script ended.
+/// Error in the end of a script.
 #[expect(clippy::too_many_lines)]
 fn judged(faults: &Faults, outcome: &Outcome) -> Option<String> {
     let has = |lines: &[&str]| faults.iter().any(|(kind, ..)| lines.contains(&kind.line));
@@ -371,7 +369,7 @@ fn judged(faults: &Faults, outcome: &Outcome) -> Option<String> {
     for (kind, at, length) in faults {
         let late = outcome.stood_at() - at;
         let is_resumed = !has_dashboard && matches!(kind.line, "pause" | "open");
-        // without a dashboard its watchdog stops it
+        // without a dashboard the watchdog stops the arm
         let most = kind.stands.map(|most| {
             if has_dashboard {
                 most
@@ -379,7 +377,7 @@ fn judged(faults: &Faults, outcome: &Outcome) -> Option<String> {
                 most.max(WATCHDOG)
             }
         });
-        // what another one ends was there for a shorter time
+        // another fault may end this one early
         let mends = faults
             .iter()
             .filter(|(other, ..)| other.ends == "mend")
@@ -410,8 +408,8 @@ fn judged(faults: &Faults, outcome: &Outcome) -> Option<String> {
         }
         _ => {}
     }
-    // states that never came, that a caller was held up for, or that came at once, of which the
-    // library has the newest
+    // lost states, states during a delay of the caller, and bunched states, which the library
+    // reduces to the newest
     let may_miss = has(&[
         "silent",
         "unplug",
@@ -447,7 +445,7 @@ fn without_a_fault_it_touches_and_touches() {
     );
 }
 
-/// A part that is 7 mm higher than where the links are clear, met from above at the speed of links.
+/// A part 7 mm above the mesh that clears the links, met from above at link speed.
 #[test]
 fn a_part_met_at_link_speed_is_pressed_with_no_more_than_the_limit_and_left() {
     let outcome = played(vec![(0.2, "raise 7".to_owned())], 1, 6.0);
@@ -466,7 +464,7 @@ fn a_part_met_at_link_speed_is_pressed_with_no_more_than_the_limit_and_left() {
     assert!(last < 1.0, "{last} N are left");
 }
 
-/// In the fastest link, in the search for the surface, and pressed; each as a row of a table.
+/// Each fault in the fastest link, in the search for the surface, and pressed; one table row each.
 #[test]
 #[ignore = "a slow proof"]
 fn each_fault_alone_ends_as_it_should() {
@@ -505,7 +503,7 @@ fn each_fault_alone_ends_as_it_should() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// Searching at 5.3 mm/s; its program is paused, nobody ends it, and somebody resumes it.
+/// The program pauses during a search at 5.3 mm/s, nobody ends it, and somebody resumes it.
 #[test]
 fn an_arm_that_is_resumed_while_its_dashboard_is_mute_is_braked_by_its_client() {
     let lines = [
@@ -531,7 +529,7 @@ fn an_arm_that_is_resumed_while_its_dashboard_is_mute_is_braked_by_its_client() 
     );
 }
 
-/// Moments of a session without a fault, s: in its fastest link, in the search 50 ms before the ball
+/// Times in a session without a fault, s: in its fastest link, in the search 50 ms before the ball
 /// meets the surface, pressed, and on the way back.
 fn moments() -> [(&'static str, f64); 4] {
     let free = played(Vec::new(), 1, 8.0).record;
@@ -555,8 +553,8 @@ fn moments() -> [(&'static str, f64); 4] {
     ]
 }
 
-/// Two periods after the newest cycle, and one until the next state where it hangs in between; then
-/// the brakes. One that takes two periods for each cycle is no fault, one that takes three is.
+/// Detection takes two periods after the newest cycle, and one until the next state if the hang
+/// falls between two states; then the brakes. Two periods for each cycle are no fault, three are.
 #[test]
 fn a_program_that_hangs_is_seen_in_the_state_after_two_periods_whatever_is_ordered() {
     let moments = moments();
@@ -575,8 +573,8 @@ fn a_program_that_hangs_is_seen_in_the_state_after_two_periods_whatever_is_order
     assert!(slow.error.is_none(), "{:?}", slow.error);
 }
 
-/// Held up for 300 ms in its fastest link: 20 ms until the client brakes, and as many to see that
-/// it looks, to order and to brake. Where its program hangs as well, nobody but the guard sees that.
+/// A delay of 300 ms in the fastest link: 20 ms until the client brakes, and as many for polling,
+/// order and braking. If the program hangs as well, only the guard notices.
 #[test]
 fn an_arm_whose_caller_is_held_up_stands_also_where_its_program_hangs() {
     let [(_, at), ..] = moments();
@@ -602,7 +600,7 @@ fn an_arm_whose_caller_is_held_up_stands_also_where_its_program_hangs() {
     assert!(held < 0.07 && both < 0.02, "{held} s, {both} s");
 }
 
-/// One or two faults of any kind at any moment; 10 scripts, in the slow proofs 200 of each of two
+/// One or two faults of any kind at any time; 10 scripts, in the slow proofs 200 of each of two
 /// seeds.
 #[test]
 fn random_scripts_end_as_they_should() {

@@ -10,13 +10,12 @@ use super::session::{ProbingSession, limits};
 use crate::probing::arm::Arm;
 use crate::sim::Plate;
 
-/// The last of a script and the recovery are so far apart, s.
+/// Time between the last event of a script and the recovery, s.
 const QUIET: f64 = 0.3;
-/// Memory may differ by this between the first and the last quarter: what a queue has grown to,
-/// bytes.
+/// Maximum growth of memory from the first to the last quarter, for queues, bytes.
 const FLAT: isize = 64 << 10;
 
-/// Five minutes of the arm's time, in the slow proofs an hour.
+/// One hour of the arm's time.
 #[test]
 #[ignore = "a slow proof"]
 #[expect(clippy::too_many_lines)]
@@ -38,7 +37,7 @@ fn hours_of_faults_and_recoveries_leave_no_stuck_state_and_no_memory_behind() {
             recent = script_of(&next);
             world.script.borrow_mut().extend(script_of(&next));
         }
-        // one that nobody noticed would be in this zero, and the force off by its weight after the
+        // an unnoticed payload would enter this zero, and its weight would bias the force after the
         // next recovery
         world
             .script
@@ -51,7 +50,7 @@ fn hours_of_faults_and_recoveries_leave_no_stuck_state_and_no_memory_behind() {
             while !world.script.borrow().is_empty() || world.now() < at + QUIET {
                 session.arm.step();
             }
-            // it stands since, whatever has happened meanwhile
+            // the arm has stood since, whatever else has happened
             let quiet_since = world.now() - 0.05;
             let moved =
                 |moment: &&super::chain::Moment| moment.time > quiet_since && moment.speed > 0.0;

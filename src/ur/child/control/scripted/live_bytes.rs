@@ -1,4 +1,4 @@
-//! Bytes that a thread has asked for and not given back, in the tests of this crate.
+//! Bytes that a thread has allocated and not freed, in the tests of this crate.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -7,11 +7,11 @@ thread_local! {
     static LIVE: Cell<isize> = const { Cell::new(0) };
 }
 
-/// The system's allocator, which counts.
+/// The system's allocator with a count.
 struct LiveBytes;
 
 fn note(bytes: isize) {
-    // a thread that ends counts no more
+    // an ending thread counts no more
     let _ = LIVE.try_with(|live| live.set(live.get() + bytes));
 }
 
@@ -31,7 +31,7 @@ unsafe impl GlobalAlloc for LiveBytes {
 #[global_allocator]
 static LIVE_BYTES: LiveBytes = LiveBytes;
 
-/// Of this thread.
+/// Live bytes of this thread.
 pub fn live_bytes() -> isize {
     LIVE.get()
 }

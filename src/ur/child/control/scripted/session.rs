@@ -1,5 +1,4 @@
-//! Touches here and there on a plate with links between, until something is wrong; and how it goes
-//! on after that.
+//! Touches on a plate with links between them until a fault, and the continuation after it.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
@@ -11,13 +10,13 @@ use crate::sim::ArmParams;
 
 /// Top of the plate, m in O.
 const TOP: f64 = 12e-3;
-/// Where it is touched, m in O.
+/// Touched positions, m in O.
 const PLACES: [[f64; 2]; 2] = [[45e-3, 8e-3], [8e-3, 6e-3]];
-/// How fast and how far the tip backs off after a fault, m/s and m.
+/// Speed and distance of backing off after a fault, m/s and m.
 const BACK_OFF_SPEED: f64 = 10e-3;
 const BACK_OFF: f64 = 8e-3;
 
-/// Counts the states that the observer was not given.
+/// Counts the states that the observer did not get.
 #[derive(Default)]
 pub struct Heard {
     last_ns: Option<i64>,
@@ -34,7 +33,7 @@ impl Observer for Heard {
     }
 }
 
-/// An arm, and what it has touched.
+/// An arm and its touches.
 pub struct ProbingSession<'a, 'b> {
     world: &'b World<'a>,
     pub arm: ScriptedArm<'a, 'b>,
@@ -71,13 +70,13 @@ impl<'a, 'b> ProbingSession<'a, 'b> {
 
     fn zero(&mut self) -> Result<(), ProbeError> {
         Watched::new(&mut self.arm, limits(), &mut self.heard).zero()?;
-        // what waited meanwhile is thrown away
+        // states of that time are discarded
         self.heard.last_ns = None;
         Ok(())
     }
 
-    /// Touches the next place; how high the surface is there beside where it should be, m; `None`:
-    /// nothing was met.
+    /// Touches the next position; returns the surface height relative to nominal, m; `None`: no
+    /// contact.
     fn touch(&mut self) -> Result<Option<f64>, ProbeError> {
         let [x, y] = PLACES[self.touches % PLACES.len()];
         let params = ArmParams::default();
@@ -100,7 +99,7 @@ impl<'a, 'b> ProbingSession<'a, 'b> {
         ))
     }
 
-    /// After a fault: recovers, backs off, zeroes, and touches once; what the touch finds.
+    /// After a recovery: backs off, zeroes, and touches once; returns the surface error, m.
     pub fn go_on(&mut self) -> Result<Option<f64>, ProbeError> {
         self.back_off()?;
         self.zero()?;
