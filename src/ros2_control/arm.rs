@@ -14,59 +14,58 @@ use crate::probing::arm::{
 use crate::ros::port::ArmPort;
 use crate::stylus::Wrench;
 
-/// States at the start whose rate is looked at; the middle one of their distances is the period.
+/// Number of states at the start; the median time between them is the period.
 const RATED: usize = 21;
-/// The longest period, s: contact is to be felt within this.
+/// Maximum period for feeling contact, s.
 const LONGEST_PERIOD: f64 = 11e-3;
-/// A line comes to its end with so many latencies as its time constant.
+/// Time constant of the end of a line, in latencies.
 const SETTLING: f64 = 3.0;
-/// A press comes to its force with so many latencies as its time constant.
+/// Time constant of the force of a press, in latencies.
 const CALM: f64 = 4.0;
-/// Of the velocity of a press, m/s².
+/// Acceleration of a press, m/s².
 const PRESS_ACCELERATION: f64 = 2.0;
-/// With which it brakes when no order comes any more, and after a fault, m/s².
+/// Deceleration without orders, and after a fault, m/s².
 const FAULT_STOP: f64 = 2.0;
-/// Most that anything may ask for, m/s².
+/// Maximum acceleration of a command, m/s².
 const TOP_ACCELERATION: f64 = 10.0;
-/// Turns begin and end with this, rad/s².
+/// Acceleration of rotations, rad/s².
 const TURN_ACCELERATION: f64 = 2.0;
-/// A tip stands below this speed, m/s …
+/// Maximum speed of a standing tip, m/s.
 const STANDING: f64 = 5e-3;
-/// … for so long.
+/// Minimum duration of standing.
 const STANDING_FOR: Duration = Duration::from_millis(20);
-/// After a fault the arm is braked and looked at for so long at most.
+/// Maximum duration of braking and watching after a fault.
 const BRAKING: Duration = Duration::from_millis(300);
-/// A stop is sent again after this time where nothing is heard.
+/// Period of resending a stop while no message comes.
 const AGAIN: Duration = Duration::from_millis(10);
-/// After joints were ordered to go so far, rad …
+/// Minimum ordered travel of the joints for the check that they follow, rad.
 const ORDERED: f64 = 20e-3;
-/// … they must have gone this share of it.
+/// Minimum share of the ordered travel that the joints make.
 const FOLLOWED: f64 = 0.2;
-/// The same kind of order is sent again after this time, s: a controller that is given a new
-/// trajectory in each of its periods repeats its last set point for ever (ros2_controllers before
-/// pull request 780).
+/// Minimum time between orders of the same kind, s: a controller with a new trajectory in each of
+/// its periods repeats its last set point forever (ros2_controllers before pull request 780).
 const ORDER_EVERY: f64 = 8e-3;
-/// States of which the mean is the zero of the sensor.
+/// Number of states whose mean is the zero of the sensor.
 const ZEROING: usize = 64;
-/// The means of their halves may differ by this, N, or something moves the tip.
+/// Maximum difference of the means of the two halves, N; beyond it something moves the tip.
 const CALM_FORCE: f64 = 0.5;
 
 /// An arm behind ros2_control that holds a probe.
 ///
-/// After a fault it is braked until its joints stand, and every call but a stop returns the fault,
+/// After a fault it brakes until its joints stand, and every call but a stop returns the fault,
 /// until [`Arm::recover`].
 pub struct Ros2ControlArm {
     params: Ros2ControlParams,
     reader: StateReader,
     begun: Instant,
-    /// s
+    /// median time between states, s
     period: f64,
     last: Measured,
-    /// of the sensor in the flange
+    /// zero of the sensor in the flange
     tare: Wrench,
     plan: BrakePlan,
     planned_at: Instant,
-    /// what the plan is for
+    /// motion of the plan
     doing: Option<OrderedMotion>,
     freshness: Freshness,
     obedience: Obedience,
@@ -74,12 +73,12 @@ pub struct Ros2ControlArm {
     fault: Option<ArmError>,
 }
 
-/// How far the joints were ordered to go, and from where.
+/// Ordered travel of the joints, and its start.
 #[derive(Clone, Debug)]
 struct Way {
     from: Joints,
     ordered: SVector<f64, MOST_JOINTS>,
-    /// the orders up to here are in it
+    /// end of the orders included
     until: Instant,
 }
 
@@ -87,15 +86,15 @@ impl Ros2ControlArm {
     /// Listens until states have come on all topics. Nothing moves.
     ///
     /// # Errors
-    /// [`ArmError::TopicSilent`] for one that brings nothing; [`ArmError::Unreadable`];
-    /// [`ArmError::Refused`] for parameters out of range, states that come too seldom, and orders
-    /// that nobody listens to.
+    /// [`ArmError::TopicSilent`] for a topic without messages; [`ArmError::Unreadable`];
+    /// [`ArmError::Refused`] for parameters out of range, a low rate of states, and orders without
+    /// a listener.
     pub fn connect(params: &Ros2ControlParams, port: Box<dyn ArmPort>) -> Result<Self, ArmError> {
         params.check()?;
         let mut reader = StateReader::new(port, params);
         let (last, period) = rated(&mut reader, params)?;
         let begun = params.clock.now();
-        // who listens is found somewhat later than who sends
+        // discovery finds listeners somewhat later than senders
         while reader.port().order_listeners() == Some(0)
             && params.clock.since(begun) < params.connect
         {
@@ -134,12 +133,12 @@ impl Ros2ControlArm {
         })
     }
 
-    /// What was measured, as the trait has it.
+    /// Converts a measurement to the state of the trait.
     fn seen(&self, measured: &Measured) -> ArmState {
         let pose_bf = self.params.geometry.flange(&measured.sample.joints);
         let free = self.unweighed(measured);
         let (force, torque) = (free.force - self.tare.force, free.torque - self.tare.torque);
-        // about the centre of the ball
+        // torque about the centre of the ball
         let torque = torque - self.params.pose_ft.translation.vector.cross(&force);
         ArmState {
             stamp_ns: measured.sample.stamp_ns,
@@ -154,7 +153,7 @@ impl Ros2ControlArm {
         }
     }
 
-    /// What the sensor has but for the weight, in the flange.
+    /// Reading of the sensor less the weight, in the flange.
     fn unweighed(&self, measured: &Measured) -> Wrench {
         let r_bf = self
             .params
@@ -168,13 +167,13 @@ impl Ros2ControlArm {
         }
     }
 
-    /// From the flange to the tip, m in B.
+    /// Vector from the flange to the tip, m in B.
     fn arm_of_tip(&self) -> Vector3<f64> {
         let pose_bf: Isometry3<f64> = self.params.geometry.flange(&self.last.sample.joints);
         pose_bf.rotation * self.params.pose_ft.translation.vector
     }
 
-    /// Velocity of the tip by that of the joints, m/s and rad/s in B.
+    /// Twist of the tip from joint velocities, m/s and rad/s in B.
     fn twist_of(&self, rates: &Joints) -> [f64; 6] {
         let mut all = SVector::<f64, MOST_JOINTS>::zeros();
         rates
@@ -190,7 +189,7 @@ impl Ros2ControlArm {
         ]
     }
 
-    /// Velocity of the joints by that of the tip, rad/s.
+    /// Joint velocities from the twist of the tip, rad/s.
     fn rates_of(&self, [x, y, z, a, b, c]: [f64; 6]) -> Result<Joints, ArmError> {
         let angular = Vector3::new(a, b, c);
         let of_flange = Vector3::new(x, y, z) - angular.cross(&self.arm_of_tip());
@@ -217,14 +216,14 @@ impl Ros2ControlArm {
         }
     }
 
-    /// Velocity of the joints that the controller should have by now, rad/s.
+    /// Expected joint velocities of the controller, rad/s.
     fn ordered_now(&self, now: Instant) -> Joints {
         self.plan
             .velocity(now.saturating_duration_since(self.planned_at).as_secs_f64())
     }
 
-    /// Changes of velocity take no shorter, s: the controller may be behind what it is thought to
-    /// do by its share of the latency.
+    /// Minimum duration of a change of velocity, s: the controller may lag the plan by its share of
+    /// the latency.
     fn least_ramp(&self) -> f64 {
         (2.0 * self.period).max(0.5 * self.params.latency)
     }
@@ -256,7 +255,7 @@ impl Ros2ControlArm {
         self.send(BrakePlan::stopping(from, ramp), &motion)
     }
 
-    /// Whether the order before is of the same kind, and too young to be replaced.
+    /// Whether the previous order is of the same kind, and too young for a replacement.
     fn is_early(&self, motion: &OrderedMotion) -> bool {
         let same =
             |doing: &OrderedMotion| std::mem::discriminant(doing) == std::mem::discriminant(motion);
@@ -280,7 +279,7 @@ impl Ros2ControlArm {
         Ok(())
     }
 
-    /// The next state, with all that can be wrong with it.
+    /// Waits for the next state and checks it for all faults.
     fn await_state(&mut self) -> Result<ArmState, ArmError> {
         self.last = self.reader.next(&self.params, self.params.silent)?;
         let now = self.params.clock.now();
@@ -304,21 +303,20 @@ impl Ros2ControlArm {
         Ok(self.seen(&self.last))
     }
 
-    /// Brakes until the arm is seen to stand; from now on it is stopped for a reason.
+    /// Brakes until the states show standstill; from now on the arm keeps the fault.
     fn fail(&mut self, first: ArmError) -> ArmError {
         let clock = self.params.clock.clone();
         let begun = clock.now();
         let (mut moving, mut still_since) = (None, None);
         let mut last_ns = self.last.sample.stamp_ns;
         while clock.since(begun) < BRAKING {
-            // an order that is not sent is one that the trajectory before does without: it ends at
-            // rest
+            // a lost order does no harm: the previous trajectory ends at rest
             let _ = self.stop(FAULT_STOP);
             let Some(sample) = self.reader.watch(&self.params, AGAIN) else {
                 continue;
             };
             if std::mem::replace(&mut last_ns, sample.stamp_ns) == sample.stamp_ns {
-                // the same again says nothing of now
+                // a repeated state is not new evidence
                 continue;
             }
             let speed = self.speed_of(&sample);
@@ -342,7 +340,7 @@ impl Ros2ControlArm {
         fault
     }
 
-    /// Of the tip, m/s.
+    /// Speed of the tip, m/s.
     fn speed_of(&self, sample: &JointSample) -> f64 {
         let [x, y, z, ..] = self.twist_of(&sample.rates);
         Vector3::new(x, y, z).norm()
@@ -423,8 +421,8 @@ impl Ros2ControlArm {
                 else {
                     return refuse("a press", "its axis is no direction");
                 };
-                // dF/dt = K v: with v = (F − F_now)/(K T) the force comes to its end with T, stable
-                // while T is some latencies
+                // dF/dt = K v: with v = (F − F_now)/(K T) the force converges with time constant T,
+                // stable for T of some latencies
                 let felt = -self.seen(&self.last).wrench_b.force.dot(&axis);
                 let gain =
                     1.0 / (CALM * self.params.stiffness * (self.params.latency + self.period));
@@ -497,15 +495,15 @@ impl Way {
         }
     }
 
-    /// The orders of a plan up to now count.
+    /// Adds the orders of a plan up to now.
     fn follow(&mut self, plan: &BrakePlan, planned_at: Instant, now: Instant) {
         let after = |at: Instant| at.saturating_duration_since(planned_at).as_secs_f64();
         self.ordered += plan.way(after(self.until), after(now));
         self.until = now;
     }
 
-    /// How far they were ordered to go and went, rad, once that is clear and where it is not
-    /// enough.
+    /// Ordered and actual travel of the joints, rad, once it is long enough to judge and shows that
+    /// they do not follow.
     fn ignored(&mut self, joints: &Joints, now: Instant) -> Option<[f64; 2]> {
         let ordered = self.ordered.norm();
         if ordered < ORDERED {
@@ -522,7 +520,7 @@ impl Way {
     }
 }
 
-/// How long a change of the velocity of the tip takes, s.
+/// Duration of a change of the tip's twist, s.
 fn lasting([x, y, z, a, b, c]: &[f64; 6], acceleration: f64) -> f64 {
     let (linear, angular) = (
         Vector3::new(*x, *y, *z).norm(),
@@ -531,7 +529,7 @@ fn lasting([x, y, z, a, b, c]: &[f64; 6], acceleration: f64) -> f64 {
     (linear / acceleration).max(angular / TURN_ACCELERATION)
 }
 
-/// The first states, and their period, s.
+/// The last of the first states, and their period, s.
 fn rated(
     reader: &mut StateReader,
     params: &Ros2ControlParams,
@@ -570,7 +568,7 @@ impl Arm for Ros2ControlArm {
     fn command(&mut self, command: &Command) -> Result<(), ArmError> {
         let is_stop = matches!(command, Command::Stop { .. });
         match &self.fault {
-            // a stop is right whenever it comes
+            // a stop is right at any time
             Some(_) if is_stop => return self.obey(command),
             Some(fault) => return Err(fault.clone()),
             None => {}
@@ -579,7 +577,7 @@ impl Arm for Ros2ControlArm {
             .drain(&self.params)
             .map_err(|error| self.fail(error))?;
         let followed_s = self.last.sample.stamp_ns as f64 * 1e-9;
-        // the order before ends at rest, where none is sent
+        // without a new order the previous one ends at rest
         if is_stop
             || self
                 .freshness
@@ -600,8 +598,8 @@ impl Arm for Ros2ControlArm {
         })
     }
 
-    /// Listens anew: states have to come on all topics, and the arm has to stand. No order is sent,
-    /// and the sensor is not zeroed, for the probe may still be pressed.
+    /// Listens anew: states have to come on all topics, and the arm has to stand. Sends no order,
+    /// and does not zero the sensor, as the probe may still be pressed.
     fn recover(&mut self) -> Result<(), ArmError> {
         self.reader.restart(&self.params);
         let (last, period) = rated(&mut self.reader, &self.params)?;

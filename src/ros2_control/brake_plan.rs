@@ -1,29 +1,29 @@
 //! An order as a short trajectory that ends at rest.
 //!
-//! joint_trajectory_controller goes on with the newest trajectory from where its own set point is,
-//! and holds its last point. So each order is: to the velocity wanted, with it for [`HOLD`], and to
-//! rest. The next one replaces it long before that; when none comes, as this process has died, the
-//! arm brakes by itself. The points have velocities alone and no places, so that the controller
-//! integrates from where it is: it cannot jump, however late the order comes.
+//! joint_trajectory_controller continues the newest trajectory from its own set point, and holds
+//! its last point. So each order goes to the desired velocity, keeps it for [`HOLD`], and goes to
+//! rest. The next order replaces it long before that; if none comes, as this process has died, the
+//! arm brakes by itself. The points have velocities but no positions, so the controller integrates
+//! from its current position: it cannot jump, however late the order comes.
 
 use nalgebra::SVector;
 
 use crate::probing::arm::{Joints, MOST_JOINTS};
 use crate::ros::messages::{Duration, Header, JointTrajectory, JointTrajectoryPoint};
 
-/// How long a velocity is kept when nothing more is heard, s: more than states may stay away.
+/// Duration of a velocity without a further order, s: longer than the allowed silence of states.
 pub(super) const HOLD: f64 = 60e-3;
 
-/// Velocities of the joints, rad/s, linear between points; at rest after the last.
+/// Joint velocities, rad/s, linear between points; at rest after the last.
 #[derive(Clone, Debug)]
 pub(super) struct BrakePlan {
     begin: Joints,
-    /// s after the order, rad/s
+    /// time after the order, s, and velocities, rad/s
     points: Vec<(f64, Joints)>,
 }
 
 impl BrakePlan {
-    /// At rest.
+    /// Plan of an arm at rest.
     pub fn rest(count: usize) -> Option<Self> {
         Some(Self {
             begin: Joints::of(&[0.0; MOST_JOINTS][..count.min(MOST_JOINTS)])?,
@@ -31,9 +31,9 @@ impl BrakePlan {
         })
     }
 
-    /// From a velocity to another, which is kept for [`HOLD`], and to rest.
+    /// Plan from a velocity to another, which lasts for [`HOLD`], and to rest.
     ///
-    /// - `ramp`, `brake`: how long the changes take, s, above zero.
+    /// - `ramp`, `brake`: durations of the two changes, s, above zero.
     pub fn going(from: Joints, to: Joints, ramp: f64, brake: f64) -> Self {
         let still = to.mapped(|_, _| 0.0);
         Self {
@@ -42,7 +42,7 @@ impl BrakePlan {
         }
     }
 
-    /// From a velocity to rest.
+    /// Plan from a velocity to rest.
     pub fn stopping(from: Joints, ramp: f64) -> Self {
         Self {
             begin: from,
@@ -50,7 +50,7 @@ impl BrakePlan {
         }
     }
 
-    /// Velocity so long after the order, rad/s.
+    /// Joint velocities at a time (s) after the order, rad/s.
     pub fn velocity(&self, after: f64) -> Joints {
         let mut before = (0.0, self.begin);
         for &(at, velocity) in &self.points {
@@ -69,8 +69,8 @@ impl BrakePlan {
         }
     }
 
-    /// Way of the joints from one time after the order to another, rad: the velocity is linear
-    /// between points, so the middle of short times is near enough.
+    /// Travel of the joints between two times after the order, rad, from the velocity at their
+    /// middle: near enough for short times, as the velocity is linear between points.
     pub fn way(&self, from: f64, to: f64) -> SVector<f64, MOST_JOINTS> {
         let middle = self.velocity(f64::midpoint(from, to));
         let mut way = SVector::zeros();
@@ -81,7 +81,7 @@ impl BrakePlan {
         way
     }
 
-    /// The message: it begins as it arrives.
+    /// The message: its trajectory begins on arrival.
     pub fn message(&self, names: &[std::sync::Arc<str>]) -> JointTrajectory {
         let point = |&(at, velocity): &(f64, Joints)| JointTrajectoryPoint {
             velocities: velocity.to_vec(),
@@ -108,7 +108,7 @@ fn length(seconds: f64) -> Duration {
 mod tests {
     use super::*;
 
-    /// By hand: 0.2 rad/s after 0.1 s, kept for 60 ms, at rest 40 ms later.
+    /// By hand: 0.2 rad/s after 0.1 s, for 60 ms, at rest 40 ms later.
     #[test]
     fn an_order_ends_at_rest_whatever_it_is() {
         let plan = BrakePlan::going([0.0; 6].into(), [0.2; 6].into(), 0.1, 0.04);

@@ -1,12 +1,12 @@
-//! Any arm behind ros2_control: joint_state_broadcaster and force_torque_sensor_broadcaster say
-//! what it does, and joint_trajectory_controller moves it.
+//! Any arm behind ros2_control: joint_state_broadcaster and force_torque_sensor_broadcaster report
+//! its state, and joint_trajectory_controller moves it.
 //!
-//! A velocity controller would keep the last command for ever when this process dies:
+//! A velocity controller would keep the last command forever after the death of this process:
 //! forward_command_controller and velocity_controllers have no timeout (ros2_controllers issue 95).
 //! So every order is a trajectory of a few points that ends at rest within a fraction of a second,
-//! and replaces the one before: what stops the arm needs nobody to be alive. There is no other way
-//! to stop it from here, and no state of its safety system:
-//! [`crate::probing::arm::ArmError::GoesOn`] says so.
+//! and replaces the previous one: the arm stops without any live process here. There is no other
+//! stop from here, and no state of its safety system: [`crate::probing::arm::ArmError::GoesOn`]
+//! says so.
 
 mod arm;
 mod brake_plan;

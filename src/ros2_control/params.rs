@@ -9,7 +9,7 @@ use crate::clock::Clock;
 use crate::probing::arm::{ArmError, ArmGeometry, UrGeometry};
 use crate::stylus::Payload;
 
-/// The topics that an arm behind ros2_control is spoken to on.
+/// Topics of an arm behind ros2_control.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ArmTopics {
     /// `sensor_msgs/JointState` of joint_state_broadcaster
@@ -23,41 +23,41 @@ pub struct ArmTopics {
 /// One arm behind ros2_control, with a probe.
 #[derive(Clone, Debug)]
 pub struct Ros2ControlParams {
-    /// Where its messages come and go.
+    /// Topics of its messages.
     pub topics: ArmTopics,
-    /// How its joints move the flange F.
+    /// Kinematics from the joints to the flange F.
     pub geometry: ArmGeometry,
-    /// Of its joints from the base to the wrist, as in its joint states.
+    /// Names of the joints from the base to the wrist, as in its joint states.
     pub joint_names: Vec<Arc<str>>,
-    /// The tip (centre of its ball, z from tip to handle) in the flange.
+    /// Pose of the tip (centre of its ball, z from tip to handle) in the flange.
     pub pose_ft: Isometry3<f64>,
-    /// The frame that wrenches have to name.
+    /// Required frame of the wrenches.
     pub wrench_frame: String,
     /// Pose of that frame, S, in the flange.
     pub pose_fs: Isometry3<f64>,
-    /// All that hangs on the sensor, its centre in the flange, gravity in the base B.
+    /// Everything on the sensor, its centre in the flange, gravity in the base B.
     pub payload: Payload,
-    /// Of arm and probe in series, N/m; bounds the gain of a press.
+    /// Stiffness of arm and probe in series, N/m; bounds the gain of a press.
     pub stiffness: f64,
-    /// From a state to the motion that answers it, s, its network and its controller included.
+    /// Time from a state to the motion that answers it, s, including network and controller.
     pub latency: f64,
     /// Highest commanded speed of the tip, m/s; [`crate::probing::arm::Limits`] are below it.
     pub top_speed: f64,
-    /// Most that is ever pressed with, N.
+    /// Maximum pressing force, N.
     pub top_force: f64,
     /// Highest speed of a joint, rad/s.
     pub top_joint_speed: f64,
-    /// From the start to states on all topics.
+    /// Maximum time from the start to states on all topics.
     pub connect: Duration,
-    /// A topic without a new message for longer is silent; as much later than before is late.
+    /// Maximum time between new messages of a topic, and maximum lateness of a message.
     pub silent: Duration,
-    /// On which the deadlines are kept.
+    /// Clock of the deadlines.
     pub clock: Clock,
 }
 
 impl Default for Ros2ControlParams {
-    /// Topics as the controllers have them by default; a UR5e with a probe of 150 mm and 0.25 kg,
-    /// held upright, its sensor in the flange.
+    /// Default topics of the controllers; a UR5e with a probe of 150 mm and 0.25 kg, held upright,
+    /// its sensor in the flange.
     fn default() -> Self {
         let upright = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
         let gravity_o = Vector3::new(0.0, 0.0, -9.81);
@@ -86,7 +86,7 @@ impl Default for Ros2ControlParams {
             top_force: 50.0,
             top_joint_speed: 1.57,
             connect: Duration::from_secs(10),
-            // a machine that is not real-time is late by 25 ms now and then
+            // a machine without real-time priority is late by 25 ms now and then
             silent: Duration::from_millis(60),
             clock: Clock::system(),
         }
@@ -94,7 +94,7 @@ impl Default for Ros2ControlParams {
 }
 
 impl Ros2ControlParams {
-    /// Checks the parameters before anything is listened to.
+    /// Checks the parameters before listening.
     pub(super) fn check(&self) -> Result<(), ArmError> {
         let refuse = |reason: String| {
             Err(ArmError::Refused {
@@ -135,7 +135,7 @@ impl Ros2ControlParams {
                 "s",
             ),
         ];
-        // what is no number is in no range
+        // NaN is in no range
         let wrong = numbers
             .iter()
             .find(|(_, value, low, high, _)| !(low..=high).contains(&value));

@@ -1,4 +1,4 @@
-//! Messages of two topics become states: joints and wrench of one moment.
+//! Combines messages of two topics into states: joints and wrench of one moment.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -13,41 +13,41 @@ use crate::ros::messages::{Header, JointState, WrenchStamped};
 use crate::ros::port::{ArmPort, ArmReport};
 use crate::stylus::Wrench;
 
-/// States that wait for a late caller or for their wrench; older ones are dropped.
+/// Maximum number of states that wait for a late caller or for their wrench; older ones drop out.
 const WAITING: usize = 64;
-/// Wrenches among which that of a state is looked for.
+/// Maximum number of wrenches among which to search that of a state.
 const WRENCHES: usize = 64;
-/// Velocities that are not reported come from places so far apart, ns.
+/// Time between the positions that yield velocities, if the topic has none, ns.
 const BASE_NS: i64 = 18_000_000;
-/// The wrench of a state is at most so much older than it, ns, where a newer one may still come.
+/// Maximum age of a state's wrench relative to the state while a newer one may still come, ns.
 const SAME_NS: i64 = 500_000;
 
 /// Joints at one moment.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct JointSample {
     pub stamp_ns: i64,
-    /// rad
+    /// positions, rad
     pub joints: Joints,
-    /// rad/s
+    /// velocities, rad/s
     pub rates: Joints,
 }
 
-/// All that was measured at one moment.
+/// Measurements of one moment.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Measured {
     pub sample: JointSample,
-    /// of the sensor, in the axes of the flange F about its origin
+    /// reading of the sensor, in the axes of the flange F about its origin
     pub wrench_f: Wrench,
 }
 
-/// Listens to an arm.
+/// Receiver of an arm's messages.
 pub(super) struct StateReader {
     port: Box<dyn ArmPort>,
     joints: TopicAge,
     wrench: TopicAge,
     waiting: VecDeque<JointSample>,
     wrenches: VecDeque<(i64, Wrench)>,
-    /// places of the last moments, for velocities that are not reported
+    /// recent positions, for velocities missing in the messages
     places: VecDeque<(i64, Joints)>,
 }
 
@@ -68,7 +68,7 @@ impl StateReader {
         &mut *self.port
     }
 
-    /// Forgets what came, as if it began to listen now.
+    /// Forgets all messages, as if it began to listen now.
     pub fn restart(&mut self, params: &Ros2ControlParams) {
         while self.port.next_report(Duration::ZERO).is_some() {}
         let now = params.clock.now();
@@ -88,10 +88,10 @@ impl StateReader {
 
     /// The next state.
     ///
-    /// - `silent`: no topic may be silent for longer.
+    /// - `silent`: maximum silence of a topic.
     ///
     /// # Errors
-    /// What [`TopicAge`] says; [`ArmError::Unreadable`].
+    /// Those of [`TopicAge`]; [`ArmError::Unreadable`].
     pub fn next(
         &mut self,
         params: &Ros2ControlParams,
@@ -112,7 +112,7 @@ impl StateReader {
         }
     }
 
-    /// Takes all that has come.
+    /// Reads all waiting messages.
     ///
     /// # Errors
     /// As [`Self::next`].
@@ -123,8 +123,7 @@ impl StateReader {
         Ok(())
     }
 
-    /// The next joints, whatever is wrong with them or with the wrench: to see whether the arm
-    /// stands.
+    /// The next joints despite any fault in them or in the wrench: to see whether the arm stands.
     pub fn watch(&mut self, params: &Ros2ControlParams, timeout: Duration) -> Option<JointSample> {
         match self.port.next_report(timeout)? {
             ArmReport::Joints(message) => self.sample(&message, params).ok().flatten(),
@@ -158,7 +157,7 @@ impl StateReader {
         Ok(())
     }
 
-    /// The oldest joints that wait, with the wrench next to them in time.
+    /// The oldest waiting joints, with the wrench nearest in time.
     fn paired(&mut self, params: &Ros2ControlParams) -> Result<Option<Measured>, ArmError> {
         let Some(sample) = self.waiting.front().copied() else {
             return Ok(None);
@@ -194,7 +193,7 @@ impl StateReader {
         Ok(Some(Measured { sample, wrench_f }))
     }
 
-    /// The joints of the arm in a message; `None` where it has none of them, as that of a gripper.
+    /// The arm's joints in a message; `None` for a message with none of them, such as a gripper's.
     fn sample(
         &mut self,
         message: &JointState,
@@ -253,7 +252,7 @@ impl StateReader {
         }))
     }
 
-    /// Velocities from places, rad/s; zero where there are none before.
+    /// Velocities from positions, rad/s; zero without an earlier position.
     fn difference(&self, stamp_ns: i64, joints: &Joints) -> Joints {
         let then = self
             .places
@@ -279,7 +278,7 @@ fn nanoseconds(header: &Header) -> i64 {
     i64::from(header.stamp.sec) * 1_000_000_000 + i64::from(header.stamp.nanosec)
 }
 
-/// What the sensor S has, in the axes of the flange F about its origin: f_F = R_FS f_S, τ_F = R_FS
+/// Reading of the sensor S in the axes of the flange F about its origin: f_F = R_FS f_S, τ_F = R_FS
 /// τ_S + p_FS × f_F.
 fn wrench_in_flange(
     message: &WrenchStamped,

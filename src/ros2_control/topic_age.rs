@@ -1,30 +1,30 @@
-//! How old what a topic brings is.
+//! Age of the messages of a topic.
 //!
-//! The clocks of the controller and of this machine need not agree: a message is late by how much
-//! more lies between its stamp and its arrival than before. The least of that is followed, and let
+//! The clocks of the controller and of this machine need not agree: the lateness of a message is
+//! the excess of its delay from stamp to arrival over the least delay before. That least delay may
 //! grow as fast as two clocks may drift apart.
 
 use std::time::{Duration, Instant};
 
 use crate::probing::arm::ArmError;
 
-/// Two clocks drift apart by this share at most.
+/// Maximum drift between two clocks, as a share.
 const DRIFT: f64 = 2e-4;
-/// Stamps that are so much ahead of time have jumped, s: what waited on the way comes at once, and
-/// is late before, not ahead.
+/// Lead of stamps that counts as a jump, s. Messages held up on the way and arriving at once are
+/// late before, not ahead.
 const JUMP: f64 = 0.1;
 
-/// What has come on a topic so far.
+/// Stamps and arrivals of a topic.
 #[derive(Clone, Debug)]
 pub(super) struct TopicAge {
     topic: String,
     begun: Instant,
     last_ns: Option<i64>,
-    /// from a stamp to its arrival, at least, s; the two clocks have zeros of their own
+    /// least delay from stamp to arrival, s; the two clocks have zeros of their own
     least_delay: f64,
-    /// when the last new one came
+    /// arrival of the last new message
     heard_at: Instant,
-    /// when the last one came, new or not
+    /// arrival of the last message, new or not
     came_at: Instant,
 }
 
@@ -41,9 +41,9 @@ impl TopicAge {
         }
     }
 
-    /// A message came; returns whether it is new.
+    /// Notes a message; returns whether it is new.
     ///
-    /// - `late`: from so much on, s.
+    /// - `late`: lateness that is a fault.
     pub fn see(&mut self, stamp_ns: i64, late: Duration, now: Instant) -> Result<bool, ArmError> {
         self.came_at = now;
         let since_last_ns = self
@@ -79,16 +79,15 @@ impl TopicAge {
         Ok(true)
     }
 
-    /// Of the newest message.
+    /// Stamp of the newest message.
     pub fn stamp_ns(&self) -> Option<i64> {
         self.last_ns
     }
 
-    /// How long it may still be silent.
+    /// Remaining time of allowed silence.
     ///
     /// # Errors
-    /// [`ArmError::TopicSilent`], or [`ArmError::Stale`] where only the same comes again: it has
-    /// been so for longer.
+    /// After it [`ArmError::TopicSilent`], or [`ArmError::Stale`] if only the same message repeats.
     pub fn patience(&self, silent: Duration, now: Instant) -> Result<Duration, ArmError> {
         let waited = now.saturating_duration_since(self.heard_at);
         if waited < silent {
@@ -111,7 +110,7 @@ mod tests {
     const SILENT: Duration = Duration::from_millis(60);
     const MS: i64 = 1_000_000;
 
-    /// A topic whose messages come 7 ms after their stamps, one each 2 ms, for one second.
+    /// A topic with messages each 2 ms for one second, 7 ms after their stamps.
     fn steady() -> (TopicAge, Instant) {
         let begun = Instant::now();
         let mut age = TopicAge::new("t", begun);
