@@ -1,6 +1,6 @@
-//! What a ROS node is started with: `--ros-args` and the environment.
+//! Start configuration of a ROS node: `--ros-args` and the environment.
 //!
-//! The later of two values counts, be it from `-p` or from a file.
+//! Of two values, from `-p` or from a file, the later one counts.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -14,80 +14,80 @@ use crate::scene::nearest;
 
 mod yaml;
 
-/// Everything that a port needs to know before it starts.
+/// Configuration of a port, complete before its start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NodeConfig {
     /// name and namespace
     pub place: GraphPlace,
-    /// 0 to 232: nodes of other domains are not seen
+    /// 0 to 232: nodes of other domains are invisible
     pub domain_id: u16,
-    /// other computers are not seen
+    /// other computers are invisible
     pub localhost_only: bool,
-    /// in the order in which they were given
+    /// in their given order
     pub remaps: Vec<Remap>,
     /// all of them, checked
     pub parameters: Parameters,
-    /// parameters in files that this node does not have: they may be meant for another
+    /// names in files that are no parameters of this node: they may be meant for another
     pub unused: Vec<String>,
 }
 
-/// Why the node does not start.
+/// Reason why the node does not start.
 #[derive(Debug, Error)]
 pub enum ArgumentError {
-    /// none of the arguments that a node takes
+    /// an unknown argument
     #[error("--ros-args does not know \"{argument}\"{}", .near.map_or_else(String::new, |near| format!(": did you mean {near}?")))]
     Unknown {
         /// as given
         argument: String,
-        /// the one that is meant, when one is near
+        /// a similar known argument, if any
         near: Option<&'static str>,
     },
-    /// nothing follows an argument that needs something
+    /// an argument without its value
     #[error("{argument} needs {needs} behind it")]
     Missing {
         /// as given
         argument: String,
-        /// what
+        /// missing value
         needs: &'static str,
     },
-    /// not of the form `NAME:=VALUE`, or a variable of the environment that means nothing
+    /// not of the form `NAME:=VALUE`, or an invalid environment variable
     #[error("{given}: it must be {form}")]
     Form {
-        /// which argument or variable, as given
+        /// argument or variable, as given
         given: String,
-        /// how it looks
+        /// expected form
         form: &'static str,
     },
-    /// no name of ROS
+    /// not a ROS name
     #[error("--remap {text}: {source}")]
     Name {
         /// as given
         text: String,
-        /// what is wrong
+        /// cause
         source: NameError,
     },
-    /// a parameter that does not exist, or that may not have this value
+    /// an unknown parameter, or an invalid value
     #[error("{origin}: {source}")]
     Parameter {
         /// `-p` or the file
         origin: String,
-        /// what is wrong
+        /// cause
         source: ParameterError,
     },
-    /// the file cannot be read
+    /// an unreadable file
     #[error("cannot read the parameter file {}: {source}", .path.display())]
     Read {
-        /// which file
+        /// path of the file
         path: PathBuf,
-        /// what the system says
+        /// error of the system
         source: std::io::Error,
     },
-    /// the file is no parameter file
+    /// a file that is no parameter file
     #[error("{}: {reason}", .path.display())]
     File {
-        /// which file
+        /// path of the file
         path: PathBuf,
-        /// with line and column
+        /// cause, with line and column
         reason: String,
     },
 }
@@ -110,7 +110,7 @@ const KNOWN: &[&str] = &[
     "--disable-external-lib-logs",
 ];
 
-/// The levels that `--log-level` knows, and what each is here.
+/// Levels of `--log-level`, and the corresponding levels here.
 const LEVELS: &[(&str, &str)] = &[
     ("debug", "debug"),
     ("info", "info"),
@@ -121,9 +121,9 @@ const LEVELS: &[(&str, &str)] = &[
     ("unset", "info"),
 ];
 
-/// What a parameter is set to, and by whom.
+/// A value of a parameter and its origin.
 struct Override {
-    /// pattern of the nodes that it is for
+    /// pattern of the node names
     nodes: String,
     name: String,
     value: ParameterValue,
@@ -131,8 +131,8 @@ struct Override {
     is_file: bool,
 }
 
-/// Takes what stands between `--ros-args` and `--` (or the end) out of a command line: what
-/// remains, what was taken.
+/// Splits a command line: the other arguments, and those between `--ros-args` and `--` (or the
+/// end).
 pub fn split<T: AsRef<OsStr>>(arguments: impl IntoIterator<Item = T>) -> (Vec<T>, Vec<T>) {
     let (mut others, mut ros) = (Vec::new(), Vec::new());
     let mut is_ros = false;
@@ -148,13 +148,13 @@ pub fn split<T: AsRef<OsStr>>(arguments: impl IntoIterator<Item = T>) -> (Vec<T>
 }
 
 impl NodeConfig {
-    /// The configuration that the arguments and the environment give to the node `touchup`.
+    /// The configuration of the node `touchup` from arguments and environment.
     ///
-    /// - `ros`: what [`split`] took out.
+    /// - `ros`: second result of [`split`].
     /// - `variable`: a variable of the environment.
     ///
     /// # Errors
-    /// [`ArgumentError`]: the first thing that is wrong.
+    /// [`ArgumentError`]: the first fault.
     pub fn new(
         ros: &[String],
         variable: impl Fn(&str) -> Option<String>,
@@ -162,10 +162,10 @@ impl NodeConfig {
         Self::named("touchup", ros, variable)
     }
 
-    /// The same for a node that has another name unless the arguments give it one.
+    /// The configuration of a node with another default name.
     ///
     /// # Errors
-    /// [`ArgumentError`]: the first thing that is wrong.
+    /// [`ArgumentError`]: the first fault.
     pub fn named(
         name: &str,
         ros: &[String],
@@ -195,7 +195,7 @@ impl NodeConfig {
                 "-r" | "--remap" => config.remap(next("FROM:=TO")?)?,
                 "-p" | "--param" => overrides.push(parameter(next("NAME:=VALUE")?)?),
                 "--params-file" => overrides.extend(from_file(Path::new(next("a file")?))?),
-                // logging has begun by then: it is only checked here
+                // logging has already begun: only checks the level
                 "--log-level" => drop(log_level(next("a level")?)?),
                 "-e" | "--enclave" | "--log-config-file" => {
                     next("a name")?;
@@ -223,12 +223,12 @@ impl NodeConfig {
     /// The absolute, remapped form of a name.
     ///
     /// # Errors
-    /// [`NameError`] when it is none.
+    /// [`NameError`] for an invalid name.
     pub fn resolve(&self, name: &str) -> Result<String, NameError> {
         self.place.resolve(name, &self.remaps)
     }
 
-    /// The same for a second node of this program, whose name goes on so.
+    /// The configuration of a second node of this program, with an ending on its name.
     pub fn beside(&self, ending: &str) -> Self {
         let mut config = self.clone();
         config.place.node.push_str(ending);
@@ -243,8 +243,8 @@ impl NodeConfig {
         }
     }
 
-    /// Where wrenches and poses come from, not yet remapped: as [`Self::sample_topics`], or
-    /// transforms.
+    /// Topics of wrenches and poses, not yet remapped: as [`Self::sample_topics`], or transforms
+    /// for the poses.
     pub fn heard_topics(&self) -> [&'static str; 2] {
         let [wrench, pose] = self.sample_topics();
         [
@@ -264,7 +264,7 @@ impl NodeConfig {
             form,
         };
         let (from, to) = text.split_once(":=").ok_or_else(malformed)?;
-        // NODE:FROM is for the node of that name alone
+        // NODE:FROM applies only to the node of that name
         let (node, from) = from
             .split_once(':')
             .map_or((None, from), |(node, from)| (Some(node), from));
@@ -306,7 +306,7 @@ impl NodeConfig {
         Ok(())
     }
 
-    /// Name and namespace are known only when all arguments are read.
+    /// Checks the rules, after all arguments have determined name and namespace.
     fn check_rules(&self) -> Result<(), ArgumentError> {
         for rule in &self.remaps {
             for name in [&rule.from, &rule.to] {
@@ -379,10 +379,10 @@ fn from_file(path: &Path) -> Result<Vec<Override>, ArgumentError> {
     Ok(entries.into_iter().map(given).collect())
 }
 
-/// What the value of `--log-level` means here: debug, info, warn or error.
+/// Converts a value of `--log-level` to debug, info, warn or error.
 ///
 /// # Errors
-/// [`ArgumentError::Form`] for a level that ROS does not have.
+/// [`ArgumentError::Form`] for a level unknown to ROS.
 pub fn log_level(text: &str) -> Result<&'static str, ArgumentError> {
     let word = text
         .rsplit_once(":=")
@@ -399,7 +399,7 @@ pub fn log_level(text: &str) -> Result<&'static str, ArgumentError> {
     })
 }
 
-/// Beyond that the ports of a domain lie over 65535.
+/// Highest domain whose ports lie below 65535.
 const LAST_DOMAIN: u16 = 232;
 
 fn domain_id(value: Option<String>) -> Result<u16, ArgumentError> {

@@ -1,4 +1,4 @@
-//! The time of ROS, of which stamps are; deadlines are kept on [`crate::clock::Clock`].
+//! The time of ROS, for stamps; deadlines use [`crate::clock::Clock`].
 
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -10,7 +10,7 @@ pub fn stamp_ns(time: Time) -> i64 {
     i64::from(time.sec) * 1_000_000_000 + i64::from(time.nanosec)
 }
 
-/// The nearest stamp that a message can have.
+/// The nearest representable stamp of a message.
 pub fn time(stamp_ns: i64) -> Time {
     let sec = stamp_ns
         .div_euclid(1_000_000_000)
@@ -37,7 +37,7 @@ impl RosClock {
         }
     }
 
-    /// Takes up what came on `/clock`.
+    /// Sets the time from `/clock`.
     pub fn set(&self, time: Time) {
         self.simulated_ns.store(stamp_ns(time), Ordering::Relaxed);
     }

@@ -1,4 +1,4 @@
-//! What every port on a network has: the way in, the time of ROS, and two threads that send.
+//! Common parts of every network port: the inbox, the time of ROS, and two sending threads.
 
 use std::fmt::Display;
 use std::io;
@@ -14,41 +14,41 @@ use super::port::{MESH_PATCH_TOPIC, Port, Publication, Reply};
 use super::send_queue::{SendQueue, Sent};
 use crate::threads::give_way;
 
-/// Why the node cannot speak to others.
+/// Reason why the node cannot communicate.
 #[derive(Debug, thiserror::Error)]
 pub enum RosError {
-    /// a name that a rule made is none
+    /// an invalid name from a rule
     #[error(transparent)]
     Name(#[from] NameError),
-    /// ROS does not do what it is asked for
+    /// a refused request to ROS
     #[error("{call}: {reason}; {remedy}")]
     Refused {
-        /// which call
+        /// name of the call
         call: &'static str,
-        /// what it says
+        /// cause
         reason: String,
-        /// what to look at
+        /// advice
         remedy: &'static str,
     },
-    /// no thread is to be had
+    /// a thread does not start
     #[error("cannot start a thread: {0}")]
     Thread(#[from] io::Error),
 }
 
-/// What the parts of a port share.
+/// State shared by the parts of a port.
 pub(super) struct Exchange {
     pub inbox: Inbox,
-    /// with its namespace
+    /// full name with its namespace
     pub node_name: String,
-    /// of wrenches and of poses, whole
+    /// topics of wrenches and of poses, absolute
     sample_topics: [String; 2],
-    /// whole
+    /// absolute
     mesh_patch_topic: String,
     pub clock: RosClock,
-    /// what is small and urgent, answers among it
+    /// queue of small and urgent messages, including answers
     pub urgent: SendQueue,
     mesh: SendQueue,
-    /// wrenches, poses that were sent and did not come, where the port sees their numbers
+    /// wrenches and poses sent but not received, if the port sees their numbers
     pub lost: [AtomicU64; 2],
 }
 
@@ -56,7 +56,7 @@ impl Exchange {
     pub fn new(config: &NodeConfig, inbox: Inbox) -> Arc<Self> {
         Arc::new(Self {
             inbox,
-            // a name that is none is refused where the topic is listened to
+            // a subscription refuses invalid names later
             sample_topics: config
                 .sample_topics()
                 .map(|name| config.resolve(name).unwrap_or_default()),
@@ -69,7 +69,7 @@ impl Exchange {
         })
     }
 
-    /// An answer that goes out from the thread that sends.
+    /// A reply that the sending thread sends.
     pub fn reply<A: Send + 'static, E: Display>(
         self: &Arc<Self>,
         service: &'static str,
@@ -85,14 +85,14 @@ impl Exchange {
         })
     }
 
-    /// Starts the threads that send: one what is urgent, one the mesh, where a slow listener may
-    /// hold things up.
+    /// Starts the two sending threads: one for urgent messages, one for the mesh, as a slow
+    /// listener may delay it.
     pub fn senders(
         self: &Arc<Self>,
         urgent: impl Fn(Publication) -> Sent<Publication> + Send + 'static,
         mesh: impl Fn(Publication) -> Sent<Publication> + Send + 'static,
     ) -> io::Result<[JoinHandle<()>; 2]> {
-        // what is urgent waits for nobody
+        // urgent messages wait for nobody
         let urgent = move |publication| match urgent(publication) {
             Sent::Later(_) => Sent::Refused,
             sent => sent,
@@ -118,7 +118,7 @@ impl Exchange {
             .spawn(move || work(&exchange))
     }
 
-    /// Has the threads that send end when all is sent.
+    /// Has the sending threads end once everything is sent.
     pub fn close(&self) {
         self.urgent.close();
         self.mesh.close();
@@ -128,12 +128,12 @@ impl Exchange {
 /// Waits for threads to end.
 pub(super) fn join(threads: impl IntoIterator<Item = JoinHandle<()>>) {
     for thread in threads {
-        // one that panicked has said so
+        // a panicked thread has already reported it
         let _ = thread.join();
     }
 }
 
-/// A port at work; `_connection` leaves the network when it goes.
+/// A port at work; `_connection` leaves the network on drop.
 pub(super) struct Joined<C> {
     pub exchange: Arc<Exchange>,
     pub _connection: C,

@@ -1,5 +1,4 @@
-//! The port without any network: what is to arrive is put in by hand, what is published is read
-//! back.
+//! The port without any network: tests put arrivals in by hand, and read publications back.
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -14,16 +13,16 @@ use super::port::{Arrival, Call, Port, Publication, Reply, SamplePort};
 use super::stop::StopState;
 use crate::clock::Clock;
 
-/// Publications that are kept for reading; the oldest go first.
+/// Maximum number of publications kept for reading; the oldest go first.
 const MOST_KEPT: usize = 1 << 16;
 
 #[derive(Debug)]
 struct InProcess {
     published: Mutex<VecDeque<Publication>>,
-    /// publications that are kept at most
+    /// maximum number of kept publications
     most_kept: usize,
     clock: Clock,
-    /// the time of ROS, ns, and when it was that
+    /// the time of ROS, ns, and the instant of its setting
     now_ns: Mutex<(i64, Instant)>,
     inbox: Inbox,
     unsent: AtomicU64,
@@ -76,19 +75,19 @@ impl Port for InProcess {
     }
 }
 
-/// The other side of an in-process port: stands for everybody else in the graph.
+/// The other side of an in-process port: all other participants in the graph.
 #[derive(Clone, Debug)]
 pub struct OtherParticipants {
     port: Arc<InProcess>,
 }
 
-/// A port, and the world around it. What is put into the world goes to `inbox`. The time of ROS is
-/// 0 now, and passes as that of `clock`.
+/// A port, and the world around it. Arrivals go to `inbox`. The time of ROS is 0 now, and follows
+/// `clock`.
 pub fn start(inbox: Inbox, clock: &Clock) -> (Arc<dyn Port>, OtherParticipants) {
     start_keeping(MOST_KEPT, inbox, clock)
 }
 
-/// The same where nobody reads what is published.
+/// The same without a reader of publications.
 pub fn start_unread(inbox: Inbox, clock: &Clock) -> (Arc<dyn Port>, OtherParticipants) {
     start_keeping(0, inbox, clock)
 }
@@ -110,38 +109,38 @@ fn start_keeping(
 }
 
 impl OtherParticipants {
-    /// Something arrives; where the node is too slow it is dropped and counted, as on a network.
-    /// Whether it got in.
+    /// Delivers an arrival; with a slow node drops and counts it, as a network does. Returns
+    /// whether it got in.
     pub fn arrive(&self, arrival: Arrival) -> bool {
         self.port.inbox.put(arrival)
     }
 
-    /// Something arrives, as soon as the node has room for it. Whether the node is still there.
+    /// Delivers an arrival as soon as the node has room. Returns whether the node is still present.
     pub fn arrive_patiently(&self, arrival: Arrival) -> bool {
         self.port.inbox.put_patiently(arrival)
     }
 
-    /// What stops the arm of the node, as the services `~/pause` and `~/stop` do it.
+    /// Stop state of the arm, as of the services `~/pause` and `~/stop`.
     pub fn stops(&self) -> &StopState {
         self.port.inbox.stops()
     }
 
-    /// Calls a service: `world.call(|reply| Call::Undo(request, reply)).recv()` is the answer.
+    /// Calls a service: `world.call(|reply| Call::Undo(request, reply)).recv()` returns the answer.
     pub fn call<A: Send + 'static>(&self, call: impl FnOnce(Reply<A>) -> Call) -> Receiver<A> {
         self.ask(|reply| Arrival::Call(call(reply)))
     }
 
-    /// Puts in whatever wants a reply.
+    /// Delivers an arrival with a reply.
     pub fn ask<A: Send + 'static>(&self, arrival: impl FnOnce(Reply<A>) -> Arrival) -> Receiver<A> {
         let (answer, answers): (SyncSender<A>, _) = sync_channel(1);
         self.arrive_patiently(arrival(Reply::new(move |said| {
-            // nobody has to wait for it
+            // the receiver may be gone
             let _ = answer.send(said);
         })));
         answers
     }
 
-    /// What was published since it was last asked, the oldest first.
+    /// Publications since the last call, oldest first.
     pub fn published(&self) -> Vec<Publication> {
         locked(&self.port.published).drain(..).collect()
     }
@@ -152,7 +151,7 @@ impl OtherParticipants {
     }
 }
 
-/// What an arm feels arrives as soon as the node has room for it.
+/// Measurements of an arm arrive as soon as the node has room.
 impl SamplePort for OtherParticipants {
     fn publish_wrench(&self, wrench: WrenchStamped) -> bool {
         self.arrive_patiently(Arrival::Wrench(wrench, self.port.clock.now()))

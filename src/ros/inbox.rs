@@ -1,10 +1,9 @@
-//! What arrives, in its order, on its way from the port to the thread of the samples.
+//! Arrivals in order, on their way from the port to the sample thread.
 //!
-//! Two kinds wait there, each with room of its own: samples and transforms, of which what finds no
-//! room is lost and counted; and calls and changes of parameters, of which none is lost: one that
-//! finds no room is refused. All are taken in the order in which they came, so that a mesh is
-//! saved, or a stroke taken back, with the samples before the call. What stops the arm does not
-//! wait here at all: it acts in [`StopState`], on the thread that puts it in.
+//! Two kinds wait here, each with room of its own: samples and transforms, lost and counted without
+//! room; and calls and parameter changes, refused without room but never lost. All come out in
+//! order of arrival, so a mesh is saved, or a stroke undone, after the samples before the call.
+//! Stops of the arm do not wait here at all: they act in [`StopState`], on the delivering thread.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel};
@@ -17,20 +16,20 @@ use super::port::{ArmOrder, Arrival, Call, Endpoint};
 use super::stop::{ALLOW_MOTION, StopState};
 use crate::clock::Clock;
 
-/// Calls and changes of parameters that wait for the node at most.
+/// Maximum number of waiting calls and parameter changes.
 const MOST_CALLS: usize = 256;
-/// Why one more is refused.
+/// Refusal of a call without room.
 const FULL: &str =
     "too many calls wait for the node: nothing was done; call again when they are answered";
-/// Why a call is refused that came too late.
+/// Refusal of a call that comes too late.
 const ENDED: &str = "the node ends: nothing was done";
 
-/// What waits.
+/// State of the queue.
 #[derive(Debug, Default)]
 struct Waiting {
-    /// samples, calls
+    /// numbers of samples and of calls
     counts: [usize; 2],
-    /// nobody takes anything any more
+    /// the receiver is gone
     is_closed: bool,
 }
 
@@ -39,31 +38,31 @@ struct Shared {
     /// for samples, for calls
     room: [usize; 2],
     waiting: Mutex<Waiting>,
-    /// something was taken
+    /// signals a removal
     taken: Condvar,
-    /// wrenches and poses, others
+    /// of wrenches and poses, of others
     dropped: [AtomicU64; 2],
     is_over: AtomicBool,
     stops: Arc<StopState>,
 }
 
-/// Where arrivals go. Clones lead to the same node.
+/// Sender of arrivals. Clones lead to the same node.
 #[derive(Clone, Debug)]
 pub struct Inbox {
     to: Sender<Arrival>,
     shared: Arc<Shared>,
 }
 
-/// Where they come out. Dropped, it refuses the calls that still wait, and all that come.
+/// Receiver of arrivals. On drop it refuses all waiting and later calls.
 #[derive(Debug)]
 pub struct Arrivals {
     from: Receiver<Arrival>,
     shared: Arc<Shared>,
 }
 
-/// A way in, and its end.
+/// A sender and its receiver.
 ///
-/// - `samples`: that wait at most
+/// - `samples`: maximum number of waiting samples
 /// - `clock`: of the node
 pub fn inbox(samples: usize, clock: &Clock) -> (Inbox, Arrivals) {
     let (to, from) = channel();
@@ -84,7 +83,7 @@ pub fn inbox(samples: usize, clock: &Clock) -> (Inbox, Arrivals) {
     )
 }
 
-/// Which room it takes; `None`: it always finds some.
+/// Kind of room that it occupies; `None`: always finds room.
 fn kind_of(arrival: &Arrival) -> Option<usize> {
     match arrival {
         Arrival::Shutdown => None,
@@ -97,18 +96,18 @@ fn kind_of(arrival: &Arrival) -> Option<usize> {
 }
 
 impl Inbox {
-    /// Puts it in, or refuses or counts it where there is no room; never waits. Whether it got in,
-    /// or was done at once.
+    /// Puts an arrival in; without room refuses or counts it; never waits. Returns whether it got
+    /// in, or took effect at once.
     pub fn put(&self, arrival: Arrival) -> bool {
         self.put_in(arrival, |_, waiting, _| waiting)
     }
 
-    /// A service or the action was called.
+    /// Puts in a call of a service or the action.
     pub fn call(&self, call: Call) {
         self.put(Arrival::Call(call));
     }
 
-    /// As [`Self::put`], as soon as there is room. Whether the node still takes anything.
+    /// As [`Self::put`], but waits for room. Returns whether the node still receives.
     pub fn put_patiently(&self, arrival: Arrival) -> bool {
         self.put_in(arrival, |shared, waiting, kind| {
             let is_full = |waiting: &mut Waiting| {
@@ -137,12 +136,12 @@ impl Inbox {
         let is_full = kind.is_some_and(|kind| waiting.counts[kind] >= shared.room[kind]);
         if !waiting.is_closed && !is_full {
             kind.into_iter().for_each(|kind| waiting.counts[kind] += 1);
-            // it is open
+            // the receiver exists
             let _ = self.to.send(arrival);
             return true;
         }
         let is_closed = waiting.is_closed;
-        // who is answered may call again
+        // a caller with an answer may call again
         drop(waiting);
         if is_closed {
             arrival.refuse(ProbeResult::SHUTDOWN, ENDED);
@@ -155,8 +154,7 @@ impl Inbox {
         false
     }
 
-    /// What stops the arm does so here, on the thread that hears it; what is still to be done by
-    /// the node.
+    /// Applies stops of the arm at once, on the receiving thread; returns the rest for the node.
     fn stop(&self, arrival: Arrival) -> Option<Arrival> {
         let stops = self.stops();
         match arrival {
@@ -171,12 +169,12 @@ impl Inbox {
         Some(arrival)
     }
 
-    /// What stops the arm, and the samples.
+    /// Stop state of the arm and the samples.
     pub fn stops(&self) -> &StopState {
         &self.shared.stops
     }
 
-    /// Reports who else is on a topic: to the log, and to the node for its diagnostics.
+    /// Reports the other participants on a topic: to the log, and to the node for its diagnostics.
     ///
     /// - `mismatch`: why one of them does not fit.
     pub fn report(&self, topic: String, count: usize, mismatch: Option<String>) {
@@ -199,7 +197,7 @@ impl Inbox {
             .map(|count| count.load(Ordering::Relaxed))
     }
 
-    /// The port leaves: it puts nothing in any more.
+    /// Marks the port as leaving: no further arrivals.
     pub fn end(&self) {
         self.shared.is_over.store(true, Ordering::Relaxed);
     }
@@ -211,7 +209,7 @@ impl Inbox {
 }
 
 impl Arrivals {
-    /// The next one. `None` when nothing can arrive any more.
+    /// The next arrival. `None` after the end of all senders.
     pub fn recv(&self) -> Option<Arrival> {
         self.from
             .recv()
@@ -219,7 +217,7 @@ impl Arrivals {
             .inspect(|arrival| self.note_taken(arrival))
     }
 
-    /// The next one, when it is there.
+    /// The next arrival if one waits.
     ///
     /// # Errors
     /// As [`Receiver::try_recv`].
@@ -229,7 +227,7 @@ impl Arrivals {
             .inspect(|arrival| self.note_taken(arrival))
     }
 
-    /// The next one within a time.
+    /// The next arrival within a timeout.
     ///
     /// # Errors
     /// As [`Receiver::recv_timeout`].
@@ -243,7 +241,7 @@ impl Arrivals {
             .inspect(|arrival| self.note_taken(arrival))
     }
 
-    /// What stops the arm, and the samples.
+    /// Stop state of the arm and the samples.
     pub fn stops(&self) -> &Arc<StopState> {
         &self.shared.stops
     }
@@ -258,7 +256,7 @@ impl Arrivals {
 
 impl Drop for Arrivals {
     fn drop(&mut self) {
-        // nothing is put in after this
+        // no arrivals after this
         locked(&self.shared.waiting).is_closed = true;
         self.shared.taken.notify_all();
         self.from
@@ -282,7 +280,7 @@ mod tests {
         Arrival::Pose(PoseStamped::default(), Instant::now())
     }
 
-    /// A reply, and where the answer comes.
+    /// A reply, and the receiver of its answer.
     fn reply<T: Send + 'static>() -> (Reply<T>, Receiver<T>) {
         let (to, answer) = channel();
         (Reply::new(move |said| drop(to.send(said))), answer)
@@ -339,7 +337,7 @@ mod tests {
         assert!(refused(&ask().1) && !inbox.put(pose()) && !inbox.put_patiently(pose()));
     }
 
-    /// One of each call.
+    /// Refuses each call once.
     #[test]
     fn every_call_has_a_refusal_of_its_type() {
         let (inbox, arrivals) = inbox(1, &Clock::system());
@@ -409,7 +407,7 @@ mod tests {
         inbox.stops().stop();
         assert!(recover());
         inbox.stops().stop();
-        // the node takes up the first call only now
+        // the node handles the first call only now
         assert!(
             inbox
                 .stops()

@@ -1,6 +1,6 @@
-//! The node's side of ROS 2: the messages, the parameters, and the port through which both go.
+//! The node's side of ROS 2: the messages, the parameters, and the port for both.
 //!
-//! The node knows [`port`] alone. What is behind it is chosen when the program is built.
+//! The node knows [`port`] alone. The build selects its implementation.
 
 pub mod arguments;
 pub mod clock;
@@ -31,7 +31,7 @@ pub mod web;
 pub use dds::{arm_port, samples, start};
 pub use exchange::RosError;
 
-/// Locks it. What is in it is whole whoever held it: nothing of ours panics while it does.
+/// Locks a mutex. A poisoned value is still whole: none of our code panics while it holds the lock.
 fn locked<T>(mutex: &std::sync::Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex
         .lock()

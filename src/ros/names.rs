@@ -1,38 +1,38 @@
-//! Names of ROS: relative, private (`~/x`) and absolute ones, and what they are remapped to.
+//! Names of ROS: relative, private (`~/x`) and absolute ones, and their remappings.
 
 use thiserror::Error;
 
-/// Why a name is none.
+/// Reason why a name is invalid.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum NameError {
-    /// it is empty, or ends with a slash, or has two together
+    /// an empty name, a slash at its end, or two adjacent slashes
     #[error("\"{0}\" has an empty part: a name is words between single slashes")]
     EmptyPart(String),
-    /// a part begins with a digit or has another sign than letters, digits and _
+    /// a part that begins with a digit or has a sign other than letters, digits and _
     #[error(
         "\"{name}\" has the part \"{part}\": letters, digits and single _ are allowed, no digit at the beginning"
     )]
     BadPart {
-        /// the whole
+        /// whole name
         name: String,
-        /// what is wrong in it
+        /// invalid part
         part: String,
     },
 }
 
-/// One rule: who uses the first name gets the second.
+/// One rule: uses of the first name become the second.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Remap {
-    /// as it is written
+    /// as written
     pub from: String,
-    /// as it is written
+    /// as written
     pub to: String,
 }
 
-/// A node's place in the graph: what its names are relative to.
+/// A node's place in the graph, the base of its relative names.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GraphPlace {
-    /// absolute, without a slash at its end; empty for the root
+    /// absolute, without a final slash; empty for the root
     pub namespace: String,
     /// one word
     pub node: String,
@@ -47,7 +47,7 @@ impl GraphPlace {
     /// The absolute form of a name.
     ///
     /// # Errors
-    /// [`NameError`] when what comes out is no name.
+    /// [`NameError`] for an invalid result.
     pub fn expand(&self, name: &str) -> Result<String, NameError> {
         let name = name.replace("{node}", &self.node);
         let name = name
@@ -62,7 +62,7 @@ impl GraphPlace {
         checked(whole)
     }
 
-    /// The absolute form of a name after the first of the rules that fits.
+    /// The absolute form of a name after the first matching rule.
     ///
     /// # Errors
     /// [`NameError`] in the name or in a rule.
@@ -77,7 +77,7 @@ impl GraphPlace {
     }
 }
 
-/// An absolute name, if it is one.
+/// Checks an absolute name.
 pub(super) fn checked(whole: String) -> Result<String, NameError> {
     let Some(parts) = whole.strip_prefix('/') else {
         return Err(NameError::EmptyPart(whole));
@@ -97,8 +97,7 @@ pub(super) fn checked(whole: String) -> Result<String, NameError> {
     Ok(whole)
 }
 
-/// Whether the pattern of a parameter file names the node: `*` is one part, `**` any number of
-/// them.
+/// Whether a node pattern of a parameter file matches: `*` is one part, `**` any number of parts.
 pub(super) fn matches(pattern: &str, full_name: &str) -> bool {
     fn fits(pattern: &[&str], name: &[&str]) -> bool {
         match (pattern.split_first(), name.split_first()) {
@@ -113,7 +112,7 @@ pub(super) fn matches(pattern: &str, full_name: &str) -> bool {
         }
     }
     let mut pattern: Vec<&str> = pattern.split('/').filter(|part| !part.is_empty()).collect();
-    // two together mean the same as one, and take long
+    // two adjacent ones match the same, and slowly
     pattern.dedup_by(|a, b| *a == "**" && *b == "**");
     let name: Vec<&str> = full_name
         .split('/')

@@ -1,7 +1,7 @@
-//! The six services of parameters, as `ros2 param` calls them.
+//! The six services of parameters, as for `ros2 param`.
 //!
-//! Own ones: those of the client libraries know neither ranges nor descriptions, and cannot wait
-//! for the node's answer.
+//! Our own: those of the client libraries know neither ranges nor descriptions, and cannot wait for
+//! the node's answer.
 
 use std::sync::{Arc, Mutex};
 
@@ -12,20 +12,20 @@ use super::parameters::{Allowed, PARAMETERS, ParameterValue, Parameters, Settabl
 use super::port::{Arrival, Reply};
 use super::services::{Serves, services};
 
-/// Parameters that one call may name; beyond that it is answered short.
+/// Maximum number of parameters in one call; further ones get no answer.
 const MOST_NAMES: usize = 1024;
 
-// the numbers of rcl_interfaces/msg/ParameterType
+// numbers of rcl_interfaces/msg/ParameterType
 const NOT_SET: u8 = 0;
 const BOOL: u8 = 1;
 const INTEGER: u8 = 2;
 const DOUBLE: u8 = 3;
 const STRING: u8 = 4;
 
-/// Publishes that a parameter has changed.
+/// Publishes a change of a parameter.
 type Announce = Box<dyn Fn(&str, &ParameterValue) + Send + Sync>;
 
-/// The values as others see them.
+/// The public values.
 pub(super) struct PublicParameters {
     exchange: Arc<Exchange>,
     values: Mutex<Parameters>,
@@ -51,7 +51,7 @@ services! {
 }
 
 impl PublicParameters {
-    /// - `announce`: publishes that a parameter has changed.
+    /// - `announce`: publishes a change of a parameter.
     pub fn new(
         exchange: &Arc<Exchange>,
         values: &Parameters,
@@ -65,14 +65,14 @@ impl PublicParameters {
         })
     }
 
-    /// Asks the node for one after the other, and answers when all are done.
+    /// Sets one parameter after the other through the node, and answers after the last.
     fn set(
         self: Arc<Self>,
         mut wanted: impl Iterator<Item = Parameter> + Send + 'static,
         mut results: Vec<SetParametersResult>,
         answer: Reply<Vec<SetParametersResult>>,
     ) {
-        // what is refused here needs no answer of the node
+        // refusals here need no answer of the node
         let (name, value) = loop {
             let Some(next) = wanted.next() else {
                 return answer.send(results);
@@ -87,7 +87,7 @@ impl PublicParameters {
         let (set_name, set_value) = (name.clone(), value.clone());
         let reply = Reply::new(move |set: Result<(), String>| {
             if set.is_ok() {
-                // it was checked before the node was asked
+                // the check came before the request to the node
                 let _ = locked(&self.values).set_live(&set_name, &set_value);
                 (self.announce)(&set_name, &set_value);
             }
@@ -99,7 +99,7 @@ impl PublicParameters {
             .put(Arrival::SetParameter(name, value, reply));
     }
 
-    /// All or none, as far as the table of parameters can say before any is set.
+    /// Sets all or none, as far as the table of parameters can decide beforehand.
     fn set_all(
         self: &Arc<Self>,
         wanted: Vec<Parameter>,
@@ -132,7 +132,7 @@ impl PublicParameters {
     }
 }
 
-/// The value as it is to be set, if it may be.
+/// Checks a new value; returns it in its own type.
 fn check(values: &Parameters, wanted: &Parameter) -> Result<ParameterValue, String> {
     let value = ours(&wanted.value).ok_or("no parameter of this node has a value of this type")?;
     let mut values = values.clone();
@@ -174,7 +174,7 @@ fn types(values: &Parameters, request: &GetParameterTypesRequest) -> GetParamete
     }
 }
 
-/// Names with one of the prefixes; none of ours has a dot, so the depth matters to nobody.
+/// Names with one of the prefixes; our names have no dots, so depth has no effect.
 pub(super) fn list(request: &ListParametersRequest) -> ListParametersResponse {
     let is_wanted = |name: &str| {
         request.prefixes.is_empty() || request.prefixes.iter().any(|prefix| prefix == name)
@@ -235,7 +235,7 @@ fn type_of(value: &ParameterValue) -> u8 {
     }
 }
 
-/// As it is on the wire; of `None` that it is not set.
+/// Message of a value; `None`: not set.
 pub(super) fn raw(value: Option<&ParameterValue>) -> messages::ParameterValue {
     let mut raw = messages::ParameterValue {
         r#type: value.map_or(NOT_SET, type_of),
@@ -251,7 +251,7 @@ pub(super) fn raw(value: Option<&ParameterValue>) -> messages::ParameterValue {
     raw
 }
 
-/// `None` of a type that no parameter here has.
+/// Value of a message; `None` for a type of no parameter here.
 fn ours(value: &messages::ParameterValue) -> Option<ParameterValue> {
     match value.r#type {
         BOOL => Some(ParameterValue::Bool(value.bool_value)),

@@ -1,4 +1,4 @@
-//! The parameters of the node: one table, and what may be set.
+//! The parameters of the node: one table with ranges.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -24,7 +24,7 @@ pub enum ParameterValue {
 }
 
 impl ParameterValue {
-    /// A value as YAML has it: `true`, `3`, `0.5`, `hole`, `"3"`.
+    /// A value from YAML: `true`, `3`, `0.5`, `hole`, `"3"`.
     pub fn from_yaml(text: &str) -> Self {
         let text = text.trim();
         let quoted = |quote| text.len() >= 2 && text.starts_with(quote) && text.ends_with(quote);
@@ -49,7 +49,7 @@ impl ParameterValue {
         }
     }
 
-    /// Its type, as `ros2 param describe` has it.
+    /// Its type name, as in `ros2 param describe`.
     pub fn type_name(&self) -> &'static str {
         match self {
             Self::Bool(_) => "bool",
@@ -71,54 +71,54 @@ impl fmt::Display for ParameterValue {
     }
 }
 
-/// What a parameter may be, and what it is when nobody sets it.
+/// Type, range and default of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Allowed {
     /// on or off
     Bool(bool),
-    /// the default, and the smallest and largest number; a whole number is taken too
+    /// default, minimum and maximum; accepts whole numbers too
     Double(f64, f64, f64),
     /// any word
     String(&'static str),
-    /// a type of messages that give poses or wrenches; empty: that of who publishes them
+    /// a message type with poses or wrenches; empty: the publisher's type
     SampleType(SampleKind),
-    /// the default, and the words to choose from
+    /// default, and allowed words
     OneOf(&'static str, &'static [&'static str]),
 }
 
-/// When a parameter can be set.
+/// Time at which a parameter is settable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Settable {
-    /// when the node starts
+    /// only at the start of the node
     AtStart,
-    /// also while it runs
+    /// also in a running node
     Live,
-    /// while it runs only to `false`, and then it stays so
+    /// in a running node only to `false`, irrevocably
     OnlyToFalse,
 }
 
-/// What is declared of a parameter.
+/// Declaration of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterDescriptor {
-    /// snake_case, the unit at its end
+    /// snake_case with the unit at its end
     pub name: &'static str,
-    /// its default and its range
+    /// its type, default and range
     pub allowed: Allowed,
-    /// when it can be set
+    /// time at which it is settable
     pub settable: Settable,
-    /// what it does
+    /// its effect
     pub description: &'static str,
 }
 
-/// The frame of poses that name none.
+/// The frame of poses without one.
 pub const CELL_FRAME: &str = "cell";
 
-/// Names of the kinds of features by their numbers in messages.
+/// Names of the kinds of features, by their number in messages.
 pub const KIND_NAMES: [&str; 10] = [
     "unknown", "hole", "slot", "pocket", "boss", "edge", "corner", "plane", "cylinder", "notch",
 ];
 
-/// All parameters of the node, those of docs/ros.md and the one that every node has.
+/// All parameters of the node, those of docs/ros.md and the common one of all nodes.
 pub const PARAMETERS: &[ParameterDescriptor] = {
     use Allowed::{Bool, Double, OneOf, SampleType, String};
     const fn fixed(
@@ -261,73 +261,73 @@ pub const PARAMETERS: &[ParameterDescriptor] = {
     ]
 };
 
-/// Why a parameter is not set. The text is what `ros2 param set` shows.
+/// Reason why a parameter is not set. `ros2 param set` shows the text.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum ParameterError {
-    /// none has this name; the one that is meant, when one is near
+    /// an unknown name
     #[error("there is no parameter \"{name}\"{}", did_you_mean(.near))]
     Unknown {
         /// as given
         name: String,
-        /// the one that is meant, when one is near
+        /// a similar known name, if any
         near: Option<&'static str>,
     },
-    /// of another type
+    /// a value of another type
     #[error("{name} is a {wanted}, \"{value}\" is a {given}")]
     Type {
-        /// which one
+        /// name of the parameter
         name: &'static str,
-        /// what it is
+        /// its type
         wanted: &'static str,
-        /// what came
+        /// type of the value
         given: &'static str,
         /// as given
         value: ParameterValue,
     },
-    /// a number outside of its range
+    /// a number outside its range
     #[error("{name} is {value:?}: it may be {from} to {to}")]
     Range {
-        /// which one
+        /// name of the parameter
         name: &'static str,
         /// as given
         value: f64,
-        /// smallest
+        /// minimum
         from: f64,
-        /// largest
+        /// maximum
         to: f64,
     },
-    /// none of the words to choose from
+    /// a word not in the list
     #[error("{name} is \"{value}\": it may be {}", .words.join(", "))]
     Word {
-        /// which one
+        /// name of the parameter
         name: &'static str,
         /// as given
         value: String,
-        /// to choose from
+        /// allowed words
         words: &'static [&'static str],
     },
-    /// no type that gives what is wanted
+    /// an unsuitable message type
     #[error("{name} is {why}")]
     SampleType {
-        /// which one
+        /// name of the parameter
         name: &'static str,
-        /// what it is instead, and what can be read
+        /// cause, and the readable types
         why: String,
     },
-    /// only when the node starts
+    /// settable only at the start of the node
     #[error("{name} cannot be set while the node runs: start it again with -p {name}:={value}")]
     NotLive {
-        /// which one
+        /// name of the parameter
         name: &'static str,
         /// as given
         value: ParameterValue,
     },
-    /// once it is false it stays so
+    /// an irrevocable false
     #[error(
         "{name} cannot be set to true while the node runs: start it again with -p {name}:=true, and with robot.{name}: true in the scene"
     )]
     OnlyToFalse {
-        /// which one
+        /// name of the parameter
         name: &'static str,
     },
 }
@@ -337,7 +337,7 @@ fn did_you_mean(near: &Option<&'static str>) -> String {
 }
 
 impl ParameterDescriptor {
-    /// What it is when nobody sets it.
+    /// The default value.
     pub fn default_value(&self) -> ParameterValue {
         match self.allowed {
             Allowed::Bool(on) => ParameterValue::Bool(on),
@@ -349,8 +349,7 @@ impl ParameterDescriptor {
         }
     }
 
-    /// The value as it is to be kept from now on, while the node runs. To set what is set already
-    /// is no change, and allowed.
+    /// The value to store in a running node. Setting the current value again is allowed.
     ///
     /// # Errors
     /// As [`Self::check`]; [`ParameterError::NotLive`], [`ParameterError::OnlyToFalse`].
@@ -369,7 +368,7 @@ impl ParameterDescriptor {
         }
     }
 
-    /// The value as it is to be kept.
+    /// The value to store.
     ///
     /// # Errors
     /// [`ParameterError::Type`], [`ParameterError::Range`] (NaN too) or [`ParameterError::Word`].
@@ -432,10 +431,10 @@ fn within(
     })
 }
 
-/// What is declared of the parameter of that name.
+/// Declaration of the parameter with this name.
 ///
 /// # Errors
-/// [`ParameterError::Unknown`], with the name that is meant when one is near.
+/// [`ParameterError::Unknown`], with a similar name if any.
 pub fn descriptor(name: &str) -> Result<&'static ParameterDescriptor, ParameterError> {
     PARAMETERS
         .iter()
@@ -455,7 +454,7 @@ pub fn descriptor(name: &str) -> Result<&'static ParameterDescriptor, ParameterE
         })
 }
 
-/// Values of all parameters. Each is what its descriptor allows.
+/// Values of all parameters, each allowed by its descriptor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameters(BTreeMap<&'static str, ParameterValue>);
 
@@ -471,20 +470,20 @@ impl Default for Parameters {
 }
 
 impl Parameters {
-    /// Sets one before the node runs.
+    /// Sets a parameter before the start of the node.
     ///
     /// # Errors
-    /// [`ParameterError`]; nothing is changed then.
+    /// [`ParameterError`]; changes nothing then.
     pub fn set(&mut self, name: &str, value: &ParameterValue) -> Result<(), ParameterError> {
         let declared = descriptor(name)?;
         self.0.insert(declared.name, declared.check(value)?);
         Ok(())
     }
 
-    /// Sets one while the node runs, as [`ParameterDescriptor::change`] allows.
+    /// Sets a parameter of a running node, as [`ParameterDescriptor::change`] allows.
     ///
     /// # Errors
-    /// [`ParameterError`]; nothing is changed then.
+    /// [`ParameterError`]; changes nothing then.
     pub fn set_live(&mut self, name: &str, value: &ParameterValue) -> Result<(), ParameterError> {
         let declared = descriptor(name)?;
         let now = self
@@ -495,12 +494,12 @@ impl Parameters {
         Ok(())
     }
 
-    /// One of them.
+    /// Value of a parameter.
     pub fn value(&self, name: &str) -> Option<&ParameterValue> {
         self.0.get(name)
     }
 
-    /// One that is a word; empty for a name that is none.
+    /// Value of a text parameter; empty for any other name.
     pub fn string(&self, name: &str) -> &str {
         if let Some(ParameterValue::String(word)) = self.0.get(name) {
             word
@@ -509,8 +508,8 @@ impl Parameters {
         }
     }
 
-    /// The frame whose pose is taken from transforms, and the one in which it is wanted: `tool0 in
-    /// base`, or `tool0`, which is in the cell.
+    /// The frame whose transforms give the pose, and its base frame: `tool0 in base`, or `tool0`,
+    /// meaning in the cell.
     pub fn pose_frames(&self) -> Option<[&str; 2]> {
         let named = self.string("pose_frame").trim();
         let [frame, base] = named
@@ -519,7 +518,7 @@ impl Parameters {
         (!named.is_empty()).then(|| [frame.trim(), base.trim()])
     }
 
-    /// One that is a number; NaN for a name that is none.
+    /// Value of a number parameter; NaN for any other name.
     pub fn double(&self, name: &str) -> f64 {
         if let Some(ParameterValue::Double(number)) = self.0.get(name) {
             *number
@@ -528,7 +527,7 @@ impl Parameters {
         }
     }
 
-    /// One that is on or off; off for a name that is none.
+    /// Value of a switch parameter; off for any other name.
     pub fn bool(&self, name: &str) -> bool {
         self.0.get(name) == Some(&ParameterValue::Bool(true))
     }

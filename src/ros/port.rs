@@ -1,8 +1,8 @@
-//! What the node needs of ROS 2, and no more: what comes in, what goes out, and a way to answer.
+//! The node's interface to ROS 2: arrivals, publications, and replies.
 //!
-//! Behind it stand native DDS, r2r, or nothing at all (in-process, for tests and the demo). No type
-//! of theirs leaves their file: messages are the plain structs of [`super::messages`], a request
-//! carries the closure that answers it.
+//! Its implementations are native DDS, r2r, or in-process without a network, for tests and the
+//! demo. Their types stay in their files: messages are the plain structs of [`super::messages`],
+//! and a request carries the closure that answers it.
 
 use std::fmt;
 use std::sync::mpsc::Receiver;
@@ -12,18 +12,18 @@ use super::messages::*;
 use super::parameters::ParameterValue;
 use crate::reconstruct::Patcher;
 
-/// Tiles that a port keeps for who joins late, the latest, and that are on their way at most: 4 MB.
+/// Number of latest tiles that a port keeps for late joiners, and maximum number in flight: 4 MB.
 pub const TILES_KEPT: usize = 64;
 
-/// The topic that followers of the mesh listen to.
+/// The topic for followers of the mesh.
 pub const MESH_PATCH_TOPIC: &str = "mesh_patch";
 
-/// Something that came in.
+/// An arrival.
 #[derive(Debug)]
 pub enum Arrival {
-    /// `SOURCE/wrench`, and when it came
+    /// `SOURCE/wrench`, and its arrival
     Wrench(WrenchStamped, Instant),
-    /// `SOURCE/pose`, and when it came
+    /// `SOURCE/pose`, and its arrival
     Pose(PoseStamped, Instant),
     /// `/tf`
     Tf(TFMessage),
@@ -33,38 +33,38 @@ pub enum Arrival {
     ClickedPoint(PointStamped),
     /// `/clock`
     Clock(Clock),
-    /// a pose (0) or wrench (1) that is refused before its numbers are looked at: why, by the name
-    /// of the reason, and when it came
+    /// a pose (0) or wrench (1) refused before its numbers are checked: name of the reason, and
+    /// arrival
     Refused(usize, &'static str, Instant),
-    /// a message that could not be read: its topic, and why
+    /// an unreadable message: its topic, and the cause
     Unreadable(&'static str, String),
-    /// a service was called
+    /// a call of a service
     Call(Call),
-    /// somebody wants a parameter changed
+    /// a request to change a parameter
     SetParameter(String, ParameterValue, Reply<Result<(), String>>),
-    /// other software that listens or sends came or went on a topic: for the diagnostics
+    /// a change of the other participants on a topic: for the diagnostics
     Matched(Endpoint),
-    /// so many listen to `mesh` now; a port that does not say has one
+    /// number of listeners to `mesh`; one if the port does not know
     Viewers(usize),
-    /// somebody wants to see how well the mesh is known: a copy of the evidence, once it is made;
-    /// `None` where nothing was touched
+    /// a request for the certainty of the mesh: a copy of the evidence, once it is made; `None`
+    /// without touches
     Evidence(Reply<Option<Receiver<Patcher>>>),
-    /// a session that is replayed is at its end, or begins again; answered when that is done
+    /// end or restart of a replayed session; answered after completion
     Replay(ReplayStep, Reply<Result<(), String>>),
-    /// the process is asked to end
+    /// a request to end the process
     Shutdown,
 }
 
-/// What is between the messages of a session that is replayed.
+/// Step between the messages of a replayed session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReplayStep {
-    /// from the scan on, as if none had come
+    /// from the scan on, before the first message
     Again,
-    /// none comes any more
+    /// after the last message
     End,
 }
 
-/// A call of a service, with what answers it.
+/// A call of a service, with its reply.
 #[derive(Debug)]
 pub enum Call {
     /// `~/flag_feature`
@@ -87,11 +87,11 @@ pub enum Call {
     Reset(Reply<TriggerResponse>),
     /// `~/arm_state`
     ArmState(Reply<TriggerResponse>),
-    /// what an arm works at
+    /// an order to the arm
     Arm(ArmOrder),
 }
 
-/// An order to an arm, with what answers it.
+/// An order to an arm, with its reply.
 #[derive(Debug)]
 pub enum ArmOrder {
     /// `~/probe_feature`
@@ -107,22 +107,22 @@ pub enum ArmOrder {
 /// A goal of the action `~/probe`.
 #[derive(Debug)]
 pub struct Goal {
-    /// takes it up, or refuses it
+    /// accepts or refuses the goal
     pub accept: Reply<bool>,
-    /// feedback; may be called often, drops what nobody waits for
+    /// feedback; may be called often, drops unwanted messages
     pub feedback: Feedback,
-    /// ends it
+    /// ends the goal
     pub result: Reply<(GoalEnd, ProbeResponse)>,
-    /// whether a cancel was asked for
+    /// whether a cancel was requested
     pub is_cancelled: std::sync::Arc<std::sync::atomic::AtomicBool>,
 }
 
-/// How a goal ended, as actions name it.
+/// End of a goal, as named by actions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GoalEnd {
     /// done
     Succeeded,
-    /// stopped because somebody asked for it
+    /// stopped on request
     Canceled,
     /// not done
     Aborted,
@@ -131,7 +131,7 @@ pub enum GoalEnd {
 /// Sends feedback of a goal.
 pub struct Feedback(pub Box<dyn Fn(ProbeFeedback) + Send>);
 
-/// Answers once. Dropped without an answer, the caller gets none.
+/// Answers once. If dropped without an answer, the caller gets none.
 pub struct Reply<T>(Box<dyn FnOnce(T) + Send>);
 
 impl<T> Reply<T> {
@@ -140,7 +140,7 @@ impl<T> Reply<T> {
         Self(Box::new(send))
     }
 
-    /// Answers.
+    /// Sends the answer.
     pub fn send(self, answer: T) {
         (self.0)(answer);
     }
@@ -158,7 +158,7 @@ impl fmt::Debug for Feedback {
     }
 }
 
-/// Something that goes out.
+/// A publication.
 #[derive(Clone, Debug)]
 pub enum Publication {
     /// `mesh`: one tile
@@ -183,81 +183,80 @@ pub enum Publication {
     Diagnostics(DiagnosticArray),
 }
 
-/// Who else is on a topic.
+/// Other participants on a topic.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Endpoint {
-    /// as on the wire
+    /// name on the wire
     pub topic: String,
-    /// how many there are now
+    /// their current number
     pub count: usize,
-    /// why one does not fit, where one does not: quality of service, type, service mapping
+    /// reason why one does not fit, if any: quality of service, type, service mapping
     pub mismatch: Option<String>,
 }
 
-/// The way out. What comes in goes to the [`Inbox`](super::inbox::Inbox) that a port is started
-/// with, which counts what it drops ([`Port::dropped`]).
+/// Output of the node. Arrivals go to the [`Inbox`](super::inbox::Inbox) given at the port's start,
+/// which counts drops ([`Port::dropped`]).
 pub trait Port: Send + Sync {
-    /// Sends; never blocks for longer than it takes to write the message down.
+    /// Sends; blocks only for writing the message down.
     fn publish(&self, publication: Publication);
 
     /// Name of the node with its namespace: `/cell/touchup`.
     fn node_name(&self) -> &str;
 
-    /// Names of the topics that wrenches and poses come on, whole, as [`Endpoint::topic`] has them.
+    /// Topics of wrenches and poses, absolute, as in [`Endpoint::topic`].
     fn sample_topics(&self) -> [&str; 2];
 
-    /// Name of the topic that followers of the mesh listen to, whole, as [`Endpoint::topic`] has
-    /// it.
+    /// Topic for followers of the mesh, absolute, as in [`Endpoint::topic`].
     fn mesh_patch_topic(&self) -> &str;
 
     /// Time of ROS, ns: the system's, or that of `/clock` with `use_sim_time`.
     fn now_ns(&self) -> i64;
 
-    /// Arrivals dropped so far because the node did not take them: wrenches and poses, others.
+    /// Arrivals dropped up to now for a busy node: wrenches and poses, others.
     fn dropped(&self) -> [u64; 2];
 
-    /// Wrenches and poses that were sent and did not come: gaps in the numbers of their senders,
-    /// where the port sees them.
+    /// Wrenches and poses sent but not received: gaps in the numbers of their senders, if the port
+    /// sees them.
     fn lost(&self) -> [u64; 2];
 
-    /// Publications not sent so far because nobody took them fast enough: tiles, others.
+    /// Publications dropped up to now for slow listeners: tiles, others.
     fn unsent(&self) -> [u64; 2];
 
-    /// Tiles that wait to be sent, as somebody listens slowly.
+    /// Tiles waiting for slow listeners.
     fn tiles_waiting(&self) -> usize;
 }
 
-/// Where a stylus or a probe publishes what it measures: for what stands in for one.
+/// Publisher of the measurements of a stylus or a probe: for stand-ins of one.
 pub trait SamplePort: Send {
-    /// On `SOURCE/wrench`, best effort; whether it was sent.
+    /// Publishes on `SOURCE/wrench`, best effort; returns whether it was sent.
     fn publish_wrench(&self, wrench: WrenchStamped) -> bool;
 
-    /// On `SOURCE/pose`, best effort; whether it was sent.
+    /// Publishes on `SOURCE/pose`, best effort; returns whether it was sent.
     fn publish_pose(&self, pose: PoseStamped) -> bool;
 
-    /// How many listen now: to wrenches, to poses.
+    /// Current number of listeners: to wrenches, to poses.
     fn listeners(&mut self) -> [usize; 2];
 }
 
-/// Something that came from an arm behind ros2_control.
+/// A message from an arm behind ros2_control.
 #[derive(Clone, Debug)]
 pub enum ArmReport {
-    /// its joints
+    /// joint states
     Joints(JointState),
-    /// its sensor
+    /// wrench of its sensor
     Wrench(WrenchStamped),
-    /// a message that could not be read: why
+    /// cause of an unreadable message
     Unreadable(String),
 }
 
-/// Where an arm behind ros2_control is spoken to: two topics in, one out.
+/// Connection to an arm behind ros2_control: two topics in, one out.
 pub trait ArmPort: Send {
-    /// The next message, as soon as one is there; `None`: none came in this time.
+    /// The next message, as soon as there is one; `None` after the timeout.
     fn next_report(&mut self, timeout: std::time::Duration) -> Option<ArmReport>;
 
-    /// Sends an order, reliably; whether it was sent.
+    /// Sends an order, reliably; returns whether it was sent.
     fn publish_trajectory(&mut self, order: JointTrajectory) -> bool;
 
-    /// How many listen to orders now; `None` where the port does not know.
+    /// Current number of listeners to orders; `None` if the port does not know.
     fn order_listeners(&mut self) -> Option<usize>;
 }

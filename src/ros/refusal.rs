@@ -1,9 +1,9 @@
-//! Answers that nothing was done, and why: of the right type for each call.
+//! Refusals of calls with a reason, in the type of each call.
 
 use super::messages::*;
 use super::port::{ArmOrder, Arrival, Call, Goal, GoalEnd};
 
-/// A feature of which nothing is measured.
+/// A feature without any measurement.
 pub fn unknown_feature(id: u32) -> Feature {
     let nan = f64::NAN;
     let none = Vector3 {
@@ -58,7 +58,7 @@ pub fn not_probed(id: u32, code: u8, why: &str) -> ProbeResult {
 }
 
 impl Arrival {
-    /// Answers that nothing was done, where somebody waits for an answer.
+    /// Refuses the arrival, if it expects an answer.
     ///
     /// - `code`: of [`ProbeResult`]
     pub fn refuse(self, code: u8, why: &str) {
@@ -114,7 +114,7 @@ impl Call {
 }
 
 impl ArmOrder {
-    /// Answers that nothing was done.
+    /// Refuses the order.
     ///
     /// - `code`: of [`ProbeResult`]
     pub fn refuse(self, header: Header, code: u8, why: &str) {

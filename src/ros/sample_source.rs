@@ -1,5 +1,4 @@
-//! Where poses and wrenches come from: which type of messages is listened to, and what is made of
-//! them.
+//! Sources of poses and wrenches: choice of the message type, and conversion to arrivals.
 
 use std::time::Instant;
 
@@ -14,20 +13,19 @@ use crate::stylus::Message;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct SampleSource {
     kind: SampleKind,
-    /// by its parameter; `None`: that of who publishes
+    /// type of the parameter; `None`: the publisher's
     named: Option<LiveType>,
     usual: LiveType,
-    /// of messages that name none
+    /// frame of messages without one
     frame: String,
 }
 
 impl SampleSource {
-    /// That of poses, or of wrenches, as the parameters have it; `None` for poses that are taken
-    /// from transforms.
+    /// The source of poses or wrenches according to the parameters; `None` for poses from
+    /// transforms.
     ///
     /// # Errors
-    /// In words, where the type named by a parameter gives nothing: the parameters are checked
-    /// before.
+    /// In words, for an unsuitable type in a parameter: earlier checks exclude it.
     pub fn of(config: &NodeConfig, kind: SampleKind) -> Result<Option<Self>, String> {
         let parameters = &config.parameters;
         let name = |of: &str| parameters.string(of).to_owned();
@@ -36,8 +34,8 @@ impl SampleSource {
             SampleKind::Pose => name("pose_type"),
             SampleKind::Wrench => name("wrench_type"),
         };
-        // as in a recording: of two without headers both are in the same axes, else the wrench is
-        // in those of its sensor
+        // as in a recording: if both lack headers they have the same axes, else the wrench is in
+        // those of its sensor
         let is_pose_unnamed = || {
             LiveType::of(SampleKind::Pose, &name("pose_type")).is_ok_and(|pose| !pose.has_header())
         };
@@ -54,16 +52,15 @@ impl SampleSource {
         }))
     }
 
-    /// The type to listen to before anybody publishes.
+    /// The type before any publisher appears.
     pub fn first_type(&self) -> LiveType {
         self.named.unwrap_or(self.usual)
     }
 
-    /// The type to listen to, and why what is published cannot be read, where none of it can.
+    /// The type to subscribe to, and the reason if no published type is readable.
     ///
-    /// - `now`: that which is listened to; it stays as long as somebody publishes it, or nobody
-    ///   what can be read.
-    /// - `published`: names of types, as ROS 2 has them.
+    /// - `now`: current type; it stays while a publisher has it, or none has a readable one.
+    /// - `published`: ROS 2 names of types.
     pub fn choose<'a>(
         &self,
         now: LiveType,
@@ -102,8 +99,8 @@ impl SampleSource {
         }
     }
 
-    /// What goes to the node of a message on `topic`, read as `of`. A header that names no frame is
-    /// refused there: only a type without one is in the frame of the parameters.
+    /// Arrival for a message on `topic`, read as `of`. The node refuses a header without a frame:
+    /// only a type without a header is in the parameters' frame.
     pub fn arrival(
         &self,
         topic: &'static str,
@@ -153,7 +150,7 @@ mod tests {
         assert_eq!(poses.choose(first, []), (first, None));
         let (odometry, why) = poses.choose(first, ["sensor_msgs/msg/Imu", "nav_msgs/msg/Odometry"]);
         assert_eq!((odometry.name(), why), ("nav_msgs/msg/Odometry", None));
-        // who publishes another type beside changes nothing, and who leaves neither
+        // another publisher of another type changes nothing, nor does a leaving publisher
         assert_eq!(
             poses.choose(odometry, [first.name(), odometry.name()]),
             (odometry, None)

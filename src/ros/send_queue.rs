@@ -1,8 +1,7 @@
-//! What waits to be sent, so that nobody who publishes or answers waits for the network.
+//! Queue of outgoing messages, so that publishers and answers do not wait for the network.
 //!
-//! A port has two: one for what is small and urgent, answers among it, one for the mesh, which
-//! whoever listens slowly may hold up. Tiles of the mesh give way first: they go when nothing else
-//! waits.
+//! A port has two: one for small and urgent messages, including answers, one for the mesh, which
+//! slow listeners may delay. Tiles of the mesh give way first: they go when nothing else waits.
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -11,27 +10,27 @@ use std::sync::{Condvar, Mutex, PoisonError};
 use super::locked;
 use super::port::Publication;
 
-/// Messages that wait at most, beside tiles: 0.4 s of mismatches at 10 kHz; a follower of the mesh
-/// sees the gap.
+/// Maximum number of waiting messages besides tiles: 0.4 s of mismatches at 10 kHz; a follower of
+/// the mesh sees the gap.
 const MOST: usize = 4096;
-/// Tiles that wait at most: those of 4 million faces, as at the end all are left here.
+/// Maximum number of waiting tiles: those of 4 million faces, as at the end all of them wait here.
 const MOST_TILES: usize = 8192;
 
 /// Sends an answer.
 pub(super) type Answer = Box<dyn FnOnce() + Send>;
 
-/// What became of a message.
+/// Outcome of sending a message.
 pub(super) enum Sent<M> {
-    /// it is on its way
+    /// in flight
     Done,
-    /// never: it is counted
+    /// dropped and counted
     Refused,
-    /// somebody listens too slowly: here it is again, for later
+    /// returned for later, as a listener is slow
     Later(M),
 }
 
 impl<M> Sent<M> {
-    /// The same of the publication that the message is of.
+    /// Converts the message back to its publication.
     pub fn map<T>(self, publication: impl FnOnce(M) -> T) -> Sent<T> {
         match self {
             Self::Done => Sent::Done,
@@ -68,7 +67,7 @@ impl Waiting {
     }
 }
 
-/// Messages on their way, which one thread sends.
+/// Outgoing messages, sent by one thread.
 #[derive(Default)]
 pub(super) struct SendQueue {
     waiting: Mutex<Waiting>,
@@ -88,19 +87,19 @@ impl SendQueue {
         self.put_in(Outgoing::Answer(answer));
     }
 
-    /// Not sent because nobody took them fast enough, or because ROS refused them: tiles, others.
+    /// Number dropped for slow listeners, or refused by ROS: tiles, others.
     pub fn unsent(&self) -> [u64; 2] {
         self.unsent
             .each_ref()
             .map(|count| count.load(Ordering::Relaxed))
     }
 
-    /// Tiles that wait now.
+    /// Number of waiting tiles.
     pub fn tiles_waiting(&self) -> usize {
         locked(&self.waiting).tiles.len()
     }
 
-    /// Sends until it is closed and empty, or closed and somebody listens too slowly.
+    /// Sends until it is closed and empty, or closed with a slow listener.
     pub fn send(&self, publish: impl Fn(Publication) -> Sent<Publication>) {
         while let Some(message) = self.take() {
             let publication = match message {
@@ -117,7 +116,7 @@ impl SendQueue {
                 Sent::Later(publication) => {
                     let mut waiting = locked(&self.waiting);
                     waiting.put_back(Box::new(publication));
-                    // who leaves does not wait for who listens slowly
+                    // a leaving port does not wait for slow listeners
                     if waiting.is_closed {
                         return;
                     }
@@ -126,7 +125,7 @@ impl SendQueue {
         }
     }
 
-    /// Has [`Self::send`] end when all is sent.
+    /// Has [`Self::send`] end once everything is sent.
     pub fn close(&self) {
         locked(&self.waiting).is_closed = true;
         self.more.notify_all();
@@ -194,7 +193,7 @@ mod tests {
         }
     }
 
-    /// What goes out, in its order.
+    /// Sent publications in order.
     fn sent(queue: &SendQueue) -> Vec<String> {
         let sent = Mutex::new(Vec::new());
         queue.close();
@@ -238,7 +237,7 @@ mod tests {
             if reaches_the_end(&publication) {
                 queue.close();
             }
-            // each is taken at the second time
+            // every second attempt succeeds
             if tried.len() % 2 == 1 {
                 Sent::Later(publication)
             } else {

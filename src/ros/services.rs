@@ -1,4 +1,4 @@
-//! The services of docs/ros.md, but for those of parameters and the action.
+//! The services of docs/ros.md, except for parameters and the action.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use super::port::{ArmOrder, Call, Reply};
 
 /// A back end that offers services of one type.
 pub(super) trait Serves<S: RosService> {
-    /// Has `call` answer what is asked.
+    /// Has `call` answer requests.
     fn serve(
         &mut self,
         name: &'static str,
@@ -17,7 +17,7 @@ pub(super) trait Serves<S: RosService> {
     ) -> Result<(), RosError>;
 }
 
-/// Services that share a state: the name of each, its type, and how the state answers it.
+/// Services that share a state: name, type, and the state's answer for each.
 macro_rules! services {
     ($(#[$doc:meta])* fn $serve:ident($State:ty); $($name:literal: $service:ident, $answer:expr;)+) => {
         $(#[$doc])*
@@ -39,8 +39,8 @@ macro_rules! services {
 pub(super) use services;
 
 services! {
-    /// Offers those whose requests go to the inbox of the node, and those that stop its arm at
-    /// once.
+    /// Offers the services whose requests go to the inbox of the node, and those that stop its arm
+    /// at once.
     fn serve(Inbox);
     "~/flag_feature": FlagFeature, |to, request, reply| to.call(Call::Flag(request, reply));
     "~/unflag_feature": UnflagFeature, |to, request, reply| to.call(Call::Unflag(request, reply));
@@ -59,7 +59,7 @@ services! {
     "~/probe_feature": ProbeFeature, |to, request, reply| to.call(Call::Arm(ArmOrder::Feature(request, reply)));
 }
 
-/// The action.
+/// Name of the action.
 pub(super) const PROBE: &str = "~/probe";
 
 #[cfg(test)]
@@ -72,7 +72,7 @@ mod tests {
     use crate::ros::inbox::inbox;
     use crate::ros::port::Arrival;
 
-    /// Calls what stops as soon as it is offered.
+    /// Calls each stop service as soon as it is offered.
     struct CallsStops(Vec<String>);
 
     impl<S: RosService<Request: Default, Response: std::fmt::Debug>> Serves<S> for CallsStops {
@@ -111,7 +111,7 @@ mod tests {
         );
     }
 
-    /// What stands between `before` and `after`, each time.
+    /// Texts between `before` and `after`.
     fn between<'a>(text: &'a str, before: &'a str, after: char) -> BTreeSet<&'a str> {
         text.split(before)
             .skip(1)

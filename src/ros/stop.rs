@@ -1,9 +1,8 @@
-//! What stops the arm of the node, and the samples.
+//! Stop state of the node's arm and of the samples.
 //!
-//! Whoever asks for a stop sets it here, on the thread that hears the request; the arm's thread
-//! reads it after each of its states. So a stop waits for no queue and for no other thread: it acts
-//! within one period of the arm, and the answer goes out at once. The table of events is in
-//! docs/ros.md.
+//! A stop request acts here, on the receiving thread; the arm thread reads it after each of its
+//! states. So a stop waits for no queue and for no other thread: it acts within one period of the
+//! arm, and the answer goes out at once. The table of events is in docs/ros.md.
 
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
@@ -14,49 +13,47 @@ use super::parameters::{ParameterError, ParameterValue, descriptor};
 use crate::clock::Clock;
 use crate::probing::arm::StopRequest;
 
-/// The parameter that only the start of the node sets to true.
+/// The parameter that only the start of the node can set to true.
 pub const ALLOW_MOTION: &str = "allow_motion";
-/// An arm's thread that has not looked here for so long hangs, or its arm keeps it waiting: it
-/// looks with each state, some 500 a second, and five times a second while none comes.
+/// Time without a look here after which the arm thread hangs, or its arm blocks it: it looks with
+/// each state, some 500 a second, and five times a second without states.
 const HANGS: Duration = Duration::from_secs(1);
-/// Why an order or a stop of an arm does nothing where there is none.
+/// Refusal of an order or a stop without an arm.
 pub const NO_ARM: &str = "no arm configured: start the node with robot:=sim or robot:=ur";
-/// What is left where the arm's thread does not stop it.
+/// Remedy if the arm thread does not stop the arm.
 const BY_HAND: &str = "if the arm moves, press its emergency stop";
 
-/// After a silence of the button that is held for the arm to move that is longer than this the arm
-/// stops and stays.
+/// Maximum silence of a hold-to-run button; after a longer one the arm stops and stays.
 ///
-/// The arm is to stand within 200 ms of the last beat. It looks here with each state, 2 ms apart,
+/// The arm has to stand within 200 ms of the last beat. It looks here with each state, 2 ms apart,
 /// and then brakes as at a fault: a tip of 100 mm/s with 5 m/s² stands 20 ms later
-/// (`largest_mm_per_s`, `fault_stop_mm_per_s2`). That leaves 58 ms for threads that wake late and
-/// for the link of an arm. The page beats each 20 ms, so that the arm goes on where four beats in a
-/// row are lost and the next is less than 20 ms late, or where none is lost and one is less than
-/// 100 ms late.
+/// (`largest_mm_per_s`, `fault_stop_mm_per_s2`). That leaves 58 ms for late threads and for the
+/// link of an arm. The page beats each 20 ms, so the arm goes on if four beats in a row are lost
+/// and the next is less than 20 ms late, or if none is lost and one is less than 100 ms late.
 pub const LONGEST_BEAT: Duration = Duration::from_millis(120);
 
-/// What the arm does now.
+/// Current motion of the arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Motion {
-    /// Nothing moves it.
+    /// The arm rests.
     #[default]
     Rests,
-    /// It goes to a feature, or touches it.
+    /// It moves to a feature, or touches it.
     Moves,
-    /// It goes back into free air, at the end or after a stop.
+    /// It retracts into free air, at the end or after a stop.
     Retracts,
 }
 
-/// The thread of the arm.
+/// State of the arm thread.
 #[derive(Clone, Debug, Default)]
 enum ArmThread {
-    /// There is none.
+    /// There is no thread.
     #[default]
     None,
-    /// It runs, and looked last then.
+    /// It runs; time of its last look.
     Runs(Instant),
-    /// It has ended, and why.
+    /// It has ended; reason.
     Ended(String),
 }
 
@@ -65,15 +62,15 @@ struct Stops {
     is_ending: bool,
     is_paused: bool,
     may_move: bool,
-    /// why the arm stays where it is, until it is recovered
+    /// reason why the arm stays stopped until recovery
     stay: Option<&'static str>,
-    /// `~/recover` was called after that
+    /// whether `~/recover` was called after that
     is_recovery_asked: bool,
     motion: Motion,
     thread: ArmThread,
-    /// the last beat of a button that is held, when one has come
+    /// the last beat of a held button, if any
     beat: Option<Instant>,
-    /// orders for which a button has to be held
+    /// number of orders that need a held button
     held_orders: u32,
 }
 
@@ -85,7 +82,7 @@ impl Stops {
             .or(retract.then_some(StopRequest::Retract))
     }
 
-    /// Whether a request before this one has the arm retract, or it does so by itself.
+    /// Whether the arm retracts, by an earlier request or by itself.
     fn goes_back(&self) -> bool {
         self.motion == Motion::Retracts
             || (self.motion == Motion::Moves && self.request().is_some())
@@ -100,7 +97,7 @@ impl Stops {
             .is_some_and(|beat| clock.since(beat) <= LONGEST_BEAT)
     }
 
-    /// Why nobody hears a request, where nobody does.
+    /// Reason why the arm thread does not respond, if so.
     fn unheard(&self, clock: &Clock) -> Option<String> {
         match &self.thread {
             ArmThread::None => None,
@@ -116,7 +113,7 @@ impl Stops {
     }
 }
 
-/// What stops the arm of the node, and the samples.
+/// Stop state of the node's arm and of the samples.
 #[derive(Debug)]
 pub struct StopState {
     clock: Clock,
@@ -124,9 +121,9 @@ pub struct StopState {
 }
 
 impl StopState {
-    /// Nothing stops anything yet.
+    /// No stops yet.
     ///
-    /// - `clock`: by which a thread hangs.
+    /// - `clock`: clock for detecting a hanging thread.
     pub fn new(clock: Clock) -> Self {
         let stops = Stops {
             is_ending: false,
@@ -145,8 +142,8 @@ impl StopState {
         }
     }
 
-    /// `~/pause`: samples are passed over, what moves stops and retracts. It fails where the arm's
-    /// thread does not hear it.
+    /// `~/pause`: skips samples; a moving arm stops and retracts. Fails if the arm thread does not
+    /// respond.
     pub fn pause(&self, is_paused: bool) -> SetBoolResponse {
         let mut stops = locked(&self.stops);
         stops.is_paused = is_paused;
@@ -170,13 +167,13 @@ impl StopState {
         SetBoolResponse { success, message }
     }
 
-    /// Whether samples are passed over.
+    /// Whether samples are skipped.
     pub fn is_paused(&self) -> bool {
         locked(&self.stops).is_paused
     }
 
-    /// `~/stop`: what moves stops and stays, a retraction too; nothing moves until `~/recover`. It
-    /// fails where there is no arm, or its thread does not hear it.
+    /// `~/stop`: a moving arm stops and stays, even in a retraction; no motion until `~/recover`.
+    /// Fails without an arm, or if its thread does not respond.
     pub fn stop(&self) -> TriggerResponse {
         let mut stops = locked(&self.stops);
         stops.stay("~/stop was called");
@@ -194,10 +191,11 @@ impl StopState {
         }
     }
 
-    /// The parameter `allow_motion`: what moves stops and retracts; a retraction stops and stays.
+    /// The parameter `allow_motion`: a moving arm stops and retracts, a retracting one stops and
+    /// stays.
     ///
     /// # Errors
-    /// [`ParameterError`]: once it is false it stays so.
+    /// [`ParameterError`]: once false it stays false.
     pub fn allow(&self, may_move: &ParameterValue) -> Result<(), ParameterError> {
         let mut stops = locked(&self.stops);
         let now = ParameterValue::Bool(stops.may_move);
@@ -213,17 +211,17 @@ impl StopState {
         Ok(())
     }
 
-    /// A beat of the button that is held.
+    /// Notes a beat of a held button.
     pub fn beat(&self) {
         let now = self.clock.now();
         locked(&self.stops).beat = Some(now);
     }
 
-    /// From here on the arm moves only while the button is held: after a longer silence than
+    /// From here on the arm moves only while the button is held: after a silence longer than
     /// [`LONGEST_BEAT`] it stops and stays, until `~/recover`.
     ///
     /// # Errors
-    /// In words, where the button is not held.
+    /// In words, if nobody holds the button.
     pub fn hold_to_run(&self) -> Result<(), String> {
         let mut stops = locked(&self.stops);
         if !stops.is_held(&self.clock) {
@@ -236,14 +234,14 @@ impl StopState {
         Ok(())
     }
 
-    /// An order for which the button was held is answered.
+    /// Ends an order that needs a held button.
     pub fn end_hold(&self) {
         let mut stops = locked(&self.stops);
         stops.held_orders = stops.held_orders.saturating_sub(1);
     }
 
-    /// What is known of the arm: whether it may move, what it does, and why it stays where it is;
-    /// `None` where there is none.
+    /// State of the arm: whether it may move, its motion, and the reason if it stays stopped;
+    /// `None` without an arm.
     pub fn arm(&self) -> Option<(bool, Motion, Option<&'static str>)> {
         let stops = locked(&self.stops);
         (!matches!(stops.thread, ArmThread::None)).then_some((
@@ -253,8 +251,8 @@ impl StopState {
         ))
     }
 
-    /// The node is to end: what moves stops and retracts; asked for again, it stops and stays.
-    /// Whether that is new: `false` when nothing is left to wait for.
+    /// Requests the end of the node: a moving arm stops and retracts; at a second request it stops
+    /// and stays. Returns whether the request is new: `false` if there is nothing left to wait for.
     pub fn interrupt(&self) -> bool {
         let mut stops = locked(&self.stops);
         if !stops.is_ending {
@@ -268,7 +266,7 @@ impl StopState {
         is_new
     }
 
-    /// The node ends, whoever asked for it.
+    /// Ends the node, for any reason.
     pub fn end(&self) {
         locked(&self.stops).is_ending = true;
     }
@@ -278,15 +276,15 @@ impl StopState {
         locked(&self.stops).is_ending
     }
 
-    /// `~/recover` was called: it holds for the stops until now.
+    /// Notes a call of `~/recover`: it applies to the stops before it.
     pub fn ask_recovery(&self) {
         locked(&self.stops).is_recovery_asked = true;
     }
 
-    /// Somebody has looked: the arm may move again.
+    /// Clears the stop after acknowledgement: the arm may move again.
     ///
     /// # Errors
-    /// In words, where it was stopped again since.
+    /// In words, if another stop came since.
     pub fn recover(&self) -> Result<(), String> {
         let mut stops = locked(&self.stops);
         match stops.stay {
@@ -300,12 +298,12 @@ impl StopState {
         }
     }
 
-    /// The arm's thread looks: to be called when it begins, and with each state.
+    /// Notes a look of the arm thread: at its start, and with each state.
     pub fn look(&self) {
         locked(&self.stops).thread = ArmThread::Runs(self.clock.now());
     }
 
-    /// The arm's thread has ended. The first reason counts.
+    /// Notes the end of the arm thread. The first reason counts.
     pub fn end_arm(&self, why: &str) {
         let mut stops = locked(&self.stops);
         if let ArmThread::Runs(_) = stops.thread {
@@ -313,12 +311,12 @@ impl StopState {
         }
     }
 
-    /// What the arm does from now on.
+    /// Sets the motion of the arm.
     pub fn enter(&self, motion: Motion) {
         locked(&self.stops).motion = motion;
     }
 
-    /// How the arm is to stop, where it is.
+    /// Requested kind of stop, if any.
     pub fn request(&self) -> Option<StopRequest> {
         let mut stops = locked(&self.stops);
         if stops.held_orders > 0 && !stops.is_held(&self.clock) {
@@ -327,7 +325,7 @@ impl StopState {
         stops.request()
     }
 
-    /// Why the arm is to stop in this way, where it is: a code of [`ProbeResult`], and in words.
+    /// Reason of this kind of stop, if any: a code of [`ProbeResult`], and words.
     pub fn why(&self, request: StopRequest) -> Option<(u8, &'static str)> {
         let stops = locked(&self.stops);
         if request == StopRequest::Stay {
@@ -348,7 +346,7 @@ impl StopState {
             .map(|(_, code, why)| (code, why))
     }
 
-    /// Whether the arm's thread hears what is asked of it.
+    /// Whether the arm thread responds.
     ///
     /// # Errors
     /// In words: it hangs or has ended.
@@ -356,10 +354,10 @@ impl StopState {
         locked(&self.stops).unheard(&self.clock).map_or(Ok(()), Err)
     }
 
-    /// Whether the arm can be sent anywhere, as far as it is known here.
+    /// Whether the arm can move, as far as known here.
     ///
     /// # Errors
-    /// In words: it was stopped and stays, or its thread hangs or has ended.
+    /// In words: it stays stopped, or its thread hangs or has ended.
     pub fn ready(&self) -> Result<(), String> {
         let stops = locked(&self.stops);
         match (stops.unheard(&self.clock), stops.stay) {
@@ -448,7 +446,7 @@ mod tests {
         state.recover().unwrap();
         state.hold_to_run().unwrap();
         state.hold_to_run().unwrap();
-        // a second order that is refused ends its own hold alone
+        // a second, refused order ends only its own hold
         state.end_hold();
         hand.advance(LONGEST_BEAT * 2);
         assert_eq!(state.request(), Some(StopRequest::Stay));

@@ -14,13 +14,13 @@ use crate::io::recording::SampleKind;
 /// A topic and its quality of service.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Topic {
-    /// as in docs/ros.md
+    /// name in docs/ros.md
     pub name: &'static str,
-    /// or best effort
+    /// reliable, else best effort
     pub is_reliable: bool,
-    /// transient local: who joins late gets what is kept
+    /// transient local: late joiners get the kept messages
     pub is_latched: bool,
-    /// messages that are kept
+    /// number of kept messages
     pub depth: usize,
 }
 
@@ -57,8 +57,8 @@ pub(super) const MESH: Topic = Topic::latched("mesh", 4096);
 pub(super) const PROBE_TOUCHES: Topic = Topic::reliable("probe_touches", 4096);
 pub(super) const MESH_PATCH: Topic = Topic::reliable(MESH_PATCH_TOPIC, 4096);
 
-/// Samples are the last that may be lost: two tenths of a second at 10 kHz. What is kept is no
-/// matter of matching.
+/// Depth for samples, the last messages to lose: two tenths of a second at 10 kHz. Depth does not
+/// affect matching.
 const SAMPLES: usize = 2048;
 
 /// Sends messages of one topic.
@@ -70,9 +70,9 @@ pub(super) trait Publishes<M> {
     fn publisher(&mut self, topic: Topic) -> Result<Publisher<M>, RosError>;
 }
 
-/// A back end that listens to messages of one type.
+/// A back end that subscribes to messages of one type.
 pub(super) trait Subscribes<M> {
-    /// Listens: what comes goes to the inbox of the node.
+    /// Subscribes: messages go to the inbox of the node.
     fn subscribe(
         &mut self,
         topic: Topic,
@@ -80,13 +80,13 @@ pub(super) trait Subscribes<M> {
     ) -> Result<(), RosError>;
 }
 
-/// A back end that listens to poses and wrenches of any type that gives them.
+/// A back end that subscribes to poses and wrenches of any suitable type.
 pub(super) trait SubscribesSamples {
-    /// Listens: what comes goes to the inbox of the node.
+    /// Subscribes: messages go to the inbox of the node.
     fn subscribe_samples(&mut self, topic: Topic, source: SampleSource) -> Result<(), RosError>;
 }
 
-/// Announces topics; what sends their messages, or gives back what a slow listener holds up.
+/// Announces topics; the result sends their messages, or returns those delayed by slow listeners.
 macro_rules! publishers {
     ($(#[$doc:meta])* fn $announce:ident; $($send:ident: $publication:ident($message:ident) on $topic:expr;)+) => {
         $(#[$doc])*
@@ -97,7 +97,7 @@ macro_rules! publishers {
             $(let $send = Publishes::<$message>::publisher(back_end, $topic)?;)+
             Ok(Box::new(move |publication| match publication {
                 $(Publication::$publication(message) => $send(message).map(Publication::$publication),)+
-                // the others have a send queue of their own
+                // others have a send queue of their own
                 _ => Sent::Done,
             }))
         }
@@ -105,7 +105,7 @@ macro_rules! publishers {
 }
 
 publishers! {
-    /// What is small and urgent, and waits for nobody.
+    /// Small and urgent publications, which wait for nobody.
     fn urgent;
     features: Features(FeatureArray) on Topic::latched("features", 1);
     feature_markers: FeatureMarkers(MarkerArray) on Topic::latched("feature_markers", 1);
@@ -117,14 +117,14 @@ publishers! {
 }
 
 publishers! {
-    /// What is large and may wait.
+    /// Large publications, which may wait.
     fn mesh;
     tiles: Tile(Marker) on MESH;
     patches: MeshPatch(MeshPatch) on MESH_PATCH;
     probe_touches: ProbeTouch(ProbeTouch) on PROBE_TOUCHES;
 }
 
-/// Everything that is listened to.
+/// Makes all subscriptions.
 pub(super) fn subscribe<B>(config: &NodeConfig, back_end: &mut B) -> Result<(), RosError>
 where
     B: SubscribesSamples + Subscribes<TFMessage> + Subscribes<PointStamped> + Subscribes<Clock>,

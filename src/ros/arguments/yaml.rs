@@ -16,10 +16,10 @@ enum YamlPiece {
 
 const INNER: &str = "ros__parameters";
 
-/// Pattern of the nodes, name and value of every parameter in a file. Names of nested parameters
-/// are joined by dots.
+/// Node pattern, name and value of every parameter in a file. Dots join the names of nested
+/// parameters.
 pub(super) fn entries(text: &str) -> Result<Vec<(String, String, ParameterValue)>, String> {
-    // an empty file says nothing
+    // an empty file is valid
     let piece: Option<YamlPiece> =
         serde_saphyr::from_str(text).map_err(|error| error.to_string())?;
     let mut found = Vec::new();
@@ -77,8 +77,7 @@ fn parameters_below(
             }
         }
         YamlPiece::Value(value) => found.push((nodes.to_owned(), prefix.to_owned(), value)),
-        // no parameter of this node is a list: it is refused as a wrong word, or is for another
-        // node
+        // no parameter of this node is a list: either an invalid word, or for another node
         YamlPiece::List => found.push((
             nodes.to_owned(),
             prefix.to_owned(),

@@ -1,4 +1,4 @@
-//! The action `~/probe`: three services and two topics, and the goals that are known.
+//! The action `~/probe`: three services and two topics, and the known goals.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -29,9 +29,9 @@ use crate::ros::messages::{ProbeFeedback, ProbeGoal, ProbeResponse};
 use crate::ros::port::{ArmOrder, Call, Feedback, Goal, GoalEnd, Reply};
 use crate::ros::services::PROBE;
 
-/// Goals that are remembered; of those that ended the oldest are forgotten first.
+/// Maximum number of remembered goals; the oldest finished ones go first.
 const MOST_GOALS: usize = 32;
-/// Calls that wait for the result of one goal.
+/// Maximum number of calls that wait for the result of one goal.
 const MOST_WAITING: usize = 16;
 
 type ProbeServer = ActionServer<ProbeGoal, ProbeResponse, ProbeFeedback>;
@@ -135,13 +135,13 @@ impl Listener for Arc<ProbeAction> {
 }
 
 impl ProbeAction {
-    /// Does it in the thread that sends.
+    /// Runs a function on the sending thread.
     fn later(self: &Arc<Self>, send: impl FnOnce(&Self) + Send + 'static) {
         let probe = self.clone();
         self.exchange.urgent.answer(Box::new(move || send(&probe)));
     }
 
-    /// Answers a call, and publishes what has become of the goals.
+    /// Answers a call, and publishes the status of the goals.
     fn answer(
         self: &Arc<Self>,
         service: &'static str,
@@ -153,7 +153,7 @@ impl ProbeAction {
         });
     }
 
-    /// A new goal: the node decides.
+    /// Handles a new goal: the node decides.
     fn ask(self: &Arc<Self>, request_id: RmwRequestId, request: SendGoalRequest<ProbeGoal>) {
         let id = request.goal_id;
         let is_cancelled = Arc::new(AtomicBool::new(false));
@@ -168,7 +168,7 @@ impl ProbeAction {
                     return;
                 }
                 for_feedback.later(move |probe| {
-                    // nobody waits for it who misses it
+                    // nobody waits for a missed feedback
                     let _ = probe.server.send_feedback(id, feedback);
                 });
             })),
@@ -187,7 +187,7 @@ impl ProbeAction {
             Some(known) if accepted => {
                 (known.status, known.accepted) = (GoalStatusEnum::Executing, stamp)
             }
-            // forgets one that was not taken up
+            // forgets a rejected goal
             Some(known) if known.accepted == Time::ZERO => drop(goals.known.remove(&id)),
             _ => {}
         }
@@ -219,7 +219,7 @@ impl ProbeAction {
         });
     }
 
-    /// Somebody waits for the result of a goal.
+    /// Handles a request for the result of a goal.
     fn wait_for(self: &Arc<Self>, request_id: RmwRequestId, id: GoalId) {
         let (status, response) = match locked(&self.goals).known.get_mut(&id) {
             Some(KnownGoal {
@@ -248,7 +248,7 @@ impl ProbeAction {
         report("get_result", self.server.send_result(request_id, answer));
     }
 
-    /// Somebody wants goals stopped; the node does it when it can.
+    /// Handles a request to stop goals; the node obeys when it can.
     fn cancel(self: &Arc<Self>, request_id: RmwRequestId, request: &CancelGoalRequest) {
         let response = locked(&self.goals).cancel(wanted(request));
         self.answer("cancel_goal", move |server| {
@@ -279,10 +279,10 @@ fn report(service: &str, sent: Result<(), WriteError<()>>) {
     }
 }
 
-/// What a request to cancel names: the goal (zeros: none), and the moment up to which goals are
-/// meant (0: none), ns.
+/// Content of a request to cancel: the goal (zeros: none), and the time up to which goals count (0:
+/// none), ns.
 ///
-/// The fields of that message are closed to us; its bytes are not.
+/// The fields of that message are private; its bytes are not.
 fn wanted(request: &CancelGoalRequest) -> ([u8; 16], i64) {
     let bytes = cdr_encoding::to_vec::<_, LittleEndian>(request).unwrap_or_default();
     let part = |from: usize| {
@@ -300,7 +300,7 @@ fn wanted(request: &CancelGoalRequest) -> ([u8; 16], i64) {
 }
 
 impl Goals {
-    /// Whether there was room, and it is a new one.
+    /// Adds a goal; false for a known goal or without room.
     fn add(&mut self, id: GoalId, is_cancelled: Arc<AtomicBool>) -> bool {
         if self.known.len() >= MOST_GOALS {
             let over = self.known.iter().filter(|(_, known)| known.is_over());
@@ -331,7 +331,7 @@ impl Goals {
         self.known.get(&id).is_some_and(|known| !known.is_over())
     }
 
-    /// As `CancelGoal` says: one goal, all up to a moment, both, or all.
+    /// Cancels as `CancelGoal` says: one goal, all up to a time, both, or all.
     fn cancel(&mut self, (uuid, until_ns): ([u8; 16], i64)) -> CancelGoalResponse {
         let is_named = |id: &GoalId| *id.uuid.as_bytes() == uuid;
         let names_one = uuid != [0; 16];

@@ -1,12 +1,11 @@
 //! Answers that go out whole.
 //!
-//! RustDDS 0.15.1 writes the inline QoS of a fragment so that nobody can read it, and ros2-client
-//! names the request of an answer there: one that goes out in fragments is lost. So where
-//! ros2-client answers, which is the enhanced mapping (Fast DDS) and the action in either, an
-//! answer is made to fit into one packet: our own do by design but for long texts, and of
-//! parameters the caller asks for fewer at a time. What does not fit goes out as the same message
-//! with less in it, and the log says so. The services in the mapping of CycloneDDS are our own
-//! ([`super::services`]) and have no such limit.
+//! RustDDS 0.15.1 writes the inline QoS of a fragment unreadably, and ros2-client names the request
+//! of an answer there: an answer in fragments is lost. So for answers by ros2-client, in the
+//! enhanced mapping (Fast DDS) and of the action in either mapping, an answer has to fit into one
+//! packet: our own do by design, except for long texts, and callers ask for fewer parameters at a
+//! time. A larger answer goes out as the same message with less content, and the log says so. The
+//! services in the mapping of CycloneDDS are our own ([`super::services`]) and have no such limit.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -19,39 +18,39 @@ use ros2_client::action::GetResultResponse;
 use crate::ros::locked;
 use crate::ros::messages::*;
 
-/// Largest packet of a network, in bytes: that of Ethernet, which RustDDS too assumes where it
-/// knows no smaller one.
+/// Largest packet of a network, in bytes: Ethernet's, which RustDDS also assumes unless it knows a
+/// smaller one.
 pub(super) const ETHERNET: usize = 1500;
-/// Of a packet not the answer: headers of IP (20), UDP (8) and RTPS (20), INFO_DST (16), INFO_TS
-/// (12), DATA (24), the two parameters that name the request and the end of their list (60),
-/// HEARTBEAT (32). RustDDS counts 128 of them and makes fragments of what is larger; with all of
-/// them a packet is not parted by IP either.
+/// Bytes of a packet besides the answer: headers of IP (20), UDP (8) and RTPS (20), INFO_DST (16),
+/// INFO_TS (12), DATA (24), the two parameters that name the request and the end of their list
+/// (60), HEARTBEAT (32). RustDDS counts 128 of them and fragments larger answers; within all of
+/// them IP does not split a packet either.
 const HEADERS: usize = 192;
-/// RustDDS makes no fragments of an answer that is larger by this, and IP parts its packet: better than
-/// an empty list.
+/// Excess up to which RustDDS makes no fragments and IP splits the packet: better than an empty
+/// list.
 const PARTED_BY_IP: usize = 64;
-/// The four bytes before a message that say how it is written.
+/// Four bytes before a message that specify its encoding.
 const ENCAPSULATION: usize = 4;
 
 /// An answer that can be made smaller.
 pub(super) trait Shrinkable: ros2_client::Message {
-    /// Leaves out what does not fit into so many bytes, what matters least first. The rest stays
+    /// Reduces the message to a number of bytes, least important content first. The rest stays
     /// true.
     fn reduce(&mut self, most: usize);
 }
 
-/// How large an answer may be.
+/// Maximum size of answers.
 pub(super) struct Room {
-    /// in one packet
+    /// bytes in one packet
     most: usize,
-    /// whether answers of services have to fit into one
+    /// whether answers of services have to fit into one packet
     is_for_services: bool,
-    /// services of which the log has it
+    /// services already logged
     logged: Mutex<BTreeSet<&'static str>>,
 }
 
 impl Room {
-    /// That of the networks of this computer.
+    /// Room in the networks of this computer.
     pub fn new(mapping: &ServiceMapping) -> Self {
         let is_for_services = *mapping != ServiceMapping::Cyclone;
         Self {
@@ -61,7 +60,7 @@ impl Room {
         }
     }
 
-    /// The answer of a service, or what of it there is room for.
+    /// The answer of a service, reduced if necessary.
     pub fn fit<A: Shrinkable>(&self, service: &'static str, answer: A) -> A {
         if self.is_for_services {
             self.fit_packet(service, answer)
@@ -70,7 +69,7 @@ impl Room {
         }
     }
 
-    /// The answer, or what of it fits into one packet.
+    /// The answer, reduced to one packet if necessary.
     pub fn fit_packet<A: Shrinkable>(&self, service: &'static str, mut answer: A) -> A {
         let bytes = size(&answer);
         if bytes <= self.most {
@@ -88,12 +87,12 @@ const TOO_LARGE: &str = "an answer does not fit into one packet, and RustDDS los
                          out with less in it; ask for fewer names at a time, or start the node with service_mapping:=cyclone \
                          (RMW_IMPLEMENTATION=rmw_cyclonedds_cpp for all), or build it with the feature r2r";
 
-/// Of a packet what an answer has.
+/// Bytes of a packet available for an answer.
 pub(super) fn room(packet: usize) -> usize {
     packet.saturating_sub(HEADERS)
 }
 
-/// Of all networks that are up now, as Linux has it; elsewhere that of Ethernet.
+/// Smallest packet of all active networks, according to Linux; elsewhere Ethernet's.
 fn smallest_packet() -> usize {
     let read = |path: std::path::PathBuf| {
         fs::read_to_string(path)
@@ -111,13 +110,13 @@ fn smallest_packet() -> usize {
     packets.fold(ETHERNET, usize::min)
 }
 
-/// On the wire.
+/// Size on the wire.
 pub(super) fn size(answer: &impl ros2_client::Message) -> usize {
-    // what cannot be written is not sent, and the log says so there
+    // an unwritable message is not sent, and logged at that point
     cdr_encoding::to_vec::<_, LittleEndian>(answer).map_or(0, |bytes| bytes.len() + ENCAPSULATION)
 }
 
-/// Shortens a text by so many bytes at least, as far as it has them.
+/// Shortens a text by at least this number of bytes, as far as possible.
 fn cut(text: &mut String, by: usize) {
     const MORE: &str = " …";
     if by == 0 {
@@ -133,13 +132,13 @@ fn cut(text: &mut String, by: usize) {
     }
 }
 
-/// Bytes that are too many, and those that may be added behind the text to align what follows.
+/// Excess bytes, plus the alignment of the next field after the text.
 fn excess(answer: &impl ros2_client::Message, most: usize) -> usize {
     let too_many = size(answer).saturating_sub(most);
     if too_many > 0 { too_many + 8 } else { 0 }
 }
 
-/// Answers of which the texts alone have no limit: `texts!(Answer: text, text)`, what matters least
+/// Answers whose only unlimited parts are texts: `texts!(Answer: text, text)`, least important
 /// first.
 macro_rules! texts {
     ($($answer:ty: $($($field:ident).+),+;)+) => {
@@ -156,7 +155,7 @@ texts! {
     FlagFeatureResponse: message;
     UnflagFeatureResponse: message;
     DetectFeaturesResponse: message;
-    // the path is in the message too, of which what is left is what went wrong
+    // the message also contains the path; its remainder is the cause
     SaveMeshResponse: message, path;
     ResyncMeshResponse: message, session;
     UndoResponse: message;
@@ -168,8 +167,8 @@ texts! {
     SetParametersAtomicallyResponse: result.reason;
 }
 
-/// Answers with a list: `lists!(Answer: list of what, [what is left out of each of it first, and
-/// next])`; then all of it goes.
+/// Answers with a list: `lists!(Answer: list of item type, [reduction of each item, in order])`;
+/// after them the whole list goes.
 macro_rules! lists {
     ($($answer:ty: $($list:ident).+ of $item:ty, $steps:expr;)+) => {
         $(impl Shrinkable for $answer {
@@ -193,9 +192,9 @@ lists! {
     GetParametersResponse: values of ParameterValue, [];
     GetParameterTypesResponse: types of u8, [];
     ListParametersResponse: result.names of String, [];
-    // types and ranges are what programs need, and words to choose from where they fit
+    // programs need types and ranges, and words to choose from if they fit
     DescribeParametersResponse: descriptors of ParameterDescriptor, [|one| one.description.clear(), |one| one.additional_constraints.clear()];
-    // whether each is set comes before why not
+    // whether each was set matters more than why not
     SetParametersResponse: results of SetParametersResult, [|one| one.reason.clear()];
 }
 
@@ -215,14 +214,14 @@ mod tests {
         PARAMETERS, ParameterDescriptor, ParameterValue, Parameters, Settable,
     };
 
-    /// The smallest packet that a network of today has: what IPv6 asks for, and tunnels have.
+    /// Smallest packet of today's networks: the minimum of IPv6, also of tunnels.
     const TUNNEL: usize = 1280;
 
     fn long() -> String {
         "Ø 8.02 is not to be had: ".repeat(400)
     }
 
-    /// Whatever its texts, it fits, and says that it was cut.
+    /// Asserts that an answer fits after reduction, whatever its texts.
     fn fits<A: Shrinkable>(mut answer: A) -> A {
         assert!(size(&answer) > ETHERNET, "{}", size(&answer));
         answer.reduce(room(TUNNEL));
@@ -248,7 +247,7 @@ mod tests {
     #[test]
     #[expect(clippy::too_many_lines)]
     fn the_largest_answers_of_our_own_services_fit_into_one_packet() {
-        // as long as the node makes a text of its own; a path may be longer
+        // the longest text of the node itself; a path may be longer
         let message = || {
             "a text of 300 letters, which is longer than what the node says by itself. ".repeat(4)
         };
@@ -477,7 +476,7 @@ mod tests {
 
     #[test]
     fn values_that_ip_alone_parts_go_out_whole() {
-        // beside a network of machines in a cloud, with the paths of a launch file
+        // on a cloud network, with the paths of a launch file
         let mut whole = all_values(&launched());
         assert!((room(1400) + 1..=1400 - 128).contains(&size(&whole)));
         whole.reduce(room(1400));
@@ -517,7 +516,7 @@ mod tests {
             .collect()
     }
 
-    /// What `ros2 param dump` asks for.
+    /// Answer to the request of `ros2 param dump`.
     fn all_values(values: &Parameters) -> GetParametersResponse {
         get(values, &GetParametersRequest { names: names() })
     }
@@ -526,7 +525,7 @@ mod tests {
         describe_all(&DescribeParametersRequest { names })
     }
 
-    /// As a launch file starts it: paths where there are some.
+    /// Parameters of a launch file, with paths.
     fn launched() -> Parameters {
         let mut values = Parameters::default();
         let share = "/home/somebody/ws/install/touchup/share/touchup/config/probe.yaml";
@@ -594,12 +593,11 @@ mod tests {
             println!("{bytes:5} bytes of {} {service}", room(ETHERNET));
             assert!(bytes <= room(ETHERNET), "{service}: {bytes} bytes");
         }
-        // beside a network of smaller packets, as of machines in a cloud, names, types and ranges
-        // still are there
+        // even with smaller packets, as on a cloud network, names, types and ranges remain
         let mut without_words = described(names());
         without_words.reduce(room(1400));
         assert_eq!(without_words.descriptors.len(), PARAMETERS.len());
-        // nothing but the descriptions is left out
+        // only the descriptions are missing
         let of = |one: &messages::ParameterDescriptor| {
             (
                 one.name.clone(),

@@ -1,4 +1,4 @@
-//! Speaks to an arm behind ros2_control.
+//! Port of an arm behind ros2_control.
 
 use std::collections::BTreeSet;
 use std::io;
@@ -21,10 +21,10 @@ use crate::ros::exchange::RosError;
 use crate::ros::messages::{JointState, JointTrajectory, RosMessage, WrenchStamped};
 use crate::ros::port::{ArmPort, ArmReport};
 
-/// Messages of a topic that DDS keeps until they are taken: a tenth of a second at 1 kHz.
+/// Maximum number of messages of a topic kept by DDS until read: a tenth of a second at 1 kHz.
 const DEPTH: usize = 100;
-/// Messages that wait for the arm's driver; who does not take them for a second finds the oldest,
-/// and sees that they are late.
+/// Maximum number of messages waiting for the arm's driver; a driver late by a second gets the
+/// oldest, and sees their lateness.
 const WAITING: usize = 2048;
 
 struct DdsArm {
@@ -35,17 +35,17 @@ struct DdsArm {
     is_over: Arc<AtomicBool>,
     waker: Arc<Waker>,
     thread: Option<JoinHandle<()>>,
-    // its entities leave the graph when it goes
+    // its entities leave the graph on drop
     _node: Node,
 }
 
 impl Drop for DdsArm {
     fn drop(&mut self) {
         self.is_over.store(true, Ordering::Relaxed);
-        // without it the thread stays until the next message: nothing worse
+        // otherwise the thread stays until the next message, which does no harm
         let _ = self.waker.wake();
         if let Some(thread) = self.thread.take() {
-            // one that panicked has said so
+            // a panicked thread has already reported it
             let _ = thread.join();
         }
     }
@@ -57,7 +57,7 @@ impl Drop for DdsArm {
 /// - `orders`: topic of trajectories.
 ///
 /// # Errors
-/// [`RosError`]: a name that is none, no network, no thread.
+/// [`RosError`]: an invalid name, no network, no thread.
 pub fn arm_port(
     config: &NodeConfig,
     reports: [&str; 2],
@@ -74,7 +74,7 @@ pub fn arm_port(
     let mut wrench = node
         .create_subscription::<WrenchStamped>(&wrench, Some(heard))
         .during("subscribing to a topic")?;
-    // the newest order alone counts
+    // only the newest order counts
     let sent = keep(URGENT, 1);
     let topic = make_topic::<JointTrajectory>(&node, &config.resolve(orders)?, &sent)?;
     let orders = node
@@ -94,7 +94,7 @@ pub fn arm_port(
         .spawn(move || {
             let mut events = Events::with_capacity(16);
             while !over.load(Ordering::Relaxed) {
-                // what came before the registration wakes nobody
+                // messages from before the registration wake nobody
                 take(&joints, &sender, ArmReport::Joints);
                 take(&wrench, &sender, ArmReport::Wrench);
                 match poll.poll(&mut events, None) {
@@ -118,7 +118,7 @@ pub fn arm_port(
     }))
 }
 
-/// Takes all that is there.
+/// Reads all waiting messages.
 fn take<M: RosMessage>(
     from: &Subscription<M>,
     to: &SyncSender<ArmReport>,
@@ -130,7 +130,7 @@ fn take<M: RosMessage>(
             Ok(None) => return,
             Err(error) => ArmReport::Unreadable(error.to_string()),
         };
-        // where there is no room the driver is late, and finds out by the stamps
+        // without room the driver is late, and notices it by the stamps
         let _ = to.try_send(report);
     }
 }

@@ -1,4 +1,4 @@
-//! The node while it begins: topics, services and the action are added to it.
+//! The node during its start, while topics, services and the action are added.
 
 use std::fmt::Debug;
 use std::sync::{Arc, Mutex, OnceLock};
@@ -14,7 +14,7 @@ use super::sockets::{OpenSockets, guard};
 use crate::ros::arguments::NodeConfig;
 use crate::ros::exchange::{Exchange, RosError};
 
-/// Says what DDS was asked for, where it refuses.
+/// Names the refused request to DDS.
 pub(super) trait During<T> {
     fn during(self, call: &'static str) -> Result<T, RosError>;
 }
@@ -23,7 +23,7 @@ impl<T, E: Debug> During<T> for Result<T, E> {
     fn during(self, call: &'static str) -> Result<T, RosError> {
         self.map_err(|error| {
             let reason = format!("{error:?}");
-            // RustDDS does not always say why it has no socket
+            // RustDDS does not always give the reason for a missing socket
             let remedy = if reason.contains("open files") {
                 "a node takes some 250: allow the process more (ulimit -n)"
             } else {
@@ -35,10 +35,10 @@ impl<T, E: Debug> During<T> for Result<T, E> {
     }
 }
 
-/// The node once all is added to it, for topics whose type changes.
+/// The complete node, for topics whose type changes.
 pub(super) type BegunNode = Arc<OnceLock<Arc<Mutex<Node>>>>;
 
-/// Publishes, subscribes and serves.
+/// Back end that publishes, subscribes and serves.
 pub(super) struct DdsBackEnd<'a> {
     pub config: &'a NodeConfig,
     pub context: Context,
@@ -47,15 +47,15 @@ pub(super) struct DdsBackEnd<'a> {
     pub begun: BegunNode,
     pub exchange: Arc<Exchange>,
     pub room: Arc<Room>,
-    /// of the services so far, absolute and remapped
+    /// names of the services up to now, absolute and remapped
     pub names: Vec<String>,
     pub listeners: Vec<Box<dyn Listener>>,
 }
 
-/// Joins the network as a node that does nothing yet.
+/// Joins the network as a node without any topics.
 ///
 /// # Errors
-/// [`RosError`]: the environment asks for what this back end does not do, or there is no network.
+/// [`RosError`]: an unsupported environment, or no network.
 pub(super) fn join(config: &NodeConfig, options: NodeOptions) -> Result<(Context, Node), RosError> {
     let variable = |name: &str| std::env::var(name).ok();
     environment::check(variable)?;

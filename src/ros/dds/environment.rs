@@ -1,22 +1,22 @@
-//! Variables of the environment that other ROS nodes heed and this back end does not.
+//! Environment variables that other ROS nodes heed and this back end does not.
 
 use crate::ros::exchange::RosError;
 
-/// Distributions whose nodes name readers and writers by 24 bytes to each other, not by 16.
+/// Distributions whose nodes identify readers and writers by 24 bytes, not by 16.
 const OLD: [&str; 6] = [
     "humble", "galactic", "foxy", "eloquent", "dashing", "crystal",
 ];
-/// … and those that the node is known to work with.
+/// Distributions known to work with the node.
 const KNOWN: [&str; 5] = ["iron", "jazzy", "kilted", "lyrical", "rolling"];
 
-/// Whether the environment asks for security, as [`unheeded`] takes it: whoever sets the variable
-/// means it.
+/// Whether the environment requests security: any value except empty, 0 and false, as for
+/// [`unheeded`].
 fn is_secured(variable: &impl Fn(&str) -> Option<String>) -> bool {
     variable("ROS_SECURITY_ENABLE")
         .is_some_and(|value| !["", "0", "false"].contains(&value.to_lowercase().as_str()))
 }
 
-/// Refuses an environment in which a node of this back end must not run, or would not be seen.
+/// Refuses an environment in which a node of this back end must not run, or would be invisible.
 ///
 /// - `variable`: of the environment.
 ///
@@ -51,7 +51,7 @@ pub(super) fn check(variable: impl Fn(&str) -> Option<String>) -> Result<(), Ros
     Ok(())
 }
 
-/// One sentence for each that is set.
+/// One sentence for each set variable.
 ///
 /// - `variable`: of the environment.
 pub(super) fn unheeded(variable: impl Fn(&str) -> Option<String>) -> Vec<String> {

@@ -1,21 +1,20 @@
-//! The first request of a program that the node meets in the same moment.
+//! The first request of a program at the moment of discovery.
 //!
-//! Fast DDS sends a request as soon as it knows our reader, be it before RustDDS knows the writer: that
-//! request is passed over, and comes again only when it is asked for. RustDDS 0.15 asks by an ACKNACK
-//! of everything before number 1, and Fast DDS answers one before number 0 alone: the request would
-//! come with the next heartbeat, after 3 s. So one with 0 is sent from here.
+//! Fast DDS sends a request as soon as it knows our reader, even before RustDDS knows the writer:
+//! RustDDS skips that request, and gets it again only on demand. RustDDS 0.15 asks by an ACKNACK of
+//! everything before number 1, and Fast DDS answers only one before number 0: the request would
+//! come with the next heartbeat, after 3 s. So this module sends an ACKNACK with 0.
 //!
-//! An ACKNACK has a count, and Fast DDS passes over one that it knows. So our reader gets a heartbeat
-//! that has its answer come here, and that answer goes on to the writer: its count is used by nobody
-//! else.
+//! An ACKNACK has a count, and Fast DDS skips known counts. So our reader gets a heartbeat that
+//! directs its answer here, and that answer goes on to the writer: nobody else uses its count.
 
 use std::net::{IpAddr, SocketAddr};
 
 use ros2_client::dds::rustdds::GUID;
 
-/// A heartbeat of a writer that has nothing (RTPS 2.5, 9.4.5.7), with where to answer it (9.4.5.9).
-/// `None` for writers of discovery: Fast DDS sends them a first heartbeat by itself, and RustDDS would
-/// pass over it. `None` for an IPv6 address, of which neither has any.
+/// A heartbeat of a writer without data (RTPS 2.5, 9.4.5.7), with the address for the answer
+/// (9.4.5.9). `None` for writers of discovery: Fast DDS sends them a first heartbeat by itself, and
+/// RustDDS would skip it. `None` for an IPv6 address, as neither side has any.
 pub(super) fn heartbeat(reader: GUID, writer: GUID, answers: SocketAddr) -> Option<Vec<u8>> {
     let IpAddr::V4(address) = answers.ip() else {
         return None;
@@ -28,9 +27,9 @@ pub(super) fn heartbeat(reader: GUID, writer: GUID, answers: SocketAddr) -> Opti
         let bytes = words.iter().flat_map(|word| word.to_le_bytes());
         bytes.collect()
     };
-    // how many, kind, port, and an address of which IPv4 has the last four bytes
+    // count, kind, port, and an address with IPv4 in its last four bytes
     let place = words(&[1, 1, answers.port().into(), 0, 0, 0]);
-    // RustDDS reads on where there may be multicast addresses: it finds none
+    // RustDDS also reads optional multicast addresses: none
     let place = [place.as_slice(), &address.octets(), &[0; 4]].concat();
     let entities = [reader, writer].map(|guid| guid.entity_id.to_slice());
     // first and last number, high half first, and the count
@@ -45,15 +44,15 @@ pub(super) fn heartbeat(reader: GUID, writer: GUID, answers: SocketAddr) -> Opti
     is_user_defined.then(|| message.concat())
 }
 
-/// Makes the answer of our reader to such a heartbeat one that Fast DDS answers: it has a base of 0
-/// and is not final (RTPS 2.5, 9.4.5.2). Returns the participant that it is for; `None` for anything
-/// else.
+/// Turns the answer of our reader to such a heartbeat into a question that Fast DDS answers: with
+/// base 0 and not final (RTPS 2.5, 9.4.5.2). Returns its destination participant; `None` for
+/// anything else.
 pub(super) fn question(answer: &mut [u8; LENGTH], own: &[u8]) -> Option<[u8; 12]> {
     let (header, submessages) = answer.split_at_mut(20);
     let (info, acknack) = submessages.split_at_mut(16);
     let is_ours = header.starts_with(b"RTPS") && header.ends_with(own);
     let is_both = info[0] == INFO_DST && acknack[0] == ACKNACK;
-    // an answer that asks for something has a longer set of bits
+    // an answer with a request has a longer bit set
     let is_empty = acknack[20..24] == [0; 4];
     acknack[1] &= LITTLE_ENDIAN;
     acknack[12..20].fill(0);
@@ -61,7 +60,7 @@ pub(super) fn question(answer: &mut [u8; LENGTH], own: &[u8]) -> Option<[u8; 12]
     to.filter(|_| is_ours && is_both && is_empty)
 }
 
-/// Of an answer that asks for nothing: header, whom it is for, reader, writer, base, bits, count.
+/// Length of an answer without a request: header, destination, reader, writer, base, bits, count.
 pub(super) const LENGTH: usize = 20 + 16 + 4 + 8 + 8 + 4 + 4;
 /// Numbers of submessages (RTPS 2.5, 9.4.5.1.1), and the flag of their byte order.
 const ACKNACK: u8 = 0x06;

@@ -1,4 +1,4 @@
-//! Who else is on our topics, and why somebody who is does not fit.
+//! Other participants on our topics, and reasons for their mismatches.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -22,29 +22,29 @@ use crate::ros::exchange::{Exchange, RosError};
 use crate::ros::locked;
 use crate::ros::port::Arrival;
 
-/// Vendors by their number on the wire: who knows one mapping of services alone.
+/// Vendors by their number on the wire; each knows only one mapping of services.
 const FAST_DDS: [u8; 2] = [0x01, 0x0f];
 const CYCLONE_DDS: [u8; 2] = [0x01, 0x10];
-/// Participants that are remembered; a domain holds 120.
+/// Maximum number of remembered participants; a domain holds 120.
 const MOST_PARTICIPANTS: usize = 1024;
-/// Callers of services that are remembered.
+/// Maximum number of remembered callers of services.
 const MOST_CALLERS: usize = 4096;
 
-/// What others publish on one topic.
+/// Publishers of one topic and their types.
 #[derive(Default)]
 struct PublishedTypes {
-    /// how often that has changed
+    /// number of changes
     changes: u64,
-    /// as ROS 2 names them
+    /// types as named in ROS 2
     writers: BTreeMap<GUID, String>,
 }
 
-/// Publishers of a topic of samples that are looked at.
+/// Maximum number of publishers of a sample topic.
 const MOST_WRITERS: usize = 64;
 
 pub(super) struct DdsGraph {
     listener: DomainParticipantStatusListener,
-    /// `None` if its ports are not to be had
+    /// `None` if its ports are not available
     keep_alive: Option<KeepAlive>,
     rematch: Rematch,
     exchange: Arc<Exchange>,
@@ -52,30 +52,30 @@ pub(super) struct DdsGraph {
     own: GUID,
     /// ROS name and type of our topics, by their name in DDS
     topics: BTreeMap<String, (String, String)>,
-    /// types that others publish our topics of samples with
+    /// published types of our sample topics
     published: BTreeMap<String, PublishedTypes>,
-    /// why nothing of a topic can be read, by its name in ROS
+    /// reason why a topic is unreadable, by its name in ROS
     unread: BTreeMap<String, String>,
     /// ROS names of our services
     pub services: Vec<String>,
-    /// our readers and writers: ROS name of the topic, and who is matched
+    /// our readers and writers: ROS name of the topic, and matched remotes
     matched: BTreeMap<GUID, (String, BTreeSet<GUID>)>,
-    /// what others call services with: the service in ROS, and what is so once both sides know each
+    /// endpoints of service callers: the service in ROS, and the log text once both sides know each
     /// other
     callers: BTreeMap<GUID, (String, &'static str)>,
-    /// of the other participants
+    /// vendors of the other participants
     vendors: BTreeMap<GUID, [u8; 2]>,
-    /// said once for each
+    /// endpoints already reported
     reported: BTreeSet<GUID>,
-    /// what sends tiles
+    /// writer of tiles
     pub tiles: Option<GUID>,
 }
 
 impl DdsGraph {
-    /// Follows who is there from now on.
+    /// Follows other participants from now on.
     ///
     /// # Errors
-    /// [`RosError`]: of this computer alone, and a socket cannot be closed to others.
+    /// [`RosError`]: for this computer alone, a socket that does not close to others.
     pub fn new(
         context: &Context,
         exchange: &Arc<Exchange>,
@@ -108,7 +108,7 @@ impl DdsGraph {
         })
     }
 
-    /// A reader or writer of ours, and what its topic is called in ROS.
+    /// Adds a reader or writer of ours, and the ROS name of its topic.
     pub fn add(&mut self, guid: GUID, topic: &Topic, name: String) {
         self.topics.insert(
             topic.name(),
@@ -117,19 +117,19 @@ impl DdsGraph {
         self.matched.insert(guid, (name, BTreeSet::new()));
     }
 
-    /// The same is there no more.
+    /// Removes a reader or writer of ours.
     pub fn remove(&mut self, guid: GUID) {
         self.matched.remove(&guid);
     }
 
-    /// From now on the types are noted that a topic is published with.
+    /// Notes the published types of a topic from now on.
     ///
-    /// - `topic`: as DDS names it.
+    /// - `topic`: its DDS name.
     pub fn watch_types(&mut self, topic: &str) {
         self.published.entry(topic.to_owned()).or_default();
     }
 
-    /// How often they have changed, and which they are now.
+    /// Number of changes of the published types, and the current ones.
     pub fn published_types(&self, topic: &str) -> Option<(u64, BTreeSet<String>)> {
         let published = self.published.get(topic)?;
         Some((
@@ -138,7 +138,7 @@ impl DdsGraph {
         ))
     }
 
-    /// Why nothing of a topic can be read; reported when that is new.
+    /// Sets the reason why a topic is unreadable; reports a new reason.
     pub fn set_unread(&mut self, name: &str, why: Option<String>) {
         if self.unread.get(name) == why.as_ref() {
             return;
@@ -158,12 +158,12 @@ impl DdsGraph {
             .for_each(|local| self.report(local, None));
     }
 
-    /// How often it looks who is silent, where anybody may be.
+    /// Period of checks for silent participants; `None` without a keep-alive.
     pub fn look_every(&self) -> Option<Duration> {
         self.keep_alive.as_ref().map(|_| LOOK_EVERY)
     }
 
-    /// Remembers participants that RustDDS may forget, and has it match them when it meets them again.
+    /// Remembers participants that RustDDS may forget, and has it rematch them on their return.
     fn remember(&mut self, event: &Event) {
         match event {
             Event::ParticipantDiscovered { dpd } => {
@@ -247,7 +247,7 @@ impl DdsGraph {
                 self.reported.retain(|guid| guid.prefix != id);
                 self.unmatch(|guid| guid.prefix == id);
             }
-            // what the node itself publishes there says nothing
+            // ignores the node's own publications
             Event::WriterDetected { writer }
                 if self.published.contains_key(&writer.topic_name)
                     && writer.guid.prefix == self.own.prefix => {}
@@ -361,7 +361,7 @@ impl DdsGraph {
         }
     }
 
-    /// Somebody has a topic or a service of ours: with the same type, and the same mapping?
+    /// Checks the type and the service mapping of a remote endpoint on a topic or service of ours.
     fn seen(&mut self, guid: GUID, topic: &str, type_name: &str) {
         if guid.prefix == self.own.prefix {
             return;
@@ -426,7 +426,7 @@ impl DdsGraph {
     }
 }
 
-/// The name of a type in ROS, of that which DDS has.
+/// ROS name of a type from its DDS name.
 fn ros_type(wire_name: &str) -> String {
     let plain = wire_name.replace("::dds_::", "::");
     plain.strip_suffix('_').unwrap_or(&plain).replace("::", "/")
@@ -437,7 +437,7 @@ fn service_of<'a>(topic: &'a str, before: &str, after: &str) -> Option<&'a str> 
     topic.strip_prefix(before)?.strip_suffix(after)
 }
 
-/// What is asked for and not offered.
+/// The requested quality of service that is not offered.
 fn difference(wanted: &QosPolicies, offered: &QosPolicies) -> String {
     if wanted.is_reliable() && !offered.is_reliable() {
         return "it wants reliable, offered is best effort".to_owned();
@@ -453,7 +453,7 @@ fn difference(wanted: &QosPolicies, offered: &QosPolicies) -> String {
     }
 }
 
-/// It is asked by the topics that follow what is published, on the same thread.
+/// The topics that follow published types query the graph, on the same thread.
 impl Listener for Arc<Mutex<DdsGraph>> {
     fn sources(
         &mut self,
@@ -480,7 +480,7 @@ impl Listener for Arc<Mutex<DdsGraph>> {
     }
 }
 
-/// How services are carried, by the parameter.
+/// Mapping of services, by the parameter.
 pub(super) fn mapping(config: &NodeConfig) -> ServiceMapping {
     match config.parameters.string("service_mapping") {
         "cyclone" => ServiceMapping::Cyclone,

@@ -1,4 +1,4 @@
-//! One thread takes everything that comes.
+//! One thread receives all messages.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -14,20 +14,20 @@ use crate::ros::exchange::{Exchange, RosError};
 use crate::ros::messages::RosMessage;
 use crate::ros::port::Arrival;
 
-/// Something that messages come from.
+/// A source of messages.
 pub(super) trait Listener: Send {
-    /// Gives out what wakes the thread, once for all that came since it was last read empty. Asked
-    /// for once, before anything is taken.
+    /// Passes on the event sources that wake the thread, once per batch since the last full read.
+    /// Called before any read, and again after [`Self::has_changed`].
     fn sources(
         &mut self,
         each: &mut dyn FnMut(&mut dyn Source) -> io::Result<()>,
     ) -> io::Result<()>;
 
-    /// Takes all that is there.
+    /// Reads all waiting messages.
     fn take(&mut self);
 
-    /// Whether other sources are to wake the thread from now on, as what others publish has
-    /// changed.
+    /// Whether other sources have to wake the thread from now on, after a change of published
+    /// types.
     fn has_changed(&mut self) -> bool {
         false
     }
@@ -36,10 +36,9 @@ pub(super) trait Listener: Send {
 /// Not the number of any listener.
 const WAKE: Token = Token(usize::MAX);
 
-/// Starts the thread; the waker lets it look whether all is over.
+/// Starts the thread; the waker makes it check for the end.
 ///
-/// - `look_every`: how long listeners may go without being asked for what is there; `None` where
-///   only what comes counts.
+/// - `look_every`: maximum time between reads of each listener; `None`: only events count.
 pub(super) fn listen(
     mut listeners: Vec<Box<dyn Listener>>,
     look_every: Option<Duration>,
@@ -55,7 +54,7 @@ pub(super) fn listen(
     let waker = Arc::new(Waker::new(poll.registry(), WAKE)?);
     let thread = exchange.thread("touchup-receive", move |exchange| {
         let mut events = Events::with_capacity(128);
-        // what came before the registration wakes nobody
+        // messages from before the registration wake nobody
         listeners.iter_mut().for_each(|listener| listener.take());
         let mut looked = Instant::now();
         while !exchange.inbox.is_over() {
@@ -94,8 +93,8 @@ pub(super) fn listen(
     Ok((waker, thread))
 }
 
-/// Takes all that is there of what has this name; what cannot be read is reported with a remark
-/// behind the reason.
+/// Reads all waiting messages under this name; reports unreadable ones with a remark after the
+/// reason.
 pub(super) fn drain<T>(
     (name, exchange, remark): (&'static str, &Arc<Exchange>, &str),
     mut receive: impl FnMut() -> ReadResult<Option<T>>,
@@ -119,12 +118,12 @@ pub(super) fn drain<T>(
 pub(super) struct LastNumbers(BTreeMap<Gid, i64>);
 
 impl LastNumbers {
-    /// Senders that are followed.
+    /// Maximum number of senders.
     const MOST: usize = 64;
-    /// A gap that is larger is no loss: 100 s at 10 kHz.
+    /// A larger gap is no loss: 100 s at 10 kHz.
     const LARGEST: i64 = 1_000_000;
 
-    /// How many are missing before this one.
+    /// Number of messages missing before this one.
     pub fn missing(&mut self, sender: Gid, number: i64) -> u64 {
         if self.0.len() >= Self::MOST && !self.0.contains_key(&sender) {
             self.0.pop_first();
@@ -141,7 +140,7 @@ impl LastNumbers {
     }
 }
 
-/// A topic that is listened to.
+/// A subscribed topic.
 pub(super) struct HeardTopic<M: RosMessage> {
     pub name: &'static str,
     pub subscription: Subscription<M>,

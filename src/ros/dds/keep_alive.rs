@@ -1,15 +1,15 @@
-//! Waits longer for participants that are silent than RustDDS does, and has it meet again those that
-//! it has forgotten: a cable was out, a program was stopped, a computer slept, a packet was lost.
+//! Waits for silent participants longer than RustDDS does, and has it meet forgotten ones again:
+//! after an unplugged cable, a stopped program, a sleeping computer, a lost packet.
 //!
-//! A participant says that it is alive by announcing itself every few seconds (RTPS 2.5, 8.5.3),
-//! and whoever hears nothing of it for the time that it asks for forgets it: CycloneDDS asks for 10
-//! s and announces itself every 8 s, so one lost packet is enough. So RustDDS hears the last
-//! announcement again from here until the participant has been silent for [`PATIENCE`], unless its
-//! computer says that the program has ended.
+//! A participant shows that it is alive by announcing itself every few seconds (RTPS 2.5, 8.5.3),
+//! and listeners forget it after silence for its lease: CycloneDDS has a lease of 10 s and
+//! announces itself every 8 s, so one lost packet is enough. So this module repeats the last
+//! announcement to RustDDS until the participant has been silent for [`PATIENCE`], unless its
+//! computer reports the end of the program.
 //!
-//! RustDDS 0.15 never meets again whom it has forgotten: others repeat their announcement under the
-//! number that it had, and RustDDS passes over messages with a number that it knows. From here it hears
-//! the announcement of one that came back under a new number. [`super::rematch`] does the rest.
+//! RustDDS 0.15 never meets a forgotten participant again: others repeat their announcement under
+//! its old number, and RustDDS skips messages with a known number. This module passes on the
+//! announcement of a returning participant under a new number. [`super::rematch`] does the rest.
 
 use std::collections::BTreeMap;
 use std::io::{Error, ErrorKind, Result};
@@ -22,41 +22,40 @@ use socket2::{Domain, Protocol, Socket, Type};
 
 use super::first_request;
 
-/// So long a participant may be silent. RustDDS asks the others for 50 s and announces itself every
-/// 10 s: beyond 40 s of silence they may have forgotten us, and both sides begin anew.
+/// Maximum silence of a participant. RustDDS asks the others for 50 s and announces itself every 10
+/// s: beyond 40 s of silence they may have forgotten us, and both sides begin anew.
 const PATIENCE: Duration = Duration::from_secs(40);
-/// How often it is looked for who is silent.
+/// Period of checks for silent participants.
 pub(super) const LOOK_EVERY: Duration = Duration::from_millis(500);
-/// Where participants announce themselves (RTPS 2.5, 9.6.2.4.1).
+/// Multicast group of announcements (RTPS 2.5, 9.6.2.4.1).
 const GROUP: Ipv4Addr = Ipv4Addr::new(239, 255, 0, 1);
-/// Ports of the first domain, and from one domain and one participant to the next (RTPS 2.5,
-/// 9.6.2.3).
+/// Ports of the first domain, and steps per domain and per participant (RTPS 2.5, 9.6.2.3).
 const MULTICAST_PORT: u32 = 7400;
 const UNICAST_PORT: u32 = 7410;
 const PORTS_OF_A_DOMAIN: u32 = 250;
 const PORTS_OF_A_PARTICIPANT: u32 = 2;
-/// A participant that knows no multicast announces itself to the ports of this number of participants
-/// of a computer, as rmw_fastrtps and rmw_cyclonedds do that meet programs of their computer alone.
+/// Number of participants of a computer whose ports get the announcements of one without multicast,
+/// as in rmw_fastrtps and rmw_cyclonedds for programs of one computer.
 const ASKED_PARTICIPANTS: u32 = 32;
-/// Participants that are remembered; a domain holds 120.
+/// Maximum number of remembered participants; a domain holds 120.
 const MOST_PARTICIPANTS: usize = 1024;
-/// No datagram is larger.
+/// Maximum size of a datagram.
 const LARGEST_DATAGRAM: usize = 1 << 16;
-/// Larger announcements are not kept: one of a participant of ROS has some 500 bytes.
+/// Maximum size of a stored announcement: a ROS participant's has some 500 bytes.
 const LARGEST_ANNOUNCEMENT: usize = 1 << 13;
 
-/// What names a participant on the wire.
+/// Identifier of a participant on the wire.
 type Prefix = [u8; 12];
 
-/// The participants of a domain, by what they announce.
+/// The participants of a domain, by their announcements.
 pub(super) struct KeepAlive {
-    /// wake the thread that takes: one hears announcements to all, one answers of our readers, one has
-    /// the port of a participant of this computer and hears announcements to each
+    /// wake the reading thread: one receives announcements to all, one answers of our readers, one
+    /// has the port of a participant of this computer and receives announcements to each
     pub sockets: Vec<MioSocket>,
     answers_port: u16,
-    /// numbers of the announcements handed over
+    /// next number of a forwarded announcement
     next_number: i64,
-    /// our own participant, and where it listens
+    /// our own participant, and its port
     own: Prefix,
     own_port: u16,
     known: BTreeMap<Prefix, KnownParticipant>,
@@ -68,26 +67,26 @@ struct KnownParticipant {
     datagram: Vec<u8>,
     from: SocketAddr,
     heard: Instant,
-    /// after so much silence RustDDS forgets it
+    /// silence after which RustDDS forgets it
     lease: Duration,
-    /// when RustDDS heard the last announcement, here or from the participant
+    /// time of the last announcement to RustDDS, from here or from the participant
     renewed: Instant,
     state: PeerState,
 }
 
 enum PeerState {
     Heard,
-    /// silent for long: its computer was asked whether the program still has its port, where there
-    /// is a way to it
+    /// long silent: asked its computer whether the program still has its port; `None` without a
+    /// route
     Asked(Option<UdpSocket>),
-    /// it has not
+    /// the program has ended
     Ended,
     /// RustDDS has forgotten it
     Lost,
 }
 
 impl KnownParticipant {
-    /// Whether RustDDS has to hear of it soon.
+    /// Whether RustDDS needs an announcement of it soon.
     fn is_due(&self, now: Instant) -> bool {
         let early = (self.lease / 2).min(3 * LOOK_EVERY);
         let silent = now.saturating_duration_since(self.heard);
@@ -96,7 +95,7 @@ impl KnownParticipant {
             && silent + self.lease <= PATIENCE
     }
 
-    /// Whether it may have forgotten us, and RustDDS waits on.
+    /// Whether it may have forgotten us while RustDDS still waits.
     fn is_forgotten_late(&self, now: Instant) -> bool {
         !matches!(self.state, PeerState::Ended | PeerState::Lost)
             && self.lease > PATIENCE
@@ -105,7 +104,7 @@ impl KnownParticipant {
 
     /// Sends its last announcement to our own participant, under a new number.
     ///
-    /// - `lease_s`: that RustDDS is to take it for; `None`: its own.
+    /// - `lease_s`: replaces its lease; `None`: its own.
     fn hand_over(&self, next_number: &mut i64, lease_s: Option<i32>, own_port: u16) {
         let Some(announcement) = announcement(&self.datagram) else {
             return;
@@ -125,7 +124,7 @@ impl KeepAlive {
     /// Listens beside RustDDS.
     ///
     /// # Errors
-    /// Those of the system, when the port cannot be shared.
+    /// Those of the system, if the port cannot be shared.
     pub fn new(domain_id: u16, participant_id: u16, own: GUID) -> Result<Self> {
         let offset = u32::from(domain_id) * PORTS_OF_A_DOMAIN;
         let port_of =
@@ -142,7 +141,7 @@ impl KeepAlive {
         socket.set_reuse_port(true)?;
         socket.bind(&SocketAddr::from((Ipv4Addr::UNSPECIFIED, port)).into())?;
         socket.set_nonblocking(true)?;
-        // on Linux a socket hears every group that any other has joined, as RustDDS has on each
+        // on Linux a socket hears every group joined by any other, and RustDDS joins on each
         // interface
         if let Err(error) = socket.join_multicast_v4(&GROUP, &Ipv4Addr::UNSPECIFIED) {
             tracing::debug!(%error, "no route for multicast yet");
@@ -171,7 +170,7 @@ impl KeepAlive {
         })
     }
 
-    /// RustDDS has waited for it in vain, or this process stood still meanwhile.
+    /// Handles a timeout of RustDDS for a participant, or after a pause of this process.
     pub fn lost(&mut self, prefix: &[u8], now: Instant) {
         let Ok(prefix) = Prefix::try_from(prefix) else {
             return;
@@ -181,7 +180,7 @@ impl KeepAlive {
         };
         let before = std::mem::replace(&mut known.state, PeerState::Lost);
         let silent = now.saturating_duration_since(known.heard);
-        // this process was stopped, not the other one
+        // this process stopped, not the other one
         if silent < known.lease.min(PATIENCE) {
             self.meet(prefix);
         } else if !matches!(before, PeerState::Ended) {
@@ -192,14 +191,14 @@ impl KeepAlive {
         }
     }
 
-    /// It has taken its leave.
+    /// Handles the farewell of a participant.
     pub fn left(&mut self, prefix: &[u8]) {
         if let Ok(prefix) = Prefix::try_from(prefix) {
             self.known.remove(&prefix);
         }
     }
 
-    /// Has a writer of Fast DDS say what it has sent, as [`first_request`] has it.
+    /// Has a writer of Fast DDS list its sent messages, see [`first_request`].
     ///
     /// - `reader`: ours.
     pub fn ask(&self, reader: GUID, writer: GUID) {
@@ -212,7 +211,7 @@ impl KeepAlive {
         let asked = way_from(known.from).and_then(|(way, own)| {
             let answers = SocketAddr::new(own, self.answers_port);
             let heartbeat = first_request::heartbeat(reader, writer, answers);
-            // readers and writers have the port behind that of the participant
+            // readers and writers have the port after the participant's
             let to = (own, self.own_port + 1);
             heartbeat.map_or(Ok(0), |heartbeat| way.send_to(&heartbeat, to))
         });
@@ -221,7 +220,7 @@ impl KeepAlive {
         }
     }
 
-    /// The answer of our reader goes on to the writer.
+    /// Passes the answer of our reader on to the writer.
     fn pass_on(&self, answer: &[u8]) {
         let Ok(mut question) = <[u8; first_request::LENGTH]>::try_from(answer) else {
             return;
@@ -236,7 +235,7 @@ impl KeepAlive {
         }
     }
 
-    /// Takes all announcements that are there, and looks who is silent.
+    /// Reads all waiting announcements, and checks for silent participants.
     pub fn take(&mut self) {
         let mut datagram = std::mem::take(&mut self.datagram);
         for number in 0..self.sockets.len() {
@@ -244,7 +243,7 @@ impl KeepAlive {
                 match self.sockets[number].recv_from(&mut datagram) {
                     Ok((length, from)) => self.hear(&datagram[..length], from, Instant::now()),
                     Err(error) if error.kind() == ErrorKind::Interrupted => {}
-                    // nothing is left; any other error ends what was there as well
+                    // empty; any other error ends the read as well
                     Err(_) => break,
                 }
             }
@@ -308,14 +307,14 @@ impl KeepAlive {
         }
     }
 
-    /// Has RustDDS meet one that it has forgotten.
+    /// Has RustDDS meet a forgotten participant.
     fn meet(&mut self, prefix: Prefix) {
         if let Some(known) = self.known.get(&prefix) {
             known.hand_over(&mut self.next_number, None, self.own_port);
         }
     }
 
-    /// RustDDS has met it.
+    /// Notes that RustDDS has met a participant.
     pub fn met(&mut self, prefix: &[u8]) {
         let known = Prefix::try_from(prefix)
             .ok()
@@ -327,9 +326,8 @@ impl KeepAlive {
     }
 }
 
-/// A message without content, for the port that a participant sends from. Where the program has
-/// ended its computer answers that nobody is there (ICMP, RFC 792); nobody answers where the way is
-/// cut.
+/// Sends an empty message to a participant's sending port. If the program has ended its computer
+/// answers port unreachable (ICMP, RFC 792); over a broken route nobody answers.
 fn knock(port: SocketAddr) -> Result<UdpSocket> {
     let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0))?;
     socket.set_nonblocking(true)?;
@@ -342,9 +340,9 @@ fn is_refused(asked: &UdpSocket) -> bool {
     matches!(asked.take_error(), Ok(Some(error)) if error.kind() == ErrorKind::ConnectionRefused)
 }
 
-/// A way to our own participant, and where on it that is: from an address of ours that reaches
-/// somebody. A loopback address would make RustDDS believe that he is on this computer; it is taken
-/// if there is no way to him at all.
+/// A socket to our own participant, and its address there: one of our addresses that reaches the
+/// remote. From a loopback address RustDDS would conclude that the remote is on this computer; used
+/// only without any route.
 fn way_from(somebody: SocketAddr) -> Result<(UdpSocket, IpAddr)> {
     let way = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0))?;
     let own: IpAddr = match way.connect(somebody) {
@@ -354,30 +352,28 @@ fn way_from(somebody: SocketAddr) -> Result<(UdpSocket, IpAddr)> {
     Ok((UdpSocket::bind((own, 0))?, own))
 }
 
-/// Length of the header of a message (RTPS 2.5, 9.4.4), which ends with who sends it.
+/// Length of the header of a message (RTPS 2.5, 9.4.4), which ends with the sender.
 const HEADER: usize = 20;
 /// Numbers of submessages (RTPS 2.5, 9.4.5.1.1).
 const PAD: u8 = 0x01;
 const INFO_TS: u8 = 0x09;
 const INFO_SOURCE: u8 = 0x0c;
 const DATA: u8 = 0x15;
-/// Flags of a submessage DATA: byte order, whether there are parameters before the data, and
-/// whether there is data.
+/// Flags of a submessage DATA: byte order, parameters before the data, and data.
 const LITTLE_ENDIAN: u8 = 0x01;
 const HAS_PARAMETERS: u8 = 0x02;
 const HAS_DATA: u8 = 0x04;
 /// The writer of announcements (RTPS 2.5, 9.3.1.3).
 const ANNOUNCER: [u8; 4] = [0x00, 0x01, 0x00, 0xc2];
-/// Parameters (RTPS 2.5, 9.6.3): how long to wait, where readers and writers listen, and the last one
-/// of a list.
+/// Parameters (RTPS 2.5, 9.6.3): lease, address of readers and writers, and end of a list.
 const LEASE: u16 = 0x0002;
 const LISTENS: u16 = 0x0031;
 const SENTINEL: u16 = 0x0001;
-/// The kind of such a place (RTPS 2.5, 9.3.2.4).
+/// The kind of such an address (RTPS 2.5, 9.3.2.4).
 const UDP_V4: u32 = 1;
-/// Announcements that are handed over have numbers from here on: no participant comes so far.
+/// First number of forwarded announcements: no participant counts that far.
 const FIRST_NUMBER: i64 = 1 << 40;
-/// Where an announcement has no lease, RustDDS waits so long.
+/// Lease that RustDDS assumes for an announcement without one.
 const DEFAULT_LEASE: Duration = Duration::from_secs(60);
 
 fn short(bytes: &[u8], at: usize, is_little_endian: bool) -> Option<u16> {
@@ -389,23 +385,23 @@ fn short(bytes: &[u8], at: usize, is_little_endian: bool) -> Option<u16> {
     })
 }
 
-/// The announcement of a participant in a datagram, and where in it.
+/// The announcement of a participant, and positions in its datagram.
 #[derive(Debug, PartialEq, Eq)]
 struct Announcement {
     prefix: Prefix,
     lease: Duration,
-    /// where its readers and writers listen
+    /// address of its readers and writers
     listens: Option<SocketAddr>,
-    /// place of its number, and its byte order
+    /// position of its number, and its byte order
     number: (usize, bool),
-    /// place of the seconds of its lease, and their byte order
+    /// position of the seconds of its lease, and their byte order
     lease_s: Option<(usize, bool)>,
 }
 
 impl Announcement {
-    /// Reads its data, which end at a place of the datagram; `None` for data that are none.
+    /// Reads its data, which end at a position of the datagram; `None` for invalid data.
     fn take_from(&mut self, data: &[u8], end: usize) -> Option<()> {
-        // the byte order of the data is its own: an even number is big endian
+        // the data has its own byte order: an even number is big endian
         let is_little_endian = data.get(1)? & 1 != 0;
         let word = |bytes: [u8; 4]| {
             if is_little_endian {
@@ -422,7 +418,7 @@ impl Announcement {
                 self.lease = Duration::from_secs(if is_negative { 0 } else { seconds });
                 self.lease_s = Some((end - left, is_little_endian));
             }
-            // kind, port, address, of which IPv4 has the last four bytes
+            // kind, port, address with IPv4 in its last four bytes
             if let (LISTENS, Some((head, tail))) = (id, value.split_first_chunk::<8>())
                 && let (Some(kind), Some(port)) = (head.first_chunk(), head.last_chunk())
                 && (self.listens, word(*kind)) == (None, UDP_V4)
@@ -435,7 +431,7 @@ impl Announcement {
         .map(drop)
     }
 
-    /// Writes another number and another lease into the datagram that it was read from.
+    /// Writes another number and another lease into its datagram.
     fn renumber(&self, datagram: &mut [u8], number: i64, lease_s: Option<i32>) {
         let mut put = |(at, is_little_endian): (usize, bool), value: i32| {
             let bytes = if is_little_endian {
@@ -455,7 +451,7 @@ impl Announcement {
     }
 }
 
-/// Who announces itself in an RTPS datagram, and its lease; `None` for anything else.
+/// The announcement in an RTPS datagram; `None` for anything else.
 fn announcement(datagram: &[u8]) -> Option<Announcement> {
     if !datagram.starts_with(b"RTPS") {
         return None;
@@ -473,7 +469,7 @@ fn announcement(datagram: &[u8]) -> Option<Announcement> {
         };
         let body = datagram.get(at + 4..end)?;
         if id == DATA && flags & HAS_DATA != 0 && body.get(8..12) == Some(&ANNOUNCER) {
-            // more flags, where the data is, reader, writer, and then the number
+            // more flags, offset of the data, reader, writer, and then the number
             body.get(12..20)?;
             let number = (at + 16, is_little_endian);
             let skipped = 4 + usize::from(short(body, 2, is_little_endian)?);
@@ -491,7 +487,7 @@ fn announcement(datagram: &[u8]) -> Option<Announcement> {
             read.take_from(data, end)?;
             return Some(read);
         }
-        // what follows would be from somebody else
+        // the rest would be from another sender
         if id == INFO_SOURCE {
             return None;
         }
@@ -499,8 +495,8 @@ fn announcement(datagram: &[u8]) -> Option<Announcement> {
     }
 }
 
-/// Reads a list of parameters: number, value, and how many bytes there are from the value on; what
-/// comes after it.
+/// Reads a list of parameters: number, value, and number of bytes from the value on; returns the
+/// bytes after the list.
 fn parameters(
     mut bytes: &[u8],
     is_little_endian: bool,
@@ -525,12 +521,12 @@ mod tests {
 
     const SENDER: Prefix = [1, 16, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
 
-    /// A timestamp, then an announcement with a lease, as RTPS 2.5 9.4.5 and 9.6.3 draw them.
+    /// A timestamp, then an announcement with a lease, as drawn in RTPS 2.5 9.4.5 and 9.6.3.
     fn datagram(lease_s: i32, is_little_endian: bool, flags: u8) -> Vec<u8> {
         numbered([0, 1], lease_s, is_little_endian, flags)
     }
 
-    /// The same with another number: its high half, its low half.
+    /// The same datagram with another number: its high half, its low half.
     fn numbered(number: [u32; 2], lease_s: i32, is_little_endian: bool, flags: u8) -> Vec<u8> {
         let flag = u8::from(is_little_endian);
         let short = |value: u16| {
@@ -568,7 +564,7 @@ mod tests {
         let list = [
             [0, 2 | flag, 0, 0].as_slice(),
             &version,
-            // one of another kind stands before it
+            // an address of another kind comes first
             &place(16, [0; 4]),
             &place(1, [10, 0, 0, 7]),
             &lease,
@@ -637,11 +633,11 @@ mod tests {
         }
     }
 
-    /// One that is looked at twice a second, and the port that it forwards to.
+    /// A participant checked twice a second, and the port that receives its announcements.
     struct WatchedPeer {
         keep_alive: KeepAlive,
         own: UdpSocket,
-        /// what the participant sends from; `None` when it has ended
+        /// its sending socket; `None` after its end
         sender: Option<UdpSocket>,
         from: SocketAddr,
         begun: Instant,
@@ -670,7 +666,7 @@ mod tests {
                 .hear(&datagram(lease_s, true, HAS_DATA), self.from, now);
         }
 
-        /// When something is handed over in a time, s.
+        /// Times of forwarded announcements in an interval, s.
         fn handed_over(&mut self, from_s: f64, until_s: f64) -> Vec<f64> {
             let looks = (0..)
                 .map(|look| from_s + 0.5 * f64::from(look))
@@ -684,7 +680,7 @@ mod tests {
             found
         }
 
-        /// The datagram that our own participant has heard.
+        /// The datagram received by our own participant.
         fn received(&mut self) -> Option<Vec<u8>> {
             let mut bytes = [0; 400];
             let length = self.own.recv(&mut bytes).ok()?;
@@ -711,8 +707,8 @@ mod tests {
     fn who_is_silent_is_spoken_for_before_each_end_of_its_lease_until_patience_ends() {
         let mut watched = WatchedPeer::new();
         watched.hear(10, 0.0);
-        // asked 1.5 s before the end, handed over 0.5 s later; what begins at 27 s ends at 37 s,
-        // and 46 s would be too late
+        // asked 1.5 s before the end, forwarded 0.5 s later; a lease from 27 s ends at 37 s, and 46
+        // s would be too late
         assert_eq!(watched.handed_over(0.0, 100.0), [9.0, 18.0, 27.0]);
         watched.hear(10, 100.0);
         assert_eq!(watched.handed_over(100.0, 110.0), [109.0]);
@@ -751,7 +747,7 @@ mod tests {
             watched.lost(at_s + 12.0);
             assert!(watched.received().is_none());
         }
-        // as long as it is not met
+        // until RustDDS has met it
         for _ in 0..2 {
             watched.hear(10, 600.0);
             assert!(watched.received().is_some());

@@ -1,8 +1,8 @@
 //! The port on its own DDS: ros2-client over RustDDS, no ROS installation needed.
 //!
-//! Three threads of ours stand beside those of DDS. One takes what comes and puts it into the inbox
-//! of the node. Two send: one what is small and urgent, answers among it; one the mesh, where a
-//! slow listener may hold things up.
+//! Three threads of ours run beside those of DDS. One receives messages and puts them into the
+//! inbox of the node. Two send: one small and urgent messages, including answers; one the mesh, as
+//! a slow listener may delay it.
 
 mod action;
 mod answers;
@@ -49,26 +49,26 @@ struct DdsConnection {
     exchange: Arc<Exchange>,
     waker: Arc<rustdds::mio1::Waker>,
     threads: Vec<JoinHandle<()>>,
-    /// its entities leave the graph when it goes
+    /// its entities leave the graph on drop
     node: Option<Arc<Mutex<Node>>>,
 }
 
-/// The network is left within this time, or as it is: RustDDS that is busy with what it received
-/// keeps no node from its end.
+/// Maximum time for leaving the network in order: a RustDDS busy with received messages does not
+/// keep a node from its end.
 const LEAVES_WITHIN: Duration = Duration::from_secs(20);
 
 impl Drop for DdsConnection {
     fn drop(&mut self) {
         self.exchange.inbox.end();
         self.exchange.close();
-        // without it the thread stays until the next message: nothing worse
+        // otherwise the thread stays until the next message, which does no harm
         let _ = self.waker.wake();
         let (threads, node) = (std::mem::take(&mut self.threads), self.node.take());
         let (done, has_left) = sync_channel(1);
         let leave = move || {
             exchange::join(threads);
             drop(node);
-            // nobody may wait any more
+            // the waiting thread may have given up
             let _ = done.send(());
         };
         let is_late = Builder::new()
@@ -84,14 +84,14 @@ impl Drop for DdsConnection {
     }
 }
 
-/// Joins the network as a node: what comes goes to `inbox` from now on.
+/// Joins the network as a node: messages go to `inbox` from now on.
 ///
 /// # Errors
-/// [`RosError`]: a name that is none, no network, no thread.
+/// [`RosError`]: an invalid name, no network, no thread.
 #[expect(clippy::too_many_lines)]
 pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosError> {
     let exchange = Exchange::new(config, inbox);
-    // its own parameter services know one mapping alone, and nothing of ranges
+    // the library's parameter services know only one mapping, and no ranges
     let options = declare(
         NodeOptions::new().start_parameter_services(false),
         &config.parameters,

@@ -1,10 +1,10 @@
-//! Has RustDDS match our readers and writers again with those of a participant that it meets for the
-//! second time.
+//! Has RustDDS match our readers and writers again with those of a participant that it meets for
+//! the second time.
 //!
-//! RustDDS 0.15 keeps the readers and writers of a participant that it has forgotten, and has them
-//! again when it meets the participant again; the participant itself does not announce them anew.
-//! But RustDDS matches them with ours only when one of ours begins on their topic. So one does, for a
-//! moment.
+//! RustDDS 0.15 keeps the readers and writers of a forgotten participant, and has them again when
+//! it meets the participant again; the participant itself does not announce them anew. But RustDDS
+//! matches them with ours only when one of ours begins on their topic. So this module starts one
+//! for a moment.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};
@@ -17,12 +17,12 @@ use ros2_client::dds::rustdds::{
     QosPolicyBuilder, TopicKind,
 };
 
-/// Endpoints of others to remember.
+/// Maximum number of remembered remote endpoints.
 const MOST_ENDPOINTS: usize = 4096;
-/// How long one of ours is there: RustDDS takes a few milliseconds.
+/// Lifetime of an endpoint of ours: RustDDS takes a few milliseconds.
 const MOMENT: Duration = Duration::from_secs(1);
 
-/// A reader or writer of somebody else.
+/// A remote reader or writer.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct RemoteEndpoint {
     topic: String,
@@ -30,16 +30,16 @@ struct RemoteEndpoint {
     is_reader: bool,
 }
 
-/// One of ours that nothing is read from and written to.
+/// An endpoint of ours without any reads or writes.
 enum Momentary {
     Reader(#[expect(dead_code)] SimpleDataReader<(), CDRDeserializerAdapter<()>>),
     Writer(#[expect(dead_code)] DataWriter<(), CDRSerializerAdapter<()>>),
 }
 
-/// Those of others that ours are matched with.
+/// Remote endpoints matched with ours.
 pub(super) struct Rematch {
     participant: DomainParticipant,
-    /// RustDDS says which it is before it says whom it fits
+    /// RustDDS describes an endpoint before it reports a match
     described: Option<(GUID, RemoteEndpoint)>,
     matched: BTreeMap<GUID, RemoteEndpoint>,
     begun: Vec<(Instant, Momentary)>,
@@ -55,7 +55,7 @@ impl Rematch {
         }
     }
 
-    /// RustDDS has heard of a reader or writer.
+    /// Notes a description of a remote reader or writer.
     pub fn described(&mut self, endpoint: &EndpointDescription, is_reader: bool) {
         let remote = RemoteEndpoint {
             topic: endpoint.topic_name.clone(),
@@ -65,7 +65,7 @@ impl Rematch {
         self.described = Some((endpoint.guid, remote));
     }
 
-    /// … and one of ours fits it.
+    /// Notes that the described endpoint matches one of ours.
     pub fn matched(&mut self, remote: GUID) {
         if let Some((_, endpoint)) = self.described.as_ref().filter(|(guid, _)| *guid == remote)
             && self.matched.len() < MOST_ENDPOINTS
@@ -74,15 +74,15 @@ impl Rematch {
         }
     }
 
-    /// These have gone for good.
+    /// Forgets endpoints that have left.
     pub fn left(&mut self, is_gone: impl Fn(&GUID) -> bool) {
         self.matched.retain(|guid, _| !is_gone(guid));
     }
 
-    /// RustDDS has met the participant of these: again, where some were matched before.
+    /// Handles a meeting with the participant of these endpoints; rematches those matched before.
     ///
     /// # Errors
-    /// Those of RustDDS, with what it was asked for.
+    /// Those of RustDDS, with the refused request.
     pub fn met(&mut self, is_of: impl Fn(&GUID) -> bool, now: Instant) -> CreateResult<()> {
         let of_it = self.matched.iter().filter(|(guid, _)| is_of(guid));
         let again: BTreeSet<_> = of_it.map(|(_, endpoint)| endpoint.clone()).collect();
@@ -92,13 +92,13 @@ impl Rematch {
         Ok(())
     }
 
-    /// Ends those of ours that have had their moment.
+    /// Ends endpoints of ours whose moment is over.
     pub fn look(&mut self, now: Instant) {
         self.begun
             .retain(|(begun, _)| now.saturating_duration_since(*begun) < MOMENT);
     }
 
-    /// One of ours that fits all others: a reader asks for least, a writer offers most.
+    /// Starts an endpoint of ours that fits all: a reader requests least, a writer offers most.
     fn begin(&self, remote: RemoteEndpoint) -> CreateResult<Momentary> {
         let RemoteEndpoint {
             topic,

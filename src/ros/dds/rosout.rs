@@ -1,4 +1,4 @@
-//! `/rosout`: what the log says, for who watches the nodes of a cell.
+//! `/rosout`: the log, for observers of the nodes of a cell.
 
 use std::sync::mpsc::RecvTimeoutError;
 use std::sync::{Arc, Mutex};
@@ -14,7 +14,7 @@ use crate::log_lines::listen;
 use crate::ros::exchange::{Exchange, RosError};
 use crate::ros::locked;
 
-/// It looks so often whether the port leaves.
+/// Period of checks whether the port leaves.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 /// Starts the thread that sends lines of the log, in the name of the node.
@@ -23,7 +23,7 @@ pub(super) fn send(
     exchange: &Arc<Exchange>,
 ) -> Result<JoinHandle<()>, RosError> {
     let (node, lines) = (node.clone(), listen());
-    // as loggers have it: `cell.touchup`
+    // name of a logger: `cell.touchup`
     let name = exchange.node_name.trim_start_matches('/').replace('/', ".");
     Ok(exchange.thread("touchup-rosout", move |exchange| {
         loop {

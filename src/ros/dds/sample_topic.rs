@@ -1,4 +1,4 @@
-//! Topics of poses and wrenches, whatever type they are published with.
+//! Topics of poses and wrenches, of any published type.
 
 use std::io;
 use std::sync::atomic::Ordering;
@@ -22,10 +22,10 @@ use crate::ros::locked;
 use crate::ros::sample_source::SampleSource;
 use crate::ros::topics::{SubscribesSamples, Topic};
 
-/// A message as the decoder of recordings reads it.
+/// A message as read by the decoder of recordings.
 struct ReadMessage(Result<LiveMessage, BadMessage>);
 
-/// The library wants it of what is subscribed to; what a message means only its type says.
+/// The library requires this of subscribed types; decoding needs the type of the message.
 impl<'de> Deserialize<'de> for ReadMessage {
     fn deserialize<D: Deserializer<'de>>(_: D) -> Result<Self, D::Error> {
         Err(D::Error::custom("read without its type"))
@@ -42,7 +42,7 @@ impl<'de> DeserializeSeed<'de> for Seed<'_> {
     type Value = ReadMessage;
 
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<ReadMessage, D::Error> {
-        // it is there by now, and no earlier
+        // the message has arrived by now
         self.of
             .seed(self.clock.now_ns())
             .deserialize(deserializer)
@@ -50,23 +50,23 @@ impl<'de> DeserializeSeed<'de> for Seed<'_> {
     }
 }
 
-/// A topic of poses or wrenches that is listened to, with the type that is published.
+/// A topic of poses or wrenches, with its published type.
 struct SampleTopic {
     name: &'static str,
     /// absolute, remapped
     whole: String,
-    /// as DDS has it
+    /// DDS name
     wire_name: String,
     profile: QosProfile,
     source: SampleSource,
     of: LiveType,
     subscription: Subscription<ReadMessage>,
-    /// changes of what is published that were looked at
+    /// number of examined changes of the published types
     seen: u64,
     node: BegunNode,
     graph: Arc<Mutex<DdsGraph>>,
     exchange: Arc<Exchange>,
-    /// which of the two counters of what was lost on the way
+    /// index of its counter of lost messages
     counter: usize,
     numbers: LastNumbers,
 }
@@ -105,7 +105,7 @@ impl SubscribesSamples for DdsBackEnd<'_> {
 }
 
 impl SampleTopic {
-    /// Listens to another type from now on.
+    /// Subscribes to another type.
     fn listen_to(&mut self, of: LiveType) -> Result<(), RosError> {
         let node = self
             .node
@@ -160,7 +160,7 @@ impl Listener for SampleTopic {
     }
 
     fn has_changed(&mut self) -> bool {
-        // until it has begun nothing can change
+        // nothing changes before the start of the node
         if self.node.get().is_none() {
             return false;
         }

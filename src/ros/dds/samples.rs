@@ -1,4 +1,4 @@
-//! Publishes what a stylus or a probe measures.
+//! Publishes the measurements of a stylus or a probe.
 
 use std::collections::BTreeSet;
 
@@ -14,23 +14,23 @@ use crate::ros::exchange::RosError;
 use crate::ros::messages::{PoseStamped, RosMessage, WrenchStamped};
 use crate::ros::port::SamplePort;
 
-/// Nothing is sent twice: what is kept is for who takes it at once.
+/// Nothing is resent: the history serves readers that read at once.
 const DEPTH: usize = 100;
 
 struct DdsSamples {
     wrench: Publisher<WrenchStamped>,
     pose: Publisher<PoseStamped>,
     listener: DomainParticipantStatusListener,
-    /// to wrenches, to poses
+    /// of wrenches, of poses
     listeners: [BTreeSet<GUID>; 2],
-    // its entities leave the graph when it goes
+    // its entities leave the graph on drop
     _node: Node,
 }
 
-/// Joins the network as a stylus or probe: the topics are those of the parameter `source`.
+/// Joins the network as a stylus or probe: the parameter `source` selects the topics.
 ///
 /// # Errors
-/// [`RosError`]: a name that is none, no network.
+/// [`RosError`]: an invalid name, no network.
 pub fn samples(config: &NodeConfig) -> Result<Box<dyn SamplePort>, RosError> {
     let (context, mut node) = join(config, NodeOptions::new().start_parameter_services(false))?;
     let listener = context.domain_participant().status_listener();

@@ -1,8 +1,8 @@
 //! Services, in the mapping of either RMW.
 //!
-//! In the enhanced mapping a server is that of ros2-client. In the mapping of CycloneDDS it is our
-//! own: that of ros2-client puts the identity of the request into the inline QoS there too, which
-//! nobody reads, and which RustDDS 0.15.1 writes wrongly in fragments.
+//! In the enhanced mapping the server is ros2-client's. In the mapping of CycloneDDS it is our own:
+//! ros2-client's also puts the identity of the request into the inline QoS there, which nobody
+//! reads, and which RustDDS 0.15.1 writes wrongly in fragments.
 
 use std::io;
 use std::sync::Arc;
@@ -28,7 +28,7 @@ macro_rules! carried {
 }
 include!(concat!(env!("OUT_DIR"), "/carried.rs"));
 
-/// One service: what it is called, and what is done with a request.
+/// One service: its name, and the action for a request.
 struct Service<Q: ros2_client::Message + 'static, A: ros2_client::Message + 'static> {
     name: &'static str,
     server: Server<Q, A>,
@@ -76,7 +76,7 @@ where
     }
 }
 
-/// A request that cannot be read is most often one with another header.
+/// An unreadable request most often has another header.
 pub(super) const OTHER_MAPPING: &str = "; has the caller another service_mapping?";
 
 impl<S> Serves<S> for DdsBackEnd<'_>
@@ -102,12 +102,11 @@ where
     }
 }
 
-/// As ROS 2 has it for services: nothing is lost, calls wait for each other.
+/// Profile of ROS 2 for services: no losses, calls queue up.
 pub(super) const SERVICE: QosProfile =
     QosProfile::publisher_default().history(History::KeepLast { depth: 10 });
 
-/// A request or an answer as rmw_cyclonedds has it: whose call it is, and its number, stand before
-/// the message.
+/// A request or an answer of rmw_cyclonedds: caller and number precede the message.
 #[derive(Clone, Serialize, Deserialize)]
 struct Headed<M> {
     caller: u64,
@@ -120,7 +119,7 @@ impl<M: ros2_client::Message> ros2_client::Message for Headed<M> {}
 /// Sends the answer to one request.
 type SendAnswer<A> = Box<dyn FnOnce(A) -> Result<(), String> + Send>;
 
-/// Takes requests.
+/// Receives requests.
 enum Server<Q: ros2_client::Message + 'static, A: ros2_client::Message + 'static> {
     Enhanced(Arc<ros2_client::Server<Q, A>>),
     Cyclone(Box<Subscription<Headed<Q>>>, Arc<Publisher<Headed<A>>>),
@@ -170,7 +169,7 @@ where
             .during("offering a service")?;
         Ok(Self::Cyclone(Box::new(requests), Arc::new(answers)))
     }
-    /// The next request that has come, and what answers it.
+    /// The next waiting request, and the function that answers it.
     fn take(&self) -> ReadResult<Option<(Q, SendAnswer<A>)>> {
         Ok(match self {
             Self::Enhanced(server) => server.receive_request()?.map(|(id, request)| {

@@ -1,10 +1,10 @@
-//! What RustDDS leaves open on its sockets is closed from here: it listens on every interface
-//! whatever networks it was given, and of a message in fragments it takes the memory that the first
-//! fragment claims, up to 4 GB.
+//! Closes openings that RustDDS leaves on its sockets: it listens on every interface whatever its
+//! networks, and for a message in fragments it allocates the size claimed by the first fragment, up
+//! to 4 GB.
 //!
-//! Its sockets are known by having come while it joined. The kernel then drops fragments of what is
-//! larger than any message to a node of ours, and with [`Range::Computer`] all that does not come
-//! over the loopback interface.
+//! Its sockets are those opened while it joined. The kernel then drops fragments of messages larger
+//! than any to a node of ours, and with [`Range::Computer`] everything from outside the loopback
+//! interface.
 
 use std::collections::BTreeSet;
 use std::fs::{self, DirEntry};
@@ -17,31 +17,30 @@ use socket2::{SockFilter, SockRef, Type};
 
 use crate::ros::exchange::RosError;
 
-/// Messages in fragments up to so many bytes are taken; what a node of ours listens to has a
-/// hundredth of it.
+/// Maximum size of messages in fragments, bytes; a subscribed message has a hundredth of it.
 const LARGEST_MESSAGE: u32 = 1 << 20;
-/// Submessages of a datagram that are looked at; participants put a few into one.
+/// Maximum number of examined submessages of a datagram; participants put a few into one.
 const MOST_SUBMESSAGES: usize = 24;
 
-/// Who is met.
+/// Reach of the network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Range {
-    /// programs of this computer alone
+    /// only programs of this computer
     Computer,
-    /// … and of its networks
+    /// also programs of its networks
     Networks,
 }
 
-/// The open sockets of this process: the number of the file, and what the system calls the socket,
-/// as numbers are given again.
+/// The open sockets of this process: the file number, and the system's name of the socket, as
+/// numbers are reused.
 #[derive(Debug)]
 pub(super) struct OpenSockets(BTreeSet<(RawFd, PathBuf)>);
 
 impl OpenSockets {
-    /// Those that are open now.
+    /// The sockets open now.
     ///
     /// # Errors
-    /// Those of the system, where it does not say.
+    /// Those of the system, if it does not list them.
     pub fn now() -> io::Result<Self> {
         let socket = |entry: io::Result<DirEntry>| {
             let entry = entry.ok()?;
@@ -56,17 +55,17 @@ impl OpenSockets {
         ))
     }
 
-    /// Closes what UDP sockets that were opened since then leave open; how many there are.
+    /// Guards the UDP sockets opened since then; returns their number.
     ///
     /// # Errors
-    /// Those of the system, where a socket cannot be closed so far.
+    /// Those of the system, if a socket refuses the filter or device.
     pub fn guard_since(&self, range: Range) -> io::Result<usize> {
         let filter = filter();
         let mut guarded = 0;
         for &(number, _) in Self::now()?.0.difference(&self.0) {
             // SAFETY: it was open a moment ago, and is borrowed for a few system calls, each of
-            // which refuses what is no socket; a file that another thread has opened under this
-            // number meanwhile is no UDP socket, or is one that may be guarded as well
+            // which refuses anything but a socket; a file opened by another thread under this
+            // number meanwhile is no UDP socket, or one that may be guarded as well
             let file = unsafe { BorrowedFd::borrow_raw(number) };
             let socket = SockRef::from(&file);
             let address = socket
@@ -89,8 +88,8 @@ impl OpenSockets {
     }
 }
 
-/// A node that others must not reach does not run where they do; without a filter for what is too
-/// large it does.
+/// Guards the sockets of a join. Without protection from other computers a local node does not run;
+/// without a filter for large messages a node does.
 pub(super) fn guard(before: io::Result<OpenSockets>, localhost_only: bool) -> Result<(), RosError> {
     let range = if localhost_only {
         Range::Computer
@@ -112,23 +111,22 @@ pub(super) fn guard(before: io::Result<OpenSockets>, localhost_only: bool) -> Re
     Ok(())
 }
 
-/// Of a datagram as a filter sees it: the header of UDP, and behind it that of RTPS.
+/// Start of the submessages in a filter's view of a datagram: after the headers of UDP and RTPS.
 const FIRST_SUBMESSAGE: u32 = 8 + 20;
 /// Numbers of submessages (RTPS 2.5, 9.4.5.1.1).
 const PAD: u32 = 0x01;
 const INFO_TS: u32 = 0x09;
 const DATA_FRAG: u32 = 0x16;
-/// Where a DATA_FRAG says how large the whole is (RTPS 2.5, 9.4.5.5).
+/// Offset of the total size in a DATA_FRAG (RTPS 2.5, 9.4.5.5).
 const DATA_SIZE: u32 = 32;
-/// Verdicts of a filter, as bytes that are taken of a datagram.
+/// Verdicts of a filter, as accepted bytes of a datagram.
 const TAKEN: SockFilter = SockFilter::new(0x06, 0, 0, u32::MAX);
 const DROPPED: SockFilter = SockFilter::new(0x06, 0, 0, 0);
 
 /// Passes all but fragments of messages of [`LARGEST_MESSAGE`] and more: walks along the
 /// submessages of a datagram, X at the header of one after the other.
 fn filter() -> Vec<SockFilter> {
-    // a jump names how many instructions it skips, where what is asked for is so and where it is
-    // not
+    // a jump holds the number of instructions to skip if true and if false
     let op = SockFilter::new;
     let length = || op(0x80, 0, 0, 0);
     let byte = |at| op(0x50, 0, 0, at);
@@ -142,7 +140,7 @@ fn filter() -> Vec<SockFilter> {
         op(0x01, 0, 0, FIRST_SUBMESSAGE),
     ];
     for _ in 0..MOST_SUBMESSAGES {
-        // a whole header is left: length - 4 >= X
+        // a whole header remains: length - 4 >= X
         program.extend([length(), op(0x14, 0, 0, 4), op(0x3d, 1, 0, 0), TAKEN]);
         program.extend([
             byte(0),
@@ -161,7 +159,7 @@ fn filter() -> Vec<SockFilter> {
             is_at_least(LARGEST_MESSAGE, 0, 1),
             DROPPED,
         ]);
-        // its length into A, by way of the memory: the bytes in order, or the other way round
+        // its length into A, through memory: bytes in order, or reversed
         program.extend([
             byte(1),
             is_little_endian(0, 9),
@@ -178,7 +176,7 @@ fn filter() -> Vec<SockFilter> {
             op(0x05, 0, 0, 1),
         ]);
         program.push(op(0x48, 0, 0, 2));
-        // without a length it is the last one, but for the two that may be empty
+        // without a length it is the last one, except for the two that may be empty
         program.extend([
             is(0, 0, 5),
             byte(0),
@@ -200,7 +198,7 @@ mod tests {
 
     use super::*;
 
-    /// A submessage: its number, whether its numbers are little endian, what is in it.
+    /// A submessage: its number, whether its numbers are little endian, its content.
     fn submessage(id: u8, is_little_endian: bool, body: &[u8]) -> Vec<u8> {
         let length = body.len() as u16;
         let length = if is_little_endian {
@@ -211,7 +209,7 @@ mod tests {
         [&[id, u8::from(is_little_endian)], length.as_slice(), body].concat()
     }
 
-    /// The fragment of a message of so many bytes.
+    /// A fragment of a message of this number of bytes.
     fn fragment(is_little_endian: bool, size: u32) -> Vec<u8> {
         let size = if is_little_endian {
             size.to_le_bytes()
@@ -235,7 +233,7 @@ mod tests {
         .concat()
     }
 
-    /// Whether each passes the filter; after each comes one that does.
+    /// Whether each datagram passes the filter; a passing one follows each.
     fn passed(datagrams: &[Vec<u8>]) -> Vec<bool> {
         let before = OpenSockets::now().unwrap();
         let receiver = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
@@ -275,7 +273,7 @@ mod tests {
                     fragment(size),
                 ])
             });
-            // an empty time, padding, and a submessage longer than a byte can say
+            // an empty time, padding, and a submessage longer than 255 bytes
             let far = [
                 submessage(0x09, true, &[]),
                 submessage(0x01, false, &[]),
@@ -297,7 +295,7 @@ mod tests {
         for is_little_endian in [true, false] {
             let fragments =
                 [0, 1000, (1 << 20) - 1].map(|size| datagram(&[fragment(is_little_endian, size)]));
-            // the content of the last one looks like a fragment, as it may
+            // the content of the last one may look like a fragment
             let looks_like = [
                 submessage(0x06, is_little_endian, &[2; 24]),
                 vec![0x15, u8::from(is_little_endian), 0, 0],

@@ -18,10 +18,10 @@ use crate::ros::topics::{
 };
 
 pub(super) const BEST_EFFORT: QosProfile = QosProfile::subscription_default();
-/// The thread that sends what is urgent is not held up by who does not listen for longer than this.
+/// Profile of urgent messages: an unresponsive listener delays the sending thread by 10 ms at most.
 pub(super) const URGENT: QosProfile =
     BEST_EFFORT.reliability_reliable(WhenFull::Wait(std::time::Duration::from_millis(10)));
-/// The mesh waits for who listens slowly, then tries again.
+/// Profile of the mesh: waits for slow listeners, then tries again.
 const PATIENT: QosProfile =
     BEST_EFFORT.reliability_reliable(WhenFull::Wait(std::time::Duration::from_millis(100)));
 
@@ -29,8 +29,8 @@ pub(super) const fn keep(profile: QosProfile, depth: usize) -> QosProfile {
     profile.history(History::KeepLast { depth })
 }
 
-/// Touches on their way at most, of 33 kB each: together they fit into the buffer that Linux gives
-/// a socket (212 kB).
+/// Maximum number of touches in flight, of 33 kB each: together they fit into the buffer that Linux
+/// gives a socket (212 kB).
 const TOUCHES_SENT: usize = 4;
 
 pub(super) fn profile(topic: Topic) -> QosProfile {
@@ -47,8 +47,8 @@ pub(super) fn profile(topic: Topic) -> QosProfile {
     keep(profile, limit(topic).unwrap_or(topic.depth))
 }
 
-/// Of large messages no more are on their way than this: RustDDS keeps each until everybody has it,
-/// and who listens slowly or is silent would see what was long ago, or lose some of many at once.
+/// Maximum number of large messages in flight: RustDDS keeps each until everybody has it, and a
+/// slow or silent listener would get old ones, or lose some of many at once.
 fn limit(topic: Topic) -> Option<usize> {
     [(MESH, TILES_KEPT), (PROBE_TOUCHES, TOUCHES_SENT)]
         .into_iter()
@@ -109,7 +109,7 @@ impl<M: RosMessage> Subscribes<M> for DdsBackEnd<'_> {
     }
 }
 
-/// The same topic with a limit, which a profile of ROS does not have.
+/// The same topic with a limit, which ROS profiles lack.
 fn limited(topic: &rustdds::Topic, most: usize) -> Result<rustdds::Topic, RosError> {
     let most = most as i32;
     let limits = ResourceLimits {
@@ -162,7 +162,7 @@ pub(super) fn topic_of(
     .during("making a topic")
 }
 
-/// The name as ros2-client has it.
+/// A name of ros2-client.
 pub(super) fn dds_name(whole: &str) -> Result<Name, RosError> {
     Name::parse(whole).during("naming a topic or service")
 }

@@ -1,10 +1,10 @@
-//! Messages as ROS 2 has them: plain structs, fields in the order in which they are on the wire.
+//! Messages of ROS 2: plain structs, fields in wire order.
 //!
-//! Units are m, rad, N, N·m and s. What has a header is in the frame that it names; what has none
-//! is in that of the message around it.
+//! Units are m, rad, N, N·m and s. A message with a header is in the frame named there; without one
+//! it is in the frame of the enclosing message.
 //!
-//! `generate/` makes them from the definitions in `msg/` and, of the packages that every ROS 2 has,
-//! in `standard/`.
+//! `generate/` makes them from the definitions in `msg/` and, for packages of every ROS 2, in
+//! `standard/`.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -13,15 +13,15 @@ use serde::de::DeserializeOwned;
 pub trait RosMessage:
     Clone + PartialEq + std::fmt::Debug + Serialize + DeserializeOwned + Send + 'static
 {
-    /// as `ros2 interface show` takes it: package, kind, name
+    /// package, kind, name, as for `ros2 interface show`
     const TYPE_NAME: &'static str;
 }
 
-/// A service: what is asked, and what is answered.
+/// A service: request and response.
 pub trait RosService: 'static {
-    /// what is asked
+    /// message of a request
     type Request: RosMessage + Sync;
-    /// what is answered
+    /// message of a response
     type Response: RosMessage + Sync;
     /// package and name
     const TYPE_NAME: [&'static str; 2];

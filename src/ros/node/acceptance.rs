@@ -1,22 +1,22 @@
-//! Whether what comes is used: how many samples were accepted lately, and why the others were not.
+//! Use of the input: number of samples accepted lately, and reasons of the refusals.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
 
-/// What counts as lately.
+/// Window of recent counts.
 const WINDOW: Duration = Duration::from_secs(2);
-/// Counts are kept so often within it.
+/// Period of stored counts within the window.
 const KEPT_EVERY: Duration = Duration::from_millis(250);
-/// So soon after both streams began nothing is said of what does not come.
+/// Time after the start of both streams without a verdict on missing samples.
 const SETTLES: Duration = Duration::from_secs(1);
-/// Refusals that mean nothing for poses and wrenches.
+/// Refusals unrelated to poses and wrenches.
 const OF_OTHERS: [&str; 2] = ["bad_transform", "clicked_point"];
 
-/// What is one in so many of all that is refused may be the cause of the others: ten wrenches miss
-/// each pose, and more.
+/// Minimum share of a cause among all refusals, one in 50: each bad pose costs ten wrenches or
+/// more.
 const FEWEST_OF_A_CAUSE: u64 = 50;
 
-/// Counts since the session began.
+/// Counts since the start of the session.
 #[derive(Clone, Debug)]
 struct Counted {
     at: Instant,
@@ -24,41 +24,41 @@ struct Counted {
     refused: BTreeMap<String, u64>,
 }
 
-/// What became of poses and wrenches lately.
+/// Recent fate of poses and wrenches.
 #[derive(Clone, Debug, Default)]
 pub struct Acceptance {
     counted: VecDeque<Counted>,
 }
 
-/// How it stands with the samples.
+/// Verdict on the samples.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// Both streams come, for too short a time to say more.
+    /// Both streams come, for too short a time for a verdict.
     Begins,
-    /// Samples are accepted, and most of what comes is.
+    /// Samples are accepted, and at most half of the input is refused.
     Accepts,
     /// Nothing is refused, and no sample is complete.
     PairsNone,
-    /// Most of what comes is refused.
+    /// Most messages are refused.
     Refuses {
-        /// the main reason
+        /// main reason
         reason: String,
-        /// messages and samples that were refused for it
+        /// number of messages and samples refused for it
         count: u64,
-        /// all that were refused or accepted
+        /// number of all refused or accepted
         of: u64,
     },
 }
 
 impl Acceptance {
-    /// A stream is away, or samples are passed over: what was before says nothing of what comes.
+    /// Forgets earlier counts, after a missing stream or skipped samples.
     pub fn restart(&mut self) {
         self.counted.clear();
     }
 
-    /// To be called from time to time while both streams come.
+    /// Judges the samples; called from time to time while both streams come.
     ///
-    /// - `accepted`, `refused`: since the session began.
+    /// - `accepted`, `refused`: since the start of the session.
     pub fn judge(
         &mut self,
         now: Instant,
@@ -115,7 +115,7 @@ impl Counted {
             .map(lately)
             .collect();
         let total: u64 = refused.values().sum();
-        // what is wrong with the messages comes before what it has wrenches miss
+        // faults of the messages come before the pairing failures that they cause
         let is_cause = |(reason, count): &(&String, &u64)| {
             !is_of_pairing(reason) && total <= count.saturating_mul(FEWEST_OF_A_CAUSE)
         };
@@ -153,7 +153,7 @@ pub fn is_of_pairing(reason: &str) -> bool {
     )
 }
 
-/// What a reason of refusal means, and what to do about it.
+/// Meaning and remedy of a reason of refusal.
 pub fn meaning(reason: &str) -> &'static str {
     match reason.strip_prefix("pose_").unwrap_or(reason) {
         "no_frame" => "headers name no frame: fill frame_id at the source",
@@ -187,8 +187,8 @@ mod tests {
 
     const MS: Duration = Duration::from_millis(1);
 
-    /// Judges every 5 ms for so many ms; in each ms `each` adds to accepted and to the refused, by
-    /// reason.
+    /// Judges every 5 ms for a duration, ms; in each ms `each` adds to accepted and to the refused,
+    /// by reason.
     fn after(ms: u32, each: impl Fn(u32, &mut u64, &mut BTreeMap<String, u64>)) -> Verdict {
         let (begun, mut acceptance) = (Instant::now(), Acceptance::default());
         let (mut accepted, mut refused, mut verdict) = (0, BTreeMap::new(), Verdict::Begins);

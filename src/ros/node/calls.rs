@@ -1,4 +1,4 @@
-//! What the node does when it is asked.
+//! Calls of the node.
 
 use std::sync::Arc;
 use std::sync::mpsc::TrySendError;
@@ -29,15 +29,15 @@ use crate::ros::port::{Call, Endpoint, Reply};
 use crate::ros::stop::NO_ARM;
 use crate::session::{Exchange, StrokeChange};
 
-/// A flag may reach so far, m.
+/// Maximum radius of a flag, m.
 const LARGEST_RADIUS: f64 = 1.0;
-/// Strokes that are taken back by one call at most.
+/// Maximum number of strokes undone by one call.
 const MOST_STROKES: u32 = 1000;
-/// How long mesh and patch may take until they are complete for a file.
+/// Maximum wait for the complete mesh and patch of a file.
 const COPY_WAIT: Duration = Duration::from_secs(30);
-/// The name of a file that nobody named.
+/// Default name of a file.
 const DEFAULT_NAME: &str = "refined.ply";
-/// Meshes that are saved at a time at most: each has a copy of all touches.
+/// Maximum number of concurrent saves: each has a copy of all touches.
 const MOST_SAVING: usize = 4;
 
 impl RefinementWorker {
@@ -119,7 +119,7 @@ impl RefinementWorker {
         })
     }
 
-    /// How far around a place is looked, m.
+    /// Search radius around a position, m.
     ///
     /// - `given`: of a request; 0: the parameter.
     pub(super) fn search_radius(&self, given: f64) -> Result<f64, String> {
@@ -158,7 +158,7 @@ impl RefinementWorker {
             .ok_or_else(|| "the point is not finite, or absurdly far".to_owned())
     }
 
-    /// RViz's Publish Point.
+    /// Flags a point from RViz's Publish Point.
     pub(super) fn flag_clicked(&mut self, clicked: &PointStamped) {
         let parameters = self.setup.shared.parameters();
         let kind = Kind::of_name(parameters.string("flag_kind"));
@@ -250,7 +250,7 @@ impl RefinementWorker {
         }
     }
 
-    /// Ends the session beside the next one.
+    /// Begins the next session; a side thread ends the previous one.
     pub(super) fn begin_again(&mut self) -> Result<String, NodeError> {
         let next = self.session.next(&self.setup)?;
         if !next.keeping.is_replayed() {
@@ -268,14 +268,14 @@ impl RefinementWorker {
         self.side_work.begin("ending", end)?;
         self.fault = None;
         let replica = Box::new(MeshVersion::of(&self.setup.scan.0, &name));
-        // both take these however much they have to do
+        // both receivers take these despite any backlog
         let _ = self.view.send(ViewInput::Session(replica));
         self.setup.shared.mesh.announce_session();
         let _ = self.features.send(FeatureInput::Session(name.clone()));
         Ok(name)
     }
 
-    /// The samples that only waited for more to come.
+    /// Takes the samples held back for later messages.
     pub(super) fn finish_samples(&mut self) {
         self.session.sync.finish();
         while let Some(sample) = self.session.sync.next_sample() {
@@ -299,7 +299,7 @@ impl RefinementWorker {
         }
     }
 
-    /// Writes what `touchup refine` would write of the samples so far, once it is called.
+    /// Returns a function that writes the result of `touchup refine` for the samples up to now.
     fn saving(
         &mut self,
         request: &SaveMeshRequest,
@@ -317,7 +317,7 @@ impl RefinementWorker {
             .map_err(|error| error.to_string())?;
         self.send_edits();
         let snapshot = self.setup.shared.mesh.complete();
-        // while the mesh moves on none of its versions is what is written
+        // while the mesh moves no version equals the written file
         let (engine, setup) = (&self.session.engine, Arc::clone(&self.setup));
         let mesh_version = if engine.is_settled() {
             self.session.version

@@ -1,4 +1,4 @@
-//! What the workers send each other.
+//! Messages between the workers.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -18,72 +18,72 @@ use crate::ros::messages::{
 };
 use crate::ros::port::Reply;
 
-/// What goes to the view.
+/// Input of the view.
 pub enum ViewInput {
-    /// the mesh changed
+    /// a change of the mesh
     Edits(Box<Edits>),
-    /// how well vertices are known is known
+    /// variances of vertices
     Variances(Variances),
     /// a new session
     Session(Box<MeshVersion>),
-    /// a face was touched so far from where the mesh had it, m; if tiles are coloured by that
+    /// a touched face and its signed distance, m; only with tiles coloured by mismatch
     Mismatch(u32, f64),
-    /// where the tip is
+    /// position of the tip
     Tip(LastTip),
-    /// all features, and where a hand should touch them next
+    /// all features, and the next touches by hand
     Features(Arc<FeatureArray>, NextTouches),
-    /// somebody wants the whole state on the topic
+    /// a request for the whole state on the topic
     Resync,
-    /// once a second
+    /// diagnostics, once a second
     Diagnostics(Box<DiagnosticArray>),
-    /// a parameter was set
+    /// a changed parameter
     Parameters,
 }
 
-/// Where the tip was last.
+/// Last position of the tip.
 #[derive(Clone, Copy, Debug)]
 pub struct LastTip {
-    /// of the sample, ns
+    /// stamp of the sample, ns
     pub stamp_ns: i64,
     /// centre of the ball, m, in O
     pub centre: Point3<f64>,
     /// radius of the ball, m
     pub radius: f64,
-    /// the closest point of the mesh, and how far the ball's surface is from it, m; `None` beyond
+    /// the closest point of the mesh, and its distance from the ball's surface, m; `None` beyond
     /// the reach
     pub closest: Option<(Point3<f64>, f64)>,
 }
 
-/// What goes to the feature worker.
+/// Input of the feature worker.
 pub enum FeatureInput {
-    /// touches came or went
+    /// new or removed touches
     Probed(TouchDelta),
     /// a new session
     Session(String),
-    /// somebody points at a place, which has no number yet
+    /// a flag without a number yet
     Flag(Flag, Option<Reply<FlagFeatureResponse>>),
-    /// takes that back
+    /// removal of a flag
     Unflag(u32, Reply<UnflagFeatureResponse>),
-    /// asks what is to be probed; no numbers: all that is flagged
+    /// request for features to probe; no numbers: all flagged ones
     Targets(Vec<u32>, SyncSender<Vec<Flag>>),
-    /// an arm has measured something
+    /// a measurement of an arm
     Measured(Box<ArmMeasurement>),
-    /// looks at the mesh now
+    /// request for a detection on the current mesh
     Detect(DetectFeaturesRequest, Reply<DetectFeaturesResponse>),
 }
 
-/// What an arm has measured.
+/// A feature measured by an arm.
 #[derive(Clone, Debug)]
 pub struct ArmMeasurement {
-    /// in which it was flagged
+    /// session of the flag
     pub session: String,
     /// number of the flag
     pub id: u32,
-    /// what it is
+    /// measured feature
     pub feature: Feature,
-    /// it is known as well as was wanted
+    /// the requested accuracy is reached
     pub is_done: bool,
 }
 
-/// Where a hand should touch next, by the number of the feature.
+/// Next touches by hand, by the number of the feature.
 pub type NextTouches = BTreeMap<u32, NextTouch>;

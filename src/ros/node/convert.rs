@@ -1,4 +1,4 @@
-//! Between messages and the rooms' own types.
+//! Conversions between messages and the rooms' own types.
 
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
@@ -9,12 +9,12 @@ use crate::ros::messages::{
 };
 use crate::stylus::{FrameTransform, StampedPose, StampedWrench, Wrench, measured_rotation};
 
-/// ns; `None` for what no message may have: before 1970, or nanoseconds that are a second or more.
+/// Stamp, ns; `None` for an invalid one: before 1970, or nanoseconds of a second or more.
 pub fn stamp_ns(time: &Time) -> Option<i64> {
     (time.sec >= 0 && time.nanosec < 1_000_000_000).then(|| clock::stamp_ns(*time))
 }
 
-/// Header of what is published in `frame`.
+/// Header of a publication in `frame`.
 pub fn header(stamp_ns: i64, frame: &str) -> Header {
     Header {
         stamp: time(stamp_ns),
@@ -22,8 +22,7 @@ pub fn header(stamp_ns: i64, frame: &str) -> Header {
     }
 }
 
-/// A pose as it was measured; `None` when its orientation is no rotation. The position may be
-/// anything.
+/// A measured pose; `None` if its orientation is no rotation. The position is unchecked.
 pub fn isometry(pose: &Pose) -> Option<Isometry3<f64>> {
     let (p, q) = (&pose.position, &pose.orientation);
     let rotation = measured_rotation(Quaternion::new(q.w, q.x, q.y, q.z))?;
@@ -33,7 +32,7 @@ pub fn isometry(pose: &Pose) -> Option<Isometry3<f64>> {
     ))
 }
 
-/// A link of a tree of frames; `None` where its stamp is no time, or its orientation no rotation.
+/// A link of a tree of frames; `None` if its stamp is no time, or its orientation no rotation.
 pub fn frame_transform(stamped: &TransformStamped) -> Option<FrameTransform> {
     let TransformStamped {
         header,
@@ -58,7 +57,7 @@ pub fn frame_transform(stamped: &TransformStamped) -> Option<FrameTransform> {
     })
 }
 
-/// As a message has it.
+/// Message of a point.
 pub fn point(p: &Point3<f64>) -> Point {
     Point {
         x: p.x,
@@ -67,7 +66,7 @@ pub fn point(p: &Point3<f64>) -> Point {
     }
 }
 
-/// As a message has it.
+/// Message of a vector.
 pub fn vector(v: &Vector3<f64>) -> Vector3Msg {
     Vector3Msg {
         x: v.x,
@@ -76,17 +75,17 @@ pub fn vector(v: &Vector3<f64>) -> Vector3Msg {
     }
 }
 
-/// Of a message.
+/// Point of a message.
 pub fn point_of(p: &Point) -> Point3<f64> {
     Point3::new(p.x, p.y, p.z)
 }
 
-/// Of a message.
+/// Vector of a message.
 pub fn vector_of(v: &Vector3Msg) -> Vector3<f64> {
     Vector3::new(v.x, v.y, v.z)
 }
 
-/// As a message has it.
+/// Message of a pose.
 pub fn pose(position: &Point3<f64>, q: &UnitQuaternion<f64>) -> Pose {
     Pose {
         position: point(position),
@@ -124,7 +123,7 @@ pub fn as_wrench(wrench: &StampedWrench, frame: &str) -> WrenchStamped {
     }
 }
 
-/// Whether it is done, and how or why not.
+/// Response with success, and the result or reason in words.
 pub fn trigger(done: Result<String, String>) -> TriggerResponse {
     TriggerResponse {
         success: done.is_ok(),
@@ -132,7 +131,7 @@ pub fn trigger(done: Result<String, String>) -> TriggerResponse {
     }
 }
 
-/// What has no meaning.
+/// Value of an undefined vector.
 pub const NO_VECTOR: Vector3Msg = Vector3Msg {
     x: f64::NAN,
     y: f64::NAN,

@@ -1,4 +1,4 @@
-//! How the node says how it is: in words, and in numbers once a second.
+//! State of the node: in words, and in numbers once a second.
 
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -16,18 +16,18 @@ use crate::ros::messages::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use crate::ros::port::Endpoint;
 use crate::session::Unrecorded;
 
-/// The state before anything can be said of the samples.
+/// State before the first verdict on the samples.
 const BEGINS: &str = "begins";
-/// Clocks of the two streams that are farther apart are not set alike, s: no sensor is so slow.
+/// Offset between the streams' stamps that means unsynchronised clocks, s: no sensor is that slow.
 const CLOCKS_APART: f64 = 1.0;
-/// … and where nothing pairs, from here on that is named as the cause, s.
+/// Minimum offset named as the cause if nothing pairs, s.
 const NAMED_APART: f64 = 0.1;
 
 impl RefinementWorker {
-    /// Looks whether the streams come; says so when that changed.
+    /// Checks the streams; logs a changed state.
     pub(super) fn watch_streams(&mut self) {
         let (level, words) = self.state();
-        // ages in it grow: what is said once is said until something else is
+        // ages in it grow: only a new state is logged
         let name = words.split(':').next().unwrap_or_default().to_owned();
         if name != self.last_state {
             let now = self.setup.clock.now();
@@ -35,12 +35,12 @@ impl RefinementWorker {
                 .saturating_duration_since(self.state_since)
                 .as_secs_f64();
             match level {
-                // who sees a warning sees its end too
+                // readers of a warning also see its end
                 DiagnosticStatus::OK if self.last_state.starts_with("holds") => {
                     warn!("{words}, again after {since_s:.1} s");
                 }
                 DiagnosticStatus::OK => info!("{words}"),
-                // the first second is too short to say anything
+                // the first second is too short for a verdict
                 _ if name == BEGINS => return,
                 _ => warn!("{words}"),
             }
@@ -48,7 +48,7 @@ impl RefinementWorker {
         }
     }
 
-    /// What a state means to who watches: a level of [`DiagnosticStatus`], and in words.
+    /// The state for an observer: a level of [`DiagnosticStatus`], and words.
     #[expect(clippy::too_many_lines)]
     fn state(&mut self) -> (u8, String) {
         let now = self.setup.clock.now();
@@ -141,7 +141,7 @@ impl RefinementWorker {
         self.state_of_samples(now)
     }
 
-    /// Sensor topics that others publish and of which nothing has come, each with the reason.
+    /// Silent sensor topics despite a publisher, each with the reason.
     fn unread_topics(&self) -> Vec<String> {
         let [wrench, pose] = self.port.sample_topics();
         let silent = [(pose, 0), (wrench, 1)]
@@ -152,7 +152,7 @@ impl RefinementWorker {
         why.map(|(topic, why)| format!("{topic}, {why}")).collect()
     }
 
-    /// What becomes of the samples while both streams come.
+    /// State of the samples while both streams come.
     #[expect(clippy::too_many_lines)]
     fn state_of_samples(&mut self, now: Instant) -> (u8, String) {
         let verdict =
@@ -229,7 +229,7 @@ impl RefinementWorker {
         }
     }
 
-    /// What the session says of itself so far.
+    /// Report of the session up to now.
     pub(super) fn report(&self) -> SessionReport {
         self.session.report(
             &self.setup,
@@ -362,7 +362,7 @@ impl RefinementWorker {
         values
     }
 
-    /// Ends the session and what still ends of those before.
+    /// Ends the session and finishes the earlier ones.
     pub(super) fn end(mut self) -> Result<NodeEnd, NodeError> {
         self.finish_samples();
         self.send_edits();

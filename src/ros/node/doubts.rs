@@ -1,4 +1,4 @@
-//! What speaks against the input while it comes: looked for beside the samples, every few seconds.
+//! Doubts about the input while it comes: checked beside the samples, every few seconds.
 
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -11,10 +11,9 @@ use crate::clock::Clock;
 use crate::diagnose::{InputCause, InputFinding, InputMonitor};
 use crate::ros::locked;
 
-/// The input is looked at so often.
+/// Period of checks of the input.
 const LOOKED_EVERY: Duration = Duration::from_secs(5);
-/// What is no doubt while somebody may still come to touch something, or what the state of the
-/// streams says itself.
+/// Findings that are no doubt before the first touches, or that the state of the streams covers.
 const OF_OTHERS: [InputCause; 4] = [
     InputCause::NoContact,
     InputCause::FewContacts,
@@ -22,18 +21,18 @@ const OF_OTHERS: [InputCause; 4] = [
     InputCause::StampsGoBack,
 ];
 
-/// What was found, and what looks for more.
+/// The findings, and the running check.
 #[derive(Debug)]
 pub struct InputDoubts {
     work: SideWork,
     looked: Instant,
-    /// samples that were accepted then
+    /// samples accepted at the last check
     accepted: u64,
     found: Arc<Mutex<Vec<InputFinding>>>,
 }
 
 impl InputDoubts {
-    /// Nothing was looked at yet.
+    /// Before the first check.
     pub fn on(clock: &Clock) -> Self {
         Self {
             work: SideWork::on(clock.clone()),
@@ -43,7 +42,7 @@ impl InputDoubts {
         }
     }
 
-    /// Looks at what came, on a thread of its own, where it is time and there is something new.
+    /// Checks the input on a thread of its own, if it is time and there are new samples.
     pub fn look(&mut self, setup: &Setup, monitor: &InputMonitor, accepted: u64) {
         let now = setup.clock.now();
         let is_due =
@@ -67,13 +66,13 @@ impl InputDoubts {
         }
     }
 
-    /// What was said of a session before means nothing in the next.
+    /// Forgets the findings of the previous session.
     pub fn restart(&mut self) {
-        // what still looks writes to what nobody reads any more
+        // a check still running writes to a result without readers
         (self.accepted, self.found) = (0, Arc::default());
     }
 
-    /// The surest.
+    /// The most certain finding.
     pub fn first(&self) -> Option<InputFinding> {
         locked(&self.found).first().cloned()
     }

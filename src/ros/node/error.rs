@@ -1,4 +1,4 @@
-//! Why the node does not start, or its session was not kept.
+//! Errors of starting the node and keeping its session.
 
 use std::path::PathBuf;
 
@@ -9,10 +9,10 @@ use crate::scene::SceneError;
 use crate::session::{OutcomeError, SessionError};
 use crate::stylus::SettingError;
 
-/// Why the node does not start, or its session was not kept.
+/// Reason why the node does not start, or its session was not kept.
 #[derive(Debug, thiserror::Error)]
 pub enum NodeError {
-    /// Neither the parameter `scan` nor the scene names one.
+    /// Neither the parameter `scan` nor the scene names a scan.
     #[error(
         "there is no scan to refine: name one by -p scan:=FILE, or as `scan: {{ file: … }}` in the scene"
     )]
@@ -23,7 +23,7 @@ pub enum NodeError {
          them out of the scene, or start without robot"
     )]
     RegionWithRobot,
-    /// The scene cannot be used.
+    /// The scene is unusable.
     #[error(transparent)]
     Scene(#[from] Box<SceneError>),
     /// The scene says `refine: off`.
@@ -34,38 +34,38 @@ pub enum NodeError {
         "robot:= needs `robot:` in the scene: nobody knows where the arm stands and what it must never leave (config/probe.yaml is an example)"
     )]
     NoRobot,
-    /// The scan cannot be read.
+    /// The scan is unreadable.
     #[error("{0}")]
     Scan(#[from] Box<ScanError>),
-    /// A setting of the scene.
+    /// An invalid setting of the scene.
     #[error(transparent)]
     Setting(#[from] SettingError),
     /// The scan cannot be refined.
     #[error("the scan cannot be refined: {0}")]
     Refine(#[from] RefineError),
-    /// The thread of the patch.
+    /// An error of the patch thread.
     #[error(transparent)]
     Live(#[from] LiveError),
-    /// The folder of sessions cannot be used.
+    /// The folder of sessions is unusable.
     #[error("{}: {source}; name another by -p session_folder:=FOLDER", path.display())]
     Folder {
-        /// which one
+        /// path of the folder
         path: PathBuf,
-        /// what the system says
+        /// error of the system
         source: std::io::Error,
     },
-    /// The session cannot be kept.
+    /// The session is not kept.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// The result cannot be written.
+    /// The result is not written.
     #[error(transparent)]
     Outcome(#[from] Box<OutcomeError>),
-    /// The result is written, the recording is not whole.
+    /// The result is written, the recording is incomplete.
     #[error("{count} messages are not in the session's recording: {reason}")]
     Unrecorded {
-        /// how many
+        /// number of missing messages
         count: u64,
-        /// why
+        /// cause
         reason: String,
     },
     /// The system gives no thread.

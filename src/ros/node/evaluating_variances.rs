@@ -1,8 +1,8 @@
-//! The variance of what was touched, for `MeshPatch`: evaluated on a thread of its own once the
-//! mesh rests, where somebody follows it.
+//! Variances of touched vertices, for `MeshPatch`: computed on a thread of its own once the mesh
+//! rests, if there are followers.
 //!
-//! The mesh with it is the next version, so that a follower takes it up as any other change; no
-//! vertex moves by it.
+//! The mesh with variances is the next version, so followers handle it as any other change; it
+//! moves no vertex.
 
 use std::sync::Arc;
 use std::sync::mpsc::{TryRecvError, sync_channel};
@@ -14,15 +14,14 @@ use super::channels::ViewInput;
 use super::refinement::RefinementWorker;
 use super::variances::{VarianceState, Variances, VertexVariance, evaluated};
 
-/// Without a sample for so long the variance is evaluated: longer than the node takes to settle the
-/// mesh.
+/// Time without samples after which the variances are computed: longer than the node takes to
+/// settle the mesh.
 const KNOWN_AFTER: Duration = Duration::from_millis(1000);
-/// How long the copies of mesh and evidence may take.
+/// Maximum duration of the copies of mesh and evidence.
 const COPY_WAIT: Duration = Duration::from_secs(30);
 
 impl RefinementWorker {
-    /// Begins to evaluate the variances when they are due, and passes on what was evaluated; never
-    /// waits.
+    /// Starts the computation of variances when due, and passes on its result; never waits.
     pub(super) fn go_on_with_variance(&mut self, now: Instant) {
         let is_done = self
             .variance
@@ -31,7 +30,7 @@ impl RefinementWorker {
             .is_some_and(|of| self.is_state(of));
         if let Some((of, made)) = self.variance.made.take() {
             match made.try_recv() {
-                // at most one is made at a time, also where the mesh has gone on
+                // only one computation at a time, even if the mesh has changed
                 Err(TryRecvError::Empty) => self.variance.made = Some((of, made)),
                 Ok(variances) if self.is_state(&of) && self.is_at_rest(now) => {
                     self.send_variances(of, variances)
@@ -49,7 +48,7 @@ impl RefinementWorker {
         session == self.session.folder.name() && *version == self.session.version
     }
 
-    /// Whether the mesh is complete, on its way to the view, and what a file would have.
+    /// Whether the mesh is complete, on its way to the view, and equal to a saved file.
     fn is_at_rest(&self, now: Instant) -> bool {
         let session = &self.session;
         let is_sent =
@@ -62,7 +61,7 @@ impl RefinementWorker {
             && self.fault.is_none()
     }
 
-    /// Whether somebody listens to `mesh_patch`.
+    /// Whether `mesh_patch` has a listener.
     fn is_followed(&self) -> bool {
         self.endpoints
             .get(self.port.mesh_patch_topic())
@@ -71,7 +70,7 @@ impl RefinementWorker {
 
     fn begin_variances(&mut self, state: VarianceState) {
         let Ok(Some(copy)) = self.session.engine.copy_patcher() else {
-            // nothing was touched, or there is no patch
+            // no touches, or no patch
             self.variance.done = Some(state);
             return;
         };
@@ -98,7 +97,7 @@ impl RefinementWorker {
                 .zip(known);
             let changed = variances.filter(|((_, variance), known)| variance.to_bits() != *known);
             let changed = changed.map(|(variance, _)| variance).collect();
-            // its next version need not be a copy
+            // the next version need not be a copy
             drop(mesh);
             // the node may have ended
             let _ = to.send(changed);
@@ -115,7 +114,7 @@ impl RefinementWorker {
             return;
         }
         let version = version + 1;
-        // a view that is behind gets them with the next evaluation
+        // a busy view gets them with the next computation
         if self
             .view
             .try_send(ViewInput::Variances(Variances { version, of }))

@@ -1,4 +1,4 @@
-//! The thread that knows the features: found on the mesh, measured by touches, or pointed at.
+//! The feature thread: features detected on the mesh, measured by touches, or flagged.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -23,18 +23,18 @@ use crate::ros::messages::{
 use crate::ros::parameters::KIND_NAMES;
 use crate::stylus::ProbedPoint;
 
-/// The mesh is looked at again when it has not changed for so long …
+/// Time without a mesh change before the next detection.
 const QUIET: Duration = Duration::from_secs(1);
-/// … or, while it is touched all the time, when so many times the last look have passed.
+/// Period of detections on a constantly changing mesh, in durations of the last detection.
 const LOOKS_APART: u32 = 10;
-/// Flags are so many at most.
+/// Maximum number of flags.
 const MOST_FLAGS: usize = 1000;
-/// Numbers of features in one answer at most, so that it goes out in one packet.
+/// Maximum number of feature numbers in one answer, so that it fits into one packet.
 const MOST_NAMED: usize = 128;
-/// How long a change of the mesh may take until it is complete.
+/// Maximum duration of a mesh change until the mesh is complete.
 const SNAPSHOT_WAIT: Duration = Duration::from_secs(10);
 
-/// The thread's own.
+/// State of the feature thread.
 pub struct FeatureWorker {
     clock: Clock,
     shared: Arc<Shared>,
@@ -42,15 +42,15 @@ pub struct FeatureWorker {
     session: String,
     tracker: Tracker,
     touches: Vec<ProbedPoint>,
-    /// by number; those at which nothing was found yet
+    /// by number; flags without a detected feature
     flags: BTreeMap<u32, Flag>,
-    /// how far around a feature that was found somebody wants it looked for, m, by its number
+    /// requested search radius around a detected feature, m, by its number
     radii: BTreeMap<u32, f64>,
-    /// number under which a feature is known, where that is the number of its flag
+    /// public number of a feature if it is the number of its flag
     names: BTreeMap<u32, u32>,
-    /// measured by an arm, by the number of the flag
+    /// measurements of an arm, by the number of the flag
     measured: BTreeMap<u32, ArmMeasurement>,
-    /// version of the mesh and its newest stamp at the last look
+    /// version of the mesh and its newest stamp at the last detection
     looked: Option<(u64, i64)>,
     look_took: Duration,
     looked_at: Instant,
@@ -61,7 +61,7 @@ pub struct FeatureWorker {
 }
 
 impl FeatureWorker {
-    /// Knows nothing yet.
+    /// Before the first input.
     pub fn new(
         clock: Clock,
         shared: Arc<Shared>,
@@ -90,7 +90,7 @@ impl FeatureWorker {
         }
     }
 
-    /// Runs until nobody sends anything any more.
+    /// Runs until all senders are gone.
     pub fn run(mut self, inputs: &Receiver<FeatureInput>) {
         loop {
             let period =
@@ -98,7 +98,7 @@ impl FeatureWorker {
             match self.clock.recv_timeout(inputs, period) {
                 Ok(input) => {
                     self.take(input);
-                    // what came at the same time is in the next look too
+                    // simultaneous inputs belong to the next detection too
                     inputs
                         .try_iter()
                         .take(1000)
@@ -108,7 +108,7 @@ impl FeatureWorker {
                 Err(RecvTimeoutError::Disconnected) => return,
             }
             if self.is_due() {
-                // a mesh that cannot be had now is asked for again
+                // an unavailable mesh is requested again
                 let _ = self.look();
             }
             if self.has_changes
@@ -146,11 +146,11 @@ impl FeatureWorker {
                 reply.send(self.unflag(id));
             }
             FeatureInput::Targets(ids, reply) => {
-                // who asked may have gone
+                // the receiver may be gone
                 let _ = reply.try_send(self.targets(&ids));
             }
             FeatureInput::Measured(measured) => {
-                // another session knows nothing of it
+                // a measurement belongs to its session only
                 if measured.session == self.session {
                     self.measured.insert(measured.id, *measured);
                     self.has_changes = true;
@@ -158,7 +158,7 @@ impl FeatureWorker {
             }
             FeatureInput::Detect(request, reply) => {
                 let looked = self.look();
-                // on its way before the answer names its version
+                // published before the answer names its version
                 (self.has_changes, self.published_at) = (false, Some(Instant::now()));
                 self.publish();
                 reply.send(self.answer(&request, looked));
@@ -166,7 +166,7 @@ impl FeatureWorker {
         }
     }
 
-    /// Whether the mesh is another one than at the last look, and now is the time.
+    /// Whether the mesh has changed since the last detection, and a detection is due.
     fn is_due(&mut self) -> bool {
         let version = self.shared.mesh.shape_version();
         if std::mem::replace(&mut self.seen_version, version) != version {
@@ -197,7 +197,7 @@ impl FeatureWorker {
             .mesh()
             .map_err(|error: MeshError| error.to_string())?;
         self.looked = Some((snapshot.version, snapshot.stamp_ns));
-        // its next version need not be a copy
+        // the next version need not be a copy
         drop(snapshot);
         self.tracker.renew(&mesh, &self.touches);
         self.name_found_flags();
@@ -207,18 +207,18 @@ impl FeatureWorker {
         Ok(())
     }
 
-    /// The number under which a feature is known.
+    /// The public number of a feature.
     fn name_of(&self, feature: &Feature) -> u32 {
         self.name_of_id(feature.id)
     }
 
-    /// The number under which a feature is known that the detector numbers so.
+    /// The public number of a feature with this number of the detector.
     fn name_of_id(&self, id: u32) -> u32 {
         self.names.get(&id).copied().unwrap_or(id)
     }
 
-    /// The nearest feature where somebody pointed, of the kind that is meant. A region to be
-    /// explored stays one: a plane in it is no answer.
+    /// The nearest feature of the flagged kind at a flag. A region to explore stays one: a plane in
+    /// it is no answer.
     fn nearest(&self, flag: &Flag, may_be: impl Fn(&Feature) -> bool) -> Option<&Feature> {
         let far = |feature: &&Feature| (feature.centre.value - flag.place).norm();
         let is_meant = |feature: &&Feature| {
@@ -231,7 +231,7 @@ impl FeatureWorker {
             .min_by(|a, b| far(a).total_cmp(&far(b)))
     }
 
-    /// A feature that appears where somebody pointed goes by the number of that flag.
+    /// Gives new features at a flag the number of that flag.
     fn name_found_flags(&mut self) {
         for (id, flag) in std::mem::take(&mut self.flags) {
             let is_new = |feature: &Feature| !self.names.contains_key(&feature.id);
@@ -301,7 +301,7 @@ impl FeatureWorker {
         }
     }
 
-    /// What is flagged, or has one of these numbers.
+    /// The flagged features, or those with the given numbers.
     fn targets(&self, ids: &[u32]) -> Vec<Flag> {
         let default = self.shared.parameters().double("flag_radius_mm") / 1e3;
         let found = self.tracker.features().iter().map(|feature| {
@@ -406,12 +406,12 @@ impl FeatureWorker {
                 ..found(feature, id, radius)
             })
         };
-        // what an arm has measured is better than what the mesh shows
+        // an arm's measurement is better than the mesh
         let mut features: Vec<_> = known
             .chain(self.flags.values().map(flagged))
             .map(|one| measured(one.id).unwrap_or(one))
             .collect();
-        // also one that is flagged no longer
+        // measured features without a flag too
         let is_listed = |id: &&u32| features.iter().any(|one| one.id == **id);
         let others: Vec<_> = self
             .measured
@@ -437,14 +437,14 @@ impl FeatureWorker {
     }
 
     fn publish(&self) {
-        // the view holds nothing back for long, and shows them even when it is late
+        // the view takes it without much delay, and shows it even when late
         let _ = self.view.send(ViewInput::Features(
             Arc::new(self.features()),
             self.next_touches(),
         ));
     }
 
-    /// For each feature where a hand should touch next; of a flag its place.
+    /// The next touch by hand for each feature; for a flag its position.
     fn next_touches(&self) -> NextTouches {
         let found = self.tracker.features().iter().filter_map(|feature| {
             let next = advise_next_touch(feature, &self.touches)?;
@@ -459,7 +459,7 @@ impl FeatureWorker {
                 },
             )
         });
-        // what an arm has measured well enough needs no hand
+        // a feature measured well enough by an arm needs no hand
         let is_open = |id: &u32| {
             !self
                 .measured

@@ -1,10 +1,9 @@
-//! From the frames that headers name to those of a recording that `touchup refine` reads with the
-//! scene.
+//! Transforms messages from the frames in their headers to the frames of a recording, for `touchup
+//! refine` with the scene.
 //!
-//! Poses come into the frame in which the scene has them: `cell` where it says where the scan lies
-//! in that (`scan_to_space`), else that of the object. A wrench comes into the sensor's own axes,
-//! or into those of the poses. So what is recorded of a session is, with its scene, all that it
-//! takes to get the same result.
+//! Poses go to the scene's frame of poses: `cell` if the scene places the scan in it
+//! (`scan_to_space`), else the object frame. A wrench goes to the sensor's own axes, or to those of
+//! the poses. So the recording of a session and its scene suffice for the same result.
 
 use nalgebra::{Isometry3, UnitQuaternion};
 
@@ -15,12 +14,12 @@ use crate::stylus::{
     plain_name,
 };
 
-/// Frame of the poses where the scene says where the scan lies in it.
+/// Frame of the poses if the scene places the scan in it.
 pub const CELL: &str = "cell";
-/// Frame of the poses where it does not, as recordings name it.
+/// Frame of the poses otherwise, as named in recordings.
 const OBJECT: &str = "object";
 
-/// Why a message is not taken.
+/// Reason why a message is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Refusal {
     /// Its stamp is before 1970, or no time.
@@ -35,8 +34,7 @@ pub enum Refusal {
     /// The frames are not connected at its stamp.
     #[error(transparent)]
     Frame(#[from] FrameError),
-    /// Wrenches came in the sensor's axes before and come in the object's now, or the other way
-    /// round.
+    /// Earlier wrenches came in the sensor's axes and now in the object's, or the reverse.
     #[error("its axes are others than those of the wrenches before: reset begins anew")]
     AxesChanged,
 }
@@ -55,25 +53,25 @@ impl Refusal {
     }
 }
 
-/// Names of the frames that the rule knows.
+/// Names of the known frames.
 #[derive(Clone, Debug)]
 pub struct FrameNames {
-    /// of the mesh
+    /// frame of the mesh
     pub object: String,
-    /// whose pose comes
+    /// frame whose pose the source reports
     pub tool: String,
-    /// in whose axes the wrench is measured
+    /// frame of the wrench axes
     pub sensor: String,
 }
 
-/// Brings messages into the frames of the recording.
+/// Transforms messages into the frames of the recording.
 #[derive(Clone, Debug)]
 pub struct FrameResolver {
     names: FrameNames,
     placement: Placement,
-    /// the axes of the wrenches, once one has come
+    /// axes of the wrenches, after the first one
     pub axes: Option<WrenchFrame>,
-    /// all transforms so far
+    /// all transforms up to now
     pub frames: FrameBuffer,
 }
 
@@ -97,7 +95,7 @@ impl FrameResolver {
         }
     }
 
-    /// A message of the recording, as the refiner takes it.
+    /// A message of the recording in the refiner's frame.
     pub fn placed(&self, message: Message) -> Message {
         self.placement.place(message, self.axes.unwrap_or_default())
     }
@@ -165,7 +163,7 @@ impl FrameResolver {
         Ok((WrenchFrame::Object, turn.map_or(wrench, of)))
     }
 
-    /// Pose of `frame` in the frame of the recording; `None` when it is that.
+    /// Pose of `frame` in the frame of the recording; `None` for that frame itself.
     fn recorded_from(&self, frame: &str, stamp_ns: i64) -> Result<Option<Isometry3<f64>>, Refusal> {
         let (name, object) = (plain_name(frame), self.names.object.as_str());
         if name.is_empty() {
@@ -180,7 +178,7 @@ impl FrameResolver {
         };
         Ok(match self.placement.pose_wo {
             None if name == object => None,
-            // without `scan_to_space` the scan lies in the cell as it is
+            // without `scan_to_space` the scan lies unmoved in the cell
             None if name == CELL && is_apart(&in_object()) => None,
             None => Some(in_object()?),
             Some(_) if name == CELL => None,
@@ -196,7 +194,7 @@ impl FrameResolver {
         })
     }
 
-    /// Pose of any frame in that of the object.
+    /// Pose of any frame in the object frame.
     ///
     /// # Errors
     /// [`Refusal`]

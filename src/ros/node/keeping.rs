@@ -1,5 +1,4 @@
-//! Whether the samples of a session are recorded as they come, or come from what was recorded of
-//! it.
+//! Whether the samples of a session are recorded live, or replayed from a recording.
 
 use std::path::{Path, PathBuf};
 
@@ -8,14 +7,14 @@ use crate::session::{SessionRecorder, StrokeChange, StrokeChanges, StrokeHistory
 
 /// Whether a session is recorded or replayed.
 pub enum Keeping {
-    /// what is accepted is taken down
+    /// records accepted messages
     Recorded(SessionRecorder),
-    /// it is there already, and stays as it is
+    /// replays an existing recording, which stays unchanged
     Replayed(Box<ReplayedSession>),
 }
 
 impl Keeping {
-    /// What takes the session down; `None` where it is replayed.
+    /// The recorder of the session; `None` for a replay.
     pub fn recorder(&self) -> Option<&SessionRecorder> {
         if let Self::Recorded(recorder) = self {
             Some(recorder)
@@ -24,12 +23,12 @@ impl Keeping {
         }
     }
 
-    /// Whether it is replayed.
+    /// Whether the session is a replay.
     pub fn is_replayed(&self) -> bool {
         matches!(self, Self::Replayed(_))
     }
 
-    /// Messages missing in its recording so far.
+    /// Messages missing in its recording up to now.
     pub fn unrecorded(&self) -> Unrecorded {
         self.recorder()
             .map(SessionRecorder::unrecorded)
@@ -37,7 +36,7 @@ impl Keeping {
     }
 }
 
-/// What a session that is replayed has beside its messages.
+/// Data of a replayed session besides its messages.
 #[derive(Clone, Debug)]
 pub struct ReplayedSession {
     recording: PathBuf,
@@ -50,8 +49,8 @@ pub struct ReplayedSession {
 impl ReplayedSession {
     /// Before its first message.
     ///
-    /// - `recording`, `topics`: its messages, to make touches again without one that was taken out.
-    /// - `changes`: of strokes, as its record has them.
+    /// - `recording`, `topics`: its messages, to recompute the touches without a removed one.
+    /// - `changes`: recorded stroke changes.
     pub fn new(recording: PathBuf, topics: Topics, changes: StrokeChanges) -> Self {
         Self {
             recording,
@@ -62,7 +61,7 @@ impl ReplayedSession {
         }
     }
 
-    /// The same from the beginning, once more.
+    /// The same session, once more from the beginning.
     pub fn again(&self) -> Self {
         let history = self.history.clone().again();
         Self {
@@ -73,33 +72,33 @@ impl ReplayedSession {
         }
     }
 
-    /// How often it was begun, this time among them.
+    /// Number of runs, including this one.
     pub fn run(&self) -> u32 {
         self.run
     }
 
-    /// Its messages, as [`EvidenceSource`](crate::session::EvidenceSource) reads them.
+    /// Its messages, in the form for [`EvidenceSource`](crate::session::EvidenceSource).
     pub fn recording(&self) -> (&Path, &Topics) {
         (&self.recording, &self.topics)
     }
 
-    /// The changes of strokes that were returned so far.
+    /// The stroke changes returned up to now.
     pub fn changes_so_far(&self) -> StrokeChanges {
         self.history.so_far()
     }
 
-    /// A sample comes. Before that [`Self::next_change_before`] is asked for its stamp, ns.
+    /// Notes a sample, after [`Self::next_change_before`] for its stamp, ns.
     pub fn comes(&mut self, stamp_ns: i64) {
         self.seen_ns = Some(stamp_ns);
     }
 
-    /// The next change of strokes that was made before the sample of this stamp, ns.
+    /// The next stroke change before the sample of this stamp, ns.
     pub fn next_change_before(&mut self, stamp_ns: i64) -> Option<StrokeChange> {
         self.history.next_before(stamp_ns)
     }
 
-    /// The next change of strokes that was made after the last sample that has come. What was
-    /// recorded later, of a session that goes on, is of strokes that have not come.
+    /// The next stroke change after the last sample to date. Later changes in a continuing
+    /// recording belong to future strokes.
     pub fn next_change_at_end(&mut self) -> Option<StrokeChange> {
         let seen_ns = self.seen_ns?;
         self.next_change_before(seen_ns.saturating_add(1))
@@ -151,7 +150,7 @@ mod tests {
                 session.changes_so_far(),
                 changes[..3].iter().copied().collect()
             );
-            // that of the sample at 70 belongs to what has not come
+            // the change after the sample at 70 belongs to a future stroke
             assert_eq!(
                 (session.next_change_at_end(), session.next_change_at_end()),
                 (Some(changes[3]), None)

@@ -1,4 +1,4 @@
-//! The mesh for programs: changes from version to version, and the whole state for who has none.
+//! The mesh for programs: changes from version to version, and the whole state for new followers.
 
 use std::sync::Arc;
 
@@ -8,17 +8,17 @@ use crate::mesh::IdSet;
 use crate::reconstruct::Support;
 use crate::ros::messages::MeshPatch;
 
-/// Vertices and faces of one message at most: 37 kB.
+/// Maximum number of vertices and faces of one message: 37 kB.
 const OF_A_PART: usize = 1000;
 
-/// What followers have, and what they lack.
+/// State of the followers, and pending changes.
 #[derive(Debug)]
 pub struct MeshPatches {
-    /// the state that they have
+    /// version of the followers
     version: u64,
     vertices: FollowedIds,
     faces: FollowedIds,
-    /// variance of what rests on the scan, m²; NaN where it is not known
+    /// variance of vertices on the scan, m²; NaN if unknown
     scan_variance: f32,
 }
 
@@ -26,7 +26,7 @@ pub struct MeshPatches {
 #[derive(Debug)]
 struct FollowedIds {
     changed: IdSet,
-    /// for each number, whether they have such a one
+    /// for each number, whether followers have it
     had: Vec<bool>,
 }
 
@@ -38,7 +38,7 @@ impl FollowedIds {
         }
     }
 
-    /// What is to be set, and what is to be removed; from now on they have it.
+    /// Numbers to set and numbers to remove; marks them as sent.
     fn take(&mut self, is_there: impl Fn(u32) -> bool) -> [Vec<u32>; 2] {
         let Self { changed, had } = self;
         let (mut set, mut removed) = (Vec::new(), Vec::new());
@@ -59,9 +59,9 @@ impl FollowedIds {
 }
 
 impl MeshPatches {
-    /// Followers have what the replica has.
+    /// Followers have the state of the replica.
     ///
-    /// - `scan_sigma`: standard deviation of the scan, m, when it is known.
+    /// - `scan_sigma`: standard deviation of the scan, m, if known.
     pub fn of(replica: &MeshVersion, scan_sigma: Option<f64>) -> Self {
         let [vertices, faces] = replica.slots();
         Self {
@@ -72,9 +72,9 @@ impl MeshPatches {
         }
     }
 
-    /// Remembers what changed.
+    /// Notes changes.
     ///
-    /// - `turned`: vertices that faces have begun to use by it, or use no more.
+    /// - `turned`: vertices that faces use from now on, or no longer.
     pub fn note(&mut self, edits: &Edits, turned: &[u32]) {
         turned
             .iter()
@@ -89,15 +89,14 @@ impl MeshPatches {
             .for_each(|(face, _)| self.faces.changed.insert(*face));
     }
 
-    /// Remembers that something of vertices changed that are where they were.
+    /// Notes changes of vertices other than their position.
     pub fn note_vertices(&mut self, vertices: impl IntoIterator<Item = u32>) {
         vertices
             .into_iter()
             .for_each(|vertex| self.vertices.changed.insert(vertex));
     }
 
-    /// The change from what followers have to what the replica has, in parts; none when it is the
-    /// same.
+    /// The change from the followers' state to the replica, in parts; empty if both are equal.
     pub fn change(&mut self, replica: &MeshVersion, frame: &str) -> Vec<MeshPatch> {
         let is_same = self.vertices.changed.is_empty() && self.faces.changed.is_empty();
         if self.version == replica.version || is_same {
@@ -126,7 +125,7 @@ impl MeshPatches {
         (0..draft.part_count()).map(part).collect()
     }
 
-    /// The whole state, part by part: that of the replica, which followers have.
+    /// The whole state of the replica, equal to the followers', part by part.
     pub fn whole(
         &self,
         replica: Arc<MeshVersion>,
@@ -148,7 +147,7 @@ impl MeshPatches {
     }
 }
 
-/// A change before it is cut into parts.
+/// A change before its division into parts.
 #[derive(Default)]
 struct DraftPatch {
     removed_faces: Vec<u32>,
@@ -173,8 +172,8 @@ impl DraftPatch {
             .max(1)
     }
 
-    /// The four lists one after the other, cut into parts: so a face comes after its corners, and a
-    /// vertex goes after all faces that used it.
+    /// The four lists in sequence, cut into parts: so a face comes after its corners, and a vertex
+    /// goes after all faces that used it.
     fn part(
         &self,
         part: u32,

@@ -3,9 +3,9 @@
 //! Six threads of its own. `haptic` has the refiner and takes samples, `patch` reconstructs the
 //! touched surface beside it if the scene has a patch, `view` publishes the mesh, `features` finds
 //! and fits features, `recorder` writes down the accepted messages, `arm` moves an arm if there is
-//! one. Between them are bounded queues; a full one drops first, and counts, what is only for
-//! viewing. Each longer piece of work beside (a save, variances, a check of the input, a touch
-//! taken out) has a short-lived thread, and the port has those of its network.
+//! one. Between them are bounded queues; a full one first drops, and counts, inputs for viewing
+//! only. Each longer piece of work beside (a save, variances, a check of the input, removal of a
+//! touch) has a short-lived thread, and the port has those of its network.
 
 mod acceptance;
 mod arm;

@@ -1,5 +1,5 @@
-//! What the thread of the samples sends to the others: each mismatch, the place of the tip, changes
-//! of the mesh, touches.
+//! Output of the sample thread to the others: each mismatch, the position of the tip, mesh changes,
+//! touches.
 
 use std::sync::mpsc::TrySendError;
 use std::time::Duration;
@@ -16,12 +16,11 @@ use crate::haptic::{Case, Mismatch, Update};
 use crate::ros::messages::HapticMismatch;
 use crate::ros::port::Publication;
 
-/// The distance at the tip is looked up so often.
+/// Period of the distance query at the tip.
 const TIP_EVERY: Duration = Duration::from_millis(25);
-/// … up to here, m.
+/// Maximum distance of that query, m.
 const TIP_REACH: f64 = 0.02;
-/// A mesh torn by a change that goes on with the next sample is shown all the same when none has
-/// come for so long.
+/// Time without samples after which a mesh inside an unfinished change is shown.
 const TORN_AFTER: Duration = Duration::from_millis(200);
 
 impl RefinementWorker {
@@ -58,7 +57,7 @@ impl RefinementWorker {
         self.mismatch_ns = tip.stamp_ns;
         let centre = tip.pose_ot.translation.vector.into();
         let found = update.mismatch.as_ref();
-        // without a face near nothing is expected, and what is felt is the mismatch
+        // without a near face nothing is expected, and the measured force is the mismatch
         let actual_force = found.map_or(tip.force_o, |found| found.expected_force_o + found.linear);
         let of = |part: fn(&Mismatch) -> Vector3<f64>| found.map_or_else(Vector3::zeros, part);
         let message = HapticMismatch {
@@ -80,7 +79,7 @@ impl RefinementWorker {
             let coloured = ViewInput::Mismatch(message.face, message.signed_distance);
             shared.offer(&self.view, coloured);
         }
-        // an answer waits for no other thread of the node
+        // the answer waits for no other thread of the node
         self.port.publish(Publication::Mismatch(message));
         let now = self.setup.clock.now();
         if now.saturating_duration_since(self.tip_published) >= TIP_EVERY {
@@ -110,7 +109,7 @@ impl RefinementWorker {
         self.setup.shared.offer(&self.view, ViewInput::Tip(tip));
     }
 
-    /// Sends what changed in the mesh, as far as the view has taken up what was sent before.
+    /// Sends mesh changes, as far as the view has taken earlier ones.
     pub(super) fn send_edits(&mut self) {
         let is_idle = self.setup.clock.since(self.sampled) >= TORN_AFTER;
         while let Some(edits) = self.unsent.take().or_else(|| self.filled(is_idle)) {
@@ -127,7 +126,7 @@ impl RefinementWorker {
         }
     }
 
-    /// The next changes, when one of those that go round is here and anything has changed.
+    /// The next changes, if a free list is here and there are changes.
     fn filled(&mut self, is_idle: bool) -> Option<Box<Edits>> {
         let edits_now = self.session.engine.edits();
         let is_sent = self.session.sent_version == self.session.version

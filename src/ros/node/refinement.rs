@@ -1,5 +1,5 @@
-//! The thread of the samples: frames, pairing, haptic update. It alone has the refiner, and does
-//! little else; what it sends to the other threads is in `publishing.rs`.
+//! The sample thread: frames, pairing, haptic update. It alone has the refiner, and does little
+//! else; `publishing.rs` has its output to the other threads.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::ops::ControlFlow;
@@ -31,26 +31,26 @@ use crate::ros::port::{Arrival, Endpoint, Port};
 use crate::ros::stop::StopState;
 use crate::stylus::{FrameError, FrameTransform, Message, MovingFrame, Sample, WrenchFrame};
 
-/// The loop looks at the streams so often when nothing comes.
+/// Period of stream checks without messages.
 const IDLE: Duration = Duration::from_millis(10);
-/// Changes of the mesh go to the view so often.
+/// Period of mesh changes to the view.
 const EDITS_EVERY: Duration = Duration::from_millis(5);
-/// Diagnostics come so often.
+/// Period of diagnostics.
 const DIAGNOSTICS_EVERY: Duration = Duration::from_secs(1);
-/// Without a sample for so long the streams rest: longer than a renewal is given, and than usual
-/// gaps between poses.
+/// Time without samples after which the streams rest: longer than the time of a renewal, and than
+/// usual gaps between poses.
 const RESTS_AFTER: Duration = Duration::from_millis(50);
-/// What cannot be read is said so often for each topic, and counted meanwhile.
+/// Period of warnings about unreadable messages of each topic, with their count.
 const UNREADABLE_EVERY: Duration = Duration::from_secs(10);
-/// From here on a stamp does not fit the seconds of a message, ns: 2038.
+/// First stamp beyond the seconds of a message, ns: 2038.
 const END_OF_TIME_NS: i64 = (1 << 31) * 1_000_000_000;
-/// … and after so long, and while none comes, the mesh becomes what would be saved. A hand lifts
-/// the stylus for less.
+/// Time without samples after which the mesh settles to the state of a saved file. A hand lifts the
+/// stylus for less.
 const SETTLES_AFTER: Duration = Duration::from_millis(500);
-/// Messages of a stream that wait for a transform at most.
+/// Maximum number of messages of a stream that wait for a transform.
 const MOST_WAITING: usize = 4096;
 
-/// A message and when it came.
+/// A message of either stream.
 #[derive(Debug)]
 enum ArrivedMessage {
     Pose(PoseStamped),
@@ -69,45 +69,45 @@ impl ArrivedMessage {
     }
 }
 
-/// The thread's own.
+/// State of the sample thread.
 pub struct RefinementWorker {
     pub(super) setup: Arc<Setup>,
     pub(super) port: Arc<dyn Port>,
     pub(super) view: SyncSender<ViewInput>,
     pub(super) features: SyncSender<FeatureInput>,
     pub(super) spare: Receiver<Box<Edits>>,
-    /// probes what it is asked for, where there is one
+    /// handle of the arm, if any
     pub(super) arm: Option<ArmHandle>,
-    /// filled, and the view had no room for it
+    /// filled changes refused by a full view
     pub(super) unsent: Option<Box<Edits>>,
-    /// to be filled again
+    /// changes to fill again
     pub(super) kept: Option<Box<Edits>>,
     pub(super) resolver: FrameResolver,
-    /// the frame whose pose is that of the stylus, where it is taken from transforms
+    /// frame whose transforms give the pose of the stylus, if any
     pub(super) moving: Option<MovingFrame>,
     pub(super) session: NodeSession,
-    /// poses and wrenches that wait for a transform, with when they came
+    /// poses and wrenches waiting for a transform, and their arrival
     waiting: [VecDeque<(ArrivedMessage, Instant)>; 2],
     pub(super) streams: [StreamWatch; 2],
     pub(super) acceptance: Acceptance,
     pub(super) doubts: InputDoubts,
-    /// topics with messages that could not be read: when that was said, and how many came since
+    /// topics with unreadable messages: time of the last warning, and number since
     unreadable: BTreeMap<&'static str, (Instant, u64)>,
-    /// what stops the arm, and the samples
+    /// stop state of arm and samples
     pub(super) stops: Arc<StopState>,
     pub(super) fault: Option<String>,
-    /// when a message was refused because its frames are not connected, and why
+    /// time and reason of the last refusal for unconnected frames
     pub(super) lost_transform: Option<(Instant, String)>,
     pub(super) last_state: String,
-    /// since when
+    /// start of the state
     pub(super) state_since: Instant,
-    /// who else is on the topics
+    /// other participants on the topics
     pub(super) endpoints: BTreeMap<String, Endpoint>,
-    /// sessions that are being ended, and files that are being written
+    /// ending sessions and running saves
     pub(super) side_work: SideWork,
-    /// a touch that is being taken out or put back
+    /// running removal or restoration of a touch
     pub(super) taking_out: Option<TakingOut>,
-    /// how well vertices are known, for who follows the mesh
+    /// computation of variances, for followers of the mesh
     pub(super) variance: VarianceWork,
     pub(super) sampled: Instant,
     edits_sent: Instant,
@@ -118,7 +118,7 @@ pub struct RefinementWorker {
 }
 
 impl RefinementWorker {
-    /// Ready to take samples; without an arm.
+    /// Ready for samples; without an arm.
     pub fn new(
         setup: Arc<Setup>,
         port: Arc<dyn Port>,
@@ -179,15 +179,15 @@ impl RefinementWorker {
         }
     }
 
-    /// The same with an arm that probes what it is asked for.
+    /// The same worker with an arm for probing.
     pub fn with_arm(self, arm: Option<ArmHandle>) -> Self {
         Self { arm, ..self }
     }
 
-    /// Runs until it is asked to end, or nobody can ask any more; ends the session.
+    /// Runs until a shutdown or the end of all senders; ends the session.
     ///
     /// # Errors
-    /// [`NodeError`] when the result could not be written.
+    /// [`NodeError`] if the result was not written.
     pub fn run(mut self, inbox: Arrivals) -> Result<NodeEnd, NodeError> {
         loop {
             let flow = match inbox.recv_timeout(&self.setup.clock, IDLE) {
@@ -200,7 +200,7 @@ impl RefinementWorker {
             }
             self.tick();
         }
-        // it stops, retracts and ends while the session is written; who calls now is refused
+        // the arm stops, retracts and ends while the session is written; later calls are refused
         self.arm = None;
         drop(inbox);
         self.give_up_taking_out("the node ends");
@@ -214,7 +214,7 @@ impl RefinementWorker {
             Arrival::Tf(transforms) => self.transforms(&transforms, false),
             Arrival::TfStatic(transforms) => self.transforms(&transforms, true),
             Arrival::ClickedPoint(clicked) => self.flag_clicked(&clicked),
-            // samples have their time in their stamps; the port has this one
+            // samples carry their time in stamps; the port uses this one
             Arrival::Clock(_) => {}
             Arrival::Refused(stream, reason, at) => {
                 self.streams[stream].arrive(self.setup.clock.now(), None, at);
@@ -269,7 +269,7 @@ impl RefinementWorker {
         self.retry_waiting();
     }
 
-    /// The next pose that the transforms give.
+    /// The next pose from the transforms.
     fn next_moving_pose(&mut self) -> Option<PoseStamped> {
         let moving = self.moving.as_mut()?;
         let pose = moving.next_pose(&self.resolver.frames);
@@ -290,7 +290,7 @@ impl RefinementWorker {
                 self.waiting[stream].extend(left.map(|message| (message, at)));
             }
             MOST_WAITING.. => self.session.counters.refuse("transform"),
-            // behind those that wait already, so that the order stays
+            // behind waiting messages, to keep the order
             _ => {
                 self.waiting[stream].push_back((message, at));
                 self.retry_waiting();
@@ -298,7 +298,7 @@ impl RefinementWorker {
         }
     }
 
-    /// Tries again what waits for a transform; gives up what has waited for too long.
+    /// Retries messages waiting for a transform; refuses those that have waited too long.
     fn retry_waiting(&mut self) {
         let now = self.setup.clock.now();
         let longest =
@@ -322,7 +322,7 @@ impl RefinementWorker {
         }
     }
 
-    /// Brings a message into its frame and on; gives it back where a transform has to come first.
+    /// Transforms a message and passes it on; returns it if a transform is still missing.
     fn place(&mut self, message: ArrivedMessage, at: Instant) -> Option<ArrivedMessage> {
         let placed = match &message {
             ArrivedMessage::Pose(pose) => self.resolver.pose(pose),
@@ -341,11 +341,10 @@ impl RefinementWorker {
         None
     }
 
-    /// A message in its frame goes to the synchroniser and to the recording, and what the first
-    /// lets out to the refiner.
+    /// Passes a transformed message to the synchroniser and the recording, and complete samples to
+    /// the refiner.
     fn pair(&mut self, message: Message, stream: usize, at: Instant) {
-        // the first wrench says that its axes are those of the object: nothing was pushed yet, so
-        // all is begun anew
+        // the first wrench shows object axes: without any push yet, everything starts again
         if self.resolver.axes == Some(WrenchFrame::Object)
             && self.session.axes == WrenchFrame::Sensor
             && let Err(error) = self.session.turn_axes(&self.setup, WrenchFrame::Object)
@@ -381,10 +380,10 @@ impl RefinementWorker {
         }
     }
 
-    /// Moves the mesh and says what was found, then follows the patch and sends what changed to the
+    /// Moves the mesh and publishes the mismatch, then follows the patch and sends changes to the
     /// others.
     ///
-    /// - `at`: when the message came that completed the sample, where one did.
+    /// - `at`: arrival of the message that completed the sample, if any.
     pub(super) fn sample(&mut self, sample: &Sample, at: Option<Instant>) {
         self.follow_record(sample.stamp_ns);
         let begun = self.setup.clock.now();
@@ -435,7 +434,7 @@ impl RefinementWorker {
         self.fault = Some(error.to_string());
     }
 
-    /// Another state of the mesh has another version; touches that are new go to the features.
+    /// Gives a changed mesh a new version; sends new touches to the features.
     fn note_changes(&mut self) {
         let edits = self.session.engine.edits();
         self.session.version +=
@@ -446,14 +445,14 @@ impl RefinementWorker {
         }
     }
 
-    /// What is due now and then.
+    /// Does periodic work.
     fn tick(&mut self) {
         let now = self.setup.clock.now();
         if now.saturating_duration_since(self.edits_sent) >= EDITS_EVERY {
             self.edits_sent = now;
             let rested = now.saturating_duration_since(self.sampled);
             if self.fault.is_none() && rested >= RESTS_AFTER {
-                // the mesh goes on to what the patch knows by then: what is shown is not left
+                // the mesh follows the patch to its latest state, so that the view is not left
                 // behind
                 let engine = &mut self.session.engine;
                 match if rested >= SETTLES_AFTER {
@@ -474,7 +473,7 @@ impl RefinementWorker {
                 self.watch_streams();
             }
         }
-        // of a session that is replayed the streams rest when the replay does
+        // in a replay the streams rest whenever the replay does
         if now.saturating_duration_since(self.diagnosed) >= DIAGNOSTICS_EVERY
             && !self.session.keeping.is_replayed()
         {
@@ -488,11 +487,11 @@ impl RefinementWorker {
         }
     }
 
-    /// Goes over to another session; the one before.
+    /// Switches to another session; returns the previous one.
     pub(super) fn change_session(&mut self, next: NodeSession) -> NodeSession {
-        // its wrenches may come in other axes
+        // its wrenches may have other axes
         (self.resolver.axes, self.waiting, self.mismatch_ns) = (None, Default::default(), i64::MIN);
-        // a change of the session before means nothing in this one
+        // changes of the previous session do not apply to this one
         self.doubts.restart();
         self.give_up_taking_out("a new session has begun");
         self.kept = self.unsent.take().or(self.kept.take());
@@ -508,8 +507,8 @@ fn shifted(mut message: Message, shift_ns: i64) -> Message {
     message
 }
 
-/// The synchroniser lets only checked samples out, in order of time: what is left is a step whose
-/// result is no number.
+/// Refusal reason of an error. The synchroniser passes only checked samples, in order of time: the
+/// remaining cause is a step with a non-finite result.
 fn reason_of(error: &RefineError) -> &'static str {
     match error {
         RefineError::Sample(_) => "sample",

@@ -1,5 +1,5 @@
-//! A session that was recorded, replayed: strokes are taken back, done again, taken out and put
-//! back where they were, and nothing else acts on it.
+//! Replay of a recorded session: strokes are undone, redone, removed and restored at their recorded
+//! times, and nothing else acts on it.
 
 use super::keeping::{Keeping, ReplayedSession};
 use super::refinement::RefinementWorker;
@@ -8,7 +8,7 @@ use crate::ros::messages::ProbeResult;
 use crate::ros::port::{Arrival, Call, ReplayStep};
 use crate::session::{EvidenceSource, Removal, StrokeChange};
 
-/// What calls are answered.
+/// Answer to calls.
 pub(super) const REPLAYED: &str =
     "this is the replay of a session, in which nothing can be changed";
 
@@ -18,7 +18,7 @@ impl RefinementWorker {
         Arrival::Call(call).refuse(ProbeResult::NO_ARM, REPLAYED);
     }
 
-    /// Does what the record of a session that is replayed has before a sample.
+    /// Applies the recorded changes before a sample of a replayed session.
     pub(super) fn follow_record(&mut self, stamp_ns: i64) {
         self.change_strokes_as_recorded(|replayed| replayed.next_change_before(stamp_ns));
         if let Keeping::Replayed(replayed) = &mut self.session.keeping {
@@ -26,7 +26,7 @@ impl RefinementWorker {
         }
     }
 
-    /// Goes on with a replay.
+    /// Continues a replay.
     pub(super) fn replay_step(&mut self, step: ReplayStep) -> Result<(), String> {
         if !self.session.keeping.is_replayed() {
             return Err("this session is not replayed".to_owned());
@@ -44,7 +44,7 @@ impl RefinementWorker {
         }
     }
 
-    /// Makes the changes of strokes that are next.
+    /// Applies the next stroke changes.
     fn change_strokes_as_recorded(
         &mut self,
         mut next: impl FnMut(&mut ReplayedSession) -> Option<StrokeChange>,
@@ -75,7 +75,7 @@ impl RefinementWorker {
         }
     }
 
-    /// Makes the evidence again with or without a stroke, as the changes until then have it.
+    /// Recomputes the evidence with or without a stroke, according to the changes up to then.
     /// Samples wait meanwhile.
     fn remake_as_recorded(&mut self, removal: Removal) -> Result<(), String> {
         let Keeping::Replayed(replayed) = &self.session.keeping else {

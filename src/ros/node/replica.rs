@@ -1,8 +1,8 @@
-//! The replica of the mesh: plain arrays by id, which one worker keeps up to date and all of them
-//! read; and the changes on their way to it.
+//! The replica of the mesh: plain arrays by id, written by one worker and read by all; and the
+//! changes on their way to it.
 //!
-//! Two lists of changes go round, each bounded. When both are on their way, what changes stays in
-//! the mesh's journal, which is bounded by the mesh: the view can be as slow as it likes.
+//! Two lists of changes circulate, each bounded. While both are on their way, changes stay in the
+//! mesh's journal, whose size the mesh bounds: the view can be arbitrarily slow.
 
 use std::ops::Deref;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -18,37 +18,37 @@ use crate::mesh::{Changes, FaceId, MeshError, TriMesh, VertexId};
 use crate::reconstruct::Support;
 use crate::ros::locked;
 
-/// Vertices, and faces, that go at once: some 50 µs.
+/// Maximum number of vertices, and of faces, per transfer: some 50 µs.
 const AT_ONCE: usize = 1000;
 
 /// Faces of a tile, by number: 1500 points are 60 kB with their colours, below the 64 kB of a
 /// datagram.
 pub const FACES_OF_A_TILE: u32 = 500;
-/// Where a vertex is, m, in O, and what it rests on.
+/// Position of a vertex, m, in O, and its support.
 pub type VertexPlace = (Point3<f64>, Support);
 
-/// Some changes.
+/// A list of changes.
 #[derive(Clone, Debug, Default)]
 pub struct Edits {
-    /// state of the mesh with these in it, when they are the last of it
+    /// version of the mesh after these changes, if they complete it
     pub version: u64,
-    /// whether they are: before that, ids may not fit each other
+    /// whether they do: before that, ids may not fit each other
     pub is_complete: bool,
     /// stamp of the newest sample in it, ns
     pub stamp_ns: i64,
-    /// place and support; `None`: gone
+    /// position and support; `None`: removed
     pub vertices: Vec<(u32, Option<VertexPlace>)>,
-    /// corners; `None`: gone
+    /// corners; `None`: removed
     pub faces: Vec<(u32, Option<[u32; 3]>)>,
-    /// tiles in which something is to be drawn anew
+    /// tiles to redraw
     pub tiles: Vec<u32>,
     taken: Changes,
 }
 
 impl Edits {
-    /// Fills it with what changed.
+    /// Fills the list with changes.
     ///
-    /// - `may_be_torn`: count as complete what is in the middle of a change of the patch.
+    /// - `may_be_torn`: counts a state inside a change of the patch as complete.
     ///
     /// # Errors
     /// As [`Engine::take_changes`].
@@ -75,7 +75,7 @@ impl Edits {
         let mesh = engine.mesh();
         let mut note = |face: FaceId| {
             let tile = face.0 / FACES_OF_A_TILE;
-            // neighbours are mostly in one tile: the list stays short
+            // neighbours mostly share a tile: the list stays short
             if tiles.last() != Some(&tile) {
                 tiles.push(tile);
             }
@@ -99,13 +99,13 @@ impl Edits {
         Ok(())
     }
 
-    /// Whether nothing has changed.
+    /// Whether there are no changes.
     pub fn is_empty(&self) -> bool {
         self.vertices.is_empty() && self.faces.is_empty()
     }
 }
 
-/// Corners of a face that is not there.
+/// Corners of a missing face.
 const NO_FACE: [u32; 3] = [u32::MAX; 3];
 
 /// The mesh at one version.
@@ -115,23 +115,23 @@ pub struct MeshVersion {
     pub session: String,
     /// state of the mesh, as in `MeshPatch`
     pub version: u64,
-    /// … that its shape came with: in later ones only variances are others
+    /// version of its shape: later ones only change variances
     pub shape_version: u64,
     /// stamp of the newest sample in it, ns
     pub stamp_ns: i64,
     positions: Vec<Point3<f64>>,
     support: Vec<Option<Support>>,
-    /// along the normal, m²; NaN where it is not known
+    /// along the normal, m²; NaN if unknown
     variance: Vec<f32>,
-    /// faces at each vertex: what no face uses is not shown
+    /// number of faces at each vertex: unused vertices are not shown
     uses: Vec<u32>,
     corners: Vec<[u32; 3]>,
-    /// of the vertices that faces use, and of the faces
+    /// numbers of used vertices and of faces
     pub counts: [u32; 2],
 }
 
 impl MeshVersion {
-    /// The scan, before anything was touched.
+    /// The scan before any touch.
     pub fn of(scan: &TriMesh, session: &str) -> Self {
         let slots = scan.vertex_slots() as u32;
         let is_there = |vertex| scan.has_vertex(VertexId(vertex)).then_some(Support::Scan);
@@ -156,7 +156,7 @@ impl MeshVersion {
         }
     }
 
-    /// Takes changes up; vertices that faces have begun to use, or use no more.
+    /// Applies changes; returns vertices that faces use from now on, or no longer.
     pub fn apply(&mut self, edits: &Edits) -> Vec<u32> {
         for &(vertex, place) in &edits.vertices {
             self.make_room(vertex);
@@ -202,7 +202,7 @@ impl MeshVersion {
         turned
     }
 
-    /// Takes variances up; which vertices have others now.
+    /// Applies variances; returns the changed vertices.
     pub fn apply_variances(&mut self, variances: &Variances) -> Vec<u32> {
         self.version = variances.version;
         let known = variances
@@ -227,19 +227,19 @@ impl MeshVersion {
         }
     }
 
-    /// One more than the largest numbers of a vertex and of a face.
+    /// Largest number of a vertex and of a face, plus one.
     pub fn slots(&self) -> [u32; 2] {
         [self.positions.len() as u32, self.corners.len() as u32]
     }
 
-    /// Place of a vertex, m, and what it rests on; `None` where there is none, or no face uses it.
+    /// Position of a vertex, m, and its support; `None` for a missing or unused vertex.
     pub fn vertex(&self, vertex: u32) -> Option<(Point3<f64>, Support)> {
         let at = vertex as usize;
         let is_used = self.uses.get(at).is_some_and(|uses| *uses > 0);
         is_used.then_some((*self.positions.get(at)?, (*self.support.get(at)?)?))
     }
 
-    /// Variance along the normal of a vertex that was touched, m²; NaN where it is not known.
+    /// Variance along the normal of a touched vertex, m²; NaN if unknown.
     pub fn variance(&self, vertex: u32) -> f32 {
         self.variance
             .get(vertex as usize)
@@ -247,7 +247,7 @@ impl MeshVersion {
             .unwrap_or(f32::NAN)
     }
 
-    /// The vertices that do not rest on the scan: number, place, m, and what it rests on.
+    /// The vertices not supported by the scan: number, position, m, and support.
     pub fn touched(&self) -> impl Iterator<Item = (u32, Point3<f64>, Support)> + '_ {
         let all = (0..self.positions.len() as u32)
             .filter_map(|vertex| Some((vertex, self.vertex(vertex)?)));
@@ -255,7 +255,7 @@ impl MeshVersion {
             .map(|(vertex, (place, support))| (vertex, place, support))
     }
 
-    /// Corners of a face; `None` where there is none.
+    /// Corners of a face; `None` for a missing one.
     pub fn face(&self, face: u32) -> Option<[u32; 3]> {
         self.corners
             .get(face as usize)
@@ -266,7 +266,7 @@ impl MeshVersion {
     /// As a mesh of its own: vertices keep their numbers, faces their order.
     ///
     /// # Errors
-    /// [`MeshError`], when faces name vertices that are not there yet.
+    /// [`MeshError`] if faces name missing vertices.
     pub fn mesh(&self) -> Result<TriMesh, MeshError> {
         let faces = self
             .corners
@@ -278,19 +278,19 @@ impl MeshVersion {
     }
 }
 
-/// A state of the mesh: which session, counted from 0 on, and which version in it.
+/// A state of the mesh: number of the session from 0 on, and version in it.
 type Revision = (u64, u64);
 
-/// The mesh as it was sent so far. The publishing worker writes, and it, the feature worker, the
-/// arm and who saves the mesh read.
+/// The mesh as sent up to now. The publishing worker writes it; that worker, the feature worker,
+/// the arm and saves read it.
 ///
-/// Who reads holds a state that no longer changes. The writer copies it only where somebody still
-/// reads it when the next change comes.
+/// Readers hold a state that no longer changes. The writer copies it only if a reader still holds
+/// it at the next change.
 #[derive(Debug)]
 pub struct MeshReplica {
     clock: Clock,
     state: Mutex<ReplicaState>,
-    /// the last complete state that is on its way to the writer, or with it
+    /// last complete state on its way to the writer, or with it
     announced: Mutex<Revision>,
     version: AtomicU64,
     shape_version: AtomicU64,
@@ -300,15 +300,15 @@ pub struct MeshReplica {
 struct ReplicaState {
     mesh: Arc<MeshVersion>,
     session: u64,
-    /// all of a change is in it: before that, ids may not fit each other
+    /// a whole change is included: before that, ids may not fit each other
     is_complete: bool,
     is_closed: bool,
-    /// who waits for a complete state, this one or a later one
+    /// readers waiting for this complete state or a later one
     waiting: Vec<(Revision, SyncSender<Snapshot>)>,
 }
 
 impl MeshReplica {
-    /// The scan, before anything was touched, in no session yet.
+    /// The scan before any touch, without a session yet.
     pub fn new(clock: Clock, scan: &TriMesh) -> Self {
         let mesh = Arc::new(MeshVersion::of(scan, ""));
         let state = ReplicaState {
@@ -332,19 +332,19 @@ impl MeshReplica {
         name.clone_into(&mut Arc::make_mut(&mut locked(&self.state).mesh).session);
     }
 
-    /// Changes up to this version are on their way to the writer: who reads from now on gets it or
-    /// a later one.
+    /// Announces changes up to this version on their way to the writer: later readers get it or a
+    /// newer one.
     pub fn announce(&self, version: u64) {
         locked(&self.announced).1 = version;
     }
 
-    /// Another session is on its way to the writer.
+    /// Announces another session on its way to the writer.
     pub fn announce_session(&self) {
         let mut announced = locked(&self.announced);
         *announced = (announced.0 + 1, 1);
     }
 
-    /// Takes changes up; as [`MeshVersion::apply`].
+    /// Applies changes; as [`MeshVersion::apply`].
     pub fn apply(&self, edits: &Edits) -> Vec<u32> {
         let mut state = locked(&self.state);
         let turned = Arc::make_mut(&mut state.mesh).apply(edits);
@@ -353,7 +353,7 @@ impl MeshReplica {
         turned
     }
 
-    /// Takes variances up; as [`MeshVersion::apply_variances`].
+    /// Applies variances; as [`MeshVersion::apply_variances`].
     pub fn apply_variances(&self, variances: &Variances) -> Vec<u32> {
         let mut state = locked(&self.state);
         let changed = Arc::make_mut(&mut state.mesh).apply_variances(variances);
@@ -361,7 +361,7 @@ impl MeshReplica {
         changed
     }
 
-    /// Goes over to another session.
+    /// Switches to another session.
     pub fn begin_session(&self, mesh: MeshVersion) {
         let mut state = locked(&self.state);
         state.mesh = Arc::new(mesh);
@@ -369,31 +369,31 @@ impl MeshReplica {
         self.answer(&mut state);
     }
 
-    /// Nothing comes any more: nobody is to wait.
+    /// Ends the changes: readers no longer wait.
     pub fn close(&self) {
         let mut state = locked(&self.state);
         state.is_closed = true;
         state.waiting.clear();
     }
 
-    /// The version that it has got to.
+    /// The current version.
     pub fn version(&self) -> u64 {
         self.version.load(Ordering::Relaxed)
     }
 
-    /// The version that its shape came with: in later ones only variances are others.
+    /// The version of the current shape: later ones only change variances.
     pub fn shape_version(&self) -> u64 {
         self.shape_version.load(Ordering::Relaxed)
     }
 
-    /// As it is now, and whether it is complete: for the writer.
+    /// The current state, and whether it is complete: for the writer.
     pub fn now(&self) -> (Arc<MeshVersion>, bool) {
         let state = locked(&self.state);
         (Arc::clone(&state.mesh), state.is_complete)
     }
 
-    /// As it is when all that was announced is in it, and it is complete: mostly at once. Nothing
-    /// comes after [`Self::close`].
+    /// The state once it is complete and includes all announced changes: mostly at once. No result
+    /// after [`Self::close`].
     pub fn complete(&self) -> Receiver<Snapshot> {
         let wanted = *locked(&self.announced);
         let (reply, snapshot) = sync_channel(1);
@@ -417,7 +417,7 @@ impl MeshReplica {
         state.waiting.retain(|(wanted, reply)| {
             let is_there = *wanted <= revision;
             if is_there {
-                // who asked may have gone
+                // the receiver may be gone
                 drop(reply.try_send(Snapshot {
                     mesh: Arc::clone(mesh),
                     _working: self.clock.begin_work(),
@@ -428,7 +428,7 @@ impl MeshReplica {
     }
 }
 
-/// A state of the mesh that no longer changes. Time waits for who takes it up.
+/// A state of the mesh that no longer changes. A manual clock waits for its receiver.
 #[derive(Debug)]
 pub struct Snapshot {
     mesh: Arc<MeshVersion>,
@@ -484,7 +484,7 @@ mod tests {
                 (0..2000).all(|i| replica.vertex(i) == place(i)),
                 "step {step}"
             );
-            // what is not complete is no version
+            // an incomplete state is no version
             assert_eq!(replica.version, if step == 3 { 3 } else { 1 });
         }
         let faces: Vec<_> = scan
@@ -496,7 +496,7 @@ mod tests {
             (replica.counts, replica.slots()),
             ([2000, 1998], [2000, 1998])
         );
-        // the first vertex goes with its face, and one comes far beyond the last
+        // the first vertex goes with its face, and a new one has a far larger number
         let new = (Point3::new(7.0, 8.0, 9.0), Support::Scan);
         replica.apply(&edits(
             &[(0, None), (2500, Some(new))],
@@ -550,7 +550,7 @@ mod tests {
             (read(&readers), replica.version()),
             (vec![None, Some(3)], 3)
         );
-        // versions begin anew with a session
+        // a session starts its own versions
         replica.announce_session();
         let of_the_next = [replica.complete()];
         assert_eq!(read(&of_the_next), [None]);

@@ -27,16 +27,16 @@ use crate::ros::port::Port;
 use crate::ros::stop::ALLOW_MOTION;
 use crate::scene::{LeftOut, Memory, Scene, SceneCost};
 
-/// Inputs that wait for the view at most: frames of it are dropped first.
+/// Maximum number of inputs waiting for the view: its frames drop first.
 const VIEW_QUEUE: usize = 256;
-/// Inputs that wait for the thread of the features at most.
+/// Maximum number of inputs waiting for the feature thread.
 const FEATURE_QUEUE: usize = 256;
-/// Changes of the mesh that go round.
+/// Number of circulating lists of mesh changes.
 const EDITS_ROUND: usize = 2;
-/// Samples that wait for the node at most: two seconds of both streams.
+/// Maximum number of samples waiting for the node: two seconds of both streams.
 pub const INBOX: usize = 4096;
 
-/// A node that runs.
+/// A running node.
 #[derive(Debug)]
 pub struct Node {
     haptic: JoinHandle<Result<NodeEnd, NodeError>>,
@@ -44,8 +44,8 @@ pub struct Node {
     folder: PathBuf,
 }
 
-/// A node that has read scene and scan and begun a session, and hears nothing yet: loading a large
-/// scan takes seconds, in which nothing that is sent to the node may be lost.
+/// A node that has read scene and scan and begun a session, and does not listen yet: loading a
+/// large scan takes seconds, in which no message may be lost.
 pub struct Prepared {
     setup: Arc<Setup>,
     session: NodeSession,
@@ -60,7 +60,7 @@ impl Prepared {
         Self::on(Clock::system(), parameters)
     }
 
-    /// As [`Self::new`]; all that is due at a time is so on `clock`.
+    /// As [`Self::new`], with all deadlines on `clock`.
     ///
     /// # Errors
     /// As there.
@@ -71,9 +71,9 @@ impl Prepared {
         Ok(Self { setup, session })
     }
 
-    /// Reads scene and scan of a session that was recorded, to replay it: what arrives has to be
-    /// its messages, with [`ReplayStep`](crate::ros::port::ReplayStep)s between. Nothing is kept,
-    /// calls are refused, and nothing is said of streams.
+    /// Reads scene and scan of a recorded session for a replay: arrivals have to be its messages,
+    /// with [`ReplayStep`](crate::ros::port::ReplayStep)s between. It keeps nothing, refuses calls,
+    /// and does not report on streams.
     ///
     /// - `parameters`: its scene, scan, unit and source.
     /// - `replayed`: before its first message.
@@ -96,7 +96,7 @@ impl Prepared {
         self.session.folder.path()
     }
 
-    /// The scan: where it was read from, and how many faces it has.
+    /// The scan: its path, and its number of faces.
     pub fn scan(&self) -> (&Path, usize) {
         (&self.setup.scan_path, self.setup.scan.0.face_count())
     }
@@ -106,30 +106,29 @@ impl Prepared {
         self.setup.mesh_unit
     }
 
-    /// The mesh before anything was touched, in parts: what a follower has that is there from the
-    /// beginning.
+    /// The mesh before any touch, in parts: the state of a follower present from the beginning.
     pub fn whole_mesh(&self) -> impl Iterator<Item = MeshPatch> + Send + 'static + use<> {
         let shared = &self.setup.shared;
         let (replica, _) = shared.mesh.now();
         MeshPatches::of(&replica, shared.scan_sigma).whole(replica, shared.frame.clone())
     }
 
-    /// The scan, or the region of it that is refined, with the tree over its faces.
+    /// The scan, or its refined region, with the tree over its faces.
     pub fn scan_mesh(&self) -> Arc<(TriMesh, FaceTree)> {
         Arc::clone(&self.setup.scan)
     }
 
-    /// The scene as it was read.
+    /// The scene as read.
     pub fn scene(&self) -> &Scene {
         &self.setup.scene
     }
 
-    /// … and its text.
+    /// Text of the scene.
     pub fn scene_yaml(&self) -> &str {
         &self.setup.scene_yaml
     }
 
-    /// What was built of the scene, and the memory that it took.
+    /// The parts built of the scene, and their memory.
     ///
     /// - `has_arm`: whether an arm probes.
     pub fn cost(&self, has_arm: bool) -> SceneCost {
@@ -162,9 +161,9 @@ impl Prepared {
 
     /// Starts the threads.
     ///
-    /// - `arm`: that probes what is flagged; without one orders are answered so.
-    /// - `arrivals`: what the port puts in; the node ends with
-    ///   [`Shutdown`](crate::ros::port::Arrival::Shutdown), or when nothing can arrive any more.
+    /// - `arm`: probes flagged features; without one, orders are refused.
+    /// - `arrivals`: input from the port; the node ends with
+    ///   [`Shutdown`](crate::ros::port::Arrival::Shutdown), or after the end of all senders.
     ///
     /// # Errors
     /// [`NodeError`]
@@ -186,7 +185,7 @@ impl Prepared {
         }
         let clock = setup.clock.clone();
         let stops = Arc::clone(arrivals.stops());
-        // false is what every start allows
+        // every start allows false
         let _ = stops.allow(&ParameterValue::Bool(
             setup.shared.parameters().bool(ALLOW_MOTION),
         ));
@@ -221,7 +220,7 @@ impl Prepared {
 }
 
 impl Node {
-    /// Folder of the session that it began with.
+    /// Folder of the first session.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
@@ -229,7 +228,7 @@ impl Node {
     /// Waits for its end.
     ///
     /// # Errors
-    /// [`NodeError`] when the result was not written, or a thread ended by a fault.
+    /// [`NodeError`] if the result was not written, or a thread ended by a fault.
     pub fn join(self) -> Result<NodeEnd, NodeError> {
         let ended = self.haptic.join().map_err(|_| NodeError::Stopped)?;
         self.others

@@ -1,4 +1,4 @@
-//! One session of the node: its folder, its recording, and the mesh that is refined in it.
+//! One session of the node: its folder, its recording, and its refined mesh.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -23,117 +23,117 @@ use crate::session::{
 };
 use crate::stylus::{Synchroniser, WrenchFrame};
 
-/// What was refused and lost, and how long things took.
+/// Numbers of accepted, refused and skipped input.
 #[derive(Debug, Default)]
 pub struct Counters {
-    /// samples that the refiner took
+    /// samples accepted by the refiner
     pub accepted: u64,
-    /// messages and samples that were not taken, by reason
+    /// refused messages and samples, by reason
     pub refused: BTreeMap<&'static str, u64>,
-    /// messages that came while the node was paused
+    /// messages received during a pause
     pub paused: u64,
 }
 
 impl Counters {
-    /// One more of `count`.
+    /// Counts a refusal.
     pub fn refuse(&mut self, reason: &'static str) {
         *self.refused.entry(reason).or_default() += 1;
     }
 }
 
-/// What belongs to a session and goes with it.
+/// State of one session.
 pub struct NodeSession {
-    /// by which followers of the mesh know it
+    /// name for followers of the mesh
     pub name: String,
-    /// where all of it is kept
+    /// folder of all its files
     pub folder: SessionFolder,
-    /// whether it is recorded, or was
+    /// whether it is recorded or replayed
     pub keeping: Keeping,
     /// moves the mesh
     pub engine: Engine,
-    /// axes of the wrenches that the engine expects
+    /// expected axes of the wrenches
     pub axes: WrenchFrame,
-    /// state of the mesh that went to the view completely
+    /// last version completely sent to the view
     pub sent_version: u64,
-    /// … and edits at that time
+    /// edits at `sent_version`
     pub sent_edits: u64,
     /// pairs poses and wrenches
     pub sync: Synchroniser,
-    /// what came of poses and wrenches, to be doubted
+    /// statistics of poses and wrenches, for doubts about the input
     pub input: InputMonitor,
-    /// follows clocks that are set back
+    /// follows clocks that go back
     pub epoch: Epoch,
-    /// what was refused
+    /// numbers of accepted and refused input
     pub counters: Counters,
-    /// work for one sample: answer, and what follows it
+    /// work for one sample: answer and follow-up
     pub pushes: Latencies,
-    /// from the arrival of what completed a sample to the mesh
+    /// from the arrival of a sample's last message to the mesh
     pub latencies: Latencies,
-    /// age of the touches that the mesh shows, at each sample …
+    /// age of the touches in the mesh, at each sample
     pub behind: Latencies,
-    /// … and since the last diagnostics
+    /// age of the touches since the last diagnostics
     pub behind_lately: Latencies,
-    /// state of the mesh, as in `MeshPatch`
+    /// version of the mesh, as in `MeshPatch`
     pub version: u64,
-    /// … and edits at that time
+    /// edits at `version`
     pub edits: u64,
-    /// strokes that were taken back, done again, taken out and put back
+    /// strokes undone, redone, removed and restored
     pub strokes: StrokeChanges,
     /// stamp of the newest sample, ns
     pub last_ns: Option<i64>,
-    /// touches that the thread of the features had no room for
+    /// touches for which the feature thread had no room
     pub probed: TouchDelta,
 }
 
-/// What a session says of itself when it is over.
+/// Report of a session at its end.
 #[derive(Debug, Serialize)]
 pub struct SessionReport {
     /// name of the session
     pub session: String,
-    /// samples that the refiner took
+    /// samples accepted by the refiner
     pub accepted: u64,
-    /// messages and samples that were not taken, by reason; `pose_…` are poses
+    /// refused messages and samples, by reason; `pose_…` are poses
     pub refused: BTreeMap<String, u64>,
-    /// samples that were sent and did not come: wrenches, poses
+    /// samples sent but not received: wrenches, poses
     pub lost: [u64; 2],
-    /// arrivals that the node had no time for: wrenches and poses, others
+    /// arrivals dropped by a busy node: wrenches and poses, others
     pub dropped: [u64; 2],
-    /// publications that nobody took fast enough: tiles, others
+    /// publications dropped for slow listeners: tiles, others
     pub unsent: [u64; 2],
-    /// messages that came while it was paused
+    /// messages received during a pause
     pub paused: u64,
-    /// messages that are not in the recording
+    /// messages missing in the recording
     pub unrecorded: u64,
-    /// frames of the view that were dropped
+    /// dropped frames of the view
     pub dropped_view_frames: u64,
-    /// times that a stream was stale: poses, wrenches
+    /// number of gaps of a stream: poses, wrenches
     pub gaps: [u64; 2],
-    /// times that a clock jumped
+    /// number of clock jumps
     pub clock_jumps: u64,
-    /// times that the tip came into contact
+    /// number of contacts of the tip
     pub contacts: u64,
-    /// updates made smaller because a face would have folded
+    /// updates reduced to keep a face from folding
     pub cut_back: u64,
     /// work for one sample: its answer, and following the patch before the next one, ns
     pub push_ns: Quantiles,
-    /// from the arrival of what completed a sample to the mesh, ns
+    /// from the arrival of a sample's last message to the mesh, ns
     pub latency_ns: Quantiles,
-    /// age of the touches that the patch in the mesh shows, at each sample, ns
+    /// age of the touches in the mesh's patch, at each sample, ns
     pub patch_behind_ns: Quantiles,
     /// renewals of the patch
     pub renewals: u64,
-    /// … that were not done when they were due: the mesh showed a touch later
+    /// renewals of the patch later than due: the mesh showed a touch later
     pub late_renewals: u64,
-    /// what was written
+    /// written result
     pub result: Option<Outcome>,
 }
 
-/// What is left of a node.
+/// Result of a node.
 #[derive(Debug)]
 pub struct NodeEnd {
     /// folder of the last session, with the refined mesh in it
     pub folder: PathBuf,
-    /// what became of it
+    /// report of that session
     pub report: SessionReport,
 }
 
@@ -169,9 +169,9 @@ impl NodeSession {
         )
     }
 
-    /// Begins one again that was recorded.
+    /// Begins a replay of a recorded session.
     ///
-    /// - `folder`: where it is; nothing is written there.
+    /// - `folder`: of the recording, not written to.
     ///
     /// # Errors
     /// [`NodeError`]
@@ -180,12 +180,12 @@ impl NodeSession {
         folder: SessionFolder,
         replayed: ReplayedSession,
     ) -> Result<Self, NodeError> {
-        // followers take each run for another session; no folder is called so
+        // each run is another session for followers; no folder has such a name
         let name = format!("{}#{}", folder.name(), replayed.run());
         Self::of(setup, name, folder, Keeping::Replayed(Box::new(replayed)))
     }
 
-    /// The one that begins when this is given up.
+    /// Begins the session after this one.
     ///
     /// # Errors
     /// [`NodeError`]
@@ -230,7 +230,7 @@ impl NodeSession {
         })
     }
 
-    /// Wrenches come in other axes than was thought; nothing was touched yet.
+    /// Restarts for wrenches in other axes than assumed, before any touch.
     ///
     /// # Errors
     /// [`NodeError`]
@@ -242,10 +242,10 @@ impl NodeSession {
     }
 
     /// Ends the session: writes the result into its folder, as `touchup refine` does, and a report
-    /// beside it. Of one that is replayed nothing is written.
+    /// beside it. A replay writes nothing.
     ///
     /// # Errors
-    /// [`NodeError`] when the result could not be written; the recording is ended all the same.
+    /// [`NodeError`] if the result was not written; the recording ends all the same.
     pub fn end(self, setup: &Setup, mut report: SessionReport) -> Result<SessionReport, NodeError> {
         let Self {
             folder,
@@ -290,7 +290,7 @@ impl NodeSession {
         })
     }
 
-    /// Everything that was not taken, by reason; those of poses begin with `pose_`.
+    /// All refused input, by reason; reasons of poses begin with `pose_`.
     pub fn refused(&self) -> BTreeMap<String, u64> {
         let mut refused: BTreeMap<_, _> = self
             .counters
@@ -306,9 +306,9 @@ impl NodeSession {
         refused
     }
 
-    /// What is known of it so far.
+    /// Report up to now.
     ///
-    /// - `gaps`: times that a stream was stale: poses, wrenches.
+    /// - `gaps`: number of gaps of a stream: poses, wrenches.
     pub fn report(&self, setup: &Setup, port: &dyn Port, gaps: [u64; 2]) -> SessionReport {
         let Self {
             engine,
@@ -341,13 +341,13 @@ impl NodeSession {
     }
 }
 
-/// Room for new faces that is made ahead.
+/// Number of new faces with room reserved in advance.
 const ROOM: usize = 1 << 18;
 
-/// What moves the mesh: the haptic update, with the patch beside it where the scene has one.
-/// Nothing touched yet.
+/// The engine that moves the mesh: the haptic update, with the patch beside it if the scene has
+/// one. No touches yet.
 ///
-/// - `axes`: those of the wrenches.
+/// - `axes`: of the wrenches.
 fn engine_of(setup: &Setup, axes: WrenchFrame) -> Result<Engine, NodeError> {
     let Setup {
         scan,
@@ -369,24 +369,24 @@ fn engine_of(setup: &Setup, axes: WrenchFrame) -> Result<Engine, NodeError> {
     let mut engine = Engine::new(scan.0.clone(), refine, patch, renewal)?;
     engine.watch();
     engine.keep_strokes();
-    // bounds of the scan, which the first renewal looks up, take some ms on a large one: no sample
-    // is to wait for that
+    // the first renewal needs the bounds of the scan, some ms on a large one: no sample should wait
+    // for them
     engine.catch_up()?;
     Ok(engine)
 }
 
 /// The files of a result.
 pub struct ResultFiles {
-    /// as [`OutcomePlaces`] has them
+    /// path of the mesh, as in [`OutcomePlaces`]
     pub mesh: PathBuf,
-    /// …
+    /// path of the features, if any
     pub features: Option<PathBuf>,
-    /// …
+    /// path of the touches, if any
     pub touches: Option<PathBuf>,
 }
 
 impl ResultFiles {
-    /// Writes them, as `touchup refine` does.
+    /// Writes the files, as `touchup refine` does.
     ///
     /// # Errors
     /// [`OutcomeError`]
@@ -418,7 +418,7 @@ mod tests {
 
     use super::*;
 
-    /// As `date -u` has them.
+    /// Expected names from `date -u`.
     #[test]
     fn a_session_is_named_by_the_time_it_began() {
         let named = |seconds| name_of(UNIX_EPOCH + Duration::from_secs(seconds));

@@ -1,4 +1,4 @@
-//! What the node is started with: parameters, scene and scan.
+//! Start configuration of the node: parameters, scene and scan.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -14,10 +14,10 @@ use crate::ros::parameters::Parameters;
 use crate::scan::read_scan;
 use crate::scene::{CutScan, RegionCut, Scene, SceneError, Setting};
 
-/// The scan as it came, and the tree over its faces.
+/// The original scan, and the tree over its faces.
 pub type Scan = Arc<(TriMesh, FaceTree)>;
 
-/// All that does not change while the node runs.
+/// Constant data of a running node.
 pub(crate) struct Setup {
     pub clock: Clock,
     pub shared: Arc<Shared>,
@@ -30,7 +30,7 @@ pub(crate) struct Setup {
     pub topics: Topics,
     pub source: &'static str,
     pub tool: String,
-    /// whose pose is taken from transforms, and in which frame
+    /// frame whose transforms give the pose, and its base frame
     pub pose_frames: Option<[String; 2]>,
 }
 
@@ -88,10 +88,10 @@ impl Setup {
     }
 }
 
-/// The scene and its text, which the session keeps: both with the radius of the ball that was told.
+/// The scene and its text for the session, both with the given radius of the ball.
 ///
 /// - `path`: empty for the default scene.
-/// - `radius_mm`: the parameter; 0: as the scene says.
+/// - `radius_mm`: the parameter; 0: the scene's radius.
 fn scene_of(path: &Path, radius_mm: f64) -> Result<(Scene, String), SceneError> {
     let (mut scene, yaml) = match path.as_os_str().is_empty() {
         true => (Scene::default(), Scene::template_without_radius()),
@@ -103,7 +103,7 @@ fn scene_of(path: &Path, radius_mm: f64) -> Result<(Scene, String), SceneError> 
     let Some(mm) = radius_mm else {
         return Ok((scene, yaml));
     };
-    // what the text says, without the files that it names
+    // scene of the text, without its files
     let mut expected = Scene::from_yaml(&yaml)?;
     expected.tell_radius(&yaml, radius_mm)?;
     let set = [Setting::scalar("tip.radius_mm", mm)];
@@ -111,7 +111,7 @@ fn scene_of(path: &Path, radius_mm: f64) -> Result<(Scene, String), SceneError> 
     Ok((scene, yaml))
 }
 
-/// The unit of the files, of the parameter `mesh_unit`.
+/// Unit of mesh files, from the parameter `mesh_unit`.
 pub fn mesh_unit(parameters: &Parameters) -> MeshUnit {
     MeshUnit::of_name(parameters.string("mesh_unit")).unwrap_or_default()
 }

@@ -1,4 +1,4 @@
-//! What the threads of the node know of each other.
+//! State shared by the threads of the node.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{SyncSender, TrySendError};
@@ -9,28 +9,28 @@ use super::replica::MeshReplica;
 use crate::ros::locked;
 use crate::ros::parameters::Parameters;
 
-/// Read by all threads.
+/// Readable from all threads.
 #[derive(Debug)]
 pub struct Shared {
-    /// frame of all that is published
+    /// frame of all publications
     pub frame: String,
-    /// standard deviation of the scan, m, when the scene says it
+    /// standard deviation of the scan, m, if in the scene
     pub scan_sigma: Option<f64>,
-    /// the mesh as far as it was sent
+    /// the mesh as sent up to now
     pub mesh: MeshReplica,
     parameters: Mutex<Arc<Parameters>>,
-    /// tiles that are still to be sent
+    /// number of tiles waiting to be sent
     pub tiles_waiting: AtomicUsize,
-    /// frames of the view that were dropped
+    /// number of dropped frames of the view
     pub dropped_frames: AtomicU64,
-    /// how many look at the tiles; one if the port does not say
+    /// number of viewers of the tiles; one if the port does not know
     pub viewers: AtomicUsize,
-    /// somebody joined who has no tiles yet
+    /// a new viewer without tiles has joined
     pub has_new_viewer: AtomicBool,
 }
 
 impl Shared {
-    /// Nothing shown yet.
+    /// Before the first publication.
     pub fn new(parameters: Parameters, scan_sigma: Option<f64>, mesh: MeshReplica) -> Self {
         Self {
             frame: parameters.string("object_frame").to_owned(),
@@ -44,25 +44,24 @@ impl Shared {
         }
     }
 
-    /// As they are now.
+    /// The current parameters.
     pub fn parameters(&self) -> Arc<Parameters> {
         Arc::clone(&locked(&self.parameters))
     }
 
-    /// Sets them.
+    /// Sets the parameters.
     pub fn set_parameters(&self, parameters: Parameters) {
         *locked(&self.parameters) = Arc::new(parameters);
     }
 
-    /// So many look at the tiles now.
+    /// Sets the number of viewers of the tiles.
     pub fn note_viewers(&self, count: usize) {
         if self.viewers.swap(count, Ordering::Relaxed) < count {
             self.has_new_viewer.store(true, Ordering::Relaxed);
         }
     }
 
-    /// Sends the view something that it can do without: where it has no time, that is dropped and
-    /// counted.
+    /// Sends the view an optional input; drops and counts it if the view is busy.
     pub fn offer(&self, view: &SyncSender<ViewInput>, input: ViewInput) {
         if let Err(TrySendError::Full(_)) = view.try_send(input) {
             self.dropped_frames.fetch_add(1, Ordering::Relaxed);

@@ -1,5 +1,4 @@
-//! Threads of the node, and those beside that write sessions and files: counted, and none is left
-//! behind.
+//! Threads of the node, and side threads that write sessions and files: counted, and all joined.
 
 use std::io;
 use std::thread::{Builder, JoinHandle};
@@ -11,7 +10,7 @@ use crate::threads::give_way;
 /// Starts a thread that waits on `clock`.
 ///
 /// # Errors
-/// Of the operating system, when there is no thread for it.
+/// Of the operating system, if no thread is available.
 pub fn begin<T: Send + 'static>(
     clock: &Clock,
     name: &str,
@@ -26,7 +25,7 @@ pub fn begin<T: Send + 'static>(
     Builder::new().name(name.to_owned()).spawn(work)
 }
 
-/// The same for work that gives way to the thread of the samples.
+/// Starts a thread that gives way to the sample thread.
 ///
 /// # Errors
 /// As there.
@@ -41,7 +40,7 @@ pub fn begin_behind<T: Send + 'static>(
     })
 }
 
-/// What is under way.
+/// Side threads at work.
 #[derive(Debug)]
 pub struct SideWork {
     clock: Clock,
@@ -49,7 +48,7 @@ pub struct SideWork {
 }
 
 impl SideWork {
-    /// Nothing yet. Whatever waits does so on `clock`.
+    /// No threads yet. All waits use `clock`.
     pub fn on(clock: Clock) -> Self {
         Self {
             clock,
@@ -57,22 +56,22 @@ impl SideWork {
         }
     }
 
-    /// How much is under way now.
+    /// Number of running threads.
     pub fn count(&mut self) -> usize {
         self.threads.retain(|thread| !thread.is_finished());
         self.threads.len()
     }
 
-    /// Begins one more.
+    /// Starts a thread.
     ///
     /// # Errors
-    /// Of the operating system, when there is no thread for it.
+    /// Of the operating system, if no thread is available.
     pub fn begin(&mut self, name: &str, work: impl FnOnce() + Send + 'static) -> io::Result<()> {
         self.threads.push(begin_behind(&self.clock, name, work)?);
         Ok(())
     }
 
-    /// Waits for all of it.
+    /// Waits for all threads.
     pub fn finish(self) {
         join(self.threads);
     }

@@ -1,29 +1,29 @@
-//! Whether the two streams come, and how.
+//! Arrival of the two streams.
 
 use std::time::{Duration, Instant};
 
-/// Rates are those of so long, at least.
+/// Minimum averaging time of rates.
 const RATE_OVER: Duration = Duration::from_secs(1);
 
-/// One stream as it arrives.
+/// Arrival of one stream.
 #[derive(Clone, Debug)]
 pub struct StreamWatch {
     last: Option<Instant>,
-    /// stamp of the last one, ns, and when it came
+    /// stamp of the last message, ns, and its arrival
     stamped: Option<(i64, Instant)>,
-    /// messages so far
+    /// number of messages
     pub arrived: u64,
-    /// times that it was stale
+    /// number of gaps
     pub gaps: u64,
     is_stale: bool,
     since: Instant,
     arrived_since: u64,
-    /// how many come in a second
+    /// messages per second
     pub rate_hz: f64,
 }
 
 impl StreamWatch {
-    /// Nothing came yet.
+    /// Before the first message.
     pub fn new(now: Instant) -> Self {
         Self {
             last: None,
@@ -37,9 +37,9 @@ impl StreamWatch {
         }
     }
 
-    /// A message came.
+    /// Notes a message.
     ///
-    /// - `stamp_ns`: as its header has it, where that is a time; `at`: when the port had it.
+    /// - `stamp_ns`: of its header, if valid; `at`: arrival at the port.
     pub fn arrive(&mut self, now: Instant, stamp_ns: Option<i64>, at: Instant) {
         self.last = Some(now);
         self.stamped = stamp_ns.map(|stamp_ns| (stamp_ns, at));
@@ -47,7 +47,7 @@ impl StreamWatch {
         self.arrived += 1;
     }
 
-    /// To be called from time to time; whether the stream is stale.
+    /// Updates rate and gaps, called from time to time; returns whether the stream is stale.
     pub fn check(&mut self, now: Instant, stale: Duration) -> bool {
         let is_stale = self
             .last
@@ -62,13 +62,13 @@ impl StreamWatch {
         is_stale
     }
 
-    /// Whether the last one has no stamp: the header was not filled.
+    /// Whether the last message has an empty stamp.
     pub fn is_unstamped(&self) -> bool {
         self.stamped.is_some_and(|(stamp_ns, _)| stamp_ns == 0)
     }
 
-    /// How far the stamps of this stream are beyond those that come on the other at the same time,
-    /// s; `None` before both have come.
+    /// Lead of this stream's stamps over simultaneous ones of the other, s; `None` before both have
+    /// come.
     pub fn stamped_beyond(&self, other: &Self) -> Option<f64> {
         let ((ours_ns, ours), (theirs_ns, theirs)) = (self.stamped?, other.stamped?);
         let between = ours.saturating_duration_since(theirs).as_secs_f64()
@@ -76,38 +76,38 @@ impl StreamWatch {
         Some((ours_ns as f64 - theirs_ns as f64) * 1e-9 - between)
     }
 
-    /// How long ago the last one came; `None` before the first.
+    /// Age of the last message; `None` before the first.
     pub fn age(&self, now: Instant) -> Option<Duration> {
         self.last.map(|last| now.saturating_duration_since(last))
     }
 }
 
-/// A clock that was set back: both streams come with stamps before those that came already, one
-/// message after the other.
+/// Detection of a clock set back: both streams come with stamps older than earlier ones, message
+/// after message.
 ///
-/// Time in a session only goes forward: from then on a second is added beyond what had come, so
+/// Time in a session only goes forward: from then on stamps continue 61 s beyond the newest one, so
 /// that nothing pairs across.
 #[derive(Clone, Debug, Default)]
 pub struct Epoch {
-    /// what is added to stamps, ns
+    /// offset added to stamps, ns
     pub shift_ns: i64,
     newest_ns: i64,
     late: [u32; 2],
-    /// times that the clock was set back
+    /// number of times that the clock went back
     pub jumps: u64,
 }
 
-/// So many of both streams one after the other are no mistake of single messages.
+/// Number of late messages in a row of both streams that is no mistake of single messages.
 const MOST_LATE: u32 = 50;
-/// Between two epochs, ns: longer than any gap between poses that is bridged.
+/// Time between two epochs, ns: longer than any bridged gap between poses.
 const BETWEEN_NS: i64 = 61_000_000_000;
 
 impl Epoch {
-    /// What became of a message of stream 0 or 1 with this stamp, as shifted. Returns whether a new
-    /// epoch begins: then the message after it is to be shifted by another amount.
+    /// Notes whether a message of stream 0 or 1 with this shifted stamp was accepted. Returns
+    /// whether a new epoch begins: then the next message needs another shift.
     ///
-    /// - `newest_ns`: of both streams, as kept for good: a stamp that leaps and is given up again
-    ///   is none.
+    /// - `newest_ns`: confirmed newest stamp of both streams: a leap withdrawn later does not
+    ///   count.
     pub fn note(
         &mut self,
         stream: usize,
@@ -169,7 +169,7 @@ mod tests {
         }
     }
 
-    /// Worked by hand: the wrench comes 2 ms after the pose, and is stamped 5 s and 2 ms later.
+    /// Worked by hand: the wrench comes 2 ms after the pose, and its stamp is 5 s and 2 ms later.
     #[test]
     fn stamps_are_compared_at_the_same_time() {
         let begun = Instant::now();

@@ -1,4 +1,4 @@
-//! The touch that is to be taken out or put back: which one that is, and what is answered.
+//! Selection of the touch to remove or restore, and the answers.
 
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
@@ -14,39 +14,39 @@ use crate::ros::port::Reply;
 use crate::session::StrokeChange;
 use crate::stylus::ProbedPoint;
 
-/// How long disk and patch may take until what was taken is there to be read.
+/// Maximum time of disk and patch until the touches are readable.
 pub(super) const READ_WAIT: Duration = Duration::from_secs(30);
-/// Contacts in an answer at most: it is to fit into one packet.
+/// Maximum number of contacts in an answer, so that it fits into one packet.
 const MOST_POINTS: usize = 24;
-/// Questions that are worked at at a time at most: each has a copy of all touches.
+/// Maximum number of concurrent queries: each has a copy of all touches.
 pub(super) const MOST_ASKED: usize = 4;
 
-/// What other calls are answered meanwhile.
+/// Answer to other calls meanwhile.
 pub(super) const BUSY: &str =
     "a touch is being taken out or put back: call again when that is done";
 pub(super) const NOTHING_TOUCHED: &str = "nothing is touched yet that could be taken out";
 pub(super) const NO_PATCH: &str = "the scene has no patch, so each touch has moved the mesh for good: `~/undo` takes the last ones back";
 
-/// A touch that is being taken out or put back.
+/// A running removal or restoration of a touch.
 pub(super) struct TakingOut {
     pub reply: Reply<TakeOutTouchResponse>,
     pub made: Receiver<Result<Remade, String>>,
-    /// the answer, once the evidence is in its place and the mesh is to follow
+    /// the answer, once the evidence is replaced and the mesh follows
     pub answer: Option<TakeOutTouchResponse>,
 }
 
-/// The evidence as it is to be, and what it is to be answered.
+/// The recomputed evidence, and its answer.
 pub(super) struct Remade {
     pub evidence: EvidenceReplay,
     pub change: StrokeChange,
     pub answer: TakeOutTouchResponse,
 }
 
-/// Which touch is asked for.
+/// Requested touch.
 pub(super) enum WantedTouch {
-    /// that of this touch-down, ns
+    /// touch with this touch-down, ns
     Named(i64),
-    /// that of the contact nearest to a place, up to a distance, m, in O
+    /// touch of the contact nearest to a position, up to a distance, m, in O
     Near(Point3<f64>, f64),
 }
 
@@ -68,17 +68,16 @@ pub(super) fn counted_contacts(count: usize) -> String {
     )
 }
 
-/// The touch-down that a request names, ns.
+/// The touch-down named by a request, ns.
 pub(super) fn named(request: &TakeOutTouchRequest) -> Result<Option<i64>, String> {
     let stamp_ns = stamp_ns(&request.touch).ok_or("the stamp of the touch is no time")?;
     Ok(Some(stamp_ns).filter(|stamp_ns| *stamp_ns != 0))
 }
 
-/// The stroke that is asked for, and its contacts.
+/// The requested stroke, and its contacts.
 ///
 /// - `patcher`: a copy.
-/// - `last_ns`: stamp of the last sample; of a stroke that still goes on it is what came until
-///   then.
+/// - `last_ns`: stamp of the last sample; an unfinished stroke ends there.
 pub(super) fn touch_of(
     mut patcher: Patcher,
     wanted: Option<&WantedTouch>,
@@ -99,7 +98,7 @@ pub(super) fn touch_of(
                 .iter()
                 .map(|touch| (far(touch), touch))
                 .filter(|(far, _)| far <= radius);
-            // of several as near the last one
+            // of several at equal distance the last one
             let nearest =
                 within.min_by(|a, b| a.0.total_cmp(&b.0).then(b.1.stamp_ns.cmp(&a.1.stamp_ns)));
             let why = || format!("nothing was touched within {:.1} mm of there", radius * 1e3);
@@ -117,7 +116,7 @@ pub(super) fn touch_of(
     ))
 }
 
-/// The contacts of a stroke that are kept, in order of time.
+/// The stored contacts of a stroke, in order of time.
 pub(super) fn touches_of(patcher: &Patcher, span: StrokeSpan) -> Vec<ProbedPoint> {
     patcher
         .probed()
@@ -133,7 +132,7 @@ pub(super) fn answer_of(
     message: String,
 ) -> TakeOutTouchResponse {
     let shown = touches.len().min(MOST_POINTS);
-    // from the first to the last one, evenly
+    // evenly from the first to the last one
     let at = |i: usize| i * (touches.len() - 1) / (shown - 1).max(1);
     TakeOutTouchResponse {
         success: true,

@@ -1,7 +1,7 @@
-//! Taking one touch out, wherever it is in their order, and putting it back.
+//! Removal of one touch, at any position in their order, and its restoration.
 //!
-//! The evidence is made again from the recording of the session on a thread of its own, without the
-//! samples of that stroke, while samples go on. Then it takes the place of the one before, and the
+//! A thread of its own recomputes the evidence from the recording of the session, without the
+//! samples of that stroke, while samples go on. Then it replaces the previous evidence, and the
 //! mesh follows.
 
 use std::sync::Arc;
@@ -20,8 +20,7 @@ use crate::ros::messages::{TakeOutTouchRequest, TakeOutTouchResponse};
 use crate::ros::port::Reply;
 use crate::session::{EvidenceSource, Removal, StrokeChange, StrokeChanges};
 
-/// Why a touch stays where it is: without the samples that came meanwhile the others would not be
-/// what they are.
+/// Reason why a touch stays: samples dropped meanwhile would change the other touches.
 fn too_many(dropped: u64) -> String {
     format!(
         "{dropped} samples came while the touches were made again, more than are kept meanwhile, so nothing was changed: pause the samples \
@@ -30,7 +29,7 @@ fn too_many(dropped: u64) -> String {
 }
 
 impl RefinementWorker {
-    /// Answers `~/take_out_touch`: now, or when the mesh shows it.
+    /// Answers `~/take_out_touch`: now, or once the mesh shows the result.
     pub(super) fn take_out_touch(
         &mut self,
         request: &TakeOutTouchRequest,
@@ -67,12 +66,12 @@ impl RefinementWorker {
         }
     }
 
-    /// Whether a touch is being taken out or put back.
+    /// Whether a removal or restoration is running.
     pub(super) fn is_taking_out(&self) -> bool {
         self.taking_out.is_some()
     }
 
-    /// Goes on with what is being taken out, as far as it is made; never waits.
+    /// Continues a running removal as far as possible; never waits.
     pub(super) fn go_on_taking_out(&mut self) {
         let Some(taking_out) = &mut self.taking_out else {
             return;
@@ -100,7 +99,7 @@ impl RefinementWorker {
         }
     }
 
-    /// Answers that it is done.
+    /// Answers with success.
     fn end_taking_out(&mut self) {
         if let Some(TakingOut {
             reply,
@@ -115,7 +114,7 @@ impl RefinementWorker {
         }
     }
 
-    /// Answers that it was not done, unless the evidence is in its place already.
+    /// Answers with failure, unless the evidence is already replaced.
     pub(super) fn give_up_taking_out(&mut self, why: &str) {
         let Some(TakingOut { reply, answer, .. }) = self.taking_out.take() else {
             return;
@@ -157,7 +156,7 @@ impl RefinementWorker {
         Ok(answer)
     }
 
-    /// Takes a change of strokes down.
+    /// Records a stroke change.
     pub(super) fn note_stroke(&mut self, change: StrokeChange) {
         self.session.strokes.push(change);
         let recorder = self.session.keeping.recorder();
@@ -166,7 +165,7 @@ impl RefinementWorker {
         }
     }
 
-    /// Finds the touch and says which it is, once it is called.
+    /// Returns a function that finds the touch and describes it.
     fn looking(
         &mut self,
         request: &TakeOutTouchRequest,
@@ -198,7 +197,7 @@ impl RefinementWorker {
         })
     }
 
-    /// Makes the evidence again with or without the touch, once it is called.
+    /// Returns a function that recomputes the evidence with or without the touch.
     #[expect(clippy::too_many_lines)]
     fn remaking(
         &mut self,
@@ -282,7 +281,7 @@ impl RefinementWorker {
         })
     }
 
-    /// A copy of what was touched, once it is made.
+    /// A copy of the touches, once it is made.
     fn copied_evidence(&mut self) -> Result<Receiver<Patcher>, String> {
         let copy = self
             .session
@@ -292,7 +291,7 @@ impl RefinementWorker {
         copy.ok_or_else(|| NOTHING_TOUCHED.to_owned())
     }
 
-    /// Without some messages the other touches would not be what they are.
+    /// Checks the recording: missing messages would change the other touches.
     fn check_recorded(&self) -> Result<(), String> {
         let unrecorded = self.session.keeping.unrecorded();
         match (unrecorded.messages, unrecorded.reason) {
@@ -317,7 +316,7 @@ impl RefinementWorker {
         })
     }
 
-    /// The stroke that is to be put back.
+    /// The stroke to restore.
     fn taken_out(&self, request: &TakeOutTouchRequest) -> Result<StrokeSpan, String> {
         let mut taken_out = self.session.strokes.taken_out();
         match named(request)? {

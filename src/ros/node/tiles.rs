@@ -1,4 +1,4 @@
-//! The mesh to look at: in tiles, of which only those that changed are sent again.
+//! The mesh for viewers: in tiles, of which only changed ones are resent.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -10,28 +10,28 @@ use super::replica::{FACES_OF_A_TILE, MeshVersion};
 use crate::reconstruct::Support;
 use crate::ros::messages::{ColorRGBA, Marker, Vector3 as Vector3Msg};
 
-/// A tile is sent once more when it has not changed for so long: a network that was away for less
-/// has kept nothing from anybody.
+/// Time after which unchanged tiles are resent, so that viewers recover from outages shorter than
+/// that.
 const ONCE_MORE_AFTER: Duration = Duration::from_secs(10);
 /// Namespace of the markers.
 const NAMESPACE: &str = "mesh";
-/// Light comes from above, a little from the side.
+/// Direction of the light: from above, a little from the side.
 const LIGHT: Vector3<f64> = Vector3::new(0.3, 0.2, 0.933);
-/// Share of the light that is everywhere.
+/// Share of ambient light.
 const AMBIENT: f64 = 0.45;
-/// A mismatch of so much has the full colour, m.
+/// Mismatch with full colour, m.
 const FULL_MISMATCH: f64 = 0.5e-3;
 
-/// What colours the mesh.
+/// Colouring of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColourBy {
-    /// what was touched
+    /// by the support of each vertex
     Touched,
-    /// how far the surface was from where the mesh had it when it was touched last
+    /// by the signed distance of the surface at the last touch
     Mismatch,
 }
 
-/// Tiles that wait for their turn, each once.
+/// Waiting tiles, each once.
 #[derive(Clone, Debug, Default)]
 struct Turns {
     order: VecDeque<u32>,
@@ -56,34 +56,33 @@ impl Turns {
     }
 }
 
-/// Which tiles are to be sent.
+/// Tiles to send.
 #[derive(Clone, Debug, Default)]
 pub struct Tiles {
-    /// what has changed goes first …
+    /// changed tiles go first
     changed: Turns,
-    /// … then what is sent because of somebody new, or of other colours
+    /// then tiles resent for a new viewer or other colours
     again: Turns,
-    /// for each tile, whether something is drawn
+    /// for each tile, whether it has content
     is_drawn: Vec<bool>,
-    /// … and which it was, in the order in which all were sent
+    /// for each tile, its number in the order of sending
     sent_as: Vec<u64>,
     sent: u64,
-    /// tiles that are to be sent once more, if they are not sent before for a change: when they
-    /// were sent, and as which
+    /// tiles to resend unless a change comes first: time and number of sending
     once_more: VecDeque<(Instant, u32, u64)>,
-    /// for each face, the last signed distance at which it was touched, m; NaN where it was not
+    /// for each face, the signed distance at its last touch, m; NaN for an untouched one
     mismatch: Vec<f32>,
 }
 
 impl Tiles {
-    /// All of them are to be sent.
+    /// Tiles with everything to send.
     pub fn all_of(replica: &MeshVersion) -> Self {
         let mut tiles = Self::default();
         tiles.renew(replica);
         tiles
     }
 
-    /// Everything is to be sent again.
+    /// Queues all tiles again.
     pub fn renew(&mut self, replica: &MeshVersion) {
         (0..replica.slots()[1]
             .div_ceil(FACES_OF_A_TILE)
@@ -91,14 +90,14 @@ impl Tiles {
             .for_each(|tile| self.again.push(tile));
     }
 
-    /// What was sent before the last `kept` is to be sent again: nobody keeps it for who comes now.
+    /// Queues tiles sent before the last `kept`: nobody keeps those for a new viewer.
     pub fn renew_older_than(&mut self, kept: u64) {
         let is_older = |sent_as: u64| sent_as > 0 && self.sent - sent_as >= kept;
         let older = (0..self.sent_as.len()).filter(|&tile| is_older(self.sent_as[tile]));
         older.for_each(|tile| self.again.push(tile as u32));
     }
 
-    /// What has not changed for a while is to be sent once more: for who missed it.
+    /// Queues tiles unchanged for a while once more, for viewers that missed them.
     pub fn renew_settled(&mut self, now: Instant) {
         while let Some(&(sent_at, tile, sent_as)) = self.once_more.front()
             && now.saturating_duration_since(sent_at) >= ONCE_MORE_AFTER
@@ -110,26 +109,26 @@ impl Tiles {
         }
     }
 
-    /// Another mesh: everything is to be sent, and nothing was touched.
+    /// Starts another mesh: all tiles are to be sent, and no mismatches are known.
     pub fn restart(&mut self, replica: &MeshVersion) {
         self.mismatch.clear();
         self.sent_as.fill(0);
         self.renew(replica);
     }
 
-    /// A tile is to be sent.
+    /// Queues a changed tile.
     pub fn note(&mut self, tile: u32) {
         self.changed.push(tile);
     }
 
-    /// A face is another one now.
+    /// Forgets the mismatch of a changed face.
     pub fn forget_mismatch(&mut self, face: u32) {
         if let Some(mismatch) = self.mismatch.get_mut(face as usize) {
             *mismatch = f32::NAN;
         }
     }
 
-    /// A face was touched this far from where the mesh had it, m.
+    /// Notes the signed distance of a touched face, m.
     pub fn note_mismatch(&mut self, face: u32, distance: f64, replica: &MeshVersion) {
         if face >= replica.slots()[1] {
             return;
@@ -141,12 +140,12 @@ impl Tiles {
         self.note(face / FACES_OF_A_TILE);
     }
 
-    /// How many are to be sent.
+    /// Number of tiles to send.
     pub fn waiting(&self) -> usize {
         self.changed.order.len() + self.again.order.len()
     }
 
-    /// Makes up to `most` of those that are to be sent now.
+    /// Draws up to `most` of the waiting tiles.
     pub fn take(
         &mut self,
         most: usize,
@@ -227,7 +226,7 @@ fn drawn(tile: u32, replica: &MeshVersion, by: ColourBy, mismatch: &[f32], frame
     marker
 }
 
-/// Viewers draw coloured points as they are, without light: it is in the colour.
+/// Brightness of a face. Viewers draw coloured points without light, so the colour contains it.
 fn light([a, b, c]: &[Point3<f64>; 3]) -> f64 {
     let normal = (b - a)
         .cross(&(c - a))
@@ -236,7 +235,7 @@ fn light([a, b, c]: &[Point3<f64>; 3]) -> f64 {
     AMBIENT + (1.0 - AMBIENT) * normal.dot(&LIGHT).abs().min(1.0)
 }
 
-/// Dark enough for white labels in front of it.
+/// Colour of a support; dark enough for white labels in front of it.
 fn of_support(support: Support) -> [f64; 3] {
     match support {
         Support::Scan => [0.60, 0.61, 0.63],
@@ -246,7 +245,7 @@ fn of_support(support: Support) -> [f64; 3] {
     }
 }
 
-/// Red where the surface is outside of the mesh, blue where it is inside, white where both agree.
+/// Colour of a mismatch: red for a surface outside of the mesh, blue inside, white for agreement.
 fn of_mismatch(distance: f32) -> [f64; 3] {
     if distance.is_nan() {
         return of_support(Support::Scan);
@@ -285,7 +284,7 @@ mod tests {
         assert!(least_difference(&colours) > 23.0);
     }
 
-    /// What a port keeps is the end of the list of all that was sent.
+    /// A port keeps the end of the list of sent tiles.
     #[test]
     fn who_joins_late_is_sent_what_is_not_kept() {
         let corner = |i: u32| Point3::new(f64::from(i), f64::from(i % 2), 0.0);
@@ -326,7 +325,7 @@ mod tests {
             take(&mut joined, &mut again);
             assert_eq!(again, lost, "the last {kept} are kept");
         }
-        // what changes meanwhile does not wait for that
+        // changes meanwhile go first
         tiles.renew_older_than(1);
         [3, 1, 3].into_iter().for_each(|tile| tiles.note(tile));
         sent.clear();

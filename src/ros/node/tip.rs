@@ -1,4 +1,4 @@
-//! What an operator wants to know at the tip.
+//! Information for the operator at the tip.
 
 use nalgebra::Point3;
 
@@ -8,13 +8,13 @@ use super::feature_messages::{ball, label, letters};
 use crate::probing::plan::NextTouch;
 use crate::ros::messages::{ColorRGBA, Feature, FeatureArray, Marker, MarkerArray, Vector3};
 
-/// Farther from a feature than this nobody asks for it, m.
+/// Maximum distance to a feature of interest, m.
 const NEAR: f64 = 0.05;
 
-/// Above the labels of features, m.
+/// Height of the text above the labels of features, m.
 const TEXT_HEIGHT: f64 = 12e-3;
 
-/// Ball, text, the arrow to the mesh, and the one onto where to touch next.
+/// Markers of the tip: ball, text, the arrow to the mesh, and the arrow to the next touch.
 #[expect(clippy::too_many_lines)]
 pub fn markers(
     tip: &LastTip,
@@ -83,7 +83,7 @@ pub fn markers(
             },
         }
     };
-    // at the surface it would hide what it points at
+    // at the surface it would hide its target
     let closest = tip
         .closest
         .filter(|(_, distance)| *distance > tip.radius)
@@ -99,7 +99,7 @@ pub fn markers(
                 [tip.centre, closest],
             )
         });
-    // onto the place, from outside; where nobody knows what is outside, from the tip
+    // towards the position from outside; without a known outside, from the tip
     let there =
         nearest
             .and_then(|feature| next.get(&feature.id))
@@ -125,7 +125,7 @@ pub fn markers(
     }
 }
 
-/// Takes all of [`markers`] away.
+/// Deletes all of [`markers`].
 pub fn no_markers(frame: &str) -> MarkerArray {
     let gone = |id| Marker {
         header: header(0, frame),
@@ -139,10 +139,10 @@ pub fn no_markers(frame: &str) -> MarkerArray {
     }
 }
 
-/// Length of the arrow onto the next place, m.
+/// Length of the arrow to the next touch, m.
 const NEXT_LENGTH: f64 = 10e-3;
 
-/// The feature that who holds the tip is asking about.
+/// The feature of interest to the operator.
 fn nearest<'a>(tip: &LastTip, features: &'a FeatureArray) -> Option<&'a Feature> {
     let far = |feature: &&Feature| (point_of(&feature.center) - tip.centre).norm();
     let is_asked = |feature: &&Feature| {
@@ -156,8 +156,8 @@ fn nearest<'a>(tip: &LastTip, features: &'a FeatureArray) -> Option<&'a Feature>
         .filter(|feature| far(feature) < NEAR)
 }
 
-/// "0.12 mm; hole Ø8.02 ± 0.04; next: green arrow": RViz puts lines 10 mm apart, however small the
-/// letters.
+/// "0.12 mm; hole Ø8.02 ± 0.04; next: green arrow" in one line: RViz puts lines 10 mm apart,
+/// however small the letters.
 fn text(tip: &LastTip, nearest: Option<&Feature>, has_next: bool) -> String {
     let distance = match tip.closest {
         Some((_, distance)) => format!("{:.2} mm", distance * 1e3),

@@ -1,4 +1,4 @@
-//! Variances of vertices along their normals, and the work that evaluates them.
+//! Variances of vertices along their normals, and the state of their computation.
 
 use std::sync::mpsc::Receiver;
 
@@ -10,28 +10,28 @@ use crate::reconstruct::{Patcher, Support};
 /// Number of a vertex, and its variance along the normal, m².
 pub type VertexVariance = (u32, f32);
 
-/// Variances of vertices, those that are others than before.
+/// Changed variances of vertices.
 #[derive(Debug)]
 pub struct Variances {
-    /// state of the mesh with these in it
+    /// version of the mesh after this change
     pub version: u64,
-    /// of which vertices
+    /// vertices and variances
     pub of: Vec<VertexVariance>,
 }
 
 /// Session and version.
 pub type VarianceState = (String, u64);
 
-/// What is evaluated now, and what was.
+/// Running and last computation.
 #[derive(Debug, Default)]
 pub struct VarianceWork {
-    /// evaluated last, or tried
+    /// last one, successful or not
     pub done: Option<VarianceState>,
-    /// what is being evaluated, and where it comes
+    /// running one, and its result
     pub made: Option<(VarianceState, Receiver<Vec<VertexVariance>>)>,
 }
 
-/// Variances of vertices in their order; none where the scene asks for no uncertainty.
+/// Variances of vertices in their order; none if the scene has no uncertainty.
 pub fn evaluated(
     patcher: &mut Patcher,
     (scan, tree): &(TriMesh, FaceTree),

@@ -1,5 +1,5 @@
-//! The thread that shows: it follows the mesh, and sends tiles, changes, markers and diagnostics at
-//! its own pace.
+//! The view thread: it follows the mesh, and sends tiles, changes, markers and diagnostics at its
+//! own pace.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -17,20 +17,20 @@ use crate::clock::Clock;
 use crate::ros::messages::{FeatureArray, MeshPatch};
 use crate::ros::port::{Port, Publication, TILES_KEPT};
 
-/// Tiles that wait in the port at most: what waits here is sent as it is then, and what has changed
-/// goes first.
+/// Maximum number of tiles waiting in the port: tiles waiting here are drawn at the time of
+/// sending, changed ones first.
 const TILES_AHEAD: usize = 32;
-/// Parts of the whole state that are sent at once: 2.4 MB.
+/// Maximum number of parts of the whole state per period: 2.4 MB.
 const PARTS_AT_ONCE: usize = 64;
-/// While there is more to send than that, it goes on after so long.
+/// Period while there is more to send.
 const CATCH_UP: Duration = Duration::from_millis(10);
 
-/// The thread's own.
+/// State of the view thread.
 pub struct View {
     clock: Clock,
     port: Arc<dyn Port>,
     shared: Arc<Shared>,
-    /// where changes go to be filled again
+    /// returns change lists for filling
     spare: SyncSender<Box<Edits>>,
     tiles: Tiles,
     patches: MeshPatches,
@@ -43,7 +43,7 @@ pub struct View {
 }
 
 impl View {
-    /// Shows nothing yet.
+    /// Before the first publication.
     pub fn new(
         clock: Clock,
         port: Arc<dyn Port>,
@@ -67,7 +67,7 @@ impl View {
         }
     }
 
-    /// Runs until nobody sends anything any more, then publishes what is left.
+    /// Runs until all senders are gone, then publishes the rest.
     pub fn run(mut self, inputs: &Receiver<ViewInput>) {
         let mut due = self.clock.now();
         loop {
@@ -80,7 +80,7 @@ impl View {
                 Err(RecvTimeoutError::Disconnected) => break,
             }
             if self.clock.now() >= due {
-                // ids fit each other only when all of a change has come
+                // ids fit each other only after a complete change
                 let period =
                     Duration::from_secs_f64(1.0 / self.shared.parameters().double("view_rate_hz"));
                 due = self.clock.now()
@@ -92,7 +92,7 @@ impl View {
             }
         }
         self.tick(true);
-        // nobody moves it any more
+        // nobody moves the tip any more
         self.port
             .publish(Publication::Tip(tip::no_markers(&self.shared.frame)));
         self.shared.mesh.close();
@@ -107,7 +107,7 @@ impl View {
                     .faces
                     .iter()
                     .for_each(|(face, _)| self.tiles.forget_mismatch(*face));
-                // as many come back as went out
+                // the channel has room for all lists
                 let _ = self.spare.try_send(edits);
             }
             ViewInput::Variances(variances) => {
@@ -118,8 +118,8 @@ impl View {
                 self.tiles.restart(&replica);
                 self.patches = MeshPatches::of(&replica, self.shared.scan_sigma);
                 self.shared.mesh.begin_session(*replica);
-                // who follows sees another session and asks; it would see that only at the next
-                // change
+                // followers would see the new session only at the next change, so the whole state
+                // goes out
                 (self.whole, self.asked_whole) = (None, true);
             }
             ViewInput::Mismatch(face, distance) => {
@@ -149,9 +149,9 @@ impl View {
         }
     }
 
-    /// Sends what is due; whether there is more.
+    /// Sends due publications; returns whether there is more.
     ///
-    /// - `is_last`: all tiles are left to the port.
+    /// - `is_last`: passes all tiles to the port.
     fn tick(&mut self, is_last: bool) -> bool {
         let frame = self.shared.frame.as_str();
         if let Some(tip) = self.tip.take() {
@@ -170,7 +170,7 @@ impl View {
             self.port.publish(Publication::MeshPatch(part));
         }
         if self.whole.is_none() && std::mem::take(&mut self.asked_whole) {
-            // the next change leads from what was sent last
+            // the next change starts from the state sent last
             self.whole = Some(Box::new(
                 self.patches.whole(Arc::clone(&replica), frame.to_owned()),
             ));
@@ -196,7 +196,7 @@ impl View {
             port,
             ..
         } = self;
-        // tiles that nobody looks at wait for who comes
+        // tiles wait until there is a viewer
         let is_seen = self.shared.viewers.load(Ordering::Relaxed) > 0;
         let most = match (is_last, is_seen) {
             (_, false) => 0,
@@ -212,7 +212,7 @@ impl View {
     }
 }
 
-/// As the parameter of this name has it.
+/// Colouring by the parameter of this name.
 pub(super) fn colour_by(shared: &Shared) -> ColourBy {
     match shared.parameters().string("colour_by") {
         "mismatch" => ColourBy::Mismatch,

@@ -1,4 +1,4 @@
-//! The action `~/probe`: goals, their feedback, and that somebody wants them stopped.
+//! The action `~/probe`: goals, their feedback, and cancel requests.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -15,14 +15,14 @@ use crate::ros::messages::{ProbeFeedback, ProbeGoal, ProbeResponse};
 use crate::ros::port::{ArmOrder, Call, Feedback, Goal, GoalEnd};
 use crate::ros::services::PROBE;
 
-/// A goal from the first question to the result.
+/// State of a goal from its request to the result.
 enum GoalState {
     Asked(ActionServerGoalRequest<Action>),
     Running(ActionServerGoal<Action>),
     Over,
 }
 
-/// What the closures of one goal share.
+/// State shared by the closures of one goal.
 struct GoalHandle {
     state: Mutex<GoalState>,
     is_cancelled: Arc<AtomicBool>,
@@ -30,13 +30,13 @@ struct GoalHandle {
 }
 
 impl GoalHandle {
-    /// Goes over to another state; the one that it was in.
+    /// Sets the state; returns the previous one.
     fn change(&self, state: GoalState) -> GoalState {
         std::mem::replace(&mut *locked(&self.state), state)
     }
 }
 
-/// A running goal, and who wants it stopped.
+/// A running goal, and its cancel requests.
 struct Cancels {
     handle: Arc<GoalHandle>,
     requests: Box<dyn Stream<Item = ActionServerCancelRequest> + Send + Unpin>,
@@ -44,7 +44,7 @@ struct Cancels {
 
 type Running = Arc<Mutex<Vec<Cancels>>>;
 
-/// The server of the action: one source of goals, one of what is asked of those that run.
+/// The server of the action: one source of goals, one of cancel requests.
 pub(super) fn server(
     node: &mut Node,
     exchange: &Arc<Exchange>,
@@ -65,8 +65,7 @@ pub(super) fn server(
     Ok([goals, Box::new(move || take_cancels(&mut locked(&cancels)))])
 }
 
-/// What the node answers with: it goes out from the thread that sends, so the answers keep their
-/// order.
+/// Replies of the node, sent by the sending thread to keep their order.
 fn goal(
     request: ActionServerGoalRequest<Action>,
     exchange: &Arc<Exchange>,
@@ -117,7 +116,7 @@ fn publish(handle: &GoalHandle, feedback: ProbeFeedback) {
     if let GoalState::Running(goal) = &*locked(&handle.state)
         && let Err(error) = goal.publish_feedback(feedback.theirs())
     {
-        // nobody waits for it who misses it
+        // nobody waits for a missed feedback
         tracing::debug!(%error, "feedback is not sent");
     }
 }
@@ -128,8 +127,8 @@ fn finish(handle: &GoalHandle, end: GoalEnd, response: ProbeResponse) -> r2r::Re
     };
     handle.is_over.store(true, Ordering::Relaxed);
     let cancelled = response.clone().theirs();
-    // r2r lets go of a goal once its cancelling is confirmed: from then on no other end reaches who
-    // waits
+    // r2r drops a goal after the confirmation of its cancel: from then on no other end reaches the
+    // client
     match end {
         GoalEnd::Canceled => goal.cancel(cancelled),
         GoalEnd::Succeeded => goal
@@ -141,8 +140,8 @@ fn finish(handle: &GoalHandle, end: GoalEnd, response: ProbeResponse) -> r2r::Re
     }
 }
 
-/// Confirms what is asked for and sets the node's flag, which stops when it can; forgets goals that
-/// are over.
+/// Confirms cancel requests and sets the flag for the node, which stops when it can; forgets
+/// finished goals.
 fn take_cancels(running: &mut Vec<Cancels>) -> bool {
     let mut has_come = false;
     for cancels in running.iter_mut() {

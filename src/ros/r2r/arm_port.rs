@@ -1,4 +1,4 @@
-//! Speaks to an arm behind ros2_control.
+//! Port of an arm behind ros2_control.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,12 +21,12 @@ use crate::ros::messages::{JointState, JointTrajectory, WrenchStamped};
 use crate::ros::port::{ArmPort, ArmReport};
 use crate::ros::topics::Topic;
 
-/// Messages of a topic that are kept until they are taken.
+/// Maximum number of messages of a topic kept until read.
 const DEPTH: usize = 100;
-/// Messages that wait for the arm's driver; who does not take them for a second finds the oldest,
-/// and sees that they are late.
+/// Maximum number of messages waiting for the arm's driver; a driver late by a second gets the
+/// oldest, and sees their lateness.
 const WAITING: usize = 2048;
-/// So long it takes to notice that all is over when nothing comes; what comes wakes it at once.
+/// Maximum time to notice the end without messages; a message wakes it at once.
 const NOTHING_CAME: Duration = Duration::from_millis(20);
 
 struct R2rArm {
@@ -40,7 +40,7 @@ impl Drop for R2rArm {
     fn drop(&mut self) {
         self.is_over.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // one that panicked has said so
+            // a panicked thread has already reported it
             let _ = thread.join();
         }
     }
@@ -67,14 +67,14 @@ pub fn arm_port(
     let wrench = node
         .subscribe::<TheirWrench>(reports[1], heard)
         .during("subscribing to a topic")?;
-    // the newest order alone counts
+    // only the newest order counts
     let sent = r2r::qos::QosProfile::default().reliable().keep_last(1);
     let orders = node
         .create_publisher::<TheirOrder>(orders, sent)
         .during("publishing a topic")?;
     let (sender, received) = sync_channel(WAITING);
     let of_joints = sender.clone();
-    // where there is no room the driver is late, and finds out by the stamps
+    // without room the driver is late, and notices it by the stamps
     let mut joints = source(joints, move |message| {
         let _ = of_joints.try_send(ArmReport::Joints(JointState::ours(message)));
     });
@@ -109,7 +109,7 @@ impl ArmPort for R2rArm {
         self.orders.publish(&order.theirs()).is_ok()
     }
 
-    /// None where rcl does not know.
+    /// `None` if rcl does not know.
     fn order_listeners(&mut self) -> Option<usize> {
         self.orders.get_inter_process_subscription_count().ok()
     }

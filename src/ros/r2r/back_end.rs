@@ -1,4 +1,4 @@
-//! What topics, services and the action are added to, while the node begins.
+//! The node during its start, while topics, services and the action are added.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use super::graph::R2rGraph;
 use crate::ros::arguments::NodeConfig;
 use crate::ros::exchange::{Exchange, RosError};
 
-/// Says what rcl was asked for, where it refuses.
+/// Names the refused request to rcl.
 pub(super) trait During<T> {
     fn during(self, call: &'static str) -> Result<T, RosError>;
 }
@@ -24,12 +24,12 @@ impl<T> During<T> for r2r::Result<T> {
     }
 }
 
-/// Takes all that has come from one topic, service or action since it was called last; whether
-/// anything had.
+/// Reads all messages of one topic, service or action since its last call; returns whether there
+/// were any.
 pub(super) type PollSource = Box<dyn FnMut() -> bool + Send>;
 
-/// A stream of r2r as a source. r2r reads one message of each at a time and keeps ten, so none is
-/// lost between two spins.
+/// A stream of r2r as a source. r2r reads one message of each at a time and keeps ten, so there are
+/// no losses between two spins.
 pub(super) fn source<S>(mut stream: S, mut take: impl FnMut(S::Item) + Send + 'static) -> PollSource
 where
     S: Stream + Unpin + Send + 'static,
@@ -44,7 +44,7 @@ where
     })
 }
 
-/// Publishes, subscribes and serves.
+/// Back end that publishes, subscribes and serves.
 pub(super) struct R2rBackEnd<'a> {
     pub config: &'a NodeConfig,
     pub node: r2r::Node,

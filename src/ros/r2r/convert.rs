@@ -1,29 +1,29 @@
-//! Messages of the node into those of r2r and back, field by field.
+//! Conversion of the node's messages to those of r2r and back, field by field.
 //!
-//! The two differ in nothing but the type; `generate/` lists the fields, and the compiler sees when
-//! one is missing on either side.
+//! The two differ only in type; `generate/` lists the fields, and the compiler notices a missing
+//! one on either side.
 
 use r2r::WrappedServiceTypeSupport;
 
 use crate::ros::messages::{self as ours, RosService};
 
-/// A value that r2r has too.
+/// A value with a counterpart in r2r.
 pub(super) trait Convert: Sized {
-    /// its type there
+    /// type in r2r
     type Theirs;
 
-    /// The value as r2r has it.
+    /// Converts to r2r.
     fn theirs(self) -> Self::Theirs;
 
-    /// The value as the node has it.
+    /// Converts from r2r.
     fn ours(theirs: Self::Theirs) -> Self;
 }
 
-/// A service that r2r offers.
+/// A service of r2r.
 pub(super) trait R2rService:
     RosService<Request: Convert<Theirs: Clone>, Response: Convert>
 {
-    /// its type there
+    /// type in r2r
     type Theirs: WrappedServiceTypeSupport<
             Request = <Self::Request as Convert>::Theirs,
             Response = <Self::Response as Convert>::Theirs,
@@ -50,7 +50,7 @@ the_same!(bool, u8, i32, u32, i64, u64, f32, f64);
 impl Convert for String {
     type Theirs = Self;
 
-    /// Without zeros: a string of C ends at the first, and r2r panics on one.
+    /// Without zeros: a C string ends at the first, and r2r panics on one.
     fn theirs(mut self) -> Self {
         self.retain(|c| c != '\0');
         self
@@ -121,8 +121,8 @@ mod tests {
 
     use super::*;
 
-    /// The same text from both sides: names, order and values of all fields, by the code that serde
-    /// made for each. And the message itself comes back. Its fields are those that rosbags filled.
+    /// Asserts the same text from both sides: names, order and values of all fields, by serde's
+    /// code for each, and that the message converts back. Its fields come from rosbags.
     fn both_agree<M: ours::RosMessage + Convert<Theirs: Clone + Serialize>>() {
         let all = include_str!(concat!(
             env!("CARGO_MANIFEST_DIR"),

@@ -1,5 +1,5 @@
-//! Who else is on our topics, and why somebody who is does not fit. r2r reports nothing by itself,
-//! so it is asked once in a second; of those who listen it knows the number alone.
+//! Other participants on our topics, and reasons for their mismatches. r2r reports nothing by
+//! itself, so this queries it once per second; of listeners it knows only the number.
 
 use std::time::{Duration, Instant};
 
@@ -9,17 +9,17 @@ use r2r::{Context, Node, Publisher, WrappedTypesupport};
 use crate::ros::exchange::Exchange;
 use crate::ros::port::Arrival;
 
-/// How often it is asked.
+/// Period of the queries.
 const PERIOD: Duration = Duration::from_secs(1);
 
-/// How many there are that fit, and why one does not.
+/// Number of fitting participants, and reason of a mismatch.
 type EndpointMatch = (usize, Option<String>);
 
 type GraphQuery = Box<dyn Fn(&Node) -> r2r::Result<EndpointMatch> + Send>;
 
 struct WatchedTopic {
     topic: String,
-    /// who listens is a viewer
+    /// listeners are viewers
     is_mesh: bool,
     look: GraphQuery,
     reported: EndpointMatch,
@@ -40,10 +40,10 @@ impl R2rGraph {
         }
     }
 
-    /// A topic that we publish.
+    /// Watches a published topic.
     ///
     /// - `topic`: absolute, remapped.
-    /// - `is_mesh`: tiles go out on it.
+    /// - `is_mesh`: topic of the tiles.
     pub fn watch_listeners<T>(&mut self, topic: String, is_mesh: bool, publisher: Publisher<T>)
     where
         T: WrappedTypesupport + 'static,
@@ -58,7 +58,7 @@ impl R2rGraph {
         });
     }
 
-    /// A topic that we listen to.
+    /// Watches a subscribed topic.
     ///
     /// - `topic`: absolute, remapped.
     pub fn watch_senders(&mut self, topic: String, type_name: &'static str, wanted: QosProfile) {
@@ -80,7 +80,7 @@ impl R2rGraph {
         });
     }
 
-    /// Reports what has changed, when it is time to look again; whether ROS is still there.
+    /// Reports changes, if a query is due; returns whether ROS is still present.
     pub fn look(&mut self, node: &Node, exchange: &Exchange) -> bool {
         if self.looked.elapsed() < PERIOD {
             return true;
@@ -110,7 +110,7 @@ impl R2rGraph {
     }
 }
 
-/// Why what is sent does not reach who listens.
+/// Reason why messages do not reach a listener.
 fn misfit(
     wanted_type: &str,
     wanted: &QosProfile,

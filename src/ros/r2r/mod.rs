@@ -1,9 +1,9 @@
-//! The port on a sourced ROS 2: r2r over rcl, with whichever RMW is chosen there.
+//! The port on a sourced ROS 2: r2r over rcl, with the RMW chosen there.
 //!
-//! Three threads of ours stand beside those of the RMW. One spins: it takes what comes and puts it
-//! into the inbox of the node. Two send: one what is small and urgent, answers among it; one the
-//! mesh, where a slow listener may hold things up. rcl reads the command line and the environment
-//! by itself, so names go to it as the node has them, not yet remapped.
+//! Three threads of ours run beside those of the RMW. One spins: it receives messages and puts them
+//! into the inbox of the node. Two send: one small and urgent messages, including answers; one the
+//! mesh, as a slow listener may delay it. rcl reads the command line and the environment by itself,
+//! so it gets the node's names before remapping.
 
 mod action;
 mod arm_port;
@@ -48,7 +48,7 @@ struct R2rConnection {
 }
 
 impl Drop for R2rConnection {
-    /// Sends what waits, then leaves: the node of rcl must outlive all who send.
+    /// Sends waiting messages, then leaves: the node of rcl must outlive all senders.
     fn drop(&mut self) {
         self.exchange.close();
         exchange::join(self.sending.drain(..));
@@ -57,11 +57,11 @@ impl Drop for R2rConnection {
     }
 }
 
-/// Joins ROS as a node: what comes goes to `inbox` from now on. Once in a process: rcl reads the
-/// command line.
+/// Joins ROS as a node: messages go to `inbox` from now on. Once per process: rcl reads the command
+/// line.
 ///
 /// # Errors
-/// [`RosError`]: a name that is none, ROS does not start, no thread.
+/// [`RosError`]: an invalid name, ROS does not start, no thread.
 pub fn start(config: &NodeConfig, inbox: Inbox) -> Result<Arc<dyn Port>, RosError> {
     let exchange = Exchange::new(config, inbox);
     let context = context()?;
@@ -138,7 +138,7 @@ fn announce(
     })
 }
 
-/// The context of the process. r2r panics where rcl refuses the command line or the environment.
+/// The context of the process. r2r panics if rcl refuses the command line or the environment.
 fn context() -> Result<r2r::Context, RosError> {
     let created = match std::panic::catch_unwind(r2r::Context::create) {
         Ok(context) => context.map_err(|error| error.to_string()),
@@ -158,15 +158,15 @@ fn context() -> Result<r2r::Context, RosError> {
     })
 }
 
-/// So long it takes to notice that all is over when nothing comes; what comes wakes it at once.
+/// Maximum time to notice the end without messages; a message wakes it at once.
 const NOTHING_CAME: Duration = Duration::from_millis(50);
-/// Some 10 ms of spinning for nothing, more than lies between two samples at 100 Hz.
+/// Number of idle spins, some 10 ms: more than between two samples at 100 Hz.
 const MOST_IN_VAIN: u32 = 160;
-/// The first sample after a rest waits at most so long.
+/// Maximum delay of the first sample after a rest.
 const PAUSE: Duration = Duration::from_millis(2);
 
-/// The thread that takes what comes. There is always a subscription, or rcl would not wait at all
-/// (r2r issue 93).
+/// Spins until the end. There is always a subscription, or rcl would not wait at all (r2r issue
+/// 93).
 fn spin(
     mut node: r2r::Node,
     mut sources: Vec<PollSource>,
@@ -184,7 +184,7 @@ fn spin(
         } else {
             u32::saturating_add(in_vain, 1)
         };
-        // once the result of a goal is too old to be kept, rcl waits no more (r2r issue 136)
+        // after the expiry of a goal's result rcl no longer waits (r2r issue 136)
         if in_vain > MOST_IN_VAIN {
             std::thread::sleep(PAUSE);
         }
@@ -194,7 +194,7 @@ fn spin(
     }
 }
 
-/// The node ends too, and saves, when nothing can come any more.
+/// Ends the node too, which then saves, once nothing can arrive any more.
 struct ReportsEnd<'a>(&'a Exchange);
 
 impl Drop for ReportsEnd<'_> {

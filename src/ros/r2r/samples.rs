@@ -1,4 +1,4 @@
-//! Publishes what a stylus or a probe measures.
+//! Publishes the measurements of a stylus or a probe.
 
 use r2r::{Publisher, WrappedTypesupport, geometry_msgs::msg as geometry};
 
@@ -12,18 +12,17 @@ use crate::ros::messages::{PoseStamped, WrenchStamped};
 use crate::ros::port::SamplePort;
 use crate::ros::topics::Topic;
 
-/// Nothing is sent twice: what is kept is for who takes it at once.
+/// Nothing is resent: the history serves readers that read at once.
 const DEPTH: usize = 100;
 
 struct R2rSamples {
     wrench: Publisher<geometry::WrenchStamped>,
     pose: Publisher<geometry::PoseStamped>,
-    // its publishers leave the graph when it goes
+    // its publishers leave the graph on drop
     _node: r2r::Node,
 }
 
-/// Joins ROS as a stylus or probe: the topics are those of the parameter `source`. Once in a
-/// process.
+/// Joins ROS as a stylus or probe: the parameter `source` selects the topics. Once per process.
 ///
 /// # Errors
 /// [`RosError`]: ROS does not start.
@@ -44,7 +43,7 @@ pub fn samples(config: &NodeConfig) -> Result<Box<dyn SamplePort>, RosError> {
     }))
 }
 
-/// None where rcl does not know.
+/// Number of listeners; 0 if rcl does not know.
 fn count<T: WrappedTypesupport + 'static>(publisher: &Publisher<T>) -> usize {
     publisher
         .get_inter_process_subscription_count()

@@ -1,12 +1,12 @@
-//! What r2r generates of `touchup_msgs` and `std_srvs` where ROS is sourced, as far as the compiler
-//! looks: the fields, which `generate/` lists, and nothing behind them. For feature `r2r-check`
-//! alone; nothing here can run.
+//! Stand-in for the code that r2r generates from `touchup_msgs` and `std_srvs` in a sourced ROS:
+//! only the fields, listed by `generate/`, for the compiler. For feature `r2r-check` alone; nothing
+//! here can run.
 #![expect(
     non_snake_case,
     reason = "services and actions are modules there, with the names of their files"
 )]
 
-/// Functions that nothing here can do.
+/// Functions without an implementation here.
 macro_rules! needs_ros {
     ($(fn $name:ident($($taken:ty),*) -> $given:ty;)+) => {
         $(fn $name($(_: $taken),*) -> $given {
@@ -15,7 +15,7 @@ macro_rules! needs_ros {
     };
 }
 
-/// A message: its fields, and that r2r takes it for one.
+/// A message: its fields, and the trait of r2r.
 macro_rules! message {
     ($name:ident { $($field:ident: $kind:ty),* $(,)? }) => {
         #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -104,7 +104,7 @@ macro_rules! action {
     };
 }
 
-// what carries a goal and a result on the wire: any service will do here
+// carrier of a goal and a result on the wire: any service fits here
 service!(Wire {} {});
 
 include!(concat!(env!("OUT_DIR"), "/stand_ins.rs"));

@@ -77,8 +77,8 @@ where
 }
 
 impl SubscribesSamples for R2rBackEnd<'_> {
-    /// With the type of who publishes when the node begins, if none is named: r2r finds the code
-    /// for a type by its name, where it was built with it.
+    /// Subscribes with the parameter's type, else with the publisher's at the node's start: r2r
+    /// finds the code of a type by name, if built with it.
     fn subscribe_samples(&mut self, topic: Topic, samples: SampleSource) -> Result<(), RosError> {
         let (profile, whole) = (profile(topic), self.config.resolve(topic.name)?);
         let known = self

@@ -1,4 +1,4 @@
-//! What came of a probing, as messages.
+//! Results of a probing, as messages.
 
 use crate::probing::arm::{
     ArmError, LimitError, OnsetVerdict, ProbeError, Safety, SlideEnding, StopRequest, TouchMoment,
@@ -11,7 +11,7 @@ use crate::ros::node::convert::{NO_VECTOR, point, pose, vector};
 use crate::ros::node::feature_messages::{flagged, found};
 use crate::ros::refusal::not_probed;
 
-/// Why nothing is probed where all that is flagged was asked for.
+/// Message if there is no flagged feature to probe.
 pub const NOTHING_FLAGGED: &str = "nothing is flagged that was not probed already";
 const NOWHERE: Point = Point {
     x: f64::NAN,
@@ -19,7 +19,7 @@ const NOWHERE: Point = Point {
     z: f64::NAN,
 };
 
-/// Not begun.
+/// Result of a feature that was not begun.
 pub fn refused(target: &Flag, code: u8, message: String) -> ProbeResult {
     ProbeResult {
         feature: flagged(target),
@@ -27,7 +27,7 @@ pub fn refused(target: &Flag, code: u8, message: String) -> ProbeResult {
     }
 }
 
-/// A dry run.
+/// Result of a dry run.
 pub fn planned(target: &Flag, plan: &Plan) -> ProbeResult {
     let (code, message) = match plan.held_back.len() {
         0 => {
@@ -51,7 +51,7 @@ pub fn planned(target: &Flag, plan: &Plan) -> ProbeResult {
     refused(target, code, message)
 }
 
-/// What was measured.
+/// Result of the measurement.
 pub fn result_of(target: &Flag, probed: &Probed) -> ProbeResult {
     let feature = probed
         .found
@@ -86,7 +86,7 @@ pub fn result_of(target: &Flag, probed: &Probed) -> ProbeResult {
     }
 }
 
-/// How many places were left out, in words.
+/// Number of omitted positions, in words.
 fn beside_the_part(count: usize) -> String {
     if count == 0 {
         String::new()
@@ -95,7 +95,7 @@ fn beside_the_part(count: usize) -> String {
     }
 }
 
-/// How the slides ended, behind how the probing did.
+/// Endings of the slides, as an addition to the ending of the probing.
 fn slid(slides: &[ProbedSlide]) -> String {
     if slides.is_empty() {
         return String::new();
@@ -117,10 +117,10 @@ fn slid(slides: &[ProbedSlide]) -> String {
     format!("; {arrived} of {} slides arrived{others}", slides.len())
 }
 
-/// Features that the result of a goal names at most, so that it goes out in one packet.
+/// Maximum number of features in the result of a goal, so that it fits into one packet.
 const MOST_NAMED: usize = 128;
 
-/// How a goal ended, of the features that were begun.
+/// Result of a goal, from the features begun.
 pub fn response_of(results: &[ProbeResult], header: Header) -> ProbeResponse {
     let (code, message) = match results.iter().max_by_key(|one| one.code) {
         Some(worst) => (worst.code, worst.message.clone()),
@@ -137,7 +137,7 @@ pub fn response_of(results: &[ProbeResult], header: Header) -> ProbeResponse {
     }
 }
 
-/// How all that is flagged ended, in words: each where they are few, else how many and the worst.
+/// Result of all flagged features, in words: each of a few, else the number and the worst.
 pub fn summary_of(results: &[ProbeResult]) -> String {
     const FEW: usize = 4;
     let line = |one: &ProbeResult| format!("{}: {}", one.id, one.message);
@@ -158,7 +158,7 @@ pub fn summary_of(results: &[ProbeResult]) -> String {
     }
 }
 
-/// What came of the touches of a feature, one message each.
+/// Results of the touches of a feature, one message each.
 ///
 /// - `radius`: of the tip, m.
 pub fn touches_of(
@@ -185,11 +185,11 @@ pub fn touches_of(
     made.collect()
 }
 
-/// A message above 64 kB goes out in fragments, of which readers with default buffers lose some: a
-/// curve has no more rows, 16 bytes each.
+/// Maximum number of rows of a curve, 16 bytes each: a message above 64 kB goes out in fragments,
+/// and readers with default buffers lose some.
 const MOST_ROWS: usize = 2000;
 
-/// Every so many rows where there are more, the first and the last among them.
+/// Thins longer curves evenly, keeping first and last row.
 fn downsampled(mut touch: ProbeTouch) -> ProbeTouch {
     let thin = |row: &mut Vec<f32>| {
         if row.len() > MOST_ROWS {
@@ -215,7 +215,7 @@ fn downsampled(mut touch: ProbeTouch) -> ProbeTouch {
 fn code_of(ending: &Ending) -> u8 {
     match ending {
         Ending::ToleranceReached | Ending::Decided => ProbeResult::TOLERANCE_REACHED,
-        // as good as touches can make it; the message has the reason
+        // limited by the touches; the message has the reason
         Ending::TouchesSpent
         | Ending::CalibrationLimits { .. }
         | Ending::Undecided { .. }
@@ -280,7 +280,7 @@ fn stopped(error: &ProbeError) -> u8 {
     }
 }
 
-/// The touch, and the stamp that goes into its header.
+/// The touch, and the stamp for its header.
 fn touch_of(touch: &ProbedTouch, radius: f64, cell: &Cell, offset_ns: i64) -> (Time, ProbeTouch) {
     let approach = touch.planned.direction.into_inner();
     let mut made = ProbeTouch {
@@ -303,7 +303,7 @@ fn touch_of(touch: &ProbedTouch, radius: f64, cell: &Cell, offset_ns: i64) -> (T
         TouchOutcome::Contact { onset, force_b, .. } => {
             onset_s = onset_at(record, onset.travel);
             if let Some(centre) = touch.centre {
-                // the part pushes along its normal, but for friction
+                // the part pushes along its normal, except for friction
                 let normal = (cell.pose_bo.rotation.inverse() * force_b)
                     .try_normalize(0.0)
                     .unwrap_or(-approach);
@@ -322,7 +322,7 @@ fn touch_of(touch: &ProbedTouch, radius: f64, cell: &Cell, offset_ns: i64) -> (T
         &(cell.pose_bo.inverse() * record.target.standoff_bt).rotation,
     );
     made.speed = record.speed;
-    // its size is known, and that the part pushes back
+    // only its size is known, and that the part pushes back
     made.peak_wrench.force = vector(&(approach * -record.peak_force));
     let row =
         |value: fn(&TouchMoment) -> f64| record.curve.iter().map(|m| value(m) as f32).collect();
@@ -351,7 +351,7 @@ fn verdict_of(outcome: &TouchOutcome) -> u8 {
     }
 }
 
-/// When a travel is reached first, s from the beginning of the curve.
+/// First time at which a travel is reached, s from the start of the curve.
 fn onset_at(record: &TouchRecord, travel: f64) -> f64 {
     record
         .curve

@@ -1,4 +1,4 @@
-//! What the thread of the arm and the others know of each other.
+//! State shared by the arm thread and the others.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -9,11 +9,11 @@ use crate::ros::locked;
 use crate::ros::messages::TriggerResponse;
 use crate::ros::stop::StopState;
 
-/// Read and written by any thread.
+/// Readable and writable from any thread.
 #[derive(Debug)]
 pub struct Common {
     is_busy: AtomicBool,
-    /// what stops it
+    /// stop state
     pub stops: Arc<StopState>,
     seen: Mutex<StateSeen>,
 }
@@ -22,12 +22,12 @@ pub struct Common {
 struct StateSeen {
     last: Option<ArmState>,
     fault: Option<String>,
-    /// what it was stopped by, until somebody has looked and says so
+    /// reason of the last stop, until acknowledged
     stop: Option<String>,
 }
 
 impl Common {
-    /// Nothing is known yet.
+    /// Before the first state.
     pub fn new(stops: Arc<StopState>) -> Self {
         Self {
             is_busy: AtomicBool::new(false),
@@ -36,17 +36,17 @@ impl Common {
         }
     }
 
-    /// Takes up an order; whether no other is worked at.
+    /// Takes up an order; returns whether no other order is active.
     pub fn begin(&self) -> bool {
         !self.is_busy.swap(true, Ordering::AcqRel)
     }
 
-    /// The order is done.
+    /// Marks the order as done.
     pub fn done(&self) {
         self.is_busy.store(false, Ordering::Release);
     }
 
-    /// A state came. A stop in it is one until somebody has looked, also when nobody moved the arm.
+    /// Handles a state; a reported stop latches until acknowledged, even if nobody moved the arm.
     pub fn see(&self, state: &ArmState) {
         let mut seen = locked(&self.seen);
         (seen.last, seen.fault) = (Some(*state), None);
@@ -55,12 +55,12 @@ impl Common {
         }
     }
 
-    /// The last one.
+    /// The last state.
     pub fn last(&self) -> Option<ArmState> {
         locked(&self.seen).last
     }
 
-    /// None came; whether that is new.
+    /// Notes a missing state; returns whether that is new.
     pub fn miss(&self, error: &ArmError) -> bool {
         let mut seen = locked(&self.seen);
         use ArmError::{
@@ -80,21 +80,21 @@ impl Common {
         seen.fault.replace(error.to_string()).is_none()
     }
 
-    /// The arm was stopped while it moved.
+    /// Notes a stop of the arm during motion.
     pub fn stop(&self, why: &str) {
         locked(&self.seen).stop = Some(why.to_owned());
     }
 
-    /// Somebody has looked.
+    /// Acknowledges stop and fault.
     pub fn recovered(&self) {
         let mut seen = locked(&self.seen);
         (seen.stop, seen.fault) = (None, None);
     }
 
-    /// Why it cannot be sent anywhere, when it cannot.
+    /// Whether the arm can move.
     ///
     /// # Errors
-    /// In words.
+    /// The reason against it, in words.
     pub fn ready(&self) -> Result<(), String> {
         self.stops.ready()?;
         let seen = locked(&self.seen);

@@ -1,4 +1,4 @@
-//! A simulated arm in the time of a clock.
+//! A simulated arm paced by a clock.
 
 use std::time::{Duration, Instant};
 
@@ -6,10 +6,10 @@ use crate::clock::Clock;
 use crate::probing::arm::{Arm, ArmError, ArmState, Command};
 use crate::sim::SimArm;
 
-/// So late it begins to count anew: it does not run after the time.
+/// Delay after which the pace restarts instead of catching up.
 const LATE: Duration = Duration::from_millis(100);
 
-/// Returns states when they are due.
+/// Returns states at their due times.
 pub struct Paced<'a> {
     clock: Clock,
     arm: SimArm<'a>,
@@ -17,7 +17,7 @@ pub struct Paced<'a> {
 }
 
 impl<'a> Paced<'a> {
-    /// From now on.
+    /// Starts now.
     pub fn new(clock: Clock, arm: SimArm<'a>) -> Self {
         Self {
             arm,
@@ -65,7 +65,7 @@ mod tests {
     use super::*;
     use crate::sim::{ArmParams, Plate};
 
-    /// It does each order as the arm does without a clock.
+    /// It obeys each order as the arm does without a clock.
     #[test]
     fn every_order_reaches_the_arm() {
         let (clock, _hand) = Clock::lock_step();
@@ -74,7 +74,7 @@ mod tests {
         let arm = || SimArm::new(&plate, params.clone(), &start).unwrap();
         let (mut paced, mut free) = (Paced::new(clock, arm()), arm());
         for order in 0..500 {
-            // one that is lost leaves the arm on a way of its own
+            // a lost order would leave the arm on another path
             let linear = Vector3::new(
                 0.02 * f64::from(order).sin(),
                 0.02 * f64::from(order).cos(),
@@ -113,11 +113,11 @@ mod tests {
             clock.since(begun)
         };
         (1..=50u32).for_each(|k| assert_eq!(next_at(), k * period));
-        // ten of them are late: they come at once, then it goes on as if nothing had been
+        // ten late states come at once, then the original pace continues
         hand.advance(10 * period);
         (51..=60).for_each(|_| assert_eq!(next_at(), 60 * period));
         assert_eq!(next_at(), 61 * period);
-        // so late that it begins to count anew
+        // late enough for a restart of the pace
         let late = LATE + 2 * period;
         hand.advance(late);
         (0..2u32).for_each(|k| assert_eq!(next_at(), 61 * period + late + k * period));

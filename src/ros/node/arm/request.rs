@@ -1,4 +1,4 @@
-//! What a request asks for: within what is configured.
+//! Content of a request, within the configured limits.
 
 use crate::features::Kind;
 use crate::probing::arm::{CRAWL, Narrower};
@@ -6,22 +6,22 @@ use crate::probing::execute::ProbeParams;
 use crate::probing::plan::{Quantity, sigma_of};
 use crate::ros::messages::{ProbeResult, ProbeSettings};
 
-/// What is wanted of a probing.
+/// Settings of a probing.
 pub struct Wanted {
-    /// as configured, and narrowed
+    /// configured parameters, narrowed
     pub params: ProbeParams,
-    /// plan alone
+    /// only plan
     pub is_dry_run: bool,
 }
 
-/// Where a tolerance is asked for without a probability.
+/// Confidence of a tolerance without one.
 const CONFIDENCE: f64 = 0.95;
 
 impl Wanted {
     /// Reads settings; 0 means as configured.
     ///
     /// # Errors
-    /// A code of [`ProbeResult`] and why.
+    /// A code of [`ProbeResult`] and the reason.
     #[expect(clippy::too_many_lines)]
     pub fn of(
         settings: &ProbeSettings,
@@ -102,7 +102,7 @@ impl Wanted {
     }
 }
 
-/// Standard deviation that is wanted, m or rad.
+/// Requested standard deviation, m or rad.
 fn sigma(settings: &ProbeSettings, configured: f64) -> Result<f64, String> {
     let confidence = if settings.confidence == 0.0 {
         CONFIDENCE

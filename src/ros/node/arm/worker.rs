@@ -1,4 +1,4 @@
-//! The thread of the arm: it streams wrench and pose like any probe, and probes what is asked for.
+//! The arm thread: it streams wrench and pose like any probe, and probes on request.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -35,42 +35,42 @@ use crate::ros::stop::{Motion, StopState};
 use crate::scene::simulated_arm;
 use crate::sim::{MeshSurface, SimArm};
 
-/// Orders that wait for the thread: one is taken up at a time, and who comes meanwhile is refused.
+/// Orders waiting for the thread: it takes one at a time, and refuses others meanwhile.
 const QUEUE: usize = 1;
-/// An arm from which nothing comes is asked again after this.
+/// Delay before a retry with a silent arm.
 const LOST: Duration = Duration::from_millis(200);
-/// How long the other threads may take to answer what is flagged, and until the mesh is complete.
+/// Maximum wait for the flagged features, and for the complete mesh.
 const WAIT: Duration = Duration::from_secs(15);
-/// The clock of an arm is followed by this share of how far it is off, with each state: latency
-/// comes and goes, drift stays.
+/// Divisor for following the clock of an arm: each state corrects this share of the deviation;
+/// latency varies, drift stays.
 const FOLLOW: i64 = 1024;
-/// Farther off it is another clock, ns.
+/// Deviation that means another clock, ns.
 const OTHER_CLOCK_NS: i64 = 200_000_000;
 
-/// An order, and the folder of the session, where what is touched is written down.
+/// An order, and the session folder for its touches.
 type FolderOrder = (ArmOrder, PathBuf);
 
-/// Which arm there is.
+/// Kind of arm.
 pub enum ArmKind {
-    /// A simulated one, against the part as it is.
+    /// A simulated arm, touching the true part.
     Sim(Box<TriMesh>),
-    /// One that exists.
+    /// A real arm.
     Real(Box<dyn Arm + Send>),
 }
 
-/// An arm, and where what it feels is published.
+/// An arm, and the port for its measurements.
 pub struct ArmOfNode {
-    /// which
+    /// kind of arm
     pub kind: ArmKind,
-    /// on the topics of the probe
+    /// publishes on the topics of the probe
     pub samples: Box<dyn SamplePort>,
 }
 
-/// The arm's thread, as the others see it. Dropped, it has the arm stop, retract and end.
+/// Handle of the arm thread. On drop the arm stops, retracts and ends.
 #[derive(Debug)]
 pub struct ArmHandle {
     inputs: SyncSender<FolderOrder>,
-    /// what it and the others know of each other
+    /// state shared with the thread
     pub common: Arc<Common>,
     cell: Cell,
 }
@@ -82,9 +82,9 @@ impl Drop for ArmHandle {
 }
 
 impl ArmHandle {
-    /// Gives an order, or answers why it cannot be taken up.
+    /// Passes on an order, or answers with the reason against it.
     ///
-    /// - `folder`: of the session, where what is touched is written down.
+    /// - `folder`: of the session, for the record of touches.
     pub fn order(&self, order: ArmOrder, folder: &Path, header: Header) {
         if let Err(why) = self.common.stops.heard() {
             return order.refuse(header, ProbeResult::ARM_NOT_READY, &why);
@@ -104,13 +104,13 @@ impl ArmHandle {
         }
     }
 
-    /// `~/arm_state`: answered at once, whatever the arm does.
+    /// `~/arm_state`: answers at once, whatever the arm does.
     pub fn state(&self) -> TriggerResponse {
         self.common.state(&self.cell)
     }
 }
 
-/// What the thread works with.
+/// State of the arm thread.
 struct ArmWorker {
     link: ArmLink,
     port: Arc<dyn Port>,
@@ -118,18 +118,18 @@ struct ArmWorker {
     cell: Cell,
     params: ProbeParams,
     inputs: Receiver<FolderOrder>,
-    /// the time of ROS when the last state came, ns
+    /// the time of ROS at the last state, ns
     ros_ns: i64,
-    /// of the feature that the last probing was stopped in
+    /// way out of the feature at which the last probing stopped
     way_out: Option<WayOut>,
-    /// contacts that are touched again after each feature
+    /// contacts touched again after each feature
     references: References,
 }
 
-/// Starts the thread of an arm.
+/// Starts the arm thread.
 ///
 /// # Errors
-/// [`NodeError::NoRobot`] where the scene has none, [`NodeError::NoThread`].
+/// [`NodeError::NoRobot`] for a scene without a robot, [`NodeError::NoThread`].
 pub fn start(
     setup: &Arc<Setup>,
     port: &Arc<dyn Port>,
@@ -186,7 +186,7 @@ pub fn start(
     Ok((handle, thread))
 }
 
-/// Says that the thread of the arm has ended, however it did.
+/// Reports the end of the arm thread, for any reason.
 struct EndsArm(Arc<StopState>);
 
 impl Drop for EndsArm {
@@ -210,7 +210,7 @@ impl ArmWorker {
         Ok(())
     }
 
-    /// Streams, and does what it is asked, until the node ends.
+    /// Streams and executes orders until the node ends.
     fn run(&mut self, arm: &mut dyn Arm) {
         while !self.link.common.stops.is_ending() {
             self.see_next(arm);
@@ -222,7 +222,7 @@ impl ArmWorker {
         }
     }
 
-    /// Nobody who still waits is left without an answer.
+    /// Answers all waiting callers.
     fn refuse_the_rest(&self) {
         for (order, _) in self.inputs.try_iter() {
             let why = self
@@ -241,7 +241,7 @@ impl ArmWorker {
         }
     }
 
-    /// Takes the next state of an arm that nobody moves.
+    /// Takes the next state of a resting arm.
     fn see_next(&mut self, arm: &mut dyn Arm) {
         self.link.common.stops.look();
         let state = match arm.next_state() {
@@ -257,8 +257,7 @@ impl ArmWorker {
         let now_ns = self.port.now_ns();
         let off = now_ns - state.stamp_ns;
         let followed = match self.link.offset_ns {
-            // a simulated time that has not come yet, or stands still, says nothing of the arm's
-            // clock
+            // a simulated time that has not begun, or stands still, does not reveal the arm's clock
             Some(offset) if now_ns == self.ros_ns => offset,
             Some(offset) if (off - offset).abs() < OTHER_CLOCK_NS => {
                 offset + (off - offset) / FOLLOW
@@ -270,7 +269,7 @@ impl ArmWorker {
         self.link.publish(&state);
     }
 
-    /// Waits for what another thread makes ready, while the arm's states go on.
+    /// Waits for a result of another thread, while the arm's states go on.
     fn wait<T>(&mut self, arm: &mut dyn Arm, ready: &Receiver<T>) -> Option<T> {
         let deadline = self.link.setup.clock.now() + WAIT;
         loop {
@@ -286,7 +285,8 @@ impl ArmWorker {
         }
     }
 
-    /// Works at an order. Who has the answer may give the next, so it is done before that is sent.
+    /// Executes an order. Marks it done before the answer, as the caller may then give the next
+    /// one.
     fn take(&mut self, order: ArmOrder, folder: &Path, arm: &mut dyn Arm) {
         self.link.begun = self.link.setup.clock.now();
         match order {
@@ -346,7 +346,7 @@ impl ArmWorker {
             .last()
             .is_some_and(|last| last.code == ProbeResult::CANCELLED);
         let end = match response.code {
-            // by who gave it, and by nobody else: a pause ends it too
+            // only for a cancel by the client: a pause ends a goal too
             _ if was_broken_off && is_cancelled.load(Ordering::Acquire) => GoalEnd::Canceled,
             code if code < ProbeResult::CANCELLED => GoalEnd::Succeeded,
             _ => GoalEnd::Aborted,
@@ -355,7 +355,7 @@ impl ArmWorker {
         result.send((end, response));
     }
 
-    /// What casts doubt on the check of the arm, behind how a probing ended; empty: nothing does.
+    /// Doubts about the check of the arm, as an addition to an ending; empty: none.
     fn doubts_of_check(&self) -> String {
         let robot = self.link.setup.scene.robot.as_ref();
         let standing = robot.map(|robot| robot.check_standing(SystemTime::now()));
@@ -363,7 +363,7 @@ impl ArmWorker {
         doubtful.map_or_else(String::new, |standing| format!("; {standing}"))
     }
 
-    /// A result as it is now, for who follows and for who asked.
+    /// Stamps a result and publishes it, for followers and for the caller.
     fn done(&self, result: ProbeResult) -> ProbeResult {
         let result = ProbeResult {
             header: self.header(),
@@ -377,7 +377,7 @@ impl ArmWorker {
         header(self.port.now_ns(), &self.link.setup.shared.frame)
     }
 
-    /// Probes what is asked for, one after the other; a result for each that was begun.
+    /// Probes the requested features, one after the other; returns a result for each feature begun.
     fn probe(
         &mut self,
         folder: &Path,
@@ -404,7 +404,7 @@ impl ArmWorker {
                     self.probe_one(folder, &target, &wanted, arm, watched, [number, count])
                 }
             };
-            // after a cancel or a stop the others are not begun
+            // a cancel or a stop ends the series
             let goes_on = result.code < ProbeResult::CANCELLED
                 || matches!(
                     result.code,
@@ -420,7 +420,7 @@ impl ArmWorker {
         results
     }
 
-    /// What is flagged, in the order that was asked for, or nearest first.
+    /// The flagged features in the requested order, or nearest first.
     fn targets(&mut self, ids: &[u32], arm: &mut dyn Arm) -> Result<Vec<Flag>, Box<ProbeResult>> {
         let (to, targets) = sync_channel(1);
         let asked = self
@@ -530,7 +530,7 @@ impl ArmWorker {
                     return planned_result(target, &planned);
                 }
             }
-            // there is no such pattern, or no such number
+            // no such pattern or quantity
             Err(error) => {
                 return refused(
                     target,
@@ -543,7 +543,7 @@ impl ArmWorker {
         let references = std::mem::take(&mut self.references);
         let mut prober = prober.leaving_by(self.way_out.take()).beside(references);
         let probed = prober.probe(target);
-        // after a contact that moved nothing holds that was touched before
+        // a contact that moved the part invalidates earlier touches
         if !probed.ending.is_displaced() {
             self.references = prober.take_references();
         }
@@ -573,7 +573,7 @@ impl ArmWorker {
             .and_then(|found| found.feature.clone())
             .filter(|_| is_whole)
         {
-            // the number that was wanted is still wanted, where it is not known well enough
+            // a quantity not known well enough stays requested
             let is_done = matches!(probed.ending, Ending::ToleranceReached);
             let session = folder
                 .file_name()
@@ -612,7 +612,7 @@ impl ArmWorker {
             && let Some((code, why)) = self.link.common.stops.why(request)
         {
             result.message = format!("{why}: {}", result.message);
-            // the others are refused before they begin
+            // the remaining features are refused before they begin
             if code == ProbeResult::SHUTDOWN {
                 result.code = code;
             }
@@ -622,7 +622,7 @@ impl ArmWorker {
     }
 }
 
-/// Beside the recording of a session.
+/// File of touches, beside the recording of a session.
 const TOUCHES: &str = "probed_touches.jsonl";
 const BUSY: &str = "the arm works at an order: wait, or cancel that";
 const HAS_ENDED: &str = "the arm's thread has ended: start the node again";

@@ -1,4 +1,4 @@
-//! What is around the arm of the node: the mesh as it was sent, the topics, and whoever may cancel.
+//! Surroundings of the node's arm: the mesh as sent, the topics, and cancel requests.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -19,13 +19,13 @@ use crate::ros::node::side_work::begin;
 use crate::ros::port::{Feedback, SamplePort};
 use crate::ros::stop::Motion;
 
-/// Feedback comes at least so often while the arm moves.
+/// Maximum period of feedback while the arm moves.
 const FEEDBACK_EVERY: Duration = Duration::from_millis(100);
-/// How long a change of the mesh may take until it is complete.
+/// Maximum duration of a mesh change until the mesh is complete.
 const COPY_WAIT: Duration = Duration::from_secs(15);
 
-/// Has something made of the mesh as it is now, beside the loop of the arm, which must not wait for
-/// it. Nothing comes where the mesh is not complete in time, or the memory has no room.
+/// Computes a result from the current mesh, outside the loop of the arm, which must not wait for
+/// it. No result if the mesh is not complete in time, or memory is short.
 pub fn ask_mesh<T: Send + 'static>(
     Setup { clock, shared, .. }: &Setup,
     make_of: impl FnOnce(StaticWorld) -> T + Send + 'static,
@@ -34,36 +34,36 @@ pub fn ask_mesh<T: Send + 'static>(
     let snapshot = shared.mesh.complete();
     let waiting = clock.clone();
     let make = move || {
-        // the snapshot goes at once: the next version of the mesh need not be a copy
+        // dropped at once: the next version of the mesh need not be a copy
         let mesh = waiting
             .recv_timeout(&snapshot, COPY_WAIT)
             .ok()
             .and_then(|snapshot| snapshot.mesh().ok());
         if let Some(mesh) = mesh {
-            // who asked may have gone
+            // the receiver may be gone
             let _ = to.send(make_of(StaticWorld::new(mesh)));
         }
     };
-    // without a thread the receiver finds its sender gone, as it does where nothing comes
+    // without a thread the receiver finds its sender gone, as without a result
     let _ = begin(clock, "arm mesh", make);
     ready
 }
 
-/// What the thread of the arm streams to, and how it stands to it.
+/// Connections of the arm thread to its streams.
 pub struct ArmLink {
     pub setup: Arc<Setup>,
-    /// where what the arm feels is published
+    /// port for the measurements of the arm
     pub samples: Box<dyn SamplePort>,
     pub common: Arc<Common>,
-    /// from the arm's clock to that of ROS, ns
+    /// offset from the arm's clock to ROS time, ns
     pub offset_ns: Option<i64>,
-    /// when the order at hand was taken up
+    /// start of the current order
     pub begun: Instant,
 }
 
 impl ArmLink {
-    /// Publishes a state as a probe does: the pose in the frame in which the scene has poses, the
-    /// wrench in the axes of the probe.
+    /// Publishes a state as a probe does: the pose in the scene's frame of poses, the wrench in the
+    /// axes of the probe.
     pub fn publish(&self, state: &ArmState) {
         let Setup {
             scene,
@@ -71,7 +71,7 @@ impl ArmLink {
             tool,
             ..
         } = &*self.setup;
-        // the base of the arm, where the scene says where the scan lies in it
+        // base of the arm, if the scene places the scan in it
         let base = if scene.scan_to_space.is_some() {
             CELL
         } else {
@@ -84,10 +84,10 @@ impl ArmLink {
     }
 }
 
-/// Who follows a goal: the feedback, and whether it is to end.
+/// Follower of a goal: the feedback, and a cancel flag.
 pub type GoalWatcher<'a> = (&'a Feedback, &'a Arc<AtomicBool>);
 
-/// Whether it is.
+/// Whether the follower has cancelled the goal.
 pub fn is_cancelled(watched: Option<GoalWatcher<'_>>) -> bool {
     watched.is_some_and(|(_, cancelled)| cancelled.load(Ordering::Acquire))
 }
@@ -96,10 +96,10 @@ pub fn is_cancelled(watched: Option<GoalWatcher<'_>>) -> bool {
 pub struct ArmWorld<'a> {
     link: &'a ArmLink,
     still: StaticWorld,
-    /// as it will be
+    /// next mesh
     next: Option<Receiver<StaticWorld>>,
     watched: Option<GoalWatcher<'a>>,
-    /// number of the feature, from 0 on, and how many
+    /// number of the feature, from 0 on, and number of features
     feature: [usize; 2],
     progress: Option<Progress>,
     phase: Phase,
@@ -108,9 +108,9 @@ pub struct ArmWorld<'a> {
 }
 
 impl<'a> ArmWorld<'a> {
-    /// What is around the arm while it probes a feature.
+    /// The surroundings of the arm while it probes a feature.
     ///
-    /// - `feature`: its number, from 0 on, and how many there are.
+    /// - `feature`: its number, from 0 on, and the number of features.
     pub fn new(
         link: &'a ArmLink,
         still: StaticWorld,
@@ -131,8 +131,7 @@ impl<'a> ArmWorld<'a> {
         }
     }
 
-    /// Takes the mesh that has become ready, and asks for the next: it is behind by a touch, or by
-    /// as long as it takes to make.
+    /// Takes a finished mesh and requests the next: it lags by one touch, or by its computing time.
     fn renew(&mut self) {
         match self.next.as_ref().map(Receiver::try_recv) {
             Some(Ok(still)) => self.still = still,
