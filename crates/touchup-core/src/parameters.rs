@@ -1,20 +1,20 @@
-//! Parameters of the scene, each declared once, in the module that it belongs to.
+//! Scene parameters, each declared once, in its own module.
 //!
-//! [`parameters!`](crate::parameters!) makes of one declaration the struct in SI, its defaults, its
-//! check, how it reads itself from YAML, and a [`Parameter`] for each key, of which the template of
-//! the scene and the table of docs/scene.md are made:
+//! [`parameters!`](crate::parameters!) generates from one declaration the struct in SI units, its
+//! defaults, its range check, its YAML reader, and a [`Parameter`] for each key. The scene template
+//! and the table of docs/scene.md come from these:
 //!
 //! ```
 //! use touchup_core::{parameters, parameters::Section};
 //! parameters! {
-//!     /// How a door is closed.
+//!     /// Closing of a door.
 //!     #[derive(Clone, Debug, PartialEq)]
 //!     pub struct DoorParams in "door" {
 //!         /// The door is closed by this force.
 //!         ///
-//!         /// What follows the first paragraph is not shown to the user: here, why the default is what it is.
+//!         /// The user sees the first paragraph only: the reason for the default stands here.
 //!         force: f64 = 4.0, "force_n" [N, 0, 100];
-//!         /// How far it is opened; left out: as far as it goes.
+//!         /// Width of the opening; left out: as far as it goes.
 //!         opening: Option<f64> = None, "opening_mm" [MM, 1, 2000] like "800";
 //!         /// Not in the scene.
 //!         count: usize = 0;
@@ -25,8 +25,8 @@
 //! assert_eq!(wide.check().unwrap_err().to_string(), "door.opening_mm is 3000; it must be 1 to 2000 mm; it is left out by default");
 //! ```
 //!
-//! A struct may end `with { part: Part }`, whose keys are in the same section, and name a `check
-//! path;` of what several parameters must hold together.
+//! `with { part: Part }` at the end adds the keys of `Part` to the section; `check path;` checks
+//! conditions across several parameters.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -38,15 +38,15 @@ use serde::de::{
     DeserializeOwned, DeserializeSeed, Deserializer, Error, MapAccess, Unexpected, Visitor,
 };
 
-/// A parameter outside the range in which it has a meaning.
+/// Parameter value outside its valid range.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{name} is {}; it must be {allowed}", Number(*.value))]
 pub struct SettingError {
-    /// its key in the scene, or what it is and its unit
+    /// key in the scene, or quantity with its unit
     pub name: String,
-    /// what it is, in the unit of `allowed`
+    /// value, in the unit of `allowed`
     pub value: f64,
-    /// the range
+    /// valid range
     pub allowed: String,
 }
 
@@ -67,7 +67,7 @@ impl SettingError {
     }
 }
 
-/// A number for people: twelve digits, powers of ten where it is large or small.
+/// Number for display: twelve digits, powers of ten for large and small values.
 struct Number(f64);
 
 impl fmt::Display for Number {
@@ -83,12 +83,12 @@ impl fmt::Display for Number {
     }
 }
 
-/// The unit of a key.
+/// Unit of a key.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unit {
-    /// as it is written behind a number; empty for a pure number
+    /// printed after a number; empty for a pure number
     pub symbol: &'static str,
-    /// so many are `size` of SI; one of the two is 1, so that a conversion rounds once
+    /// `count` of this unit equal `size` of SI; one of the two is 1, so a conversion rounds once
     count: f64,
     size: f64,
 }
@@ -136,46 +136,46 @@ units! {
 }
 
 impl Unit {
-    /// A number of this unit in SI.
+    /// Converts a number of this unit to SI.
     pub fn to_si(self, x: f64) -> f64 {
         x / self.count * self.size
     }
 
-    /// A number of SI in this unit.
+    /// Converts a number of SI to this unit.
     pub fn of_si(self, x: f64) -> f64 {
         x * self.count / self.size
     }
 }
 
-/// What is declared of one key.
+/// Declaration of one key.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
-    /// the section that it is in, with those around it: `compensation.payload`; empty at the top
+    /// section with its parents: `compensation.payload`; empty at the top level
     pub section: &'static str,
-    /// its key there
+    /// key in the section
     pub key: &'static str,
-    /// of its numbers
+    /// unit of its numbers
     pub unit: Unit,
-    /// smallest and largest number, in the unit
+    /// smallest and largest number, in `unit`
     pub range: Option<[f64; 2]>,
-    /// what else is to be said of the range
+    /// remark on the range
     pub hint: &'static str,
-    /// the words to choose from
+    /// allowed words
     pub words: &'static [&'static str],
-    /// as YAML; `None`: it is left out
+    /// default, as YAML; `None`: absent
     pub default: Option<String>,
-    /// a value for one that is left out, as YAML
+    /// example for an absent key, as YAML
     pub example: &'static str,
-    /// the whole documentation, line by line
+    /// documentation, line by line
     pub doc: &'static [&'static str],
-    /// of a section: what is in it
+    /// parameters of a section
     pub inner: Vec<Parameter>,
-    /// whether it is a section
+    /// whether the key is a section
     pub is_section: bool,
 }
 
 impl Parameter {
-    /// Section and key.
+    /// Full name: section and key.
     pub fn name(&self) -> String {
         if self.section.is_empty() {
             self.key.to_owned()
@@ -184,7 +184,7 @@ impl Parameter {
         }
     }
 
-    /// What it does: the first paragraph of its documentation.
+    /// First paragraph of the documentation.
     pub fn summary(&self) -> String {
         let lines = self
             .doc
@@ -194,7 +194,7 @@ impl Parameter {
         lines.collect::<Vec<_>>().join(" ")
     }
 
-    /// What it may be: a range, or words; empty where anything may be.
+    /// Range, or words; empty if every value is allowed.
     pub fn allowed(&self) -> String {
         let Some([low, high]) = self.range else {
             return self.words.join(", ");
@@ -203,43 +203,43 @@ impl Parameter {
     }
 }
 
-/// What a key may hold.
+/// Type of a parameter.
 pub trait Value: Sized {
-    /// As it is written in the YAML.
+    /// Type in the YAML.
     type Written: DeserializeOwned;
-    /// The words to choose from.
+    /// Allowed words.
     const WORDS: &'static [&'static str] = &[];
-    /// Whether it is a section, or one that may be left out.
+    /// Whether the type is a section, optional or not.
     const IS_SECTION: bool = false;
 
-    /// The value in SI.
+    /// Converts a YAML value to SI.
     fn of(written: Self::Written, unit: Unit) -> Self;
 
-    /// As YAML on one line; `None`: it is left out.
+    /// YAML on one line; `None`: absent.
     fn yaml(&self, unit: Unit) -> Option<String>;
 
-    /// The value of a key that is there, also without a value: that names a section with its
-    /// defaults; `off` is no section.
+    /// Value of a present key; a section key without a value gives the default section, `off` gives
+    /// none.
     fn given(written: Self::Written, unit: Unit) -> Self {
         Self::of(written, unit)
     }
 
-    /// A section of defaults.
+    /// Default section; `None` for other types.
     fn named() -> Option<Self> {
         None
     }
 
-    /// Whether it is a section that is written as `off`.
+    /// Whether a section has the YAML value `off`.
     fn is_off(_: &Self::Written) -> bool {
         false
     }
 
-    /// Its numbers in SI, all within the range.
+    /// Numbers in SI; the range applies to each.
     fn numbers(&self) -> Vec<f64> {
         vec![]
     }
 
-    /// Of a section: whether all in it may be.
+    /// Checks every parameter of a section.
     ///
     /// # Errors
     /// [`SettingError`]
@@ -247,7 +247,7 @@ pub trait Value: Sized {
         Ok(())
     }
 
-    /// Of a section: what is in it.
+    /// Parameters of a section.
     fn inner() -> Vec<Parameter> {
         vec![]
     }
@@ -269,15 +269,15 @@ impl Value for f64 {
     }
 }
 
-/// Nanoseconds in a second.
+/// Nanoseconds per second.
 const NS: f64 = 1e9;
 
-/// A time in ns. The smallest represents NaN, the largest infinity: none of them is in a range.
+/// Time in ns. `MIN` represents NaN, `MAX` infinity: both are outside every range.
 impl Value for i64 {
     type Written = f64;
 
     fn of(written: f64, unit: Unit) -> Self {
-        // 1 ms is exactly 10⁶ ns, where 0.001 s is rounded
+        // 1 ms is exactly 10⁶ ns, but 0.001 s is inexact
         if written.is_nan() {
             Self::MIN
         } else {
@@ -298,7 +298,7 @@ impl Value for i64 {
     }
 }
 
-/// Values that have no unit: how they are written, and the number in them.
+/// Types without unit: their YAML text, and the number in them.
 macro_rules! without_unit {
     ($($Type:ty, $text:expr, $number:expr;)*) => {$(
         impl Value for $Type {
@@ -326,7 +326,7 @@ without_unit! {
     String, |text| format!("'{text}'"), |_| None;
     PathBuf, |path| path.display().to_string(), |_| None;
     usize, usize::to_string, |count| Some(*count as f64);
-    // a quaternion x, y, z, w as it is written; its one number is its length
+    // quaternion x, y, z, w as in the YAML; its one number is its length
     [f64; 4], |xyzw| list(xyzw, Unit::ONE), |xyzw| Some(xyzw.iter().map(|c| c * c).sum::<f64>().sqrt());
 }
 
@@ -413,21 +413,21 @@ impl<T: Value> Value for Option<T> {
     }
 }
 
-/// Parameters that are written under one key; made by [`parameters!`](crate::parameters!).
+/// Parameters under one key; generated by [`parameters!`](crate::parameters!).
 pub trait Section: Default {
-    /// Its name, with those of the sections around it.
+    /// Section name with its parents.
     const NAME: &'static str;
 
     /// All keys.
     fn keys() -> &'static [&'static str];
 
-    /// What is declared of each key.
+    /// Declaration of each key.
     fn parameters() -> Vec<Parameter>;
 
-    /// Reads the value of a key; `false` for one that is not of this section.
+    /// Reads the value of `key`; `false` for a key of another section.
     ///
     /// # Errors
-    /// Those of the deserializer.
+    /// Errors of the deserializer.
     fn read_key<'de, A: MapAccess<'de>>(
         &mut self,
         key: &str,
@@ -435,7 +435,7 @@ pub trait Section: Default {
     ) -> Result<bool, A::Error>;
 }
 
-/// Refuses the first number of the value of `key` that is not in its range.
+/// Refuses the first number of `value` outside the range of `key`.
 ///
 /// # Errors
 /// [`SettingError`]
@@ -473,10 +473,10 @@ pub fn check<T: Value>(value: &T, key: &str, declared: &[Parameter]) -> Result<(
     })
 }
 
-/// Reads a section; what is not named keeps its default.
+/// Reads a section; absent keys keep their defaults.
 ///
 /// # Errors
-/// Those of the deserializer; a key that the section does not have.
+/// Errors of the deserializer; an unknown key.
 pub fn read_section<'de, S: Section, D: Deserializer<'de>>(deserializer: D) -> Result<S, D::Error> {
     deserializer.deserialize_struct(S::NAME, S::keys(), SectionVisitor(PhantomData))
 }
@@ -499,12 +499,12 @@ impl<'de, S: Section> Visitor<'de> for SectionVisitor<S> {
     }
 }
 
-/// A section as it is written under its key.
+/// YAML value of a section key.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum WrittenSection<S> {
-    /// its keys
+    /// keys with values
     Keys(S),
-    /// the word `off`: it is not built
+    /// the word `off`: no such part
     Off,
 }
 
@@ -543,7 +543,7 @@ impl<'de, S: Section> Visitor<'de> for WrittenSectionVisitor<S> {
         }
     }
 
-    // off is a boolean of YAML 1.1
+    // YAML 1.1 reads off as a boolean
     fn visit_bool<E: Error>(self, is_on: bool) -> Result<Self::Value, E> {
         if is_on {
             Err(E::invalid_value(Unexpected::Bool(is_on), &self))
@@ -553,7 +553,7 @@ impl<'de, S: Section> Visitor<'de> for WrittenSectionVisitor<S> {
     }
 }
 
-/// One of these keys.
+/// Seed for one of the known keys.
 struct KnownKey(&'static [&'static str]);
 
 impl<'de> DeserializeSeed<'de> for KnownKey {
@@ -625,7 +625,7 @@ macro_rules! parameters {
         }
 
         impl $Name {
-            /// Refuses the first parameter that is not in its range.
+            /// Refuses the first parameter outside its range.
             ///
             /// # Errors
             /// A number outside its range, by its key.
@@ -741,17 +741,17 @@ macro_rules! names {
         }
 
         impl $Name {
-            /// Each, in their order.
+            /// All variants, in order.
             pub const ALL: [Self; [$($name),*].len()] = [$(Self::$One),*];
 
-            /// As it is written, in files and for people.
+            /// Name in files and for display.
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$One => $name,)*
                 }
             }
 
-            /// The one of this name.
+            /// Variant of this name.
             pub fn of_name(name: &str) -> Option<Self> {
                 Self::ALL.into_iter().find(|one| one.name() == name)
             }
@@ -765,7 +765,7 @@ macro_rules! names {
     };
 }
 
-/// Declares an enum of words that a key may hold, with [`names!`](crate::names!).
+/// Declares an enum of the words allowed for a key, by [`names!`](crate::names!).
 ///
 /// ```
 /// touchup_core::words! {
