@@ -1,9 +1,8 @@
-//! Slow drift of a force sensor, followed while nothing is touched.
+//! Slow drift of a force sensor, followed in free air.
 //!
-//! In free air a sensor whose weight and bias were taken off reads its drift alone: d b/dt = (f −
-//! b) / T. A light contact looks the same, so only lasting free motion counts, and the start of a
-//! contact is taken back: when free motion ends, the bias returns to what it was before the last
-//! settling time.
+//! In free air a sensor reads, less weight and bias, its drift alone: d b/dt = (f − b) / T. A light
+//! contact looks the same, so only lasting free motion counts, and the bias forgets the start of a
+//! contact: at the end of free motion, it returns to its value before the last settling time.
 
 use nalgebra::Vector3;
 
@@ -21,15 +20,14 @@ parameters! {
         settle_ns: i64 = 60.0, "settle_ms" [MS, 0.001, 60000];
         /// Time constant of the running mean.
         ///
-        /// In s. A noise of 0.05 N at 1 kHz becomes 2 mN, and a drift of 10 mN/s is followed 3 mN
-        /// behind.
+        /// In s. A noise of 0.05 N at 1 kHz becomes 2 mN; the bias lags a drift of 10 mN/s by 3 mN.
         time: f64 = 0.3, "time_s" [S, 1e-6, 1e6];
     }
 }
 
-/// Follows the bias of the force in the axes of the stylus, in which a sensor that is fixed to it
-/// drifts. A bias that is larger from the start than what counts as free motion is never found:
-/// take it off by [`super::CompensatorParams::bias_s`].
+/// Follows the bias of the force in the axes of the stylus, in which a sensor fixed to it drifts.
+/// Never finds an initial bias beyond the limit of free motion: subtract it by
+/// [`super::CompensatorParams::bias_s`].
 ///
 /// # Example
 /// ```
@@ -48,7 +46,7 @@ parameters! {
 pub struct BiasTracker {
     params: BiasParams,
     bias_t: Vector3<f64>,
-    /// the bias at the start of this span of a settling time, and of the one before
+    /// bias at the start of the current span of a settling time, and of the previous one
     began_t: [Vector3<f64>; 2],
     span_ns: i64,
     free_since_ns: Option<i64>,
@@ -56,7 +54,7 @@ pub struct BiasTracker {
 }
 
 impl BiasTracker {
-    /// A tracker without a bias yet.
+    /// A tracker without a bias.
     ///
     /// # Errors
     /// [`SettingError`] unless all settings are more than 0.
@@ -73,10 +71,10 @@ impl BiasTracker {
         })
     }
 
-    /// The force of the next tip without the bias, N, in O.
+    /// Force of the next tip without the bias, N, in O.
     ///
-    /// - `tip`: later than the one before.
-    /// - `is_free`: whether a force without the bias, N, is one of free motion.
+    /// - `tip`: later than the previous one.
+    /// - `is_free`: whether a force without the bias, N, means free motion.
     #[inline]
     pub fn compensate(
         &mut self,
@@ -90,7 +88,7 @@ impl BiasTracker {
         if !is_free(&rest_t) {
             self.touch();
         } else {
-            // what happened in a long pause is unknown
+            // events in a long pause are unknown
             let paused = since_last_ns > self.params.settle_ns;
             let since_ns = *self.free_since_ns.get_or_insert(tip.stamp_ns);
             if paused {
@@ -102,7 +100,7 @@ impl BiasTracker {
         tip.force_o - rotation * self.bias_t
     }
 
-    /// What the sensor is thought to read in free air, in the axes of T, N.
+    /// Estimated reading of the sensor in free air, in the axes of T, N.
     pub fn bias_t(&self) -> Vector3<f64> {
         self.bias_t
     }
@@ -112,11 +110,11 @@ impl BiasTracker {
             self.began_t = [self.began_t[1], self.bias_t];
             self.span_ns = stamp_ns;
         }
-        // the exact step of the first-order lag: no step is too long for it
+        // exact step of the first-order lag, for any length
         self.bias_t -= rest_t * (-dt / self.params.time).exp_m1();
     }
 
-    /// The last part of what was taken for free air may have been the contact already.
+    /// Discards the last part of free air, which may have been the contact already.
     fn touch(&mut self) {
         self.free_since_ns = None;
         self.bias_t = self.began_t[0];
@@ -168,7 +166,7 @@ mod tests {
         }
     }
 
-    /// A ramp of slope s is followed s T behind: the steady state of a first-order lag.
+    /// The bias lags a ramp of slope s by s T: the steady state of a first-order lag.
     #[test]
     fn a_drift_in_the_axes_of_the_stylus_is_followed_while_it_turns() {
         let (slope, time) = (Vector3::new(0.01, 0.0, -0.02), 0.3);
@@ -186,8 +184,7 @@ mod tests {
         }
     }
 
-    /// Presses of 2 N that rise and fall in 10 to 40 ms. In 14 s there are 6 s of free air that
-    /// count: e^(−20).
+    /// Presses of 2 N that rise and fall in 10 to 40 ms. In 14 s, 6 s of free air count: e^(−20).
     #[test]
     fn contacts_leave_no_trace() {
         let drift = Vector3::new(0.03, -0.02, 0.04);

@@ -1,13 +1,13 @@
-//! Clock offset: how late the clock of the wrench reads, from the samples themselves.
+//! Clock offset: delay of the wrench clock, from the samples themselves.
 //!
-//! A ball that comes down onto a surface is stopped at the instant at which the force leaves zero.
-//! Along the force, its centre p + F/k goes as c + v₋ min(t − t₀, 0) + v₊ max(t − t₀, 0), and the
-//! force rises as A (1 − e^(−(t − t₁)/T)). The delay is δ = t₁ − t₀. Within ± 120 ms, the δ is
-//! searched at which the ball loses most speed along the force, on the mean of all onsets; around
-//! that, each onset gives the profile of its least squares over δ. All of them together give δ, and
-//! how much they differ gives its uncertainty. Where another stop, apart from the first, is as
-//! strong, they say nothing. The course of motion and force between the onsets ([`CourseClock`])
-//! speaks where they do not, and against them where they are wrong.
+//! A ball that comes down onto a surface stops at the instant at which the force leaves zero. Along
+//! the force, its centre p + F/k goes as c + v₋ min(t − t₀, 0) + v₊ max(t − t₀, 0), and the force
+//! rises as A (1 − e^(−(t − t₁)/T)). The delay is δ = t₁ − t₀. A search within ± 120 ms finds the δ
+//! at which the ball loses most speed along the force, over all onsets; around it, each onset gives
+//! its least-squares profile over δ. Their sum gives δ, their differences its uncertainty. If
+//! another stop, apart from the first, is as strong, the onsets are inconclusive. The course of
+//! motion and force between the onsets ([`CourseClock`]) then decides, and overrules the onsets if
+//! they are wrong.
 
 use std::collections::VecDeque;
 
@@ -18,64 +18,63 @@ use super::course_clock::CourseClock;
 use super::{ContactSample, SettingError};
 use crate::numeric::{NormalEquations, direction, median};
 
-/// Of a stop, on each side of it, s.
+/// Window of a stop, before and after it, s.
 const BEFORE: f64 = 25e-3;
 const AFTER: f64 = 15e-3;
-/// A contact that begins sooner after the last one ended is no onset, ns.
+/// Minimum time from the end of a contact to an onset, ns.
 const CALM_NS: i64 = 25_000_000;
-/// Delays that are searched, s.
+/// Largest delay of the search, s.
 const SEARCHED: f64 = 0.12;
 const SEARCH_STEP: f64 = 1e-3;
 const SEARCHED_STEPS: usize = 2 * (SEARCHED / SEARCH_STEP) as usize + 1;
-/// What is kept of an onset, on each side of the instant at which the gate opens, ns.
+/// Window of the samples of an onset, on each side of the opening of the gate, ns.
 const BEFORE_NS: i64 = 160_000_000;
 const AFTER_NS: i64 = 150_000_000;
-/// Two stops that are this far apart are two, s; one within half of it of an end of what is
-/// searched may go on beyond it.
+/// Minimum time between two distinct stops, s; a stop within half of it of an end of the search may
+/// go on beyond.
 const APART: f64 = 20e-3;
-/// The second stop has this share of the first at most.
+/// Maximum second stop, as a share of the first.
 const SECOND_STOP: f64 = 0.7;
-/// The force's rise is fitted from this long before the gate opens, s …
+/// Start of the fit of the force's rise, before the gate opens, s.
 const RISE_BEFORE: f64 = 8e-3;
-/// … to this long after, s: later the hand changes its motion.
+/// End of the fit of the force's rise, after the gate opens, s: later the hand changes its motion.
 const RISE_AFTER: f64 = 8e-3;
-/// Delays that are tried around the one that was searched: ± [`REACH`] steps of [`STEP`] s.
+/// Trial delays around the result of the search: ± [`REACH`] steps of [`STEP`] s.
 const REACH: usize = 48;
 const STEP: f64 = 0.25e-3;
 const DELAYS: usize = 2 * REACH + 1;
-/// Samples of an onset: 1 kHz has 310, 4 kHz would have 1240.
+/// Maximum number of samples of an onset: 310 at 1 kHz, 1240 at 4 kHz.
 const MOST_SAMPLES: usize = 1536;
-/// With fewer there is no line to fit.
+/// Minimum number of samples for the fit of a line.
 const LEAST_SAMPLES: usize = 16;
-/// An onset at which the ball loses less speed than this is not used, m/s.
+/// Minimum loss of speed at an onset, m/s.
 const LEAST_STOP: f64 = 15e-3;
-/// Onsets that are kept, 4 MB at 4 kHz; later ones take the place of the first.
+/// Maximum number of onsets, 4 MB at 4 kHz; later ones replace the first.
 const MOST_ONSETS: usize = 128;
-/// Fewer do not determine their spread.
+/// Minimum number of onsets that determines their spread.
 const LEAST_ONSETS: usize = 8;
-/// A force that does not rise exponentially is taken to begin too early or too late by about this,
-/// s. Half a period of the wrench is added: over which part of it a sensor takes its mean is
-/// unknown.
+/// Error of the onset of a force that does not rise exponentially, s. Half a period of the wrench
+/// adds to it: the part of the period over which a sensor averages is unknown.
 const SHAPE: f64 = 0.3e-3;
-/// A wider uncertainty is no estimate, s.
+/// Maximum uncertainty of an estimate, s.
 const LARGEST_SIGMA: f64 = 3e-3;
 
-/// Collects onsets of contact. Memory is bounded.
+/// Collects onsets of contact, in bounded memory.
 #[derive(Clone, Debug)]
 pub struct ClockEstimator {
     stiffness: Option<f64>,
     is_in_contact: bool,
     held: VecDeque<OnsetEntry>,
-    /// stamp at which contact began or ended last, and the onset that waits for its samples
+    /// stamp of the last start or end of contact, and the onset that waits for its samples
     turned_ns: Option<i64>,
     onset_ns: Option<i64>,
-    /// between two samples, at the last onset, s
+    /// mean time between two samples, at the last onset, s
     period: f64,
     onsets: VecDeque<Onset>,
     course: CourseClock,
 }
 
-/// The samples around the instant at which the gate opens, and when the force begins, s after that.
+/// Samples around the opening of the gate, and the start of the force, s after it.
 #[derive(Clone, Debug)]
 struct Onset {
     samples: Vec<OnsetSample>,
@@ -96,7 +95,7 @@ impl ClockEstimator {
     /// - `stiffness`: of stylus and probe, N/m; `None`: rigid.
     ///
     /// # Errors
-    /// [`SettingError`] for a stiffness of no use.
+    /// [`SettingError`] for a stiffness that is not positive and finite.
     pub fn new(stiffness: Option<f64>) -> Result<Self, SettingError> {
         let value = stiffness.unwrap_or(1.0);
         SettingError::check("tip stiffness (N/m)", value, value > 0.0, "more than 0")?;
@@ -115,7 +114,7 @@ impl ClockEstimator {
         })
     }
 
-    /// Takes the next sample, which is later than the one before.
+    /// Takes the next sample, later than the previous one.
     pub fn push(&mut self, sample: &ContactSample) {
         self.course.push(sample);
         let (tip, is_in_contact) = (&sample.tip, sample.is_in_contact());
@@ -152,12 +151,12 @@ impl ClockEstimator {
         }
     }
 
-    /// The delay by all onsets so far; where they do not determine it, or the course of motion and
-    /// force contradicts them or shows a drift, by that; `None` when neither does.
+    /// Delay by all onsets; if they do not determine it, or the course of motion and force
+    /// contradicts them or shows a drift, by the course; `None` if neither determines it.
     pub fn offset(&self) -> Option<ClockOffset> {
         let (onsets, course) = (self.by_onsets(), self.course.offset());
         match (onsets, course) {
-            // onsets tell the mean of a clock that drifts
+            // onsets give the mean of a clock that drifts
             (Some(onsets), Some(course)) if course.drift.is_some() || !onsets.agrees(&course) => {
                 Some(course)
             }
@@ -182,7 +181,7 @@ impl ClockEstimator {
         let sum: Profile =
             std::array::from_fn(|at| profiles.iter().map(|profile| profile[at]).sum());
         let best = (0..DELAYS).min_by(|&a, &b| sum[a].total_cmp(&sum[b]))?;
-        // slopes over ±3 steps: the rounding of single samples is smoother than that
+        // slopes over ±3 steps smooth the rounding of single samples
         const SPAN: usize = 3;
         if best < 2 * SPAN || best + 2 * SPAN >= DELAYS {
             return None;
@@ -210,8 +209,8 @@ impl ClockEstimator {
         })
     }
 
-    /// The delay at which the ball loses most speed on the mean of all onsets; `None` where it
-    /// stops at two of them.
+    /// Delay at which the ball loses most speed, by the median of all onsets; `None` if it stops at
+    /// two delays.
     fn searched(&self) -> Option<f64> {
         let at_step = |step: usize| (step as f64 - (SEARCHED_STEPS / 2) as f64) * SEARCH_STEP;
         let stops: Vec<f64> = (0..SEARCHED_STEPS)
@@ -222,7 +221,7 @@ impl ClockEstimator {
                     .filter_map(|onset| onset.stop(at_step(step)))
                     .collect();
                 let is_seen = stops.len() >= LEAST_ONSETS.max(self.onsets.len() / 2);
-                // the median: what one onset does, as the ball leaving an edge, is not the clock's
+                // the median ignores one odd onset, as of a ball leaving an edge
                 if is_seen {
                     median(&mut stops).unwrap_or(0.0)
                 } else {
@@ -239,7 +238,7 @@ impl ClockEstimator {
         (is_alone && stops[best] >= LEAST_STOP).then(|| at_step(best))
     }
 
-    /// `None` when the samples around the onset do not show one.
+    /// Onset at `onset_ns`; `None` if the samples around it do not show one.
     fn onset(&self, onset_ns: i64) -> Option<Onset> {
         let around = self
             .held
@@ -262,7 +261,7 @@ impl ClockEstimator {
         if samples.len() < LEAST_SAMPLES || samples[0].t > -0.6 * BEFORE {
             return None;
         }
-        // far-off numbers do not lose the digits of a micrometre
+        // centred, so that far-off positions keep the digits of a micrometre
         let middle = samples[samples.len() / 2].centre;
         samples.iter_mut().for_each(|x| x.centre -= middle);
         let begun = force_begins(&samples)?;
@@ -271,7 +270,7 @@ impl ClockEstimator {
 }
 
 impl Onset {
-    /// The samples around an instant; `None` where they do not cover it.
+    /// Samples around an instant; `None` if they do not cover it.
     fn around(&self, t: f64) -> Option<&[OnsetSample]> {
         let first = self.samples.partition_point(|x| x.t < t - BEFORE);
         let end = self.samples.partition_point(|x| x.t <= t + AFTER);
@@ -293,7 +292,7 @@ impl Onset {
         Some(solved.z - solved.y)
     }
 
-    /// - `coarse`: the delay in the middle of the profile, s.
+    /// - `coarse`: delay in the middle of the profile, s.
     /// - `bend`: compliance of the stylus, m/N.
     fn profile(&self, coarse: f64, bend: f64) -> Option<Profile> {
         let around = self.around(self.begun - coarse)?;
@@ -316,13 +315,13 @@ impl Onset {
 struct OnsetSample {
     /// s after the gate opened
     t: f64,
-    /// of the reported ball, m
+    /// position of the reported ball, m
     centre: f64,
     /// N
     force: f64,
 }
 
-/// When the force leaves zero: least squares of offset and A (1 − e^(−(t − t₁)/T)) over t₁ and T.
+/// Onset of the force: least squares of offset and A (1 − e^(−(t − t₁)/T)) over t₁ and T.
 fn force_begins(samples: &[OnsetSample]) -> Option<f64> {
     let rise = || {
         samples
@@ -352,10 +351,9 @@ fn force_begins(samples: &[OnsetSample]) -> Option<f64> {
     best.map(|(_, begun)| begun)
 }
 
-/// The residual of the centre's path after a bent line is subtracted, and the speeds before and
-/// after the bend.
+/// Residual of the centre's path from a bent line, and the speeds before and after the bend.
 ///
-/// - `around`: those of the stop, out of `samples`.
+/// - `around`: samples around the stop, out of `samples`.
 fn kink(
     around: &[OnsetSample],
     samples: &[OnsetSample],
@@ -375,7 +373,7 @@ fn kink(
     Some((equations.residual_square(&solved), [solved.y, solved.z]))
 }
 
-/// Between samples straight, beyond them as the nearest.
+/// Linear between samples, constant beyond them.
 fn force_at(samples: &[OnsetSample], t: f64) -> f64 {
     let after = samples.partition_point(|x| x.t <= t);
     match (

@@ -1,43 +1,43 @@
-//! What is known of the delay between the clocks of wrench and pose.
+//! Delay between the clocks of wrench and pose.
 
 use std::fmt;
 
 use serde::Serialize;
 
-/// What the clock of the wrench reads beyond that of the pose.
+/// Reading of the wrench clock beyond the pose clock.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ClockOffset {
-    /// in the middle of what it is estimated from, s; to be added to
-    /// [`super::SyncParams::wrench_offset_ns`] where there is no drift
+    /// in the middle of the evidence, s; add it to [`super::SyncParams::wrench_offset_ns`] unless
+    /// there is a drift
     pub offset: f64,
     /// standard uncertainty, s
     pub sigma: f64,
-    /// where one is seen
+    /// drift, if evident
     pub drift: Option<ClockDrift>,
-    /// what it is estimated from
+    /// evidence of the estimate
     pub evidence: ClockEvidence,
 }
 
-/// What the clock of the wrench gains on that of the pose.
+/// Gain of the wrench clock on the pose clock.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ClockDrift {
-    /// s/s; to be added to [`super::SyncParams::wrench_drift`]
+    /// s/s; add it to [`super::SyncParams::wrench_drift`]
     pub rate: f64,
     /// standard uncertainty
     pub rate_sigma: f64,
-    /// what it reads beyond the other at the first sample, s; to be added to
+    /// reading beyond the pose clock at the first sample, s; add it to
     /// [`super::SyncParams::wrench_offset_ns`]
     pub offset_at_first: f64,
-    /// … and at the last, s
+    /// reading beyond the pose clock at the last sample, s
     pub offset_at_last: f64,
 }
 
 impl ClockDrift {
-    /// Standard uncertainty of [`Self::offset_at_first`] and [`Self::offset_at_last`], s: of an
-    /// offset in the middle between them, and of a rate over half the time, which are independent
+    /// Standard uncertainty of [`Self::offset_at_first`] and [`Self::offset_at_last`], s: of the
+    /// offset in the middle between them, and of the rate over half the time, which are independent
     /// there: u² = σ² + (σ_rate T/2)².
     ///
-    /// - `sigma`: that of the offset in the middle, s.
+    /// - `sigma`: standard uncertainty of the offset in the middle, s.
     ///
     /// ```
     /// use touchup_core::stylus::ClockDrift;
@@ -53,13 +53,13 @@ impl ClockDrift {
     }
 }
 
-/// What a delay is estimated from.
+/// Evidence of a delay.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ClockEvidence {
-    /// So many onsets of contact.
+    /// Number of contact onsets.
     Onsets(usize),
-    /// The course of motion and force over so many seconds of sliding or lifting.
+    /// Seconds of sliding or lifting in the course of motion and force.
     Course(f64),
 }
 
@@ -72,7 +72,7 @@ impl fmt::Display for ClockEvidence {
     }
 }
 
-/// Beyond their uncertainties, two estimates of one delay differ by less than this, s.
+/// Maximum difference of two estimates of one delay, beyond their uncertainties, s.
 const AGREED: f64 = 4e-3;
 
 impl ClockOffset {

@@ -1,4 +1,4 @@
-//! The contact wrench on the tip, from the measured wrench.
+//! Contact wrench on the tip, from the measured wrench.
 //!
 //! A sensor measures the contact, the weight of its payload, and its own bias:
 //!
@@ -12,14 +12,13 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use super::{Sample, SettingError, Wrench};
 use crate::parameters;
 
-/// The axes in which the measured wrench is expressed. Its torque is about the sensor's origin So
-/// in both.
+/// Axes of the measured wrench. Its torque is about the sensor's origin So in both.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum WrenchFrame {
     /// The sensor's own axes: the force turns with the stylus (Eq 14).
     #[default]
     Sensor,
-    /// The axes of O: the driver has turned it already.
+    /// The axes of O: the driver has rotated the wrench already.
     Object,
 }
 
@@ -43,7 +42,7 @@ parameters! {
 }
 
 parameters! {
-    /// Where the sensor sits on the stylus.
+    /// Mount of the sensor on the stylus.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct SensorMount in "compensation" {
         /// Origin of the sensor from the centre of the ball, in the axes of the tip (z: along the
@@ -58,7 +57,7 @@ parameters! {
 }
 
 parameters! {
-    /// What the sensor reads without contact and payload, expressed in S.
+    /// Sensor reading without contact and payload, expressed in S.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct SensorBias in "compensation.bias" {
         /// The force, in the axes of the sensor.
@@ -73,7 +72,7 @@ parameters! {
 }
 
 impl Payload {
-    /// Weight of the payload as the sensor measures it, in the axes of O.
+    /// Weight of the payload in the measurement, in the axes of O.
     ///
     /// f = m g,   τ = (R_OS · p_SC) × f
     ///
@@ -88,21 +87,20 @@ impl Payload {
     }
 }
 
-/// How the sensor is mounted and what it carries. The default is a sensor in the tip's axes without
-/// payload.
+/// Mount and payload of the sensor. The default is a sensor in the tip's axes without payload.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CompensatorParams {
-    /// In which axes the wrench arrives.
+    /// Axes of the incoming wrench.
     pub wrench_frame: WrenchFrame,
     /// Pose of S in T: orientation of the sensor, and its origin from the centre of the ball, m.
     pub pose_ts: Isometry3<f64>,
-    /// The payload of the sensor; `None` when the driver subtracts it already.
+    /// The payload of the sensor; `None` if the driver subtracts it already.
     pub payload: Option<Payload>,
-    /// What the sensor reads without contact and payload, expressed in S.
+    /// Sensor reading without contact and payload, expressed in S.
     pub bias_s: Option<Wrench>,
 }
 
-/// The tip at one instant: where it is and what the object does to it.
+/// The tip at one instant: its pose and the action of the object on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tip {
     /// Time of measurement, ns.
@@ -115,7 +113,7 @@ pub struct Tip {
     pub torque_o: Vector3<f64>,
 }
 
-/// Takes weight, bias and lever arm out of each sample. A part that is not given costs nothing.
+/// Removes weight, bias and lever arm from each sample. An absent part costs nothing.
 #[derive(Clone, Copy, Debug)]
 pub struct Compensator {
     params: CompensatorParams,
@@ -143,7 +141,7 @@ impl Compensator {
         Ok(Self { params })
     }
 
-    /// What the object does to the tip.
+    /// Action of the object on the tip.
     #[inline]
     pub fn compensate(&self, sample: &Sample) -> Tip {
         let CompensatorParams {

@@ -5,10 +5,9 @@ use nalgebra::Vector3;
 use super::SettingError;
 use crate::parameters;
 
-/// A pause in contact longer than this parts two strokes, ns: a hand that lifts the stylus, not one
-/// that bounces.
+/// Longest pause in contact within one stroke, ns: a bounce of the hand, not a lift.
 pub(crate) const STROKE_PAUSE_NS: i64 = 100_000_000;
-/// A sample acts for no longer than this, s: what happens in a longer pause is unknown.
+/// Maximum duration for which a sample acts, s: a longer pause is unknown.
 pub(crate) const LONGEST_HOLD: f64 = 0.03;
 
 parameters! {
@@ -17,18 +16,18 @@ parameters! {
     pub struct ContactGateParams in "contact" {
         /// A force above this begins a contact; no less than off_n.
         ///
-        /// In N. Eight times the 0.05 N by which both noise and bias of a usual sensor vary, and
-        /// far below the 2–4 N of a hand that presses.
+        /// In N. Eight times the 0.05 N variation of noise and bias of a usual sensor, and far
+        /// below the 2–4 N of a pressing hand.
         on: f64 = 0.4, "on_n" [N, 0, 1000];
         /// A force below this ends it.
         ///
-        /// In N. Above noise and bias together, and so far below `on` that the noise at the
+        /// In N. Above noise and bias together, and low enough below `on` that noise at the
         /// threshold does not chatter.
         off: f64 = 0.22, "off_n" [N, 0, 1000];
         /// Below on_n, what the zero of the sensor may be off by: a force above this that its noise
         /// does not explain may be a light touch, which neither moves the mesh nor frees space.
         ///
-        /// In N. Three times the 0.05 N by which the bias of a usual sensor varies.
+        /// In N. Three times the 0.05 N variation of the bias of a usual sensor.
         free: f64 = 0.15, "free_n" [N, 0, 1000];
     }
     check ContactGateParams::is_in_order;
@@ -41,21 +40,21 @@ impl ContactGateParams {
     }
 }
 
-/// What a force says of the stylus.
+/// State of the stylus by its force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TouchState {
-    /// It presses.
+    /// Pressing.
     Contact,
-    /// It may press, too lightly for a contact: that says nothing of where material is.
+    /// Perhaps pressing, too lightly for a contact: no information on the material.
     Light,
-    /// Nothing is touched.
+    /// Touching nothing.
     Free,
 }
 
-/// A contact that is going on.
+/// An ongoing contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Contact {
-    /// Time of the sample that began it, ns.
+    /// Time of its first sample, ns.
     pub onset_ns: i64,
 }
 
@@ -70,7 +69,7 @@ pub struct ContactGate {
 }
 
 impl ContactGate {
-    /// A gate that starts open: no contact.
+    /// A gate without contact.
     ///
     /// # Errors
     /// [`SettingError`] unless 0 ≤ `off` ≤ `on` ≤ 1000.
@@ -83,8 +82,7 @@ impl ContactGate {
         })
     }
 
-    /// Takes the next force, N, in any frame; returns the contact that it begins or continues, if
-    /// any.
+    /// Takes the next force, N, in any frame; returns the new or continuing contact, if any.
     #[inline]
     pub fn update(&mut self, stamp_ns: i64, force: &Vector3<f64>) -> Option<Contact> {
         let magnitude = force.norm();
@@ -99,7 +97,7 @@ impl ContactGate {
         self.contact
     }
 
-    /// How many contacts have begun.
+    /// Number of contacts begun.
     pub fn contacts(&self) -> u64 {
         self.contacts
     }

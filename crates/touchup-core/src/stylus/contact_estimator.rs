@@ -1,18 +1,17 @@
-//! The state of the contact at one sample, decided once for all its users.
+//! Contact state at one sample, decided once for all users.
 //!
-//! [`ContactEstimator::observe`] turns a raw [`Sample`] into a [`ContactSample`]: weight, lever arm
-//! and bias off the wrench, the real centre of the ball, in contact or not and since when, and the
-//! normal of the surface within the friction cone. The haptic update, the reconstruction, the
-//! registration of the scan, the clock estimate and the node all read this one value.
+//! [`ContactEstimator::observe`] turns a raw [`Sample`] into a [`ContactSample`]: wrench without
+//! weight, lever arm and bias, real ball centre, contact and its onset, surface normal within the
+//! friction cone. The haptic update, the reconstruction, the registration of the scan, the clock
+//! estimate and the node all read this one value.
 //!
-//! Two uses differ on purpose, and in this alone. The evidence of the reconstruction may wait: it
-//! takes [`ContactSample::contact`], which the unsmoothed force decides, and smooths
-//! [`ContactSample::centre`] and the force over a window that looks as far ahead as back. The
-//! haptic update and the registration answer at once, by position and force smoothed by the past
-//! ([`ContactSample::ball`]): for them it is [`ContactSample::ball_contact`], the same thresholds
-//! on the smoothed force, so that a ball whose filter still holds free motion is not taken for one
-//! that touches. Bias, thresholds and [`WIDEST_CONE_COSINE`](super::WIDEST_CONE_COSINE) are the
-//! same for both.
+//! Two uses differ on purpose, in this alone. The evidence of the reconstruction may wait: it takes
+//! [`ContactSample::contact`], by the unsmoothed force, and smooths [`ContactSample::centre`] and
+//! the force over a symmetric window. The haptic update and the registration answer at once, by
+//! causally smoothed position and force ([`ContactSample::ball`]): their contact is
+//! [`ContactSample::ball_contact`], the same thresholds on the smoothed force, so that a ball whose
+//! filter still holds free motion does not count as touching. Bias, thresholds and
+//! [`WIDEST_CONE_COSINE`](super::WIDEST_CONE_COSINE) are the same for both.
 
 use nalgebra::{Point3, Vector3};
 
@@ -23,24 +22,24 @@ use super::{
     SettingError, SlidingParams, Tip, TipMotion, TipParams, TouchState,
 };
 
-/// Settings of a [`ContactEstimator`]. What is `None` is not built.
+/// Settings of a [`ContactEstimator`]; `None` disables a part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactEstimatorParams {
     /// Weight, constant bias, frames.
     pub compensator: CompensatorParams,
-    /// Slow drift of the sensor, followed in free air; `None`: it has none.
+    /// Slow drift of the sensor, followed in free air; `None`: no drift.
     pub bias: Option<BiasParams>,
     /// Thresholds of contact; `None`: every sample is contact \[paper\].
     pub gate: Option<ContactGateParams>,
     /// Size and stiffness of the tip.
     pub tip: TipParams,
-    /// Smoothing and friction; `None`: the sample as it is, with the force as the normal.
+    /// Smoothing and friction; `None`: the raw sample, with the force as the normal.
     pub sliding: Option<SlidingParams>,
 }
 
 impl ContactEstimatorParams {
-    /// All of it with its defaults, for a sensor that carries nothing: what evidence for the
-    /// reconstruction needs.
+    /// All parts with their defaults, for a sensor without payload: the settings for evidence of
+    /// the reconstruction.
     pub fn new(tip: TipParams) -> Self {
         let gate = ContactGateParams::default();
         Self {
@@ -52,8 +51,8 @@ impl ContactEstimatorParams {
         }
     }
 
-    /// With default thresholds and smoothing where the haptic update does without one of them;
-    /// `None` where it has both, so that its own contacts do.
+    /// Adds default thresholds and smoothing if the haptic update lacks either; `None` if it has
+    /// both, so that its own contacts serve.
     pub fn completed(self) -> Option<Self> {
         let is_complete = self.gate.is_some() && self.sliding.is_some();
         let (gate, sliding) = (
@@ -68,25 +67,25 @@ impl ContactEstimatorParams {
     }
 }
 
-/// One sample with all that is decided about its contact.
+/// One sample with all decisions about its contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactSample {
     /// pose, and wrench without weight and bias
     pub tip: Tip,
-    /// time since the sample before, s; 0 for the first
+    /// time since the previous sample, s; 0 for the first
     pub dt: f64,
-    /// bias of the force as tracked so far, in the axes of T, N
+    /// tracked bias of the force, in the axes of T, N
     pub bias_t: Vector3<f64>,
-    /// real centre of the ball, m, in O: the reported one and the deflection of the stylus
+    /// real ball centre, m, in O: reported centre plus deflection of the stylus
     pub centre: Point3<f64>,
-    /// by the unsmoothed force; `None` in free motion, and for a touch too light for the thresholds
+    /// by the unsmoothed force; `None` in free motion, and for a touch below the thresholds
     pub contact: Option<Contact>,
-    /// whether nothing is touched: noise and zero of the sensor explain the force. Neither this nor
-    /// in contact: perhaps a light touch
+    /// whether noise and zero error of the sensor explain the force; neither free nor in contact:
+    /// perhaps a light touch
     pub is_free: bool,
-    /// the ball smoothed by the past
+    /// the causally smoothed ball
     pub ball: Ball,
-    /// … and its contact, by the force smoothed alike; `None` in free motion
+    /// contact of [`Self::ball`], by the force smoothed likewise; `None` in free motion
     pub ball_contact: Option<Contact>,
     /// the surface under [`Self::ball`], within the friction cone; `None` without
     /// [`Self::ball_contact`] or force
@@ -99,12 +98,12 @@ impl ContactSample {
         self.contact.is_some()
     }
 
-    /// What the unsmoothed force says.
+    /// State by the unsmoothed force.
     pub fn state(&self) -> TouchState {
         state_of(self.contact, self.is_free)
     }
 
-    /// What the force says that is smoothed by the past.
+    /// State by the causally smoothed force.
     pub fn ball_state(&self) -> TouchState {
         state_of(self.ball_contact, self.is_free)
     }
@@ -145,7 +144,7 @@ pub struct ContactEstimator {
     bias: Option<BiasTracker>,
     free_motion: FreeMotion,
     gate: Option<ContactGate>,
-    /// of the smoothed force
+    /// gate of the smoothed force
     ball_gate: Option<ContactGate>,
     motion: TipMotion,
     first_ns: Option<i64>,
@@ -174,8 +173,8 @@ impl ContactEstimator {
     /// Takes the next raw sample.
     ///
     /// # Errors
-    /// [`SampleError`] for one that is not finite, absurd or not after the last; nothing is changed
-    /// then.
+    /// [`SampleError`] for a sample that is not finite, absurd or not after the last; the state
+    /// then stays unchanged.
     #[inline]
     pub fn observe(&mut self, sample: &Sample) -> Result<&ContactSample, SampleError> {
         sample.check()?;
@@ -237,18 +236,17 @@ impl ContactEstimator {
         })
     }
 
-    /// The last sample that was taken; `None` before the first.
+    /// Last sample; `None` before the first.
     pub fn latest(&self) -> Option<&ContactSample> {
         self.latest.as_ref()
     }
 
-    /// How many contacts of the smoothed ball have begun; 0 without thresholds of contact.
+    /// Number of contacts of the smoothed ball; 0 without contact thresholds.
     pub fn contacts(&self) -> u64 {
         self.ball_gate.as_ref().map_or(0, ContactGate::contacts)
     }
 
-    /// Kinetic friction as measured so far; `None` until the ball has slid far enough, or without
-    /// `sliding`.
+    /// Measured kinetic friction; `None` until the ball has slid far enough, or without `sliding`.
     pub fn friction(&self) -> Option<FrictionCoefficient> {
         self.motion.friction()
     }

@@ -1,19 +1,17 @@
-//! How late the clock of the wrench reads, from the whole course of motion and force.
+//! Delay of the wrench clock, from the whole course of motion and force.
 //!
-//! **Sliding**: friction turns with the motion. A ball that slides is held back by the force along
-//! its way, F · v̂ = −|F| sin φ, with the angle of friction φ. Where the stylus turns back, and
-//! where it rolls around an edge, F and v turn at one instant. Read with a delay δ, the cosine s =
-//! F(t + δ) · v(t) / |F| |v| leaves its level there: over all sliding, its variance is least at the
-//! delay.
+//! **Sliding**: friction turns with the motion. The force holds a sliding ball back along its path,
+//! F · v̂ = −|F| sin φ, with the angle of friction φ. As the stylus turns back or rolls around an
+//! edge, F and v turn at one instant. Read with a delay δ, the cosine s = F(t + δ) · v(t) / |F| |v|
+//! leaves its level there: over all sliding, its variance is least at the delay.
 //!
-//! **Lifting**: where there is a gap between ball and part there is no force (Signorini's
-//! condition, F ≥ 0, g ≥ 0, F g = 0). Read with a delay, the force is still there when the ball has
-//! left, and there before it comes: the mean of F(t + δ) g(t) is least at the delay. The gap is
-//! measured from where the ball was lowest along the force shortly before and after.
+//! **Lifting**: a gap between ball and part excludes a force (Signorini's condition, F ≥ 0, g ≥ 0,
+//! F g = 0). Read with a delay, the force outlasts the contact, or precedes it: the mean of F(t +
+//! δ) g(t) is least at the delay. The gap counts from the lowest position of the ball along the
+//! force shortly before and after.
 //!
-//! **Drift**: two clocks of their own run at rates that differ by up to some 100 ppm, which is 30
-//! ms after five minutes. The delay is then δ + ε (t − t̄), and the sums over all blocks are least
-//! at both.
+//! **Drift**: two independent clocks differ in rate by up to some 100 ppm, 30 ms after five
+//! minutes. The delay is then δ + ε (t − t̄), and the sums over all blocks are least at both.
 
 use std::collections::VecDeque;
 
@@ -23,50 +21,49 @@ use super::ContactSample;
 use super::clock_offset::{ClockDrift, ClockEvidence, ClockOffset, mean_period};
 use crate::numeric::jackknife_variance;
 
-/// Delays that are tried: ± [`REACH`] steps of [`STEP_NS`].
+/// Trial delays: ± [`REACH`] steps of [`STEP_NS`].
 const STEP_NS: i64 = 4_000_000;
 const REACH: usize = 37;
 const DELAYS: usize = 2 * REACH + 1;
-/// The longest of them.
+/// Longest trial delay, ns.
 const SPAN_NS: i64 = REACH as i64 * STEP_NS;
-/// A velocity is the difference of two means over this long, on both sides of its instant.
+/// Duration of the two means whose difference is a velocity, on both sides of its instant, ns.
 const MEAN_NS: i64 = 35_000_000;
-/// Slower, the ball does not slide for sure, m/s.
+/// Minimum speed of certain sliding, m/s.
 const LEAST_SPEED: f64 = 8e-3;
-/// Samples farther apart do not belong together, ns.
+/// Maximum gap between samples of one course, ns.
 const LONGEST_GAP_NS: i64 = 100_000_000;
-/// Samples that are held: 300 ms at 4 kHz.
+/// Maximum number of samples: 300 ms at 4 kHz.
 const MOST_SAMPLES: usize = 1536;
-/// One instant in this time is enough, ns.
+/// Minimum time between instants, ns.
 const EVERY_NS: i64 = 4_000_000;
 /// Instants of a block: 0.4 s.
 const BLOCK: usize = 100;
-/// Blocks that are kept; then two become one.
+/// Maximum number of blocks; at this number, pairs merge.
 const MOST_BLOCKS: usize = 64;
-/// Fewer do not determine their spread.
+/// Minimum number of blocks that determines their spread.
 const LEAST_BLOCKS: usize = 8;
-/// What is least at the delay is this share at most of its mean over all delays: else nothing
-/// turned, or lifted.
+/// Maximum of the least sum, as a share of its mean over all delays: above it nothing turned, or
+/// lifted.
 const LEAST_SHARE: f64 = 0.7;
-/// Another delay whose sum is lower than the mean by all but this share may be it as well: what
-/// repeats itself within the span.
+/// Another delay may be as good if its sum is lower than the mean by all but this share: the motion
+/// repeats within the span.
 const OTHER_DEPTH: f64 = 0.1;
-/// … when it is so many steps away.
+/// Minimum distance of two equally good delays, in steps.
 const OTHER_STEPS: usize = 10;
-/// Rates of drift that are tried on each side: up to this one, in steps of this one or finer, so
-/// many.
+/// Trial rates of drift on each side: the largest, the step or a finer one, and the maximum number.
 const LARGEST_RATE: f64 = 400e-6;
 const RATE_STEP: f64 = 5e-6;
 const MOST_RATES: i64 = 400;
-/// A drift is sure when it is so many of its standard uncertainties, and worth taking off when it
-/// gains this much, s.
+/// Minimum of a sure drift, in standard uncertainties, and of one worth removing, in its gain over
+/// the span, s.
 const SURE_SIGMAS: f64 = 5.0;
 const LEAST_GAIN: f64 = 8e-3;
-/// A delay or a drift by which the sum falls by less than so many of its standard errors is none.
+/// Minimum fall of the sum by a delay or a drift, in standard errors.
 const LEAST_FALL: f64 = 4.0;
-/// A delay that is off by more than so many of its standard uncertainties is to make the sum fall.
+/// Standard uncertainties beyond which a delay must make the sum fall.
 const CLEAR_SIGMAS: f64 = 3.0;
-/// A wider uncertainty is no estimate, s.
+/// Maximum uncertainty of an estimate, s.
 const LARGEST_SIGMA: f64 = 12e-3;
 
 /// One number for each delay.
@@ -111,7 +108,7 @@ impl DelayBlock {
 /// Blocks of instants, bounded.
 #[derive(Clone, Debug)]
 struct DelayBlocks {
-    /// instants that make one
+    /// instants per block
     size: usize,
     block: DelayBlock,
     blocks: Vec<DelayBlock>,
@@ -140,8 +137,8 @@ impl DelayBlocks {
         }
     }
 
-    /// Where the sum of what `of_block` gives is least, with the jackknife's uncertainty over the
-    /// blocks: one delay, or one that grows steadily where that is sure.
+    /// Delay with the least sum of `of_block` over the blocks, with its jackknife uncertainty:
+    /// constant, or with a steady drift if that is sure.
     ///
     /// - `period`: between two samples, s.
     /// - `ends`: first and last sample, s.
@@ -174,7 +171,7 @@ impl DelayBlocks {
         let without: Vec<f64> = without.iter().map(least).collect::<Option<_>>()?;
         let [step, every] = [STEP_NS, EVERY_NS].map(|ns| ns as f64 * 1e-9);
         let instants: usize = self.blocks.iter().map(|block| block.count).sum();
-        // of the steps, and of the mean that a sensor takes over a period
+        // error of the steps, and of the sensor's averaging over a period
         let sigma = jackknife_variance(&without)
             .sqrt()
             .hypot(step / 2.0)
@@ -198,9 +195,9 @@ impl DelayBlocks {
     }
 }
 
-/// What some blocks give, each with when it was.
+/// Curves of all blocks, each with its time.
 struct Parts {
-    /// of each block: its middle, s, and its values
+    /// of each block: middle time, s, and values
     curves: Vec<(f64, OfDelays)>,
     /// mean of the times, s
     middle: f64,
@@ -216,7 +213,7 @@ impl Parts {
         Self { curves, middle }
     }
 
-    /// From the first block to the last, s.
+    /// Time from the first block to the last, s.
     fn span(&self) -> f64 {
         self.curves
             .first()
@@ -224,7 +221,7 @@ impl Parts {
             .map_or(0.0, |(first, last)| last.0 - first.0)
     }
 
-    /// Sum of all at each delay in the middle, where the delay grows by `rate`.
+    /// Sum of all curves at each delay in the middle, for a delay that grows by `rate`.
     fn total(&self, rate: f64) -> OfDelays {
         let all = 0..self.curves.len();
         all.fold([0.0; DELAYS], |total, at| {
@@ -232,12 +229,12 @@ impl Parts {
         })
     }
 
-    /// A block's values at each delay in the middle, where the delay grows by `rate`.
+    /// Values of a block at each delay in the middle, for a delay that grows by `rate`.
     fn shifted(&self, block: usize, rate: f64) -> OfDelays {
         let (time, curve) = &self.curves[block];
         let shift = rate * (time - self.middle) / (STEP_NS as f64 * 1e-9);
         let mean = curve.iter().sum::<f64>() / DELAYS as f64;
-        // beyond what was tried nothing is known
+        // nothing is known beyond the trial delays
         let value = |at: i64| {
             usize::try_from(at)
                 .ok()
@@ -252,11 +249,11 @@ impl Parts {
         })
     }
 
-    /// The rate at which the least of the sum is least, and its standard uncertainty: by the
-    /// jackknife over all rates, since without a block it may be another one altogether. `None` at
-    /// an end of what is tried, and if the sum hardly falls by it.
+    /// Rate with the lowest least sum, and its standard uncertainty: by the jackknife over all
+    /// rates, since without a block it may be another one altogether. `None` at an end of the trial
+    /// rates, and if the sum hardly falls by it.
     fn drift(&self) -> Option<[f64; 2]> {
-        // one step of the rate is one of the delay from end to end
+        // one step of the rate is one step of the delay from end to end
         let rate_step = (STEP_NS as f64 * 1e-9 / self.span().max(f64::MIN_POSITIVE)).min(RATE_STEP);
         let count = ((LARGEST_RATE / rate_step) as i64).min(MOST_RATES);
         let rates: Vec<f64> = (-count..=count).map(|at| at as f64 * rate_step).collect();
@@ -286,7 +283,7 @@ impl Parts {
             .iter()
             .map(|depths| best(depths))
             .collect::<Option<_>>()?;
-        // what a step of the delays hides
+        // error of the steps of the delay
         let of_steps = STEP_NS as f64 * 0.5e-9 / self.span().max(f64::MIN_POSITIVE);
         let sigma = jackknife_variance(&without).sqrt().hypot(of_steps);
         (rate.abs() + CLEAR_SIGMAS * sigma < *rates.last()?).then_some([rate, sigma])
@@ -300,7 +297,7 @@ fn sum_of(one: &OfDelays, other: &OfDelays, weight: f64) -> OfDelays {
 
 /// A sum over blocks in its standard errors, by the jackknife.
 ///
-/// - `without`: the same without each block.
+/// - `without`: the sum without each block.
 fn in_errors(sum: f64, without: impl Iterator<Item = f64>) -> f64 {
     let without: Vec<f64> = without.collect();
     sum / jackknife_variance(&without).sqrt().max(f64::MIN_POSITIVE)
@@ -328,7 +325,7 @@ struct CourseSample {
     is_in_contact: bool,
 }
 
-/// Collects what slides and lifts. Memory is bounded.
+/// Collects sliding and lifting, in bounded memory.
 #[derive(Clone, Debug)]
 pub(super) struct CourseClock {
     held: VecDeque<CourseSample>,
@@ -353,7 +350,7 @@ impl Default for CourseClock {
 }
 
 impl CourseClock {
-    /// Takes the next sample, which is later than the one before.
+    /// Takes the next sample, later than the previous one.
     pub fn push(&mut self, sample: &ContactSample) {
         let (tip, is_in_contact) = (&sample.tip, sample.is_in_contact());
         let is_next =
@@ -373,7 +370,7 @@ impl CourseClock {
             is_in_contact,
         });
         let oldest_ns = stamp_ns.saturating_sub(2 * SPAN_NS);
-        // one before that stays: it shows that the course is as long
+        // the sample before that stays: it shows the length of the course
         while self
             .held
             .get(1)
@@ -455,7 +452,7 @@ impl CourseClock {
         })
     }
 
-    /// `value` of the force at each delay: between two samples it goes straight.
+    /// `value` of the force at each delay, linear between two samples.
     fn at_delays(&self, middle_ns: i64, value: impl Fn(&Vector3<f64>) -> f64) -> OfDelays {
         let mut after = 1;
         std::array::from_fn(|at| {
@@ -470,7 +467,7 @@ impl CourseClock {
         })
     }
 
-    /// The delay; `None` where neither sliding nor lifting determines it, or the two differ.
+    /// The delay; `None` if neither sliding nor lifting determines it, or the two differ.
     pub fn offset(&self) -> Option<ClockOffset> {
         let period = mean_period(self.held.iter().map(|x| x.stamp_ns));
         let ends = self
@@ -494,9 +491,9 @@ impl CourseClock {
     }
 }
 
-/// Whether a drift is there for sure, and worth taking off.
+/// Whether a drift is sure, and worth removing.
 ///
-/// - `span`: over which it was seen, s.
+/// - `span`: time of observation, s.
 fn is_sure([rate, sigma]: &[f64; 2], span: f64) -> bool {
     rate.abs() > SURE_SIGMAS * sigma && rate.abs() * span > LEAST_GAIN
 }
@@ -511,7 +508,7 @@ fn has_another(sums: &OfDelays, limit: f64) -> bool {
         .is_some_and(|(first, last)| last - first > OTHER_STEPS)
 }
 
-/// Where a sum is least, by the parabola through the three points around it, s; `None` at an end.
+/// Delay of the least sum, by the parabola through three points, s; `None` at an end.
 fn least(sums: &OfDelays) -> Option<f64> {
     let at = (0..DELAYS).min_by(|&a, &b| sums[a].total_cmp(&sums[b]))?;
     let (before, after) = (sums.get(at.checked_sub(1)?)?, sums.get(at + 1)?);
@@ -519,7 +516,7 @@ fn least(sums: &OfDelays) -> Option<f64> {
     Some((at as f64 - REACH as f64 + shift) * STEP_NS as f64 * 1e-9)
 }
 
-/// Where the parabola through three values is least, in steps from the middle one.
+/// Minimum of the parabola through three values, in steps from the middle one.
 fn parabola([before, middle, after]: [f64; 3]) -> f64 {
     let bend = before - 2.0 * middle + after;
     if bend > 0.0 {

@@ -1,4 +1,4 @@
-//! Where frames are, as `/tf` and `/tf_static` publish it, at any moment of the last seconds.
+//! Frame transforms from `/tf` and `/tf_static`, at any moment of the last seconds.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -6,19 +6,19 @@ use nalgebra::Isometry3;
 
 use super::sync::interpolated;
 
-/// So much of what moves is kept, ns.
+/// History of moving frames, ns.
 pub(super) const KEPT_NS: i64 = 10_000_000_000;
-/// A moving frame has so many poses at most: 10 s at 1 kHz.
+/// Maximum number of poses of a moving frame: 10 s at 1 kHz.
 const MOST_POSES: usize = 10_000;
-/// Frames are so many at most: a cell has dozens.
+/// Maximum number of frames: a cell has dozens.
 const MOST_FRAMES: usize = 1000;
-/// A longer name is none.
+/// Maximum length of a frame name.
 const LONGEST_NAME: usize = 256;
 
-/// Where a frame is in its parent at one instant, as `geometry_msgs/TransformStamped` has it.
+/// Pose of a frame in its parent at one instant, as in `geometry_msgs/TransformStamped`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameTransform {
-    /// ns; says nothing where the frame stays
+    /// ns; meaningless for a static frame
     pub stamp_ns: i64,
     /// name of the parent
     pub parent: String,
@@ -28,34 +28,34 @@ pub struct FrameTransform {
     pub pose: Isometry3<f64>,
 }
 
-/// Why two frames are not connected.
+/// Reason for a missing transform between two frames.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FrameError {
-    /// No transform of this frame has come.
+    /// No transform names this frame.
     #[error("frame \"{0}\" is not known: is its transform published?")]
     Unknown(String),
-    /// Both are known, and nothing joins them.
+    /// Known frames without a connection.
     #[error(
         "frames \"{0}\" and \"{1}\" are not connected: a transform between their trees is missing"
     )]
     NotConnected(String, String),
-    /// Its parents lead back to it.
+    /// Cycle in the parents of a frame.
     #[error(
         "frame \"{0}\" is its own ancestor: two nodes publish transforms that contradict each other"
     )]
     Cycle(String),
-    /// The moment is before what is kept.
+    /// Time before the history.
     #[error("frame \"{0}\" is known from {1} ns on, {2} ns was asked for")]
     TooEarly(String, i64, i64),
-    /// The moment is after what has come so far; it may still come.
+    /// Time after the newest transform; a later one may still cover it.
     #[error("frame \"{0}\" is known up to {1} ns, {2} ns was asked for")]
     NotYet(String, i64, i64),
-    /// The moment is between two poses that are farther apart in time than is bridged.
+    /// Time in a gap longer than the maximum.
     #[error("frame \"{0}\" has no transform for {1} ns around {2} ns")]
     Gap(String, i64, i64),
 }
 
-/// Where a frame is in its parent.
+/// Pose of a frame in its parent.
 #[derive(Clone, Debug)]
 enum FrameMotion {
     Static(Isometry3<f64>),
@@ -69,19 +69,19 @@ struct FrameLink {
     motion: FrameMotion,
 }
 
-/// All frames, and where they were lately.
+/// All frames, with their recent poses.
 #[derive(Clone, Debug, Default)]
 pub struct FrameBuffer {
     links: BTreeMap<String, FrameLink>,
 }
 
-/// A name as tf has it: without the slash that ROS 1 put in front.
+/// Frame name as in tf: without the leading slash of ROS 1.
 pub fn plain_name(name: &str) -> &str {
     name.strip_prefix('/').unwrap_or(name)
 }
 
 impl FrameBuffer {
-    /// Takes a transform; whether it was one that can be.
+    /// Inserts a transform; `false` for an invalid one, or for too many frames.
     pub fn insert(&mut self, transform: &FrameTransform, is_static: bool) -> bool {
         let FrameTransform { stamp_ns, pose, .. } = *transform;
         let (parent, child) = (plain_name(&transform.parent), plain_name(&transform.child));
@@ -109,13 +109,13 @@ impl FrameBuffer {
         true
     }
 
-    /// Forgets all that moves, as after a jump of the clock.
+    /// Forgets all moving frames, as after a clock jump.
     pub fn forget_moving(&mut self) {
         self.links
             .retain(|_, link| matches!(link.motion, FrameMotion::Static(_)));
     }
 
-    /// The pose of `of` in `in_frame` at a moment: maps points of `of` to `in_frame`.
+    /// Pose of `of` in `in_frame` at a moment: maps points of `of` to `in_frame`.
     ///
     /// # Errors
     /// [`FrameError`]
@@ -128,8 +128,8 @@ impl FrameBuffer {
         Ok(self.bridged_pose(in_frame, of, stamp_ns, i64::MAX)?.0)
     }
 
-    /// The same where no link lacks transforms for longer than `longest_gap_ns`; and whether a link
-    /// is between two of them.
+    /// As [`Self::pose`], refusing gaps longer than `longest_gap_ns` in any link; and whether any
+    /// link was interpolated.
     pub(super) fn bridged_pose(
         &self,
         in_frame: &str,
@@ -143,7 +143,7 @@ impl FrameBuffer {
         Ok((down.inv_mul(&up), is_between || is_also))
     }
 
-    /// The frames from `in_frame`, and those from `of`, to below the first that both hang on.
+    /// Frames from `in_frame`, and from `of`, to below their first common ancestor.
     pub(super) fn links_between<'a>(
         &'a self,
         in_frame: &'a str,
@@ -151,7 +151,7 @@ impl FrameBuffer {
     ) -> Result<[Vec<&'a str>; 2], FrameError> {
         let (mut target, mut source) = (self.ancestors(in_frame)?, self.ancestors(of)?);
         let Some(up) = source.iter().position(|name| target.contains(name)) else {
-            // of two that are not known the one that a header names
+            // if both are unknown, name the one in a header
             let unknown = [of, in_frame].into_iter().find(|name| !self.is_known(name));
             return Err(match unknown {
                 Some(name) => FrameError::Unknown(name.to_owned()),
@@ -175,12 +175,12 @@ impl FrameBuffer {
             .is_some_and(|link| matches!(link.motion, FrameMotion::Moving(_)))
     }
 
-    /// A frame of which a transform has come, as a child or as a parent.
+    /// Whether any transform names the frame, as child or parent.
     fn is_known(&self, name: &str) -> bool {
         self.links.contains_key(name) || self.links.values().any(|link| link.parent == name)
     }
 
-    /// The frame itself and all above it.
+    /// The frame and its ancestors.
     pub(super) fn ancestors<'a>(&'a self, name: &'a str) -> Result<Vec<&'a str>, FrameError> {
         let mut names = vec![name];
         let mut at = name;
@@ -194,7 +194,7 @@ impl FrameBuffer {
         Ok(names)
     }
 
-    /// The pose of the first of these frames in the parent of the last.
+    /// Pose of the first frame in the parent of the last; and whether any link was interpolated.
     fn climbed(
         &self,
         names: &[&str],
@@ -231,8 +231,8 @@ fn keep(poses: &mut VecDeque<(i64, Isometry3<f64>)>, stamp: i64, pose: Isometry3
 }
 
 impl FrameMotion {
-    /// Straight between two poses, at constant angular velocity the shorter way; and whether it is
-    /// between two.
+    /// Interpolates between two poses, linearly and at constant angular velocity along the shorter
+    /// arc; and whether it did.
     fn at(
         &self,
         name: &str,
@@ -287,8 +287,8 @@ mod tests {
         }
     }
 
-    /// Worked by hand: the arm goes from 0 to 2 m in two seconds and turns by 90° about z; the tool
-    /// is 1 m along its x.
+    /// Worked by hand: the arm moves from 0 to 2 m in two seconds and turns by 90° about z; the
+    /// tool is 1 m along its x.
     #[test]
     fn a_moving_frame_is_between_its_poses() {
         let mut frames = FrameBuffer::default();

@@ -1,31 +1,31 @@
-//! Free motion, told from a light touch.
+//! Free motion, as distinct from a light touch.
 //!
-//! Below the threshold of contact a stylus may be free, or press lightly. Only a force that noise
-//! and zero of the sensor explain is free motion: |F| itself, and |F| smoothed over a short time,
-//! in which noise averages out and a touch does not.
+//! Below the contact threshold the stylus may be free or press lightly. It counts as free only if
+//! noise and zero error of the sensor explain both |F| and |F| smoothed over a short time, which
+//! averages out noise but not a touch.
 
 use nalgebra::Vector3;
 
 use super::contact::LONGEST_HOLD;
 use super::force_noise::ForceNoise;
 
-/// Time constant of the smoothed force, s: at 1 kHz its noise is a sixth.
+/// Time constant of the smoothed force, s: reduces the noise to a sixth at 1 kHz.
 const SMOOTHING: f64 = 0.02;
-/// |F| of noise alone is below so many standard deviations of one axis in 999 of 1000 samples: χ with three degrees.
+/// 99.9 % quantile of |F| of noise alone, in standard deviations of one axis: χ, three degrees.
 const NOISE_SIGMAS: f64 = 4.03;
 
-/// After a start or a gap nothing is free until the variance of the smoothed force is so many times
-/// that which it ends at: 44 ms at 1 kHz.
+/// Nothing is free after a start or a gap until the variance of the smoothed force is within this
+/// factor of its final value: 44 ms at 1 kHz.
 const SETTLED: f64 = 1.5;
 
 /// Decides whether the stylus is free, sample by sample.
 #[derive(Clone, Debug)]
 pub(super) struct FreeMotion {
-    /// what the zero of the sensor may be off by, N
+    /// zero error of the sensor, N
     zero: f64,
     noise: ForceNoise,
     smoothed: Vector3<f64>,
-    /// of it, of white noise of unit variance
+    /// variance of the smoothed force for white noise of unit variance
     variance: f64,
     last: Option<Vector3<f64>>,
 }
@@ -41,8 +41,8 @@ impl FreeMotion {
         }
     }
 
-    /// Takes the next force without weight and bias, N, `dt` (s) after the one before; returns
-    /// whether nothing is touched.
+    /// Takes the next force without weight and bias, N, `dt` (s) after the previous one; returns
+    /// whether the stylus is free.
     pub(super) fn update(&mut self, force: &Vector3<f64>, dt: f64) -> bool {
         let gain = match self.last {
             Some(last) if dt > 0.0 && dt <= LONGEST_HOLD => {
@@ -52,12 +52,12 @@ impl FreeMotion {
             _ => 1.0,
         };
         self.last = Some(*force);
-        // of the lag of white noise of unit variance: so far, and in the end
+        // variance of the lag for white noise of unit variance: now, and its limit
         self.variance = (1.0 - gain).powi(2) * self.variance + gain * gain;
         let last_variance = gain / (2.0 - gain);
         let noise = NOISE_SIGMAS * self.noise.sigma();
         let largest = self.zero.hypot(noise);
-        // cut off there, so that a firm contact is soon forgotten
+        // capped, for a quick decay of a firm contact
         self.smoothed += (force.cap_magnitude(largest) - self.smoothed) * gain;
         let is_settled = gain < 1.0 && self.variance <= SETTLED * last_variance;
         is_settled
@@ -72,7 +72,7 @@ mod tests {
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 
-    /// How many of 4000 samples at 1 kHz are free, after a second to learn the noise.
+    /// Number of free samples among 4000 at 1 kHz, after a second to learn the noise.
     fn free_of(force: Vector3<f64>, sigma: f64) -> usize {
         let (mut rng, mut free) = (rand_pcg::Pcg64::seed_from_u64(3), FreeMotion::new(0.15));
         let mut noise = || Vector3::from_fn(|_, _| StandardNormal.sample(&mut rng)) * sigma;

@@ -1,24 +1,24 @@
-//! The normal of the touched surface, when friction tilts the force.
+//! Normal of the touched surface under a force that friction tilts.
 //!
-//! The contact force of a sliding ball is F = N (n − μ t), t the direction of sliding: F lies at φ
-//! = atan μ from the normal n, in the plane of the two, behind. Two methods measure that angle.
-//! From this instant alone: t is at right angles to n, so that sin φ = −F̂·t; this needs no μ, but
-//! an error of t out of the surface is one of n, degree for degree. And from all earlier samples:
-//! over a stretch of sliding, ∫ −F·dx / ∫ |F| |dx|, the share of the force that did work, is sin φ,
-//! and the noise of the positions hardly enters it. With φ known, t only has to give the direction
-//! *along* the surface, and its error enters by the factor φ. [`Friction::normal`] weights the two
-//! by their variances.
+//! The contact force of a sliding ball is F = N (n − μ t), with the direction of sliding t: F lies
+//! at φ = atan μ from the normal n, in the plane of the two, behind. Two methods measure φ. The
+//! first uses this instant alone: t is at right angles to n, hence sin φ = −F̂·t; this needs no μ,
+//! but an error of t out of the surface becomes an error of n, degree for degree. The second uses
+//! all earlier samples: over a stretch of sliding, the working share of the force, ∫ −F·dx / ∫ |F|
+//! |dx|, is sin φ, and hardly depends on the noise of the positions. With φ known, t only has to
+//! give the direction *along* the surface, and its error enters by the factor φ.
+//! [`Friction::normal`] weights the two by their variances.
 //!
-//! Slower than the noise of the velocity, t is not known either; the force is then all there is,
-//! within the cone.
+//! At speeds below the noise of the velocity t is unknown too; the force then decides alone, within
+//! the cone.
 
 use nalgebra::Vector3;
 
 use crate::numeric::direction;
 
 /// Cosine of the widest friction cone accepted by default: cos 24° (μ = 0.45, dry metal on metal).
-/// The normal of a surface is nowhere farther from the force, neither for the haptic update nor for
-/// the evidence of the reconstruction.
+/// It bounds the angle between normal and force, for the haptic update and for the evidence of the
+/// reconstruction.
 pub const WIDEST_CONE_COSINE: f64 = 0.9135;
 
 /// Velocity and contact force of the ball at one instant, averaged over a short time.
@@ -42,7 +42,7 @@ pub struct NormalEstimate {
 }
 
 impl NormalEstimate {
-    /// The force itself, where friction is not estimated; `None` without one.
+    /// The force itself, for use without a friction estimate; `None` without a force.
     ///
     /// - `force_o`: force of the object on the stylus, N, in O.
     pub(crate) fn of_force(force_o: &Vector3<f64>) -> Option<Self> {
@@ -60,13 +60,13 @@ pub struct FrictionCoefficient {
     pub mu: f64,
     /// standard error of that median
     pub sigma: f64,
-    /// how much one stretch differs from another: standard deviation, by the quartiles
+    /// standard deviation between stretches, by the quartiles
     pub spread: f64,
-    /// how many stretches
+    /// number of stretches
     pub stretches: u32,
 }
 
-/// Friction as it is found while the ball slides.
+/// Friction estimated while the ball slides.
 ///
 /// # Example
 /// ```
@@ -95,16 +95,16 @@ pub struct Friction {
     /// rad
     widest: f64,
     stretch: SlidingStretch,
-    /// the whole path until enough is known
+    /// the whole path, until the coefficient is known
     early: SlidingStretch,
-    /// how many stretches had a coefficient within each bin
+    /// number of stretches with a coefficient within each bin
     bins: [u32; BINS],
     known: Option<FrictionCoefficient>,
     /// φ = atan μ and its standard deviation for one more place, rad
     angle: [f64; 2],
 }
 
-/// A piece of sliding of which one coefficient is made.
+/// A piece of sliding, for one coefficient.
 #[derive(Clone, Copy, Debug, Default)]
 struct SlidingStretch {
     /// m
@@ -123,37 +123,37 @@ impl SlidingStretch {
     }
 }
 
-/// Width of a bin: a normal is off by 0.03° for half of it.
+/// Width of a bin: half of it tilts a normal by 0.03°.
 const BIN: f64 = 0.001;
 /// Bins from 0 to 1.
 const BINS: usize = 1000;
 /// Length of a stretch, m: 0.2 s of a calm hand, long enough for the noise of the positions to
 /// vanish.
 const STRETCH: f64 = 5e-3;
-/// So many make a coefficient.
+/// Minimum number of stretches for a coefficient.
 const FEWEST: u32 = 4;
-/// Before that the path so far determines φ with this standard deviation, rad: place and direction
-/// change friction …
+/// Standard deviation of φ before [`FEWEST`] stretches, rad: friction varies with place and
+/// direction.
 const EARLY_SIGMA: f64 = 0.03;
-/// … and the ends of the path are off by this, m: 0.2 mm of pose noise after smoothing.
+/// Error of the ends of the path before [`FEWEST`] stretches, m: 0.2 mm of pose noise, smoothed.
 const EARLY_PATH: f64 = 0.1e-3;
-/// Slower than this the ball creeps, and friction is undecided, m/s …
+/// Speed of creep, at which friction is undecided, m/s.
 const CREEP: f64 = 1e-3;
-/// … and slower than so many times the noise of the velocity it may be at rest.
+/// Speed below which the ball may be at rest, in standard deviations of the velocity.
 const CLEAR: f64 = 3.0;
-/// No dry surface holds a ball back more.
+/// Maximum friction of a dry surface.
 const MOST_FRICTION: f64 = 0.8;
-/// φ before anything is known, and its standard deviation, rad: μ from 0.05 to 0.3.
+/// φ and its standard deviation before any measurement, rad: μ from 0.05 to 0.3.
 const USUAL_ANGLE: [f64; 2] = [0.17, 0.12];
-/// Friction and force are never known better than this, rad: bias and noise of a usual force
-/// sensor, 0.05 N of 2.5 N.
+/// Lower bound of the error of friction and force, rad: bias and noise of a usual force sensor,
+/// 0.05 N of 2.5 N.
 const LEAST_SIGMA: f64 = 0.015;
-/// The two methods for φ contradict each other when they differ by more standard deviations than
-/// this.
+/// Difference of the two methods for φ from which they contradict each other, in standard
+/// deviations.
 const CONTRADICTION: f64 = 3.0;
 
 impl Friction {
-    /// Without samples yet.
+    /// Friction before the first sample.
     ///
     /// - `widest`: angle of the widest friction cone accepted, rad.
     pub fn new(widest: f64) -> Self {
@@ -168,7 +168,7 @@ impl Friction {
         }
     }
 
-    /// Takes in what the ball did in contact during `dt` (s).
+    /// Takes in the motion of the ball in contact during `dt` (s).
     pub fn observe(&mut self, sliding: &Sliding, dt: f64) {
         let Sliding {
             force_o,
@@ -203,18 +203,18 @@ impl Friction {
         }
     }
 
-    /// The ball has left the surface: the next contact begins another stretch.
+    /// Notes that the ball has left the surface: the next contact begins another stretch.
     pub fn lift(&mut self) {
         self.stretch = SlidingStretch::default();
     }
 
-    /// The friction; `None` until the ball has slid far enough, and if it is more than friction
-    /// can be: then motion and force do not belong together.
+    /// The friction; `None` until the ball has slid far enough, and beyond any real friction:
+    /// motion and force then do not belong together.
     pub fn coefficient(&self) -> Option<FrictionCoefficient> {
         self.known.filter(|found| found.mu <= MOST_FRICTION)
     }
 
-    /// The normal under the ball; `None` without a force.
+    /// Normal under the ball; `None` without a force.
     pub fn normal(&self, sliding: &Sliding) -> Option<NormalEstimate> {
         let along_force = direction(&sliding.force_o)?;
         let [usual, usual_sigma] = self.angle;
@@ -227,7 +227,7 @@ impl Friction {
                 sigma: usual.hypot(usual_sigma),
             });
         }
-        // error of the direction of sliding, rad
+        // error of the sliding direction, rad
         let astray = (noise / speed).min(1.0).hypot(LEAST_SIGMA);
         let measured = (-sliding.velocity.dot(&along_force) / speed)
             .clamp(-1.0, 1.0)
@@ -242,7 +242,7 @@ impl Friction {
             // another friction, two surfaces at once, or no sliding at all
             variance += contradiction;
         }
-        // how far the direction along the surface can be distinguished from noise
+        // distinctness of the direction along the surface from noise
         let squared = across_speed * across_speed;
         let clear = squared / (squared + 2.0 * noise * noise + CREEP * CREEP);
         variance += angle * angle * (astray * astray + 1.0 - clear * clear).min(1.0);
@@ -254,7 +254,7 @@ impl Friction {
         })
     }
 
-    /// Counts a stretch of this sin φ.
+    /// Counts a stretch with this sin φ.
     fn note(&mut self, sine: f64) {
         let sine = sine.clamp(0.0, std::f64::consts::FRAC_1_SQRT_2);
         let mu = sine / (1.0 - sine * sine).sqrt();
@@ -284,7 +284,7 @@ impl Friction {
         }
     }
 
-    /// φ while there are too few stretches.
+    /// Estimates φ from too few stretches.
     fn guess(&mut self) {
         let SlidingStretch {
             length,

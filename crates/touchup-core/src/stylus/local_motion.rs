@@ -1,13 +1,12 @@
-//! Position and velocity of the ball, from the positions around one instant.
+//! Position and velocity of the ball from the positions around one instant.
 //!
-//! A parabola in time through the positions of a window, by least squares: unlike a mean it does
-//! not cut corners. Its window is as long as the path looks like a parabola, give or take the noise
-//! of the positions.
+//! Least-squares parabola in time through the positions of a window: unlike a mean it does not cut
+//! corners. The window is as long as the path fits a parabola within the noise of the positions.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-/// Sums over a window, about an instant: all that the parabola needs. A longer window goes on where
-/// a shorter one ended.
+/// Sums over a window about an instant, sufficient for the parabola. A longer window extends a
+/// shorter one.
 #[derive(Clone, Debug)]
 pub struct LocalMotion {
     /// unit of time of the sums, s
@@ -21,18 +20,18 @@ pub struct LocalMotion {
     squares: f64,
 }
 
-/// Where the ball is at the instant, and how fast it moves.
+/// Position and velocity of the ball at the instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SmoothedMotion {
     /// m, in O
     pub centre: Point3<f64>,
     /// m/s, in O
     pub velocity: Vector3<f64>,
-    /// variance of a component of the centre for positions off by 1 m, m²
+    /// variance of a component of the centre for position errors of 1 m, m²
     pub centre_gain: f64,
-    /// standard deviation of a component of the velocity for positions off by 1 m, 1/s
+    /// standard deviation of a component of the velocity for position errors of 1 m, 1/s
     pub velocity_gain: f64,
-    /// standard deviation of a component of a position from the parabola, m
+    /// standard deviation of a position component from the parabola, m
     pub residual: f64,
 }
 
@@ -67,8 +66,8 @@ impl LocalMotion {
         self.squares += arm.norm_squared();
     }
 
-    /// The parabola at the instant; the mean, at rest and with no bound on its error, of too few
-    /// positions.
+    /// Parabola at the instant; for too few positions their mean, at rest and with no bound on its
+    /// error.
     pub fn motion(&self) -> SmoothedMotion {
         let [n, u, u2, u3, u4] = self.powers;
         let parabola = (n > 3.0)

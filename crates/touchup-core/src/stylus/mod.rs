@@ -1,14 +1,13 @@
 //! From raw pose and wrench messages to samples the refiner can use.
 //!
-//! [`MarkerFilter`] makes the pose of the markers on the stylus, [`Placement`] brings it to the
-//! ball and into the frame of the scan, [`Synchroniser`] brings the two streams to one instant,
-//! [`ContactEstimator`] makes of each sample, once for all its users, one [`ContactSample`]:
-//! [`Compensator`] takes weight and bias off and turns the force into the frame of the object,
-//! [`BiasTracker`] follows what drifts, [`ContactGate`] decides whether the stylus touches,
-//! [`TipMotion`] and [`Friction`] how the ball slides and how the surface under it is oriented.
-//! [`TipBody`] finds the point of the tip that touches, [`LocalMotion`] the motion around one
-//! instant. Where the pose is not published as such, [`MovingFrame`] takes it from the transforms
-//! of a [`FrameBuffer`].
+//! [`MarkerFilter`] computes the stylus pose from its markers, [`Placement`] maps it to the ball
+//! centre and the scan frame, [`Synchroniser`] brings both streams to common instants.
+//! [`ContactEstimator`] turns each sample into one [`ContactSample`] for all users: [`Compensator`]
+//! subtracts weight and bias and rotates the force into the object frame, [`BiasTracker`] follows
+//! the sensor drift, [`ContactGate`] detects contact, [`TipMotion`] and [`Friction`] estimate
+//! sliding and surface normal. [`TipBody`] finds the touching point of the tip, [`LocalMotion`] the
+//! motion around one instant. Without a pose topic, [`MovingFrame`] derives the pose from the
+//! transforms of a [`FrameBuffer`].
 
 mod bias;
 mod clock;
@@ -61,23 +60,22 @@ pub use crate::parameters::SettingError;
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
-/// Farther from the object's origin than this, a pose is a fault and not a measurement, m.
+/// Largest coordinate of a valid pose in the object frame, m.
 ///
-/// Parts and cells are a few metres large; a corrupted exponent is off by far more than that.
+/// Parts and cells are a few metres large; a corrupted exponent is off by far more.
 pub const LARGEST_POSITION: f64 = 1e3;
 
-/// A greater force is a fault and not a measurement, N: a hundred times what a hand-held stylus or
-/// a small arm can exert.
+/// Largest component of a valid force, N: a hundred times the force of a hand-held stylus or a
+/// small arm.
 pub const LARGEST_FORCE: f64 = 1e5;
 
-/// A greater torque is a fault and not a measurement, N·m: [`LARGEST_FORCE`] at a lever of one
-/// metre.
+/// Largest component of a valid torque, N·m: [`LARGEST_FORCE`] at a lever of one metre.
 pub(crate) const LARGEST_TORQUE: f64 = 1e5;
 
-/// A unit quaternion as it arrives may be off by this: components printed with six digits.
+/// Tolerance on the norm of a received unit quaternion: components printed with six digits.
 const UNIT_TOLERANCE: f64 = 1e-5;
 
-/// Why a message or a sample is refused.
+/// Reason for refusing a message or a sample.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SampleError {
     /// NaN or infinite component.
@@ -88,14 +86,14 @@ pub enum SampleError {
         /// its time, ns
         stamp_ns: i64,
     },
-    /// A magnitude that no stylus reaches.
+    /// A magnitude beyond any stylus.
     #[error(
         "the {what} of {magnitude:e} {unit} at {stamp_ns} ns is beyond {limit:e} {unit}; is the unit right?"
     )]
     Absurd {
         /// "position", "force" or "torque"
         what: &'static str,
-        /// its length, in `unit`
+        /// its magnitude, in `unit`
         magnitude: f64,
         /// the largest accepted, in `unit`
         limit: f64,
@@ -104,7 +102,7 @@ pub enum SampleError {
         /// its time, ns
         stamp_ns: i64,
     },
-    /// An orientation that is no rotation.
+    /// A quaternion that is no rotation.
     #[error(
         "the orientation at {stamp_ns} ns is a quaternion of length {norm}, not 1; normalise it at its source"
     )]
@@ -114,7 +112,7 @@ pub enum SampleError {
         /// its time, ns
         stamp_ns: i64,
     },
-    /// Repeated or backward in time.
+    /// A repeated or backward stamp.
     #[error(
         "the sample at {stamp_ns} ns is not after the one at {last_ns} ns; give samples in order of time"
     )]
@@ -126,14 +124,14 @@ pub enum SampleError {
     },
 }
 
-/// A measured quaternion is rounded, not wrong, this close to norm 1.
+/// Largest deviation from norm 1 of a measured quaternion due to rounding.
 const QUATERNION_NORM_SLACK: f64 = 0.01;
-/// Roundings of a product of three rotations: such a quaternion is kept bit by bit, so that writing
-/// and reading again changes nothing.
+/// Rounding of a product of three rotations: such a quaternion stays bit-identical, so writing and
+/// reading again changes nothing.
 const QUATERNION_ROUNDING: f64 = 8.0 * f64::EPSILON;
 
-/// The rotation that a message means, as its source rounded it; `None` for what is none, NaN among
-/// it.
+/// Rotation of a message, with its rounding removed; `None` for a quaternion that is no rotation,
+/// or NaN.
 pub fn measured_rotation(q: Quaternion<f64>) -> Option<UnitQuaternion<f64>> {
     let off = (q.norm() - 1.0).abs();
     if off <= QUATERNION_ROUNDING {
@@ -152,7 +150,7 @@ pub struct Wrench {
 }
 
 impl Wrench {
-    /// In other axes.
+    /// Rotated into other axes.
     pub(crate) fn turned(&self, rotation: &UnitQuaternion<f64>) -> Self {
         Self {
             force: rotation * self.force,
@@ -171,7 +169,7 @@ pub struct StampedPose {
 }
 
 impl StampedPose {
-    /// Refuses what cannot be a pose.
+    /// Refuses an invalid pose.
     ///
     /// # Errors
     /// [`SampleError::NotFinite`], [`SampleError::Absurd`], [`SampleError::NotARotation`].
@@ -208,7 +206,7 @@ pub struct StampedWrench {
 }
 
 impl StampedWrench {
-    /// Refuses what cannot be a wrench.
+    /// Refuses an invalid wrench.
     ///
     /// # Errors
     /// [`SampleError::NotFinite`], [`SampleError::Absurd`].
@@ -233,7 +231,7 @@ impl StampedWrench {
 /// One message of either stream, as a recording or a topic delivers it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Message {
-    /// Where the tip is.
+    /// Tip pose.
     Pose(StampedPose),
     /// The measured wrench.
     Wrench(StampedWrench),
@@ -249,10 +247,10 @@ impl Message {
     }
 }
 
-/// Pose and wrench at one instant: what [`crate::haptic::Refiner::push`] takes.
+/// Pose and wrench at one instant: input of [`crate::haptic::Refiner::push`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// Time of measurement of the wrench, ns; the pose is interpolated to it.
+    /// Time of measurement of the wrench, ns, to which the pose is interpolated.
     pub stamp_ns: i64,
     /// Pose of T in O, m.
     pub pose_ot: Isometry3<f64>,
@@ -261,7 +259,7 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// Refuses what cannot be a measurement.
+    /// Refuses an invalid measurement.
     ///
     /// # Errors
     /// As [`StampedPose::check`] and [`StampedWrench::check`].
@@ -278,10 +276,10 @@ impl Sample {
         .check()
     }
 
-    /// Time since the sample before this one, s; 0 for the first.
+    /// Time since the previous sample, s; 0 for the first.
     ///
     /// # Errors
-    /// [`SampleError::NotAfter`] when this one is repeated or older.
+    /// [`SampleError::NotAfter`] for a repeated or older stamp.
     pub fn seconds_since(&self, last_ns: Option<i64>) -> Result<f64, SampleError> {
         match last_ns {
             Some(last_ns) if self.stamp_ns <= last_ns => Err(SampleError::NotAfter {

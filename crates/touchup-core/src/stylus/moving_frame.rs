@@ -1,22 +1,22 @@
-//! The pose of one frame in another, as transforms of the links between them come, each at the rate
-//! of its own publisher.
+//! Pose of one frame in another, from the transforms of the links between them, each at the rate of
+//! its publisher.
 
 use std::collections::BTreeSet;
 
 use super::StampedPose;
 use super::frame_buffer::{FrameBuffer, FrameError, FrameTransform, KEPT_NS, plain_name};
 
-/// Transforms of a link that are farther apart are not bridged, ns: what publishes at 10 Hz, not
-/// quite regularly. A link that accelerates by 1 m/s² is within 2 mm of the straight line in
-/// between, one of 100 Hz within 15 µm.
+/// Longest interpolated gap between transforms of a link, ns: a somewhat irregular publisher at 10
+/// Hz. A link that accelerates by 1 m/s² is within 2 mm of the straight line in between, at 100 Hz
+/// within 15 µm.
 const LONGEST_GAP_NS: i64 = 120_000_000;
-/// Stamps that wait for transforms of slower links at most: 10 s at 1 kHz.
+/// Maximum number of stamps waiting for transforms of slower links: 10 s at 1 kHz.
 const MOST_PENDING: usize = 10_000;
 
-/// Gives a pose at each stamp that a moving link between the two frames has: where others have
-/// another one at that stamp, or are between two, they are interpolated, straight for the position
-/// and at constant angular velocity for the orientation. Never beyond the first and the last
-/// transform of a link, and not over more than 0.12 s.
+/// Gives a pose at each stamp of a moving link between the two frames; the other links are
+/// interpolated at that stamp, linearly in position and at constant angular velocity in
+/// orientation. Never extrapolates beyond the first or last transform of a link, nor bridges more
+/// than 0.12 s.
 ///
 /// ```
 /// use nalgebra::Isometry3;
@@ -34,19 +34,19 @@ const MOST_PENDING: usize = 10_000;
 pub struct MovingFrame {
     moving: String,
     base: String,
-    /// stamps of which there is no pose yet, ns
+    /// stamps still without a pose, ns
     pending: BTreeSet<i64>,
     /// stamp of the last pose, ns
     given_ns: Option<i64>,
-    /// poses for which a link was interpolated
+    /// poses with an interpolated link
     pub interpolated: u64,
-    /// stamps of which there is no pose, as a link had no transform yet, or has none any more
+    /// stamps without a pose, before the first or after the last transform of a link
     pub outside: u64,
     apart: u64,
 }
 
 impl MovingFrame {
-    /// - `moving`: the frame whose pose is wanted; `base`: in which.
+    /// - `moving`: frame of the pose; `base`: reference frame.
     pub fn new(moving: &str, base: &str) -> Self {
         let [moving, base] = [moving, base].map(|name| plain_name(name).to_owned());
         Self {
@@ -60,13 +60,13 @@ impl MovingFrame {
         }
     }
 
-    /// The frame in which the poses are.
+    /// Reference frame of the poses.
     pub fn base(&self) -> &str {
         &self.base
     }
 
-    /// Puts the transforms of one message into the buffer, and notes the stamps of those that move
-    /// between the two frames; how many the buffer refused.
+    /// Inserts the transforms of one message into the buffer, and notes the stamps of moving links
+    /// between the two frames; returns the number of refused transforms.
     pub fn push(
         &mut self,
         frames: &mut FrameBuffer,
@@ -75,7 +75,7 @@ impl MovingFrame {
     ) -> u64 {
         let has_jumped = !are_static && self.has_jumped(frames, transforms);
         if has_jumped {
-            // the clock was set back: what was before belongs to nothing that comes
+            // clock set back: earlier transforms no longer apply
             frames.forget_moving();
             self.apart += self.pending.len() as u64;
             self.pending.clear();
@@ -86,7 +86,7 @@ impl MovingFrame {
             .filter(|transform| !frames.insert(transform, are_static))
             .count();
         if !are_static {
-            // until the two are connected, as far up as links are known
+            // before the two frames are connected: all known links above `moving`
             let links = frames.links_between(&self.base, &self.moving);
             let known = links
                 .or_else(|_| Ok::<_, FrameError>([Vec::new(), frames.ancestors(&self.moving)?]));
@@ -109,7 +109,7 @@ impl MovingFrame {
         refused as u64
     }
 
-    /// A link between the two frames is farther back in time than anything is kept.
+    /// Whether a link between the two frames jumps back beyond the history.
     fn has_jumped(&self, frames: &FrameBuffer, transforms: &[FrameTransform]) -> bool {
         let Some(given_ns) = self.given_ns else {
             return false;
@@ -128,8 +128,7 @@ impl MovingFrame {
         )
     }
 
-    /// The next pose, in order of their stamps; `None` as long as a link may still come to the
-    /// stamp.
+    /// Next pose, in order of stamps; `None` while a link may still reach the stamp.
     pub fn next_pose(&mut self, frames: &FrameBuffer) -> Option<StampedPose> {
         while let Some(stamp_ns) = self.pending.first().copied() {
             match frames.bridged_pose(&self.base, &self.moving, stamp_ns, LONGEST_GAP_NS) {
@@ -159,7 +158,7 @@ impl MovingFrame {
         None
     }
 
-    /// Why there cannot be a pose, as far as the transforms so far say; `None` when there can.
+    /// Reason for a missing pose, by the transforms received; `None` if a pose is possible.
     pub fn missing(&self, frames: &FrameBuffer) -> Option<String> {
         match frames.links_between(&self.base, &self.moving) {
             Err(error) => Some(error.to_string()),
@@ -171,13 +170,12 @@ impl MovingFrame {
         }
     }
 
-    /// How many stamps there are, since this was asked last, of which there is no pose, as a link
-    /// lacks transforms around them.
+    /// Number of stamps since the last call that have no pose for lack of transforms around them.
     pub fn take_apart(&mut self) -> u64 {
         std::mem::take(&mut self.apart)
     }
 
-    /// No more transforms come: stamps that wait are lost.
+    /// Ends the transforms: pending stamps are lost.
     pub fn finish(&mut self) {
         self.outside += self.pending.len() as u64;
         self.pending.clear();
@@ -214,7 +212,7 @@ mod tests {
             .collect()
     }
 
-    /// base → arm turns by a quarter in 100 ms at 10 Hz, arm → tool goes along x by 1 m in that
+    /// base → arm turns by a quarter in 100 ms at 10 Hz, arm → tool moves along x by 1 m in that
     /// time at 50 Hz.
     #[test]
     fn a_slow_link_is_interpolated_at_the_stamps_of_a_fast_one_by_hand() {
@@ -257,7 +255,7 @@ mod tests {
             assert!((pose.rotation.angle() - turned).abs() < 1e-12);
         }
         assert_eq!(tool.missing(&frames), None);
-        // the first and the last have their own transforms
+        // the first and the last pose have their own transforms
         assert_eq!((tool.interpolated, tool.take_apart()), (4, 0));
     }
 
@@ -289,7 +287,7 @@ mod tests {
         let arm = |ms| [link(ms, "base", "arm", 1.0, 0.0)];
         let hand = |ms| [link(ms, "arm", "tool0", 1.0, 0.0)];
         let at = |found: Vec<(i64, _)>| found.iter().map(|(stamp, _)| *stamp).collect::<Vec<_>>();
-        // before the first of the arm there is nothing
+        // nothing before the first transform of the arm
         assert!(poses(&mut tool, &mut frames, &hand(0)).is_empty());
         assert!(poses(&mut tool, &mut frames, &arm(60)).is_empty());
         for (ms, expected) in [
@@ -306,12 +304,12 @@ mod tests {
             );
         }
         assert_eq!((tool.outside, tool.take_apart()), (2, 0));
-        // from 60 to 190 is more than is bridged, and 100 and 150 are in between
+        // 60 to 190 exceeds the longest gap, and 100 and 150 lie in between
         assert_eq!(at(poses(&mut tool, &mut frames, &arm(190))), [190]);
         assert_eq!(tool.take_apart(), 2);
         assert_eq!(at(poses(&mut tool, &mut frames, &arm(240))), [200, 240]);
         tool.finish();
-        // 250 is behind the last of the arm
+        // 250 is after the last transform of the arm
         assert_eq!((tool.outside, tool.take_apart()), (3, 0));
     }
 

@@ -1,26 +1,24 @@
 //! Frames of the recorded poses: from the tracked stylus to the ball, and from space to the scan.
 //!
-//! A tracker gives the pose of its own point H on the stylus, in its own frame W. The centre of the
-//! ball is d from H, in the axes of H, and the scan lies at `pose_wo`: pose_OT = pose_WO⁻¹ ·
-//! pose_WH · d. A wrench in the stylus' own axes is as it was; one in the axes of W is turned into
-//! those of O.
+//! A tracker gives the pose of its point H on the stylus, in its frame W. The ball centre is d from
+//! H, in the axes of H, and the scan lies at `pose_wo`: pose_OT = pose_WO⁻¹ · pose_WH · d. A wrench
+//! in stylus axes stays unchanged; a wrench in the axes of W turns into the axes of O.
 
 use nalgebra::{Isometry3, Translation3, Vector3};
 
 use super::{Message, SettingError, StampedPose, StampedWrench, WrenchFrame};
 
-/// Applied to each message as it is read, before all else. The default changes nothing.
+/// Applied to each message on reading, before all else. The default changes nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Placement {
-    /// Pose of the scan's frame O in the frame W of the recorded poses; `None`: they are in O.
+    /// Pose of the scan frame O in the frame W of the recorded poses; `None`: W is O.
     pub pose_wo: Option<Isometry3<f64>>,
-    /// Centre of the ball from the origin of the recorded pose, in its axes, m; `None`: it is that
-    /// origin.
+    /// Ball centre from the origin of the recorded pose, in its axes, m; `None`: at that origin.
     pub p_ht: Option<Vector3<f64>>,
 }
 
 impl Placement {
-    /// Refuses what is no number.
+    /// Refuses numbers that are not finite.
     ///
     /// # Errors
     /// [`SettingError`]
@@ -37,7 +35,7 @@ impl Placement {
 
     /// `message` in the frames of the scene.
     ///
-    /// - `wrench_frame`: [`WrenchFrame::Object`] when its wrenches are in the axes of its poses.
+    /// - `wrench_frame`: [`WrenchFrame::Object`] for wrenches in the axes of the poses.
     pub fn place(&self, message: Message, wrench_frame: WrenchFrame) -> Message {
         match message {
             Message::Pose(pose) => Message::Pose(self.pose(pose)),

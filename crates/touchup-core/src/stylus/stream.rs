@@ -4,26 +4,26 @@ use std::collections::VecDeque;
 
 use super::{StampedPose, StampedWrench, SyncCounts, SyncParams};
 
-/// Messages one after the other that show together that time has leapt: four wrong ones in a row
-/// are seen in practice.
+/// Consecutive messages that together confirm a leap in time: four wrong ones in a row occur in
+/// practice.
 const AGREEING: usize = 5;
-/// … and that show where a stream begins: before it nothing can become late.
+/// Messages that confirm the start of a stream: before it nothing can become late.
 const AGREEING_AT_FIRST: usize = 2;
-/// Between two messages that agree: 10 s are a pause, not a fault, ns.
+/// Longest time between two agreeing messages, ns: 10 s are a pause, not a fault.
 const LONGEST_PAUSE_NS: i64 = 10_000_000_000;
 
-/// One stream in order of time, as far as it is held.
+/// One stream in order of time, within its buffer.
 #[derive(Debug)]
 pub(super) struct Stream<T> {
     pub held: VecDeque<T>,
     newest: Option<i64>,
-    /// a stamp up to here is late
+    /// latest stamp that counts as late
     pub watermark: i64,
-    /// leap ahead and agree with each other; wait for the next ones to do so too
+    /// leap ahead and agree with each other; wait for confirmation by the next ones
     leapt: Vec<T>,
-    /// how far a message may lag behind the newest, and one more, ns; 0: none may
+    /// maximum lag of a message behind the newest, plus one, ns; 0: no lag
     wait_ns: i64,
-    /// messages were pushed out of the full buffer
+    /// whether the full buffer dropped messages
     pub overflown: bool,
     pub counts: SyncCounts,
 }
@@ -41,10 +41,10 @@ impl<T: Stamped + Copy> Stream<T> {
         }
     }
 
-    /// Takes a message, or counts why not; whether it is kept, for now at least.
+    /// Takes a message, or counts the reason for refusing it; returns whether it keeps it for now.
     ///
-    /// What leaps ahead waits for others that agree: one wrong stamp would make all that is right
-    /// late until its time has come.
+    /// A message that leaps ahead waits for others that agree: one wrong stamp would make all
+    /// correct ones late until its time.
     pub fn push(&mut self, message: T, params: &SyncParams) -> bool {
         let stamp = message.stamp_ns();
         let leap_ns = params.largest_jump_ns.max(params.reorder_ns);
@@ -78,7 +78,7 @@ impl<T: Stamped + Copy> Stream<T> {
         true
     }
 
-    /// Messages that no other contradicted are kept.
+    /// Ends the stream; keeps messages that no other contradicts.
     pub fn finish(&mut self, params: &SyncParams) {
         let reached = self
             .newest
@@ -91,7 +91,7 @@ impl<T: Stamped + Copy> Stream<T> {
         }
     }
 
-    /// Stamp of the newest message that is kept for good, ns.
+    /// Stamp of the newest accepted message, ns.
     pub fn newest_ns(&self) -> Option<i64> {
         self.newest
     }
@@ -138,7 +138,7 @@ impl<T: Stamped + Copy> Stream<T> {
         true
     }
 
-    /// Drops what lies before the last message at or before `stamp_ns`.
+    /// Drops the messages before the last one at or before `stamp_ns`.
     pub fn forget_before(&mut self, stamp_ns: i64) {
         while self
             .held
@@ -157,8 +157,8 @@ impl<T: Stamped + Copy> Stream<T> {
 }
 
 pub(super) trait Stamped {
-    /// Whether dropping one is a loss in itself; a pose is missed only by a wrench that would have
-    /// needed it.
+    /// Whether dropping one is a loss in itself; a dropped pose counts only through a wrench that
+    /// needs it.
     const IS_LOST_ALONE: bool;
 
     fn stamp_ns(&self) -> i64;

@@ -1,8 +1,8 @@
-//! Pose and wrench brought to one instant: the pose is interpolated at the stamp of each wrench.
+//! Pose and wrench at one instant: interpolates the pose at the stamp of each wrench.
 //!
 //! The two streams have their own rates and clocks, and their messages arrive late, twice, out of
-//! order or not at all. Which samples come out depends on the messages alone: any order of arrival
-//! that moves no message by more than the reorder window gives the same samples, bit for bit.
+//! order or not at all. The samples depend on the messages alone: any order of arrival that moves
+//! no message by more than the reorder window gives the same samples, bit for bit.
 
 use nalgebra::Isometry3;
 
@@ -10,7 +10,7 @@ use super::stream::Stream;
 use super::sync_params::{SyncCounts, SyncParams};
 use super::{Message, Sample, SampleError, SettingError, StampedPose, StampedWrench};
 
-/// Two wrenches in succession closer than this confirm each other, ns.
+/// Maximum time between two successive wrenches that confirm each other, ns.
 const DRIFTS_FROM_NS: u64 = 10_000_000_000;
 
 /// Turns two streams of messages into one stream of samples, in order of time.
@@ -36,8 +36,8 @@ pub struct Synchroniser {
     params: SyncParams,
     poses: Stream<StampedPose>,
     wrenches: Stream<StampedWrench>,
-    /// stamp of the wrench from which its clock drifts: the first that the next one confirms; and
-    /// of the one before
+    /// stamp of the wrench from which its clock drifts, the first that the next one confirms; and
+    /// stamp of the previous wrench
     drifts_from_ns: Option<i64>,
     last_wrench_ns: Option<i64>,
     finished: bool,
@@ -52,9 +52,9 @@ impl Synchroniser {
         Self::waiting(params, params.reorder_ns.saturating_add(1))
     }
 
-    /// As [`Self::new`], for streams each of which comes in order of its stamps, however the two
-    /// interleave: a sample goes out with the later of its wrench and the pose after it, and what
-    /// is out of order is late. As long as nothing is, the samples are those of any reorder window.
+    /// As [`Self::new`], for streams that each come in order of stamps, in any interleaving: a
+    /// sample goes out with the later of its wrench and the pose after it, and a message out of
+    /// order is late. Without such messages, the samples equal the samples of any reorder window.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -78,9 +78,9 @@ impl Synchroniser {
         })
     }
 
-    /// Takes one message; draw samples with [`Self::next_sample`] before the next one. What comes
-    /// after [`Self::finish`] is late. Returns whether it was taken: what was not is counted and
-    /// changes nothing else.
+    /// Takes one message; draw samples with [`Self::next_sample`] before the next one. A message
+    /// after [`Self::finish`] is late. Returns whether it took the message: a refused one raises a
+    /// count and changes nothing else.
     pub fn push(&mut self, message: Message) -> bool {
         let (checked, counts) = match &message {
             Message::Pose(pose) => (pose.check(), &mut self.poses.counts),
@@ -109,10 +109,10 @@ impl Synchroniser {
         }
     }
 
-    /// The stamp of a wrench without the offset of its clock and without its drift.
+    /// Stamp of a wrench without the offset and drift of its clock.
     fn on_clock_of_pose(&mut self, stamp_ns: i64) -> i64 {
         let is_near = |last: &i64| stamp_ns.abs_diff(*last) < DRIFTS_FROM_NS;
-        // a first stamp that is wild would shift all others
+        // a wild first stamp would shift all others
         let last = self.last_wrench_ns.replace(stamp_ns).filter(is_near);
         self.drifts_from_ns = self.drifts_from_ns.or(last);
         let since_ns = self
@@ -122,15 +122,14 @@ impl Synchroniser {
         stamp_ns.saturating_sub(self.params.wrench_offset_ns.saturating_add(gained_ns))
     }
 
-    /// Nothing more will come: what is held may go out.
+    /// Ends the streams: the held messages may go out.
     pub fn finish(&mut self) {
         self.finished = true;
         self.poses.finish(&self.params);
         self.wrenches.finish(&self.params);
     }
 
-    /// The next sample that no message still allowed to arrive could change; `None` when more
-    /// messages are needed.
+    /// Next sample that no admissible message could change; `None` until more messages come.
     pub fn next_sample(&mut self) -> Option<Sample> {
         loop {
             let wrench = *self.wrenches.held.front()?;
@@ -154,23 +153,23 @@ impl Synchroniser {
         }
     }
 
-    /// Wrenches that became no sample so far, and why.
+    /// Wrenches without a sample, by reason.
     pub fn counts(&self) -> &SyncCounts {
         &self.wrenches.counts
     }
 
-    /// Poses dropped so far, and why; a wrench that misses one is counted in [`Self::counts`].
+    /// Dropped poses, by reason; a wrench that misses one counts in [`Self::counts`].
     pub fn pose_counts(&self) -> &SyncCounts {
         &self.poses.counts
     }
 
-    /// Newest stamp of either stream that is kept for good, ns; `None` before the first. The offset
-    /// of the wrench is taken off.
+    /// Newest accepted stamp of either stream, ns, without the offset of the wrench; `None` before
+    /// the first.
     pub fn newest_ns(&self) -> Option<i64> {
         self.poses.newest_ns().max(self.wrenches.newest_ns())
     }
 
-    /// Up to this stamp nothing of `stream` can arrive any more.
+    /// Stamp up to which nothing of `stream` can arrive any more.
     fn watermark<T>(&self, stream: &Stream<T>) -> i64 {
         if self.finished {
             i64::MAX
@@ -179,8 +178,7 @@ impl Synchroniser {
         }
     }
 
-    /// The pose at `stamp_ns`, or the counter to raise when there is none; `None` while that is
-    /// still open.
+    /// Pose at `stamp_ns`, or the counter to raise for a missing one; `None` while still open.
     fn pose_at(&self, stamp_ns: i64, watermark: i64) -> Option<Result<Isometry3<f64>, Counter>> {
         let mut held = self.poses.held.iter();
         let missing: Counter = if self.poses.overflown {
@@ -214,18 +212,18 @@ impl Synchroniser {
     }
 }
 
-/// Which counter of [`SyncCounts`] to raise.
+/// Counter of [`SyncCounts`] to raise.
 type Counter = fn(&mut SyncCounts) -> &mut u64;
 
-/// Between two poses: straight for the position, at constant angular velocity along the shorter arc
-/// for the orientation.
+/// Interpolates between two poses: linear in position, constant angular velocity along the shorter
+/// arc in orientation.
 pub(super) fn interpolated(
     before: &Isometry3<f64>,
     after: &Isometry3<f64>,
     t: f64,
 ) -> Isometry3<f64> {
     let position = before.translation.vector.lerp(&after.translation.vector, t);
-    // the power of the relative rotation keeps its digits at angles where a slerp by sines loses
+    // the power of the relative rotation keeps its digits at angles at which a slerp by sines loses
     // them
     let mut rotation = before.rotation * (before.rotation.inverse() * after.rotation).powf(t);
     rotation.renormalize();

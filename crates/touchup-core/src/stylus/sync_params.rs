@@ -1,4 +1,4 @@
-//! Settings of the synchronisation of streams, and counts of messages that make no sample.
+//! Settings of the synchronisation of streams, and counts of messages without a sample.
 
 use serde::Serialize;
 
@@ -37,7 +37,7 @@ parameters! {
     }
 }
 
-/// Messages of one stream that became no sample, by reason. Every wrench is in a sample, held, or
+/// Messages of one stream without a sample, by reason. Every wrench is in a sample, held, or
 /// counted once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct SyncCounts {
@@ -55,14 +55,14 @@ pub struct SyncCounts {
     pub not_finite: u64,
     /// Messages that no stylus can cause, or whose orientation is no rotation.
     pub absurd: u64,
-    /// Messages whose stamp leaps ahead and is not confirmed by the next ones.
+    /// Messages whose stamp leaps ahead without confirmation by the next ones.
     pub jump: u64,
-    /// Wrenches pushed out of a full buffer, or whose poses were.
+    /// Wrenches dropped from a full buffer, or with dropped poses.
     pub overflow: u64,
 }
 
 impl SyncCounts {
-    /// Each reason by its name, in the order of the fields.
+    /// Each reason by name, in the order of the fields.
     pub fn reasons(&self) -> [(&'static str, u64); 9] {
         let Self {
             gap,
@@ -88,7 +88,7 @@ impl SyncCounts {
         ]
     }
 
-    /// All of them.
+    /// Sum of all counts.
     pub fn total(&self) -> u64 {
         self.reasons().iter().map(|(_, count)| count).sum()
     }

@@ -1,5 +1,4 @@
-//! Centre of the ball, direction of sliding and normal of the surface under it, from the past
-//! alone.
+//! Ball centre, sliding direction and surface normal, from past samples alone.
 
 use nalgebra::{Point3, Vector3};
 
@@ -17,14 +16,13 @@ parameters! {
         radius: f64 = 1.5, "radius_mm" [MM, 0, 1000];
         /// Stiffness of stylus and holder at the ball; left out: rigid.
         ///
-        /// In N/m; `None` when rigid or not known.
+        /// In N/m; `None` if rigid or unknown.
         stiffness: Option<f64> = Some(20.0), "stiffness_n_per_mm" [N_PER_MM, 0.001, 1e9, "leave it out for rigid"];
     }
 }
 
 impl TipParams {
-    /// Where the ball really is, m: the pose is that of a rigid stylus, and the force F bends it
-    /// back by F/k.
+    /// Real ball centre, m: the pose assumes a rigid stylus, and the force F bends it back by F/k.
     pub fn centre(&self, reported: &Point3<f64>, force_o: &Vector3<f64>) -> Point3<f64> {
         self.stiffness
             .map_or(*reported, |stiffness| reported + force_o / stiffness)
@@ -37,13 +35,13 @@ parameters! {
     pub struct SlidingParams in "sliding" {
         /// Time constant of the filter on position and force.
         ///
-        /// In s; 0 filters nothing. 6 ms are three poses at 500 Hz, so that 0.2 mm of pose noise
-        /// becomes 0.1 mm, while a hand at 50 mm/s lags 0.3 mm behind, along the surface.
+        /// In s; 0 filters nothing. 6 ms are three poses at 500 Hz: 0.2 mm of pose noise becomes
+        /// 0.1 mm, while a hand at 50 mm/s lags 0.3 mm behind, along the surface.
         smoothing: f64 = 6.0, "smoothing_ms" [MS, 0, 10000];
         /// Time constant of the velocity.
         ///
         /// In s. With 0.2 mm of pose noise and μ = 0.4 half of the normals are then within 3° (12
-        /// ms: 4°), while that of a hand that turns by 5 rad/s lags 6° behind, along the surface.
+        /// ms: 4°); for a hand that turns by 5 rad/s they lag 6° behind, along the surface.
         velocity_smoothing: f64 = 20.0, "velocity_smoothing_ms" [MS, 0, 10000];
         /// Uncertainty of the velocity: slower than this the sliding direction hardly determines
         /// the normal.
@@ -52,40 +50,40 @@ parameters! {
         slowest: f64 = 8.0, "slowest_mm_per_s" [MM_PER_S, 0, 1e6];
         /// Cosine of the widest friction cone accepted; 0.9135 is 24 degrees, friction 0.45.
         ///
-        /// The normal is nowhere farther from the force: dry metal on metal.
+        /// Maximum angle between normal and force: dry metal on metal.
         cone_cosine: f64 = WIDEST_CONE_COSINE, "cone_cosine" [ONE, 0, 1];
     }
 }
 
-/// The ball as position and force, smoothed by the past, have it.
+/// The ball by causally smoothed position and force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ball {
-    /// Reported centre of the ball (that of a rigid stylus), smoothed, m, in O.
+    /// Reported ball centre (of a rigid stylus), smoothed, m, in O.
     pub reported: Point3<f64>,
-    /// Where it really is: the reported centre and the deflection of the stylus, m, in O.
+    /// Real ball centre: reported centre plus deflection of the stylus, m, in O.
     pub centre: Point3<f64>,
-    /// Force of the object on the stylus, smoothed alike, N, in O.
+    /// Force of the object on the stylus, smoothed likewise, N, in O.
     pub force_o: Vector3<f64>,
-    /// Force smoothed once more, as the velocity is, so that the two are of one time, N, in O.
+    /// Force smoothed once more, as the velocity is, for equal delays, N, in O.
     pub force_with_velocity: Vector3<f64>,
-    /// Velocity of the real centre, m/s, in O: that of the reported one would take a change of
-    /// force for motion.
+    /// Velocity of the real centre, m/s, in O: with the reported centre a change of force would
+    /// appear as motion.
     pub velocity: Vector3<f64>,
 }
 
-/// Smooths position and force with one time constant, so that they stay in step, and differentiates
-/// the position.
+/// Smooths position and force with one time constant, to keep them in step, and differentiates the
+/// position.
 #[derive(Clone, Debug)]
 pub struct TipMotion {
     params: SlidingParams,
     tip: TipParams,
     last: Option<Ball>,
     friction: Friction,
-    /// s
+    /// time in contact, s
     touched_for: f64,
 }
 
-/// Transient of the filters after the onset of a contact, in time constants.
+/// Transient of the filters after contact onset, in time constants.
 const TRANSIENT: f64 = 4.0;
 
 /// Noise of the velocity, as a share of [`SlidingParams::slowest`].
@@ -104,7 +102,7 @@ impl TipMotion {
         }
     }
 
-    /// Takes the next tip, `dt` (s) after the one before; a longer pause than `largest_gap` (s)
+    /// Takes the next tip, `dt` (s) after the previous one; a pause longer than `largest_gap` (s)
     /// restarts the filter.
     pub fn update(&mut self, tip: &Tip, dt: f64, largest_gap: f64) -> Ball {
         let (here, force) = (Point3::from(tip.pose_ot.translation.vector), tip.force_o);
@@ -133,8 +131,7 @@ impl TipMotion {
         ball
     }
 
-    /// The ball of a tip by itself, where its velocity is not needed: nothing is smoothed and
-    /// nothing kept.
+    /// The ball of a single tip, for uses without velocity: no smoothing, no state.
     pub fn unfiltered(&self, tip: &Tip) -> Ball {
         let (reported, force_o) = (Point3::from(tip.pose_ot.translation.vector), tip.force_o);
         let centre = self.tip.centre(&reported, &force_o);
@@ -147,8 +144,8 @@ impl TipMotion {
         }
     }
 
-    /// Outward normal of the surface under the ball, which has been in contact for the last `dt`
-    /// (s); `None` without a force.
+    /// Outward normal of the surface under the ball, in contact for the last `dt` (s); `None`
+    /// without a force.
     pub fn surface_normal(&mut self, ball: &Ball, dt: f64) -> Option<NormalEstimate> {
         let velocity_sigma = VELOCITY_NOISE * self.params.slowest;
         let sliding = Sliding {
@@ -169,19 +166,19 @@ impl TipMotion {
         self.friction.normal(&sliding)
     }
 
-    /// The ball is free.
+    /// Notes that the ball is free.
     pub fn lift(&mut self) {
         self.touched_for = 0.0;
         self.friction.lift();
     }
 
-    /// Kinetic friction as measured so far; `None` until the ball has slid far enough.
+    /// Measured kinetic friction; `None` until the ball has slid far enough.
     pub fn friction(&self) -> Option<FrictionCoefficient> {
         self.friction.coefficient()
     }
 }
 
-/// Share of a step that a first-order filter makes in `dt`.
+/// Step response of a first-order filter after `dt`.
 fn follow(dt: f64, time_constant: f64) -> f64 {
     if time_constant > 0.0 {
         -(-dt / time_constant).exp_m1()
@@ -232,7 +229,7 @@ mod tests {
         for _ in 0..2000 {
             motion.surface_normal(&ball, 1e-3);
         }
-        // noise of 3.2 mm/s is reckoned with: 2 · 3.2² / 20² = 5 % of atan 0.15 stay
+        // assumed noise of 3.2 mm/s: 2 · 3.2² / 20² = 5 % of atan 0.15 remain
         assert!(
             motion
                 .surface_normal(&ball, 1e-3)

@@ -1,10 +1,10 @@
-//! The tip that touches: a ball, the flat end of a cylinder, or a cone with a small nose.
+//! Touching tip: a ball, the flat end of a cylinder, or a cone with a small nose.
 //!
 //! All three are bodies of revolution about z of the tip frame T, which points from the tip to the
-//! handle, and all are a *core* grown by a radius: a ball is a point, a flat end a cylinder, a cone
-//! a cone. The core is bounded by the half profile (0, z₀)–(a₀, z₀)–(a₁, z₁)–(0, z₁), so that one
-//! closed form serves all: the point farthest along a direction is that of the core and the radius
-//! on top, the distance is that from the core less the radius.
+//! handle, and all are a *core* grown by a radius: a point for a ball, a cylinder for a flat end, a
+//! cone for a cone. The half profile (0, z₀)–(a₀, z₀)–(a₁, z₁)–(0, z₁) bounds the core, so one
+//! closed form serves all: the support point is the point of the core plus the radius along the
+//! direction, the distance is the distance from the core minus the radius.
 
 use nalgebra::{Isometry3, Point3, Vector2, Vector3, vector};
 
@@ -12,7 +12,7 @@ use super::SettingError;
 use crate::numeric::tangent_basis;
 use crate::parameters;
 
-/// Which tip it is; its radius is a setting of its own.
+/// Tip shape; the radius is a setting of its own.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum TipShape {
     /// A ball; the origin of T is its centre.
@@ -22,19 +22,19 @@ pub enum TipShape {
     Flat {
         /// radius of the rounded edge, m; 0 for a sharp one
         edge_radius: f64,
-        /// how far from the face the cylinder is known to reach, m
+        /// known reach of the cylinder from the face, m
         length: f64,
     },
     /// A cone whose nose is a ball of the tip's radius; the origin of T is the centre of that ball.
     Cone {
-        /// between axis and flank, rad
+        /// angle between axis and flank, rad
         half_angle: f64,
-        /// how far from the centre of the nose the cone is known to reach, m
+        /// known reach of the cone from the centre of the nose, m
         length: f64,
     },
 }
 
-/// Where a tip is: a body of revolution needs no more of its pose.
+/// Place of a tip: a body of revolution needs no more of its pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TipPlace {
     /// origin of T, m, in O
@@ -52,15 +52,15 @@ impl From<&Isometry3<f64>> for TipPlace {
     }
 }
 
-/// Where a tip touches a surface.
+/// Contact of a tip with a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TipContact {
     /// point of the surface, m, in O
     pub point: Point3<f64>,
     /// outward normal of the surface, unit, in O
     pub normal: Vector3<f64>,
-    /// a whole line or face of the tip may touch, and this is the point of it nearest to the end of
-    /// the tip
+    /// whether a whole line or face of the tip may touch; `point` is then its point nearest to the
+    /// end of the tip
     pub is_vague: bool,
 }
 
@@ -85,7 +85,7 @@ parameters! {
 pub struct TipBody {
     shape: TipShape,
     radius: f64,
-    /// what the core is grown by, m
+    /// growth of the core, m
     round: f64,
     /// (a₀, z₀), m
     low: Vector2<f64>,
@@ -95,16 +95,15 @@ pub struct TipBody {
     flank: Vector2<f64>,
 }
 
-/// The resolution of a sharp tip is limited by how closely spaced a hand moves its strokes, m.
+/// Resolution limit of a sharp tip, m: spacing of strokes by hand.
 const HAND: f64 = 1e-3;
-/// A face or a line of the tip may touch as a whole when the normal is within so many standard
-/// deviations of it …
+/// Largest flush angle, between the normal and a face or line of the tip that touches as a whole,
+/// in standard deviations of the normal.
 const FLUSH_SIGMAS: f64 = 1.5;
-/// … but no less than this, rad: a degree, what an optical tracker leaves of the axis.
+/// Lower bound of the flush angle, rad: a degree, the axis error of an optical tracker.
 const LEAST_FLUSH: f64 = 0.0175;
 
-/// What is off the axis by less than this share of its length is on it: below, rounding is all
-/// there is.
+/// Distance from the axis, as a share of the length, below which it is mere rounding.
 const ON_AXIS: f64 = 1e-9;
 
 impl TipBody {
@@ -125,7 +124,7 @@ impl TipBody {
     /// cone.
     ///
     /// # Errors
-    /// [`SettingError`] for sizes of which no tip can be made.
+    /// [`SettingError`] for sizes of no possible tip.
     pub fn new(shape: TipShape, radius: f64) -> Result<Self, SettingError> {
         SettingError::check("tip.radius_mm", radius * 1e3, radius >= 0.0, "0 to 1000 mm")?;
         let sizes = TipSizes::default();
@@ -188,23 +187,23 @@ impl TipBody {
         })
     }
 
-    /// Which tip it is.
+    /// Tip shape.
     pub fn shape(&self) -> TipShape {
         self.shape
     }
 
-    /// Of the ball, of the flat end, or of the nose of the cone, m.
+    /// Radius of the ball, of the flat end, or of the nose of the cone, m.
     pub fn radius(&self) -> f64 {
         self.radius
     }
 
-    /// Whether it is a plain ball.
+    /// Whether the tip is a plain ball.
     #[inline]
     pub(crate) fn is_ball(&self) -> bool {
         self.shape == TipShape::Ball
     }
 
-    /// Its resolution, m: its radius, but for a cone with a sharp nose no less than the spacing of
+    /// Resolution, m: the radius, but for a cone with a sharp nose no less than the spacing of
     /// strokes by hand.
     pub fn scale(&self) -> f64 {
         match self.shape {
@@ -213,7 +212,7 @@ impl TipBody {
         }
     }
 
-    /// The tip's point farthest along `direction` (unit, in O), m, in O.
+    /// Support point: point of the tip farthest along `direction` (unit, in O), m, in O.
     pub fn support(&self, place: &TipPlace, direction: &Vector3<f64>) -> Point3<f64> {
         if self.is_ball() {
             return place.centre + direction * self.round;
@@ -238,8 +237,8 @@ impl TipBody {
         }
     }
 
-    /// Signed distance of `x` (m, in O), and the direction in which it grows, unit, in O; zero
-    /// where there is none.
+    /// Signed distance of `x` (m, in O), and the direction in which it grows, unit, in O; zero if
+    /// there is none.
     pub(crate) fn shortest_exit(&self, place: &TipPlace, x: &Point3<f64>) -> (f64, Vector3<f64>) {
         let arm = x - place.centre;
         let height = arm.dot(&place.axis);
@@ -293,12 +292,12 @@ impl TipBody {
         (distance, arm / distance)
     }
 
-    /// Where the tip touches a surface that faces `normal` (unit, in O), which is uncertain by
-    /// `sigma` (rad).
+    /// Contact of the tip with a surface that faces `normal` (unit, in O), uncertain by `sigma`
+    /// (rad).
     ///
-    /// A flat end touches with its whole face where its axis may be the normal, else with the point
-    /// of its rim; the side of a cylinder may lie on a wall or lean on an edge. `None` where the
-    /// flank of a cone or what is behind it touches: the force does not determine where along it.
+    /// A flat end touches with its whole face if its axis may be the normal, else with the point of
+    /// its rim; the side of a cylinder may lie on a wall or lean on an edge. `None` for the flank
+    /// of a cone and the shaft behind it: the force does not determine the point along it.
     pub fn touched(
         &self,
         place: &TipPlace,
@@ -346,7 +345,7 @@ impl TipBody {
             return (vec![0.0], self.round);
         }
         let length = self.high.y - self.low.y;
-        // finer than the width of the tip gains nothing, coarser covers what is beside it
+        // finer than the width of the tip gains nothing, coarser covers space beside it
         let widest = self.low.x.max(self.high.x);
         let count = (length / (widest + self.round)).ceil().clamp(1.0, 64.0);
         let half = 0.5 * length / count;
@@ -356,7 +355,7 @@ impl TipBody {
         (heights, widest.hypot(half) + self.round)
     }
 
-    /// Height on the axis of the middle of a ball that holds the tip, and its radius, m.
+    /// Height on the axis of the centre of a ball that holds the tip, and its radius, m.
     pub fn bound(&self) -> (f64, f64) {
         let half = 0.5 * (self.high.y - self.low.y);
         let widest = self.low.x.max(self.high.x);
@@ -364,7 +363,7 @@ impl TipBody {
     }
 }
 
-/// A direction as its part along the axis, the size of that across it, and the direction of the
+/// Splits a direction: its part along the axis, the size of its part across, the direction of the
 /// latter.
 fn split(axis: &Vector3<f64>, direction: &Vector3<f64>) -> (f64, f64, Vector3<f64>) {
     let along = direction.dot(axis);
@@ -411,7 +410,7 @@ mod tests {
         ]
     }
 
-    /// Directions all around, and places of a tip in them.
+    /// Directions all around, also for the axis of a tip.
     fn directions() -> Vec<Vector3<f64>> {
         let turn =
             |i: i32| UnitQuaternion::from_euler_angles(f64::from(i), 1.7 * f64::from(i), 0.3);
@@ -436,8 +435,8 @@ mod tests {
                         body.signed_distance(&place, &farthest).abs() < 1e-12,
                         "{body:?}"
                     );
-                    // all of the tip is behind the plane there: a point in front of it is at least
-                    // so far away
+                    // the whole tip is behind the plane there: a point in front of it has at least
+                    // this distance
                     let beyond = farthest + direction * 1e-3;
                     assert!((body.signed_distance(&place, &beyond) - 1e-3).abs() < 1e-12);
                     for other in directions() {

@@ -1,4 +1,4 @@
-//! The marker positions on the stylus, and the pose that fits a set of observed ones best.
+//! Marker positions on the stylus, and the pose that best fits a set of observations.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
@@ -6,10 +6,10 @@ use super::{MOST_MARKERS, MarkerObservation};
 use crate::numeric::{mean, scatter};
 use crate::stylus::SettingError;
 
-/// Markers that hold fewer than this share of the body's second extent are on a line within the
-/// noise.
+/// Smallest second extent of markers off a line, as a share of the body's second extent: below it
+/// is noise.
 const LINE_SHARE: f64 = 0.2;
-/// A body is no line when its second extent is more than this share of the first.
+/// Smallest second extent of a body that is no line, as a share of the first.
 const FLAT_SHARE: f64 = 0.02;
 
 /// The markers of a rigid body in the frame of the tip.
@@ -19,7 +19,7 @@ const FLAT_SHARE: f64 = 0.02;
 pub struct MarkerBody {
     markers_t: Vec<Point3<f64>>,
     centroid_t: Point3<f64>,
-    /// between any two markers, m
+    /// smallest distance between two markers, m
     pub(super) smallest_distance: f64,
     /// root of the middle eigenvalue of the scatter about the centroid, m
     second_extent: f64,
@@ -35,7 +35,7 @@ impl Default for MarkerBody {
     }
 }
 
-/// Which marker of the body is where: pairs of its index and a position in O.
+/// Pairs of a marker's index in the body and its position in O.
 pub(super) type MarkerPairs = [(usize, Point3<f64>)];
 
 impl MarkerBody {
@@ -53,7 +53,7 @@ impl MarkerBody {
     ///
     /// # Errors
     /// [`SettingError`] for fewer than 3 or more than [`MOST_MARKERS`], markers at one place or on
-    /// one line, and for anything not finite.
+    /// one line, and values that are not finite.
     pub fn new(markers_t: Vec<Point3<f64>>) -> Result<Self, SettingError> {
         let count = markers_t.len();
         let fits = (3..=MOST_MARKERS).contains(&count);
@@ -110,16 +110,15 @@ impl MarkerBody {
         self.centroid_t
     }
 
-    /// Whether these markers hold the body in all six directions: three that are not on a line.
+    /// Whether these markers determine all six degrees of freedom: three that are not on a line.
     pub(super) fn is_held_by(&self, pairs: &MarkerPairs) -> bool {
         pairs.len() >= 3
             && extents(pairs.iter().map(|&(i, _)| self.markers_t[i]))[1]
                 > LINE_SHARE * self.second_extent
     }
 
-    /// The pose of T in O with the least squares of distances between markers and their measured
-    /// places \[Umeyama 1991\]: with H = Σ (r − r̄)(m − m̄)ᵀ = U S Vᵀ, R = V diag(1, 1, det V Uᵀ)
-    /// Uᵀ.
+    /// Pose of T in O by least squares of the distances between markers and their measured places
+    /// \[Umeyama 1991\]: with H = Σ (r − r̄)(m − m̄)ᵀ = U S Vᵀ, R = V diag(1, 1, det V Uᵀ) Uᵀ.
     pub(super) fn fit(&self, pairs: &MarkerPairs) -> Option<Isometry3<f64>> {
         let from = centroid(pairs.iter().map(|&(i, _)| self.markers_t[i]));
         let to = centroid(pairs.iter().map(|&(_, m)| m));
@@ -147,12 +146,11 @@ impl MarkerBody {
             .then_some(pose_ot)
     }
 
-    /// The pose at which most of the seen markers, and at least three, are within `gate` of a
-    /// marker of the body, and which markers those are; `None` when not more than half of them
-    /// agree.
+    /// Pose with most of the seen markers, and at least three, within `gate` of a marker of the
+    /// body, and these matches; `None` unless more than half of the seen markers agree.
     ///
-    /// Every three markers are tried in turn, each identified by its label, so that swapped labels
-    /// and outliers are outvoted.
+    /// Tries every three markers in turn, each identified by its label, so that the majority
+    /// outvotes swapped labels and outliers.
     pub(super) fn acquire(
         &self,
         seen: &[MarkerObservation],
@@ -191,9 +189,9 @@ impl MarkerBody {
             .then_some(pose_ot)
     }
 
-    /// Which seen marker is which of the body at that pose: the labelled one when it is within
-    /// `gate`, or else the one that is. Nothing else can be, for markers are farther apart than
-    /// twice the gate.
+    /// Matches the seen markers to the body at that pose: to the labelled marker if it is within
+    /// `gate`, else to any that is. No other can be, as markers are farther apart than twice the
+    /// gate.
     pub(super) fn matched(
         &self,
         pose_ot: &Isometry3<f64>,
@@ -217,15 +215,15 @@ impl MarkerBody {
     }
 }
 
-/// Observed markers that are identified with markers of the body.
+/// Observed markers matched to markers of the body.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Matches {
     pairs: [(usize, Point3<f64>); MOST_MARKERS],
     distances: [f64; MOST_MARKERS],
     count: usize,
-    /// labels that were wrong
+    /// wrong labels
     pub relabelled: u64,
-    /// markers that are none of the body
+    /// markers that match none of the body
     pub rejected: u64,
 }
 
@@ -245,7 +243,7 @@ impl Matches {
         &self.pairs[..self.count]
     }
 
-    /// Of two at the place of one marker the nearer counts.
+    /// Adds a match; of two matches of one marker the nearer counts.
     fn add(&mut self, i: usize, position: Point3<f64>, distance: f64, relabelled: bool) {
         let twin = self.pairs().iter().position(|&(other, _)| other == i);
         self.rejected += u64::from(twin.is_some());
@@ -258,7 +256,7 @@ impl Matches {
         }
     }
 
-    /// More markers, or as many at less distance.
+    /// Whether it has more markers, or as many at less distance.
     fn beats(&self, other: &Self) -> bool {
         let off = |matches: &Self| {
             matches.distances[..matches.count]

@@ -9,33 +9,33 @@ use crate::stylus::stream::Stream;
 use crate::stylus::sync::interpolated;
 use crate::stylus::{SettingError, StampedPose, SyncCounts, SyncParams};
 
-/// What is known of the pose.
+/// Knowledge of the pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tracking {
-    /// The markers hold the body.
+    /// The markers determine it.
     Held,
-    /// They did a moment ago; it flies on.
+    /// They did a moment ago; the body flies on.
     Coasting,
     /// No pose.
     Lost,
 }
 
-/// What became of frames and markers so far.
+/// Frames and markers by outcome.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct MarkerCounts {
-    /// frames whose markers held the body
+    /// frames whose markers determined the pose
     pub held: u64,
-    /// frames through which the body flew on
+    /// frames during which the body flew on
     pub coasting: u64,
     /// frames without a pose
     pub lost: u64,
-    /// markers that another label belongs to
+    /// markers with a wrong label
     pub relabelled: u64,
-    /// markers that are none of the body
+    /// markers that match none of the body
     pub rejected: u64,
 }
 
-/// Frames that are held while earlier ones may still arrive: a tenth of a second at 640 Hz.
+/// Maximum number of frames waiting for earlier ones: a tenth of a second at 640 Hz.
 const HELD_FRAMES: usize = 64;
 
 /// Follows a rigid body by its markers. Memory is bounded and allocated once, in
@@ -76,7 +76,7 @@ pub struct MarkerFilter {
 #[derive(Clone, Copy, Debug)]
 struct Tracked {
     stamp_ns: i64,
-    /// when its markers last held it
+    /// last time at which its markers determined the pose
     held_ns: i64,
     motion: BodyMotion,
 }
@@ -102,8 +102,8 @@ impl MarkerFilter {
         })
     }
 
-    /// Takes the next frame and gives the poses that no later frame can change to `each`, in order
-    /// of time.
+    /// Takes the next frame and gives `each` the poses that no later frame can change, in order of
+    /// time.
     pub fn push(&mut self, frame: &MarkerFrame, mut each: impl FnMut(StampedPose)) {
         self.frames.push(*frame, &self.order);
         while self
@@ -116,7 +116,7 @@ impl MarkerFilter {
         }
     }
 
-    /// Nothing more will come: gives out what is held.
+    /// Ends the frames: gives the remaining poses.
     pub fn finish(&mut self, mut each: impl FnMut(StampedPose)) {
         self.frames.finish(&self.order);
         while !self.frames.held.is_empty() {
@@ -124,7 +124,7 @@ impl MarkerFilter {
         }
     }
 
-    /// As of the last frame that was used.
+    /// State as of the last frame in use.
     pub fn tracking(&self) -> Tracking {
         match &self.tracked {
             None => Tracking::Lost,
@@ -133,17 +133,17 @@ impl MarkerFilter {
         }
     }
 
-    /// What became of frames and markers.
+    /// Frames and markers by outcome.
     pub fn counts(&self) -> &MarkerCounts {
         &self.counts
     }
 
-    /// Frames that were not used, and why.
+    /// Unused frames by reason.
     pub fn frame_counts(&self) -> &SyncCounts {
         &self.frames.counts
     }
 
-    /// Uses the earliest frame that is held.
+    /// Uses the earliest waiting frame.
     fn step(&mut self, each: &mut impl FnMut(StampedPose)) {
         let Some(frame) = self.frames.held.front().copied() else {
             return;
@@ -181,8 +181,8 @@ impl MarkerFilter {
         })
     }
 
-    /// The body flown on to the frame and pulled by its markers; `None` when too little has held it
-    /// for too long.
+    /// Flies the body on to the frame and pulls it by its markers; `None` after too little hold for
+    /// too long.
     fn follow(&mut self, before: &Tracked, frame: &MarkerFrame) -> Option<Tracked> {
         if frame.stamp_ns.saturating_sub(before.held_ns) > self.params.coast_ns {
             return None;
@@ -195,8 +195,7 @@ impl MarkerFilter {
         self.counts.relabelled += matches.relabelled;
         self.counts.rejected += matches.rejected;
         let is_held = self.body.is_held_by(matches.pairs());
-        // what has gone astray since the speed was last corrected is not taken for the speed of the
-        // last moment
+        // drift since the last correction of the speed must not count as speed of the last moment
         let since_ns = if is_held {
             before.held_ns
         } else {

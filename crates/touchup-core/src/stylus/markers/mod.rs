@@ -1,10 +1,10 @@
-//! The pose of a stylus from the LED markers on it, whichever of them are observed.
+//! Pose of a stylus from any observed subset of its LED markers.
 //!
-//! A rigid body with its mass in the markers is pulled by a spring and a damper at each marker that
-//! is seen to where it is measured; between two frames it flies on. Spring k and damper d for a
-//! mass m determine how: by the natural frequency √(k/m) and the damping d/(2 √(k m)).
-//! [`MarkerFilter`] finds the first pose in closed form, follows it through occlusion, swapped
-//! labels and outliers, and gives poses at a steady rate.
+//! A spring and a damper at each seen marker pull a rigid body, with its mass in the markers, to
+//! the measured place; between two frames it flies on. Spring k and damper d for a mass m determine
+//! the natural frequency √(k/m) and the damping d/(2 √(k m)). [`MarkerFilter`] finds the first pose
+//! in closed form, follows it through occlusion, swapped labels and outliers, and gives poses at a
+//! steady rate.
 
 mod body;
 mod filter;
@@ -20,19 +20,19 @@ use super::SettingError;
 use super::stream::Stamped;
 use crate::parameters;
 
-/// Markers that a body, and a frame, may have.
+/// Maximum number of markers of a body, and of a frame.
 pub const MOST_MARKERS: usize = 16;
 
 /// The measured position of one marker.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MarkerObservation {
-    /// which marker of the body the camera takes it for; it may be wrong, or none of the body
+    /// label from the camera: index of the marker in the body; may be wrong, or none of the body
     pub label: u32,
-    /// where, m, in O
+    /// position, m, in O
     pub position: Point3<f64>,
 }
 
-/// The markers observed at one instant.
+/// Markers observed at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MarkerFrame {
     /// Time of measurement, ns.
@@ -55,7 +55,7 @@ impl MarkerFrame {
         }
     }
 
-    /// Adds a marker; `false` when it is not finite, absurdly far or one too many, and not added.
+    /// Adds a marker; refuses with `false` one that is not finite, absurdly far or one too many.
     pub fn see(&mut self, marker: MarkerObservation) -> bool {
         let fits = marker
             .position
@@ -89,7 +89,7 @@ parameters! {
     pub struct MarkerParams in "markers" {
         /// Noise of a marker per axis.
         ///
-        /// In m: what lies much farther from the fit counts little. An active LED system at 2 m.
+        /// In m: markers much farther from the fit count little. An active LED system at 2 m.
         noise: f64 = 0.15, "noise_mm" [MM, 1e-6, 1000];
         /// A marker farther than this from where it is expected is another one, or none; less than
         /// half of the smallest distance between two markers.
@@ -118,8 +118,8 @@ parameters! {
 }
 
 impl MarkerParams {
-    /// Refuses the first setting that is not in its range, and a gate that could take one marker of
-    /// `body` for another.
+    /// Refuses the first setting outside its range, and a gate that could confuse two markers of
+    /// `body`.
     ///
     /// # Errors
     /// [`SettingError`]

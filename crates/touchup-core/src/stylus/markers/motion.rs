@@ -1,4 +1,4 @@
-//! The motion model of the body: flight, pulled by springs and dampers.
+//! Motion model of the body: free flight with the pull of springs and dampers.
 //!
 //! For one degree of freedom let e be the distance to the measured place. A damper that acts on the
 //! speed relative to the *measured* motion does not lag behind a steady hand; in the observer form
@@ -22,8 +22,8 @@ parameters! {
         /// Natural frequency √(k/m) / 2π of the springs between the body and its markers: higher
         /// follows faster, lower smooths more.
         ///
-        /// In Hz. A hand that accelerates by 1 m/s² is followed 0.2 mm behind, and the noise of
-        /// frames at 200 Hz falls to two thirds.
+        /// In Hz. Behind a hand that accelerates by 1 m/s² the body lags by 0.2 mm, and the noise
+        /// of frames at 200 Hz falls to two thirds.
         frequency: f64 = 12.0, "spring_hz" [HZ, 0.001, 1e6];
         /// Damping d / (2 √(k m)): 1 is the fastest that does not swing.
         damping: f64 = 1.0, "damping" [ONE, 0.5, 100];
@@ -46,28 +46,28 @@ impl SpringParams {
     }
 }
 
-/// Share of the mass that sits in all markers; the remainder sits in those that are observed. It
-/// keeps the body from being thrown about where the seen ones do not hold it: there it flies on.
+/// Share of the mass that sits in all markers; the remainder sits in the observed ones. It keeps
+/// the body from jumping in directions that these do not determine: there it flies on.
 const LOOSE_MASS: f64 = 0.02;
-/// Frames closer than this give no velocity but noise, s.
+/// Frame interval below which a velocity is mere noise, s.
 const SHORTEST: f64 = 1e-3;
-/// … and for the first ones, which have no earlier frames, s.
+/// Frame interval below which the velocity of the first frames is mere noise, s.
 const FIRST_SHORTEST: f64 = 5e-3;
-/// Rounds in which the weights of the markers are found.
+/// Rounds of the marker weights.
 const ROUNDS: usize = 3;
-/// A marker this many times the noise away from the fit counts half.
+/// Distance from the fit at which a marker counts half, in units of the noise.
 const HALF_WEIGHT: f64 = 3.0;
 
-/// The body's pose and its motion, about the centroid of its markers.
+/// Pose and motion of the body, about the centroid of its markers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct BodyMotion {
     pub centroid: Point3<f64>,
     pub rotation: UnitQuaternion<f64>,
-    /// of the centroid, m/s, in O
+    /// velocity of the centroid, m/s, in O
     velocity: Vector3<f64>,
-    /// rad/s, in O
+    /// angular velocity, rad/s, in O
     spin: Vector3<f64>,
-    /// frames that went into it
+    /// frames in use
     pub frames: u32,
 }
 
@@ -99,7 +99,7 @@ impl BodyMotion {
         }
     }
 
-    /// Pulled by the seen markers after a flight of `dt` s.
+    /// Pulls the body by the seen markers after a flight of `dt` s.
     pub fn pull(
         &mut self,
         body: &MarkerBody,
@@ -131,7 +131,7 @@ impl BodyMotion {
         self.spin += turn * rate;
     }
 
-    /// Where the springs pull: M⁻¹ Σ w Jᵀ e with J = \[1, −\[r\]×\], the small motion (shift, turn)
+    /// Motion by the springs: M⁻¹ Σ w Jᵀ e with J = \[1, −\[r\]×\], the small motion (shift, turn)
     /// that takes the body to equilibrium among the observed markers. The eigenvalues of M⁻¹ Σ w
     /// JᵀJ lie in \[0, 1\], so no set of markers makes a step too long.
     fn twist(&self, body: &MarkerBody, pairs: &MarkerPairs, noise: f64) -> Option<Vector6<f64>> {
