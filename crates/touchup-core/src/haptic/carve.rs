@@ -1,8 +1,8 @@
-//! Carving (case 2): what the tip passes through is not there.
+//! Carving (case 2): moves surface out of the path of the tip.
 //!
-//! All faces inside the tip are displaced at once, the deepest first: the closest one along the arm
-//! from it to the centre of the ball, the others, of which only those count that the tip comes to
-//! from the front, out of the tip along the shortest path.
+//! All faces inside the tip move at once, the deepest first: the closest one along the arm from it
+//! to the centre of the ball, the others out of the tip along the shortest path, if the tip comes
+//! to them from the front.
 
 use nalgebra::{Point3, Vector3};
 
@@ -11,10 +11,10 @@ use crate::mesh::{FaceHit, FaceId, triangle};
 use crate::numeric::length_and_direction;
 use crate::stylus::{Ball, TipBody, TipPlace, TouchState};
 
-/// Faces beside the closest one that move in one update, at most: those of a ball on a scan as
-/// coarse as itself.
+/// Maximum number of faces to move in one update beside the closest one: a ball on a scan as coarse
+/// as itself.
 const MOST_OTHERS: usize = 6;
-/// An arm whose sine to the face is below this lies sideways.
+/// Sine of the angle between arm and face below which the arm lies sideways.
 const SIDEWAYS: f64 = 0.2;
 
 /// A point of a face inside the tip.
@@ -27,7 +27,7 @@ struct Inside {
 }
 
 impl Refiner {
-    /// Moves what is inside the tip out of it, unless the touch is too light to say so.
+    /// Moves faces out of the tip, unless the touch is too light to decide.
     pub(super) fn carve(
         &mut self,
         ball: &Ball,
@@ -38,7 +38,7 @@ impl Refiner {
         let Some(carve) = self.params.carve else {
             return update;
         };
-        // a mesh that the tip does not enter by more than the tolerance is left alone
+        // penetration up to the tolerance leaves the mesh as it is
         let (tolerance, hint) = if state == TouchState::Contact {
             (carve.contact_tolerance.max(carve.tolerance), self.nearest)
         } else {
@@ -56,7 +56,7 @@ impl Refiner {
         else {
             return update;
         };
-        // before the face is moved
+        // before the face moves
         let mismatch =
             (update.case == Case::Free).then(|| self.mismatch_in_free_motion(ball, hit.face));
         if state == TouchState::Light {
@@ -72,15 +72,14 @@ impl Refiner {
         self.gather(&place, tolerance, hit.face);
         for at in 0..self.inside_faces.len().min(MOST_OTHERS) {
             let face = self.inside_faces[at].1;
-            // the faces before it have taken its corners along
+            // the faces before it have moved its corners
             if let Some(inside) = self
                 .inside(&place, face)
                 .filter(|inside| inside.depth > tolerance)
             {
                 let moved = self.displace(&carve, face, &inside, dt);
                 fit = fit.or(Some(moved));
-                // if the mesh cannot follow a deeper face, it does not follow those beside it
-                // either
+                // a mesh that cannot follow a deeper face does not follow the faces beside it
                 if moved == RegionFit::CutBack {
                     break;
                 }
@@ -100,7 +99,7 @@ impl Refiner {
         }
     }
 
-    /// Moves a face by the share of its depth that is carved in `dt` (s).
+    /// Moves a face by the share of its depth to carve in `dt` (s).
     fn displace(
         &mut self,
         carve: &CarveParams,
@@ -123,8 +122,8 @@ impl Refiner {
         fit
     }
 
-    /// Finds the faces deeper in the tip than `tolerance` (m), the deepest first; not the `first`,
-    /// when the tip is a ball.
+    /// Finds the faces deeper in the tip than `tolerance` (m), the deepest first; without `first`
+    /// if the tip is a ball.
     fn gather(&mut self, place: &TipPlace, tolerance: f64, first: FaceId) {
         let (height, bound) = self.body.bound();
         let (middle, half) = (
@@ -135,7 +134,7 @@ impl Refiner {
             .tree
             .faces_in_box(&(middle - half), &(middle + half), &mut self.near_faces);
         let near = &mut self.near_faces.faces;
-        // in the order of their names: that of the tree depends on how it was built
+        // in order of ids: the order in the tree depends on its construction
         near.sort_unstable();
         let stride = near.len().div_ceil(MOST_LOOKED_AT).max(1);
         let mut found = std::mem::take(&mut self.inside_faces);
@@ -158,8 +157,7 @@ impl Refiner {
         self.inside_faces = found;
     }
 
-    /// The deepest point of a face that the tip comes to from the front, of those that are looked
-    /// at.
+    /// Deepest tested point of a face, if the tip comes to the face from the front.
     fn inside(&self, place: &TipPlace, face: FaceId) -> Option<Inside> {
         if self.deformable.is_stiff(face) {
             return None;
@@ -178,7 +176,7 @@ impl Refiner {
         })
     }
 
-    /// The direction in which the mesh yields to the ball, and how deep the ball is in it.
+    /// Direction in which the mesh yields to the ball, and depth of the ball in it.
     fn penetration(&self, centre: &Point3<f64>, hit: &FaceHit) -> Option<Inside> {
         let normal = self.deformable.mesh.normal(hit.face);
         let arm = centre - hit.point;
@@ -202,8 +200,8 @@ impl Refiner {
     }
 }
 
-/// The point of a triangle deepest in the tip, with its barycentric coordinates; of a body that is
-/// no ball, the best of the points closest to some balls along its axis.
+/// Point of a triangle deepest in the tip, with its barycentric coordinates; for a body that is no
+/// ball, the best of the points closest to some balls along its axis.
 fn deepest_point(
     body: &TipBody,
     place: &TipPlace,

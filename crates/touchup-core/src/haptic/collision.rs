@@ -1,5 +1,5 @@
-//! Self-collision: each pair of faces that could meet is tested exactly, and then left alone for as
-//! long as it cannot.
+//! Self-collision: an exact test of each pair of faces that could meet, with none until it could
+//! meet again.
 
 use nalgebra::{Point3, Vector3};
 
@@ -9,10 +9,10 @@ use crate::numeric::{direction, length_and_direction};
 
 type TrianglePoints = [Point3<f64>; 3];
 
-/// A share of the altitude below which the bound on a turning normal in [`margin_at_corner`] holds.
+/// Share of the altitude up to which the bound on a turning normal in [`margin_at_corner`] holds.
 const SMALL_TURN: f64 = 0.1;
 
-/// Pairs to make room for.
+/// Room for pairs per face.
 const PAIRS_PER_FACE: usize = 16;
 
 /// Two faces that share no edge.
@@ -21,15 +21,15 @@ struct FacePair {
     faces: [FaceId; 2],
     /// index of the common corner in either face
     common: Option<[u8; 2]>,
-    /// the pair cannot meet before vertices have moved this far in all, m
+    /// motion of the vertices before which the pair cannot meet, m
     safe_until: f64,
 }
 
-/// All pairs of a region that could come to meet.
+/// All pairs of a region that could meet.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Pairs {
     list: Vec<FacePair>,
-    /// what the fastest vertex has moved since the list was made, m
+    /// motion of the fastest vertex since the start of the list, m
     travel: f64,
 }
 
@@ -40,8 +40,8 @@ impl Pairs {
         self.travel = 0.0;
     }
 
-    /// Finds the pairs of `face` and each of `others` that are no farther apart than `margin` (m)
-    /// and that `is_wanted`, unless they share an edge: neighbours fold, they do not pierce.
+    /// Finds the pairs of `face` and each of `others` that are within `margin` (m) and `is_wanted`,
+    /// unless they share an edge: neighbours fold, they do not pierce.
     ///
     /// - `is_smooth`: whether two faces in a fan around this vertex cannot meet.
     pub fn add_near(
@@ -81,10 +81,10 @@ impl Pairs {
         self.list.reserve(PAIRS_PER_FACE * faces);
     }
 
-    /// Whether no pair has come to meet by an update whose largest step is `displacement` (m).
+    /// Whether no pair has begun to meet by an update whose largest step is `displacement` (m).
     ///
-    /// - `gap`: faces nearer than this meet, m.
-    /// - `before`: the position of a vertex before the update, m; a pair that met then may go on.
+    /// - `gap`: distance below which faces meet, m.
+    /// - `before`: position of a vertex before the update, m; a pair that met then may go on.
     pub fn are_clear(
         &mut self,
         mesh: &TriMesh,
@@ -102,15 +102,14 @@ impl Pairs {
                 let [t, u] = pair.faces.map(|face| mesh.corners(face).map(&before));
                 return meet(&t, &u, pair.common, gap);
             }
-            // should the update be taken back after all, the pair is `displacement` away from where
-            // it was looked at
+            // after a withdrawn update the pair is `displacement` away from the tested state
             pair.safe_until = travel + margin(&t, &u, pair.common, gap) - displacement;
             true
         })
     }
 
-    /// Finds how far each pair can go before it could meet, where it does not now: until then no
-    /// update needs to look at it.
+    /// Finds the motion before which each pair that does not meet now cannot meet: until then no
+    /// update needs to test it.
     ///
     /// - `gap`: as in [`Self::are_clear`].
     pub fn measure(&mut self, mesh: &TriMesh, gap: f64) {
@@ -129,7 +128,7 @@ impl Pairs {
     }
 }
 
-/// How far every vertex may move before two faces can meet, m; 0 when there is no simple bound.
+/// Motion of the vertices before which two faces cannot meet, m; 0 without a simple bound.
 fn margin(t: &TrianglePoints, u: &TrianglePoints, common: Option<[u8; 2]>, gap: f64) -> f64 {
     match common.map(|pair| pair.map(usize::from)) {
         Some([i, j]) => margin_at_corner(t, i, u, j)
@@ -151,8 +150,8 @@ fn margin(t: &TrianglePoints, u: &TrianglePoints, common: Option<[u8; 2]>, gap: 
     }
 }
 
-/// How far all of `u` lies beyond an edge of `t`, along its plane and across that edge, m; negative
-/// when it does not.
+/// Distance of all of `u` beyond an edge of `t`, along its plane and across that edge, m; negative
+/// if not all of `u` is beyond.
 fn beside(t: &TrianglePoints, u: &TrianglePoints) -> f64 {
     let normal = (t[1] - t[0]).cross(&(t[2] - t[0]));
     let beyond = |i: usize| {
@@ -167,12 +166,12 @@ fn beside(t: &TrianglePoints, u: &TrianglePoints) -> f64 {
     (0..3).filter_map(beyond).fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// How far every vertex may move before two faces with a common corner, `i` of `t` and `j` of `u`,
-/// can meet beside it, m: while a plane through the corner has one face on either side. Tried are
-/// the planes halfway between an edge of one and an edge of the other.
+/// Motion of the vertices before which two faces with a common corner, `i` of `t` and `j` of `u`,
+/// cannot meet beside it, m: a plane through the corner has one face on either side. Tries the
+/// planes halfway between an edge of one and an edge of the other.
 ///
-/// The height of a point above a plane through the corner, of a direction that stays, changes by no
-/// more than 2 m when both move by m.
+/// The height of a point above a plane through the corner, of fixed direction, changes by no more
+/// than 2 m when both move by m.
 fn margin_between_arms(t: &TrianglePoints, i: usize, u: &TrianglePoints, j: usize) -> f64 {
     let arms_of = |triangle: &TrianglePoints, at: usize| {
         [1, 2].map(|next| triangle[(at + next) % 3] - triangle[at])
@@ -198,7 +197,7 @@ fn margin_between_arms(t: &TrianglePoints, i: usize, u: &TrianglePoints, j: usiz
     0.5 * widest
 }
 
-/// How far all of `u` lies on one side of the plane of `t`, m; negative when it does not.
+/// Distance of all of `u` on one side of the plane of `t`, m; negative if it is on both.
 fn height_above(t: &TrianglePoints, u: &TrianglePoints) -> f64 {
     let Some(normal) = direction(&(t[1] - t[0]).cross(&(t[2] - t[0]))) else {
         return f64::NEG_INFINITY;
@@ -212,11 +211,11 @@ fn height_above(t: &TrianglePoints, u: &TrianglePoints) -> f64 {
     low.max(-high)
 }
 
-/// How far every vertex may move before the edge of `u` across its corner `j`, the same as corner
-/// `i` of `t`, can reach the plane of `t`, m.
+/// Motion of the vertices before which the edge of `u` across its corner `j`, the same as corner
+/// `i` of `t`, cannot reach the plane of `t`, m.
 ///
 /// The height of a point at distance r from the corner changes by no more than 2 m + r |Δn| when
-/// all vertices move by m, and |Δn| ≤ 3 m / altitude while m is small.
+/// all vertices move by m, and |Δn| ≤ 3 m / altitude for small m.
 fn margin_at_corner(t: &TrianglePoints, i: usize, u: &TrianglePoints, j: usize) -> f64 {
     let double = (t[1] - t[0]).cross(&(t[2] - t[0]));
     let (area, normal) = length_and_direction(&double);
@@ -254,7 +253,7 @@ mod tests {
         assert_eq!(margin(&t, &through, None, 0.0), 0.0);
     }
 
-    /// An own small generator, from −0.5 to 0.5.
+    /// A small generator of its own, from −0.5 to 0.5.
     fn random() -> impl FnMut() -> f64 {
         let mut state = 1u64;
         move || {

@@ -12,39 +12,38 @@ use crate::mesh::{
 };
 use crate::reconstruct::{PatchDelta, Support};
 
-/// An update that would break the mesh is tried again at this share of its length …
+/// Factor on the length of an update that would break the mesh, for the next try.
 const CUT: f64 = 0.35;
-/// … this often, and then given up.
+/// Maximum number of tries of an update.
 const TRIES: usize = 3;
-/// Other faces within this many mean edges are in the way of a region while its handle stays.
+/// Distance of other faces in the way of a region while its handle stays, in mean edges.
 const MARGIN_EDGES: f64 = 0.2;
-/// By how much of the mean edge the boxes of what moves are made wider: a touch moves vertices by
-/// less while it stays on a face.
+/// Margin on the boxes of moving faces, in mean edges: a touch moves vertices by less while it
+/// stays on a face.
 const BOX_MARGIN_EDGES: f64 = 0.05;
 
-/// How an update ended.
+/// Outcome of an update.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RegionFit {
     /// As computed.
     Whole,
-    /// Shortened, or not made at all, because the mesh would have folded, flipped, starved or met
-    /// itself.
+    /// Shortened, or omitted, because the mesh would have folded, flipped, starved or met itself.
     CutBack,
 }
 
 /// Memory of a mesh under refinement, bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Footprint {
-    /// positions, faces, adjacency, where each vertex was scanned, the normal measured on each face
+    /// positions, faces, adjacency, scanned positions of vertices, measured normals of faces
     pub mesh: usize,
-    /// the tree over the faces
+    /// tree over the faces
     pub tree: usize,
-    /// what is kept of a patch that is followed
+    /// data of a followed patch
     pub patch: usize,
 }
 
-/// A mesh under refinement: the triangles, the tree over them, and what was scanned or measured
-/// where.
+/// A mesh under refinement: the triangles, the tree over them, and the scanned or measured
+/// evidence.
 #[derive(Clone, Debug)]
 pub(super) struct DeformableMesh {
     pub mesh: TriMesh,
@@ -56,13 +55,13 @@ pub(super) struct DeformableMesh {
     guard: Option<GuardParams>,
     /// mean edge length, m
     pub mean_edge: f64,
-    /// vertices stay within this distance of where they were scanned, m
+    /// maximum distance of vertices from their scanned positions, m
     pub largest_move: f64,
-    /// vertices that were scanned outside of it stay; `None`: all may move
+    /// vertices scanned outside of it stay; `None`: all may move
     movable: Option<Region>,
     /// stamp of the current sample, ns
     pub now_ns: i64,
-    /// counts the edits, so that a region can detect edits by others
+    /// number of edits, by which a region detects edits by others
     edits: u64,
     displacements: Vec<Vector3<f64>>,
     before: Vec<Point3<f64>>,
@@ -70,16 +69,16 @@ pub(super) struct DeformableMesh {
     strokes: Option<StrokeUndo>,
 }
 
-/// A region of interest with the edit after which it was last looked at.
+/// A region of interest with the edit after its last check.
 #[derive(Clone, Debug)]
 pub(super) struct HandleRegion {
     pub roi: Roi,
     size: RoiSize,
     refit: RefitPlan,
     seen: Option<u64>,
-    /// whether the motion that needs no look was bounded since the region was refreshed
+    /// whether a bound on unchecked motion exists since the last refresh
     is_bounded: bool,
-    /// other faces within this distance are in its way, m
+    /// distance within which other faces are in its way, m
     margin: f64,
 }
 
@@ -120,8 +119,8 @@ impl DeformableMesh {
         }
     }
 
-    /// The closest face nearer than `reach` (m), sooner if it is near `hint`, and `p` near what was
-    /// asked for last with `nearby`.
+    /// Closest face nearer than `reach` (m); faster near `hint`, and for `p` near the last query
+    /// with `nearby`.
     pub fn closest(
         &self,
         p: &Point3<f64>,
@@ -143,7 +142,7 @@ impl DeformableMesh {
         self.evidence[face.0 as usize] = normal.cast::<f32>().into();
     }
 
-    /// An empty region with room for one of this size.
+    /// An empty region with room for this size.
     pub fn region(&mut self, size: RoiSize) -> HandleRegion {
         let vertices = size.room(self.mean_edge);
         self.displacements.reserve(vertices);
@@ -158,8 +157,7 @@ impl DeformableMesh {
         }
     }
 
-    /// Makes the region that of `handle`, and looks at it again where the mesh was changed
-    /// elsewhere.
+    /// Makes `region` the region of `handle`, and checks it again after edits elsewhere.
     pub fn prepare(&mut self, region: &mut HandleRegion, handle: FaceId) {
         if region.roi.handle != Some(handle) {
             region
@@ -182,7 +180,7 @@ impl DeformableMesh {
         }
     }
 
-    /// Whether a region is that of `handle` in the mesh as it is.
+    /// Whether `region` is the region of `handle` in the current mesh.
     pub fn is_prepared(&self, region: &HandleRegion, handle: FaceId) -> bool {
         region.roi.handle == Some(handle) && region.seen == Some(self.edits)
     }
@@ -226,7 +224,7 @@ impl DeformableMesh {
         fit
     }
 
-    /// Keeps what it takes to undo strokes from here on, unless a patch is followed.
+    /// Keeps an undo history of strokes from here on, unless there is a patch.
     pub fn keep_strokes(&mut self) {
         self.strokes = self.patch.is_none().then(StrokeUndo::default);
     }
@@ -238,8 +236,7 @@ impl DeformableMesh {
         }
     }
 
-    /// Takes the last stroke back, or does again what was undone last; returns whether there was
-    /// any.
+    /// Undoes the last stroke, or redoes the last undone one; returns whether there was one.
     pub fn change_strokes(&mut self, is_undo: bool) -> bool {
         let Self {
             strokes,
@@ -264,7 +261,7 @@ impl DeformableMesh {
         true
     }
 
-    /// Makes ready to follow a patch, with room for so many new faces.
+    /// Prepares to follow a patch, with room for `faces` new faces.
     pub fn expect_patch(&mut self, faces: usize) -> Result<(), MeshError> {
         self.mesh.reserve(faces / 2, faces)?;
         self.tree.reserve(faces)?;
@@ -286,8 +283,8 @@ impl DeformableMesh {
         })
     }
 
-    /// Begins to take up what changed in the patch: puts vertices that moved last before that back
-    /// to where they were scanned, or are in the patch; returns whether there was any.
+    /// Begins to take up the changes of the patch: vertices that moved last before them return to
+    /// their scanned or patch positions; returns whether there were any.
     pub fn begin_delta(&mut self, delta: &PatchDelta) -> bool {
         let Self {
             patch: Some(patch),
@@ -324,8 +321,8 @@ impl DeformableMesh {
         !refit.is_empty()
     }
 
-    /// Takes up to `most` parts more of it, as [`crate::reconstruct::Splice::go_on`]; whether that
-    /// was all.
+    /// Takes up to `most` more parts of the changes, as [`crate::reconstruct::Splice::go_on`];
+    /// returns whether they are complete.
     pub fn go_on(&mut self, delta: &PatchDelta, most: usize) -> Result<bool, MeshError> {
         let Self {
             patch: Some(patch),
@@ -437,7 +434,7 @@ impl DeformableMesh {
             .judge(mesh, &self.evidence(guard), share * longest, was)
     }
 
-    /// The displacement of each vertex of the region; returns the longest, m.
+    /// Displacement of each vertex of the region; returns the longest, m.
     fn displace(&mut self, roi: &Roi, steps: &[Vector3<f64>; 3]) -> f64 {
         self.displacements.clear();
         self.before.clear();
@@ -456,8 +453,7 @@ impl DeformableMesh {
             let (moved, next) = (here - scanned, here + step - scanned);
             let is_far = next.norm_squared() > self.largest_move * self.largest_move
                 && next.norm() > moved.norm();
-            // the last look at what all formulas before came to: a vertex never goes where there is
-            // no place
+            // last check after all formulas: a vertex never goes to an invalid place
             if is_stiff || is_far || !is_place(&(here + step)) {
                 step = Vector3::zeros();
             }

@@ -1,5 +1,5 @@
-//! Closed fans of faces around a vertex: as long as one is a height field, its faces meet in their
-//! common corner alone.
+//! Closed fans of faces around a vertex: while a fan is a height field, its faces meet only in
+//! their common corner.
 
 use nalgebra::{Point3, Vector3};
 
@@ -8,20 +8,20 @@ use super::scratch_map::ScratchMap;
 use crate::mesh::{FaceId, TriMesh, VertexId, triangle};
 use crate::numeric::direction;
 
-/// The smooth fans around the corners of a region that moves.
+/// Smooth fans around the corners of a moving region.
 ///
-/// The faces of a closed fan whose normals are all on one side of a plane, and that go around its
-/// vertex once, have projections on that plane that lie beside each other.
+/// The faces of a closed fan that goes around its vertex once, with all normals on one side of a
+/// plane, have projections on that plane that lie beside each other.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Fans {
     list: Vec<CornerFan>,
-    /// numbers in the ring of those faces of the fans that move, fan after fan
+    /// ring numbers of the moving faces of the fans, fan after fan
     moving: Vec<u32>,
-    /// corners of the moving faces by number …
+    /// numbers of the corners of the moving faces
     corners: ScratchMap,
-    /// … and whether the fan around each is smooth
+    /// whether the fan around each corner is smooth
     are_smooth: Vec<bool>,
-    /// a fan: neighbours of its vertex at the start and at the end of each face, m from it
+    /// a fan: neighbours of its vertex at the start and at the end of each face, relative to it, m
     spokes: Vec<[Spoke; 2]>,
     normals: Vec<Vector3<f64>>,
 }
@@ -31,14 +31,14 @@ type Spoke = (VertexId, Vector3<f64>);
 #[derive(Clone, Copy, Debug)]
 struct CornerFan {
     corner: VertexId,
-    /// of the normals, unit
+    /// mean normal, unit
     mean: Vector3<f64>,
-    /// where its faces end in [`Fans::moving`]
+    /// end of its faces in [`Fans::moving`]
     end: u32,
 }
 
 impl Fans {
-    /// Makes room for the corners of so many moving faces.
+    /// Makes room for the corners of `faces` moving faces.
     pub fn reserve(&mut self, faces: usize) {
         self.list.reserve(faces);
         self.moving.reserve(3 * faces);
@@ -48,7 +48,7 @@ impl Fans {
 
     /// Finds the fans whose normals are within `smallest_cosine` of their mean.
     ///
-    /// - `normal`: of a face of the ring by its number, unit.
+    /// - `normal`: unit normal of a ring face by its number.
     pub fn find(
         &mut self,
         mesh: &TriMesh,
@@ -83,7 +83,7 @@ impl Fans {
         }
     }
 
-    /// Whether the faces around this corner of a moving face need no look, pair by pair.
+    /// Whether the faces around this corner of a moving face need no test by pairs.
     #[inline]
     pub fn is_smooth(&self, corner: VertexId) -> bool {
         self.corners
@@ -91,10 +91,10 @@ impl Fans {
             .is_some_and(|number| self.are_smooth[number as usize])
     }
 
-    /// Whether no two faces of a fan have come to meet.
+    /// Whether no two faces of a fan have begun to meet.
     ///
-    /// - `normal`: after the update, of a moving face by its number, unit; within `smallest_cosine`
-    ///   of the mean a fan is smooth.
+    /// - `normal`: unit normal of a moving face after the update, by its number; a fan is smooth
+    ///   within `smallest_cosine` of the mean.
     /// - `gap`, `before`: as in [`super::collision::Pairs::are_clear`].
     pub fn are_clear(
         &self,
@@ -115,8 +115,8 @@ impl Fans {
         })
     }
 
-    /// The mean normal of the faces around a vertex, where they are a closed fan that goes around
-    /// once, all within the cosine of it.
+    /// Mean normal of the faces around a vertex, if they are a closed fan that goes around once,
+    /// all within the cosine of it.
     fn smooth_mean(
         &mut self,
         mesh: &TriMesh,
@@ -159,8 +159,8 @@ impl Fans {
     }
 }
 
-/// Whether faces between spokes follow each other all around, once as seen along `mean`, on whose
-/// side all of them are.
+/// Whether faces between spokes follow each other all around, once as seen along `mean`; all of
+/// them are on its side.
 fn goes_around_once(spokes: &[[Spoke; 2]], mean: &Vector3<f64>) -> bool {
     let Some([(first, from), (second, to)]) = spokes.first() else {
         return false;
@@ -186,7 +186,7 @@ fn goes_around_once(spokes: &[[Spoke; 2]], mean: &Vector3<f64>) -> bool {
             .all(|[(_, start), (_, end)]| !(right.dot(start) >= 0.0 && left.dot(end) >= 0.0))
 }
 
-/// Whether no two faces around a vertex meet that did not before, but for those that share an edge.
+/// Whether no two faces around a vertex have begun to meet, except faces that share an edge.
 fn is_fan_clear(
     mesh: &TriMesh,
     corner: VertexId,
@@ -220,8 +220,8 @@ fn is_fan_clear(
 mod tests {
     use super::*;
 
-    /// Vertex 0 with so many others around it, from the first turn to the last one of `turns` by
-    /// `height` (of a turn) above it; closed.
+    /// Vertex 0 with `around` others around it, over `turns` turns, each by `height` (of its turn)
+    /// above it; closed.
     fn fan(around: u32, turns: f64, height: impl Fn(f64) -> f64) -> TriMesh {
         let rim = |k: u32| {
             let turn = turns * f64::from(k) / f64::from(around);
@@ -243,7 +243,7 @@ mod tests {
         .unwrap()
     }
 
-    /// The fans around the corners of the faces at vertex 0.
+    /// Fans around the corners of the faces at vertex 0.
     fn fans_of(mesh: &TriMesh) -> Fans {
         let mut ring = Ring::default();
         ring.gather(mesh, &[VertexId(0)]);
@@ -280,7 +280,7 @@ mod tests {
 
     #[test]
     fn faces_of_a_smooth_fan_meet_in_their_corner_alone() {
-        // an own small generator
+        // a small generator of its own
         let mut state = 1u64;
         let mut next = || {
             state = state
@@ -297,7 +297,7 @@ mod tests {
                 let step = Vector3::new(next() - 0.5, next() - 0.5, 2.0 * next() - 1.0) * 2.0;
                 mesh.set_position(VertexId(vertex), here + step);
             }
-            // before the motion nothing met
+            // no faces met before the motion
             let is_clear = is_fan_clear(&mesh, VertexId(0), 0.0, |vertex| {
                 fan(around, 1.0, |_| 0.0).position(vertex)
             });
@@ -332,7 +332,7 @@ mod tests {
         // a spoke goes over its neighbour and through the face behind that
         mesh.set_position(VertexId(1), Point3::new(-0.4, 0.9, 0.05));
         assert!(!clear(&mesh));
-        // one that stands upright is no height field any more, and meets nothing
+        // an upright spoke ends the height field, and meets nothing
         mesh.set_position(VertexId(1), Point3::new(0.3, 0.0, 2.0));
         assert!(clear(&mesh));
     }

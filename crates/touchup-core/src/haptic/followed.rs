@@ -1,31 +1,31 @@
-//! The patch in the mesh that the haptic update works on.
+//! The patch in the working mesh of the haptic update.
 //!
-//! What the patch knows from touches is stiff. What the update moves elsewhere, scan and guesses,
-//! is there at once, and for the moment: when the patch has caught up with that touch it is put
-//! back, and the patch has the contact.
+//! Touched parts of the patch are stiff. The update moves other parts, scan and guesses, at once
+//! but temporarily: they return to their place once the patch has caught up with that touch and
+//! holds the contact.
 
 use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::reconstruct::{Splice, Support};
 
-/// Never moved.
+/// Stamp of a vertex that never moved.
 pub(super) const NEVER: i64 = i64::MIN;
 
-/// The patch as the mesh shows it, and what was moved beside it.
+/// The patch in the mesh, and the vertices moved beside it.
 #[derive(Clone, Debug)]
 pub(super) struct FollowedPatch {
     pub splice: Splice,
-    /// the support of each vertex
+    /// support of each vertex
     pub support: Vec<Support>,
-    /// vertices that are not where scan and patch have them
+    /// vertices away from their place in scan and patch
     pub moved: Vec<VertexId>,
-    /// … and when each of them moved last, ns
+    /// time of the last motion of each vertex, ns
     pub moved_ns: Vec<i64>,
-    /// room for the faces around them
+    /// buffer for the faces around the moved vertices
     pub refit: Vec<FaceId>,
 }
 
 impl FollowedPatch {
-    /// For a scan without a patch, with room for so many new vertices.
+    /// For a scan without a patch, with room for `vertices` new vertices.
     pub fn new(scan: &TriMesh, vertices: usize) -> Self {
         let slots = scan.vertex_slots();
         let (mut support, mut moved_ns) = (
@@ -43,7 +43,7 @@ impl FollowedPatch {
         }
     }
 
-    /// Memory of what is kept for each vertex, bytes.
+    /// Memory of the data per vertex, bytes.
     pub fn bytes(&self) -> usize {
         self.support.capacity() * size_of::<Support>()
             + self.moved_ns.capacity() * size_of::<i64>()
@@ -55,13 +55,13 @@ impl FollowedPatch {
         self.support(vertex) == Support::Touched
     }
 
-    /// The support of a vertex in the patch.
+    /// Support of a vertex in the patch.
     #[inline]
     pub fn support(&self, vertex: VertexId) -> Support {
         self.support[vertex.0 as usize]
     }
 
-    /// Remembers that these were moved.
+    /// Records the motion of these vertices.
     pub fn note_moved(&mut self, vertices: &[VertexId], stamp_ns: i64) {
         for &vertex in vertices {
             let moved_ns = &mut self.moved_ns[vertex.0 as usize];

@@ -1,4 +1,4 @@
-//! The guard of an update: no face around it may flip, fold, degenerate or be pierced.
+//! Guard of an update: no face around it may flip, fold, degenerate or be pierced.
 //!
 //! A scan may have such faces already; an update may not make one worse.
 
@@ -20,7 +20,7 @@ parameters! {
         /// Smallest twice area over longest edge squared: 0.15 is a triangle stretched sixfold; of
         /// a triangle that was scanned thin nine tenths of what it had.
         ///
-        /// [`Self::SCANNED_SHARE`] of it, where that is less: it must not hold all around it.
+        /// [`Self::SCANNED_SHARE`] of the scanned value, if less: it must not hold all around it.
         smallest_quality: f64 = 0.15, "smallest_quality" [ONE, 0, 0.87];
         /// Smallest cosine between normals before and after one update.
         ///
@@ -41,44 +41,44 @@ parameters! {
 
 impl GuardParams {
     /// See [`Self::smallest_quality`]. To follow a touch a thin triangle needs to lose little. With
-    /// a share of 0.8 a vertex of a crumpled scan strayed, with 0.3 one more face was inverted on
+    /// a share of 0.8 a vertex of a crumpled scan strayed, with 0.3 one more face inverted onto
     /// another.
     pub const SCANNED_SHARE: f64 = 0.9;
 }
 
-/// Normals of a smooth region are within this cosine of their mean: 70°. Such a region is a height
-/// field over the plane across its mean normal and cannot meet itself.
+/// Smallest cosine between the normals of a smooth region and their mean: 70°. Such a region is a
+/// height field over the plane across its mean normal and cannot meet itself.
 const SMOOTH_COSINE: f64 = 0.35;
-/// While each normal stays within this cosine (75°), the region remains a height field.
+/// Smallest cosine of the normals at which the region remains a height field: 75°.
 const STILL_SMOOTH_COSINE: f64 = 0.25;
-/// Vertices of a smooth region that each moved by less than this share of the smallest altitude
-/// since the last look turn a normal by less than 0.04 rad and change a quality by less than 12 %,
-/// so that what passed with the margins below need not be looked at again. Proof: a normal turns by
-/// at most the sum of two corner motions over the altitude.
+/// Motion of the vertices of a smooth region since the last check, as a share of the smallest
+/// altitude, that needs no new check: below it a normal turns by less than 0.04 rad and a quality
+/// changes by less than 12 %, within the margins below. Proof: a normal turns by at most the sum of
+/// two corner motions over the altitude.
 const UNSEEN_SHARE: f64 = 0.02;
 /// Margin on the cosine of a normal with a fixed direction; 0.04 rad change it by no more than
 /// 0.04.
 const COSINE_MARGIN: f64 = 0.05;
-/// Margin on the cosine between two normals, both of which turn.
+/// Margin on the cosine between two turning normals.
 const FOLD_MARGIN: f64 = 0.1;
 /// Margin on the quality.
 const QUALITY_MARGIN: f64 = 1.15;
 
-/// What was scanned or measured, against which an update is judged, and by which limits.
+/// Scanned or measured evidence for judging an update, and the limits.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct GuardEvidence<'a> {
     pub params: &'a GuardParams,
-    /// faces nearer than this touch, m
+    /// distance below which faces touch, m
     pub gap: f64,
     /// positions as scanned, m
     pub scanned: &'a [Point3<f64>],
-    /// for each face the last normal scanned or measured there; zero where it was scanned without
-    /// area and never touched: it has no side to keep then, and must not hold the others
+    /// for each face the last normal scanned or measured there; zero for a face scanned without
+    /// area and never touched: it has no side to keep, and must not hold the others
     pub normals: &'a [[f32; 3]],
 }
 
 impl GuardEvidence<'_> {
-    /// Twice the area over the longest edge squared that a face may not fall below.
+    /// Smallest allowed twice area over longest edge squared of a face.
     fn smallest_quality(&self, mesh: &TriMesh, face: FaceId) -> f64 {
         let corners = mesh
             .corners(face)
@@ -101,7 +101,7 @@ struct FaceShape {
     altitude: f64,
 }
 
-/// The verdict of [`Neighbourhood::judge`] on an update.
+/// Verdict of [`Neighbourhood::judge`] on an update.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum GuardVerdict {
     /// The mesh is no worse than before.
@@ -112,27 +112,27 @@ pub(super) enum GuardVerdict {
     Rough,
 }
 
-/// The faces that change when the vertices of a region move, and what they could run into.
+/// Faces that change when the vertices of a region move, and the faces in their way.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Neighbourhood {
     pub ring: Ring,
-    /// state at the last look, for each face of the ring
+    /// state at the last check, for each face of the ring
     before: Vec<FaceShape>,
-    /// state after the update, for the moving ones
+    /// state after the update, for each moving face
     after: Vec<FaceShape>,
-    /// mean normal of a smooth region; without one, the fans and the pairs in `suspects` are looked
-    /// at
+    /// mean normal of a smooth region; without one, the guard tests the fans and the pairs in
+    /// `suspects`
     smooth: Option<Vector3<f64>>,
     fans: Fans,
     suspects: Pairs,
-    /// how far vertices may still move before `suspects` or `smooth` must be found again, m
+    /// motion left to the vertices before a new search for `suspects` or `smooth`, m
     allowance: f64,
-    /// how far vertices may still move before the region must be looked at again, m
+    /// motion left to the vertices before a new check of the region, m
     unseen: f64,
     near: BoxQuery,
-    /// the faces nearby with their boxes
+    /// nearby faces with their boxes
     boxes: Vec<(FaceId, Extent)>,
-    /// corners that hang together with the region
+    /// corners connected with the region
     reached: ScratchMap,
 }
 
@@ -152,7 +152,7 @@ fn shape_of(mesh: &TriMesh, face: FaceId) -> FaceShape {
 }
 
 impl Neighbourhood {
-    /// Makes room for a region of so many vertices: two to three faces each, three edges for two
+    /// Makes room for a region of `vertices` vertices: two to three faces each, three edges for two
     /// faces.
     pub fn reserve(&mut self, vertices: usize) {
         let faces = 3 * vertices;
@@ -166,8 +166,8 @@ impl Neighbourhood {
         self.reached.reserve(4 * faces);
     }
 
-    /// Collects the region again after the mesh was changed elsewhere. No vertex may move unseen
-    /// then, before [`Self::bound_unseen`].
+    /// Collects the region again after edits elsewhere. No vertex may then move unchecked before
+    /// [`Self::bound_unseen`].
     ///
     /// - `gap`: as in [`GuardEvidence`].
     pub fn refresh(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64, gap: f64) {
@@ -181,7 +181,7 @@ impl Neighbourhood {
         self.unseen = 0.0;
     }
 
-    /// Finds how far the vertices of a refreshed region may move unseen; `evidence` as in
+    /// Bounds the unchecked motion of the vertices of a refreshed region; `evidence` as in
     /// [`Self::judge`].
     pub fn bound_unseen(&mut self, mesh: &TriMesh, evidence: &GuardEvidence) {
         if let Some(mean) = self.smooth {
@@ -193,7 +193,7 @@ impl Neighbourhood {
         }
     }
 
-    /// Looks for other faces within `margin` (m), which both sides of a pair may use up but for the
+    /// Finds other faces within `margin` (m), which both sides of a pair may use up but for the
     /// gap; `gap` as in [`GuardEvidence`].
     pub fn collect(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64, gap: f64) {
         self.allowance = 0.5 * (margin - gap);
@@ -204,7 +204,7 @@ impl Neighbourhood {
         }
     }
 
-    /// Gives up the claim to be smooth: pairs of faces are looked at from now on; parameters as of
+    /// Gives up the claim to be smooth: tests pairs of faces from now on; parameters as of
     /// [`Self::collect`].
     pub fn roughen(&mut self, mesh: &TriMesh, tree: &FaceTree, margin: f64, gap: f64) {
         self.allowance = 0.5 * (margin - gap);
@@ -253,7 +253,7 @@ impl Neighbourhood {
         );
     }
 
-    /// The mean normal, if all faces nearby are within [`SMOOTH_COSINE`] of it and hang together.
+    /// Mean normal, if all nearby faces are within [`SMOOTH_COSINE`] of it and connected.
     fn smooth_normal(&mut self, mesh: &TriMesh) -> Option<Vector3<f64>> {
         let sum: Vector3<f64> = self.before[..self.ring.moving]
             .iter()
@@ -276,8 +276,7 @@ impl Neighbourhood {
         if !self.near.faces.iter().all(within) {
             return None;
         }
-        // nearly always the rim's other corners reach all; at a border some are reached from the
-        // moving faces
+        // nearly always the rim's other corners reach all; at a border the moving faces reach some
         self.reached.clear();
         let (moving, rim) = self.ring.faces.split_at(self.ring.moving);
         for faces in [rim, moving] {
@@ -292,8 +291,8 @@ impl Neighbourhood {
         None
     }
 
-    /// Takes a motion of the vertices by `displacement` (m) if it needs no look; whether it does
-    /// not.
+    /// Takes a motion of the vertices by `displacement` (m) if it needs no check; returns whether
+    /// it took it.
     #[inline]
     pub fn pass_unseen(&mut self, displacement: f64) -> bool {
         let passes = displacement <= self.unseen;
@@ -304,10 +303,10 @@ impl Neighbourhood {
         passes
     }
 
-    /// Judges the current mesh against what it was before the update.
+    /// Judges the current mesh against the mesh before the update.
     ///
-    /// - `displacement`: the largest of a vertex in the update, m.
-    /// - `before`: the position of a vertex before the update, m.
+    /// - `displacement`: largest motion of a vertex in the update, m.
+    /// - `before`: position of a vertex before the update, m.
     pub fn judge(
         &mut self,
         mesh: &TriMesh,
@@ -333,7 +332,7 @@ impl Neighbourhood {
         }
     }
 
-    /// Whether no faces have come to meet.
+    /// Whether no faces have begun to meet.
     fn are_apart(
         &mut self,
         mesh: &TriMesh,
@@ -348,8 +347,8 @@ impl Neighbourhood {
             && self.suspects.are_clear(mesh, gap, displacement, &before)
     }
 
-    /// Whether a region that was smooth is still; sets how far its vertices may move without a
-    /// look, where all of it `is_safe`.
+    /// Whether a smooth region is still smooth; bounds the unchecked motion of its vertices, if all
+    /// of it `is_safe`.
     fn stays_smooth(&mut self, mean: &Vector3<f64>, is_safe: bool) -> bool {
         let lowest = self
             .after
@@ -367,7 +366,7 @@ impl Neighbourhood {
         lowest > STILL_SMOOTH_COSINE
     }
 
-    /// Looks at the region: `None` where it is broken, else whether it is sound with margins.
+    /// Checks the region: `None` if it is broken, else whether it is sound with margins.
     fn is_safe(&self, mesh: &TriMesh, evidence: &GuardEvidence) -> Option<bool> {
         Some(self.are_faces_safe(mesh, evidence)? & self.are_edges_safe(evidence)?)
     }
@@ -421,7 +420,7 @@ impl Neighbourhood {
         Some(is_safe)
     }
 
-    /// Takes the state just looked at as the new state before; `displacement` is the largest of a
+    /// Takes the checked state as the new state before; `displacement` is the largest motion of a
     /// vertex, m.
     pub fn accept(&mut self, displacement: f64) {
         self.before[..self.ring.moving].copy_from_slice(&self.after);
@@ -429,15 +428,15 @@ impl Neighbourhood {
         self.allowance -= displacement;
     }
 
-    /// Whether the faces nearby must be collected again before a motion of `displacement` (m).
+    /// Whether a motion of `displacement` (m) needs a new collection of the nearby faces.
     #[inline]
     pub fn is_outdated(&self, displacement: f64) -> bool {
         self.allowance < displacement
     }
 }
 
-/// Whether `faces` reach the corners already `reached`, over common corners among themselves; takes
-/// out those that do.
+/// Whether `faces` reach the corners already `reached`, over common corners among themselves;
+/// removes the faces that do.
 fn reach_all(mesh: &TriMesh, faces: &mut Vec<FaceId>, reached: &mut ScratchMap) -> bool {
     loop {
         let before = faces.len();
@@ -456,7 +455,7 @@ fn reach_all(mesh: &TriMesh, faces: &mut Vec<FaceId>, reached: &mut ScratchMap) 
     }
 }
 
-/// As [`Vec::retain`], without a branch on the answer: it cannot be foretold.
+/// As [`Vec::retain`], without a branch on the answer, which is unpredictable.
 #[inline]
 fn retain(faces: &mut Vec<FaceId>, mut stays: impl FnMut(FaceId) -> bool) {
     let mut kept = 0;

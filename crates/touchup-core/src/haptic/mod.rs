@@ -1,8 +1,8 @@
-//! The haptic update: one sample of pose and force moves the mesh.
+//! Haptic update: one sample of pose and force moves the mesh.
 //!
 //! [`Refiner::push`] does all of it: contact, closest face, face dynamics, deformation of the
-//! region around it, update of the tree. [`RefineParams::robust`] is what works on real scans,
-//! [`RefineParams::paper`] the published rule.
+//! region around it, update of the tree. [`RefineParams::robust`] suits real scans,
+//! [`RefineParams::paper`] is the published rule.
 
 mod carve;
 mod collision;
@@ -31,7 +31,7 @@ pub use params::{CarveParams, RefineParams, ScanParams, ScanRegion, TouchPoint, 
 pub use registration::{Registrar, Registration, RegistrationError, RegistrationParams};
 pub use roi::RoiSize;
 
-/// Of a stylus: part of [`RefineParams`].
+/// Stylus settings in [`RefineParams`].
 pub use crate::stylus::{SlidingParams, TipParams};
 
 use crate::mesh::{BoxQuery, Changes, FaceHit, FaceId, MeshError, Nearby, TriMesh, VertexId};
@@ -43,14 +43,13 @@ use crate::stylus::{
 use deform::{DeformableMesh, HandleRegion};
 use dynamics::turn;
 
-/// The measured normal of one sample is uncertain by this, rad: a flat tip that may lie on its face
-/// does.
+/// Uncertainty of the measured normal of one sample, rad: a flat tip that may lie on its face does.
 const FLUSH: f64 = 0.05;
-/// Faces looked at for those inside the tip, at most: on a scan finer than a tenth of the ball they
-/// are a sample.
+/// Maximum number of faces to test against the inside of the tip: on a scan finer than a tenth of
+/// the ball they are a sample.
 const MOST_LOOKED_AT: usize = 128;
 
-/// Why a sample was refused, or a refiner not built. A refused sample does not change the mesh.
+/// Reason for refusing a sample or a refiner. A refused sample does not change the mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RefineError {
     /// Not finite, absurd, or not in order of time.
@@ -65,7 +64,7 @@ pub enum RefineError {
     /// Nothing to refine.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// A handle that is not in the mesh.
+    /// A handle outside the mesh.
     #[error("the mesh has no face {face}; take a handle from `TriMesh::faces`")]
     NoSuchFace {
         /// its id
@@ -76,24 +75,24 @@ pub enum RefineError {
 /// The four cases of haptic mismatch \[paper, Fig 5\].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub enum Case {
-    /// 1: no contact is measured and none expected.
+    /// 1: contact neither measured nor expected.
     Free,
-    /// 2: contact is expected but not measured; the mesh is carved.
+    /// 2: contact expected but not measured; carves the mesh.
     MeshOnly,
-    /// 3: contact is measured but not expected; the mesh is raised to the surface.
+    /// 3: contact measured but not expected; raises the mesh to the surface.
     SurfaceOnly,
-    /// 4: both; the mesh is moved and turned.
+    /// 4: both; moves and turns the mesh.
     Both,
 }
 
-/// Haptic mismatch at the face that was touched \[paper, Eq 1–5\].
+/// Haptic mismatch at the touched face \[paper, Eq 1–5\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mismatch {
     /// the handle
     pub face: FaceId,
     /// h, signed distance of the ball's contact point from the face, m (Eq 1)
     pub distance: f64,
-    /// F*, N, in O (Eq 2); none outside of the mesh, where a spring would pull
+    /// F*, N, in O (Eq 2); zero outside of the mesh, instead of the pull of a spring
     pub expected_force_o: Vector3<f64>,
     /// ε_L = F − F*, N (Eq 4)
     pub linear: Vector3<f64>,
@@ -101,15 +100,15 @@ pub struct Mismatch {
     pub rotational: Vector3<f64>,
 }
 
-/// What one sample did.
+/// Effect of one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Update {
-    /// which of the four cases
+    /// one of the four cases
     pub case: Case,
-    /// at the face that is touched or that the tip has entered; `None` where no face is within its
-    /// reach: F* is zero there, and ε_L the measured force
+    /// at the face that the tip touches or has entered; `None` without a face in reach: F* is then
+    /// zero, and ε_L the measured force
     pub mismatch: Option<Mismatch>,
-    /// how the deformation ended; `None` when nothing was to be moved
+    /// outcome of the deformation; `None` if there was nothing to move
     pub fit: Option<RegionFit>,
 }
 
@@ -119,7 +118,7 @@ impl Update {
         mismatch: None,
         fit: None,
     };
-    /// Contact with nothing that may be moved.
+    /// Contact without a movable face.
     const BESIDE: Self = Self {
         case: Case::SurfaceOnly,
         mismatch: None,
@@ -127,25 +126,25 @@ impl Update {
     };
 }
 
-/// What became of the samples so far.
+/// Samples by outcome.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct RefineCounts {
-    /// taken
+    /// accepted samples
     pub accepted: u64,
-    /// times that contact began
+    /// number of contacts
     pub contacts: u64,
     /// updates of the mesh, by contact or by carving; a sample can bring both
     pub moved: u64,
-    /// updates shortened or given up to keep the mesh sound
+    /// updates shortened or abandoned to keep the mesh sound
     pub cut_back: u64,
     /// neither in contact nor free: the end of a contact, or a touch too light for one
     pub light: u64,
     /// contacts beyond the reach of any face
     pub out_of_reach: u64,
-    /// contacts outside the region that may be touched
+    /// contacts outside the touchable region
     pub outside_region: u64,
-    /// contacts with a force beyond what the contact model can answer; clamped where the rigid
-    /// offset is taken out
+    /// contacts with a force beyond the contact model; clamped if the model takes out the rigid
+    /// offset
     pub clamped: u64,
 }
 
@@ -175,52 +174,52 @@ pub struct Refiner {
     dynamics: FaceDynamics,
     deformable: DeformableMesh,
     contact_region: HandleRegion,
-    /// of the face that the tip is likely to touch next
+    /// region of the face that the tip is likely to touch next
     next_region: HandleRegion,
     carve_region: HandleRegion,
-    /// the face that was found last at the point that touches
+    /// last face closest to the touching point
     nearest: Option<FaceId>,
-    /// where the tip touches; `None` without contact, and where the point depends on the face
+    /// track of the touching point; `None` without contact, and if the point depends on the face
     track: Option<TouchTrack>,
-    /// leaves around the point of the tip that touches …
+    /// leaves around the touching point of the tip
     near_contact: Nearby,
-    /// … and around its middle
+    /// leaves around the middle of the tip
     near_tip: Nearby,
     body: TipBody,
-    /// from the tip to the handle, unit, in O; a ball needs none
+    /// from the tip to the handle, unit, in O; unused for a ball
     axis: Vector3<f64>,
-    /// faces near the tip …
+    /// faces near the tip
     near_faces: BoxQuery,
-    /// … and those inside it, with their depth, m
+    /// faces inside the tip, with their depth, m
     inside_faces: Vec<(f64, FaceId)>,
-    /// the handle and n*(0), its normal when it became the handle (Eq 6)
+    /// handle and n*(0), its normal on becoming the handle (Eq 6)
     begun: Option<(FaceId, Vector3<f64>)>,
     counts: RefineCounts,
 }
 
-/// Where the tip touches from sample to sample, m, in O.
+/// Touching point of the tip from sample to sample, m, in O.
 #[derive(Clone, Copy, Debug)]
 struct TouchTrack {
     last: Point3<f64>,
-    /// where it comes to if it goes on as it did
+    /// next point by extrapolation
     next: Point3<f64>,
 }
 
-/// The ball against the face it touches.
+/// Ball against the face it touches.
 struct Pressing {
     handle: FaceId,
     /// the face before the update
     face: FaceState,
     /// measured outward normal of the surface, unit; the face's own in [`RefineParams::paper`]
     normal: Vector3<f64>,
-    /// the point of the reported ball that touches, m, in O
+    /// touching point of the reported ball, m, in O
     point: Point3<f64>,
-    /// force on the stylus; only its part along `normal` where friction is known, N, in O
+    /// force on the stylus; only its part along `normal` if friction is known, N, in O
     force_o: Vector3<f64>,
 }
 
 impl Refiner {
-    /// Builds tree and buffers; takes O(F log F).
+    /// Builds tree and buffers, in O(F log F).
     ///
     /// # Errors
     /// [`RefineError::Setting`], [`RefineError::Dynamics`], [`MeshError::Empty`].
@@ -256,18 +255,18 @@ impl Refiner {
     /// Takes the next sample and moves the mesh accordingly.
     ///
     /// # Errors
-    /// [`RefineError::Sample`] for one that is not finite, absurd or not after the last; nothing is
-    /// changed then. [`RefineError::Dynamics`] for a step that overflows or is too stiff for its
-    /// rule; the mesh is not changed then.
+    /// [`RefineError::Sample`] for a sample that is not finite, absurd or not after the last; the
+    /// state then stays unchanged. [`RefineError::Dynamics`] for a step that overflows or is too
+    /// stiff for its rule; the mesh then stays unchanged.
     pub fn push(&mut self, sample: &Sample) -> Result<Update, RefineError> {
         self.take(sample, None)
     }
 
     /// As [`Self::push`], but a contact acts on `handle` instead of the closest face: for a stylus
-    /// that is kept on one face after the other \[paper, Sec 4.3\].
+    /// that stays on one face after the other \[paper, Sec 4.3\].
     ///
     /// # Errors
-    /// Those of [`Self::push`], and [`RefineError::NoSuchFace`]; nothing is changed then.
+    /// Errors of [`Self::push`], and [`RefineError::NoSuchFace`] with an unchanged state.
     pub fn push_on(&mut self, handle: FaceId, sample: &Sample) -> Result<Update, RefineError> {
         if !self.deformable.mesh.has_face(handle) {
             return Err(RefineError::NoSuchFace { face: handle.0 });
@@ -293,7 +292,7 @@ impl Refiner {
             self.axis = TipPlace::from(&sample.pose_ot).axis;
         }
         self.counts.contacts = self.contacts.contacts();
-        // a sample outside the region that may be touched moves nothing
+        // a sample outside the touchable region moves nothing
         let is_outside = self
             .params
             .region
@@ -328,10 +327,10 @@ impl Refiner {
         })
     }
 
-    /// Cases 3 and 4, and without a gate also 1 and 2: moves the face that the ball touches.
+    /// Cases 3 and 4, and without a gate also 1 and 2: moves the touched face.
     fn press(&mut self, pressing: &Pressing, dt: f64) -> Result<Update, RefineError> {
         let mismatch = self.mismatch(pressing);
-        // without a gate the surface is felt by more than what is expected at the face itself
+        // without a gate, contact takes more force than expected at the face itself
         let is_felt = self.params.gate.is_some()
             || pressing.force_o.norm() > self.params.dynamics.model.force(0.0).max(0.0);
         let case = match (mismatch.distance < 0.0, is_felt) {
@@ -346,7 +345,7 @@ impl Refiner {
             fit: None,
         });
         let face = &pressing.face;
-        // without area a face has no normal; turned away from the measured normal it is another
+        // a face without area has no normal; a face turned away from the measured normal is another
         // surface
         let is_apart = face.n == Vector3::zeros()
             || face.n.dot(&pressing.normal) < self.params.smallest_contact_cosine;
@@ -385,7 +384,7 @@ impl Refiner {
         })
     }
 
-    /// The ball against `handle`, else against the face that it touches; `None` beyond the reach.
+    /// Ball against `handle`, else against the face that it touches; `None` beyond the reach.
     fn pressing(
         &mut self,
         ball: &Ball,
@@ -450,12 +449,12 @@ impl Refiner {
         })
     }
 
-    /// Faces farther from the point that touches are out of reach, m.
+    /// Maximum distance of a face from the touching point, m.
     fn reach(&self) -> f64 {
         self.deformable.largest_move + self.params.tip.radius
     }
 
-    /// The face closest to the point that touches.
+    /// Face closest to the touching point.
     fn touched_face(&mut self, point: &Point3<f64>) -> Option<FaceHit> {
         let hit =
             self.deformable
@@ -464,8 +463,7 @@ impl Refiner {
         hit
     }
 
-    /// The region of the contact becomes the one that was made ready for this handle, if there is
-    /// one.
+    /// Makes the prepared region the region of the contact, if it belongs to this handle.
     fn take_region(&mut self, handle: FaceId) {
         if self.contact_region.roi.handle != Some(handle)
             && self.deformable.is_prepared(&self.next_region, handle)
@@ -475,9 +473,8 @@ impl Refiner {
         }
     }
 
-    /// Makes ready what the next sample needs if the tip goes on as it did, so that this does not
-    /// wait for it: the closest face, and the region around it. To be called between samples; it
-    /// changes no result.
+    /// Prepares the closest face and its region for the next sample, if the tip goes on as before,
+    /// so that the sample does not wait for them. Call it between samples; it changes no result.
     pub fn look_ahead(&mut self) {
         let Some(TouchTrack { next, .. }) = self.track else {
             return;
@@ -491,13 +488,13 @@ impl Refiner {
         if self.contact_region.roi.handle == Some(face) {
             self.deformable.prepare(&mut self.contact_region, face);
         } else if !self.deformable.is_prepared(&self.next_region, face) {
-            // what lies within a region depends on when it is made
+            // the extent of a region depends on the time of its construction
             self.next_region.roi.handle = None;
             self.deformable.prepare(&mut self.next_region, face);
         }
     }
 
-    /// The point of the tip that touches a surface of this outward normal, m, in O.
+    /// Touching point of the tip on a surface of this outward normal, m, in O.
     fn touching_point(&self, centre: Point3<f64>, normal: &Vector3<f64>) -> Point3<f64> {
         let place = TipPlace {
             centre,
@@ -528,7 +525,7 @@ impl Refiner {
         }
     }
 
-    /// Case 1 or 2 at a face that the tip is at or in, without contact.
+    /// Case 1 or 2, without contact, at a face that the tip is at or in.
     fn mismatch_in_free_motion(&self, ball: &Ball, handle: FaceId) -> Mismatch {
         let mesh = &self.deformable.mesh;
         let face = FaceState {
@@ -545,10 +542,10 @@ impl Refiner {
         })
     }
 
-    /// The rigid motion of the handle to its next state, as steps of its corners, m.
+    /// Rigid motion of the handle to its next state, as steps of its corners, m.
     ///
-    /// Along the force a corner only goes along it: the turn's sideways part would make the
-    /// triangles creep.
+    /// With [`Along::Force`] a corner moves along `normal` only: the sideways part of the turn
+    /// would make the triangles creep.
     fn rigid_steps(
         &self,
         Pressing {
@@ -574,7 +571,7 @@ impl Refiner {
                 step
             }
         });
-        // by one share: corners shortened each by itself would turn the face
+        // one share for all corners: shortened each by itself they would turn the face
         let farthest = steps.iter().map(Vector3::norm).fold(0.0, f64::max);
         if farthest > longest {
             steps.map(|step| step * (longest / farthest))
@@ -583,21 +580,21 @@ impl Refiner {
         }
     }
 
-    /// Keeps what it takes to undo strokes from here on; with a patch that is followed, it is the
-    /// patch's strokes that are undone ([`crate::reconstruct::Patcher::undo`]).
+    /// Keeps an undo history of strokes from here on; strokes of a followed patch belong to the
+    /// patch ([`crate::reconstruct::Patcher::undo`]).
     pub fn keep_strokes(&mut self) {
         self.deformable.keep_strokes();
     }
 
-    /// Takes the last stroke back, bit by bit: what was touched without a pause of a tenth of a
-    /// second, and what the tip moved after it. Returns whether there was one: 64 at most are kept.
-    /// Estimates of friction and bias stay.
+    /// Undoes the last stroke, bit for bit: the touches without a pause of a tenth of a second, and
+    /// all motion by the tip after them. Returns whether there was a stroke: the history holds at
+    /// most 64. Estimates of friction and bias stay.
     pub fn undo(&mut self) -> bool {
         self.change_strokes(true)
     }
 
-    /// Does the stroke again that was undone last, bit by bit, unless something was touched since.
-    /// Returns whether there was one.
+    /// Redoes the last undone stroke, bit for bit, unless there was a touch since. Returns whether
+    /// there was one.
     pub fn redo(&mut self) -> bool {
         self.change_strokes(false)
     }
@@ -610,19 +607,19 @@ impl Refiner {
         has_changed
     }
 
-    /// Makes ready to follow a patch, with room for so many new faces: more are taken in all the
-    /// same, with a pause.
+    /// Prepares to follow a patch, with room for `faces` new faces: more fit as well, after a
+    /// pause.
     ///
     /// # Errors
-    /// [`MeshError::TooMany`] where memory is short.
+    /// [`MeshError::TooMany`] if memory is short.
     pub fn expect_patch(&mut self, faces: usize) -> Result<(), RefineError> {
         Ok(self.deformable.expect_patch(faces)?)
     }
 
-    /// Takes up what changed in the patch of this scan, bit by bit, so that no sample has to wait
-    /// for long: [`Self::go_on_following`] is to be called with the same delta until it is done.
-    /// What this moved up to the patch's last touch goes back to where scan and patch have it; what
-    /// was touched is in the patch now, which alone moves it from then on. Does nothing before
+    /// Begins to take up the changes of the patch of this scan, step by step, so that no sample
+    /// waits long: call [`Self::go_on_following`] with the same delta until it is done. Vertices
+    /// moved here up to the patch's last touch return to their place in scan and patch; the touched
+    /// surface is in the patch now, which alone moves it from then on. Does nothing before
     /// [`Self::expect_patch`].
     pub fn begin_to_follow(&mut self, delta: &PatchDelta) {
         if self.deformable.begin_delta(delta) {
@@ -630,13 +627,13 @@ impl Refiner {
         }
     }
 
-    /// Takes up to `most` parts more of the change of the patch, as
-    /// [`crate::reconstruct::Splice::go_on`]; returns whether that was all. In between the mesh has
-    /// gaps and overlaps where old faces meet new ones.
+    /// Takes up to `most` more parts of the change of the patch, as
+    /// [`crate::reconstruct::Splice::go_on`]; returns whether it is complete. Until then the mesh
+    /// has gaps and overlaps between old faces and new ones.
     ///
     /// # Errors
-    /// [`MeshError::TooMany`] when 32-bit ids do not suffice, [`MeshError::NotFinite`]; the mesh is
-    /// inconsistent then.
+    /// [`MeshError::TooMany`] if 32-bit ids do not suffice, [`MeshError::NotFinite`]; the mesh is
+    /// then inconsistent.
     pub fn go_on_following(
         &mut self,
         delta: &PatchDelta,
@@ -648,7 +645,7 @@ impl Refiner {
         Ok(self.deformable.go_on(delta, most)?)
     }
 
-    /// Faces were added, removed or moved.
+    /// Forgets all regions after a change of the faces.
     fn forget_regions(&mut self) {
         for region in [
             &mut self.contact_region,
@@ -671,17 +668,17 @@ impl Refiner {
         &self.deformable.mesh
     }
 
-    /// From here on notes what changes in the mesh, for [`Self::take_changes`].
+    /// Records changes of the mesh from here on, for [`Self::take_changes`].
     pub fn watch(&mut self) {
         self.deformable.mesh.watch();
     }
 
-    /// What changed in the mesh since the last call, as [`TriMesh::take_changes`].
+    /// Changes of the mesh since the last call, as [`TriMesh::take_changes`].
     pub fn take_changes(&mut self, most: usize, into: &mut Changes) -> bool {
         self.deformable.mesh.take_changes(most, into)
     }
 
-    /// The support of a vertex in the patch that is followed; `None` without a patch.
+    /// Support of a vertex in the followed patch; `None` without a patch.
     pub fn support(&self, vertex: VertexId) -> Option<Support> {
         self.deformable
             .patch
@@ -689,7 +686,7 @@ impl Refiner {
             .map(|patch| patch.support(vertex))
     }
 
-    /// Gives the mesh back.
+    /// Returns the mesh.
     pub fn into_mesh(self) -> TriMesh {
         self.deformable.mesh
     }
@@ -699,25 +696,25 @@ impl Refiner {
         self.deformable.footprint()
     }
 
-    /// The closest face of the current mesh, by true surface distance, nearer than `reach` (m).
+    /// Closest face of the current mesh, by true surface distance, nearer than `reach` (m).
     pub fn closest_face(&self, p: &Point3<f64>, reach: f64) -> Option<FaceHit> {
         self.deformable
             .tree
             .closest(&self.deformable.mesh, p, reach)
     }
 
-    /// What became of the samples so far.
+    /// Samples by outcome.
     pub fn counts(&self) -> &RefineCounts {
         &self.counts
     }
 
-    /// Kinetic friction as measured so far; `None` until the ball has slid far enough, or where
-    /// friction is not estimated.
+    /// Measured kinetic friction; `None` until the ball has slid far enough, or without a friction
+    /// estimate.
     pub fn friction(&self) -> Option<FrictionCoefficient> {
         self.contacts.friction()
     }
 
-    /// What decides about contacts here, before its first sample.
+    /// A new contact estimator with the settings of this refiner.
     ///
     /// # Errors
     /// [`RefineError::Setting`].
@@ -730,20 +727,20 @@ impl Refiner {
         &self.contacts
     }
 
-    /// Lets another estimator decide about contacts from here on, as if it had from the first
-    /// sample on. The mesh stays.
+    /// Lets another estimator decide about contacts from here on, as if from the first sample on.
+    /// The mesh stays.
     pub fn set_contacts(&mut self, contacts: ContactEstimator) {
         self.counts.contacts = contacts.contacts();
         self.contacts = contacts;
         (self.begun, self.track) = (None, None);
     }
 
-    /// What was decided about the contact of the last sample; `None` before the first.
+    /// Contact decision on the last sample; `None` before the first.
     pub fn contact(&self) -> Option<&ContactSample> {
         self.contacts.latest()
     }
 
-    /// The vertices that the last contact moved.
+    /// Vertices moved by the last contact.
     pub fn moved_vertices(&self) -> &[VertexId] {
         &self.contact_region.roi.vertices
     }

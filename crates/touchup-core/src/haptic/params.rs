@@ -1,4 +1,4 @@
-//! The settings of a [`super::Refiner`], and the two presets.
+//! Settings of a [`super::Refiner`], and two presets.
 
 use super::guard::GuardParams;
 use super::{Along, ContactModel, DynamicsParams, RoiSize, StepRule};
@@ -10,7 +10,7 @@ use crate::stylus::{
 };
 
 parameters! {
-    /// How good a scan is.
+    /// Quality of a scan.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct ScanParams in "scan" {
         /// Standard deviation of the scan from the true surface.
@@ -20,11 +20,11 @@ parameters! {
     }
 }
 
-/// Which point of the ball touches, and which face.
+/// Touching point of the ball, and touched face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TouchPoint {
     /// The face with the closest barycentre \[paper, Eq 12\], at the point under its normal; the
-    /// force only gives the magnitude \[paper\].
+    /// force gives only the magnitude \[paper\].
     FaceNormal,
     /// The point that the measured force points away from, at the face with the least true distance
     /// to it.
@@ -32,12 +32,12 @@ pub enum TouchPoint {
 }
 
 parameters! {
-    /// Carving: what the ball passes through without a force is not there (case 2).
+    /// Carving: removes surface that the ball passes through without a force (case 2).
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct CarveParams in "carve" {
         /// Share of the depth that goes in a second.
         ///
-        /// In 1/s. What the ball sweeps is certain, and it is gone soon.
+        /// In 1/s. The swept volume is certainly free, and soon cleared.
         rate: f64 = 300.0, "rate_per_s" [PER_S, 0, 1e6];
         /// Depth that is left alone: the noise of the tracking.
         ///
@@ -51,33 +51,33 @@ parameters! {
     }
 }
 
-/// The part of a scan that a refiner has, and where in it may be touched.
+/// Part of a scan in a refiner, and its touchable region.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScanRegion {
-    /// a contact whose ball is centred elsewhere moves nothing
+    /// a contact whose ball is centred outside moves nothing
     pub region: Region,
-    /// vertices farther from the region than this stay, m
+    /// distance from the region beyond which vertices stay, m
     pub margin: f64,
     /// mean edge of the whole scan, m
     pub mean_edge: f64,
 }
 
-/// All settings of a [`super::Refiner`]. What is `None` is not built.
+/// All settings of a [`super::Refiner`]; `None` disables a part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RefineParams {
     /// Weight, bias, frames.
     pub compensator: CompensatorParams,
-    /// Slow drift of the sensor, followed in free air; `None`: it has none \[paper\].
+    /// Slow drift of the sensor, followed in free air; `None`: no drift \[paper\].
     pub bias: Option<BiasParams>,
     /// `None`: every sample is contact \[paper\].
     pub gate: Option<ContactGateParams>,
     /// Size and stiffness of the tip.
     pub tip: TipParams,
-    /// Which tip it is: a ball in both presets.
+    /// Tip shape: a ball in both presets.
     pub shape: TipShape,
-    /// Smoothing and friction; `None`: the sample as it is, and the force taken for the normal.
+    /// Smoothing and friction; `None`: the raw sample, with the force as the normal.
     pub sliding: Option<SlidingParams>,
-    /// Where on the ball the contact is, and which face is the handle.
+    /// Touching point of the ball, and choice of the handle.
     pub touch_point: TouchPoint,
     /// Eq 1–7.
     pub dynamics: DynamicsParams,
@@ -89,48 +89,46 @@ pub struct RefineParams {
     pub carve: Option<CarveParams>,
     /// Size of the region that follows the handle.
     pub roi: RoiSize,
-    /// What an update may not do; `None`: anything \[paper\], which on a noisy scan ends in a
-    /// blow-up.
+    /// Limits of an update; `None`: no limits \[paper\], which on a noisy scan ends in a blow-up.
     pub guard: Option<GuardParams>,
-    /// A face turned away from the measured normal by more than this cosine is another surface.
-    /// Default 0.2: 78°.
+    /// Smallest cosine between a face and the measured normal: below it the face is another
+    /// surface. Default 0.2: 78°.
     pub smallest_contact_cosine: f64,
     /// Longest step of a vertex in one update, in mean edges. Default 1/25, far below any feature
     /// the mesh can show.
     pub longest_step_edges: f64,
-    /// A vertex stays within this many mean edges of where it was scanned: beyond that a triangle
+    /// Maximum distance of a vertex from its scanned position, in mean edges: beyond it a triangle
     /// is too stretched to show anything. Default 2.6.
     pub largest_move_edges: f64,
-    /// … or within this many times the scan's noise, whichever is more. Default 5.
+    /// [`Self::largest_move_edges`] in scan noises; the larger limit holds. Default 5.
     pub largest_move_noises: f64,
     /// Standard deviation of the scan's vertices, m.
     pub scan_noise: f64,
-    /// `None`: the mesh is all there is, and may be touched anywhere.
+    /// `None`: the mesh is the whole scan, touchable anywhere.
     pub region: Option<ScanRegion>,
-    /// Edges that the haptic update needs, m: a scan with much shorter ones is simplified to this
-    /// for it, so that the cost of a touch follows from the tip and not from the scan. Default 0.6
-    /// of the radius of the tip. `None`: every face of the scan \[paper\].
+    /// Edge length that the haptic update needs, m: a scan with much shorter edges is simplified to
+    /// it, so that the cost of a touch follows from the tip and not from the scan. Default 0.6 of
+    /// the radius of the tip. `None`: every face of the scan \[paper\].
     pub working_edge: Option<f64>,
 }
 
 /// Relaxation of a touched face in [`RefineParams::robust`], 1/s: within 40 ms, twenty poses at 500
-/// Hz, so that their noise is averaged, while a hand at 25 mm/s stays on a face of 2.4 mm for 100
-/// ms.
+/// Hz, which averages their noise, while a hand at 25 mm/s stays on a face of 2.4 mm for 100 ms.
 const RELAXATION: f64 = 25.0;
 /// Contact force at which [`relaxing_alpha`] holds, N.
 const USUAL_FORCE: f64 = 2.5;
-/// Edges of what the haptic update works on, in radii of the tip. With 0.6 a dense scan 0.3 mm too
-/// high ends 0.014 mm off the part (`cargo test -p touchup-tests --test rooms haptic::dense --
-/// --nocapture`); with 0.5, where a region has more vertices, it ended 0.038 mm off.
+/// Working edge of the haptic update, in radii of the tip. With 0.6 a dense scan 0.3 mm too high
+/// ends 0.014 mm off the part (`cargo test -p touchup-tests --test rooms haptic::dense --
+/// --nocapture`); with 0.5, and more vertices in a region, it ended 0.038 mm off.
 const WORKING_EDGE: f64 = 0.6;
-/// A scan whose edges are at least this share of that is left as it is: simplified it would have
-/// hardly fewer faces.
+/// Smallest mean edge of a scan that stays as it is, as a share of the working edge: simplification
+/// would save hardly any faces.
 const COARSE_ENOUGH: f64 = 0.6;
 /// Turning of a touched face in [`RefineParams::robust`], 1/s: about as fast as its motion.
 const TURNING: f64 = 30.0;
 
-/// The α, m/(N·s), by which a face relaxes within 40 ms at the usual force of a hand: rate over
-/// −df/dh.
+/// Value of α, m/(N·s), by which a face relaxes within 40 ms at the usual force of a hand: rate
+/// over −df/dh.
 pub fn relaxing_alpha(model: &ContactModel) -> f64 {
     let slope = match *model {
         ContactModel::Spring { stiffness_n_per_m } => stiffness_n_per_m,
@@ -145,13 +143,13 @@ pub fn relaxing_alpha(model: &ContactModel) -> f64 {
     RELAXATION / slope
 }
 
-/// For a tip of this size, m; a point feels every face.
+/// Working edge for a tip of this size, m; a point needs every face.
 fn working_edge(scale: f64) -> Option<f64> {
     Some(WORKING_EDGE * scale).filter(|edge| *edge > 0.0)
 }
 
 impl RefineParams {
-    /// What works on real scans: contact gate, friction, motion along the force, carving by free
+    /// Preset for real scans: contact gate, friction, motion along the force, carving by free
     /// motion.
     ///
     /// With a known stiffness the contact model is the linear spring of the real tip, which has no
@@ -216,20 +214,20 @@ impl RefineParams {
         }
     }
 
-    /// The same for a tip of another size than the radius of its ball, m.
+    /// Adapts the settings to a tip whose size, m, differs from the radius of its ball.
     pub fn set_scale(&mut self, scale: f64) {
         self.roi = RoiSize::Radius(scale);
         self.working_edge = self.working_edge.and(working_edge(scale));
     }
 
-    /// The edges to which a scan of this mean edge (m) is to be simplified for the haptic update;
-    /// `None`: it is coarse enough.
+    /// Edge length to which to simplify a scan of this mean edge (m) for the haptic update; `None`
+    /// if the scan is coarse enough.
     pub fn simplified_edge(&self, mean_edge: f64) -> Option<f64> {
         self.working_edge
             .filter(|edge| mean_edge < COARSE_ENOUGH * edge)
     }
 
-    /// How contact is decided.
+    /// Settings of the contact estimator.
     pub fn contact(&self) -> ContactEstimatorParams {
         let &Self {
             compensator,

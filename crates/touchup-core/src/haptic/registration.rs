@@ -1,10 +1,10 @@
-//! The small rigid offset between scan and touched part, from contacts against the untouched scan.
+//! Small rigid offset between scan and touched part, from contacts against the untouched scan.
 //!
-//! Point to plane: a scan point q with normal n that is moved by a small twist (t, θ) about the
-//! centre c meets the contact p when n · (p − q) = n · t + ((q − c) × n) · θ + b. A scan may also
-//! be too fat or too thin all over, b; touches from one side cannot distinguish that from a shift,
-//! so b takes part with what is known of it beforehand. The noise of a scan is correlated: all
-//! contacts in one cell of the correlation length count as one.
+//! Point to plane: a scan point q with normal n, moved by a small twist (t, θ) about the centre c,
+//! meets the contact p when n · (p − q) = n · t + ((q − c) × n) · θ + b. A scan may also be too fat
+//! or too thin all over, b; touches from one side cannot distinguish that from a shift, so b enters
+//! with its prior. The noise of a scan is correlated: all contacts in one cell of the correlation
+//! length count as one.
 
 use std::collections::BTreeMap;
 
@@ -27,9 +27,9 @@ pub struct RegistrationParams {
     /// Edge of the square over which the noise of the scan counts as one value, m: the root of the
     /// area under its correlation. Default 9 mm, for waves smoothed by 3.5 mm.
     pub correlation: f64,
-    /// How fat or thin a scan usually is, standard deviation, m. Default 0.3 mm.
+    /// Usual surface offset of a scan, fat or thin, standard deviation, m. Default 0.3 mm.
     pub surface_offset: f64,
-    /// Contacts closer together than this become one, m. Default 1 mm.
+    /// Distance below which contacts merge, m. Default 1 mm.
     pub spacing: f64,
 }
 
@@ -49,29 +49,29 @@ impl Default for RegistrationParams {
 pub struct Registration {
     /// Moves the scan onto the contacts: x ↦ c + R (x − c) + t.
     pub scan_to_part: Isometry3<f64>,
-    /// The same as shift t of the centre and rotation vector θ, m and rad.
+    /// The same motion as shift t of the centre and rotation vector θ, m and rad.
     pub twist: Vector6<f64>,
     /// Covariance of (t, θ), symmetric, m², m·rad and rad².
     pub covariance: Matrix6<f64>,
-    /// What the rotation is about: the middle of the contacts, m, in O.
+    /// Centre of the rotation: the middle of the contacts, m, in O.
     pub centre: Point3<f64>,
-    /// How much fatter the scan is than the part, m, and its standard uncertainty.
+    /// Surface offset of the scan, positive if fatter, m, and its standard uncertainty.
     pub surface_offset: [f64; 2],
-    /// Contacts that were used, one kept per voxel.
+    /// Number of contacts in use, one per voxel.
     pub contacts: usize,
 }
 
-/// Why there is no [`Registration`].
+/// Reason for a missing [`Registration`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RegistrationError {
-    /// Too little was touched.
+    /// Too few touches.
     #[error(
         "{cells} separate places of the scan were touched, {needed} are needed: touch more of it"
     )]
     TooFew {
         /// cells of the correlation length
         cells: usize,
-        /// at least
+        /// minimum number of cells
         needed: usize,
     },
     /// The touched surfaces let the scan slide.
@@ -80,11 +80,11 @@ pub enum RegistrationError {
         list(directions)
     )]
     Undetermined {
-        /// shift and turn about the middle of the contacts; unit, a turn counting as the shift that
-        /// it gives on average
+        /// shift and turn about the middle of the contacts; unit, with a turn expressed by its
+        /// average shift
         directions: Vec<Vector6<f64>>,
     },
-    /// The iterations do not converge, or end outside of what can be a small offset.
+    /// Iterations that do not converge, or end outside the range of a small offset.
     #[error("the registration does not converge to one place of the scan")]
     NotConverged,
 }
@@ -113,34 +113,33 @@ struct Mean {
 type Unknowns = SVector<f64, 7>;
 type Information = SMatrix<f64, 7, 7>;
 
-/// Collects contacts as the means of small cells, of which it keeps a bounded number.
+/// Collects contacts as the means of small cells, up to a maximum number.
 #[derive(Clone, Debug)]
 pub struct Registrar {
     params: RegistrationParams,
     means: BTreeMap<(VoxelKey, i8), Mean>,
 }
 
-/// Cells of contacts that are kept; later ones elsewhere are left out.
+/// Maximum number of contact cells; the registrar ignores later ones elsewhere.
 const MOST_MEANS: usize = 50_000;
-/// Fewer separate places do not determine six numbers.
+/// Minimum number of separate places that determines six numbers.
 const LEAST_CELLS: usize = 20;
-/// Contacts count as of a face when their normals are no farther apart than 37°.
+/// Smallest cosine between the normals of a contact and its face: 37°.
 const SMALLEST_COSINE: f64 = 0.8;
-/// A direction is undetermined when the normals have less than this part in it: 6° of noise is
-/// 0.01.
+/// Smallest part of the normals in a determined direction: 6° of noise is 0.01.
 const LEAST_SHARE: f64 = 0.02;
-/// Rounds of closest points.
+/// Maximum rounds of closest points.
 const ROUNDS: usize = 30;
-/// A round that moves less than this ends them, in scan noises: below it contacts go to and fro
-/// between faces.
+/// Motion below which a round is the last, in scan noises: below it contacts alternate between
+/// faces.
 const REST: f64 = 0.02;
-/// Late iterations that alternate by less than this many standard uncertainties count as converged.
+/// Largest alternation of late iterations that count as converged, in standard uncertainties.
 const SMALL_STEP: f64 = 0.3;
-/// Smallest mean square error accepted, in squares of the scan's noise.
+/// Smallest mean square error, in squares of the scan's noise.
 const LEAST_SCALE: f64 = 0.05;
-/// An error of this many scan noises counts half.
+/// Error with half the weight, in scan noises.
 const HALF_WEIGHT: f64 = 3.0;
-/// Farther than this from the scan is a feature that it lacks, in scan noises.
+/// Maximum distance of a contact from the scan, in scan noises: beyond it is a missing feature.
 const REACH: f64 = 4.0;
 
 impl Registrar {
@@ -169,7 +168,7 @@ impl Registrar {
 
     /// Takes a point of the part, m, with its outward unit normal, in O.
     pub fn push(&mut self, point: &Point3<f64>, normal: &Vector3<f64>) {
-        // the two sides of a thin wall stay apart
+        // keeps the two sides of a thin wall apart
         let facing = (normal.iamax() as i8 + 1) * if normal[normal.iamax()] < 0.0 { -1 } else { 1 };
         let cell = (voxel_of(point, self.params.spacing), facing);
         if self.means.len() >= MOST_MEANS && !self.means.contains_key(&cell) {
@@ -181,7 +180,7 @@ impl Registrar {
         mean.count += 1.0;
     }
 
-    /// The offset at which the scan fits the contacts best.
+    /// Offset at which the scan fits the contacts best.
     ///
     /// - `scan`: untouched, with the tree over its faces.
     ///
@@ -232,7 +231,7 @@ struct RegistrationRound {
 }
 
 impl RegistrationRound {
-    /// Length of the step in standard uncertainties; infinite when those are none.
+    /// Length of the step in standard uncertainties; infinite without valid ones.
     fn step_in_sigmas(&self) -> f64 {
         let twist = self.step.fixed_rows::<6>(0).into_owned();
         let covariance = self.covariance.fixed_view::<6, 6>(0, 0).into_owned();
@@ -256,7 +255,7 @@ impl RegistrationRound {
             surface_offset,
             ..
         } = registrar.params;
-        // the scan stays where it is: the contacts are moved back
+        // the scan stays in place: the contacts move back
         let rows: Vec<_> = contacts
             .iter()
             .filter_map(|(p, n)| {
@@ -313,7 +312,7 @@ impl RegistrationRound {
             .iter()
             .map(|(_, row, error, ..)| weight(*error, row))
             .collect();
-        // how far the estimate yields: not by the weights but by how fast the weighted errors grow
+        // information by the growth of the weighted errors, not by the weights
         let mut slopes = Information::zeros();
         slopes[(6, 6)] = prior;
         for ((_, row, ..), weight) in rows.iter().zip(&weights) {
@@ -331,7 +330,7 @@ impl RegistrationRound {
         let scale =
             (square / weights.iter().sum::<f64>() / (scan_noise * scan_noise)).max(LEAST_SCALE);
         let mut covariance = inverse * scale;
-        // what is known of the surface offset beforehand does not depend on the errors
+        // the prior of the surface offset does not depend on the errors
         covariance += inverse.column(6) * inverse.column(6).transpose() * (prior * (1.0 - scale));
         Ok(Self {
             step,
@@ -354,7 +353,7 @@ impl RegistrationRound {
     }
 }
 
-/// How many independent values of the scan's noise `points` amount to: n² / Σ ρ(p − q) with a
+/// Number of independent values of the scan's noise among `points`: n² / Σ ρ(p − q) with a
 /// correlation ρ that falls linearly to 0 over `correlation` on each axis.
 fn independent<'a>(points: impl Iterator<Item = &'a Point3<f64>>, correlation: f64) -> f64 {
     let mut cells: BTreeMap<VoxelKey, f64> = BTreeMap::new();
@@ -370,7 +369,7 @@ fn independent<'a>(points: impl Iterator<Item = &'a Point3<f64>>, correlation: f
     total * total / alike
 }
 
-/// Refuses when a direction of motion leaves all planes where they are.
+/// Refuses if a direction of motion leaves all planes in place.
 fn check_directions(rows: &[Unknowns], lever: f64) -> Result<(), RegistrationError> {
     let mut information = Matrix6::zeros();
     for row in rows {

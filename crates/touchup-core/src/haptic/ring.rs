@@ -1,5 +1,5 @@
-//! The ring: the faces around the vertices that move, and their connectivity. Found once, then used
-//! by number.
+//! The ring: the faces around the moving vertices, and their connectivity. Found once, then used by
+//! number.
 
 use std::hint::select_unpredictable;
 use std::ops::Range;
@@ -7,22 +7,21 @@ use std::ops::Range;
 use super::scratch_map::ScratchMap;
 use crate::mesh::{FaceId, TriMesh, VertexId};
 
-/// Vertices around the ring that do not move, for each that does: all around a single face.
+/// Fixed vertices around the ring, for each moving one: all around a single face.
 const RIM_SHARE: usize = 4;
 /// Faces around a vertex; six in a regular mesh.
 const STAR_FACES: usize = 8;
-/// Not a number of a vertex.
+/// Placeholder for no vertex.
 const NONE: u32 = u32::MAX;
 
-/// Faces and vertices have numbers here: their order in `faces`, and in the scratch map of the
-/// region.
+/// Numbers of faces and vertices are their order in `faces`, and in the scratch map of the region.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ring {
     /// faces with a moving vertex, then the faces that share an edge with one of these
     pub faces: Vec<FaceId>,
-    /// how many of them move
+    /// number of moving faces
     pub moving: usize,
-    /// faces that share an edge, the first one moving; more than once where they share several
+    /// faces that share an edge, the first one moving; repeated if they share several
     pub edges: Vec<(u32, u32)>,
     /// number of each face
     known: ScratchMap,
@@ -30,24 +29,24 @@ pub(super) struct Ring {
     corners: Vec<[u32; 3]>,
     /// faces around the moving vertices, vertex after vertex
     stars: Vec<u32>,
-    /// neighbours of the moving vertices, and where those of each one start
+    /// neighbours of the moving vertices, and the start of each vertex's own
     neighbours: Vec<u32>,
     starts: Vec<usize>,
-    /// for each vertex: around which one it was met last, the face there, and how often before
+    /// for each vertex: centre of the last visit, the face there, and number of visits before
     met: Vec<(u32, u32, u32)>,
 }
 
-/// How many edges and neighbours were found so far.
+/// Numbers of edges and neighbours.
 #[derive(Clone, Copy, Default)]
 struct RingCount {
     edges: usize,
     neighbours: usize,
-    /// an edge of more than two faces
+    /// whether an edge has more than two faces
     crowded: bool,
 }
 
 impl Ring {
-    /// Makes room for so many moving vertices: two to three faces each, three edges for two faces.
+    /// Makes room for moving `vertices`: two to three faces each, three edges for two faces.
     pub fn reserve(&mut self, vertices: usize) {
         let faces = 3 * vertices;
         self.faces.reserve(faces);
@@ -56,7 +55,7 @@ impl Ring {
         self.met.reserve(RIM_SHARE * vertices);
         self.starts.reserve(vertices + 1);
         self.stars.reserve(STAR_FACES * vertices);
-        // as many as corners of faces, before those met twice are left out
+        // as many as corners of faces, before the removal of duplicates
         self.edges.reserve(2 * STAR_FACES * vertices);
         self.neighbours.reserve(2 * STAR_FACES * vertices);
     }
@@ -84,7 +83,7 @@ impl Ring {
         for &face in vertices.iter().flat_map(|&vertex| mesh.star(vertex)) {
             let [number] = self.known.number([face.0]);
             self.stars.push(number);
-            // no branches: which face was met before cannot be predicted
+            // no branches: the repetition of a face is unpredictable
             self.faces.push(face);
             self.faces[number as usize] = face;
             self.faces.truncate(self.known.len());
@@ -92,8 +91,8 @@ impl Ring {
         self.moving = self.faces.len();
     }
 
-    /// Finds their connectivity, for the same vertices, which have the first numbers in
-    /// `scratch_map`; their neighbours get the next.
+    /// Finds the connectivity for the same vertices, which have the first numbers in `scratch_map`;
+    /// their neighbours get the next.
     pub fn link(&mut self, mesh: &TriMesh, vertices: &[VertexId], scratch_map: &mut ScratchMap) {
         self.corners.clear();
         self.corners.extend(
@@ -135,7 +134,7 @@ impl Ring {
                 select_unpredictable(a == vertex, b, a),
                 select_unpredictable(c == vertex, b, c),
             ] {
-                // no branches: which corner was met before cannot be predicted
+                // no branches: the repetition of a corner is unpredictable
                 let (around, other, times) = met[corner as usize];
                 let is_met = around == vertex;
                 met[corner as usize] = (vertex, face, (times + 1) * u32::from(is_met));
@@ -149,7 +148,7 @@ impl Ring {
         found
     }
 
-    /// Notes all pairs of faces at the edges of moving vertices, also where more than two meet.
+    /// Notes all pairs of faces at the edges of moving vertices, also of more than two at an edge.
     fn link_crowded(&mut self, mesh: &TriMesh, vertices: &[VertexId]) {
         self.edges.clear();
         let mut rest = &self.stars[..];
@@ -173,7 +172,7 @@ impl Ring {
         }
     }
 
-    /// Notes the other faces at edges of moving faces of which no end moves.
+    /// Notes the other faces at edges of moving faces without a moving end.
     fn link_outside(&mut self, mesh: &TriMesh, moving_vertices: u32) {
         for index in 0..self.moving {
             let fixed = self.corners[index].map(|corner| corner >= moving_vertices);
@@ -196,7 +195,7 @@ impl Ring {
         if other as usize == self.faces.len() {
             self.faces.push(face);
         }
-        // pairs of moving faces are met from both sides
+        // both sides find a pair of moving faces
         if other > index {
             self.edges.push((index, other));
         }

@@ -1,10 +1,9 @@
-//! The region of interest around a touched face: handle, free vertices, fixed rim \[paper, Sec
-//! 4.3\].
+//! Region of interest around a touched face: handle, free vertices, fixed rim \[paper, Sec 4.3\].
 //!
 //! The handle is the touched face. Free vertices follow it by Laplacian surface editing with
 //! uniform weights \[Sorkine 2004\]: the displacement of each free vertex is the mean of its
-//! neighbours' displacements, the handle's is given, the rim's is zero. The solution is linear in
-//! the displacements of the three handle vertices, so it is solved once for each handle, as three
+//! neighbours' displacements, the handle's is an input, the rim's is zero. The solution is linear
+//! in the displacements of the three handle vertices, hence one solution for each handle, as three
 //! weights for each free vertex.
 
 use nalgebra::Point3;
@@ -14,50 +13,49 @@ use super::ring::Ring;
 use super::scratch_map::ScratchMap;
 use crate::mesh::{FaceId, TriMesh, VertexId};
 
-/// How far the free vertices reach.
+/// Extent of the free vertices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RoiSize {
     /// Only the handle moves.
     Handle,
     /// All neighbours of the handle are free \[paper\].
     OneRing,
-    /// Vertices within this distance (m) of the handle's barycentre are free, as far as they are
-    /// connected.
+    /// Connected vertices within this distance (m) of the handle's barycentre are free.
     Radius(f64),
 }
 
-/// Room for more vertices is not made ahead.
+/// Maximum number of vertices with room made ahead.
 const LARGEST_ROOM: f64 = 1e4;
 /// Entries of a row of the skyline; twelve in a ring around a face, some thirty for a few hundred
 /// vertices.
 const ROW_ENTRIES: usize = 32;
 
-/// One handle and what moves with it.
+/// One handle and its moving vertices.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Roi {
-    /// the face it was made for; `None` after faces were added, removed or moved by others
+    /// face of the region; `None` after others added, removed or moved faces
     pub handle: Option<FaceId>,
     /// handle vertices first, then the free ones
     pub vertices: Vec<VertexId>,
     /// for each vertex: its share in the displacement of each handle vertex
     pub weights: Vec<[f64; 3]>,
-    /// what the guard looks at
+    /// faces under guard
     pub neighbourhood: Neighbourhood,
-    /// index in `vertices` of each vertex that moves; their neighbours have higher numbers
+    /// index in `vertices` of each moving vertex; their neighbours have higher numbers
     pub numbers: ScratchMap,
     solver: Solver,
 }
 
 impl RoiSize {
-    /// How many vertices to make room for, where edges are `mean_edge` (m) long: several times what
-    /// a regular mesh needs, so that a sample allocates nothing.
+    /// Number of vertices to make room for, at an edge length of `mean_edge` (m): several times the
+    /// need of a regular mesh, so that a sample allocates nothing.
     pub(super) fn room(self, mean_edge: f64) -> usize {
         let rings = match self {
             Self::Handle => 0.0,
             Self::OneRing => 1.0,
             Self::Radius(radius) => radius / mean_edge,
         };
-        // a mesh far finer than the tip grows its buffers when it comes to that
+        // a mesh far finer than the tip grows its buffers on demand
         (16.0 * (1.0 + rings) * (1.0 + rings)).min(LARGEST_ROOM) as usize
     }
 }
@@ -74,8 +72,8 @@ impl Roi {
         roi
     }
 
-    /// Makes the region of `handle`; the connectivity of its faces is looked up only for free
-    /// vertices or a guard.
+    /// Builds the region of `handle`; finds the connectivity of its faces only for free vertices or
+    /// a guard.
     pub fn rebuild(&mut self, mesh: &TriMesh, handle: FaceId, size: RoiSize, is_guarded: bool) {
         self.handle = Some(handle);
         self.numbers.clear();
@@ -122,11 +120,10 @@ impl Roi {
     }
 }
 
-/// Solves the Laplace equation on the free vertices by L D Lᵀ in skyline storage; its arrays are
-/// kept.
+/// Solves the Laplace equation on the free vertices by L D Lᵀ in skyline storage; reuses its
+/// arrays.
 ///
-/// Vertices come ring by ring, so that the neighbours of one are not far from it in the order and
-/// the skyline is low.
+/// Vertices come ring by ring, so that neighbours are close in the order and the skyline is low.
 #[derive(Clone, Debug, Default)]
 struct Solver {
     /// row i of the matrix is `rows[starts[i]..starts[i + 1]]`: from its first entry to the
@@ -198,7 +195,7 @@ impl Solver {
                 let sum: f64 = done.iter().zip(other).map(|(x, y)| x * y).sum();
                 self.rows[start + column - first] -= sum;
             }
-            // the row holds L D so far
+            // the row holds L D at this point
             let mut diagonal = self.rows[start + row - first];
             for column in first..row {
                 let scaled = self.rows[start + column - first];
@@ -247,7 +244,7 @@ fn less(x: &[f64; 3], factor: f64, y: &[f64; 3]) -> [f64; 3] {
 mod tests {
     use super::*;
 
-    /// A fan around vertex 0 with the handle 0–1–2 and a second ring, of which 3–8 and 12 are free.
+    /// A fan around vertex 0 with the handle 0–1–2 and a second ring; 3–8 and 12 are free.
     #[test]
     fn weights_solve_the_laplace_equation() {
         let ring = |k: u32, radius: f64| {

@@ -1,12 +1,12 @@
-//! A scratch map that numbers ids in order of insertion, is cleared in no time and stays in the
-//! nearest cache.
+//! A scratch map that numbers ids in order of insertion, clears in no time and stays in the nearest
+//! cache.
 
 use std::hint::select_unpredictable;
 
 /// Open addressing with linear probing. Entries of older stamps count as empty.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ScratchMap {
-    /// a power of two, at most half full
+    /// length: a power of two, at most half full
     entries: Vec<Entry>,
     stamp: u32,
     len: usize,
@@ -19,7 +19,7 @@ struct Entry {
     number: u32,
 }
 
-/// Room at the start: a one-ring region has 37 faces and twice as many edges.
+/// Initial room: a one-ring region has 37 faces and twice as many edges.
 const FIRST_ROOM: usize = 256;
 
 impl ScratchMap {
@@ -41,14 +41,14 @@ impl ScratchMap {
         u64::from(self.stamp) << 32 | u64::from(key)
     }
 
-    /// Where `key` is, or where it would go. Fibonacci hashing: the high bits of a product are well
-    /// mixed.
+    /// Slot of `key`, or the slot for inserting it. Fibonacci hashing: the high bits of a product
+    /// are well mixed.
     #[inline]
     fn slot(&self, key: u32) -> usize {
         let (tag, mask) = (self.tag(key), self.entries.len() - 1);
         let mut at = (u64::from(key).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize & mask;
-        // another key of this stamp: tags that differ, but in the lower half alone. One branch,
-        // seldom taken: whether the key itself is there cannot be foretold
+        // another key of this stamp: tags that differ only in the lower half. One branch, seldom
+        // taken: the presence of the key itself is unpredictable
         while (self.entries[at].tag ^ tag).wrapping_sub(1) < u64::from(u32::MAX) {
             at = (at + 1) & mask;
         }
@@ -62,7 +62,7 @@ impl ScratchMap {
         (entry.tag == self.tag(key)).then_some(entry.number)
     }
 
-    /// The numbers of `keys`: the next ones for those that have none yet.
+    /// Numbers of `keys`; new keys get the next ones.
     #[inline]
     pub fn number<const N: usize>(&mut self, keys: [u32; N]) -> [u32; N] {
         let mut len = self.len;
@@ -82,7 +82,7 @@ impl ScratchMap {
         numbers
     }
 
-    /// Takes back the numbers of `keys`, which were given last.
+    /// Takes back the numbers of `keys`, which must be the last ones.
     pub fn take_back<const N: usize>(&mut self, keys: [u32; N]) {
         for key in keys.into_iter().rev() {
             let at = self.slot(key);
@@ -91,7 +91,7 @@ impl ScratchMap {
         self.len -= N;
     }
 
-    /// How many keys have a number.
+    /// Number of keys.
     pub fn len(&self) -> usize {
         self.len
     }

@@ -1,4 +1,4 @@
-//! Stroke undo: the state before each stroke, so that the haptic update can be reversed.
+//! Stroke undo: the state before each stroke, for reversing the haptic update.
 
 use nalgebra::Point3;
 
@@ -6,10 +6,10 @@ use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::reconstruct::History;
 use crate::stylus::STROKE_PAUSE_NS;
 
-/// Positions and normals kept at most: some 60 MB.
+/// Maximum number of positions and normals: some 60 MB.
 const MOST_KEPT: usize = 1_000_000;
 
-/// Positions of vertices, and normals measured on faces, before each stroke moved them.
+/// Positions of vertices, and measured normals of faces, before each stroke.
 #[derive(Clone, Debug)]
 pub(super) struct StrokeUndo {
     positions: History<u32, Point3<f64>>,
@@ -28,7 +28,7 @@ impl Default for StrokeUndo {
 }
 
 impl StrokeUndo {
-    /// Begins a stroke when the contact at `stamp_ns` follows none for a while.
+    /// Begins a stroke if the contact at `stamp_ns` follows a pause.
     pub fn touch(&mut self, stamp_ns: i64) {
         if self
             .last_contact_ns
@@ -40,20 +40,20 @@ impl StrokeUndo {
         self.last_contact_ns = Some(stamp_ns);
     }
 
-    /// Keeps where vertices are before they move.
+    /// Keeps the positions of vertices before they move.
     pub fn note_positions(&mut self, vertices: &[VertexId], mesh: &TriMesh) {
         for &vertex in vertices {
             self.positions.note(vertex.0, || mesh.position(vertex));
         }
     }
 
-    /// Keeps the normal known on a face before another is measured.
+    /// Keeps the known normal of a face before a new measurement.
     pub fn note_evidence(&mut self, face: FaceId, before: [f32; 3]) {
         self.evidence.note(face.0, || before);
     }
 
-    /// Exchanges what the last stroke changed with what was there before it, or what was so undone
-    /// last with what is there; returns the vertices that moved, `None` where there was no stroke.
+    /// Undoes the last stroke, or redoes the last undone one, by exchanging its state with the
+    /// current one; returns the vertices that moved, `None` without a stroke.
     pub fn change(
         &mut self,
         is_undo: bool,

@@ -1,40 +1,39 @@
-//! The coupled equations of one held sample with a bound on the error, however stiff they are.
+//! Coupled equations of one held sample with a bound on the error, however stiff.
 //!
-//! The turned angle follows from the impulse alone, tan(θ/2) = tan(θ₀/2) e^(−β|F|J), so two
-//! unknowns are left: the travel s along a and the impulse J of the expected force,
+//! The turned angle follows from the impulse alone, tan(θ/2) = tan(θ₀/2) e^(−β|F|J), which leaves
+//! two unknowns: the travel s along a and the impulse J of the expected force,
 //!
 //! ```text
 //! ds/dt = α (F·n(J) − f(h))      dJ/dt = f(h)      h = (p − b₀ − s a)·n(J)
 //! ```
 //!
-//! They are integrated by Radau IIA of order 5 (L-stable, stiffly accurate) \[Hairer Wanner 1996,
-//! IV.5\], whose stages Newton's method solves with the exact Jacobian. Each step is compared with
-//! its two halves, which go on, and is made shorter until both agree.
+//! Radau IIA of order 5 (L-stable, stiffly accurate) \[Hairer Wanner 1996, IV.5\] integrates them;
+//! Newton's method solves its stages with the exact Jacobian. A comparison of each step with its
+//! two halves, which go on, shortens it until both agree.
 //!
-//! Where the face turns beyond a right angle from a, h leaves its rest point as fast as it was
-//! drawn to it before, and what starts that are roundings: they are followed through the path, and
-//! a result that they decide is refused.
+//! If the face turns beyond a right angle from a, h leaves its rest point as fast as it approached
+//! it before, and roundings start that: the solver follows them through the path, and refuses a
+//! result that they decide.
 
 use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2};
 
 use super::error::DynamicsError;
 
-/// A step and its halves agree to this share of the size of each unknown: the halves are 31 times
-/// nearer, and a few hundred steps together stay below [`super::RELATIVE_ERROR`].
+/// Agreement of a step and its halves, as a share of the size of each unknown: the halves are 31
+/// times nearer, and a few hundred steps together stay below [`super::RELATIVE_ERROR`].
 const AGREEMENT: f64 = 1e-11;
-/// Newton's method stops at this share of what is asked for.
+/// Stop of Newton's method, as a share of the required agreement.
 const NEWTON: f64 = 1e-2;
 const MOST_ITERATIONS: usize = 14;
-/// Steps, accepted or not, after which it gives up.
+/// Maximum number of steps, accepted or not.
 const MOST_STEPS: usize = 100_000;
-/// Share of the shortest time constant that the first step takes.
+/// First step, as a share of the shortest time constant.
 const FIRST: f64 = 0.1;
-/// A step may not be longer than this over the rate at which the solution grows: an implicit method
-/// would damp it.
+/// Longest step, in time constants of a growing solution: an implicit method would damp it.
 const LONGEST_GROWTH: f64 = 1.0;
 /// A step may shrink to a tenth and grow eightfold.
 const CHANGE: (f64, f64) = (0.1, 8.0);
-/// Aim below what is asked for, so that most steps are accepted.
+/// Aim below the required agreement, so that most steps pass.
 const SAFETY: f64 = 0.85;
 
 /// Travel, m, and impulse in the same unit (times α), at one instant.
@@ -46,23 +45,23 @@ pub(super) struct Slope {
     pub jacobian: Matrix2<f64>,
 }
 
-/// The size of each unknown that counts, m.
+/// Relevant size of each unknown, m.
 #[derive(Clone, Copy)]
 pub(super) struct Sizes {
-    /// below it the roundings of the input decide
+    /// size below which the roundings of the input decide
     pub rounding: f64,
-    /// turns the face by one
+    /// impulse that turns the face by one
     pub turning: f64,
-    /// changes the expected force by a good part
+    /// travel that changes the expected force by a good part
     pub contact: f64,
 }
 
 /// Integrates from zero over `end` (s).
 ///
 /// # Errors
-/// [`DynamicsError::Stiff`] when [`MOST_STEPS`] do not suffice, [`DynamicsError::NotFinite`] where
-/// the solution is not, [`DynamicsError::Undetermined`] where roundings grow beyond `relative` of
-/// the travel.
+/// [`DynamicsError::Stiff`] if [`MOST_STEPS`] do not suffice, [`DynamicsError::NotFinite`] if the
+/// solution is not, [`DynamicsError::Undetermined`] if roundings grow beyond `relative` of the
+/// travel.
 #[expect(clippy::too_many_lines)]
 pub(super) fn integrate(
     end: f64,
@@ -71,9 +70,9 @@ pub(super) fn integrate(
     slope: impl Fn(&Coupled) -> Slope,
 ) -> Result<Coupled, DynamicsError> {
     let (mut y, mut time, mut farthest) = (Coupled::zeros(), 0.0, 0.0_f64);
-    // what the roundings of this step and of those before have come to
+    // accumulated roundings of this step and the steps before
     let mut noise = Coupled::zeros();
-    // the first step does not change much, and the next ones grow from there
+    // the first step changes little, and the next ones grow from there
     let Slope { rate, jacobian } = slope(&y);
     let fastest = jacobian
         .amax()
@@ -139,8 +138,7 @@ pub(super) fn integrate(
     })
 }
 
-/// Half of the trace, and the squared half distance of both eigenvalues, negative where they are
-/// complex.
+/// Half of the trace, and the squared half distance of both eigenvalues, negative for complex ones.
 fn eigenvalues(jacobian: &Matrix2<f64>) -> (f64, f64) {
     let [[a, c], [b, d]] = jacobian.data.0;
     let across = 0.5 * (a - d);
@@ -153,7 +151,7 @@ fn fastest_growth(jacobian: &Matrix2<f64>) -> f64 {
     half + squared.max(0.0).sqrt()
 }
 
-/// e^(A t): what a small difference becomes in a step.
+/// e^(A t): growth of a small difference in a step.
 fn propagator(jacobian: &Matrix2<f64>, dt: f64) -> Matrix2<f64> {
     let (half, squared) = eigenvalues(jacobian);
     let distance = squared.abs().sqrt();
@@ -173,7 +171,7 @@ fn propagator(jacobian: &Matrix2<f64>, dt: f64) -> Matrix2<f64> {
     Matrix2::identity() * even + (jacobian - Matrix2::identity() * half) * odd
 }
 
-/// One step; `None` where Newton's method does not converge.
+/// One step; `None` if Newton's method does not converge.
 fn radau(
     y: &Coupled,
     dt: f64,
@@ -204,7 +202,7 @@ fn radau(
         let left = (0..3)
             .map(|i| change.fixed_rows::<2>(2 * i).component_div(&sizes).amax())
             .fold(0.0, f64::max);
-        // … or no nearer than roundings let it come
+        // or no nearer than roundings allow
         if left <= NEWTON * AGREEMENT || left <= AGREEMENT && left > 0.5 * last {
             return (growth * dt <= LONGEST_GROWTH).then_some(end);
         }
@@ -216,7 +214,7 @@ fn radau(
     None
 }
 
-/// Of the three stages at (4 ∓ √6)/10 and 1 \[Hairer Wanner 1996, table IV.5.6\].
+/// Coefficients of the three stages at (4 ∓ √6)/10 and 1 \[Hairer Wanner 1996, table IV.5.6\].
 fn coefficients() -> Matrix3<f64> {
     const ROOT: f64 = 2.449_489_742_783_178;
     Matrix3::new(

@@ -1,20 +1,20 @@
-//! The contact model: the force expected from the scan, and the displacement of a face by it.
+//! Contact model: the force expected from the scan, and the displacement of a face by it.
 //!
 //! The flow of a linear spring is exact too: dh/dt = v − α (a·n) (F·n + k h) is linear in h.
 
 use super::error::DynamicsError;
 use super::sigmoid_flow::{advance, share};
 
-/// Share of f_max up to which a sigmoid is trusted: beyond it the depth runs off to infinity, and
+/// Share of f_max up to which a sigmoid is reliable: beyond it the depth runs off to infinity, and
 /// with it the offset.
 pub const LARGEST_SHARE: f64 = 0.99;
-/// Below this scaled time one rounding of u is more than what happens.
+/// Scaled time below which the change is less than one rounding of u.
 const NO_TIME: f64 = 1e-200;
-/// Scaled times beyond it leave too little room below the largest number: they are divided by e^u,
-/// at u = −40 at least.
+/// Largest scaled time: longer ones leave too little room below the largest number for a division
+/// by e^u, at u = −40 at least.
 const LONGEST: f64 = 1e280;
-/// Of a spring: below it the series is taken, above it the closed form (which there loses no more
-/// than four roundings).
+/// Limit of the series for a spring; above it the closed form, which there loses no more than four
+/// roundings.
 const SERIES_UP_TO: f64 = 1.0;
 /// 1/k! for k = 2 … 19; the next one is below a rounding of 1/2.
 const INVERSE_FACTORIALS: [f64; 18] = {
@@ -27,12 +27,12 @@ const INVERSE_FACTORIALS: [f64; 18] = {
     inverse
 };
 
-/// One face held against one sample, seen along the direction a in which the face may move.
+/// One face held against one sample, along the direction a in which the face may move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Hold {
     /// h at the start, m
     pub h: f64,
-    /// dh/dt that does not come from the motion of the face, m/s
+    /// dh/dt from other causes than the motion of the face, m/s
     pub drift: f64,
     /// a · n
     pub cosine: f64,
@@ -40,11 +40,11 @@ pub(super) struct Hold {
     pub force: f64,
     /// α, m/(N·s)
     pub alpha: f64,
-    /// s
+    /// time step, s
     pub dt: f64,
 }
 
-/// What one position flow did.
+/// Result of one position flow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shift {
     /// s = α ∫ (F·n − f) dt, m, along a
@@ -53,7 +53,7 @@ pub(super) struct Shift {
     pub impulse: f64,
 }
 
-/// The expected force f over the signed distance h of the tip from the face (positive outside).
+/// Expected force f over the signed distance h of the tip from the face (positive outside).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ContactModel {
     /// f(h) = f_max / (1 + exp(h/h_min + δ)) \[paper, Eq 3\].
@@ -74,8 +74,7 @@ pub enum ContactModel {
 
 impl ContactModel {
     /// # Errors
-    /// [`DynamicsError::BadParameter`] for a value that is not finite, or not positive where it
-    /// must be.
+    /// [`DynamicsError::BadParameter`] for a value that is not finite, or not positive as required.
     pub fn check(&self) -> Result<(), DynamicsError> {
         let positive = |name, value| DynamicsError::check(name, value, value > 0.0);
         match *self {
@@ -119,7 +118,7 @@ impl ContactModel {
         }
     }
 
-    /// f⁻¹(F), m; infinite where the sigmoid never reaches F.
+    /// f⁻¹(F), m; infinite if the sigmoid never reaches F.
     pub fn distance(&self, force_n: f64) -> f64 {
         match *self {
             Self::Sigmoid { f_max_n, .. } if force_n <= 0.0 => f_max_n * f64::INFINITY,
@@ -130,7 +129,7 @@ impl ContactModel {
                 delta,
             } => {
                 let (rest, quotient) = (f_max_n - force_n, (f_max_n - force_n) / force_n);
-                // a force so small that the quotient overflows is still reached
+                // the sigmoid still reaches a force so small that the quotient overflows
                 let log = if quotient.is_finite() {
                     quotient.ln()
                 } else {
@@ -142,7 +141,7 @@ impl ContactModel {
         }
     }
 
-    /// The derivative of [`Self::distance`], m/N; zero where that is infinite.
+    /// Derivative of [`Self::distance`], m/N; zero if the distance is infinite.
     pub(super) fn distance_slope(&self, force_n: f64) -> f64 {
         match *self {
             Self::Sigmoid { f_max_n, .. } if force_n <= 0.0 || force_n >= f_max_n => 0.0,
@@ -153,14 +152,13 @@ impl ContactModel {
         }
     }
 
-    /// Whether F·n is more than the model can answer: [`Self::rigid_offset`], and a step that takes
-    /// the offset out, then use [`LARGEST_SHARE`] · f_max instead; a step that does not lets the
-    /// face escape.
+    /// Whether F·n exceeds the model: [`Self::rigid_offset`], and a step that takes the offset out,
+    /// then use [`LARGEST_SHARE`] · f_max instead; any other step lets the face escape.
     pub fn clamps(&self, force_n: f64) -> bool {
         matches!(*self, Self::Sigmoid { f_max_n, .. } if force_n > LARGEST_SHARE * f_max_n)
     }
 
-    /// The force a rigid contact is compared with: F·n between f(0), below which the model cannot
+    /// Force for comparison with a rigid contact: F·n between f(0), below which the model cannot
     /// distinguish contact from none, and [`LARGEST_SHARE`] · f_max.
     pub(super) fn comparable(&self, force_n: f64, at_zero_n: f64) -> f64 {
         match *self {
@@ -169,7 +167,7 @@ impl ContactModel {
         }
     }
 
-    /// Where a face on a rigid surface comes to rest under the force F·n, seen from the tip:
+    /// Rest position of a face on a rigid surface under the force F·n, relative to the tip:
     /// f⁻¹(F·n), m, ≤ 0.
     ///
     /// Zero below f(0), clamped above [`LARGEST_SHARE`] · f_max: always finite.
@@ -177,8 +175,7 @@ impl ContactModel {
         self.distance(self.comparable(force_n, self.force(0.0)))
     }
 
-    /// Exact solution of ds/dt = α (F·n − f(h₀ + v t − (a·n) s)), s(0) = 0; not finite where it
-    /// overflows.
+    /// Exact solution of ds/dt = α (F·n − f(h₀ + v t − (a·n) s)), s(0) = 0; not finite on overflow.
     #[inline]
     pub(super) fn flow(&self, hold: &Hold) -> Shift {
         match *self {
@@ -192,7 +189,7 @@ impl ContactModel {
     }
 }
 
-/// a b c, also where a b underflows or overflows and a b c does not; none is negative.
+/// a b c, even if a b underflows or overflows and a b c does not; none is negative.
 #[inline]
 fn product(a: f64, b: f64, c: f64) -> f64 {
     let first = a * b;
@@ -216,7 +213,7 @@ fn sigmoid(hold: &Hold, f_max: f64, h_min: f64, delta: f64) -> Shift {
     };
     let c = (hold.force - drift) / f_max;
     if t.abs() < NO_TIME || !c.is_finite() {
-        // the face does not move along its own normal: only the drift changes h, seen at its middle
+        // no motion of the face along its own normal: only the drift changes h, taken at its middle
         let load = share(u + 0.5 * hold.drift * hold.dt / h_min);
         let impulse = load * f_max * hold.dt;
         return Shift {

@@ -4,14 +4,14 @@ use super::error::DynamicsError;
 
 /// Error per step, relative to the size of each component, of [`super::StepRule::DormandPrince`].
 pub(crate) const RELATIVE: f64 = 1e-11;
-/// Steps, accepted or not, after which the problem is called stiff: some ten milliseconds.
+/// Maximum number of steps, accepted or not; beyond it the problem is stiff: some ten milliseconds.
 pub const MAX_STEPS: usize = 20_000;
 /// A step may shrink to a fifth and grow fivefold.
 const CHANGE: (f64, f64) = (0.2, 5.0);
-/// Aim below the tolerance, so that most steps are accepted.
+/// Aim below the tolerance, so that most steps pass.
 const SAFETY: f64 = 0.9;
 
-/// Stages: nodes of the tableau of Dormand and Prince (1980), the right-hand side does not depend
+/// Stages: nodes of the tableau of Dormand and Prince (1980); the right-hand side does not depend
 /// on time.
 const A: [[f64; 6]; 6] = [
     [1.0 / 5.0, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -56,12 +56,12 @@ const E: [f64; 7] = [
 /// Displacement along a, m, and the normal.
 pub(crate) type OdeState = [f64; 4];
 
-/// Integrates dy/dt = `rate`(y) from 0 to `end`, s; `scale` is the size of each component that
-/// counts, and `relative` the error per step in units of it.
+/// Integrates dy/dt = `rate`(y) from 0 to `end`, s; `scale` is the relevant size of each component,
+/// `relative` the error per step in units of it.
 ///
 /// # Errors
-/// [`DynamicsError::Stiff`] when [`MAX_STEPS`] do not suffice, [`DynamicsError::NotFinite`] when
-/// the rate is not.
+/// [`DynamicsError::Stiff`] if [`MAX_STEPS`] do not suffice, [`DynamicsError::NotFinite`] if the
+/// rate is not.
 pub fn integrate(
     start: OdeState,
     end: f64,

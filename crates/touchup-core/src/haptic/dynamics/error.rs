@@ -1,20 +1,20 @@
-//! What the face dynamics refuses.
+//! Errors of the face dynamics.
 
-/// What [`super::FaceDynamics`] refuses.
+/// Error of [`super::FaceDynamics`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DynamicsError {
     /// A parameter outside its range.
     #[error("{name} is {value}, but must be {range}", range = range_of(name))]
     BadParameter {
-        /// as in the scene and in `touchup step`
+        /// name in the scene and in `touchup step`
         name: &'static str,
-        /// as given
+        /// given value
         value: f64,
     },
     /// NaN or infinite input, or a result beyond the largest number.
     #[error("{what} is not finite; check the units of the input")]
     NotFinite {
-        /// which quantity
+        /// name of the quantity
         what: &'static str,
     },
     /// The face has no usable normal.
@@ -29,13 +29,13 @@ pub enum DynamicsError {
         /// s
         dt_s: f64,
     },
-    /// The face turned so far that its rest point repels it.
+    /// A face turned beyond the angle from which its rest point repels it.
     #[error(
         "the step has no answer within its bound: what roundings grow to on the way is {share:.1e} of it; take a shorter step, \
          or a force nearer to the normal"
     )]
     Undetermined {
-        /// what roundings come to, over the bound
+        /// effect of roundings, over the bound
         share: f64,
     },
     /// An adaptive solver gave up.
@@ -45,11 +45,11 @@ pub enum DynamicsError {
     Stiff {
         /// as in the scene and in `touchup step`
         rule: &'static str,
-        /// tried
+        /// number of steps tried
         steps: usize,
-        /// s
+        /// time reached, s
         reached_s: f64,
-        /// s
+        /// time step, s
         dt_s: f64,
     },
 }

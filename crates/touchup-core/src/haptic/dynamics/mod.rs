@@ -1,20 +1,20 @@
-//! Face dynamics: how one held sample moves and turns the face it touches \[paper, Eq 1–7\].
+//! Face dynamics: motion and turn of a touched face by one held sample \[paper, Eq 1–7\].
 //!
 //! ```text
 //! h = (p − b)·n      F* = f(h) n      db/dt = α ((F − F*)·n) a      dn/dt = β (F* × F) × n
 //! ```
 //!
-//! p and F are held over the step; a is n(0), or F/|F| ([`Along`]). Two sub-flows are solved
-//! exactly:
+//! p and F are constant over the step; a is n(0), or F/|F| ([`Along`]). Two sub-flows have exact
+//! solutions:
 //!
-//! - **position**, n frozen: b = b₀ + s a, ds/dt = α (F·n − f(h₀ − (a·n) s)). Since a·n is frozen
-//!   with n, h obeys dh/dt = −α (a·n) (F·n − f(h)): the equation for a = n with α (a·n) in the
+//! - **position**, n frozen: b = b₀ + s a, ds/dt = α (F·n − f(h₀ − (a·n) s)). With n, a·n is
+//!   constant: h obeys dh/dt = −α (a·n) (F·n − f(h)): the equation for a = n with α (a·n) in the
 //!   place of α. A moving tip or a turning face adds a drift v to dh/dt, frozen as well.
 //! - **rotation**, the impulse J = ∫ f dt given: n turns towards F by tan(θ/2) → tan(θ/2)
 //!   e^(−β|F|J).
 //!
-//! [`StepRule::Lie`] does one after the other. Where F is parallel to n that is the exact solution,
-//! whatever dt; elsewhere [`StepRule::Bounded`] solves both together to [`RELATIVE_ERROR`].
+//! [`StepRule::Lie`] does one after the other. For F parallel to n that is the exact solution,
+//! whatever dt; otherwise [`StepRule::Bounded`] solves both together to [`RELATIVE_ERROR`].
 
 mod bounded;
 mod contact_model;
@@ -33,17 +33,17 @@ use contact_model::{Hold, Shift};
 pub use error::DynamicsError;
 pub use rotation::turn;
 
-/// How far |n| may be from 1 on input: six digits in a file are enough.
+/// Tolerance on |n| = 1 of the input: six digits in a file are enough.
 pub const UNIT_TOLERANCE: f64 = 1e-6;
 /// Largest error of [`StepRule::Bounded`]: of the position over the farthest travel, of the normal
-/// over 1. Where the roundings of the input do more than that, they decide.
+/// over 1. Larger roundings of the input decide instead.
 pub const RELATIVE_ERROR: f64 = 1e-9;
-/// An impulse (times α) that turns a face by one is no larger, m: beyond it the face does not turn.
+/// Bound of the impulse (times α) that turns a face by one, m: beyond it the face does not turn.
 const NO_TURNING: f64 = 1e100;
-/// Below it the weight of the end is 1/2 + z/12 to rounding.
+/// Decay z below which the weight of the end is 1/2 + z/12 to rounding.
 const SMALL_DECAY: f64 = 1e-5;
 
-/// A face as the dynamics sees it: a point and a direction.
+/// Face in the dynamics: a point and a direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FaceState {
     /// b*: barycentre, m, in O
@@ -53,14 +53,14 @@ pub struct FaceState {
 }
 
 words! {
-    /// How the two sub-flows are put together.
+    /// Combination of the two sub-flows.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum StepRule {
-        /// Position, then rotation: first order, exact where F is parallel to n.
+        /// Position, then rotation: first order, exact for F parallel to n.
         #[default]
         Lie = "lie",
-        /// The position flow again with the drift and the mean normal that the rotation causes:
-        /// second order.
+        /// The position flow again with the drift and the mean normal due to the rotation: second
+        /// order.
         DriftCorrected = "corrected",
         /// The coupled equations to [`RELATIVE_ERROR`], however stiff: adaptive and implicit, and
         /// far slower (`cargo bench --bench dynamics`).
@@ -71,13 +71,13 @@ words! {
 }
 
 words! {
-    /// The direction a in which b* moves.
+    /// Direction a of the motion of b*.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
     pub enum Along {
-        /// n*(0) \[paper, Eq 6\]: n* when the face was first touched, or at the start of the step
-        /// if no other is given.
+        /// n*(0) \[paper, Eq 6\]: n* at the first touch of the face, or at the start of the step if
+        /// no other is given.
         InitialNormal = "normal0",
-        /// F/|F|, which stays bounded where n* is far off; n* at the start where F = 0.
+        /// F/|F|, which stays bounded for a far-off n*; n* at the start if F = 0.
         #[default]
         Force = "force",
     }
@@ -101,7 +101,7 @@ parameters! {
 }
 
 impl SigmoidParams {
-    /// The expected force of it.
+    /// Expected force of the sigmoid.
     pub fn model(&self) -> ContactModel {
         ContactModel::Sigmoid {
             f_max_n: self.f_max,
@@ -125,14 +125,14 @@ pub struct DynamicsParams {
     /// Direction of motion.
     pub along: Along,
     /// Compares h with f⁻¹(F·n) ([`ContactModel::rigid_offset`]) instead of 0, so that a face at
-    /// rest lies at the tip whatever the force. F·n is taken between f(0) and [`LARGEST_SHARE`] ·
-    /// f_max then.
+    /// rest lies at the tip whatever the force; clamps F·n between f(0) and [`LARGEST_SHARE`] ·
+    /// f_max.
     pub take_out_rigid_offset: bool,
 }
 
 impl Default for DynamicsParams {
     /// The paper's α, β, h_min, δ, with the f_max of 10 N that the paper leaves open; the robust
-    /// choice elsewhere.
+    /// choice for the rest.
     fn default() -> Self {
         Self {
             model: SigmoidParams::default().model(),
@@ -165,7 +165,7 @@ pub struct FaceDynamics {
     at_zero_n: f64,
 }
 
-/// A sample seen from the face.
+/// A sample relative to the face.
 struct FaceSample {
     /// n at the start
     n: Vector3<f64>,
@@ -205,8 +205,8 @@ impl FaceDynamics {
     /// for `dt` (s).
     ///
     /// # Errors
-    /// Input that is not finite, a normal that is not of length 1, a negative `dt`, a result that
-    /// overflows, and [`DynamicsError::Stiff`] from [`StepRule::DormandPrince`] and
+    /// Input that is not finite, a normal not of length 1, a negative `dt`, a result that
+    /// overflows, [`DynamicsError::Stiff`] from [`StepRule::DormandPrince`] and
     /// [`StepRule::Bounded`], and [`DynamicsError::Undetermined`] from the latter.
     pub fn step(
         &self,
@@ -219,10 +219,10 @@ impl FaceDynamics {
     }
 
     /// As [`Self::step`], with the n*(0) of an earlier step: [`Along::InitialNormal`] keeps b* on
-    /// the line on which it was then. n*(0) is taken as it is, |n*(0)| = 1.
+    /// its line of that step. Uses n*(0) unchecked, |n*(0)| = 1.
     ///
     /// # Errors
-    /// Those of [`Self::step`].
+    /// Errors of [`Self::step`].
     pub fn step_from(
         &self,
         initial_normal: &Vector3<f64>,
@@ -273,7 +273,7 @@ impl FaceDynamics {
         Ok(FaceState { b, n })
     }
 
-    /// F·n as it is compared, N, and the h that is compared with it, m.
+    /// F·n, N, and h, m, for their comparison.
     #[inline]
     fn compared(&self, n: &Vector3<f64>, touch: &FaceSample, displacement: f64) -> (f64, f64) {
         let force = touch.magnitude * touch.towards.dot(n);
@@ -317,10 +317,10 @@ impl FaceDynamics {
         (displacement, self.turned(touch, impulse))
     }
 
-    /// The position flow with h₀ + v t from the arm held and n turning evenly from its start to its
-    /// predicted end; twice, so that b* fits the n* that is returned. F·n and a·n, which change
-    /// during the step, enter by a mean that weights the end the more the faster h forgets: 1/2
-    /// when slow (second order), 1 when stiff.
+    /// Position flow with h₀ + v t from the arm held and n turning evenly from its start to its
+    /// predicted end; twice, so that b* fits the returned n*. F·n and a·n, which change during the
+    /// step, enter by a mean that weights the end the more the faster h forgets: 1/2 when slow
+    /// (second order), 1 when stiff.
     fn drift_corrected(&self, touch: &FaceSample) -> (f64, Vector3<f64>) {
         let (displacement, end) = self.lie(touch);
         if touch.dt == 0.0 || end == touch.n {
@@ -332,7 +332,7 @@ impl FaceDynamics {
         (shift.displacement, end)
     }
 
-    /// The flow, and what its mean of F·n leaves out of the impulse, N·s.
+    /// The flow, and the part of the impulse outside its mean of F·n, N·s.
     fn drifting_flow(
         &self,
         touch: &FaceSample,
@@ -404,7 +404,7 @@ impl FaceDynamics {
                 ),
             }
         };
-        // of a force that turns the face by nothing
+        // for a force that turns the face by nothing
         let turned = (unit / turning).min(NO_TURNING);
         let sizes = bounded::Sizes {
             rounding,

@@ -1,19 +1,19 @@
-//! The exact flow of the normal: dn/dt = β f (F − (F·n) n).
+//! Exact flow of the normal: dn/dt = β f (F − (F·n) n).
 
 use nalgebra::Vector3;
 
-/// 1 + n·to below which the two are opposite: half the square of a rounding of a unit vector.
+/// Limit of 1 + n·to for opposite vectors: half the square of a rounding of a unit vector.
 const OPPOSITE: f64 = 1e-33;
 
 /// Turns `n` towards the unit vector `to` until tan(θ/2) has fallen by e^−`exponent`; away from it
-/// where negative.
+/// if the exponent is negative.
 ///
 /// With e = e^−exponent, m = n + to and p = |m|²/2 = 1 + n·to,
 ///
 /// n′ ∝ 2e m + ((1 − e)² p − 2e²) to,
 ///
-/// which needs no angle and keeps its precision where n and `to` are nearly opposite. Opposite
-/// vectors stay.
+/// which needs no angle and keeps its precision for n and `to` nearly opposite. Opposite vectors
+/// stay.
 #[inline]
 pub fn turn(n: &Vector3<f64>, to: &Vector3<f64>, exponent: f64) -> Vector3<f64> {
     if exponent == 0.0 {
@@ -27,7 +27,6 @@ pub fn turn(n: &Vector3<f64>, to: &Vector3<f64>, exponent: f64) -> Vector3<f64> 
         return *n;
     }
     let turned = 2.0 * e * m + ((1.0 - e) * (1.0 - e) * p - 2.0 * e * e) * to;
-    // its length is 2e² + p (1 − e²): far above the smallest number, since p is at least that of
-    // `OPPOSITE`
+    // its length is 2e² + p (1 − e²): far above the smallest number, since p is at least `OPPOSITE`
     turned / turned.norm()
 }

@@ -1,4 +1,4 @@
-//! The exact flow of a sigmoid contact: du/dT = 1/(1 + eᵘ) − c.
+//! Exact flow of a sigmoid contact: du/dT = 1/(1 + eᵘ) − c.
 //!
 //! Integrated by partial fractions from u₀ to u₀ + D, with E₀ = e^{u₀} and ρ = E₀ / (1 − c − c E₀),
 //!
@@ -6,29 +6,29 @@
 //! D + L = (1 − c) T,     L = ∫ 1/(1 + e⁻ᵘ) dT = −ln(1 − c y)/c,     y = ρ (e^D − 1)
 //! ```
 //!
-//! The reflection u → −u, c → 1 − c maps the equation to itself, so only a right-hand side that is
-//! positive at u₀ is solved. Then D and L have the sign of T, nothing cancels in the sum, and D
-//! keeps its relative precision however small it is. Where eᵘ is small D is nearly linear in T and
-//! the root of the sum is sought; where it is not, L is, and the root of D = ln(1 + y(L)/ρ), L = (1
-//! − c) T − D is sought. Both are so straight there that two or three steps of Halley's method
-//! suffice.
+//! The reflection u → −u, c → 1 − c maps the equation to itself, so it suffices to solve for a
+//! right-hand side that is positive at u₀. Then D and L have the sign of T, nothing cancels in the
+//! sum, and D keeps its relative precision however small it is. For small eᵘ, D is nearly linear in
+//! T and the solver finds the root of the sum; otherwise L is, and it finds the root of D = ln(1 +
+//! y(L)/ρ), L = (1 − c) T − D. Both are nearly straight there: two or three steps of Halley's
+//! method suffice.
 
 /// Beyond ±40 the logistic function is 0 or 1 to 4e-18, less than a rounding.
 const SATURATED: f64 = 40.0;
-/// A force below this share of f_max is none: what it moves in a step of T = 1e200 is still below a
+/// Share of f_max below which a force is none: its motion in a step of T = 1e200 is still below a
 /// rounding.
 const NO_FORCE: f64 = 1e-280;
 /// Largest u whose exponential, times e, is finite with room to spare.
 const LARGEST_EXPONENT: f64 = 700.0;
-/// From here on the one in e^x − 1 or 1 + eˣ is below a rounding of what it is added to.
+/// Argument from which on the one in e^x − 1 or 1 + eˣ is below a rounding.
 const LARGE: f64 = 38.0;
-/// Beyond it the logarithm of a product is taken as the sum of logarithms.
+/// Largest product under a logarithm; beyond it, a sum of logarithms.
 const LARGEST_PRODUCT: f64 = 1e300;
-/// Halley's method leaves at most the cube of its step (in u): stop where that is below a rounding
-/// of D.
+/// Halley's method leaves at most the cube of its step (in u): it stops once that is below a
+/// rounding of D.
 const CUBE_BELOW_ROUNDING: f64 = 1e-17;
-/// A difference smaller than this share of its terms is taken from another formula: three digits
-/// are lost at most.
+/// Share of its terms below which a difference comes from another formula: it loses three digits at
+/// most.
 const CANCELLED: f64 = 1e-3;
 /// A rise (in u) so short that the sum serves on both sides of the bend, and (e^SHORT − 1)/SHORT,
 /// rounded up.
@@ -36,11 +36,11 @@ const SHORT: f64 = 1.5;
 const SHORT_GROWTH: f64 = 2.33;
 /// No progress is possible below two roundings.
 const ROUNDING: f64 = 2.0 * f64::EPSILON;
-/// Each step that Halley's method does not shorten halves the bracket: this many pin down any
+/// Each step that Halley's method does not shorten halves the bracket: this number pins down any
 /// double.
 const MAX_ITERATIONS: usize = 120;
 
-/// What happens while the scaled time T passes.
+/// Change during the scaled time T.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Advance {
     /// Change of u, with its sign.
@@ -85,7 +85,7 @@ pub(super) fn advance(u: f64, c: f64, t: f64) -> Advance {
 struct Arc {
     u: f64,
     c: f64,
-    /// 1 − c, given apart because the difference would lose it where c is near 1.
+    /// 1 − c, separate because the difference would lose it for c near 1.
     rest: f64,
     /// E₀
     e: f64,
@@ -122,7 +122,7 @@ impl Arc {
         }
     }
 
-    /// Straight parts first, where they reach that far, then the curved one.
+    /// Straight parts first, if they reach that far, then the curved one.
     #[inline]
     fn after(self, t: f64) -> Passed {
         let (span, down) = (t.abs(), t < 0.0);
@@ -143,8 +143,8 @@ impl Arc {
         self.curved(span, down)
     }
 
-    /// u moves at the constant `slope`, at most to the `edge`; what is left of the time goes on
-    /// from there.
+    /// u moves at the constant `slope`, at most to the `edge`; the rest of the time goes on from
+    /// there.
     fn straight(self, span: f64, down: bool, slope: f64, edge: Option<f64>) -> Passed {
         let sign = if down { -1.0 } else { 1.0 };
         let free = self.u + sign * slope * span;
@@ -219,8 +219,7 @@ impl Arc {
         (self.rate * span / (1.0 + 0.5 * decay)).min(high)
     }
 
-    /// The value of eᵘ up to which D, and from which on L, is nearly linear in T; `None`: D always
-    /// is.
+    /// Value of eᵘ up to which D, and from which on L, is nearly linear in T; `None`: D always is.
     #[inline]
     fn bend(&self) -> Option<f64> {
         if self.c <= -1.0 {
@@ -279,7 +278,8 @@ impl Arc {
         (residual, 1.0 + m, sign * m * (self.c + m) / (1.0 + m))
     }
 
-    /// |L| = ∫ 1/(1 + e⁻ᵘ) d|T|, taken from the lower end so that nothing cancels, and eᵘ after the signed change `d` of u.
+    /// |L| = ∫ 1/(1 + e⁻ᵘ) d|T|, from the lower end so that nothing cancels, and eᵘ after the
+    /// signed change `d` of u.
     #[inline]
     fn high_and_end(&self, d: f64) -> (f64, f64) {
         let grown = d.exp_m1();
