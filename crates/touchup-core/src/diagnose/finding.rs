@@ -1,4 +1,4 @@
-//! What is wrong with an input.
+//! Findings about an input: cause, evidence, remedy.
 
 use std::fmt;
 
@@ -7,63 +7,61 @@ use serde::Serialize;
 use crate::names;
 
 names! {
-    /// What would explain the recording, in the order in which it is to be mended: each may be what
-    /// the later ones come of.
+    /// Cause of a faulty recording, in order of repair: each may itself cause the later ones.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
     #[serde(rename_all = "snake_case")]
     pub enum InputCause {
-        /// Stamps of zero.
+        /// All stamps are zero.
         ZeroStamps = "zero_stamps",
-        /// Poses and wrenches are stamped by clocks that have nothing in common.
+        /// Unrelated clocks stamp poses and wrenches.
         TwoEpochs = "two_epochs",
         /// Stamps in another unit of time.
         TimeUnit = "time_unit",
-        /// Stamps of one stream that go back.
+        /// Stamps of one stream go back.
         StampsGoBack = "stamps_go_back",
-        /// Poses too far apart in time to interpolate between them.
+        /// Poses too far apart in time for interpolation.
         SlowPoses = "slow_poses",
-        /// No sample came of the messages.
+        /// The messages yield no sample.
         NoSample = "no_sample",
-        /// No force that stands out of the noise.
+        /// No force above the noise.
         NoContact = "no_contact",
-        /// So few places were touched that they fit almost anywhere.
+        /// Too few touched places: they fit almost anywhere.
         FewContacts = "few_contacts",
         /// Forces in another unit.
         ForceUnit = "force_unit",
-        /// Contacts whose force is below the threshold of contact.
+        /// Contact forces below the contact threshold.
         LightTouch = "light_touch",
-        /// Forces in steps wider than what decides about contact.
+        /// Force steps too coarse for the contact decision.
         ForceSteps = "force_steps",
         /// Poses, scan or radius in another unit of length.
         LengthUnit = "length_unit",
-        /// Axes of the positions are swapped or mirrored.
+        /// Position axes swapped or mirrored.
         PositionAxes = "position_axes",
-        /// The components of the orientation are in another order.
+        /// Quaternion components in another order.
         QuaternionOrder = "quaternion_order",
-        /// The scan has its outside within.
+        /// Scan faces inside out.
         InsideOut = "inside_out",
-        /// The wrench is what the stylus does to the part.
+        /// Reversed wrench: the stylus acts on the part.
         WrenchSign = "wrench_sign",
-        /// The wrench is in other axes than those it was read in.
+        /// Wrench in axes other than those assumed.
         WrenchFrame = "wrench_frame",
-        /// The wrench is stamped later or earlier than the pose of the same instant.
+        /// Wrench stamps later or earlier than the pose of the same instant.
         Delay = "delay",
-        /// The contacts are not on the scan.
+        /// Contacts off the scan.
         Frame = "frame",
-        /// The ball's centre is another distance off the surface than its radius.
+        /// Distance from ball centre to surface differs from the tip radius.
         Radius = "radius",
-        /// The stylus bends more, or less, than its stiffness says.
+        /// The stylus bends more or less than its stiffness predicts.
         Stiffness = "stiffness",
         /// Forces clipped at one value.
         Saturation = "saturation",
-        /// A force that is there while nothing is touched.
+        /// Nonzero force in free motion.
         Tare = "tare",
     }
 }
 
 impl InputCause {
-    /// Whether it is read off how the contacts lie on the scan: no certainty where the scan lacks
-    /// what was touched.
+    /// Whether the contacts' fit to the scan shows it: uncertain if the scan lacks touched surface.
     pub fn is_read_off_the_scan(self) -> bool {
         match self {
             Self::LengthUnit
@@ -93,16 +91,16 @@ impl InputCause {
     }
 }
 
-/// A doubt about the input, what was measured, and what to do.
+/// A doubt about the input, with its measurement and remedy.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct InputFinding {
-    /// what would explain it
+    /// cause
     pub cause: InputCause,
-    /// whether nothing but a mistake explains it; a result of such an input is not to be trusted
+    /// only a mistake explains it; results of such an input are not trustworthy
     pub is_sure: bool,
-    /// with units
+    /// measurement, with units
     pub measured: String,
-    /// what to do
+    /// remedy
     pub remedy: &'static str,
 }
 

@@ -1,32 +1,32 @@
-//! What the forces alone say: rest, noise, and which samples press.
+//! Findings from forces alone: rest, noise, and pressing samples.
 
 use nalgebra::{SMatrix, Vector3, Vector6};
 
 use super::input_record::InputRecord;
 use crate::numeric::{NormalEquations, quantile};
 
-/// Samples that are tried as the rest.
+/// Samples tried as the rest.
 const REST_CANDIDATES: usize = 64;
-/// Share of all samples that lie around the rest at least.
+/// Minimum share of all samples around the rest.
 const REST_SHARE: f64 = 0.05;
-/// A force this many noises off the rest is one.
+/// Minimum force of a press above the rest, in noise deviations.
 pub(super) const NOISES: f64 = 8.0;
-/// … and this share of the largest.
+/// Minimum force of a press above the rest, as a share of the largest.
 const SHARE_OF_LARGEST: f64 = 0.25;
 
-/// Levels of the force in the axes of T, N.
+/// Force levels in the axes of T, N.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ForceLevels {
-    /// where the force mostly is: of free motion, where there is any
+    /// most frequent force: that of free motion, if there is any
     pub rest_t: Vector3<f64>,
-    /// deviation of one axis
+    /// standard deviation of one axis
     pub noise: f64,
     /// 95th percentile of the distance from the rest
     pub largest: f64,
 }
 
 impl ForceLevels {
-    /// The densest place of the forces is the rest: what presses scatters wider than what is free.
+    /// The rest is the densest force: presses scatter wider than free motion.
     pub fn of(records: &[InputRecord], noise: f64) -> Self {
         let forces: Vec<Vector3<f64>> = records.iter().map(InputRecord::force_t).collect();
         let step = (forces.len() / REST_CANDIDATES).max(1);
@@ -87,18 +87,18 @@ impl ForceLevels {
     }
 }
 
-/// The force of a sensor that touches nothing: its zero b and its weight w, F_T = b + Rᵀ w.
+/// Force of a sensor in free motion: its zero b and its weight w, F_T = b + Rᵀ w.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SensorWeight {
-    /// mean of both, N
+    /// mean of zero and weight together, N
     pub mean_t: Vector3<f64>,
     /// mean of their length, N
     pub size: f64,
-    /// 95th percentile of what they leave of the force, N
+    /// 95th percentile of the residual force, N
     pub left: f64,
 }
 
-/// If the stylus hardly turns, zero and weight are not told apart: the least of both.
+/// Damping that chooses the smallest zero and weight if the stylus hardly turns.
 const DAMPING: f64 = 1e-6;
 
 impl SensorWeight {
@@ -132,8 +132,7 @@ impl SensorWeight {
     }
 }
 
-/// The 47 axes that a right one can be taken for, and itself first: permutations of the three with
-/// signs.
+/// The 48 signed permutations of three axes, the identity first.
 pub(super) fn signed_permutations() -> impl Iterator<Item = nalgebra::Matrix3<f64>> {
     const ORDERS: [[usize; 3]; 6] = [
         [0, 1, 2],
@@ -153,7 +152,7 @@ pub(super) fn signed_permutations() -> impl Iterator<Item = nalgebra::Matrix3<f6
     })
 }
 
-/// Axes as a wrench or a position is taken in: (x, −z, y).
+/// Axes in words, as a wrench or position reads them: (x, −z, y).
 pub(super) fn axes_in_words(axes: &nalgebra::Matrix3<f64>) -> String {
     let name = |row: usize| {
         let column = (0..3)

@@ -1,8 +1,8 @@
-//! A sample as the monitor keeps it.
+//! Samples kept by the monitor.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
-/// One sample that is kept.
+/// One kept sample.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct InputRecord {
     pub centre: Point3<f64>,

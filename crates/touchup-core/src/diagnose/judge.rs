@@ -1,4 +1,4 @@
-//! What the samples say of forces, places, wrench and clock, and what would mend it.
+//! Findings about forces, places, wrench and clock, each with a remedy.
 
 use std::collections::BTreeSet;
 
@@ -18,54 +18,53 @@ use crate::mesh::{FaceTree, TriMesh};
 use crate::numeric::{SIGMA_OF_MEDIAN, VoxelKey, counted, median, voxel_of};
 use crate::stylus::{ClockDrift, ClockOffset, SyncParams, TipParams, TipShape, WrenchFrame};
 
-/// Fewer presses say nothing.
+/// Minimum number of presses for a finding.
 pub(super) const FEWEST_PRESSES: usize = 20;
-/// Fewer places do not fix the six numbers of a rigid motion and one more.
+/// Minimum number of places: six unknowns of a rigid motion and one more.
 const FEWEST_PLACES: usize = 7;
-/// A place is no larger than this share of the scan.
+/// Maximum size of a place, as a share of the scan.
 const PLACE_SHARE: f64 = 1.0 / 16.0;
-/// Presses within so many edges of the scan share its errors.
+/// Presses within this distance share the scan's errors, in edges of the scan.
 pub(super) const PLACE_EDGES: f64 = 2.0;
-/// … and its normals are alike within so many.
+/// Presses within this distance have similar scan normals, in edges of the scan.
 const WIDE_EDGES: f64 = 4.0;
-/// Presses that are compared with the scan.
+/// Maximum number of presses compared with the scan.
 const MOST_PRESSES: usize = 400;
-/// A delay moves each touch along the path by this at most, m; a half of it is said.
+/// Maximum shift of a touch along the path by a delay, m; half of it gives a doubt.
 const LARGEST_PATH: f64 = 0.32e-3;
-/// A speed of the stylus over the part, m/s.
+/// Speed of the stylus over the part, m/s.
 const USUAL_SPEED: f64 = 0.04;
-/// A ball that is free is farther from the surface than one that presses by this at least, m.
+/// Minimum lift of a free ball above a pressing one, m.
 const LEAST_LIFT: f64 = 0.3e-3;
-/// … and by so many standard errors of the scan: it may be that low under all of what rests.
+/// Minimum lift in standard errors of the scan, which may be that low under all resting samples.
 const LIFT_ERRORS: f64 = 3.0;
-/// Half of what presses is beyond the median; of what is free, more than this is.
+/// Minimum share of free samples beyond the lift; of presses, half lie beyond the median.
 const SHARE_OF_FREE: f64 = 0.55;
-/// No cell resolves less, N.
+/// Finest resolution of any force sensor, N.
 const LEAST_NOISE: f64 = 0.5e-3;
-/// What a hand or a light arm presses with at most, N.
+/// Maximum force of a hand or a light arm, N.
 const LARGEST_PRESS: f64 = 150.0;
-/// … and with a stylus that bends, no more than bends it by this, m, …
+/// Maximum bend of an elastic stylus, m, for forces above [`HARD_PRESS`].
 const LARGEST_BEND: f64 = 8e-3;
-/// … above this force, N.
+/// Minimum force for the check of the bend, N.
 const HARD_PRESS: f64 = 40.0;
-/// A rest is one beyond so many times what the zero may be off by.
+/// Maximum rest, in multiples of the zero's uncertainty.
 const LARGEST_REST: f64 = 1.6;
-/// A smaller one is no reason to refuse, N.
+/// Minimum tare that makes an input refusable, N.
 const LEAST_TARE: f64 = 0.4;
-/// No ball is smaller, m.
+/// Minimum radius of a ball, m.
 pub(super) const LEAST_BALL: f64 = 20e-6;
-/// A force presses straight when the cosine to the scan's normal is larger.
+/// Minimum cosine between a straight press and the scan's normal.
 const STRAIGHT: f64 = 0.8;
-/// The ball is another one when its centre is so many deviations of the scan from where it should
-/// be, and surely with so many.
+/// The radius is doubtful if the centre is off by the first multiple of the scan's noise, and
+/// surely wrong by the second.
 pub(super) const DOUBTED_NOISES: f64 = 1.0;
 pub(super) const SURE_NOISES: f64 = 1.5;
-/// … beyond this share of what the stylus bends by: so far its stiffness may be off.
+/// Tolerated error of the bend, as a share of the bend: uncertainty of the stiffness.
 const OTHER_SINK: f64 = 0.2;
-/// A ball that does not press is nearer to the scan than its radius in no more than this share of
-/// the time.
+/// Maximum share of force-free samples in which the ball is nearer than its radius.
 const NEARER_SHARE: f64 = 0.1;
-/// No scanner is worse, m.
+/// Maximum noise of any scanner, m.
 pub(super) const LARGEST_SCAN_NOISE: f64 = 2e-3;
 
 /// The samples beside the scan.
@@ -75,24 +74,24 @@ pub(super) struct InputJudge<'a> {
     pub scan: &'a TriMesh,
     pub tree: &'a FaceTree,
     pub records: &'a [InputRecord],
-    /// of one axis of the force, N
+    /// standard deviation of one force axis, N
     pub noise: f64,
     /// smallest change of a component of the measured force, N
     pub force_step: f64,
-    /// largest component of the measured force, N, how often it was exactly that, and of how many
+    /// largest component of the measured force, N; how often it had exactly that value; total count
     pub largest: (f64, u64, u64),
     pub clock: Option<ClockOffset>,
 }
 
-/// What presses, and what it is compared with.
+/// Presses, and the scan's scale for their comparison.
 #[derive(Debug)]
 pub(super) struct Presses<'a> {
     pub records: Vec<&'a InputRecord>,
     pub levels: ForceLevels,
     pub scale: ScanScale,
-    /// how far the reported centre may sink below one radius, m
+    /// maximum sink of the reported centre below one radius, m
     pub sunk: f64,
-    /// of the distance of a centre from the surface, m
+    /// tolerance of the distance between centre and surface, m
     pub tolerance: f64,
 }
 
@@ -100,9 +99,9 @@ pub(super) struct Presses<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StraightPress {
     pub centre: Point3<f64>,
-    /// outward, of the scan under it
+    /// outward normal of the scan under it
     pub normal: Vector3<f64>,
-    /// of the centre from the scan, m
+    /// distance of the centre from the scan, m
     pub distance: f64,
     /// N
     pub force: f64,
@@ -130,20 +129,20 @@ impl InputJudge<'_> {
             findings.extend(if is_explained { wrench } else { Some(few) });
             return findings;
         }
-        // turned forces choose other presses
+        // turned forces select other presses
         let is_registration = wrench.is_none() && !is_doubted_place;
         let registration = is_registration
             .then(|| self.judge_registration(&presses))
             .flatten();
         findings.extend(registration);
-        // each of these decides what is a contact, and turns the force in its course
+        // each of these changes the contacts, and the course of the force
         if wrench.is_none() && !findings.iter().any(|finding| finding.is_sure) {
             findings.extend(self.judge_clock());
         }
         let stiffness = (wrench.is_none() && findings.is_empty())
             .then(|| self.judge_stiffness(&presses))
             .flatten();
-        // as far off as a place or a stiffness that is wrong has it
+        // radius last: a wrong place or stiffness moves the centre as far
         let is_explained = wrench.is_some() || stiffness.is_some() || is_doubted_place;
         let radius = (!is_explained)
             .then(|| self.judge_radius(&presses))
@@ -153,12 +152,12 @@ impl InputJudge<'_> {
         findings
     }
 
-    /// The finding of a source that touches nothing: zero and weight of the sensor explain all of
-    /// its force, F = b + Rᵀ w. `None` if they do not.
+    /// The finding for a source in free motion: zero and weight of the sensor explain all of its
+    /// force, F = b + Rᵀ w. `None` otherwise.
     fn untouched(&self) -> Option<Vec<InputFinding>> {
         let SensorWeight { mean_t, size, left } = SensorWeight::of(self.records)?;
         let free = self.params.gate?.free;
-        // forces in another unit are no smaller for it
+        // for forces in another unit `free` is no bound
         let least = if self.noise < LEAST_NOISE { 0.0 } else { free };
         let measured = format!(
             "nothing is touched yet, and the sensor reads its zero and weight, ({:.2}, {:.2}, {:.2}) N in the axes of the stylus on average",
@@ -171,10 +170,10 @@ impl InputJudge<'_> {
             .then(|| [no_contact].into_iter().chain(tare).collect())
     }
 
-    /// The presses, and how many free samples the rest is the mean of, if it is one.
+    /// The presses, and the number of free samples in the mean of the rest, if there is a rest.
     ///
     /// # Errors
-    /// The finding of a source that touches nothing.
+    /// The finding for a source in free motion.
     fn presses(&self) -> Result<(Presses<'_>, Option<usize>), Vec<InputFinding>> {
         let TipParams { radius, stiffness } = self.params.tip;
         let scale = ScanScale::of(self.scan);
@@ -190,7 +189,7 @@ impl InputJudge<'_> {
         if let Some(untouched) = self.untouched().filter(|_| !is_on_scan) {
             return Err(untouched);
         }
-        // what rests on the surface presses all the time: then the rest is no force of free motion
+        // samples that rest on the surface all press: then the rest is no force of free motion
         let places = places_of(&resting, WIDE_EDGES * scale.edge.max(LEAST_BALL)).len();
         let error = self.params.scan_noise.max(scale.noise) / (places.max(1) as f64).sqrt();
         let lift = LEAST_LIFT.max(LIFT_ERRORS * error);
@@ -218,9 +217,9 @@ impl InputJudge<'_> {
         Ok((presses, is_free.then_some(resting.len())))
     }
 
-    /// So few places fix no rigid motion of the scan, so that they fit almost anywhere.
+    /// Too few places fix no rigid motion of the scan: they fit almost anywhere.
     fn few_places(&self, presses: &Presses) -> Option<InputFinding> {
-        // the radius may be told wrongly
+        // the radius setting may be wrong
         let ball = (2.0 * self.params.tip.radius).min(PLACE_SHARE * presses.scale.extent);
         let size = ball.max(2.0 * LEAST_TOLERANCE);
         let places = places_of(&presses.records, size);
@@ -255,7 +254,7 @@ impl InputJudge<'_> {
         )
     }
 
-    /// - `resting`: how many free samples the rest is the mean of, where it is one.
+    /// - `resting`: number of free samples in the mean of the rest, if there is a rest.
     #[expect(clippy::too_many_lines)]
     fn judge_forces(
         &self,
@@ -329,7 +328,7 @@ impl InputJudge<'_> {
             ));
         }
         let (clip, times, samples) = self.largest;
-        // where even the noise repeats itself, a value that does says nothing
+        // with repeating noise a repeated value proves nothing
         if noise > 0.0
             && times > 20
             && times as f64 > 0.002 * samples as f64
@@ -349,8 +348,8 @@ impl InputJudge<'_> {
         }
     }
 
-    /// Forces that are rounded to more than the noise, which would average it out, and than what the
-    /// zero may be off by.
+    /// Force steps coarser than the noise, which would average them out, and than the zero's
+    /// uncertainty.
     fn judge_steps(&self, levels: &ForceLevels) -> Option<InputFinding> {
         let (gate, step) = (self.params.gate?, self.force_step);
         let is_coarse = step.is_finite() && step / 2.0 > gate.free.max(levels.noise);
@@ -364,7 +363,7 @@ impl InputJudge<'_> {
             .then(|| InputFinding::new(InputCause::ForceSteps, step > gate.on, measured, remedy))
     }
 
-    /// Whether sign and axes of the wrench are right, by the presses on the scan.
+    /// Checks sign and axes of the wrench by the presses on the scan.
     fn judge_wrench(&self, presses: &Presses) -> Option<InputFinding> {
         let other_frame = match self.params.compensator.wrench_frame {
             WrenchFrame::Sensor => "read in the frame of the poses",
@@ -373,7 +372,7 @@ impl InputJudge<'_> {
         judge_wrench(&self.read_presses(presses), other_frame)
     }
 
-    /// All that presses on the scan, but for around holes that it lacks: there it is wrong as well.
+    /// All presses on the scan, except around holes of the scan: there the scan is wrong as well.
     fn read_presses(&self, presses: &Presses) -> Vec<ReadPress> {
         let Presses {
             levels,
@@ -410,7 +409,7 @@ impl InputJudge<'_> {
             .collect()
     }
 
-    /// A press with the force in all of its readings.
+    /// A press with its force in every reading.
     fn read_press(
         &self,
         record: &InputRecord,
@@ -438,7 +437,7 @@ impl InputJudge<'_> {
         )
     }
 
-    /// Whether the ball sinks with the force as its stiffness has it.
+    /// Checks whether the ball sinks with the force as its stiffness predicts.
     fn judge_stiffness(&self, presses: &Presses) -> Option<InputFinding> {
         let Presses {
             levels,
@@ -478,8 +477,8 @@ impl InputJudge<'_> {
         )
     }
 
-    /// Whether the ball is as far from the scan as its radius where it presses straight on it; what
-    /// leans is at edges and in holes, of which the scan knows little.
+    /// Checks whether straight presses lie one radius off the scan; leaning presses lie at edges
+    /// and in holes, which the scan shows poorly.
     fn judge_radius(&self, presses: &Presses) -> Option<InputFinding> {
         let Presses { levels, scale, .. } = presses;
         let TipParams { radius, stiffness } = self.params.tip;
@@ -493,7 +492,7 @@ impl InputJudge<'_> {
             .map(|press| press.distance + compliance * press.force)
             .collect();
         let count = distances.len();
-        // a radius of less than nothing is none
+        // a negative radius is impossible
         let distance =
             median(&mut distances).filter(|distance| count >= FEWEST_PRESSES && *distance > 0.0)?;
         distances
@@ -501,13 +500,13 @@ impl InputJudge<'_> {
             .for_each(|x| *x = (*x - distance).abs());
         let scatter = median(&mut distances)?;
         let error = error_of_median(scatter, count);
-        // what differs slowly over the scan is seen between the contacts alone
+        // only differences between contacts show slow variation over the scan
         let roughness = scale
             .noise
             .max(SIGMA_OF_MEDIAN * scatter)
             .min(LARGEST_SCAN_NOISE);
         let noise = roughness.max(self.params.scan_noise.min(LARGEST_SCAN_NOISE));
-        // the nearest of what is rough is above its mean
+        // a ball touches the peaks of a rough scan, above its mean
         let off =
             (distance + 0.5 * roughness - radius).abs() - OTHER_SINK * compliance * levels.largest;
         let is_doubted = off - 3.0 * error > (DOUBTED_NOISES * noise).max(LEAST_TOLERANCE);
@@ -521,10 +520,10 @@ impl InputJudge<'_> {
         })
     }
 
-    /// Presses that are no ball of another radius: without force it comes nearer to the scan than
-    /// any ball of that radius can.
+    /// A force too early instead of another radius: free of force, the ball comes nearer to the
+    /// scan than any ball of that radius can.
     ///
-    /// - `distance`: of the centre from the scan where it presses, m.
+    /// - `distance`: of the pressing centre from the scan, m.
     pub(super) fn early_force(&self, presses: &Presses, distance: f64) -> Option<InputFinding> {
         let Presses {
             levels, tolerance, ..
@@ -549,7 +548,7 @@ impl InputJudge<'_> {
             .then(|| InputFinding::new(InputCause::Delay, true, measured, remedy))
     }
 
-    /// All that presses straight on the scan.
+    /// All straight presses on the scan.
     pub(super) fn straight_presses(&self, presses: &Presses) -> Vec<StraightPress> {
         let Presses {
             records,
@@ -654,13 +653,13 @@ pub(super) fn off_by_radius(distance: f64, error: f64, radius: f64) -> InputFind
     InputFinding::new(InputCause::Radius, true, measured, remedy)
 }
 
-/// Where some records are, in cubes of `size`, m.
+/// Positions of some records, in cubes of `size`, m.
 fn places_of(records: &[&InputRecord], size: f64) -> BTreeSet<VoxelKey> {
     let place = |record: &&InputRecord| voxel_of(&record.centre, size);
     records.iter().map(place).collect()
 }
 
-/// Not more than [`MOST_PRESSES`], spread over all.
+/// At most [`MOST_PRESSES`], spread over all.
 fn thinned<'a>(records: impl Iterator<Item = &'a InputRecord>) -> Vec<&'a InputRecord> {
     let all: Vec<&InputRecord> = records.collect();
     let step = all.len().div_ceil(MOST_PRESSES).max(1);

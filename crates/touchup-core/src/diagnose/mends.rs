@@ -1,4 +1,4 @@
-//! What may have happened to all poses, or to the unit of the scan, and what brings it back.
+//! Candidate mistakes in all poses or in the scan's unit, and their corrections.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, UnitQuaternion, Vector3};
 
@@ -7,25 +7,25 @@ use super::forces::{axes_in_words, signed_permutations};
 use super::input_record::InputRecord;
 use crate::stylus::Placement;
 
-/// A mistake, undone.
+/// A correction of one mistake.
 #[derive(Clone, Debug)]
 pub(super) struct PlaceMend {
-    /// what it mends
+    /// corrected cause
     pub cause: InputCause,
     /// in words
     pub says: String,
-    /// of the recorded positions, in the frame that they were recorded in
+    /// axes of the recorded positions, in the frame of the recording
     poses: Matrix3<f64>,
-    /// the recorded orientation was read with w behind
+    /// the recording has w first in the quaternion, the reader took it last
     is_w_first: bool,
-    /// what is read as 1 m of the scan is so many
+    /// length of a true 1 m in the scan as read, m
     pub scan_unit: f64,
-    /// the centre of the ball from where it was taken to be, in the axes of T, m
+    /// offset of the ball's centre from its assumed place, in the axes of T, m
     tip: Vector3<f64>,
 }
 
 impl PlaceMend {
-    /// Where the ball is then, in the scan as it was read.
+    /// Corrected place of the ball, in the scan as read.
     pub fn centre(&self, placement: &Placement, record: &InputRecord) -> Point3<f64> {
         let pose = self.pose(placement, record);
         (pose.translation.vector + pose.rotation * self.tip)
@@ -33,12 +33,12 @@ impl PlaceMend {
             .into()
     }
 
-    /// A force in O, if the axes of the positions are also its own.
+    /// A force in O, if it shares the axes of the positions.
     pub fn turned(&self, force: &Vector3<f64>) -> Vector3<f64> {
         self.poses * force
     }
 
-    /// How the ball is turned then.
+    /// Corrected rotation of the ball.
     pub fn rotation(&self, placement: &Placement, record: &InputRecord) -> UnitQuaternion<f64> {
         self.pose(placement, record).rotation
     }
@@ -78,7 +78,7 @@ impl PlaceMend {
         }
     }
 
-    /// A ball that is farther along the stylus than the recorded point.
+    /// A ball farther along the stylus than the recorded point.
     ///
     /// - `tip`: from that point, in the axes of T, m.
     pub fn tip(tip: Vector3<f64>) -> Self {
@@ -93,7 +93,7 @@ impl PlaceMend {
         }
     }
 
-    /// Factors of length that a file or a driver is wrong by.
+    /// Usual length factors by which a file or driver is wrong.
     pub fn units() -> impl Iterator<Item = Self> {
         const UNITS: [(f64, f64, &str); 10] = [
             (1e-3, 1.0, "the poses look like mm, and are read as m"),
@@ -127,7 +127,7 @@ impl PlaceMend {
         })
     }
 
-    /// Axes of the positions, swapped and mirrored.
+    /// Swapped and mirrored position axes.
     pub fn axes() -> impl Iterator<Item = Self> {
         signed_permutations().skip(1).map(|poses| Self {
             says: format!(
@@ -139,7 +139,7 @@ impl PlaceMend {
     }
 }
 
-/// The orientation that was meant where w stands in front of x, y and z.
+/// The intended orientation, for a source that puts w before x, y and z.
 fn w_first(read: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::new_normalize(Quaternion::new(read.i, read.j, read.k, read.w))
 }

@@ -1,10 +1,10 @@
-//! Whether scan and touches belong together: wrong signs, axes, units, frames, tare, stamps and
-//! clocks show in the data themselves.
+//! Checks whether scan and touches belong together: wrong signs, axes, units, frames, tare, stamps
+//! and clocks show in the data themselves.
 //!
-//! [`InputMonitor`] takes what everything else takes, message by message and sample by sample, in
-//! bounded memory, and gives [`InputFinding`]s at any time. A rigid ball that touches has its
-//! centre one radius off the surface and a force along the outward normal of it; free, it has no
-//! force. What breaks one of these is compared with what would mend it.
+//! [`InputMonitor`] takes the same messages and samples as the refinement, in bounded memory, and
+//! gives [`InputFinding`]s at any time. A rigid ball in contact has its centre one radius off the
+//! surface and a force along the surface's outward normal; in free motion it has no force. The
+//! monitor compares each violation with candidate corrections.
 
 mod finding;
 mod forces;

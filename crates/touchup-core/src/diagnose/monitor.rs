@@ -1,4 +1,4 @@
-//! Collects samples in bounded memory and compares what they say with what would mend it.
+//! Collects samples in bounded memory and compares them with candidate corrections.
 
 use nalgebra::Vector3;
 
@@ -14,13 +14,13 @@ use crate::stylus::{
     SettingError,
 };
 
-/// Samples that are kept: 60 s at 1 kHz are one in sixteen.
+/// Maximum number of kept samples: of 60 s at 1 kHz one in sixteen.
 const MOST_RECORDS: usize = 4096;
-/// Force steps that the noise is estimated from.
+/// Maximum number of force steps for the noise estimate.
 const MOST_STEPS: usize = 4096;
 /// Median length of a vector of three standard normal components.
 const MEDIAN_OF_THREE: f64 = 1.538;
-/// Doubts the input while it is replayed or measured. Memory is bounded, and a sample costs a
+/// Checks the input during replay or measurement. Memory is bounded, and a sample costs one
 /// rotation.
 #[derive(Clone, Debug)]
 pub struct InputMonitor {
@@ -30,25 +30,25 @@ pub struct InputMonitor {
     clock: ClockEstimator,
     records: Vec<InputRecord>,
     samples: u64,
-    /// one of so many is kept
+    /// one sample in this number stays
     stride: u64,
     last_force: Option<Vector3<f64>>,
-    /// |F − F of the sample before|, N
+    /// |F − previous F|, N
     steps: Vec<f64>,
-    /// of each component of the measured force
+    /// changes of each component of the measured force
     changes: [ComponentChanges; 3],
-    /// largest component of the measured force, N, and how often it was exactly that
+    /// largest component of the measured force, N, and how often it had exactly that value
     largest: (f64, u64),
 }
 
-/// How a component of the measured force changes, N.
+/// Changes of one component of the measured force, N.
 #[derive(Clone, Copy, Debug)]
 struct ComponentChanges {
     last: f64,
     smallest: f64,
     low: f64,
     high: f64,
-    /// it had a value other than these two
+    /// it had a third value
     has_others: bool,
 }
 
@@ -77,7 +77,7 @@ impl ComponentChanges {
         self.last = value;
     }
 
-    /// Smallest change; infinite of a force that is there or not, which has no steps.
+    /// Smallest change; infinite for a two-valued force, which has no steps.
     fn step(&self) -> f64 {
         if self.has_others {
             self.smallest
@@ -88,7 +88,7 @@ impl ComponentChanges {
 }
 
 impl InputMonitor {
-    /// A monitor that has seen nothing.
+    /// An empty monitor.
     ///
     /// # Errors
     /// [`SettingError`] naming the first setting outside its range.
@@ -108,18 +108,18 @@ impl InputMonitor {
         })
     }
 
-    /// Takes a message as it came.
+    /// Takes a message as received.
     pub fn message(&mut self, message: &Message) {
         self.stamps.push(message);
     }
 
-    /// Takes the stamp of a sample that came as one message: its pose and its wrench have it.
+    /// Takes the common stamp of pose and wrench of a sample that came as one message.
     #[inline]
     pub fn paired_message(&mut self, stamp_ns: i64) {
         self.stamps.push_pair(stamp_ns);
     }
 
-    /// Takes a sample that was made of the messages.
+    /// Takes a sample made from the messages.
     pub fn sample(&mut self, sample: &Sample) {
         let force = sample.wrench.force;
         let size = force.amax();
@@ -160,14 +160,14 @@ impl InputMonitor {
         self.samples += 1;
     }
 
-    /// Takes what was decided about the contact of a sample.
+    /// Takes a sample after the contact decision.
     pub fn contact(&mut self, sample: &ContactSample) {
         self.clock.push(sample);
     }
 
-    /// How late the wrench reads; `None` where the contacts do not determine it. Where the ball
-    /// stops between two poses is not seen: that is part of the uncertainty of onsets. Sliding and
-    /// lifting are not shifted by it.
+    /// Delay of the wrench; `None` if the contacts do not determine it. The stop of the ball
+    /// between two poses is invisible and adds to the uncertainty of onsets, but not to that of
+    /// sliding and lifting.
     pub fn clock_offset(&self) -> Option<ClockOffset> {
         let found = self.clock.offset()?;
         let unseen = match found.evidence {
@@ -180,7 +180,7 @@ impl InputMonitor {
         })
     }
 
-    /// All doubts so far, the surest and most basic first; empty: none.
+    /// All doubts up to now, the surest and most basic first; empty: none.
     pub fn findings(&self, scan: &TriMesh, tree: &FaceTree) -> Vec<InputFinding> {
         let mut findings = self
             .stamps

@@ -1,4 +1,4 @@
-//! Whether the presses are on the scan, and the remedies that bring them there.
+//! Checks whether the presses lie on the scan, and finds remedies that bring them there.
 
 use nalgebra::{Point3, Vector3};
 
@@ -10,32 +10,32 @@ use super::places::{BallFit, SHARE_ON_SCAN, ScanAgreement, error_of_median, exte
 use super::shift::{ContactShift, best_shift};
 use crate::stylus::{TipShape, WrenchFrame};
 
-/// A remedy of an input brings so many more onto the scan.
+/// Minimum gain of a remedy: additional share of presses on the scan.
 const MENDED_SHARE: f64 = 0.3;
-/// A sure remedy brings so many more onto the scan than anything else would.
+/// Minimum lead of a sure remedy over any other, in share of presses on the scan.
 const REFUTED_SHARE: f64 = 0.1;
-/// The touched part is no smaller and no larger than this share of the scan …
+/// Plausible extent of the touched part, as a share of the scan.
 const SHARES_OF_SCAN: std::ops::RangeInclusive<f64> = 0.05..=1.5;
-/// … and larger than so many tolerances: less lies on anything.
+/// Minimum extent of the touched part, in tolerances: a smaller one fits anywhere.
 const LEAST_SPREAD: f64 = 8.0;
-/// Contacts do not span more than this many times the scan.
+/// Maximum span of the contacts, in spans of the scan.
 const LARGEST_SPREAD: f64 = 5.0;
-/// A shift is one when it is longer than so many tolerances …
+/// Minimum length of a shift, in tolerances.
 const LEAST_SHIFT: f64 = 4.0;
-/// … brings all but some contacts onto the scan …
+/// Minimum share of contacts on the scan after a shift.
 pub(super) const SHIFTED_SHARE: f64 = 0.85;
-/// … and this many more than are there as it is.
+/// Minimum gain of a shift, in share of contacts on the scan.
 const SHIFT_GAIN: f64 = 0.15;
-/// A ball this much farther from the surface than its radius is another one.
+/// Minimum ratio of distance to radius for a radius in another unit.
 const LEAST_RATIO: f64 = 20.0;
-/// Of contacts on a rough scan this share is not farther off than so many times what most are.
+/// Minimum share of contacts on a rough scan within [`FAR`] tolerances.
 const SHARE_NOT_FAR: f64 = 0.9;
 const FAR: f64 = 3.0;
-/// No ball is larger than this share of the scan that it is for.
+/// Maximum radius of a ball, as a share of the scan.
 const LARGEST_BALL: f64 = 0.25;
-/// No ball is farther from the recorded point of the stylus, m.
+/// Maximum distance of a ball from the recorded point of the stylus, m.
 const LONGEST_TIP: f64 = 0.4;
-/// Presses that such a distance is searched by.
+/// Maximum number of presses in the search for that distance.
 const TIP_JUDGES: usize = 60;
 pub(super) const FRAME_REMEDY: &str =
     "are the poses those of the ball in the frame of the scan (scan_to_space, tip.offset_mm)?";
@@ -46,17 +46,17 @@ struct ReportedPlacement {
     centres: Vec<Point3<f64>>,
     /// in O, N
     forces: Vec<Vector3<f64>>,
-    /// of the distance from one radius, m
+    /// tolerance of the distance from one radius, m
     tolerance: f64,
     is_on_scan: bool,
-    /// so few were touched that almost any motion and ball explains them
+    /// too few touched places: almost any motion and ball explains them
     is_few: bool,
 }
 
 impl InputJudge<'_> {
-    /// The fault in the places of the presses, and whether they are on the scan even so.
+    /// The fault in the places of the presses, and whether they still lie on the scan.
     ///
-    /// - `is_few`: so few were touched that almost any motion and ball explains them.
+    /// - `is_few`: too few touched places: almost any motion and ball explains them.
     pub fn judge_places(&self, presses: &Presses, is_few: bool) -> Option<(InputFinding, bool)> {
         let Presses { records, .. } = presses;
         let radius = self.params.tip.radius;
@@ -106,8 +106,8 @@ impl InputJudge<'_> {
         self.judge_frame(presses, &reported)
     }
 
-    /// A scan whose faces look inwards: the centres are a radius below its surface, and the forces
-    /// point into it.
+    /// A scan with inward faces: the centres lie a radius below its surface, and the forces point
+    /// into it.
     fn inside_out(&self, reported: &ReportedPlacement) -> Option<InputFinding> {
         let ReportedPlacement {
             fit,
@@ -123,7 +123,7 @@ impl InputJudge<'_> {
         };
         let [as_read, inwards] =
             [fit, &inwards].map(|fit| fit.explained(forces, radius, *tolerance).on_scan());
-        // a wrench that is reversed leaves the centres a radius above it
+        // a reversed wrench leaves the centres a radius above it
         let is_below = (fit.distance + radius).abs() < (fit.distance - radius).abs();
         let is_found = is_below && inwards >= SHARE_ON_SCAN && inwards > as_read + MENDED_SHARE;
         is_found.then(|| {
@@ -137,7 +137,7 @@ impl InputJudge<'_> {
         })
     }
 
-    /// A radius in another unit: no matter of tolerance.
+    /// A radius in another unit, beyond any tolerance.
     fn ball_of_other_unit(
         &self,
         presses: &Presses,
@@ -156,7 +156,7 @@ impl InputJudge<'_> {
             .then(|| off_by_radius(distance, error, radius))
     }
 
-    /// Presses that are all as far from the surface as each other: another ball.
+    /// Presses at one common distance from the surface: another ball.
     fn other_ball(&self, presses: &Presses, reported: &ReportedPlacement) -> Option<InputFinding> {
         let Presses { records, scale, .. } = presses;
         let BallFit {
@@ -175,7 +175,7 @@ impl InputJudge<'_> {
             .then(|| off_by_radius(distance, error_of_median(scatter, records.len()), radius))
     }
 
-    /// Contacts that are not on the scan, or many more of them when all are shifted alike.
+    /// Contacts off the scan, or a common shift that brings many more onto it.
     fn judge_frame(
         &self,
         presses: &Presses,
@@ -215,7 +215,7 @@ impl InputJudge<'_> {
         if *is_on_scan || as_it_is.on_scan_or_in_holes() >= SHARE_NOT_FAR {
             return None;
         }
-        // a rough scan: most are less than a radius off, and hardly one is far
+        // a rough scan: most are less than a radius off, and hardly any is far
         let wide = radius.max(presses.tolerance) + presses.sunk;
         let share_within = |distance: f64| self.fit(&presses.records, distance).share;
         let is_near = (fit.distance - radius).abs() <= wide
@@ -228,10 +228,10 @@ impl InputJudge<'_> {
         ))
     }
 
-    /// Another unit, other axes, another order of the quaternion or another point of the stylus.
+    /// Another unit, other axes, another quaternion order or another point of the stylus.
     ///
-    /// - `is_few`: of few contacts a unit is all that is tried.
-    /// - `is_far`: whether no other ball explains them as well as another point of the stylus.
+    /// - `is_few`: too few contacts for any correction but a unit.
+    /// - `is_far`: no other ball explains them as well as another point of the stylus.
     fn mends(&self, presses: &Presses, is_few: bool, is_far: bool) -> Vec<PlaceMend> {
         let mut mends: Vec<PlaceMend> = PlaceMend::units().collect();
         if !is_few {
@@ -244,7 +244,7 @@ impl InputJudge<'_> {
         mends
     }
 
-    /// That of `tried` with which the contacts are on the scan.
+    /// The one of `tried` that puts the contacts on the scan.
     fn mend(
         &self,
         presses: &Presses,
@@ -288,8 +288,8 @@ impl InputJudge<'_> {
         }
     }
 
-    /// Share of `records` that the scan explains with a mend; `None` if they would be so close
-    /// together that they lie on anything, or much wider apart than the scan.
+    /// Share of `records` that the scan explains after a correction; `None` if they would lie too
+    /// close together to prove anything, or much wider apart than the scan.
     fn mended(&self, presses: &Presses, records: &[&InputRecord], mend: &PlaceMend) -> Option<f64> {
         let Presses {
             levels,
@@ -315,7 +315,7 @@ impl InputJudge<'_> {
             .iter()
             .map(|record| rotation(record) * (record.force_t() - levels.rest_t))
             .collect();
-        // whoever swaps axes of the positions may have those of the orientation swapped as well
+        // a mistake in the position axes often repeats in the orientation
         let turned: Vec<Vector3<f64>> = forces.iter().map(|force| mend.turned(force)).collect();
         is_spread.then(|| {
             let fit = BallFit::of(self.scan, self.tree, centres.into_iter(), radius, tolerance);
@@ -325,7 +325,7 @@ impl InputJudge<'_> {
         })
     }
 
-    /// The place of the ball along an axis of the stylus with which most presses are on the scan.
+    /// The place of the ball along a stylus axis that puts most presses on the scan.
     fn best_tip(&self, presses: &Presses) -> Option<PlaceMend> {
         let records = &presses.records;
         let every = records.len().div_ceil(TIP_JUDGES).max(1);
@@ -338,12 +338,12 @@ impl InputJudge<'_> {
             .flat_map(|axis| (-count..=count).map(move |steps| (steps, at(axis, steps))))
             .map(|(steps, mend)| (share(&mend), steps, mend))
             .max_by(|a, b| a.0.total_cmp(&b.0))?;
-        // the best of all that was searched lies within it
+        // a maximum at the end of the search range is no optimum
         (steps.abs() < count).then_some(mend)
     }
 
-    /// The shift of all contacts that brings many more of them onto the scan, and explains more of
-    /// them than holes do that the scan lacks; `None` if none does.
+    /// The common shift that brings many more contacts onto the scan, and explains more of them
+    /// than holes in the scan do; `None` if there is none.
     fn shift(
         &self,
         reported: &ReportedPlacement,

@@ -1,25 +1,24 @@
-//! Where the ball is against the scan.
+//! Position of the ball against the scan.
 
 use nalgebra::{Point3, Vector3};
 
 use crate::mesh::{FaceTree, TriMesh, is_on_rim};
 use crate::numeric::{SIGMA_OF_MEDIAN, median};
 
-/// Contacts are on the scan when this share of them is: if the scan lacks a wall or a hole, they
-/// are not.
+/// Minimum share of contacts on the scan: a scan that lacks a wall or a hole misses the others.
 pub(super) const SHARE_ON_SCAN: f64 = 0.5;
 
-/// A noisy scan is this much off at most, m: a wider tolerance would hide a wrong unit.
+/// Maximum tolerance, m, for a noisy scan: a wider one would hide a wrong unit.
 const LARGEST_TOLERANCE: f64 = 6e-3;
-/// … and no pose is better than this, m.
+/// Minimum tolerance, m: no pose is better.
 pub(super) const LEAST_TOLERANCE: f64 = 0.3e-3;
-/// Vertices that the noise is estimated from.
+/// Vertices for the noise estimate.
 const NOISE_VERTICES: usize = 4000;
 
-/// A force points out of the surface when it is no farther from its normal, as cosine.
+/// Minimum cosine between an outward force and the normal.
 const LEANS: f64 = 0.5;
 
-/// What the scan says of itself.
+/// Scale and noise of a scan, from its mesh.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ScanScale {
     /// deviation of the vertices along the normal, m
@@ -31,7 +30,7 @@ pub(super) struct ScanScale {
 }
 
 impl ScanScale {
-    /// Noise: how far a vertex is off the mean of its neighbours along its normal; for n
+    /// Noise: distance of a vertex from the mean of its neighbours along its normal; for n
     /// independent neighbours that is σ √(1 + 1/n).
     pub fn of(scan: &TriMesh) -> Self {
         let step = (scan.vertex_slots() / NOISE_VERTICES).max(1);
@@ -70,9 +69,9 @@ impl ScanScale {
         }
     }
 
-    /// How far the ball's centre may be from one radius off the surface, m.
+    /// Tolerance of the distance between ball centre and surface about one radius, m.
     ///
-    /// - `unit`: how many m the scan as it was read takes for one.
+    /// - `unit`: length of a true 1 m in the scan as read, m.
     pub fn tolerance(&self, told_noise: f64, radius: f64, unit: f64) -> f64 {
         let noise = self.noise.max(told_noise);
         (3.0 * noise + 0.2 * self.edge + 0.1 * radius)
@@ -90,25 +89,24 @@ pub(super) fn extent_of(points: impl Iterator<Item = Point3<f64>>) -> f64 {
     bounds.map_or(0.0, |[low, high]| (high - low).norm() / 2.0)
 }
 
-/// How a set of ball centres lies on the scan.
+/// Fit of a set of ball centres to the scan.
 #[derive(Clone, Debug)]
 pub(super) struct BallFit {
-    /// median signed distance of the centre from the surface, m, of those that the scan says
-    /// something of: neither below it, where it has a lid over a hole, nor beyond its rims, where
-    /// it has no inside
+    /// median signed distance of the centre from the surface, m; centres below a lid over a hole
+    /// and beyond a rim, which has no inside, do not count
     pub distance: f64,
     /// median deviation from that, m
     pub scatter: f64,
-    /// share within the tolerance, of those that are not below the surface
+    /// share within the tolerance, of the centres not below the surface
     pub share: f64,
-    /// of each centre, m
+    /// signed distance of each centre, m
     pub distances: Vec<f64>,
     /// outward normal under each centre
     pub normals: Vec<Vector3<f64>>,
 }
 
-/// Whether a press is against a wall that the scan lacks: lower than a ball can rest on it, as under
-/// a lid over a hole.
+/// Whether a press is against a wall that the scan lacks: lower than a ball can rest on the scan,
+/// as under a lid over a hole.
 pub(super) fn is_in_hole(
     distance: f64,
     normal: &Vector3<f64>,
@@ -118,17 +116,17 @@ pub(super) fn is_in_hole(
     distance < radius && force.dot(normal).abs() <= LEANS * force.norm()
 }
 
-/// How many presses the scan explains.
+/// Number of presses that the scan explains.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ScanAgreement {
     on_scan: usize,
-    /// against walls that it lacks
+    /// against walls that the scan lacks
     in_holes: usize,
     count: usize,
 }
 
 impl ScanAgreement {
-    /// Share on the scan; what is in holes that it lacks says nothing, unless it is most of all.
+    /// Share on the scan; presses in holes that it lacks do not count, unless they are most of all.
     pub fn on_scan(&self) -> f64 {
         let is_lid = self.in_holes as f64 <= MOST_UNDER_LIDS * self.count as f64;
         let count = self.count - if is_lid { self.in_holes } else { 0 };
@@ -141,10 +139,10 @@ impl ScanAgreement {
     }
 }
 
-/// Touches that follow each other share the same error of the scan: so many count as one.
+/// Number of consecutive touches that share one error of the scan and count as one.
 pub(super) const ALIKE: f64 = 10.0;
 
-/// No more than this share of the contacts is under lids of the scan, and no more beyond its rims.
+/// Maximum share of contacts under lids of the scan, and beyond its rims.
 const MOST_UNDER_LIDS: f64 = 0.6;
 const MOST_BEYOND_RIMS: f64 = 0.8;
 
@@ -208,7 +206,7 @@ impl BallFit {
         }
     }
 
-    /// How many of the presses the scan explains: the centre is one radius off it, and the force
+    /// Number of presses that the scan explains: the centre is one radius off it, and the force
     /// points out of it.
     ///
     /// - `forces`: of each centre, in O.
@@ -227,8 +225,8 @@ impl BallFit {
         of
     }
 
-    /// Share of the centres that are farther off the surface than `distance`, m, on whichever side:
-    /// beside the part, and where the scan has holes, the side is not known.
+    /// Share of the centres farther off the surface than `distance`, m, on either side: beside the
+    /// part and over holes of the scan the side is unknown.
     pub fn share_beyond(&self, distance: f64) -> f64 {
         self.distances.iter().filter(|x| x.abs() > distance).count() as f64
             / self.distances.len().max(1) as f64

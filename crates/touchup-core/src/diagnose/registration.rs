@@ -1,10 +1,10 @@
-//! Whether the scan lies where it is said to: presses on one that is turned or shifted a little are
-//! all within what the scan may be off by, but off by what a rigid motion explains.
+//! Checks the registration of the scan: presses on a slightly turned or shifted scan all lie within
+//! the scan's error, but a rigid motion explains their offsets.
 //!
-//! A press straight on the scan has its centre one radius off it. The small motion of all centres
-//! that brings them there, and another radius, are found by least squares. How much the motion
-//! differs from place to place, along the normals, is compared with what the scan is off by; its
-//! uncertainty is the jackknife's over places.
+//! A press straight on the scan has its centre one radius off it. Least squares find the small
+//! motion of all centres that brings them there, and another radius. The variation of the motion
+//! from place to place, along the normals, stands against the scan's noise; the jackknife over
+//! places gives its uncertainty.
 
 use std::collections::BTreeMap;
 
@@ -24,18 +24,18 @@ use crate::numeric::{
 
 /// Shift, turn, and radius.
 const NUMBERS: usize = 7;
-/// Fewer places than two for each of them determine nothing.
+/// Minimum number of places: two for each unknown.
 const FEWEST_PLACES: usize = 2 * NUMBERS;
-/// What the places do not determine is left as it is.
+/// Damping that keeps undetermined unknowns at zero.
 const DAMPING: f64 = 1e-3;
-/// A motion is one beyond so many of its standard uncertainties.
+/// Minimum size of a motion in its standard uncertainties.
 const CLEAR_ERRORS: f64 = 3.0;
 
 type Row = SVector<f64, NUMBERS>;
 
-/// The motion, and by how much it differs along the normals: root mean square about its mean, m.
+/// The motion, and its variation along the normals: root mean square about its mean, m.
 ///
-/// - `all`: of all places; `some`: of those that the motion is found by.
+/// - `all`: equations of all places; `some`: of the fitted places.
 fn motion(all: &NormalEquations<NUMBERS>, some: NormalEquations<NUMBERS>) -> Option<(Row, f64)> {
     let found = some.damped(DAMPING).solution()?;
     let mut moved = found;
@@ -47,7 +47,7 @@ fn motion(all: &NormalEquations<NUMBERS>, some: NormalEquations<NUMBERS>) -> Opt
     ))
 }
 
-/// Standard deviation of what is left about its median, m.
+/// Standard deviation of the residuals about their median, m.
 fn deviation(left: impl Iterator<Item = f64>) -> f64 {
     let mut left: Vec<f64> = left.collect();
     let middle = median(&mut left).unwrap_or(0.0);
@@ -56,7 +56,7 @@ fn deviation(left: impl Iterator<Item = f64>) -> f64 {
 }
 
 impl InputJudge<'_> {
-    /// A scan that is turned or shifted from where it is said to be.
+    /// A scan turned or shifted from its stated pose.
     pub fn judge_registration(&self, presses: &Presses) -> Option<InputFinding> {
         let straight = self.straight_presses(presses);
         let radius = self.params.tip.radius;
@@ -88,7 +88,7 @@ impl InputJudge<'_> {
         let before = deviation(rows.iter().map(|(_, off)| *off));
         let left = || rows.iter().map(|(row, off)| off - row.dot(&found));
         let after = deviation(left());
-        // a motion that follows a few far ones brings most of them no nearer
+        // a motion that follows a few outliers brings most centres no nearer
         let explained = (before.powi(2) - after.powi(2)).max(0.0).sqrt();
         let off = explained.min(moved - CLEAR_ERRORS * error);
         let noise = presses.scale.noise.max(self.params.scan_noise);

@@ -1,22 +1,22 @@
-//! Whether the contacts lie on the scan when all of them are shifted.
+//! Search for a common shift that puts the contacts on the scan.
 
 use nalgebra::{Point3, Vector3};
 
 use super::places::BallFit;
 use crate::mesh::{FaceTree, TriMesh, VertexId};
 
-/// Contacts, and vertices of the scan, that are brought together.
+/// Contacts, and vertices of the scan, paired for candidate shifts.
 const CONTACTS: usize = 24;
 const VERTICES: usize = 48;
-/// Contacts that a shift is judged by first.
+/// Contacts for the first evaluation of a shift.
 const JUDGES: usize = 60;
-/// Best shifts that are refined.
+/// Number of best shifts for refinement.
 const REFINED: usize = 8;
-/// Steps of the refinement: from so many tolerances on, each half of the one before.
+/// Steps of the refinement: the first in tolerances, each next half as long.
 const FIRST_STEP: f64 = 4.0;
 const STEPS: usize = 6;
 
-/// A shift of all contacts, and how they lie then.
+/// A shift of all contacts, and their fit after it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ContactShift {
     /// m
@@ -25,8 +25,8 @@ pub(super) struct ContactShift {
     pub share: f64,
 }
 
-/// The shift with which most contacts are on the scan: each of some contacts is laid on each of
-/// some vertices, and the best are refined.
+/// The shift with most contacts on the scan: candidates lay each of some contacts on each of some
+/// vertices, and the best candidates are refined.
 pub(super) fn best_shift(
     scan: &TriMesh,
     tree: &FaceTree,

@@ -1,16 +1,16 @@
-//! The stamps of the messages, before they are paired.
+//! Stamps of the messages, before pairing.
 
 use super::finding::{InputCause, InputFinding};
 use crate::numeric::median;
 use crate::stylus::Message;
 
-/// Periods that are kept.
+/// Maximum number of kept periods.
 const MOST_PERIODS: usize = 2048;
-/// A stamp that goes back by more was not swapped on the way, ns.
+/// Maximum backward step of messages swapped in transit, ns.
 const GOES_BACK_NS: i64 = 1_000_000_000;
-/// No force is measured in a shorter time, s.
+/// Minimum period of any force sensor, s.
 const FASTEST: f64 = 20e-6;
-/// Fewer messages say nothing.
+/// Minimum number of messages for a finding.
 const FEWEST: u64 = 20;
 
 /// Stamps of one stream.
@@ -58,7 +58,7 @@ pub(super) struct InputStamps {
 }
 
 impl InputStamps {
-    /// A sample whose pose and wrench have one stamp.
+    /// Takes a sample with one stamp for pose and wrench.
     #[inline]
     pub fn push_pair(&mut self, stamp_ns: i64) {
         self.poses.push(stamp_ns);
@@ -79,8 +79,8 @@ impl InputStamps {
         median(&mut self.poses.periods.clone()).unwrap_or(0.0)
     }
 
-    /// - `largest_gap_ns`: between two poses that are interpolated.
-    /// - `samples`: how many came of the messages.
+    /// - `largest_gap_ns`: maximum gap between two poses for interpolation.
+    /// - `samples`: number of samples from the messages.
     pub fn findings(&self, largest_gap_ns: i64, samples: u64) -> Vec<InputFinding> {
         let mut findings = Vec::new();
         for (name, stream) in [("poses", &self.poses), ("wrenches", &self.wrenches)] {
@@ -106,7 +106,7 @@ impl InputStamps {
         if !findings.is_empty() {
             return findings;
         }
-        // of all: a recorder may write several at once
+        // mean of all periods: a recorder may write several messages at once
         let wrench_period = self.wrenches.mean_period();
         if self.wrenches.count >= FEWEST && wrench_period < FASTEST {
             findings.push(InputFinding::new(

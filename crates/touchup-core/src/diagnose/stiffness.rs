@@ -1,8 +1,8 @@
-//! How far the reported centre sinks with the force.
+//! Sink of the reported centre with the force.
 //!
-//! A scan is off by as much for all presses on one place, whatever their force: the sink is the
-//! slope of the centre's distance from the scan over |F| among the presses of one place, by least
-//! squares over all places, with the jackknife's uncertainty over them.
+//! All presses on one place share the scan's error, whatever their force: the sink is the slope of
+//! the centre's distance from the scan over |F| among the presses of one place, by least squares
+//! over all places, with the jackknife's uncertainty over them.
 
 use std::collections::BTreeMap;
 
@@ -11,17 +11,17 @@ use nalgebra::{Point3, Vector2};
 use super::finding::{InputCause, InputFinding};
 use crate::numeric::{VoxelKey, jackknife_variance, voxel_of};
 
-/// Fewer places say nothing.
+/// Minimum number of places for a finding.
 const FEWEST_PLACES: usize = 8;
-/// The compliance is another one when it differs by this share of the larger …
+/// Minimum difference of a doubtful compliance, as a share of the larger one.
 const OTHER_COMPLIANCE: f64 = 0.4;
-/// … and the ball sinks by so much less or more, m.
+/// Minimum difference of the sink for a doubt, m.
 const LEAST_SUNK: f64 = 0.15e-3;
-/// An estimate that is less than nothing by more than so many of its standard uncertainties is none.
+/// Maximum depth of an estimate below zero, in its standard uncertainties.
 const CLEAR_SIGMAS: f64 = 2.0;
-/// A force that varies within places by less than this share of the largest says nothing.
+/// Minimum variation of the force within places, as a share of the largest force.
 const LEAST_VARIATION: f64 = 0.01;
-/// The difference is so many standard uncertainties; surely with so many.
+/// Minimum difference in standard uncertainties, for a doubt and for a sure finding.
 const DOUBTED_SIGMAS: f64 = 4.0;
 const SURE_SIGMAS: f64 = 6.0;
 
@@ -34,7 +34,7 @@ pub(super) struct SunkPress {
     pub force: f64,
 }
 
-/// Sums of squares about the means of one place: of the force, and of both together.
+/// Sums about the means of one place: of squares of the force, and of products with the distance.
 type PlaceSums = [f64; 2];
 
 fn sums_of(presses: &[Vector2<f64>]) -> PlaceSums {
@@ -45,8 +45,8 @@ fn sums_of(presses: &[Vector2<f64>]) -> PlaceSums {
     })
 }
 
-/// Compliance and its standard uncertainty, m/N, by places that are `place` wide, m; `None` where too few places say something, or what
-/// they say cannot be.
+/// Compliance and its standard uncertainty, m/N, by places of width `place`, m; `None` for too few
+/// places, too little variation of the force, or a clearly negative compliance.
 fn compliance(presses: &[SunkPress], place: f64, largest: f64) -> Option<[f64; 2]> {
     let mut places: BTreeMap<VoxelKey, Vec<Vector2<f64>>> = BTreeMap::new();
     for press in presses {
@@ -77,9 +77,9 @@ fn compliance(presses: &[SunkPress], place: f64, largest: f64) -> Option<[f64; 2
     (found + CLEAR_SIGMAS * sigma >= 0.0).then_some([found.max(0.0), sigma])
 }
 
-/// Whether the stiffness is another one than was told.
+/// Checks whether the stiffness differs from its setting.
 ///
-/// - `told`: its inverse, m/N. `place`: how wide one is, m. `largest`: force, N.
+/// - `told`: inverse of the setting, m/N. `place`: width of a place, m. `largest`: force, N.
 pub(super) fn judge_stiffness(
     presses: &[SunkPress],
     told: f64,

@@ -1,10 +1,10 @@
-//! Sign and axes of the wrench: a force points out of the surface that is pressed and, if the
-//! ball slides, against its motion.
+//! Sign and axes of the wrench: a force points out of the pressed surface and, if the ball slides,
+//! against its motion.
 //!
-//! Each way in which the wrench may be read turns the measured forces. How well it explains them is
-//! the mean cosine between them and n − μ t, with the normal n of the scan, the direction t of
-//! sliding, and the friction μ that suits it best. One of them is any rotation [Wahba 1965]: it has
-//! to be clearly better than those that have nothing to choose.
+//! Each candidate reading of the wrench turns the measured forces. Its score is the mean cosine
+//! between the forces and n − μ t, with the scan's normal n, the sliding direction t, and the best
+//! friction μ for that reading. One reading is any rotation [Wahba 1965]: it must be clearly better
+//! than the readings without free parameters.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,48 +15,47 @@ use super::forces::{ForceLevels, axes_in_words, signed_permutations};
 use super::input_record::InputRecord;
 use crate::numeric::{VoxelKey, jackknife_variance, mean};
 
-/// Of the way that the ball slid, m: so short that it is straight, so long that no noise of the
-/// pose turns it.
+/// Length of the sliding path, m: short enough to be straight, long enough to average pose noise.
 const COURSE: std::ops::RangeInclusive<f64> = 0.3e-3..=10e-3;
-/// Records that are looked back for it.
+/// Maximum number of earlier records in the search for that path.
 const MOST_BACK: usize = 16;
-/// It slides when its course is no steeper, as cosine to the normal.
+/// Maximum steepness of a sliding path, as cosine to the normal.
 const STEEP: f64 = 0.5;
-/// The wrench is read rightly when it is so near to what is expected, as mean cosine.
+/// Minimum mean cosine of a right reading.
 const LEANS: f64 = 0.5;
-/// Another reading explains the forces better when its mean cosine is larger by this at least …
+/// Minimum gain in mean cosine of a better reading.
 const LEAST_GAIN: f64 = 0.02;
-/// … and the difference is so many standard errors.
+/// Minimum gain of a better reading, in standard errors.
 const CLEAR_ERRORS: f64 = 3.0;
-/// Fewer presses, or presses on fewer places, say nothing …
+/// Minimum number of presses, and of places, for a finding.
 const FEWEST: usize = 32;
 const FEWEST_PLACES: usize = 6;
-/// … and on fewer than this nothing of a rotation, which has three numbers to choose.
+/// Minimum number of places for a rotation, which has three free parameters.
 const FEWEST_TURNED: usize = 24;
-/// Friction of a dry surface is no more.
+/// Maximum friction of a dry surface.
 const MOST_FRICTION: f64 = 0.8;
 /// Rounds of friction and rotation.
 const ROUNDS: usize = 4;
-/// Axes are named as swapped and reversed when they are no farther off, rad.
+/// Maximum angle to swapped and reversed axes for naming them, rad.
 const NAMED_ANGLE: f64 = 0.2;
 const WRENCH_FRAME_REMEDY: &str = "the frame_id of the wrench names its axes: that of the pose the scan's, any other the stylus' own";
 const W_LAST: &str = "give the orientation as x, y, z, w";
 
-/// A press on the scan, in the axes in which the wrench was read.
+/// A press on the scan, in the axes of the wrench as read.
 pub(super) struct ReadPress {
-    /// on which presses share the errors of the scan
+    /// place on which presses share the errors of the scan
     pub place: VoxelKey,
-    /// out of the scan; a unit vector
+    /// outward normal of the scan; a unit vector
     pub normal: Vector3<f64>,
-    /// of the ball over it; 0 if it does not slide
+    /// sliding direction of the ball over the scan; 0 if it does not slide
     pub course: Vector3<f64>,
-    /// the measured force, as unit vectors: as it was read, and by the other readings
+    /// the measured force as a unit vector: as read, and by the other readings
     pub force: Vector3<f64>,
     pub in_other_frame: Vector3<f64>,
     pub w_first: Vector3<f64>,
 }
 
-/// A reading of the wrench, with what it explains.
+/// A reading of the wrench, with its score.
 struct WrenchReading {
     cause: Option<InputCause>,
     says: String,
@@ -66,7 +65,7 @@ struct WrenchReading {
 }
 
 impl WrenchReading {
-    /// - `force`: as this reading has it.
+    /// - `force`: under this reading.
     fn of(
         presses: &[ReadPress],
         (cause, says, remedy): (Option<InputCause>, &str, &'static str),
@@ -86,7 +85,7 @@ impl WrenchReading {
         }
     }
 
-    /// By how many standard errors it is better than another.
+    /// Lead over another reading, in standard errors.
     fn errors_beyond(&self, other: &Self, presses: &[ReadPress]) -> f64 {
         let gains: Vec<f64> = self
             .cosines
@@ -104,7 +103,7 @@ impl ReadPress {
     }
 }
 
-/// Friction that suits a reading best.
+/// Best friction of a reading.
 fn friction_of(presses: &[ReadPress], force: &impl Fn(&ReadPress) -> Vector3<f64>) -> f64 {
     let slides = || {
         presses
@@ -120,8 +119,8 @@ fn friction_of(presses: &[ReadPress], force: &impl Fn(&ReadPress) -> Vector3<f64
     (against / along.max(f64::MIN_POSITIVE)).clamp(0.0, MOST_FRICTION)
 }
 
-/// The rotation that brings the forces nearest to what is expected of them; with `is_mirrored` the
-/// best that also reverses.
+/// The rotation that brings the forces nearest to their expected directions; with `is_mirrored` the
+/// best rotation with reversal.
 fn best_turn(presses: &[ReadPress], is_mirrored: bool) -> Option<Matrix3<f64>> {
     let mut turn = Matrix3::identity() * if is_mirrored { -1.0 } else { 1.0 };
     for _ in 0..ROUNDS {
@@ -141,7 +140,7 @@ fn best_turn(presses: &[ReadPress], is_mirrored: bool) -> Option<Matrix3<f64>> {
     Some(turn)
 }
 
-/// A rotation of the wrench as it is named: swapped and reversed axes, or an angle about an axis.
+/// Name of a wrench rotation: swapped and reversed axes, or an angle about an axis.
 fn turn_in_words(turn: &Matrix3<f64>) -> String {
     let off = |axes: &Matrix3<f64>| (axes.transpose() * turn).trace();
     let near = signed_permutations().max_by(|a, b| off(a).total_cmp(&off(b)));
@@ -161,7 +160,7 @@ fn turn_in_words(turn: &Matrix3<f64>) -> String {
     )
 }
 
-/// Readings that have nothing to choose, the best first.
+/// Readings without free parameters, the best first.
 fn fixed_readings(presses: &[ReadPress], other_frame: &str) -> [WrenchReading; 3] {
     let sign = "reverse the wrench: it is what the part does to the stylus";
     let named = |cause, says, remedy| (Some(cause), says, remedy);
@@ -209,11 +208,11 @@ fn turned_reading(presses: &[ReadPress]) -> Option<WrenchReading> {
         .max_by(|a, b| a.mean.total_cmp(&b.mean))
 }
 
-/// The fault in sign or axes of the wrench; `None` if nothing explains the forces better
-/// than they were read.
+/// The fault in sign or axes of the wrench; `None` if no reading explains the forces better than
+/// the given one.
 ///
 /// - `presses`: on the scan.
-/// - `other_frame`: the other axes that the wrench may be in, in words.
+/// - `other_frame`: the other possible axes of the wrench, in words.
 pub(super) fn judge_wrench(presses: &[ReadPress], other_frame: &str) -> Option<InputFinding> {
     let places: BTreeSet<VoxelKey> = presses.iter().map(|press| press.place).collect();
     if presses.len() < FEWEST || places.len() < FEWEST_PLACES {
@@ -227,7 +226,7 @@ pub(super) fn judge_wrench(presses: &[ReadPress], other_frame: &str) -> Option<I
     let is_better = |one: &WrenchReading, other: &WrenchReading| {
         one.mean > other.mean + LEAST_GAIN && one.errors_beyond(other, presses) > CLEAR_ERRORS
     };
-    // with another order of the quaternion the stylus stands upside down
+    // with another quaternion order the stylus stands upside down
     let is_possible = |other: &&WrenchReading| {
         other.cause != Some(InputCause::QuaternionOrder) || as_read.mean < LEANS
     };
@@ -241,7 +240,7 @@ pub(super) fn judge_wrench(presses: &[ReadPress], other_frame: &str) -> Option<I
         .filter(|turned| turned.mean > fixed.mean + LEAST_GAIN)
         .unwrap_or(fixed);
     let cause = best.cause.filter(|_| is_better(best, &as_read))?;
-    // of an upright stylus whose quaternion has w first, the wrench is right in the axes of the poses
+    // with w first and an upright stylus, the wrench is right in the axes of the poses
     let is_order = cause == InputCause::QuaternionOrder;
     let is_refuted =
         |other: &WrenchReading| is_order || other.cause == best.cause || is_better(best, other);
@@ -256,8 +255,8 @@ pub(super) fn judge_wrench(presses: &[ReadPress], other_frame: &str) -> Option<I
     Some(InputFinding::new(cause, is_sure, measured, best.remedy))
 }
 
-/// The unit vector along the scan by which the record `at` has slid there from another one that
-/// presses, all between them too, in O; 0 if it has not.
+/// The unit vector along the scan, in O, of the sliding that ends at record `at`, from an earlier
+/// press with only presses between; 0 without sliding.
 ///
 /// - `normal`: of the scan under it.
 pub(super) fn course_at(
@@ -282,7 +281,7 @@ pub(super) fn course_at(
 }
 
 impl ReadPress {
-    /// - `axes`: turns O into those in which the wrench was read.
+    /// - `axes`: rotation from O to the axes of the wrench as read.
     pub fn new(
         place: VoxelKey,
         axes: &UnitQuaternion<f64>,
@@ -301,8 +300,8 @@ impl ReadPress {
     }
 }
 
-/// A mean in standard errors, by the jackknife over places: the scan's normal is off by as much for
-/// all presses on one place.
+/// A mean in standard errors, by the jackknife over places: all presses on one place share the
+/// error of the scan's normal.
 fn errors_of_mean(presses: &[ReadPress], values: &[f64]) -> f64 {
     let mut places: BTreeMap<VoxelKey, (f64, usize)> = BTreeMap::new();
     for (press, value) in presses.iter().zip(values) {
