@@ -1,4 +1,4 @@
-//! Distance from point to point: both shapes taken for clouds, as in the paper's Fig 20.
+//! Distance from point to point: both shapes as clouds, as in the paper's Fig 20.
 
 use nalgebra::Point3;
 
@@ -6,19 +6,19 @@ use super::CompareError;
 use super::deviation::check_finite;
 use crate::mesh::{PointTree, Workers, coherent_order, map_pieces_by};
 
-/// Neighbours that are searched for one after the other.
+/// Points in one run of consecutive searches.
 const RUN: usize = 1024;
-/// Runs that are worth a thread.
+/// Minimum number of runs for a thread.
 const FEWEST_RUNS: usize = 4;
-/// By what a bound on a distance is widened, so that no rounding shuts out the point it comes from.
+/// Factor that widens a distance bound, so that rounding never excludes the point behind it.
 const WIDENED: f64 = 1.0 + 1e-9;
 
 /// Distance from each of `points` to the nearest point of `cloud`, m.
 ///
-/// It is the distance of the surfaces only where the cloud is dense against it: half the spacing is
-/// in it.
+/// It approximates the distance of the surfaces only for a dense cloud: it includes half the
+/// spacing.
 ///
-/// - `workers`: threads that search; the distances are the same to the last bit.
+/// - `workers`: threads for the search; the distances are the same to the last bit.
 ///
 /// # Errors
 /// [`CompareError::NotFinite`] of either; [`CompareError::NoPoints`],
@@ -53,9 +53,9 @@ pub fn cloud_distances(
     Ok(distances)
 }
 
-/// Those of a run of neighbours, in its order. The nearest point of one is no farther from the next
-/// than its own nearest: from far away, where many points of a cloud are about equally near, that
-/// leaves fewer to be looked at.
+/// Distances of one run of neighbours, in its order. A point's nearest cloud point bounds the
+/// distance of the next point: far away, many cloud points are almost equally near, and the bound
+/// leaves fewer to search.
 fn run_distances(
     points: &[Point3<f64>],
     run: &[u32],

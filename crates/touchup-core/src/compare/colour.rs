@@ -1,5 +1,5 @@
-//! Colours of signed deviations: blue lacks material, white fits, red has too much. The
-//! colour-blind can distinguish them. And of classes of disagreement.
+//! Colours of signed deviations, safe for the colour-blind: blue lacks material, white fits, red
+//! has too much. And colours of classes of disagreement.
 
 use super::disagreement::Class;
 
@@ -19,8 +19,8 @@ const STOPS: [[f64; 3]; 9] = [
     [122.0, 12.0, 32.0],
 ];
 
-/// The colour of `deviation` on a scale from −`range` to `range` (m, more than 0); what is beyond
-/// has the colour of its end.
+/// The colour of `deviation` on a scale from −`range` to `range` (m, more than 0); values beyond
+/// have the colour of their end.
 pub fn colour_of(deviation: f64, range: f64) -> Rgb {
     let last = STOPS.len() - 1;
     let at = ((deviation / range).clamp(-1.0, 1.0) + 1.0) / 2.0 * last as f64;
@@ -32,12 +32,12 @@ pub fn colour_of(deviation: f64, range: f64) -> Rgb {
     })
 }
 
-/// Colours of deviations, with one colour for all that is within tolerance.
+/// Colours of deviations, with one colour for all within tolerance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ColourScale {
-    /// its ends, m, more than 0
+    /// half the range of the scale, m, more than 0
     pub range: f64,
-    /// at most so much has the colour of 0, m
+    /// maximum deviation with the colour of 0, m
     pub tolerance: Option<f64>,
 }
 
@@ -50,7 +50,7 @@ impl ColourScale {
     }
 }
 
-/// The colour of a class, set apart also for the colour-blind.
+/// The colour of a class, distinct also for the colour-blind.
 pub fn colour_of_class(class: Class) -> Rgb {
     match class {
         Class::Agrees => [238, 240, 242],
@@ -74,7 +74,7 @@ mod tests {
 
     #[test]
     fn classes_are_apart_without_red_and_green() {
-        // ten times what is just seen
+        // ten times the just noticeable difference
         assert!(least_difference(&Class::ALL.map(colour_of_class)) > 23.0);
         let former_pair = [[204, 56, 40], [20, 130, 60]];
         assert!(

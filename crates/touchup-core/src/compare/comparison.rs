@@ -1,4 +1,4 @@
-//! All of it for two shapes, region by region.
+//! The whole comparison of two shapes, region by region.
 
 use nalgebra::Point3;
 
@@ -24,38 +24,37 @@ pub struct IndexedMesh<'a> {
 pub enum SupportRegion {
     /// as scanned
     Untouched,
-    /// what touches nearby suggest
+    /// inferred from touches nearby
     Guessed,
     /// touched
     Touched,
 }
 
-/// Where the regions of a mesh come from.
+/// Source of the regions of a mesh.
 #[derive(Clone, Copy, Debug)]
 pub enum Regions<'a> {
-    /// unknown: there is only the whole
+    /// unknown: only the whole
     Unknown,
     /// one for each vertex slot of the mesh itself
     Own(&'a [SupportRegion]),
-    /// those of another mesh of the same part, looked up through the truth: where that mesh is
-    /// closest to the true place
+    /// regions of another mesh of the same part, by its place closest to the true place
     Of(IndexedMesh<'a>, &'a [SupportRegion]),
 }
 
 /// Settings of [`compare`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CompareParams {
-    /// Points on the true surface, about; as dense on the mesh. Default 200 000: percentiles to a
-    /// few tenths of a per cent.
+    /// Approximate number of points on the true surface; the mesh gets the same density. Default
+    /// 200 000: percentiles to a few tenths of a per cent.
     pub samples: usize,
-    /// Another seed gives another sample.
+    /// Seed of the sample.
     pub seed: u64,
     /// Half the range of the histogram, m. Default: from the 95th percentile.
     pub range: Option<f64>,
-    /// How far a true place may be from the mesh and yet be one that it shows, m. Default 2 mm:
-    /// three times the noise of a poor scan.
+    /// Maximum distance of a visible true place from the mesh, m. Default 2 mm: three times the
+    /// noise of a poor scan.
     pub reach: f64,
-    /// Deviations of at most so much are within tolerance, m. Default: none.
+    /// Maximum deviation within tolerance, m. Default: none.
     pub tolerance: Option<f64>,
 }
 
@@ -71,51 +70,50 @@ impl Default for CompareParams {
     }
 }
 
-/// A mesh of more than so many times the area of the truth is sampled less densely: its unit is
-/// probably wrong.
+/// Maximum area of a mesh at full sampling density, in areas of the truth: a larger one probably
+/// has a wrong unit.
 const MOST_AREA: f64 = 10.0;
 
-/// Narrowest range chosen, m: no scan or touch is more accurate.
+/// Narrowest automatic range, m: no scan or touch is more accurate.
 const SMALLEST_RANGE: f64 = 1e-6;
 
-/// How far one region is from the truth.
+/// Deviations of one region from the truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RegionComparison {
-    /// `None`: all of it
+    /// `None`: the whole
     pub region: Option<SupportRegion>,
     /// points spread over the mesh, to the true surface
     pub mesh_to_truth: Option<Summary>,
     /// the same in bins
     pub histogram: Histogram,
-    /// share of them within [`CompareParams::tolerance`]; `None` where there is none, or no point
+    /// share of them within [`CompareParams::tolerance`]; `None` without tolerance or points
     pub within_tolerance: Option<f64>,
-    /// points spread over the true surface, to the mesh: what is missing. A region has those that
-    /// the mesh shows; all of it has also what was never scanned.
+    /// points spread over the true surface, to the mesh: missing surface. A region has the points
+    /// visible on the mesh; the whole includes surface never scanned.
     pub truth_to_mesh: Option<Summary>,
     /// the mesh's vertices, to the true surface
     pub vertices_to_truth: Option<Summary>,
-    /// points spread over the mesh, to the nearest of those spread over the truth; without sign,
-    /// `bias` is the mean
+    /// points spread over the mesh, to the nearest point on the truth; without sign, `bias` is the
+    /// mean
     pub cloud_to_truth: Option<Summary>,
-    /// and the reverse
+    /// points on the truth, to the nearest point on the mesh
     pub truth_to_cloud: Option<Summary>,
-    /// of the faces
+    /// tilts of the faces
     pub tilt: Option<TiltSummary>,
 }
 
-/// How far a mesh is from the truth.
+/// Deviations of a mesh from the truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
     /// points for each m²
     pub density: f64,
     /// half the range of the histograms, m
     pub range: f64,
-    /// share of the true surface that the mesh, or the one that has the regions, does not show:
-    /// never scanned, or missing
+    /// share of the true surface missing from the mesh, or from the mesh that has the regions
     pub unseen: f64,
-    /// all of it, then the regions that there are
+    /// the whole, then each region present
     pub regions: Vec<RegionComparison>,
-    /// of each vertex slot, m, + outside; 0 where no vertex is
+    /// of each vertex slot, m, + outside; 0 for empty slots
     pub vertex_deviations: Vec<f64>,
 }
 
@@ -138,7 +136,7 @@ impl Sorted {
     }
 }
 
-/// Where a point meets a mesh.
+/// Closest place of a mesh to a point.
 #[derive(Clone, Copy)]
 struct Foot {
     deviation: f64,
@@ -147,7 +145,7 @@ struct Foot {
     corner: VertexId,
 }
 
-/// Everything measured, before it is summed up by region.
+/// All measurements, before the summary by region.
 struct MeasuredDeviations {
     to_truth: Sorted,
     to_mesh: Sorted,
@@ -160,7 +158,7 @@ struct MeasuredDeviations {
 
 /// Compares a mesh with the truth; both lie in one frame.
 ///
-/// - `workers`: threads that search for the closest places; the result is the same to the last bit.
+/// - `workers`: threads for the search of closest places; the result is the same to the last bit.
 ///
 /// # Errors
 /// [`CompareError::NoFaces`] of either; [`CompareError::TooManyPoints`].
@@ -171,13 +169,13 @@ pub fn compare(
     params: &CompareParams,
     workers: &dyn Workers,
 ) -> Result<Comparison, CompareError> {
-    // by the truth alone, so that a scan and what became of it are held against the same places
+    // by the truth alone: a scan and its refinement then meet the same true places
     let area = surface_area(truth.mesh).max(surface_area(mesh.mesh) / MOST_AREA);
     let density = params.samples.max(1) as f64 / area;
     if !density.is_normal() {
         return Err(CompareError::NoFaces);
     }
-    // a mesh that is the truth must not meet its own points
+    // another seed: a mesh equal to the truth must not meet its own points
     let [seed, other] = [params.seed, params.seed.wrapping_add(1)];
     let samples = [
         sample_surface(mesh.mesh, density, seed),
@@ -352,8 +350,8 @@ fn feet(
 
 /// The region of each point.
 ///
-/// - `own`: the vertex of the mesh that each belongs to.
-/// - `places`: where each is on the true part.
+/// - `own`: the mesh vertex of each point.
+/// - `places`: the place of each point on the true part.
 fn regions_of(
     regions: Regions<'_>,
     own: impl Iterator<Item = VertexId>,
@@ -372,8 +370,8 @@ fn regions_of(
     })
 }
 
-/// The region of each point of the truth: that of the closest place of the mesh that has the
-/// regions, where this is within `reach` (m) and has a normal alike. A scan from above carries no
+/// The region of each point of the truth: the region of the closest place on the mesh that has the
+/// regions, if it is within `reach` (m) and its normal is similar. A scan from above carries no
 /// information on the underside.
 ///
 /// - `feet`: of the points on `mesh`.
@@ -411,7 +409,7 @@ fn regions_of_truth(
     Ok(points.iter().zip(&looked_up).map(region).collect())
 }
 
-/// The region of two corners of three, the one between where all differ.
+/// The region of two corners of three; the middle one if all differ.
 fn most_common(corners: [VertexId; 3], of_vertex: &[SupportRegion]) -> SupportRegion {
     let mut regions = corners.map(|vertex| of_vertex[vertex.0 as usize]);
     regions.sort_unstable();

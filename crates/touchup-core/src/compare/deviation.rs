@@ -1,18 +1,17 @@
-//! How far points are from a surface, and on which side of it.
+//! Signed distance of points from a surface.
 
 use nalgebra::Point3;
 
 use super::CompareError;
 use crate::mesh::{FaceHit, FaceTree, TriMesh, Workers, coherent_order, map_by, pseudo_normal};
 
-/// Finds the place of `mesh` closest to each of `points` and hands it to `take` with the number of
-/// the point: each point once, in an order in which neighbours follow each other, so that what one
-/// query has read is cached for the next.
+/// Finds the place of `mesh` closest to each of `points` and passes it to `take` with the index of
+/// the point: each point once, neighbours after each other, for a warm cache.
 ///
 /// - `points`: m, in the frame of `mesh`.
 ///
 /// # Errors
-/// [`CompareError::NotFinite`]; [`CompareError::NoFaces`] where the mesh has none.
+/// [`CompareError::NotFinite`]; [`CompareError::NoFaces`] for an empty mesh.
 pub fn closest_places(
     points: &[Point3<f64>],
     mesh: &TriMesh,
@@ -31,7 +30,7 @@ pub fn closest_places(
     Ok(())
 }
 
-/// What `evaluate` returns for each of `points` and its closest place, in their order; the same for
+/// Results of `evaluate` for each of `points` and its closest place, in their order; the same for
 /// any `workers`.
 ///
 /// # Errors
@@ -59,8 +58,8 @@ pub(super) fn at_closest_places<T: Send>(
         .collect()
 }
 
-/// Numbers of the points so that neighbours follow each other, and the points in this order: read
-/// one by one they would each be waited for.
+/// Indices of the points with neighbours after each other, and the points in this order, for
+/// contiguous reads.
 fn in_order(points: &[Point3<f64>]) -> Result<(Vec<u32>, Vec<Point3<f64>>), CompareError> {
     check_finite(points)?;
     let order = coherent_order(points);
@@ -72,7 +71,7 @@ fn in_order(points: &[Point3<f64>]) -> Result<(Vec<u32>, Vec<Point3<f64>>), Comp
 /// material.
 ///
 /// - `points`: m, in the frame of `truth`.
-/// - `workers`: threads that search for the closest places; the distances are the same to the last
+/// - `workers`: threads for the search of closest places; the distances are the same to the last
 ///   bit.
 ///
 /// # Errors
@@ -98,7 +97,7 @@ pub fn deviations(
     at_closest_places(points, truth, tree, workers, |p, hit| signed(p, truth, hit))
 }
 
-/// The distance between `p` and its closest place, m, negative where `p` is behind it.
+/// The distance between `p` and its closest place, m, negative behind the surface.
 #[inline]
 pub(super) fn signed(p: &Point3<f64>, mesh: &TriMesh, hit: &FaceHit) -> f64 {
     let is_inside = hit.barycentric.iter().all(|&share| share > 0.0);
@@ -112,7 +111,7 @@ pub(super) fn signed(p: &Point3<f64>, mesh: &TriMesh, hit: &FaceHit) -> f64 {
         .copysign((p - hit.point).dot(&normal))
 }
 
-/// Refuses what is no place.
+/// Refuses points with non-finite coordinates.
 pub(super) fn check_finite(points: &[Point3<f64>]) -> Result<(), CompareError> {
     let bad = points
         .iter()

@@ -1,5 +1,5 @@
-//! How far a surface moved from one refinement of a scan to another, and whether that is more than
-//! either of them knows.
+//! Displacement of a surface between two refinements of a scan, and its significance against their
+//! uncertainties.
 
 use nalgebra::{Point3, Vector3};
 
@@ -8,29 +8,28 @@ use super::comparison::IndexedMesh;
 use super::deviation::{at_closest_places, signed};
 use crate::mesh::{FaceHit, TriMesh, VertexId, Workers};
 
-/// Along the normal.
+/// Displacement along the normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Displacement {
-    /// from the first surface to the second, m; positive: outwards, so that there is more material
+    /// from the first surface to the second, m; positive: outwards, more material
     pub distance: f64,
-    /// the larger standard deviation of the two surfaces there, m; `None` where neither is known
+    /// the larger standard deviation of the two surfaces there, m; `None` if neither is known
     pub sigma: Option<f64>,
 }
 
 impl Displacement {
-    /// What it must exceed to be more than the surfaces are uncertain, m: `k` standard deviations;
-    /// 0 where none is known.
+    /// Bound of a significant displacement, m: `k` standard deviations; 0 if none is known.
     pub fn plus_minus(&self, k: f64) -> f64 {
         self.sigma.map_or(0.0, |sigma| k * sigma)
     }
 
-    /// Whether it does.
+    /// Whether the displacement exceeds `k` standard deviations.
     pub fn is_moved(&self, k: f64) -> bool {
         self.distance.abs() > self.plus_minus(k)
     }
 }
 
-/// Which of the two surfaces the vertices are of.
+/// The surface that owns the vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DisplacedFrom {
     /// the first
@@ -39,8 +38,8 @@ pub enum DisplacedFrom {
     After,
 }
 
-/// Displacement of each vertex slot of a mesh whose vertices and faces are those of the other:
-/// along the normal of the first. `None` where they are not.
+/// Displacement of each vertex slot of a mesh, along the normal of the first, if both share
+/// vertices and faces; else `None`.
 ///
 /// - `sigmas`: standard deviation of each vertex slot, m, of both.
 pub fn displacements_by_vertex(
@@ -81,12 +80,11 @@ pub fn displacements_by_vertex(
 /// Displacement at each vertex slot of one of two meshes, to the nearest place of the other
 /// surface.
 ///
-/// - `shape`: whose vertices these are; `sigma`: standard deviation of each, m.
-/// - `other`: the other surface; `other_sigma`: of its vertices, m; between them it is
-///   interpolated.
+/// - `shape`: the mesh of the vertices; `sigma`: standard deviation of each, m.
+/// - `other`: the other surface; `other_sigma`: of its vertices, m, interpolated between them.
 ///
 /// # Errors
-/// [`CompareError::NoFaces`] where the other one has none.
+/// [`CompareError::NoFaces`] if the other one has none.
 pub fn displacements_to_surface(
     shape: &TriMesh,
     sigma: Option<&[f64]>,
@@ -122,12 +120,12 @@ pub fn displacements_to_surface(
         .collect())
 }
 
-/// `None` where neither is known.
+/// `None` if neither is known.
 fn larger(sigmas: [Option<f64>; 2]) -> Option<f64> {
     sigmas.into_iter().flatten().reduce(f64::max)
 }
 
-/// How many of the vertices that a mesh has are moved.
+/// Number of moved vertices among those present in a mesh.
 pub fn moved_count(mesh: &TriMesh, displacements: &[Displacement], k: f64) -> usize {
     let is_moved = |(at, one): &(usize, &Displacement)| {
         mesh.has_vertex(VertexId(*at as u32)) && one.is_moved(k)
@@ -182,8 +180,8 @@ mod tests {
         );
     }
 
-    /// The same by the nearest place of a sheet with other faces: parallel to it all rise by as
-    /// much.
+    /// The same by the nearest place of a sheet with other faces: parallel to it all vertices rise
+    /// equally.
     #[test]
     fn where_the_faces_differ_the_nearest_surface_counts_and_outwards_is_outwards_from_both() {
         let (low, high) = (sheet(|_, _| 0.0, false), sheet(|_, _| 3e-5, true));

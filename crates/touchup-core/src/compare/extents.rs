@@ -1,27 +1,27 @@
-//! Whether two meshes can be of one part: by the boxes around them.
+//! Checks whether two meshes can belong to one part, by their bounding boxes.
 
 use std::fmt;
 
 use crate::mesh::TriMesh;
 
-/// A scan may show a part of the part: diagonals whose ratio is within are plausible.
+/// Plausible ratio of the diagonals: a scan may show a fraction of the part.
 const PLAUSIBLE: std::ops::Range<f64> = 0.125..8.0;
 
-/// Boxes that are farther apart than this share of the diagonal of the truth are not of one place:
-/// a thin scan may lie above it.
+/// Maximum distance of boxes at one place, as a share of the truth's diagonal: a thin scan may lie
+/// above it.
 const BESIDE: f64 = 0.1;
 
-/// What speaks against two meshes being of one part, in one unit and one frame.
+/// Evidence against two meshes of one part, in one unit and one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum UnlikeExtents {
-    /// So many times as long is the diagonal of the first as that of the second.
+    /// Ratio of the first diagonal to the second.
     Size(f64),
-    /// So far are they apart, m.
+    /// Distance between the boxes, m.
     Apart(f64),
 }
 
 impl UnlikeExtents {
-    /// `None` where nothing does.
+    /// `None` for plausible boxes.
     pub fn of(mesh: &TriMesh, truth: &TriMesh) -> Option<Self> {
         let ([low, high], [true_low, true_high]) = (mesh.bounds(), truth.bounds());
         let true_diagonal = (true_high - true_low).norm();
@@ -37,7 +37,7 @@ impl UnlikeExtents {
     }
 }
 
-/// Of a mesh and its truth; without what to do.
+/// Evidence in words, for a mesh and its truth; without a remedy.
 impl fmt::Display for UnlikeExtents {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {

@@ -1,5 +1,5 @@
-//! Lines and places as small solids among the faces of a mesh, so that a picture shows them where
-//! they are, and hides them where they are hidden.
+//! Lines and places as small solids among the faces of a mesh: pictures show them in place, and
+//! hide them behind the part.
 
 use nalgebra::{Point3, Vector3};
 
@@ -7,7 +7,7 @@ use super::colour::Rgb;
 use crate::mesh::{MeshError, TriMesh};
 use crate::numeric::tangent_basis;
 
-/// A mesh with what is drawn into it, and a colour for each vertex.
+/// A mesh with added solids, and a colour for each vertex.
 #[derive(Clone, Debug, Default)]
 pub struct DrawnMesh {
     positions: Vec<Point3<f64>>,
@@ -42,7 +42,7 @@ impl DrawnMesh {
             .extend(faces.iter().map(|face| face.map(|corner| first + corner)));
     }
 
-    /// A line of a radius (m) from one place to another; nothing where both are one.
+    /// A line of a radius (m) from one place to another; nothing between equal places.
     pub fn line(&mut self, from: &Point3<f64>, to: &Point3<f64>, radius: f64, colour: Rgb) {
         let Some(along) = (to - from).try_normalize(0.0) else {
             return;
@@ -86,10 +86,10 @@ impl DrawnMesh {
         self.add(&points, &faces, colour);
     }
 
-    /// What can be drawn.
+    /// The mesh and colours for drawing.
     ///
     /// # Errors
-    /// [`MeshError`] for places that are no numbers.
+    /// [`MeshError`] for non-finite places.
     pub fn finish(self) -> Result<(TriMesh, Vec<Rgb>), MeshError> {
         Ok((TriMesh::new(self.positions, self.faces)?, self.paint))
     }

@@ -1,8 +1,8 @@
-//! How far a mesh is from the part as it is: deviation point to surface and cloud to cloud,
-//! normals, and pictures of them.
+//! Deviation of a mesh from the true part: point to surface and cloud to cloud, normals, and
+//! pictures of them.
 //!
-//! All distances are in m. A deviation is positive where the mesh lies above the true part and
-//! negative where it lies in its material, whichever of the two the points were taken from.
+//! All distances are in m. A deviation is positive if the mesh lies above the true part and
+//! negative if it lies in its material, for points of either shape.
 
 mod cloud;
 mod colour;
@@ -47,21 +47,21 @@ pub enum CompareError {
     /// NaN or infinity.
     #[error("point {point} has a coordinate that is not finite")]
     NotFinite {
-        /// which, counted from 0
+        /// index, from 0
         point: usize,
     },
-    /// Nothing to measure to.
+    /// Empty mesh to measure to.
     #[error("the mesh to compare with has no faces")]
     NoFaces,
-    /// Nothing to measure to.
+    /// Empty cloud to measure to.
     #[error("the cloud to compare with has no points")]
     NoPoints,
-    /// More than can be counted.
+    /// More points than an index can count.
     #[error("{points} points are more than {most}: take fewer samples")]
     TooManyPoints {
-        /// how many
+        /// number of points
         points: usize,
-        /// at most
+        /// maximum number
         most: usize,
     },
 }

@@ -1,4 +1,4 @@
-//! How far the faces of a mesh are turned from the true surface.
+//! Angles between the faces of a mesh and the true surface.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -9,10 +9,10 @@ use super::deviation::closest_places;
 use crate::mesh::{FaceId, FaceTree, TriMesh};
 use crate::numeric::weighted_quantile;
 
-/// The angle between a face's normal and that of the closest true face.
+/// The angle between the normals of a face and of the closest true face.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tilt {
-    /// of the mesh
+    /// face of the mesh
     pub face: FaceId,
     /// 0 to π, rad
     pub angle: f64,
@@ -27,7 +27,7 @@ pub struct TiltSummary {
     pub median: f64,
     /// 95th percentile, rad
     pub p95: f64,
-    /// share of the area whose normal is reversed: more than π/2
+    /// share of the area with reversed normal: more than π/2
     pub flipped: f64,
 }
 
@@ -36,10 +36,10 @@ pub fn angle_between(n: &Vector3<f64>, m: &Vector3<f64>) -> f64 {
     n.cross(m).norm().atan2(n.dot(m))
 }
 
-/// The tilt of each face of `mesh` against the true face that is closest to its barycentre.
+/// The tilt of each face of `mesh` against the true face closest to its barycentre.
 ///
 /// # Errors
-/// [`CompareError::NoFaces`] where `truth` has none.
+/// [`CompareError::NoFaces`] if `truth` has none.
 pub fn tilts(mesh: &TriMesh, truth: &TriMesh, tree: &FaceTree) -> Result<Vec<Tilt>, CompareError> {
     let faces: Vec<FaceId> = mesh.faces().map(|(face, _)| face).collect();
     let middles: Vec<Point3<f64>> = faces.iter().map(|&face| mesh.barycentre(face)).collect();
@@ -60,7 +60,7 @@ pub fn tilts(mesh: &TriMesh, truth: &TriMesh, tree: &FaceTree) -> Result<Vec<Til
 }
 
 impl TiltSummary {
-    /// `None` where there is no area.
+    /// `None` without area.
     pub fn of(tilts: &[Tilt]) -> Option<Self> {
         let mut angles: Vec<_> = tilts.iter().map(|tilt| (tilt.angle, tilt.area)).collect();
         let (median, p95) = (

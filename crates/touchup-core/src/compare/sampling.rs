@@ -7,7 +7,7 @@ use rand_pcg::Pcg64;
 use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::numeric::largest;
 
-/// The stream of the generator that belongs to sampling.
+/// The generator's stream for sampling.
 const STREAM: u64 = 0x5a3b;
 
 /// A point of a surface.
@@ -15,7 +15,7 @@ const STREAM: u64 = 0x5a3b;
 pub struct SampledPoint {
     /// m, in the frame of the mesh
     pub point: Point3<f64>,
-    /// the face it lies on
+    /// the face under it
     pub face: FaceId,
     /// the nearest corner of that face, by barycentric coordinates
     pub corner: VertexId,
@@ -28,15 +28,15 @@ pub fn surface_area(mesh: &TriMesh) -> f64 {
         .sum()
 }
 
-/// Points spread over a surface by area: one at random in each piece of 1/`density` that the faces,
-/// laid end to end in order of id, are cut into. Same mesh, density and seed, same points.
+/// Points spread over a surface by area: one at random in each piece of 1/`density` of the faces,
+/// laid end to end in order of id. Same mesh, density and seed, same points.
 ///
 /// - `density`: points for each m², more than 0.
 pub fn sample_surface(mesh: &TriMesh, density: f64, seed: u64) -> Vec<SampledPoint> {
     let mut rng = Pcg64::new(u128::from(seed), u128::from(STREAM));
     let mut random = move || -> f64 { StandardUniform.sample(&mut rng) };
     let mut samples = Vec::new();
-    // where the next point is, counted in pieces from the start of the current face
+    // position of the next point, in pieces from the start of the first face
     let mut next = random();
     let mut pieces_before = 0.0_f64;
     let mut number = 0.0_f64;

@@ -1,11 +1,11 @@
-//! A set of deviations in a few numbers.
+//! Statistics of a set of deviations.
 
 use crate::numeric::quantile;
 
 /// Statistics of a set of deviations. All but `bias` are of the sizes, without sign.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Summary {
-    /// how many
+    /// number of deviations
     pub points: usize,
     /// m
     pub mean: f64,
@@ -24,7 +24,7 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Of deviations in m; `None` where there are none.
+    /// Of deviations in m; `None` without any.
     pub fn of(deviations: &[f64]) -> Option<Self> {
         let count = deviations.len() as f64;
         let mut sizes: Vec<f64> = deviations.iter().map(|d| d.abs()).collect();
@@ -43,7 +43,7 @@ impl Summary {
     }
 }
 
-/// How many deviations lie in each of equal bins.
+/// Number of deviations in each of equal bins.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Histogram {
     /// lower end of the first bin, m; the upper end of the last is the same with the other sign
@@ -62,8 +62,8 @@ pub struct Histogram {
 pub(crate) const BINS: usize = 40;
 
 impl Histogram {
-    /// Of deviations in m, in 40 bins from −`range` to `range` (m, more than 0); a bin has its
-    /// lower end in it.
+    /// Of deviations in m, in 40 bins from −`range` to `range` (m, more than 0); a bin includes its
+    /// lower end.
     pub fn of(deviations: &[f64], range: f64) -> Self {
         let width = 2.0 * range / BINS as f64;
         let mut histogram = Self {

@@ -1,4 +1,4 @@
-//! The part of a surface that was touched.
+//! The touched part of a surface.
 
 use std::collections::HashSet;
 
@@ -6,21 +6,21 @@ use nalgebra::Point3;
 
 use crate::numeric::{PointGrid, voxel_of};
 
-/// A place belongs to the touched region when a contact is within this distance, m.
+/// Distance from a contact to the border of the touched region, m.
 const REACH: f64 = 1e-3;
-/// One contact is kept in each cell of this size, m: a static ball does not count a thousandfold.
+/// Cell size of one kept contact, m: a static ball does not count a thousandfold.
 const SPACING: f64 = 0.25e-3;
 
-/// Where a ball touched a part.
+/// Touched region of a part.
 #[derive(Clone, Debug)]
 pub struct TouchedRegion {
     contacts: Vec<Point3<f64>>,
-    /// numbers of `contacts`
+    /// indices into `contacts`
     grid: PointGrid,
 }
 
 impl TouchedRegion {
-    /// The region around points of the part, m, that were touched; what is not finite is left out.
+    /// The region around touched points of the part, m; non-finite points are left out.
     pub fn of(contacts: impl IntoIterator<Item = Point3<f64>>) -> Self {
         let mut kept = HashSet::new();
         let mut region = Self {

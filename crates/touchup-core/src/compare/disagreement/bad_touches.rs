@@ -9,42 +9,41 @@ use crate::mesh::{Alone, FaceHit};
 use crate::numeric::{PointGrid, median};
 use crate::stylus::ProbedPoint;
 
-/// Bad touches one after the other.
+/// Consecutive bad touches.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BadTouches {
-    /// numbers of the touches, in ascending order
+    /// indices of the touches, ascending
     pub touches: Vec<u32>,
     /// mean place, m
     pub centre: Point3<f64>,
-    /// the largest distance from the surface that the other touches make, m, with its sign:
-    /// positive outside
+    /// the largest signed distance from the surface of the other touches, m: positive outside
     pub off: f64,
-    /// … in standard deviations
+    /// the same distance in standard deviations
     pub sigmas: f64,
-    /// how many were rejected while the mesh was refined
+    /// number of touches rejected during refinement
     pub rejected: usize,
-    /// good touches of other passes there with normals alike
+    /// number of good touches there from other passes with similar normals
     pub against: usize,
 }
 
-/// Off by more standard deviations than this …
+/// Minimum distance of a bad touch from the surface, in standard deviations.
 const SIGMAS: f64 = 6.0;
-/// … and by more than this, m: what a lattice of half a millimetre leaves at an edge.
+/// Minimum distance, m: the error of a half-millimetre lattice at an edge.
 const LEAST_OFF: f64 = 0.15e-3;
-/// Touches of other times that contradict one, at least.
+/// Minimum number of touches at other times that contradict one.
 const FEWEST: usize = 3;
-/// Their normals are alike within 26°.
+/// Minimum cosine between similar normals: 26°.
 const ALIKE: f64 = 0.9;
-/// A standard deviation below this is none, m.
+/// Minimum standard deviation, m.
 const LEAST_SIGMA: f64 = 1e-6;
-/// Touches so close together in time are one, ns.
+/// Maximum pause between touches of one group, ns.
 const PAUSE_NS: i64 = 100_000_000;
-/// Touches so near speak of the same place, m, where there is no ball; else its radius.
+/// Radius of one place, m, for a tip without a ball; else the ball's radius.
 const NEAR: f64 = 1e-3;
-/// A place is badly touched when this share of its touches is bad.
+/// Minimum share of bad touches at a badly touched place.
 const SHARE: f64 = 0.5;
 
-/// Those rejected, and those that lie off the surface and off what others measured there.
+/// Rejected touches, and touches off both the surface and the other measurements there.
 pub(super) fn find(
     refined: &RefinedShape<'_>,
     touches: &[ProbedPoint],
@@ -80,12 +79,12 @@ pub(super) fn find(
     Ok(bad.chunk_by(goes_on).map(bad_touches_of).collect())
 }
 
-/// How far off a touch must be, m.
+/// Minimum distance of a bad touch from the surface, m.
 fn limit(touch: &ProbedPoint) -> f64 {
     (SIGMAS * touch.sigma_along_normal()).max(LEAST_OFF)
 }
 
-/// Touches of other times near the foot of a touch on the surface, with normals alike.
+/// Touches at other times near the foot of a touch on the surface, with similar normals.
 fn against<'a>(
     touches: &'a [ProbedPoint],
     at: usize,
@@ -100,8 +99,8 @@ fn against<'a>(
     })
 }
 
-/// How far a touch is from the planes that others measured there, the middle of them, m; `None`
-/// where they are too few.
+/// Median distance of a touch from the planes of other touches there, m; `None` if they are too
+/// few.
 fn contradiction(
     touches: &[ProbedPoint],
     at: usize,
@@ -148,8 +147,8 @@ fn bad_touches_of(
     }
 }
 
-/// How far the surface that each touch says is from the refined one, m: of a ball by its centre,
-/// which the measured normal does not move; and the closest place there.
+/// Distance of each touch from the refined surface, m, by the ball's centre, which is independent
+/// of the measured normal; and the closest place there.
 fn distances(
     refined: &RefinedShape<'_>,
     touches: &[ProbedPoint],
@@ -170,7 +169,7 @@ fn reach(touches: &[ProbedPoint]) -> f64 {
     if radius > 0.0 { radius } else { NEAR }
 }
 
-/// Marks the places that most touches near them say wrongly.
+/// Marks the places that most nearby touches measure wrongly.
 pub(super) fn mark(
     refined: &RefinedShape<'_>,
     touches: &[ProbedPoint],

@@ -1,4 +1,4 @@
-//! Where a scanner of a resolution rounds edges, and closes over what is narrow.
+//! Edges that a scanner of limited resolution rounds, and narrow places that it closes over.
 
 use nalgebra::{Point3, Vector3};
 
@@ -6,18 +6,18 @@ use crate::compare::IndexedMesh;
 use crate::mesh::TriMesh;
 use crate::numeric::{PointGrid, median};
 
-/// What is so many edges of the scan's triangles wide is seen: a facet on each wall, one on the
-/// floor, and one in between.
+/// Minimum width that the scanner sees, in edges of the scan's triangles: a facet on each wall, one
+/// on the floor, and one in between.
 const NARROW: f64 = 5.0;
-/// Edges are rounded within so many edges of the triangles.
+/// Distance within which edges are round, in edges of the triangles.
 const ROUNDED: f64 = 1.5;
-/// An edge is one of the surface that a place lies on when it is within so many edges of its
-/// tangent plane.
+/// Maximum height of an edge over a place's tangent plane, in edges of the triangles, for an edge
+/// of the same surface.
 const LEVEL: f64 = 0.2;
-/// An edge of the refined mesh turns by more than this, as a cosine: 35°.
+/// Minimum turn at an edge of the refined mesh, as a cosine: 35°.
 pub(super) const SHARP: f64 = 0.82;
-/// A ball of the least seen width touches nothing but its contact point within this share of its
-/// radius.
+/// Share of its radius within which a ball of the least visible width touches only its contact
+/// point.
 const FITS: f64 = 0.85;
 
 /// Median length of the edges, m.
@@ -59,9 +59,9 @@ fn sharp_vertices(mesh: &TriMesh, is_seen: &[bool]) -> Vec<[bool; 2]> {
 pub(super) struct SharpEdges {
     /// median edge of the scan's triangles, m
     pub resolution: f64,
-    /// vertices at them, by slot: whether one is convex there, and whether one is concave
+    /// vertices at these edges, by slot: whether one is convex there, and whether one is concave
     is_sharp: Vec<[bool; 2]>,
-    /// those vertices
+    /// the same vertices, by place
     grid: PointGrid,
 }
 
@@ -77,28 +77,28 @@ impl SharpEdges {
         }
     }
 
-    /// Edges are rounded within this, m.
+    /// Distance within which edges are round, m.
     pub fn reach(&self) -> f64 {
         ROUNDED * self.resolution
     }
 
-    /// What is narrower is closed over, m.
+    /// Width below which the scan closes over gaps, m.
     pub fn sees_from(&self) -> f64 {
         NARROW * self.resolution
     }
 
-    /// Vertices at edges that are rounded where a place is.
+    /// Vertices at rounded edges near a place.
     fn near(&self, p: &Point3<f64>) -> impl Iterator<Item = usize> {
         self.grid.near(p, self.reach())
     }
 
-    /// Whether the scanner may round an edge where a place is.
+    /// Whether the scanner may round an edge at a place.
     pub fn is_near(&self, p: &Point3<f64>) -> bool {
         self.near(p).next().is_some()
     }
 
-    /// Whether an edge of the surface that a place lies on, near it, is convex, so that a scan may
-    /// be too low there, and whether one turns in, so that it may be too high.
+    /// Whether a place's own surface has a convex edge nearby, so that a scan may be too low there,
+    /// and a concave edge, so that it may be too high.
     pub fn may_be(&self, mesh: &TriMesh, p: &Point3<f64>, normal: &Vector3<f64>) -> [bool; 2] {
         let is_own = |&other: &usize| {
             (mesh.positions()[other] - p).dot(normal).abs() <= LEVEL * self.resolution

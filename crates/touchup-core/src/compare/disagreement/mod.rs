@@ -1,14 +1,12 @@
-//! Where touch and scan disagree, without a true part: what of it looks like this scanner, what
-//! like a part that is no longer what was scanned, and what like a bad touch.
+//! Disagreements of touch and scan, without a true part: scanner errors, changes of the part since
+//! the scan, and bad touches.
 //!
-//! The rigid offset of the scan, where it is more than noise, is removed first. How the scanner
-//! errs is then found where it should see well, on touched places away from edges: its offset b,
-//! its noise σ and the distance ℓ over which that stays alike, Cov = σ² exp(−r²/2ℓ²). The mean over
-//! a region of area A then has the variance σ²/(1 + A/2πℓ²), and a region that is off by many times
-//! its root was changed. In what is narrower than a few edges of the scan's triangles the scan
-//! lacks what it could not see, and it rounds edges: it takes off convex ones and fills concave
-//! ones. Near an edge a disagreement of the other sign is not the scanner's rounding, but too near
-//! to be sure of.
+//! A rigid offset of the scan beyond its noise is removed first. Touched places away from edges,
+//! which the scanner sees well, then give its error: offset b, noise σ and correlation length ℓ,
+//! Cov = σ² exp(−r²/2ℓ²). The mean over a region of area A has the variance σ²/(1 + A/2πℓ²); a
+//! region off by many times its root was changed. The scan misses places narrower than a few edges
+//! of its triangles, and it rounds edges: it cuts convex ones and fills concave ones. Near an edge
+//! a disagreement of the other sign is not the scanner's rounding, but remains unsure.
 
 mod bad_touches;
 mod edges;
@@ -35,8 +33,8 @@ use crate::stylus::ProbedPoint;
 /// A mesh with its classes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClassMap {
-    /// by vertex slot, m: how far the touched surface lies outside of the scan; 0 where nothing was
-    /// touched
+    /// by vertex slot, m: distance of the touched surface outside of the scan; 0 for untouched
+    /// places
     pub disagreement: Vec<f64>,
     /// by vertex slot
     pub classes: Vec<Class>,
@@ -44,14 +42,14 @@ pub struct ClassMap {
     pub areas: [f64; 7],
 }
 
-/// Where touch and scan disagree.
+/// Disagreements of touch and scan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Disagreement {
-    /// offset of the whole scan, removed before the remainder is examined; `None` where it is no
-    /// more than the noise of the scan explains
+    /// offset of the whole scan, removed before the analysis of the remainder; `None` if the noise
+    /// of the scan explains it
     pub rigid_offset: Option<RigidOffset>,
-    /// how the scanner errs; `None` where too little was touched for an estimate, and then nothing
-    /// is called changed
+    /// error model of the scanner; `None` after too few touches for an estimate: then no place
+    /// counts as changed
     pub scanner: Option<Scanner>,
     /// the refined mesh
     pub refined: ClassMap,
@@ -63,20 +61,20 @@ pub struct Disagreement {
     pub bad_touches: Vec<BadTouches>,
 }
 
-/// Standard deviations of the scan within which it agrees.
+/// Maximum disagreement of an agreeing place, in standard deviations of the scan.
 const AGREES: f64 = 2.0;
 
-/// Scan and touch speak of the same side of the part when their normals are within 60°.
+/// Minimum cosine between normals of scan and touch on the same side of the part: 60°.
 const FACING: f64 = 0.5;
 
-/// Finds where touch and scan disagree, and why, as far as the data determine it.
+/// Finds disagreements of touch and scan, and their causes as far as the data determine them.
 ///
-/// - `scan`: as it was.
+/// - `scan`: before refinement.
 /// - `refined`: the refined mesh.
-/// - `touches`: those that refined it.
+/// - `touches`: the touches of the refinement.
 ///
 /// # Errors
-/// [`CompareError::NoFaces`] where either mesh has none.
+/// [`CompareError::NoFaces`] if either mesh has none.
 pub fn disagreement(
     scan: IndexedMesh<'_>,
     refined: &RefinedShape<'_>,
@@ -187,14 +185,14 @@ impl Places {
             (VertexBasis::Touched, Some(scanner)) if self.is_seen[at] => {
                 match scanner.is_noise(self.off[at], AGREES) {
                     true => Class::Agrees,
-                    // at an edge, and yet by more than a rounded edge
+                    // at an edge, but by more than a rounded edge
                     false if self.is_wide[at] && !scanner.may_round(self.off[at], AGREES) => {
                         Class::Unsure
                     }
                     false => Class::ScannerError,
                 }
             }
-            // the scan has nothing there
+            // the scan has a gap there
             (VertexBasis::Touched, Some(_)) => Class::ScannerError,
         };
         refined.known.iter().enumerate().map(class).collect()
@@ -218,7 +216,7 @@ impl ClassMap {
     }
 }
 
-/// Whether the surface ends where `hit` is.
+/// Whether the surface ends at `hit`.
 fn is_on_rim(mesh: &TriMesh, hit: &FaceHit) -> bool {
     let corners = mesh.corners(hit.face);
     let is_rim = |a: VertexId, b: VertexId| mesh.faces_at_edge(a, b).count() < 2;

@@ -1,4 +1,4 @@
-//! What is compared, and what is known of each place of it.
+//! Inputs of the comparison, and properties of each place.
 
 use nalgebra::{Point3, Vector3};
 
@@ -9,7 +9,7 @@ use crate::names;
 /// The source of a vertex of a refined mesh, as `refine` writes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VertexBasis {
-    /// the scan, or what is near touches suggests
+    /// the scan, or inference from touches nearby
     NotTouched,
     /// touches
     Touched,
@@ -27,41 +27,40 @@ pub struct RefinedShape<'a> {
 }
 
 names! {
-    /// What a place is.
+    /// Class of a place.
     #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
     pub enum Class {
         /// scan and touch agree within the noise of the scan
         Agrees = "agrees",
-        /// they do not, and it looks like this scanner: its noise, a rounded edge, a closed hole
+        /// a disagreement typical of this scanner: its noise, a rounded edge, a closed hole
         ScannerError = "scanner error",
-        /// the part is not what was scanned
+        /// the part has changed since the scan
         ChangedPart = "changed part",
         /// the touch is wrong
         BadTouch = "bad touch",
-        /// may be changed as well as the scanner's error
+        /// a change or a scanner error
         Unsure = "unsure",
-        /// nothing is known but the scan
+        /// known from the scan alone
         NeverTouched = "never touched",
-        /// the ball does not get there
+        /// out of reach of the ball
         Unreachable = "unreachable",
     }
 }
 
 impl Class {
-    /// Whether a touch says something of it.
+    /// Whether touches measured it.
     pub(super) fn is_touched(self) -> bool {
         !matches!(self, Self::NeverTouched | Self::Unreachable)
     }
 }
 
-/// What is known of each vertex of the refined mesh beside its class.
+/// Properties of each vertex of the refined mesh beside its class.
 pub(super) struct Places {
     /// m, by slot
     pub positions: Vec<Point3<f64>>,
-    /// how far it lies outside of the scan, m, by slot; without the rigid offset, once that is
-    /// known
+    /// distance outside of the scan, m, by slot; without the rigid offset, once known
     pub off: Vec<f64>,
-    /// whether it was touched, and the scan is there at all
+    /// whether it is touched, and the scan is there at all
     pub is_seen: Vec<bool>,
     /// whether a scanner of this resolution sees it at all: no narrow place
     pub is_wide: Vec<bool>,
@@ -69,16 +68,16 @@ pub(super) struct Places {
     pub is_open: Vec<bool>,
     /// edges that the scanner rounds
     pub edges: SharpEdges,
-    /// whether one of them near may leave it too low, and too high
+    /// whether an edge nearby may leave the scan too low, and too high
     pub may_be: Vec<[bool; 2]>,
-    /// normals, by slot; zero where there are none
+    /// normals, by slot; zero without a normal
     pub normals: Vec<Vector3<f64>>,
-    /// a third of the faces at it, m²
+    /// a third of the area of its faces, m²
     pub areas: Vec<f64>,
 }
 
 impl Places {
-    /// Numbers of those that the scanner sees well.
+    /// Indices of places that the scanner sees well.
     pub fn open(&self) -> Vec<usize> {
         (0..self.off.len()).filter(|&at| self.is_open[at]).collect()
     }

@@ -11,36 +11,35 @@ use crate::stylus::ProbedPoint;
 /// The evidence for the class of a region.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RegionEvidence {
-    /// how far its mean is from what the scanner is off everywhere, in standard deviations of such
-    /// a mean
+    /// distance of its mean from the scanner's offset, in standard deviations of such a mean
     pub sigmas: f64,
-    /// area that the scanner should have seen well, m²
+    /// area that the scanner should see well, m²
     pub open_area: f64,
     /// its extent over the correlation length of the scanner's error
     pub lengths: f64,
-    /// times that it was passed by the tip
+    /// number of passes of the tip
     pub passes: usize,
-    /// share of its rim that lies at edges of the refined surface
+    /// share of its rim at edges of the refined surface
     pub edges: f64,
 }
 
-/// A region in which touch and scan disagree.
+/// A region of disagreement between touch and scan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DisagreementRegion {
-    /// what it is
+    /// its class
     pub class: Class,
     /// mean place, m
     pub centre: Point3<f64>,
     /// m²
     pub area: f64,
-    /// mean of touch − scan, m: over the places that the scanner should have seen well, or over all
-    /// where there are none
+    /// mean of touch − scan, m: over the places that the scanner should see well, or over all if
+    /// there are none
     pub mean: f64,
-    /// why
+    /// evidence for the class
     pub evidence: RegionEvidence,
 }
 
-/// What regions are found in.
+/// Inputs of the search for regions.
 pub(super) struct RegionInput<'a> {
     pub refined: &'a RefinedShape<'a>,
     pub places: &'a Places,
@@ -48,25 +47,25 @@ pub(super) struct RegionInput<'a> {
     pub touches: &'a [ProbedPoint],
 }
 
-/// A region is of places whose surroundings are off by so many standard deviations.
+/// Minimum mean disagreement around a place of a region, in standard deviations.
 const OFF: f64 = 1.5;
-/// A mean that is off by more than this is no error of the scanner: with 50 independent places by
-/// chance once in 35 000.
+/// Minimum mean of a change, in standard deviations: with 50 independent places a chance of one in
+/// 35 000.
 const CHANGED: f64 = 5.0;
-/// From here on it may be either.
+/// Minimum mean of an unsure region, in standard deviations.
 const UNSURE: f64 = 3.5;
-/// A change that only one pass measured is not sure.
+/// Minimum number of passes for a sure change.
 const PASSES: usize = 2;
-/// Touches later than this are of another pass, ns.
+/// Minimum pause between two passes, ns.
 const PASS_NS: i64 = 1_000_000_000;
-/// Regions smaller than this are not reported, over the square of the scan's edges.
+/// Minimum area of a reported region, in squares of the scan's edges.
 const LEAST_AREA: f64 = 1.0;
-/// A region grows to places that are off by this share of its mean.
+/// Minimum disagreement for growth of a region, as a share of its mean.
 const GOES_ON: f64 = 0.5;
-/// Neighbours in a mean have normals alike within 37°.
+/// Minimum cosine between similar normals in a mesh: 37°.
 const ALIKE: f64 = 0.8;
 
-/// Finds the regions, and gives their classes to the places in them.
+/// Finds the regions, and assigns their classes to their places.
 pub(super) fn find(seen: &RegionInput<'_>, classes: &mut [Class]) -> Vec<DisagreementRegion> {
     let (mesh, places, scanner) = (seen.refined.shape.mesh, seen.places, seen.scanner);
     let smooth = smoothed(mesh, places, scanner);
@@ -92,14 +91,14 @@ pub(super) fn find(seen: &RegionInput<'_>, classes: &mut [Class]) -> Vec<Disagre
     regions
 }
 
-/// Whether a disagreement is evidence of a change, and not of what the scanner cannot see: the scan
-/// too low, `side` 0, or too high, 1.
+/// Whether a disagreement is evidence of a change, not of limited visibility: the scan too low,
+/// `side` 0, or too high, 1.
 fn is_evidence(places: &Places, at: usize, side: usize) -> bool {
     places.is_open[at] || (places.is_wide[at] && !places.may_be[at][side])
 }
 
-/// Means over the surroundings, m, by slot: of open places over open ones, of others over all that
-/// are wide.
+/// Means over the surroundings, m, by slot: for open places over open ones, for others over all
+/// wide ones.
 fn smoothed(mesh: &TriMesh, places: &Places, scanner: &Scanner) -> Vec<f64> {
     let reach = scanner.correlation / 2.0;
     let cells = |is_own: &[bool]| {
@@ -151,7 +150,7 @@ fn mean_of(places: &Places, own: impl Iterator<Item = usize>) -> (f64, f64) {
     (area, sum / area)
 }
 
-/// What a region is, if it is worth telling; its places get its class.
+/// A reportable region with its class; its places get the class too.
 fn judged(
     seen: &RegionInput<'_>,
     own: &[usize],
@@ -167,10 +166,10 @@ fn judged(
     let sigmas_of =
         |area: f64, mean: f64| (mean - scanner.offset).abs() / scanner.sigma_of_mean(area);
     let sigmas = sigmas_of(own_area, own_mean);
-    // what lies at edges alone makes nothing sure
+    // places at edges alone make nothing sure
     let is_sure = open_area >= LEAST_AREA * scanner.edge.powi(2)
         && sigmas_of(open_area, open_mean) >= CHANGED;
-    // on to the edges that it ends at, which the scanner rounds
+    // on to the edges at its border, which the scanner rounds
     let reach = places.edges.reach();
     let near = PointGrid::of(&places.positions, own.iter().copied(), reach);
     let is_off = |at: usize| {
@@ -185,8 +184,7 @@ fn judged(
     let is_new =
         |at: usize| !is_taken[at] && goes_on(at) && !std::mem::replace(&mut is_taken[at], true);
     let all = flood(own.to_vec(), |at| neighbours(mesh, at), is_new);
-    // it has grown to edges that the scanner rounds: these add to its area, and say nothing of how
-    // far the part was changed
+    // growth to rounded edges adds to its area, but tells nothing about the size of the change
     let (area, all_mean) = mean_of(places, all.iter().copied());
     let mean = if open_area > 0.0 { open_mean } else { all_mean };
     let moments = all
@@ -221,7 +219,7 @@ fn judged(
     })
 }
 
-/// Largest number of times that any place of a region was passed.
+/// Largest number of passes over any place of a region.
 fn passes(touches: &[ProbedPoint], region: &PointGrid, reach: f64) -> usize {
     let (mut count, mut last) = (0, None);
     for touch in touches.iter().filter(|touch| !touch.is_rejected) {
@@ -236,7 +234,7 @@ fn passes(touches: &[ProbedPoint], region: &PointGrid, reach: f64) -> usize {
     count
 }
 
-/// Share of the places at the rim of a region that have an edge near.
+/// Share of the places at the rim of a region with an edge nearby.
 fn rim_at_edges(mesh: &TriMesh, places: &Places, all: &[usize], is_own: &[bool]) -> f64 {
     let rim: Vec<usize> = all
         .iter()

@@ -1,9 +1,9 @@
-//! How far the scan as a whole lies off the touches: a small rigid motion, and a surface offset.
+//! Offset of the whole scan from the touches: a small rigid motion, and a surface offset.
 //!
 //! At a place x with the normal n touch − scan is b + n·s + ((x − c) × n)·θ; b, s and θ by least
-//! squares with Tukey's weights, s and θ slightly regularised, so that what no touch determines
-//! goes to b. Noise that stays alike over a distance tilts a scan too: of n independent places the
-//! motion is reported when it explains more than that does once in a thousand times.
+//! squares with Tukey's weights, s and θ slightly regularised, so that undetermined parts go to b.
+//! Correlated noise tilts a scan too: the motion is significant if it explains more than noise of n
+//! independent places does once in a thousand times.
 
 use std::f64::consts::TAU;
 
@@ -16,7 +16,7 @@ use crate::numeric::{
     point_to_plane_row,
 };
 
-/// The scan against the touches, of small angles.
+/// Motion of the scan to the touches, for small angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RigidOffset {
     /// shift that would bring the scan onto the touches, m, at `centre`
@@ -33,21 +33,19 @@ pub struct RigidOffset {
 
 /// Rounds of weights.
 const ROUNDS: usize = 10;
-/// By which share of the weight of all places shift and turn are held back.
+/// Regularisation of shift and turn, as a share of the weight of all places.
 const HELD_BACK: f64 = 0.03;
-/// Squares of normal numbers, one to six of them, sum up to more than this once in a thousand
-/// times.
+/// Squares of one to six normal numbers sum up to more than this once in a thousand times.
 const ONCE_IN_1000: [f64; 6] = [10.83, 13.82, 16.27, 18.47, 20.52, 22.46];
-/// Where the noise is known from m places more than there are unknowns, the bound is 1 + 12/m times
-/// as high: within 3 % of the F distribution from 13 on.
+/// Correction for noise known from m places more than there are unknowns: the bound is 1 + 12/m
+/// times as high, within 3 % of the F distribution from 13 on.
 const FEW_PLACES: f64 = 12.0;
 /// Unknowns: an offset, a shift, a turn.
 const UNKNOWNS: f64 = 7.0;
-/// A direction in which the motion is known so much better than in the best one is held back, not
-/// known.
+/// Maximum relative variance of a direction that only the regularisation determines.
 const HELD: f64 = 1e-9;
 
-/// A motion that fits, which noise alone may have made.
+/// A fitted motion, perhaps of noise alone.
 pub(super) struct OffsetFit {
     shift: Vector3<f64>,
     turn: Vector3<f64>,
@@ -61,7 +59,7 @@ pub(super) struct OffsetFit {
 }
 
 impl OffsetFit {
-    /// Of the open places; `None` where they determine nothing.
+    /// Fits the open places; `None` if they determine nothing.
     pub fn of(places: &Places) -> Option<Self> {
         let open = places.open();
         let (centre, lever) = centroid_and_spread(open.iter().map(|&at| &places.positions[at]));
@@ -109,12 +107,12 @@ impl OffsetFit {
         })
     }
 
-    /// What of touch − scan it explains at a place, m.
+    /// Part of touch − scan that it explains at a place, m.
     pub fn at(&self, p: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
         normal.dot(&(self.shift + self.turn.cross(&(p - self.centre))))
     }
 
-    /// The motion where it is significant against the noise.
+    /// The motion, if it is significant against the noise.
     ///
     /// - `scanner`: without the motion.
     pub fn significant(&self, scanner: &Scanner) -> Option<RigidOffset> {
@@ -123,7 +121,7 @@ impl OffsetFit {
         if more <= 0.0 {
             return None;
         }
-        // the fit took its share of the noise with it
+        // correction for the noise that the fit absorbed
         let variance = scanner.noise.powi(2) * (1.0 + UNKNOWNS / more);
         let covariance = self.spread * (variance * alike);
         let turn = self.turn * self.lever;

@@ -1,44 +1,44 @@
-//! How the scanner errs, found from scan and touch themselves.
+//! Error model of the scanner, from scan and touch alone.
 
 use super::edges::SHARP;
 use super::places::Places;
 use crate::numeric::{SIGMA_OF_MEDIAN, median};
 
-/// How the scanner errs where it should see well.
+/// Error of the scanner at places that it should see well.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scanner {
-    /// median of touch − scan, m: negative where the scan lies outside of the part
+    /// median of touch − scan, m: negative if the scan lies outside of the part
     pub offset: f64,
-    /// standard deviation about it, robustly, m
+    /// robust standard deviation about it, m
     pub noise: f64,
     /// correlation length ℓ of the noise, m
     pub correlation: f64,
     /// median edge of the scan's triangles, m
     pub edge: f64,
-    /// what is narrower may be closed over, m
+    /// width below which the scan may close over gaps, m
     pub sees_from: f64,
-    /// on so many places
+    /// number of places in the estimate
     pub places: usize,
 }
 
 /// The median of a squared normal number of variance 1.
 const MEDIAN_OF_SQUARE: f64 = 0.4549;
-/// Places from which the scanner can be characterised.
+/// Minimum number of places for the estimate.
 const FEWEST: usize = 200;
-/// Places whose pairs are examined.
+/// Maximum number of places for pairs.
 const MOST_PLACES: usize = 1_500;
-/// Distances up to so many edges of the triangles, in so many bins.
+/// Maximum distance of a pair, in edges of the triangles; number of bins.
 const LONGEST: f64 = 8.0;
 const BINS: usize = 32;
 /// Pairs that fill a bin.
 const FULL: usize = 50;
-/// Where half the mean square difference has grown to 1 − 1/e of the variance, in ℓ.
+/// Distance of half the mean square difference at 1 − 1/e of the variance, in ℓ.
 const GROWN: f64 = std::f64::consts::SQRT_2;
-/// Noise below this share of the edges is no noise that matters: nothing is distinguished below it.
+/// Minimum noise, as a share of the edges: finer differences are negligible.
 const LEAST_NOISE: f64 = 1e-3;
 
 impl Scanner {
-    /// `None` where too few places are open.
+    /// `None` if too few places are open.
     pub(super) fn of(places: &Places) -> Option<Self> {
         let open = places.open();
         if open.len() < FEWEST {
@@ -62,12 +62,12 @@ impl Scanner {
         })
     }
 
-    /// Whether a disagreement is within so many standard deviations.
+    /// Whether a disagreement is within a number of standard deviations.
     pub(super) fn is_noise(&self, off: f64, sigmas: f64) -> bool {
         (off - self.offset).abs() <= sigmas * self.noise
     }
 
-    /// Whether rounding an edge and noise may explain a disagreement.
+    /// Whether edge rounding and noise may explain a disagreement.
     pub(super) fn may_round(&self, off: f64, sigmas: f64) -> bool {
         (off - self.offset).abs() <= self.edge + sigmas * self.noise
     }
@@ -79,8 +79,8 @@ impl Scanner {
     }
 }
 
-/// Distance over which disagreements stay alike, m: half the mean square of their differences grows
-/// to 1 − 1/e of the variance within √2 ℓ.
+/// Correlation length of disagreements, m: half the mean square of their differences grows to 1 −
+/// 1/e of the variance within √2 ℓ.
 fn correlation(places: &Places, open: &[usize], noise: f64, edge: f64) -> f64 {
     let some: Vec<usize> = open
         .iter()

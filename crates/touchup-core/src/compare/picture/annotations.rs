@@ -1,4 +1,4 @@
-//! Annotations of the panels: legend, scale of colours, histogram, length, names of places.
+//! Annotations of the panels: legend, colour scale, histogram, length, names of places.
 
 use std::cmp::Ordering;
 
@@ -26,12 +26,12 @@ pub(super) const GAP: i32 = 28;
 pub(super) const PAPER: Rgb = [255, 255, 255];
 pub(super) const INK: Rgb = [32, 36, 44];
 pub(super) const SOFT_INK: Rgb = [92, 98, 110];
-/// The bar of colours, pixels.
+/// The colour bar, pixels.
 pub(super) const BAR: [i32; 2] = [640, 24];
 /// Height of the histogram above it, pixels.
 pub(super) const HISTOGRAM: i32 = 96;
 
-/// Where the bar of colours lies across the picture, pixels.
+/// Horizontal position of the colour bar in the picture, pixels.
 struct ColourBar {
     left: i32,
     length: i32,
@@ -48,7 +48,7 @@ impl ColourBar {
     }
 }
 
-/// Colours and what they mean in one line.
+/// Colours and their meaning in one line.
 pub(super) fn draw_legend(picture: &mut Picture, top: i32, legend: &[(Rgb, &str)]) {
     let side = NOTE.height();
     let width = picture.size[0] as i32 - 2 * MARGIN;
@@ -64,7 +64,7 @@ pub(super) fn draw_legend(picture: &mut Picture, top: i32, legend: &[(Rgb, &str)
     }
 }
 
-/// The bar of colours in the middle, its unit above, ticks below, and the tolerance marked.
+/// The colour bar in the middle, its unit above, ticks below, and marks of the tolerance.
 ///
 /// - `tops`: of the line above, and of the bar.
 pub(super) fn draw_scale(
@@ -117,8 +117,8 @@ pub(super) fn draw_scale(
     picture.write([left + length + 24, bar], NOTE, INK, &text);
 }
 
-/// How much of the surface lies in each bin of deviations: bars for the last panel, a line for the
-/// others. The height is the root of the share, so that what is rare is seen.
+/// Share of the surface in each bin of deviations: bars for the last panel, a line for the others.
+/// The height is the root of the share, so that rare values are visible.
 pub(super) fn draw_histograms(
     picture: &mut Picture,
     bar: i32,
@@ -186,15 +186,15 @@ pub(super) fn draw_histograms(
     }
 }
 
-/// Names of places with a line to each. A name keeps clear of the places and of the names before it
-/// as far as there is room.
+/// Names of places with a line to each. A name keeps clear of the places and of earlier names as
+/// far as there is room.
 pub(super) fn draw_labels(
     picture: &mut Picture,
     labels: &[PictureLabel],
     camera: &Camera,
     frame: &PictureFrame,
 ) {
-    /// Directions in which a name may be placed: right and down, in heights of a letter.
+    /// Candidate directions of a name: right and down, in heights of a letter.
     const AROUND: [[i32; 2]; 8] = [
         [2, -3],
         [-2, -3],
@@ -249,7 +249,7 @@ pub(super) fn draw_labels(
     }
 }
 
-/// A length in mm with its sign, with as many digits as the half of `range` needs.
+/// A signed length in mm, with the number of digits that half of `range` needs.
 fn signed_mm(length: f64, range: f64) -> String {
     let digits = (2.0 - (range * 1e3).log10().floor()).clamp(0.0, 9.0) as usize;
     let text = format!("{:.digits$}", (length * 1e3).abs());

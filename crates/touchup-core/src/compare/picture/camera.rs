@@ -1,16 +1,16 @@
-//! From where the part is seen.
+//! Viewpoint of the pictures.
 
 use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 
 use crate::mesh::{FaceId, TriMesh, VertexId};
 
-/// How much the view leaves the direction in which the part is touched: about 37°, so that walls
-/// and steps are seen too.
+/// Tilt of the view from the direction of touch: about 37°, so that walls and steps are visible
+/// too.
 const TILT: f64 = 0.7;
-/// And to the side.
+/// Sideways turn of the view.
 const YAW: f64 = 0.25;
 
-/// Share of the surface that faces one direction for it to be a side: less is left over by chance.
+/// Minimum share of the surface with one direction for a side: less occurs by chance.
 const LEAST_SIDE: f64 = 0.05;
 
 /// A parallel projection.
@@ -25,10 +25,10 @@ pub(super) struct Camera {
 }
 
 impl Camera {
-    /// Views from the direction `out` with `up` upwards, as far as that can be.
+    /// Views from the direction `out` with `up` upwards, as far as possible.
     pub fn new(out: &Vector3<f64>, up: &Vector3<f64>) -> Self {
         let out = out.try_normalize(0.0).unwrap_or_else(Vector3::z);
-        // nearly along the view `up` says nothing
+        // nearly along the view `up` is useless
         let other = if out.y.abs() < 0.9 {
             Vector3::y()
         } else {
@@ -45,8 +45,8 @@ impl Camera {
         }
     }
 
-    /// Views obliquely the side that `weight` is on, with the longest extent of the part across the
-    /// picture.
+    /// Views obliquely the side with the most `weight`, with the longest extent of the part across
+    /// the picture.
     ///
     /// - `weight`: of each vertex slot, 0 or more.
     pub fn towards(mesh: &TriMesh, weight: impl Fn(VertexId) -> f64) -> Self {
@@ -55,7 +55,7 @@ impl Camera {
         };
         let total: f64 = mesh.faces().map(weighted).map(|n| n.norm()).sum();
         let sum: Vector3<f64> = mesh.faces().map(weighted).sum();
-        // a closed shell that matters everywhere alike has no such side
+        // a closed shell of uniform weight has no such side
         let facing = if sum.norm() > LEAST_SIDE * total {
             sum.normalize()
         } else {
@@ -67,7 +67,7 @@ impl Camera {
         Self::new(&(facing - along * TILT + across * YAW), &facing)
     }
 
-    /// Direction across the view in which the vertices are spread most; its largest coordinate is
+    /// Direction of largest spread of the vertices across the view; its largest coordinate is
     /// positive.
     fn longest(&self, mesh: &TriMesh) -> Vector3<f64> {
         let flat =

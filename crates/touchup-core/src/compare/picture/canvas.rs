@@ -34,19 +34,19 @@ pub(super) const NOTE: Font = Font {
 };
 
 impl Font {
-    /// Of a line, pixels.
+    /// Height of a line, pixels.
     pub fn height(self) -> i32 {
         self.height.val() as i32
     }
 
-    /// Of a text in one line, pixels.
+    /// Width of a text in one line, pixels.
     pub fn width(self, text: &str) -> i32 {
         (get_raster_width(self.weight, self.height) * text.chars().count()) as i32
     }
 }
 
 impl Picture {
-    /// One colour all over.
+    /// A picture of one colour.
     pub fn blank(size: [u32; 2], colour: Rgb) -> Self {
         Self {
             size,
@@ -54,7 +54,7 @@ impl Picture {
         }
     }
 
-    /// Mixes `share` (0 to 1) of a colour into a pixel; outside of the picture nothing happens.
+    /// Mixes `share` (0 to 1) of a colour into a pixel; has no effect outside of the picture.
     pub(crate) fn mix(&mut self, x: i32, y: i32, colour: Rgb, share: f64) {
         let [width, height] = self.size.map(|side| side as i32);
         if !(0..width).contains(&x) || !(0..height).contains(&y) {
@@ -73,7 +73,7 @@ impl Picture {
         }
     }
 
-    /// Writes one line from its upper left corner; letters that the font lacks become question
+    /// Writes one line from its upper left corner; letters missing from the font become question
     /// marks.
     pub(super) fn write(&mut self, [x, y]: [i32; 2], font: Font, colour: Rgb, text: &str) {
         let advance = font.width(" ");
@@ -90,7 +90,7 @@ impl Picture {
         }
     }
 
-    /// Writes one line on a box of `paper` that is a little larger than the text.
+    /// Writes one line on a box of `paper` a little larger than the text.
     pub(super) fn write_on(
         &mut self,
         [x, y]: [i32; 2],

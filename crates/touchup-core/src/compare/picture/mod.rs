@@ -1,5 +1,4 @@
-//! A picture of a mesh in the colours of its deviations: what was before beside what is now, in the
-//! same scale.
+//! A picture of a mesh in the colours of its deviations: before beside after, in the same scale.
 
 mod annotations;
 mod camera;
@@ -22,7 +21,7 @@ use canvas::{Font, NOTE, TEXT, TITLE};
 pub use raster::PicturePanel;
 use raster::{PictureFrame, draw};
 
-/// What is drawn around the panels, and how.
+/// Settings of a picture: title, scale, view, legend.
 #[derive(Clone, Debug)]
 pub struct PictureParams<'a> {
     /// first line; Latin-1
@@ -31,16 +30,15 @@ pub struct PictureParams<'a> {
     pub caption: &'a str,
     /// of the whole picture, pixels, 400 to 8000. Default 1600.
     pub width: u32,
-    /// ends of the scale of colours, m, more than 0. Default 1 mm.
+    /// ends of the colour scale, m, more than 0. Default 1 mm.
     pub range: f64,
-    /// what is off by at most so much has the colour of 0, and is marked on the scale, m
+    /// maximum deviation with the colour of 0, marked on the scale, m
     pub tolerance: Option<f64>,
-    /// from where it is seen, with z upwards; default: the side that most matters, askance
+    /// direction of the viewpoint, with z upwards; default: the side of most weight, askance
     pub from: Option<Vector3<f64>>,
-    /// how much each vertex of the last panel matters, by slot; without: by its deviation
+    /// weight of each vertex of the last panel, by slot; without: by its deviation
     pub weights: Option<&'a [f64]>,
-    /// colours and what they mean, Latin-1: instead of the bar of deviations where panels are
-    /// painted
+    /// colours and their meaning, Latin-1: replaces the bar of deviations for painted panels
     pub legend: &'a [(Rgb, &'a str)],
     /// names of places
     pub labels: &'a [PictureLabel],
@@ -63,16 +61,16 @@ impl Default for PictureParams<'_> {
 }
 
 const WIDTHS: [u32; 2] = [400, 8000];
-/// What a panel leaves free around the part, share of its sides.
+/// Margin of a panel around the part, as a share of its sides.
 const AIR: f64 = 0.05;
-/// A panel is at least so high over its width.
+/// Minimum height of a panel over its width.
 const FLATTEST: f64 = 0.45;
-/// And a picture of one panel or more at most, so that it fits on a screen.
+/// Maximum height of a picture over its width, for a fit on a screen.
 const HIGHEST: f64 = 0.62;
-/// Title of the bar of colours.
+/// Titles of the colour bar.
 const OF_TRUTH: &str = "deviation, mm:  - too little   + too much material";
 const OF_TOUCHES: &str = "touch - scan, mm:  - inside of the scan   + outside";
-/// Draws the panels side by side, in one scale and one view, with title, bar of colours and length.
+/// Draws the panels side by side, in one scale and one view, with title, colour bar and length.
 #[expect(clippy::too_many_lines)]
 pub fn draw_picture(panels: &[PicturePanel<'_>], params: &PictureParams<'_>) -> Picture {
     let width = params.width.clamp(WIDTHS[0], WIDTHS[1]) as i32;
@@ -161,7 +159,7 @@ pub fn draw_picture(panels: &[PicturePanel<'_>], params: &PictureParams<'_>) -> 
     picture
 }
 
-/// A picture of a mesh with nothing around it, and where places come to lie in it.
+/// A bare picture of a mesh, with the pixels of some places.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PartView {
     /// the mesh, with air around it
@@ -170,7 +168,7 @@ pub struct PartView {
     pub places: Vec<[f64; 2]>,
 }
 
-/// Draws a mesh alone, so that what is written around it can be drawn by somebody else.
+/// Draws a bare mesh, for annotation by the caller.
 ///
 /// - `places`: m, in the frame of the mesh.
 pub fn draw_part(
@@ -203,7 +201,7 @@ fn camera_for(panels: &[PicturePanel<'_>], params: &PictureParams<'_>) -> Camera
     match (&params.from, panels.last()) {
         (Some(from), _) => Camera::new(from, &Vector3::z()),
         (None, Some(panel)) => {
-            // what is far off matters, but not without end
+            // large deviations weigh more, up to the range
             let weight = |v: VertexId| match params.weights {
                 Some(weights) => weights.get(v.0 as usize).copied().unwrap_or(0.0),
                 None => panel
@@ -217,7 +215,7 @@ fn camera_for(panels: &[PicturePanel<'_>], params: &PictureParams<'_>) -> Camera
     }
 }
 
-/// All panels fit into it.
+/// The frame around all panels.
 fn frame_for(panels: &[PicturePanel<'_>], camera: &Camera, width: i32) -> PictureFrame {
     let [lo, hi] = camera.bounds(panels.iter().map(|panel| panel.mesh));
     let sides = (hi - lo).map(|side| {
@@ -242,7 +240,7 @@ fn frame_for(panels: &[PicturePanel<'_>], camera: &Camera, width: i32) -> Pictur
     }
 }
 
-/// The text, cut off where it is wider than `width` pixels.
+/// The text, cut to `width` pixels.
 fn fitted(text: &str, font: Font, width: i32) -> String {
     let most = (width / font.width(" ").max(1)).max(0) as usize;
     if text.chars().count() <= most {

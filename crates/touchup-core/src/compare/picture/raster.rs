@@ -11,19 +11,18 @@ use crate::compare::summary::Histogram;
 use crate::mesh::{FaceId, TriMesh, VertexId};
 use crate::numeric::largest;
 
-/// A mesh to be drawn.
+/// A mesh to draw.
 #[derive(Clone, Copy, Debug)]
 pub struct PicturePanel<'a> {
     /// m
     pub mesh: &'a TriMesh,
     /// of each vertex slot, m, + outside
     pub deviations: &'a [f64],
-    /// of each vertex slot; drawn in their colours where they are given
+    /// of each vertex slot; their colours replace those of the deviations
     pub classes: Option<&'a [Class]>,
-    /// of each vertex slot, instead of all that; what it means is said in the legend
+    /// of each vertex slot, instead of both; the legend gives their meaning
     pub paint: Option<&'a [Rgb]>,
-    /// of its deviations, drawn over the bar of colours: bars for the last panel, a line for the
-    /// others
+    /// of its deviations, drawn over the colour bar: bars for the last panel, a line for the others
     pub histogram: Option<&'a Histogram>,
     /// printed above it; Latin-1
     pub title: &'a str,
@@ -32,7 +31,7 @@ pub struct PicturePanel<'a> {
 }
 
 impl<'a> PicturePanel<'a> {
-    /// A mesh with nothing around it.
+    /// A bare mesh.
     pub fn of(mesh: &'a TriMesh) -> Self {
         Self {
             mesh,
@@ -46,26 +45,26 @@ impl<'a> PicturePanel<'a> {
     }
 }
 
-/// Behind the part.
+/// Colour behind the part.
 const BACKGROUND: Rgb = [233, 236, 240];
 /// Samples on each axis of a pixel.
 const FINE: u32 = 3;
-/// Colours of the scale that are worked out beforehand.
+/// Number of precomputed colours of the scale.
 const SHADES: usize = 512;
 /// Share of ambient light; the remainder comes from the lamp.
 const AMBIENT: f64 = 0.55;
-/// Where the lamp is: right, up, towards the viewer.
+/// Direction of the lamp: right, up, towards the viewer.
 const LAMP: [f64; 3] = [-0.3, 0.45, 0.85];
-/// What the inside of a surface shows of its colour; the remainder is grey.
+/// Share of its colour on the inside of a surface; the remainder is grey.
 const INSIDE: f64 = 0.35;
 /// Grey of the inside.
 const INSIDE_GREY: f64 = 120.0;
 /// Share of the light at a silhouette.
 const OUTLINE: f64 = 0.45;
-/// A step in depth is a silhouette from this share of the picture's height on.
+/// Minimum step in depth at a silhouette, as a share of the picture's height.
 const STEP: f64 = 0.012;
 
-/// Where a picture lies in the plane of the view.
+/// Placement of a picture in the plane of the view.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PictureFrame {
     /// middle of the picture, m
@@ -89,7 +88,7 @@ impl PictureFrame {
 struct Samples {
     width: usize,
     height: usize,
-    /// towards the viewer, m; −∞ where nothing is
+    /// towards the viewer, m; −∞ for the background
     depth: Vec<f32>,
     colour: Vec<Rgb>,
 }
@@ -119,7 +118,7 @@ pub(super) fn draw(
         let [x, y] = frame.pixel(&p.xy()).map(|side| side * f64::from(FINE));
         Vector3::new(x, y, p.z)
     };
-    // of a vertex; where there is none, deviations are shown
+    // colour of a vertex; `None` shows deviations
     let paint = |v: VertexId| match (panel.paint, panel.classes) {
         (Some(paint), _) => Some(paint.get(v.0 as usize).copied().unwrap_or(BACKGROUND)),
         (None, Some(classes)) => Some(
@@ -154,7 +153,7 @@ pub(super) fn draw(
     samples.averaged(frame.size)
 }
 
-/// Share of the light that a face gets, negative where its inside is seen.
+/// Share of the light on a face, negative for its inside.
 fn light_on(panel: &PicturePanel<'_>, camera: &Camera, face: FaceId) -> f64 {
     let normal = panel.mesh.normal(face);
     let [x, y, z] = LAMP;
@@ -184,7 +183,7 @@ fn lit(colour: Rgb, light: f64) -> Rgb {
 }
 
 impl Samples {
-    /// Colours the samples inside a triangle that nothing hides.
+    /// Colours the visible samples inside a triangle.
     ///
     /// - `places`: corners, samples to the right and downwards, and m towards the viewer.
     /// - `colour`: from the barycentric coordinates.
@@ -216,7 +215,7 @@ impl Samples {
         }
     }
 
-    /// Darkens samples beside which the surface ends or falls back by more than `step` (m).
+    /// Darkens samples at which the surface ends or falls back by more than `step` (m).
     fn silhouette(&mut self, step: f32) {
         for y in 0..self.height {
             for x in 0..self.width {
@@ -257,7 +256,7 @@ impl Samples {
     }
 }
 
-/// The samples whose middles may lie between `lo` and `hi`.
+/// The samples with possible middles between `lo` and `hi`.
 fn covered(lo: f64, hi: f64, count: usize) -> std::ops::Range<usize> {
     // casts end at 0 and at the largest number
     (lo - 0.5).ceil().max(0.0) as usize..((hi + 0.5).floor().max(0.0) as usize).min(count)
