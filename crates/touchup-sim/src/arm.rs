@@ -1,10 +1,9 @@
-//! An arm with a probe that bends, against a known surface, in its own time.
+//! An arm with an elastic probe against a known surface, in its own time.
 //!
-//! The arm follows its command with a limited acceleration, some milliseconds late. Its encoders
-//! say where its tip would be if nothing bent: x_c. The ball is at x, where the part lets it be,
-//! and arm and probe pull it back with K (x_c − x), so the part pushes with K (x − x_c). While that
-//! is inside the cone of friction the ball stays where it is; else it slides until the force lies
-//! on the cone.
+//! The arm follows its command with limited acceleration, some milliseconds late. Its encoders give
+//! the place of its tip without bending: x_c. The part keeps the ball at x; arm and probe pull it
+//! back with K (x_c − x), so the part pushes with K (x − x_c). Inside the cone of friction the ball
+//! stays; else it slides until the force lies on the cone.
 
 use std::collections::VecDeque;
 
@@ -23,10 +22,10 @@ use touchup_core::probing::arm::{
 use touchup_core::stylus::{Payload, Wrench};
 
 settings! {
-    /// The arm, how it is mounted, and what is not ideal about it.
+    /// The arm, its mounting, and its imperfections.
     #[derive(Clone, Debug, PartialEq)]
     pub struct ArmParams,
-    /// A UR5e, the part on a table before it; a probe of 150 mm with a 3 mm ball, held upright.
+    /// A UR5e, the part on a table before it; an upright probe of 150 mm with a 3 mm ball.
     default {
         /// Lengths.
         geometry: ArmGeometry = UrGeometry::UR5E.into();
@@ -37,58 +36,58 @@ settings! {
             Vector3::new(0.0, 0.0, 0.15).into(),
             UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
         );
-        /// True offset of the centre of its ball from there, in the axes of the tip, m.
+        /// True offset of the ball's centre from there, in the axes of the tip, m.
         ball_offset: Vector3<f64> = Vector3::zeros();
-        /// Of the ball, m.
+        /// Radius of the ball, m.
         radius: f64 = 1.5e-3,
             positive("the ball's radius", *radius, "m"),
             up_to("the offset of the ball", ball_offset.norm(), "m", 0.1, "from zero to 0.1 m");
-        /// Of arm and probe in series, N/m.
+        /// Stiffness of arm and probe in series, N/m.
         stiffness: f64 = 15e3, positive("the stiffness of the arm", *stiffness, "N/m");
         /// Coefficient of friction.
         friction: f64 = 0.15, up_to("the friction", *friction, "", 10.0, "from zero to ten");
         /// Position noise of the encoders, per axis, root mean square, m.
-        // repeatability of a UR5e is 0.03 mm; what encoders add to one reading is less
+        // repeatability of a UR5e is 0.03 mm; encoder noise of one reading is less
         pose_noise: f64 = 10e-6, up_to("the pose noise", *pose_noise, "m", 1.0, "from zero to 1 m");
-        /// Of the force, per axis, root mean square, N.
+        /// Noise of the force, per axis, root mean square, N.
         force_noise: f64 = 0.15, up_to("the force noise", *force_noise, "N", 1e3, "from zero to 1 kN");
-        /// Of the torque about the flange's origin, per axis, root mean square, N·m.
+        /// Noise of the torque about the flange's origin, per axis, root mean square, N·m.
         torque_noise: f64 = 5e-3, up_to("the torque noise", *torque_noise, "N·m", 100.0, "from zero to 100 N·m");
-        /// Bias of the sensor before zeroing, N in the flange.
+        /// Force bias of the sensor before zeroing, N in the flange.
         force_bias: Vector3<f64> = Vector3::new(0.4, -0.3, 1.1), not_negative("the bias of the force", force_bias.norm(), "N");
-        /// … of the torque, N·m in the flange.
+        /// Torque bias of the sensor before zeroing, N·m in the flange.
         torque_bias: Vector3<f64> = Vector3::new(0.05, -0.08, 0.02),
             not_negative("the bias of the torque", torque_bias.norm(), "N·m");
-        /// What hangs on the flange: its centre in the flange, gravity in B.
+        /// Payload on the flange: its centre in the flange, gravity in B.
         payload: Payload = WEIGHTLESS, check_payload(payload);
         /// Payload that its controller compensates.
         configured_payload: Payload = WEIGHTLESS, check_payload(configured_payload);
-        /// From a command to the motion, s.
+        /// Delay from a command to the motion, s.
         command_latency: f64 = 6e-3, up_to("the latency of commands", *command_latency, "s", 1.0, "from zero to 1 s");
-        /// How much older than its stamp the force is, s.
+        /// Age of the force at its stamp, s.
         force_latency: f64 = 4e-3, up_to("the latency of the force", *force_latency, "s", 1.0, "from zero to 1 s");
         /// Largest speed of the tip, m/s.
         top_speed: f64 = 0.5, positive("the largest speed", *top_speed, "m/s");
         /// Largest acceleration of the tip, m/s².
         top_acceleration: f64 = 2.0, positive("the largest acceleration", *top_acceleration, "m/s²");
-        /// Largest speed at which the tip turns, rad/s.
+        /// Largest turning speed of the tip, rad/s.
         top_turn_speed: f64 = 0.5, positive("the largest speed of a turn", *top_turn_speed, "rad/s");
         /// Largest speed of a joint, rad/s.
         top_joint_speed: f64 = 3.1, positive("the largest speed of a joint", *top_joint_speed, "rad/s");
-        /// The arm stops by itself beyond this force, N.
+        /// Force of the arm's own protective stop, N.
         safety_force: f64 = 150.0, positive("the safety force", *safety_force, "N");
-        /// By what the arm differs from all of the above.
+        /// Errors of all of the above.
         errors: ArmErrors = ArmErrors::NONE,
             positive("the true radius of the ball", radius + errors.radius, "m"),
             positive("the true stiffness, as a share of that told", 1.0 + errors.stiffness.min(), ""),
             not_negative("the repeatability", errors.repeatability, "m"),
             not_negative("the play", errors.play, "m");
-        /// Noise comes from it.
+        /// Seed of the noise.
         seed: u64 = 1;
     }
 }
 
-/// Nothing hangs on the flange; the base is upright.
+/// No payload on the flange; the base is upright.
 pub const WEIGHTLESS: Payload = Payload {
     mass: 0.0,
     p_sc: Vector3::new(0.0, 0.0, 0.0),
@@ -114,7 +113,7 @@ fn check_payload(payload: &Payload) -> Result<(), SimError> {
 /// An injected fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ArmFault {
-    /// No state comes any more; the arm stops when no command comes.
+    /// States stop coming; the arm stops without commands.
     LinkLost,
     /// States come with frozen stamps; the arm is at rest.
     ControllerKilled,
@@ -122,54 +121,54 @@ pub enum ArmFault {
     OperatorStop,
     /// A safety plane, or too much force.
     ProtectiveStop,
-    /// Something hits the probe for three states, N against the shaft.
+    /// An impact on the probe for three states, N along the shaft.
     ForceSpike(f64),
-    /// From then on its force sensor senses something else.
+    /// A fault of the force sensor from then on.
     Sensor(SensorFault),
-    /// The probe is bent: its ball is displaced by this, m in the axes of the tip.
+    /// Bent probe: displacement of its ball, m in the axes of the tip.
     TipBent(Vector3<f64>),
-    /// The part moves: by a scaled axis about the origin of O, rad, then by a shift, m; in O.
+    /// Moved part: rotation by a scaled axis about the origin of O, rad, then a shift, m; in O.
     PartMoved(Vector3<f64>, Vector3<f64>),
 }
 
 /// A fault of a force sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SensorFault {
-    /// Each reading is the last one, but along some axes of the flange (0) it goes on (1).
+    /// Each reading repeats the last one, except along the live axes (1) of the flange; 0: frozen.
     Frozen(Vector3<f64>),
-    /// The same in all axes, with noise of this root mean square, N, on it.
+    /// Frozen in all axes, with added noise of this root mean square, N.
     Dithers(f64),
-    /// It reads nothing.
+    /// All readings are zero.
     Zero,
-    /// It reads no more than this along each axis of the flange, N.
+    /// Largest reading along each axis of the flange, N.
     Clipped(f64),
-    /// Its noise has another root mean square, N.
+    /// New root mean square of the noise, N.
     Noise(f64),
-    /// Its bias drifts along each axis of the flange, N/s.
+    /// Drift of the bias along each axis of the flange, N/s.
     Drifts(Vector3<f64>),
-    /// It is later than before, s.
+    /// Additional delay, s.
     Late(f64),
-    /// It reads a multiple of the force.
+    /// Factor on the force.
     Gain(f64),
 }
 
 /// Time between two states, s.
 const PERIOD: f64 = 2e-3;
-/// Steps of the motion in it.
+/// Steps of the motion in one period.
 const STEPS: usize = 4;
 const STEP: f64 = PERIOD / STEPS as f64;
-/// An arm that receives no command stops after this time, s: the watchdog that is set in a UR.
+/// Time without a command until the arm stops, s: the watchdog of a UR.
 const WATCHDOG: f64 = 0.1;
-/// With which it stops when it has to, m/s².
+/// Deceleration of safety stops, m/s².
 const HARD_STOP: f64 = 8.0;
-/// States that a spike lasts.
+/// Length of a spike in states.
 const SPIKE: u32 = 3;
-/// The time that a force needs to settle is this many times its latencies.
+/// Settling time of a force, in multiples of its latencies.
 const CALM: f64 = 4.0;
-/// Farther than this from its last contact the ball comes anew, with another error of place, m: a
-/// second search begins nearer.
+/// Minimum distance of a new approach from the last contact, with a new error of place, m: a second
+/// search begins nearer.
 const NEW_APPROACH: f64 = 1e-3;
-/// A line has ended when what is left is less than this, m.
+/// Maximum remaining length of a completed line, m.
 const ARRIVED: f64 = 1e-9;
 
 /// A simulated arm. Its base is B, the surface is in O.
@@ -180,25 +179,25 @@ pub struct SimArm<'a> {
     torque_rng: Pcg64,
     approach_rng: Pcg64,
     time: f64,
-    /// of the part in the base, truly
+    /// true pose of the part in the base
     pose_bo: Isometry3<f64>,
-    /// truly
+    /// true geometry
     geometry: ArmGeometry,
-    /// from where the tip is by the kinematics as told to where it is, in B
+    /// from the tip by the nominal kinematics to the true tip, in B
     kinematic: Isometry3<f64>,
     /// error of place of this approach, in B, m
     approach: Vector3<f64>,
-    /// where the drives hold the tip, in B, m
+    /// place of the tip held by the drives, in B, m
     driven: Vector3<f64>,
     /// centre of the ball at the last contact of this approach, in O
     touched: Option<Point3<f64>>,
-    /// of the tip if nothing bent, in B
+    /// pose of the tip without bending, in B
     nominal: Isometry3<f64>,
     velocity: Vector3<f64>,
     joints: Joints,
-    /// where the ball is, in O
+    /// place of the ball, in O
     ball: Point3<f64>,
-    /// of the part on the tip, N in B; newest last
+    /// forces of the part on the tip, N in B; newest last
     forces: VecDeque<Vector3<f64>>,
     /// N in the flange
     tare: Vector3<f64>,
@@ -207,10 +206,10 @@ pub struct SimArm<'a> {
     doing: Command,
     heard_at: f64,
     faults: Vec<(f64, ArmFault)>,
-    /// … once the ball has left so many contacts
+    /// faults after a number of contacts that the ball has left
     faults_of_contacts: Vec<(usize, ArmFault)>,
     contacts: usize,
-    /// since when it is another sensor, s, and its last reading before that, N in the flange
+    /// start of a sensor fault, s, the fault, and the last reading before it, N in the flange
     sensor: Option<(f64, SensorFault, Vector3<f64>)>,
     last_force: Vector3<f64>,
     spike: u32,
@@ -218,13 +217,13 @@ pub struct SimArm<'a> {
     is_lost: bool,
     is_killed: bool,
     last_stamp_ns: i64,
-    /// when it last moved, s
+    /// time of the last motion, s
     moved_at: f64,
     /// largest force ever, N
     peak_force: f64,
 }
 
-/// Refuses a ball that would be in the part.
+/// Refuses a ball inside the part.
 fn check_free(surface: &dyn Surface, ball: &Point3<f64>, radius_m: f64) -> Result<(), SimError> {
     let clearance_m = surface.signed_distance(ball);
     if clearance_m < radius_m {
@@ -240,8 +239,8 @@ impl<'a> SimArm<'a> {
     /// An arm at rest with its tip at a pose in B.
     ///
     /// # Errors
-    /// [`SimError::BadParameter`]; [`SimError::OutOfReach`]; [`SimError::StartsInside`] when the
-    /// ball would be in the part.
+    /// [`SimError::BadParameter`]; [`SimError::OutOfReach`]; [`SimError::StartsInside`] for a ball
+    /// inside the part.
     pub fn new(
         surface: &'a dyn Surface,
         params: ArmParams,
@@ -301,12 +300,12 @@ impl<'a> SimArm<'a> {
         })
     }
 
-    /// Has something go wrong at a time of the arm, s.
+    /// Schedules a fault at a time of the arm, s.
     pub fn fail_at(&mut self, time: f64, fault: ArmFault) {
         self.faults.push((time, fault));
     }
 
-    /// Has something go wrong once the ball has left its contact so many times for another one.
+    /// Schedules a fault after the ball has left a number of contacts for new ones.
     pub fn fail_after_contacts(&mut self, contacts: usize, fault: ArmFault) {
         self.faults_of_contacts.push((contacts, fault));
     }
@@ -316,39 +315,38 @@ impl<'a> SimArm<'a> {
         self.time
     }
 
-    /// Its joints now.
+    /// Its current joints.
     pub fn joints(&self) -> Joints {
         self.joints
     }
 
-    /// Since when it is at rest, s.
+    /// Start of its present rest, s.
     pub fn at_rest_since(&self) -> f64 {
         self.moved_at
     }
 
-    /// The largest force that the part has ever done to it, N.
+    /// The largest force of the part on it up to now, N.
     pub fn peak_force(&self) -> f64 {
         self.peak_force
     }
 
-    /// Where the ball really is, m in O.
+    /// True place of the ball, m in O.
     pub fn ball(&self) -> Point3<f64> {
         self.ball
     }
 
-    /// Lets time go by without anybody asking.
+    /// Lets time pass without requests.
     pub fn advance(&mut self, seconds: f64) {
         (0..(seconds / PERIOD).round() as usize).for_each(|_| self.tick());
     }
 
-    /// Has its joints turn to others within one period, as the drives of somebody else's controller
-    /// do, whatever it was commanded; returns the state that this ends in, without the noise of its
-    /// place.
+    /// Turns the joints to others within one period, like the drives of a foreign controller,
+    /// whatever the command; returns the final state, without the noise of its place.
     ///
-    /// - `joints`: near those of now.
+    /// - `joints`: near the current ones.
     ///
     /// # Panics
-    /// For another number of joints than it has.
+    /// For another number of joints than the arm has.
     pub fn drive(&mut self, joints: &Joints) -> ArmState {
         self.begin_faults();
         let begin = self.nominal;
@@ -457,7 +455,7 @@ impl<'a> SimArm<'a> {
         self.bend();
     }
 
-    /// - `silent`: since when nothing came over the link, s.
+    /// - `silent`: time since the last message over the link, s.
     fn check_link(&self, silent: f64) -> Result<(), ArmError> {
         if self.is_lost {
             Err(ArmError::Lost {
@@ -468,7 +466,7 @@ impl<'a> SimArm<'a> {
         }
     }
 
-    /// Velocity that the command asks for now, and its acceleration.
+    /// Velocity that the current command requests, and its acceleration.
     fn wanted(&mut self) -> (Vector3<f64>, f64) {
         match self.doing {
             Command::Stop { deceleration } => (Vector3::zeros(), deceleration),
@@ -487,7 +485,7 @@ impl<'a> SimArm<'a> {
                     self.turn(&to.rotation, 1.0);
                     return (Vector3::zeros(), acceleration);
                 }
-                // as fast as it may, and so that it still comes to rest there, in whole steps
+                // as fast as possible, but able to stop there in whole steps
                 let brake = acceleration.min(self.params.top_acceleration);
                 let fast = (2.0 * brake * distance).sqrt() - brake * STEP;
                 let least = (distance / (2.0 * STEP)).min(brake * STEP);
@@ -513,7 +511,7 @@ impl<'a> SimArm<'a> {
         }
     }
 
-    /// Turns by a share of what is left, no faster than it can.
+    /// Turns by a share of the remaining angle, within the largest turning speed.
     fn turn(&mut self, to: &UnitQuaternion<f64>, share: f64) {
         let left = self.nominal.rotation.rotation_to(to);
         let most = self.params.top_turn_speed * STEP;
@@ -525,8 +523,8 @@ impl<'a> SimArm<'a> {
         }
     }
 
-    /// Where the ball would be if nothing bent, in O: by the true kinematics, the play and the
-    /// error of this approach.
+    /// Place of the ball without bending, in O: by the true kinematics, the play and the error of
+    /// this approach.
     fn unbent(&mut self) -> Point3<f64> {
         let ArmParams {
             ball_offset,
@@ -547,7 +545,7 @@ impl<'a> SimArm<'a> {
             .inverse_transform_point(&(place + self.approach))
     }
 
-    /// The ball goes where the part lets it, and pulls.
+    /// Moves the ball as far as the part lets it; the ball pulls back.
     fn bend(&mut self) {
         let (nominal, pose_bo) = (self.unbent(), self.pose_bo);
         let radius = self.params.radius + self.params.errors.radius;
@@ -558,7 +556,7 @@ impl<'a> SimArm<'a> {
             .sum::<Vector3<f64>>();
         let mut next = rest;
         if let Some(out) = normal.try_normalize(0.0) {
-            // friction keeps it where it was, as far as it can
+            // friction holds the ball at its old place as far as it can
             let behind = self.ball - rest;
             let across = behind - out * behind.dot(&out);
             let most = self.params.friction * normal.norm();
@@ -581,7 +579,7 @@ impl<'a> SimArm<'a> {
         self.forces.pop_front();
     }
 
-    /// Force of the part as the sensor has it now, N in B.
+    /// Force of the part as the sensor currently has it, N in B.
     fn contact_force(&self) -> Vector3<f64> {
         self.forces.front().copied().unwrap_or_default()
     }
@@ -628,7 +626,7 @@ impl<'a> SimArm<'a> {
         wrench
     }
 
-    /// What of a force the controller does not take for weight, N in the flange.
+    /// A force less the controller's weight compensation, N in the flange.
     fn unweighed(&self, raw: &Wrench) -> Vector3<f64> {
         let r_bf = self.flange();
         raw.force - r_bf.inverse() * self.params.configured_payload.weight_o(&r_bf).force
@@ -656,8 +654,7 @@ impl<'a> SimArm<'a> {
         }
     }
 
-    /// The joints that belong to the pose; the arm stops where there are none, or where they would
-    /// have to jump.
+    /// Joints for the pose; the arm stops if there are none, or if they would have to jump.
     fn follow_joints(&mut self) {
         let flange = self.nominal * self.params.pose_ft.inverse();
         let most = self.params.top_joint_speed * PERIOD;
@@ -681,7 +678,7 @@ impl<'a> SimArm<'a> {
     }
 }
 
-/// From where the flange is by the kinematics as told to where it is, in B.
+/// From the flange by the nominal kinematics to the true flange, in B.
 fn kinematic_error(geometry: &ArmGeometry, params: &ArmParams, joints: &Joints) -> Isometry3<f64> {
     let offsets = params.errors.joints;
     if *geometry == params.geometry && offsets == [0.0; MOST_JOINTS] {
@@ -719,7 +716,7 @@ impl Arm for SimArm<'_> {
     fn zero_sensor(&mut self) -> Result<(), ArmError> {
         self.check_link(0.0)?;
         self.heard_at = self.time;
-        // a controller takes the mean of what it reads for a while
+        // a controller averages its readings for a while
         let readings = 64;
         let mut sum = Vector3::zeros();
         for _ in 0..readings {

@@ -1,4 +1,4 @@
-//! By what a real arm differs from what is told of it.
+//! Errors of a real arm relative to its description.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
@@ -7,28 +7,27 @@ use rand_pcg::Pcg64;
 use super::random::{gauss, gauss_vector};
 use touchup_core::probing::arm::{ArmGeometry, MOST_JOINTS, UrGeometry};
 
-/// True less told, and what no two touches have in common. Zero: the arm is what is told of it.
+/// True less nominal values, and errors that differ from touch to touch. Zero: an ideal arm.
 ///
 /// Encoder offsets and link lengths make an error of place that varies smoothly over the workspace:
-/// the pose that the arm reports is by the kinematics as told, the place of its ball by the true
-/// ones.
+/// the reported pose comes from the nominal kinematics, the place of the ball from the true ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArmErrors {
-    /// share by which the stiffness is larger along each axis of the base
+    /// relative excess of the stiffness along each axis of the base
     pub stiffness: Vector3<f64>,
-    /// by which the ball is larger, m
+    /// excess of the ball's radius, m
     pub radius: f64,
-    /// of the centre of the ball, in the axes of the tip, m
+    /// error of the ball's centre, in the axes of the tip, m
     pub tip: Vector3<f64>,
-    /// by which the part lies elsewhere, in O, m
+    /// displacement of the part, in O, m
     pub shift: Vector3<f64>,
-    /// … and is turned, a scaled axis in O, rad
+    /// rotation of the part, a scaled axis in O, rad
     pub turn: Vector3<f64>,
-    /// place that the turn leaves where it is, m in O
+    /// fixed point of the rotation, m in O
     pub turned_about: Point3<f64>,
     /// encoder offsets, from the base to the wrist, rad
     pub joints: [f64; MOST_JOINTS],
-    /// of d₁, a₂, a₃, d₄, d₅, d₆ of a UR, m
+    /// errors of d₁, a₂, a₃, d₄, d₅, d₆ of a UR, m
     pub lengths: [f64; 6],
     /// standard deviation of the ball's place along each axis from one approach to the next, m
     pub repeatability: f64,
@@ -36,33 +35,32 @@ pub struct ArmErrors {
     pub play: f64,
 }
 
-/// Standard deviations that [`ArmErrors::draw`] draws from.
+/// Standard deviations of [`ArmErrors::draw`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArmErrorSigmas {
     /// share of the stiffness
     pub stiffness: f64,
-    /// of the ball, m
+    /// radius of the ball, m
     pub radius: f64,
-    /// of the tip in the flange along each axis, m
+    /// place of the tip in the flange along each axis, m
     pub tip: f64,
-    /// of the part in the base along each axis, m …
+    /// place of the part in the base along each axis, m
     pub shift: f64,
-    /// … and of its turn about each axis, rad
+    /// rotation of the part about each axis, rad
     pub turn: f64,
-    /// of each encoder, rad
+    /// each encoder, rad
     pub joints: f64,
-    /// of each length, m
+    /// each length, m
     pub lengths: f64,
     /// as in [`ArmErrors`], not drawn, m
     pub repeatability: f64,
-    /// of the play, m: its size is drawn
+    /// play, m: the draw uses its absolute value
     pub play: f64,
 }
 
 impl ArmErrorSigmas {
-    /// A UR whose probe and part were calibrated by its own touches: a ball known to 2 µm, its
-    /// place and that of the part to some hundredths of a millimetre, repeatability 0.03 mm as its
-    /// maker states it.
+    /// A UR with probe and part calibrated by its own touches: a ball known to 2 µm, its place and
+    /// the part's to some hundredths of a millimetre, repeatability 0.03 mm by its data sheet.
     pub const CALIBRATED: Self = Self {
         stiffness: 0.1,
         radius: 2e-6,
@@ -77,7 +75,7 @@ impl ArmErrorSigmas {
 }
 
 impl ArmErrors {
-    /// The arm is what is told of it.
+    /// An ideal arm.
     pub const NONE: Self = Self {
         stiffness: Vector3::new(0.0, 0.0, 0.0),
         radius: 0.0,
@@ -93,7 +91,7 @@ impl ArmErrors {
 
     /// Normal errors of a seed.
     ///
-    /// - `turned_about`: place of the part where its registration is known best, m in O.
+    /// - `turned_about`: best registered place of the part, m in O.
     pub fn draw(sigmas: &ArmErrorSigmas, turned_about: Point3<f64>, seed: u64) -> Self {
         let mut rng = Pcg64::seed_from_u64(seed ^ 0x7c15_9e37_79b9_4a7f);
         Self {
@@ -110,8 +108,8 @@ impl ArmErrors {
         }
     }
 
-    /// Where the part really is, from where it is told to be; maps O as told to O, in coordinates
-    /// of O.
+    /// Displacement of the part from its nominal to its true pose; maps nominal O to O, in
+    /// coordinates of O.
     pub fn displacement(&self) -> Isometry3<f64> {
         let about = self.turned_about.coords;
         let turned = Isometry3::from_parts(
@@ -121,7 +119,7 @@ impl ArmErrors {
         turned * Translation3::from(-about)
     }
 
-    /// An arm with its true lengths; of another than a UR they are as told.
+    /// An arm with its true lengths; unchanged for other arms than a UR.
     pub(super) fn geometry(&self, told: &ArmGeometry) -> ArmGeometry {
         let ArmGeometry::Ur(told) = told else {
             return told.clone();

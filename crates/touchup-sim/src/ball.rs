@@ -1,34 +1,33 @@
-//! A rigid ball that is pushed against a rigid surface and does not enter it.
+//! A rigid ball pushed against a rigid surface without entering it.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::surface::{Surface, SurfacePoint};
 
-/// Rounds of linearising the surface around the ball. Each gains a factor of about radius / step,
-/// so ten are usual.
+/// Rounds of linearising the surface around the ball. Each gains a factor of about radius / step;
+/// ten are usual.
 const ROUNDS: usize = 40;
-/// Planes that may join in one round.
+/// Maximum number of planes that join in one round.
 const JOINS: usize = 40;
-/// A plane is broken by more than this, m.
+/// Tolerance of a plane, m.
 const BROKEN: f64 = REST / 4.0;
-/// Planes whose normals span less than this (determinant of their Gram matrix) count as parallel:
-/// one represents all.
+/// Minimum span of the normals (determinant of their Gram matrix): below it planes count as
+/// parallel, and one represents all.
 const PARALLEL: f64 = 1e-10;
-/// The ball has come to rest when a round moves it by less than this, m; and it may enter the
-/// surface by as much.
+/// Maximum step of a ball at rest, m, and its maximum penetration.
 const REST: f64 = 1e-12;
-/// Contacts that push less than this share of the hardest are none.
+/// Minimum push of a contact, as a share of the hardest.
 const IDLE: f64 = 1e-6;
 
-/// Where the ball touches, and how hard.
+/// Place and strength of a contact of the ball.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BallContact {
     /// Point of the surface, m, in O.
     pub point: Point3<f64>,
-    /// From there to the centre of the ball, or out of the tip, unit vector in O: the contact
-    /// normal, also on edges and corners.
+    /// Contact normal, also on edges and corners: unit vector in O from there to the centre of the
+    /// ball, or out of the tip.
     pub normal: Vector3<f64>,
-    /// Distance along `normal` by which the ball is held back from the guide, m.
+    /// Distance along `normal` by which the contact holds the ball back from the guide, m.
     pub held_back: f64,
 }
 
@@ -52,9 +51,8 @@ struct ContactPlane {
 /// Equilibrium of the ball, and penetration of the planes that hold it, m.
 type BallRest = (Point3<f64>, Vec<(usize, f64)>);
 
-/// Moves a ball from `from`, where it is free, towards `to`, and returns where it comes to rest:
-/// the point nearest to `to`, near `from`, at which it does not enter the surface; with its
-/// contacts there.
+/// Moves a ball from the free place `from` towards `to`, and returns its place of rest, the point
+/// nearest to `to`, near `from`, without penetration, and its contacts there.
 ///
 /// It solves min |x − to|² under n_i·(x − q_i) ≥ radius, for the points q_i of the surface around
 /// the ball and the directions n_i from them to its centre, again and again until x rests. to − x
@@ -78,8 +76,8 @@ pub fn push_ball(
     )
 }
 
-/// As [`push_ball`], for balls that are fixed to each other: `from`, `to` and the result are their
-/// common origin.
+/// As [`push_ball`], for rigidly connected balls: `from`, `to` and the result are their common
+/// origin.
 pub(super) fn push_balls(
     surface: &dyn Surface,
     from: &Point3<f64>,
@@ -106,7 +104,7 @@ pub(super) fn push_balls(
             return (x, contacts(&planes));
         }
     }
-    // no rest (the ball would be squeezed): stay, which is free, pushed by what is nearest
+    // no rest (the gap is too narrow): stay at the free start, without contacts
     (*from, Vec::new())
 }
 
@@ -121,11 +119,10 @@ fn plane(middle: &Point3<f64>, s: &SurfacePoint, ball: &TipBall) -> Option<Conta
     })
 }
 
-/// The point nearest to `to` in front of all planes, and in each plane's `held_back` how much it
-/// takes part.
+/// The point nearest to `to` in front of all planes, with each plane's share in its `held_back`.
 ///
-/// Active set: the plane that is broken worst joins, those that no longer push leave, until none is
-/// broken.
+/// Active set: the most violated plane joins, planes that no longer push leave, until none is
+/// violated.
 fn nearest_in_front(planes: &mut [ContactPlane], to: &Point3<f64>) -> Point3<f64> {
     let (mut x, mut active) = (*to, Vec::new());
     for _ in 0..JOINS {
@@ -151,7 +148,7 @@ fn nearest_in_front(planes: &mut [ContactPlane], to: &Point3<f64>) -> Point3<f64
 }
 
 /// The same for at most four planes, by trying every three, two and one of them; with the shares of
-/// those that push.
+/// the pushing planes.
 fn nearest_in_front_of_few(
     planes: &[ContactPlane],
     few: &[usize],
@@ -170,7 +167,7 @@ fn nearest_in_front_of_few(
                 normals.set_row(row, &planes[i].normal.transpose());
                 missing[row] = planes[i].level - planes[i].normal.dot(&to.coords);
             }
-            // ones for the rows that are not used keep the matrix regular
+            // ones for the unused rows keep the matrix regular
             let gram = normals * normals.transpose()
                 + Matrix3::from_fn(|r, c| {
                     if r == c && r >= chosen.len() {
@@ -197,7 +194,7 @@ fn nearest_in_front_of_few(
         })
 }
 
-/// The planes that push; pieces of the surface that meet in one point count once.
+/// The pushing planes; pieces of the surface that meet in one point count once.
 fn contacts(planes: &[ContactPlane]) -> Vec<BallContact> {
     let hardest = planes.iter().map(|p| p.held_back).fold(0.0, f64::max);
     let mut contacts: Vec<BallContact> = Vec::new();

@@ -1,4 +1,4 @@
-//! How the tip bends under a force: a stiffness for each of three perpendicular directions.
+//! Bending of the tip under a force: a stiffness for each of three perpendicular directions.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -14,12 +14,12 @@ pub struct TipBending {
 }
 
 impl TipBending {
-    /// By how much the tip gives way to a force, m, in O: R K⁻¹ Rᵀ F, K = A diag(k s) Aᵀ.
+    /// Deflection of the tip under a force, m, in O: R K⁻¹ Rᵀ F, K = A diag(k s) Aᵀ.
     ///
     /// - `r_ot`: orientation of the stylus; `force_o`: N, in O.
     pub fn bend(&self, r_ot: &UnitQuaternion<f64>, force_o: &Vector3<f64>) -> Vector3<f64> {
         let principal = r_ot * self.axes;
-        // what the directions differ by beside the common part: nothing where they are alike
+        // additional compliance of each direction beyond the common part: zero for equal directions
         let extra = (principal.inverse() * force_o)
             .component_mul(&self.shares.map(|share| share.recip() - 1.0));
         (force_o + principal * extra) / self.stiffness

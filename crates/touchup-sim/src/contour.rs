@@ -1,4 +1,4 @@
-//! Triangles for the zero level of a field: one vertex per cell, evened out afterwards.
+//! Triangles for the zero level of a field: one vertex per cell, relaxed afterwards.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,18 +8,18 @@ use super::field::{Field, cells};
 use touchup_core::mesh::triangle::intersect;
 use touchup_core::mesh::{BoxQuery, FaceId, FaceTree, MeshError, TriMesh};
 
-/// Rounds of flipping, evening out and going back to the level.
+/// Rounds of flipping, relaxing and returning to the level.
 const ROUNDS: usize = 12;
 /// Relaxation: share of the step towards the middle of its neighbours in one round.
 const EVEN: f64 = 0.5;
-/// A vertex may not tilt a face more than this (cosine) against the level's normal.
+/// Minimum cosine between a face and the level's normal after a vertex moves.
 const UPRIGHT: f64 = 0.3;
 /// Cosine between a face and the gradient below which it counts as folded over.
 const FOLDED: f64 = 0.05;
 /// Steps back to the level in one round.
 const RETURN_STEPS: usize = 3;
 
-/// A triangle mesh while it is being shaped.
+/// A triangle mesh in the making.
 #[derive(Clone, Debug, Default)]
 pub(super) struct MeshDraft {
     /// m, in V
@@ -48,7 +48,7 @@ pub(super) fn contour(field: &Field, side: f64) -> MeshDraft {
                 cell[2] + (k >> 2),
             ]
         };
-        // where the level crosses the cell's twelve edges
+        // crossings of the level with the cell's twelve edges
         let edges = (0..8)
             .flat_map(|k| [1, 2, 4].map(|bit| (k, k | bit)))
             .filter(|(k, l)| k != l);
@@ -93,7 +93,7 @@ pub(super) fn contour(field: &Field, side: f64) -> MeshDraft {
 fn on_level(field: &Field, mut p: Point3<f64>, side: f64) -> Point3<f64> {
     for _ in 0..RETURN_STEPS {
         let gradient = field.gradient(&p);
-        // a flat field (cut off far from the surface) gives no direction
+        // a flat field (clamped far from the surface) gives no direction
         let step = gradient * (field.at(&p) / gradient.norm_squared().max(0.1));
         p -= step.cap_magnitude(side / 2.0);
     }
@@ -114,7 +114,7 @@ impl MeshDraft {
     }
 
     /// Moves a vertex onto the level, and along it towards the middle of its neighbours if no face
-    /// turns over by that.
+    /// turns over.
     fn relax_mut(&mut self, vertex: u32, star: &[usize], field: &Field, side: f64) {
         let old = on_level(field, self.positions[vertex as usize], side);
         self.positions[vertex as usize] = old;
@@ -123,7 +123,7 @@ impl MeshDraft {
             .flat_map(|&face| self.faces[face])
             .filter(|&v| v != vertex);
         let sum: Vector3<f64> = corners.map(|v| self.positions[v as usize] - old).sum();
-        // inside the mesh every neighbour is counted twice
+        // inside the mesh every neighbour counts twice
         let shift = sum * (EVEN / (2 * star.len()).max(1) as f64);
         let normal = field
             .gradient(&old)
@@ -212,8 +212,8 @@ impl MeshDraft {
             && upright([d, c, a])
     }
 
-    /// Keeps the faces that are seen, with unseen patches of fewer than `fewest` faces between
-    /// them, and without seen patches as small; pieces as small go in any case.
+    /// Keeps the visible faces and the invisible patches of fewer than `fewest` faces between them,
+    /// without equally small visible patches; equally small pieces always go.
     pub(super) fn retain_mut(
         &mut self,
         fewest: usize,
@@ -230,14 +230,13 @@ impl MeshDraft {
         self.keep_mut((0..seen.len()).map(kept));
     }
 
-    /// Keeps the faces for which `kept` says so, one after another.
+    /// Keeps the faces with a true `kept`, in order.
     fn keep_mut(&mut self, kept: impl IntoIterator<Item = bool>) {
         let mut kept = kept.into_iter();
         self.faces.retain(|_| kept.next().unwrap_or(false));
     }
 
-    /// For each face, how many faces its patch has: those connected to it over edges that are
-    /// marked alike.
+    /// Size of each face's patch in faces: the faces connected to it over edges with the same mark.
     fn patch_sizes(&self, marked: &[bool]) -> Vec<usize> {
         let edges = self.edges();
         let mut patch = vec![usize::MAX; self.faces.len()];
@@ -276,7 +275,7 @@ impl MeshDraft {
     /// Drops faces that cross others.
     ///
     /// # Errors
-    /// Those of [`TriMesh::new`].
+    /// As [`TriMesh::new`].
     pub(super) fn drop_crossings_mut(&mut self) -> Result<(), MeshError> {
         let mesh = TriMesh::new(self.positions.clone(), self.faces.clone())?;
         let tree = FaceTree::new(&mesh);
@@ -298,8 +297,8 @@ impl MeshDraft {
         Ok(())
     }
 
-    /// Drops, until none is left: faces at edges that more than two share, faces that hang on by
-    /// one edge or less, and all faces around vertices where the mesh only meets in a point.
+    /// Drops repeatedly: faces at edges of more than two faces, faces that hang on by one edge or
+    /// less, and all faces around vertices at which the mesh meets only in a point.
     pub(super) fn tidy_mut(&mut self) {
         loop {
             let edges = self.edges();
@@ -343,7 +342,7 @@ impl MeshDraft {
     }
 
     /// Closes rims of at most `longest` edges with a fan around a new vertex in their middle; the
-    /// mesh must be tidy, so that one rim at most goes through a vertex.
+    /// mesh must be tidy: at most one rim goes through a vertex.
     pub(super) fn fill_mut(&mut self, longest: usize) {
         let edges = self.edges();
         let open = edges.keys().filter(|(a, b)| !edges.contains_key(&(*b, *a)));
@@ -367,7 +366,7 @@ impl MeshDraft {
         }
     }
 
-    /// Drops vertices that no face uses.
+    /// Drops unused vertices.
     pub(super) fn drop_unused_mut(&mut self) {
         let mut renamed = vec![u32::MAX; self.positions.len()];
         let mut kept = Vec::new();

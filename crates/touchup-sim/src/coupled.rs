@@ -1,8 +1,8 @@
-//! A stylus that is drawn to a face and presses on it \[paper, Eq 8–11\].
+//! A stylus drawn to a face and pressing on it \[paper, Eq 8–11\].
 //!
-//! dp/dt = γ (F + K (b* − p) − F_c n*): F is what the real surface exerts, K (b* − p) draws the tip
-//! to the face, and −F_c n* presses. Together with the face dynamics of `refine` it is the coupled
-//! system of Eq 11.
+//! dp/dt = γ (F + K (b* − p) − F_c n*): F is the force of the real surface, K (b* − p) draws the
+//! tip to the face, and −F_c n* presses. Together with the face dynamics of `refine` it is the
+//! coupled system of Eq 11.
 
 use nalgebra::{Point3, Vector3};
 
@@ -44,8 +44,8 @@ impl GuidedStylus {
 
     /// The tip after `dt` (s) with the face held, by the classical Runge–Kutta method.
     ///
-    /// `surface_force`: what the real surface exerts on a tip, N. Stable while γ (K + its
-    /// stiffness) dt < 2.7.
+    /// `surface_force`: force of the real surface on a tip, N. Stable while γ (K + its stiffness)
+    /// dt < 2.7.
     pub fn step(
         &self,
         p: &Point3<f64>,

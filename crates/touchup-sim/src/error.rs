@@ -4,9 +4,9 @@ pub enum SimError {
     /// A parameter outside its range.
     #[error("{name} is {value:?} {unit}, but must be {allowed}")]
     BadParameter {
-        /// which one
+        /// name of the parameter
         name: &'static str,
-        /// what was given
+        /// given value
         value: f64,
         /// its unit
         unit: &'static str,
@@ -23,16 +23,16 @@ pub enum SimError {
         /// m
         radius_m: f64,
     },
-    /// The arm cannot be there.
+    /// The start is out of the arm's reach.
     #[error("the arm does not reach its start: bring the part nearer, or take a longer arm")]
     OutOfReach,
-    /// A tip that cannot be.
+    /// An impossible tip.
     #[error(transparent)]
     Tip(#[from] touchup_core::stylus::SettingError),
     /// The path is empty.
     #[error("the path has no point: give at least one stroke with two points")]
     EmptyPath,
-    /// The scan would be larger than is sensible.
+    /// The scan exceeds the cell limit.
     #[error(
         "the part is {size_m:.3e} m long, with {margin_m:.3e} m around it for noise, bias and rounding: at edges of \
          {edge_m:.3e} m that is more than {limit} cells; use {}",
@@ -45,10 +45,10 @@ pub enum SimError {
         margin_m: f64,
         /// m
         edge_m: f64,
-        /// cells at most
+        /// maximum number of cells
         limit: usize,
     },
-    /// The scan's triangles are so large that none is left.
+    /// The scan's triangles are too large to leave any.
     #[error(
         "edges of {edge_m:?} m leave nothing of a part that is {size_m:.3e} m long: use shorter ones"
     )]
@@ -58,7 +58,7 @@ pub enum SimError {
         /// m
         edge_m: f64,
     },
-    /// No surface was found in the part's bounds, or none that can be seen.
+    /// No surface in the part's bounds, or no visible one.
     #[error(
         "the scanner sees nothing of the part: check the view direction and the size of the holes it closes"
     )]

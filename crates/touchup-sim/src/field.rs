@@ -1,10 +1,10 @@
-//! A scalar field on a regular grid: the signed distance as a scanner's filters leave it.
+//! A scalar field on a regular grid: the signed distance after a scanner's filters.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use super::surface::Surface;
 
-/// Voxels along the side of a block that is decided by one distance where the surface is far.
+/// Voxels along the side of a block for which one distance suffices far from the surface.
 const BLOCK: usize = 4;
 
 /// Values at the nodes of a grid in a frame V; x runs fastest.
@@ -19,7 +19,7 @@ pub(super) struct Field {
 }
 
 impl Field {
-    /// The signed distance, cut off at ± `band` (m), on a grid from `low` to `high` (m, in V).
+    /// The signed distance, clamped to ± `band` (m), on a grid from `low` to `high` (m, in V).
     pub(super) fn of_surface(
         surface: &dyn Surface,
         frame_ov: &Isometry3<f64>,
@@ -83,11 +83,11 @@ impl Field {
             })
     }
 
-    /// Closes what is narrower than 2 `radius` (m) across z: in every layer a disc takes the
-    /// smallest, then the largest.
+    /// Closes gaps narrower than 2 `radius` (m) across z: in every layer a disc takes the smallest,
+    /// then the largest.
     ///
-    /// A flat disc fills holes level with what surrounds them and leaves straight walls where they
-    /// are. Costs as many steps for each node as the disc has rows.
+    /// A flat disc fills holes level with their surroundings and leaves straight walls in place.
+    /// Costs as many steps for each node as the disc has rows.
     pub(super) fn close_mut(&mut self, radius: f64) {
         let disc = Disc::new(radius / self.pitch, self.nodes);
         let [width, height, _] = self.nodes;
@@ -95,7 +95,7 @@ impl Field {
             if layer.iter().all(|v| *v == layer[0]) {
                 continue;
             }
-            // the largest is the smallest of the opposite; twice turned round, the sign is back
+            // the largest is the smallest of the opposite; two reversals restore the sign
             for _ in 0..2 {
                 disc.take_smallest_mut(layer);
                 layer.iter_mut().for_each(|v| *v = -*v);
@@ -104,7 +104,7 @@ impl Field {
     }
 
     /// Blurs with a Gaussian of standard deviation `sigma` (m), which rounds edges and leaves
-    /// planes where they are.
+    /// planes in place.
     pub(super) fn blur_mut(&mut self, sigma: f64) {
         let reach = (3.0 * sigma / self.pitch).ceil() as isize;
         let bell = |i: isize| (-0.5 * (i as f64 * self.pitch / sigma).powi(2)).exp();
@@ -170,7 +170,7 @@ struct Disc {
 }
 
 impl Disc {
-    /// `radius` in nodes; what reaches beyond the layer takes part in nothing and is left out.
+    /// `radius` in nodes, clipped to the layer, since nodes beyond it have no effect.
     fn new(radius: f64, [width, height, _]: [usize; 3]) -> Self {
         let reach = (radius.floor() as usize).min(height - 1);
         let half = |dy: usize| {
@@ -182,7 +182,7 @@ impl Disc {
         }
     }
 
-    /// Every node takes the smallest value of the disc around it.
+    /// Gives every node the smallest value of the disc around it.
     fn take_smallest_mut(&self, layer: &mut [f64]) {
         let (width, height) = (self.width, layer.len() / self.width);
         let old = layer.to_vec();
@@ -201,7 +201,7 @@ impl Disc {
     }
 }
 
-/// Smallest values of all runs of 1, 2, 4, … nodes of one row: two of them that overlap make up any
+/// Smallest values of all runs of 1, 2, 4, … nodes of one row: two overlapping runs make up any
 /// window.
 struct Runs {
     /// by the power of two; the row has `margin` infinite values at both ends
@@ -239,7 +239,7 @@ impl Runs {
     }
 }
 
-/// Each value becomes the smaller of itself and its partner, as far as both go.
+/// Replaces each value by the smaller of itself and its partner, up to the shorter length.
 fn take_smaller_mut(values: &mut [f64], others: &[f64]) {
     for (value, &other) in values.iter_mut().zip(others) {
         *value = if other < *value { other } else { *value };

@@ -1,10 +1,10 @@
-//! How a hand goes along the lines that it means to touch: it slides, scrubs, or taps.
+//! Motion of a hand along its lines: sliding, scrubbing, or tapping.
 
 use nalgebra::{Point3, Unit, Vector3};
 
 use super::path::Stroke;
 
-/// How a hand touches.
+/// Manner of touching.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Habit {
     /// It slides from end to end.
@@ -15,19 +15,19 @@ pub enum Habit {
     Tap,
 }
 
-/// A scrub goes forward by this length of the line, m, and back by [`BACK`] of it.
+/// Forward length of a scrub along the line, m; it goes back by [`BACK`] of it.
 const FORTH: f64 = 10e-3;
 const BACK: f64 = 0.6;
 /// Distance of two taps along a line, m.
 const TAP_EVERY: f64 = 2.5e-3;
-/// How high the tip is lifted between two taps, m.
+/// Height of the tip between two taps, m.
 const LIFT: f64 = 2e-3;
-/// How deep a tap aims below the line, m: so it lasts a while.
+/// Depth of a tap's target below the line, m: it makes the contact last.
 const INTO: f64 = 0.5e-3;
 
 impl Habit {
-    /// The strokes as this hand makes them: free moves stay, what is pressed changes. A tap needs
-    /// lines at the depth at which the ball touches, as [`plan_mesh`](super::plan_mesh) has them.
+    /// The strokes of this hand: free moves stay, pressed lines change. A tap needs lines at the
+    /// depth of the ball's contact, as in [`plan_mesh`](super::plan_mesh).
     pub fn led(self, strokes: Vec<Stroke>) -> Vec<Stroke> {
         let pressed = |stroke: Stroke| match (self, stroke.press) {
             (Self::Slide, _) | (_, None) => vec![stroke],
@@ -65,7 +65,7 @@ fn at_length(line: &[Point3<f64>], lengths: &[f64], s: f64) -> Point3<f64> {
     line[after - 1] + (line[after] - line[after - 1]) * share
 }
 
-/// To and fro along a line, through each of its points that lie on the way.
+/// To and fro along a line, through each of its points on the way.
 fn scrubbed(line: &[Point3<f64>]) -> Vec<Point3<f64>> {
     let lengths = lengths(line);
     let Some(&whole) = lengths.last().filter(|_| line.len() > 1) else {
@@ -94,7 +94,7 @@ fn scrubbed(line: &[Point3<f64>]) -> Vec<Point3<f64>> {
     points
 }
 
-/// Short contacts along a line; nothing is pressed between them.
+/// Short contacts along a line, with no pressing between them.
 fn tapped(stroke: &Stroke, press: &Unit<Vector3<f64>>) -> Stroke {
     let line = &stroke.points;
     let lengths = lengths(line);

@@ -1,4 +1,4 @@
-//! Known surfaces, a scanner and a stylus to test against.
+//! Known surfaces, a scanner and a stylus for tests.
 //!
 //! A [`Surface`] has a signed distance at every point. The scanner makes a bad mesh of one, the
 //! stylus slides a ball over it and records its contacts ([`touch`]). All randomness comes from a

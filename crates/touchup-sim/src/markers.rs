@@ -1,4 +1,4 @@
-//! What a camera sees of the LED markers on a simulated stylus: noise, occlusion, swapped labels,
+//! Camera images of the LED markers on a simulated stylus: noise, occlusion, swapped labels,
 //! reflections.
 
 use nalgebra::{Isometry3, Vector3};
@@ -11,7 +11,7 @@ use super::sensor::{Moment, TICK};
 use touchup_core::stylus::{MarkerBody, MarkerFrame, MarkerObservation};
 
 settings! {
-    /// The camera and how badly it sees.
+    /// The camera and its errors.
     #[derive(Clone, Debug, PartialEq)]
     pub struct CameraParams,
     /// An active LED system at 2 m.
@@ -22,29 +22,29 @@ settings! {
         rate: f64 = 250.0,
             positive("the rate of the camera", *rate, "1/s"),
             up_to("the rate of the camera", *rate, "1/s", 1.0 / TICK, "1000 1/s or less");
-        /// Root mean square per axis, m.
+        /// Noise, root mean square per axis, m.
         noise: f64 = 0.05e-3, up_to("the noise of the markers", *noise, "m", 1.0, "from zero to 1 m");
-        /// Share of the time that a marker is hidden, for 0.05 to 0.3 s each time.
+        /// Share of the time in which a marker is invisible, for 0.05 to 0.3 s each time.
         hidden: f64 = 0.15, up_to("the share of hidden markers", *hidden, "", 0.9, "from zero to 0.9");
-        /// Times per second that all markers are hidden, for 0.01 to 0.1 s.
+        /// Rate of blackouts of all markers, 1/s, for 0.01 to 0.1 s each.
         blackout_rate: f64 = 0.2, up_to("the rate of blackouts", *blackout_rate, "1/s", 1.0 / TICK, "from zero to 1000 1/s");
-        /// Times per second that two labels are swapped, for 0.05 to 0.3 s.
+        /// Rate of swaps of two labels, 1/s, for 0.05 to 0.3 s each.
         swap_rate: f64 = 0.1, up_to("the rate of swaps", *swap_rate, "1/s", 1.0 / TICK, "from zero to 1000 1/s");
-        /// Share of the seen markers that are a reflection 1 to 50 mm away.
+        /// Share of visible markers replaced by a reflection 1 to 50 mm away.
         outliers: f64 = 0.005, up_to("the share of outliers", *outliers, "", 1.0, "from zero to one");
         /// Stamp of the first moment, ns.
         start_ns: i64 = super::SensorParams::default().start_ns;
     }
 }
 
-/// How long a marker is hidden, or two are swapped, s.
+/// Duration of an occlusion or a swap, s.
 const SPELL: [f64; 2] = [0.05, 0.3];
-/// How long all are hidden, s.
+/// Duration of a blackout, s.
 const BLACKOUT: [f64; 2] = [0.01, 0.1];
 /// Distance of a reflection from its marker, m.
 const REFLECTION: [f64; 2] = [1e-3, 50e-3];
 
-/// Until when something lasts.
+/// End of a temporary error.
 #[derive(Clone, Copy)]
 struct Spell {
     until: f64,
@@ -65,8 +65,7 @@ impl Spell {
 
 /// The frames of a camera that watches a simulated touch.
 ///
-/// The markers sit on the handle, so that they give the pose of a stylus that does not bend, as the
-/// poses do.
+/// The markers sit on the handle: like the poses they show a stylus without bending.
 ///
 /// - `stiffness`: of the tip, N/m.
 ///

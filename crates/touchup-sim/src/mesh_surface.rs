@@ -9,9 +9,9 @@ use touchup_core::mesh::{BoxQuery, FaceHit, FaceTree, MeshError, TriMesh, pseudo
 
 /// A triangle mesh with exact distances to its triangles.
 ///
-/// Inside and outside are distinguished by the [`pseudo_normal`] at the closest point. That is
-/// right for closed meshes without self-intersection whose faces look outwards; where a mesh is
-/// open, the side of the nearest face decides.
+/// The [`pseudo_normal`] at the closest point distinguishes inside and outside. That is right for
+/// closed meshes without self-intersection and with outward faces; at an open rim the side of the
+/// nearest face decides.
 pub struct MeshSurface<'a> {
     mesh: &'a TriMesh,
     tree: FaceTree,

@@ -1,4 +1,4 @@
-//! What people get wrong about a sound recording, and the cause that a check of it is to name.
+//! Typical mistakes in a sound recording, and the cause that a check must name.
 
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
@@ -6,14 +6,14 @@ use touchup_core::diagnose::InputCause;
 use touchup_core::mesh::TriMesh;
 use touchup_core::stylus::{Message, StampedPose, StampedWrench, TipParams};
 
-/// A scan, what was recorded on its part, and what is told of the tip.
+/// A scan, a recording of its part, and the tip settings.
 #[derive(Clone, Debug)]
 pub struct ToldRecording {
     /// the scan, in its own frame, m
     pub scan: TriMesh,
-    /// poses and wrenches as they were recorded
+    /// recorded poses and wrenches
     pub messages: Vec<Message>,
-    /// what is told of the tip
+    /// tip settings
     pub tip: TipParams,
 }
 
@@ -22,7 +22,7 @@ pub struct ToldRecording {
 pub struct InputMistake {
     /// in words
     pub name: &'static str,
-    /// what is to be said of it
+    /// cause that a check must report
     pub cause: InputCause,
     make: fn(ToldRecording) -> ToldRecording,
 }
@@ -170,7 +170,7 @@ pub const INPUT_MISTAKES: &[InputMistake] = &[
     }),
 ];
 
-/// x, y, z, w read from a message that has w first.
+/// x, y, z, w read from a message with w first.
 fn read_w_first(pose: &mut StampedPose) {
     let q = pose.pose_ot.rotation.coords;
     pose.pose_ot.rotation = UnitQuaternion::new_normalize(Quaternion::new(q.z, q.w, q.x, q.y));
@@ -216,7 +216,7 @@ impl ToldRecording {
     fn inside_out(mut self) -> Self {
         let corners = |(_, [a, b, c]): (_, [touchup_core::mesh::VertexId; 3])| [a.0, c.0, b.0];
         let faces = self.scan.faces().map(corners).collect();
-        // the same faces in another order of their corners are a mesh as they were
+        // the same faces with reordered corners remain a valid mesh
         if let Ok(scan) = TriMesh::new(self.scan.positions().to_vec(), faces) {
             self.scan = scan;
         }
@@ -232,7 +232,7 @@ impl ToldRecording {
         self.wrenches(|wrench| wrench.stamp_ns += ms * 1_000_000)
     }
 
-    /// Keeps one pose of so many.
+    /// Keeps one pose in `of`.
     fn every_pose(mut self, of: usize) -> Self {
         let mut count = 0;
         self.messages.retain(|message| {
@@ -242,7 +242,7 @@ impl ToldRecording {
         self
     }
 
-    /// Forces clipped at half of the largest component that there is.
+    /// Forces clipped at half of the largest component.
     fn clipped(self) -> Self {
         let largest = self.messages.iter().map(|message| match message {
             Message::Wrench(wrench) => wrench.wrench.force.amax(),

@@ -1,4 +1,4 @@
-//! Where the hand leads the ball: rasters, runs along walls, free moves between them.
+//! Paths of the hand: rasters, runs along walls, free moves between them.
 
 use nalgebra::{Isometry3, Point2, Point3, Unit, Vector2, Vector3};
 
@@ -14,13 +14,13 @@ pub struct Stroke {
     pub points: Vec<Point3<f64>>,
     /// m/s
     pub speed: f64,
-    /// Direction in which the hand presses, in O. With it the line says how deep the ball may sink
-    /// at most, and the hand follows the line only sideways; without it the hand follows the line
-    /// as well as the part allows.
+    /// Pressing direction of the hand, in O. With it the line limits the depth of the ball, and the
+    /// hand follows the line only sideways; without it the hand follows the line as well as the
+    /// part allows.
     pub press: Option<Unit<Vector3<f64>>>,
 }
 
-/// A rectangle seen from where the hand comes: in a frame V whose z axis points towards the hand.
+/// A rectangle seen from the hand: in a frame V whose z axis points towards the hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RasterRegion {
     /// V in O
@@ -29,7 +29,7 @@ pub struct RasterRegion {
     pub low: Point2<f64>,
     /// largest x and y in V, m
     pub high: Point2<f64>,
-    /// z in V below which the ball's centre does not sink, m
+    /// lowest z in V of the ball's centre, m
     pub floor: f64,
     /// z in V at which the ball's centre is free of the part, m
     pub clear: f64,
@@ -45,11 +45,11 @@ pub enum Lines {
 }
 
 settings! {
-    /// How fast and how densely the hand works.
+    /// Speed and density of the hand's paths.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct PathParams,
-    /// A hand with a 1.5 mm ball: lines closer than the ball is wide, as fast as people rub a
-    /// surface.
+    /// A hand with a 1.5 mm ball: lines closer than the ball's width, at the speed of a rubbing
+    /// hand.
     default {
         /// Ball radius, m.
         radius: f64 = 1.5e-3, positive("the ball's radius", *radius, "m");
@@ -59,10 +59,10 @@ settings! {
         speed: f64 = 0.04, positive("the speed along rasters", *speed, "m/s");
         /// Speed along walls, m/s.
         wall_speed: f64 = 0.025, positive("the speed along walls", *wall_speed, "m/s");
-        /// Distance of the guide beyond the wall along which it runs, m.
+        /// Distance of the guide behind the surface of the wall, m.
         lean: f64 = 0.4e-3, not_negative("the size of the lean", lean.abs(), "m");
-        /// Share of a turn that a run around a wall goes; at 1 it goes a little farther, so that no
-        /// gap is left at its start.
+        /// Share of a turn in a run around a wall; at 1 it goes a little farther, to leave no gap
+        /// at its start.
         turn: f64 = 1.0, share_of_turn(*turn);
         /// Longest time for the rasters of [`plan_mesh`], s; the pitch grows to keep it.
         longest: f64 = 90.0, positive("the longest time", *longest, "s");
@@ -74,22 +74,22 @@ fn share_of_turn(turn: f64) -> Result<(), SimError> {
     up_to("the share of a turn", turn, "", 1.0, "1 or less")
 }
 
-/// Lines of a raster at most: 200 m of them at the usual pitch.
+/// Maximum number of lines in a raster: 200 m of them at the usual pitch.
 const MAX_LINES: f64 = 1e5;
 /// Speed of free moves, m/s.
 const FREE_SPEED: f64 = 0.08;
 /// Room between ball and part on free moves, m.
 const CLEARANCE: f64 = 3e-3;
-/// Share of a turn that a run around a wall repeats, so that no gap is left at its start.
+/// Repeated share of a turn around a wall, to leave no gap at its start.
 const OVERLAP: f64 = 0.1;
-/// Radii of the ball by which a raster over a whole part goes beyond it: the ball leaves the edge
-/// and sinks beside it.
+/// Overrun of a raster beyond a whole part, in radii of the ball: the ball leaves the edge and
+/// sinks beside it.
 const OVERRUN: f64 = 2.5;
 /// Length of the pieces in which a planned line follows the surface, m.
 const PIECE: f64 = 1e-3;
-/// A ball this close touches, m: far less than it is pressed in.
+/// Maximum distance of a touching ball, m: far less than the depth of a press.
 const TOUCHING: f64 = 10e-6;
-/// A ball goes around in a hole where the guide of its centre has at least this radius, m.
+/// Minimum radius of the centre's guide for a run inside a hole, m.
 const ROOM: f64 = 0.5e-3;
 /// Longest chord of a run along a curved wall, m.
 const CHORD: f64 = 0.2e-3;
@@ -101,7 +101,7 @@ impl RasterRegion {
     }
 }
 
-/// A free move from wherever the ball is.
+/// A free move from the current place of the ball.
 pub(super) fn free(points: Vec<Point3<f64>>) -> Stroke {
     Stroke {
         points,
@@ -258,8 +258,8 @@ pub fn plan_demo(plate: &Plate, params: &PathParams) -> Result<Vec<Stroke>, SimE
     Ok(strokes)
 }
 
-/// Runs along the walls of the plate's holes, slot and boss, for a ball that goes in; a hole that
-/// is too narrow for it is left out.
+/// Runs along the walls of the plate's holes, slot and boss, for a ball that goes in; without holes
+/// too narrow for it.
 ///
 /// # Errors
 /// [`SimError::BadParameter`].
@@ -288,13 +288,13 @@ pub fn plan_walls(plate: &Plate, params: &PathParams) -> Result<Vec<Stroke>, Sim
     Ok(reached.flat_map(around).collect())
 }
 
-/// Rasters in both directions over all of a surface that can be reached from one side.
+/// Rasters in both directions over the reachable surface from one side.
 ///
 /// - `bounds`: the part of it to go over, in O; `view`: direction in which the hand looks and
 ///   presses, in O.
-/// - The ball drops into whatever it fits and a little way down the outer walls, but not behind
-///   overhangs. The pitch grows beyond [`PathParams::pitch`] where the rasters would last longer
-///   than [`PathParams::longest`].
+/// - The ball drops into every gap that fits it and a little way down the outer walls, but not
+///   behind overhangs. The pitch grows beyond [`PathParams::pitch`] if the rasters would last
+///   longer than [`PathParams::longest`].
 ///
 /// # Errors
 /// [`SimError::BadParameter`].
@@ -320,8 +320,8 @@ pub fn plan_mesh(
     Ok(strokes)
 }
 
-/// A region over all of a box, seen along `view` (in O), and as far beyond it as a ball of `radius`
-/// (m) needs.
+/// A region over all of a box, seen along `view` (in O), extended as far as a ball of `radius` (m)
+/// needs.
 pub(super) fn region_over(bounds: &Bounds, view: &Unit<Vector3<f64>>, radius: f64) -> RasterRegion {
     let frame_ov = looking_along(view, bounds);
     let seen = bounds.seen_from(&frame_ov);
@@ -335,8 +335,7 @@ pub(super) fn region_over(bounds: &Bounds, view: &Unit<Vector3<f64>>, radius: f6
     }
 }
 
-/// The line in short pieces, as deep as a ball that comes from above goes at each of its points,
-/// and a little deeper.
+/// The line in short pieces, at each point as deep as a ball from above goes, and a little deeper.
 fn follow_heights(
     surface: &dyn Surface,
     region: &RasterRegion,
@@ -368,7 +367,7 @@ pub(super) fn first_contact(
 ) -> Option<f64> {
     let mut z = region.clear;
     while z > region.floor {
-        // the distance says how far the ball can go without touching
+        // the distance bounds the next free step of the ball
         let gap = surface.signed_distance(&region.at(*q, z)) - radius;
         if gap < TOUCHING {
             return Some(z);
@@ -378,8 +377,8 @@ pub(super) fn first_contact(
     None
 }
 
-/// A frame in the middle of a box whose z axis points against the direction of view; any turn about
-/// it does.
+/// A frame in the middle of a box whose z axis points against the direction of view, with an
+/// arbitrary turn about it.
 pub(super) fn looking_along(view: &Unit<Vector3<f64>>, bounds: &Bounds) -> Isometry3<f64> {
     Isometry3::from_parts(
         bounds.centre().coords.into(),

@@ -22,20 +22,19 @@ const HEIGHT: f64 = 0.020;
 const UNIT: f64 = SIDE / 6.0;
 /// Extremes of the formula, in its own unit.
 const RANGE: [f64; 2] = [-6.551_133_332_835_84, 8.106_213_589_442_332];
-/// Pitch of the grid on which the search starts, m: a quarter of the smallest radius of curvature
-/// (1.57 mm).
+/// Pitch of the search's starting grid, m: a quarter of the smallest radius of curvature (1.57 mm).
 const PITCH: f64 = 0.4e-3;
-/// The grid reaches so far beyond the square, m; there the formula is below 1e-6 of its height.
+/// Reach of the grid beyond the square, m; there the formula is below 1e-6 of its height.
 const MARGIN: f64 = 0.015;
-/// Cells along a side of the mesh at most.
+/// Maximum number of cells along a side of the mesh.
 const MAX_CELLS: f64 = 2000.0;
-/// Newton steps at most; ten are usual, with damping a few more.
+/// Maximum number of Newton steps; ten are usual, with damping a few more.
 const MAX_STEPS: usize = 60;
 
 /// The surface z = f(x, y), material below it; the square is centred on the origin and z = 0 is its
 /// middle height.
 ///
-/// Beyond the square the formula simply goes on, so the distance has no rim.
+/// The formula continues beyond the square, so the distance has no rim.
 #[derive(Clone, Debug)]
 pub struct Peaks {
     /// heights at the nodes of the starting grid, row after row, m
@@ -71,8 +70,8 @@ impl Peaks {
     /// outward up.
     ///
     /// # Errors
-    /// [`SimError::BadParameter`] for an `edge` that is no length, or so short that it makes more
-    /// than eight million faces.
+    /// [`SimError::BadParameter`] for an `edge` that is no length, or that makes more than eight
+    /// million faces.
     pub fn mesh(&self, edge: f64) -> Result<TriMesh, SimError> {
         positive("the edge length", edge, "m")?;
         let cells = (SIDE / edge).ceil();
@@ -90,8 +89,7 @@ impl Peaks {
         )?)
     }
 
-    /// Nodes of the starting grid that none of their neighbours beats in closeness to `p`, within
-    /// `reach` (m) sideways.
+    /// Nodes of the starting grid closer to `p` than their neighbours, within `reach` (m) sideways.
     fn starts(&self, p: &Point3<f64>, reach: f64) -> Vec<Point2<f64>> {
         let last = self.nodes - 1;
         let index = |x: f64| (((x + SIDE / 2.0 + MARGIN) / PITCH).max(0.0) as usize).min(last);
@@ -119,7 +117,7 @@ impl Peaks {
         lowest.map(|(i, j)| Point2::new(at(i), at(j))).collect()
     }
 
-    /// Closest points, one for each dip of the distance that comes within `reach`.
+    /// Closest points, one for each dip of the distance within `reach`.
     fn dips(&self, p: &Point3<f64>, reach: f64) -> Vec<SurfacePoint> {
         let from = [p.xy()].into_iter().chain(self.starts(p, reach));
         from.map(|start| on_surface(&descend(p, start))).collect()
@@ -131,7 +129,7 @@ impl Peaks {
 /// - `noise`: standard deviation per axis, m (the paper's scan: 3 mm).
 /// - `offset`: m (the paper's scan: 2 mm along z).
 ///
-/// Faces keep their ids, so the noisy mesh and the true one can be compared face by face.
+/// Faces keep their ids, for a comparison of the noisy and true mesh face by face.
 pub fn add_vertex_noise(mesh: &mut TriMesh, noise: f64, offset: &Vector3<f64>, seed: u64) {
     let mut rng = Pcg64::seed_from_u64(seed);
     for vertex in 0..mesh.vertex_count() as u32 {
@@ -209,7 +207,7 @@ fn descend(p: &Point3<f64>, start: Point2<f64>) -> Point2<f64> {
         let gradient = (q - p.xy()) + j.slope * (j.z - p.z);
         let tangent = Matrix2::identity() + j.slope * j.slope.transpose();
         let full = tangent + j.bend * (j.z - p.z);
-        // without the bend the matrix is positive definite and the step goes down in any case
+        // without the bend the matrix is positive definite and the step always goes down
         let hessian = if full.determinant() > 0.0 && full.trace() > 0.0 {
             full
         } else {
@@ -244,8 +242,7 @@ impl Surface for Peaks {
     }
 
     fn closest(&self, p: &Point3<f64>) -> SurfacePoint {
-        // straight above or below there is a point of the surface: none farther sideways can be
-        // closer
+        // the surface has a point straight above or below: none farther sideways can be closer
         let reach = (p.z - self.height(p.x, p.y)).abs();
         self.dips(p, reach)
             .into_iter()

@@ -2,8 +2,8 @@
 //!
 //! The plate lies on z = 0 with one corner in the origin. Every wall is parallel to z, so the
 //! boundary consists of three kinds of patch: rectangles with holes, lids, and walls above the
-//! outline of a [`PlateStadium`]. The distance is the smallest over all patches, each of which has
-//! a closed form; the sign comes from the cross-section at the height asked.
+//! outline of a [`PlateStadium`]. The distance is the smallest over all patches, each in closed
+//! form; the sign comes from the cross-section at the point's height.
 
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 
@@ -65,7 +65,7 @@ pub(super) struct Extrusion {
     pub(super) high: f64,
 }
 
-/// What a [`TruthFeature`] is, with its sizes in m.
+/// Kind of a [`TruthFeature`], with its sizes in m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TruthShape {
     /// round hole
@@ -106,10 +106,10 @@ pub enum TruthShape {
     },
 }
 
-/// One feature of the plate, as a drawing would state it.
+/// One feature of the plate, as on a drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TruthFeature {
-    /// what a user would call it
+    /// user's name of the feature
     pub name: &'static str,
     /// centre of the opening, of the boss' foot, or middle of the upper edge; m, in O
     pub centre: Point3<f64>,
@@ -307,9 +307,8 @@ impl Plate {
 /// One smooth piece of the boundary.
 #[derive(Clone, Debug, PartialEq)]
 enum BoundaryPatch {
-    /// A rectangle in the plane coordinate `axis` = `level`, without the discs and stadiums cut out
-    /// of it; the two coordinates in it are those after `axis`, cyclically. `side`: +1 when the
-    /// normal points along the axis.
+    /// A rectangle in the plane coordinate `axis` = `level`, less some discs and stadiums; the two
+    /// coordinates in it follow `axis` cyclically. `side`: +1 for a normal along the axis.
     Flat {
         axis: usize,
         side: f64,
@@ -320,7 +319,7 @@ enum BoundaryPatch {
     },
     /// A stadium at a height, its normal along +z.
     Lid { outline: PlateStadium, level: f64 },
-    /// The prism above an outline; `side`: +1 when the normal points away from the stadium.
+    /// The prism above an outline; `side`: +1 for a normal away from the stadium.
     Wall {
         outline: PlateStadium,
         low: f64,
@@ -343,8 +342,7 @@ impl BoundaryPatch {
             } => {
                 let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
                 let inside = Point2::new(p[u], p[v]).sup(low).inf(high);
-                // the cut-outs stay clear of the rim and of each other, so at most one holds the
-                // point
+                // the cut-outs stay clear of the rim and of each other: at most one holds the point
                 let free = holes
                     .iter()
                     .find(|hole| hole.contains(&inside))

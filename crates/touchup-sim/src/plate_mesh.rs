@@ -19,7 +19,7 @@ impl PlateStadium {
     /// distance from it, m.
     pub fn polygon(&self, chord_error: f64) -> Vec<Point2<f64>> {
         let corners = PI / (1.0 - (chord_error / self.radius).clamp(0.0, 1.0)).acos();
-        // an even count, so that both ends of a slot get the same half circle
+        // an even count: both ends of a slot get the same half circle
         let half = (corners.clamp(MIN_CORNERS, MAX_CORNERS) / 2.0).ceil() as usize;
         let along = self.to - self.from;
         let start = along.y.atan2(along.x) - PI / 2.0;
@@ -83,7 +83,7 @@ impl Plate {
     /// - `chord_error`: largest distance of a circle's polygon from the circle, m.
     ///
     /// # Errors
-    /// Those of [`TriMesh::new`]; none is known to happen.
+    /// As [`TriMesh::new`]; none is known to happen.
     pub fn mesh(&self, chord_error: f64) -> Result<TriMesh, MeshError> {
         let mut b = MeshDraft::default();
         let (size, x, z) = (self.size, self.step_x, self.step_z);

@@ -1,4 +1,4 @@
-//! Random numbers, and drift: slow, smooth random change, of a hand-held stylus or of a sensor's
+//! Random numbers, and drift: slow, smooth random change of a hand-held stylus or of a sensor's
 //! bias.
 
 use nalgebra::{Point3, Vector3};
@@ -49,7 +49,7 @@ pub(super) struct SmoothField {
 }
 
 impl SmoothField {
-    /// - `length`: over which it stays alike, m.
+    /// - `length`: correlation length ℓ, m.
     pub(super) fn new(length: f64, rng: &mut Pcg64) -> Self {
         let mut wave = || {
             (
@@ -78,7 +78,7 @@ pub(super) fn gauss(rng: &mut Pcg64) -> f64 {
     StandardNormal.sample(rng)
 }
 
-/// Three of them.
+/// Three draws from the standard normal distribution.
 pub(super) fn gauss_vector(rng: &mut Pcg64) -> Vector3<f64> {
     Vector3::from_fn(|_, _| gauss(rng))
 }

@@ -1,9 +1,9 @@
 //! A scanner that makes a bad mesh of a good surface.
 //!
-//! What it loses is lost on the signed distance, on a grid: a flat closing across the view fills
-//! holes that are too narrow, a blur rounds the edges, an offset makes the part too large, a smooth
-//! random field makes it wavy. The level of such a field cannot cross itself, and its triangles
-//! keep to that. Then what cannot be seen goes, and the rest is rigidly offset.
+//! Its errors act on the signed distance, on a grid: a flat closing across the view fills narrow
+//! holes, a blur rounds the edges, an offset makes the part too large, a smooth random field makes
+//! it wavy. The level of such a field cannot cross itself, and its triangles keep to that. Then
+//! invisible surface goes, and the remainder gets a rigid offset.
 
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, Vector3};
 use rand::SeedableRng;
@@ -19,7 +19,7 @@ use touchup_core::mesh::TriMesh;
 use touchup_core::numeric::weighted_quantile;
 
 settings! {
-    /// How bad the scanner is.
+    /// Errors of the scanner.
     #[derive(Clone, Copy, Debug, PartialEq)]
     pub struct ScannerParams,
     /// A hand-held structured-light scanner of the cheaper kind, looking down.
@@ -28,7 +28,7 @@ settings! {
         edge: f64 = 2.4e-3, positive("the scan's edge length", *edge, "m");
         /// Noise along the normals, root mean square, m.
         noise: f64 = 0.6e-3, not_negative("the scan's noise", *noise, "m");
-        /// Distance over which the noise stays alike, m.
+        /// Correlation length of the noise, m.
         noise_correlation: f64 = 3.5e-3, positive("the correlation length of the noise", *noise_correlation, "m");
         /// Share of the noise's power that is independent from vertex to vertex.
         white_share: f64 = 0.02,
@@ -38,31 +38,30 @@ settings! {
         bias: f64 = 0.3e-3;
         /// Standard deviation of the blur that rounds the edges, m.
         rounding: f64 = 0.8e-3, not_negative("the rounding", *rounding, "m");
-        /// Holes and slots narrower than this are closed over, m; where only a little narrower the
-        /// noise may open them.
+        /// Maximum width of closed holes and slots, m; the noise may open slightly narrower ones.
         closes_holes_below: f64 = 11e-3, not_negative("the width of closed holes", *closes_holes_below, "m");
-        /// By which share all lengths are too large, from the middle of the part.
+        /// Relative excess of all lengths, from the middle of the part.
         scale_error: f64 = 0.0, not_negative("the size of the scale error", scale_error.abs(), ""),
             not_negative("what the scale error leaves", 1.0 + scale_error, "");
-        /// How many places are missing that the scanner could not see.
+        /// Number of missing places that the scanner did not see.
         missing: usize = 0, up_to("the number of missing places", *missing as f64, "", 1e4, "10000 or less");
         /// Radius of each, m.
         missing_radius: f64 = 3e-3, not_negative("the radius of missing places", *missing_radius, "m");
         /// Translation of the rigid offset of the scan, m.
         rigid_shift: f64 = 0.2e-3, not_negative("the rigid shift", *rigid_shift, "m");
-        /// And by which angle, rad.
+        /// Angle of the rigid offset, rad.
         rigid_turn: f64 = 0.15f64.to_radians(),
             not_negative("the rigid turn", *rigid_turn, "rad"), not_negative("the size of the bias", bias.abs(), "m");
         /// Direction in which the scanner looks, in O.
         view: Unit<Vector3<f64>> = -Vector3::z_axis();
-        /// Angle between the two lines of sight that a triangulation needs, rad: what only one of
-        /// them reaches, such as the floor of a deep hole, is missing. 0: one line is enough.
+        /// Angle between the two lines of sight of a triangulation, rad: places that only one of
+        /// them reaches, such as the floor of a deep hole, are missing. 0: one line is enough.
         baseline: f64 = 0.0, not_negative("the angle between the lines of sight", *baseline, "rad"),
             up_to("the angle between the lines of sight", *baseline, "rad", 1.0, "1 rad or less");
-        /// Whether what cannot be seen from the view direction is missing; otherwise the scan is
+        /// Whether places invisible from the view direction are missing; otherwise the scan is
         /// closed.
         open_back: bool = true;
-        /// Of all randomness.
+        /// Seed of all randomness.
         seed: u64 = 1;
     }
 }
@@ -71,32 +70,32 @@ settings! {
 const NODES_PER_EDGE: f64 = 3.0;
 /// Most nodes of the grid: 300 × 300 × 250 mm at 0.8 mm; 0.3 GB.
 const MAX_NODES: usize = 36_000_000;
-/// Side of the contour's cells over the median edge of the evened triangles, measured.
+/// Side of the contour's cells over the median edge of the relaxed triangles, measured.
 const CELL_PER_EDGE: f64 = 1.065;
-/// Waves that make up the noise: with a hundred its distribution is Gaussian to the eye.
+/// Waves of the noise: with a hundred its distribution is Gaussian to the eye.
 const WAVES: usize = 96;
-/// Nodes along x for which the waves are summed at once.
+/// Nodes along x in one summation of the waves.
 const RUN: usize = 64;
-/// Where the edges are longer than this share of the part, a scan without a face comes of them.
+/// Ratio of edge to part above which a scan without faces is due to the edges.
 const COARSE: f64 = 0.1;
-/// Faces that look away from the scanner by more than this (cosine of the angle to the view) are
-/// not seen. Walls that stand along the view are: the scanner is moved about.
+/// Cosine to the view below which faces are invisible; walls along the view stay visible: the
+/// scanner moves about.
 const SEEN: f64 = -0.35;
-/// So often the scanner is turned about the view …
+/// Number of turns of the scanner about the view.
 const SIGHT_TURNS: usize = 12;
-/// … and leaned aside by these angles, rad.
+/// Sideways leans of the scanner, rad.
 const SIGHT_LEANS: [f64; 3] = [0.0, 0.35, 0.7];
-/// Patches of fewer faces are removed where isolated: seen ones are dirt, unseen ones in between
-/// are filled in.
+/// Minimum size of an isolated patch in faces: smaller visible ones are dirt, smaller invisible
+/// gaps are filled.
 const FEWEST_FACES: usize = 30;
 
-/// Rounds of repair and evening out; the second finds little, the third next to nothing.
+/// Rounds of repair and relaxation; the second finds little, the third next to nothing.
 const REPAIRS: usize = 2;
-/// Rims of so many edges at most are defects of the contour and filled.
+/// Maximum number of edges of a filled rim, which is a defect of the contour.
 const LONGEST_FILLED: usize = 20;
 
 impl ScannerParams {
-    /// A stationary scanner with striped light: fine and exact, but it sees no floor of a deep
+    /// A stationary scanner with striped light: fine and exact, but blind to the floor of a deep
     /// hole.
     pub fn good() -> Self {
         Self {
@@ -113,8 +112,8 @@ impl ScannerParams {
         }
     }
 
-    /// Distance (m) from the surface beyond which the field need not be known: blur, bias, noise
-    /// and the gradient stay within.
+    /// Distance (m) from the surface beyond which the field has no effect: blur, bias, noise and
+    /// the gradient stay within.
     fn band(&self) -> f64 {
         3.0 * self.rounding + self.bias.abs() + 4.0 * self.noise + self.edge
     }
@@ -123,8 +122,8 @@ impl ScannerParams {
 /// Scans a surface with the errors of `params`; same parameters, same mesh.
 ///
 /// # Errors
-/// [`SimError::BadParameter`]; [`SimError::TooFine`] when the grid would not fit;
-/// [`SimError::TooCoarse`] and [`SimError::NothingSeen`] when no face is left.
+/// [`SimError::BadParameter`]; [`SimError::TooFine`] for a grid beyond its limit;
+/// [`SimError::TooCoarse`] and [`SimError::NothingSeen`] if no face remains.
 pub fn scan(surface: &dyn Surface, params: &ScannerParams) -> Result<TriMesh, SimError> {
     params.check()?;
     let mut rng = Pcg64::seed_from_u64(params.seed);
@@ -132,7 +131,7 @@ pub fn scan(surface: &dyn Surface, params: &ScannerParams) -> Result<TriMesh, Si
     let field = scanned_field(surface, params, &frame_ov, &mut rng)?;
     let side = params.edge * CELL_PER_EDGE;
     let mut soup = contour(&field, side);
-    // the lattice's own defects are filled first, then the folds that evening out leaves
+    // first the lattice's own defects, then the folds that relaxation leaves
     for _ in 0..REPAIRS {
         repair_mut(&mut soup, &field);
         soup.even_out_mut(&field, side);
@@ -157,7 +156,7 @@ pub fn scan(surface: &dyn Surface, params: &ScannerParams) -> Result<TriMesh, Si
     }
     soup.drop_unused_mut();
     if soup.faces.is_empty() {
-        // what to change
+        // name the parameter to change
         let (size_m, edge_m) = (surface.bounds().size().max(), params.edge);
         let is_coarse = edge_m > COARSE * size_m;
         return Err(if is_coarse {
@@ -173,7 +172,7 @@ pub fn scan(surface: &dyn Surface, params: &ScannerParams) -> Result<TriMesh, Si
     Ok(TriMesh::new(soup.positions, soup.faces)?)
 }
 
-/// Takes away what is within `radius` (m) of one of the vertices.
+/// Removes the faces within `radius` (m) of one of the vertices.
 fn lose_place_mut(soup: &mut MeshDraft, radius: f64, rng: &mut Pcg64) {
     let Some(&[corner, ..]) = soup
         .faces
@@ -186,14 +185,14 @@ fn lose_place_mut(soup: &mut MeshDraft, radius: f64, rng: &mut Pcg64) {
     soup.faces.retain(|face| face.iter().all(is_far));
 }
 
-/// Fills in for what is not a clean surface.
+/// Fills the defects of the surface.
 fn repair_mut(soup: &mut MeshDraft, field: &Field) {
     soup.drop_folds_mut(field);
     soup.tidy_mut();
     soup.fill_mut(LONGEST_FILLED);
 }
 
-/// The signed distance as the scanner's filters leave it, in V; zero where the scan will be.
+/// The signed distance after the scanner's filters, in V; zero on the scan.
 fn scanned_field(
     surface: &dyn Surface,
     params: &ScannerParams,
@@ -269,8 +268,8 @@ impl Waves {
         sums
     }
 
-    /// Mean and standard deviation over the nodes at the field's zero level: with them the noise of
-    /// every seed is as strong as asked, and the bias is the bias.
+    /// Mean and standard deviation over the nodes at the field's zero level: they make noise and
+    /// bias of every seed exactly as set.
     fn spread(&self, field: &mut Field) -> (f64, f64) {
         let mut found = Vec::new();
         let pitch = field.pitch;
@@ -297,8 +296,8 @@ impl Waves {
     }
 }
 
-/// Pairs of lines of sight, each `baseline` (rad) apart, as unit vectors in V towards the scanner:
-/// it is turned about the view and leaned aside as it is moved.
+/// Pairs of lines of sight, each `baseline` (rad) apart, as unit vectors in V towards the scanner,
+/// which turns about the view and leans aside.
 fn sight_pairs(baseline: f64) -> Vec<[Vector3<f64>; 2]> {
     if baseline == 0.0 {
         return Vec::new();
@@ -336,7 +335,7 @@ fn is_triangulated(
     pairs.iter().any(|pair| pair.iter().all(reaches))
 }
 
-/// Whether a face looks towards the scanner and nothing occludes it.
+/// Whether a face looks towards the scanner without occlusion.
 fn is_seen(field: &Field, [a, b, c]: &[Point3<f64>; 3]) -> bool {
     let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
     let Some(normal) = field.gradient(&middle).try_normalize(0.0) else {
@@ -362,7 +361,7 @@ fn slip(params: &ScannerParams, rng: &mut Pcg64) -> Isometry3<f64> {
 /// Deviation of a scan from its surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScanQuality {
-    /// how many triangles
+    /// number of triangles
     pub faces: usize,
     /// median length of the edges, m
     pub edge_median: f64,
@@ -372,12 +371,12 @@ pub struct ScanQuality {
     pub rms: f64,
     /// exceeded by one in twenty points, m
     pub p95: f64,
-    /// median signed distance, m; positive where the scan lies outside the part
+    /// median signed distance, m; positive if the scan lies outside the part
     pub bias: f64,
 }
 
-/// Points measured on each face: its middle and three points around it, each standing for a quarter
-/// of its area.
+/// Sample points of each face: its middle and three points around it, each for a quarter of its
+/// area.
 const SAMPLES: [[f64; 3]; 4] = [
     [1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0],
     [2.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0],
@@ -385,12 +384,10 @@ const SAMPLES: [[f64; 3]; 4] = [
     [1.0 / 6.0, 1.0 / 6.0, 2.0 / 3.0],
 ];
 
-/// Measures a mesh against the surface it should show; every point counts by the area it
-/// represents.
+/// Measures a mesh against the surface it should show, weighted by area.
 ///
-/// - `within`: which points count, e.g. those of a touched region; the edges are those of all
-///   faces.
-/// - returns `None` when no point counts.
+/// - `within`: selects points, e.g. of a touched region; the edges are those of all faces.
+/// - returns `None` without points.
 pub fn measure_quality(
     mesh: &TriMesh,
     surface: &dyn Surface,

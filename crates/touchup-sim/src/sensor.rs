@@ -1,4 +1,4 @@
-//! From what really was to messages: noise, bias, clocks, and what goes wrong on the wire.
+//! From true moments to messages: noise, bias, clocks, and transport errors.
 
 use std::f64::consts::PI;
 
@@ -13,7 +13,7 @@ use super::error::{SimError, not_negative, require, up_to};
 use super::random::{Drift, gauss, gauss_vector, uniform};
 use touchup_core::stylus::{Message, StampedPose, StampedWrench, Wrench};
 
-/// What really was, at one instant.
+/// The true state at one instant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moment {
     /// Time since the start, s.
@@ -22,7 +22,7 @@ pub struct Moment {
     pub pose_ot: Isometry3<f64>,
     /// Force of the part on the stylus, N, in O.
     pub force_o: Vector3<f64>,
-    /// Where the ball really touched; empty while it is free.
+    /// True contacts of the ball; empty while it is free.
     pub contacts: Vec<BallContact>,
 }
 
@@ -32,35 +32,34 @@ settings! {
     pub struct SensorParams,
     /// Optical tracking and a small six-axis cell on a busy network.
     default {
-        /// Per axis, m.
+        /// Position noise per axis, m.
         pose_noise: f64 = 0.05e-3, up_to("the pose noise", *pose_noise, "m", 1.0, "from zero to 1 m");
-        /// Per axis, rad.
+        /// Orientation noise per axis, rad.
         orientation_noise: f64 = 0.1f64.to_radians(),
             up_to("the orientation noise", *orientation_noise, "rad", PI, "from zero to half a turn");
-        /// Per axis, N.
+        /// Force noise per axis, N.
         force_noise: f64 = 0.05, up_to("the force noise", *force_noise, "N", 1e3, "from zero to 1 kN");
-        /// Per axis, N·m.
+        /// Torque noise per axis, N·m.
         torque_noise: f64 = 1e-3, up_to("the torque noise", *torque_noise, "N m", 1e3, "from zero to 1 kN m");
-        /// Slowly drifting, per axis, N.
+        /// Slowly drifting force bias per axis, N.
         force_bias: f64 = 0.05, up_to("the force bias", *force_bias, "N", 1e3, "from zero to 1 kN");
-        /// What the sensor reads when nothing touches, in T, N; the drift of the bias is on top of
-        /// it.
+        /// Reading of the sensor in free motion, in T, N, without the drift of the bias.
         tare: Vector3<f64> = Vector3::zeros(),
             up_to("the size of the tare", tare.norm(), "N", 1e3, "from zero to 1 kN");
         /// Smallest difference between two readings of the force, per axis, N; zero: none.
         force_step: f64 = 0.0, up_to("the step of the force", *force_step, "N", 1e3, "from zero to 1 kN");
-        /// Half the width of the sensor's play, per axis, N: a reading follows the force only once
-        /// it differs by more.
+        /// Half the width of the sensor's play, per axis, N: a reading follows the force only
+        /// beyond it.
         force_play: f64 = 0.0, up_to("the play of the force", *force_play, "N", 1e3, "from zero to 1 kN");
         /// Slow wander of the pose beside its noise, per axis, m.
         pose_wander: f64 = 0.0, up_to("the wander of the pose", *pose_wander, "m", 1.0, "from zero to 1 m");
-        /// Poses in a second.
+        /// Rate of poses, 1/s.
         pose_rate: f64 = 500.0, check_rate("the rate of the poses", *pose_rate);
-        /// Wrenches in a second.
+        /// Rate of wrenches, 1/s.
         wrench_rate: f64 = 1000.0, check_rate("the rate of the wrenches", *wrench_rate);
-        /// How much later the wrench's clock reads than the pose's at the start, s.
+        /// Lead of the wrench's clock over the pose's at the start, s.
         wrench_clock: f64 = 1.8e-3;
-        /// By which share the wrench's clock is faster than the pose's.
+        /// Relative excess rate of the wrench's clock over the pose's.
         clock_rate: f64 = 0.0, up_to("the size of the clock's rate", clock_rate.abs(), "", 1e-2, "within 1 %");
         /// Maps O to the frame of the recorded poses.
         scan_to_space: Isometry3<f64> = Isometry3::identity(),
@@ -68,13 +67,13 @@ settings! {
         /// Origin of T from the origin of the recorded pose, in its axes, m.
         tip_offset: Vector3<f64> = Vector3::zeros(),
             up_to("the size of the tip's offset", tip_offset.norm(), "m", 10.0, "from zero to 10 m");
-        /// Of the pose's stamps, s; those of the wrench have half of it.
+        /// Jitter of the pose's stamps, s; half of it for the wrench.
         jitter: f64 = 0.1e-3, not_negative("the jitter", *jitter, "s");
         /// Share of messages that never arrive.
         lost: f64 = 0.005, up_to("the share of lost messages", *lost, "", 1.0, "from zero to one");
         /// Share of messages that arrive 5 to 15 ms late, after later ones.
         late: f64 = 0.006, up_to("the share of late messages", *late, "", 1.0, "from zero to one");
-        /// Times per second that a topic falls silent for 5 to 60 ms.
+        /// Rate of silences of a topic, 1/s, of 5 to 60 ms each.
         gap_rate: f64 = 0.1,
             not_negative("the rate of gaps", *gap_rate, "1/s"),
             require(wrench_clock.abs() <= LARGEST_CLOCK, "the wrench clock's offset", *wrench_clock, "s", "within one second");
@@ -112,15 +111,15 @@ impl SensorParams {
     }
 }
 
-/// Largest clock offset that makes sense, s.
+/// Largest sensible clock offset, s.
 const LARGEST_CLOCK: f64 = 1.0;
 /// Time between two moments, s.
 pub(super) const TICK: f64 = 1e-3;
 /// The same, ns.
 const TICK_NS: u64 = 1_000_000;
-/// Jitter is cut off at this share of the period, so that stamps keep their order.
+/// Maximum jitter as a share of the period: stamps keep their order.
 const JITTER_LIMIT: f64 = 0.45;
-/// Time on the wire: at least, and on average beyond that, s.
+/// Time on the wire: minimum, and mean beyond that, s.
 const LATENCY: [f64; 2] = [0.3e-3, 0.4e-3];
 /// Extra time of late messages, s.
 const LATE: [f64; 2] = [5e-3, 15e-3];
@@ -141,7 +140,7 @@ pub(super) struct Sensor<'a> {
     rng: Pcg64,
 }
 
-/// Which messages of one topic arrive, and when.
+/// Transport of one topic: loss, and time of arrival.
 #[derive(Clone, Copy)]
 struct Wire {
     period: f64,
@@ -153,7 +152,7 @@ struct Wire {
 
 impl<'a> Sensor<'a> {
     pub(super) fn new(params: &'a SensorParams, tip: TipBending, seed: u64) -> Self {
-        // a stream of its own, so that the hand moves the same whatever the sensors do
+        // a stream of its own: the sensors do not change the hand's motion
         let mut rng = Pcg64::seed_from_u64(seed ^ 0x5e75_0412_93ab_77c1);
         let bias = [(); 3].map(|()| Drift::new(DRIFT_PERIOD, &mut rng));
         let mut own = Pcg64::seed_from_u64(seed ^ 0x77a9_de11_4c20_5b3d);
@@ -228,7 +227,7 @@ impl<'a> Sensor<'a> {
         gauss_vector(&mut self.rng) * rms
     }
 
-    /// The pose as reported: of a stylus that does not bend, in the frame of the recorded poses.
+    /// The reported pose: of a stylus without bending, in the frame of the recorded poses.
     fn pose(&mut self, moment: &Moment) -> Isometry3<f64> {
         let p = self.params;
         let bend = self.tip.bend(&moment.pose_ot.rotation, &moment.force_o);
@@ -241,8 +240,7 @@ impl<'a> Sensor<'a> {
         Isometry3::from_parts((origin + shake).into(), pose_wt.rotation * turn)
     }
 
-    /// The wrench as reported: in T, about the ball's centre, through which every contact force
-    /// goes.
+    /// The reported wrench: in T, about the ball's centre, through which every contact force goes.
     fn wrench(&mut self, moment: &Moment) -> Wrench {
         let p = self.params;
         let bias = Vector3::from_fn(|i, _| self.bias[i].at(moment.t)) * p.force_bias + p.tare;
@@ -264,7 +262,7 @@ impl<'a> Sensor<'a> {
         }
     }
 
-    /// When a message arrives (s) and what its stamp says (ns); `None` when it is lost.
+    /// Time of arrival (s) and stamp (ns) of a message; `None` for a lost one.
     fn send(&mut self, wire: &mut Wire, t: f64) -> Option<(f64, i64)> {
         let p = self.params;
         let limit = JITTER_LIMIT * wire.period;
@@ -293,7 +291,7 @@ fn nanoseconds(count: u64, rate: f64) -> u64 {
     (count as f64 * 1e9 / rate).round() as u64
 }
 
-/// What was at a time after the start: between two moments all but the contacts is interpolated.
+/// State at a time after the start: all but the contacts is interpolated between two moments.
 /// `None` past the last.
 fn moment_at(moments: &[Moment], at_ns: u64) -> Option<Moment> {
     let before = moments.get((at_ns / TICK_NS) as usize)?;

@@ -1,8 +1,7 @@
 //! The settings of the simulation, each declared once.
 
-/// Declares a struct of settings, a line for each: its name, its type, its default and, where it
-/// has a range, the check that refuses what lies outside, in which every setting is there by its
-/// name.
+/// Declares a struct of settings, a line for each: its name, type, default and, for a limited
+/// range, the check that refuses values outside; the check sees every setting by its name.
 macro_rules! settings {
     (
         $(#[$meta:meta])* pub struct $Name:ident, $(#[$of_default:meta])* default {
@@ -22,7 +21,7 @@ macro_rules! settings {
         }
 
         impl $Name {
-            /// Refuses the first setting that is outside its range.
+            /// Refuses the first setting outside its range.
             #[allow(unused_variables, reason = "not every setting has a range")]
             pub(super) fn check(&self) -> Result<(), super::error::SimError> {
                 let Self { $($field,)* } = self;

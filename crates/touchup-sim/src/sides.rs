@@ -1,4 +1,4 @@
-//! The hand goes over a part from several of its sides.
+//! Paths of the hand over several sides of a part.
 
 use nalgebra::{Unit, Vector3};
 
@@ -8,14 +8,14 @@ use super::path::{PathParams, Stroke, free, plan_mesh};
 use super::surface::{Bounds, Surface};
 use super::waterline::plan_waterlines;
 
-/// Radii of the ball by which it keeps away from the part between two sides.
+/// Distance from the part between two sides, in radii of the ball.
 const AWAY: f64 = 4.0;
 
-/// The other sides get this share of the time of the first.
+/// Time for each other side, as a share of the first.
 const ASIDE: f64 = 0.5;
 
 /// Rasters from each side with a habit, and runs along all walls that the ball reaches from there.
-/// On the first side each of the two takes [`PathParams::longest`] at most, on the others half of
+/// On the first side each of the two takes at most [`PathParams::longest`], on the others half of
 /// it.
 ///
 /// - `sides`: unit vectors from the part towards the hand, in O.

@@ -1,11 +1,10 @@
 //! A hand-held stylus: a tip led over a rigid surface, and its sensor readings.
 //!
-//! The hand pulls the tip, a ball unless said otherwise, along [`Stroke`]s, presses, slows where it
-//! is blocked and climbs out of what it fell into. The tip does not enter the part
-//! ([`super::push_ball`]); what holds it back gives the direction of the force, the hand gives its
-//! size, friction is added against the motion: F = N Σ w_i (n_i − μ t_i), Σ w_i = 1. The reported
-//! pose is that of a rigid stylus, so a tip of compliance C makes it read centre − C F
-//! ([`TipBending`]).
+//! The hand pulls the tip, by default a ball, along [`Stroke`]s, presses, slows at obstacles and
+//! climbs out of gaps. The tip does not enter the part ([`super::push_ball`]); its contacts give
+//! the direction of the force, the hand its size, friction adds a part against the motion: F = N Σ
+//! w_i (n_i − μ t_i), Σ w_i = 1. The reported pose belongs to a rigid stylus, so a tip of
+//! compliance C makes it read centre − C F ([`TipBending`]).
 
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use rand::SeedableRng;
@@ -31,8 +30,8 @@ settings! {
         /// Radius of the ball, of the flat end, or of the nose of the cone, m.
         radius: f64 = 1.5e-3,
             positive("the ball's radius", *radius, "m"), up_to("the ball's radius", *radius, "m", 1.0, "1 m or less");
-        /// Which tip it is; its z points along the shaft. A sharp edge or nose is rounded by 0.05
-        /// mm.
+        /// Shape of the tip; its z points along the shaft. Sharp edges and noses have a rounding of
+        /// 0.05 mm.
         shape: TipShape = TipShape::Ball;
         /// Stiffness of the tip, N/m.
         stiffness: f64 = 20e3, positive("the tip's stiffness", *stiffness, "N/m");
@@ -44,17 +43,17 @@ settings! {
         stiffness_axes: UnitQuaternion<f64> = UnitQuaternion::identity();
         /// Coefficient of friction.
         friction: f64 = 0.15, up_to("the friction", *friction, "", 10.0, "from zero to ten");
-        /// How much it varies over the part, root mean square over the mean.
+        /// Variation of the friction over the part, root mean square over the mean.
         friction_variation: f64 = 0.0,
             up_to("the variation of friction", *friction_variation, "", 1.0, "from zero to one");
-        /// Over which distance it stays alike, m.
+        /// Correlation length of the friction, m.
         friction_length: f64 = 10e-3, positive("the length of the friction's variation", *friction_length, "m");
-        /// How hard the hand presses on average, N.
+        /// Mean force of the hand, N.
         force: f64 = 2.5, up_to("the hand's force", *force, "N", LARGEST_FORCE, "from zero to 1 kN");
-        /// How much that varies, root mean square, N.
+        /// Variation of the force, root mean square, N.
         force_variation: f64 = 0.5,
             up_to("the variation of force", *force_variation, "N", LARGEST_FORCE, "from zero to 1 kN");
-        /// The hand presses no less and no more than this, N.
+        /// Smallest and largest force of the hand, N.
         force_range: [f64; 2] = [1.0, 4.0], check_range(*force_range, *stiffness);
         /// Root mean square of the shaft's tilt about each of two axes, rad.
         tilt: f64 = 5f64.to_radians(), up_to("the tilt", *tilt, "rad", std::f64::consts::PI, "from zero to half a turn");
@@ -90,7 +89,7 @@ fn check_range([least, most]: [f64; 2], stiffness: f64) -> Result<(), SimError> 
 }
 
 impl StylusParams {
-    /// How the tip bends.
+    /// Bending of the tip.
     pub fn bending(&self) -> TipBending {
         TipBending {
             stiffness: self.stiffness,
@@ -103,43 +102,42 @@ impl StylusParams {
 /// A simulated recording with the truth behind it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Touch {
-    /// As they arrive: poses in O, wrenches in T.
+    /// Messages in order of arrival: poses in O, wrenches in T.
     pub messages: Vec<Message>,
     /// One for each tick of 1 ms.
     pub moments: Vec<Moment>,
 }
 
-/// No hand presses harder, N; a sample may hold a hundred times as much.
+/// Maximum force of a hand, N; a sample may hold a hundred times as much.
 const LARGEST_FORCE: f64 = 1e3;
-/// A tip that bends further is none, m; a sample may be a thousand times as far.
+/// Maximum bend of a tip, m; a sample may be a thousand times as far.
 const LARGEST_BEND: f64 = 1.0;
-/// The hand closes a distance with this rate, 1/s: a lag of 0.4 mm at 40 mm/s.
+/// Rate at which the hand closes a distance, 1/s: a lag of 0.4 mm at 40 mm/s.
 const FOLLOW: f64 = 100.0;
-/// The hand is never faster than this, m/s.
+/// Maximum speed of the hand, m/s.
 const TOP_SPEED: f64 = 0.08;
-/// It sinks and climbs at most this fast, m/s.
+/// Maximum speed of sinking and climbing, m/s.
 const SINK_SPEED: f64 = 0.06;
-/// It slows down from this lag on and waits at three times as much, m.
+/// Lag at which the hand slows down, m; it waits at three times as much.
 const LAG: f64 = 0.6e-3;
-/// It climbs from this lag on, m, until it is back at [`LAG`].
+/// Lag at which the hand starts to climb, m, until it is back at [`LAG`].
 const BLOCKED: f64 = 1.2e-3;
-/// The force comes and goes with this time constant, s.
+/// Time constant of the force, s.
 const FIRM: f64 = 0.01;
-/// Sliding slower than this leaves friction undecided, m/s.
+/// Sliding speed at half of the friction, m/s.
 const CREEP: f64 = 1e-3;
-/// The hand gives up a line when it takes longer than this, s, beyond [`PATIENCE_FACTOR`] times
-/// what it should take.
+/// Patience of the hand with a line, s, beyond [`PATIENCE_FACTOR`] times its nominal duration.
 const PATIENCE: f64 = 0.5;
 const PATIENCE_FACTOR: f64 = 2.0;
-/// A ball is caught when it does not reach so many points in a row in time: led freely, and
-/// pressed, when it climbs over what is in its way.
+/// Consecutive points missed in time by a trapped ball: in free motion, and pressed, when it climbs
+/// over obstacles.
 const CAUGHT: usize = 3;
 const CAUGHT_PRESSED: usize = 8;
-/// A way out of where the ball is caught is looked at in steps of this share of its radius …
+/// Step of the search for a way out of a trap, as a share of the ball's radius.
 const LOOK: f64 = 0.2;
-/// … and may come nearer to the surface than the ball by this, m: it touches where it is caught.
+/// Maximum excess approach to the surface on the way out, m: a trapped ball touches.
 const GRAZE: f64 = 1e-6;
-/// On the way around the part it turns by no more than this at once, rad.
+/// Maximum turn in one step on the way around the part, rad.
 const BEND: f64 = 0.8;
 
 /// Slow motions of the hand.
@@ -165,7 +163,7 @@ impl Hand {
     }
 }
 
-/// The ball in the hand, while it is led along.
+/// The ball in the hand, in motion.
 struct Leading<'a> {
     surface: &'a dyn Surface,
     params: &'a StylusParams,
@@ -179,11 +177,11 @@ struct Leading<'a> {
     moments: Vec<Moment>,
 }
 
-/// Leads a ball along `path` over `surface` and records what the stylus reports.
+/// Leads a ball along `path` over `surface` and records the stylus' messages.
 ///
 /// Starts at the path's first point. The shaft is opposite to the first direction of pressing
-/// (along z when there is none), give or take the tilt. Same surface, path, parameters and seed
-/// give the same messages.
+/// (along z without any), give or take the tilt. Same surface, path, parameters and seed give the
+/// same messages.
 ///
 /// # Errors
 /// [`SimError::BadParameter`], [`SimError::EmptyPath`], [`SimError::StartsInside`].
@@ -259,7 +257,7 @@ impl Leading<'_> {
         let from = (self.centre + out * (2.0 * away) - middle).normalize();
         let to = (point - middle).try_normalize(0.0).unwrap_or(out);
         let mut points = vec![middle + from * (2.0 * away)];
-        // to the opposite side any way around is as short
+        // to the opposite side all ways around are equally short
         let aside = Unit::new_normalize(turned_to(&from) * Vector3::x());
         let turn = UnitQuaternion::rotation_between(&from, &to)
             .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&aside, std::f64::consts::PI));
@@ -271,8 +269,8 @@ impl Leading<'_> {
         self.follow(&free(points));
     }
 
-    /// A direction in which the ball can leave straight for `away` (m); along the shaft where there
-    /// is none.
+    /// A direction in which the ball can leave straight for `away` (m); along the shaft if there is
+    /// none.
     fn way_out(&self, away: f64) -> Vector3<f64> {
         let shaft = self.upright * Vector3::z();
         let pushed = self
@@ -302,17 +300,17 @@ impl Leading<'_> {
         directions.clone().find(is_free).unwrap_or(shaft)
     }
 
-    /// Goes along one stroke, starting wherever the ball is. Returns whether it got through: it may
-    /// be caught where the part is in its way.
+    /// Goes along one stroke from the current place of the ball. Returns whether it got through:
+    /// the part may trap it.
     fn follow(&mut self, stroke: &Stroke) -> bool {
-        // points in a row that were not reached, and how many may be
+        // consecutive missed points, and their maximum
         let mut missed = 0;
         let (most, most_at_end) = if stroke.press.is_some() {
             (CAUGHT_PRESSED, CAUGHT_PRESSED)
         } else {
             (CAUGHT, 1)
         };
-        // a pressed stroke starts sideways of where the ball is, and sinks from there
+        // a pressed stroke starts sideways of the ball, and sinks from there
         let mut guide = stroke
             .press
             .and(stroke.points.first())
@@ -341,7 +339,7 @@ impl Leading<'_> {
         missed < most_at_end
     }
 
-    /// One tick towards the guide; returns how far the ball lags behind it, m.
+    /// One tick towards the guide; returns the ball's lag behind it, m.
     fn step(&mut self, stroke: &Stroke, guide: &Point3<f64>) -> f64 {
         let t = self.moments.len() as f64 * TICK;
         let mut error = guide + self.hand.stray(t) * self.params.stray - self.centre;

@@ -7,8 +7,8 @@ use nalgebra::{Isometry3, Point3, Vector3};
 pub struct SurfacePoint {
     /// m, in O
     pub point: Point3<f64>,
-    /// Unit normal of the surface there, out of the material; on an edge that of one of the pieces
-    /// that meet.
+    /// Unit normal of the surface there, out of the material; on an edge the normal of one adjacent
+    /// piece.
     pub normal: Vector3<f64>,
 }
 
@@ -22,7 +22,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The smallest box around `points`; `None` when there are none.
+    /// The smallest box around `points`; `None` without points.
     pub fn around<'a>(points: impl IntoIterator<Item = &'a Point3<f64>>) -> Option<Self> {
         points.into_iter().fold(None, |bounds, p| {
             let Bounds { min, max } = bounds.unwrap_or(Bounds { min: *p, max: *p });
@@ -64,22 +64,21 @@ impl Bounds {
     }
 }
 
-/// A surface that is known exactly, with material behind it.
+/// An exactly known surface, with material behind it.
 ///
 /// The distance of a point that is not finite is NaN, and so is its closest point.
 pub trait Surface: Sync {
     /// Distance to the surface, m; positive outside the material, negative inside.
     fn signed_distance(&self, p: &Point3<f64>) -> f64;
 
-    /// A point of the surface that no other point of it beats in closeness to `p`.
+    /// A point of the surface closest to `p`.
     fn closest(&self, p: &Point3<f64>) -> SurfacePoint;
 
-    /// Box around the part that is of interest.
+    /// Box around the part of interest.
     fn bounds(&self) -> Bounds;
 
-    /// Appends, for each smooth piece of the surface that comes within `reach` (m) of `p`, the
-    /// point of it closest to `p`: where a ball around `p` may touch. The closest of all is among
-    /// them.
+    /// Appends, for each smooth piece of the surface within `reach` (m) of `p`, its point closest
+    /// to `p`: a possible contact of a ball around `p`. The closest of all is among them.
     fn near(&self, p: &Point3<f64>, reach: f64, found: &mut Vec<SurfacePoint>);
 
     /// Unit vector along which the signed distance grows fastest: out of the material, also beside
@@ -91,6 +90,6 @@ pub trait Surface: Sync {
     }
 }
 
-/// Below this distance (m) two points do not give a direction any more: a thousand roundings of a
-/// coordinate of 1 m.
+/// Minimum distance (m) of two points that give a direction: a thousand roundings of a coordinate
+/// of 1 m.
 const COINCIDENT: f64 = 1e3 * f64::EPSILON;

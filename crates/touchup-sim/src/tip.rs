@@ -1,10 +1,9 @@
-//! A tip of any shape as balls fixed to each other, so that what holds for a ball against a surface
-//! holds for it.
+//! A tip of any shape as rigidly connected balls: results for a ball against a surface hold for it.
 //!
-//! A cone is the balls that fit into it along its axis; a flat end rings of balls that touch both
-//! its face and its side, from those of its edge to those as wide as the cylinder, and more of
-//! these along the shaft. Distances to a surface change no faster than the balls move, so that only
-//! those that could touch are looked at.
+//! A cone is the balls that fit into it along its axis; a flat end is rings of balls that touch
+//! both its face and its side, from the edge's radius to the cylinder's, and more of the latter
+//! along the shaft. Distances to a surface change no faster than the balls move, so only balls that
+//! could touch need a query.
 
 use std::f64::consts::TAU;
 
@@ -17,18 +16,18 @@ use touchup_core::stylus::{TipBody, TipShape};
 
 /// Balls around a rim: between two of them a rim of 2 mm is 4 µm too small.
 const AROUND: usize = 48;
-/// A sharp edge is rounded by this, m.
+/// Rounding of a sharp edge, m.
 const SHARP: f64 = 0.05e-3;
-/// Between two balls the tip is too small by this at most, m.
+/// Maximum shortfall of the tip between two balls, m.
 const SCALLOP: f64 = 4e-6;
 
-/// A tip that is led over a surface.
+/// A tip led over a surface.
 pub(super) struct SimTip {
     /// in T
     balls: Vec<TipBall>,
-    /// no ball is nearer to the surface than this, m
+    /// lower bound of each ball's distance from the surface, m
     clearance: Vec<f64>,
-    /// where that was so
+    /// pose of the tip for these bounds
     place: (Point3<f64>, UnitQuaternion<f64>),
     /// balls that could touch, in O
     near: Vec<TipBall>,
@@ -36,7 +35,7 @@ pub(super) struct SimTip {
 
 impl SimTip {
     /// # Errors
-    /// [`SimError::Tip`] for sizes of which no tip can be made, [`SimError::StartsInside`].
+    /// [`SimError::Tip`] for impossible sizes of a tip, [`SimError::StartsInside`].
     pub fn new(
         shape: TipShape,
         radius: f64,
@@ -67,8 +66,8 @@ impl SimTip {
         })
     }
 
-    /// Moves the tip, in its new orientation, from `from` towards `to`; returns where its origin
-    /// comes to rest and the contacts there.
+    /// Moves the tip, in its new orientation, from `from` towards `to`; returns the resting place
+    /// of its origin and the contacts there.
     pub fn push(
         &mut self,
         surface: &dyn Surface,
@@ -145,8 +144,7 @@ fn apart(radius: f64) -> f64 {
     (8.0 * radius * SCALLOP).sqrt()
 }
 
-/// Balls of one radius on a circle, resting on the face, as close to each other as those on the
-/// rim.
+/// Balls of one radius on a circle, resting on the face, as close to each other as on the rim.
 fn ring(from_axis: f64, radius: f64, rim: f64) -> impl Iterator<Item = TipBall> {
     let count = (AROUND as f64 * from_axis / rim.max(f64::MIN_POSITIVE))
         .ceil()
@@ -179,7 +177,7 @@ mod tests {
             centre: Point3::origin(),
             axis: Vector3::z(),
         };
-        // the end of a cone is cut off, its last ball bulges beyond
+        // the cone ends in a cut, beyond which its last ball bulges
         for (shape, radius, slack, highest) in [
             (TipShape::Ball, 1.5e-3, 1e-12, 1.0),
             (flat, 2e-3, 5e-6, 0.0),

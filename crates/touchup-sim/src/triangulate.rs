@@ -5,8 +5,8 @@ use nalgebra::{Point2, Vector2};
 /// Triangulates the polygon `outline` (counter-clockwise) without `holes` (clockwise), all given as
 /// indices into `points`; the triangles are counter-clockwise and use only these points.
 ///
-/// Each hole is joined to the outline by a cut to a visible corner, then ears are cut off, the one
-/// with the largest smallest angle first. O(n³) for n points: meant for drawings, not for scans.
+/// A cut to a visible corner joins each hole to the outline, then ears are cut off, the one with
+/// the largest smallest angle first. O(n³) for n points: meant for drawings, not for scans.
 pub(super) fn triangulate(
     points: &[Point2<f64>],
     outline: &[u32],
@@ -37,8 +37,7 @@ pub(super) fn triangulate(
     triangles
 }
 
-/// Joins a hole to the ring by the shortest cut that crosses neither the ring nor a hole still to
-/// be joined.
+/// Joins a hole to the ring by the shortest cut that crosses neither the ring nor a remaining hole.
 fn join(ring: &mut Vec<u32>, hole: &[u32], open: &[&Vec<u32>], points: &[Point2<f64>]) {
     let at = |v: u32| points[v as usize];
     let sides = |loop_: &[u32]| -> Vec<[Point2<f64>; 2]> {
@@ -70,8 +69,8 @@ fn join(ring: &mut Vec<u32>, hole: &[u32], open: &[&Vec<u32>], points: &[Point2<
     ring.splice(i + 1..i + 1, cut);
 }
 
-/// Whether `target` lies inside the angle of corner `i`: corners that a cut has doubled open to one
-/// side each.
+/// Whether `target` lies inside the angle of corner `i`: corners doubled by a cut open to one side
+/// each.
 fn opens_towards(ring: &[u32], i: usize, target: Point2<f64>, points: &[Point2<f64>]) -> bool {
     let at = |k: usize| points[ring[k % ring.len()] as usize];
     let (before, here, after) = (at(i + ring.len() - 1), at(i), at(i + 1));
@@ -88,7 +87,7 @@ fn opens_towards(ring: &[u32], i: usize, target: Point2<f64>, points: &[Point2<f
 /// Whether two segments share a point other than a common end.
 fn crosses([a, b]: [Point2<f64>; 2], [c, d]: [Point2<f64>; 2]) -> bool {
     if [a, b].iter().any(|p| *p == c || *p == d) {
-        // they may still lie upon each other
+        // with a common end they may still overlap
         let (u, v): (Vector2<f64>, Vector2<f64>) = (b - a, d - c);
         return u.perp(&v) == 0.0 && (a != c && a != d || b != c && b != d) && {
             let shared = if a == c || a == d { a } else { b };

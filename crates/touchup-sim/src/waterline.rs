@@ -1,9 +1,9 @@
-//! Runs of the ball along walls at constant heights, as a mill cuts steep walls: into every hole,
-//! slot and pocket that lets it in.
+//! Runs of the ball along walls at constant heights, as a mill cuts steep walls: into every
+//! accessible hole, slot and pocket.
 //!
-//! At a height the ball's centre may be where the surface is at least a radius away. Of that plane
-//! region the parts count that the ball reaches from above and sideways; their outlines are the
-//! runs. Loops that repeat the one above are thinned out.
+//! At each height the ball's centre stays at least a radius from the surface. The runs are the
+//! outlines of those parts of this plane region that the ball reaches from above and sideways.
+//! Loops that repeat the one above are thinned out.
 
 use std::collections::BTreeMap;
 
@@ -15,32 +15,32 @@ use super::surface::{Bounds, Surface};
 
 /// Nodes of the grid to a radius of the ball.
 const NODES_PER_RADIUS: f64 = 2.5;
-/// Heights that are examined to a radius of the ball.
+/// Number of heights to a radius of the ball.
 const HEIGHTS_PER_RADIUS: f64 = 4.0;
 /// Most nodes of the grid of one height.
 const MOST_NODES: f64 = 250_000.0;
 /// Most heights.
 const MOST_HEIGHTS: usize = 400;
-/// Loops around the whole part are this much farther apart.
+/// Factor on the distance of loops around the whole part.
 const OUTER_SPARSER: f64 = 4.0;
-/// Loops are alike when their middles are no farther apart than this, m, and their lengths agree
-/// within this share.
+/// Maximum distance between the middles of similar loops, m, and maximum relative difference of
+/// their lengths.
 const SAME_MIDDLE: f64 = 0.5e-3;
 const SAME_LENGTH: f64 = 0.08;
-/// From one try to thin the loops out to the next, and how often.
+/// Factor from one thinning of the loops to the next, and number of tries.
 const WIDER: f64 = 1.3;
 const TRIES: i32 = 12;
-/// Share of a loop that is repeated, so that no gap is left at its start.
+/// Repeated share of a loop, to leave no gap at its start.
 const OVERLAP: f64 = 0.08;
 
-/// A closed line along which the ball's centre runs at one height.
+/// A closed line of the ball's centre at one height.
 #[derive(Clone, Debug)]
 struct Loop {
     /// number of the height
     height: usize,
     /// x and y in V, m
     points: Vec<Point2<f64>>,
-    /// where the ball comes down to the height, x and y in V, m
+    /// place of the ball's descent to the height, x and y in V, m
     entry: Point2<f64>,
     is_outer: bool,
     /// m
@@ -55,7 +55,7 @@ impl Loop {
     }
 }
 
-/// The grid over a region and what is known at its nodes.
+/// The grid over a region and the values at its nodes.
 struct Grid<'a> {
     surface: &'a dyn Surface,
     region: &'a RasterRegion,
@@ -64,7 +64,7 @@ struct Grid<'a> {
     count: [usize; 2],
     /// lowest z in V that the ball's centre reaches from above, m
     reached: Vec<f64>,
-    /// signed distance when a node was last asked, m, and at which z
+    /// last computed signed distance of a node, m, and its z
     known: Vec<[f64; 2]>,
 }
 
@@ -73,7 +73,7 @@ struct Grid<'a> {
 ///
 /// - `bounds`: the part of the surface to go over, in O; `view`: direction in which the hand looks,
 ///   in O.
-/// - The distance of the loops grows beyond [`PathParams::pitch`] where they would last longer than
+/// - The distance of the loops grows beyond [`PathParams::pitch`] if they would last longer than
 ///   [`PathParams::longest`].
 ///
 /// # Errors
@@ -101,8 +101,8 @@ pub fn plan_waterlines(
         .collect())
 }
 
-/// The loops that are run in [`PathParams::longest`]: no closer than the pitch, wider apart where
-/// that takes too long; the longest are left out where the last of each kind alone do.
+/// The loops for [`PathParams::longest`]: no closer than the pitch, wider apart if that takes too
+/// long; without the longest ones if even the last of each kind alone take too long.
 fn within<'a>(loops: &'a [Vec<Loop>], step: f64, params: &PathParams) -> Vec<&'a Loop> {
     let time = |run: &Loop| run.length * (1.0 + OVERLAP) / params.wall_speed;
     let is_short =
@@ -130,7 +130,7 @@ fn within<'a>(loops: &'a [Vec<Loop>], step: f64, params: &PathParams) -> Vec<&'a
         .collect()
 }
 
-/// The loops that do not repeat one above by less than so many heights, and the last of each kind.
+/// The loops at least `every` heights below a similar one, and the last of each kind.
 fn thinned(loops: &[Vec<Loop>], every: f64) -> Vec<&Loop> {
     let mut kept: Vec<&Loop> = Vec::new();
     for (height, at_height) in loops.iter().enumerate() {
@@ -200,7 +200,7 @@ impl<'a> Grid<'a> {
         self.region.low + nalgebra::Vector2::new(i as f64, j as f64) * self.pitch
     }
 
-    /// Signed distance at a node, m; where it is far from `level`, anything on the same side.
+    /// Signed distance at a node, m; far from `level` any value on the same side.
     fn distance(&mut self, node: usize, z: f64, level: f64) -> f64 {
         let [value, at] = self.known[node];
         let (moved, side) = ((at - z).abs(), (value - level).signum());
@@ -213,7 +213,7 @@ impl<'a> Grid<'a> {
         value
     }
 
-    /// The outlines at one height of where the ball can be.
+    /// The outlines of the ball's free region at one height.
     fn loops(&mut self, height: usize, z: f64, params: &PathParams) -> Vec<Loop> {
         let level = params.radius - params.lean;
         let values: Vec<f64> = (0..self.reached.len())
@@ -269,8 +269,8 @@ impl<'a> Grid<'a> {
         ]
     }
 
-    /// From each crossing of the outline to the next, the free side on the left; a crossing is
-    /// named by its free node and the other.
+    /// From each crossing of the outline to the next, the free side on the left; its free node and
+    /// its other node identify a crossing.
     fn segments(&self, values: &[f64], part: &[u32]) -> BTreeMap<[usize; 2], [usize; 2]> {
         let mut next = BTreeMap::new();
         let is_free = |node: usize| values[node] > 0.0 && part[node] != 0;
@@ -279,8 +279,7 @@ impl<'a> Grid<'a> {
                 let low = j * self.count[0] + i;
                 // counter-clockwise
                 let corners = [low, low + 1, low + 1 + self.count[0], low + self.count[0]];
-                // an outline comes in where free turns into not free, and goes out where it turns
-                // back
+                // an outline enters from free to not free, and leaves in the reverse direction
                 let sides = (0..4).map(|k| [corners[k], corners[(k + 1) % 4]]);
                 let (mut ins, mut outs) = (Vec::new(), Vec::new());
                 for (k, [from, to]) in sides.enumerate() {
@@ -291,7 +290,7 @@ impl<'a> Grid<'a> {
                     }
                 }
                 for &(k, start) in &ins {
-                    // at a saddle the free corners are kept apart
+                    // at a saddle the free corners stay apart
                     let end = outs.iter().min_by_key(|(l, _)| (k + 4 - l) % 4);
                     if let Some(&(_, end)) = end {
                         next.insert(start, end);

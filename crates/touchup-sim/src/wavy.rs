@@ -1,22 +1,22 @@
-//! A wavy plate as a structured grid, smooth, open, of any number of faces, and a ball that slides
-//! over it: what a push costs is measured on it.
+//! A wavy plate as a structured grid, smooth, open, of any number of faces, and a sliding ball, for
+//! measuring the cost of a push.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use touchup_core::mesh::{MeshError, TriMesh};
 use touchup_core::stylus::{Sample, Wrench};
 
-/// Side of the plate where none is said, m.
+/// Default side of the plate, m.
 pub const SIDE: f64 = 0.3;
 /// Radius of the ball, m.
 pub const RADIUS: f64 = 1.5e-3;
 /// Stiffness of its stylus, N/m.
 pub const STIFFNESS: f64 = 2e4;
-/// Force that it presses with, N.
+/// Pressing force of the ball, N.
 pub const FORCE: f64 = 2.0;
 /// Time between two samples, ns.
 pub const STEP_NS: i64 = 1_000_000;
-/// The part lies this much below the scan, m: every contact moves vertices.
+/// Depth of the part below the scan, m: every contact moves vertices.
 const DEPTH: f64 = 0.05e-3;
 /// Noise of the tracker on each axis, of [`noisy_slide_on`], m.
 const NOISE: f64 = 0.03e-3;
@@ -42,7 +42,7 @@ pub fn wavy_plate(faces: usize) -> Result<TriMesh, MeshError> {
 /// About `faces` triangles over the square from 0 to `side` (m).
 ///
 /// # Errors
-/// [`MeshError::TooMany`] for more than 32-bit ids can count.
+/// [`MeshError::TooMany`] beyond the range of 32-bit ids.
 pub fn plate(faces: usize, side: f64) -> Result<TriMesh, MeshError> {
     let n = ((faces as f64 / 2.0).sqrt().round() as u32).max(1);
     height_field(n, |i| side * f64::from(i) / f64::from(n), height)
@@ -110,7 +110,7 @@ pub fn noisy_slide_on(side: f64, i: usize, width: f64) -> Sample {
     sample
 }
 
-/// Where the ball touches the part at sample `i` of [`slide_on`], m, and the outward normal there.
+/// Contact point of ball and part at sample `i` of [`slide_on`], m, and the outward normal there.
 pub fn contact_on(side: f64, i: usize, width: f64) -> (Point3<f64>, Vector3<f64>) {
     let length = 0.8 * side;
     let travel = SPEED * i as f64 * STEP_NS as f64 * 1e-9;

@@ -5,11 +5,11 @@ use nalgebra::{Point3, Vector3};
 use super::surface::{Bounds, Surface, SurfacePoint};
 use touchup_core::calibrate::ReferenceSphere;
 
-/// A surface, and spheres that lie outside of it.
+/// A surface, and spheres outside of it.
 pub struct WithSpheres<'a> {
     /// the other surface
     pub part: &'a dyn Surface,
-    /// no two of them meet
+    /// disjoint spheres
     pub spheres: &'a [ReferenceSphere],
 }
 

@@ -1,9 +1,9 @@
-//! Named worlds: from a seed each draws its own truth, and what a calibration tells of it.
+//! Named worlds: each draws its own truth from a seed, and a calibration's report of it.
 //!
-//! What is told differs from what is true by Gaussian errors whose standard deviations are known
-//! ([`Told`]). The recorded poses are in a frame of their own, those of the origin of a tracked
-//! body, so that place of the part, offset of the tip, delay of the clocks and tare all have to be
-//! told. Nothing of a world is shared with the defaults of scanner and stylus.
+//! The reported values have Gaussian errors with known standard deviations ([`Told`]). The recorded
+//! poses have a frame of their own, the origin of a tracked body, so that a report needs the place
+//! of the part, the offset of the tip, the delay of the clocks and the tare. A world shares nothing
+//! with the defaults of scanner and stylus.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
@@ -35,7 +35,7 @@ pub enum SimWorld {
     CarelessOperator,
 }
 
-/// What a world draws from. Each pair is the smallest and the largest value, all equally likely;
+/// Ranges of a world's draws. Each pair is the smallest and the largest value, all equally likely;
 /// SI.
 struct WorldRanges {
     radius: [f64; 2],
@@ -77,7 +77,7 @@ struct WorldRanges {
     stds: CalibrationStds,
 }
 
-/// Standard deviations of what a calibration leaves.
+/// Standard deviations of a calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CalibrationStds {
     /// m
@@ -98,7 +98,7 @@ pub struct CalibrationStds {
     pub scan_noise: f64,
 }
 
-/// By which factor what is told errs more than its standard deviations say; 1: as they say.
+/// Factors of the true errors over their reported standard deviations; 1: as reported.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToldOff {
     /// radius of the tip
@@ -129,7 +129,7 @@ impl ToldOff {
     }
 }
 
-/// What the program is told of a world.
+/// A calibration's report of a world: the input of the program.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Told {
     /// Radius of the ball, m.
@@ -140,9 +140,9 @@ pub struct Told {
     pub tip_offset: Vector3<f64>,
     /// Maps the scan to the frame of the recorded poses.
     pub scan_to_space: Isometry3<f64>,
-    /// What the clock of the wrench reads beyond that of the pose, s.
+    /// Lead of the wrench's clock over the pose's, s.
     pub wrench_clock: f64,
-    /// What the sensor reads when nothing touches, N, in T.
+    /// Reading of the sensor in free motion, N, in T.
     pub tare: Vector3<f64>,
     /// Noise of the scan, m.
     pub scan_noise: f64,
@@ -151,8 +151,7 @@ pub struct Told {
 }
 
 impl Told {
-    /// Standard deviation along an axis of what the offset of the tip and the place of the scan
-    /// leave, m.
+    /// Standard deviation along an axis of the error of tip offset and scan placement together, m.
     ///
     /// - `lever`: root mean square distance of the surface from O's origin, m.
     pub fn place_std(&self, lever: f64) -> f64 {
@@ -169,49 +168,49 @@ impl Told {
     }
 }
 
-/// One drawn number: the truth, where it was drawn from, and what is told of it.
+/// One drawn number: the truth, its range, and the reported value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DrawnValue {
     /// its name
     pub name: &'static str,
     /// its unit, SI
     pub unit: &'static str,
-    /// what is true
+    /// true value
     pub truth: f64,
     /// smallest and largest value of this world
     pub range: [f64; 2],
-    /// what the program is told and the standard deviation of that; `None`: nothing
+    /// reported value and its standard deviation; `None`: not reported
     pub told: Option<[f64; 2]>,
 }
 
-/// The truth of a world, and what is told of it.
+/// The truth of a world, and the report of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DrawnWorld {
-    /// the world it was drawn from
+    /// the drawn world
     pub world: SimWorld,
-    /// of all that was drawn
+    /// seed of all draws
     pub seed: u64,
     /// the scanner
     pub scanner: ScannerParams,
     /// tip, hand and sensors
     pub stylus: StylusParams,
-    /// how the hand goes along
+    /// habit of the hand
     pub habit: Habit,
-    /// what the program is told
+    /// input of the program
     pub told: Told,
     /// each number once
     pub values: Vec<DrawnValue>,
 }
 
-/// Farthest that the part is from the origin of the poses along each axis, m.
+/// Largest distance of the part from the origin of the poses along each axis, m.
 const FARTHEST: f64 = 0.8;
-/// The hand presses no less and no more than these shares of its mean force.
+/// Smallest and largest force of the hand, as shares of its mean.
 const FORCE_SHARES: [f64; 2] = [0.3, 2.5];
-/// Seeds of worlds, told errors, scans and hands are apart from each other by these.
+/// Offsets between the seeds of worlds, reported errors, scans and hands.
 const TRUTH_STREAM: u64 = 0x0b57_a91e_66d2_30f7;
 const TOLD_STREAM: u64 = 0x2f8e_14c5_9d03_7ab1;
 
-/// Draws and notes what was drawn.
+/// Draws numbers and records them.
 struct Draw {
     rng: Pcg64,
     values: Vec<DrawnValue>,
@@ -267,7 +266,7 @@ impl Draw {
 }
 
 impl SimWorld {
-    /// All of them.
+    /// All worlds.
     pub const ALL: [Self; 5] = [
         Self::WorkshopStylus,
         Self::OpticalTracker,
@@ -276,7 +275,7 @@ impl SimWorld {
         Self::CarelessOperator,
     ];
 
-    /// The world of this name; `None` when there is none.
+    /// The world of this name; `None` for an unknown name.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|world| world.name() == name)
     }
@@ -292,25 +291,25 @@ impl SimWorld {
         }
     }
 
-    /// Standard deviations of what is told in this world.
+    /// Standard deviations of the reported values in this world.
     pub fn calibration_stds(self) -> CalibrationStds {
         self.ranges().stds
     }
 
-    /// Draws the truth, and what a calibration tells of it.
+    /// Draws the truth, and a calibration's report of it.
     ///
     /// # Errors
-    /// As [`SimWorld::draw_told_off`], which has the factors 1 here.
+    /// As [`SimWorld::draw_told_off`], with all factors 1.
     pub fn draw(self, seed: u64) -> Result<DrawnWorld, SimError> {
         self.draw_told_off(seed, &ToldOff::all(1.0))
     }
 
-    /// As [`SimWorld::draw`], with the errors of what is told made larger by `off`. The truth is
-    /// the same whatever that is.
+    /// As [`SimWorld::draw`], with the errors of the report multiplied by `off`. The truth does not
+    /// depend on `off`.
     ///
     /// # Errors
-    /// [`SimError::BadParameter`] for factors that are negative, not finite, or so large that what
-    /// is told cannot be.
+    /// [`SimError::BadParameter`] for factors that are negative, not finite, or too large for a
+    /// possible report.
     pub fn draw_told_off(self, seed: u64, off: &ToldOff) -> Result<DrawnWorld, SimError> {
         let ToldOff {
             radius,
@@ -366,7 +365,7 @@ impl Draw {
             self.number("lateral_share_1", "", of.lateral),
             self.number("lateral_share_2", "", of.lateral),
         ];
-        // so that `stiffness` is what the mean compliance of the three directions comes from
+        // `stiffness` then gives the mean compliance of the three directions
         let shares = Vector3::new(lateral[0], lateral[1], 1.0);
         let stiffness_shares = shares * (shares.map(f64::recip).sum() / 3.0);
         let stiffness_axes = UnitQuaternion::from_axis_angle(
@@ -430,7 +429,7 @@ impl Draw {
             missing: self.number("missing_places", "", of.missing) as usize,
             missing_radius: 1.5 * edge,
             rounding: edge / 3.0,
-            // where the scan is told to be has that error
+            // the stated place of the scan has that error
             rigid_shift: 0.0,
             rigid_turn: 0.0,
             seed,
@@ -478,8 +477,8 @@ impl Draw {
 }
 
 impl DrawnWorld {
-    /// Gives a number another truth; what is told of it errs by as much as before, or, for a
-    /// stiffness or a noise, by the same share.
+    /// Gives a number another truth; the reported value keeps its error, or, for a stiffness or a
+    /// noise, its relative error.
     ///
     /// - `name`: `tip_radius`, `stiffness`, `friction`, `scan_edge`, `scan_noise`; others stay as
     ///   they are.
@@ -526,8 +525,8 @@ impl DrawnWorld {
         scan(surface, &self.scanner)
     }
 
-    /// The hand's strokes over all of a part that is reached from where the scanner looks,
-    /// `longest` seconds at most.
+    /// The hand's strokes over the whole reachable part from the scanner's view, at most `longest`
+    /// seconds.
     ///
     /// # Errors
     /// As [`plan_mesh`].
@@ -545,7 +544,7 @@ impl DrawnWorld {
         )?))
     }
 
-    /// Touches a part along strokes, with the habit that they have.
+    /// Touches a part along strokes with their habit.
     ///
     /// # Errors
     /// As [`touch`].
@@ -556,7 +555,7 @@ impl DrawnWorld {
     /// The hand's strokes over the plate: as [`DrawnWorld::strokes`], and along the walls of its
     /// features.
     ///
-    /// - `turn`: share of a turn that the runs along walls go; `None`: the hand goes into no hole.
+    /// - `turn`: share of a turn in the runs along walls; `None`: the hand goes into no hole.
     ///
     /// # Errors
     /// As [`plan_mesh`], and for a share beyond 1.
@@ -578,9 +577,9 @@ impl DrawnWorld {
         Ok(strokes)
     }
 
-    /// Standard deviation of the one stiffness that is told, as a share of it: what a calibration
-    /// leaves of the mean compliance C̄ = tr C / 3, and by how much those of the three axes differ
-    /// from that, √(Σ (Cᵢ − C̄)² / 3) / C̄, which one that presses along each of them sees.
+    /// Relative standard deviation of the reported single stiffness: the calibration's error of the
+    /// mean compliance C̄ = tr C / 3, and the spread of the three axes, √(Σ (Cᵢ − C̄)² / 3) / C̄,
+    /// for presses along each of them.
     pub fn stiffness_std(&self) -> f64 {
         // their reciprocals have the mean 1
         let uneven = self
@@ -592,7 +591,7 @@ impl DrawnWorld {
         self.told.stds.stiffness.hypot(uneven.sqrt())
     }
 
-    /// What is told, as the scene of a scan `scan.ply` in mm.
+    /// The report, as the scene of a scan `scan.ply` in mm.
     ///
     /// - `lever`: root mean square distance of the part from its origin, m.
     pub fn told_scene(&self, lever: f64) -> String {
@@ -600,7 +599,7 @@ impl DrawnWorld {
         let mm = |v: &[f64]| format!("{:?}", v.iter().map(|x| x * 1e3).collect::<Vec<_>>());
         let place = told.scan_to_space.translation.vector;
         let turn = told.scan_to_space.rotation.coords;
-        // what may be left of the zero in all three axes together, and what the noise adds to it
+        // possible zero error of all three axes together, and the contribution of the noise
         let per_axis =
             2.0 * told.stds.tare + sensor.force_bias + sensor.force_play + sensor.force_step / 2.0;
         let free_n = 0.15f64.max(3f64.sqrt() * per_axis);
@@ -634,7 +633,7 @@ impl DrawnWorld {
             noise = told.scan_noise * 1e3,
             tolerance = 1e3 * sensor.pose_noise.max(0.05e-3),
             radius_std = told.stds.radius * 1e3,
-            // where poses wander slowly, so does the scan
+            // slow wander of the poses also moves the scan
             place_std = told.place_std(lever).hypot(sensor.pose_wander) * 1e3,
             stiffness_std = self.stiffness_std() * 100.0,
         )
@@ -661,7 +660,7 @@ impl DrawnWorld {
 /// One degree, rad.
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// A stylus of the workshop; the other worlds differ from it.
+/// A stylus of the workshop; base of the other worlds.
 const WORKSHOP: WorldRanges = WorldRanges {
     radius: [1.9e-3, 3.1e-3],
     stiffness: [26e3, 60e3],
